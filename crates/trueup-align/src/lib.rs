@@ -1,0 +1,9 @@
+//! Measurements to geometry: stitch graph, cameras, vanishing points, similarity prior and mesh.
+#![forbid(unsafe_code)]
+
+pub mod cameras;
+pub mod match_points;
+pub mod mesh;
+pub mod similarity;
+pub mod stitch_graph;
+pub mod vanishing;

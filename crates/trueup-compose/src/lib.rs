@@ -1,0 +1,1 @@
+//! Geometry and pixels to the panorama: canvas, exposure, warp and blend.

@@ -1,0 +1,139 @@
+//! What every stage receives beside its input and options: progress, cancellation, seed and a sink for diagnostics.
+
+use std::sync::Mutex;
+use std::sync::PoisonError;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::diagnostics::Diagnostic;
+use crate::error::{Error, Result};
+
+/// Receives the progress of long work. Called from any thread.
+pub trait Progress: Send + Sync {
+    /// `stage` begins; it will report `total` steps.
+    fn begin(&self, stage: &str, total: u64);
+    /// `steps` more steps of `stage` are done.
+    fn advance(&self, stage: &str, steps: u64);
+    /// `stage` is over.
+    fn finish(&self, stage: &str);
+}
+
+/// A [`Progress`] that tells nobody.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Silent;
+
+impl Progress for Silent {
+    fn begin(&self, _stage: &str, _total: u64) {}
+    fn advance(&self, _stage: &str, _steps: u64) {}
+    fn finish(&self, _stage: &str) {}
+}
+
+/// Set from anywhere (a signal handler, another thread) to stop the work at its next check.
+#[derive(Debug, Default)]
+pub struct CancelToken(AtomicBool);
+
+impl CancelToken {
+    /// Asks the work to stop.
+    pub fn cancel(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether a stop was asked for.
+    pub fn is_cancelled(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// What a stage may use of the world around it.
+///
+/// Parallel work runs on the thread pool that is current when the stage is called; a stage starts no threads.
+pub struct StageContext<'a> {
+    progress: &'a dyn Progress,
+    cancel: &'a CancelToken,
+    seed: u64,
+    diagnostics: Mutex<Vec<Diagnostic>>,
+}
+
+impl std::fmt::Debug for StageContext<'_> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_struct("StageContext").field("seed", &self.seed).finish_non_exhaustive()
+    }
+}
+
+static SILENT: Silent = Silent;
+static NEVER: CancelToken = CancelToken(AtomicBool::new(false));
+
+impl Default for StageContext<'_> {
+    /// Silent, never cancelled, seed 0: for tests and small programs.
+    fn default() -> Self {
+        Self::new(&SILENT, &NEVER, 0)
+    }
+}
+
+impl<'a> StageContext<'a> {
+    /// A context that reports to `progress`, stops on `cancel` and derives every random choice from `seed`.
+    pub fn new(progress: &'a dyn Progress, cancel: &'a CancelToken, seed: u64) -> Self {
+        Self { progress, cancel, seed, diagnostics: Mutex::new(Vec::new()) }
+    }
+
+    /// Where progress goes.
+    pub fn progress(&self) -> &dyn Progress {
+        self.progress
+    }
+
+    /// Returns [`Error::Cancelled`] once a stop was asked for. Long loops call it at least every tenth of a second.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`].
+    pub fn check_cancelled(&self) -> Result<()> {
+        if self.cancel.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
+    }
+
+    /// A generator for one subject of one stage (an image's or a pair's index), so that results depend neither on the
+    /// order of the work nor on the number of threads.
+    pub fn generator(&self, stage: &str, subject: u64) -> ChaCha8Rng {
+        // FNV-1a over stage and subject, mixed with the run's seed; ChaCha expands it.
+        const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+        const PRIME: u64 = 0x0000_0100_0000_01b3;
+        let bytes = stage.bytes().chain(subject.to_le_bytes()).chain(self.seed.to_le_bytes());
+        let hash = bytes.fold(OFFSET, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(PRIME));
+        ChaCha8Rng::seed_from_u64(hash)
+    }
+
+    /// Records a finding. Stages call this from their sequential part only, so that the order is always the same.
+    pub fn report(&self, diagnostic: Diagnostic) {
+        self.diagnostics.lock().unwrap_or_else(PoisonError::into_inner).push(diagnostic);
+    }
+
+    /// Takes the findings recorded so far, in order.
+    pub fn take_diagnostics(&self) -> Vec<Diagnostic> {
+        std::mem::take(&mut self.diagnostics.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::Rng;
+
+    use super::*;
+
+    #[test]
+    fn generators_differ_by_subject_and_repeat() {
+        let context = StageContext::default();
+        let draw = |stage: &str, subject| context.generator(stage, subject).next_u64();
+        assert_eq!(draw("matching", 3), draw("matching", 3));
+        assert_ne!(draw("matching", 3), draw("matching", 4));
+        assert_ne!(draw("matching", 3), draw("vanishing", 3));
+    }
+
+    #[test]
+    fn cancelled_context_says_so() {
+        let token = CancelToken::default();
+        let context = StageContext::new(&SILENT, &token, 0);
+        assert!(context.check_cancelled().is_ok());
+        token.cancel();
+        assert!(matches!(context.check_cancelled(), Err(Error::Cancelled)));
+    }
+}

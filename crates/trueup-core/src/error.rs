@@ -1,0 +1,96 @@
+//! One error type for the libraries, its variants named by whose fault it is.
+
+use std::path::{Path, PathBuf};
+
+use crate::options::InvalidOption;
+
+/// The result of every fallible function in trueup's libraries.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// What went wrong, by whose fault it is.
+///
+/// Every message names the subject (a file, an option, a stage), the reason, and where possible what to do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file or picture the user gave cannot be used.
+    #[error("{subject}: {reason}. {hint}")]
+    Input {
+        /// The file, picture or argument at fault.
+        subject: String,
+        /// Why it cannot be used, without a closing full stop.
+        reason: String,
+        /// What the user can do about it, a whole sentence.
+        hint: String,
+    },
+    /// One or more options are outside their allowed range; all of them are listed.
+    #[error("{}", list_invalid(.0))]
+    Options(Vec<InvalidOption>),
+    /// The work would need more than a declared limit allows; refused before allocation.
+    #[error("{subject}: {needed} needed, {allowed} allowed. {hint}")]
+    Limits {
+        /// What is too large.
+        subject: String,
+        /// What it would take, with its unit.
+        needed: String,
+        /// What the limit allows, with its unit.
+        allowed: String,
+        /// Which option or change of input helps, a whole sentence.
+        hint: String,
+    },
+    /// The request is understood but not something this program does.
+    #[error("{what} is not supported. {hint}")]
+    Unsupported {
+        /// The format, feature or combination asked for.
+        what: String,
+        /// The nearest thing that is supported, a whole sentence.
+        hint: String,
+    },
+    /// The data do not determine an answer.
+    #[error("{stage}: {subject}: {why}. {hint}")]
+    Unsolvable {
+        /// The stage that gave up.
+        stage: &'static str,
+        /// The picture, pair or system it gave up on.
+        subject: String,
+        /// Why there is no answer, without a closing full stop.
+        why: String,
+        /// What the user can do about it, a whole sentence.
+        hint: String,
+    },
+    /// The user asked to stop.
+    #[error("stopped on request")]
+    Cancelled,
+    /// The operating system refused a file operation.
+    #[error("{action} {}: {source}", path.display())]
+    Io {
+        /// What was being done, e.g. "reading".
+        action: &'static str,
+        /// The file or folder concerned.
+        path: PathBuf,
+        /// The operating system's reason.
+        source: std::io::Error,
+    },
+}
+
+impl Error {
+    /// An [`Error::Input`]: `subject` cannot be used because of `reason`; `hint` says what to do.
+    pub fn input(subject: impl ToString, reason: impl ToString, hint: impl ToString) -> Self {
+        Self::Input { subject: subject.to_string(), reason: reason.to_string(), hint: hint.to_string() }
+    }
+
+    /// An [`Error::Unsolvable`]: `stage` found no answer for `subject` because of `why`.
+    pub fn unsolvable(stage: &'static str, subject: impl ToString, why: impl ToString, hint: impl ToString) -> Self {
+        Self::Unsolvable { stage, subject: subject.to_string(), why: why.to_string(), hint: hint.to_string() }
+    }
+
+    /// An [`Error::Io`] for `path`: `action` is what was being done, e.g. "reading".
+    pub fn io(action: &'static str, path: &Path, source: std::io::Error) -> Self {
+        Self::Io { action, path: path.to_owned(), source }
+    }
+}
+
+fn list_invalid(invalid: &[InvalidOption]) -> String {
+    let lines: Vec<String> = invalid.iter().map(ToString::to_string).collect();
+    lines.join("\n")
+}

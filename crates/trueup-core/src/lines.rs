@@ -1,0 +1,24 @@
+//! Straight line segments found in a picture.
+
+use serde::{Deserialize, Serialize};
+
+/// A straight segment in working pixels, directed so that the brighter side lies to its right when y points down
+/// (the sense of the detector's gradient); most uses ignore the direction.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LineSegment {
+    /// First end (x, y).
+    pub start: [f64; 2],
+    /// Second end (x, y).
+    pub end: [f64; 2],
+    /// Width of the supporting region in working pixels.
+    pub width_px: f64,
+    /// -log10 of the expected number of false alarms: larger is surer.
+    pub significance: f64,
+}
+
+impl LineSegment {
+    /// Length in working pixels.
+    pub fn length(&self) -> f64 {
+        (self.end[0] - self.start[0]).hypot(self.end[1] - self.start[1])
+    }
+}

@@ -1,0 +1,67 @@
+//! What is known of a pair of pictures after matching.
+
+use serde::{Deserialize, Serialize};
+
+/// A point seen in both pictures of a pair, in working pixels of each.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PointMatch {
+    /// Position in picture a (x, y).
+    pub in_a: [f64; 2],
+    /// Position in picture b (x, y).
+    pub in_b: [f64; 2],
+}
+
+/// Why a pair was accepted or not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PairVerdict {
+    /// The pictures overlap.
+    Joined,
+    /// The user's graph says that they overlap, and enough matches agree to use it.
+    JoinedByGraph,
+    /// Fewer putative matches than a homography needs.
+    TooFewMatches,
+    /// The best homography folds, mirrors or explodes the picture.
+    ImplausibleHomography,
+    /// Too few of the matches in the predicted overlap agree.
+    TooFewInliers,
+    /// Too few, and many candidates elsewhere: the pair was not tried because a quick look found nothing.
+    NotProposed,
+}
+
+impl PairVerdict {
+    /// Whether the pair is an edge of the stitch graph.
+    pub fn is_joined(self) -> bool {
+        matches!(self, Self::Joined | Self::JoinedByGraph)
+    }
+}
+
+/// The outcome of matching pictures `a` and `b` (`a < b`).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PairMatches {
+    /// Index of the first picture.
+    pub a: usize,
+    /// Index of the second picture, larger than `a`.
+    pub b: usize,
+    /// Number of putative matches (after ratio and mutual tests).
+    pub putative: usize,
+    /// Putative matches that lie inside the overlap the homography predicts; 0 without a homography.
+    pub in_overlap: usize,
+    /// Those that agree with the global homography (n_i of the Brown-Lowe test).
+    pub agreeing: usize,
+    /// How many had to agree for the pair to be joined.
+    pub needed: usize,
+    /// Whether the pair is joined, and why not.
+    pub verdict: PairVerdict,
+    /// Rows of the homography from a to b in working pixels; `None` if none was found.
+    pub b_from_a: Option<[[f64; 3]; 3]>,
+    /// The matches kept (P_ij): global inliers first, then those of further planes. Empty unless joined.
+    pub inliers: Vec<PointMatch>,
+}
+
+impl PairMatches {
+    /// Brown-Lowe confidence n_i / (8 + 0.3 n_f): above 1 the pair would be joined.
+    pub fn confidence(&self) -> f64 {
+        if self.needed == 0 { 0.0 } else { self.agreeing as f64 / self.needed as f64 }
+    }
+}

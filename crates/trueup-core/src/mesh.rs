@@ -1,0 +1,116 @@
+//! The deformed grid of one picture: what every warp model yields and the renderer and the metrics consume.
+
+use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
+
+/// A grid over one picture and where its vertices go in the panorama.
+///
+/// `rows` x `columns` vertices, row-major (index = row * columns + column). Inside a cell the warp is bilinear.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GridMesh {
+    /// Number of vertex rows, at least 2.
+    pub rows: usize,
+    /// Number of vertex columns, at least 2.
+    pub columns: usize,
+    /// Width of the picture in the pixels of `source`.
+    pub width: f64,
+    /// Height of the picture in the pixels of `source`.
+    pub height: f64,
+    /// Vertices in the panorama, row-major.
+    pub target: Vec<[f64; 2]>,
+}
+
+impl GridMesh {
+    /// An undeformed grid over a `width` x `height` picture with cells of at most `cell_px` on a side.
+    pub fn regular(width: f64, height: f64, cell_px: f64) -> Self {
+        let columns = (width / cell_px).ceil().max(1.0) as usize + 1;
+        let rows = (height / cell_px).ceil().max(1.0) as usize + 1;
+        let mut mesh = Self { rows, columns, width, height, target: Vec::new() };
+        mesh.target = (0..rows * columns).map(|index| mesh.source(index).into()).collect();
+        mesh
+    }
+
+    /// Number of vertices.
+    pub fn len(&self) -> usize {
+        self.rows * self.columns
+    }
+
+    /// Whether the grid has no vertices (never true of a grid made by [`Self::regular`]).
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Width of a cell in source pixels.
+    pub fn cell_width(&self) -> f64 {
+        self.width / (self.columns - 1) as f64
+    }
+
+    /// Height of a cell in source pixels.
+    pub fn cell_height(&self) -> f64 {
+        self.height / (self.rows - 1) as f64
+    }
+
+    /// Position of a vertex in the picture.
+    pub fn source(&self, index: usize) -> Vector2<f64> {
+        let (row, column) = (index / self.columns, index % self.columns);
+        Vector2::new(
+            self.width * column as f64 / (self.columns - 1) as f64,
+            self.height * row as f64 / (self.rows - 1) as f64,
+        )
+    }
+
+    /// The four vertices around a point of the picture (top left, top right, bottom right, bottom left) and their
+    /// bilinear weights. Points outside the picture use the nearest cell and extrapolate.
+    pub fn bilinear(&self, point: Vector2<f64>) -> ([usize; 4], [f64; 4]) {
+        let gx = point.x / self.cell_width();
+        let gy = point.y / self.cell_height();
+        let column = (gx.max(0.0) as usize).min(self.columns - 2);
+        let row = (gy.max(0.0) as usize).min(self.rows - 2);
+        let (u, v) = (gx - column as f64, gy - row as f64);
+        let first = row * self.columns + column;
+        (
+            [first, first + 1, first + self.columns + 1, first + self.columns],
+            [(1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v],
+        )
+    }
+
+    /// Where a point of the picture goes in the panorama (the paper's phi_i).
+    pub fn warp(&self, point: Vector2<f64>) -> Vector2<f64> {
+        let (corners, weights) = self.bilinear(point);
+        corners
+            .iter()
+            .zip(weights)
+            .fold(Vector2::zeros(), |sum, (&corner, weight)| sum + Vector2::from(self.target[corner]) * weight)
+    }
+
+    /// Smallest and largest target coordinates.
+    pub fn bounds(&self) -> (Vector2<f64>, Vector2<f64>) {
+        let start = (Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY));
+        self.target.iter().fold(start, |(low, high), &vertex| {
+            let vertex = Vector2::from(vertex);
+            (low.inf(&vertex), high.sup(&vertex))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn regular_grid_of_the_working_size_has_the_published_vertex_count() {
+        let mesh = GridMesh::regular(800.0, 600.0, 40.0);
+        assert_eq!((mesh.columns, mesh.rows, mesh.len()), (21, 16, 336));
+    }
+
+    proptest! {
+        #[test]
+        fn an_undeformed_mesh_is_the_identity(x in 0.0..801.5_f64, y in 0.0..599.25_f64) {
+            let mesh = GridMesh::regular(801.5, 599.25, 40.0);
+            let warped = mesh.warp(Vector2::new(x, y));
+            prop_assert!((warped - Vector2::new(x, y)).norm() < 1e-9);
+        }
+    }
+}

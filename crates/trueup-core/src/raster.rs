@@ -1,0 +1,156 @@
+//! Pixels in memory: interleaved channels, rows from top to bottom.
+
+use crate::error::{Error, Result};
+
+/// A picture of `width` x `height` pixels with `channels` interleaved samples each.
+///
+/// Sample `c` of the pixel whose centre is at (x + 0.5, y + 0.5) is `data[(y * width + x) * channels + c]`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Raster<T> {
+    width: usize,
+    height: usize,
+    channels: usize,
+    data: Vec<T>,
+}
+
+impl<T: Copy + Default> Raster<T> {
+    /// A picture filled with `T::default()` (zero for numbers).
+    pub fn new(width: usize, height: usize, channels: usize) -> Self {
+        Self { width, height, channels, data: vec![T::default(); width * height * channels] }
+    }
+
+    /// Wraps samples that are already in memory.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if `data` does not hold `width * height * channels` samples.
+    pub fn from_data(width: usize, height: usize, channels: usize, data: Vec<T>) -> Result<Self> {
+        let expected = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(channels));
+        if expected != Some(data.len()) {
+            return Err(Error::input(
+                format!("raster of {width} x {height} x {channels}"),
+                format!("{} samples were given", data.len()),
+                "Give width * height * channels samples.",
+            ));
+        }
+        Ok(Self { width, height, channels, data })
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Samples per pixel.
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
+    /// All samples, row by row, channels interleaved.
+    pub fn data(&self) -> &[T] {
+        &self.data
+    }
+
+    /// All samples for writing.
+    pub fn data_mut(&mut self) -> &mut [T] {
+        &mut self.data
+    }
+
+    /// Takes the samples out.
+    pub fn into_data(self) -> Vec<T> {
+        self.data
+    }
+
+    /// The samples of row `y`, `width * channels` of them.
+    pub fn row(&self, y: usize) -> &[T] {
+        let length = self.width * self.channels;
+        &self.data[y * length..(y + 1) * length]
+    }
+
+    /// The samples of row `y` for writing.
+    pub fn row_mut(&mut self, y: usize) -> &mut [T] {
+        let length = self.width * self.channels;
+        &mut self.data[y * length..(y + 1) * length]
+    }
+
+    /// The samples of pixel (x, y).
+    pub fn pixel(&self, x: usize, y: usize) -> &[T] {
+        let start = (y * self.width + x) * self.channels;
+        &self.data[start..start + self.channels]
+    }
+
+    /// The samples of pixel (x, y) for writing.
+    pub fn pixel_mut(&mut self, x: usize, y: usize) -> &mut [T] {
+        let start = (y * self.width + x) * self.channels;
+        &mut self.data[start..start + self.channels]
+    }
+}
+
+/// A decoded photograph at its own depth: 8 or 16 bits a sample, 1 (gray), 3 (RGB) or 4 (RGBA) channels, sRGB-like
+/// encoding, already in its upright orientation.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Photograph {
+    /// 8 bits a sample, 0 to 255.
+    Eight(Raster<u8>),
+    /// 16 bits a sample, 0 to 65535.
+    Sixteen(Raster<u16>),
+}
+
+impl Photograph {
+    /// Width in pixels.
+    pub fn width(&self) -> usize {
+        match self {
+            Self::Eight(raster) => raster.width(),
+            Self::Sixteen(raster) => raster.width(),
+        }
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> usize {
+        match self {
+            Self::Eight(raster) => raster.height(),
+            Self::Sixteen(raster) => raster.height(),
+        }
+    }
+
+    /// Samples per pixel: 1, 3 or 4.
+    pub fn channels(&self) -> usize {
+        match self {
+            Self::Eight(raster) => raster.channels(),
+            Self::Sixteen(raster) => raster.channels(),
+        }
+    }
+}
+
+/// A finished picture that hands out its rows, so that a writer needs no copy of the whole.
+pub trait RowSource: Sync {
+    /// Width in pixels.
+    fn width(&self) -> usize;
+    /// Height in pixels.
+    fn height(&self) -> usize;
+    /// Writes row `y` as 8-bit RGBA with straight (not premultiplied) alpha, `4 * width` bytes.
+    fn rgba8_row(&self, y: usize, row: &mut [u8]);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_are_addressed_row_by_row() {
+        let mut raster = Raster::<u8>::new(3, 2, 2);
+        raster.pixel_mut(2, 1).copy_from_slice(&[7, 9]);
+        assert_eq!(raster.row(1), [0, 0, 0, 0, 7, 9]);
+        assert_eq!(raster.pixel(2, 1), [7, 9]);
+    }
+
+    #[test]
+    fn wrong_sample_counts_are_refused() {
+        assert!(Raster::from_data(2, 2, 3, vec![0_u8; 11]).is_err());
+        assert!(Raster::from_data(usize::MAX, 2, 3, vec![0_u8; 11]).is_err());
+    }
+}

@@ -1,0 +1,90 @@
+//! What is known of a photograph before its pixels are looked at, and how pixels are asked for.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::Result;
+use crate::raster::Photograph;
+
+/// Where a focal length came from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FocalSource {
+    /// EXIF FocalLengthIn35mmFilm.
+    Equivalent35mm,
+    /// EXIF FocalLength with the sensor's size from the focal plane resolution tags.
+    FocalPlaneResolution,
+    /// EXIF FocalLength with the sensor's size from the camera's model.
+    CameraModel,
+}
+
+/// A focal length known before the pictures are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FocalPrior {
+    /// Focal length in pixels of the full-resolution picture.
+    pub focal_px: f64,
+    /// Where it came from.
+    pub source: FocalSource,
+}
+
+/// A photograph the user gave: file, size and what its metadata say. The paper's I_i.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SourceImage {
+    /// The file as the user named it.
+    pub path: PathBuf,
+    /// Short name for messages: the file's name, or enough of the path to be unique among the inputs.
+    pub name: String,
+    /// Width in pixels after orientation.
+    pub width: usize,
+    /// Height in pixels after orientation.
+    pub height: usize,
+    /// EXIF orientation (1 to 8) that is applied on decoding: 1 where the tag is absent or stale.
+    pub orientation: u8,
+    /// Focal length from metadata, if believable.
+    pub focal_prior: Option<FocalPrior>,
+    /// Camera make and model, trimmed, if stated; pictures of one camera share a focal length where none is stated.
+    pub camera_model: Option<String>,
+}
+
+/// The reduced frame a photograph is measured in: `working = working_from_full * full` on both axes, corner (0, 0).
+///
+/// Width and height are real numbers; the working raster holds the whole pixels inside them, so that the scale stays
+/// exact and pixels stay square. The principal point is (width / 2, height / 2).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct WorkingFrame {
+    /// Width in working pixels.
+    pub width: f64,
+    /// Height in working pixels.
+    pub height: f64,
+    /// Factor from full-resolution to working coordinates, at most 1.
+    pub working_from_full: f64,
+}
+
+impl WorkingFrame {
+    /// The frame of a picture of `width` x `height` full pixels, reduced to at most `max_area_px` working pixels.
+    pub fn new(width: usize, height: usize, max_area_px: f64) -> Self {
+        let (width, height) = (width as f64, height as f64);
+        let working_from_full = (max_area_px / (width * height)).sqrt().min(1.0);
+        Self { width: width * working_from_full, height: height * working_from_full, working_from_full }
+    }
+
+    /// Diagonal in working pixels.
+    pub fn diagonal(&self) -> f64 {
+        self.width.hypot(self.height)
+    }
+
+    /// Whether (x, y) lies inside the picture, borders included.
+    pub fn contains(&self, x: f64, y: f64) -> bool {
+        (0.0..=self.width).contains(&x) && (0.0..=self.height).contains(&y)
+    }
+}
+
+/// Hands out full-resolution photographs by index; implemented over files, memory or a cache.
+pub trait PhotographSource: Sync {
+    /// Decodes photograph `index` in its upright orientation.
+    ///
+    /// # Errors
+    /// If the file can no longer be read or decoded.
+    fn photograph(&self, index: usize) -> Result<Photograph>;
+}

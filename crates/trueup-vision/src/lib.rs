@@ -1,0 +1,9 @@
+//! Pixels to measurements: SIFT features, matching, pairing and line segments.
+//!
+//! Positions are in the pixels of the picture given (working pixels in the pipeline), corner at (0, 0), the centre of
+//! the first pixel at (0.5, 0.5).
+
+pub mod features;
+pub mod lines;
+pub mod matching;
+pub mod pairing;

@@ -1,0 +1,2 @@
+//! Photographs in, an upright panorama out.
+#![forbid(unsafe_code)]
