@@ -1,0 +1,344 @@
+//! Bundle adjustment: rotations and focal lengths that bring all matches together, by Levenberg-Marquardt on block
+//! normal equations.
+//!
+//! # Source
+//! Brown and Lowe (2007), equations 14 to 18: both directions of every match, Huber loss.
+//!
+//! # Departures
+//! The unknown of a focal length is its logarithm, so that steps are relative and the sign is safe.
+
+use faer::linalg::solvers::Solve;
+use nalgebra::{Matrix2x3, Matrix3, SMatrix, SVector, Vector2, Vector3};
+use rayon::prelude::*;
+use trueup_core::camera::Camera;
+use trueup_core::geometry::{cross_matrix, exp_rotation, nearest_rotation};
+use trueup_core::{Result, StageContext};
+
+use super::observations::{Observations, PairObservations};
+use super::{CameraOptions, CameraPrior, focal};
+
+/// Unknowns of one pair: rotation of a, rotation of b, log focal length of a, of b.
+const LOCAL: usize = 8;
+type LocalMatrix = SMatrix<f64, LOCAL, LOCAL>;
+type LocalVector = SVector<f64, LOCAL>;
+
+/// The state being refined.
+#[derive(Debug, Clone)]
+pub(super) struct Parameters {
+    pub focal_px: Vec<f64>,
+    pub rotations: Vec<Matrix3<f64>>,
+}
+
+/// Which unknown scales which picture's focal length; `None` holds it fixed.
+pub(super) struct FocalModel {
+    pub parameter_of: Vec<Option<usize>>,
+    pub parameters: usize,
+}
+
+impl FocalModel {
+    /// One unknown per camera group.
+    pub fn shared(priors: &[CameraPrior]) -> Self {
+        let mut groups: Vec<usize> = priors.iter().map(|prior| prior.camera_group).collect();
+        groups.sort_unstable();
+        groups.dedup();
+        let parameter_of = priors.iter().map(|prior| groups.binary_search(&prior.camera_group).ok()).collect();
+        Self { parameter_of, parameters: groups.len() }
+    }
+
+    /// One unknown per picture.
+    pub fn per_picture(pictures: usize) -> Self {
+        Self { parameter_of: (0..pictures).map(Some).collect(), parameters: pictures }
+    }
+
+    /// No unknowns: focal lengths stay as they are.
+    pub fn fixed(pictures: usize) -> Self {
+        Self { parameter_of: vec![None; pictures], parameters: 0 }
+    }
+}
+
+pub(super) struct Problem<'a> {
+    pub priors: &'a [CameraPrior],
+    pub observations: &'a Observations,
+    pub start_focal: Vec<f64>,
+    pub reference: usize,
+    pub options: &'a CameraOptions,
+}
+
+/// The quadratic model of one pair's cost.
+struct PairTerm {
+    normal: LocalMatrix,
+    gradient: LocalVector,
+}
+
+impl Problem<'_> {
+    /// Refines `parameters` until the cost settles; `huber_px` bounds the influence of a single match.
+    pub fn minimise(
+        &self,
+        mut parameters: Parameters,
+        model: &FocalModel,
+        huber_px: f64,
+        context: &StageContext,
+    ) -> Result<Parameters> {
+        const FIRST_DAMPING: f64 = 1e-4;
+        const LARGEST_DAMPING: f64 = 1e12;
+        const SETTLED: f64 = 1e-8;
+        let mut cost = self.cost(&parameters, model, huber_px);
+        let mut damping = FIRST_DAMPING;
+        for _ in 0..self.options.max_iterations {
+            context.check_cancelled()?;
+            let (normal, gradient) = self.normal_equations(&parameters, model, huber_px);
+            let mut decrease = 0.0;
+            while damping < LARGEST_DAMPING {
+                let Some(step) = solve_damped(&normal, &gradient, damping) else {
+                    damping *= 10.0;
+                    continue;
+                };
+                let moved = self.moved(&parameters, model, &step);
+                let moved_cost = self.cost(&moved, model, huber_px);
+                if moved_cost < cost {
+                    decrease = (cost - moved_cost) / cost;
+                    (parameters, cost) = (moved, moved_cost);
+                    damping = (damping * 0.1).max(f64::EPSILON);
+                    break;
+                }
+                damping *= 10.0;
+            }
+            if decrease < SETTLED {
+                break;
+            }
+        }
+        Ok(parameters)
+    }
+
+    /// Whether the solution can be used: finite, and no focal length at the short end of its range. (At the long end the
+    /// pictures are merely close to affine, which is harmless.)
+    pub fn is_sound(&self, parameters: &Parameters) -> bool {
+        const MARGIN: f64 = 1.001;
+        parameters.rotations.iter().all(|rotation| rotation.iter().all(|entry| entry.is_finite()))
+            && parameters.focal_px.iter().zip(self.priors).all(|(&focal_px, prior)| {
+                focal_px.is_finite() && focal_px > MARGIN * focal::clamp(0.0, prior, self.options)
+            })
+    }
+
+    fn unknowns(&self, model: &FocalModel) -> usize {
+        3 * self.priors.len() + model.parameters
+    }
+
+    /// Columns of a pair's local unknowns in the global system; `None` is held fixed. The reference picture's rotation
+    /// is fixed: it is the gauge.
+    fn columns(&self, pair: &PairObservations, model: &FocalModel) -> [Option<usize>; LOCAL] {
+        let rotation = |picture: usize, axis: usize| (picture != self.reference).then_some(3 * picture + axis);
+        let focal = |picture: usize| model.parameter_of[picture].map(|k| 3 * self.priors.len() + k);
+        std::array::from_fn(|local| match local {
+            0..3 => rotation(pair.a, local),
+            3..6 => rotation(pair.b, local - 3),
+            6 => focal(pair.a),
+            _ => focal(pair.b),
+        })
+    }
+
+    fn cameras(&self, parameters: &Parameters) -> Vec<Camera> {
+        (0..self.priors.len())
+            .map(|k| {
+                let frame = &self.priors[k].frame;
+                Camera::new(parameters.focal_px[k], frame.width, frame.height, &parameters.rotations[k])
+            })
+            .collect()
+    }
+
+    /// Pull of the focal lengths towards their start values: (ln f - ln f0) / sd, one per picture with a free one.
+    fn focal_prior(&self, parameters: &Parameters, model: &FocalModel) -> Vec<(usize, f64, f64)> {
+        (0..self.priors.len())
+            .filter_map(|k| {
+                let column = 3 * self.priors.len() + model.parameter_of[k]?;
+                let known = self.priors[k].focal_px.is_some();
+                let sd = if known { self.options.known_focal_sd } else { self.options.estimated_focal_sd };
+                Some((column, (parameters.focal_px[k] / self.start_focal[k]).ln() / sd, 1.0 / sd))
+            })
+            .collect()
+    }
+
+    fn cost(&self, parameters: &Parameters, model: &FocalModel, huber_px: f64) -> f64 {
+        let cameras = self.cameras(parameters);
+        let costs: Vec<f64> =
+            self.observations.pairs.par_iter().map(|pair| pair_cost(&cameras, pair, huber_px)).collect();
+        let prior: f64 = self.focal_prior(parameters, model).iter().map(|(_, residual, _)| residual * residual).sum();
+        costs.iter().sum::<f64>() + prior
+    }
+
+    fn normal_equations(
+        &self,
+        parameters: &Parameters,
+        model: &FocalModel,
+        huber_px: f64,
+    ) -> (faer::Mat<f64>, faer::Mat<f64>) {
+        let cameras = self.cameras(parameters);
+        let unknowns = self.unknowns(model);
+        let mut normal = faer::Mat::<f64>::zeros(unknowns, unknowns);
+        let mut gradient = faer::Mat::<f64>::zeros(unknowns, 1);
+        let terms: Vec<PairTerm> =
+            self.observations.pairs.par_iter().map(|pair| pair_term(&cameras, pair, huber_px)).collect();
+        for (pair, term) in self.observations.pairs.iter().zip(&terms) {
+            let columns = self.columns(pair, model);
+            for (local_row, row) in columns.iter().enumerate() {
+                let Some(row) = *row else { continue };
+                gradient[(row, 0)] += term.gradient[local_row];
+                for (local_column, column) in columns.iter().enumerate() {
+                    if let Some(column) = *column {
+                        normal[(row, column)] += term.normal[(local_row, local_column)];
+                    }
+                }
+            }
+        }
+        for (column, residual, slope) in self.focal_prior(parameters, model) {
+            normal[(column, column)] += slope * slope;
+            gradient[(column, 0)] += slope * residual;
+        }
+        (normal, gradient)
+    }
+
+    fn moved(&self, parameters: &Parameters, model: &FocalModel, step: &faer::Mat<f64>) -> Parameters {
+        let mut moved = parameters.clone();
+        for k in 0..self.priors.len() {
+            let turn = Vector3::new(step[(3 * k, 0)], step[(3 * k + 1, 0)], step[(3 * k + 2, 0)]);
+            moved.rotations[k] = nearest_rotation(&(exp_rotation(&turn) * parameters.rotations[k]));
+            if let Some(parameter) = model.parameter_of[k] {
+                let stretched = parameters.focal_px[k] * step[(3 * self.priors.len() + parameter, 0)].exp();
+                moved.focal_px[k] = focal::clamp(stretched, &self.priors[k], self.options);
+            }
+        }
+        moved
+    }
+}
+
+/// Solves (N + damping diag N) step = -gradient; unknowns without any data stay where they are. `None` if not positive
+/// definite or not finite.
+fn solve_damped(normal: &faer::Mat<f64>, gradient: &faer::Mat<f64>, damping: f64) -> Option<faer::Mat<f64>> {
+    let mut damped = normal.clone();
+    for k in 0..damped.nrows() {
+        let diagonal = damped[(k, k)];
+        damped[(k, k)] = if diagonal > 0.0 { diagonal * (1.0 + damping) } else { 1.0 };
+    }
+    let factor = damped.llt(faer::Side::Lower).ok()?;
+    let step = factor.solve(-gradient);
+    (0..step.nrows()).all(|k| step[(k, 0)].is_finite()).then_some(step)
+}
+
+/// Huber's loss, quadratic up to the limit: rho and the weight rho'(e)/(2 e).
+fn huber(error: f64, limit: f64) -> (f64, f64) {
+    if error <= limit { (error * error, 1.0) } else { (limit * (2.0 * error - limit), limit / error) }
+}
+
+fn pair_cost(cameras: &[Camera], pair: &PairObservations, huber_px: f64) -> f64 {
+    let (a, b) = (&cameras[pair.a], &cameras[pair.b]);
+    let b_from_a = b.rotation() * a.rotation().transpose();
+    let a_from_b = b_from_a.transpose();
+    // A match behind a camera costs as much as one a picture away: it must not look free.
+    let behind = huber(b.principal_point[0].hypot(b.principal_point[1]) * 2.0, huber_px).0;
+    let one_way = |from: &Camera, to: &Camera, turn: &Matrix3<f64>, source: [f64; 2], target: [f64; 2]| {
+        to.project(turn * from.bearing(Vector2::from(source)))
+            .map_or(behind, |place| huber((Vector2::from(target) - place).norm(), huber_px).0)
+    };
+    pair.matches
+        .iter()
+        .map(|m| one_way(a, b, &b_from_a, m.in_a, m.in_b) + one_way(b, a, &a_from_b, m.in_b, m.in_a))
+        .sum()
+}
+
+fn pair_term(cameras: &[Camera], pair: &PairObservations, huber_px: f64) -> PairTerm {
+    let (a, b) = (&cameras[pair.a], &cameras[pair.b]);
+    let b_from_a = b.rotation() * a.rotation().transpose();
+    let a_from_b = b_from_a.transpose();
+    let mut term = PairTerm { normal: LocalMatrix::zeros(), gradient: LocalVector::zeros() };
+    for one in &pair.matches {
+        // (rotation, focal) columns of the camera the bearing leaves and of the camera it arrives in.
+        accumulate(&mut term, a, b, &b_from_a, one.in_a, one.in_b, [0, 3, 6, 7], huber_px);
+        accumulate(&mut term, b, a, &a_from_b, one.in_b, one.in_a, [3, 0, 7, 6], huber_px);
+    }
+    term
+}
+
+/// Adds one transfer's linearised residual; `columns` are (rotation of `from`, rotation of `to`, focal of `from`, focal
+/// of `to`) among the pair's local unknowns.
+#[allow(clippy::too_many_arguments, reason = "the two directions of a match differ in every one of these")]
+fn accumulate(
+    term: &mut PairTerm,
+    from: &Camera,
+    to: &Camera,
+    turn: &Matrix3<f64>,
+    source: [f64; 2],
+    target: [f64; 2],
+    columns: [usize; 4],
+    huber_px: f64,
+) {
+    let bearing = from.bearing(Vector2::from(source));
+    let arrived = turn * bearing;
+    let Some(place) = to.project(arrived) else { return };
+    let residual = Vector2::from(target) - place;
+    let weight = huber(residual.norm(), huber_px).1;
+
+    let (inverse_depth, focal_px) = (1.0 / arrived.z, to.focal_px);
+    let projection = Matrix2x3::new(1.0, 0.0, -arrived.x * inverse_depth, 0.0, 1.0, -arrived.y * inverse_depth)
+        * (focal_px * inverse_depth);
+    // residual = target - projection(arrived), hence the minus signs.
+    let by_to_rotation = projection * cross_matrix(&arrived);
+    let by_from_rotation = -(projection * turn * cross_matrix(&bearing));
+    let by_from_focal = projection * turn * Vector3::new(bearing.x, bearing.y, 0.0);
+    let by_to_focal = -(place - Vector2::from(to.principal_point));
+
+    let mut jacobian = SMatrix::<f64, 2, LOCAL>::zeros();
+    jacobian.fixed_columns_mut::<3>(columns[0]).copy_from(&by_from_rotation);
+    jacobian.fixed_columns_mut::<3>(columns[1]).copy_from(&by_to_rotation);
+    jacobian.column_mut(columns[2]).copy_from(&by_from_focal);
+    jacobian.column_mut(columns[3]).copy_from(&by_to_focal);
+    term.normal += jacobian.transpose() * jacobian * weight;
+    term.gradient += jacobian.transpose() * residual * weight;
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::matches::PointMatch;
+    use trueup_core::source::WorkingFrame;
+
+    use super::*;
+
+    /// The analytic gradient of the quadratic cost must be that of finite differences.
+    #[test]
+    fn gradient_matches_finite_differences() {
+        let frame = WorkingFrame { width: 640.0, height: 480.0, working_from_full: 1.0 };
+        let priors: Vec<CameraPrior> =
+            [0, 1].map(|group| CameraPrior { frame, focal_px: None, camera_group: group }).to_vec();
+        let matches = vec![
+            PointMatch { in_a: [400.0, 200.0], in_b: [180.0, 260.0] },
+            PointMatch { in_a: [520.0, 410.0], in_b: [300.0, 440.0] },
+        ];
+        let observations = Observations { pairs: vec![PairObservations { a: 0, b: 1, matches }] };
+        let options = CameraOptions::default();
+        let problem = Problem {
+            priors: &priors,
+            observations: &observations,
+            start_focal: vec![500.0, 520.0],
+            reference: 0,
+            options: &options,
+        };
+        let model = FocalModel::per_picture(2);
+        let at = Parameters {
+            focal_px: vec![510.0, 505.0],
+            rotations: vec![Matrix3::identity(), exp_rotation(&Vector3::new(0.05, -0.35, 0.1))],
+        };
+        let huge = 1e9;
+        let (_, gradient) = problem.normal_equations(&at, &model, huge);
+        for unknown in 3..problem.unknowns(&model) {
+            let shifted = |amount: f64| {
+                let mut step = faer::Mat::<f64>::zeros(problem.unknowns(&model), 1);
+                step[(unknown, 0)] = amount;
+                problem.cost(&problem.moved(&at, &model, &step), &model, huge)
+            };
+            let step = 1e-6;
+            let numeric = (shifted(step) - shifted(-step)) / (2.0 * step);
+            // The cost is the sum of squares; its gradient is twice J^T r.
+            let analytic = 2.0 * gradient[(unknown, 0)];
+            assert!((numeric - analytic).abs() < 1e-4 * (1.0 + analytic.abs()), "{unknown}: {numeric} {analytic}");
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! Start values for focal lengths.
+
+use nalgebra::{Matrix3, Vector2};
+use trueup_core::geometry::Homography;
+use trueup_core::matches::PairMatches;
+
+use super::observations::{Observations, PairObservations};
+use super::rotations::fit_rotation;
+use super::{CameraOptions, CameraPrior};
+
+/// Focal lengths (source, target) of the rotating cameras behind a homography in centred coordinates, if both are real.
+///
+/// Of the two values that the rows (source) and the columns (target) of the homography give, the one with the larger
+/// denominator is taken.
+///
+/// # Source
+/// Szeliski and Shum, "Creating full view panoramic image mosaics" (1997), section 5.
+pub fn focal_from_homography(target_from_source: &Matrix3<f64>) -> Option<(f64, f64)> {
+    let h = |row: usize, column: usize| target_from_source[(row, column)];
+    let source = better_root(
+        (-h(0, 2) * h(1, 2), h(0, 0) * h(1, 0) + h(0, 1) * h(1, 1)),
+        (h(1, 2).powi(2) - h(0, 2).powi(2), h(0, 0).powi(2) + h(0, 1).powi(2) - h(1, 0).powi(2) - h(1, 1).powi(2)),
+    )?;
+    let target = better_root(
+        (-(h(0, 0) * h(0, 1) + h(1, 0) * h(1, 1)), h(2, 0) * h(2, 1)),
+        (h(0, 0).powi(2) + h(1, 0).powi(2) - h(0, 1).powi(2) - h(1, 1).powi(2), h(2, 1).powi(2) - h(2, 0).powi(2)),
+    )?;
+    Some((source, target))
+}
+
+/// The square root of whichever quotient (numerator, denominator) is positive; of two, that with the larger denominator.
+fn better_root(first: (f64, f64), second: (f64, f64)) -> Option<f64> {
+    let value = |(numerator, denominator): (f64, f64)| {
+        let quotient = numerator / denominator;
+        (quotient.is_finite() && quotient > 0.0).then(|| quotient.sqrt())
+    };
+    match (value(first), value(second)) {
+        (Some(one), Some(other)) => Some(if first.1.abs() >= second.1.abs() { one } else { other }),
+        (one, other) => one.or(other),
+    }
+}
+
+/// A focal length for every picture: from metadata where there is any, else from the pictures.
+///
+/// Pictures without metadata get a common value (relative to their diagonal), found by trying a range of values and the
+/// homographies' own estimates and keeping the one under which rotations explain the matches best.
+pub(super) fn initial_focal_lengths(
+    priors: &[CameraPrior],
+    pairs: &[&PairMatches],
+    observations: &Observations,
+    options: &CameraOptions,
+) -> Vec<f64> {
+    let known: Vec<Option<f64>> = priors
+        .iter()
+        .map(|prior| prior.focal_px.filter(|focal| focal.is_finite()).map(|focal| clamp(focal, prior, options)))
+        .collect();
+    let relative = common_relative_focal(priors, pairs, observations, &known, options);
+    priors
+        .iter()
+        .zip(&known)
+        .map(|(prior, known)| known.unwrap_or_else(|| clamp(relative * prior.frame.diagonal(), prior, options)))
+        .collect()
+}
+
+/// Limits a focal length to the allowed multiples of the picture's longer side.
+pub(super) fn clamp(focal_px: f64, prior: &CameraPrior, options: &CameraOptions) -> f64 {
+    let longer = prior.frame.width.max(prior.frame.height);
+    focal_px.clamp(options.min_focal * longer, options.max_focal * longer)
+}
+
+/// The focal length, in diagonals, that explains the pairs best when all pictures without metadata share it.
+fn common_relative_focal(
+    priors: &[CameraPrior],
+    pairs: &[&PairMatches],
+    observations: &Observations,
+    known: &[Option<f64>],
+    options: &CameraOptions,
+) -> f64 {
+    /// A normal lens: the focal length equals the diagonal. Used when the pictures tell nothing.
+    const NORMAL_LENS: f64 = 1.0;
+    /// Candidates run from a very wide to a long lens in steps of 8 %.
+    const SHORTEST: f64 = 0.3;
+    const STEP: f64 = 1.08;
+    const CANDIDATES: i32 = 36;
+    if known.iter().all(Option::is_some) {
+        return NORMAL_LENS;
+    }
+    let mut candidates: Vec<f64> = (0..CANDIDATES).map(|k| SHORTEST * STEP.powi(k)).collect();
+    candidates.extend(median_from_homographies(priors, pairs));
+    let cost = |relative: f64| -> f64 {
+        let focal: Vec<f64> = priors
+            .iter()
+            .zip(known)
+            .map(|(prior, known)| known.unwrap_or_else(|| clamp(relative * prior.frame.diagonal(), prior, options)))
+            .collect();
+        observations.pairs.iter().map(|pair| rotation_cost(priors, &focal, pair, options)).sum()
+    };
+    let costs: Vec<f64> = candidates.iter().map(|&candidate| cost(candidate)).collect();
+    let best = (0..candidates.len()).min_by(|&one, &other| costs[one].total_cmp(&costs[other]));
+    best.filter(|&best| costs[best] > 0.0 && costs[best].is_finite()).map_or(NORMAL_LENS, |best| candidates[best])
+}
+
+/// Median over pairs and pictures of the homographies' focal lengths, in diagonals.
+fn median_from_homographies(priors: &[CameraPrior], pairs: &[&PairMatches]) -> Option<f64> {
+    let centre = |k: usize| {
+        let frame = &priors[k].frame;
+        Matrix3::new(1.0, 0.0, frame.width / 2.0, 0.0, 1.0, frame.height / 2.0, 0.0, 0.0, 1.0)
+    };
+    let mut estimates = Vec::new();
+    for pair in pairs {
+        let Some(rows) = &pair.b_from_a else { continue };
+        let Some(back) = centre(pair.b).try_inverse() else { continue };
+        let centred = back * Homography::from_rows(rows).0 * centre(pair.a);
+        if let Some((source, target)) = focal_from_homography(&centred) {
+            estimates.push(source / priors[pair.a].frame.diagonal());
+            estimates.push(target / priors[pair.b].frame.diagonal());
+        }
+    }
+    estimates.sort_by(f64::total_cmp);
+    estimates.get(estimates.len() / 2).copied()
+}
+
+/// How badly the best rotation explains a pair: Huber-like sum of transfer errors over a subset of the matches.
+fn rotation_cost(priors: &[CameraPrior], focal: &[f64], pair: &PairObservations, options: &CameraOptions) -> f64 {
+    const SAMPLE: usize = 48;
+    let step = pair.matches.len().div_ceil(SAMPLE).max(1);
+    let sample: Vec<_> = pair.matches.iter().copied().step_by(step).collect();
+    let (camera_a, camera_b) = (pinhole(&priors[pair.a], focal[pair.a]), pinhole(&priors[pair.b], focal[pair.b]));
+    let rotation = fit_rotation(&camera_a, &camera_b, &sample);
+    let turned = trueup_core::camera::Camera::new(
+        focal[pair.b],
+        priors[pair.b].frame.width,
+        priors[pair.b].frame.height,
+        &rotation,
+    );
+    let limit = options.coarse_huber_px;
+    let sum: f64 = sample
+        .iter()
+        .map(|one| {
+            let error = camera_a
+                .transfer(&turned, Vector2::from(one.in_a))
+                .map_or(limit, |place| (place - Vector2::from(one.in_b)).norm());
+            error.min(limit)
+        })
+        .sum();
+    // Pairs count by their matches, not by the size of the sample.
+    sum * pair.matches.len() as f64 / sample.len().max(1) as f64
+}
+
+/// The camera of a prior with the identity rotation.
+pub(super) fn pinhole(prior: &CameraPrior, focal_px: f64) -> trueup_core::camera::Camera {
+    trueup_core::camera::Camera::new(focal_px, prior.frame.width, prior.frame.height, &Matrix3::identity())
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z};
+
+    use super::*;
+
+    /// Focal lengths 800 and 1000 were put into the homography by hand: K_j R K_i^-1.
+    #[test]
+    fn focal_lengths_are_recovered_exactly() {
+        let degrees = f64::to_radians;
+        let rotation =
+            rotation_about_x(degrees(6.0)) * rotation_about_y(degrees(22.0)) * rotation_about_z(degrees(4.0));
+        let intrinsic = |focal: f64| Matrix3::from_diagonal(&nalgebra::Vector3::new(focal, focal, 1.0));
+        let inverse = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0 / 800.0, 1.0 / 800.0, 1.0));
+        for scale in [1.0, -0.37] {
+            let homography = intrinsic(1000.0) * rotation * inverse * scale;
+            let (source, target) = focal_from_homography(&homography).expect("regular");
+            assert!((source - 800.0).abs() < 1e-9 * 800.0, "{source}");
+            assert!((target - 1000.0).abs() < 1e-9 * 1000.0, "{target}");
+        }
+    }
+
+    #[test]
+    fn a_translation_tells_no_focal_length() {
+        let shift = Matrix3::new(1.0, 0.0, 120.0, 0.0, 1.0, 7.0, 0.0, 0.0, 1.0);
+        assert!(focal_from_homography(&shift).is_none());
+    }
+}

@@ -1,0 +1,71 @@
+//! The matches that cameras are estimated from: a bounded number per pair, spread evenly over the overlap.
+
+use nalgebra::Vector2;
+use trueup_core::camera::Camera;
+use trueup_core::matches::{PairMatches, PointMatch};
+
+use super::{CameraOptions, CameraPrior};
+
+/// The matches of one pair.
+pub(super) struct PairObservations {
+    pub a: usize,
+    pub b: usize,
+    pub matches: Vec<PointMatch>,
+}
+
+/// The matches of all pairs used, in the pairs' order.
+pub(super) struct Observations {
+    pub pairs: Vec<PairObservations>,
+}
+
+impl Observations {
+    pub fn choose(priors: &[CameraPrior], pairs: &[&PairMatches], options: &CameraOptions) -> Self {
+        const FEWEST: usize = 24;
+        let share = options.matches_in_all / pairs.len().max(1);
+        let limit = options.matches_per_pair.min(share.max(FEWEST));
+        let pairs = pairs
+            .iter()
+            .map(|pair| PairObservations {
+                a: pair.a,
+                b: pair.b,
+                matches: spread_evenly(&pair.inliers, &priors[pair.a], limit),
+            })
+            .collect();
+        Self { pairs }
+    }
+}
+
+/// At most `limit` matches, taken in turns from the cells of a grid over picture a, in their given order.
+fn spread_evenly(matches: &[PointMatch], prior: &CameraPrior, limit: usize) -> Vec<PointMatch> {
+    const CELLS: usize = 16;
+    if matches.len() <= limit {
+        return matches.to_vec();
+    }
+    let cell = |coordinate: f64, length: f64| ((coordinate / length * CELLS as f64) as usize).min(CELLS - 1);
+    let mut cells: Vec<Vec<PointMatch>> = vec![Vec::new(); CELLS * CELLS];
+    for one in matches {
+        let (x, y) = (cell(one.in_a[0], prior.frame.width), cell(one.in_a[1], prior.frame.height));
+        cells[y * CELLS + x].push(*one);
+    }
+    let mut chosen = Vec::with_capacity(limit);
+    for turn in 0.. {
+        for bucket in &cells {
+            if chosen.len() == limit {
+                return chosen;
+            }
+            chosen.extend(bucket.get(turn));
+        }
+    }
+    chosen
+}
+
+/// Root mean square distance, over both directions, between a pair's matches and where the cameras put them; matches
+/// behind a camera count as infinitely far.
+pub(super) fn pair_rms(cameras: &[Camera], pair: &PairMatches) -> f64 {
+    let (a, b) = (&cameras[pair.a], &cameras[pair.b]);
+    let distance = |from: &Camera, to: &Camera, source: [f64; 2], target: [f64; 2]| {
+        from.transfer(to, Vector2::from(source)).map_or(f64::INFINITY, |q| (q - Vector2::from(target)).norm_squared())
+    };
+    let sum: f64 = pair.inliers.iter().map(|m| distance(a, b, m.in_a, m.in_b) + distance(b, a, m.in_b, m.in_a)).sum();
+    (sum / (2 * pair.inliers.len()).max(1) as f64).sqrt()
+}

@@ -1,0 +1,162 @@
+//! Whole-stage tests on synthetic pictures with known cameras.
+
+use nalgebra::Vector2;
+use rand::RngExt;
+use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z, wrap_angle};
+use trueup_core::matches::{PairVerdict, PointMatch};
+
+use super::*;
+
+const WIDTH: f64 = 800.0;
+const HEIGHT: f64 = 600.0;
+
+fn frame() -> WorkingFrame {
+    WorkingFrame { width: WIDTH, height: HEIGHT, working_from_full: 1.0 }
+}
+
+/// A camera by yaw, pitch and roll in degrees (camera to world: Ry Rx Rz).
+fn camera(focal: f64, yaw: f64, pitch: f64, roll: f64) -> Camera {
+    let turn =
+        rotation_about_y(yaw.to_radians()) * rotation_about_x(pitch.to_radians()) * rotation_about_z(roll.to_radians());
+    Camera::new(focal, WIDTH, HEIGHT, &turn.transpose())
+}
+
+/// Matches between all pictures that overlap, with Gaussian-like noise (sum of uniforms) of standard deviation
+/// `noise_px` and a share of gross errors.
+fn matched(truth: &[Camera], noise_px: f64, gross: f64) -> Vec<PairMatches> {
+    let context = StageContext::default();
+    let mut pairs = Vec::new();
+    for a in 0..truth.len() {
+        for b in a + 1..truth.len() {
+            let mut generator = context.generator("camera test", (a * truth.len() + b) as u64);
+            let mut noise = || (0..12).map(|_| generator.random::<f64>()).sum::<f64>() - 6.0;
+            let mut inliers = Vec::new();
+            for k in 0..400 {
+                let (u, v) = ((f64::from(k) * 0.618_034).fract(), (f64::from(k) * 0.754_877).fract());
+                let source = Vector2::new(u * WIDTH, v * HEIGHT);
+                let Some(target) = truth[a].transfer(&truth[b], source) else { continue };
+                if !frame().contains(target.x, target.y) {
+                    continue;
+                }
+                let off = if (f64::from(k) * 0.414_213).fract() < gross { 60.0 } else { 0.0 };
+                inliers.push(PointMatch {
+                    in_a: [source.x + noise_px * noise(), source.y + noise_px * noise()],
+                    in_b: [target.x + noise_px * noise() + off, target.y + noise_px * noise()],
+                });
+            }
+            if inliers.len() >= 40 {
+                pairs.push(PairMatches {
+                    a,
+                    b,
+                    putative: inliers.len(),
+                    in_overlap: inliers.len(),
+                    agreeing: inliers.len(),
+                    needed: 15,
+                    verdict: PairVerdict::Joined,
+                    b_from_a: None,
+                    inliers,
+                });
+            }
+        }
+    }
+    pairs
+}
+
+fn estimate(truth: &[Camera], pairs: &[PairMatches], known_focal: Option<f64>, groups: &[usize]) -> Cameras {
+    let priors: Vec<CameraPrior> = groups
+        .iter()
+        .map(|&camera_group| CameraPrior { frame: frame(), focal_px: known_focal, camera_group })
+        .collect();
+    let names: Vec<String> = (0..truth.len()).map(|k| format!("{k}.jpg")).collect();
+    run(&priors, &names, pairs, 0, &CameraOptions::default(), &StageContext::default()).expect("solvable")
+}
+
+/// Largest angle between estimated and true rotations relative to picture 0, in degrees.
+fn worst_rotation_error(truth: &[Camera], estimated: &[Camera]) -> f64 {
+    (0..truth.len())
+        .map(|k| {
+            let wanted = relative_rotation(&truth[0].rotation(), &truth[k].rotation());
+            let found = relative_rotation(&estimated[0].rotation(), &estimated[k].rotation());
+            trueup_core::geometry::log_rotation(&relative_rotation(&wanted, &found)).norm().to_degrees()
+        })
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn a_row_without_metadata_is_recovered_despite_gross_errors() {
+    let rolls = [3.0, -5.0, 1.0, 7.0, -2.0, 4.0];
+    let truth: Vec<Camera> =
+        (0..6).map(|k| camera(700.0, 22.0 * f64::from(k), 2.0 * f64::from(k % 3), rolls[k as usize])).collect();
+    let cameras = estimate(&truth, &matched(&truth, 0.5, 0.1), None, &[0; 6]);
+    assert!(!cameras.per_picture_focal);
+    let error = worst_rotation_error(&truth, &cameras.cameras);
+    assert!(error < 0.25, "rotation error {error} deg");
+    for camera in &cameras.cameras {
+        assert!((camera.focal_px / 700.0 - 1.0).abs() < 0.01, "focal {}", camera.focal_px);
+    }
+}
+
+#[test]
+fn a_full_turn_closes_from_a_wrong_focal_length() {
+    let truth: Vec<Camera> = (0..16).map(|k| camera(650.0, 22.5 * f64::from(k), 1.0, 0.5)).collect();
+    let cameras = estimate(&truth, &matched(&truth, 0.3, 0.0), Some(800.0), &[0; 16]);
+    assert!(worst_rotation_error(&truth, &cameras.cameras) < 0.1);
+    assert!((cameras.cameras[3].focal_px / 650.0 - 1.0).abs() < 0.005);
+}
+
+#[test]
+fn a_zoom_is_noticed() {
+    let focal = [700.0, 700.0, 900.0, 700.0, 900.0, 900.0];
+    let truth: Vec<Camera> = (0..6).map(|k| camera(focal[k], 14.0 * k as f64, 0.0, 2.0)).collect();
+    let cameras = estimate(&truth, &matched(&truth, 0.3, 0.0), None, &[0; 6]);
+    assert!(cameras.per_picture_focal);
+    for (camera, wanted) in cameras.cameras.iter().zip(focal) {
+        assert!((camera.focal_px / wanted - 1.0).abs() < 0.03, "{} for {wanted}", camera.focal_px);
+    }
+}
+
+#[test]
+fn another_reference_gives_the_same_shape() {
+    let truth: Vec<Camera> = (0..5).map(|k| camera(700.0, 20.0 * f64::from(k), 3.0, f64::from(k))).collect();
+    let pairs = matched(&truth, 0.5, 0.05);
+    let priors = vec![CameraPrior { frame: frame(), focal_px: None, camera_group: 0 }; 5];
+    let names: Vec<String> = (0..5).map(|k| k.to_string()).collect();
+    let solved = |reference| {
+        let context = StageContext::default();
+        run(&priors, &names, &pairs, reference, &CameraOptions::default(), &context).expect("solvable").cameras
+    };
+    assert!(worst_rotation_error(&solved(0), &solved(3)) < 1e-3);
+}
+
+#[test]
+fn an_absurd_start_or_a_pure_shift_never_ends_the_run() {
+    let shift: Vec<PointMatch> = (0..60)
+        .map(|k| {
+            let (x, y) = ((f64::from(k) * 0.618).fract() * 500.0, (f64::from(k) * 0.755).fract() * 600.0);
+            PointMatch { in_a: [x + 300.0, y], in_b: [x, y] }
+        })
+        .collect();
+    let truth = [camera(700.0, 0.0, 0.0, 0.0), camera(700.0, 20.0, 0.0, 0.0)];
+    let mut pairs = matched(&truth, 0.0, 0.0);
+    pairs[0].inliers = shift;
+    for known in [None, Some(1e9), Some(1e-9), Some(f64::NAN)] {
+        let cameras = estimate(&truth, &pairs, known, &[0; 2]);
+        assert!(cameras.cameras.iter().all(|camera| camera.focal_px.is_finite() && camera.focal_px > 0.0));
+        assert!(cameras.cameras.iter().all(|camera| camera.rotation().iter().all(|entry| entry.is_finite())));
+    }
+}
+
+#[test]
+fn a_pair_that_contradicts_the_rest_is_set_aside() {
+    let truth: Vec<Camera> = (0..4).map(|k| camera(700.0, 15.0 * f64::from(k), 0.0, 0.0)).collect();
+    let mut pairs = matched(&truth, 0.3, 0.0);
+    let wrong = pairs.iter().position(|pair| pair.a == 0 && pair.b == 2).expect("overlap");
+    for one in &mut pairs[wrong].inliers {
+        one.in_b[0] += 70.0;
+    }
+    pairs[wrong].inliers.truncate(30);
+    let cameras = estimate(&truth, &pairs, Some(700.0), &[0; 4]);
+    assert_eq!(cameras.contradicting, [wrong]);
+    assert!(worst_rotation_error(&truth, &cameras.cameras) < 0.1);
+    assert!(wrap_angle(cameras.pair_rms_px[wrong]) != 0.0);
+}

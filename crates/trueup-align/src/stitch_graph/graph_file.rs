@@ -1,0 +1,141 @@
+//! A stitch graph written by hand.
+//!
+//! Two notations are read, line by line; `#` starts a comment:
+//!
+//! * `NAME -- NAME` or `INDEX -- INDEX`: the two pictures overlap. Names are file names, indices count from 0 in the
+//!   order in which the pictures were given.
+//! * `{key | value | comment}` as in the graph files of the GSP data sets: `matching_graph_image_edges-I` lists the
+//!   neighbours of picture I, `center_image_index` names the reference, `center_image_rotation_angle` its rotation in
+//!   degrees; `images_count` must fit the pictures given.
+
+use trueup_core::{Error, Result};
+
+/// What a graph file says.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct GraphFile {
+    /// Overlapping pairs (a < b), sorted, each once.
+    pub edges: Vec<(usize, usize)>,
+    /// The reference picture, if stated.
+    pub reference: Option<usize>,
+    /// The rotation of the reference picture in degrees, clockwise, if stated.
+    pub reference_rotation_deg: Option<f64>,
+}
+
+/// Reads a graph for pictures called `names`, in the order given. `file` is the file's name, for messages.
+///
+/// # Errors
+/// [`Error::Input`] with the line number for unknown pictures, unreadable lines, a wrong picture count, a picture
+/// joined to itself, or a file without any pair.
+pub fn parse_graph_file(text: &str, names: &[String], file: &str) -> Result<GraphFile> {
+    let mut graph = GraphFile::default();
+    for (number, line) in text.lines().enumerate() {
+        let line = line.split('#').next().unwrap_or_default().trim();
+        if line.is_empty() {
+            continue;
+        }
+        let parsed = match line.strip_prefix('{').and_then(|rest| rest.strip_suffix('}')) {
+            Some(fields) => keyed_line(fields, names, &mut graph),
+            None => pair_line(line, names).map(|edge| graph.edges.push(edge)),
+        };
+        parsed.map_err(|reason| {
+            Error::input(
+                format!("{file}, line {}", number + 1),
+                reason,
+                "Write one pair per line as NAME -- NAME, with the names of pictures that are being stitched.",
+            )
+        })?;
+    }
+    if graph.edges.is_empty() {
+        return Err(Error::input(file, "no pair of pictures in it", "Write one pair per line as NAME -- NAME."));
+    }
+    graph.edges.sort_unstable();
+    graph.edges.dedup();
+    Ok(graph)
+}
+
+fn pair_line(line: &str, names: &[String]) -> std::result::Result<(usize, usize), String> {
+    let (first, second) = line.split_once("--").ok_or_else(|| format!("\"{line}\" is not a pair"))?;
+    ordered(picture(first, names)?, picture(second, names)?)
+}
+
+fn keyed_line(fields: &str, names: &[String], graph: &mut GraphFile) -> std::result::Result<(), String> {
+    let mut parts = fields.split('|').map(str::trim);
+    let (key, value) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
+    if let Some(owner) = key.strip_prefix("matching_graph_image_edges-") {
+        let owner = index(owner, names)?;
+        for neighbour in value.split([' ', ',']).filter(|word| !word.is_empty()) {
+            graph.edges.push(ordered(owner, index(neighbour, names)?)?);
+        }
+        return Ok(());
+    }
+    match key {
+        "center_image_index" => graph.reference = Some(index(value, names)?),
+        "center_image_rotation_angle" => {
+            let angle: f64 = value.parse().map_err(|_| format!("\"{value}\" is not an angle in degrees"))?;
+            graph.reference_rotation_deg = angle.is_finite().then_some(angle);
+        }
+        "images_count" if value.parse() != Ok(names.len()) => {
+            return Err(format!("the graph is for {value} pictures, {} were given", names.len()));
+        }
+        // Other keys of the notation carry nothing this program uses.
+        _ => {}
+    }
+    Ok(())
+}
+
+fn picture(text: &str, names: &[String]) -> std::result::Result<usize, String> {
+    let text = text.trim().trim_matches('"');
+    match names.iter().position(|name| name == text) {
+        Some(found) => Ok(found),
+        None => index(text, names).map_err(|_| format!("\"{text}\" is none of the {} pictures given", names.len())),
+    }
+}
+
+fn index(text: &str, names: &[String]) -> std::result::Result<usize, String> {
+    match text.trim().parse::<usize>() {
+        Ok(value) if value < names.len() => Ok(value),
+        _ => Err(format!("\"{}\" is not a picture's index from 0 to {}", text.trim(), names.len().saturating_sub(1))),
+    }
+}
+
+fn ordered(a: usize, b: usize) -> std::result::Result<(usize, usize), String> {
+    if a == b { Err("a picture is joined to itself".to_owned()) } else { Ok((a.min(b), a.max(b))) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names() -> Vec<String> {
+        ["a 1.jpg", "b.jpg", "c.jpg"].map(str::to_owned).to_vec()
+    }
+
+    #[test]
+    fn names_with_spaces_and_indices_are_read() {
+        let graph = parse_graph_file("# two pairs\nc.jpg -- a 1.jpg\n0 -- 1 # the first\n\n", &names(), "g.txt");
+        assert_eq!(graph.expect("valid").edges, [(0, 1), (0, 2)]);
+    }
+
+    #[test]
+    fn the_gsp_notation_is_read() {
+        let text = "{center_image_index | 1 | centre}\n{center_image_rotation_angle | -3.5 | angle}\n\
+                    {images_count | 3 | count}\n{matching_graph_image_edges-0 | 1 2 | edges}";
+        let graph = parse_graph_file(text, &names(), "g.txt").expect("valid");
+        assert_eq!(graph.edges, [(0, 1), (0, 2)]);
+        assert_eq!((graph.reference, graph.reference_rotation_deg), (Some(1), Some(-3.5)));
+    }
+
+    #[test]
+    fn mistakes_are_named_with_their_line() {
+        for (text, reason) in [
+            ("0 -- 1\nb.jpg -- d.jpg", "line 2: \"d.jpg\" is none of the 3 pictures given"),
+            ("b.jpg c.jpg", "line 1: \"b.jpg c.jpg\" is not a pair"),
+            ("1 -- 1", "line 1: a picture is joined to itself"),
+            ("{images_count | 5 | count}", "the graph is for 5 pictures, 3 were given"),
+            ("# nothing", "no pair of pictures in it"),
+        ] {
+            let message = parse_graph_file(text, &names(), "g.txt").expect_err("must fail").to_string();
+            assert!(message.contains(reason), "{message}");
+        }
+    }
+}

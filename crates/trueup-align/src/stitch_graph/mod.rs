@@ -1,0 +1,205 @@
+//! Which pictures overlap: the paper's graph G with edges J, its components and its spanning tree.
+
+mod graph_file;
+
+use petgraph::algo::min_spanning_tree;
+use petgraph::data::Element;
+use petgraph::graph::{NodeIndex, UnGraph};
+use petgraph::unionfind::UnionFind;
+use serde::{Deserialize, Serialize};
+use trueup_core::matches::PairMatches;
+
+pub use graph_file::{GraphFile, parse_graph_file};
+
+/// Two overlapping pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GraphEdge {
+    /// Index of the first picture.
+    pub a: usize,
+    /// Index of the second picture, larger than `a`.
+    pub b: usize,
+    /// Number of matches that agree with the pair's global homography.
+    pub weight: usize,
+}
+
+/// Overlapping pictures as a graph.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StitchGraph {
+    /// Number of pictures, joined or not.
+    pub pictures: usize,
+    /// The joined pairs, sorted by (a, b).
+    pub edges: Vec<GraphEdge>,
+    /// Connected pictures, each list ascending; the largest component first, ties by the sum of the weights.
+    /// A picture without an edge is a component of its own.
+    pub components: Vec<Vec<usize>>,
+}
+
+/// A step of a spanning tree: `child` is placed relative to `parent`, which comes earlier.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TreeStep {
+    /// A picture that is already placed.
+    pub parent: usize,
+    /// The picture that is placed next.
+    pub child: usize,
+}
+
+impl StitchGraph {
+    /// The graph of the joined pairs among `pictures` pictures.
+    pub fn new(pictures: usize, pairs: &[PairMatches]) -> Self {
+        let mut edges: Vec<GraphEdge> = pairs
+            .iter()
+            .filter(|pair| pair.verdict.is_joined())
+            .map(|pair| GraphEdge { a: pair.a, b: pair.b, weight: pair.agreeing })
+            .collect();
+        edges.sort_by_key(|edge| (edge.a, edge.b));
+        let components = components(pictures, &edges);
+        Self { pictures, edges, components }
+    }
+
+    /// The edges inside a component.
+    pub fn edges_of<'a>(&'a self, component: &'a [usize]) -> impl Iterator<Item = &'a GraphEdge> {
+        self.edges.iter().filter(|edge| component.binary_search(&edge.a).is_ok())
+    }
+
+    /// The component's spanning tree of largest total weight, walked breadth first from `root`.
+    ///
+    /// The order is deterministic: children by falling weight, then by index.
+    pub fn spanning_tree(&self, component: &[usize], root: usize) -> Vec<TreeStep> {
+        let mut graph = UnGraph::<(), i64>::with_capacity(self.pictures, self.edges.len());
+        for _ in 0..self.pictures {
+            graph.add_node(());
+        }
+        for edge in self.edges_of(component) {
+            // petgraph minimises: the heaviest edges must come first.
+            graph.add_edge(NodeIndex::new(edge.a), NodeIndex::new(edge.b), -(edge.weight as i64));
+        }
+        let mut neighbours: Vec<Vec<(i64, usize)>> = vec![Vec::new(); self.pictures];
+        for element in min_spanning_tree(&graph) {
+            if let Element::Edge { source, target, weight } = element {
+                neighbours[source].push((weight, target));
+                neighbours[target].push((weight, source));
+            }
+        }
+        for list in &mut neighbours {
+            list.sort_unstable();
+        }
+        let mut steps = Vec::with_capacity(component.len().saturating_sub(1));
+        let mut placed = vec![false; self.pictures];
+        let mut queue = std::collections::VecDeque::from([root]);
+        placed[root] = true;
+        while let Some(parent) = queue.pop_front() {
+            for &(_, child) in &neighbours[parent] {
+                if !std::mem::replace(&mut placed[child], true) {
+                    steps.push(TreeStep { parent, child });
+                    queue.push_back(child);
+                }
+            }
+        }
+        steps
+    }
+
+    /// The picture in the middle of the component: the spanning tree's node with the fewest steps to the farthest one,
+    /// ties by the larger sum of edge weights, then by the smaller index.
+    pub fn central_picture(&self, component: &[usize]) -> usize {
+        let root = component.first().copied().unwrap_or(0);
+        let tree = self.spanning_tree(component, root);
+        let mut neighbours: Vec<Vec<usize>> = vec![Vec::new(); self.pictures];
+        for step in &tree {
+            neighbours[step.parent].push(step.child);
+            neighbours[step.child].push(step.parent);
+        }
+        let weight = |picture: usize| -> usize {
+            self.edges.iter().filter(|edge| edge.a == picture || edge.b == picture).map(|edge| edge.weight).sum()
+        };
+        component
+            .iter()
+            .copied()
+            .min_by_key(|&picture| (eccentricity(&neighbours, picture), usize::MAX - weight(picture), picture))
+            .unwrap_or(root)
+    }
+}
+
+fn components(pictures: usize, edges: &[GraphEdge]) -> Vec<Vec<usize>> {
+    let mut union = UnionFind::new(pictures);
+    for edge in edges {
+        union.union(edge.a, edge.b);
+    }
+    let labels = union.into_labeling();
+    let mut members: Vec<Vec<usize>> = vec![Vec::new(); pictures];
+    let mut weights = vec![0_usize; pictures];
+    for (picture, &label) in labels.iter().enumerate() {
+        members[label].push(picture);
+    }
+    for edge in edges {
+        weights[labels[edge.a]] += edge.weight;
+    }
+    let mut order: Vec<usize> = (0..pictures).filter(|&label| !members[label].is_empty()).collect();
+    order.sort_by_key(|&label| {
+        (usize::MAX - members[label].len(), usize::MAX - weights[label], members[label].first().copied())
+    });
+    order.into_iter().map(|label| std::mem::take(&mut members[label])).collect()
+}
+
+/// Steps from `start` to the farthest node of its tree.
+fn eccentricity(neighbours: &[Vec<usize>], start: usize) -> usize {
+    let mut distance = vec![usize::MAX; neighbours.len()];
+    let mut queue = std::collections::VecDeque::from([start]);
+    distance[start] = 0;
+    let mut farthest = 0;
+    while let Some(node) = queue.pop_front() {
+        farthest = distance[node];
+        for &next in &neighbours[node] {
+            if distance[next] == usize::MAX {
+                distance[next] = distance[node] + 1;
+                queue.push_back(next);
+            }
+        }
+    }
+    farthest
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::matches::PairVerdict;
+
+    use super::*;
+
+    fn pair(a: usize, b: usize, agreeing: usize) -> PairMatches {
+        PairMatches {
+            a,
+            b,
+            putative: agreeing,
+            in_overlap: agreeing,
+            agreeing,
+            needed: 15,
+            verdict: if agreeing >= 15 { PairVerdict::Joined } else { PairVerdict::TooFewInliers },
+            b_from_a: None,
+            inliers: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn components_are_sorted_by_size_and_strangers_stand_alone() {
+        let graph = StitchGraph::new(6, &[pair(0, 5, 20), pair(1, 2, 50), pair(2, 3, 50), pair(0, 4, 3)]);
+        assert_eq!(graph.components, [vec![1, 2, 3], vec![0, 5], vec![4]]);
+        assert_eq!(graph.edges_of(&[0, 5]).count(), 1);
+    }
+
+    #[test]
+    fn equal_components_are_sorted_by_weight() {
+        let graph = StitchGraph::new(4, &[pair(0, 1, 20), pair(2, 3, 90)]);
+        assert_eq!(graph.components, [vec![2, 3], vec![0, 1]]);
+    }
+
+    #[test]
+    fn the_tree_uses_the_heaviest_edges_and_the_centre_is_in_the_middle() {
+        let pairs = [pair(0, 1, 100), pair(1, 2, 80), pair(0, 2, 20), pair(2, 3, 60), pair(3, 4, 60)];
+        let graph = StitchGraph::new(5, &pairs);
+        let component = graph.components[0].clone();
+        let centre = graph.central_picture(&component);
+        assert_eq!(centre, 2);
+        let steps: Vec<(usize, usize)> =
+            graph.spanning_tree(&component, centre).iter().map(|step| (step.parent, step.child)).collect();
+        assert_eq!(steps, [(2, 1), (2, 3), (1, 0), (3, 4)]);
+    }
+}
