@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod cameras;
+pub mod full_turn;
 pub mod match_points;
 pub mod mesh;
 pub mod similarity;

@@ -17,7 +17,7 @@ use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Result, StageContext};
 
-use crate::stitch_graph::StitchGraph;
+use crate::stitch_graph::{GraphEdge, StitchGraph};
 use bundle::{FocalModel, Parameters};
 use observations::Observations;
 
@@ -167,7 +167,7 @@ fn solve(
     let observations = Observations::choose(priors, &used, options);
     let start_focal = focal::initial_focal_lengths(priors, &used, &observations, options);
     let relative = rotations::relative_rotations(priors, &used, &observations, &start_focal);
-    let graph = StitchGraph::new(priors.len(), &used.iter().map(|&pair| without_matches(pair)).collect::<Vec<_>>());
+    let graph = StitchGraph::from_edges(priors.len(), used.iter().map(|&pair| edge_of(pair)).collect());
     let rotations = rotations::average(&graph, &used, &relative, reference);
     let start = Parameters { focal_px: start_focal.clone(), rotations };
     let (parameters, per_picture_focal, focal_failed) =
@@ -251,11 +251,11 @@ fn contradicting_pairs(
     suspects.sort_by(|&first, &second| pair_rms_px[second].total_cmp(&pair_rms_px[first]).then(first.cmp(&second)));
     let mut dropped: Vec<usize> = Vec::new();
     for suspect in suspects {
-        let rest: Vec<PairMatches> = (0..pairs.len())
+        let rest: Vec<GraphEdge> = (0..pairs.len())
             .filter(|position| *position != suspect && !dropped.contains(position))
-            .map(|position| without_matches(&pairs[position]))
+            .map(|position| edge_of(&pairs[position]))
             .collect();
-        if StitchGraph::new(pictures, &rest).components.len() == 1 {
+        if StitchGraph::from_edges(pictures, rest).components.len() == 1 {
             dropped.push(suspect);
         }
     }
@@ -263,9 +263,8 @@ fn contradicting_pairs(
     dropped
 }
 
-/// The pair's verdict and counts alone, for graph work.
-fn without_matches(pair: &PairMatches) -> PairMatches {
-    PairMatches { inliers: Vec::new(), ..*pair }
+fn edge_of(pair: &PairMatches) -> GraphEdge {
+    GraphEdge { a: pair.a, b: pair.b, weight: pair.agreeing }
 }
 
 /// Rotation of picture j seen from picture i: `R_j R_i^T`.

@@ -52,6 +52,11 @@ impl StitchGraph {
             .map(|pair| GraphEdge { a: pair.a, b: pair.b, weight: pair.agreeing })
             .collect();
         edges.sort_by_key(|edge| (edge.a, edge.b));
+        Self::from_edges(pictures, edges)
+    }
+
+    /// The graph of given edges, sorted by (a, b).
+    pub fn from_edges(pictures: usize, edges: Vec<GraphEdge>) -> Self {
         let components = components(pictures, &edges);
         Self { pictures, edges, components }
     }

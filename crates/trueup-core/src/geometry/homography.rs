@@ -121,16 +121,16 @@ fn finite(homography: Homography) -> Option<Homography> {
     scaled.iter().all(|entry| entry.is_finite()).then_some(Homography(scaled))
 }
 
-/// Hartley's normalisation: centroid to the origin, mean distance to sqrt(2).
+/// Hartley's normalisation of a point set: centroid to the origin, mean distance to sqrt(2).
 #[derive(Debug, Clone, Copy)]
-struct Normalisation {
+pub struct Normalisation {
     centre: Vector2<f64>,
     scale: f64,
 }
 
 impl Normalisation {
-    /// `None` if the points coincide.
-    fn of(points: &[Vector2<f64>]) -> Option<Self> {
+    /// The normalisation of `points`; `None` if they coincide or there are none.
+    pub fn of(points: &[Vector2<f64>]) -> Option<Self> {
         const COINCIDENT: f64 = 1e-9;
         let count = points.len() as f64;
         let centre = points.iter().sum::<Vector2<f64>>() / count;
@@ -138,16 +138,19 @@ impl Normalisation {
         (spread > COINCIDENT).then(|| Self { centre, scale: std::f64::consts::SQRT_2 / spread })
     }
 
-    fn apply(&self, point: Vector2<f64>) -> Vector2<f64> {
+    /// A point in normalised coordinates.
+    pub fn apply(&self, point: Vector2<f64>) -> Vector2<f64> {
         (point - self.centre) * self.scale
     }
 
-    fn matrix(&self) -> Matrix3<f64> {
+    /// `normalised_from_point` as a matrix.
+    pub fn matrix(&self) -> Matrix3<f64> {
         let (s, c) = (self.scale, self.centre);
         Matrix3::new(s, 0.0, -s * c.x, 0.0, s, -s * c.y, 0.0, 0.0, 1.0)
     }
 
-    fn inverse(&self) -> Matrix3<f64> {
+    /// `point_from_normalised` as a matrix.
+    pub fn inverse(&self) -> Matrix3<f64> {
         let (s, c) = (1.0 / self.scale, self.centre);
         Matrix3::new(s, 0.0, c.x, 0.0, s, c.y, 0.0, 0.0, 1.0)
     }

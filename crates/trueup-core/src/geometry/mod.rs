@@ -5,7 +5,7 @@ mod homography;
 mod rotation;
 
 pub use angle::{circular_mean, wrap_angle};
-pub use homography::Homography;
+pub use homography::{Homography, Normalisation};
 pub use rotation::{
     cross_matrix, exp_rotation, log_rotation, nearest_rotation, random_rotation, rotation_about_x, rotation_about_y,
     rotation_about_z,

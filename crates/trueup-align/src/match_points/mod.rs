@@ -1,0 +1,218 @@
+//! Where the vertices of one picture's grid appear in another: the data of the alignment energy.
+//!
+//! # Source
+//! Chen and Chuang, "Natural image stitching with the global similarity prior" (2016), section 3.1: grid vertices carried
+//! by local homographies replace the feature matches, because they cover the overlap uniformly.
+
+mod moving_dlt;
+mod residual;
+
+use nalgebra::Vector2;
+use rayon::prelude::*;
+use trueup_core::camera::Camera;
+use trueup_core::geometry::Homography;
+use trueup_core::matches::PairMatches;
+use trueup_core::mesh::GridMesh;
+use trueup_core::source::WorkingFrame;
+use trueup_core::{Result, StageContext};
+
+pub use moving_dlt::MovingDlt;
+use residual::CameraResidual;
+
+/// The vertices of picture `from`'s grid carried into picture `to` (working pixels).
+#[derive(Debug, Clone, PartialEq)]
+pub struct OverlapWarp {
+    /// Index of the picture whose grid it is.
+    pub from: usize,
+    /// Index of the picture it is carried into.
+    pub to: usize,
+    /// For every vertex of `from`'s grid, row-major: its place in `to`, or `None` outside the overlap.
+    pub vertices: Vec<Option<[f64; 2]>>,
+}
+
+trueup_core::choice! {
+    /// How a grid vertex is carried into another picture.
+    pub enum TransferModel {
+        /// The cameras' transfer, corrected by the matches' local deviation from it.
+        CameraResidual = "camera-residual",
+        /// A homography fitted to the matches around the vertex (APAP), as published.
+        MovingDlt = "moving-dlt",
+    }
+}
+
+trueup_core::options! {
+    /// How the overlap of two pictures is sampled.
+    pub struct MatchPointOptions("match_points") {
+        /// How a grid vertex is carried into another picture.
+        model: TransferModel = TransferModel::CameraResidual, Allowed::Any, "";
+        /// Distance over which the influence of a match on a vertex falls to 1/e.
+        decay_px: f64 = 72.25, between(1.0, 10000.0), "working px";
+        /// Smallest weight of a match in the moving DLT; it keeps vertices far from all matches determined.
+        weight_floor: f64 = 0.0015, between(0.0, 1.0), "";
+        /// Strength, in matches, with which the correction is drawn towards none.
+        shrinkage: f64 = 0.5, between(0.0, 1000.0), "matches";
+        /// Largest distance from the global homography's place, relative to the diagonal.
+        max_deviation: f64 = 0.1, between(0.001, 10.0), "diagonals";
+    }
+}
+
+/// Carries the grid of each picture of every pair into the other: two warps a pair, a to b first.
+///
+/// `grids` are the undeformed grids of the pictures. Needs the pairs' inliers and homographies.
+///
+/// # Errors
+/// [`trueup_core::Error::Cancelled`].
+pub fn run(
+    frames: &[WorkingFrame],
+    grids: &[GridMesh],
+    cameras: &[Camera],
+    pairs: &[PairMatches],
+    options: &MatchPointOptions,
+    context: &StageContext,
+) -> Result<Vec<OverlapWarp>> {
+    const STAGE: &str = "match points";
+    context.progress().begin(STAGE, pairs.len() as u64);
+    let warps: Vec<[OverlapWarp; 2]> = pairs
+        .par_iter()
+        .map(|pair| {
+            context.check_cancelled()?;
+            let points_a: Vec<Vector2<f64>> = pair.inliers.iter().map(|one| Vector2::from(one.in_a)).collect();
+            let points_b: Vec<Vector2<f64>> = pair.inliers.iter().map(|one| Vector2::from(one.in_b)).collect();
+            let b_from_a = pair.b_from_a.as_ref().map(Homography::from_rows);
+            let a_from_b = b_from_a.and_then(|homography| homography.inverse());
+            let direction = |from: usize, to: usize, source: &[_], target: &[_], global: Option<Homography>| {
+                let transfer = Transfer { from: &cameras[from], to: &cameras[to], source, target, global, options };
+                let vertices = transfer.carry(&grids[from], &frames[to]);
+                OverlapWarp { from, to, vertices }
+            };
+            let warps = [
+                direction(pair.a, pair.b, &points_a, &points_b, b_from_a),
+                direction(pair.b, pair.a, &points_b, &points_a, a_from_b),
+            ];
+            context.progress().advance(STAGE, 1);
+            Ok(warps)
+        })
+        .collect::<Result<_>>()?;
+    context.progress().finish(STAGE);
+    Ok(warps.into_iter().flatten().collect())
+}
+
+/// One direction of a pair.
+struct Transfer<'a> {
+    from: &'a Camera,
+    to: &'a Camera,
+    source: &'a [Vector2<f64>],
+    target: &'a [Vector2<f64>],
+    global: Option<Homography>,
+    options: &'a MatchPointOptions,
+}
+
+impl Transfer<'_> {
+    fn carry(&self, grid: &GridMesh, frame: &WorkingFrame) -> Vec<Option<[f64; 2]>> {
+        let inside = |place: Vector2<f64>| frame.contains(place.x, place.y).then_some([place.x, place.y]);
+        match self.options.model {
+            TransferModel::CameraResidual => {
+                let model = CameraResidual::new(self.from, self.to, self.source, self.target, self.options);
+                (0..grid.len()).map(|vertex| model.at(grid.source(vertex)).and_then(inside)).collect()
+            }
+            TransferModel::MovingDlt => {
+                let Some(global) = self.global else { return vec![None; grid.len()] };
+                let Some(model) = MovingDlt::new(self.source, self.target) else { return vec![None; grid.len()] };
+                let limit = self.options.max_deviation * frame.diagonal();
+                let place = |vertex: Vector2<f64>| {
+                    let expected = global.apply(vertex);
+                    // Vertices that the global homography sees far outside need no local one.
+                    let near = (-limit..=frame.width + limit).contains(&expected.x)
+                        && (-limit..=frame.height + limit).contains(&expected.y)
+                        && global.denominator(vertex) > 0.0;
+                    let local = near.then(|| model.at(vertex, self.options)).flatten().unwrap_or(global);
+                    let place = local.apply(vertex);
+                    ((place - expected).norm() <= limit && near).then_some(place)
+                };
+                (0..grid.len()).map(|vertex| place(grid.source(vertex)).and_then(inside)).collect()
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+    use trueup_core::geometry::rotation_about_y;
+    use trueup_core::matches::{PairVerdict, PointMatch};
+
+    use super::*;
+
+    fn example() -> (Vec<WorkingFrame>, Vec<Camera>, PairMatches) {
+        let frame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
+        let cameras = vec![
+            Camera::new(700.0, 800.0, 600.0, &Matrix3::identity()),
+            Camera::new(700.0, 800.0, 600.0, &rotation_about_y(0.35).transpose()),
+        ];
+        let mut inliers = Vec::new();
+        for k in 0..900 {
+            let source = Vector2::new((f64::from(k) * 0.618).fract() * 800.0, (f64::from(k) * 0.755).fract() * 600.0);
+            let target = cameras[0].transfer(&cameras[1], source).expect("in front");
+            if frame.contains(target.x, target.y) {
+                inliers.push(PointMatch { in_a: source.into(), in_b: target.into() });
+            }
+        }
+        let points = |of: fn(&PointMatch) -> [f64; 2]| -> Vec<Vector2<f64>> {
+            inliers.iter().map(|one| Vector2::from(of(one))).collect()
+        };
+        let homography = Homography::fit(&points(|one| one.in_a), &points(|one| one.in_b), None).expect("regular");
+        let pair = PairMatches {
+            a: 0,
+            b: 1,
+            putative: inliers.len(),
+            in_overlap: inliers.len(),
+            agreeing: inliers.len(),
+            needed: 15,
+            verdict: PairVerdict::Joined,
+            b_from_a: Some(homography.to_rows()),
+            inliers,
+        };
+        (vec![frame, frame], cameras, pair)
+    }
+
+    #[test]
+    fn both_models_carry_vertices_to_their_true_place() {
+        let (frames, cameras, pair) = example();
+        let grids = vec![GridMesh::regular(800.0, 600.0, 40.0); 2];
+        for model in [TransferModel::CameraResidual, TransferModel::MovingDlt] {
+            let options = MatchPointOptions { model, ..MatchPointOptions::default() };
+            let context = StageContext::default();
+            let warps =
+                run(&frames, &grids, &cameras, std::slice::from_ref(&pair), &options, &context).expect("not cancelled");
+            assert_eq!((warps[0].from, warps[0].to, warps[1].from, warps[1].to), (0, 1, 1, 0));
+            for warp in &warps {
+                let carried = warp.vertices.iter().flatten().count();
+                assert!(carried > 100, "{model:?}: only {carried} vertices in the overlap");
+                for (vertex, place) in warp.vertices.iter().enumerate() {
+                    let Some(place) = place else { continue };
+                    let truth = cameras[warp.from].transfer(&cameras[warp.to], grids[0].source(vertex));
+                    let error = (truth.expect("in front") - Vector2::from(*place)).norm();
+                    assert!(error < 1e-5, "{model:?}: vertex {vertex} is off by {error} px");
+                }
+            }
+        }
+    }
+
+    /// Parallax: the matches deviate from the cameras smoothly; the correction must follow.
+    #[test]
+    fn the_correction_follows_parallax() {
+        let (frames, cameras, mut pair) = example();
+        for one in &mut pair.inliers {
+            one.in_b[0] += 6.0;
+        }
+        let grids = vec![GridMesh::regular(800.0, 600.0, 40.0); 2];
+        let options = MatchPointOptions::default();
+        let context = StageContext::default();
+        let warps = run(&frames, &grids, &cameras, &[pair], &options, &context).expect("not cancelled");
+        for (vertex, place) in warps[0].vertices.iter().enumerate() {
+            let Some(place) = place else { continue };
+            let truth = cameras[0].transfer(&cameras[1], grids[0].source(vertex)).expect("in front");
+            assert!((place[0] - truth.x - 6.0).abs() < 1.0, "{} of 6 px", place[0] - truth.x);
+        }
+    }
+}

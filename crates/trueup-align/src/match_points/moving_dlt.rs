@@ -1,0 +1,158 @@
+//! A homography for every place: the direct linear transform with weights that fall off with distance.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector2};
+use trueup_core::geometry::{Homography, Normalisation};
+
+use super::MatchPointOptions;
+
+/// Matches prepared for fitting many local homographies.
+///
+/// # Source
+/// Zaragoza et al., "As-projective-as-possible image stitching with moving DLT" (2013), equations 9 to 13.
+///
+/// # Departures
+/// The weight of a match is exp(-distance / decay), with the distance not squared, as the code of the global similarity
+/// prior has it; the published weight squares it.
+#[derive(Debug, Clone)]
+pub struct MovingDlt {
+    /// Match positions in source pixels, for the weights.
+    positions: Vec<Vector2<f64>>,
+    /// Normalised (x, y) and (x', y').
+    rows: Vec<[f64; 4]>,
+    normalised_from_source: Matrix3<f64>,
+    target_from_normalised: Matrix3<f64>,
+    /// The solution with equal weights, where the iteration for each vertex starts.
+    global: SVector<f64, 9>,
+}
+
+impl MovingDlt {
+    /// Prepares the matches `source[k]` to `target[k]`. `None` with fewer than four or in a degenerate configuration.
+    pub fn new(source: &[Vector2<f64>], target: &[Vector2<f64>]) -> Option<Self> {
+        if source.len() < 4 || source.len() != target.len() {
+            return None;
+        }
+        let (normalised_source, normalised_target) = (Normalisation::of(source)?, Normalisation::of(target)?);
+        let rows: Vec<[f64; 4]> = source
+            .iter()
+            .zip(target)
+            .map(|(&p, &q)| {
+                let (p, q) = (normalised_source.apply(p), normalised_target.apply(q));
+                [p.x, p.y, q.x, q.y]
+            })
+            .collect();
+        let mut dlt = Self {
+            positions: source.to_vec(),
+            rows,
+            normalised_from_source: normalised_source.matrix(),
+            target_from_normalised: normalised_target.inverse(),
+            global: SVector::zeros(),
+        };
+        let eigen = dlt.normal_matrix(|_| 1.0).symmetric_eigen();
+        dlt.global = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        Some(dlt)
+    }
+
+    /// The homography around `vertex` (source pixels); `None` where it is not determined.
+    pub fn at(&self, vertex: Vector2<f64>, options: &MatchPointOptions) -> Option<Homography> {
+        self.solve(|position| (-(position - vertex).norm() / options.decay_px).exp().max(options.weight_floor))
+    }
+
+    /// The homography for any weights of the match positions.
+    pub fn solve(&self, weight: impl Fn(Vector2<f64>) -> f64) -> Option<Homography> {
+        const ITERATIONS: usize = 8;
+        const SETTLED: f64 = 1e-12;
+        const RELATIVE_SHIFT: f64 = 1e-12;
+        let mut normal = self.normal_matrix(weight);
+        let shift = normal.trace() * RELATIVE_SHIFT;
+        for k in 0..9 {
+            normal[(k, k)] += shift;
+        }
+        // Inverse iteration: the eigenvector of the smallest eigenvalue, from the global solution.
+        let factor = normal.cholesky()?;
+        let mut h = self.global;
+        for _ in 0..ITERATIONS {
+            let next = factor.solve(&h).try_normalize(f64::MIN_POSITIVE)?;
+            let change = 1.0 - next.dot(&h).abs();
+            h = next;
+            if change < SETTLED {
+                break;
+            }
+        }
+        let normalised = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]);
+        let matrix = self.target_from_normalised * normalised * self.normalised_from_source;
+        let scale = matrix[(2, 2)];
+        let matrix = matrix / scale;
+        matrix.iter().all(|entry| entry.is_finite()).then_some(Homography(matrix))
+    }
+
+    /// The 9 x 9 matrix A^T W^2 A. Its blocks are four weighted sums of p p^T, p = (x, y, 1).
+    fn normal_matrix(&self, weight: impl Fn(Vector2<f64>) -> f64) -> SMatrix<f64, 9, 9> {
+        let mut sums = [[0.0; 6]; 4];
+        for (position, &[x, y, u, v]) in self.positions.iter().zip(&self.rows) {
+            let w = weight(*position).powi(2);
+            let products = [x * x, x * y, x, y * y, y, 1.0];
+            let factors = [w, w * u, w * v, w * (u * u + v * v)];
+            for (sum, factor) in sums.iter_mut().zip(factors) {
+                for (entry, product) in sum.iter_mut().zip(products) {
+                    *entry += factor * product;
+                }
+            }
+        }
+        let block = |s: &[f64; 6]| Matrix3::new(s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5]);
+        let [plain, by_u, by_v, by_square] = [block(&sums[0]), block(&sums[1]), block(&sums[2]), block(&sums[3])];
+        let mut normal = SMatrix::<f64, 9, 9>::zeros();
+        normal.fixed_view_mut::<3, 3>(0, 0).copy_from(&plain);
+        normal.fixed_view_mut::<3, 3>(3, 3).copy_from(&plain);
+        normal.fixed_view_mut::<3, 3>(0, 6).copy_from(&-by_u);
+        normal.fixed_view_mut::<3, 3>(6, 0).copy_from(&-by_u);
+        normal.fixed_view_mut::<3, 3>(3, 6).copy_from(&-by_v);
+        normal.fixed_view_mut::<3, 3>(6, 3).copy_from(&-by_v);
+        normal.fixed_view_mut::<3, 3>(6, 6).copy_from(&by_square);
+        normal
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noisy_matches() -> (Vec<Vector2<f64>>, Vec<Vector2<f64>>) {
+        let homography = Homography(Matrix3::new(1.05, 0.08, 200.0, -0.06, 1.02, 30.0, -4e-4, 6e-5, 1.0));
+        (0..80)
+            .map(|k| {
+                let t = f64::from(k);
+                let source = Vector2::new((t * 0.618).fract() * 640.0, (t * 0.755).fract() * 480.0);
+                let noise = Vector2::new((t * 0.3).sin(), (t * 0.7).cos()) * 0.8;
+                (source, homography.apply(source) + noise)
+            })
+            .unzip()
+    }
+
+    /// Equal weights everywhere must give the plain DLT, which is computed by another route.
+    #[test]
+    fn equal_weights_are_the_plain_dlt() {
+        let (source, target) = noisy_matches();
+        let dlt = MovingDlt::new(&source, &target).expect("regular");
+        let moving = dlt.solve(|_| 1.0).expect("regular");
+        let plain = Homography::fit(&source, &target, None).expect("regular");
+        assert!((moving.0 - plain.0).amax() < 1e-6 * plain.0.amax());
+    }
+
+    #[test]
+    fn local_weights_are_the_weighted_dlt() {
+        let (source, target) = noisy_matches();
+        let vertex = Vector2::new(100.0, 300.0);
+        let options = MatchPointOptions::default();
+        let weights: Vec<f64> = source.iter().map(|p| (-(p - vertex).norm() / 72.25_f64).exp().max(0.0015)).collect();
+        let moving = MovingDlt::new(&source, &target).and_then(|dlt| dlt.at(vertex, &options)).expect("regular");
+        let weighted = Homography::fit(&source, &target, Some(&weights)).expect("regular");
+        assert!((moving.apply(vertex) - weighted.apply(vertex)).norm() < 1e-5);
+    }
+
+    #[test]
+    fn too_few_or_coincident_matches_have_no_homography() {
+        let point = vec![Vector2::new(1.0, 2.0); 6];
+        assert!(MovingDlt::new(&point, &point).is_none());
+        assert!(MovingDlt::new(&point[..3], &point[..3]).is_none());
+    }
+}

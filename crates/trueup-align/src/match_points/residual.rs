@@ -1,0 +1,97 @@
+//! The cameras' transfer corrected by what the matches around a place say.
+
+use nalgebra::{Matrix3, Matrix3x2, Vector2, Vector3};
+use trueup_core::camera::Camera;
+
+use super::MatchPointOptions;
+
+/// Carries points from one picture to another by the cameras, plus a smooth correction.
+///
+/// The correction at a place is a local linear regression of the matches' deviations from the cameras, weighted by
+/// distance and robustly, and drawn towards zero. Where the pictures were taken from one point it vanishes and the
+/// places are as consistent as the cameras; with parallax it follows the matches.
+///
+/// # Departures
+/// The published method carries vertices by moving DLT from the matches alone. On rotating cameras that adds the noise of
+/// a few local matches, and extrapolates it where there are none.
+pub(super) struct CameraResidual<'a> {
+    from: &'a Camera,
+    to: &'a Camera,
+    samples: Vec<Sample>,
+    options: &'a MatchPointOptions,
+    /// Farthest outside the other picture that a correction could still bring a point in.
+    margin: f64,
+}
+
+struct Sample {
+    position: Vector2<f64>,
+    deviation: Vector2<f64>,
+}
+
+impl<'a> CameraResidual<'a> {
+    pub fn new(
+        from: &'a Camera,
+        to: &'a Camera,
+        source: &[Vector2<f64>],
+        target: &[Vector2<f64>],
+        options: &'a MatchPointOptions,
+    ) -> Self {
+        let samples = source
+            .iter()
+            .zip(target)
+            .filter_map(|(&position, target)| {
+                from.transfer(to, position).map(|place| Sample { position, deviation: target - place })
+            })
+            .collect();
+        let [x, y] = to.principal_point;
+        let margin = options.max_deviation * 2.0 * x.hypot(y);
+        Self { from, to, samples, options, margin }
+    }
+
+    /// The place of `point` in the other picture; `None` behind its camera or far outside.
+    pub fn at(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
+        let place = self.from.transfer(self.to, point)?;
+        let [x, y] = self.to.principal_point;
+        let near = (place.x - x).abs() <= x + self.margin && (place.y - y).abs() <= y + self.margin;
+        if !near {
+            return None;
+        }
+        let correction = self.correction(point);
+        (correction.norm() <= self.margin).then(|| place + correction)
+    }
+
+    fn correction(&self, point: Vector2<f64>) -> Vector2<f64> {
+        /// Rounds of reweighting.
+        const ROUNDS: usize = 3;
+        /// Deviations from the local trend below this are noise of the matches.
+        const NOISE_PX: f64 = 1.5;
+        /// The slope is drawn towards zero this many times as strongly as the offset (in units of the decay length).
+        const SLOPE_SHRINKAGE: f64 = 4.0;
+        let decay = self.options.decay_px;
+        let kernel: Vec<f64> =
+            self.samples.iter().map(|sample| (-(sample.position - point).norm() / decay).exp()).collect();
+        let mut trend = Matrix3x2::<f64>::zeros();
+        for round in 0..ROUNDS {
+            let shrinkage = self.options.shrinkage;
+            let mut normal = Matrix3::from_diagonal(
+                &(Vector3::new(1.0, SLOPE_SHRINKAGE, SLOPE_SHRINKAGE) * shrinkage.max(f64::EPSILON)),
+            );
+            let mut right = Matrix3x2::zeros();
+            for (sample, &near) in self.samples.iter().zip(&kernel) {
+                let offset = (sample.position - point) / decay;
+                let row = Vector3::new(1.0, offset.x, offset.y);
+                // Without a trend yet, a common deviation would make every match look wrong.
+                let misfit = match round {
+                    0 => 0.0,
+                    _ => (sample.deviation - trend.transpose() * row).norm() / NOISE_PX,
+                };
+                let weight = near / (1.0 + misfit * misfit);
+                normal += row * row.transpose() * weight;
+                right += row * sample.deviation.transpose() * weight;
+            }
+            let Some(factor) = normal.cholesky() else { break };
+            trend = factor.solve(&right);
+        }
+        trend.row(0).transpose()
+    }
+}

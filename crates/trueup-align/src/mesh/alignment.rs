@@ -1,0 +1,77 @@
+//! The alignment energy E_a: match points of overlapping pictures fall on each other.
+
+use nalgebra::Vector2;
+use trueup_core::mesh::GridMesh;
+
+use super::NormalEquations;
+use crate::match_points::OverlapWarp;
+
+/// A grid vertex of one picture and its place in another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MatchPoint {
+    /// The picture whose vertex it is.
+    pub from: usize,
+    /// The vertex.
+    pub vertex: usize,
+    /// The other picture.
+    pub to: usize,
+    /// The place in it, in working pixels.
+    pub place: [f64; 2],
+}
+
+/// Sum over match points of |phi_from(vertex) - phi_to(place)|^2; paper equation for E_a.
+#[derive(Debug)]
+pub struct AlignmentEnergy {
+    points: Vec<MatchPoint>,
+}
+
+impl AlignmentEnergy {
+    /// The match points of all warps. `grids` bound the vertex counts.
+    pub fn new(grids: &[GridMesh], warps: &[OverlapWarp]) -> Self {
+        let points = warps
+            .iter()
+            .flat_map(|warp| {
+                warp.vertices.iter().take(grids[warp.from].len()).enumerate().filter_map(|(vertex, place)| {
+                    place.map(|place| MatchPoint { from: warp.from, vertex, to: warp.to, place })
+                })
+            })
+            .collect();
+        Self { points }
+    }
+
+    /// Adds the energy, each match point weighted by `weight` squared.
+    pub fn add(&self, weight: f64, equations: &mut NormalEquations, grids: &[GridMesh]) {
+        for point in &self.points {
+            let (corners, shares) = grids[point.to].bilinear(Vector2::from(point.place));
+            let to: [(usize, f64); 4] = std::array::from_fn(|k| (corners[k], -shares[k]));
+            equations.add_between((point.from, &[(point.vertex, 1.0)]), (point.to, &to), weight * weight);
+        }
+    }
+
+    /// For every picture and grid cell (row-major), whether a match point lies in it: a vertex carried elsewhere counts
+    /// for the cell to its lower right.
+    pub fn overlap_cells(&self, grids: &[GridMesh]) -> Vec<Vec<bool>> {
+        let mut cells: Vec<Vec<bool>> =
+            grids.iter().map(|grid| vec![false; (grid.rows - 1) * (grid.columns - 1)]).collect();
+        for point in &self.points {
+            let grid = &grids[point.from];
+            let row = (point.vertex / grid.columns).min(grid.rows - 2);
+            let column = (point.vertex % grid.columns).min(grid.columns - 2);
+            cells[point.from][row * (grid.columns - 1) + column] = true;
+        }
+        cells
+    }
+
+    /// Root mean square distance of the two places of a match point in the deformed `meshes`; 0 without match points.
+    pub fn rms(&self, meshes: &[GridMesh]) -> f64 {
+        let sum: f64 = self
+            .points
+            .iter()
+            .map(|point| {
+                let vertex = Vector2::from(meshes[point.from].target[point.vertex]);
+                (vertex - meshes[point.to].warp(Vector2::from(point.place))).norm_squared()
+            })
+            .sum();
+        (sum / self.points.len().max(1) as f64).sqrt()
+    }
+}

@@ -1,0 +1,140 @@
+//! The deformed grids of all pictures: one sparse least-squares problem.
+//!
+//! Energies, one file each: alignment of the overlaps ([`alignment`]), and of the grid's edges ([`similarity`]) local
+//! similarity and agreement with the similarity prior. Unknown are the vertices of all grids in the panorama.
+//!
+//! # Source
+//! Chen and Chuang (2016), section 3; VPG section IV with its global similarity.
+
+mod alignment;
+mod normal_equations;
+mod similarity;
+
+use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
+use trueup_core::mesh::GridMesh;
+use trueup_core::{Error, Result, StageContext};
+
+use crate::match_points::OverlapWarp;
+pub use alignment::{AlignmentEnergy, MatchPoint};
+pub use normal_equations::NormalEquations;
+pub use similarity::{LocalTarget, SimilarityEnergy};
+
+trueup_core::options! {
+    /// How the grids are deformed.
+    pub struct MeshOptions("mesh") {
+        /// Largest side of a grid cell.
+        cell_px: f64 = 40.0, between(4.0, 1000.0), "working px";
+        /// Weight of the alignment of overlaps.
+        alignment_weight: f64 = 1.0, between(0.0, 1000.0), "";
+        /// Weight of local similarity (on residuals).
+        local_weight: f64 = 0.75, between(0.0, 1000.0), "";
+        /// Weight of the similarity prior next to an overlap (on residuals, for 40 px cells).
+        prior_weight: f64 = 6.0, between(0.001, 1000.0), "";
+        /// Growth of that weight with the distance from the overlap, per picture diagonal.
+        prior_slope: f64 = 20.0, between(0.0, 1000.0), "";
+    }
+}
+
+/// The cell size that the published weights belong to.
+pub(crate) const PUBLISHED_CELL_PX: f64 = 40.0;
+
+/// The deformed grids of one component.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WarpedMesh {
+    /// One grid per picture: sources in working pixels, targets in panorama units (about working pixels).
+    pub meshes: Vec<GridMesh>,
+    /// Root mean square distance between the two places of a match point, in panorama units.
+    pub alignment_rms: f64,
+    /// Number of grid triangles turned over (signed area not positive), over all pictures.
+    pub folds: usize,
+    /// Relative gradient |A^T (A x - b)| / |A^T b| of the energy at the solution.
+    pub relative_gradient: f64,
+}
+
+/// Deforms the undeformed `grids` so that overlaps align and every edge follows its `targets` similarity.
+///
+/// * `warps`: match points, two directions a pair; pairs across the cut of a full turn are left out by the caller.
+/// * `targets`: for every picture the similarity wanted along its grid.
+/// * `reference`: the picture whose first vertex stays in place (translation is otherwise free).
+///
+/// # Errors
+/// [`Error::Unsolvable`] if the system is not positive definite or the solution is not finite;
+/// [`Error::Cancelled`].
+pub fn run(
+    grids: &[GridMesh],
+    warps: &[OverlapWarp],
+    targets: &[LocalTarget],
+    reference: usize,
+    options: &MeshOptions,
+    context: &StageContext,
+) -> Result<WarpedMesh> {
+    /// Any positive weight anchors the one free translation exactly; 1 keeps the system well conditioned.
+    const ANCHOR_WEIGHT: f64 = 1.0;
+    context.check_cancelled()?;
+    let mut equations = NormalEquations::new(grids);
+    let alignment = AlignmentEnergy::new(grids, warps);
+    alignment.add(options.alignment_weight, &mut equations, grids);
+    let overlap = alignment.overlap_cells(grids);
+    for (picture, grid) in grids.iter().enumerate() {
+        SimilarityEnergy::new(grid, &targets[picture], &overlap[picture], options).add(picture, &mut equations);
+    }
+    let anchored = anchors(grids.len(), warps, reference);
+    for picture in anchored {
+        equations.anchor(picture, ANCHOR_WEIGHT);
+    }
+    context.check_cancelled()?;
+    let unsolvable = |why: &str| {
+        Error::unsolvable(
+            "mesh",
+            "the panorama's grid",
+            why,
+            "Raise mesh.prior_weight, or leave out pictures that hardly overlap.",
+        )
+    };
+    let solution = equations.solve().ok_or_else(|| unsolvable("the equations are not positive definite"))?;
+    let relative_gradient = equations.relative_gradient(&solution);
+    if !solution.iter().all(|coordinate| coordinate.is_finite()) {
+        return Err(unsolvable("the solution is not finite"));
+    }
+    let meshes = equations.meshes(grids, &solution);
+    let alignment_rms = alignment.rms(&meshes);
+    let folds = meshes.iter().map(count_folds).sum();
+    Ok(WarpedMesh { meshes, alignment_rms, folds, relative_gradient })
+}
+
+/// One picture of every part that the warps connect: the reference where it is a member, else the first.
+fn anchors(pictures: usize, warps: &[OverlapWarp], reference: usize) -> Vec<usize> {
+    let mut union = petgraph::unionfind::UnionFind::<usize>::new(pictures);
+    for warp in warps.iter().filter(|warp| warp.vertices.iter().any(Option::is_some)) {
+        union.union(warp.from, warp.to);
+    }
+    let labels = union.into_labeling();
+    let mut anchored: Vec<usize> = Vec::new();
+    for picture in std::iter::once(reference).chain(0..pictures) {
+        if picture < pictures && !anchored.iter().any(|&other| labels[other] == labels[picture]) {
+            anchored.push(picture);
+        }
+    }
+    anchored
+}
+
+/// Triangles of the grid with a signed area that is not positive.
+pub fn count_folds(mesh: &GridMesh) -> usize {
+    let vertex = |row: usize, column: usize| Vector2::from(mesh.target[row * mesh.columns + column]);
+    let mut folds = 0;
+    for row in 0..mesh.rows - 1 {
+        for column in 0..mesh.columns - 1 {
+            let top_left = vertex(row, column);
+            let bottom_right = vertex(row + 1, column + 1) - top_left;
+            let top_right = vertex(row, column + 1) - top_left;
+            let bottom_left = vertex(row + 1, column) - top_left;
+            folds += usize::from(top_right.perp(&bottom_right) <= 0.0);
+            folds += usize::from(bottom_right.perp(&bottom_left) <= 0.0);
+        }
+    }
+    folds
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,234 @@
+//! Normal equations of the mesh: assembled block by block, solved by sparse Cholesky.
+
+use faer::linalg::solvers::Solve;
+use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::sparse::{SparseColMat, SymbolicSparseColMat};
+use nalgebra::Vector2;
+use trueup_core::mesh::GridMesh;
+
+/// Largest distance, in grid steps along an axis, of two vertices that one energy row couples.
+const REACH: usize = 3;
+const SPAN: usize = 2 * REACH + 1;
+/// Couplings of a vertex with itself and with vertices before it in row-major order.
+const SLOTS: usize = (REACH + 1) * SPAN;
+
+/// Coefficient of a vertex in a residual, as the complex factor c + i s acting on x + i y: the rotation-scaling
+/// [[c, -s], [s, c]]. All energies of the grid are linear in this sense.
+pub type Coefficient = Vector2<f64>;
+
+/// A 2 x 2 block [[a, b], [c, d]] of the normal matrix, row-major.
+type Block = [f64; 4];
+
+/// A^T A and A^T b of a least-squares problem in the vertices of several grids.
+///
+/// Unknown 2 v is the x and 2 v + 1 the y coordinate of vertex v, vertices numbered through all grids, row-major in
+/// each. Couplings inside a grid reach a few vertices only and live in tables; couplings between grids in a list.
+#[derive(Debug)]
+pub struct NormalEquations {
+    /// First vertex of every grid, and the total at the end.
+    first: Vec<usize>,
+    columns: Vec<usize>,
+    inside: Vec<[Block; SLOTS]>,
+    /// (larger vertex, smaller vertex, block), unsorted.
+    between: Vec<(u32, u32, Block)>,
+    right: Vec<f64>,
+}
+
+impl NormalEquations {
+    /// Empty equations for the vertices of `grids`.
+    pub fn new(grids: &[GridMesh]) -> Self {
+        let mut first = vec![0];
+        for grid in grids {
+            first.push(first[first.len() - 1] + grid.len());
+        }
+        let vertices = first[grids.len()];
+        Self {
+            first,
+            columns: grids.iter().map(|grid| grid.columns).collect(),
+            inside: vec![[[0.0; 4]; SLOTS]; vertices],
+            between: Vec::new(),
+            right: vec![0.0; 2 * vertices],
+        }
+    }
+
+    /// Number of scalar unknowns.
+    pub fn unknowns(&self) -> usize {
+        self.right.len()
+    }
+
+    /// Adds |sum_m coefficient_m v_m - value|^2 for vertices `members` of grid `picture`, which lie within three grid
+    /// steps of each other.
+    pub fn add_inside(&mut self, picture: usize, members: &[(usize, Coefficient)], value: Vector2<f64>) {
+        let first = self.first[picture];
+        for &(m, factor_m) in members {
+            let gradient = conjugate_product(factor_m, value);
+            self.right[2 * (first + m)] += gradient.x;
+            self.right[2 * (first + m) + 1] += gradient.y;
+            for &(n, factor_n) in members {
+                if n <= m {
+                    let product = conjugate_product(factor_m, factor_n);
+                    self.add_block_inside(picture, m, n, [product.x, -product.y, product.y, product.x]);
+                }
+            }
+        }
+    }
+
+    /// Adds |sum_m weight_m v_m|^2 for vertices of two different grids with real weights; the first `(picture, vertex)`
+    /// list and the second must belong to one grid each.
+    pub fn add_between(
+        &mut self,
+        first: (usize, &[(usize, f64)]),
+        second: (usize, &[(usize, f64)]),
+        squared_weight: f64,
+    ) {
+        for (picture, members) in [first, second] {
+            for &(m, weight_m) in members {
+                for &(n, weight_n) in members {
+                    if n <= m {
+                        let product = squared_weight * weight_m * weight_n;
+                        self.add_block_inside(picture, m, n, [product, 0.0, 0.0, product]);
+                    }
+                }
+            }
+        }
+        for &(m, weight_m) in first.1 {
+            for &(n, weight_n) in second.1 {
+                let product = squared_weight * weight_m * weight_n;
+                let (one, other) = (self.first[first.0] + m, self.first[second.0] + n);
+                let block = [product, 0.0, 0.0, product];
+                self.between.push((one.max(other) as u32, one.min(other) as u32, block));
+            }
+        }
+    }
+
+    /// Adds weight |v - source place|^2 for the first vertex of grid `picture`, whose source is (0, 0).
+    pub fn anchor(&mut self, picture: usize, weight: f64) {
+        self.add_block_inside(picture, 0, 0, [weight, 0.0, 0.0, weight]);
+    }
+
+    /// The least-squares solution, or `None` if the matrix is not positive definite.
+    pub fn solve(&self) -> Option<Vec<f64>> {
+        let matrix = self.matrix()?;
+        let symbolic = SymbolicLlt::try_new(matrix.symbolic(), faer::Side::Lower).ok()?;
+        let factor = Llt::try_new_with_symbolic(symbolic, matrix.as_ref(), faer::Side::Lower).ok()?;
+        let right = faer::Mat::from_fn(self.unknowns(), 1, |row, _| self.right[row]);
+        let mut solution = factor.solve(&right);
+        // One step of refinement recovers the digits that the normal equations lose.
+        let residual = &right - self.multiply(&matrix, &solution);
+        solution += factor.solve(&residual);
+        Some((0..self.unknowns()).map(|row| solution[(row, 0)]).collect())
+    }
+
+    /// |A^T A x - A^T b| / |A^T b|.
+    pub fn relative_gradient(&self, solution: &[f64]) -> f64 {
+        let Some(matrix) = self.matrix() else { return f64::INFINITY };
+        let x = faer::Mat::from_fn(solution.len(), 1, |row, _| solution[row]);
+        let product = self.multiply(&matrix, &x);
+        let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>().sqrt();
+        let gradient = norm(&mut (0..self.unknowns()).map(|row| product[(row, 0)] - self.right[row]));
+        gradient / norm(&mut self.right.iter().copied()).max(f64::MIN_POSITIVE)
+    }
+
+    /// The grids with the solution as their targets.
+    pub fn meshes(&self, grids: &[GridMesh], solution: &[f64]) -> Vec<GridMesh> {
+        grids
+            .iter()
+            .enumerate()
+            .map(|(picture, grid)| {
+                let first = self.first[picture];
+                let target = (first..first + grid.len()).map(|v| [solution[2 * v], solution[2 * v + 1]]).collect();
+                GridMesh { target, ..grid.clone() }
+            })
+            .collect()
+    }
+
+    fn add_block_inside(&mut self, picture: usize, m: usize, n: usize, block: Block) {
+        let columns = self.columns[picture];
+        let (m_row, m_column) = (m / columns, m % columns);
+        let (n_row, n_column) = (n / columns, n % columns);
+        let slot = (m_row - n_row) * SPAN + (m_column + REACH - n_column);
+        let entry = &mut self.inside[self.first[picture] + m][slot];
+        for (sum, value) in entry.iter_mut().zip(block) {
+            *sum += value;
+        }
+    }
+
+    /// All blocks (row vertex >= column vertex), sorted by column, then row; couplings between grids merged in the order
+    /// in which they were added.
+    fn blocks(&self) -> Vec<(u32, u32, Block)> {
+        let mut blocks = Vec::with_capacity(self.inside.len() * SLOTS / 2 + self.between.len());
+        for (picture, &columns) in self.columns.iter().enumerate() {
+            let first = self.first[picture];
+            for vertex in first..self.first[picture + 1] {
+                for (slot, block) in self.inside[vertex].iter().enumerate() {
+                    if *block != [0.0; 4] {
+                        let back = (slot / SPAN) * columns + slot % SPAN;
+                        blocks.push((vertex as u32, (vertex + REACH - back) as u32, *block));
+                    }
+                }
+            }
+        }
+        let mut between = self.between.clone();
+        between.sort_by_key(|&(row, column, _)| (column, row));
+        for (row, column, block) in between {
+            match blocks.last_mut() {
+                Some(last) if (last.0, last.1) == (row, column) => {
+                    for (sum, value) in last.2.iter_mut().zip(block) {
+                        *sum += value;
+                    }
+                }
+                _ => blocks.push((row, column, block)),
+            }
+        }
+        blocks.sort_unstable_by_key(|&(row, column, _)| (column, row));
+        blocks
+    }
+
+    /// The lower triangle as a sparse matrix.
+    fn matrix(&self) -> Option<SparseColMat<usize, f64>> {
+        let blocks = self.blocks();
+        let unknowns = self.unknowns();
+        let mut column_starts = Vec::with_capacity(unknowns + 1);
+        let mut rows = Vec::with_capacity(4 * blocks.len());
+        let mut values = Vec::with_capacity(4 * blocks.len());
+        column_starts.push(0);
+        for group in blocks.chunk_by(|one, other| one.1 == other.1) {
+            for side in 0..2 {
+                for &(row, column, block) in group {
+                    let row = row as usize;
+                    if row != column as usize || side == 0 {
+                        rows.push(2 * row);
+                        values.push(block[side]);
+                    }
+                    rows.push(2 * row + 1);
+                    values.push(block[2 + side]);
+                }
+                column_starts.push(rows.len());
+            }
+        }
+        // Every vertex has at least its own block, so that no column is skipped.
+        (column_starts.len() == unknowns + 1).then(|| {
+            let pattern = SymbolicSparseColMat::new_checked(unknowns, unknowns, column_starts, None, rows);
+            SparseColMat::new(pattern, values)
+        })
+    }
+
+    /// The product of the symmetric matrix, given by its lower triangle, with a column.
+    fn multiply(&self, lower: &SparseColMat<usize, f64>, x: &faer::Mat<f64>) -> faer::Mat<f64> {
+        let mut product = faer::Mat::<f64>::zeros(self.unknowns(), 1);
+        for column in 0..self.unknowns() {
+            for (row, value) in lower.row_idx_of_col(column).zip(lower.val_of_col(column)) {
+                product[(row, 0)] += value * x[(column, 0)];
+                if row != column {
+                    product[(column, 0)] += value * x[(row, 0)];
+                }
+            }
+        }
+        product
+    }
+}
+
+/// conj(a) b of complex numbers.
+fn conjugate_product(a: Vector2<f64>, b: Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(a.x * b.x + a.y * b.y, a.x * b.y - a.y * b.x)
+}

@@ -1,0 +1,172 @@
+//! The energies of grid edges: E_l keeps every edge in a similarity with its neighbourhood, E_g draws that similarity to
+//! the prior's scale and rotation.
+
+use nalgebra::Vector2;
+use trueup_core::mesh::GridMesh;
+
+use super::normal_equations::Coefficient;
+use super::{MeshOptions, NormalEquations, PUBLISHED_CELL_PX};
+
+/// The similarity wanted of one picture.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LocalTarget {
+    /// One similarity for the whole picture: s (cos theta, sin theta). The paper's (s_i, theta_i).
+    Uniform(Vector2<f64>),
+    /// A similarity for every vertex of the grid, row-major; an edge takes the mean of its ends.
+    PerVertex(Vec<Vector2<f64>>),
+}
+
+impl LocalTarget {
+    /// A uniform similarity of scale `scale` and clockwise rotation `theta` (radians).
+    pub fn uniform(scale: f64, theta: f64) -> Self {
+        Self::Uniform(Vector2::new(scale * theta.cos(), scale * theta.sin()))
+    }
+
+    fn along(&self, a: usize, b: usize) -> Vector2<f64> {
+        match self {
+            Self::Uniform(similarity) => *similarity,
+            Self::PerVertex(similarities) => 0.5 * (similarities[a] + similarities[b]),
+        }
+    }
+}
+
+/// E_l and E_g of one picture.
+///
+/// For an edge from a to b the neighbourhood is the 4-neighbours of a and of b without a. The similarity c + i s that
+/// maps the undeformed differences from a to the deformed ones best is linear in the vertices:
+/// sum_m conj(d_m) (v_m - v_a) / sum |d_m|^2 with complex numbers for points of the plane.
+#[derive(Debug)]
+pub struct SimilarityEnergy<'a> {
+    grid: &'a GridMesh,
+    target: &'a LocalTarget,
+    local_weight: f64,
+    /// Weight of the prior for every cell, row-major.
+    cell_weights: Vec<f64>,
+}
+
+impl<'a> SimilarityEnergy<'a> {
+    /// `overlap` tells for every cell whether match points lie in it: the prior's weight grows with the distance to the
+    /// nearest such cell.
+    ///
+    /// # Departures
+    /// The distance is the exact one to the nearest cell with match points; the published code propagates it from cell
+    /// to cell, which can miss the nearest.
+    pub fn new(grid: &'a GridMesh, target: &'a LocalTarget, overlap: &[bool], options: &MeshOptions) -> Self {
+        let columns = grid.columns - 1;
+        let centre = |cell: usize| {
+            Vector2::new(
+                ((cell % columns) as f64 + 0.5) * grid.cell_width(),
+                ((cell / columns) as f64 + 0.5) * grid.cell_height(),
+            )
+        };
+        let bearing: Vec<Vector2<f64>> = (0..overlap.len()).filter(|&cell| overlap[cell]).map(centre).collect();
+        let diagonal = grid.width.hypot(grid.height);
+        // The published weights belong to 40 px cells: E_g has no unit, the other energies are in pixels.
+        let unit = options.cell_px / PUBLISHED_CELL_PX;
+        let cell_weights = (0..overlap.len())
+            .map(|cell| {
+                let here = centre(cell);
+                let nearest = bearing.iter().map(|other| (other - here).norm()).min_by(f64::total_cmp);
+                unit * (options.prior_weight + options.prior_slope * nearest.unwrap_or(0.0) / diagonal)
+            })
+            .collect();
+        Self { grid, target, local_weight: options.local_weight, cell_weights }
+    }
+
+    /// Adds both energies for every edge of the grid of `picture`.
+    pub fn add(&self, picture: usize, equations: &mut NormalEquations) {
+        let (rows, columns) = (self.grid.rows, self.grid.columns);
+        for row in 0..rows {
+            for column in 0..columns {
+                let a = row * columns + column;
+                if column + 1 < columns {
+                    let weight = self.mean_weight(row.checked_sub(1), Some(row), Some(column), Some(column));
+                    self.add_edge(picture, a, a + 1, weight, equations);
+                }
+                if row + 1 < rows {
+                    let weight = self.mean_weight(Some(row), Some(row), column.checked_sub(1), Some(column));
+                    self.add_edge(picture, a, a + columns, weight, equations);
+                }
+            }
+        }
+    }
+
+    /// Mean weight of the one or two cells that share an edge; cells outside the grid do not count.
+    fn mean_weight(
+        &self,
+        row: Option<usize>,
+        other_row: Option<usize>,
+        column: Option<usize>,
+        other_column: Option<usize>,
+    ) -> f64 {
+        let columns = self.grid.columns - 1;
+        let weight = |row: Option<usize>, column: Option<usize>| match (row, column) {
+            (Some(row), Some(column)) if row + 1 < self.grid.rows && column < columns => {
+                self.cell_weights.get(row * columns + column).copied()
+            }
+            _ => None,
+        };
+        let (first, second) = (weight(row, column), weight(other_row, other_column));
+        match (first, second) {
+            (Some(one), Some(other)) => 0.5 * (one + other),
+            (one, other) => one.or(other).unwrap_or_default(),
+        }
+    }
+
+    fn add_edge(&self, picture: usize, a: usize, b: usize, weight: f64, equations: &mut NormalEquations) {
+        let neighbourhood = self.neighbourhood(a, b);
+        let origin = self.grid.source(a);
+        let difference = |m: usize| self.grid.source(m) - origin;
+        let total: f64 = neighbourhood.iter().map(|&m| difference(m).norm_squared()).sum();
+        let mut similarity: Vec<(usize, Coefficient)> = Vec::with_capacity(neighbourhood.len() + 1);
+        let mut at_origin = Vector2::zeros();
+        for &m in &neighbourhood {
+            let d = difference(m);
+            let factor = Vector2::new(d.x, -d.y) / total;
+            similarity.push((m, factor));
+            at_origin -= factor;
+        }
+        similarity.push((a, at_origin));
+
+        let edge = difference(b);
+        let local: Vec<(usize, Coefficient)> = similarity
+            .iter()
+            .map(|&(m, factor)| {
+                let mut coefficient = -product(edge, factor);
+                if m == b {
+                    coefficient.x += 1.0;
+                } else if m == a {
+                    coefficient.x -= 1.0;
+                }
+                (m, coefficient * self.local_weight)
+            })
+            .collect();
+        equations.add_inside(picture, &local, Vector2::zeros());
+        for (_, factor) in &mut similarity {
+            *factor *= weight;
+        }
+        equations.add_inside(picture, &similarity, self.target.along(a, b) * weight);
+    }
+
+    /// The 4-neighbours of a and b without a, ascending, each once.
+    fn neighbourhood(&self, a: usize, b: usize) -> Vec<usize> {
+        let (rows, columns) = (self.grid.rows, self.grid.columns);
+        let mut found = Vec::with_capacity(8);
+        for vertex in [a, b] {
+            let (row, column) = (vertex / columns, vertex % columns);
+            found.extend((row > 0).then(|| vertex - columns));
+            found.extend((column > 0).then(|| vertex - 1));
+            found.extend((column + 1 < columns).then_some(vertex + 1));
+            found.extend((row + 1 < rows).then_some(vertex + columns));
+        }
+        found.sort_unstable();
+        found.dedup();
+        found.retain(|&vertex| vertex != a);
+        found
+    }
+}
+
+/// a b of complex numbers.
+fn product(a: Vector2<f64>, b: Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x)
+}

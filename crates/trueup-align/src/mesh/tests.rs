@@ -1,0 +1,114 @@
+//! Whole-stage tests on synthetic grids.
+
+use nalgebra::Matrix3;
+use proptest::prelude::*;
+use trueup_core::camera::Camera;
+use trueup_core::geometry::{rotation_about_y, rotation_about_z};
+
+use super::*;
+
+/// Rotation of the similarity that maps a grid best onto its target, in degrees.
+fn rotation_deg(mesh: &GridMesh) -> f64 {
+    let count = mesh.len() as f64;
+    let source: Vec<Vector2<f64>> = (0..mesh.len()).map(|k| mesh.source(k)).collect();
+    let target: Vec<Vector2<f64>> = mesh.target.iter().map(|&v| Vector2::from(v)).collect();
+    let (source_mean, target_mean) =
+        (source.iter().sum::<Vector2<f64>>() / count, target.iter().sum::<Vector2<f64>>() / count);
+    let (mut cross, mut dot) = (0.0, 0.0);
+    for (s, t) in source.iter().zip(&target) {
+        cross += (s - source_mean).perp(&(t - target_mean));
+        dot += (s - source_mean).dot(&(t - target_mean));
+    }
+    cross.atan2(dot).to_degrees()
+}
+
+/// Two 400 x 300 pictures 20 degrees apart, rolled by 5 and 17 degrees, as in the numeric check of the specification.
+fn two_pictures() -> (Vec<GridMesh>, Vec<OverlapWarp>) {
+    let camera = |yaw: f64, roll: f64| {
+        let world_from_camera = rotation_about_y(yaw.to_radians()) * rotation_about_z(roll.to_radians());
+        Camera::new(400.0, 400.0, 300.0, &world_from_camera.transpose())
+    };
+    let cameras = [camera(0.0, 5.0), camera(20.0, 17.0)];
+    let grids = vec![GridMesh::regular(400.0, 300.0, 50.0); 2];
+    let warps = [(0, 1), (1, 0)]
+        .map(|(from, to)| OverlapWarp {
+            from,
+            to,
+            vertices: (0..grids[0].len())
+                .map(|vertex| {
+                    let place = cameras[from].transfer(&cameras[to], grids[from].source(vertex))?;
+                    ((0.0..=400.0).contains(&place.x) && (0.0..=300.0).contains(&place.y)).then_some(place.into())
+                })
+                .collect(),
+        })
+        .to_vec();
+    (grids, warps)
+}
+
+fn options() -> MeshOptions {
+    MeshOptions { prior_slope: 0.0, cell_px: PUBLISHED_CELL_PX, ..MeshOptions::default() }
+}
+
+fn solve(thetas_deg: [f64; 2]) -> WarpedMesh {
+    let (grids, warps) = two_pictures();
+    let targets = thetas_deg.map(|theta| LocalTarget::uniform(1.0, theta.to_radians()));
+    run(&grids, &warps, &targets, 0, &options(), &StageContext::default()).expect("solvable")
+}
+
+/// Expected values: numeric check 11 of the specification (5.13, 16.95 degrees; 0.306 px mean residual).
+#[test]
+fn two_rolled_pictures_turn_by_their_rolls() {
+    let warped = solve([5.0, 17.0]);
+    let rotations = [rotation_deg(&warped.meshes[0]), rotation_deg(&warped.meshes[1])];
+    assert!((rotations[0] - 5.13).abs() < 0.02 && (rotations[1] - 16.95).abs() < 0.02, "{rotations:?}");
+    assert!(warped.alignment_rms < 0.6);
+    assert_eq!(warped.folds, 0);
+}
+
+/// With the opposite sign the prior fights the alignment: the recovered rotations are far from what was asked.
+#[test]
+fn the_sign_of_theta_matters() {
+    let warped = solve([-5.0, -17.0]);
+    assert!((rotation_deg(&warped.meshes[0]) + 14.29).abs() < 0.05);
+    assert!((rotation_deg(&warped.meshes[1]) + 7.66).abs() < 0.05);
+}
+
+#[test]
+fn the_gradient_vanishes_at_the_solution() {
+    assert!(solve([5.0, 17.0]).relative_gradient < 1e-9);
+}
+
+#[test]
+fn parts_without_match_points_are_anchored_each() {
+    let grids = vec![GridMesh::regular(200.0, 100.0, 50.0); 2];
+    let targets = [LocalTarget::uniform(1.0, 0.0), LocalTarget::uniform(2.0, 0.0)];
+    let warped = run(&grids, &[], &targets, 1, &options(), &StageContext::default()).expect("solvable");
+    let (low, high) = warped.meshes[1].bounds();
+    assert!((high - low - Vector2::new(400.0, 200.0)).norm() < 1e-6);
+}
+
+#[test]
+fn a_turned_over_cell_is_counted() {
+    let mut mesh = GridMesh::regular(100.0, 100.0, 50.0);
+    assert_eq!(count_folds(&mesh), 0);
+    mesh.target[4] = [200.0, 50.0];
+    assert!(count_folds(&mesh) > 0);
+}
+
+proptest! {
+    /// A picture alone takes exactly the similarity it is asked for.
+    #[test]
+    fn a_single_picture_is_an_exact_similarity(scale in 0.3..3.0_f64, theta in -3.0..3.0_f64) {
+        let grid = GridMesh::regular(330.0, 250.0, 40.0);
+        let target = LocalTarget::uniform(scale, theta);
+        let warped = run(std::slice::from_ref(&grid), &[], &[target], 0, &options(), &StageContext::default())
+            .expect("solvable");
+        let turn = rotation_about_z(theta);
+        let similarity: Matrix3<f64> = turn * scale;
+        for vertex in 0..grid.len() {
+            let source = grid.source(vertex);
+            let wanted = similarity.fixed_view::<2, 2>(0, 0) * source;
+            prop_assert!((Vector2::from(warped.meshes[0].target[vertex]) - wanted).norm() < 1e-6);
+        }
+    }
+}
