@@ -1,0 +1,99 @@
+//! Photographs in files, each decoded once where memory allows.
+
+use std::sync::{Mutex, PoisonError};
+
+use trueup_core::raster::Photograph;
+use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
+use trueup_core::{Error, Result};
+
+use super::{WorkingPicture, photograph, reduce_photograph};
+
+/// Photographs in files. What [`working`](Self::working) decodes is kept, within a budget of bytes, until
+/// [`photograph`](PhotographSource::photograph) asks for it, so that a small set is decoded once.
+///
+/// The budget decides only how often files are decoded, never what is returned.
+#[derive(Debug)]
+pub struct FilePhotographs {
+    images: Vec<SourceImage>,
+    kept: Mutex<Kept>,
+}
+
+/// Decoded photographs by index, and the bytes that may still be kept.
+#[derive(Debug)]
+struct Kept {
+    photographs: Vec<Option<Photograph>>,
+    free_bytes: usize,
+}
+
+impl FilePhotographs {
+    /// Over `images`, keeping at most `cache_bytes` bytes of decoded pixels; 0 keeps none.
+    pub fn new(images: Vec<SourceImage>, cache_bytes: usize) -> Self {
+        let photographs = images.iter().map(|_| None).collect();
+        Self { images, kept: Mutex::new(Kept { photographs, free_bytes: cache_bytes }) }
+    }
+
+    /// The photographs this hands out, in order.
+    pub fn images(&self) -> &[SourceImage] {
+        &self.images
+    }
+
+    /// Decodes photograph `index` and reduces it as [`working`](super::working) does; keeps the photograph if it fits.
+    ///
+    /// # Errors
+    /// As [`working`](super::working); [`Error::Input`] if there is no photograph `index`.
+    pub fn working(&self, index: usize, frame: &WorkingFrame, thumbnail_max_area: f64) -> Result<WorkingPicture> {
+        let image = self.image(index)?;
+        let photograph = photograph(image)?;
+        let working = reduce_photograph(&photograph, &image.name, frame, thumbnail_max_area)?;
+        self.keep(index, photograph);
+        Ok(working)
+    }
+
+    /// Forgets photograph `index` if it is kept: for those that will not be asked for again.
+    pub fn forget(&self, index: usize) {
+        drop(self.take(index));
+    }
+
+    fn image(&self, index: usize) -> Result<&SourceImage> {
+        self.images.get(index).ok_or_else(|| {
+            let reason = format!("there are only {} photographs", self.images.len());
+            Error::input(format!("photograph number {index}"), reason, "Ask for one of them.")
+        })
+    }
+
+    fn keep(&self, index: usize, photograph: Photograph) {
+        let bytes = byte_size(&photograph);
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let Kept { photographs, free_bytes } = &mut *kept;
+        let Some(place) = photographs.get_mut(index) else { return };
+        if place.is_none() && bytes <= *free_bytes {
+            *free_bytes -= bytes;
+            *place = Some(photograph);
+        }
+    }
+
+    fn take(&self, index: usize) -> Option<Photograph> {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let photograph = kept.photographs.get_mut(index)?.take()?;
+        kept.free_bytes += byte_size(&photograph);
+        Some(photograph)
+    }
+}
+
+impl PhotographSource for FilePhotographs {
+    /// Hands out a kept photograph, which is then no longer kept, or decodes the file.
+    fn photograph(&self, index: usize) -> Result<Photograph> {
+        let image = self.image(index)?;
+        match self.take(index) {
+            Some(photograph) => Ok(photograph),
+            None => photograph(image),
+        }
+    }
+}
+
+fn byte_size(photograph: &Photograph) -> usize {
+    match photograph {
+        Photograph::Eight(raster) => size_of_val(raster.data()),
+        Photograph::Sixteen(raster) => size_of_val(raster.data()),
+    }
+}

@@ -1,0 +1,112 @@
+//! Pixels from files: whole photographs, and the reduced pictures that measurement works on.
+
+mod codecs;
+mod files;
+mod orientation;
+mod reduce;
+#[cfg(test)]
+mod tests;
+
+use trueup_core::raster::{Photograph, Raster};
+use trueup_core::source::{SourceImage, WorkingFrame};
+use trueup_core::{Error, Result};
+
+pub(crate) use codecs::jpeg_options;
+pub use files::FilePhotographs;
+
+/// Rec. 601 luma weights of red, green and blue, applied to encoded values.
+///
+/// # Source
+/// ITU-R BT.601-7, section 2.5.1.
+const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
+
+/// A photograph reduced to the sizes that measurement works on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorkingPicture {
+    /// Rec. 601 luma of the encoded values, 0 to 255, one channel: the whole pixels inside the working frame.
+    pub gray: Raster<f32>,
+    /// A small RGB picture for comparing colours and for reports: the whole pixels inside `thumbnail_frame`.
+    pub thumbnail: Raster<u8>,
+    /// Size and scale of the thumbnail; its corner is the photograph's corner, like that of the working frame.
+    pub thumbnail_frame: WorkingFrame,
+}
+
+/// Decodes a photograph in full size, upright.
+///
+/// Gray stays one channel; gray with alpha becomes RGBA; palettes, CMYK and one-bit pictures become RGB or gray;
+/// 16 bits a sample stay 16; floating point is clamped to [0, 1] and becomes 16 bits.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read, [`Error::Input`] if its pixels are damaged or incomplete (no missing part
+/// is tolerated), of an unsupported kind, or no longer of the size that was found when it was examined.
+pub fn photograph(image: &SourceImage) -> Result<Photograph> {
+    Ok(match codecs::decode_stored(image)? {
+        Photograph::Eight(raster) => Photograph::Eight(orientation::upright(raster, image.orientation)),
+        Photograph::Sixteen(raster) => Photograph::Sixteen(orientation::upright(raster, image.orientation)),
+    })
+}
+
+/// Decodes a photograph and reduces it to the working frame and to a thumbnail of at most `thumbnail_max_area` pixels.
+///
+/// # Errors
+/// As [`photograph`]; [`Error::Input`] if `frame` is not a frame of this photograph.
+pub fn working(image: &SourceImage, frame: &WorkingFrame, thumbnail_max_area: f64) -> Result<WorkingPicture> {
+    reduce_photograph(&photograph(image)?, &image.name, frame, thumbnail_max_area)
+}
+
+/// Reduces a decoded photograph by exact area averaging: every working pixel is the mean of the full pixels under it,
+/// each weighted by the area it covers, so that `working = working_from_full * full` holds without any shift.
+/// Transparent parts count as black. Where nothing is to be reduced, the values are those of the photograph.
+///
+/// # Errors
+/// [`Error::Input`] if `frame` is not a frame of a picture of this size.
+pub fn reduce_photograph(
+    photograph: &Photograph,
+    name: &str,
+    frame: &WorkingFrame,
+    thumbnail_max_area: f64,
+) -> Result<WorkingPicture> {
+    let (width, height) = (photograph.width(), photograph.height());
+    let scale = frame.working_from_full;
+    let fits = |working: f64, full: usize| (working - full as f64 * scale).abs() <= 0.5;
+    if !(scale > 0.0 && scale <= 1.0 && fits(frame.width, width) && fits(frame.height, height)) {
+        return Err(Error::input(
+            name,
+            format!("it has {width} x {height} px, which does not belong to a working frame of {frame:?}"),
+            "Make the frame from the photograph's own size.",
+        ));
+    }
+    // A thumbnail of no area would have no scale; one pixel is the least.
+    let thumbnail_frame = WorkingFrame::new(width, height, thumbnail_max_area.max(1.0));
+    let (colors, thumbnail) = match photograph {
+        Photograph::Eight(raster) => {
+            (reduce::area_average(raster, frame), reduce::area_average(raster, &thumbnail_frame))
+        }
+        Photograph::Sixteen(raster) => {
+            (reduce::area_average(raster, frame), reduce::area_average(raster, &thumbnail_frame))
+        }
+    };
+    Ok(WorkingPicture { gray: luma(colors)?, thumbnail: rgb8(&thumbnail)?, thumbnail_frame })
+}
+
+/// The luma of a gray or RGB picture.
+fn luma(colors: Raster<f32>) -> Result<Raster<f32>> {
+    if colors.channels() == 1 {
+        return Ok(colors);
+    }
+    let (pixels, _) = colors.data().as_chunks::<3>();
+    let gray = pixels.iter().map(|[r, g, b]| LUMA[0] * r + LUMA[1] * g + LUMA[2] * b).collect();
+    Raster::from_data(colors.width(), colors.height(), 1, gray)
+}
+
+/// A gray or RGB picture as rounded 8-bit RGB.
+fn rgb8(colors: &Raster<f32>) -> Result<Raster<u8>> {
+    // The addition rounds; the conversion truncates and saturates.
+    let rounded = |value: f32| (value + 0.5) as u8;
+    let data = if colors.channels() == 1 {
+        colors.data().iter().flat_map(|&gray| [rounded(gray); 3]).collect()
+    } else {
+        colors.data().iter().map(|&value| rounded(value)).collect()
+    };
+    Raster::from_data(colors.width(), colors.height(), 3, data)
+}

@@ -1,0 +1,125 @@
+//! The EXIF fields that matter here, read alike from a TIFF's own directories and from an embedded EXIF block.
+
+use std::io::{Read, Seek};
+
+use exif::{Exif, In, Tag, Value};
+use tiff::decoder::Decoder;
+use tiff::decoder::ifd::Value as TiffValue;
+use tiff::tags::Tag as TiffTag;
+
+/// EXIF 3.0 tag numbers read from a TIFF's EXIF directory (section 4.6).
+const FOCAL_LENGTH: u16 = 0x920a;
+const PIXEL_X_DIMENSION: u16 = 0xa002;
+const PIXEL_Y_DIMENSION: u16 = 0xa003;
+const FOCAL_PLANE_X_RESOLUTION: u16 = 0xa20e;
+const FOCAL_PLANE_RESOLUTION_UNIT: u16 = 0xa210;
+const FOCAL_LENGTH_IN_35MM_FILM: u16 = 0xa405;
+
+/// EXIF fields as written, unjudged: numbers may be zero, infinite or absurd.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct ExifFields {
+    /// Orientation, 1 to 8 where valid.
+    pub(crate) orientation: Option<u32>,
+    /// PixelXDimension, pixels. Tools that reduce a picture often leave it at the original's size.
+    pub(crate) pixel_width: Option<f64>,
+    /// PixelYDimension, pixels.
+    pub(crate) pixel_height: Option<f64>,
+    /// FocalLength, millimetres.
+    pub(crate) focal_mm: Option<f64>,
+    /// FocalLengthIn35mmFilm, millimetres.
+    pub(crate) focal_35mm: Option<f64>,
+    /// FocalPlaneXResolution, pixels per unit.
+    pub(crate) focal_plane_resolution: Option<f64>,
+    /// FocalPlaneResolutionUnit: 2 inch (also where absent), 3 centimetre, 4 millimetre, 5 micrometre.
+    pub(crate) focal_plane_unit: Option<u32>,
+    /// Make, trimmed.
+    pub(crate) make: Option<String>,
+    /// Model, trimmed.
+    pub(crate) model: Option<String>,
+}
+
+impl ExifFields {
+    /// The fields of an EXIF block.
+    pub(crate) fn from_exif(exif: &Exif) -> Self {
+        let value = |tag| exif.get_field(tag, In::PRIMARY).map(|field| &field.value);
+        let number = |tag| value(tag).and_then(first_number);
+        let text = |tag| match value(tag)? {
+            Value::Ascii(lines) => trimmed(&String::from_utf8_lossy(lines.first()?)),
+            _ => None,
+        };
+        Self {
+            orientation: value(Tag::Orientation).and_then(|value| value.get_uint(0)),
+            pixel_width: number(Tag::PixelXDimension),
+            pixel_height: number(Tag::PixelYDimension),
+            focal_mm: number(Tag::FocalLength),
+            focal_35mm: number(Tag::FocalLengthIn35mmFilm),
+            focal_plane_resolution: number(Tag::FocalPlaneXResolution),
+            focal_plane_unit: value(Tag::FocalPlaneResolutionUnit).and_then(|value| value.get_uint(0)),
+            make: text(Tag::Make),
+            model: text(Tag::Model),
+        }
+    }
+
+    /// The fields of a TIFF's first directory and of the EXIF directory it points to.
+    pub(crate) fn from_tiff<R: Read + Seek>(decoder: &mut Decoder<R>) -> Option<Self> {
+        let text = |value: Option<TiffValue>| trimmed(&value?.into_string().ok()?);
+        let mut fields = Self {
+            orientation: decoder.find_tag_unsigned(TiffTag::Orientation).ok().flatten(),
+            make: text(decoder.find_tag(TiffTag::Make).ok().flatten()),
+            model: text(decoder.find_tag(TiffTag::Model).ok().flatten()),
+            ..Self::default()
+        };
+        let pointer = decoder.find_tag(TiffTag::ExifDirectory).ok().flatten();
+        let Some(pointer) = pointer.and_then(|value| value.into_ifd_pointer().ok()) else { return Some(fields) };
+        let Ok(directory) = decoder.read_directory(pointer) else { return Some(fields) };
+        let mut tags = decoder.read_directory_tags(&directory);
+        let mut number = |tag| {
+            let value = tags.find_tag(TiffTag::from_u16_exhaustive(tag)).ok().flatten()?;
+            first_tiff_number(value)
+        };
+        fields.pixel_width = number(PIXEL_X_DIMENSION);
+        fields.pixel_height = number(PIXEL_Y_DIMENSION);
+        fields.focal_mm = number(FOCAL_LENGTH);
+        fields.focal_35mm = number(FOCAL_LENGTH_IN_35MM_FILM);
+        fields.focal_plane_resolution = number(FOCAL_PLANE_X_RESOLUTION);
+        fields.focal_plane_unit = number(FOCAL_PLANE_RESOLUTION_UNIT).map(|unit| unit as u32);
+        Some(fields)
+    }
+
+    /// Make and model in one line. A model that repeats its make ("Canon", "Canon EOS 5D") is left as it is.
+    pub(crate) fn camera_model(&self) -> Option<String> {
+        match (&self.make, &self.model) {
+            (Some(make), Some(model)) if model.to_lowercase().starts_with(&make.to_lowercase()) => Some(model.clone()),
+            (Some(make), Some(model)) => Some(format!("{make} {model}")),
+            (make, model) => model.clone().or_else(|| make.clone()),
+        }
+    }
+}
+
+/// The first number of an EXIF value of any numeric type.
+fn first_number(value: &Value) -> Option<f64> {
+    match value {
+        Value::Rational(ratios) => ratios.first().map(exif::Rational::to_f64),
+        Value::SRational(ratios) => ratios.first().map(exif::SRational::to_f64),
+        Value::Float(numbers) => numbers.first().map(|&number| f64::from(number)),
+        Value::Double(numbers) => numbers.first().copied(),
+        other => other.get_uint(0).map(f64::from),
+    }
+}
+
+fn first_tiff_number(value: TiffValue) -> Option<f64> {
+    match value {
+        TiffValue::List(values) => first_tiff_number(values.into_iter().next()?),
+        TiffValue::Rational(numerator, denominator) => Some(f64::from(numerator) / f64::from(denominator)),
+        TiffValue::SRational(numerator, denominator) => Some(f64::from(numerator) / f64::from(denominator)),
+        TiffValue::Float(number) => Some(f64::from(number)),
+        TiffValue::Double(number) => Some(number),
+        other => other.into_u32().ok().map(f64::from),
+    }
+}
+
+/// Cameras pad these fields with blanks and zero bytes.
+fn trimmed(text: &str) -> Option<String> {
+    let text = text.trim_matches(|character: char| character.is_whitespace() || character == '\0');
+    (!text.is_empty()).then(|| text.to_owned())
+}

@@ -1,0 +1,79 @@
+//! What a file's header and EXIF say about a photograph, without decoding its pixels.
+
+mod exif_fields;
+mod focal;
+mod orientation;
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Seek, SeekFrom};
+
+use image::{ImageDecoder, ImageFormat, ImageReader};
+use tiff::decoder::Decoder as TiffDecoder;
+use trueup_core::source::FocalPrior;
+use zune_jpeg::JpegDecoder;
+
+use crate::decode::jpeg_options;
+use crate::format::PictureFormat;
+
+pub(crate) use exif_fields::ExifFields;
+pub(crate) use focal::focal_prior;
+pub(crate) use orientation::{TagVerdict, judge_orientation};
+
+/// Size and EXIF facts of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Header {
+    /// Width of the stored pixels, before orientation.
+    pub(crate) stored_width: usize,
+    /// Height of the stored pixels, before orientation.
+    pub(crate) stored_height: usize,
+    /// EXIF fields; all empty where the file has none or they cannot be read.
+    pub(crate) exif: ExifFields,
+}
+
+impl Header {
+    /// The focal length that EXIF tells, in pixels of this picture.
+    pub(crate) fn focal_prior(&self) -> Option<FocalPrior> {
+        focal_prior(&self.exif, self.stored_width as f64, self.stored_height as f64)
+    }
+}
+
+/// Reads size and EXIF of `file`, which holds a picture in `format`. Damaged EXIF counts as absent.
+///
+/// # Errors
+/// The codec's words, when the header cannot be read.
+pub(crate) fn read_header(file: &File, format: PictureFormat) -> Result<Header, String> {
+    let mut reader = BufReader::new(file);
+    let (stored_width, stored_height) = stored_size(&mut reader, format)?;
+    let exif = reader.seek(SeekFrom::Start(0)).ok().and_then(|_| read_exif(&mut reader, format)).unwrap_or_default();
+    Ok(Header { stored_width, stored_height, exif })
+}
+
+/// The pixel size the header states.
+fn stored_size<R: BufRead + Seek>(reader: &mut R, format: PictureFormat) -> Result<(usize, usize), String> {
+    let format = match format {
+        PictureFormat::Jpeg => {
+            let mut decoder = JpegDecoder::new_with_options(reader, jpeg_options());
+            decoder.decode_headers().map_err(|error| format!("{error:?}"))?;
+            return decoder.dimensions().ok_or_else(|| "no frame header".to_owned());
+        }
+        PictureFormat::Png => ImageFormat::Png,
+        PictureFormat::Tiff => ImageFormat::Tiff,
+        PictureFormat::WebP => ImageFormat::WebP,
+    };
+    let mut picture = ImageReader::with_format(reader, format);
+    // Sizes are judged by the caller, whose limit is an option.
+    picture.no_limits();
+    let (width, height) = picture.into_decoder().map_err(|error| error.to_string())?.dimensions();
+    Ok((width as usize, height as usize))
+}
+
+fn read_exif<R: BufRead + Seek>(reader: &mut R, format: PictureFormat) -> Option<ExifFields> {
+    if format == PictureFormat::Tiff {
+        // The EXIF library would read the whole file, pixels and all.
+        return ExifFields::from_tiff(&mut TiffDecoder::new(reader).ok()?);
+    }
+    let mut exif_reader = exif::Reader::new();
+    exif_reader.continue_on_error(true);
+    let exif = exif_reader.read_from_container(reader);
+    exif.or_else(|error| error.distill_partial_result(|_| {})).ok().map(|exif| ExifFields::from_exif(&exif))
+}

@@ -1,0 +1,279 @@
+//! Finds the photographs the user means and reads their headers: size, orientation, focal length, camera.
+
+mod duplicates;
+mod inputs;
+mod names;
+#[cfg(test)]
+mod tests;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use trueup_core::diagnostics::Diagnostic;
+use trueup_core::options::StageOptions;
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result, StageContext};
+
+use crate::format::{self, PictureFormat, SIGNATURE_BYTES, SUPPORTED};
+use crate::metadata::{Header, TagVerdict, judge_orientation, read_header};
+
+use duplicates::Accepted;
+use inputs::Candidate;
+
+/// The largest file that is opened. Files are read into memory to be decoded; no photograph is this large.
+const MAX_FILE_BYTES: u64 = 4 << 30;
+
+trueup_core::choice! {
+    /// When the EXIF orientation tag is applied.
+    pub enum OrientationTrust {
+        /// Unless the stored size shows that the pixels were turned already.
+        Auto = "auto",
+        /// Whenever the tag is present.
+        Always = "always",
+        /// Pixels are taken as they are stored.
+        Never = "never",
+    }
+}
+
+trueup_core::options! {
+    /// Which files are accepted as photographs.
+    pub struct SourceOptions("source") {
+        /// Largest photograph that is accepted; larger ones are rejected by their header, before memory is taken.
+        max_megapixels: f64 = 300.0, between(0.001, 10_000.0), "megapixels";
+        /// Shortest side a photograph must have to be worth stitching.
+        min_side_px: usize = 16, between(1.0, 65_535.0), "px";
+        /// When the EXIF orientation tag is applied.
+        trust_orientation: OrientationTrust = OrientationTrust::Auto, Allowed::Any, "";
+    }
+}
+
+/// What [`scan`] found.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Sources {
+    /// The photographs, in the order of the inputs; within a folder or pattern in the natural order of names.
+    pub images: Vec<SourceImage>,
+    /// Everything that was asked for and cannot be used, in the same order.
+    pub rejected: Vec<RejectedSource>,
+}
+
+/// An input that cannot be used, and why.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RejectedSource {
+    /// The file, folder or pattern as the user named it.
+    pub path: PathBuf,
+    /// Short name for messages, unique among the inputs.
+    pub name: String,
+    /// Stable machine-readable reason in kebab case: `file-missing`, `pattern-without-match`, `folder-without-pictures`,
+    /// `folder-not-file`, `file-unreadable`, `file-empty`, `not-a-picture`, `format-unsupported`, `picture-damaged`,
+    /// `picture-too-large`, `picture-too-small`, `duplicate`.
+    pub code: String,
+    /// Why it cannot be used, without a closing full stop.
+    pub reason: String,
+    /// What the user can do about it, a whole sentence.
+    pub hint: String,
+}
+
+impl RejectedSource {
+    /// The rejection as an error, for callers who cannot go on without this input.
+    pub fn to_error(&self) -> Error {
+        Error::input(&self.name, &self.reason, &self.hint)
+    }
+}
+
+/// A reason for rejection, before it is tied to a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Rejection {
+    pub(crate) code: &'static str,
+    pub(crate) reason: String,
+    pub(crate) hint: String,
+}
+
+impl Rejection {
+    pub(crate) fn new(code: &'static str, reason: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self { code, reason: reason.into(), hint: hint.into() }
+    }
+}
+
+/// Finds the photographs that `inputs` name and reads their headers.
+///
+/// An input is a file, a folder (its pictures, not those of folders inside it, hidden files left out) or a pattern with
+/// `*`, `?`, `[...]` and `**`. A path that exists is never read as a pattern. A file is taken for what its content says,
+/// whatever its name. In folders and patterns, files that are no photographs are passed over in silence; everything
+/// else that cannot be used is listed in [`Sources::rejected`], and the good files beside it are used all the same.
+/// Of the same file given twice, or of two files with the same bytes, the first is used.
+///
+/// A stale orientation tag is reported as the note `orientation-tag-stale`.
+///
+/// # Errors
+/// [`Error::Options`] for options out of range, [`Error::Cancelled`]. Never for what is in the files.
+pub fn scan(inputs: &[String], options: &SourceOptions, context: &StageContext) -> Result<Sources> {
+    let invalid = options.invalid();
+    if !invalid.is_empty() {
+        return Err(Error::Options(invalid));
+    }
+    let candidates = inputs::expand(inputs);
+    let paths: Vec<&Path> = candidates.iter().map(Candidate::path).collect();
+    let names = names::unique_names(&paths);
+
+    context.progress().begin(SourceOptions::STAGE, candidates.len() as u64);
+    let mut sources = Sources::default();
+    let mut accepted = Accepted::default();
+    for (candidate, name) in candidates.into_iter().zip(names) {
+        context.check_cancelled()?;
+        let path = candidate.path().to_owned();
+        match examine(candidate, &name, options, &mut accepted, context) {
+            Ok(image) => sources.images.push(image),
+            Err(Rejection { code, reason, hint }) => {
+                sources.rejected.push(RejectedSource { path, name, code: code.to_owned(), reason, hint });
+            }
+        }
+        context.progress().advance(SourceOptions::STAGE, 1);
+    }
+    context.progress().finish(SourceOptions::STAGE);
+    Ok(sources)
+}
+
+/// Decides over one candidate.
+fn examine(
+    candidate: Candidate,
+    name: &str,
+    options: &SourceOptions,
+    accepted: &mut Accepted,
+    context: &StageContext,
+) -> std::result::Result<SourceImage, Rejection> {
+    let path = match candidate {
+        Candidate::Rejected(_, rejection) => return Err(rejection),
+        Candidate::File(path) => path,
+    };
+    let (mut file, length) = open(&path)?;
+    let format = recognise(&mut file, length)?;
+    let header = read_header(&file, format).map_err(|words| {
+        Rejection::new(
+            "picture-damaged",
+            format!("its header cannot be read ({words})"),
+            "Export it again or leave it out.",
+        )
+    })?;
+    check_size(&header, options)?;
+    accepted.admit(&path, name, length)?;
+
+    let tag = header.exif.orientation;
+    let verdict = match options.trust_orientation {
+        OrientationTrust::Auto => judge_orientation(tag, header.stored_width, header.stored_height),
+        OrientationTrust::Always => TagVerdict::Applied(tag.and_then(|tag| u8::try_from(tag).ok()).unwrap_or(1)),
+        OrientationTrust::Never => TagVerdict::Applied(1),
+    };
+    let orientation = match verdict {
+        TagVerdict::Applied(tag) if (1..=8).contains(&tag) => tag,
+        TagVerdict::Applied(_) => 1,
+        TagVerdict::Stale => {
+            context.report(stale_tag_note(name, &header));
+            1
+        }
+    };
+    let (width, height) = match orientation {
+        5..=8 => (header.stored_height, header.stored_width),
+        _ => (header.stored_width, header.stored_height),
+    };
+    let focal_prior = header.focal_prior();
+    let camera_model = header.exif.camera_model();
+    Ok(SourceImage { path, name: name.to_owned(), width, height, orientation, focal_prior, camera_model })
+}
+
+fn stale_tag_note(name: &str, header: &Header) -> Diagnostic {
+    let tag = header.exif.orientation.unwrap_or(1);
+    Diagnostic::note(
+        "orientation-tag-stale",
+        name,
+        format!(
+            "the EXIF orientation tag ({tag}, a quarter turn) was not applied: the pixels are stored upright already, \
+             {} x {}",
+            header.stored_width, header.stored_height
+        ),
+        "If the photograph now lies on its side, set source.trust_orientation to always.",
+    )
+}
+
+/// Opens a file; tells its length in bytes.
+fn open(path: &Path) -> std::result::Result<(File, u64), Rejection> {
+    let unreadable = |error: std::io::Error| {
+        Rejection::new("file-unreadable", format!("it cannot be read ({error})"), "Check the file and its permissions.")
+    };
+    // Looked at before it is opened: opening a named pipe would wait for its writer.
+    let metadata = std::fs::metadata(path).map_err(unreadable)?;
+    if metadata.is_dir() {
+        return Err(Rejection::new(
+            "folder-not-file",
+            "it is a folder, not a picture",
+            "Give the folder itself to use the pictures in it.",
+        ));
+    }
+    if !metadata.is_file() {
+        return Err(Rejection::new("file-unreadable", "it is not a regular file", "Give a picture file."));
+    }
+    let length = metadata.len();
+    if length > MAX_FILE_BYTES {
+        let gibibytes = length as f64 / (1_u64 << 30) as f64;
+        return Err(Rejection::new(
+            "picture-too-large",
+            format!("the file has {gibibytes:.1} GiB, at most {} are read", MAX_FILE_BYTES >> 30),
+            "Export a smaller copy of it.",
+        ));
+    }
+    Ok((File::open(path).map_err(unreadable)?, length))
+}
+
+/// Tells the format by the file's first bytes.
+fn recognise(file: &mut File, length: u64) -> std::result::Result<PictureFormat, Rejection> {
+    if length == 0 {
+        return Err(Rejection::new(
+            "file-empty",
+            "the file is empty (0 bytes)",
+            "Copy it again from the camera or leave it out.",
+        ));
+    }
+    let mut start = Vec::with_capacity(SIGNATURE_BYTES);
+    file.take(SIGNATURE_BYTES as u64).read_to_end(&mut start).map_err(|error| {
+        Rejection::new("file-unreadable", format!("it cannot be read ({error})"), "Check the file and its permissions.")
+    })?;
+    if let Some(format) = PictureFormat::of_content(&start) {
+        return Ok(format);
+    }
+    Err(match format::describe_foreign_content(&start) {
+        Some(what) => Rejection::new(
+            "format-unsupported",
+            format!("it is {what}, a format that is not read"),
+            format!("Convert it to {SUPPORTED}."),
+        ),
+        None => Rejection::new(
+            "not-a-picture",
+            format!("its content is not a {SUPPORTED} picture, whatever its name says"),
+            format!("Give photographs in {SUPPORTED}."),
+        ),
+    })
+}
+
+fn check_size(header: &Header, options: &SourceOptions) -> std::result::Result<(), Rejection> {
+    let (width, height) = (header.stored_width, header.stored_height);
+    let megapixels = width as f64 * height as f64 / 1e6;
+    if megapixels > options.max_megapixels {
+        return Err(Rejection::new(
+            "picture-too-large",
+            format!(
+                "{width} x {height} px are {megapixels:.0} megapixels, at most {} are accepted",
+                options.max_megapixels
+            ),
+            "Export a smaller copy, or raise source.max_megapixels if the picture is truly this large.",
+        ));
+    }
+    if width.min(height) < options.min_side_px {
+        return Err(Rejection::new(
+            "picture-too-small",
+            format!("{width} x {height} px are too few to stitch, each side needs {}", options.min_side_px),
+            "Give the photograph in its original size.",
+        ));
+    }
+    Ok(())
+}
