@@ -1,4 +1,26 @@
 //! Scale-invariant features (SIFT).
+//!
+//! The stages of [`detect`] are one file each: the Gaussian [scale space](scale_space), [extrema] of its differences,
+//! their [orientations](orientation) and [descriptors](descriptor).
+
+mod descriptor;
+mod extrema;
+mod maths;
+mod orientation;
+mod scale_space;
+mod simd;
+
+#[cfg(test)]
+mod tests;
+
+use rayon::prelude::*;
+use trueup_core::options::StageOptions;
+use trueup_core::raster::Raster;
+use trueup_core::{Error, Result, StageContext};
+
+use extrema::Extremum;
+use scale_space::Octave;
+use simd::InstructionSet;
 
 /// Length of a SIFT descriptor: 4 x 4 spatial bins of 8 orientations.
 pub const DESCRIPTOR_LENGTH: usize = 128;
@@ -29,4 +51,144 @@ pub struct Features {
     pub descriptors: Vec<Descriptor>,
     /// For every descriptor, the index of its point.
     pub descriptor_points: Vec<u32>,
+}
+
+trueup_core::options! {
+    /// How features are found and described.
+    pub struct FeatureOptions("features") {
+        /// Most points kept, strongest response first.
+        max_points: usize = 8000, between(1.0, 1_000_000.0), "points";
+        /// Whether the picture is doubled first, which finds finer detail for four times the work.
+        double_image: bool = false, Allowed::Any, "";
+        /// Scales sampled in each doubling of scale.
+        levels_per_octave: usize = 3, between(1.0, 8.0), "levels";
+        /// Blur of the first level of each octave, in the octave's samples.
+        base_sigma: f64 = 1.6, between(0.8, 3.2), "samples";
+        /// Blur the picture is assumed to have already.
+        nominal_blur_px: f64 = 0.5, between(0.0, 2.0), "px";
+        /// Smallest difference-of-Gaussians response of a point, in grey levels of 0 to 255.
+        peak_threshold: f64 = 0.0, between(0.0, 255.0), "grey levels";
+        /// Largest ratio of the two principal curvatures; points above it lie on edges.
+        edge_threshold: f64 = 10.0, between(1.0, 1000.0), "";
+        /// Most dominant orientations of a point, each with its own descriptor.
+        max_orientations: usize = 4, between(1.0, 18.0), "orientations";
+        /// Whether descriptors are L1-normalised and square-rooted (RootSIFT).
+        root_sift: bool = false, Allowed::Any, "";
+    }
+}
+
+/// Most pixels of a picture that [`detect`] accepts, the doubled picture counted where that is asked for.
+const MAX_PIXELS: usize = 1 << 28;
+
+/// Points described by one task.
+const POINTS_PER_TASK: usize = 64;
+
+/// Finds and describes the features of a picture.
+///
+/// `image` has one channel of 0 to 255. A picture too small or too flat has no features. The result is the same for
+/// any number of threads and on every processor.
+///
+/// # Errors
+/// [`Error::Options`] for options out of range, [`Error::Input`] for a picture of several channels,
+/// [`Error::Limits`] for one too large, [`Error::Cancelled`].
+///
+/// # Source
+/// Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004. RootSIFT: Arandjelovic and
+/// Zisserman, "Three things everyone should know to improve object retrieval", CVPR 2012.
+pub fn detect(image: &Raster<f32>, options: &FeatureOptions, context: &StageContext) -> Result<Features> {
+    detect_with(image, options, context, InstructionSet::detect())
+}
+
+fn detect_with(
+    image: &Raster<f32>,
+    options: &FeatureOptions,
+    context: &StageContext,
+    instructions: InstructionSet,
+) -> Result<Features> {
+    check(image, options)?;
+    if image.width() == 0 || image.height() == 0 {
+        return Ok(Features::default());
+    }
+    let octaves = scale_space::build(image, options, instructions, context)?;
+    let mut extrema = Vec::new();
+    for octave in 0..octaves.len() {
+        extrema.extend(extrema::find(&octaves, octave, options, instructions, context)?);
+    }
+    // A stable sort: equal responses stay in the order of octave, row and column.
+    extrema.sort_by(|a, b| b.response.abs().total_cmp(&a.response.abs()));
+    extrema.truncate(options.max_points);
+    let described: Result<Vec<Vec<Described>>> = extrema
+        .par_chunks(POINTS_PER_TASK)
+        .map(|extrema| {
+            context.check_cancelled()?;
+            Ok(extrema.iter().filter_map(|extremum| describe(&octaves, extremum, options, instructions)).collect())
+        })
+        .collect();
+    Ok(gathered(described?))
+}
+
+fn check(image: &Raster<f32>, options: &FeatureOptions) -> Result<()> {
+    let invalid = options.invalid();
+    if !invalid.is_empty() {
+        return Err(Error::Options(invalid));
+    }
+    if image.channels() != 1 {
+        return Err(Error::input(
+            "picture for feature detection",
+            format!("it has {} channels", image.channels()),
+            "Give a grey picture of one channel.",
+        ));
+    }
+    let pixels = image.data().len() * if options.double_image { 4 } else { 1 };
+    if pixels > MAX_PIXELS {
+        return Err(Error::Limits {
+            subject: "feature detection".to_owned(),
+            needed: format!("{pixels} pixels"),
+            allowed: format!("{MAX_PIXELS} pixels"),
+            hint: "Reduce the picture first.".to_owned(),
+        });
+    }
+    Ok(())
+}
+
+/// A point and its descriptors.
+struct Described {
+    point: FeaturePoint,
+    descriptors: Vec<Descriptor>,
+}
+
+/// The orientations and descriptors of an extremum; `None` if it has none.
+fn describe(
+    octaves: &[Octave],
+    extremum: &Extremum,
+    options: &FeatureOptions,
+    instructions: InstructionSet,
+) -> Option<Described> {
+    let octave = &octaves[extremum.octave];
+    let plane = &octave.planes[extremum.level];
+    let (position, sigma) = (extremum.position, extremum.sigma);
+    let limit = options.max_orientations;
+    let angles = instructions.run(orientation::Orientations { plane, position, sigma, limit });
+    let root_sift = options.root_sift;
+    let descriptors: Vec<Descriptor> = angles
+        .into_iter()
+        .filter_map(|angle| instructions.run(descriptor::Describe { plane, position, sigma, angle, root_sift }))
+        .collect();
+    let point = FeaturePoint {
+        // Sample k lies on pixel k * step, whose centre is half a pixel further.
+        position: position.map(|coordinate| coordinate * octave.step_px + 0.5),
+        scale_px: sigma * octave.step_px,
+        response: extremum.response.abs(),
+    };
+    (!descriptors.is_empty()).then_some(Described { point, descriptors })
+}
+
+fn gathered(described: Vec<Vec<Described>>) -> Features {
+    let mut features = Features::default();
+    for (index, Described { point, descriptors }) in described.into_iter().flatten().enumerate() {
+        features.points.push(point);
+        features.descriptor_points.extend(std::iter::repeat_n(index as u32, descriptors.len()));
+        features.descriptors.extend(descriptors);
+    }
+    features
 }

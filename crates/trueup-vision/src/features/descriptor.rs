@@ -1,0 +1,205 @@
+//! Histograms of gradient directions that describe a point's surroundings.
+
+use std::sync::LazyLock;
+
+use super::scale_space::Plane;
+use super::simd::{Kernel, Lanes};
+use super::{DESCRIPTOR_LENGTH, Descriptor};
+
+/// Spatial bins on a side.
+const SPATIAL_BINS: usize = 4;
+
+/// Direction bins.
+const DIRECTION_BINS: usize = 8;
+
+/// Width of a spatial bin, in units of the point's blur (Lowe's implementation, and all since).
+const BIN_WIDTH: f64 = 3.0;
+
+/// Gradients sampled on a side; they cover the bins and the half bin around them that interpolation reaches.
+const GRID: usize = 24;
+
+/// Spatial bins that the grid covers.
+const COVERED_BINS: f64 = SPATIAL_BINS as f64 + 1.0;
+
+/// Grey values sampled on a side: the corners of the gradient cells.
+const CORNERS: usize = GRID + 1;
+
+/// Largest component of the normalised descriptor (Lowe 2004, section 6.1).
+const CLAMP: f32 = 0.2;
+
+/// The factor from a component of the normalised descriptor to its byte (Lowe's implementation).
+const QUANTISATION: f32 = 512.0;
+
+/// Describes the surroundings of a point in a plane whose blur is about `sigma` samples.
+///
+/// # Source
+/// Lowe 2004, section 6.
+///
+/// # Departures
+/// Lowe takes the gradients of all pixels around the point and rotates them. Here grey values are sampled on a grid of
+/// [`CORNERS`] x [`CORNERS`] that is already turned and scaled with the point, and gradients are differences on that
+/// grid. Its step is 0.625 times the blur, so that the blur leaves nothing to see between the samples, and the
+/// weights of interpolation are the same for all points.
+pub(super) struct Describe<'a> {
+    pub(super) plane: &'a Plane,
+    /// Position (x, y) in samples.
+    pub(super) position: [f64; 2],
+    pub(super) sigma: f64,
+    /// Direction of the point, radians clockwise on the screen from the x axis.
+    pub(super) angle: f64,
+    /// Whether to take square roots of the L1-normalised components.
+    pub(super) root_sift: bool,
+}
+
+impl Kernel for Describe<'_> {
+    /// `None` where the surroundings are flat or not finite.
+    type Output = Option<Descriptor>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<Descriptor> {
+        let corners = sample(self.plane, self.position, self.sigma, self.angle);
+        let histogram = histogram(&corners);
+        quantised(histogram, self.root_sift)
+    }
+}
+
+/// Grey values on the turned grid, row by row. Outside the picture its edge is continued.
+#[inline(always)]
+fn sample(plane: &Plane, position: [f64; 2], sigma: f64, angle: f64) -> [[f32; CORNERS]; CORNERS] {
+    let step = BIN_WIDTH * sigma * COVERED_BINS / GRID as f64;
+    let (sin, cos) = angle.sin_cos();
+    let (sin, cos) = ((sin * step) as f32, (cos * step) as f32);
+    let half = GRID as f32 / 2.0;
+    let (centre_x, centre_y) = (position[0] as f32, position[1] as f32);
+    // The last sample is left to the one before it, with a weight of nearly one.
+    let (last_x, last_y) = ((plane.width - 1) as f32 - 1e-3, (plane.height - 1) as f32 - 1e-3);
+    let mut corners = [[0.0; CORNERS]; CORNERS];
+    for (v, row) in corners.iter_mut().enumerate() {
+        let v = v as f32 - half;
+        let (mut index, mut fraction_x, mut fraction_y) = ([0_u32; CORNERS], [0.0_f32; CORNERS], [0.0_f32; CORNERS]);
+        for u in 0..CORNERS {
+            let offset = u as f32 - half;
+            let x = (centre_x + cos * offset - sin * v).clamp(0.0, last_x);
+            let y = (centre_y + sin * offset + cos * v).clamp(0.0, last_y);
+            let (whole_x, whole_y) = (x as u32, y as u32);
+            index[u] = whole_y * plane.stride as u32 + whole_x;
+            fraction_x[u] = x - whole_x as f32;
+            fraction_y[u] = y - whole_y as f32;
+        }
+        let (mut top, mut bottom) = ([[0.0_f32; 2]; CORNERS], [[0.0_f32; 2]; CORNERS]);
+        for u in 0..CORNERS {
+            let at = index[u] as usize;
+            top[u] = pair(&plane.data, at);
+            bottom[u] = pair(&plane.data, at + plane.stride);
+        }
+        for u in 0..CORNERS {
+            let upper = top[u][0] + fraction_x[u] * (top[u][1] - top[u][0]);
+            let lower = bottom[u][0] + fraction_x[u] * (bottom[u][1] - bottom[u][0]);
+            row[u] = upper + fraction_y[u] * (lower - upper);
+        }
+    }
+    corners
+}
+
+#[inline(always)]
+fn pair(samples: &[f32], at: usize) -> [f32; 2] {
+    let pair = &samples[at..at + 2];
+    [pair[0], pair[1]]
+}
+
+/// Gradient magnitudes shared between the nearest bins of place and direction, weighed by the Gaussian window.
+#[inline(always)]
+fn histogram(corners: &[[f32; CORNERS]; CORNERS]) -> [f32; DESCRIPTOR_LENGTH] {
+    let weights = &*BIN_WEIGHTS;
+    // Summed over the rows of the grid first: by row of bins, direction and column of the grid.
+    let mut by_column = [[[0.0_f32; GRID]; DIRECTION_BINS]; SPATIAL_BINS];
+    for v in 0..GRID {
+        let (upper, lower) = (&corners[v], &corners[v + 1]);
+        let (mut magnitude, mut direction) = ([0.0_f32; GRID], [0.0_f32; GRID]);
+        for u in 0..GRID {
+            let (main, other) = (lower[u + 1] - upper[u], lower[u] - upper[u + 1]);
+            let (gx, gy) = (main - other, main + other);
+            magnitude[u] = (gx * gx + gy * gy).sqrt();
+            direction[u] = super::maths::turns(gy, gx) * DIRECTION_BINS as f32;
+        }
+        for bin in 0..DIRECTION_BINS {
+            let mut share = [0.0_f32; GRID];
+            for u in 0..GRID {
+                let distance = (direction[u] - bin as f32).abs();
+                let other_way = DIRECTION_BINS as f32 - distance;
+                let nearest = 1.0 - if distance < other_way { distance } else { other_way };
+                share[u] = magnitude[u] * if nearest > 0.0 { nearest } else { 0.0 };
+            }
+            for (row, weights) in weights.iter().enumerate() {
+                let weight = weights[v];
+                if weight > 0.0 {
+                    for u in 0..GRID {
+                        by_column[row][bin][u] += weight * share[u];
+                    }
+                }
+            }
+        }
+    }
+    let mut histogram = [0.0_f32; DESCRIPTOR_LENGTH];
+    for row in 0..SPATIAL_BINS {
+        for column in 0..SPATIAL_BINS {
+            for bin in 0..DIRECTION_BINS {
+                histogram[(row * SPATIAL_BINS + column) * DIRECTION_BINS + bin] =
+                    dot(&by_column[row][bin], &weights[column]);
+            }
+        }
+    }
+    histogram
+}
+
+/// The sum of products, in eight partial sums that are then added in a fixed order.
+#[inline(always)]
+fn dot(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; 8];
+    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
+        for lane in 0..8 {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    let [s0, s1, s2, s3, s4, s5, s6, s7] = sums;
+    ((s0 + s4) + (s2 + s6)) + ((s1 + s5) + (s3 + s7))
+}
+
+/// The weight of each line of the grid in each line of bins: linear interpolation times the Gaussian window, whose
+/// standard deviation is half the width of the bins together.
+static BIN_WEIGHTS: LazyLock<[[f32; GRID]; SPATIAL_BINS]> = LazyLock::new(|| {
+    std::array::from_fn(|bin| {
+        std::array::from_fn(|line| {
+            let place = ((line as f64 + 0.5) / GRID as f64 - 0.5) * COVERED_BINS;
+            let centre = bin as f64 - 0.5 * (SPATIAL_BINS as f64 - 1.0);
+            let window = place / (0.5 * SPATIAL_BINS as f64);
+            ((1.0 - (place - centre).abs()).max(0.0) * (-0.5 * window * window).exp()) as f32
+        })
+    })
+});
+
+/// Normalises, clamps, normalises again and rounds to bytes.
+#[inline(always)]
+fn quantised(mut histogram: [f32; DESCRIPTOR_LENGTH], root_sift: bool) -> Option<Descriptor> {
+    let length = dot(&histogram, &histogram).sqrt();
+    if !(length > f32::MIN_POSITIVE && length.is_finite()) {
+        return None;
+    }
+    let limit = CLAMP * length;
+    for component in &mut histogram {
+        *component = if *component < limit { *component } else { limit };
+    }
+    if root_sift {
+        let sum = dot(&histogram, &[1.0; DESCRIPTOR_LENGTH]);
+        for component in &mut histogram {
+            *component = (*component / sum).sqrt();
+        }
+    } else {
+        let length = dot(&histogram, &histogram).sqrt();
+        for component in &mut histogram {
+            *component = *component / length;
+        }
+    }
+    // The conversion to a byte stops at 255.
+    Some(histogram.map(|component| (component * QUANTISATION + 0.5) as u8))
+}

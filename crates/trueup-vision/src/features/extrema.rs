@@ -1,0 +1,269 @@
+//! Extrema of the difference of Gaussians, located between the samples.
+
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+use trueup_core::{Result, StageContext};
+
+use super::FeatureOptions;
+use super::scale_space::Octave;
+use super::simd::{InstructionSet, Kernel, Lanes, MAX_LANES};
+
+/// Responses below this many grey levels are rounding errors of a flat picture.
+const ROUNDING_NOISE: f32 = 1e-3;
+
+/// How often an extremum may move to a neighbouring sample before it is given up.
+const MAX_MOVES: usize = 5;
+
+/// A move is made when the extremum lies farther than this from the sample, in samples.
+const MOVE_OFFSET: f64 = 0.6;
+
+/// Rows that one task scans.
+const BAND_ROWS: usize = 64;
+
+/// An extremum of the difference of Gaussians.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extremum {
+    /// Index of its octave.
+    pub(super) octave: usize,
+    /// Index of the difference's lower plane, 1 to `levels_per_octave`.
+    pub(super) level: usize,
+    /// The nearest sample (column, row).
+    pub(super) sample: [usize; 2],
+    /// Position (x, y) in the octave's samples; a whole number lies on a sample.
+    pub(super) position: [f64; 2],
+    /// Blur in the octave's samples.
+    pub(super) sigma: f64,
+    /// Interpolated difference of Gaussians, in grey levels; positive for dark blobs.
+    pub(super) response: f64,
+}
+
+/// All extrema of one octave that pass the peak and edge thresholds, row by row.
+///
+/// # Source
+/// Lowe 2004, sections 3.1 and 4: 26 neighbours, quadratic fit in position and scale, ratio of principal curvatures.
+pub(super) fn find(
+    octaves: &[Octave],
+    octave: usize,
+    options: &FeatureOptions,
+    instructions: InstructionSet,
+    context: &StageContext,
+) -> Result<Vec<Extremum>> {
+    let planes = &octaves[octave].planes;
+    let (width, height) = (planes[0].width, planes[0].height);
+    if width < 3 || height < 3 {
+        return Ok(Vec::new());
+    }
+    let bands = (height - 2).div_ceil(BAND_ROWS);
+    let found: Result<Vec<Vec<Extremum>>> = (0..bands)
+        .into_par_iter()
+        .map(|band| {
+            context.check_cancelled()?;
+            let first_row = 1 + band * BAND_ROWS;
+            let rows = first_row..(first_row + BAND_ROWS).min(height - 1);
+            let threshold = ROUNDING_NOISE.max(LOOSE_FACTOR * options.peak_threshold as f32);
+            let candidates = instructions.run(ScanBand { octave: &octaves[octave], rows, threshold });
+            Ok(candidates.iter().filter_map(|candidate| refine(octaves, octave, candidate, options)).collect())
+        })
+        .collect();
+    let mut extrema: Vec<Extremum> = found?.into_iter().flatten().collect();
+    // Two samples may move to the same extremum.
+    extrema.sort_by_key(|extremum| (extremum.sample[1], extremum.sample[0], extremum.level));
+    extrema.dedup_by_key(|extremum| (extremum.sample[1], extremum.sample[0], extremum.level));
+    Ok(extrema)
+}
+
+/// A sample may fall this much short of the peak threshold, because the interpolated peak is higher.
+const LOOSE_FACTOR: f32 = 0.5;
+
+/// A sample that is the greatest or least of its 27 neighbours.
+struct Candidate {
+    level: usize,
+    x: usize,
+    y: usize,
+}
+
+/// Finds the candidates of some rows, in all levels of an octave.
+struct ScanBand<'a> {
+    octave: &'a Octave,
+    rows: std::ops::Range<usize>,
+    /// Smallest absolute difference, in grey levels.
+    threshold: f32,
+}
+
+impl Kernel for ScanBand<'_> {
+    type Output = Vec<Candidate>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Vec<Candidate> {
+        let planes = &self.octave.planes;
+        let stride = planes[0].stride;
+        let padded = stride + 2 * MAX_LANES;
+        let differences = planes.len() - 1;
+        let mut found = Vec::new();
+        // The differences of the last three rows; row y is kept in slot y % 3.
+        let mut recent = vec![0.0_f32; 3 * differences * padded];
+        // For each level between the outer ones, the greatest and the least of 3 levels x 3 rows.
+        let mut extremes = vec![0.0_f32; 2 * (differences - 2) * padded];
+        for y in [self.rows.start - 1, self.rows.start] {
+            subtract_row::<L>(self.octave, y, padded, &mut recent);
+        }
+        for y in self.rows.clone() {
+            subtract_row::<L>(self.octave, y + 1, padded, &mut recent);
+            column_extremes::<L>(&recent, differences, padded, &mut extremes);
+            for level in 1..differences - 1 {
+                let slot = ((y % 3) * differences + level) * padded;
+                let centre = &recent[slot..slot + padded];
+                let (greatest, least) = extremes[2 * (level - 1) * padded..][..2 * padded].split_at(padded);
+                compare_row::<L>(centre, greatest, least, self.threshold, planes[0].width, |x| {
+                    found.push(Candidate { level, x, y });
+                });
+            }
+        }
+        found
+    }
+}
+
+/// Writes row `y` of all differences into its slot, [`MAX_LANES`] samples from the slot's beginning.
+#[inline(always)]
+fn subtract_row<L: Lanes>(octave: &Octave, y: usize, padded: usize, recent: &mut [f32]) {
+    let differences = octave.planes.len() - 1;
+    let stride = octave.planes[0].stride;
+    for level in 0..differences {
+        let lower = &octave.planes[level].data[y * stride..(y + 1) * stride];
+        let upper = &octave.planes[level + 1].data[y * stride..(y + 1) * stride];
+        let target = &mut recent[((y % 3) * differences + level) * padded + MAX_LANES..][..stride];
+        for x in (0..stride).step_by(L::COUNT) {
+            (L::load(upper, x) - L::load(lower, x)).store(target, x);
+        }
+    }
+}
+
+/// The greatest and least over three rows and three neighbouring levels, column by column.
+#[inline(always)]
+fn column_extremes<L: Lanes>(recent: &[f32], differences: usize, padded: usize, extremes: &mut [f32]) {
+    let slot = |row: usize, level: usize| &recent[(row * differences + level) * padded..][..padded];
+    for level in 1..differences - 1 {
+        let rows: [&[f32]; 9] = std::array::from_fn(|n| slot(n % 3, level + n / 3 - 1));
+        let (greatest, least) = extremes[2 * (level - 1) * padded..][..2 * padded].split_at_mut(padded);
+        for x in (0..padded).step_by(L::COUNT) {
+            let first = L::load(rows[0], x);
+            let (mut high, mut low) = (first, first);
+            for row in &rows[1..] {
+                let value = L::load(row, x);
+                high = high.max(value);
+                low = low.min(value);
+            }
+            high.store(greatest, x);
+            low.store(least, x);
+        }
+    }
+}
+
+/// Calls `found` with the columns, border excluded, where the centre is as great or as small as all its neighbours.
+#[inline(always)]
+fn compare_row<L: Lanes>(
+    centre: &[f32],
+    greatest: &[f32],
+    least: &[f32],
+    threshold: f32,
+    width: usize,
+    mut found: impl FnMut(usize),
+) {
+    let (positive, negative) = (L::splat(threshold), L::splat(-threshold));
+    for x in (0..width).step_by(L::COUNT) {
+        let at = MAX_LANES + x;
+        let value = L::load(centre, at);
+        let (bright, dark) = (value.at_least(positive), negative.at_least(value));
+        if bright | dark == 0 {
+            continue;
+        }
+        let high = L::load(greatest, at - 1).max(L::load(greatest, at)).max(L::load(greatest, at + 1));
+        let low = L::load(least, at - 1).min(L::load(least, at)).min(L::load(least, at + 1));
+        let mut mask = (bright & value.at_least(high)) | (dark & low.at_least(value));
+        while mask != 0 {
+            let column = x + mask.trailing_zeros() as usize;
+            mask &= mask - 1;
+            if column >= 1 && column + 1 < width {
+                found(column);
+            }
+        }
+    }
+}
+
+/// Fits a quadratic to the 27 samples around a candidate and applies the thresholds.
+fn refine(octaves: &[Octave], octave: usize, candidate: &Candidate, options: &FeatureOptions) -> Option<Extremum> {
+    let planes = &octaves[octave].planes;
+    let levels = options.levels_per_octave;
+    let (mut level, mut x, mut y) = (candidate.level, candidate.x, candidate.y);
+    for _ in 0..=MAX_MOVES {
+        let fit = Quadratic::around(&octaves[octave], level, x, y);
+        let offset = fit.extremum()?;
+        let moves = offset.map(|component| f64::from(i8::from(component > MOVE_OFFSET) - i8::from(component < -MOVE_OFFSET)));
+        let moved = |index: usize, step: f64, last: usize| -> Option<usize> {
+            let index = index.checked_add_signed(step as isize)?;
+            (index >= 1 && index <= last).then_some(index)
+        };
+        if moves == Vector3::zeros() {
+            let response = fit.value + 0.5 * fit.gradient.dot(&offset);
+            let accepted = response.abs() >= options.peak_threshold.max(f64::from(ROUNDING_NOISE))
+                && !fit.is_edge(options.edge_threshold);
+            return accepted.then(|| Extremum {
+                octave,
+                level,
+                sample: [x, y],
+                position: [x as f64 + offset[0], y as f64 + offset[1]],
+                sigma: options.base_sigma * ((level as f64 + offset[2]) / levels as f64).exp2(),
+                response,
+            });
+        }
+        x = moved(x, moves[0], planes[0].width - 2)?;
+        y = moved(y, moves[1], planes[0].height - 2)?;
+        level = moved(level, moves[2], levels)?;
+    }
+    None
+}
+
+/// Second-order Taylor expansion of the difference of Gaussians in (x, y, level).
+struct Quadratic {
+    value: f64,
+    gradient: Vector3<f64>,
+    hessian: Matrix3<f64>,
+}
+
+impl Quadratic {
+    fn around(octave: &Octave, level: usize, x: usize, y: usize) -> Self {
+        let stride = octave.planes[0].stride;
+        // d[level][row][column] - the 27 differences of Gaussians.
+        let d: [[[f64; 3]; 3]; 3] = std::array::from_fn(|dl| {
+            let (lower, upper) = (&octave.planes[level + dl - 1].data, &octave.planes[level + dl].data);
+            std::array::from_fn(|dy| {
+                let start = (y + dy - 1) * stride + x - 1;
+                let (lower, upper) = (&lower[start..start + 3], &upper[start..start + 3]);
+                std::array::from_fn(|dx| f64::from(upper[dx] - lower[dx]))
+            })
+        });
+        let value = d[1][1][1];
+        let gradient = 0.5
+            * Vector3::new(d[1][1][2] - d[1][1][0], d[1][2][1] - d[1][0][1], d[2][1][1] - d[0][1][1]);
+        let xx = d[1][1][2] + d[1][1][0] - 2.0 * value;
+        let yy = d[1][2][1] + d[1][0][1] - 2.0 * value;
+        let ss = d[2][1][1] + d[0][1][1] - 2.0 * value;
+        let xy = 0.25 * (d[1][2][2] - d[1][2][0] - d[1][0][2] + d[1][0][0]);
+        let xs = 0.25 * (d[2][1][2] - d[2][1][0] - d[0][1][2] + d[0][1][0]);
+        let ys = 0.25 * (d[2][2][1] - d[2][0][1] - d[0][2][1] + d[0][0][1]);
+        Self { value, gradient, hessian: Matrix3::new(xx, xy, xs, xy, yy, ys, xs, ys, ss) }
+    }
+
+    /// Offset (x, y, level) of the extremum from the sample; `None` where there is none.
+    fn extremum(&self) -> Option<Vector3<f64>> {
+        let offset = -self.hessian.try_inverse()? * self.gradient;
+        offset.iter().all(|component| component.is_finite()).then_some(offset)
+    }
+
+    /// Whether one principal curvature exceeds `ratio` times the other, or they differ in sign.
+    fn is_edge(&self, ratio: f64) -> bool {
+        let trace = self.hessian[(0, 0)] + self.hessian[(1, 1)];
+        let determinant = self.hessian[(0, 0)] * self.hessian[(1, 1)] - self.hessian[(0, 1)].powi(2);
+        !(determinant > 0.0 && trace.powi(2) * ratio < (ratio + 1.0).powi(2) * determinant)
+    }
+}
