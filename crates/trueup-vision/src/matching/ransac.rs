@@ -1,0 +1,268 @@
+//! A homography that many of the matches agree on.
+//!
+//! # Source
+//! Fischler and Bolles, Random sample consensus; the cost is MSAC's (Torr and Zisserman, MLESAC, section 4), samples of
+//! the most distinctive matches come first as in PROSAC (Chum and Matas, 2005), and every new best is optimised locally
+//! (Chum, Matas and Kittler, Locally optimized RANSAC).
+
+use nalgebra::{Matrix3, Vector2};
+use rand::{Rng, RngExt};
+use trueup_core::geometry::Homography;
+
+use super::refine;
+
+/// Matches in a sample.
+const SAMPLE: usize = 4;
+/// Twice the smallest area of a triangle of sample points, in square pixels; below, the three count as collinear.
+const MIN_TRIANGLE_PX2: f64 = 20.0;
+/// Thresholds of the local optimisation's rounds, in units of the final one.
+const LOCAL_THRESHOLDS: [f64; 4] = [2.0, 1.5, 1.0, 1.0];
+/// Rounds of final refinement and new choice of inliers.
+const FINAL_ROUNDS: usize = 4;
+/// Matches measured between two looks at whether a hypothesis can still win.
+const BATCH: usize = 16;
+
+/// How a homography is sought.
+#[derive(Debug, Clone, Copy)]
+pub struct Search {
+    /// How far a match may lie from where the homography predicts it, in pixels of b.
+    pub inlier_px: f64,
+    /// Probability of having drawn a sample of inliers at which drawing ends.
+    pub confidence: f64,
+    /// Largest number of samples.
+    pub max_samples: usize,
+}
+
+/// A homography and the matches that agree with it.
+#[derive(Debug, Clone)]
+pub struct Consensus {
+    /// The map; its denominator is positive at the agreeing matches.
+    pub b_from_a: Homography,
+    /// Indices of the agreeing matches, ascending.
+    pub inliers: Vec<usize>,
+}
+
+/// Matched points, most distinctive first.
+#[derive(Debug, Clone, Default)]
+pub struct MatchedPoints {
+    /// In picture a.
+    pub in_a: Vec<Vector2<f64>>,
+    /// In picture b.
+    pub in_b: Vec<Vector2<f64>>,
+}
+
+impl MatchedPoints {
+    /// The matches of the given indices.
+    pub fn select(&self, indices: &[usize]) -> Self {
+        Self {
+            in_a: indices.iter().map(|&index| self.in_a[index]).collect(),
+            in_b: indices.iter().map(|&index| self.in_b[index]).collect(),
+        }
+    }
+
+    /// Indices of the matches within `inlier_px` of where a homography predicts them, forward, on the visible side.
+    pub fn agreeing(&self, b_from_a: &Homography, inlier_px: f64) -> Vec<usize> {
+        let agrees = |&k: &usize| squared_error(&b_from_a.0, self.in_a[k], self.in_b[k]) <= inlier_px.powi(2);
+        (0..self.in_a.len()).filter(agrees).collect()
+    }
+}
+
+/// The plausible homography of least truncated squared forward transfer error, refined on its inliers; `None` if
+/// there are fewer than four matches or no sample gives a plausible one.
+///
+/// The error of a match counts at most `inlier_px`; hypotheses that cannot win any more are dropped early. The result
+/// minimises the symmetric transfer error of its inliers.
+pub fn find_homography(
+    points: &MatchedPoints,
+    search: &Search,
+    is_plausible: impl Fn(&Homography) -> bool,
+    generator: &mut impl Rng,
+) -> Option<Consensus> {
+    let count = points.in_a.len();
+    if count < SAMPLE {
+        return None;
+    }
+    let mut best: Option<Homography> = None;
+    let mut best_cost = count as f64;
+    let mut needed = search.max_samples;
+    let mut pool = ProgressivePool::new(count, search.max_samples);
+    let mut drawn = 0;
+    while drawn < needed {
+        drawn += 1;
+        let sample = pool.draw(generator);
+        let Some(hypothesis) = through_sample(points, &sample) else { continue };
+        let Some(cost) = truncated_cost(points, &hypothesis, search.inlier_px, best_cost) else { continue };
+        if !is_plausible(&hypothesis) {
+            continue;
+        }
+        let (hypothesis, cost) = optimise_locally(points, hypothesis, cost, search.inlier_px, &is_plausible);
+        (best, best_cost) = (Some(hypothesis), cost);
+        let agreeing = points.agreeing(&hypothesis, search.inlier_px).len();
+        needed = needed.min(samples_needed(agreeing as f64 / count as f64, search.confidence));
+    }
+    let refined = finish(points, best?, search.inlier_px, &is_plausible);
+    let inliers = points.agreeing(&refined, search.inlier_px);
+    Some(Consensus { b_from_a: refined, inliers })
+}
+
+/// Samples after which one is all inliers with the probability asked for.
+fn samples_needed(inlier_ratio: f64, confidence: f64) -> usize {
+    let needed = (1.0 - confidence).ln() / (1.0 - inlier_ratio.powi(SAMPLE as i32)).ln();
+    if needed.is_finite() { needed.ceil().max(1.0) as usize } else { 1 }
+}
+
+/// Draws samples alternately from all matches and from a pool of the most distinctive that grows to all of them.
+///
+/// # Departures
+/// PROSAC draws from the pool only; the samples from all matches guard against distinctive matches that agree on
+/// something else.
+struct ProgressivePool {
+    count: usize,
+    samples: usize,
+    drawn: usize,
+}
+
+impl ProgressivePool {
+    /// Matches in the first pool.
+    const FIRST: usize = 12;
+
+    fn new(count: usize, samples: usize) -> Self {
+        Self { count, samples, drawn: 0 }
+    }
+
+    fn draw(&mut self, generator: &mut impl Rng) -> [usize; SAMPLE] {
+        self.drawn += 1;
+        let mut size = self.count;
+        if self.drawn.is_multiple_of(2) {
+            // The number of samples from the best n matches grows as n^4 (PROSAC, equation 3).
+            let progress = (self.drawn as f64 / self.samples as f64).powf(1.0 / SAMPLE as f64);
+            size = ((progress * self.count as f64) as usize).clamp(Self::FIRST.min(self.count), self.count);
+        }
+        let mut sample = [usize::MAX; SAMPLE];
+        for k in 0..SAMPLE {
+            sample[k] = loop {
+                let index = generator.random_range(0..size);
+                if !sample[..k].contains(&index) {
+                    break index;
+                }
+            };
+        }
+        sample
+    }
+}
+
+/// The homography through four matches; `None` if three points are collinear or the map would turn a triangle over.
+///
+/// # Source
+/// The projective basis of four points: Hartley and Zisserman, Multiple View Geometry, section 2.3; that all four
+/// triangles keep their orientation is the condition that no point crosses the horizon.
+fn through_sample(points: &MatchedPoints, sample: &[usize; SAMPLE]) -> Option<Homography> {
+    let (a, b) = (sample.map(|k| points.in_a[k]), sample.map(|k| points.in_b[k]));
+    let (areas_a, areas_b) = (triangle_areas(&a), triangle_areas(&b));
+    let kept = |(&a, &b): (&f64, &f64)| a * b > 0.0 && a.abs() >= MIN_TRIANGLE_PX2 && b.abs() >= MIN_TRIANGLE_PX2;
+    if !areas_a.iter().zip(&areas_b).all(kept) {
+        return None;
+    }
+    let basis_a_inverse = basis(&a, &areas_a).try_inverse()?;
+    let matrix = basis(&b, &areas_b) * basis_a_inverse;
+    let homography = Homography(matrix / matrix.amax());
+    let sign = homography.denominator(a[0]).signum();
+    let signed = Homography(homography.0 * sign);
+    signed.0.iter().all(|entry| entry.is_finite()).then_some(signed)
+}
+
+/// Twice the signed areas of the triangles (1 2 3), (4 2 3), (1 4 3), (1 2 4).
+fn triangle_areas(p: &[Vector2<f64>; SAMPLE]) -> [f64; SAMPLE] {
+    let area = |i: usize, j: usize, k: usize| (p[j] - p[i]).perp(&(p[k] - p[i]));
+    [area(0, 1, 2), area(3, 1, 2), area(0, 3, 2), area(0, 1, 3)]
+}
+
+/// The matrix that maps the unit vectors to the first three points and (1, 1, 1) to the fourth.
+fn basis(p: &[Vector2<f64>; SAMPLE], areas: &[f64; SAMPLE]) -> Matrix3<f64> {
+    Matrix3::from_columns(&std::array::from_fn::<_, 3, _>(|k| p[k].push(1.0) * (areas[k + 1] / areas[0])))
+}
+
+/// Squared forward transfer error; infinite behind the horizon.
+fn squared_error(h: &Matrix3<f64>, a: Vector2<f64>, b: Vector2<f64>) -> f64 {
+    let w = h[(2, 0)] * a.x + h[(2, 1)] * a.y + h[(2, 2)];
+    let x = h[(0, 0)] * a.x + h[(0, 1)] * a.y + h[(0, 2)] - b.x * w;
+    let y = h[(1, 0)] * a.x + h[(1, 1)] * a.y + h[(1, 2)] - b.y * w;
+    if w > 0.0 { (x * x + y * y) / (w * w) } else { f64::INFINITY }
+}
+
+/// Sum over the matches of min(1, error^2 / inlier_px^2); `None` once it reaches `bound`.
+fn truncated_cost(points: &MatchedPoints, hypothesis: &Homography, inlier_px: f64, bound: f64) -> Option<f64> {
+    let scale = inlier_px.powi(2).recip();
+    let mut cost = 0.0;
+    for (a, b) in points.in_a.chunks(BATCH).zip(points.in_b.chunks(BATCH)) {
+        let errors = a.iter().zip(b).map(|(&a, &b)| (squared_error(&hypothesis.0, a, b) * scale).min(1.0));
+        cost += errors.sum::<f64>();
+        if cost >= bound {
+            return None;
+        }
+    }
+    Some(cost)
+}
+
+/// Fits the map to its inliers at shrinking thresholds as long as that lowers the cost.
+fn optimise_locally(
+    points: &MatchedPoints,
+    hypothesis: Homography,
+    cost: f64,
+    inlier_px: f64,
+    is_plausible: &impl Fn(&Homography) -> bool,
+) -> (Homography, f64) {
+    let (mut best, mut best_cost, mut current) = (hypothesis, cost, hypothesis);
+    for factor in LOCAL_THRESHOLDS {
+        let chosen = points.select(&points.agreeing(&current, factor * inlier_px));
+        if chosen.in_a.len() <= SAMPLE {
+            break;
+        }
+        let Some(fit) = fit_visible(&chosen) else { break };
+        current = fit;
+        if let Some(cost) = truncated_cost(points, &current, inlier_px, best_cost)
+            && is_plausible(&current)
+        {
+            (best, best_cost) = (current, cost);
+        }
+    }
+    (best, best_cost)
+}
+
+/// Least-squares map, signed so that the points are in front; `None` if degenerate or the points lie on both sides.
+fn fit_visible(points: &MatchedPoints) -> Option<Homography> {
+    let fit = Homography::fit(&points.in_a, &points.in_b, None)?;
+    let sign = fit.denominator(*points.in_a.first()?).signum();
+    let signed = Homography(fit.0 * sign);
+    points.in_a.iter().all(|&point| signed.denominator(point) > 0.0).then_some(signed)
+}
+
+/// Refines on the inliers and chooses these again until they stay; keeps the map of least cost.
+fn finish(
+    points: &MatchedPoints,
+    found: Homography,
+    inlier_px: f64,
+    is_plausible: &impl Fn(&Homography) -> bool,
+) -> Homography {
+    let all = points.in_a.len() as f64;
+    let mut best = found;
+    let mut best_cost = truncated_cost(points, &found, inlier_px, f64::INFINITY).unwrap_or(all);
+    let mut inliers = points.agreeing(&found, inlier_px);
+    for _ in 0..FINAL_ROUNDS {
+        if inliers.len() <= SAMPLE {
+            break;
+        }
+        let Some(refined) = refine::minimise_symmetric_error(&best, &points.select(&inliers)) else { break };
+        let Some(cost) = truncated_cost(points, &refined, inlier_px, best_cost) else { break };
+        if !is_plausible(&refined) {
+            break;
+        }
+        (best, best_cost) = (refined, cost);
+        let chosen = points.agreeing(&best, inlier_px);
+        if chosen == inliers {
+            break;
+        }
+        inliers = chosen;
+    }
+    best
+}
