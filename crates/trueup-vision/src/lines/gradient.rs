@@ -1,0 +1,277 @@
+//! The reduced picture's gradient: magnitudes and unit vectors along the level lines.
+
+use rayon::prelude::*;
+use trueup_core::raster::Raster;
+
+use super::LineOptions;
+
+/// The Gaussian is cut where it has fallen to 10^-3 of its peak: sqrt(2 ln 1000) standard deviations.
+const GAUSSIAN_REACH_SIGMAS: f64 = 3.717;
+
+/// Rows a thread reduces at a time.
+const ROWS_PER_TASK: usize = 16;
+
+/// Level lines and gradient magnitudes at the nodes between the pixels of the reduced picture.
+///
+/// Arrays are padded by one element on every side, which is never aligned with anything, so that neighbours need no
+/// check of the border: the element at column x and row y of the padded arrays lies at (x, y) in corner coordinates of
+/// the reduced picture.
+#[derive(Debug)]
+pub(super) struct GradientField {
+    width: usize,
+    height: usize,
+    picture_from_field: f64,
+    level_lines: Vec<[f32; 2]>,
+    magnitudes: Vec<f32>,
+}
+
+impl GradientField {
+    /// Reduces the picture and takes its gradient on 2 x 2 pixels.
+    ///
+    /// # Source
+    /// IPOL, sections 2.1 to 2.4. The gradient averages two differences on each axis; pixels whose magnitude is not
+    /// above `quantisation / sin(angle_tolerance)` have no direction (their level line is (0, 0)).
+    pub(super) fn new(image: &Raster<f32>, options: &LineOptions) -> Self {
+        let reduced = reduce(image, options.scale, options.sigma_scale);
+        let picture_from_field = 1.0 / options.scale;
+        let (width, height) = (reduced.width().saturating_sub(1), reduced.height().saturating_sub(1));
+        if width == 0 || height == 0 {
+            return Self {
+                width: 0,
+                height: 0,
+                picture_from_field,
+                level_lines: vec![[0.0; 2]; 4],
+                magnitudes: vec![0.0; 4],
+            };
+        }
+        let stride = width + 2;
+        let threshold = (options.quantisation / options.angle_tolerance_deg.to_radians().sin()) as f32;
+        let mut level_lines = vec![[0.0_f32; 2]; stride * (height + 2)];
+        let mut magnitudes = vec![0.0_f32; stride * (height + 2)];
+        let inside = stride..stride * (height + 1);
+        level_lines[inside.clone()]
+            .par_chunks_mut(stride)
+            .zip(magnitudes[inside].par_chunks_mut(stride))
+            .with_min_len(ROWS_PER_TASK)
+            .enumerate()
+            .for_each(|(y, (lines, magnitudes))| {
+                let nodes = 1..=width;
+                gradient_row(
+                    reduced.row(y),
+                    reduced.row(y + 1),
+                    threshold,
+                    &mut lines[nodes.clone()],
+                    &mut magnitudes[nodes],
+                );
+            });
+        Self { width, height, picture_from_field, level_lines, magnitudes }
+    }
+
+    /// Nodes across, without padding.
+    pub(super) fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Nodes down, without padding.
+    pub(super) fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Elements from one row of the padded arrays to the next.
+    pub(super) fn stride(&self) -> usize {
+        self.width + 2
+    }
+
+    /// Factor from the reduced picture's coordinates to the picture's.
+    pub(super) fn picture_from_field(&self) -> f64 {
+        self.picture_from_field
+    }
+
+    /// Unit vectors along the level lines, the brighter side to their right on the screen; (0, 0) where there is none.
+    pub(super) fn level_lines(&self) -> &[[f32; 2]] {
+        &self.level_lines
+    }
+
+    /// Gradient magnitudes in grey levels per reduced pixel; 0 where there is no level line.
+    pub(super) fn magnitudes(&self) -> &[f32] {
+        &self.magnitudes
+    }
+
+    /// Column and row of an element of the padded arrays.
+    pub(super) fn position(&self, index: u32) -> (f64, f64) {
+        let stride = self.stride() as u32;
+        (f64::from(index % stride), f64::from(index / stride))
+    }
+
+    /// The elements that have a level line, those of the largest magnitude first, in `bins` classes; row by row
+    /// inside a class (IPOL, section 2.3).
+    pub(super) fn seeds(&self, bins: usize) -> Vec<u32> {
+        let largest = self.magnitudes.iter().copied().fold(0.0_f32, f32::max);
+        if largest <= 0.0 {
+            return Vec::new();
+        }
+        let bins = bins.max(1);
+        let class_from_magnitude = bins as f32 / largest;
+        // Class 0 holds the largest magnitudes.
+        let class_of = |magnitude: f32| bins - 1 - ((magnitude * class_from_magnitude) as usize).min(bins - 1);
+        let mut starts = vec![0_usize; bins + 1];
+        for &magnitude in self.magnitudes.iter().filter(|&&magnitude| magnitude > 0.0) {
+            starts[class_of(magnitude) + 1] += 1;
+        }
+        for class in 0..bins {
+            starts[class + 1] += starts[class];
+        }
+        let mut seeds = vec![0_u32; starts[bins]];
+        for (index, &magnitude) in self.magnitudes.iter().enumerate() {
+            if magnitude > 0.0 {
+                let next = &mut starts[class_of(magnitude)];
+                seeds[*next] = index as u32;
+                *next += 1;
+            }
+        }
+        seeds
+    }
+}
+
+/// The nodes between two rows of pixels. All slices but the rows are as long as there are nodes.
+fn gradient_row(upper: &[f32], lower: &[f32], threshold: f32, lines: &mut [[f32; 2]], magnitudes: &mut [f32]) {
+    let pairs = upper.iter().zip(&upper[1..]).zip(lower.iter().zip(&lower[1..]));
+    for (((&nw, &ne), (&sw, &se)), (line, magnitude)) in pairs.zip(lines.iter_mut().zip(magnitudes)) {
+        let gradient_x = 0.5 * ((ne - nw) + (se - sw));
+        let gradient_y = 0.5 * ((sw - nw) + (se - ne));
+        let norm = (gradient_x * gradient_x + gradient_y * gradient_y).sqrt();
+        // False for NaN and infinity too.
+        let defined = norm > threshold && norm < f32::MAX;
+        let inverse = if defined { 1.0 / norm } else { 0.0 };
+        *magnitude = if defined { norm } else { 0.0 };
+        *line = if defined { [gradient_y * inverse, -gradient_x * inverse] } else { [0.0; 2] };
+    }
+}
+
+/// The picture smoothed by a Gaussian of `sigma_scale / scale` pixels and sampled at the centres of pixels that are
+/// `1 / scale` wide; corners coincide. A scale of 1 only copies.
+fn reduce(image: &Raster<f32>, scale: f64, sigma_scale: f64) -> Raster<f32> {
+    if scale >= 1.0 || image.data().is_empty() {
+        return image.clone();
+    }
+    let columns = AxisFilter::new(image.width(), scale, sigma_scale);
+    let rows = AxisFilter::new(image.height(), scale, sigma_scale);
+    let mut reduced = Raster::new(columns.starts.len(), rows.starts.len(), 1);
+    if reduced.data().is_empty() {
+        return reduced;
+    }
+    let reduced_width = reduced.width();
+    reduced.data_mut().par_chunks_mut(reduced_width).with_min_len(ROWS_PER_TASK).enumerate().for_each_init(
+        || vec![0.0_f32; image.width()],
+        |blended, (y, output)| {
+            rows.blend_rows(y, image, blended);
+            columns.filter_row(blended, output);
+        },
+    );
+    reduced
+}
+
+/// A Gaussian sampled along one axis: for each output, weights of `taps` inputs from `start` on.
+struct AxisFilter {
+    taps: usize,
+    starts: Vec<usize>,
+    weights: Vec<f32>,
+}
+
+impl AxisFilter {
+    fn new(length: usize, scale: f64, sigma_scale: f64) -> Self {
+        let sigma = sigma_scale / scale;
+        let reach = (sigma * GAUSSIAN_REACH_SIGMAS).ceil() as isize;
+        let taps = (2 * reach as usize + 2).min(length);
+        let outputs = (length as f64 * scale).floor() as usize;
+        let mut starts = Vec::with_capacity(outputs);
+        let mut weights = vec![0.0_f32; outputs * taps];
+        for (output, weights) in weights.chunks_exact_mut(taps.max(1)).enumerate() {
+            let centre = (output as f64 + 0.5) / scale;
+            let first = centre.floor() as isize - reach;
+            let start = first.clamp(0, (length - taps) as isize);
+            let inputs = first..first + 2 * reach + 2;
+            let weight_of = |input: isize| (-0.5 * ((input as f64 + 0.5 - centre) / sigma).powi(2)).exp();
+            let total: f64 = inputs.clone().map(weight_of).sum();
+            for input in inputs {
+                let inside = mirror(input, length as isize) - start;
+                // Short axes fold more than once; what falls outside the window then is negligible or nothing.
+                if let Some(weight) = weights.get_mut(inside.max(0) as usize) {
+                    *weight += (weight_of(input) / total) as f32;
+                }
+            }
+            starts.push(start as usize);
+        }
+        Self { taps, starts, weights }
+    }
+
+    /// The weighted mean of the image's rows that make output row `y`.
+    fn blend_rows(&self, y: usize, image: &Raster<f32>, blended: &mut [f32]) {
+        blended.fill(0.0);
+        let weights = &self.weights[y * self.taps..(y + 1) * self.taps];
+        for (tap, &weight) in weights.iter().enumerate() {
+            // A weight of zero is a tap beyond the Gaussian's reach.
+            if weight != 0.0 {
+                let row = image.row(self.starts[y] + tap);
+                blended.iter_mut().zip(row).for_each(|(sum, &sample)| *sum += weight * sample);
+            }
+        }
+    }
+
+    /// Filters one row.
+    fn filter_row(&self, row: &[f32], output: &mut [f32]) {
+        let windows = self.starts.iter().zip(self.weights.chunks_exact(self.taps));
+        for (sample, (&start, weights)) in output.iter_mut().zip(windows) {
+            let inputs = &row[start..start + self.taps];
+            *sample = weights.iter().zip(inputs).map(|(weight, input)| weight * input).sum();
+        }
+    }
+}
+
+/// The index in 0..length that `index` mirrors to at the outer edges of the first and last element.
+fn mirror(index: isize, length: isize) -> isize {
+    let folded = index.rem_euclid(2 * length);
+    if folded < length { folded } else { 2 * length - 1 - folded }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reduction_keeps_a_constant_and_the_corner() {
+        let flat = Raster::from_data(11, 7, 1, vec![90.0; 77]).expect("sizes agree");
+        let reduced = reduce(&flat, 0.8, 0.6);
+        assert_eq!((reduced.width(), reduced.height()), (8, 5));
+        assert!(reduced.data().iter().all(|&sample| (sample - 90.0).abs() < 1e-4));
+        // A ramp of one level a pixel, x + 0.5 at its centres, stays a ramp of the same corner coordinates.
+        let ramp = Raster::from_data(40, 1, 1, (0..40).map(|x| x as f32 + 0.5).collect()).expect("sizes agree");
+        let filter = AxisFilter::new(40, 0.8, 0.6);
+        let mut output = vec![0.0; 32];
+        filter.filter_row(ramp.row(0), &mut output);
+        assert!((f64::from(output[16]) - 16.5 / 0.8).abs() < 2e-3, "{}", output[16]);
+    }
+
+    #[test]
+    fn level_lines_have_the_brighter_side_on_their_right() {
+        // Brighter towards larger x: up the screen.
+        let image = Raster::from_data(2, 2, 1, vec![0.0, 100.0, 0.0, 100.0]).expect("sizes agree");
+        let field = GradientField::new(&image, &LineOptions { scale: 1.0, ..LineOptions::default() });
+        assert_eq!(field.level_lines()[field.stride() + 1], [0.0, -1.0]);
+        assert_eq!(field.magnitudes()[field.stride() + 1], 100.0);
+    }
+
+    #[test]
+    fn seeds_come_by_falling_magnitude() {
+        let image = Raster::from_data(4, 2, 1, vec![0.0, 10.0, 60.0, 100.0, 0.0, 10.0, 60.0, 100.0]).expect("sizes");
+        let field = GradientField::new(&image, &LineOptions { scale: 1.0, ..LineOptions::default() });
+        let first = field.stride() as u32 + 1;
+        assert_eq!(field.seeds(1024), [first + 1, first + 2, first]);
+    }
+
+    #[test]
+    fn mirroring_folds_as_often_as_needed() {
+        let folded: Vec<isize> = (-3..6).map(|index| mirror(index, 2)).collect();
+        assert_eq!(folded, [1, 1, 0, 0, 1, 1, 0, 0, 1]);
+    }
+}

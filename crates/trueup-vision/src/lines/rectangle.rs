@@ -1,0 +1,213 @@
+//! Rectangles around regions of one direction, and how they are improved.
+
+use super::gradient::GradientField;
+use super::significance::FalseAlarms;
+
+/// Changes tried in each step of the improvement (IPOL, section 2.8).
+const TRIES: usize = 5;
+
+/// What a try takes off the width, in reduced pixels (IPOL, section 2.8).
+const WIDTH_STEP_PX: f64 = 0.5;
+
+/// The narrowest rectangle the improvement leaves, in reduced pixels.
+const MIN_IMPROVED_WIDTH_PX: f64 = 0.5;
+
+/// The narrowest rectangle of a region: a row of pixels is one pixel wide.
+const MIN_WIDTH_PX: f64 = 1.0;
+
+/// Pixel centres this close outside a rectangle count as inside: those that define its sides must.
+const BOUNDARY_SLACK_PX: f64 = 1e-6;
+
+/// A rectangle in the padded field's coordinates: a centre, a direction, and intervals along and across it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rectangle {
+    centre: [f64; 2],
+    /// Unit vector; level lines run its way.
+    direction: [f64; 2],
+    /// Interval along the direction, from the centre.
+    along: [f64; 2],
+    /// Interval along (-direction.y, direction.x), from the centre.
+    across: [f64; 2],
+    /// Probability that a pixel of noise is aligned: twice the tolerance over 2 pi.
+    probability: f64,
+}
+
+impl Rectangle {
+    /// The rectangle of the region `indices`: through its centre of mass along the principal axis of its inertia, with
+    /// gradient magnitudes for masses, and as large as to hold all the pixels' centres.
+    ///
+    /// `towards` is any vector within a quarter turn of the wanted direction. `None` if the region has no mass.
+    ///
+    /// # Source
+    /// IPOL, section 2.5.
+    pub(super) fn around(indices: &[u32], field: &GradientField, towards: [f64; 2], probability: f64) -> Option<Self> {
+        let magnitudes = field.magnitudes();
+        let weighted = || {
+            indices.iter().map(|&index| {
+                let (x, y) = field.position(index);
+                (x, y, f64::from(magnitudes[index as usize]))
+            })
+        };
+        let (mass, sum_x, sum_y) = weighted().fold((0.0, 0.0, 0.0), |(mass, sum_x, sum_y), (x, y, weight)| {
+            (mass + weight, sum_x + weight * x, sum_y + weight * y)
+        });
+        if mass <= 0.0 {
+            return None;
+        }
+        let centre = [sum_x / mass, sum_y / mass];
+        let (xx, xy, yy) = weighted().fold((0.0, 0.0, 0.0), |(xx, xy, yy), (x, y, weight)| {
+            let (dx, dy) = (x - centre[0], y - centre[1]);
+            (xx + weight * dx * dx, xy + weight * dx * dy, yy + weight * dy * dy)
+        });
+        let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
+        let mut direction = [angle.cos(), angle.sin()];
+        if direction[0] * towards[0] + direction[1] * towards[1] < 0.0 {
+            direction = direction.map(|component| -component);
+        }
+        let (mut along, mut across) = ([0.0_f64; 2], [0.0_f64; 2]);
+        for (x, y, _) in weighted() {
+            let (dx, dy) = (x - centre[0], y - centre[1]);
+            let (a, b) = (dx * direction[0] + dy * direction[1], dy * direction[0] - dx * direction[1]);
+            along = [along[0].min(a), along[1].max(a)];
+            across = [across[0].min(b), across[1].max(b)];
+        }
+        let missing = 0.5 * (MIN_WIDTH_PX - (across[1] - across[0])).max(0.0);
+        across = [across[0] - missing, across[1] + missing];
+        Some(Self { centre, direction, along, across, probability })
+    }
+
+    /// Width, in reduced pixels.
+    pub(super) fn width(&self) -> f64 {
+        self.across[1] - self.across[0]
+    }
+
+    fn length(&self) -> f64 {
+        self.along[1] - self.along[0]
+    }
+
+    /// The share of the rectangle's area that a region of `pixels` fills (may exceed 1 for small rectangles).
+    pub(super) fn density(&self, pixels: usize) -> f64 {
+        pixels as f64 / (self.length() * self.width()).max(f64::MIN_POSITIVE)
+    }
+
+    /// Start and end of the axis: through the centre of mass unless that side was cut away.
+    pub(super) fn axis(&self) -> [[f64; 2]; 2] {
+        let offset = 0.0_f64.clamp(self.across[0], self.across[1]);
+        self.along.map(|along| self.point(along, offset))
+    }
+
+    fn point(&self, along: f64, across: f64) -> [f64; 2] {
+        let [x, y] = self.direction;
+        [self.centre[0] + along * x - across * y, self.centre[1] + along * y + across * x]
+    }
+
+    /// Pixels whose centre is inside, and how many of them are aligned with the direction.
+    fn count(&self, field: &GradientField) -> (usize, usize) {
+        let corners = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(a, b)| self.point(self.along[a], self.across[b])[1]);
+        let top = corners.iter().copied().fold(f64::INFINITY, f64::min) - BOUNDARY_SLACK_PX;
+        let bottom = corners.iter().copied().fold(f64::NEG_INFINITY, f64::max) + BOUNDARY_SLACK_PX;
+        let first_row = top.ceil().max(1.0) as usize;
+        let last_row = bottom.floor().min(field.height() as f64).max(0.0) as usize;
+        let tangent = (std::f64::consts::PI * self.probability).tan() as f32;
+        let direction = self.direction.map(|component| component as f32);
+        let (mut total, mut aligned) = (0, 0);
+        for row in first_row..=last_row {
+            let (left, right) = self.row_interval(row as f64);
+            let first = left.ceil().max(1.0) as usize;
+            let last = right.floor().min(field.width() as f64).max(0.0) as usize;
+            if first > last {
+                continue;
+            }
+            let start = row * field.stride();
+            total += last - first + 1;
+            aligned += field.level_lines()[start + first..=start + last]
+                .iter()
+                .filter(|&&line| is_aligned(line, direction, tangent))
+                .count();
+        }
+        (total, aligned)
+    }
+
+    /// The columns of row `y` that are inside, as an interval that may be empty.
+    fn row_interval(&self, y: f64) -> (f64, f64) {
+        let dy = y - self.centre[1];
+        let [x, slope] = self.direction;
+        // along = dx x + dy slope, across = dy x - dx slope: each bounds dx unless its factor vanishes.
+        let bounds = [(x, dy * slope, self.along), (-slope, dy * x, self.across)];
+        let (mut left, mut right) = (f64::NEG_INFINITY, f64::INFINITY);
+        for (factor, constant, interval) in bounds {
+            let [low, high] = [interval[0] - BOUNDARY_SLACK_PX - constant, interval[1] + BOUNDARY_SLACK_PX - constant];
+            if factor.abs() < f64::EPSILON {
+                if low > 0.0 || high < 0.0 {
+                    return (f64::INFINITY, f64::NEG_INFINITY);
+                }
+                continue;
+            }
+            let (a, b) = (low / factor, high / factor);
+            left = left.max(a.min(b));
+            right = right.min(a.max(b));
+        }
+        (left + self.centre[0], right + self.centre[0])
+    }
+
+    fn significance(&self, field: &GradientField, false_alarms: &FalseAlarms) -> f64 {
+        let (total, aligned) = self.count(field);
+        false_alarms.significance(total, aligned, self.probability)
+    }
+
+    fn finer(mut self) -> Option<Self> {
+        self.probability *= 0.5;
+        Some(self)
+    }
+
+    /// Cuts `first` off the one side and `second` off the other; `None` if too little would remain.
+    fn narrower(mut self, first: f64, second: f64) -> Option<Self> {
+        self.across = [self.across[0] + first, self.across[1] - second];
+        (self.width() >= MIN_IMPROVED_WIDTH_PX).then_some(self)
+    }
+}
+
+/// Whether two directions are within the angle of the tangent given; never if either is (0, 0).
+#[inline]
+pub(super) fn is_aligned(line: [f32; 2], direction: [f32; 2], tangent: f32) -> bool {
+    let dot = line[0] * direction[0] + line[1] * direction[1];
+    let cross = line[0] * direction[1] - line[1] * direction[0];
+    dot > 0.0 && cross.abs() <= tangent * dot
+}
+
+/// Looks for a more significant variant of a rectangle that is not significant yet: finer precisions, then a smaller
+/// width, then one side, then the other cut away, then finer precisions again. Returns the best with its -log10 NFA.
+///
+/// # Source
+/// IPOL, section 2.8.
+pub(super) fn improve(
+    rectangle: Rectangle,
+    field: &GradientField,
+    false_alarms: &FalseAlarms,
+    enough: f64,
+) -> (Rectangle, f64) {
+    const HALF: f64 = 0.5 * WIDTH_STEP_PX;
+    let steps: [fn(Rectangle) -> Option<Rectangle>; 5] = [
+        Rectangle::finer,
+        |rectangle| rectangle.narrower(HALF, HALF),
+        |rectangle| rectangle.narrower(WIDTH_STEP_PX, 0.0),
+        |rectangle| rectangle.narrower(0.0, WIDTH_STEP_PX),
+        Rectangle::finer,
+    ];
+    let mut best = (rectangle, rectangle.significance(field, false_alarms));
+    for step in steps {
+        if best.1 > enough {
+            break;
+        }
+        let mut variant = best.0;
+        for _ in 0..TRIES {
+            let Some(next) = step(variant) else { break };
+            variant = next;
+            let significance = variant.significance(field, false_alarms);
+            if significance > best.1 {
+                best = (variant, significance);
+            }
+        }
+    }
+    best
+}

@@ -1,0 +1,163 @@
+//! Connected pixels whose level lines share a direction.
+
+use super::LineOptions;
+use super::gradient::GradientField;
+use super::rectangle::{Rectangle, is_aligned};
+
+/// The smallest region a rectangle can be fitted to.
+const MIN_REGION: usize = 2;
+
+/// What a step of the reduction of a sparse region leaves of its radius (IPOL, section 2.6).
+const RADIUS_REDUCTION: f64 = 0.75;
+
+/// A sparse region is grown again within this many standard deviations of the directions near its seed (IPOL, 2.6).
+const TOLERANCE_SIGMAS: f64 = 2.0;
+
+/// Grows regions; every pixel belongs to at most one.
+#[derive(Debug)]
+pub(super) struct RegionGrower<'a> {
+    field: &'a GradientField,
+    /// Pixels that are in a region or have no level line.
+    used: Vec<bool>,
+    /// The region in the making, its seed first.
+    region: Vec<u32>,
+    /// Sum of the region's level lines: its direction.
+    sum: [f32; 2],
+    tolerance: f64,
+    min_density: f64,
+}
+
+impl<'a> RegionGrower<'a> {
+    pub(super) fn new(field: &'a GradientField, options: &LineOptions) -> Self {
+        Self {
+            field,
+            used: field.magnitudes().iter().map(|&magnitude| magnitude <= 0.0).collect(),
+            region: Vec::new(),
+            sum: [0.0; 2],
+            tolerance: options.angle_tolerance_deg.to_radians(),
+            min_density: options.min_density,
+        }
+    }
+
+    /// The probability that a pixel of noise is aligned with a region.
+    pub(super) fn aligned_probability(&self) -> f64 {
+        self.tolerance / std::f64::consts::PI
+    }
+
+    /// Grows a region from `seed` and fits its rectangle; `None` if the seed is taken, or the region is smaller than
+    /// `min_region` or cannot be made dense enough.
+    pub(super) fn rectangle_from(&mut self, seed: u32, min_region: usize) -> Option<Rectangle> {
+        if self.used[seed as usize] {
+            return None;
+        }
+        self.grow(seed, self.tolerance);
+        if self.region.len() < min_region.max(MIN_REGION) {
+            return None;
+        }
+        let rectangle = self.fit()?;
+        if rectangle.density(self.region.len()) >= self.min_density {
+            return Some(rectangle);
+        }
+        let rectangle = self.grow_narrowly(seed, &rectangle)?;
+        if rectangle.density(self.region.len()) >= self.min_density {
+            return Some(rectangle);
+        }
+        self.shrink(seed, rectangle)
+    }
+
+    fn fit(&self) -> Option<Rectangle> {
+        Rectangle::around(&self.region, self.field, self.sum.map(f64::from), self.aligned_probability())
+    }
+
+    /// Adds 8-connected pixels within `tolerance` of the region's mean direction until there are none.
+    ///
+    /// # Source
+    /// IPOL, section 2.4.
+    fn grow(&mut self, seed: u32, tolerance: f64) {
+        let lines = self.field.level_lines();
+        let stride = self.field.stride();
+        let tangent = tolerance.tan() as f32;
+        self.region.clear();
+        self.region.push(seed);
+        self.used[seed as usize] = true;
+        let mut sum = lines[seed as usize];
+        let mut next = 0;
+        while let Some(&index) = self.region.get(next) {
+            next += 1;
+            // Pixels of the field have all eight neighbours in the padded arrays.
+            let centre = index as usize;
+            for row_start in [centre - stride - 1, centre - 1, centre + stride - 1] {
+                for neighbour in row_start..row_start + 3 {
+                    if !self.used[neighbour] && is_aligned(lines[neighbour], sum, tangent) {
+                        self.used[neighbour] = true;
+                        sum = [sum[0] + lines[neighbour][0], sum[1] + lines[neighbour][1]];
+                        self.region.push(neighbour as u32);
+                    }
+                }
+            }
+        }
+        self.sum = sum;
+    }
+
+    /// Grows the region again with a tolerance taken from the directions near its seed.
+    ///
+    /// # Source
+    /// IPOL, section 2.6.
+    fn grow_narrowly(&mut self, seed: u32, rectangle: &Rectangle) -> Option<Rectangle> {
+        let lines = self.field.level_lines();
+        let seed_line = lines[seed as usize];
+        let near = squared(rectangle.width());
+        let (mut count, mut sum, mut sum_of_squares) = (0.0, 0.0, 0.0);
+        for &index in &self.region {
+            self.used[index as usize] = false;
+            if self.squared_distance(seed, index) < near {
+                let line = lines[index as usize];
+                let dot = line[0] * seed_line[0] + line[1] * seed_line[1];
+                let cross = seed_line[0] * line[1] - seed_line[1] * line[0];
+                let turn = f64::from(cross.atan2(dot));
+                count += 1.0;
+                sum += turn;
+                sum_of_squares += turn * turn;
+            }
+        }
+        let variance = if count > 0.0 { sum_of_squares / count - squared(sum / count) } else { 0.0 };
+        // Never wider than the first growth, which the seed's surroundings alone could suggest.
+        let tolerance = (TOLERANCE_SIGMAS * variance.max(0.0).sqrt()).min(self.tolerance);
+        self.grow(seed, tolerance);
+        if self.region.len() < MIN_REGION { None } else { self.fit() }
+    }
+
+    /// Gives up the pixels farthest from the seed until the rectangle is dense enough.
+    ///
+    /// # Source
+    /// IPOL, section 2.6.
+    fn shrink(&mut self, seed: u32, mut rectangle: Rectangle) -> Option<Rectangle> {
+        let (x, y) = self.field.position(seed);
+        let mut radius_squared =
+            rectangle.axis().map(|end| squared(end[0] - x) + squared(end[1] - y)).into_iter().fold(0.0, f64::max);
+        while rectangle.density(self.region.len()) < self.min_density {
+            radius_squared *= squared(RADIUS_REDUCTION);
+            let (field, used) = (self.field, &mut self.used);
+            self.region.retain(|&index| {
+                let (px, py) = field.position(index);
+                let keep = squared(px - x) + squared(py - y) <= radius_squared;
+                used[index as usize] = keep;
+                keep
+            });
+            if self.region.len() < MIN_REGION {
+                return None;
+            }
+            rectangle = self.fit()?;
+        }
+        Some(rectangle)
+    }
+
+    fn squared_distance(&self, first: u32, second: u32) -> f64 {
+        let ((ax, ay), (bx, by)) = (self.field.position(first), self.field.position(second));
+        squared(ax - bx) + squared(ay - by)
+    }
+}
+
+fn squared(value: f64) -> f64 {
+    value * value
+}

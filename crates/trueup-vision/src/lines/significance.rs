@@ -1,0 +1,121 @@
+//! How many rectangles as well aligned as one found are expected in noise.
+
+use std::f64::consts::{LN_10, TAU};
+
+/// Number of precisions a rectangle is tried with, the factor gamma of the number of tests (IPOL, section 2.7).
+const PRECISIONS_TESTED: f64 = 11.0;
+
+/// Factorials kept in a table; above, Stirling's series is exact to double precision.
+const TABLED_FACTORIALS: usize = 2048;
+
+/// The tail's sum ends when what is left cannot change it by more than this share.
+const TAIL_TOLERANCE: f64 = 1e-3;
+
+/// The number of false alarms (NFA) of rectangles in a field of given size.
+#[derive(Debug)]
+pub(super) struct FalseAlarms {
+    /// log10 of the number of rectangles, times precisions, that a picture of this size has.
+    log10_tests: f64,
+    /// ln n! for small n.
+    ln_factorials: Vec<f64>,
+}
+
+impl FalseAlarms {
+    /// # Source
+    /// The number of tests is (width height)^(5/2) gamma: two end points and a width (TPAMI, section 2.3).
+    pub(super) fn new(width: usize, height: usize) -> Self {
+        let area = (width.max(1) as f64) * (height.max(1) as f64);
+        let mut sum = 0.0;
+        let ln_factorials = (0..TABLED_FACTORIALS)
+            .map(|n| {
+                sum += (n.max(1) as f64).ln();
+                sum
+            })
+            .collect();
+        Self { log10_tests: 2.5 * area.log10() + PRECISIONS_TESTED.log10(), ln_factorials }
+    }
+
+    /// The fewest pixels that could be significant if all of them were aligned.
+    pub(super) fn smallest_region(&self, probability: f64, min_significance: f64) -> usize {
+        ((self.log10_tests + min_significance) / -probability.log10()).max(0.0) as usize
+    }
+
+    /// -log10 of the number of false alarms: `aligned` of `total` pixels, each aligned with `probability` in noise.
+    ///
+    /// # Source
+    /// NFA = tests * P(Binomial(total, probability) >= aligned) (TPAMI, equation 1).
+    pub(super) fn significance(&self, total: usize, aligned: usize, probability: f64) -> f64 {
+        -self.log10_tests - self.log10_tail(total, aligned, probability)
+    }
+
+    /// log10 of the upper tail of the binomial law.
+    fn log10_tail(&self, total: usize, aligned: usize, probability: f64) -> f64 {
+        if aligned == 0 || total == 0 {
+            return 0.0;
+        }
+        let (n, k) = (total as f64, aligned as f64);
+        let failures = total.saturating_sub(aligned);
+        let ln_first = self.ln_factorial(total) - self.ln_factorial(aligned) - self.ln_factorial(failures)
+            + k * probability.ln()
+            + failures as f64 * (-probability).ln_1p();
+        // Terms relative to the first. Their ratios fall, so that the rest is bounded by a geometric series.
+        let odds = probability / (1.0 - probability);
+        let (mut term, mut sum) = (1.0, 1.0);
+        for i in aligned + 1..=total {
+            let ratio = (n - i as f64 + 1.0) / i as f64 * odds;
+            term *= ratio;
+            sum += term;
+            if ratio < 1.0 && term * ratio / (1.0 - ratio) < TAIL_TOLERANCE * sum {
+                break;
+            }
+        }
+        ((ln_first + sum.ln()) / LN_10).min(0.0)
+    }
+
+    /// ln n!.
+    fn ln_factorial(&self, n: usize) -> f64 {
+        self.ln_factorials.get(n).copied().unwrap_or_else(|| stirling(n as f64))
+    }
+}
+
+/// ln n! for n >= 2000 by Stirling's series; the first term left out is below 1e-19.
+fn stirling(n: f64) -> f64 {
+    n * n.ln() - n + 0.5 * (TAU * n).ln() + 1.0 / (12.0 * n) - 1.0 / (360.0 * n.powi(3))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Exact sums of binomial terms, computed with rational arithmetic (Python's fractions).
+    #[test]
+    fn tails_agree_with_exact_sums() {
+        let alarms = FalseAlarms::new(10, 10);
+        let tail = |n, k, p: f64| 10_f64.powf(alarms.log10_tail(n, k, p));
+        // sum_{j>=3} C(10, j) (1/8)^j (7/8)^(10 - j)
+        assert!((tail(10, 3, 0.125) / 0.119_497_267_529_368_4 - 1.0).abs() < 2e-3);
+        // C(5, 5) (1/8)^5
+        assert!((tail(5, 5, 0.125) * 32768.0 - 1.0).abs() < 1e-9);
+        assert_eq!(tail(20, 0, 0.125), 1.0);
+        // 10 x 10: 100^2.5 * 11 tests.
+        let expected = -(5.0 + 11_f64.log10()) + 5.0 * 8_f64.log10();
+        assert!((alarms.significance(5, 5, 0.125) - expected).abs() < 1e-9);
+    }
+
+    #[test]
+    fn factorials_continue_beyond_the_table() {
+        let alarms = FalseAlarms::new(1, 1);
+        let last = alarms.ln_factorial(TABLED_FACTORIALS - 1);
+        let next = alarms.ln_factorial(TABLED_FACTORIALS);
+        assert!((next - last - (TABLED_FACTORIALS as f64).ln()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_region_below_the_smallest_is_never_significant() {
+        let alarms = FalseAlarms::new(640, 480);
+        let smallest = alarms.smallest_region(0.125, 0.0);
+        assert!(smallest > 10);
+        assert!(alarms.significance(smallest - 1, smallest - 1, 0.125) < 0.0);
+        assert!(alarms.significance(smallest + 1, smallest + 1, 0.125) > 0.0);
+    }
+}
