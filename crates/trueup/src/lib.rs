@@ -1,2 +1,45 @@
-//! Photographs in, an upright panorama out.
+//! Photographs in, an upright panorama out, with numbers and reasons for what was done.
+//!
+//! [`Stitcher`] runs trueup's stages in their order: find and measure the photographs, match them, estimate cameras,
+//! vanishing points and the similarity prior, deform the grids, and compose the panorama. Everything it decided is in
+//! the [`Project`], which is also what `--project` writes.
+//!
+//! ```no_run
+//! use trueup::{Inputs, StitchOptions, Stitcher, StageContext};
+//!
+//! let options = StitchOptions::default();
+//! let context = StageContext::default();
+//! let stitcher = Stitcher::new(&options, &context)?;
+//! let inputs = Inputs::new(["holiday/"]);
+//! for alignment in stitcher.align(&inputs)?.alignments {
+//!     let panorama = stitcher.compose(&alignment)?;
+//!     trueup::write_picture("pano.jpg".as_ref(), &panorama, &options.output, &context)?;
+//! }
+//! # Ok::<(), trueup::Error>(())
+//! ```
 #![forbid(unsafe_code)]
+
+mod align;
+mod clock;
+mod files;
+mod inputs;
+mod left_out;
+mod measure;
+mod options;
+mod project;
+mod stitcher;
+
+pub use files::{StitchJob, Written};
+pub use inputs::{Inputs, Reference};
+pub use options::{Method, StitchOptions, WorkingOptions};
+pub use project::{
+    Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
+};
+pub use stitcher::{Aligned, Alignment, Stitcher};
+pub use trueup_compose::render::Panorama;
+pub use trueup_core::context::{CancelToken, Progress, Silent};
+pub use trueup_core::diagnostics::{Diagnostic, Severity};
+pub use trueup_core::options::{InvalidOption, OptionDescription};
+pub use trueup_core::raster::RowSource;
+pub use trueup_core::{Error, Result, StageContext};
+pub use trueup_io::encode::{OutputOptions, write as write_picture};

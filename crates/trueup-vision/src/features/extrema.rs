@@ -198,7 +198,8 @@ fn refine(octaves: &[Octave], octave: usize, candidate: &Candidate, options: &Fe
     for _ in 0..=MAX_MOVES {
         let fit = Quadratic::around(&octaves[octave], level, x, y);
         let offset = fit.extremum()?;
-        let moves = offset.map(|component| f64::from(i8::from(component > MOVE_OFFSET) - i8::from(component < -MOVE_OFFSET)));
+        let moves =
+            offset.map(|component| f64::from(i8::from(component > MOVE_OFFSET) - i8::from(component < -MOVE_OFFSET)));
         let moved = |index: usize, step: f64, last: usize| -> Option<usize> {
             let index = index.checked_add_signed(step as isize)?;
             (index >= 1 && index <= last).then_some(index)
@@ -243,8 +244,7 @@ impl Quadratic {
             })
         });
         let value = d[1][1][1];
-        let gradient = 0.5
-            * Vector3::new(d[1][1][2] - d[1][1][0], d[1][2][1] - d[1][0][1], d[2][1][1] - d[0][1][1]);
+        let gradient = 0.5 * Vector3::new(d[1][1][2] - d[1][1][0], d[1][2][1] - d[1][0][1], d[2][1][1] - d[0][1][1]);
         let xx = d[1][1][2] + d[1][1][0] - 2.0 * value;
         let yy = d[1][2][1] + d[1][0][1] - 2.0 * value;
         let ss = d[2][1][1] + d[0][1][1] - 2.0 * value;

@@ -113,8 +113,7 @@ fn peaks(histogram: &[f32; BINS], limit: usize) -> Vec<f64> {
     let greatest = histogram.iter().copied().fold(0.0, f32::max);
     let mut found: Vec<(f32, f64)> = Vec::new();
     for bin in 0..BINS {
-        let (before, here, after) =
-            (histogram[(bin + BINS - 1) % BINS], histogram[bin], histogram[(bin + 1) % BINS]);
+        let (before, here, after) = (histogram[(bin + BINS - 1) % BINS], histogram[bin], histogram[(bin + 1) % BINS]);
         if here > before && here >= after && here >= PEAK_SHARE * greatest {
             let offset = 0.5 * f64::from(before - after) / f64::from(before - 2.0 * here + after);
             let bin = (bin as f64 + offset).rem_euclid(BINS as f64);

@@ -1,0 +1,215 @@
+//! From matches to deformed grids for one group of overlapping photographs.
+
+use std::path::Path;
+
+use nalgebra::Matrix3;
+use rayon::prelude::*;
+use trueup_align::cameras::{self, CameraPrior, Cameras};
+use trueup_align::full_turn::{self, FullTurnCut};
+use trueup_align::match_points;
+use trueup_align::mesh::{self, LocalTarget, WarpedMesh};
+use trueup_align::similarity::{self, PriorInput, SimilarityPrior};
+use trueup_align::stitch_graph::{GraphEdge, StitchGraph};
+use trueup_align::vanishing::{self, TriadOutcome};
+use trueup_core::diagnostics::Diagnostic;
+use trueup_core::lines::LineSegment;
+use trueup_core::matches::PairMatches;
+use trueup_core::mesh::GridMesh;
+use trueup_core::source::{SourceImage, WorkingFrame};
+use trueup_core::{Result, StageContext};
+
+use crate::clock::Clock;
+use crate::measure::Measured;
+use crate::options::StitchOptions;
+
+/// One group of overlapping photographs with everything the geometry stages need; indices are local, 0..N.
+pub(crate) struct Component<'a> {
+    /// Positions of the members among all photographs, ascending.
+    pub members: Vec<usize>,
+    pub images: Vec<&'a SourceImage>,
+    pub frames: Vec<WorkingFrame>,
+    pub lines: Vec<Vec<LineSegment>>,
+    pub pairs: Vec<PairMatches>,
+    pub reference: usize,
+    /// Rotation that the user's graph wants of the reference photograph, radians clockwise.
+    pub reference_rotation: f64,
+}
+
+/// The geometry of one group.
+pub(crate) struct Geometry {
+    pub cameras: Cameras,
+    pub triads: Vec<TriadOutcome>,
+    pub prior: SimilarityPrior,
+    pub cut: Option<FullTurnCut>,
+    pub mesh: WarpedMesh,
+}
+
+impl<'a> Component<'a> {
+    /// Cuts a component out of the measured photographs; pairs are renumbered to local indices.
+    pub fn new(
+        members: &[usize],
+        reference: usize,
+        reference_rotation: f64,
+        images: &'a [SourceImage],
+        measured: &[Option<Measured>],
+        pairs: &[PairMatches],
+    ) -> Self {
+        let local = |picture: usize| members.binary_search(&picture).ok();
+        let known = |picture: &usize| measured[*picture].as_ref();
+        let pairs = pairs
+            .iter()
+            .filter(|pair| pair.verdict.is_joined())
+            .filter_map(|pair| Some(PairMatches { a: local(pair.a)?, b: local(pair.b)?, ..pair.clone() }))
+            .collect();
+        Self {
+            members: members.to_vec(),
+            images: members.iter().map(|&picture| &images[picture]).collect(),
+            frames: members.iter().filter_map(known).map(|one| one.frame).collect(),
+            lines: members.iter().filter_map(known).map(|one| one.lines.clone()).collect(),
+            pairs,
+            reference: local(reference).unwrap_or(0),
+            reference_rotation,
+        }
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.images.iter().map(|image| image.name.clone()).collect()
+    }
+
+    /// What metadata say of the cameras, in working pixels.
+    fn camera_priors(&self) -> Vec<CameraPrior> {
+        let key = |image: &SourceImage| {
+            let (short, long) = (image.width.min(image.height), image.width.max(image.height));
+            (image.camera_model.clone(), short, long)
+        };
+        let mut keys: Vec<_> = self.images.iter().map(|image| key(image)).collect();
+        keys.sort();
+        keys.dedup();
+        self.images
+            .iter()
+            .zip(&self.frames)
+            .map(|(image, frame)| CameraPrior {
+                frame: *frame,
+                focal_px: image.focal_prior.map(|prior| prior.focal_px * frame.working_from_full),
+                camera_group: keys.binary_search(&key(image)).unwrap_or(0),
+            })
+            .collect()
+    }
+}
+
+/// Runs the geometry stages in their order.
+pub(crate) fn run(
+    component: &Component,
+    options: &StitchOptions,
+    context: &StageContext,
+    clock: &mut Clock,
+) -> Result<Geometry> {
+    let names = component.names();
+    let priors = component.camera_priors();
+    let cameras = clock.time("cameras", || {
+        cameras::run(&priors, &names, &component.pairs, component.reference, &options.cameras, context)
+    })?;
+    let pairs: Vec<PairMatches> = (0..component.pairs.len())
+        .filter(|position| cameras.contradicting.binary_search(position).is_err())
+        .map(|position| component.pairs[position].clone())
+        .collect();
+    let grids: Vec<GridMesh> = component
+        .frames
+        .iter()
+        .map(|frame| GridMesh::regular(frame.width, frame.height, options.mesh.cell_px))
+        .collect();
+    let warps = clock.time("match points", || {
+        match_points::run(&component.frames, &grids, &cameras.cameras, &pairs, &options.match_points, context)
+    })?;
+    let triads = clock.time("vanishing points", || find_triads(component, &cameras, options, context))?;
+    let prior = clock.time("prior", || {
+        let input = PriorInput {
+            cameras: &cameras.cameras,
+            triads: &triads,
+            lines: &component.lines,
+            frames: &component.frames,
+            pairs: &pairs,
+            warps: &warps,
+            grids: &grids,
+            reference: component.reference,
+            reference_rotation: component.reference_rotation,
+        };
+        similarity::run(&input, &options.similarity, context)
+    })?;
+
+    let edges: Vec<GraphEdge> =
+        pairs.iter().map(|pair| GraphEdge { a: pair.a, b: pair.b, weight: pair.agreeing }).collect();
+    let cut = full_turn::find_cut(&cameras.cameras, &edges, &level(&prior));
+    let kept: Vec<_> = match &cut {
+        None => warps,
+        Some(cut) => {
+            report_cut(cut, component, context);
+            let severed = |from: usize, to: usize| cut.severed.binary_search(&(from.min(to), from.max(to))).is_ok();
+            warps.into_iter().filter(|warp| !severed(warp.from, warp.to)).collect()
+        }
+    };
+    let targets: Vec<LocalTarget> =
+        (0..grids.len()).map(|k| LocalTarget::uniform(prior.scale[k], prior.theta[k])).collect();
+    let mesh =
+        clock.time("mesh", || mesh::run(&grids, &kept, &targets, component.reference, &options.mesh, context))?;
+    Ok(Geometry { cameras, triads, prior, cut, mesh })
+}
+
+/// The rotation that levels the world of the cameras.
+pub(crate) fn level(prior: &SimilarityPrior) -> Matrix3<f64> {
+    prior.level_from_world
+}
+
+fn find_triads(
+    component: &Component,
+    cameras: &Cameras,
+    options: &StitchOptions,
+    context: &StageContext,
+) -> Result<Vec<TriadOutcome>> {
+    const STAGE: &str = "vanishing points";
+    context.progress().begin(STAGE, component.frames.len() as u64);
+    let triads = (0..component.frames.len())
+        .into_par_iter()
+        .map(|k| {
+            context.check_cancelled()?;
+            // Seeded by the photograph's own content-independent name, so that the order of inputs does not matter.
+            let mut generator = context.generator(STAGE, name_seed(&component.images[k].path));
+            let focal_px = cameras.cameras[k].focal_px;
+            let outcome = vanishing::detect_triad(
+                &component.lines[k],
+                focal_px,
+                &component.frames[k],
+                &options.vanishing,
+                &mut generator,
+            );
+            context.progress().advance(STAGE, 1);
+            Ok(outcome)
+        })
+        .collect();
+    context.progress().finish(STAGE);
+    triads
+}
+
+/// A number for a file name, the same whatever folder it lies in and wherever it stands among the inputs.
+fn name_seed(path: &Path) -> u64 {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.bytes().fold(0, |hash: u64, byte| hash.wrapping_mul(31).wrapping_add(u64::from(byte)))
+}
+
+fn report_cut(cut: &FullTurnCut, component: &Component, context: &StageContext) {
+    let graph = StitchGraph::from_edges(
+        component.images.len(),
+        cut.severed.iter().map(|&(a, b)| GraphEdge { a, b, weight: 1 }).collect(),
+    );
+    let pairs: Vec<String> = graph
+        .edges
+        .iter()
+        .map(|edge| format!("{} - {}", component.images[edge.a].name, component.images[edge.b].name))
+        .collect();
+    context.report(Diagnostic::note(
+        "full-turn",
+        "mesh",
+        format!("the photographs go all the way round; the panorama is cut between {}", pairs.join(", ")),
+        "",
+    ));
+}

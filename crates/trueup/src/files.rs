@@ -1,0 +1,119 @@
+//! From photographs to files: the whole job with its outputs.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use trueup_core::{Error, Result, StageContext};
+use trueup_io::encode;
+
+use crate::inputs::Inputs;
+use crate::options::StitchOptions;
+use crate::project::Project;
+use crate::stitcher::Stitcher;
+
+/// What to stitch and where to put it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StitchJob {
+    /// The photographs.
+    pub inputs: Inputs,
+    /// The panorama's file; its extension chooses the format. With [`Inputs::all`] and several panoramas, they are
+    /// numbered: `pano-1.jpg`, `pano-2.jpg`.
+    pub output: PathBuf,
+    /// The project's file, if wanted; numbered like the panoramas.
+    pub project: Option<PathBuf>,
+    /// Number of threads; 0 for one per core.
+    pub threads: usize,
+}
+
+/// A panorama that was written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Written {
+    /// The panorama's file.
+    pub output: PathBuf,
+    /// Its size in bytes.
+    pub bytes: u64,
+    /// The project's file, if one was wanted.
+    pub project_file: Option<PathBuf>,
+    /// The record.
+    pub project: Project,
+}
+
+impl StitchJob {
+    /// Runs the job. Outputs are checked before work starts, written beside their place and renamed.
+    ///
+    /// # Errors
+    /// Those of [`Stitcher::align`] and [`Stitcher::compose`], and those of writing. Panoramas already written stay.
+    pub fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<Written>> {
+        options.validate()?;
+        encode::check_writable(&self.output)?;
+        if let Some(project) = &self.project {
+            check_folder(project)?;
+        }
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(self.threads)
+            .build()
+            .map_err(|error| Error::input("threads", error, "Ask for fewer threads."))?;
+        pool.install(|| self.stitch(options, context))
+    }
+
+    fn stitch(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<Written>> {
+        let stitcher = Stitcher::new(options, context);
+        let aligned = stitcher.align(&self.inputs)?;
+        let several = aligned.alignments.len() > 1;
+        let mut written = Vec::new();
+        for (index, mut alignment) in aligned.alignments.into_iter().enumerate() {
+            let number = several.then_some(index + 1);
+            let start = Instant::now();
+            let panorama = stitcher.compose(&alignment)?;
+            alignment.record_seconds("render", start.elapsed());
+            let output = numbered(&self.output, number);
+            let start = Instant::now();
+            let bytes = encode::write(&output, &panorama, &options.output, context)?;
+            alignment.record_seconds("output", start.elapsed());
+            drop(panorama);
+            let mut project = alignment.project;
+            project.diagnostics.extend(context.take_diagnostics());
+            let project_file = self.project.as_deref().map(|path| numbered(path, number));
+            if let Some(path) = &project_file {
+                encode::write_atomically(path, project.to_json()?.as_bytes())?;
+            }
+            written.push(Written { output, bytes, project_file, project });
+        }
+        Ok(written)
+    }
+}
+
+/// `pano.jpg` becomes `pano-2.jpg`.
+fn numbered(path: &Path, number: Option<usize>) -> PathBuf {
+    let Some(number) = number else { return path.to_owned() };
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = match path.extension() {
+        Some(extension) => format!("{stem}-{number}.{}", extension.to_string_lossy()),
+        None => format!("{stem}-{number}"),
+    };
+    path.with_file_name(name)
+}
+
+fn check_folder(path: &Path) -> Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if folder.is_dir() {
+        return Ok(());
+    }
+    Err(Error::input(
+        path.display(),
+        format!("the folder {} does not exist", folder.display()),
+        "Create it, or choose another place for the project file.",
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn several_panoramas_are_numbered_before_the_extension() {
+        assert_eq!(numbered(Path::new("out/pano.jpg"), Some(2)), Path::new("out/pano-2.jpg"));
+        assert_eq!(numbered(Path::new("pano"), Some(1)), Path::new("pano-1"));
+        assert_eq!(numbered(Path::new("pano.jpg"), None), Path::new("pano.jpg"));
+    }
+}

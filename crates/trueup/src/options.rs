@@ -1,0 +1,258 @@
+//! All options of all stages in one place.
+
+use serde::{Deserialize, Serialize};
+use trueup_align::cameras::CameraOptions;
+use trueup_align::match_points::MatchPointOptions;
+use trueup_align::mesh::MeshOptions;
+use trueup_align::similarity::SimilarityOptions;
+use trueup_align::vanishing::VanishingOptions;
+use trueup_compose::exposure::ExposureOptions;
+use trueup_compose::layout::CanvasOptions;
+use trueup_compose::render::RenderOptions;
+use trueup_core::options::{InvalidOption, OptionDescription, StageOptions};
+use trueup_core::{Error, Result};
+use trueup_io::encode::OutputOptions;
+use trueup_io::source::SourceOptions;
+use trueup_vision::features::FeatureOptions;
+use trueup_vision::lines::LineOptions;
+use trueup_vision::matching::MatchingOptions;
+use trueup_vision::pairing::PairingOptions;
+
+trueup_core::choice! {
+    /// How the panorama's shape is found.
+    pub enum Method {
+        /// Vanishing-point-guided natural stitching: upright wherever the scene has straight lines to tell.
+        Vpg = "vpg",
+    }
+}
+
+trueup_core::options! {
+    /// What holds for the whole run.
+    pub struct WorkingOptions("stitch") {
+        /// How the panorama's shape is found.
+        method: Method = Method::Vpg, Allowed::Any, "";
+        /// Photographs are measured on a copy reduced to at most this many pixels; the panorama itself is made from
+        /// the full photographs.
+        working_pixels: f64 = 480000.0, between(10000.0, 100000000.0), "px";
+        /// Line segments are found on a copy of at most this many pixels.
+        line_pixels: f64 = 480000.0, between(10000.0, 100000000.0), "px";
+        /// Size of the small pictures that exposure is compared on.
+        thumbnail_pixels: f64 = 30000.0, between(100.0, 1000000.0), "px";
+        /// Decoded photographs are kept up to this much memory so that they need not be decoded twice.
+        photograph_cache: f64 = 96.0, between(0.0, 1000000.0), "MB";
+        /// Every random choice derives from this number.
+        seed: u64 = 0, between(0.0, 9007199254740992.0), "";
+    }
+}
+
+macro_rules! stage_options {
+    ($($(#[doc = $doc:literal])* $field:ident : $type:ty),* $(,)?) => {
+        /// The options of every stage. Serialised as one table per stage; unknown tables and fields are denied.
+        #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields, default)]
+        pub struct StitchOptions {
+            $($(#[doc = $doc])* pub $field: $type,)*
+        }
+
+        impl StitchOptions {
+            /// Every option outside its allowed range; empty when all is well.
+            pub fn invalid(&self) -> Vec<InvalidOption> {
+                let mut invalid = Vec::new();
+                $(invalid.extend(self.$field.invalid());)*
+                invalid
+            }
+
+            /// A row per option of every stage, with defaults, ranges and units.
+            pub fn describe() -> Vec<OptionDescription> {
+                let mut rows = Vec::new();
+                $(rows.extend(<$type>::describe());)*
+                rows
+            }
+
+            /// The stages' names, as in `stage.option`.
+            pub fn stages() -> Vec<&'static str> {
+                vec![$(<$type>::STAGE),*]
+            }
+        }
+    };
+}
+
+stage_options! {
+    /// What holds for the whole run.
+    stitch: WorkingOptions,
+    /// Which files are accepted.
+    source: SourceOptions,
+    /// How features are found.
+    features: FeatureOptions,
+    /// How line segments are found.
+    lines: LineOptions,
+    /// Which pairs are tried.
+    pairing: PairingOptions,
+    /// How pairs are matched and verified.
+    matching: MatchingOptions,
+    /// How cameras are estimated.
+    cameras: CameraOptions,
+    /// How vanishing points are found.
+    vanishing: VanishingOptions,
+    /// How rotations and scales are wanted.
+    similarity: SimilarityOptions,
+    /// How overlaps are sampled.
+    match_points: MatchPointOptions,
+    /// How the grids are deformed.
+    mesh: MeshOptions,
+    /// How large the panorama is.
+    canvas: CanvasOptions,
+    /// How exposures are evened out.
+    exposure: ExposureOptions,
+    /// How photographs are resampled and blended.
+    render: RenderOptions,
+    /// How the panorama is encoded.
+    output: OutputOptions,
+}
+
+impl StitchOptions {
+    /// Checks every option.
+    ///
+    /// # Errors
+    /// [`Error::Options`] with the complete list of options outside their range.
+    pub fn validate(&self) -> Result<()> {
+        let invalid = self.invalid();
+        if invalid.is_empty() { Ok(()) } else { Err(Error::Options(invalid)) }
+    }
+
+    /// Reads a TOML text with a table per stage over the present values; what it does not name stays as it is.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for text that is not TOML, unknown stages or options, or values of the wrong type.
+    pub fn merge_toml(&mut self, text: &str, file: &str) -> Result<()> {
+        let hint = "List stages, options and their ranges with `trueup options`.";
+        let given: toml::Table = text.parse().map_err(|error| Error::input(file, first_line(&error), hint))?;
+        let mut merged = self.to_table()?;
+        for (stage, values) in given {
+            let Some(known) = merged.get_mut(&stage).and_then(toml::Value::as_table_mut) else {
+                return Err(Error::input(file, format!("there is no stage \"{stage}\""), hint));
+            };
+            let toml::Value::Table(values) = values else {
+                return Err(Error::input(file, format!("\"{stage}\" must be a table, [{stage}]"), hint));
+            };
+            for (option, value) in values {
+                if !known.contains_key(&option) {
+                    return Err(Error::input(file, format!("there is no option \"{stage}.{option}\""), hint));
+                }
+                known.insert(option, value);
+            }
+        }
+        *self = merged.try_into().map_err(|error| Error::input(file, first_line(&error), hint))?;
+        Ok(())
+    }
+
+    /// Sets one option from text, as in `stage.option=value`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if there is no such option or the value is of the wrong type.
+    pub fn set(&mut self, assignment: &str) -> Result<()> {
+        let wrong = |reason: String| {
+            Error::input(assignment, reason, "Write stage.option=value; list the options with `trueup options`.")
+        };
+        let (name, value) = assignment.split_once('=').ok_or_else(|| wrong("there is no \"=\" in it".to_owned()))?;
+        let (stage, option) =
+            name.trim().split_once('.').ok_or_else(|| wrong("there is no \".\" in the name".to_owned()))?;
+        let value = value.trim();
+        let mut table = self.to_table()?;
+        let known = table
+            .get(stage)
+            .and_then(|stage| stage.get(option))
+            .cloned()
+            .ok_or_else(|| wrong(format!("there is no option \"{stage}.{option}\"")))?;
+        let parsed = match known {
+            toml::Value::Float(_) => value.parse().ok().map(toml::Value::Float),
+            toml::Value::Integer(_) => value.parse().ok().map(toml::Value::Integer),
+            toml::Value::Boolean(_) => value.parse().ok().map(toml::Value::Boolean),
+            _ => Some(toml::Value::String(value.to_owned())),
+        };
+        let parsed = parsed.ok_or_else(|| wrong(format!("\"{value}\" is not {}", in_words(&known))))?;
+        if let Some(values) = table.get_mut(stage).and_then(toml::Value::as_table_mut) {
+            values.insert(option.to_owned(), parsed);
+        }
+        *self = table.try_into().map_err(|error: toml::de::Error| wrong(first_line(&error)))?;
+        Ok(())
+    }
+
+    fn to_table(&self) -> Result<toml::Table> {
+        toml::Table::try_from(self).map_err(|error| Error::input("options", error, "Report this as a defect."))
+    }
+}
+
+fn in_words(value: &toml::Value) -> &'static str {
+    match value {
+        toml::Value::Float(_) => "a number",
+        toml::Value::Integer(_) => "a whole number",
+        toml::Value::Boolean(_) => "true or false",
+        _ => "a text",
+    }
+}
+
+/// TOML's errors span lines with a picture of the text; the reason is what users need.
+fn first_line(error: &toml::de::Error) -> String {
+    error.message().lines().next().unwrap_or_default().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_default_is_valid_and_every_option_can_be_set_to_its_default() {
+        let mut options = StitchOptions::default();
+        options.validate().expect("defaults are valid");
+        for row in StitchOptions::describe() {
+            options.set(&format!("{}={}", row.name, row.default)).expect("a default can be written back");
+            assert!(!row.meaning.is_empty(), "{} has no meaning", row.name);
+        }
+        assert_eq!(options, StitchOptions::default());
+    }
+
+    #[test]
+    fn stage_tables_are_called_like_their_stages() {
+        let table = StitchOptions::default().to_table().expect("serialisable");
+        for stage in StitchOptions::stages() {
+            assert!(table.contains_key(stage), "{stage}");
+        }
+    }
+
+    #[test]
+    fn mistakes_say_what_is_wrong() {
+        let mut options = StitchOptions::default();
+        for (assignment, reason) in [
+            ("mesh.cell_px", "there is no \"=\""),
+            ("cell_px=3", "there is no \".\""),
+            ("mesh.cell=3", "there is no option \"mesh.cell\""),
+            ("mesh.cell_px=wide", "\"wide\" is not a number"),
+            ("stitch.method=magic", "unknown variant"),
+        ] {
+            let message = options.set(assignment).expect_err("must fail").to_string();
+            assert!(message.contains(reason), "{message}");
+        }
+        assert!(options.merge_toml("[mesh]\ncell = 3", "c.toml").is_err());
+        assert!(options.merge_toml("[mash]\ncell_px = 3", "c.toml").is_err());
+        assert!(options.merge_toml("mesh", "c.toml").is_err());
+        assert_eq!(options, StitchOptions::default());
+    }
+
+    #[test]
+    fn a_file_changes_only_what_it_names() {
+        let mut options = StitchOptions::default();
+        options.set("mesh.prior_weight=7.5").expect("valid");
+        options.merge_toml("[mesh]\ncell_px = 30.0\n[stitch]\nseed = 9", "c.toml").expect("valid");
+        assert_eq!((options.mesh.cell_px, options.mesh.prior_weight, options.stitch.seed), (30.0, 7.5, 9));
+    }
+
+    #[test]
+    fn all_bad_values_are_listed() {
+        let mut options = StitchOptions::default();
+        options.mesh.cell_px = -1.0;
+        options.stitch.working_pixels = f64::INFINITY;
+        let message = options.validate().expect_err("two bad values").to_string();
+        assert!(message.contains("mesh.cell_px = -1") && message.contains("stitch.working_pixels = inf"), "{message}");
+    }
+}

@@ -1,0 +1,521 @@
+//! The order of the stages: the one place that knows it.
+
+use std::collections::BTreeSet;
+
+use trueup_align::stitch_graph::{GraphFile, StitchGraph, parse_graph_file};
+use trueup_align::vanishing::TriadOutcome;
+use trueup_compose::exposure;
+use trueup_compose::layout::{self, CanvasLayout, Placed};
+use trueup_compose::render::{self, Panorama};
+use trueup_core::diagnostics::Diagnostic;
+use trueup_core::matches::PairMatches;
+use trueup_core::mesh::GridMesh;
+use trueup_core::raster::Raster;
+use trueup_core::source::{SourceImage, WorkingFrame};
+use trueup_core::{Error, Result, StageContext};
+use trueup_io::decode::FilePhotographs;
+use trueup_io::source::{self, RejectedSource, Sources};
+use trueup_vision::features::Features;
+use trueup_vision::{matching, pairing};
+
+use crate::align::{self, Component, Geometry};
+use crate::clock::Clock;
+use crate::inputs::{Inputs, Reference};
+use crate::left_out::{self, LeftOut};
+use crate::measure::{self, Measured};
+use crate::options::StitchOptions;
+use crate::project::{
+    Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
+};
+
+/// Runs the stages with one set of options.
+#[derive(Debug)]
+pub struct Stitcher<'a> {
+    options: &'a StitchOptions,
+    context: &'a StageContext<'a>,
+}
+
+/// What [`Stitcher::align`] found: one alignment per group of photographs to be stitched, the largest first.
+#[derive(Debug)]
+pub struct Aligned {
+    /// At least one.
+    pub alignments: Vec<Alignment>,
+}
+
+/// The geometry of one panorama, ready to be composed.
+#[derive(Debug)]
+pub struct Alignment {
+    /// The record so far; complete but for the seconds that composing and writing take.
+    pub project: Project,
+    layout: CanvasLayout,
+    gains: Vec<f64>,
+    photographs: std::sync::Arc<FilePhotographs>,
+    clock: Clock,
+}
+
+impl Alignment {
+    /// Adds the wall seconds that a later stage took to the record.
+    pub(crate) fn record_seconds(&mut self, stage: &str, duration: std::time::Duration) {
+        self.clock.add(stage, duration);
+        self.project.seconds.clone_from(self.clock.seconds());
+    }
+}
+
+/// Everything known after matching.
+struct Matched {
+    sources: Sources,
+    /// `None` for photographs that could not be decoded, whose reason is in `undecodable`.
+    measured: Vec<Option<Measured>>,
+    undecodable: Vec<Option<Error>>,
+    pairs: Vec<PairMatches>,
+    graph: StitchGraph,
+    graph_file: GraphFile,
+}
+
+impl<'a> Stitcher<'a> {
+    /// A stitcher with these options. Parallel work runs on the current thread pool.
+    pub fn new(options: &'a StitchOptions, context: &'a StageContext<'a>) -> Self {
+        Self { options, context }
+    }
+
+    /// Finds, measures and matches the photographs and estimates the panoramas' geometry.
+    ///
+    /// # Errors
+    /// [`Error::Options`]; [`Error::Input`] when no photograph can be read, the graph or the reference does not fit the
+    /// photographs, or `require_all` is not met; [`Error::Unsolvable`] when no two photographs overlap;
+    /// [`Error::Cancelled`].
+    pub fn align(&self, inputs: &Inputs) -> Result<Aligned> {
+        self.options.validate()?;
+        let mut clock = Clock::default();
+        let sources = clock.time("source", || source::scan(&inputs.photographs, &self.options.source, self.context))?;
+        self.check_any(&sources, inputs)?;
+        let cache_bytes = (self.options.stitch.photograph_cache * 1e6) as usize;
+        let photographs = std::sync::Arc::new(FilePhotographs::new(sources.images.clone(), cache_bytes));
+        let matched = self.match_all(sources, &photographs, inputs, &mut clock)?;
+        let components = self.components_to_stitch(&matched, inputs)?;
+        if inputs.require_all {
+            require_all(&matched, &components)?;
+        }
+        for (index, image) in matched.sources.images.iter().enumerate() {
+            if !components.iter().any(|component| component.contains(&index)) {
+                photographs.forget(index);
+                self.report_left_out(&image.name, &matched.why_left_out(index, &components));
+            }
+        }
+        for rejected in &matched.sources.rejected {
+            self.report_rejected(rejected);
+        }
+        let shared_diagnostics = self.context.take_diagnostics();
+
+        let mut alignments = Vec::new();
+        for component in &components {
+            let mut alignment = self.align_component(component, &components, &matched, inputs, &photographs, &clock)?;
+            alignment.project.diagnostics =
+                shared_diagnostics.iter().cloned().chain(self.context.take_diagnostics()).collect();
+            alignments.push(alignment);
+        }
+        Ok(Aligned { alignments })
+    }
+
+    /// Renders an aligned panorama from the full-resolution photographs.
+    ///
+    /// # Errors
+    /// Those of reading the photographs; [`Error::Limits`] if the canvas is too large; [`Error::Cancelled`].
+    pub fn compose(&self, alignment: &Alignment) -> Result<Panorama> {
+        render::run(
+            &alignment.layout,
+            &alignment.gains,
+            alignment.photographs.as_ref(),
+            &self.options.render,
+            self.context,
+        )
+    }
+
+    fn check_any(&self, sources: &Sources, inputs: &Inputs) -> Result<()> {
+        if !sources.images.is_empty() {
+            return Ok(());
+        }
+        match sources.rejected.as_slice() {
+            [] => Err(Error::input(
+                if inputs.photographs.is_empty() { "photographs".to_owned() } else { inputs.photographs.join(", ") },
+                "no photographs were given",
+                "Name at least two overlapping photographs, or a folder that holds them.",
+            )),
+            [only] => Err(only.to_error()),
+            [first, rest @ ..] => {
+                let others: Vec<String> =
+                    rest.iter().map(|rejected| format!("{}: {}", rejected.name, rejected.reason)).collect();
+                Err(Error::input(
+                    &first.name,
+                    format!("{}; {}", first.reason, others.join("; ")),
+                    "None of the files given can be used; name at least two overlapping photographs.",
+                ))
+            }
+        }
+    }
+
+    fn match_all(
+        &self,
+        sources: Sources,
+        photographs: &FilePhotographs,
+        inputs: &Inputs,
+        clock: &mut Clock,
+    ) -> Result<Matched> {
+        let names: Vec<String> = sources.images.iter().map(|image| image.name.clone()).collect();
+        let graph_file = match &inputs.graph {
+            None => GraphFile::default(),
+            Some(path) => {
+                let text = std::fs::read_to_string(path).map_err(|error| Error::io("reading", path, error))?;
+                parse_graph_file(&text, &names, &path.display().to_string())?
+            }
+        };
+        let (mut measured, mut undecodable) = (Vec::new(), Vec::new());
+        for outcome in measure::run(photographs, self.options, self.context, clock)? {
+            match outcome {
+                Ok(one) => {
+                    measured.push(Some(one));
+                    undecodable.push(None);
+                }
+                Err(error) if measure::concerns_one_photograph(&error) => {
+                    measured.push(None);
+                    undecodable.push(Some(error));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        let unmeasured = Features::default();
+        let placeholder = WorkingFrame { width: 1.0, height: 1.0, working_from_full: 1.0 };
+        let frames: Vec<WorkingFrame> =
+            measured.iter().map(|one| one.as_ref().map_or(placeholder, |one| one.frame)).collect();
+        let features: Vec<Features> = measured
+            .iter_mut()
+            .map(|one| one.as_mut().map_or(unmeasured.clone(), |one| std::mem::take(&mut one.features)))
+            .collect();
+        let pairs = clock.time("matching", || -> Result<Vec<PairMatches>> {
+            let candidates = if graph_file.edges.is_empty() {
+                pairing::propose(&features, &self.options.pairing, self.context)?.pairs
+            } else {
+                graph_file.edges.clone()
+            };
+            let usable = |index: usize| measured[index].is_some();
+            let candidates: Vec<_> = candidates.into_iter().filter(|&(a, b)| usable(a) && usable(b)).collect();
+            let forced: BTreeSet<(usize, usize)> = graph_file.edges.iter().copied().collect();
+            matching::run(&features, &frames, &candidates, &forced, &self.options.matching, self.context)
+        })?;
+        let graph = StitchGraph::new(names.len(), &pairs);
+        Ok(Matched { sources, measured, undecodable, pairs, graph, graph_file })
+    }
+
+    /// The groups to be stitched: the largest, or all with at least two members; a single photograph is a group.
+    fn components_to_stitch(&self, matched: &Matched, inputs: &Inputs) -> Result<Vec<Vec<usize>>> {
+        let decodable: Vec<usize> =
+            (0..matched.measured.len()).filter(|&index| matched.measured[index].is_some()).collect();
+        match decodable.as_slice() {
+            [] => {
+                let reasons: Vec<String> = matched.undecodable.iter().flatten().map(ToString::to_string).collect();
+                return Err(Error::input("photographs", reasons.join("; "), "None of the files given can be used."));
+            }
+            [only] => {
+                let name = &matched.sources.images[*only].name;
+                self.context.report(Diagnostic::warning(
+                    "single-photograph",
+                    name,
+                    "there is only one photograph to use; it is written as it is",
+                    "Name at least two overlapping photographs, or a folder that holds them.",
+                ));
+                return Ok(vec![vec![*only]]);
+            }
+            _ => {}
+        }
+        let mut joined: Vec<Vec<usize>> =
+            matched.graph.components.iter().filter(|component| component.len() > 1).cloned().collect();
+        if joined.is_empty() {
+            return Err(no_overlap(matched));
+        }
+        if let Reference::Named(name) = &inputs.reference
+            && !inputs.all
+        {
+            // The panorama that holds the named reference is the one that is wanted.
+            let wanted = matched.picture_named(name)?;
+            let Some(position) = joined.iter().position(|component| component.contains(&wanted)) else {
+                return Err(Error::input(
+                    name,
+                    "it cannot be the reference because it overlaps no other photograph",
+                    "Choose another reference, or leave --reference out.",
+                ));
+            };
+            joined.swap(0, position);
+        }
+        if !inputs.all {
+            joined.truncate(1);
+        }
+        Ok(joined)
+    }
+
+    fn align_component(
+        &self,
+        members: &[usize],
+        stitched: &[Vec<usize>],
+        matched: &Matched,
+        inputs: &Inputs,
+        photographs: &std::sync::Arc<FilePhotographs>,
+        clock: &Clock,
+    ) -> Result<Alignment> {
+        let mut clock = clock.clone();
+        let reference = matched.reference_of(members, inputs)?;
+        let rotation = match matched.graph_file.reference == Some(reference) {
+            true => matched.graph_file.reference_rotation_deg.unwrap_or(0.0).to_radians(),
+            false => 0.0,
+        };
+        let component =
+            Component::new(members, reference, rotation, &matched.sources.images, &matched.measured, &matched.pairs);
+        let geometry = match members.len() {
+            1 => None,
+            _ => Some(align::run(&component, self.options, self.context, &mut clock)?),
+        };
+        let placed = place(&component, geometry.as_ref());
+        let layout = layout::run(placed, component.reference, &self.options.canvas, self.context)?;
+        let thumbnails: Vec<(&Raster<u8>, WorkingFrame)> = members
+            .iter()
+            .filter_map(|&picture| matched.measured[picture].as_ref())
+            .map(|one| (&one.thumbnail, one.thumbnail_frame))
+            .collect();
+        let gains = clock.time("exposure", || {
+            exposure::run(&layout, &thumbnails, component.reference, &self.options.exposure, self.context)
+        })?;
+        let mut project = matched.project(self.options, stitched);
+        fill_geometry(&mut project, &component, geometry.as_ref(), &layout, &gains);
+        project.seconds.clone_from(clock.seconds());
+        Ok(Alignment { project, layout, gains, photographs: photographs.clone(), clock })
+    }
+
+    fn report_left_out(&self, name: &str, left_out: &LeftOut) {
+        self.context.report(Diagnostic::warning(left_out.code, name, &left_out.reason, &left_out.hint));
+    }
+
+    fn report_rejected(&self, rejected: &RejectedSource) {
+        self.context.report(Diagnostic::warning(&rejected.code, &rejected.name, &rejected.reason, &rejected.hint));
+    }
+}
+
+impl Matched {
+    fn names(&self) -> Vec<String> {
+        self.sources.images.iter().map(|image| image.name.clone()).collect()
+    }
+
+    /// The photograph the user calls `name`: by name, by path, or by the end of its path.
+    fn picture_named(&self, name: &str) -> Result<usize> {
+        let called = |image: &SourceImage| image.name == name || image.path.as_os_str() == name;
+        let images = &self.sources.images;
+        images
+            .iter()
+            .position(called)
+            .or_else(|| images.iter().position(|image| image.path.ends_with(name)))
+            .ok_or_else(|| {
+                Error::input(
+                    name,
+                    "no photograph of this name was given, so it cannot be the reference",
+                    "Write the name of one of the photographs, with its extension.",
+                )
+            })
+    }
+
+    fn reference_of(&self, members: &[usize], inputs: &Inputs) -> Result<usize> {
+        let wished = match &inputs.reference {
+            Reference::Named(name) => Some(self.picture_named(name)?),
+            Reference::Auto => self.graph_file.reference,
+        };
+        Ok(wished.filter(|wished| members.contains(wished)).unwrap_or_else(|| self.graph.central_picture(members)))
+    }
+
+    /// Why a photograph that is in none of the `stitched` groups was left out.
+    fn why_left_out(&self, index: usize, stitched: &[Vec<usize>]) -> LeftOut {
+        if let Some(error) = &self.undecodable[index] {
+            let (reason, hint) = match error {
+                Error::Input { reason, hint, .. } => (reason.clone(), hint.clone()),
+                other => (other.to_string(), "Check the file, or copy it again.".to_owned()),
+            };
+            return LeftOut { code: "picture-damaged", reason, hint };
+        }
+        let component = stitched.first().map_or(&[][..], Vec::as_slice);
+        left_out::explain(index, component, &self.pairs, &self.names())
+    }
+
+    /// The record of all photographs and pairs, without geometry.
+    fn project(&self, options: &StitchOptions, stitched: &[Vec<usize>]) -> Project {
+        let images = self
+            .sources
+            .images
+            .iter()
+            .enumerate()
+            .map(|(index, image)| {
+                let why = self.why_left_out(index, stitched);
+                let component = self.graph.components.iter().position(|component| component.contains(&index));
+                ImageRecord {
+                    width: image.width,
+                    height: image.height,
+                    component: component.filter(|_| self.measured[index].is_some()),
+                    ..left_out_record(image.path.display().to_string(), why.reason, why.hint)
+                }
+            })
+            .chain(self.sources.rejected.iter().map(|rejected| {
+                left_out_record(rejected.path.display().to_string(), rejected.reason.clone(), rejected.hint.clone())
+            }))
+            .collect();
+        let pairs = self.pairs.iter().map(|pair| PairRecord {
+            a: pair.a,
+            b: pair.b,
+            matches: pair.putative,
+            inliers: pair.agreeing,
+            needed: pair.needed,
+            verdict: pair.verdict,
+        });
+        Project {
+            format: PROJECT_FORMAT.to_owned(),
+            version: PROJECT_VERSION,
+            method: trueup_core::options::OptionValue::display(&options.stitch.method),
+            options: options.clone(),
+            reference: String::new(),
+            images,
+            pairs: pairs.collect(),
+            manhattan: ManhattanRecord {
+                divergence: None,
+                threshold: options.similarity.max_divergence,
+                accepted: false,
+                failed_clause: Some("a single photograph is left as it is".to_owned()),
+                dominant: None,
+                inliers: Vec::new(),
+            },
+            canvas: Canvas { width: 0, height: 0 },
+            seconds: std::collections::BTreeMap::new(),
+            diagnostics: Vec::new(),
+        }
+    }
+}
+
+fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
+    ImageRecord {
+        path,
+        width: 0,
+        height: 0,
+        status: ImageStatus::LeftOut,
+        reason,
+        hint,
+        component: None,
+        focal_px: None,
+        rotation: None,
+        theta_deg: None,
+        scale: None,
+        gain: None,
+        vanishing_points: None,
+        mesh: None,
+    }
+}
+
+/// The deformed grids over the full-resolution photographs; a single photograph stays as it is.
+fn place(component: &Component, geometry: Option<&Geometry>) -> Vec<Placed> {
+    (0..component.members.len())
+        .map(|k| {
+            let (width, height) = (component.images[k].width as f64, component.images[k].height as f64);
+            let mesh = match geometry {
+                Some(geometry) => GridMesh { width, height, ..geometry.mesh.meshes[k].clone() },
+                None => GridMesh::regular(width, height, width.max(height)),
+            };
+            Placed { photograph: component.members[k], mesh }
+        })
+        .collect()
+}
+
+fn fill_geometry(
+    project: &mut Project,
+    component: &Component,
+    geometry: Option<&Geometry>,
+    layout: &CanvasLayout,
+    gains: &[f64],
+) {
+    project.canvas = Canvas { width: layout.width, height: layout.height };
+    project.reference = component.images[component.reference].path.display().to_string();
+    for (k, &picture) in component.members.iter().enumerate() {
+        let record = &mut project.images[picture];
+        let mesh = &layout.placed[k].mesh;
+        record.status = ImageStatus::Used;
+        record.reason.clear();
+        record.hint.clear();
+        record.gain = Some(gains[k]);
+        record.mesh = Some(MeshRecord {
+            rows: mesh.rows,
+            cols: mesh.columns,
+            source: (0..mesh.len()).map(|vertex| mesh.source(vertex).into()).collect(),
+            target: mesh.target.clone(),
+        });
+        let Some(geometry) = geometry else { continue };
+        let camera = &geometry.cameras.cameras[k];
+        let camera_from_level = camera.rotation() * align::level(&geometry.prior).transpose();
+        record.focal_px = Some(camera.focal_px / component.frames[k].working_from_full);
+        record.rotation = Some(rows(&camera_from_level));
+        record.theta_deg = Some(geometry.prior.theta[k].to_degrees());
+        record.scale = Some(geometry.prior.scale[k]);
+        record.vanishing_points = match &geometry.triads[k] {
+            TriadOutcome::Found(triad) => {
+                let matrix = triad.rotation();
+                Some(std::array::from_fn(|direction| matrix.column(direction).into_owned().into()))
+            }
+            TriadOutcome::Missing(_) => None,
+        };
+    }
+    if let Some(geometry) = geometry {
+        let guidance = &geometry.prior.guidance;
+        project.manhattan = ManhattanRecord {
+            divergence: guidance.divergence,
+            threshold: guidance.threshold,
+            accepted: guidance.used,
+            failed_clause: guidance.failed_clause.clone(),
+            dominant: guidance.dominant.as_ref().map(rows),
+            inliers: guidance.inliers.iter().map(|&k| component.images[k].path.display().to_string()).collect(),
+        };
+    }
+}
+
+fn rows(matrix: &nalgebra::Matrix3<f64>) -> [[f64; 3]; 3] {
+    std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
+}
+
+fn no_overlap(matched: &Matched) -> Error {
+    let names = matched.names();
+    let best = matched.pairs.iter().max_by(|one, two| left_out::strength(one).total_cmp(&left_out::strength(two)));
+    let why = match best {
+        Some(pair) => format!(
+            "no overlapping photographs found; the best pair is {} and {}: {}",
+            names[pair.a],
+            names[pair.b],
+            left_out::counts(pair)
+        ),
+        None => "no overlapping photographs found".to_owned(),
+    };
+    Error::unsolvable(
+        "matching",
+        format!("{} photographs", names.len()),
+        why,
+        "Photographs must share a third of their view, with detail in it; join pairs by hand in a --graph file.",
+    )
+}
+
+fn require_all(matched: &Matched, stitched: &[Vec<usize>]) -> Result<()> {
+    let used: usize = stitched.iter().map(Vec::len).sum();
+    let given = matched.sources.images.len() + matched.sources.rejected.len();
+    if used == given {
+        return Ok(());
+    }
+    let mut reasons: Vec<String> = (0..matched.sources.images.len())
+        .filter(|index| !stitched.iter().any(|component| component.contains(index)))
+        .map(|index| {
+            format!("{}: {}", matched.sources.images[index].name, matched.why_left_out(index, stitched).reason)
+        })
+        .collect();
+    reasons.extend(matched.sources.rejected.iter().map(|one| format!("{}: {}", one.name, one.reason)));
+    Err(Error::input(
+        format!("{} of {given} photographs", given - used),
+        format!("they cannot be used although all are required: {}", reasons.join("; ")),
+        "Leave --require-all out to stitch the others.",
+    ))
+}
