@@ -1,1 +1,20 @@
 //! Geometry and pixels to the panorama: canvas, exposure, warp and blend.
+//!
+//! Three stages, one module each:
+//!
+//! * [`layout`]: deformed grids in any common unit to one canvas in pixels;
+//! * [`exposure`]: reduced photographs to one gain per photograph;
+//! * [`render`]: full-resolution photographs, layout and gains to a [`render::Panorama`].
+//!
+//! Every photograph is resampled exactly once, from its own samples straight to the canvas.
+
+pub mod exposure;
+pub mod layout;
+pub mod render;
+
+mod deformed_grid;
+mod sampling;
+#[allow(unsafe_code)] // Vector instructions chosen at run time; every other module is safe code.
+mod simd;
+mod transfer_curve;
+mod weights;

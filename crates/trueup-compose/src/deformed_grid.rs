@@ -1,0 +1,226 @@
+//! A deformed grid seen from the canvas: which cell covers a canvas pixel, and where in the photograph it looks.
+//!
+//! Cells are filled row by row from the crossings of their straight edges with the line through the pixel centres. A
+//! crossing is computed from the edge's two vertices in an order that does not depend on the cell, so two cells that
+//! share an edge meet at exactly the same pixel: inside a grid without folds every pixel belongs to exactly one cell
+//! (the left and top edges belong to a cell, the right and bottom ones to its neighbour).
+
+use std::ops::Range;
+
+use nalgebra::Vector2;
+use trueup_core::mesh::GridMesh;
+
+use crate::simd::InverseBilinear;
+
+/// Marks a canvas pixel that no cell covers.
+pub(crate) const NO_CELL: u32 = u32::MAX;
+
+/// Largest number of photograph pixels that one canvas pixel is taken to span, per axis; beyond it a cell is as good
+/// as folded, and its filter stays affordable.
+pub(crate) const MAX_FOOTPRINT_PX: f64 = 4096.0;
+
+/// One cell of the grid.
+#[derive(Debug, Clone)]
+pub(crate) struct Cell {
+    /// Top left, top right, bottom right, bottom left in canvas pixels.
+    corners: [Vector2<f64>; 4],
+    /// Top left corner in the photograph, in pixels.
+    source: [f64; 2],
+    /// Width and height in the photograph, in pixels.
+    source_size: [f64; 2],
+    /// Photograph pixels, along its x and its y axis, spanned by one canvas pixel at the middle of the cell.
+    pub(crate) footprint: [f64; 2],
+    /// Whether a canvas pixel of the cell may be cut by the photograph's border.
+    pub(crate) near_border: bool,
+    /// Lowest and highest y of the corners.
+    y_range: [f64; 2],
+}
+
+/// The grid of one photograph, ready to be asked row by row.
+#[derive(Debug)]
+pub(crate) struct DeformedGrid {
+    /// Row-major; where cells overlap (folds) the later one covers.
+    pub(crate) cells: Vec<Cell>,
+    /// Size of the photograph in pixels.
+    pub(crate) size: [f64; 2],
+    /// Rows of the canvas that may be covered.
+    pub(crate) rows: Range<usize>,
+    /// Columns of the canvas that may be covered.
+    pub(crate) columns: Range<usize>,
+}
+
+/// A stretch of one canvas row covered by one cell.
+#[derive(Debug, Clone)]
+pub(crate) struct Run {
+    /// Index of the cell.
+    pub(crate) cell: usize,
+    /// Columns of the canvas.
+    pub(crate) columns: Range<usize>,
+}
+
+/// How many of a grid's triangles (TL, TR, BR) and (TL, BR, BL) are folded: signed area not above zero.
+pub(crate) fn count_folded_triangles(mesh: &GridMesh) -> usize {
+    let vertex = |index: usize| Vector2::from(mesh.target[index]);
+    (0..(mesh.rows - 1) * (mesh.columns - 1))
+        .map(|cell| {
+            let first = cell / (mesh.columns - 1) * mesh.columns + cell % (mesh.columns - 1);
+            let top_left = vertex(first);
+            let to_bottom_right = vertex(first + mesh.columns + 1) - top_left;
+            let upper = (vertex(first + 1) - top_left).perp(&to_bottom_right);
+            let lower = to_bottom_right.perp(&(vertex(first + mesh.columns) - top_left));
+            usize::from(upper <= 0.0) + usize::from(lower <= 0.0)
+        })
+        .sum()
+}
+
+impl DeformedGrid {
+    /// The grid with its targets multiplied by `canvas_from_mesh`, clipped to a canvas of `width` x `height` pixels.
+    ///
+    /// With `rim`, a ring of cells extrapolated beyond the photograph's border is added, wide enough for the canvas
+    /// pixels that the border cuts.
+    pub(crate) fn new(mesh: &GridMesh, canvas_from_mesh: f64, rim: bool, width: usize, height: usize) -> Self {
+        let mut columns: Vec<f64> = (0..mesh.columns).map(|column| mesh.source(column).x).collect();
+        let mut rows: Vec<f64> = (0..mesh.rows).map(|row| mesh.source(row * mesh.columns).y).collect();
+        if rim {
+            let [margin_x, margin_y] = rim_width(mesh, canvas_from_mesh);
+            columns.insert(0, -margin_x);
+            columns.push(mesh.width + margin_x);
+            rows.insert(0, -margin_y);
+            rows.push(mesh.height + margin_y);
+        }
+        let target: Vec<Vector2<f64>> = rows
+            .iter()
+            .flat_map(|&y| columns.iter().map(move |&x| Vector2::new(x, y)))
+            .map(|source| mesh.warp(source) * canvas_from_mesh)
+            .collect();
+        let size = [mesh.width, mesh.height];
+        let mut cells = Vec::with_capacity((rows.len() - 1) * (columns.len() - 1));
+        for (row, y) in rows.windows(2).enumerate() {
+            for (column, x) in columns.windows(2).enumerate() {
+                let first = row * columns.len() + column;
+                let corners =
+                    [first, first + 1, first + columns.len() + 1, first + columns.len()].map(|index| target[index]);
+                cells.push(Cell::new(corners, [x[0], y[0]], [x[1] - x[0], y[1] - y[0]], size));
+            }
+        }
+        let low = target.iter().fold(Vector2::repeat(f64::INFINITY), |low, vertex| low.inf(vertex));
+        let high = target.iter().fold(Vector2::repeat(f64::NEG_INFINITY), |high, vertex| high.sup(vertex));
+        Self {
+            cells,
+            size,
+            rows: first_centre_from(low.y, height)..first_centre_from(high.y, height),
+            columns: first_centre_from(low.x, width)..first_centre_from(high.x, width),
+        }
+    }
+
+    /// Indices of the cells that may cover a pixel of `rows`, in order.
+    pub(crate) fn cells_in_rows(&self, rows: &Range<usize>, indices: &mut Vec<u32>) {
+        indices.clear();
+        let (top, bottom) = (rows.start as f64, rows.end as f64);
+        indices.extend(
+            (0_u32..)
+                .zip(&self.cells)
+                .filter(|(_, cell)| cell.y_range[0] < bottom && cell.y_range[1] > top)
+                .map(|(index, _)| index),
+        );
+    }
+
+    /// The runs of canvas row `y` in order of columns, from `candidates` (see [`Self::cells_in_rows`]). No column is in
+    /// two runs. `owner` is scratch space.
+    pub(crate) fn runs(&self, y: usize, candidates: &[u32], owner: &mut Vec<u32>, runs: &mut Vec<Run>) {
+        let start = self.columns.start;
+        owner.clear();
+        owner.resize(self.columns.len(), NO_CELL);
+        runs.clear();
+        let centre_y = y as f64 + 0.5;
+        for &index in candidates {
+            let (crossings, count) = self.cells[index as usize].crossings(centre_y);
+            for pair in crossings[..count].chunks_exact(2) {
+                let first = first_centre_from(pair[0], self.columns.end).max(start);
+                let end = first_centre_from(pair[1], self.columns.end).max(first);
+                owner[first - start..end - start].fill(index);
+            }
+        }
+        let mut column = 0;
+        for same in owner.chunk_by(|left, right| left == right) {
+            if same[0] != NO_CELL {
+                let columns = start + column..start + column + same.len();
+                runs.push(Run { cell: same[0] as usize, columns });
+            }
+            column += same.len();
+        }
+    }
+}
+
+impl Cell {
+    fn new(corners: [Vector2<f64>; 4], source: [f64; 2], source_size: [f64; 2], size: [f64; 2]) -> Self {
+        let [top_left, top_right, bottom_right, bottom_left] = corners;
+        // Derivatives of the target by the cell's own coordinates u, v in [0, 1], at the middle of the cell.
+        let along_u = 0.5 * (top_right - top_left + bottom_right - bottom_left);
+        let along_v = 0.5 * (bottom_left - top_left + bottom_right - top_right);
+        let jacobian = along_u.perp(&along_v).abs();
+        let footprint = [source_size[0] * along_v.norm(), source_size[1] * along_u.norm()].map(|length| {
+            let ratio = length / jacobian;
+            if ratio.is_finite() { ratio.min(MAX_FOOTPRINT_PX) } else { MAX_FOOTPRINT_PX }
+        });
+        let near_border = (0..2).any(|axis| {
+            let far = size[axis] - (source[axis] + source_size[axis]);
+            source[axis].min(far) < footprint[axis]
+        });
+        let ys = corners.map(|corner| corner.y);
+        let y_range =
+            [ys.iter().copied().fold(f64::INFINITY, f64::min), ys.iter().copied().fold(f64::NEG_INFINITY, f64::max)];
+        Self { corners, source, source_size, footprint, near_border, y_range }
+    }
+
+    /// Where the cell's outline crosses the line y = `centre_y`, from left to right: an even number of places.
+    fn crossings(&self, centre_y: f64) -> ([f64; 4], usize) {
+        let mut found = [f64::INFINITY; 4];
+        let mut count = 0;
+        for corner in 0..4 {
+            let (from, to) = (self.corners[corner], self.corners[(corner + 1) % 4]);
+            // The same order of vertices for both cells of an edge, so that both compute the same bits.
+            let (upper, lower) = if (from.y, from.x) <= (to.y, to.x) { (from, to) } else { (to, from) };
+            if upper.y <= centre_y && centre_y < lower.y {
+                found[count] = upper.x + (centre_y - upper.y) * ((lower.x - upper.x) / (lower.y - upper.y));
+                count += 1;
+            }
+        }
+        found[..count].sort_unstable_by(f64::total_cmp);
+        (found, count)
+    }
+
+    /// The inverse of the cell's bilinear map along canvas row `y`.
+    pub(crate) fn inverse_along_row(&self, y: usize) -> InverseBilinear {
+        InverseBilinear::new(self.corners.map(Into::into), self.source, self.source_size, y as f64 + 0.5)
+    }
+}
+
+/// Index of the first pixel whose centre is not left of (or above) `position`, within 0 to `limit`.
+fn first_centre_from(position: f64, limit: usize) -> usize {
+    // The cast saturates.
+    ((position - 0.5).ceil().max(0.0) as usize).min(limit)
+}
+
+/// Width of the extrapolated ring in photograph pixels along x and y: a little more than one canvas pixel.
+fn rim_width(mesh: &GridMesh, canvas_from_mesh: f64) -> [f64; 2] {
+    const CANVAS_PX: f64 = 1.25;
+    let step = Vector2::new(mesh.cell_width(), mesh.cell_height());
+    let mut widest = [0.0_f64; 2];
+    for row in 0..mesh.rows - 1 {
+        for column in 0..mesh.columns - 1 {
+            let outer = row == 0 || column == 0 || row + 2 == mesh.rows || column + 2 == mesh.columns;
+            if outer {
+                let first = row * mesh.columns + column;
+                let corners = [first, first + 1, first + mesh.columns + 1, first + mesh.columns]
+                    .map(|index| Vector2::from(mesh.target[index]) * canvas_from_mesh);
+                let cell = Cell::new(corners, [0.0; 2], step.into(), step.into());
+                for (widest, footprint) in widest.iter_mut().zip(cell.footprint) {
+                    *widest = widest.max(footprint);
+                }
+            }
+        }
+    }
+    // A nearly collapsed border cell must not drag the ring across the canvas.
+    [(CANVAS_PX * widest[0]).min(mesh.width), (CANVAS_PX * widest[1]).min(mesh.height)]
+}

@@ -1,0 +1,116 @@
+use trueup_core::mesh::GridMesh;
+
+use super::*;
+
+/// The scene's linear light, smooth with some texture.
+fn scene(x: f64, y: f64) -> f64 {
+    0.08 + 0.03 * (x / 37.0).sin() + 0.02 * (y / 23.0).cos() + 0.01 * (x / 5.0 + y / 7.0).sin()
+}
+
+fn encoded(linear: f64) -> u8 {
+    let linear = linear.clamp(0.0, 1.0);
+    let value = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+    (255.0 * value).round() as u8
+}
+
+const WIDTH: usize = 240;
+const HEIGHT: usize = 160;
+
+/// A photograph at x = `shift` whose light is `gain` times the scene's.
+fn picture(shift: f64, gain: f64) -> Raster<u8> {
+    let data = (0..WIDTH * HEIGHT)
+        .flat_map(|i| [encoded(gain * scene((i % WIDTH) as f64 + shift, (i / WIDTH) as f64)); 3])
+        .collect();
+    Raster::from_data(WIDTH, HEIGHT, 3, data).expect("as many samples")
+}
+
+fn layout(shifts: &[f64]) -> CanvasLayout {
+    let placed = shifts
+        .iter()
+        .enumerate()
+        .map(|(photograph, shift)| {
+            let mut mesh = GridMesh::regular(WIDTH as f64, HEIGHT as f64, 40.0);
+            for vertex in &mut mesh.target {
+                vertex[0] += shift;
+            }
+            Placed { photograph, mesh }
+        })
+        .collect();
+    let width = WIDTH + shifts.iter().copied().fold(0.0, f64::max) as usize;
+    CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, placed }
+}
+
+fn estimate(shifts: &[f64], rasters: &[Raster<u8>], options: &ExposureOptions) -> Exposure {
+    let frame = WorkingFrame::new(WIDTH, HEIGHT, 480_000.0);
+    let thumbnails: Vec<Thumbnail> = rasters.iter().map(|raster| Thumbnail { raster, frame }).collect();
+    run(&layout(shifts), &thumbnails, 0, options, &StageContext::default()).expect("estimates")
+}
+
+#[test]
+fn gains_from_a_quarter_to_four_are_recovered() {
+    let shifts = [0.0, 150.0, 300.0, 450.0];
+    let lights = [1.0, 0.25, 4.0, 1.7];
+    let rasters: Vec<_> = shifts.iter().zip(lights).map(|(&shift, light)| picture(shift, light)).collect();
+    for anchor in [GainAnchor::Mean, GainAnchor::Reference] {
+        let exposure = estimate(&shifts, &rasters, &ExposureOptions { anchor, ..ExposureOptions::default() });
+        assert_eq!(exposure.pairs.len(), 3);
+        let products: Vec<f64> = exposure.gains.iter().zip(lights).map(|(gain, light)| gain * light).collect();
+        for product in &products {
+            assert!((product / products[0] - 1.0).abs() < 0.02, "{products:?}");
+        }
+        match anchor {
+            GainAnchor::Reference => assert_eq!(exposure.gains[0], 1.0),
+            GainAnchor::Mean => {
+                assert!(exposure.gains.iter().map(|gain| gain.ln()).sum::<f64>().abs() < 1e-9);
+            }
+        }
+    }
+}
+
+#[test]
+fn saturated_and_moving_things_do_not_count() {
+    let shifts = [0.0, 100.0];
+    let mut rasters = [picture(0.0, 1.0), picture(100.0, 2.0)];
+    for y in 0..HEIGHT {
+        for x in 110..WIDTH {
+            // A third of the overlap is blown out in both, a fifth is a dark passer-by in the second only.
+            if y < HEIGHT / 3 {
+                rasters[0].pixel_mut(x, y).fill(255);
+                rasters[1].pixel_mut(x - 100, y).fill(255);
+            } else if y > HEIGHT * 4 / 5 {
+                rasters[1].pixel_mut(x - 100, y).fill(30);
+            }
+        }
+    }
+    let exposure = estimate(&shifts, &rasters, &ExposureOptions::default());
+    assert!((exposure.gains[0] / exposure.gains[1] - 2.0).abs() < 0.04, "{exposure:?}");
+}
+
+#[test]
+fn photographs_without_overlap_keep_their_brightness() {
+    let rasters = [picture(0.0, 1.0), picture(150.0, 2.0), picture(900.0, 3.0)];
+    let exposure = estimate(&[0.0, 150.0, 900.0], &rasters, &ExposureOptions::default());
+    assert_eq!(exposure.gains[2], 1.0);
+    assert!((exposure.gains[0] / exposure.gains[1] - 2.0).abs() < 0.04);
+    let alone = estimate(&[0.0], &rasters[..1], &ExposureOptions::default());
+    assert_eq!(alone.gains, [1.0]);
+    let off = ExposureOptions { enabled: false, ..ExposureOptions::default() };
+    assert_eq!(estimate(&[0.0, 150.0, 900.0], &rasters, &off).gains, [1.0; 3]);
+}
+
+#[test]
+fn gains_stay_within_their_limit_and_black_says_nothing() {
+    let rasters = [picture(0.0, 1.0), picture(150.0, 8.0)];
+    let options = ExposureOptions { max_gain: 1.5, ..ExposureOptions::default() };
+    assert_eq!(estimate(&[0.0, 150.0], &rasters, &options).gains, [1.5, 1.5_f64.recip()]);
+    let black = Raster::new(WIDTH, HEIGHT, 3);
+    assert_eq!(estimate(&[0.0, 150.0], &[black, picture(150.0, 1.0)], &ExposureOptions::default()).gains, [1.0; 2]);
+}
+
+#[test]
+fn input_that_does_not_fit_is_refused() {
+    let options = ExposureOptions::default();
+    let context = StageContext::default();
+    let none = run(&layout(&[0.0, 9.0]), &[], 0, &options, &context);
+    assert!(matches!(none, Err(Error::Input { .. })));
+}

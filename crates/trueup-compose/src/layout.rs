@@ -1,0 +1,267 @@
+//! The canvas: deformed grids in any common unit become grids in canvas pixels.
+
+use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
+use trueup_core::diagnostics::Diagnostic;
+use trueup_core::mesh::GridMesh;
+use trueup_core::options::StageOptions;
+use trueup_core::{Error, Result, StageContext};
+
+const STAGE: &str = CanvasOptions::STAGE;
+
+trueup_core::options! {
+    /// How large the panorama becomes.
+    pub struct CanvasOptions("canvas") {
+        /// Size of the panorama relative to the reference photograph's own pixels: 1 keeps every detail the reference
+        /// has, 0.25 makes a quick preview.
+        scale: f64 = 1.0, between(1e-4, 16.0), "";
+        /// Largest number of canvas pixels. A larger canvas is reduced evenly to fit, and a diagnostic says so.
+        max_pixels: f64 = 400e6, between(1.0, 1e12), "px";
+    }
+}
+
+/// A photograph and the deformed grid that carries it to the panorama.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Placed {
+    /// Index of the photograph in the [`trueup_core::source::PhotographSource`].
+    pub photograph: usize,
+    /// Grid over the full-resolution photograph: width and height are its pixels.
+    pub mesh: GridMesh,
+}
+
+/// The canvas and where every photograph lies on it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CanvasLayout {
+    /// Width of the canvas in pixels, at least 1.
+    pub width: usize,
+    /// Height of the canvas in pixels, at least 1.
+    pub height: usize,
+    /// Canvas pixels per unit of the targets that were given.
+    pub canvas_from_target: f64,
+    /// The photographs used, in the order given; targets are canvas pixels, the smallest coordinate 0 on both axes.
+    pub placed: Vec<Placed>,
+}
+
+/// Lays the grids on one canvas: shifted by the smallest vertex, scaled so that the photograph `placed[reference]`
+/// keeps its pixel scale times [`CanvasOptions::scale`].
+///
+/// Targets may be in any unit common to all grids. The canvas is `ceil(max - min)` of the scaled vertices; above
+/// [`CanvasOptions::max_pixels`] all vertices are reduced evenly and `canvas-reduced` is reported.
+///
+/// # Errors
+/// [`Error::Options`]; [`Error::Input`] if there is no grid, `reference` is not one of them, or a grid's size and
+/// number of vertices disagree; [`Error::Unsolvable`] if a vertex is not finite or the reference has no area.
+///
+/// # Departures
+/// The scale of the reference is the median over its cells, so that a few stretched cells at its border do not count.
+pub fn run(
+    mut placed: Vec<Placed>,
+    reference: usize,
+    options: &CanvasOptions,
+    context: &StageContext,
+) -> Result<CanvasLayout> {
+    check_options(options)?;
+    for item in &placed {
+        check_mesh(item)?;
+    }
+    let Some(anchor) = placed.get(reference) else {
+        return Err(Error::input(
+            "canvas",
+            format!("photograph {reference} of {} cannot be the reference", placed.len()),
+            "Choose one of the photographs in use.",
+        ));
+    };
+    let pixel_scale = median_cell_scale(&anchor.mesh);
+    if !(pixel_scale.is_finite() && pixel_scale > 0.0) {
+        return Err(Error::unsolvable(
+            STAGE,
+            format!("photograph {}", anchor.photograph),
+            "the reference has no area in the panorama",
+            "Choose another reference or another method.",
+        ));
+    }
+    let (low, high) = bounds(&placed);
+    let extent = high - low;
+    if !extent.max().is_finite() {
+        return Err(Error::unsolvable(
+            STAGE,
+            "the canvas",
+            "the photographs lie too far apart to be measured",
+            "Leave out the photographs that are not part of the scene.",
+        ));
+    }
+    let wanted = options.scale / pixel_scale;
+    let canvas_from_target = scale_within(extent, wanted, options.max_pixels);
+    let [width, height] = canvas_size(extent, canvas_from_target);
+    if canvas_from_target < wanted {
+        let [wanted_width, wanted_height] = canvas_size(extent, wanted);
+        context.report(Diagnostic::warning(
+            "canvas-reduced",
+            STAGE,
+            format!(
+                "a canvas of {wanted_width:.0} x {wanted_height:.0} px is above the limit of {:.0} px; it was reduced \
+                 to {width:.0} x {height:.0}",
+                options.max_pixels
+            ),
+            "Raise canvas.max_pixels, or choose a projection that stretches the borders less.",
+        ));
+    }
+    for vertex in placed.iter_mut().flat_map(|item| &mut item.mesh.target) {
+        *vertex = ((Vector2::from(*vertex) - low) * canvas_from_target).into();
+    }
+    Ok(CanvasLayout { width: width as usize, height: height as usize, canvas_from_target, placed })
+}
+
+fn check_options(options: &CanvasOptions) -> Result<()> {
+    let invalid = options.invalid();
+    if invalid.is_empty() { Ok(()) } else { Err(Error::Options(invalid)) }
+}
+
+/// Refuses grids no later step could walk.
+pub(crate) fn check_mesh(placed: &Placed) -> Result<()> {
+    let mesh = &placed.mesh;
+    let subject = || format!("photograph {}", placed.photograph);
+    let whole = mesh.rows >= 2
+        && mesh.columns >= 2
+        && mesh.rows.checked_mul(mesh.columns) == Some(mesh.target.len())
+        && mesh.width >= 1.0
+        && mesh.height >= 1.0
+        && mesh.width.max(mesh.height).is_finite();
+    if !whole {
+        return Err(Error::input(
+            subject(),
+            format!(
+                "a grid of {} x {} with {} vertices over {} x {} px is not one",
+                mesh.rows,
+                mesh.columns,
+                mesh.target.len(),
+                mesh.width,
+                mesh.height
+            ),
+            "Give rows * columns vertices, at least 2 x 2, over a picture of at least one pixel.",
+        ));
+    }
+    if mesh.target.iter().flatten().any(|coordinate| !coordinate.is_finite()) {
+        return Err(Error::unsolvable(
+            STAGE,
+            subject(),
+            "its grid has vertices that are not finite",
+            "Leave this photograph out, or choose another method.",
+        ));
+    }
+    Ok(())
+}
+
+/// Median over the cells of the square root of target area per source area.
+fn median_cell_scale(mesh: &GridMesh) -> f64 {
+    let cell_area = mesh.cell_width() * mesh.cell_height();
+    let mut scales: Vec<f64> = (0..(mesh.rows - 1) * (mesh.columns - 1))
+        .map(|cell| {
+            let first = cell / (mesh.columns - 1) * mesh.columns + cell % (mesh.columns - 1);
+            let vertex = |index: usize| Vector2::from(mesh.target[index]);
+            // Area of a quadrilateral from its diagonals.
+            let falling = vertex(first + mesh.columns + 1) - vertex(first);
+            let rising = vertex(first + 1) - vertex(first + mesh.columns);
+            (0.5 * falling.perp(&rising).abs() / cell_area).sqrt()
+        })
+        .collect();
+    scales.sort_by(f64::total_cmp);
+    scales.get(scales.len() / 2).copied().unwrap_or(0.0)
+}
+
+fn bounds(placed: &[Placed]) -> (Vector2<f64>, Vector2<f64>) {
+    let start = (Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY));
+    placed.iter().fold(start, |(low, high), item| {
+        let (item_low, item_high) = item.mesh.bounds();
+        (low.inf(&item_low), high.sup(&item_high))
+    })
+}
+
+/// Width and height of the canvas in whole pixels, at least 1 each.
+fn canvas_size(extent: Vector2<f64>, scale: f64) -> [f64; 2] {
+    // A photograph of 100 px placed at a fractional offset spans 100 px plus rounding; that is no 101st column.
+    const ROUNDING_PX: f64 = 1e-6;
+    [(extent.x * scale - ROUNDING_PX).ceil().max(1.0), (extent.y * scale - ROUNDING_PX).ceil().max(1.0)]
+}
+
+/// The largest scale, at most `wanted`, whose canvas holds at most `max_pixels`.
+fn scale_within(extent: Vector2<f64>, wanted: f64, max_pixels: f64) -> f64 {
+    // Just below the exact ratio, so that rounding up to whole pixels fits after a step or two.
+    const SAFETY: f64 = 1.0 - 1e-6;
+    // Neither side alone may exceed the limit; this keeps the product below finite.
+    let mut scale = wanted.min(max_pixels / extent.max());
+    loop {
+        let [width, height] = canvas_size(extent, scale);
+        let pixels = width * height;
+        if pixels <= max_pixels {
+            return scale;
+        }
+        scale *= (max_pixels / pixels).sqrt() * SAFETY;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn placed(scale: f64, shift: [f64; 2]) -> Placed {
+        let mut mesh = GridMesh::regular(400.0, 300.0, 40.0);
+        for vertex in &mut mesh.target {
+            *vertex = [vertex[0] * scale + shift[0], vertex[1] * scale + shift[1]];
+        }
+        Placed { photograph: 0, mesh }
+    }
+
+    #[test]
+    fn the_reference_keeps_its_pixel_scale() {
+        let context = StageContext::default();
+        let pictures = vec![placed(0.25, [-7.0, 3.0]), placed(0.5, [43.0, 3.0])];
+        let layout = run(pictures.clone(), 0, &CanvasOptions::default(), &context).expect("two grids");
+        // In units of 0.25: the first spans 400 px, the second starts 200 px in and is twice as large.
+        assert_eq!((layout.width, layout.height), (1000, 600));
+        assert!((layout.canvas_from_target - 4.0).abs() < 1e-12);
+        let half = CanvasOptions { scale: 0.5, ..CanvasOptions::default() };
+        let layout = run(pictures, 1, &half, &context).expect("two grids");
+        assert_eq!((layout.width, layout.height), (250, 150));
+        assert!(context.take_diagnostics().is_empty());
+    }
+
+    #[test]
+    fn a_canvas_above_the_limit_is_reduced_and_reported() {
+        let context = StageContext::default();
+        let options = CanvasOptions { max_pixels: 1000.0, ..CanvasOptions::default() };
+        let layout = run(vec![placed(1.0, [0.0, 0.0])], 0, &options, &context).expect("one grid");
+        assert!(layout.width * layout.height <= 1000);
+        assert!(layout.width * layout.height > 900, "{} x {}", layout.width, layout.height);
+        assert_eq!(context.take_diagnostics()[0].code, "canvas-reduced");
+    }
+
+    #[test]
+    fn a_very_long_strip_is_reduced_too() {
+        let mut strip = placed(1.0, [0.0, 0.0]);
+        for vertex in &mut strip.mesh.target {
+            vertex[0] *= 1e9;
+            vertex[1] *= 1e-9;
+        }
+        let options = CanvasOptions { max_pixels: 1e5, ..CanvasOptions::default() };
+        let layout = run(vec![strip], 0, &options, &StageContext::default()).expect("one grid");
+        assert!(layout.width <= 100_000 && layout.height == 1);
+    }
+
+    #[test]
+    fn unusable_grids_are_named() {
+        let context = StageContext::default();
+        let options = CanvasOptions::default();
+        let mut infinite = placed(1.0, [0.0, 0.0]);
+        infinite.mesh.target[5][1] = f64::NAN;
+        assert!(matches!(run(vec![infinite], 0, &options, &context), Err(Error::Unsolvable { .. })));
+        let mut short = placed(1.0, [0.0, 0.0]);
+        short.mesh.target.pop();
+        assert!(matches!(run(vec![short], 0, &options, &context), Err(Error::Input { .. })));
+        assert!(matches!(run(vec![], 0, &options, &context), Err(Error::Input { .. })));
+        let point = placed(0.0, [0.0, 0.0]);
+        assert!(matches!(run(vec![point], 0, &options, &context), Err(Error::Unsolvable { .. })));
+        let bad = CanvasOptions { scale: 0.0, ..options };
+        assert!(matches!(run(vec![], 0, &bad, &context), Err(Error::Options(_))));
+    }
+}

@@ -1,0 +1,91 @@
+//! Interpolation kernels.
+
+/// A separable, even interpolation kernel over at most four samples.
+pub(crate) trait Kernel {
+    /// Half its width in samples.
+    const RADIUS: f64;
+
+    /// Value at `distance` samples from the middle.
+    fn at(distance: f64) -> f64;
+
+    /// Weights of four neighbouring samples for a position `fraction` (in [0, 1]) beyond the second of them.
+    fn taps(fraction: f32) -> [f32; 4];
+}
+
+/// Two samples, straight between them.
+#[derive(Debug)]
+pub(crate) struct Bilinear;
+
+impl Kernel for Bilinear {
+    const RADIUS: f64 = 1.0;
+
+    fn at(distance: f64) -> f64 {
+        (1.0 - distance.abs()).max(0.0)
+    }
+
+    #[inline(always)]
+    fn taps(fraction: f32) -> [f32; 4] {
+        [0.0, 1.0 - fraction, fraction, 0.0]
+    }
+}
+
+/// Four samples by cubic convolution with a = -1/2 (the Catmull-Rom spline): exact for parabolas.
+///
+/// # Source
+/// Keys, "Cubic convolution interpolation for digital image processing", IEEE TASSP 29(6), 1981, equation 15.
+#[derive(Debug)]
+pub(crate) struct Bicubic;
+
+impl Kernel for Bicubic {
+    const RADIUS: f64 = 2.0;
+
+    fn at(distance: f64) -> f64 {
+        let d = distance.abs();
+        if d < 1.0 {
+            (1.5 * d - 2.5) * d * d + 1.0
+        } else if d < 2.0 {
+            ((-0.5 * d + 2.5) * d - 4.0) * d + 2.0
+        } else {
+            0.0
+        }
+    }
+
+    #[inline(always)]
+    fn taps(fraction: f32) -> [f32; 4] {
+        // Coefficients of fraction^3, fraction^2, fraction and 1, a column for each tap: exact at both ends.
+        const CUBE: [f32; 4] = [-0.5, 1.5, -1.5, 0.5];
+        const SQUARE: [f32; 4] = [1.0, -2.5, 2.0, -0.5];
+        const LINE: [f32; 4] = [-0.5, 0.0, 0.5, 0.0];
+        const CONSTANT: [f32; 4] = [0.0, 1.0, 0.0, 0.0];
+        std::array::from_fn(|tap| {
+            ((CUBE[tap] * fraction + SQUARE[tap]) * fraction + LINE[tap]) * fraction + CONSTANT[tap]
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check_taps_follow_the_kernel<K: Kernel>() {
+        for step in 0..=16 {
+            let fraction = step as f32 / 16.0;
+            let taps = K::taps(fraction);
+            assert!((taps.iter().sum::<f32>() - 1.0).abs() < 1e-6);
+            for (tap, weight) in taps.iter().enumerate() {
+                let expected = K::at(tap as f64 - 1.0 - f64::from(fraction));
+                assert!((f64::from(*weight) - expected).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn taps_are_the_kernel_at_the_samples() {
+        check_taps_follow_the_kernel::<Bilinear>();
+        check_taps_follow_the_kernel::<Bicubic>();
+        assert_eq!(Bicubic::taps(0.0), [0.0, 1.0, 0.0, 0.0]);
+        assert_eq!(Bicubic::taps(1.0), [0.0, 0.0, 1.0, 0.0]);
+        // Keys' kernel half way: -1/16, 9/16, 9/16, -1/16.
+        assert_eq!(Bicubic::taps(0.5), [-0.0625, 0.5625, 0.5625, -0.0625]);
+    }
+}

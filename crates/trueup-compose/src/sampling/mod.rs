@@ -1,0 +1,224 @@
+//! Interpolation of photographs at real positions, in their own encoding, on the scale of 0 to 255.
+
+mod kernel;
+mod reduce;
+
+pub(crate) use kernel::{Bicubic, Bilinear, Kernel};
+pub(crate) use reduce::reduce_by_two;
+
+use trueup_core::raster::{Photograph, Raster};
+
+use crate::simd::{Positions, Rgb8, interpolate_rgb8};
+
+/// Taps of a widened kernel per axis, at most: a kernel of radius 2 widened 15 times has 60.
+const MAX_TAPS: usize = 64;
+
+/// Widest a kernel is made; see [`MAX_TAPS`].
+pub(crate) const MAX_STRETCH: f64 = 15.0;
+
+/// A sample of a photograph at its own depth.
+trait Sample: Copy + Default + Send + Sync {
+    /// On the scale of 0 to 255.
+    fn level(self) -> f32;
+}
+
+impl Sample for u8 {
+    #[inline(always)]
+    fn level(self) -> f32 {
+        f32::from(self)
+    }
+}
+
+impl Sample for u16 {
+    #[inline(always)]
+    fn level(self) -> f32 {
+        f32::from(self) * (1.0 / 257.0)
+    }
+}
+
+/// Interpolates a photograph at every position: red, green, blue and alpha from 0 to 255, not yet clamped.
+///
+/// Positions outside see the nearest sample. `stretch` is how much wider than a sample the kernel is, along x and y: 1 to
+/// interpolate, more to average where the photograph is reduced. Colours next to transparent samples are weighted by
+/// alpha, so that what lies under a mask does not show. `at_border` is scratch space.
+pub(crate) fn interpolate<K: Kernel>(
+    photograph: &Photograph,
+    positions: &Positions,
+    stretch: [f64; 2],
+    out: &mut [[f32; 4]],
+    at_border: &mut Vec<usize>,
+) {
+    match photograph {
+        Photograph::Eight(raster) if raster.channels() == 3 && stretch == [1.0, 1.0] => {
+            let picture = Rgb8 { samples: raster.data(), width: raster.width(), height: raster.height() };
+            at_border.clear();
+            interpolate_rgb8::<K>(picture, positions, out, at_border);
+            for &index in &*at_border {
+                out[index] = interpolate_one::<K, u8, 3>(raster, positions, index);
+            }
+        }
+        Photograph::Eight(raster) => interpolate_depth::<K, u8>(raster, positions, stretch, out),
+        Photograph::Sixteen(raster) => interpolate_depth::<K, u16>(raster, positions, stretch, out),
+    }
+}
+
+fn interpolate_depth<K: Kernel, T: Sample>(
+    raster: &Raster<T>,
+    positions: &Positions,
+    stretch: [f64; 2],
+    out: &mut [[f32; 4]],
+) {
+    match raster.channels() {
+        1 => interpolate_channels::<K, T, 1>(raster, positions, stretch, out),
+        3 => interpolate_channels::<K, T, 3>(raster, positions, stretch, out),
+        _ => interpolate_channels::<K, T, 4>(raster, positions, stretch, out),
+    }
+}
+
+fn interpolate_channels<K: Kernel, T: Sample, const C: usize>(
+    raster: &Raster<T>,
+    positions: &Positions,
+    stretch: [f64; 2],
+    out: &mut [[f32; 4]],
+) {
+    for (index, out) in out.iter_mut().enumerate().take(positions.len()) {
+        *out = if stretch == [1.0, 1.0] {
+            interpolate_one::<K, T, C>(raster, positions, index)
+        } else {
+            average_one::<K, T, C>(raster, positions, index, stretch)
+        };
+    }
+}
+
+/// One pixel as red, green, blue and alpha.
+#[inline(always)]
+fn pixel<T: Sample, const C: usize>(row: &[T], column: usize) -> [f32; 4] {
+    match C {
+        1 => {
+            let level = row[column].level();
+            [level, level, level, 255.0]
+        }
+        3 => {
+            let rgb = &row[3 * column..3 * column + 3];
+            [rgb[0].level(), rgb[1].level(), rgb[2].level(), 255.0]
+        }
+        _ => {
+            let rgba = &row[4 * column..4 * column + 4];
+            [rgba[0].level(), rgba[1].level(), rgba[2].level(), rgba[3].level()]
+        }
+    }
+}
+
+/// The 4 x 4 samples around a position, weighted in the order the vector form has: along the columns first.
+fn interpolate_one<K: Kernel, T: Sample, const C: usize>(
+    raster: &Raster<T>,
+    positions: &Positions,
+    index: usize,
+) -> [f32; 4] {
+    let tap = |at: i32, tap: usize, size: usize| (at.saturating_add(tap as i32 - 1).max(0) as usize).min(size - 1);
+    let columns: [usize; 4] = std::array::from_fn(|i| tap(positions.column[index], i, raster.width()));
+    let rows: [&[T]; 4] = std::array::from_fn(|i| raster.row(tap(positions.row[index], i, raster.height())));
+    let (fraction_x, fraction_y) = (positions.fraction_x[index], positions.fraction_y[index]);
+    let (wx, wy) = (K::taps(fraction_x), K::taps(fraction_y));
+    let window: [[[f32; 4]; 4]; 4] = columns.map(|column| rows.map(|row| pixel::<T, C>(row, column)));
+    if C == 4 && window.iter().flatten().any(|pixel| pixel[3] < 255.0) {
+        return weigh_by_alpha(&window, Bilinear::taps(fraction_x), Bilinear::taps(fraction_y));
+    }
+    let sums = window.map(|column| weigh(&column, wy));
+    let mut sum = weigh(&sums, wx);
+    sum[3] = 255.0;
+    sum
+}
+
+/// `((p0 w0 + p1 w1) + p2 w2) + p3 w3` for each of four values.
+#[inline(always)]
+fn weigh(pixels: &[[f32; 4]; 4], weights: [f32; 4]) -> [f32; 4] {
+    std::array::from_fn(|c| {
+        ((pixels[0][c] * weights[0] + pixels[1][c] * weights[1]) + pixels[2][c] * weights[2])
+            + pixels[3][c] * weights[3]
+    })
+}
+
+/// Mean of a window (columns of rows) by weights times alpha; weights must not be negative.
+fn weigh_by_alpha(window: &[[[f32; 4]; 4]; 4], wx: [f32; 4], wy: [f32; 4]) -> [f32; 4] {
+    let mut sum = PremultipliedSum::default();
+    for (column, wx) in window.iter().zip(wx) {
+        for (pixel, wy) in column.iter().zip(wy) {
+            sum.add(*pixel, wx * wy);
+        }
+    }
+    sum.mean()
+}
+
+/// A mean over a kernel `stretch` times as wide as the interpolating one.
+fn average_one<K: Kernel, T: Sample, const C: usize>(
+    raster: &Raster<T>,
+    positions: &Positions,
+    index: usize,
+    stretch: [f64; 2],
+) -> [f32; 4] {
+    let x = f64::from(positions.column[index]) + f64::from(positions.fraction_x[index]);
+    let y = f64::from(positions.row[index]) + f64::from(positions.fraction_y[index]);
+    let (mut wx, mut wy) = ([0.0; MAX_TAPS], [0.0; MAX_TAPS]);
+    let (first_column, wx) = widened_taps::<K>(x, stretch[0], &mut wx);
+    let (first_row, wy) = widened_taps::<K>(y, stretch[1], &mut wy);
+    let clamped = |first: i64, tap: usize, size: usize| (first + tap as i64).clamp(0, size as i64 - 1) as usize;
+    let mut sum = PremultipliedSum::default();
+    for (j, &wy) in wy.iter().enumerate() {
+        let row = raster.row(clamped(first_row, j, raster.height()));
+        for (i, &wx) in wx.iter().enumerate() {
+            let pixel = pixel::<T, C>(row, clamped(first_column, i, raster.width()));
+            // A negative lobe over transparent samples would divide by nearly nothing.
+            sum.add(pixel, if C == 4 { (wx * wy).max(0.0) } else { wx * wy });
+        }
+    }
+    sum.mean()
+}
+
+/// First sample and normalised weights of a kernel widened by `stretch` around `position` (0 at the first sample).
+fn widened_taps<K: Kernel>(position: f64, stretch: f64, taps: &mut [f32; MAX_TAPS]) -> (i64, &[f32]) {
+    let stretch = stretch.clamp(1.0, MAX_STRETCH);
+    let radius = K::RADIUS * stretch;
+    let first = (position - radius).ceil();
+    let count = (((position + radius).floor() - first).max(0.0) as usize + 1).min(MAX_TAPS);
+    let mut sum = 0.0;
+    for (tap, weight) in taps.iter_mut().take(count).enumerate() {
+        *weight = K::at((first + tap as f64 - position) / stretch) as f32;
+        sum += *weight;
+    }
+    for weight in &mut taps[..count] {
+        *weight /= sum;
+    }
+    (first as i64, &taps[..count])
+}
+
+/// A weighted sum of colours multiplied by their alpha.
+#[derive(Debug, Default)]
+struct PremultipliedSum {
+    colour: [f32; 3],
+    alpha: f32,
+    weight: f32,
+}
+
+impl PremultipliedSum {
+    #[inline(always)]
+    fn add(&mut self, pixel: [f32; 4], weight: f32) {
+        let weighted = weight * pixel[3];
+        for (sum, level) in self.colour.iter_mut().zip(pixel) {
+            *sum += weighted * level;
+        }
+        self.alpha += weighted;
+        self.weight += weight;
+    }
+
+    fn mean(&self) -> [f32; 4] {
+        if self.alpha <= 0.0 {
+            return [0.0; 4];
+        }
+        let [r, g, b] = self.colour.map(|sum| sum / self.alpha);
+        [r, g, b, self.alpha / self.weight]
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,140 @@
+//! The sRGB transfer curve, both ways, by table.
+//!
+//! # Source
+//! IEC 61966-2-1:1999, equations 5 to 7.
+
+use std::sync::LazyLock;
+
+/// Encoded value (0 to 1) to linear light (0 to 1), by the formula.
+fn linear_from_encoded(encoded: f64) -> f64 {
+    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Table steps between two 8-bit levels. The curve between two entries is replaced by its chord, which is off by less
+/// than 4e-8 of full scale: a 400th of a 16-bit step.
+const STEPS_PER_LEVEL: usize = 16;
+
+/// Linear light from samples on the scale of 0 to 255, whole or between.
+#[derive(Debug)]
+pub(crate) struct Linearise {
+    /// Value at entry `i` / 16 levels, and the difference to the next entry.
+    entries: Vec<[f32; 2]>,
+}
+
+impl Linearise {
+    /// The table of the process.
+    pub(crate) fn table() -> &'static Self {
+        static TABLE: LazyLock<Linearise> = LazyLock::new(|| {
+            let count = 255 * STEPS_PER_LEVEL + 1;
+            let value = |index: usize| linear_from_encoded(index as f64 / (255 * STEPS_PER_LEVEL) as f64);
+            let entries = (0..count)
+                .map(|index| [value(index) as f32, (value((index + 1).min(count - 1)) - value(index)) as f32])
+                .collect();
+            Linearise { entries }
+        });
+        &TABLE
+    }
+
+    /// Linear light, 0 to 1, of a sample on the scale of 0 to 255; values outside are clamped, NaN gives 0.
+    #[inline(always)]
+    pub(crate) fn linear(&self, level: f32) -> f32 {
+        // `max` first: unlike `clamp`, it turns NaN into a number.
+        #[allow(clippy::manual_clamp)]
+        let position = level.max(0.0).min(255.0) * STEPS_PER_LEVEL as f32;
+        let index = (position as usize).min(255 * STEPS_PER_LEVEL);
+        let [value, step] = self.entries[index];
+        value + (position - index as f32) * step
+    }
+}
+
+/// 8-bit sRGB from linear light, exact to rounding.
+#[derive(Debug)]
+pub(crate) struct Encode {
+    /// Level at the lower end of every bucket of the float's exponent and leading mantissa bits.
+    bucket_level: Vec<u8>,
+    /// Smallest linear value that rounds to level `i + 1`; the last one is never reached.
+    threshold: [f32; 256],
+}
+
+/// Mantissa bits that select a bucket. A bucket is then 1/128 of its value wide and spans less than one 8-bit level
+/// (0.9 of a level at white), so that one comparison settles the rounding.
+const BUCKET_BITS: u32 = 7;
+/// Values below are level 0: the first threshold is 0.5 / 255 / 12.92 = 1.5e-4, above 2^-13.
+const SMALLEST: f32 = 1.0 / 8192.0;
+
+impl Encode {
+    /// The table of the process.
+    pub(crate) fn table() -> &'static Self {
+        static TABLE: LazyLock<Encode> = LazyLock::new(|| {
+            let mut threshold = [f32::INFINITY; 256];
+            for (level, value) in threshold.iter_mut().enumerate().take(255) {
+                *value = linear_from_encoded((level as f64 + 0.5) / 255.0) as f32;
+            }
+            let buckets = Encode::bucket(1.0) + 1;
+            let bucket_level = (0..buckets)
+                .map(|bucket| {
+                    let low = f32::from_bits(SMALLEST.to_bits() + ((bucket as u32) << (23 - BUCKET_BITS)));
+                    threshold.partition_point(|&limit| limit <= low) as u8
+                })
+                .collect();
+            Encode { bucket_level, threshold }
+        });
+        &TABLE
+    }
+
+    #[inline(always)]
+    fn bucket(linear: f32) -> usize {
+        ((linear.to_bits() - SMALLEST.to_bits()) >> (23 - BUCKET_BITS)) as usize
+    }
+
+    /// The nearest 8-bit level; values outside 0 to 1 are clamped, NaN gives 0.
+    #[inline(always)]
+    pub(crate) fn level(&self, linear: f32) -> u8 {
+        // NaN fails the comparison and becomes level 0.
+        let linear = if linear >= SMALLEST { linear.min(1.0) } else { SMALLEST };
+        let level = self.bucket_level[Encode::bucket(linear)];
+        level + u8::from(linear >= self.threshold[usize::from(level)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn encoded_from_linear(linear: f64) -> f64 {
+        if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+    }
+
+    #[test]
+    fn every_level_survives_the_round_trip() {
+        for level in 0..=255_u8 {
+            assert_eq!(Encode::table().level(Linearise::table().linear(f32::from(level))), level);
+        }
+    }
+
+    #[test]
+    fn encoding_rounds_as_the_formula_does() {
+        let steps = 200_000;
+        for step in 0..=steps {
+            let linear = step as f32 / steps as f32;
+            let exact = 255.0 * encoded_from_linear(f64::from(linear));
+            let level = f64::from(Encode::table().level(linear));
+            assert!((level - exact).abs() <= 0.5 + 1e-3, "{linear}: {level} for {exact}");
+        }
+        for (value, level) in [(-1.0, 0), (0.0, 0), (1.0, 255), (7.0, 255), (f32::NAN, 0), (f32::INFINITY, 255)] {
+            assert_eq!(Encode::table().level(value), level);
+        }
+    }
+
+    #[test]
+    fn linear_light_between_levels_follows_the_formula() {
+        for step in 0..=25_500 {
+            let level = step as f32 / 100.0;
+            let exact = linear_from_encoded(f64::from(level) / 255.0);
+            assert!((f64::from(Linearise::table().linear(level)) - exact).abs() < 2e-7);
+        }
+        assert_eq!(Linearise::table().linear(-9.0), 0.0);
+        assert_eq!(Linearise::table().linear(400.0), 1.0);
+        assert_eq!(Linearise::table().linear(f32::NAN), 0.0);
+    }
+}
