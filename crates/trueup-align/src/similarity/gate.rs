@@ -1,0 +1,72 @@
+//! Whether the scene's dominant directions are believed.
+
+use super::GateMode;
+use super::SimilarityOptions;
+
+/// What the gate judges.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct GateEvidence {
+    /// Number of pictures, those without a triad included.
+    pub pictures: usize,
+    /// Pictures whose triad fits the dominant frame.
+    pub inliers: usize,
+    /// The divergence epsilon.
+    pub divergence: f64,
+    /// Angle in radians between the dominant and the straightened vertical, if the latter is well conditioned.
+    pub straightening_angle: Option<f64>,
+    /// Median over the inliers of |alpha_i|, radians.
+    pub median_roll: f64,
+}
+
+/// Largest number of pictures that counts as few.
+const FEW_PICTURES: usize = 6;
+
+/// The divergence of the vanishing directions: the mean residual of the inliers over their share of the pictures.
+///
+/// Infinite without inliers.
+///
+/// # Source
+/// The paper's eq. 15.
+///
+/// # Departures
+/// The paper does not say what its sum is divided by; the mean per picture alone puts its threshold 0.10 between scenes
+/// with and without dominant directions.
+pub(super) fn divergence(inlier_residuals: &[f64], pictures: usize) -> f64 {
+    if inlier_residuals.is_empty() {
+        return f64::INFINITY;
+    }
+    let count = inlier_residuals.len() as f64;
+    let share = count / pictures as f64;
+    inlier_residuals.iter().sum::<f64>() / count / share
+}
+
+/// The first clause that fails, in words; `None` if the guidance is accepted.
+///
+/// # Departures
+/// The paper has clause (a) alone, which cannot tell with few pictures: one picture always fits its own triad.
+/// [`GateMode::Paper`] keeps to it.
+pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions) -> Option<String> {
+    let GateEvidence { pictures, inliers, divergence, straightening_angle, median_roll } = *evidence;
+    // Not-a-number fails.
+    if divergence.is_nan() || divergence > options.max_divergence {
+        let allowed = options.max_divergence;
+        return Some(format!("the vanishing directions diverge by {divergence:.3} ({allowed:.3} allowed)"));
+    }
+    if options.gate == GateMode::Paper {
+        return None;
+    }
+    let share = if pictures <= FEW_PICTURES { options.min_inlier_share_few } else { options.min_inlier_share };
+    let needed = ((share * pictures as f64).ceil() as usize).max(2);
+    if inliers < needed {
+        return Some(format!("{inliers} of {pictures} pictures agree on the dominant directions ({needed} needed)"));
+    }
+    let allowed = options.max_straightening_angle_deg;
+    if let Some(angle) = straightening_angle.map(f64::to_degrees).filter(|&angle| angle.is_nan() || angle > allowed) {
+        return Some(format!(
+            "the dominant vertical is {angle:.1} degrees from the vertical of the cameras ({allowed:.1} allowed)"
+        ));
+    }
+    let (roll, allowed) = (median_roll.to_degrees(), options.max_median_roll_deg);
+    (roll.is_nan() || roll > allowed)
+        .then(|| format!("half of the pictures would be rolled by {roll:.1} degrees or more ({allowed:.1} allowed)"))
+}

@@ -1,0 +1,76 @@
+//! Relative scales of the pictures from the extent of their matches.
+
+use geo::{ConvexHull, Coord, Euclidean, Length, LineString, MultiPoint, Point};
+use nalgebra::{DMatrix, DVector};
+use trueup_core::matches::PairMatches;
+
+/// Perimeter below which a hull says nothing of the scale, working pixels.
+const MIN_PERIMETER_PX: f64 = 20.0;
+/// Weight of an edge without a usable hull, which is taken to keep the scale.
+const WEAK_WEIGHT: f64 = 0.1;
+/// Scales outside are not believed.
+const BELIEVABLE: std::ops::RangeInclusive<f64> = 0.2..=5.0;
+
+/// One scale per picture, of mean 1: what makes matched regions the same size.
+///
+/// Falls back to the inverse focal lengths (of mean 1) when the hulls yield a scale outside 0.2 to 5.
+///
+/// # Source
+/// The paper's eq. 10 and 11: eta_ij = perimeter of the hull in i over that in j.
+///
+/// # Departures
+/// The printed constraint eta_ij s_j = s_i scales the wrong way round: a picture in which the matches span more must
+/// shrink, s_j = eta_ij s_i. Rows are divided by sqrt(eta_ij), so that the order of a pair does not matter.
+pub(super) fn scales(edges: &[PairMatches], focals: &[f64]) -> Vec<f64> {
+    let count = focals.len();
+    hull_scales(edges, count)
+        .filter(|scales| scales.iter().all(|scale| BELIEVABLE.contains(scale)))
+        .unwrap_or_else(|| focal_scales(focals))
+}
+
+/// s_i proportional to 1 / f_i, of mean 1.
+fn focal_scales(focals: &[f64]) -> Vec<f64> {
+    let inverse: f64 = focals.iter().map(|focal| 1.0 / focal).sum();
+    let mean = inverse / focals.len() as f64;
+    focals.iter().map(|focal| if mean > 0.0 && mean.is_finite() { 1.0 / focal / mean } else { 1.0 }).collect()
+}
+
+/// Minimises sum w (sqrt(eta) s_i - s_j / sqrt(eta))^2 subject to sum s_i = N.
+fn hull_scales(edges: &[PairMatches], count: usize) -> Option<Vec<f64>> {
+    let mut system = DMatrix::<f64>::zeros(count + 1, count + 1);
+    for edge in edges {
+        let (eta, weight) = perimeter_ratio(edge).map_or((1.0, WEAK_WEIGHT), |eta| (eta, 1.0));
+        let (i, j) = (edge.a, edge.b);
+        system[(i, i)] += 2.0 * weight * eta;
+        system[(j, j)] += 2.0 * weight / eta;
+        system[(i, j)] -= 2.0 * weight;
+        system[(j, i)] -= 2.0 * weight;
+    }
+    for index in 0..count {
+        system[(index, count)] = 1.0;
+        system[(count, index)] = 1.0;
+    }
+    let mut right = DVector::<f64>::zeros(count + 1);
+    right[count] = count as f64;
+    let solution = system.lu().solve(&right)?;
+    Some(solution.iter().take(count).copied().collect())
+}
+
+/// Perimeter of the hull of the matches in picture a over that in picture b; `None` if either is too small.
+fn perimeter_ratio(edge: &PairMatches) -> Option<f64> {
+    let in_a = hull_perimeter(edge.inliers.iter().map(|point| point.in_a))?;
+    let in_b = hull_perimeter(edge.inliers.iter().map(|point| point.in_b))?;
+    Some(in_a / in_b)
+}
+
+fn hull_perimeter(points: impl Iterator<Item = [f64; 2]>) -> Option<f64> {
+    let finite = points.filter(|point| point.iter().all(|value| value.is_finite()));
+    let points: Vec<Point<f64>> = finite.map(|[x, y]| Point(Coord { x, y })).collect();
+    if points.len() < 3 {
+        return None;
+    }
+    let hull = MultiPoint(points).convex_hull();
+    let outline: &LineString<f64> = hull.exterior();
+    let perimeter = Euclidean.length(outline);
+    (perimeter >= MIN_PERIMETER_PX).then_some(perimeter)
+}

@@ -1,0 +1,63 @@
+//! Straightening ("wave correction"): a vertical from the cameras alone.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// Second eigenvalue of the mean moment of the x axes below which the pictures do not fix a vertical.
+pub(super) const CONDITIONED: f64 = 0.05;
+
+/// The vertical that the cameras' x axes span a plane orthogonal to.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Straightened {
+    /// Down, in the common frame.
+    pub down: Vector3<f64>,
+    /// Whether the x axes point in sufficiently different directions; otherwise `down` is the mean of the y axes,
+    /// freed of the x direction.
+    pub conditioned: bool,
+}
+
+/// The vertical that makes the cameras' x axes horizontal.
+///
+/// # Source
+/// Brown and Lowe, Automatic Panoramic Image Stitching using Invariant Features, section 5: the eigenvector of least
+/// eigenvalue of sum x_i x_i^T.
+///
+/// # Departures
+/// With parallel x axes (one picture, a tiny pan, a vertical sweep) that eigenvector is arbitrary; the mean of the y
+/// axes, made orthogonal to the mean x axis, takes its place.
+pub(super) fn straighten(rotations: &[Matrix3<f64>]) -> Straightened {
+    let x_axes = || rotations.iter().map(|rotation| rotation.row(0).transpose());
+    let y_sum: Vector3<f64> = rotations.iter().map(|rotation| rotation.row(1).transpose()).sum();
+    let moment: Matrix3<f64> = x_axes().map(|x| x * x.transpose()).sum();
+    let eigen = moment.symmetric_eigen();
+    let least = eigen.eigenvalues.imin();
+    let second = eigen.eigenvalues.iter().enumerate().filter(|&(k, _)| k != least).map(|(_, &value)| value);
+    let second = second.fold(f64::INFINITY, f64::min) / rotations.len().max(1) as f64;
+    if second >= CONDITIONED {
+        let axis: Vector3<f64> = eigen.eigenvectors.column(least).into_owned();
+        let down = if axis.dot(&y_sum) > 0.0 { axis } else { -axis };
+        return Straightened { down, conditioned: true };
+    }
+    let greatest: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+    let down = (y_sum - greatest * y_sum.dot(&greatest)).try_normalize(f64::EPSILON).unwrap_or_else(Vector3::y);
+    Straightened { down, conditioned: false }
+}
+
+/// The rotation from the common frame to the level world: `down` becomes y, and the mean viewing direction lies in the
+/// plane of y and z.
+///
+/// # Departures
+/// OpenCV's wave correction chooses x so that the cameras' x axes point to positive x; with `down` signed by the y axes
+/// the mean viewing direction does the same without a case distinction.
+pub(super) fn level_from_world(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> Matrix3<f64> {
+    /// Viewing directions that cancel out (a full circle) leave the yaw to the first picture.
+    const CANCELLED: f64 = 1e-6;
+    let ahead: Vector3<f64> = rotations.iter().map(|rotation| rotation.row(2).transpose()).sum();
+    let horizontal = |direction: Vector3<f64>| direction - down * direction.dot(down);
+    let first = rotations.first().map_or_else(Vector3::z, |rotation| rotation.row(2).transpose());
+    let z = horizontal(ahead)
+        .try_normalize(CANCELLED)
+        .or_else(|| horizontal(first).try_normalize(CANCELLED))
+        .unwrap_or_else(|| crate::vanishing::orthonormal_complement(down).0);
+    let x = down.cross(&z);
+    Matrix3::from_rows(&[x.transpose(), down.transpose(), z.transpose()])
+}

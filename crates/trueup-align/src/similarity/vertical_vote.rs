@@ -1,0 +1,66 @@
+//! A vertical from the segments of all pictures alone, where the horizontal directions do not agree.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::SimilarityOptions;
+use super::joint::{LineVote, Support};
+use crate::vanishing::orthonormal_complement;
+
+/// Rivals nearer to the peak than this many tolerances belong to the peak.
+const PEAK_RADIUS: f64 = 3.0;
+
+/// The direction that most segments point to, near an expected vertical.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct VerticalPeak {
+    /// Down, in the common frame.
+    pub down: Vector3<f64>,
+    /// Its support.
+    pub support: Support,
+    /// Score of the best direction outside the peak over the peak's own: near 0 for a clear vertical, near 1 for none.
+    pub rivalry: f64,
+}
+
+/// Searches the directions within `options.vertical_search_deg` of `expected` and refines the best.
+///
+/// `None` without any supporting segment.
+pub(super) fn vertical_peak(
+    vote: &LineVote,
+    expected: &Vector3<f64>,
+    options: &SimilarityOptions,
+) -> Option<VerticalPeak> {
+    let tolerance = options.vertical_tolerance_deg.to_radians();
+    let candidates = cone(expected, options.vertical_search_deg.to_radians(), tolerance * 0.7);
+    let scored: Vec<(f64, Vector3<f64>)> =
+        candidates.into_iter().map(|direction| (vote.support(&direction, tolerance).score, direction)).collect();
+    // The first of equals, so that the order of the candidates decides.
+    let mut best = scored.first().copied()?;
+    for &candidate in &scored {
+        if candidate.0 > best.0 {
+            best = candidate;
+        }
+    }
+    let down = vote.refine_direction(&best.1, options);
+    let support = vote.support(&down, tolerance);
+    let radius = (PEAK_RADIUS * tolerance).cos();
+    let outside = scored.iter().filter(|(_, direction)| direction.dot(&down) < radius);
+    let rival = outside.map(|(score, _)| *score).fold(0.0, f64::max);
+    (support.score > 0.0).then(|| VerticalPeak { down, support, rivalry: rival / support.score })
+}
+
+/// Directions within `radius` of `axis`, on rings `step` apart (radians).
+fn cone(axis: &Vector3<f64>, radius: f64, step: f64) -> Vec<Vector3<f64>> {
+    let (first, second) = orthonormal_complement(axis);
+    let frame = Matrix3::from_columns(&[first, second, *axis]);
+    let mut directions = vec![*axis];
+    let rings = (radius / step).floor() as usize;
+    for ring in 1..=rings {
+        let polar = ring as f64 * step;
+        let count = (std::f64::consts::TAU * polar.sin() / step).ceil().max(1.0) as usize;
+        for place in 0..count {
+            let azimuth = std::f64::consts::TAU * place as f64 / count as f64;
+            let (sine, cosine) = azimuth.sin_cos();
+            directions.push(frame * Vector3::new(polar.sin() * cosine, polar.sin() * sine, polar.cos()));
+        }
+    }
+    directions
+}

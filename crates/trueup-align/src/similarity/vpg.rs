@@ -1,0 +1,289 @@
+//! The vanishing point guided prior: dominant directions, gate, joint refinement, weighted solve.
+
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+use trueup_core::geometry::{exp_rotation, wrap_angle};
+use trueup_core::{Result, StageContext};
+
+use super::dominant::{Dominant, dominant_frame};
+use super::gate::{GateEvidence, divergence, failed_clause};
+use super::joint::LineVote;
+use super::path_voting::PathVote;
+use super::signed_permutation::{match_triad, triad_residual};
+use super::straighten::Straightened;
+use super::vertical::{roll_of, vertical_of};
+use super::vertical_vote::{VerticalPeak, vertical_peak};
+use super::weighted_solve::{DataTerm, TurnTerm, solve_unit_vectors};
+use super::{BetaMode, Guidance, PriorInput, STAGE, SimilarityOptions, Upright, rolls};
+use crate::vanishing::{InterpretationPlanes, RefinedTriad, rows_of};
+
+/// Share of a picture's best score that its search near the dominant directions must reach to replace its triad.
+const REDETECTION_SHARE: f64 = 0.9;
+/// Length of a solved vector below which its terms contradict each other.
+const CONTRADICTED: f64 = 0.1;
+
+/// A prior that no line takes part in.
+pub(super) fn unguided(count: usize, options: &SimilarityOptions) -> Guidance {
+    Guidance {
+        used: false,
+        vertical_only: false,
+        divergence: None,
+        threshold: options.max_divergence,
+        inlier_ratio: 0.0,
+        failed_clause: None,
+        dominant: None,
+        inliers: Vec::new(),
+        residuals: vec![None; count],
+        weights: vec![0.0; count],
+        vertical_rivalry: None,
+        vertical_share: None,
+    }
+}
+
+/// Everything known about the scene's directions.
+struct Scene<'a> {
+    input: &'a PriorInput<'a>,
+    options: &'a SimilarityOptions,
+    rotations: &'a [Matrix3<f64>],
+    /// Per picture its directions in the cameras' world.
+    triads: Vec<Option<Matrix3<f64>>>,
+    vote: LineVote,
+}
+
+/// Finds the vertical and the turns that the lines mean, if they are believed.
+pub(super) fn guide(
+    input: &PriorInput<'_>,
+    rotations: &[Matrix3<f64>],
+    straightened: &Straightened,
+    options: &SimilarityOptions,
+    context: &StageContext<'_>,
+) -> Result<(Guidance, Option<Upright>)> {
+    let count = input.cameras.len();
+    let planes = interpretation_planes(input);
+    let focals: Vec<f64> = input.cameras.iter().map(|camera| camera.focal_px).collect();
+    let triads = rotations
+        .iter()
+        .zip(input.triads)
+        .map(|(rotation, outcome)| outcome.triad().map(|triad| rotation.tr_mul(&triad.matrix())))
+        .collect();
+    let mut scene = Scene { input, options, rotations, triads, vote: LineVote::new(rotations, &focals, planes) };
+    context.check_cancelled()?;
+    let mut guidance = unguided(count, options);
+    let dominant =
+        dominant_frame(&scene.triads, options.rejection, options.max_cross_pairs, &mut context.generator(STAGE, 0));
+    context.check_cancelled()?;
+    guidance.failed_clause = match &dominant {
+        Some(dominant) => scene.judge(dominant, straightened, &mut guidance),
+        None => Some("no picture has vanishing directions".to_owned()),
+    };
+    let peak = scene.peak(dominant.as_ref().filter(|_| guidance.failed_clause.is_none()), straightened);
+    if let Some(peak) = &peak {
+        guidance.vertical_rivalry = Some(peak.rivalry);
+        guidance.vertical_share = Some(peak.support.score / scene.vote.total_weight());
+    }
+    context.check_cancelled()?;
+    match (dominant, peak) {
+        (Some(dominant), _) if guidance.failed_clause.is_none() => {
+            let upright = scene.solve_dominant(dominant, &mut guidance);
+            Ok((guidance, upright))
+        }
+        (_, Some(peak)) if options.vertical_only && clear(&peak, &scene) => {
+            let upright = scene.solve_vertical(&peak.down, &mut guidance);
+            Ok((guidance, upright))
+        }
+        _ => Ok((guidance, None)),
+    }
+}
+
+/// Whether the segments leave no doubt about the vertical.
+fn clear(peak: &VerticalPeak, scene: &Scene<'_>) -> bool {
+    let share = peak.support.score / scene.vote.total_weight();
+    peak.rivalry <= scene.options.max_vertical_rivalry && share >= scene.options.min_vertical_share
+}
+
+fn interpretation_planes(input: &PriorInput<'_>) -> Vec<InterpretationPlanes> {
+    (0..input.cameras.len())
+        .into_par_iter()
+        .map(|index| {
+            let focal_px = input.cameras[index].focal_px;
+            InterpretationPlanes::new(&input.lines[index], focal_px, &input.frames[index], input.vanishing)
+        })
+        .collect()
+}
+
+impl Scene<'_> {
+    /// Pictures whose directions agree with `dominant`.
+    fn inliers(&self, dominant: &Dominant) -> Vec<usize> {
+        let agrees = |index: &usize| dominant.residuals[*index].is_some_and(|r| r <= self.options.rejection);
+        (0..self.rotations.len()).filter(agrees).collect()
+    }
+
+    /// The roll of each agreeing picture by its own direction that matches the vertical: the paper's alpha_i.
+    ///
+    /// # Departures
+    /// Eq. 6 is printed with directions already moved to the common frame, which would give every picture about the
+    /// same roll; those of the camera's own frame are meant.
+    fn own_rolls(&self, frame: &Matrix3<f64>, down: &Vector3<f64>, inliers: &[usize]) -> Vec<Option<f64>> {
+        let mut own = vec![None; self.rotations.len()];
+        let in_frame = frame.tr_mul(down);
+        let column = in_frame.iamax();
+        for &index in inliers {
+            if let Some(triad) = &self.triads[index] {
+                let matched = match_triad(frame, triad).0.column(column) * in_frame[column].signum();
+                own[index] = roll_of(&(self.rotations[index] * matched));
+            }
+        }
+        own
+    }
+
+    /// Fills in what the dominant directions came to and returns the gate's failed clause.
+    fn judge(&self, dominant: &Dominant, straightened: &Straightened, guidance: &mut Guidance) -> Option<String> {
+        let inliers = self.inliers(dominant);
+        let down = vertical_of(&dominant.frame, self.rotations);
+        let mut magnitudes: Vec<f64> =
+            self.own_rolls(&dominant.frame, &down, &inliers).into_iter().flatten().map(f64::abs).collect();
+        magnitudes.sort_by(f64::total_cmp);
+        let residuals: Vec<f64> = inliers.iter().filter_map(|&index| dominant.residuals[index]).collect();
+        let pictures = self.rotations.len();
+        let evidence = GateEvidence {
+            pictures,
+            inliers: inliers.len(),
+            divergence: divergence(&residuals, pictures),
+            straightening_angle: straightened.conditioned.then(|| down.angle(&straightened.down)),
+            median_roll: magnitudes.get(magnitudes.len() / 2).copied().unwrap_or(f64::INFINITY),
+        };
+        guidance.divergence = Some(evidence.divergence).filter(|divergence| divergence.is_finite());
+        guidance.inlier_ratio = inliers.len() as f64 / pictures as f64;
+        guidance.residuals.clone_from(&dominant.residuals);
+        guidance.inliers = inliers;
+        failed_clause(&evidence, self.options)
+    }
+
+    /// The vertical that all segments vote for, near the accepted one or the cameras' own.
+    fn peak(&self, accepted: Option<&Dominant>, straightened: &Straightened) -> Option<VerticalPeak> {
+        let expected = accepted.map_or(straightened.down, |dominant| vertical_of(&dominant.frame, self.rotations));
+        vertical_peak(&self.vote, &expected, self.options)
+    }
+
+    /// The prior of accepted dominant directions.
+    fn solve_dominant(&mut self, mut dominant: Dominant, guidance: &mut Guidance) -> Option<Upright> {
+        if self.options.guided_redetection {
+            self.redetect(&mut dominant);
+            guidance.inliers = self.inliers(&dominant);
+            guidance.residuals.clone_from(&dominant.residuals);
+        }
+        let mut frame = dominant.frame;
+        let has_lines = self.vote.total_weight() > 0.0;
+        if self.options.joint_refinement && has_lines {
+            frame = self.vote.refine_frame(&frame, self.options);
+        }
+        let down = vertical_of(&frame, self.rotations);
+        guidance.dominant = Some(rows_of(&frame));
+        guidance.used = true;
+        let own = if self.options.joint_refinement && has_lines {
+            self.refined_rolls(&frame, &down, 3)
+        } else {
+            self.own_rolls(&frame, &down, &guidance.inliers)
+        };
+        self.solve(&down, &own, guidance)
+    }
+
+    /// The prior of a vertical alone.
+    fn solve_vertical(&self, down: &Vector3<f64>, guidance: &mut Guidance) -> Option<Upright> {
+        guidance.used = true;
+        guidance.vertical_only = true;
+        let (first, second) = crate::vanishing::orthonormal_complement(down);
+        let frame = Matrix3::from_columns(&[*down, first, second]);
+        let own = self.refined_rolls(&frame, down, 1);
+        self.solve(down, &own, guidance)
+    }
+
+    /// Each picture's roll by the common vertical and, if asked for, by its own segments within its camera's error.
+    fn refined_rolls(&self, frame: &Matrix3<f64>, down: &Vector3<f64>, axes_used: usize) -> Vec<Option<f64>> {
+        if !self.options.picture_refinement {
+            return self.rotations.iter().map(|rotation| roll_of(&(rotation * down))).collect();
+        }
+        let turns = self.vote.refine_pictures(frame, axes_used, self.options);
+        let roll = |(turn, rotation): (&Vector3<f64>, &Matrix3<f64>)| roll_of(&(exp_rotation(turn) * rotation * down));
+        turns.iter().zip(self.rotations).map(roll).collect()
+    }
+
+    /// Searches pictures that disagree, or have no triad, again near the dominant directions.
+    fn redetect(&mut self, dominant: &mut Dominant) {
+        let frame = dominant.frame;
+        for index in 0..self.rotations.len() {
+            if dominant.residuals[index].is_some_and(|residual| residual <= self.options.rejection) {
+                continue;
+            }
+            let planes = self.vote.planes(index);
+            if planes.len() < self.input.vanishing.min_lines {
+                continue;
+            }
+            let start = self.rotations[index] * frame;
+            let near = RefinedTriad::refine(&start, planes, self.input.vanishing);
+            let enough = match self.input.triads[index].triad() {
+                Some(own) => near.score >= REDETECTION_SHARE * own.quality * planes.total_weight,
+                None => near.score >= self.input.vanishing.min_quality * planes.total_weight,
+            };
+            if enough {
+                let triad = self.rotations[index].tr_mul(&near.triad);
+                dominant.residuals[index] = Some(triad_residual(&frame, &triad));
+                self.triads[index] = Some(triad);
+            }
+        }
+    }
+
+    /// The paper's weighted least squares: own rolls against relative rolls.
+    fn solve(&self, down: &Vector3<f64>, own: &[Option<f64>], guidance: &mut Guidance) -> Option<Upright> {
+        let predicted = rolls(down, self.rotations);
+        let turns: Vec<(usize, usize, f64)> =
+            self.input.edges.iter().map(|edge| self.turn(edge.a, edge.b, &predicted)).collect();
+        let mut neighbours = vec![Vec::new(); own.len()];
+        for &(i, j, beta) in &turns {
+            neighbours[i].push((j, beta));
+            neighbours[j].push((i, -beta));
+        }
+        let vote = PathVote {
+            max_edges: self.options.max_path_edges,
+            tolerance: self.options.path_tolerance_deg.to_radians(),
+            max_paths: self.options.max_paths,
+        };
+        guidance.weights = vote.weights(own, &neighbours);
+        let data: Vec<DataTerm> = own
+            .iter()
+            .zip(&guidance.weights)
+            .enumerate()
+            .filter_map(|(index, (roll, &weight))| roll.map(|angle| DataTerm { index, angle, weight }))
+            .collect();
+        let weight = self.options.relative_weight;
+        let turns: Vec<TurnTerm> = turns.into_iter().map(|(i, j, turn)| TurnTerm { i, j, turn, weight }).collect();
+        let vectors = solve_unit_vectors(own.len(), &data, &turns);
+        let theta = match vectors {
+            Some(vectors) => vectors.iter().zip(&predicted).map(|(vector, &roll)| angle_of(vector, roll)).collect(),
+            // Some picture has neither a roll of its own nor a neighbour.
+            None => predicted,
+        };
+        Some(Upright { down: *down, theta })
+    }
+
+    /// (i, j, beta_ij) of an edge, beta_ij predicting theta_j - theta_i.
+    ///
+    /// # Departures
+    /// The published decomposition of R_j R_i^-1 has the opposite sign, and is the difference of upright rolls only for
+    /// level cameras: two level cameras at pitch p that pan by y twist by about y sin p.
+    fn turn(&self, i: usize, j: usize, predicted: &[f64]) -> (usize, usize, f64) {
+        let beta = match self.options.beta_mode {
+            BetaMode::World => wrap_angle(predicted[j] - predicted[i]),
+            BetaMode::Relative => {
+                let relative = self.rotations[j] * self.rotations[i].transpose();
+                -(relative[(1, 0)] - relative[(0, 1)]).atan2(relative[(0, 0)] + relative[(1, 1)])
+            }
+        };
+        (i, j, beta)
+    }
+}
+
+fn angle_of(vector: &[f64; 2], otherwise: f64) -> f64 {
+    let [u, v] = *vector;
+    if u.hypot(v) < CONTRADICTED { otherwise } else { v.atan2(u) }
+}
