@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use nalgebra::Matrix3;
 use rayon::prelude::*;
 use trueup_align::cameras::{self, CameraPrior, Cameras};
 use trueup_align::full_turn::{self, FullTurnCut};
@@ -128,18 +127,18 @@ pub(crate) fn run(
             triads: &triads,
             lines: &component.lines,
             frames: &component.frames,
-            pairs: &pairs,
-            warps: &warps,
-            grids: &grids,
-            reference: component.reference,
-            reference_rotation: component.reference_rotation,
+            edges: &pairs,
+            overlaps: &warps,
+            cell_px: options.mesh.cell_px,
+            vanishing: &options.vanishing,
+            turn: component.reference_rotation,
         };
         similarity::run(&input, &options.similarity, context)
     })?;
 
     let edges: Vec<GraphEdge> =
         pairs.iter().map(|pair| GraphEdge { a: pair.a, b: pair.b, weight: pair.agreeing }).collect();
-    let cut = full_turn::find_cut(&cameras.cameras, &edges, &level(&prior));
+    let cut = full_turn::find_cut(&cameras.cameras, &edges, &prior.level_from_world());
     let kept: Vec<_> = match &cut {
         None => warps,
         Some(cut) => {
@@ -153,11 +152,6 @@ pub(crate) fn run(
     let mesh =
         clock.time("mesh", || mesh::run(&grids, &kept, &targets, component.reference, &options.mesh, context))?;
     Ok(Geometry { cameras, triads, prior, cut, mesh })
-}
-
-/// The rotation that levels the world of the cameras.
-pub(crate) fn level(prior: &SimilarityPrior) -> Matrix3<f64> {
-    prior.level_from_world
 }
 
 fn find_triads(

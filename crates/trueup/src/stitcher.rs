@@ -3,14 +3,12 @@
 use std::collections::BTreeSet;
 
 use trueup_align::stitch_graph::{GraphFile, StitchGraph, parse_graph_file};
-use trueup_align::vanishing::TriadOutcome;
-use trueup_compose::exposure;
+use trueup_compose::exposure::{self, Thumbnail};
 use trueup_compose::layout::{self, CanvasLayout, Placed};
 use trueup_compose::render::{self, Panorama};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
-use trueup_core::raster::Raster;
 use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::decode::FilePhotographs;
@@ -275,14 +273,16 @@ impl<'a> Stitcher<'a> {
         };
         let placed = place(&component, geometry.as_ref());
         let layout = layout::run(placed, component.reference, &self.options.canvas, self.context)?;
-        let thumbnails: Vec<(&Raster<u8>, WorkingFrame)> = members
+        let thumbnails: Vec<Thumbnail> = members
             .iter()
             .filter_map(|&picture| matched.measured[picture].as_ref())
-            .map(|one| (&one.thumbnail, one.thumbnail_frame))
+            .map(|one| Thumbnail { raster: &one.thumbnail, frame: one.thumbnail_frame })
             .collect();
-        let gains = clock.time("exposure", || {
-            exposure::run(&layout, &thumbnails, component.reference, &self.options.exposure, self.context)
-        })?;
+        let gains = clock
+            .time("exposure", || {
+                exposure::run(&layout, &thumbnails, component.reference, &self.options.exposure, self.context)
+            })?
+            .gains;
         let mut project = matched.project(self.options, stitched);
         fill_geometry(&mut project, &component, geometry.as_ref(), &layout, &gains);
         project.seconds.clone_from(clock.seconds());
@@ -450,18 +450,15 @@ fn fill_geometry(
         });
         let Some(geometry) = geometry else { continue };
         let camera = &geometry.cameras.cameras[k];
-        let camera_from_level = camera.rotation() * align::level(&geometry.prior).transpose();
+        let camera_from_level = camera.rotation() * geometry.prior.level_from_world().transpose();
         record.focal_px = Some(camera.focal_px / component.frames[k].working_from_full);
         record.rotation = Some(rows(&camera_from_level));
         record.theta_deg = Some(geometry.prior.theta[k].to_degrees());
         record.scale = Some(geometry.prior.scale[k]);
-        record.vanishing_points = match &geometry.triads[k] {
-            TriadOutcome::Found(triad) => {
-                let matrix = triad.rotation();
-                Some(std::array::from_fn(|direction| matrix.column(direction).into_owned().into()))
-            }
-            TriadOutcome::Missing(_) => None,
-        };
+        record.vanishing_points = geometry.triads[k].triad().map(|triad| {
+            let matrix = triad.matrix();
+            std::array::from_fn(|direction| matrix.column(direction).into_owned().into())
+        });
     }
     if let Some(geometry) = geometry {
         let guidance = &geometry.prior.guidance;
@@ -470,7 +467,7 @@ fn fill_geometry(
             threshold: guidance.threshold,
             accepted: guidance.used,
             failed_clause: guidance.failed_clause.clone(),
-            dominant: guidance.dominant.as_ref().map(rows),
+            dominant: guidance.dominant,
             inliers: guidance.inliers.iter().map(|&k| component.images[k].path.display().to_string()).collect(),
         };
     }
