@@ -135,8 +135,12 @@ pub fn match_pair(
     context.check_cancelled()?;
     let mut generator = context.generator(STAGE, (a.index as u64) << 32 | b.index as u64);
     let points = matched_points(&putative);
-    let search =
-        Search { inlier_px: options.inlier_px, confidence: options.confidence, max_samples: options.max_samples };
+    let search = Search {
+        inlier_px: options.inlier_px,
+        confidence: options.confidence,
+        max_samples: options.max_samples,
+        useful_inliers: pair.needed,
+    };
     let is_plausible = plausibility(a.frame, b.frame, options);
     let global = ransac::find_homography(&points, &search, &is_plausible, &mut generator);
     let Some((global, overlap)) =

@@ -32,6 +32,7 @@ pub fn find_planes(
         inlier_px: options.plane_inlier_px,
         confidence: options.confidence,
         max_samples: options.max_plane_samples,
+        useful_inliers: options.min_plane_inliers,
     };
     let mut left = points.agreeing(global, max_displacement_px);
     let mut planes = Vec::new();
