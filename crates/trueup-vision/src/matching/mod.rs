@@ -33,7 +33,7 @@ pub use search::{Kernel, Nearest, Neighbour};
 use crate::features::Features;
 use guided::Follower;
 use overlap::Overlap;
-use ransac::{Consensus, MatchedPoints, Search};
+use ransac::{Consensus, MatchedPoints, NoConsensus, Search};
 
 /// The stage's name in progress and generators.
 const STAGE: &str = MatchingOptions::STAGE;
@@ -143,12 +143,17 @@ pub fn match_pair(
     };
     let is_plausible = plausibility(a.frame, b.frame, options);
     let global = ransac::find_homography(&points, &search, &is_plausible, &mut generator);
-    let Some((global, overlap)) =
-        global.and_then(|global| Overlap::new(global.b_from_a, a.frame, b.frame).map(|overlap| (global, overlap)))
-    else {
-        pair.verdict = PairVerdict::ImplausibleHomography;
-        return Ok(pair);
+    let global = match global {
+        Ok(global) => global,
+        Err(failure) => {
+            pair.verdict = match failure {
+                NoConsensus::NoSample => PairVerdict::TooFewInliers,
+                NoConsensus::Implausible => PairVerdict::ImplausibleHomography,
+            };
+            return Ok(pair);
+        }
     };
+    let Some(overlap) = Overlap::new(global.b_from_a, a.frame, b.frame) else { return Ok(pair) };
     pair.in_overlap = putative.iter().filter(|candidate| overlap.contains(&candidate.at)).count();
     pair.agreeing = global.inliers.iter().filter(|&&k| overlap.contains(&putative[k].at)).count();
     pair.b_from_a = Some(scaled_rows(&global.b_from_a));

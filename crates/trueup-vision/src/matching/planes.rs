@@ -37,7 +37,7 @@ pub fn find_planes(
     let mut left = points.agreeing(global, max_displacement_px);
     let mut planes = Vec::new();
     while left.len() >= options.min_plane_inliers && planes.len() < MAX_PLANES {
-        let Some(found) = find_homography(&points.select(&left), &search, &is_plausible, generator) else { break };
+        let Ok(found) = find_homography(&points.select(&left), &search, &is_plausible, generator) else { break };
         if found.inliers.len() < options.min_plane_inliers {
             break;
         }

@@ -47,6 +47,15 @@ pub struct Consensus {
     pub inliers: Vec<usize>,
 }
 
+/// Why no homography was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoConsensus {
+    /// No sample gave one that could be right.
+    NoSample,
+    /// The useful ones were not plausible.
+    Implausible,
+}
+
 /// Matched points, most distinctive first.
 #[derive(Debug, Clone, Default)]
 pub struct MatchedPoints {
@@ -72,21 +81,24 @@ impl MatchedPoints {
     }
 }
 
-/// The plausible homography of least truncated squared forward transfer error, refined on its inliers; `None` if
-/// there are fewer than four matches or no sample gives a plausible one.
+/// The plausible homography of least truncated squared forward transfer error, refined on its inliers.
 ///
 /// The error of a match counts at most `inlier_px`; hypotheses that cannot win any more are dropped early. The result
 /// minimises the symmetric transfer error of its inliers.
+///
+/// # Errors
+/// [`NoConsensus`] if there are fewer than four matches or no sample gives a plausible map.
 pub fn find_homography(
     points: &MatchedPoints,
     search: &Search,
     is_plausible: impl Fn(&Homography) -> bool,
     generator: &mut impl Rng,
-) -> Option<Consensus> {
+) -> Result<Consensus, NoConsensus> {
     let count = points.in_a.len();
     if count < SAMPLE {
-        return None;
+        return Err(NoConsensus::NoSample);
     }
+    let mut failure = NoConsensus::NoSample;
     let mut best: Option<Homography> = None;
     let mut best_cost = count as f64;
     let hopeless =
@@ -100,6 +112,9 @@ pub fn find_homography(
         let Some(hypothesis) = through_sample(points, &sample) else { continue };
         let Some(cost) = truncated_cost(points, &hypothesis, search.inlier_px, best_cost) else { continue };
         if !is_plausible(&hypothesis) {
+            if points.agreeing(&hypothesis, search.inlier_px).len() >= search.useful_inliers {
+                failure = NoConsensus::Implausible;
+            }
             continue;
         }
         let (hypothesis, cost) = optimise_locally(points, hypothesis, cost, search.inlier_px, &is_plausible);
@@ -107,9 +122,9 @@ pub fn find_homography(
         let agreeing = points.agreeing(&hypothesis, search.inlier_px).len();
         needed = needed.min(samples_needed(agreeing as f64 / count as f64, search.confidence));
     }
-    let refined = finish(points, best?, search.inlier_px, &is_plausible);
+    let refined = finish(points, best.ok_or(failure)?, search.inlier_px, &is_plausible);
     let inliers = points.agreeing(&refined, search.inlier_px);
-    Some(Consensus { b_from_a: refined, inliers })
+    Ok(Consensus { b_from_a: refined, inliers })
 }
 
 /// Samples after which one is all inliers with the probability asked for.

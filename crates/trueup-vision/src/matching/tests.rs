@@ -234,14 +234,25 @@ fn nothing_matches_nothing() {
 }
 
 #[test]
-fn collinear_matches_have_no_believable_homography() {
+fn collinear_matches_have_no_homography() {
     let mut generator = generator(4);
     let mut scene = Scene::default();
     for k in 0..40 {
         let place = Vector2::new(f64::from(k) * 12.0, 300.0);
         scene.add(place, place, &mut generator);
     }
-    assert_eq!(scene.matched(false, &MatchingOptions::default()).verdict, PairVerdict::ImplausibleHomography);
+    let pair = scene.matched(false, &MatchingOptions::default());
+    assert_eq!((pair.verdict, pair.b_from_a), (PairVerdict::TooFewInliers, None));
+}
+
+#[test]
+fn a_homography_that_explodes_the_picture_is_not_believed() {
+    let mut generator = generator(4);
+    let mut scene = Scene::default();
+    let explosion = Homography(Matrix3::new(6.0, 0.0, -2000.0, 0.0, 6.0, -1500.0, 0.0, 0.0, 1.0));
+    scene.add_plane(&explosion, 60, 0.3, &mut generator);
+    let pair = scene.matched(true, &MatchingOptions::default());
+    assert_eq!((pair.verdict, pair.b_from_a), (PairVerdict::ImplausibleHomography, None));
 }
 
 #[test]

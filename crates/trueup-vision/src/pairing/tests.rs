@@ -35,13 +35,7 @@ fn few_pictures_are_paired_with_all() {
 
 #[test]
 fn many_pictures_are_paired_with_those_that_look_alike() {
-    let options = PairingOptions {
-        exhaustive_up_to: 5,
-        neighbours: 2,
-        subset: 16,
-        consecutive: false,
-        ..PairingOptions::default()
-    };
+    let options = PairingOptions { exhaustive_up_to: 5, neighbours: 2, subset: 16, consecutive: false };
     // Only the strongest 16 of 20 features are compared, of which the first 6 are the previous picture's last.
     let proposed = propose(&row(12, 10), &options, &StageContext::default()).expect("valid");
     for picture in 1..12 {

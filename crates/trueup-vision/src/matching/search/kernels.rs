@@ -111,8 +111,8 @@ fn portable(tile: &Tile<'_>, row_best: &mut [LaneBest; ROWS], column_best: &mut 
                 *dot += low * (column & 0xffff) + high * (column >> 16);
             }
         }
-        for lane in 0..LANES {
-            let key = tile.column_terms.0[lane].wrapping_sub(dots[lane] << (SHIFT + 1));
+        for (lane, dot) in dots.into_iter().enumerate() {
+            let key = tile.column_terms.0[lane].wrapping_sub(dot << (SHIFT + 1));
             let row_key = key.wrapping_add(tile.row_terms[row]).wrapping_add(tile.block_number);
             best.second.0[lane] = best.second.0[lane].min(best.first.0[lane].max(row_key));
             best.first.0[lane] = best.first.0[lane].min(row_key);
