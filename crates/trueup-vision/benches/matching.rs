@@ -6,7 +6,7 @@ use rayon::ThreadPool;
 use trueup_core::StageContext;
 use trueup_core::source::WorkingFrame;
 use trueup_vision::features::{DESCRIPTOR_LENGTH, Descriptor, FeaturePoint, Features};
-use trueup_vision::matching::{MatchingOptions, Nearest, Picture, match_pair, putative_matches};
+use trueup_vision::matching::{Kernel, MatchingOptions, Nearest, Picture, match_pair, putative_matches};
 
 /// Features of a picture at the detector's cap.
 const FEATURES: usize = 8000;
@@ -51,6 +51,14 @@ fn search_8000_by_8000(bencher: Bencher, threads: usize) {
     let (a, b) = (descriptors(1, FEATURES), descriptors(2, FEATURES));
     let pool = pool(threads);
     bencher.bench_local(|| pool.install(|| Nearest::search(&a, &b)));
+}
+
+/// The same on one thread with every instruction set.
+#[divan::bench(args = Kernel::available(), sample_count = 10)]
+fn search_by_kernel(bencher: Bencher, kernel: Kernel) {
+    let (a, b) = (descriptors(1, FEATURES), descriptors(2, FEATURES));
+    let pool = pool(1);
+    bencher.bench_local(|| pool.install(|| Nearest::search_with(kernel, &a, &b)));
 }
 
 /// The same up to the putative matches, 3000 of them.

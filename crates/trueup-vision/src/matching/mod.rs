@@ -1,8 +1,8 @@
 //! Matches between pairs of pictures, and which pairs overlap.
 //!
-//! Descriptors are compared exhaustively ([`putative`]), a homography is sought that many matches agree on
-//! ([`ransac`]), the pair is judged by how many do, and the matches of a joined pair are completed by further planes
-//! ([`planes`]) and by a second look near the predicted places ([`guided`]).
+//! Descriptors are compared exhaustively (`putative`), a homography is sought that many matches agree on
+//! (`ransac`), the pair is judged by how many do, and the matches of a joined pair are completed by further planes
+//! (`planes`) and by a second look near the predicted places (`guided`).
 
 mod guided;
 mod options;
