@@ -46,9 +46,7 @@ trueup_core::choice! {
     pub enum TiffCompression {
         /// Not at all: largest and fastest.
         None = "none",
-        /// LZW, which every TIFF reader knows.
-        Lzw = "lzw",
-        /// Deflate, smaller and faster than LZW.
+        /// Deflate, after differencing.
         Deflate = "deflate",
     }
 }
