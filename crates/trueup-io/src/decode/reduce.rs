@@ -197,7 +197,8 @@ mod tests {
     }
 
     proptest! {
-        /// A linear ramp keeps its values under area averaging: working pixel x shows the ramp at (x + 0.5) / scale.
+        /// A ramp keeps its values under area averaging: working pixel x shows the ramp at (x + 0.5) / scale. The ramp's
+        /// pixels are steps, and a mean that begins or ends within a step is off by up to an eighth of it.
         #[test]
         fn geometry_has_no_shift(width in 17_usize..200, height in 1_usize..40, area in 4.0_f64..4000.0) {
             let frame = WorkingFrame::new(width, height, area);
@@ -205,9 +206,10 @@ mod tests {
             let reduced = to_frame(&Raster::from_data(width, height, 1, data).expect("size"), &frame);
             // A single column may stand for less than its whole width; the contract is about whole pixels.
             prop_assume!(frame.width >= 1.0);
+            let tolerance = 0.125 * frame.working_from_full + 0.01;
             for x in 0..reduced.width() {
                 let expected = (x as f64 + 0.5) / frame.working_from_full - 0.5;
-                prop_assert!((f64::from(reduced.row(0)[x]) - expected).abs() < 0.01);
+                prop_assert!((f64::from(reduced.row(0)[x]) - expected).abs() < tolerance);
             }
         }
 

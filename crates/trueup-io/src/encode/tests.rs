@@ -109,8 +109,8 @@ fn jpeg_strips_join_without_a_trace() {
                 // Away from the border between background and picture, where chroma and ringing blur.
                 let x = width - 4;
                 let expected = picture.pixel(x, y);
-                for channel in 0..3 {
-                    let difference = raster.pixel(x, y)[channel].abs_diff(expected[channel]);
+                for (actual, expected) in raster.pixel(x, y).iter().zip(expected) {
+                    let difference = actual.abs_diff(expected);
                     assert!(difference <= 16, "{width} x {height} {jpeg_subsampling:?} at {y}: {difference}");
                 }
                 assert!(raster.pixel(1, y).iter().all(|&value| value > 240), "the background is white");
