@@ -126,7 +126,7 @@ pub fn write(path: &Path, picture: &dyn RowSource, options: &OutputOptions, cont
 /// the folder exists and takes files, and `path` is no folder itself. Nothing is left behind.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn check_writable(path: &Path) -> Result<()> {
     output_format(path)?;
     PendingFile::create(path).map(drop)
