@@ -163,16 +163,38 @@ fn average_one<K: Kernel, T: Sample, const C: usize>(
     let (first_column, wx) = widened_taps::<K>(x, stretch[0], &mut wx);
     let (first_row, wy) = widened_taps::<K>(y, stretch[1], &mut wy);
     let clamped = |first: i64, tap: usize, size: usize| (first + tap as i64).clamp(0, size as i64 - 1) as usize;
+    let inside = first_column >= 0 && first_column as usize + wx.len() <= raster.width();
     let mut sum = PremultipliedSum::default();
     for (j, &wy) in wy.iter().enumerate() {
         let row = raster.row(clamped(first_row, j, raster.height()));
-        for (i, &wx) in wx.iter().enumerate() {
-            let pixel = pixel::<T, C>(row, clamped(first_column, i, raster.width()));
-            // A negative lobe over transparent samples would divide by nearly nothing.
-            sum.add(pixel, if C == 4 { (wx * wy).max(0.0) } else { wx * wy });
+        if C == 4 {
+            for (i, &wx) in wx.iter().enumerate() {
+                // A negative lobe over transparent samples would divide by nearly nothing.
+                sum.add(pixel::<T, C>(row, clamped(first_column, i, raster.width())), (wx * wy).max(0.0));
+            }
+            continue;
+        }
+        let mut along_row = [0.0_f32; 4];
+        let mut add = |pixel: [f32; 4], weight: f32| {
+            for (sum, level) in along_row.iter_mut().zip(pixel) {
+                *sum += weight * level;
+            }
+        };
+        if inside {
+            let start = first_column as usize * C;
+            for (samples, &wx) in row[start..start + wx.len() * C].chunks_exact(C).zip(wx) {
+                add(pixel::<T, C>(samples, 0), wx);
+            }
+        } else {
+            for (i, &wx) in wx.iter().enumerate() {
+                add(pixel::<T, C>(row, clamped(first_column, i, raster.width())), wx);
+            }
+        }
+        for (sum, level) in sum.colour.iter_mut().zip(along_row) {
+            *sum += wy * level;
         }
     }
-    sum.mean()
+    if C == 4 { sum.mean() } else { [sum.colour[0], sum.colour[1], sum.colour[2], 255.0] }
 }
 
 /// First sample and normalised weights of a kernel widened by `stretch` around `position` (0 at the first sample).
@@ -181,13 +203,15 @@ fn widened_taps<K: Kernel>(position: f64, stretch: f64, taps: &mut [f32; MAX_TAP
     let radius = K::RADIUS * stretch;
     let first = (position - radius).ceil();
     let count = (((position + radius).floor() - first).max(0.0) as usize + 1).min(MAX_TAPS);
+    let (step, start) = (stretch.recip() as f32, ((first - position) / stretch) as f32);
     let mut sum = 0.0;
     for (tap, weight) in taps.iter_mut().take(count).enumerate() {
-        *weight = K::at((first + tap as f64 - position) / stretch) as f32;
+        *weight = K::at(start + tap as f32 * step);
         sum += *weight;
     }
+    let normalise = 1.0 / sum;
     for weight in &mut taps[..count] {
-        *weight /= sum;
+        *weight *= normalise;
     }
     (first as i64, &taps[..count])
 }
