@@ -121,6 +121,16 @@ fn invert_row_portable(cell: &InverseBilinear, first: usize, positions: &mut Pos
     }
 }
 
+/// Runs `work`, compiled for AVX2 as far as the compiler inlines it, where the processor has it.
+pub(crate) fn with_vector_instructions<R>(work: impl FnOnce() -> R) -> R {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { x86::run(work) };
+    }
+    work()
+}
+
 /// How a weighted sample joins what a canvas pixel already holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Combine {
@@ -269,6 +279,11 @@ mod x86 {
 
     use super::{Contribution, InverseBilinear, Positions, Rgb8};
     use crate::sampling::Kernel;
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn run<R>(work: impl FnOnce() -> R) -> R {
+        work()
+    }
 
     #[target_feature(enable = "avx2")]
     pub(super) fn invert_row(cell: &InverseBilinear, first: usize, positions: &mut Positions) {
