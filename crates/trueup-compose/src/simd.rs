@@ -121,14 +121,20 @@ fn invert_row_portable(cell: &InverseBilinear, first: usize, positions: &mut Pos
     }
 }
 
-/// Runs `work`, compiled for AVX2 as far as the compiler inlines it, where the processor has it.
-pub(crate) fn with_vector_instructions<R>(work: impl FnOnce() -> R) -> R {
+/// A loop to be compiled for the processor's vector instructions. `run` must be `#[inline(always)]` (a closure is not).
+pub(crate) trait VectorLoop {
+    /// Runs the loop.
+    fn run(self);
+}
+
+/// Runs a loop, compiled for AVX2 where the processor has it.
+pub(crate) fn with_vector_instructions(work: impl VectorLoop) {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has AVX2.
         return unsafe { x86::run(work) };
     }
-    work()
+    work.run();
 }
 
 /// How a weighted sample joins what a canvas pixel already holds.
@@ -277,12 +283,12 @@ mod x86 {
         _mm256_mul_ps, _mm256_set1_ps,
     };
 
-    use super::{Contribution, InverseBilinear, Positions, Rgb8};
+    use super::{Contribution, InverseBilinear, Positions, Rgb8, VectorLoop};
     use crate::sampling::Kernel;
 
     #[target_feature(enable = "avx2")]
-    pub(super) fn run<R>(work: impl FnOnce() -> R) -> R {
-        work()
+    pub(super) fn run(work: impl VectorLoop) {
+        work.run();
     }
 
     #[target_feature(enable = "avx2")]

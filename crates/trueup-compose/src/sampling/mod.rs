@@ -6,9 +6,11 @@ mod reduce;
 pub(crate) use kernel::{Bicubic, Bilinear, Kernel};
 pub(crate) use reduce::reduce_by_two;
 
+use std::marker::PhantomData;
+
 use trueup_core::raster::{Photograph, Raster};
 
-use crate::simd::{Positions, Rgb8, interpolate_rgb8, with_vector_instructions};
+use crate::simd::{Positions, Rgb8, VectorLoop, interpolate_rgb8, with_vector_instructions};
 
 /// Taps of a widened kernel per axis, at most: a kernel of radius 2 widened 15 times has 60.
 const MAX_TAPS: usize = 64;
@@ -84,16 +86,31 @@ fn interpolate_channels<K: Kernel, T: Sample, const C: usize>(
     stretch: [f64; 2],
     out: &mut [[f32; 4]],
 ) {
-    let out = out.iter_mut().enumerate().take(positions.len());
     if stretch == [1.0, 1.0] {
-        out.for_each(|(index, out)| *out = interpolate_one::<K, T, C>(raster, positions, index));
+        for (index, out) in out.iter_mut().enumerate().take(positions.len()) {
+            *out = interpolate_one::<K, T, C>(raster, positions, index);
+        }
     } else {
+        with_vector_instructions(Averages::<K, T, C> { raster, positions, stretch, out, kernel: PhantomData });
+    }
+}
+
+/// A run of [`average_one`].
+struct Averages<'a, K, T, const C: usize> {
+    raster: &'a Raster<T>,
+    positions: &'a Positions,
+    stretch: [f64; 2],
+    out: &'a mut [[f32; 4]],
+    kernel: PhantomData<K>,
+}
+
+impl<K: Kernel, T: Sample, const C: usize> VectorLoop for Averages<'_, K, T, C> {
+    #[inline(always)]
+    fn run(self) {
         let mut workspace = Workspace { wx: [0.0; MAX_TAPS], wy: [0.0; MAX_TAPS], columns: [0.0; 3 * MAX_TAPS] };
-        with_vector_instructions(|| {
-            for (index, out) in out {
-                *out = average_one::<K, T, C>(raster, positions, index, stretch, &mut workspace);
-            }
-        });
+        for (index, out) in self.out.iter_mut().enumerate().take(self.positions.len()) {
+            *out = average_one::<K, T, C>(self.raster, self.positions, index, self.stretch, &mut workspace);
+        }
     }
 }
 
