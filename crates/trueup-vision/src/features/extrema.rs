@@ -141,20 +141,18 @@ fn subtract_row<L: Lanes>(octave: &Octave, y: usize, padded: usize, recent: &mut
 /// The greatest and least over three rows and three neighbouring levels, column by column.
 #[inline(always)]
 fn column_extremes<L: Lanes>(recent: &[f32], differences: usize, padded: usize, extremes: &mut [f32]) {
-    let slot = |row: usize, level: usize| &recent[(row * differences + level) * padded..][..padded];
-    for level in 1..differences - 1 {
-        let rows: [&[f32]; 9] = std::array::from_fn(|n| slot(n % 3, level + n / 3 - 1));
-        let (greatest, least) = extremes[2 * (level - 1) * padded..][..2 * padded].split_at_mut(padded);
-        for x in (0..padded).step_by(L::COUNT) {
-            let first = L::load(rows[0], x);
-            let (mut high, mut low) = (first, first);
-            for row in &rows[1..] {
-                let value = L::load(row, x);
-                high = high.max(value);
-                low = low.min(value);
-            }
-            high.store(greatest, x);
-            low.store(least, x);
+    for x in (0..padded).step_by(L::COUNT) {
+        let three_rows = |level: usize| {
+            let [first, second, third] = [0, 1, 2].map(|row| L::load(recent, (row * differences + level) * padded + x));
+            (first.max(second).max(third), first.min(second).min(third))
+        };
+        let (mut below, mut here) = (three_rows(0), three_rows(1));
+        for level in 1..differences - 1 {
+            let above = three_rows(level + 1);
+            let at = 2 * (level - 1) * padded + x;
+            below.0.max(here.0).max(above.0).store(extremes, at);
+            below.1.min(here.1).min(above.1).store(extremes, at + padded);
+            (below, here) = (here, above);
         }
     }
 }
@@ -198,7 +196,8 @@ fn refine(octaves: &[Octave], octave: usize, candidate: &Candidate, options: &Fe
     for _ in 0..=MAX_MOVES {
         let fit = Quadratic::around(&octaves[octave], level, x, y);
         let offset = fit.extremum()?;
-        let moves = offset.map(|component| f64::from(i8::from(component > MOVE_OFFSET) - i8::from(component < -MOVE_OFFSET)));
+        let moves =
+            offset.map(|component| f64::from(i8::from(component > MOVE_OFFSET) - i8::from(component < -MOVE_OFFSET)));
         let moved = |index: usize, step: f64, last: usize| -> Option<usize> {
             let index = index.checked_add_signed(step as isize)?;
             (index >= 1 && index <= last).then_some(index)
@@ -243,8 +242,7 @@ impl Quadratic {
             })
         });
         let value = d[1][1][1];
-        let gradient = 0.5
-            * Vector3::new(d[1][1][2] - d[1][1][0], d[1][2][1] - d[1][0][1], d[2][1][1] - d[0][1][1]);
+        let gradient = 0.5 * Vector3::new(d[1][1][2] - d[1][1][0], d[1][2][1] - d[1][0][1], d[2][1][1] - d[0][1][1]);
         let xx = d[1][1][2] + d[1][1][0] - 2.0 * value;
         let yy = d[1][2][1] + d[1][0][1] - 2.0 * value;
         let ss = d[2][1][1] + d[0][1][1] - 2.0 * value;

@@ -7,6 +7,7 @@ mod descriptor;
 mod extrema;
 mod maths;
 mod orientation;
+mod patch;
 mod scale_space;
 mod simd;
 

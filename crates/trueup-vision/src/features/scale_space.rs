@@ -239,13 +239,7 @@ impl Kernel for BlurBand<'_> {
 
 /// Row `y` of the plane convolved along its columns, for some columns.
 #[inline(always)]
-fn blur_columns<L: Lanes>(
-    source: &Plane,
-    taps: &[f32],
-    y: usize,
-    columns: std::ops::Range<usize>,
-    target: &mut [f32],
-) {
+fn blur_columns<L: Lanes>(source: &Plane, taps: &[f32], y: usize, columns: std::ops::Range<usize>, target: &mut [f32]) {
     let row_start = |row: usize| row.min(source.height - 1) * source.stride;
     let mut x = columns.start;
     while x < columns.end {
