@@ -77,6 +77,7 @@ fn histogram(corners: &[[f32; CORNERS]; CORNERS]) -> [f32; DESCRIPTOR_LENGTH] {
     for v in 0..GRID {
         let (magnitude, turns) = gradients::<CORNERS, GRID>(&corners[v], &corners[v + 1]);
         let direction = turns.map(|turns| turns * DIRECTION_BINS as f32);
+        #[allow(clippy::needless_range_loop, reason = "the index is also the direction, and indexes two arrays deep")]
         for bin in 0..DIRECTION_BINS {
             let mut share = [0.0_f32; GRID];
             for u in 0..GRID {
@@ -152,7 +153,7 @@ fn quantised(mut histogram: [f32; DESCRIPTOR_LENGTH], root_sift: bool) -> Option
     } else {
         let length = dot(&histogram, &histogram).sqrt();
         for component in &mut histogram {
-            *component = *component / length;
+            *component /= length;
         }
     }
     // The conversion to a byte stops at 255.

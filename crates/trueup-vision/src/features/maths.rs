@@ -12,7 +12,7 @@ pub(super) fn turns(y: f32, x: f32) -> f32 {
     let (low, high) = if steep { (absolute_x, absolute_y) } else { (absolute_y, absolute_x) };
     let ratio = low / (high + f32::MIN_POSITIVE);
     let s = ratio * ratio;
-    let series = 0.999_866_0 + s * (-0.330_299_5 + s * (0.180_141_0 + s * (-0.085_133_0 + s * 0.020_835_1)));
+    let series = 0.999_866 + s * (-0.330_299_5 + s * (0.180_141 + s * (-0.085_133 + s * 0.020_835_1)));
     let octant = ratio * series * (0.5 * std::f32::consts::FRAC_1_PI);
     let quadrant = if steep { 0.25 - octant } else { octant };
     let half = if x < 0.0 { 0.5 - quadrant } else { quadrant };
