@@ -1,7 +1,7 @@
 //! Scale-invariant features (SIFT).
 //!
-//! The stages of [`detect`] are one file each: the Gaussian [scale space](scale_space), [extrema] of its differences,
-//! their [orientations](orientation) and [descriptors](descriptor).
+//! The steps of [`detect`] are one file each: the Gaussian scale space, the extrema of its differences, their
+//! orientations and their descriptors.
 
 mod descriptor;
 mod extrema;
