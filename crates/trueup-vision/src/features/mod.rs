@@ -90,7 +90,8 @@ const NEIGHBOUR_ROWS: usize = 16;
 /// Finds and describes the features of a picture.
 ///
 /// `image` has one channel of 0 to 255. A picture too small or too flat has no features. The result is the same for
-/// any number of threads and on every processor.
+/// any number of threads and every vector width; only the system's sine and cosine may differ between machines, in the
+/// last bit.
 ///
 /// # Errors
 /// [`Error::Options`] for options out of range, [`Error::Input`] for a picture of several channels,
