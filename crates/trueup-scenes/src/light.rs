@@ -1,13 +1,15 @@
 //! Light that depends on the place alone, worked out once per scene: windows, lamps, sky and what walls return.
 //!
-//! Every face carries a grid of irradiance, gathered with one fixed pattern of directions: no noise, the same from
-//! every camera. Direct sun is left to the renderer, whose shadow edges are finer than the grid.
+//! Every face carries a grid of irradiance, the same from every camera. Each grid point gathers with one pattern of
+//! directions, turned by a hash of its index, and neighbours are averaged. Direct sun is left to the renderer, whose
+//! shadow edges are finer than the grid.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::bvh::Ray;
 use crate::colour::Rgb;
+use crate::dice::{mix, unit_of};
 use crate::scene::Scene;
 use crate::solid::Solid;
 
@@ -61,7 +63,12 @@ struct Place {
     point: Vector3<f64>,
     normal: Vector3<f64>,
     buried: bool,
+    /// Which of the patterns of directions it deserves, 0 the densest: what is far off or turned away matters less.
+    pattern: usize,
 }
+
+/// By how much the patterns of directions are thinned for places that matter less.
+const THINNING: [usize; 3] = [1, 3, 8];
 
 impl LightField {
     /// Irradiance at chart position (s, t) of a face.
@@ -85,14 +92,19 @@ impl LightField {
         let albedo = mean_albedo(scene);
         field.fill(&places, direct.iter().map(|(portals, sun)| portals + sun));
         for directions in [detail.directions / 2, detail.directions] {
-            let pattern = cosine_pattern(directions.max(8));
-            let bounced: Vec<Rgb> =
-                places.par_iter().map(|place| field.bounced(scene, place, &pattern, &albedo)).collect();
+            let patterns = THINNING.map(|thinning| cosine_pattern((directions / thinning).max(8)));
+            let bounced: Vec<Rgb> = places
+                .par_iter()
+                .enumerate()
+                .map(|(index, place)| field.bounced(scene, place, index, &patterns[place.pattern], &albedo))
+                .collect();
             let with_sun = directions < detail.directions;
-            let total = bounced.iter().zip(&direct).map(|(bounced, (portals, sun))| {
-                bounced + portals + if with_sun { *sun } else { Rgb::zeros() }
-            });
+            let total = bounced
+                .iter()
+                .zip(&direct)
+                .map(|(bounced, (portals, sun))| bounced + portals + if with_sun { *sun } else { Rgb::zeros() });
             field.fill(&places, total);
+            field.smooth();
         }
         field
     }
@@ -103,8 +115,9 @@ impl LightField {
         for solid in solids {
             let mut grids = [None; 6];
             for &face in solid.used_faces() {
-                let [columns, rows] =
-                    solid.face_size(face).map(|size| ((size / detail.spacing_m).ceil() as usize + 1).clamp(2, MAX_GRID));
+                let [columns, rows] = solid
+                    .face_size(face)
+                    .map(|size| ((size / detail.spacing_m).ceil() as usize + 1).clamp(2, MAX_GRID));
                 grids[face] = Some(Grid { start, columns, rows });
                 start += columns * rows;
             }
@@ -116,6 +129,7 @@ impl LightField {
 
     fn places(&self, scene: &Scene) -> Vec<Place> {
         let mut places = Vec::with_capacity(self.values.len());
+        let eye = Vector3::from(scene.viewpoint().eye);
         for (solid, grids) in scene.solids.iter().zip(&self.grids) {
             for (face, grid) in grids.iter().enumerate() {
                 let Some(grid) = grid else { continue };
@@ -128,7 +142,7 @@ impl LightField {
                         let normal = solid.to_world(normal);
                         let point = solid.centre + solid.to_world(point) + normal * (10.0 * SURFACE_OFFSET_M);
                         let buried = scene.hierarchy.covers(&scene.solids, point);
-                        places.push(Place { point, normal, buried });
+                        places.push(Place { point, normal, buried, pattern: importance(point, normal, eye) });
                     }
                 }
             }
@@ -154,13 +168,38 @@ impl LightField {
         }
     }
 
+    /// Averages neighbouring grid points of a face with binomial weights.
+    fn smooth(&mut self) {
+        const PASSES: usize = 2;
+        for grid in self.grids.iter().flatten().flatten() {
+            let values = &mut self.values[grid.start..grid.start + grid.columns * grid.rows];
+            for _ in 0..PASSES {
+                for row in values.chunks_exact_mut(grid.columns) {
+                    binomial(row, 1);
+                }
+                for column in 0..grid.columns {
+                    binomial(&mut values[column..], grid.columns);
+                }
+            }
+        }
+    }
+
     /// Light that other surfaces return, and under the open sky the sky's.
-    fn bounced(&self, scene: &Scene, place: &Place, pattern: &[Vector3<f64>], albedo: &[[Rgb; 6]]) -> Rgb {
+    fn bounced(
+        &self,
+        scene: &Scene,
+        place: &Place,
+        index: usize,
+        pattern: &[Vector3<f64>],
+        albedo: &[[Rgb; 6]],
+    ) -> Rgb {
         const SKY_BLUR: f64 = 0.2;
         if place.buried {
             return Rgb::zeros();
         }
         let (tangent, bitangent) = tangents(place.normal);
+        let (sine, cosine) = (std::f64::consts::TAU * unit_of(mix(index as u64))).sin_cos();
+        let (tangent, bitangent) = (tangent * cosine + bitangent * sine, bitangent * cosine - tangent * sine);
         let mut sum = Rgb::zeros();
         for local in pattern {
             let direction = tangent * local.x + bitangent * local.y + place.normal * local.z;
@@ -177,6 +216,26 @@ impl LightField {
         }
         sum / pattern.len() as f64
     }
+}
+
+/// Weighs every `stride`-th value 1/2 and its two neighbours 1/4 each; border values count as their own neighbours.
+fn binomial(values: &mut [Vector3<f32>], stride: usize) {
+    let mut before = values[0];
+    for index in (0..values.len()).step_by(stride) {
+        let here = values[index];
+        let after = values.get(index + stride).copied().unwrap_or(here);
+        values[index] = here * 0.5 + (before + after) * 0.25;
+        before = here;
+    }
+}
+
+/// The pattern a place deserves: nobody sees what is turned away, nor much of what is far off.
+fn importance(point: Vector3<f64>, normal: Vector3<f64>, eye: Vector3<f64>) -> usize {
+    /// The camera wanders about the eye by this much at most, metres.
+    const WANDER_M: f64 = 1.0;
+    const FAR_M: f64 = 22.0;
+    let to_eye = eye - point;
+    if normal.dot(&to_eye) < -WANDER_M { 2 } else { usize::from(to_eye.norm() > FAR_M) }
 }
 
 /// One pass of filling unknown values with the mean of their known neighbours; returns what is known now.
@@ -211,8 +270,8 @@ fn direct_light(scene: &Scene, place: &Place, samples: usize) -> (Rgb, Rgb) {
     let portals = scene.portals.iter().map(|portal| portal_light(scene, place, portal, samples)).sum();
     let sun = scene.sun.map_or(Rgb::zeros(), |sun| {
         let cosine = place.normal.dot(&sun.towards);
-        let lit = cosine > 0.0
-            && !scene.hierarchy.blocked(&scene.solids, &Ray::new(place.point, sun.towards), f64::INFINITY);
+        let lit =
+            cosine > 0.0 && !scene.hierarchy.blocked(&scene.solids, &Ray::new(place.point, sun.towards), f64::INFINITY);
         if lit { sun.irradiance * cosine } else { Rgb::zeros() }
     });
     (portals, sun)
@@ -220,6 +279,8 @@ fn direct_light(scene: &Scene, place: &Place, samples: usize) -> (Rgb, Rgb) {
 
 fn portal_light(scene: &Scene, place: &Place, portal: &Portal, samples: usize) -> Rgb {
     const SKY_BLUR: f64 = 0.1;
+    /// Windows give more light than they show, so that room and view fit into one exposure.
+    const WINDOW_GAIN: f64 = 3.5;
     let patch = portal.side_s.cross(&portal.side_t).norm() / (samples * samples) as f64;
     let mut sum = Rgb::zeros();
     for k in 0..samples * samples {
@@ -236,7 +297,7 @@ fn portal_light(scene: &Scene, place: &Place, portal: &Portal, samples: usize) -
         if scene.hierarchy.blocked(&scene.solids, &Ray::new(place.point, direction), limit) {
             continue;
         }
-        let radiance = portal.radiance.unwrap_or_else(|| scene.sky.radiance(direction, SKY_BLUR));
+        let radiance = portal.radiance.unwrap_or_else(|| scene.sky.radiance(direction, SKY_BLUR) * WINDOW_GAIN);
         // A patch nearer than its own size would count as a point source too close: bound it.
         sum += radiance * (here * there * patch / distance_squared.max(patch));
     }

@@ -101,11 +101,14 @@ impl RenderArguments {
             scene.light = LightQuality::Fast;
             (rig.width, rig.height, quality) = (320, 240, Quality::Preview);
         }
-        set(&mut scene.kind, self.kind.map(|kind| match kind {
-            Kind::Room => SceneKind::Room,
-            Kind::Street => SceneKind::Street,
-            Kind::Nature => SceneKind::Nature,
-        }));
+        set(
+            &mut scene.kind,
+            self.kind.map(|kind| match kind {
+                Kind::Room => SceneKind::Room,
+                Kind::Street => SceneKind::Street,
+                Kind::Nature => SceneKind::Nature,
+            }),
+        );
         set(&mut scene.seed, self.seed);
         set(&mut rig.seed, self.seed);
         set(&mut rig.pictures, self.pictures);

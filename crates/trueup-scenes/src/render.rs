@@ -116,7 +116,8 @@ impl Eye {
             // A spiral over the sun's disc, turned from pixel to pixel.
             let radius = ((k as f64 + 0.5) / count as f64).sqrt();
             let (sine, cosine) = (turn + 2.4 * k as f64).sin_cos();
-            let light = trace(scene, self.centre, direction, angle, [radius * cosine, radius * sine], quality.mirrors());
+            let light =
+                trace(scene, self.centre, direction, angle, [radius * cosine, radius * sine], quality.mirrors());
             // A very bright spot must not outshine the rest of its pixel: bounded as film bounds it.
             const BRIGHTEST: f64 = 6.0;
             sum += light.map(|channel| (channel * scene.exposure).min(BRIGHTEST));
@@ -190,10 +191,11 @@ fn develop(light: Rgb, posed: &PosedCamera, x: usize, y: usize) -> [u8; 3] {
     })
 }
 
-/// A film's answer: straight up to one half, then a smooth shoulder that reaches 1 only in the limit.
+/// A film's answer: straight up to the knee, then a long smooth shoulder that reaches 1 only in the limit.
 fn shoulder(linear: f64) -> f64 {
-    const KNEE: f64 = 0.5;
-    if linear <= KNEE { linear.max(0.0) } else { 1.0 - (1.0 - KNEE) * (-(linear - KNEE) / (1.0 - KNEE)).exp() }
+    const KNEE: f64 = 0.4;
+    const REST: f64 = 1.0 - KNEE;
+    if linear <= KNEE { linear.max(0.0) } else { 1.0 - REST / (1.0 + (linear - KNEE) / REST) }
 }
 
 /// Noise of standard deviation 1: the sum of four uniforms, scaled.

@@ -147,8 +147,9 @@ fn posed(options: &RigOptions, viewpoint: &Viewpoint, index: usize, columns: usi
         + options.yaw_deg
         + options.yaw_step_deg * from_middle(column, columns)
         + options.yaw_sd_deg * dice.normal();
-    let pitch =
-        options.pitch_deg + options.pitch_step_deg * from_middle(row, options.rows) + options.pitch_sd_deg * dice.normal();
+    let pitch = options.pitch_deg
+        + options.pitch_step_deg * from_middle(row, options.rows)
+        + options.pitch_sd_deg * dice.normal();
     let roll = options.roll_sd_deg * dice.normal();
     let reach = options.translation_fraction * viewpoint.depth_m;
     let wander = in_ball(&mut dice) * reach;
@@ -156,7 +157,8 @@ fn posed(options: &RigOptions, viewpoint: &Viewpoint, index: usize, columns: usi
     let hfov_deg = if second { options.second_hfov_deg } else { options.hfov_deg };
     let centre = Vector3::from(viewpoint.eye) + wander;
     let exposure = (options.exposure_sd * dice.normal()).exp2();
-    let white_balance = [1.0 + options.white_balance_sd * dice.normal(), 1.0, 1.0 + options.white_balance_sd * dice.normal()];
+    let white_balance =
+        [1.0 + options.white_balance_sd * dice.normal(), 1.0, 1.0 + options.white_balance_sd * dice.normal()];
     let plain = PosedCamera::level(centre.into(), 0.0, options.width, options.height, hfov_deg);
     let mut camera = plain.camera;
     camera.set_rotation(&camera_from_world(yaw, pitch, roll));

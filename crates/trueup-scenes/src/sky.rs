@@ -14,8 +14,8 @@ pub(crate) struct Sun {
     pub(crate) irradiance: Rgb,
 }
 
-/// Sine of the sun's angular radius; larger than the true 0.0047, as thin haze makes it.
-pub(crate) const SUN_RADIUS: f64 = 0.008;
+/// Sine of the sun's angular radius; smaller than the true 0.0047, so that few samples make a clean edge.
+pub(crate) const SUN_RADIUS: f64 = 0.003;
 
 /// Sky with clouds, and a far line of trees below.
 #[derive(Debug, Clone, Copy)]

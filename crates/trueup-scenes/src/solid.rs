@@ -182,8 +182,7 @@ fn enter_block(origin: Vector3<f64>, direction: Vector3<f64>, half: Vector3<f64>
         let inverse = 1.0 / direction[axis];
         let (low, high) = ((-half[axis] - origin[axis]) * inverse, (half[axis] - origin[axis]) * inverse);
         // Entering through the low side exactly when the ray runs towards larger coordinates.
-        let (enter, leave, entered) =
-            if inverse > 0.0 { (low, high, 2 * axis) } else { (high, low, 2 * axis + 1) };
+        let (enter, leave, entered) = if inverse > 0.0 { (low, high, 2 * axis) } else { (high, low, 2 * axis + 1) };
         if enter > near {
             (near, face) = (enter, entered);
         }

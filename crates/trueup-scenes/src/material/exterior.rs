@@ -25,8 +25,7 @@ pub(super) fn brick(material: &Material, spot: &Spot) -> Rgb {
     let tone = 1.0 + faded * (lerp(0.55, 1.35, own) - 1.0);
     let fired = mix(material.colours[0], material.colours[2], faded * other * other) * tone;
     let rough = spot.noise(0.03, 4, 0.7, 102);
-    let mortar =
-        pulse(spot.down, joint, height, spot.footprint).max(pulse(shifted, joint, length, spot.footprint));
+    let mortar = pulse(spot.down, joint, height, spot.footprint).max(pulse(shifted, joint, length, spot.footprint));
     let wall = mix(fired * (1.0 + 0.25 * rough), material.colours[1] * (1.0 + 0.2 * rough), mortar);
     wall * (1.0 + 0.1 * spot.noise(2.5, 4, 0.5, 103) - 0.25 * streaks(spot, 104))
 }
@@ -50,8 +49,7 @@ pub(super) fn ashlar(material: &Material, spot: &Spot) -> Rgb {
     let column = (shifted / length).floor();
     let own = lattice(column as i64, row as i64, 0, 122);
     let joint = 0.02;
-    let groove =
-        pulse(spot.down, joint, height, spot.footprint).max(pulse(shifted, joint, length, spot.footprint));
+    let groove = pulse(spot.down, joint, height, spot.footprint).max(pulse(shifted, joint, length, spot.footprint));
     // A bevel: light from above catches the lower edge of a groove.
     let bevel = pulse(spot.down - joint, joint, height, spot.footprint);
     let grain = spot.noise(0.3, 6, 0.7, 123);
@@ -128,7 +126,8 @@ pub(super) fn foliage(material: &Material, spot: &Spot) -> Rgb {
 
 pub(super) fn rock(material: &Material, spot: &Spot) -> Rgb {
     let scale = material.scale_m;
-    let layers = fractal_noise(spot.point.component_mul(&Vector3::new(0.3, 1.6, 0.3)), scale, 5, 0.6, spot.footprint, 181);
+    let layers =
+        fractal_noise(spot.point.component_mul(&Vector3::new(0.3, 1.6, 0.3)), scale, 5, 0.6, spot.footprint, 181);
     let lumps = spot.noise(scale, 8, 0.65, 182);
     let lichen = edge(spot.noise(0.6 * scale, 5, 0.6, 183), 0.25, 0.2);
     let stone = material.colours[0] * (0.75 + 0.5 * layers + 0.9 * lumps).clamp(0.12, 1.6);

@@ -102,8 +102,8 @@ pub(super) fn planks(material: &Material, spot: &Spot) -> Rgb {
     let tone = 0.75 + 0.5 * board.chance(3);
     let colour = wood(material.colours[0], spot.point, 2, &board) * tone;
     let gap = 0.003;
-    let joint = pulse(spot.point.x, gap, width, spot.footprint)
-        .max(pulse(spot.point.z + shift, gap, length, spot.footprint));
+    let joint =
+        pulse(spot.point.x, gap, width, spot.footprint).max(pulse(spot.point.z + shift, gap, length, spot.footprint));
     let knot = specks(&Spot { across: spot.point.x, down: spot.point.z, ..*spot }, 0.4, 0.015, 43);
     colour * (1.0 - 0.75 * joint) * (1.0 - 0.5 * knot)
 }
@@ -122,8 +122,7 @@ pub(super) fn tiles(material: &Material, spot: &Spot) -> Rgb {
     let grain = spot.noise(0.006, 2, 0.7, 53);
     let stone = base * (1.0 + 0.12 * vein + 0.06 * grain - 0.18 * line);
     let joint = (0.012 * size).max(0.003);
-    let grout =
-        pulse(spot.across, joint, size, spot.footprint).max(pulse(spot.down, joint, size, spot.footprint));
+    let grout = pulse(spot.across, joint, size, spot.footprint).max(pulse(spot.down, joint, size, spot.footprint));
     mix(stone, material.colours[2] * (1.0 + 0.2 * grain), grout)
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::{Material, Spot};
-use crate::colour::{Rgb, by_hue, mix, srgb};
+use crate::colour::{Rgb, by_hue, luminance, mix, srgb};
 use crate::noise::{band, edge, fractal_noise, lattice, lerp, pulse};
 
 /// Capital letters on a grid of 3 x 5, rows from the top, the left column in the highest bit of three.
@@ -40,6 +40,12 @@ const LETTERS: [u16; 26] = [
 const WORDS: [&str; 16] = [
     "BAKERY", "BOOKS", "CAFE", "HOTEL", "FLOWERS", "BANK", "OPTICS", "MUSIC", "TAILOR", "WINE", "THEATRE", "SHOES",
     "PHARMACY", "CLOCKS", "MUSEUM", "BICYCLES",
+];
+
+/// What bookbinders like.
+const CLOTHS: [u32; 18] = [
+    0x7a_2a26, 0x22_3450, 0x2c_4c38, 0x9a_7848, 0xdc_d0b4, 0x2a_2624, 0x5c_4030, 0x8a_8880, 0xb0_4a30, 0xe4_e0d8,
+    0x3c_5c78, 0xc8_a050, 0x50_2834, 0x6a_7c5c, 0xc0_b498, 0x1c_2c30, 0xa8_3840, 0xf0_e8d0,
 ];
 
 /// Coverage of a letter at (x, y) in [0, 1] of its cell of 4 x 6 grid units (one unit of margin right and below).
@@ -89,7 +95,8 @@ pub(super) fn page(material: &Material, spot: &Spot) -> Rgb {
     let margin = 0.08 * width;
     let inside = band(x, margin, width - margin, spot.footprint) * band(y, margin, height - margin, spot.footprint);
     let hue = spot.chance(4);
-    let head = text(x - margin, y - margin, 0.16 * height, spot.footprint, spot.seed ^ 1) * band(y, margin, 0.3 * height, 1e-4);
+    let head = text(x - margin, y - margin, 0.16 * height, spot.footprint, spot.seed ^ 1)
+        * band(y, margin, 0.3 * height, 1e-4);
     let picture = band(y, 0.32 * height, 0.6 * height, spot.footprint);
     let body = text(x - margin, y, 0.028 * height, spot.footprint, spot.seed ^ 2) * edge(y, 0.63 * height, 1e-4);
     let print = fractal_noise(spot.point, 0.2 * height, 5, 0.6, spot.footprint, spot.seed ^ 3);
@@ -103,11 +110,14 @@ pub(super) fn spine(material: &Material, spot: &Spot) -> Rgb {
     let [width, height] = spot.size;
     let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);
     let chance = |k| spot.chance(k);
-    let cloth = by_hue(chance(1), lerp(0.15, 0.75, chance(2)), lerp(0.25, 0.9, chance(3)));
-    let ink = if chance(3) > 0.55 { srgb(0x24_2220) } else { srgb(0xe8_d9a0) };
+    let cloth =
+        srgb(CLOTHS[((chance(1) * CLOTHS.len() as f64) as usize).min(CLOTHS.len() - 1)]) * lerp(0.7, 1.3, chance(2));
+    let ink = if luminance(cloth) > 0.25 { srgb(0x24_2220) } else { srgb(0xe8_d9a0) };
     let soft = spot.footprint;
-    let lines = [0.08, 0.11, 0.86, 0.9].iter().map(|&at| band(y, at * height, at * height + 0.004, soft)).fold(0.0, f64::max);
-    let label = band(y, 0.16 * height, lerp(0.3, 0.45, chance(4)) * height, soft) * f64::from(u8::from(chance(5) < 0.5));
+    let lines =
+        [0.08, 0.11, 0.86, 0.9].iter().map(|&at| band(y, at * height, at * height + 0.004, soft)).fold(0.0, f64::max);
+    let label =
+        band(y, 0.16 * height, lerp(0.3, 0.45, chance(4)) * height, soft) * f64::from(u8::from(chance(5) < 0.5));
     let label_colour = by_hue(chance(6), 0.6, lerp(0.2, 0.8, chance(7)));
     // Lettering runs down the spine.
     let size = (0.55 * width).min(0.03);
@@ -143,9 +153,8 @@ fn landscape(spot: &Spot) -> Rgb {
     colour = mix(colour, srgb(0xff_f0b0), 1.0 - edge((x - sun_x).hypot(y - sun_y), 0.06, soft));
     for layer in 0..5_u32 {
         let depth = f64::from(layer) / 4.0;
-        let ridge = |salt| {
-            fractal_noise(Vector3::new(x, 7.0 * depth, 0.0), 0.9 - 0.5 * depth, 6, 0.5, soft, seed ^ salt)
-        };
+        let ridge =
+            |salt| fractal_noise(Vector3::new(x, 7.0 * depth, 0.0), 0.9 - 0.5 * depth, 6, 0.5, soft, seed ^ salt);
         let height = 0.42 + 0.13 * f64::from(layer) - 0.12 * ridge(10 + layer);
         let tint = by_hue(lerp(0.6, 0.25 + 0.15 * hue, depth), lerp(0.25, 0.65, depth), lerp(0.75, 0.35, depth));
         let relief = 1.0 + 0.6 * noise(0.12, 5, 20 + layer, 1.0 + 2.0 * depth);
@@ -164,12 +173,17 @@ fn blocks(spot: &Spot) -> Rgb {
         let cut = lerp(low[axis], high[axis], lerp(0.3, 0.7, lattice(path, level, 0, spot.seed)));
         bar = bar.max(band(at[axis], cut - 0.006, cut + 0.006, spot.footprint));
         let right = at[axis] > cut;
-        if right { low[axis] = cut } else { high[axis] = cut }
+        if right {
+            low[axis] = cut
+        } else {
+            high[axis] = cut
+        }
         path = 2 * path + i64::from(right);
     }
     let chance = |k| lattice(path, 9, k, spot.seed);
     let pale = srgb(0xee_e8da);
-    let field = if chance(0) < 0.35 { pale } else { by_hue(chance(1), lerp(0.4, 0.9, chance(2)), lerp(0.4, 0.95, chance(3))) };
+    let field =
+        if chance(0) < 0.35 { pale } else { by_hue(chance(1), lerp(0.4, 0.9, chance(2)), lerp(0.4, 0.95, chance(3))) };
     mix(field * (1.0 + 0.12 * spot.noise(0.06, 4, 0.6, 241)), srgb(0x1c_1a1a), bar)
 }
 

@@ -73,14 +73,26 @@ impl Builder {
     }
 
     /// A block turned about the vertical by `yaw` radians.
-    pub(crate) fn turned(&mut self, centre: Vector3<f64>, half: Vector3<f64>, yaw: f64, material: MaterialId) -> &mut Solid {
+    pub(crate) fn turned(
+        &mut self,
+        centre: Vector3<f64>,
+        half: Vector3<f64>,
+        yaw: f64,
+        material: MaterialId,
+    ) -> &mut Solid {
         let solid = self.push(Shape::Block, centre, half, material);
         solid.world_from_body = Some(rotation_about_y(yaw));
         solid
     }
 
     /// An upright cylinder standing at `foot`.
-    pub(crate) fn cylinder(&mut self, foot: Vector3<f64>, radius: f64, height: f64, material: MaterialId) -> &mut Solid {
+    pub(crate) fn cylinder(
+        &mut self,
+        foot: Vector3<f64>,
+        radius: f64,
+        height: f64,
+        material: MaterialId,
+    ) -> &mut Solid {
         let centre = foot - Vector3::new(0.0, height / 2.0, 0.0);
         self.push(Shape::Cylinder, centre, Vector3::new(radius, height / 2.0, radius), material)
     }

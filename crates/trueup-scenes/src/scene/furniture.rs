@@ -50,7 +50,7 @@ impl Finish {
             picture: add(Material::new(Pattern::Picture, 1.0, [0xff_ffff; 3]).glossy(0.01)),
             ceramic: add(Material::new(Pattern::Tiles, 0.09, [0xc8_d4d0, 0x3a_6a84, 0xe0_dcd0]).glossy(0.06)),
             leaves: add(Material::new(Pattern::Foliage, 1.0, [0x2e_5a26, 0x78_a048, 0])),
-            shade: add(Material::new(Pattern::Fabric, 0.01, [0xf0_dcb0, 0xe8_d0a0, 0]).emitting(0.9)),
+            shade: add(Material::new(Pattern::Fabric, 0.01, [0xf0_dcb0, 0xe8_d0a0, 0]).emitting(0.35)),
         }
     }
 }
@@ -74,7 +74,10 @@ pub(super) fn window(builder: &mut Builder, wall: &Wall, at: Opening, finish: &F
     let Opening { left, right, foot, head } = at;
     frame(builder, wall, at, 0.06, [-0.16, -0.09], finish.white_paint);
     let middle = (left + right) / 2.0;
-    builder.piece(wall.span([middle - 0.03, middle + 0.03], [foot + 0.06, head - 0.06], [-0.16, -0.09]), finish.white_paint);
+    builder.piece(
+        wall.span([middle - 0.03, middle + 0.03], [foot + 0.06, head - 0.06], [-0.16, -0.09]),
+        finish.white_paint,
+    );
     let transom = foot + 0.68 * (head - foot);
     for side in [[left + 0.06, middle - 0.03], [middle + 0.03, right - 0.06]] {
         builder.piece(wall.span(side, [transom - 0.02, transom + 0.02], [-0.15, -0.1]), finish.white_paint);
@@ -161,7 +164,8 @@ fn shelf_row(builder: &mut Builder, wall: &Wall, sides: [f64; 2], room: [f64; 2]
             if at + thick > sides[1] {
                 return;
             }
-            let book = builder.piece(wall.span([at, at + thick - 0.001], [room[0], room[0] + tall], [0.03, depth]), finish.spine);
+            let book = builder
+                .piece(wall.span([at, at + thick - 0.001], [room[0], room[0] + tall], [0.03, depth]), finish.spine);
             (book.faces[2], book.faces[3]) = (finish.paper, finish.paper);
             at += thick;
         }
@@ -185,7 +189,10 @@ pub(super) fn picture(builder: &mut Builder, wall: &Wall, centre: f64, up: f64, 
     let timber = if builder.dice.chance(0.5) { finish.dark_timber } else { finish.timber };
     frame(builder, wall, at, border, [0.0, 0.03], timber);
     let mat = if poster { border } else { border + 0.05 };
-    builder.piece(wall.span([at.left + border, at.right - border], [at.foot + border, at.head - border], [0.0, 0.012]), finish.paper);
+    builder.piece(
+        wall.span([at.left + border, at.right - border], [at.foot + border, at.head - border], [0.0, 0.012]),
+        finish.paper,
+    );
     builder.piece(wall.span([at.left + mat, at.right - mat], [at.foot + mat, at.head - mat], [0.0, 0.014]), face);
 }
 
@@ -193,7 +200,10 @@ pub(super) fn picture(builder: &mut Builder, wall: &Wall, centre: f64, up: f64, 
 pub(super) fn cabinet(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &Finish) {
     let (height, depth) = (0.8, 0.42);
     builder.piece(wall.span([left, left + width], [0.1, height - 0.03], [0.0, depth - 0.02]), finish.dark_timber);
-    builder.piece(wall.span([left - 0.02, left + width + 0.02], [height - 0.03, height], [0.0, depth + 0.01]), finish.timber);
+    builder.piece(
+        wall.span([left - 0.02, left + width + 0.02], [height - 0.03, height], [0.0, depth + 0.01]),
+        finish.timber,
+    );
     let doors = (width / 0.42).round().max(1.0);
     for k in 0..doors as usize {
         let (a, b) = (left + width * k as f64 / doors + 0.008, left + width * (k + 1) as f64 / doors - 0.008);
@@ -211,7 +221,11 @@ pub(super) fn cabinet(builder: &mut Builder, wall: &Wall, left: f64, width: f64,
     let vase = wall.at(left + width - 0.25, height, 0.2);
     builder.cylinder(vase, 0.06, 0.2, finish.ceramic);
     for _ in 0..7 {
-        let offset = Vector3::new(builder.dice.range(-0.1, 0.1), builder.dice.range(-0.42, -0.22), builder.dice.range(-0.1, 0.1));
+        let offset = Vector3::new(
+            builder.dice.range(-0.1, 0.1),
+            builder.dice.range(-0.42, -0.22),
+            builder.dice.range(-0.1, 0.1),
+        );
         let size = builder.dice.range(0.04, 0.08);
         builder.ellipsoid(vase + offset, Vector3::new(size, 0.7 * size, size), finish.leaves);
     }
@@ -259,13 +273,19 @@ pub(super) fn sofa(builder: &mut Builder, wall: &Wall, left: f64, width: f64, fi
     }
     let seats = 3;
     for k in 0..seats {
-        let (a, b) = (left + width * f64::from(k) / f64::from(seats), left + width * f64::from(k + 1) / f64::from(seats));
+        let (a, b) =
+            (left + width * f64::from(k) / f64::from(seats), left + width * f64::from(k + 1) / f64::from(seats));
         builder.piece(wall.span([a + 0.006, b - 0.006], [0.3, 0.45], [0.26, 0.9]), finish.fabric);
         builder.piece(wall.span([a + 0.01, b - 0.01], [0.45, 0.88], [0.2, 0.36]), finish.fabric);
     }
     for at in [left + 0.3, right - 0.35] {
         let turn = builder.dice.range(-0.5, 0.5);
-        builder.turned(wall.at(at, 0.64, 0.46), Vector3::new(0.2, 0.19, 0.07), turn + wall.out.x.asin(), finish.cushion);
+        builder.turned(
+            wall.at(at, 0.64, 0.46),
+            Vector3::new(0.2, 0.19, 0.07),
+            turn + wall.out.x.asin(),
+            finish.cushion,
+        );
     }
     let size = [builder.dice.range(0.9, 1.3), builder.dice.range(0.6, 0.8)];
     picture(builder, wall, (left + right) / 2.0, 1.62, size, finish);
@@ -278,15 +298,22 @@ pub(super) fn desk(builder: &mut Builder, wall: &Wall, left: f64, width: f64, fi
     builder.piece(wall.span([left + 0.02, left + 0.44], [0.06, height - 0.035], [0.02, depth - 0.04]), finish.timber);
     for k in 0..3 {
         let up = 0.08 + 0.205 * f64::from(k);
-        builder.piece(wall.span([left + 0.03, left + 0.43], [up, up + 0.19], [depth - 0.04, depth - 0.02]), finish.white_paint);
-        builder.piece(wall.span([left + 0.17, left + 0.29], [up + 0.13, up + 0.145], [depth - 0.02, depth]), finish.metal);
+        builder.piece(
+            wall.span([left + 0.03, left + 0.43], [up, up + 0.19], [depth - 0.04, depth - 0.02]),
+            finish.white_paint,
+        );
+        builder
+            .piece(wall.span([left + 0.17, left + 0.29], [up + 0.13, up + 0.145], [depth - 0.02, depth]), finish.metal);
     }
     for out in [[0.03, 0.08], [depth - 0.08, depth - 0.03]] {
         builder.piece(wall.span([right - 0.08, right - 0.03], [0.0, height - 0.035], out), finish.dark_timber);
     }
     let middle = left + 0.62 * width;
     builder.piece(wall.span([middle - 0.28, middle + 0.28], [height + 0.1, height + 0.44], [0.2, 0.23]), finish.metal);
-    builder.piece(wall.span([middle - 0.265, middle + 0.265], [height + 0.115, height + 0.425], [0.2, 0.234]), finish.page);
+    builder.piece(
+        wall.span([middle - 0.265, middle + 0.265], [height + 0.115, height + 0.425], [0.2, 0.234]),
+        finish.page,
+    );
     builder.piece(wall.span([middle - 0.03, middle + 0.03], [height, height + 0.1], [0.18, 0.22]), finish.metal);
     builder.piece(wall.span([middle - 0.2, middle + 0.2], [height, height + 0.02], [0.36, 0.5]), finish.white_paint);
     table_lamp(builder, wall.at(left + 0.2, height, 0.25), finish);
@@ -333,7 +360,11 @@ pub(super) fn table(builder: &mut Builder, foot: Vector3<f64>, ceiling: f64, fin
     builder.cylinder(corner(0.15, 0.75, 0.05), 0.14, 0.06, finish.ceramic);
     for k in 0..5 {
         let turn = f64::from(k) * 1.26;
-        builder.ellipsoid(corner(0.15 + 0.07 * turn.cos(), 0.83, 0.05 + 0.07 * turn.sin()), Vector3::repeat(0.045), finish.cushion);
+        builder.ellipsoid(
+            corner(0.15 + 0.07 * turn.cos(), 0.83, 0.05 + 0.07 * turn.sin()),
+            Vector3::repeat(0.045),
+            finish.cushion,
+        );
     }
     builder.piece([corner(-0.55, 0.75, -0.3), corner(-0.25, 0.756, 0.1)], finish.page);
     for (x, z) in [(-0.35, -0.65), (0.4, -0.7), (-0.4, 0.7), (0.35, 0.68), (-1.05, 0.0)] {
@@ -341,7 +372,7 @@ pub(super) fn table(builder: &mut Builder, foot: Vector3<f64>, ceiling: f64, fin
     }
     let hang = corner(0.0, ceiling - 0.72, 0.0);
     builder.cylinder(hang, 0.005, 0.72, finish.metal);
-    builder.cylinder(hang - Vector3::new(0.0, 0.0, 0.0), 0.24, 0.2, finish.shade);
+    builder.cylinder(hang, 0.24, 0.2, finish.shade);
     let size = 0.3;
     builder.portals.push(Portal {
         corner: hang + Vector3::new(-size / 2.0, 0.01, -size / 2.0),
@@ -363,6 +394,7 @@ pub(super) fn plant(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) 
         let centre = foot + Vector3::new(reach * turn.cos(), -up, reach * turn.sin());
         let half = Vector3::new(size, 0.35 * size, 0.6 * size);
         let leaf = builder.ellipsoid(centre, half, finish.leaves);
-        leaf.world_from_body = Some(trueup_core::geometry::rotation_about_y(-turn) * trueup_core::geometry::rotation_about_z(0.5));
+        leaf.world_from_body =
+            Some(trueup_core::geometry::rotation_about_y(-turn) * trueup_core::geometry::rotation_about_z(0.5));
     }
 }

@@ -122,8 +122,8 @@ impl Scene {
         let detail = match (quality, outdoors) {
             (LightQuality::Fast, false) => LightDetail { spacing_m: 0.4, directions: 24, portal_samples: 2 },
             (LightQuality::Fast, true) => LightDetail { spacing_m: 3.0, directions: 16, portal_samples: 1 },
-            (LightQuality::Fine, false) => LightDetail { spacing_m: 0.07, directions: 96, portal_samples: 5 },
-            (LightQuality::Fine, true) => LightDetail { spacing_m: 0.5, directions: 64, portal_samples: 1 },
+            (LightQuality::Fine, false) => LightDetail { spacing_m: 0.08, directions: 128, portal_samples: 4 },
+            (LightQuality::Fine, true) => LightDetail { spacing_m: 0.6, directions: 64, portal_samples: 1 },
         };
         let mut scene = Self {
             hierarchy: Hierarchy::new(&builder.solids),
@@ -153,8 +153,11 @@ impl Scene {
             for elevation in ELEVATIONS {
                 let direction = Vector3::new(sine, elevation, cosine).normalize();
                 if elevation == 0.0 {
-                    depths.extend(self.hierarchy.nearest(&self.solids, &Ray::new(eye, direction), f64::INFINITY)
-                        .map(|(_, entry)| entry.distance));
+                    depths.extend(
+                        self.hierarchy
+                            .nearest(&self.solids, &Ray::new(eye, direction), f64::INFINITY)
+                            .map(|(_, entry)| entry.distance),
+                    );
                 }
                 logarithms += luminance(self.radiance(eye, direction, 0.02)).max(1e-3).ln();
                 count += 1.0;

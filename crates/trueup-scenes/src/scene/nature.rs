@@ -21,7 +21,8 @@ pub(super) fn build(seed: u64) -> Builder {
     // Humps hide the plane's own horizon.
     for _ in 0..40 {
         let place = ring(&mut builder, 14.0, 80.0);
-        let half = Vector3::new(builder.dice.range(4.0, 14.0), builder.dice.range(0.6, 4.0), builder.dice.range(4.0, 14.0));
+        let half =
+            Vector3::new(builder.dice.range(4.0, 14.0), builder.dice.range(0.6, 4.0), builder.dice.range(4.0, 14.0));
         builder.ellipsoid(place, half, turf);
     }
     for _ in 0..260 {
@@ -62,7 +63,8 @@ fn tree(builder: &mut Builder, foot: Vector3<f64>, bark: usize, leaves: usize) {
     trunk.world_from_body = Some(rotation);
     let top = foot + rotation * Vector3::new(0.0, -height, 0.0);
     for _ in 0..12 {
-        let offset = Vector3::new(builder.dice.normal(), 0.7 * builder.dice.normal(), builder.dice.normal()) * (0.22 * height);
+        let offset =
+            Vector3::new(builder.dice.normal(), 0.7 * builder.dice.normal(), builder.dice.normal()) * (0.22 * height);
         let size = height * builder.dice.range(0.1, 0.24);
         builder.ellipsoid(top + offset, Vector3::new(size, 0.75 * size, size), leaves);
     }

@@ -73,8 +73,8 @@ pub(super) fn build(seed: u64) -> Builder {
     furniture::plant(&mut builder, Vector3::new(-x + 0.4, 0.0, -z + 0.4), &finish);
     builder.eye = Vector3::new(0.15 * x, -1.55, -0.4 * z);
     let towards = Vector3::new(-0.62, -0.62, 0.55).normalize();
-    builder.sun = Some(Sun { towards, irradiance: srgb(0xff_ead0) * 7.0 });
-    builder.sky.brightness = 2.2;
+    builder.sun = Some(Sun { towards, irradiance: srgb(0xff_ead0) * 4.0 });
+    builder.sky.brightness = 1.3;
     builder
 }
 
@@ -97,13 +97,17 @@ fn shell(builder: &mut Builder, [x, z]: [f64; 2], height: f64, finish: &Finish) 
         let beams = 4;
         for k in 0..beams {
             let at = -z + 2.0 * z * (f64::from(k) + 0.5) / f64::from(beams);
-            builder.piece([Vector3::new(-x, -height, at - 0.07), Vector3::new(x, -height + 0.16, at + 0.07)], finish.dark_timber);
+            builder.piece(
+                [Vector3::new(-x, -height, at - 0.07), Vector3::new(x, -height + 0.16, at + 0.07)],
+                finish.dark_timber,
+            );
         }
     }
 }
 
 fn wall_covering(builder: &mut Builder) -> MaterialId {
-    let papers = [[0xe4_dcc4, 0xd8_ccac, 0x9a_8a5c], [0xc8_d4d0, 0xb8_c8c4, 0x5a_7c7a], [0xe0_ccc4, 0xd4_bab0, 0x9a_5c54]];
+    let papers =
+        [[0xe4_dcc4, 0xd8_ccac, 0x9a_8a5c], [0xc8_d4d0, 0xb8_c8c4, 0x5a_7c7a], [0xe0_ccc4, 0xd4_bab0, 0x9a_5c54]];
     let plasters = [0xe6_dcc8, 0xc4_ccc4, 0xd8_c0a4, 0xb8_c4d0];
     let material = if builder.dice.chance(0.45) {
         Material::new(Pattern::Wallpaper, 0.16, papers[builder.dice.index(papers.len())])
@@ -114,7 +118,8 @@ fn wall_covering(builder: &mut Builder) -> MaterialId {
 }
 
 fn rug_material(builder: &mut Builder) -> MaterialId {
-    let rugs = [[0x8a_2e28, 0xe0_cc9c, 0x2a_3a58], [0x2e_4a66, 0xdc_d0b0, 0x8a_4a30], [0x5a_5a3c, 0xe4_d8b8, 0x7a_2c28]];
+    let rugs =
+        [[0x8a_2e28, 0xe0_cc9c, 0x2a_3a58], [0x2e_4a66, 0xdc_d0b0, 0x8a_4a30], [0x5a_5a3c, 0xe4_d8b8, 0x7a_2c28]];
     let colours = rugs[builder.dice.index(rugs.len())];
     builder.material(Material::new(Pattern::Rug, 1.0, colours))
 }

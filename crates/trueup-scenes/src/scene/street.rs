@@ -27,6 +27,7 @@ struct Finish {
     leaves: MaterialId,
     poster: MaterialId,
     rubber: MaterialId,
+    windscreen: MaterialId,
 }
 
 /// Builds a street along z with the eye on its roadway.
@@ -34,10 +35,14 @@ pub(super) fn build(seed: u64) -> Builder {
     let mut builder = Builder::new(seed, 2);
     let finish = finish(&mut builder);
     ground(&mut builder, finish.stone);
-    let right = Wall { corner: Vector3::new(FRONT, 0.0, REACH), along: -Vector3::z(), out: -Vector3::x(), length: 2.0 * REACH };
-    let left = Wall { corner: Vector3::new(-FRONT, 0.0, -REACH), along: Vector3::z(), out: Vector3::x(), length: 2.0 * REACH };
-    let far = Wall { corner: Vector3::new(-24.0, 0.0, REACH + 9.0), along: Vector3::x(), out: -Vector3::z(), length: 48.0 };
-    let near = Wall { corner: Vector3::new(24.0, 0.0, -REACH - 9.0), along: -Vector3::x(), out: Vector3::z(), length: 48.0 };
+    let right =
+        Wall { corner: Vector3::new(FRONT, 0.0, REACH), along: -Vector3::z(), out: -Vector3::x(), length: 2.0 * REACH };
+    let left =
+        Wall { corner: Vector3::new(-FRONT, 0.0, -REACH), along: Vector3::z(), out: Vector3::x(), length: 2.0 * REACH };
+    let far =
+        Wall { corner: Vector3::new(-24.0, 0.0, REACH + 9.0), along: Vector3::x(), out: -Vector3::z(), length: 48.0 };
+    let near =
+        Wall { corner: Vector3::new(24.0, 0.0, -REACH - 9.0), along: -Vector3::x(), out: Vector3::z(), length: 48.0 };
     for front in [right, left, far, near] {
         row_of_houses(&mut builder, &front, &finish);
     }
@@ -63,6 +68,7 @@ fn finish(builder: &mut Builder) -> Finish {
         leaves: add(Material::new(Pattern::Foliage, 1.0, [0x30_541e, 0x80_a044, 0])),
         poster: add(Material::new(Pattern::Page, 1.0, [0xee_e6d4, 0x22_2222, 0])),
         rubber: add(Material::new(Pattern::Paint, 1.0, [0x20_2022; 3])),
+        windscreen: add(Material::new(Pattern::Paint, 1.0, [0x1a_2024; 3]).glossy(0.15)),
     }
 }
 
@@ -102,7 +108,8 @@ fn row_of_houses(builder: &mut Builder, front: &Wall, finish: &Finish) {
 }
 
 fn house_surface(builder: &mut Builder) -> MaterialId {
-    let bricks = [[0x9a_5238, 0xb8_ac9c, 0x7a_4030], [0xb0_8458, 0xc4_b8a4, 0x96_6c48], [0x84_4434, 0xa0_9488, 0x5c_3428]];
+    let bricks =
+        [[0x9a_5238, 0xb8_ac9c, 0x7a_4030], [0xb0_8458, 0xc4_b8a4, 0x96_6c48], [0x84_4434, 0xa0_9488, 0x5c_3428]];
     let stuccos = [0xdc_c8a0, 0xd0_a888, 0xb8_c0b0, 0xe4_dccc, 0xc8_9c80, 0xa8_b4bc];
     let material = match builder.dice.index(5) {
         0 | 1 => Material::new(Pattern::Brick, 0.075, bricks[builder.dice.index(bricks.len())]),
@@ -216,7 +223,10 @@ fn balcony(builder: &mut Builder, wall: &Wall, at: Opening, finish: &Finish) {
         builder.piece(wall.span([x, x + 0.02], [floor, rail], [DEPTH - 0.035, DEPTH - 0.015]), finish.iron);
     }
     if builder.dice.chance(0.5) {
-        builder.piece(wall.span([left + 0.1, right - 0.1], [floor + 0.7, floor + 0.88], [DEPTH, DEPTH + 0.16]), finish.timber);
+        builder.piece(
+            wall.span([left + 0.1, right - 0.1], [floor + 0.7, floor + 0.88], [DEPTH, DEPTH + 0.16]),
+            finish.timber,
+        );
         for k in 0..7 {
             let x = left + 0.2 + (right - left - 0.4) * f64::from(k) / 6.0;
             let half = Vector3::new(0.13, builder.dice.range(0.08, 0.18), 0.1);
@@ -309,9 +319,10 @@ fn tree(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
     let height = builder.dice.range(2.6, 3.4);
     builder.cylinder(foot, 0.11, height, finish.timber);
     let crown = foot - Vector3::new(0.0, height + 0.6, 0.0);
-    for _ in 0..26 {
-        let offset = Vector3::new(0.5 * builder.dice.normal(), 0.55 * builder.dice.normal(), 0.5 * builder.dice.normal());
-        let size = builder.dice.range(0.2, 0.48);
+    for _ in 0..80 {
+        let offset =
+            Vector3::new(0.5 * builder.dice.normal(), 0.55 * builder.dice.normal(), 0.5 * builder.dice.normal());
+        let size = builder.dice.range(0.1, 0.34);
         builder.ellipsoid(crown + offset, Vector3::new(size, 0.7 * size, size), finish.leaves);
     }
 }
@@ -337,7 +348,7 @@ fn car(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
     };
     part([-0.86, 0.26, -2.05], [0.86, 0.82, 2.05], paint);
     part([-0.82, 0.82, -1.9], [0.82, 0.9, 1.95], paint);
-    part([-0.72, 0.9, -1.45], [0.72, 1.4, 0.75], finish.pane);
+    part([-0.72, 0.9, -1.45], [0.72, 1.4, 0.75], finish.windscreen);
     part([-0.74, 1.4, -1.4], [0.74, 1.46, 0.7], paint);
     for z in [-1.45, -0.4, 0.68] {
         part([-0.745, 0.9, z], [-0.72, 1.42, z + 0.08], paint);
