@@ -115,9 +115,7 @@ impl LightField {
         for solid in solids {
             let mut grids = [None; 6];
             for &face in solid.used_faces() {
-                let [columns, rows] = solid
-                    .face_size(face)
-                    .map(|size| ((size / detail.spacing_m).ceil() as usize + 1).clamp(2, MAX_GRID));
+                let [columns, rows] = solid.face_size(face).map(|size| grid_points(size, detail.spacing_m));
                 grids[face] = Some(Grid { start, columns, rows });
                 start += columns * rows;
             }
@@ -155,15 +153,19 @@ impl LightField {
         for (stored, value) in self.values.iter_mut().zip(values) {
             *stored = value.map(|channel| channel as f32);
         }
-        const PASSES: usize = 3;
+        // Faces that lie wholly in others show only where these are thin: half the scene's mean light will do.
+        let lit = places.iter().filter(|place| !place.buried).count().max(1);
+        let dim = self.values.iter().sum::<Vector3<f32>>() * (0.5 / lit as f32);
         for grid in self.grids.iter().flatten().flatten() {
             let mut known: Vec<bool> =
                 places[grid.start..grid.start + grid.columns * grid.rows].iter().map(|place| !place.buried).collect();
-            for _ in 0..PASSES {
-                if known.iter().all(|&known| known) {
-                    break;
-                }
-                known = spread(&mut self.values[grid.start..grid.start + known.len()], &known, grid.columns);
+            let values = &mut self.values[grid.start..grid.start + known.len()];
+            if known.iter().all(|&known| !known) {
+                values.fill(dim);
+                continue;
+            }
+            while known.iter().any(|&known| !known) {
+                known = spread(values, &known, grid.columns);
             }
         }
     }
@@ -216,6 +218,13 @@ impl LightField {
         }
         sum / pattern.len() as f64
     }
+}
+
+/// Grid points along a side of this length: two at least, and one in the middle of what is not tiny.
+fn grid_points(size_m: f64, spacing_m: f64) -> usize {
+    const TINY_M: f64 = 0.12;
+    let least = if size_m < TINY_M { 2 } else { 3 };
+    ((size_m / spacing_m).ceil() as usize + 1).clamp(least, MAX_GRID)
 }
 
 /// Weighs every `stride`-th value 1/2 and its two neighbours 1/4 each; border values count as their own neighbours.

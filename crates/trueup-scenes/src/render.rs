@@ -137,6 +137,7 @@ pub(crate) fn trace(
     mirrors: u32,
 ) -> Rgb {
     const MIN_COSINE: f64 = 0.08;
+    const GRAZING_GAIN: f64 = 8.0;
     let ray = Ray::new(origin, direction);
     let Some((index, entry)) = scene.hierarchy.nearest(&scene.solids, &ray, f64::INFINITY) else {
         return scene.sky.radiance(direction, angle);
@@ -155,7 +156,9 @@ pub(crate) fn trace(
     let irradiance = scene.light.at(index, entry.face, chart) + sunlight(scene, surface, normal, sun_at);
     let mut light = albedo.component_mul(&irradiance) / std::f64::consts::PI + material.colours[0] * material.emission;
     if material.gloss > 0.0 && mirrors > 0 {
-        let reflectance = material.gloss + (1.0 - material.gloss) * (1.0 - cosine).powi(5);
+        // Schlick's approximation; what is rough shines less at grazing angles than a mirror would.
+        let grazing = (GRAZING_GAIN * material.gloss).min(1.0);
+        let reflectance = material.gloss + (grazing - material.gloss) * (1.0 - cosine).powi(5);
         let mirrored = direction - normal * (2.0 * direction.dot(&normal));
         let seen = trace(scene, surface, mirrored, angle * 2.0, sun_at, mirrors - 1);
         light = light * (1.0 - reflectance) + seen * reflectance;

@@ -43,7 +43,7 @@ impl Sky {
         let crown = fractal_noise(direction * 40.0, 1.0, 5, 0.75, 40.0 * footprint, self.seed ^ 2);
         let haze = mix(srgb(0x4d_6138), srgb(0x8c_9c8c), (up / skyline.max(1e-3)).clamp(0.0, 1.0) * 0.5);
         let tree = haze * (1.0 + 0.75 * crown) * (0.55 * self.brightness);
-        let field = mix(srgb(0x7a_8a4a), srgb(0xa8_a070), 0.5 + 0.5 * crown) * (0.7 * self.brightness);
+        let field = mix(srgb(0x84_8a66), srgb(0xa8_a080), 0.5 + 0.5 * crown) * (0.55 * self.brightness);
         mix(sky, mix(tree, field, edge(-up, 0.015, 0.02)), trees)
     }
 

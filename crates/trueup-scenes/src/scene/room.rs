@@ -151,6 +151,7 @@ fn furnish(
     let gap = (room - used) / (chosen.len() as f64 - 1.0).max(1.0);
     let mut left = if chosen.len() > 1 { CORNER } else { CORNER + (room - used) / 2.0 };
     let (mut openings, mut doors) = (Vec::new(), Vec::new());
+    let mut before = None;
     for feature in chosen {
         let width = feature.width();
         match feature {
@@ -171,10 +172,27 @@ fn furnish(
             Feature::Sofa => furniture::sofa(builder, wall, left, width, finish),
             Feature::Desk => furniture::desk(builder, wall, left, width, finish),
         }
+        if let Some((from, beside)) = before {
+            fill_gap(builder, wall, [from, left], [beside, feature], finish);
+        }
+        before = Some((left + width, feature));
         left += width + gap;
     }
     wall.build(builder, &openings, [0.0, height], 0.25, surface);
     skirting(builder, wall, &doors, height, finish);
+}
+
+/// Hangs a picture between two features if they leave room for one.
+fn fill_gap(builder: &mut Builder, wall: &Wall, [from, to]: [f64; 2], beside: [Feature; 2], finish: &Finish) {
+    const CLEARANCE: f64 = 0.15;
+    const CURTAIN: f64 = 0.5;
+    let reach = beside.map(|feature| if feature == Feature::Window { CURTAIN } else { CLEARANCE });
+    let (from, to) = (from + reach[0], to - reach[1]);
+    if to - from > 0.3 {
+        let width = (to - from).min(builder.dice.range(0.5, 0.8));
+        let height = width * builder.dice.range(1.0, 1.4);
+        furniture::picture(builder, wall, (from + to) / 2.0, 1.6, [width, height], finish);
+    }
 }
 
 /// Skirting board, broken at doors, and a cornice.
