@@ -70,8 +70,9 @@ fn a_marker_shows_where_the_camera_projects_it() {
     let (mut sum, mut x_sum, mut y_sum) = (0.0, 0.0, 0.0);
     for y in 0..240 {
         for x in 0..320 {
-            // Green: the marker has none, so that partly covered pixels are not clipped.
-            let weight = f64::from(before.pixel(x, y)[1].abs_diff(after.pixel(x, y)[1]));
+            // Red and nothing else: its shadow and its image in polished wood do not count.
+            let (old, new) = (before.pixel(x, y), after.pixel(x, y));
+            let weight = f64::from(u8::from(old != new && new[0] > 200 && new[1] < 90));
             sum += weight;
             x_sum += weight * (x as f64 + 0.5);
             y_sum += weight * (y as f64 + 0.5);
