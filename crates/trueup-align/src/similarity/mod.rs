@@ -16,7 +16,7 @@ mod vpg;
 mod weighted_solve;
 
 #[cfg(test)]
-mod synthetic;
+pub(crate) mod synthetic;
 #[cfg(test)]
 mod tests;
 
@@ -101,18 +101,12 @@ trueup_core::options! {
         /// Scale of the robust loss at which the joint refinement starts.
         joint_start_scale_px: f64 = 4.0, between(0.01, 100.0), "working px";
         /// Scale of the robust loss at which the joint refinement ends.
-        joint_scale_px: f64 = 0.7, between(0.01, 100.0), "working px";
+        joint_scale_px: f64 = 0.5, between(0.01, 100.0), "working px";
         /// Largest angle between a segment and a direction for the segment to vote.
         joint_tolerance_deg: f64 = 3.0, between(0.1, 30.0), "degrees";
         /// Root mean square misorientation of the pictures' directions that is detection noise; beyond, the horizontal
         /// directions lose weight in the joint refinement.
         ordinary_misorientation_deg: f64 = 1.0, between(0.01, 90.0), "degrees";
-        /// Whether each picture's own roll may deviate from the cameras' within their expected error.
-        picture_refinement: bool = false, Allowed::Any, "";
-        /// Expected error of a camera's rotation about each axis.
-        picture_prior_deg: f64 = 0.1, between(1e-4, 30.0), "degrees";
-        /// Standard deviation of a segment's ends, including what is common to neighbouring segments.
-        joint_noise_px: f64 = 2.0, between(0.01, 100.0), "working px";
         /// Whether a vertical alone may guide where the horizontal directions do not agree.
         vertical_only: bool = true, Allowed::Any, "";
         /// How far from the cameras' own vertical the segments' is sought.
@@ -125,9 +119,9 @@ trueup_core::options! {
         min_vertical_share: f64 = 0.15, between(0.0, 1.0), "";
         /// Least share of the pictures with at least three supporting segments.
         min_vertical_pictures: f64 = 0.6, between(0.0, 1.0), "";
-        /// Roll and pitch that straightening expects of a photographer, as the ratio of their standard deviations
-        /// squared: 0 takes the cameras' x axes to be level and knows nothing of pitch, as published.
-        pitch_prior: f64 = 0.0, between(0.0, 1.0), "";
+        /// How much straightening expects pictures to look level: variance of the roll over that of the pitch among
+        /// photographers. 0 is the published form, which lets a short sweep with some roll pitch by tens of degrees.
+        pitch_prior: f64 = 0.1, between(0.0, 1.0), "";
     }
 }
 
@@ -225,12 +219,13 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     context.check_cancelled()?;
     let rotations: Vec<Matrix3<f64>> = input.cameras.iter().map(Camera::rotation).collect();
     let focals: Vec<f64> = input.cameras.iter().map(|camera| camera.focal_px).collect();
-    let straightened = straighten::straighten(&rotations, options.pitch_prior);
+    let straightened = straighten::straighten(&rotations);
+    let level = straighten::straighten_with_pitch(&rotations, options.pitch_prior);
     let (guidance, guided) = match options.prior {
-        PriorMethod::VanishingPoints => vpg::guide(input, &rotations, &straightened, options, context)?,
+        PriorMethod::VanishingPoints => vpg::guide(input, &rotations, &straightened, &level, options, context)?,
         PriorMethod::Straightening => (vpg::unguided(input.cameras.len(), options), None),
     };
-    let guided = guided.unwrap_or_else(|| fallback(input, &rotations, &straightened.down));
+    let guided = guided.unwrap_or_else(|| fallback(input, &rotations, &level));
     let level_from_world = straighten::level_from_world(&guided.down, &rotations);
     let mut guidance = guidance;
     guidance.dominant =

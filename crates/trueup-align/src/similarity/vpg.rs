@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
-use trueup_core::geometry::{exp_rotation, wrap_angle};
+use trueup_core::geometry::wrap_angle;
 use trueup_core::{Result, StageContext};
 
 use super::dominant::{Dominant, dominant_frame};
@@ -50,11 +50,13 @@ struct Scene<'a> {
     vote: LineVote,
 }
 
-/// Finds the vertical and the turns that the lines mean, if they are believed.
+/// Finds the vertical and the turns that the lines mean, if they are believed. `straightened` is what the gate compares
+/// with; near `level` the vertical is sought where the gate refuses.
 pub(super) fn guide(
     input: &PriorInput<'_>,
     rotations: &[Matrix3<f64>],
     straightened: &Straightened,
+    level: &Vector3<f64>,
     options: &SimilarityOptions,
     context: &StageContext<'_>,
 ) -> Result<(Guidance, Option<Upright>)> {
@@ -81,7 +83,7 @@ pub(super) fn guide(
         let upright = scene.solve_dominant(dominant, &mut guidance);
         return Ok((guidance, upright));
     }
-    let peak = vertical_peak(&scene.vote, &straightened.down, options).filter(|_| options.vertical_only);
+    let peak = vertical_peak(&scene.vote, level, options).filter(|_| options.vertical_only);
     if let Some(peak) = &peak {
         guidance.vertical_rivalry = Some(peak.rivalry);
         guidance.vertical_share = Some(peak.support.score / scene.vote.total_weight());
@@ -175,7 +177,7 @@ impl Scene<'_> {
         guidance.dominant = Some(rows_of(&frame));
         guidance.used = true;
         let own = if self.options.joint_refinement && has_lines {
-            self.refined_rolls(&frame, &down, 3)
+            self.common_rolls(&down)
         } else {
             self.own_rolls(&frame, &down, &guidance.inliers)
         };
@@ -199,20 +201,13 @@ impl Scene<'_> {
     fn solve_vertical(&self, down: &Vector3<f64>, guidance: &mut Guidance) -> Option<Upright> {
         guidance.used = true;
         guidance.vertical_only = true;
-        let (first, second) = crate::vanishing::orthonormal_complement(down);
-        let frame = Matrix3::from_columns(&[*down, first, second]);
-        let own = self.refined_rolls(&frame, down, 1);
+        let own = self.common_rolls(down);
         self.solve(down, &own, guidance)
     }
 
-    /// Each picture's roll by the common vertical and, if asked for, by its own segments within its camera's error.
-    fn refined_rolls(&self, frame: &Matrix3<f64>, down: &Vector3<f64>, axes_used: usize) -> Vec<Option<f64>> {
-        if !self.options.picture_refinement {
-            return self.rotations.iter().map(|rotation| roll_of(&(rotation * down))).collect();
-        }
-        let turns = self.vote.refine_pictures(frame, axes_used, self.options);
-        let roll = |(turn, rotation): (&Vector3<f64>, &Matrix3<f64>)| roll_of(&(exp_rotation(turn) * rotation * down));
-        turns.iter().zip(self.rotations).map(roll).collect()
+    /// Each picture's roll by the common vertical: after the joint refinement no picture's own segments know better.
+    fn common_rolls(&self, down: &Vector3<f64>) -> Vec<Option<f64>> {
+        self.rotations.iter().map(|rotation| roll_of(&(rotation * down))).collect()
     }
 
     /// Searches pictures that disagree, or have no triad, again near the dominant directions.
