@@ -189,7 +189,7 @@ pub(crate) fn picture_lines(
     generator: &mut impl Rng,
 ) -> Vec<LineSegment> {
     let mut segments = Vec::new();
-    let mut point = |generator: &mut dyn Rng| {
+    let point = |generator: &mut dyn Rng| {
         [(generator.random::<f64>() - 0.5) * SIZE.0, (generator.random::<f64>() - 0.5) * SIZE.1]
     };
     for axis in 0..3 {

@@ -6,7 +6,7 @@ use trueup_core::geometry::{
 };
 use trueup_core::matches::PointMatch;
 
-use super::synthetic::{FOCAL_PX, SIZE, Scene, Sweep, World, joined, noise_rotation, picture_lines};
+use super::synthetic::{Scene, Sweep, World, joined, noise_rotation, picture_lines};
 use super::*;
 use crate::vanishing::rows_of;
 
@@ -296,9 +296,48 @@ fn a_clear_vertical_guides_alone_and_a_faint_one_does_not() {
 #[test]
 fn the_overlap_range_takes_the_shortest_arc() {
     let range = edge_range::TurnRange::around(&[3.1, -3.1, 3.0]).expect("three turns");
-    assert!((range.start - 3.0).abs() < 1e-12 && range.contains(3.14) && range.contains(-3.12));
+    assert!((range.start - 3.0).abs() < 1e-12 && range.contains(3.12) && range.contains(-3.12));
     assert!(!range.contains(-3.0) && !range.contains(0.0));
     assert!(edge_range::TurnRange::around(&[]).is_none());
+}
+
+/// The grid vertices of one camera carried into another.
+fn overlap(scene: &Scene, from: usize, to: usize) -> OverlapWarp {
+    let frame = scene.frames[from];
+    let grid = trueup_core::mesh::GridMesh::regular(frame.width, frame.height, 40.0);
+    let carry = |vertex| {
+        let place = scene.cameras[from].transfer(&scene.cameras[to], grid.source(vertex))?;
+        frame.contains(place.x, place.y).then(|| place.into())
+    };
+    OverlapWarp { from, to, vertices: (0..grid.len()).map(carry).collect() }
+}
+
+#[test]
+fn overlaps_keep_true_turns_and_correct_a_wrong_one() {
+    let sweep = Sweep { count: 2, yaw_step_deg: 20.0, ..Sweep::default() };
+    let scene = Scene::new(sweep, CLEAN, 0.0, 21);
+    let overlaps = [overlap(&scene, 0, 1), overlap(&scene, 1, 0)];
+    let input = PriorInput {
+        cameras: &scene.cameras,
+        triads: &scene.triads,
+        lines: &scene.lines,
+        frames: &scene.frames,
+        edges: &scene.edges,
+        overlaps: &overlaps,
+        cell_px: 40.0,
+        vanishing: &VanishingOptions::default(),
+        turn: 0.0,
+    };
+    let kept = edge_range::correct_by_edges(&input, &scene.roll);
+    for (theta, roll) in kept.iter().zip(&scene.roll) {
+        assert!((theta - roll).abs() < 1e-12);
+    }
+    let wrong = [scene.roll[0] - 0.5, scene.roll[1] + 0.5];
+    let corrected = edge_range::correct_by_edges(&input, &wrong);
+    let turn = wrap_angle(corrected[1] - corrected[0] - (scene.roll[1] - scene.roll[0]));
+    assert!(turn.abs() < 0.1, "{turn}");
+    // The mean, and with it the level of the panorama, stays.
+    assert!(((corrected[0] + corrected[1]) - (wrong[0] + wrong[1])).abs() < 1e-6);
 }
 
 #[test]
@@ -359,5 +398,4 @@ fn the_prior_is_the_same_on_one_and_two_threads() {
         pool.install(|| scene.prior(&SimilarityOptions::default()))
     };
     assert_eq!(with_threads(1), with_threads(2));
-    assert!(FOCAL_PX > 0.0 && SIZE.0 > SIZE.1);
 }

