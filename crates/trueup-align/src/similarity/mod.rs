@@ -23,6 +23,7 @@ mod tests;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
+use trueup_core::diagnostics::Diagnostic;
 use trueup_core::geometry::wrap_angle;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
@@ -201,6 +202,10 @@ impl SimilarityPrior {
     }
 }
 
+/// What a user can do when lines do not guide the panorama.
+const REFUSED_HINT: &str =
+    "The panorama is levelled by the cameras alone; pictures that show upright edges level it better";
+
 /// The stage's name in errors and generators.
 const STAGE: &str = "similarity";
 
@@ -210,7 +215,7 @@ const STAGE: &str = "similarity";
 ///
 /// # Errors
 /// [`Error::Unsolvable`] if there are no pictures, the lists differ in length, an edge names a picture that does not
-/// exist, or a camera is not finite; [`Error::Cancelled`].
+/// exist, a camera is not finite, or overlaps come without a usable grid; [`Error::Cancelled`].
 ///
 /// # Source
 /// The paper's sections on the vanishing point guided prior; see the modules for equations and departures.
@@ -225,6 +230,9 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
         PriorMethod::VanishingPoints => vpg::guide(input, &rotations, &straightened, &level, options, context)?,
         PriorMethod::Straightening => (vpg::unguided(input.cameras.len(), options), None),
     };
+    if let Some(clause) = guidance.failed_clause.as_ref().filter(|_| !guidance.used) {
+        context.report(Diagnostic::note("vanishing-guidance-refused", STAGE, clause, REFUSED_HINT));
+    }
     let guided = guided.unwrap_or_else(|| fallback(input, &rotations, &level));
     let level_from_world = straighten::level_from_world(&guided.down, &rotations);
     let mut guidance = guidance;
@@ -275,6 +283,10 @@ fn check(input: &PriorInput<'_>) -> Result<()> {
             && camera.focal_px.is_finite()
             && camera.camera_from_world.iter().flatten().all(|value| value.is_finite())
     };
+    let frame_is_sane = |frame: &WorkingFrame| frame.width > 0.0 && frame.height > 0.0 && frame.diagonal().is_finite();
+    if !input.overlaps.is_empty() && !(input.cell_px >= 1.0 && input.frames.iter().all(frame_is_sane)) {
+        return unsolvable(format!("there is no grid of cells of {} pixels on every picture", input.cell_px));
+    }
     match input.cameras.iter().position(|camera| !finite(camera)) {
         Some(index) => unsolvable(format!("camera {index} is not finite")),
         None => Ok(()),

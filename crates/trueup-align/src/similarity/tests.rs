@@ -235,11 +235,21 @@ fn missing() -> TriadOutcome {
 }
 
 #[test]
-fn malformed_input_is_an_error() {
+fn a_triad_that_is_not_finite_counts_as_missing() {
     let mut scene = Scene::new(Sweep::default(), CLEAN, 0.0, 0);
-    scene.cameras[2].focal_px = f64::NAN;
+    scene.triads[3] = synthetic::found(&Matrix3::from_element(f64::NAN));
+    let prior = scene.prior(&paper());
+    assert!(prior.guidance.used && prior.guidance.residuals[3].is_none());
+    assert!(max(&scene.errors_deg(&prior)) < 1e-6);
+}
+
+#[test]
+fn malformed_input_is_an_error() {
+    let scene = Scene::new(Sweep::default(), CLEAN, 0.0, 0);
+    let mut broken = scene.cameras.clone();
+    broken[2].focal_px = f64::NAN;
     let input = PriorInput {
-        cameras: &scene.cameras,
+        cameras: &broken,
         triads: &scene.triads,
         lines: &scene.lines,
         frames: &scene.frames,
@@ -251,6 +261,9 @@ fn malformed_input_is_an_error() {
     };
     let options = SimilarityOptions::default();
     assert!(run(&input, &options, &StageContext::default()).is_err());
+    let nowhere = [OverlapWarp { from: 0, to: 1, vertices: Vec::new() }];
+    let no_grid = PriorInput { cameras: &scene.cameras, overlaps: &nowhere, cell_px: 0.0, ..input };
+    assert!(run(&no_grid, &options, &StageContext::default()).is_err());
     let empty = PriorInput { cameras: &[], triads: &[], lines: &[], frames: &[], edges: &[], ..input };
     assert!(run(&empty, &options, &StageContext::default()).is_err());
 }

@@ -19,6 +19,8 @@ use crate::vanishing::{InterpretationPlanes, RefinedTriad, rows_of};
 
 /// Share of a picture's best score that its search near the dominant directions must reach to replace its triad.
 const REDETECTION_SHARE: f64 = 0.9;
+/// Farthest that the joint refinement may move the vertical, in tolerances of a segment's vote.
+const MAX_REFINEMENT_TOLERANCES: f64 = 2.0;
 /// Length of a solved vector below which its terms contradict each other.
 const CONTRADICTED: f64 = 0.1;
 
@@ -66,7 +68,10 @@ pub(super) fn guide(
     let triads = rotations
         .iter()
         .zip(input.triads)
-        .map(|(rotation, outcome)| outcome.triad().map(|triad| rotation.tr_mul(&triad.matrix())))
+        .map(|(rotation, outcome)| {
+            let matrix = outcome.triad()?.matrix();
+            matrix.iter().all(|value| value.is_finite()).then(|| rotation.tr_mul(&matrix))
+        })
         .collect();
     let mut scene = Scene { input, options, rotations, triads, vote: LineVote::new(rotations, &focals, planes) };
     context.check_cancelled()?;
@@ -162,25 +167,19 @@ impl Scene<'_> {
 
     /// The prior of accepted dominant directions.
     fn solve_dominant(&mut self, mut dominant: Dominant, guidance: &mut Guidance) -> Option<Upright> {
+        let axis_weights = self.axis_weights(&dominant.frame, guidance);
         if self.options.guided_redetection {
             self.redetect(&mut dominant);
             guidance.inliers = self.inliers(&dominant);
             guidance.residuals.clone_from(&dominant.residuals);
         }
-        let mut frame = dominant.frame;
         let has_lines = self.vote.total_weight() > 0.0;
-        if self.options.joint_refinement && has_lines {
-            let axis_weights = self.axis_weights(&frame, guidance);
-            frame = self.vote.refine_frame(&frame, &axis_weights, self.options);
-        }
+        let joint = has_lines && self.options.joint_refinement;
+        let frame = if joint { self.refined(&dominant.frame, &axis_weights) } else { dominant.frame };
         let down = vertical_of(&frame, self.rotations);
         guidance.dominant = Some(rows_of(&frame));
         guidance.used = true;
-        let own = if self.options.joint_refinement && has_lines {
-            self.common_rolls(&down)
-        } else {
-            self.own_rolls(&frame, &down, &guidance.inliers)
-        };
+        let own = if joint { self.common_rolls(&down) } else { self.own_rolls(&frame, &down, &guidance.inliers) };
         self.solve(&down, &own, guidance)
     }
 
@@ -195,6 +194,15 @@ impl Scene<'_> {
         let down = vertical_of(frame, self.rotations);
         let vertical = frame.tr_mul(&down).iamax();
         std::array::from_fn(|axis| if axis == vertical { 1.0 } else { horizontal })
+    }
+
+    /// The frame that all segments vote for, unless it left the neighbourhood of the pictures' own.
+    fn refined(&self, frame: &Matrix3<f64>, axis_weights: &[f64; 3]) -> Matrix3<f64> {
+        let refined = self.vote.refine_frame(frame, axis_weights, self.options);
+        let limit = MAX_REFINEMENT_TOLERANCES * self.options.joint_tolerance_deg.to_radians();
+        let (before, after) = (vertical_of(frame, self.rotations), vertical_of(&refined, self.rotations));
+        // A comparison with NaN is false: a refinement that is not finite is dropped too.
+        if before.angle(&after) <= limit { refined } else { *frame }
     }
 
     /// The prior of a vertical alone.
