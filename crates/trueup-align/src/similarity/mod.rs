@@ -284,7 +284,8 @@ fn check(input: &PriorInput<'_>) -> Result<()> {
             && camera.camera_from_world.iter().flatten().all(|value| value.is_finite())
     };
     let frame_is_sane = |frame: &WorkingFrame| frame.width > 0.0 && frame.height > 0.0 && frame.diagonal().is_finite();
-    if !input.overlaps.is_empty() && !(input.cell_px >= 1.0 && input.frames.iter().all(frame_is_sane)) {
+    let has_grid = input.cell_px >= 1.0 && input.frames.iter().all(frame_is_sane);
+    if !input.overlaps.is_empty() && !has_grid {
         return unsolvable(format!("there is no grid of cells of {} pixels on every picture", input.cell_px));
     }
     match input.cameras.iter().position(|camera| !finite(camera)) {
