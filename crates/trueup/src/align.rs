@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use trueup_align::cameras::{self, CameraPrior, Cameras};
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points;
-use trueup_align::mesh::{self, WantedSimilarity, WarpedMesh};
+use trueup_align::mesh::{self, Base, WantedSimilarity, WarpedMesh};
 use trueup_align::similarity::{self, PriorInput, SimilarityPrior};
 use trueup_align::stitch_graph::{GraphEdge, StitchGraph};
 use trueup_align::vanishing::{self, TriadOutcome};
@@ -147,10 +147,13 @@ pub(crate) fn run(
             warps.into_iter().filter(|warp| !severed(warp.from, warp.to)).collect()
         }
     };
-    let bases: Vec<_> = (0..grids.len())
+    let scaled_focal: f64 =
+        cameras.cameras.iter().zip(&prior.scale).map(|(camera, scale)| camera.focal_px * scale).sum();
+    let units_per_radian = scaled_focal / grids.len() as f64;
+    let bases: Vec<Base> = (0..grids.len())
         .map(|k| {
-            let wanted = WantedSimilarity { scale: prior.scale[k], theta: prior.theta[k] };
-            mesh::base_grid(options.mesh.base, &cameras.cameras[k], &grids[k], &prior.level_from_world(), wanted)
+            let wanted = WantedSimilarity { scale: prior.scale[k], theta: prior.theta[k], units_per_radian };
+            Base::new(options.mesh.base, &cameras.cameras[k], &grids[k], &prior.level_from_world(), wanted)
         })
         .collect();
     let mesh = clock.time("mesh", || mesh::run(&grids, &kept, &bases, component.reference, &options.mesh, context))?;

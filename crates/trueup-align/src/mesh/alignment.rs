@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
-use super::NormalEquations;
+use super::{Base, NormalEquations};
 use crate::match_points::OverlapWarp;
 
 /// A grid vertex of one picture and its place in another.
@@ -17,22 +17,32 @@ pub struct MatchPoint {
     pub to: usize,
     /// The place in it, in working pixels.
     pub place: [f64; 2],
+    /// How far the other picture's base is, at that place, from its bilinear interpolation.
+    pub sag: [f64; 2],
 }
 
 /// Sum over match points of |phi_from(vertex) - phi_to(place)|^2; paper equation for E_a.
+///
+/// # Departures
+/// phi is bilinear in the deviation from the base, not in the vertices themselves; with a base that is a similarity the
+/// two are the same. Otherwise the bilinear chords of two curved grids would pull on each other.
 #[derive(Debug)]
 pub struct AlignmentEnergy {
     points: Vec<MatchPoint>,
 }
 
 impl AlignmentEnergy {
-    /// The match points of all warps. `grids` bound the vertex counts.
-    pub fn new(grids: &[GridMesh], warps: &[OverlapWarp]) -> Self {
+    /// The match points of all warps. `places` are the bases' places of the grids' vertices.
+    pub fn new(grids: &[GridMesh], warps: &[OverlapWarp], bases: &[Base], places: &[Vec<Vector2<f64>>]) -> Self {
         let points = warps
             .iter()
             .flat_map(|warp| {
                 warp.vertices.iter().take(grids[warp.from].len()).enumerate().filter_map(|(vertex, place)| {
-                    place.map(|place| MatchPoint { from: warp.from, vertex, to: warp.to, place })
+                    let to = warp.to;
+                    place.map(|place| {
+                        let sag = bases[to].sag(&grids[to], &places[to], Vector2::from(place)).into();
+                        MatchPoint { from: warp.from, vertex, to, place, sag }
+                    })
                 })
             })
             .collect();
@@ -44,7 +54,8 @@ impl AlignmentEnergy {
         for point in &self.points {
             let (corners, shares) = grids[point.to].bilinear(Vector2::from(point.place));
             let to: [(usize, f64); 4] = std::array::from_fn(|k| (corners[k], -shares[k]));
-            equations.add_between((point.from, &[(point.vertex, 1.0)]), (point.to, &to), weight * weight);
+            let value = Vector2::from(point.sag);
+            equations.add_between((point.from, &[(point.vertex, 1.0)]), (point.to, &to), value, weight * weight);
         }
     }
 
@@ -69,7 +80,7 @@ impl AlignmentEnergy {
             .iter()
             .map(|point| {
                 let vertex = Vector2::from(meshes[point.from].target[point.vertex]);
-                (vertex - meshes[point.to].warp(Vector2::from(point.place))).norm_squared()
+                (vertex - meshes[point.to].warp(Vector2::from(point.place)) - Vector2::from(point.sag)).norm_squared()
             })
             .sum();
         (sum / self.points.len().max(1) as f64).sqrt()

@@ -25,56 +25,108 @@ pub struct WantedSimilarity {
     pub scale: f64,
     /// Clockwise rotation theta_i in radians.
     pub theta: f64,
+    /// Panorama units per radian of the sphere, the same for all pictures: the mean of s_i f_i.
+    pub units_per_radian: f64,
 }
 
-/// The base grid of one picture, in panorama units, up to translation: the undeformed `grid` on the level sphere, turned
-/// and scaled about the picture's centre so that its similarity there is `wanted`.
-///
-/// A picture that reaches within 20 degrees of a pole cannot be unrolled; it gets the plain similarity.
+/// The base of one picture: a smooth map from its pixels to panorama units, up to translation.
 ///
 /// # Departures
 /// The published prior is one similarity per picture. Pictures that look up cannot follow it: their overlaps meet along
 /// meridians that converge, and the compromise tilts every picture's own verticals. The sphere's own shape satisfies the
 /// overlaps and the prior at once; where the view is narrow or level it differs little from the similarity.
-pub fn base_grid(
-    shape: BaseShape,
-    camera: &Camera,
-    grid: &GridMesh,
-    level_from_world: &Matrix3<f64>,
-    wanted: WantedSimilarity,
-) -> Vec<Vector2<f64>> {
-    let similarity = Vector2::new(wanted.theta.cos(), wanted.theta.sin()) * wanted.scale;
-    let plain = || (0..grid.len()).map(|vertex| product(similarity, grid.source(vertex))).collect();
-    if shape == BaseShape::Similarity {
-        return plain();
-    }
-    let level_from_camera = level_from_world * camera.rotation().transpose();
-    let forward: Vector3<f64> = level_from_camera.column(2).into_owned();
-    let project = |vertex: usize| {
-        let ray = level_from_camera * camera.bearing(grid.source(vertex));
-        unrolled(shape, &ray, &forward)
-    };
-    let Some(unrolled) = (0..grid.len()).map(project).collect::<Option<Vec<_>>>() else { return plain() };
-    let at_centre = derivative_at_centre(shape, &level_from_camera, camera.focal_px);
-    let turn = product(similarity, Vector2::new(at_centre.x, -at_centre.y)) / at_centre.norm_squared();
-    unrolled.into_iter().map(|place| product(turn, place)).collect()
+#[derive(Debug, Clone)]
+pub struct Base {
+    /// Factor on the unrolled sphere, or on the picture itself, as a complex number.
+    factor: Vector2<f64>,
+    sphere: Option<SphereView>,
 }
 
-/// Longitude relative to `forward` and (projected) latitude of a ray; `None` near the poles.
-fn unrolled(shape: BaseShape, ray: &Vector3<f64>, forward: &Vector3<f64>) -> Option<Vector2<f64>> {
-    /// Sine of the largest latitude that is unrolled, 70 degrees.
-    const STEEPEST: f64 = 0.94;
-    let horizontal = ray.x.hypot(ray.z);
-    let sine = ray.y / ray.norm();
-    if sine.abs() > STEEPEST || forward.y.abs() > STEEPEST {
-        return None;
+/// A picture on the level sphere.
+#[derive(Debug, Clone)]
+struct SphereView {
+    shape: BaseShape,
+    camera: Camera,
+    level_from_camera: Matrix3<f64>,
+    forward: Vector3<f64>,
+}
+
+impl Base {
+    /// The base of a picture: on the level sphere, turned so that its rotation at the picture's centre is the wanted one.
+    /// A picture that reaches within 20 degrees of a pole cannot be unrolled; it gets the plain similarity.
+    pub fn new(
+        shape: BaseShape,
+        camera: &Camera,
+        grid: &GridMesh,
+        level_from_world: &Matrix3<f64>,
+        wanted: WantedSimilarity,
+    ) -> Self {
+        let similarity = Vector2::new(wanted.theta.cos(), wanted.theta.sin()) * wanted.scale;
+        let plain = Self { factor: similarity, sphere: None };
+        if shape == BaseShape::Similarity {
+            return plain;
+        }
+        let level_from_camera = level_from_world * camera.rotation().transpose();
+        let forward: Vector3<f64> = level_from_camera.column(2).into_owned();
+        let view = SphereView { shape, camera: *camera, level_from_camera, forward };
+        if !(0..grid.len()).all(|vertex| view.is_moderate(grid.source(vertex))) {
+            return plain;
+        }
+        let at_centre = derivative_at_centre(shape, &level_from_camera, camera.focal_px);
+        let turn = product(similarity, Vector2::new(at_centre.x, -at_centre.y)).normalize();
+        Self { factor: turn * wanted.units_per_radian, sphere: Some(view) }
     }
-    let longitude = (ray.x * forward.z - ray.z * forward.x).atan2(ray.x * forward.x + ray.z * forward.z);
-    let latitude = match shape {
-        BaseShape::Mercator => (ray.y / horizontal).asinh(),
-        _ => ray.y.atan2(horizontal),
-    };
-    Some(Vector2::new(longitude, latitude))
+
+    /// The plain similarity of a picture.
+    pub fn similarity(scale: f64, theta: f64) -> Self {
+        Self { factor: Vector2::new(scale * theta.cos(), scale * theta.sin()), sphere: None }
+    }
+
+    /// The place of a pixel.
+    pub fn at(&self, pixel: Vector2<f64>) -> Vector2<f64> {
+        product(self.factor, self.sphere.as_ref().map_or(pixel, |view| view.unrolled(pixel)))
+    }
+
+    /// The places of all vertices of a grid, row-major.
+    pub fn places(&self, grid: &GridMesh) -> Vec<Vector2<f64>> {
+        (0..grid.len()).map(|vertex| self.at(grid.source(vertex))).collect()
+    }
+
+    /// How far the base at `pixel` is from its own bilinear interpolation over the grid's cell, whose `places` are given.
+    pub fn sag(&self, grid: &GridMesh, places: &[Vector2<f64>], pixel: Vector2<f64>) -> Vector2<f64> {
+        if self.sphere.is_none() {
+            return Vector2::zeros();
+        }
+        let (corners, shares) = grid.bilinear(pixel);
+        let straight = (0..4).fold(Vector2::zeros(), |sum, k| sum + places[corners[k]] * shares[k]);
+        self.at(pixel) - straight
+    }
+}
+
+impl SphereView {
+    fn ray(&self, pixel: Vector2<f64>) -> Vector3<f64> {
+        self.level_from_camera * self.camera.bearing(pixel)
+    }
+
+    /// Whether a pixel, and the picture's centre, are far enough from the poles.
+    fn is_moderate(&self, pixel: Vector2<f64>) -> bool {
+        /// Sine of the largest latitude that is unrolled, 70 degrees.
+        const STEEPEST: f64 = 0.94;
+        let ray = self.ray(pixel);
+        (ray.y / ray.norm()).abs() <= STEEPEST && self.forward.y.abs() <= STEEPEST
+    }
+
+    /// Longitude relative to the viewing direction and (projected) latitude of a pixel.
+    fn unrolled(&self, pixel: Vector2<f64>) -> Vector2<f64> {
+        let (ray, forward) = (self.ray(pixel), &self.forward);
+        let horizontal = ray.x.hypot(ray.z);
+        let longitude = (ray.x * forward.z - ray.z * forward.x).atan2(ray.x * forward.x + ray.z * forward.z);
+        let latitude = match self.shape {
+            BaseShape::Mercator => (ray.y / horizontal).asinh(),
+            _ => ray.y.atan2(horizontal),
+        };
+        Vector2::new(longitude, latitude)
+    }
 }
 
 /// The similarity closest to the projection's derivative at the picture's centre, per pixel.
@@ -117,8 +169,8 @@ mod tests {
         let grid = GridMesh::regular(800.0, 600.0, 2.0);
         for shape in [BaseShape::Sphere, BaseShape::Mercator] {
             let camera = camera(0.7, -0.4, 0.2);
-            let wanted = WantedSimilarity { scale: 1.5, theta: 0.2 };
-            let base = base_grid(shape, &camera, &grid, &Matrix3::identity(), wanted);
+            let wanted = WantedSimilarity { scale: 1.0, theta: 0.2, units_per_radian: 700.0 };
+            let base = Base::new(shape, &camera, &grid, &Matrix3::identity(), wanted).places(&grid);
             // Down in the picture is (sin roll, cos roll) where the camera's roll is 0.2.
             let centre = grid.columns * (grid.rows / 2) + grid.columns / 2;
             let down = Vector2::new(0.2_f64.sin(), 0.2_f64.cos());
@@ -132,8 +184,9 @@ mod tests {
     #[test]
     fn pictures_near_a_pole_get_the_plain_similarity() {
         let grid = GridMesh::regular(800.0, 600.0, 40.0);
-        let wanted = WantedSimilarity { scale: 1.0, theta: 0.0 };
-        let base = base_grid(BaseShape::Sphere, &camera(0.0, -1.3, 0.0), &grid, &Matrix3::identity(), wanted);
+        let wanted = WantedSimilarity { scale: 1.0, theta: 0.0, units_per_radian: 700.0 };
+        let base =
+            Base::new(BaseShape::Sphere, &camera(0.0, -1.3, 0.0), &grid, &Matrix3::identity(), wanted).places(&grid);
         assert!((base[grid.len() - 1] - grid.source(grid.len() - 1)).norm() < 1e-9);
     }
 }

@@ -18,7 +18,7 @@ use trueup_core::{Error, Result, StageContext};
 
 use crate::match_points::OverlapWarp;
 pub use alignment::{AlignmentEnergy, MatchPoint};
-pub use base::{BaseShape, WantedSimilarity, base_grid};
+pub use base::{Base, BaseShape, WantedSimilarity};
 pub use normal_equations::NormalEquations;
 pub use similarity::SimilarityEnergy;
 
@@ -29,6 +29,9 @@ trueup_core::options! {
         cell_px: f64 = 40.0, between(4.0, 1000.0), "working px";
         /// The shape that the similarity prior asks of each picture.
         base: BaseShape = BaseShape::Sphere, Allowed::Any, "";
+        /// Cells of the delivered grid per cell of the solved one, along each axis: the finer grid follows the base's
+        /// curves between the solved vertices.
+        subdivision: usize = 2, between(1.0, 16.0), "";
         /// Weight of the alignment of overlaps.
         alignment_weight: f64 = 1.0, between(0.0, 1000.0), "";
         /// Weight of local similarity (on residuals).
@@ -59,7 +62,7 @@ pub struct WarpedMesh {
 /// Deforms the undeformed `grids` so that overlaps align and every edge keeps to its picture's base.
 ///
 /// * `warps`: match points, two directions a pair; pairs across the cut of a full turn are left out by the caller.
-/// * `bases`: for every picture the places of its vertices, up to translation, that the prior asks for ([`base_grid`]).
+/// * `bases`: for every picture the shape that the prior asks for.
 /// * `reference`: the picture whose first vertex stays in place (translation is otherwise free).
 ///
 /// # Errors
@@ -68,7 +71,7 @@ pub struct WarpedMesh {
 pub fn run(
     grids: &[GridMesh],
     warps: &[OverlapWarp],
-    bases: &[Vec<Vector2<f64>>],
+    bases: &[Base],
     reference: usize,
     options: &MeshOptions,
     context: &StageContext,
@@ -77,11 +80,12 @@ pub fn run(
     const ANCHOR_WEIGHT: f64 = 1.0;
     context.check_cancelled()?;
     let mut equations = NormalEquations::new(grids);
-    let alignment = AlignmentEnergy::new(grids, warps);
+    let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(grids).map(|(base, grid)| base.places(grid)).collect();
+    let alignment = AlignmentEnergy::new(grids, warps, bases, &places);
     alignment.add(options.alignment_weight, &mut equations, grids);
     let overlap = alignment.overlap_cells(grids);
     for (picture, grid) in grids.iter().enumerate() {
-        SimilarityEnergy::new(grid, &bases[picture], &overlap[picture], options).add(picture, &mut equations);
+        SimilarityEnergy::new(grid, &places[picture], &overlap[picture], options).add(picture, &mut equations);
     }
     let anchored = anchors(grids.len(), warps, reference);
     for picture in anchored {
@@ -101,10 +105,25 @@ pub fn run(
     if !solution.iter().all(|coordinate| coordinate.is_finite()) {
         return Err(unsolvable("the solution is not finite"));
     }
-    let meshes = equations.meshes(grids, &solution);
-    let alignment_rms = alignment.rms(&meshes);
+    let solved = equations.meshes(grids, &solution);
+    let alignment_rms = alignment.rms(&solved);
+    let meshes: Vec<GridMesh> =
+        (0..grids.len()).map(|k| subdivided(&solved[k], &bases[k], &places[k], options.subdivision)).collect();
     let folds = meshes.iter().map(count_folds).sum();
     Ok(WarpedMesh { meshes, alignment_rms, folds, relative_gradient })
+}
+
+/// A solved grid with more vertices: the base's own curves plus the bilinear deviation from it.
+fn subdivided(solved: &GridMesh, base: &Base, places: &[Vector2<f64>], factor: usize) -> GridMesh {
+    let mut fine = GridMesh {
+        rows: (solved.rows - 1) * factor + 1,
+        columns: (solved.columns - 1) * factor + 1,
+        target: Vec::new(),
+        ..*solved
+    };
+    let place = |pixel: Vector2<f64>| solved.warp(pixel) + base.sag(solved, places, pixel);
+    fine.target = (0..fine.len()).map(|vertex| place(fine.source(vertex)).into()).collect();
+    fine
 }
 
 /// One picture of every part that the warps connect: the reference where it is a member, else the first.

@@ -73,16 +73,20 @@ impl NormalEquations {
         }
     }
 
-    /// Adds |sum_m weight_m v_m|^2 for vertices of two different grids with real weights; the first `(picture, vertex)`
+    /// Adds squared_weight |sum_m weight_m v_m - value|^2 for vertices of two different grids with real weights; the first `(picture, vertex)`
     /// list and the second must belong to one grid each.
     pub fn add_between(
         &mut self,
         first: (usize, &[(usize, f64)]),
         second: (usize, &[(usize, f64)]),
+        value: Vector2<f64>,
         squared_weight: f64,
     ) {
         for (picture, members) in [first, second] {
             for &(m, weight_m) in members {
+                let unknown = 2 * (self.first[picture] + m);
+                self.right[unknown] += squared_weight * weight_m * value.x;
+                self.right[unknown + 1] += squared_weight * weight_m * value.y;
                 for &(n, weight_n) in members {
                     if n <= m {
                         let product = squared_weight * weight_m * weight_n;

@@ -61,6 +61,8 @@ trueup_core::options! {
         max_points: usize = 8000, between(1.0, 1_000_000.0), "points";
         /// Whether the picture is doubled first, which finds finer detail for four times the work.
         double_image: bool = false, Allowed::Any, "";
+        /// A picture with fewer points than this is searched again, doubled; 0 for never.
+        sparse_points: usize = 1000, between(0.0, 1_000_000.0), "points";
         /// Scales sampled in each doubling of scale.
         levels_per_octave: usize = 3, between(1.0, 8.0), "levels";
         /// Blur of the first level of each octave, in the octave's samples.
@@ -101,7 +103,18 @@ const NEIGHBOUR_ROWS: usize = 16;
 /// Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004. RootSIFT: Arandjelovic and
 /// Zisserman, "Three things everyone should know to improve object retrieval", CVPR 2012.
 pub fn detect(image: &Raster<f32>, options: &FeatureOptions, context: &StageContext) -> Result<Features> {
-    detect_with(image, options, context, InstructionSet::detect())
+    let instructions = InstructionSet::detect();
+    let features = detect_with(image, options, context, instructions)?;
+    if options.double_image || features.points.len() >= options.sparse_points || !may_double(image) {
+        return Ok(features);
+    }
+    let doubled = FeatureOptions { double_image: true, ..options.clone() };
+    detect_with(image, &doubled, context, instructions)
+}
+
+/// Whether the doubled picture is within the limit.
+fn may_double(image: &Raster<f32>) -> bool {
+    image.width().saturating_mul(image.height()) <= MAX_PIXELS / 4
 }
 
 fn detect_with(
