@@ -1,2 +1,39 @@
 //! Pictures with exactly known cameras: rendered scenes for examples, tests and experiments.
+//!
+//! A [`Scene`] (a room, a street, or open country) is built from a seed; [`rig`] places the cameras of a hand-held
+//! panorama in it; [`render`] takes the photographs and [`write_set`] stores them with their truth.
+//!
+//! ```
+//! use trueup_scenes::{LightQuality, Quality, RigOptions, Scene, SceneOptions, render, rig};
+//! let scene = Scene::new(&SceneOptions { light: LightQuality::Fast, ..SceneOptions::default() })?;
+//! let cameras = rig(&RigOptions { width: 32, height: 24, ..RigOptions::default() }, &scene.viewpoint())?;
+//! let picture = render(&scene, &cameras[0], Quality::Preview);
+//! assert_eq!((picture.width(), picture.height(), picture.channels()), (32, 24, 3));
+//! # Ok::<(), trueup_core::Error>(())
+//! ```
+//!
+//! The world's y points down and, where a scene has Manhattan directions, they are the world's axes. Everything is
+//! drawn by rule: there are no asset files.
 #![forbid(unsafe_code)]
+
+mod bvh;
+mod colour;
+mod dice;
+mod light;
+mod material;
+mod noise;
+mod render;
+mod rig;
+mod scene;
+mod set;
+mod sky;
+mod solid;
+mod study;
+#[cfg(test)]
+mod tests;
+
+pub use render::{Quality, depth_map, render};
+pub use rig::{PosedCamera, RigOptions, camera_from_world, rig};
+pub use scene::{LightQuality, Scene, SceneKind, SceneOptions, Viewpoint};
+pub use set::{ImageTruth, JPEG_QUALITY, Truth, write_set};
+pub use study::{example_set, study_set};

@@ -1,0 +1,204 @@
+//! Printed and painted matter: lettering, book spines, posters, pictures.
+
+use nalgebra::Vector3;
+
+use super::{Material, Spot};
+use crate::colour::{Rgb, by_hue, luminance, mix, srgb};
+use crate::noise::{band, edge, fractal_noise, lattice, lerp, pulse};
+
+/// Capital letters on a grid of 3 x 5, rows from the top, the left column in the highest bit of three.
+const LETTERS: [u16; 26] = [
+    0b010_101_111_101_101,
+    0b110_101_110_101_110,
+    0b011_100_100_100_011,
+    0b110_101_101_101_110,
+    0b111_100_110_100_111,
+    0b111_100_110_100_100,
+    0b011_100_101_101_011,
+    0b101_101_111_101_101,
+    0b111_010_010_010_111,
+    0b001_001_001_101_010,
+    0b101_101_110_101_101,
+    0b100_100_100_100_111,
+    0b101_111_111_101_101,
+    0b110_101_101_101_101,
+    0b111_101_101_101_111,
+    0b110_101_110_100_100,
+    0b111_101_101_110_011,
+    0b110_101_110_101_101,
+    0b011_100_010_001_110,
+    0b111_010_010_010_010,
+    0b101_101_101_101_111,
+    0b101_101_101_101_010,
+    0b101_101_111_111_101,
+    0b101_101_010_101_101,
+    0b101_101_010_010_010,
+    0b111_001_010_100_111,
+];
+
+/// Words for signs.
+const WORDS: [&str; 16] = [
+    "BAKERY", "BOOKS", "CAFE", "HOTEL", "FLOWERS", "BANK", "OPTICS", "MUSIC", "TAILOR", "WINE", "THEATRE", "SHOES",
+    "PHARMACY", "CLOCKS", "MUSEUM", "BICYCLES",
+];
+
+/// What bookbinders like.
+const CLOTHS: [u32; 18] = [
+    0x7a_2a26, 0x22_3450, 0x2c_4c38, 0x9a_7848, 0xdc_d0b4, 0x2a_2624, 0x5c_4030, 0x8a_8880, 0xb0_4a30, 0xe4_e0d8,
+    0x3c_5c78, 0xc8_a050, 0x50_2834, 0x6a_7c5c, 0xc0_b498, 0x1c_2c30, 0xa8_3840, 0xf0_e8d0,
+];
+
+/// Coverage of a letter at (x, y) in [0, 1] of its cell of 4 x 6 grid units (one unit of margin right and below).
+fn letter(index: usize, x: f64, y: f64) -> f64 {
+    let (column, row) = ((x * 4.0).floor(), (y * 6.0).floor());
+    if !(0.0..3.0).contains(&column) || !(0.0..5.0).contains(&row) {
+        return 0.0;
+    }
+    let bit = 14 - (row as usize * 3 + column as usize);
+    f64::from((LETTERS[index % 26] >> bit) & 1)
+}
+
+/// Coverage of lines of random words in cells of `height` metres at (x, y) metres.
+fn text(x: f64, y: f64, height: f64, footprint: f64, seed: u32) -> f64 {
+    let width = 0.7 * height;
+    let (column, row) = ((x / width).floor(), (y / height).floor());
+    let chance = |k| lattice(column as i64, row as i64, k, seed);
+    if chance(0) < 0.16 {
+        return 0.0;
+    }
+    let drawn = letter((chance(1) * 26.0) as usize, x / width - column, 1.3 * (y / height - row));
+    // Too small to read: the grey that print has from afar.
+    lerp(drawn, 0.3, (3.0 * footprint / height).min(1.0))
+}
+
+pub(super) fn sign(material: &Material, spot: &Spot) -> Rgb {
+    let word = WORDS[((spot.chance(1) * WORDS.len() as f64) as usize).min(WORDS.len() - 1)];
+    let [width, height] = spot.size;
+    let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);
+    let rim = x.min(width - x).min(y).min(height - y);
+    let size = (0.62 * height).min(0.9 * width / (0.66 * word.len() as f64));
+    let (left, top) = (0.5 * (width - 0.66 * size * word.len() as f64), 0.5 * (height - 0.83 * size));
+    let cell = (x - left) / (0.66 * size);
+    let drawn = word
+        .as_bytes()
+        .get(cell.floor().max(0.0) as usize)
+        .filter(|_| cell >= 0.0)
+        .map_or(0.0, |&byte| letter(usize::from(byte - b'A'), cell.fract(), (y - top) / size));
+    let border = band(rim, 0.03, 0.045, spot.footprint);
+    let base = material.colours[0] * (1.0 + 0.08 * spot.noise(0.2, 5, 0.6, 201));
+    mix(base, material.colours[1], drawn.max(border))
+}
+
+pub(super) fn page(material: &Material, spot: &Spot) -> Rgb {
+    let [width, height] = spot.size;
+    let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);
+    let margin = 0.08 * width;
+    let inside = band(x, margin, width - margin, spot.footprint) * band(y, margin, height - margin, spot.footprint);
+    let hue = spot.chance(4);
+    let head = text(x - margin, y - margin, 0.16 * height, spot.footprint, spot.seed ^ 1)
+        * band(y, margin, 0.3 * height, 1e-4);
+    let picture = band(y, 0.32 * height, 0.6 * height, spot.footprint);
+    let body = text(x - margin, y, 0.028 * height, spot.footprint, spot.seed ^ 2) * edge(y, 0.63 * height, 1e-4);
+    let print = fractal_noise(spot.point, 0.2 * height, 5, 0.6, spot.footprint, spot.seed ^ 3);
+    let paper = material.colours[0] * (1.0 + 0.04 * spot.noise(0.05, 4, 0.6, 211));
+    let image = by_hue(hue + 0.3 * print, 0.6, 0.6 + 0.4 * print);
+    let colour = mix(paper, image, picture * inside);
+    mix(colour, mix(material.colours[1], by_hue(hue, 0.8, 0.5), 0.5), head.max(body) * inside)
+}
+
+pub(super) fn spine(material: &Material, spot: &Spot) -> Rgb {
+    let [width, height] = spot.size;
+    let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);
+    let chance = |k| spot.chance(k);
+    let cloth =
+        srgb(CLOTHS[((chance(1) * CLOTHS.len() as f64) as usize).min(CLOTHS.len() - 1)]) * lerp(0.7, 1.3, chance(2));
+    let ink = if luminance(cloth) > 0.25 { srgb(0x24_2220) } else { srgb(0xe8_d9a0) };
+    let soft = spot.footprint;
+    let lines =
+        [0.08, 0.11, 0.86, 0.9].iter().map(|&at| band(y, at * height, at * height + 0.004, soft)).fold(0.0, f64::max);
+    let label =
+        band(y, 0.16 * height, lerp(0.3, 0.45, chance(4)) * height, soft) * f64::from(u8::from(chance(5) < 0.5));
+    let label_colour = by_hue(chance(6), 0.6, lerp(0.2, 0.8, chance(7)));
+    // Lettering runs down the spine.
+    let size = (0.55 * width).min(0.03);
+    let inside = band(y, 0.2 * height, 0.8 * height, 1e-4) * band(x, 0.5 * (width - size), 0.5 * (width + size), 1e-4);
+    let title = text(y, width - x - 0.5 * (width - size), size, soft, spot.seed) * inside;
+    let rounding = 1.0 - 0.45 * (2.0 * spot.unit[0] - 1.0).powi(4);
+    let mut colour = mix(cloth, label_colour, label);
+    colour = mix(colour, ink, lines.max(0.9 * title));
+    colour.component_mul(&material.colours[0]) * rounding * (1.0 + 0.14 * spot.noise(0.01, 3, 0.8, 221))
+}
+
+pub(super) fn picture(spot: &Spot) -> Rgb {
+    let painted = match (spot.chance(1) * 4.0) as u32 {
+        0 => blocks(spot),
+        1 => discs(spot),
+        _ => landscape(spot),
+    };
+    painted * (1.0 + 0.1 * spot.noise(0.01, 3, 0.8, 231))
+}
+
+/// Hills behind hills under an evening sky.
+fn landscape(spot: &Spot) -> Rgb {
+    let aspect = spot.size[0] / spot.size[1].max(1e-3);
+    let [x, y] = [spot.unit[0] * aspect, spot.unit[1]];
+    let (soft, seed) = (spot.footprint / spot.size[1].max(1e-3), spot.seed);
+    let noise = |scale: f64, octaves, salt: u32, squash: f64| {
+        fractal_noise(Vector3::new(x, y * squash, 0.0), scale, octaves, 0.55, soft, seed ^ salt)
+    };
+    let hue = spot.chance(2);
+    let mut colour = mix(by_hue(0.58, 0.5, 0.8), by_hue(0.08 + 0.1 * hue, 0.45, 1.0), (1.6 * y).min(1.0));
+    colour = mix(colour, srgb(0xff_f4e0), (0.9 * noise(0.5, 5, 1, 2.5)).clamp(0.0, 0.8));
+    let (sun_x, sun_y) = (aspect * lerp(0.15, 0.85, spot.chance(3)), lerp(0.15, 0.35, spot.chance(4)));
+    colour = mix(colour, srgb(0xff_f0b0), 1.0 - edge((x - sun_x).hypot(y - sun_y), 0.06, soft));
+    for layer in 0..5_u32 {
+        let depth = f64::from(layer) / 4.0;
+        let ridge =
+            |salt| fractal_noise(Vector3::new(x, 7.0 * depth, 0.0), 0.9 - 0.5 * depth, 6, 0.5, soft, seed ^ salt);
+        let height = 0.42 + 0.13 * f64::from(layer) - 0.12 * ridge(10 + layer);
+        let tint = by_hue(lerp(0.6, 0.25 + 0.15 * hue, depth), lerp(0.25, 0.65, depth), lerp(0.75, 0.35, depth));
+        let relief = 1.0 + 0.6 * noise(0.12, 5, 20 + layer, 1.0 + 2.0 * depth);
+        colour = mix(colour, tint * relief, edge(y, height, soft));
+    }
+    colour
+}
+
+/// Coloured fields between black bars: a rectangle split again and again.
+fn blocks(spot: &Spot) -> Rgb {
+    let (mut low, mut high) = ([0.0, 0.0], [spot.size[0], spot.size[1]]);
+    let at = [spot.unit[0] * spot.size[0], spot.unit[1] * spot.size[1]];
+    let (mut path, mut bar) = (1_i64, 0.0_f64);
+    for level in 0..6 {
+        let axis = usize::from(high[1] - low[1] > high[0] - low[0]);
+        let cut = lerp(low[axis], high[axis], lerp(0.3, 0.7, lattice(path, level, 0, spot.seed)));
+        bar = bar.max(band(at[axis], cut - 0.006, cut + 0.006, spot.footprint));
+        let right = at[axis] > cut;
+        if right {
+            low[axis] = cut
+        } else {
+            high[axis] = cut
+        }
+        path = 2 * path + i64::from(right);
+    }
+    let chance = |k| lattice(path, 9, k, spot.seed);
+    let pale = srgb(0xee_e8da);
+    let field =
+        if chance(0) < 0.35 { pale } else { by_hue(chance(1), lerp(0.4, 0.9, chance(2)), lerp(0.4, 0.95, chance(3))) };
+    mix(field * (1.0 + 0.12 * spot.noise(0.06, 4, 0.6, 241)), srgb(0x1c_1a1a), bar)
+}
+
+/// Overlapping rings on a pale ground.
+fn discs(spot: &Spot) -> Rgb {
+    let [x, y] = [spot.unit[0] * spot.size[0], spot.unit[1] * spot.size[1]];
+    let mut colour = mix(srgb(0xf0_e6d2), srgb(0xc8_d4d8), spot.chance(2));
+    for k in 0..14 {
+        let chance = |salt| lattice(k, 40, salt, spot.seed);
+        let radius = spot.size[1] * lerp(0.05, 0.28, chance(0) * chance(0));
+        let distance = (x - chance(1) * spot.size[0]).hypot(y - chance(2) * spot.size[1]);
+        let tint = by_hue(chance(3), 0.7, lerp(0.35, 0.95, chance(4)));
+        let disc = 1.0 - edge(distance, radius, spot.footprint);
+        let rings = pulse(distance, 0.12 * radius, 0.3 * radius, spot.footprint);
+        colour = mix(colour, tint * (1.0 - 0.5 * rings), 0.85 * disc);
+    }
+    colour * (1.0 + 0.1 * spot.noise(0.08, 5, 0.6, 251))
+}

@@ -1,0 +1,104 @@
+//! Puts bodies together.
+
+use nalgebra::Vector3;
+use trueup_core::geometry::rotation_about_y;
+
+use crate::dice::Dice;
+use crate::light::Portal;
+use crate::material::{Material, MaterialId};
+use crate::sky::{Sky, Sun};
+use crate::solid::{Shape, Solid};
+
+/// A scene under construction. The y axis points down: heights are negative.
+#[derive(Debug)]
+pub(crate) struct Builder {
+    pub(crate) solids: Vec<Solid>,
+    pub(crate) materials: Vec<Material>,
+    pub(crate) portals: Vec<Portal>,
+    pub(crate) sky: Sky,
+    pub(crate) sun: Option<Sun>,
+    pub(crate) eye: Vector3<f64>,
+    pub(crate) yaw_deg: f64,
+    pub(crate) dice: Dice,
+}
+
+impl Builder {
+    pub(crate) fn new(seed: u64, stream: u64) -> Self {
+        let mut dice = Dice::new(seed, stream);
+        let sky = Sky { seed: dice.texture_seed(), clouds: dice.range(0.3, 0.6), brightness: 1.0 };
+        Self {
+            solids: Vec::new(),
+            materials: Vec::new(),
+            portals: Vec::new(),
+            sky,
+            sun: None,
+            eye: Vector3::new(0.0, -1.55, 0.0),
+            yaw_deg: 0.0,
+            dice,
+        }
+    }
+
+    pub(crate) fn material(&mut self, material: Material) -> MaterialId {
+        self.materials.push(material);
+        self.materials.len() - 1
+    }
+
+    fn push(&mut self, shape: Shape, centre: Vector3<f64>, half: Vector3<f64>, material: MaterialId) -> &mut Solid {
+        const THINNEST_M: f64 = 1e-3;
+        let solid = Solid {
+            shape,
+            centre,
+            half: half.map(|extent| extent.max(THINNEST_M)),
+            world_from_body: None,
+            faces: [material; 6],
+            texture_centre: centre,
+            seed: self.dice.texture_seed(),
+        };
+        self.solids.push(solid);
+        let last = self.solids.len() - 1;
+        &mut self.solids[last]
+    }
+
+    /// A block between two corners whose texture is fixed to the world, so that it runs on into its neighbours'.
+    pub(crate) fn block(&mut self, [a, b]: [Vector3<f64>; 2], material: MaterialId) -> &mut Solid {
+        self.push(Shape::Block, (a + b) / 2.0, ((b - a) / 2.0).abs(), material)
+    }
+
+    /// A block between two corners with a texture of its own.
+    pub(crate) fn piece(&mut self, corners: [Vector3<f64>; 2], material: MaterialId) -> &mut Solid {
+        let offset = Vector3::new(self.dice.range(-9.0, 9.0), self.dice.range(-9.0, 9.0), self.dice.range(-9.0, 9.0));
+        let solid = self.block(corners, material);
+        solid.texture_centre = offset;
+        solid
+    }
+
+    /// A block turned about the vertical by `yaw` radians.
+    pub(crate) fn turned(
+        &mut self,
+        centre: Vector3<f64>,
+        half: Vector3<f64>,
+        yaw: f64,
+        material: MaterialId,
+    ) -> &mut Solid {
+        let solid = self.push(Shape::Block, centre, half, material);
+        solid.world_from_body = Some(rotation_about_y(yaw));
+        solid
+    }
+
+    /// An upright cylinder standing at `foot`.
+    pub(crate) fn cylinder(
+        &mut self,
+        foot: Vector3<f64>,
+        radius: f64,
+        height: f64,
+        material: MaterialId,
+    ) -> &mut Solid {
+        let centre = foot - Vector3::new(0.0, height / 2.0, 0.0);
+        self.push(Shape::Cylinder, centre, Vector3::new(radius, height / 2.0, radius), material)
+    }
+
+    /// An ellipsoid.
+    pub(crate) fn ellipsoid(&mut self, centre: Vector3<f64>, half: Vector3<f64>, material: MaterialId) -> &mut Solid {
+        self.push(Shape::Ellipsoid, centre, half, material)
+    }
+}

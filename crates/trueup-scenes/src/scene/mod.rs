@@ -1,0 +1,192 @@
+//! Scenes: bodies, materials, light, and the place from which to photograph them.
+
+mod builder;
+mod furniture;
+mod nature;
+mod room;
+mod street;
+mod wall;
+
+use nalgebra::Vector3;
+use trueup_core::options::StageOptions;
+use trueup_core::{Error, Result};
+
+use crate::bvh::{Hierarchy, Ray};
+use crate::colour::{Rgb, luminance};
+use crate::light::{LightDetail, LightField, Portal};
+use crate::material::{Material, Spot};
+use crate::sky::{Sky, Sun};
+use crate::solid::{Shape, Solid};
+use builder::Builder;
+
+trueup_core::choice! {
+    /// What is built.
+    pub enum SceneKind {
+        /// A furnished room: Manhattan, near surfaces, soft light.
+        Room = "room",
+        /// A street of town houses: Manhattan, far surfaces, sun.
+        Street = "street",
+        /// Rocks and trees at random turns on rough ground: no dominant directions at all.
+        Nature = "nature",
+    }
+}
+
+trueup_core::choice! {
+    /// How finely the light of a scene is worked out.
+    pub enum LightQuality {
+        /// A fraction of a second; blurred shadows. For tests.
+        Fast = "fast",
+        /// Several seconds. For pictures to look at.
+        Fine = "fine",
+    }
+}
+
+trueup_core::options! {
+    /// What scene is built.
+    pub struct SceneOptions("scene") {
+        /// Kind of scene.
+        kind: SceneKind = SceneKind::Room, Allowed::Any, "";
+        /// Seed of its layout, colours and textures.
+        seed: u64 = 1, Allowed::Any, "";
+        /// How finely light is worked out.
+        light: LightQuality = LightQuality::Fine, Allowed::Any, "";
+    }
+}
+
+/// A place from which a scene can be photographed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Viewpoint {
+    /// The photographer's eye in the world, metres; y points down and the floor is at y = 0.
+    pub eye: [f64; 3],
+    /// The direction first looked at: turn about the vertical from world z towards world x, degrees.
+    pub yaw_deg: f64,
+    /// Median distance of what is seen at eye level all round, metres.
+    pub depth_m: f64,
+}
+
+/// A scene ready to be photographed. Its Manhattan directions, where it has them, are the axes of the world.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    pub(crate) solids: Vec<Solid>,
+    pub(crate) materials: Vec<Material>,
+    pub(crate) hierarchy: Hierarchy,
+    pub(crate) portals: Vec<Portal>,
+    pub(crate) sky: Sky,
+    pub(crate) sun: Option<Sun>,
+    pub(crate) light: LightField,
+    pub(crate) exposure: f64,
+    viewpoint: Viewpoint,
+}
+
+impl Scene {
+    /// Builds and lights a scene. The same options give the same scene for any number of threads.
+    ///
+    /// # Errors
+    /// [`Error::Options`] listing every option outside its range.
+    pub fn new(options: &SceneOptions) -> Result<Self> {
+        let invalid = options.invalid();
+        if !invalid.is_empty() {
+            return Err(Error::Options(invalid));
+        }
+        let builder = match options.kind {
+            SceneKind::Room => room::build(options.seed),
+            SceneKind::Street => street::build(options.seed),
+            SceneKind::Nature => nature::build(options.seed),
+        };
+        Ok(Self::lit(builder, options.light))
+    }
+
+    /// From where, and in which direction first, the scene is meant to be photographed.
+    pub fn viewpoint(&self) -> Viewpoint {
+        self.viewpoint
+    }
+
+    /// Adds a small self-luminous ball to the scene: a target whose picture can be found exactly.
+    pub fn add_marker(&mut self, centre: [f64; 3], radius_m: f64) {
+        let material = Material::new(crate::material::Pattern::Paint, 1.0, [0xff_0000; 3]).emitting(1e3);
+        self.materials.push(material);
+        self.solids.push(Solid {
+            shape: Shape::Ellipsoid,
+            centre: Vector3::from(centre),
+            half: Vector3::repeat(radius_m),
+            world_from_body: None,
+            faces: [self.materials.len() - 1; 6],
+            texture_centre: Vector3::zeros(),
+            seed: 0,
+        });
+        self.hierarchy = Hierarchy::new(&self.solids);
+    }
+
+    fn lit(builder: Builder, quality: LightQuality) -> Self {
+        let outdoors = builder.portals.is_empty();
+        let detail = match (quality, outdoors) {
+            (LightQuality::Fast, false) => LightDetail { spacing_m: 0.4, directions: 24, portal_samples: 2 },
+            (LightQuality::Fast, true) => LightDetail { spacing_m: 3.0, directions: 16, portal_samples: 1 },
+            (LightQuality::Fine, false) => LightDetail { spacing_m: 0.08, directions: 128, portal_samples: 4 },
+            (LightQuality::Fine, true) => LightDetail { spacing_m: 0.6, directions: 64, portal_samples: 1 },
+        };
+        let mut scene = Self {
+            hierarchy: Hierarchy::new(&builder.solids),
+            solids: builder.solids,
+            materials: builder.materials,
+            portals: builder.portals,
+            sky: builder.sky,
+            sun: builder.sun,
+            light: LightField::default(),
+            exposure: 1.0,
+            viewpoint: Viewpoint { eye: builder.eye.into(), yaw_deg: builder.yaw_deg, depth_m: 1.0 },
+        };
+        scene.light = LightField::gather(&scene, &detail);
+        scene.measure();
+        scene
+    }
+
+    /// Measures depth and brightness round the eye, as a photographer would before a panorama.
+    fn measure(&mut self) {
+        const TURNS: usize = 96;
+        const ELEVATIONS: [f64; 5] = [-0.35, -0.15, 0.0, 0.15, 0.35];
+        const MIDDLE_GREY: f64 = 0.2;
+        let eye = Vector3::from(self.viewpoint.eye);
+        let (mut depths, mut logarithms, mut count) = (Vec::new(), 0.0, 0.0);
+        for turn in 0..TURNS {
+            let (sine, cosine) = (turn as f64 / TURNS as f64 * std::f64::consts::TAU).sin_cos();
+            for elevation in ELEVATIONS {
+                let direction = Vector3::new(sine, elevation, cosine).normalize();
+                if elevation == 0.0 {
+                    depths.extend(
+                        self.hierarchy
+                            .nearest(&self.solids, &Ray::new(eye, direction), f64::INFINITY)
+                            .map(|(_, entry)| entry.distance),
+                    );
+                }
+                logarithms += luminance(self.radiance(eye, direction, 0.02)).max(1e-3).ln();
+                count += 1.0;
+            }
+        }
+        depths.sort_by(f64::total_cmp);
+        self.viewpoint.depth_m = depths.get(depths.len() / 2).copied().unwrap_or(100.0);
+        self.exposure = MIDDLE_GREY / (logarithms / count).exp();
+    }
+
+    /// The coordinates of a place on a face, for its pattern. `point` is in the body's frame.
+    pub(crate) fn spot(solid: &Solid, face: usize, point: Vector3<f64>, unit: [f64; 2], footprint: f64) -> Spot {
+        let size = solid.face_size(face);
+        let texture = point + solid.texture_centre;
+        let flat = solid.shape == Shape::Block || face != 0;
+        let (across, down) = match face {
+            _ if !flat => (unit[0] * size[0], texture.y),
+            0 => (-texture.z, texture.y),
+            1 => (texture.z, texture.y),
+            4 => (texture.x, texture.y),
+            5 => (-texture.x, texture.y),
+            _ => (texture.x, texture.z),
+        };
+        let grain = solid.half.imax();
+        Spot { point: texture, across, down, unit, size, grain, footprint, seed: solid.seed }
+    }
+
+    /// Radiance along a ray; `angle` is the pixel's, in radians. Without soft sun, for measuring.
+    fn radiance(&self, origin: Vector3<f64>, direction: Vector3<f64>, angle: f64) -> Rgb {
+        crate::render::trace(self, origin, direction, angle, [0.0, 0.0], 0)
+    }
+}

@@ -1,0 +1,114 @@
+//! Sets of pictures on disk with their truth.
+
+use std::fs;
+use std::path::Path;
+
+use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
+use serde::{Deserialize, Serialize};
+use trueup_core::raster::Raster;
+use trueup_core::{Error, Result, StageContext};
+
+use crate::render::{Quality, render};
+use crate::rig::PosedCamera;
+use crate::scene::Scene;
+
+/// JPEG quality of the pictures written, of 100.
+pub const JPEG_QUALITY: u8 = 92;
+
+/// What is true of a set: the content of its `truth.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Truth {
+    /// What the pictures show.
+    pub source: String,
+    /// One a picture, in order.
+    pub images: Vec<ImageTruth>,
+}
+
+/// What is true of one picture.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ImageTruth {
+    /// File name beside `truth.json`.
+    pub file: String,
+    /// Width, pixels.
+    pub width: usize,
+    /// Height, pixels.
+    pub height: usize,
+    /// Focal length, pixels.
+    pub focal_px: f64,
+    /// Rows of the rotation from world to camera (x right, y down, z forward; world y is down).
+    #[serde(rename = "R")]
+    pub rotation: [[f64; 3]; 3],
+    /// Angle from the picture's down to the world's vertical, positive towards the right, degrees.
+    pub gamma_deg: f64,
+    /// Centre of projection in the world, metres.
+    pub centre: [f64; 3],
+}
+
+impl ImageTruth {
+    /// The truth of a camera whose picture is stored as `file`.
+    pub fn of(posed: &PosedCamera, file: String) -> Self {
+        Self {
+            file,
+            width: posed.width,
+            height: posed.height,
+            focal_px: posed.camera.focal_px,
+            rotation: posed.camera.camera_from_world,
+            gamma_deg: posed.vertical_angle().to_degrees(),
+            centre: posed.centre,
+        }
+    }
+}
+
+/// Renders a set into a folder, which is made if need be: `00.jpg`, `01.jpg`, ... and `truth.json`.
+///
+/// # Errors
+/// [`Error::Io`] if a file cannot be written, [`Error::Limits`] for a picture too large for JPEG,
+/// [`Error::Cancelled`] between pictures.
+pub fn write_set(
+    directory: &Path,
+    source: &str,
+    scene: &Scene,
+    cameras: &[PosedCamera],
+    quality: Quality,
+    context: &StageContext,
+) -> Result<Truth> {
+    const STAGE: &str = "rendering";
+    fs::create_dir_all(directory).map_err(|error| Error::io("making the folder", directory, error))?;
+    context.progress().begin(STAGE, cameras.len() as u64);
+    let mut truth = Truth { source: source.to_owned(), images: Vec::with_capacity(cameras.len()) };
+    for (index, posed) in cameras.iter().enumerate() {
+        context.check_cancelled()?;
+        let file = format!("{index:02}.jpg");
+        let path = directory.join(&file);
+        let bytes = jpeg(&render(scene, posed, quality))?;
+        fs::write(&path, bytes).map_err(|error| Error::io("writing", &path, error))?;
+        truth.images.push(ImageTruth::of(posed, file));
+        context.progress().advance(STAGE, 1);
+    }
+    context.progress().finish(STAGE);
+    let path = directory.join("truth.json");
+    let text = serde_json::to_string_pretty(&truth)
+        .map_err(|error| Error::io("writing", &path, std::io::Error::other(error)))?;
+    fs::write(&path, text + "\n").map_err(|error| Error::io("writing", &path, error))?;
+    Ok(truth)
+}
+
+/// A baseline JPEG at [`JPEG_QUALITY`] with halved chroma.
+fn jpeg(picture: &Raster<u8>) -> Result<Vec<u8>> {
+    let too_large = || Error::Limits {
+        subject: "a JPEG picture".to_owned(),
+        needed: format!("{} x {} px", picture.width(), picture.height()),
+        allowed: "65535 x 65535 px".to_owned(),
+        hint: "Render smaller pictures.".to_owned(),
+    };
+    let width = u16::try_from(picture.width()).map_err(|_| too_large())?;
+    let height = u16::try_from(picture.height()).map_err(|_| too_large())?;
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(&mut bytes, JPEG_QUALITY);
+    encoder.set_sampling_factor(SamplingFactor::F_2_2);
+    encoder.set_optimized_huffman_tables(true);
+    encoder
+        .encode(picture.data(), width, height, ColorType::Rgb)
+        .map_err(|error| Error::input("a picture", error, "Render at least one pixel."))?;
+    Ok(bytes)
+}
