@@ -16,9 +16,9 @@ use trueup_core::{Error, Result, StageContext};
 use crate::deformed_grid::{DeformedGrid, Run, count_folded_triangles};
 use crate::layout::{CanvasLayout, Placed, check_mesh};
 use crate::sampling::{Bicubic, Bilinear, MAX_STRETCH, interpolate, reduce_by_two};
-use crate::simd::{Positions, invert_row};
-use crate::transfer_curve::{Encode, Linearise};
-use crate::weights::{Feather, alpha, weight};
+use crate::simd::{Combine, Contribution, Positions, accumulate, invert_row};
+use crate::transfer_curve::Encode;
+use crate::weights::{Feather, alpha};
 
 const STAGE: &str = RenderOptions::STAGE;
 
@@ -56,7 +56,7 @@ trueup_core::options! {
         blend: Blend = Blend::Feather, Allowed::Any, "";
         /// Power of the feather weight. Higher values let the photograph that lies deepest prevail, which shortens the
         /// transition and with it ghosts; 1 blends over the whole overlap.
-        feather_exponent: f64 = 2.0, between(0.1, 16.0), "";
+        feather_exponent: f64 = 3.0, between(0.1, 16.0), "";
         /// Photograph pixels per canvas pixel above which the photograph is averaged instead of interpolated. Lower is
         /// softer, higher lets fine patterns shimmer.
         minification_threshold: f64 = 1.25, between(1.0, 4.0), "";
@@ -279,57 +279,17 @@ impl Prepared {
             }
             Interpolation::Bicubic => interpolate::<Bicubic>(&self.photograph, positions, stretch, samples, at_border),
         }
-        let footprint = cell.near_border.then(|| cell.footprint.map(|pixels| pixels as f32));
-        match options.blend {
-            Blend::Feather => self.blend(positions, samples, footprint, sums, |feather| feather, add),
-            Blend::Average => self.blend(positions, samples, footprint, sums, |_| 1.0, add),
-            Blend::None => self.blend(positions, samples, footprint, sums, |feather| feather, keep_heavier),
-        }
-    }
-
-    /// Linearises `samples`, weighs them and gives them to `combine` with their canvas pixels.
-    #[inline(always)]
-    fn blend(
-        &self,
-        positions: &Positions,
-        samples: &[[f32; 4]],
-        footprint: Option<[f32; 2]>,
-        sums: &mut [[f32; 4]],
-        inside: impl Fn(f32) -> f32,
-        combine: impl Fn(&mut [f32; 4], [f32; 4]),
-    ) {
-        const OPAQUE: f32 = 255.0;
-        let linearise = Linearise::table();
-        let length = sums.len();
-        let (columns, rows) = (&positions.column[..length], &positions.row[..length]);
-        let (fractions_x, fractions_y) = (&positions.fraction_x[..length], &positions.fraction_y[..length]);
-        for (index, (sum, &[r, g, b, opacity])) in sums.iter_mut().zip(samples).enumerate() {
-            let (column, row) = (columns[index], rows[index]);
-            let (fraction_x, fraction_y) = (fractions_x[index], fractions_y[index]);
-            let mut share = (opacity / OPAQUE).clamp(0.0, 1.0);
-            if let Some(footprint) = footprint {
-                let position = [column as f32 + 0.5 + fraction_x, row as f32 + 0.5 + fraction_y];
-                share *= self.feather.coverage(position, footprint);
-            }
-            let weight = weight(share, inside(self.feather.at(column, row, fraction_x, fraction_y)));
-            let scale = weight * self.gain;
-            let light = [r, g, b].map(|level| linearise.linear(level) * scale);
-            combine(sum, [light[0], light[1], light[2], weight]);
-        }
-    }
-}
-
-#[inline(always)]
-fn add(sum: &mut [f32; 4], sample: [f32; 4]) {
-    for (sum, value) in sum.iter_mut().zip(sample) {
-        *sum += value;
-    }
-}
-
-#[inline(always)]
-fn keep_heavier(kept: &mut [f32; 4], sample: [f32; 4]) {
-    if sample[3] > kept[3] {
-        *kept = sample;
+        let contribution = Contribution {
+            feather: &self.feather,
+            gain: self.gain,
+            border_footprint: cell.near_border.then(|| cell.footprint.map(|pixels| pixels as f32)),
+            combine: match options.blend {
+                Blend::Feather => Combine::Feathered,
+                Blend::Average => Combine::Equal,
+                Blend::None => Combine::Heaviest,
+            },
+        };
+        accumulate(contribution, positions, samples, sums);
     }
 }
 

@@ -4,6 +4,8 @@
 //! multiply-add, so that both give the same bits.
 
 use crate::sampling::Kernel;
+use crate::transfer_curve::Linearise;
+use crate::weights::{Feather, weight};
 
 /// The inverse of one cell's bilinear map along one canvas row.
 ///
@@ -78,6 +80,15 @@ pub(crate) fn invert_row(cell: &InverseBilinear, first: usize, positions: &mut P
     invert_row_portable(cell, first, positions);
 }
 
+/// A whole number within the range of `i32` as one; a plain cast checks the range and is not vectorised.
+#[inline(always)]
+fn low_bits(whole: f64) -> i32 {
+    // Adding 1.5 * 2^52 leaves the whole number in the low bits of the mantissa.
+    const ROUNDING: f64 = 6_755_399_441_055_744.0;
+    (whole + ROUNDING).to_bits() as i32
+}
+
+#[allow(clippy::manual_clamp)]
 #[inline(always)]
 fn invert_row_portable(cell: &InverseBilinear, first: usize, positions: &mut Positions) {
     let InverseBilinear { top_left, e, f, g, orientation, source, source_size, y } = *cell;
@@ -93,18 +104,109 @@ fn invert_row_portable(cell: &InverseBilinear, first: usize, positions: &mut Pos
         let constant = px * e[1] - py * e[0];
         let linear = jacobian + (px * g[1] - py * g[0]);
         let discriminant = (linear * linear - 4.0 * quadratic * constant).max(0.0);
-        let v = (-2.0 * constant / (linear + orientation * discriminant.sqrt())).clamp(0.0, 1.0);
+        // `max` before `min` turns the NaN of a collapsed cell into a number.
+        let v = (-2.0 * constant / (linear + orientation * discriminant.sqrt())).max(0.0).min(1.0);
         let along = [e[0] + v * g[0], e[1] + v * g[1]];
         let u = (((px - v * f[0]) * along[0] + (py - v * f[1]) * along[1])
             / (along[0] * along[0] + along[1] * along[1]))
-            .clamp(0.0, 1.0);
+            .max(0.0)
+            .min(1.0);
         let x = source[0] + u * source_size[0] - 0.5;
         let y = source[1] + v * source_size[1] - 0.5;
         let (column, row) = (x.floor(), y.floor());
-        columns[index] = column as i32;
-        rows[index] = row as i32;
+        columns[index] = low_bits(column);
+        rows[index] = low_bits(row);
         fractions_x[index] = (x - column) as f32;
         fractions_y[index] = (y - row) as f32;
+    }
+}
+
+/// A loop to be compiled for the processor's vector instructions. `run` must be `#[inline(always)]` (a closure is not).
+pub(crate) trait VectorLoop {
+    /// Runs the loop.
+    fn run(self);
+}
+
+/// Runs a loop, compiled for AVX2 where the processor has it.
+pub(crate) fn with_vector_instructions(work: impl VectorLoop) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { x86::run(work) };
+    }
+    work.run();
+}
+
+/// How a weighted sample joins what a canvas pixel already holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Combine {
+    /// Feather weights, added.
+    Feathered,
+    /// Equal weights, added.
+    Equal,
+    /// The sample of the largest feather weight replaces the others.
+    Heaviest,
+}
+
+/// What one photograph brings to [`accumulate`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Contribution<'a> {
+    pub(crate) feather: &'a Feather,
+    /// Factor on linear light.
+    pub(crate) gain: f32,
+    /// Size of a canvas pixel in photograph pixels where the photograph's border may cut canvas pixels.
+    pub(crate) border_footprint: Option<[f32; 2]>,
+    pub(crate) combine: Combine,
+}
+
+/// Linearises `samples` (red, green, blue, alpha from 0 to 255), weighs them and joins them to the canvas pixels `sums`.
+pub(crate) fn accumulate(
+    contribution: Contribution<'_>,
+    positions: &Positions,
+    samples: &[[f32; 4]],
+    sums: &mut [[f32; 4]],
+) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { x86::accumulate(contribution, positions, samples, sums) };
+    }
+    accumulate_portable(contribution, positions, samples, sums);
+}
+
+#[inline(always)]
+fn accumulate_portable(
+    contribution: Contribution<'_>,
+    positions: &Positions,
+    samples: &[[f32; 4]],
+    sums: &mut [[f32; 4]],
+) {
+    const PER_LEVEL: f32 = 1.0 / 255.0;
+    let Contribution { feather, gain, border_footprint, combine } = contribution;
+    let linearise = Linearise::table();
+    let length = sums.len();
+    let (columns, rows) = (&positions.column[..length], &positions.row[..length]);
+    let (fractions_x, fractions_y) = (&positions.fraction_x[..length], &positions.fraction_y[..length]);
+    let samples = &samples[..length];
+    for index in 0..length {
+        let (column, row) = (columns[index], rows[index]);
+        let (fraction_x, fraction_y) = (fractions_x[index], fractions_y[index]);
+        let [r, g, b, opacity] = samples[index];
+        let mut share = (opacity * PER_LEVEL).clamp(0.0, 1.0);
+        if let Some(footprint) = border_footprint {
+            let position = [column as f32 + 0.5 + fraction_x, row as f32 + 0.5 + fraction_y];
+            share *= feather.coverage(position, footprint);
+        }
+        let inside = if combine == Combine::Equal { 1.0 } else { feather.at(column, row, fraction_x, fraction_y) };
+        let weight = weight(share, inside);
+        let scale = weight * gain;
+        let (r, g, b) = (linearise.linear(r), linearise.linear(g), linearise.linear(b));
+        let sum = &mut sums[index];
+        if combine != Combine::Heaviest {
+            *sum = [sum[0] + r * scale, sum[1] + g * scale, sum[2] + b * scale, sum[3] + weight];
+        } else if weight > sum[3] {
+            *sum = [r * scale, g * scale, b * scale, weight];
+        }
     }
 }
 
@@ -181,12 +283,27 @@ mod x86 {
         _mm256_mul_ps, _mm256_set1_ps,
     };
 
-    use super::{InverseBilinear, Positions, Rgb8};
+    use super::{Contribution, InverseBilinear, Positions, Rgb8, VectorLoop};
     use crate::sampling::Kernel;
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn run(work: impl VectorLoop) {
+        work.run();
+    }
 
     #[target_feature(enable = "avx2")]
     pub(super) fn invert_row(cell: &InverseBilinear, first: usize, positions: &mut Positions) {
         super::invert_row_portable(cell, first, positions);
+    }
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn accumulate(
+        contribution: Contribution<'_>,
+        positions: &Positions,
+        samples: &[[f32; 4]],
+        sums: &mut [[f32; 4]],
+    ) {
+        super::accumulate_portable(contribution, positions, samples, sums);
     }
 
     #[target_feature(enable = "avx2")]

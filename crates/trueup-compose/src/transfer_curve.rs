@@ -14,23 +14,24 @@ fn linear_from_encoded(encoded: f64) -> f64 {
 /// than 4e-8 of full scale: a 400th of a 16-bit step.
 const STEPS_PER_LEVEL: usize = 16;
 
+/// Length of the table: 255 levels of 16 steps and the end, filled up to a power of two.
+const ENTRIES: usize = 4096;
+
 /// Linear light from samples on the scale of 0 to 255, whole or between.
 #[derive(Debug)]
 pub(crate) struct Linearise {
     /// Value at entry `i` / 16 levels, and the difference to the next entry.
-    entries: Vec<[f32; 2]>,
+    entries: [[f32; 2]; ENTRIES],
 }
 
 impl Linearise {
     /// The table of the process.
     pub(crate) fn table() -> &'static Self {
         static TABLE: LazyLock<Linearise> = LazyLock::new(|| {
-            let count = 255 * STEPS_PER_LEVEL + 1;
-            let value = |index: usize| linear_from_encoded(index as f64 / (255 * STEPS_PER_LEVEL) as f64);
-            let entries = (0..count)
-                .map(|index| [value(index) as f32, (value((index + 1).min(count - 1)) - value(index)) as f32])
-                .collect();
-            Linearise { entries }
+            let last = 255 * STEPS_PER_LEVEL;
+            let value = |index: usize| linear_from_encoded(index.min(last) as f64 / last as f64);
+            let entry = |index| [value(index) as f32, (value(index + 1) - value(index)) as f32];
+            Linearise { entries: std::array::from_fn(entry) }
         });
         &TABLE
     }
@@ -38,12 +39,15 @@ impl Linearise {
     /// Linear light, 0 to 1, of a sample on the scale of 0 to 255; values outside are clamped, NaN gives 0.
     #[inline(always)]
     pub(crate) fn linear(&self, level: f32) -> f32 {
+        // Adding 1.5 * 2^23 rounds to a whole number and leaves it in the low bits: cheaper than a checked cast.
+        const ROUNDING: f32 = 12_582_912.0;
         // `max` first: unlike `clamp`, it turns NaN into a number.
         #[allow(clippy::manual_clamp)]
         let position = level.max(0.0).min(255.0) * STEPS_PER_LEVEL as f32;
-        let index = (position as usize).min(255 * STEPS_PER_LEVEL);
-        let [value, step] = self.entries[index];
-        value + (position - index as f32) * step
+        // Half a step lower, rounding gives the entry at or below; at an entry itself either side of it will do.
+        let rounded = (position - 0.5) + ROUNDING;
+        let [value, step] = self.entries[rounded.to_bits() as usize % ENTRIES];
+        value + (position - (rounded - ROUNDING)) * step
     }
 }
 

@@ -6,7 +6,7 @@ pub(crate) trait Kernel {
     const RADIUS: f64;
 
     /// Value at `distance` samples from the middle.
-    fn at(distance: f64) -> f64;
+    fn at(distance: f32) -> f32;
 
     /// Weights of four neighbouring samples for a position `fraction` (in [0, 1]) beyond the second of them.
     fn taps(fraction: f32) -> [f32; 4];
@@ -19,7 +19,7 @@ pub(crate) struct Bilinear;
 impl Kernel for Bilinear {
     const RADIUS: f64 = 1.0;
 
-    fn at(distance: f64) -> f64 {
+    fn at(distance: f32) -> f32 {
         (1.0 - distance.abs()).max(0.0)
     }
 
@@ -39,7 +39,8 @@ pub(crate) struct Bicubic;
 impl Kernel for Bicubic {
     const RADIUS: f64 = 2.0;
 
-    fn at(distance: f64) -> f64 {
+    #[inline(always)]
+    fn at(distance: f32) -> f32 {
         let d = distance.abs();
         if d < 1.0 {
             (1.5 * d - 2.5) * d * d + 1.0
@@ -73,8 +74,8 @@ mod tests {
             let taps = K::taps(fraction);
             assert!((taps.iter().sum::<f32>() - 1.0).abs() < 1e-6);
             for (tap, weight) in taps.iter().enumerate() {
-                let expected = K::at(tap as f64 - 1.0 - f64::from(fraction));
-                assert!((f64::from(*weight) - expected).abs() < 1e-6);
+                let expected = K::at(tap as f32 - 1.0 - fraction);
+                assert!((weight - expected).abs() < 1e-6);
             }
         }
     }

@@ -6,12 +6,17 @@ mod reduce;
 pub(crate) use kernel::{Bicubic, Bilinear, Kernel};
 pub(crate) use reduce::reduce_by_two;
 
+use std::marker::PhantomData;
+
 use trueup_core::raster::{Photograph, Raster};
 
-use crate::simd::{Positions, Rgb8, interpolate_rgb8};
+use crate::simd::{Positions, Rgb8, VectorLoop, interpolate_rgb8, with_vector_instructions};
 
 /// Taps of a widened kernel per axis, at most: a kernel of radius 2 widened 15 times has 60.
 const MAX_TAPS: usize = 64;
+
+/// Alpha of a sample that hides what is behind it.
+const OPAQUE: f32 = 255.0;
 
 /// Widest a kernel is made; see [`MAX_TAPS`].
 pub(crate) const MAX_STRETCH: f64 = 15.0;
@@ -81,12 +86,31 @@ fn interpolate_channels<K: Kernel, T: Sample, const C: usize>(
     stretch: [f64; 2],
     out: &mut [[f32; 4]],
 ) {
-    for (index, out) in out.iter_mut().enumerate().take(positions.len()) {
-        *out = if stretch == [1.0, 1.0] {
-            interpolate_one::<K, T, C>(raster, positions, index)
-        } else {
-            average_one::<K, T, C>(raster, positions, index, stretch)
-        };
+    if stretch == [1.0, 1.0] {
+        for (index, out) in out.iter_mut().enumerate().take(positions.len()) {
+            *out = interpolate_one::<K, T, C>(raster, positions, index);
+        }
+    } else {
+        with_vector_instructions(Averages::<K, T, C> { raster, positions, stretch, out, kernel: PhantomData });
+    }
+}
+
+/// A run of [`average_one`].
+struct Averages<'a, K, T, const C: usize> {
+    raster: &'a Raster<T>,
+    positions: &'a Positions,
+    stretch: [f64; 2],
+    out: &'a mut [[f32; 4]],
+    kernel: PhantomData<K>,
+}
+
+impl<K: Kernel, T: Sample, const C: usize> VectorLoop for Averages<'_, K, T, C> {
+    #[inline(always)]
+    fn run(self) {
+        let mut workspace = Workspace { wx: [0.0; MAX_TAPS], wy: [0.0; MAX_TAPS], columns: [0.0; 3 * MAX_TAPS] };
+        for (index, out) in self.out.iter_mut().enumerate().take(self.positions.len()) {
+            *out = average_one::<K, T, C>(self.raster, self.positions, index, self.stretch, &mut workspace);
+        }
     }
 }
 
@@ -96,11 +120,11 @@ fn pixel<T: Sample, const C: usize>(row: &[T], column: usize) -> [f32; 4] {
     match C {
         1 => {
             let level = row[column].level();
-            [level, level, level, 255.0]
+            [level, level, level, OPAQUE]
         }
         3 => {
             let rgb = &row[3 * column..3 * column + 3];
-            [rgb[0].level(), rgb[1].level(), rgb[2].level(), 255.0]
+            [rgb[0].level(), rgb[1].level(), rgb[2].level(), OPAQUE]
         }
         _ => {
             let rgba = &row[4 * column..4 * column + 4];
@@ -121,12 +145,12 @@ fn interpolate_one<K: Kernel, T: Sample, const C: usize>(
     let (fraction_x, fraction_y) = (positions.fraction_x[index], positions.fraction_y[index]);
     let (wx, wy) = (K::taps(fraction_x), K::taps(fraction_y));
     let window: [[[f32; 4]; 4]; 4] = columns.map(|column| rows.map(|row| pixel::<T, C>(row, column)));
-    if C == 4 && window.iter().flatten().any(|pixel| pixel[3] < 255.0) {
+    if C == 4 && window.iter().flatten().any(|pixel| pixel[3] < OPAQUE) {
         return weigh_by_alpha(&window, Bilinear::taps(fraction_x), Bilinear::taps(fraction_y));
     }
     let sums = window.map(|column| weigh(&column, wy));
     let mut sum = weigh(&sums, wx);
-    sum[3] = 255.0;
+    sum[3] = OPAQUE;
     sum
 }
 
@@ -150,19 +174,31 @@ fn weigh_by_alpha(window: &[[[f32; 4]; 4]; 4], wx: [f32; 4], wy: [f32; 4]) -> [f
     sum.mean()
 }
 
+/// Room for the weights and the sums over rows of one mean, kept from pixel to pixel.
+struct Workspace {
+    wx: [f32; MAX_TAPS],
+    wy: [f32; MAX_TAPS],
+    columns: [f32; 3 * MAX_TAPS],
+}
+
 /// A mean over a kernel `stretch` times as wide as the interpolating one.
+#[inline(always)]
 fn average_one<K: Kernel, T: Sample, const C: usize>(
     raster: &Raster<T>,
     positions: &Positions,
     index: usize,
     stretch: [f64; 2],
+    workspace: &mut Workspace,
 ) -> [f32; 4] {
     let x = f64::from(positions.column[index]) + f64::from(positions.fraction_x[index]);
     let y = f64::from(positions.row[index]) + f64::from(positions.fraction_y[index]);
-    let (mut wx, mut wy) = ([0.0; MAX_TAPS], [0.0; MAX_TAPS]);
-    let (first_column, wx) = widened_taps::<K>(x, stretch[0], &mut wx);
-    let (first_row, wy) = widened_taps::<K>(y, stretch[1], &mut wy);
+    let (first_column, wx) = widened_taps::<K>(x, stretch[0], &mut workspace.wx);
+    let (first_row, wy) = widened_taps::<K>(y, stretch[1], &mut workspace.wy);
     let clamped = |first: i64, tap: usize, size: usize| (first + tap as i64).clamp(0, size as i64 - 1) as usize;
+    let inside = first_column >= 0 && first_column as usize + wx.len() <= raster.width();
+    if C != 4 && inside {
+        return average_inside::<T, C>(raster, first_column as usize, first_row, wx, wy, &mut workspace.columns);
+    }
     let mut sum = PremultipliedSum::default();
     for (j, &wy) in wy.iter().enumerate() {
         let row = raster.row(clamped(first_row, j, raster.height()));
@@ -175,19 +211,50 @@ fn average_one<K: Kernel, T: Sample, const C: usize>(
     sum.mean()
 }
 
+/// [`average_one`] for opaque pictures where all columns lie inside: rows are summed first, as they lie in memory.
+#[inline(always)]
+fn average_inside<T: Sample, const C: usize>(
+    raster: &Raster<T>,
+    first_column: usize,
+    first_row: i64,
+    wx: &[f32],
+    wy: &[f32],
+    columns: &mut [f32; 3 * MAX_TAPS],
+) -> [f32; 4] {
+    let columns = &mut columns[..wx.len() * C];
+    columns.fill(0.0);
+    for (j, &wy) in wy.iter().enumerate() {
+        let row = raster.row((first_row + j as i64).clamp(0, raster.height() as i64 - 1) as usize);
+        let samples = &row[first_column * C..][..columns.len()];
+        for (sum, sample) in columns.iter_mut().zip(samples) {
+            *sum += wy * sample.level();
+        }
+    }
+    let mut sum = [0.0, 0.0, 0.0, OPAQUE];
+    for (column, &wx) in columns.chunks_exact(C).zip(wx) {
+        for (channel, sum) in sum[..3].iter_mut().enumerate() {
+            *sum += wx * column[channel % C];
+        }
+    }
+    sum
+}
+
 /// First sample and normalised weights of a kernel widened by `stretch` around `position` (0 at the first sample).
+#[inline(always)]
 fn widened_taps<K: Kernel>(position: f64, stretch: f64, taps: &mut [f32; MAX_TAPS]) -> (i64, &[f32]) {
     let stretch = stretch.clamp(1.0, MAX_STRETCH);
     let radius = K::RADIUS * stretch;
     let first = (position - radius).ceil();
     let count = (((position + radius).floor() - first).max(0.0) as usize + 1).min(MAX_TAPS);
+    let (step, start) = (stretch.recip() as f32, ((first - position) / stretch) as f32);
     let mut sum = 0.0;
     for (tap, weight) in taps.iter_mut().take(count).enumerate() {
-        *weight = K::at((first + tap as f64 - position) / stretch) as f32;
+        *weight = K::at(start + tap as f32 * step);
         sum += *weight;
     }
+    let normalise = 1.0 / sum;
     for weight in &mut taps[..count] {
-        *weight /= sum;
+        *weight *= normalise;
     }
     (first as i64, &taps[..count])
 }

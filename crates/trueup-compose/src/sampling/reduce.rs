@@ -7,10 +7,8 @@ use trueup_core::raster::{Photograph, Raster};
 /// row of an odd size averages the samples it has. Colours are weighted by alpha where there is one.
 pub(crate) fn reduce_by_two(photograph: &Photograph) -> Photograph {
     match photograph {
-        Photograph::Eight(raster) => Photograph::Eight(halve(raster, |sample| u32::from(sample), |mean| mean as u8)),
-        Photograph::Sixteen(raster) => {
-            Photograph::Sixteen(halve(raster, |sample| u32::from(sample), |mean| mean as u16))
-        }
+        Photograph::Eight(raster) => Photograph::Eight(halve(raster, u32::from, |mean| mean as u8)),
+        Photograph::Sixteen(raster) => Photograph::Sixteen(halve(raster, u32::from, |mean| mean as u16)),
     }
 }
 

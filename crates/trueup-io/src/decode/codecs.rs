@@ -1,7 +1,7 @@
 //! One function per codec, from file to stored pixels.
 
 use std::fs::File;
-use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::io::{BufReader, Read, Seek};
 
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use trueup_core::raster::{Photograph, Raster};
@@ -34,7 +34,7 @@ pub(crate) fn decode_stored(image: &SourceImage) -> Result<Photograph> {
     let mut file = File::open(&image.path).map_err(reading)?;
     let mut start = Vec::with_capacity(SIGNATURE_BYTES);
     Read::take(&mut file, SIGNATURE_BYTES as u64).read_to_end(&mut start).map_err(reading)?;
-    file.seek(SeekFrom::Start(0)).map_err(reading)?;
+    file.rewind().map_err(reading)?;
     let format = PictureFormat::of_content(&start).ok_or_else(|| {
         Error::input(&image.name, format!("it is not a {SUPPORTED} picture"), "Give the photograph again.")
     })?;

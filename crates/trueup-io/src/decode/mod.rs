@@ -76,17 +76,30 @@ pub fn reduce_photograph(
             "Make the frame from the photograph's own size.",
         ));
     }
+    let colors = average_to_frame(photograph, frame);
     // A thumbnail of no area would have no scale; one pixel is the least.
     let thumbnail_frame = WorkingFrame::new(width, height, thumbnail_max_area.max(1.0));
-    let (colors, thumbnail) = match photograph {
-        Photograph::Eight(raster) => {
-            (reduce::area_average(raster, frame), reduce::area_average(raster, &thumbnail_frame))
-        }
-        Photograph::Sixteen(raster) => {
-            (reduce::area_average(raster, frame), reduce::area_average(raster, &thumbnail_frame))
-        }
+    let thumbnail = if thumbnail_frame.working_from_full <= scale {
+        // The mean of means weighted by area: the photograph need not be walked again.
+        let (width, height) = whole_size(&thumbnail_frame);
+        reduce::area_average(&colors, thumbnail_frame.working_from_full / scale, width, height)
+    } else {
+        average_to_frame(photograph, &thumbnail_frame)
     };
     Ok(WorkingPicture { gray: luma(colors)?, thumbnail: rgb8(&thumbnail)?, thumbnail_frame })
+}
+
+fn average_to_frame(photograph: &Photograph, frame: &WorkingFrame) -> Raster<f32> {
+    let (width, height) = whole_size(frame);
+    match photograph {
+        Photograph::Eight(raster) => reduce::area_average(raster, frame.working_from_full, width, height),
+        Photograph::Sixteen(raster) => reduce::area_average(raster, frame.working_from_full, width, height),
+    }
+}
+
+/// The whole pixels inside a frame.
+fn whole_size(frame: &WorkingFrame) -> (usize, usize) {
+    (reduce::whole_pixels(frame.width), reduce::whole_pixels(frame.height))
 }
 
 /// The luma of a gray or RGB picture.

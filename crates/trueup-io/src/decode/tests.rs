@@ -1,1 +1,229 @@
+//! Files of every kind of pixel, decoded and reduced.
 
+use std::path::PathBuf;
+
+use image::{DynamicImage, GrayAlphaImage, GrayImage, ImageBuffer, ImageFormat, Luma, LumaA, Rgb, Rgb32FImage, Rgba};
+use tempfile::TempDir;
+use trueup_core::StageContext;
+use trueup_core::source::PhotographSource;
+
+use super::*;
+use crate::source::{SourceOptions, scan};
+
+const WIDTH: u32 = 45;
+const HEIGHT: u32 = 33;
+
+/// The value of channel `c` at (x, y), a different one almost everywhere.
+fn value(x: u32, y: u32, c: u32) -> u8 {
+    ((x * 5 + y * 7 + c * 50) % 251) as u8
+}
+
+fn write(folder: &TempDir, name: &str, bytes: &[u8]) -> PathBuf {
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).expect("writing a test file");
+    path
+}
+
+fn encode(picture: &DynamicImage, format: ImageFormat) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, format).expect("encoding to memory");
+    bytes.into_inner()
+}
+
+fn examine(path: PathBuf) -> SourceImage {
+    let inputs = [path.display().to_string()];
+    let mut sources = scan(&inputs, &SourceOptions::default(), &StageContext::default()).expect("a scan");
+    assert!(sources.rejected.is_empty(), "{:?}", sources.rejected);
+    sources.images.remove(0)
+}
+
+fn rgb8() -> DynamicImage {
+    ImageBuffer::from_fn(WIDTH, HEIGHT, |x, y| Rgb([value(x, y, 0), value(x, y, 1), value(x, y, 2)])).into()
+}
+
+fn rgb16() -> DynamicImage {
+    let wide = |x, y, c| u16::from(value(x, y, c)) * 257 + 3 * (x % 2) as u16;
+    ImageBuffer::from_fn(WIDTH, HEIGHT, |x, y| Rgb([wide(x, y, 0), wide(x, y, 1), wide(x, y, 2)])).into()
+}
+
+/// Channels and depth of what comes out, and whether a sample pixel has the expected values.
+#[test]
+fn every_kind_of_pixel_keeps_its_depth() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let gray: DynamicImage = GrayImage::from_fn(WIDTH, HEIGHT, |x, y| Luma([value(x, y, 0)])).into();
+    let gray_alpha: DynamicImage = GrayAlphaImage::from_fn(WIDTH, HEIGHT, |x, y| LumaA([value(x, y, 0), 77])).into();
+    let rgba: DynamicImage =
+        ImageBuffer::from_fn(WIDTH, HEIGHT, |x, y| Rgba([value(x, y, 0), value(x, y, 1), value(x, y, 2), 99])).into();
+    let (v0, v1, v2) = (value(11, 5, 0), value(11, 5, 1), value(11, 5, 2));
+    let eight: [(&DynamicImage, &[ImageFormat], Vec<u8>); 4] = [
+        (&gray, &[ImageFormat::Png, ImageFormat::Tiff], vec![v0]),
+        (&gray_alpha, &[ImageFormat::Png], vec![v0, v0, v0, 77]),
+        (&rgb8(), &[ImageFormat::Png, ImageFormat::Tiff, ImageFormat::WebP], vec![v0, v1, v2]),
+        (&rgba, &[ImageFormat::Png, ImageFormat::Tiff, ImageFormat::WebP], vec![v0, v1, v2, 99]),
+    ];
+    for (picture, formats, pixel) in eight {
+        for &format in formats {
+            let image = examine(write(&folder, "picture", &encode(picture, format)));
+            let Photograph::Eight(raster) = photograph(&image).expect("a photograph") else {
+                panic!("{format:?}: 16 bit")
+            };
+            assert_eq!((raster.width(), raster.height()), (WIDTH as usize, HEIGHT as usize));
+            assert_eq!(raster.pixel(11, 5), pixel, "{format:?}");
+        }
+    }
+    for format in [ImageFormat::Png, ImageFormat::Tiff] {
+        let image = examine(write(&folder, "picture", &encode(&rgb16(), format)));
+        let Photograph::Sixteen(raster) = photograph(&image).expect("a photograph") else {
+            panic!("{format:?}: 8 bit")
+        };
+        assert_eq!(raster.pixel(11, 5), [v0, v1, v2].map(|v| u16::from(v) * 257 + 3), "{format:?}");
+    }
+}
+
+#[test]
+fn floating_point_is_clamped_to_sixteen_bits() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let picture: DynamicImage = Rgb32FImage::from_fn(WIDTH, HEIGHT, |_, _| Rgb([0.5, -1.0, 7.0])).into();
+    let image = examine(write(&folder, "float.tif", &encode(&picture, ImageFormat::Tiff)));
+    let Photograph::Sixteen(raster) = photograph(&image).expect("a photograph") else { panic!("8 bit") };
+    assert_eq!(raster.pixel(0, 0), [32_768, 0, 65_535]);
+}
+
+#[test]
+fn palettes_and_single_bits_are_spread() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 16, 16);
+    encoder.set_color(png::ColorType::Indexed);
+    encoder.set_depth(png::BitDepth::One);
+    encoder.set_palette(vec![10, 20, 30, 40, 50, 60]);
+    let mut writer = encoder.write_header().expect("a header");
+    writer.write_image_data(&[0b0100_0000; 32]).expect("pixels");
+    writer.finish().expect("an end");
+    let image = examine(write(&folder, "palette.png", &bytes));
+    let Photograph::Eight(raster) = photograph(&image).expect("a photograph") else { panic!("16 bit") };
+    assert_eq!((raster.pixel(0, 0), raster.pixel(1, 0)), (&[10, 20, 30][..], &[40, 50, 60][..]));
+}
+
+fn jpeg(color: jpeg_encoder::ColorType, progressive: bool) -> Vec<u8> {
+    let channels = match color {
+        jpeg_encoder::ColorType::Luma => 1,
+        jpeg_encoder::ColorType::Rgb => 3,
+        _ => 4,
+    };
+    let mut bytes = Vec::new();
+    let mut encoder = jpeg_encoder::Encoder::new(&mut bytes, 95);
+    encoder.set_progressive(progressive);
+    let pixels: Vec<u8> =
+        (0..64 * 48_usize).flat_map(|i| (0..channels).map(move |c| ((i % 64) * 2 + (i / 64) + c * 30) as u8)).collect();
+    encoder.encode(&pixels, 64, 48, color).expect("encoding to memory");
+    bytes
+}
+
+#[test]
+fn every_kind_of_jpeg_is_decoded_but_none_that_is_cut_off() {
+    let folder = TempDir::new().expect("a temporary folder");
+    use jpeg_encoder::ColorType::{Cmyk, CmykAsYcck, Luma, Rgb};
+    for (color, channels) in [(Luma, 1), (Rgb, 3), (Cmyk, 3), (CmykAsYcck, 3)] {
+        for progressive in [false, true] {
+            let bytes = jpeg(color, progressive);
+            let path = write(&folder, "picture.jpg", &bytes);
+            let image = examine(path);
+            assert_eq!(photograph(&image).expect("a photograph").channels(), channels, "{color:?} {progressive}");
+            // Anywhere in the file, and just before its end.
+            for cut in (16..bytes.len()).step_by(101).chain(bytes.len() - 4..bytes.len()) {
+                write(&folder, "picture.jpg", &bytes[..cut]);
+                let error = photograph(&image).expect_err("a cut file").to_string();
+                assert!(error.starts_with("picture.jpg"), "{error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn data_after_the_end_of_a_jpeg_are_ignored() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let mut bytes = jpeg(jpeg_encoder::ColorType::Rgb, false);
+    bytes.extend_from_slice(b"maker's data");
+    assert!(photograph(&examine(write(&folder, "picture.jpg", &bytes))).is_ok());
+}
+
+#[test]
+fn cut_pngs_tiffs_and_webps_are_refused() {
+    let folder = TempDir::new().expect("a temporary folder");
+    for format in [ImageFormat::Png, ImageFormat::Tiff, ImageFormat::WebP] {
+        let bytes = encode(&rgb8(), format);
+        let image = examine(write(&folder, "picture", &bytes));
+        write(&folder, "picture", &bytes[..bytes.len() / 2]);
+        assert!(matches!(photograph(&image), Err(Error::Input { .. })), "{format:?}");
+    }
+}
+
+#[test]
+fn files_that_change_after_the_scan_are_refused() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let image = examine(write(&folder, "picture", &encode(&rgb8(), ImageFormat::Png)));
+    write(&folder, "picture", &encode(&rgb8().crop_imm(0, 0, 20, 20), ImageFormat::Png));
+    assert!(photograph(&image).expect_err("another size").to_string().contains("examined"));
+    std::fs::remove_file(&image.path).expect("our own file");
+    assert!(matches!(photograph(&image), Err(Error::Io { .. })));
+}
+
+#[test]
+fn working_pictures_have_the_size_of_their_frames() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let image = examine(write(&folder, "picture", &encode(&rgb8(), ImageFormat::Png)));
+    let frame = WorkingFrame::new(image.width, image.height, 500.0);
+    let picture = working(&image, &frame, 100.0).expect("a working picture");
+    assert_eq!((picture.gray.width(), picture.gray.height()), (frame.width as usize, frame.height as usize));
+    assert_eq!((picture.gray.channels(), picture.thumbnail.channels()), (1, 3));
+    let thumbnail_frame = WorkingFrame::new(image.width, image.height, 100.0);
+    assert_eq!(picture.thumbnail_frame, thumbnail_frame);
+    assert_eq!(picture.thumbnail.width(), thumbnail_frame.width as usize);
+    let wrong = WorkingFrame::new(image.width * 2, image.height, 500.0);
+    assert!(matches!(working(&image, &wrong, 100.0), Err(Error::Input { .. })));
+}
+
+#[test]
+fn luma_is_that_of_the_standard_and_depths_agree() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let eight = examine(write(&folder, "eight", &encode(&rgb8(), ImageFormat::Png)));
+    let sixteen = examine(write(&folder, "sixteen", &encode(&rgb16(), ImageFormat::Png)));
+    let frame = WorkingFrame::new(eight.width, eight.height, 1e9);
+    let a = working(&eight, &frame, 1e9).expect("a working picture");
+    let b = working(&sixteen, &frame, 1e9).expect("a working picture");
+    let [r, g, b0] = [value(7, 3, 0), value(7, 3, 1), value(7, 3, 2)].map(f32::from);
+    assert!((a.gray.pixel(7, 3)[0] - (0.299 * r + 0.587 * g + 0.114 * b0)).abs() < 1e-3);
+    assert_eq!(a.thumbnail.pixel(7, 3), [value(7, 3, 0), value(7, 3, 1), value(7, 3, 2)]);
+    for (a, b) in a.gray.data().iter().zip(b.gray.data()) {
+        assert!((a - b).abs() < 0.02, "{a} {b}");
+    }
+}
+
+#[test]
+fn the_cache_changes_nothing_but_the_work() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let images = vec![
+        examine(write(&folder, "a.png", &encode(&rgb8(), ImageFormat::Png))),
+        examine(write(&folder, "b.png", &encode(&rgb16(), ImageFormat::Png))),
+    ];
+    let frame = WorkingFrame::new(images[0].width, images[0].height, 300.0);
+    let first_size = (WIDTH * HEIGHT * 3) as usize;
+    for budget in [0, first_size, usize::MAX] {
+        let files = FilePhotographs::new(images.clone(), budget);
+        for (index, image) in images.iter().enumerate() {
+            let kept = files.working(index, &frame, 50.0).expect("a working picture");
+            assert_eq!(kept, working(image, &frame, 50.0).expect("a working picture"));
+        }
+        // The first photograph fits wherever there is a budget, and is then there without its file.
+        let away = folder.path().join("away");
+        std::fs::rename(&images[0].path, &away).expect("our own file");
+        assert_eq!(files.photograph(0).is_ok(), budget > 0);
+        assert!(files.photograph(0).is_err());
+        std::fs::rename(&away, &images[0].path).expect("our own file");
+        for (index, image) in images.iter().enumerate() {
+            assert_eq!(files.photograph(index).expect("decoded"), photograph(image).expect("decoded"));
+        }
+        assert!(files.photograph(2).is_err());
+    }
+}

@@ -53,7 +53,8 @@ pub(super) fn write(
             file.write_all(coded)?;
             strip_number += 1;
         }
-        context.progress().advance(OutputOptions::STAGE, (batch.len() * STRIP_ROWS) as u64);
+        let rows: usize = batch.iter().map(|first| STRIP_ROWS.min(height - first)).sum();
+        context.progress().advance(OutputOptions::STAGE, rows as u64);
     }
     file.write_all(&[0xff, END_OF_IMAGE])?;
     file.flush()?;

@@ -46,9 +46,7 @@ trueup_core::choice! {
     pub enum TiffCompression {
         /// Not at all: largest and fastest.
         None = "none",
-        /// LZW, which every TIFF reader knows.
-        Lzw = "lzw",
-        /// Deflate, smaller and faster than LZW.
+        /// Deflate, after differencing.
         Deflate = "deflate",
     }
 }
@@ -128,7 +126,7 @@ pub fn write(path: &Path, picture: &dyn RowSource, options: &OutputOptions, cont
 /// the folder exists and takes files, and `path` is no folder itself. Nothing is left behind.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn check_writable(path: &Path) -> Result<()> {
     output_format(path)?;
     PendingFile::create(path).map(drop)

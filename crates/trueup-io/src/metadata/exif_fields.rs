@@ -86,13 +86,14 @@ impl ExifFields {
         Some(fields)
     }
 
-    /// Make and model in one line. A model that repeats its make ("Canon", "Canon EOS 5D") is left as it is.
+    /// Make and model in one line. A model that names its maker already ("NIKON CORPORATION", "NIKON D7000") stands alone.
     pub(crate) fn camera_model(&self) -> Option<String> {
-        match (&self.make, &self.model) {
-            (Some(make), Some(model)) if model.to_lowercase().starts_with(&make.to_lowercase()) => Some(model.clone()),
-            (Some(make), Some(model)) => Some(format!("{make} {model}")),
-            (make, model) => model.clone().or_else(|| make.clone()),
-        }
+        let (Some(make), Some(model)) = (&self.make, &self.model) else {
+            return self.model.clone().or_else(|| self.make.clone());
+        };
+        let maker = make.split_whitespace().next().unwrap_or_default();
+        let names_maker = model.split_whitespace().next().is_some_and(|word| word.eq_ignore_ascii_case(maker));
+        Some(if names_maker { model.clone() } else { format!("{make} {model}") })
     }
 }
 

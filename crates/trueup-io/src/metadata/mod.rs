@@ -5,9 +5,9 @@ mod focal;
 mod orientation;
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Seek, SeekFrom};
+use std::io::{BufRead, BufReader, Seek};
 
-use image::{ImageDecoder, ImageFormat, ImageReader};
+use image::{ImageDecoder, ImageError, ImageFormat, ImageReader};
 use tiff::decoder::Decoder as TiffDecoder;
 use trueup_core::source::FocalPrior;
 use zune_jpeg::JpegDecoder;
@@ -37,24 +37,34 @@ impl Header {
     }
 }
 
+/// Why a header gives no picture; the codec's words.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum HeaderError {
+    /// The header contradicts its format.
+    Damaged(String),
+    /// The picture is well formed, but of a kind that is not read.
+    Unsupported(String),
+}
+
 /// Reads size and EXIF of `file`, which holds a picture in `format`. Damaged EXIF counts as absent.
 ///
 /// # Errors
-/// The codec's words, when the header cannot be read.
-pub(crate) fn read_header(file: &File, format: PictureFormat) -> Result<Header, String> {
+/// When the header cannot be read or tells of a kind of picture that is not.
+pub(crate) fn read_header(file: &File, format: PictureFormat) -> Result<Header, HeaderError> {
     let mut reader = BufReader::new(file);
+    reader.rewind().map_err(|error| HeaderError::Damaged(error.to_string()))?;
     let (stored_width, stored_height) = stored_size(&mut reader, format)?;
-    let exif = reader.seek(SeekFrom::Start(0)).ok().and_then(|_| read_exif(&mut reader, format)).unwrap_or_default();
+    let exif = reader.rewind().ok().and_then(|_| read_exif(&mut reader, format)).unwrap_or_default();
     Ok(Header { stored_width, stored_height, exif })
 }
 
 /// The pixel size the header states.
-fn stored_size<R: BufRead + Seek>(reader: &mut R, format: PictureFormat) -> Result<(usize, usize), String> {
+fn stored_size<R: BufRead + Seek>(reader: &mut R, format: PictureFormat) -> Result<(usize, usize), HeaderError> {
     let format = match format {
         PictureFormat::Jpeg => {
             let mut decoder = JpegDecoder::new_with_options(reader, jpeg_options());
-            decoder.decode_headers().map_err(|error| format!("{error:?}"))?;
-            return decoder.dimensions().ok_or_else(|| "no frame header".to_owned());
+            decoder.decode_headers().map_err(|error| HeaderError::Damaged(format!("{error:?}")))?;
+            return decoder.dimensions().ok_or_else(|| HeaderError::Damaged("no frame header".to_owned()));
         }
         PictureFormat::Png => ImageFormat::Png,
         PictureFormat::Tiff => ImageFormat::Tiff,
@@ -63,7 +73,11 @@ fn stored_size<R: BufRead + Seek>(reader: &mut R, format: PictureFormat) -> Resu
     let mut picture = ImageReader::with_format(reader, format);
     // Sizes are judged by the caller, whose limit is an option.
     picture.no_limits();
-    let (width, height) = picture.into_decoder().map_err(|error| error.to_string())?.dimensions();
+    let decoder = picture.into_decoder().map_err(|error| match error {
+        ImageError::Unsupported(unsupported) => HeaderError::Unsupported(unsupported.to_string()),
+        other => HeaderError::Damaged(other.to_string()),
+    })?;
+    let (width, height) = decoder.dimensions();
     Ok((width as usize, height as usize))
 }
 

@@ -17,7 +17,7 @@ use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 
 use crate::format::{self, PictureFormat, SIGNATURE_BYTES, SUPPORTED};
-use crate::metadata::{Header, TagVerdict, judge_orientation, read_header};
+use crate::metadata::{Header, HeaderError, TagVerdict, judge_orientation, read_header};
 
 use duplicates::Accepted;
 use inputs::Candidate;
@@ -149,12 +149,17 @@ fn examine(
     };
     let (mut file, length) = open(&path)?;
     let format = recognise(&mut file, length)?;
-    let header = read_header(&file, format).map_err(|words| {
-        Rejection::new(
+    let header = read_header(&file, format).map_err(|error| match error {
+        HeaderError::Damaged(words) => Rejection::new(
             "picture-damaged",
             format!("its header cannot be read ({words})"),
             "Export it again or leave it out.",
-        )
+        ),
+        HeaderError::Unsupported(words) => Rejection::new(
+            "format-unsupported",
+            format!("it is of a kind that is not read ({words})"),
+            "Export it as gray or RGB with 8 or 16 bits a sample.",
+        ),
     })?;
     check_size(&header, options)?;
     accepted.admit(&path, name, length)?;

@@ -1,1 +1,297 @@
+//! Files that are made here, good and bad, and what becomes of them.
 
+use std::path::{Path, PathBuf};
+
+use exif::experimental::Writer;
+use exif::{Field, In, Rational, Tag, Value};
+use jpeg_encoder::{ColorType, Encoder};
+use proptest::prelude::*;
+use tempfile::TempDir;
+use trueup_core::source::FocalSource;
+
+use super::*;
+
+/// An EXIF block of the given fields.
+fn exif_block(fields: &[(Tag, Value)]) -> Vec<u8> {
+    let fields: Vec<Field> =
+        fields.iter().map(|(tag, value)| Field { tag: *tag, ifd_num: In::PRIMARY, value: value.clone() }).collect();
+    let mut writer = Writer::new();
+    fields.iter().for_each(|field| writer.push_field(field));
+    let mut block = std::io::Cursor::new(Vec::new());
+    writer.write(&mut block, false).expect("writing to memory");
+    block.into_inner()
+}
+
+/// A gray JPEG; `shade` tells pictures apart.
+fn jpeg(width: u16, height: u16, shade: u8, exif: &[(Tag, Value)]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(&mut bytes, 90);
+    if !exif.is_empty() {
+        encoder.add_exif_metadata(&exif_block(exif)).expect("a small block");
+    }
+    let pixels: Vec<u8> = (0..usize::from(width) * usize::from(height)).map(|i| (i % 7) as u8 * 9 + shade).collect();
+    encoder.encode(&pixels, width, height, ColorType::Luma).expect("encoding to memory");
+    bytes
+}
+
+/// A folder of files, and what scanning the given names in it finds.
+struct Files(TempDir);
+
+impl Files {
+    fn new(files: &[(&str, Vec<u8>)]) -> Self {
+        let folder = TempDir::new().expect("a temporary folder");
+        for (name, bytes) in files {
+            std::fs::write(folder.path().join(name), bytes).expect("writing a test file");
+        }
+        Self(folder)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn scan(&self, names: &[&str]) -> Sources {
+        self.scan_with(names, &SourceOptions::default())
+    }
+
+    fn scan_with(&self, names: &[&str], options: &SourceOptions) -> Sources {
+        let inputs: Vec<String> = names.iter().map(|name| self.path(name).display().to_string()).collect();
+        scan(&inputs, options, &StageContext::default()).expect("scanning only fails when cancelled")
+    }
+}
+
+fn names(sources: &Sources) -> Vec<&str> {
+    sources.images.iter().map(|image| image.name.as_str()).collect()
+}
+
+/// The code of the only rejection, which must come with a reason and a hint.
+fn only_code(sources: &Sources) -> &str {
+    let [rejected] = sources.rejected.as_slice() else { panic!("one rejection expected: {:?}", sources.rejected) };
+    assert!(!rejected.reason.is_empty() && rejected.hint.ends_with('.') && !rejected.name.is_empty());
+    assert!(matches!(rejected.to_error(), Error::Input { .. }));
+    &rejected.code
+}
+
+#[test]
+fn folders_are_read_in_natural_order() {
+    let picture = |shade| jpeg(32, 24, shade, &[]);
+    let files = Files::new(&[
+        ("img10.jpg", picture(1)),
+        ("IMG2.JPEG", picture(2)),
+        ("img1 été.jpg", picture(3)),
+        (".hidden.jpg", picture(4)),
+        ("notes.txt", b"hello".to_vec()),
+    ]);
+    std::fs::create_dir(files.path("inner")).expect("a folder");
+    let sources = files.scan(&[""]);
+    assert_eq!(names(&sources), ["img1 été.jpg", "IMG2.JPEG", "img10.jpg"]);
+    assert!(sources.rejected.is_empty(), "{:?}", sources.rejected);
+    assert_eq!((sources.images[0].width, sources.images[0].height), (32, 24));
+    assert_eq!(names(&files.scan(&["img1*.jpg"])), ["img1 été.jpg", "img10.jpg"]);
+}
+
+#[test]
+fn existing_paths_are_no_patterns() {
+    let files = Files::new(&[("a[1].jpg", jpeg(32, 24, 1, &[])), ("a1.jpg", jpeg(32, 24, 2, &[]))]);
+    assert_eq!(names(&files.scan(&["a[1].jpg"])), ["a[1].jpg"]);
+    assert_eq!(names(&files.scan(&["a[1-9].jpg"])), ["a1.jpg"]);
+}
+
+#[test]
+fn content_decides_the_format() {
+    let files = Files::new(&[("jpeg.png", jpeg(32, 24, 1, &[]))]);
+    assert_eq!(names(&files.scan(&["jpeg.png"])), ["jpeg.png"]);
+}
+
+#[test]
+fn every_bad_file_is_named_and_the_good_ones_are_used() {
+    let good = jpeg(32, 24, 1, &[]);
+    let huge = {
+        let mut bytes = jpeg(32, 24, 2, &[]);
+        // The frame header's height and width, ITU-T T.81 B.2.2.
+        let frame = bytes.windows(2).position(|pair| pair == [0xff, 0xc0]).expect("a baseline frame");
+        bytes[frame + 5..frame + 9].copy_from_slice(&[0xea, 0x60, 0xea, 0x60]);
+        bytes
+    };
+    let cases: [(&str, Vec<u8>, &str); 8] = [
+        ("text.jpg", b"this is no picture at all".to_vec(), "not-a-picture"),
+        ("empty.jpg", Vec::new(), "file-empty"),
+        ("header only.jpg", good[..40].to_vec(), "picture-damaged"),
+        ("huge.jpg", huge, "picture-too-large"),
+        ("tiny.jpg", jpeg(8, 8, 0, &[]), "picture-too-small"),
+        ("same.jpg", good.clone(), "duplicate"),
+        ("phone.heic", b"\0\0\0\x18ftypheic\0\0\0\0".to_vec(), "format-unsupported"),
+        ("broken.png", b"\x89PNG\r\n\x1a\n\0\0".to_vec(), "picture-damaged"),
+    ];
+    for (name, bytes, code) in cases {
+        let files = Files::new(&[("good.jpg", good.clone()), (name, bytes)]);
+        let sources = files.scan(&["good.jpg", name]);
+        assert_eq!(names(&sources), ["good.jpg"], "{name}");
+        assert_eq!(only_code(&sources), code, "{name}: {:?}", sources.rejected);
+        assert_eq!(sources.rejected[0].name, name);
+        let folder = files.scan(&[""]);
+        assert_eq!((folder.images.len(), only_code(&folder)), (1, code), "{name} in a folder");
+    }
+}
+
+#[test]
+fn inputs_that_lead_nowhere_are_rejected() {
+    let files = Files::new(&[("notes.txt", b"hello".to_vec()), ("one.jpg", jpeg(32, 24, 1, &[]))]);
+    std::fs::create_dir(files.path("x.jpg")).expect("a folder");
+    assert_eq!(only_code(&files.scan(&["absent.jpg"])), "file-missing");
+    assert_eq!(only_code(&files.scan(&["*.webp"])), "pattern-without-match");
+    assert_eq!(only_code(&files.scan(&["[.jpg"])), "pattern-without-match");
+    assert_eq!(only_code(&files.scan(&["x.jpg"])), "folder-without-pictures");
+    assert_eq!(only_code(&files.scan(&["notes.txt"])), "not-a-picture");
+    let folder = files.scan(&[""]);
+    assert_eq!((names(&folder), only_code(&folder)), (vec!["one.jpg"], "folder-not-file"));
+    assert_eq!(scan(&[], &SourceOptions::default(), &StageContext::default()).expect("nothing"), Sources::default());
+}
+
+#[test]
+fn the_same_file_is_used_once() {
+    let files = Files::new(&[("a.jpg", jpeg(32, 24, 1, &[])), ("b.jpg", jpeg(32, 24, 1, &[]))]);
+    let twice = files.scan(&["a.jpg", "a.jpg"]);
+    assert_eq!(only_code(&twice), "duplicate");
+    assert!(twice.rejected[0].reason.contains("same file as a.jpg"));
+    let copy = files.scan(&["b.jpg", "a.jpg"]);
+    assert!(copy.rejected[0].reason.contains("same bytes as b.jpg"), "{:?}", copy.rejected);
+}
+
+#[cfg(unix)]
+#[test]
+fn unreadable_files_are_rejected() {
+    use std::os::unix::fs::PermissionsExt;
+    let files = Files::new(&[("a.jpg", jpeg(32, 24, 1, &[]))]);
+    let path = files.path("a.jpg");
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o000)).expect("our own file");
+    if File::open(&path).is_ok() {
+        eprintln!("skipped: this user may read every file");
+        return;
+    }
+    assert_eq!(only_code(&files.scan(&["a.jpg"])), "file-unreadable");
+}
+
+#[test]
+fn stale_orientation_tags_are_not_applied() {
+    let tagged = |tag| [(Tag::Orientation, Value::Short(vec![tag]))];
+    let files = Files::new(&[
+        ("true.jpg", jpeg(32, 24, 1, &tagged(8))),
+        ("stale.jpg", jpeg(24, 32, 2, &tagged(8))),
+        ("turned.jpg", jpeg(24, 32, 3, &tagged(3))),
+    ]);
+    let inputs = ["true.jpg", "stale.jpg", "turned.jpg"].map(|name| files.path(name).display().to_string());
+    let facts = |trust_orientation| {
+        let context = StageContext::default();
+        let options = SourceOptions { trust_orientation, ..SourceOptions::default() };
+        let sources = scan(&inputs, &options, &context).expect("three pictures");
+        let notes: Vec<String> = context.take_diagnostics().into_iter().map(|note| note.code + &note.subject).collect();
+        let facts: Vec<_> = sources.images.iter().map(|i| (i.orientation, i.width, i.height)).collect();
+        (facts, notes)
+    };
+    let (auto, notes) = facts(OrientationTrust::Auto);
+    assert_eq!(auto, [(8, 24, 32), (1, 24, 32), (3, 24, 32)]);
+    assert_eq!(notes, ["orientation-tag-stalestale.jpg"]);
+    assert_eq!(facts(OrientationTrust::Always).0, [(8, 24, 32), (8, 32, 24), (3, 24, 32)]);
+    assert_eq!(facts(OrientationTrust::Never).0, [(1, 32, 24), (1, 24, 32), (1, 24, 32)]);
+}
+
+#[test]
+fn focal_length_and_camera_come_from_exif() {
+    let exif = [
+        (Tag::Make, Value::Ascii(vec![b"NIKON CORPORATION ".to_vec()])),
+        (Tag::Model, Value::Ascii(vec![b"NIKON D7000".to_vec()])),
+        (Tag::FocalLength, Value::Rational(vec![Rational { num: 105, denom: 1 }])),
+        (Tag::FocalLengthIn35mmFilm, Value::Short(vec![157])),
+    ];
+    let files = Files::new(&[("a.jpg", jpeg(400, 300, 1, &exif))]);
+    let image = &files.scan(&["a.jpg"]).images[0];
+    assert_eq!(image.camera_model.as_deref(), Some("NIKON D7000"));
+    let prior = image.focal_prior.expect("a focal length");
+    assert_eq!(prior.source, FocalSource::Equivalent35mm);
+    // 157 mm * 500 px / 43.2666 mm.
+    assert!((prior.focal_px - 1814.3).abs() < 0.1, "{prior:?}");
+}
+
+#[test]
+fn tiff_tags_are_read_like_exif() {
+    use tiff::encoder::{TiffEncoder, colortype::Gray8};
+    use tiff::tags::Tag as TiffTag;
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new(&mut bytes).expect("to memory");
+    let mut image = encoder.new_image::<Gray8>(32, 24).expect("a picture");
+    image.encoder().write_tag(TiffTag::Orientation, 6_u16).expect("a tag");
+    image.encoder().write_tag(TiffTag::Model, "NIKON D7000").expect("a tag");
+    image.write_data(&[9; 32 * 24]).expect("pixels");
+    let files = Files::new(&[("a.tif", bytes.into_inner())]);
+    let image = &files.scan(&["a.tif"]).images[0];
+    assert_eq!((image.orientation, image.width, image.height), (6, 24, 32));
+    assert_eq!(image.camera_model.as_deref(), Some("NIKON D7000"));
+}
+
+#[test]
+fn options_out_of_range_are_refused_and_a_stop_is_obeyed() {
+    let bad = SourceOptions { max_megapixels: f64::NAN, ..SourceOptions::default() };
+    assert!(matches!(scan(&[], &bad, &StageContext::default()), Err(Error::Options(_))));
+    let cancel = trueup_core::context::CancelToken::default();
+    cancel.cancel();
+    let context = StageContext::new(&trueup_core::context::Silent, &cancel, 0);
+    let stopped = scan(&["nowhere.jpg".to_owned()], &SourceOptions::default(), &context);
+    assert!(matches!(stopped, Err(Error::Cancelled)));
+}
+
+/// Scans bytes as a file and decodes whatever was accepted; only a panic can fail.
+fn digest(folder: &Path, bytes: &[u8]) {
+    let path = folder.join("input.bin");
+    std::fs::write(&path, bytes).expect("writing a test file");
+    // A small limit keeps sizes that damage made up from being decoded at length.
+    let options = SourceOptions { max_megapixels: 0.1, min_side_px: 1, ..SourceOptions::default() };
+    let sources = scan(&[path.display().to_string()], &options, &StageContext::default()).expect("never fails");
+    assert_eq!(sources.images.len() + sources.rejected.len(), 1);
+    for image in &sources.images {
+        let _ = crate::decode::photograph(image);
+    }
+}
+
+/// One small file of every format, with EXIF where the encoder writes it.
+fn specimens() -> Vec<Vec<u8>> {
+    let mut specimens = vec![jpeg(20, 17, 1, &[(Tag::Orientation, Value::Short(vec![6]))])];
+    let picture = image::DynamicImage::ImageRgba8(image::RgbaImage::from_fn(19, 18, |x, y| {
+        image::Rgba([x as u8 * 9, y as u8, 7, 200])
+    }));
+    for format in [image::ImageFormat::Png, image::ImageFormat::Tiff, image::ImageFormat::WebP] {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        picture.write_to(&mut bytes, format).expect("encoding to memory");
+        specimens.push(bytes.into_inner());
+    }
+    specimens
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(150))]
+
+    #[test]
+    fn random_bytes_never_panic(specimen in 0_usize..4, mut bytes in proptest::collection::vec(any::<u8>(), 0..600), keep in 0_usize..32) {
+        let folder = TempDir::new().expect("a temporary folder");
+        let start = &specimens()[specimen];
+        let keep = keep.min(bytes.len());
+        bytes[..keep].copy_from_slice(&start[..keep]);
+        digest(folder.path(), &bytes);
+    }
+
+    #[test]
+    fn damaged_files_never_panic(
+        specimen in 0_usize..4,
+        cut in 0.0_f64..=1.2,
+        flips in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..6),
+    ) {
+        let folder = TempDir::new().expect("a temporary folder");
+        let mut bytes = specimens().swap_remove(specimen);
+        for (place, value) in flips {
+            let place = place.index(bytes.len());
+            bytes[place] = value;
+        }
+        bytes.truncate((bytes.len() as f64 * cut) as usize);
+        digest(folder.path(), &bytes);
+    }
+}

@@ -1,8 +1,8 @@
 //! Straight line segments: our own LSD (Line Segment Detector) with a sub-pixel refinement of their directions.
 //!
-//! The steps, a file each: [`gradient`] reduces the picture and finds level-line directions, [`region`] grows connected
-//! pixels of one direction, [`rectangle`] fits and improves rectangles, [`significance`] counts false alarms,
-//! [`refine`] fits the segment again to sub-pixel edge points of the picture itself, [`tidy`] drops frame artefacts,
+//! The steps, a file each: `gradient` reduces the picture and finds level-line directions, `region` grows connected
+//! pixels of one direction, `rectangle` fits and improves rectangles, `significance` counts false alarms,
+//! `refine` fits the segment again to sub-pixel edge points of the picture itself, `tidy` drops frame artefacts,
 //! merges and sorts.
 //!
 //! # Source
@@ -15,6 +15,7 @@
 //!   tolerance.
 //! * The rectangle keeps both of its sides apart from its axis, and the segment stays on the axis through the centre
 //!   of mass when one side is cut away; the papers move the axis to the middle of what remains.
+//! * Tolerances of regrown regions never exceed the first one.
 //! * The border of the picture is mirrored at the edge of its outermost pixels.
 
 use rayon::prelude::*;
@@ -59,8 +60,8 @@ trueup_core::options! {
         magnitude_bins: usize = 1024, between(1.0, 65536.0), "";
         /// Segments shorter than this are dropped.
         min_length_px: f64 = 0.0, between(0.0, 1e6), "px";
-        /// Whether segments are fitted again to sub-pixel edge points of the unreduced picture, which makes their
-        /// directions several times more accurate.
+        /// Whether segments are fitted again to sub-pixel edge points of the unreduced picture, which makes
+        /// the directions of sharp edges about twice as accurate.
         refine: bool = true, Allowed::Any, "";
         /// Segments shorter than this are not refined: too few edge points.
         refine_min_length_px: f64 = 12.0, between(4.0, 1e6), "px";

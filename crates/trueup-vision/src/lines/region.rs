@@ -76,6 +76,8 @@ impl<'a> RegionGrower<'a> {
     fn grow(&mut self, seed: u32, tolerance: f64) {
         let lines = self.field.level_lines();
         let stride = self.field.stride();
+        // The neighbours, from the one at the upper left on.
+        let offsets = [0, 1, 2, stride, stride + 2, 2 * stride, 2 * stride + 1, 2 * stride + 2];
         let tangent = tolerance.tan() as f32;
         self.region.clear();
         self.region.push(seed);
@@ -85,14 +87,13 @@ impl<'a> RegionGrower<'a> {
         while let Some(&index) = self.region.get(next) {
             next += 1;
             // Pixels of the field have all eight neighbours in the padded arrays.
-            let centre = index as usize;
-            for row_start in [centre - stride - 1, centre - 1, centre + stride - 1] {
-                for neighbour in row_start..row_start + 3 {
-                    if !self.used[neighbour] && is_aligned(lines[neighbour], sum, tangent) {
-                        self.used[neighbour] = true;
-                        sum = [sum[0] + lines[neighbour][0], sum[1] + lines[neighbour][1]];
-                        self.region.push(neighbour as u32);
-                    }
+            let first = index as usize - stride - 1;
+            for offset in offsets {
+                let neighbour = first + offset;
+                if !self.used[neighbour] && is_aligned(lines[neighbour], sum, tangent) {
+                    self.used[neighbour] = true;
+                    sum = [sum[0] + lines[neighbour][0], sum[1] + lines[neighbour][1]];
+                    self.region.push(neighbour as u32);
                 }
             }
         }

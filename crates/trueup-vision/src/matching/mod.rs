@@ -1,8 +1,8 @@
 //! Matches between pairs of pictures, and which pairs overlap.
 //!
-//! Descriptors are compared exhaustively ([`putative`]), a homography is sought that many matches agree on
-//! ([`ransac`]), the pair is judged by how many do, and the matches of a joined pair are completed by further planes
-//! ([`planes`]) and by a second look near the predicted places ([`guided`]).
+//! Descriptors are compared exhaustively (`putative`), a homography is sought that many matches agree on
+//! (`ransac`), the pair is judged by how many do, and the matches of a joined pair are completed by further planes
+//! (`planes`) and by a second look near the predicted places (`guided`).
 
 mod guided;
 mod options;
@@ -33,7 +33,7 @@ pub use search::{Kernel, Nearest, Neighbour};
 use crate::features::Features;
 use guided::Follower;
 use overlap::Overlap;
-use ransac::{Consensus, MatchedPoints, Search};
+use ransac::{Consensus, MatchedPoints, NoConsensus, Search};
 
 /// The stage's name in progress and generators.
 const STAGE: &str = MatchingOptions::STAGE;
@@ -135,16 +135,25 @@ pub fn match_pair(
     context.check_cancelled()?;
     let mut generator = context.generator(STAGE, (a.index as u64) << 32 | b.index as u64);
     let points = matched_points(&putative);
-    let search =
-        Search { inlier_px: options.inlier_px, confidence: options.confidence, max_samples: options.max_samples };
+    let search = Search {
+        inlier_px: options.inlier_px,
+        confidence: options.confidence,
+        max_samples: options.max_samples,
+        useful_inliers: pair.needed,
+    };
     let is_plausible = plausibility(a.frame, b.frame, options);
     let global = ransac::find_homography(&points, &search, &is_plausible, &mut generator);
-    let Some((global, overlap)) =
-        global.and_then(|global| Overlap::new(global.b_from_a, a.frame, b.frame).map(|overlap| (global, overlap)))
-    else {
-        pair.verdict = PairVerdict::ImplausibleHomography;
-        return Ok(pair);
+    let global = match global {
+        Ok(global) => global,
+        Err(failure) => {
+            pair.verdict = match failure {
+                NoConsensus::NoSample => PairVerdict::TooFewInliers,
+                NoConsensus::Implausible => PairVerdict::ImplausibleHomography,
+            };
+            return Ok(pair);
+        }
     };
+    let Some(overlap) = Overlap::new(global.b_from_a, a.frame, b.frame) else { return Ok(pair) };
     pair.in_overlap = putative.iter().filter(|candidate| overlap.contains(&candidate.at)).count();
     pair.agreeing = global.inliers.iter().filter(|&&k| overlap.contains(&putative[k].at)).count();
     pair.b_from_a = Some(scaled_rows(&global.b_from_a));

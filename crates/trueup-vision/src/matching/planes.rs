@@ -32,11 +32,12 @@ pub fn find_planes(
         inlier_px: options.plane_inlier_px,
         confidence: options.confidence,
         max_samples: options.max_plane_samples,
+        useful_inliers: options.min_plane_inliers,
     };
     let mut left = points.agreeing(global, max_displacement_px);
     let mut planes = Vec::new();
     while left.len() >= options.min_plane_inliers && planes.len() < MAX_PLANES {
-        let Some(found) = find_homography(&points.select(&left), &search, &is_plausible, generator) else { break };
+        let Ok(found) = find_homography(&points.select(&left), &search, &is_plausible, generator) else { break };
         if found.inliers.len() < options.min_plane_inliers {
             break;
         }

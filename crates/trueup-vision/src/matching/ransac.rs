@@ -19,6 +19,9 @@ const MIN_TRIANGLE_PX2: f64 = 20.0;
 const LOCAL_THRESHOLDS: [f64; 4] = [2.0, 1.5, 1.0, 1.0];
 /// Rounds of final refinement and new choice of inliers.
 const FINAL_ROUNDS: usize = 4;
+/// How many times the samples that would give one without outliers are drawn before useful inliers count as absent:
+/// such a sample may still be too noisy or too narrow.
+const PATIENCE: usize = 8;
 /// Matches measured between two looks at whether a hypothesis can still win.
 const BATCH: usize = 16;
 
@@ -31,6 +34,8 @@ pub struct Search {
     pub confidence: f64,
     /// Largest number of samples.
     pub max_samples: usize,
+    /// Inliers below which the answer is of no use; drawing ends where so many would have been found.
+    pub useful_inliers: usize,
 }
 
 /// A homography and the matches that agree with it.
@@ -40,6 +45,15 @@ pub struct Consensus {
     pub b_from_a: Homography,
     /// Indices of the agreeing matches, ascending.
     pub inliers: Vec<usize>,
+}
+
+/// Why no homography was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoConsensus {
+    /// No sample gave one that could be right.
+    NoSample,
+    /// The useful ones were not plausible.
+    Implausible,
 }
 
 /// Matched points, most distinctive first.
@@ -67,25 +81,30 @@ impl MatchedPoints {
     }
 }
 
-/// The plausible homography of least truncated squared forward transfer error, refined on its inliers; `None` if
-/// there are fewer than four matches or no sample gives a plausible one.
+/// The plausible homography of least truncated squared forward transfer error, refined on its inliers.
 ///
 /// The error of a match counts at most `inlier_px`; hypotheses that cannot win any more are dropped early. The result
 /// minimises the symmetric transfer error of its inliers.
+///
+/// # Errors
+/// [`NoConsensus`] if there are fewer than four matches or no sample gives a plausible map.
 pub fn find_homography(
     points: &MatchedPoints,
     search: &Search,
     is_plausible: impl Fn(&Homography) -> bool,
     generator: &mut impl Rng,
-) -> Option<Consensus> {
+) -> Result<Consensus, NoConsensus> {
     let count = points.in_a.len();
     if count < SAMPLE {
-        return None;
+        return Err(NoConsensus::NoSample);
     }
+    let mut failure = NoConsensus::NoSample;
     let mut best: Option<Homography> = None;
     let mut best_cost = count as f64;
-    let mut needed = search.max_samples;
-    let mut pool = ProgressivePool::new(count, search.max_samples);
+    let hopeless =
+        PATIENCE.saturating_mul(samples_needed(search.useful_inliers as f64 / count as f64, search.confidence));
+    let mut needed = search.max_samples.min(hopeless);
+    let mut pool = ProgressivePool::new(count, needed);
     let mut drawn = 0;
     while drawn < needed {
         drawn += 1;
@@ -93,6 +112,9 @@ pub fn find_homography(
         let Some(hypothesis) = through_sample(points, &sample) else { continue };
         let Some(cost) = truncated_cost(points, &hypothesis, search.inlier_px, best_cost) else { continue };
         if !is_plausible(&hypothesis) {
+            if points.agreeing(&hypothesis, search.inlier_px).len() >= search.useful_inliers {
+                failure = NoConsensus::Implausible;
+            }
             continue;
         }
         let (hypothesis, cost) = optimise_locally(points, hypothesis, cost, search.inlier_px, &is_plausible);
@@ -100,15 +122,18 @@ pub fn find_homography(
         let agreeing = points.agreeing(&hypothesis, search.inlier_px).len();
         needed = needed.min(samples_needed(agreeing as f64 / count as f64, search.confidence));
     }
-    let refined = finish(points, best?, search.inlier_px, &is_plausible);
+    let refined = finish(points, best.ok_or(failure)?, search.inlier_px, &is_plausible);
     let inliers = points.agreeing(&refined, search.inlier_px);
-    Some(Consensus { b_from_a: refined, inliers })
+    Ok(Consensus { b_from_a: refined, inliers })
 }
 
 /// Samples after which one is all inliers with the probability asked for.
 fn samples_needed(inlier_ratio: f64, confidence: f64) -> usize {
+    if inlier_ratio >= 1.0 {
+        return 1;
+    }
     let needed = (1.0 - confidence).ln() / (1.0 - inlier_ratio.powi(SAMPLE as i32)).ln();
-    if needed.is_finite() { needed.ceil().max(1.0) as usize } else { 1 }
+    if needed.is_finite() { needed.ceil().max(1.0) as usize } else { usize::MAX }
 }
 
 /// Draws samples alternately from all matches and from a pool of the most distinctive that grows to all of them.
@@ -265,4 +290,30 @@ fn finish(
         inliers = chosen;
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_number_of_samples_is_that_of_the_textbook() {
+        // ln(1 - 0.995) / ln(1 - p) with p = 0.225^4 and 0.2^4, as in the reference implementation; 0.5^4 by hand.
+        assert_eq!(samples_needed(0.225, 0.995), 2065);
+        assert_eq!(samples_needed(0.5, 0.995), 83);
+        assert_eq!(samples_needed(1.0, 0.995), 1);
+        assert_eq!(samples_needed(0.0, 0.995), usize::MAX);
+    }
+
+    #[test]
+    fn four_matches_determine_the_map_unless_it_turns_them_over() {
+        let h = Homography(Matrix3::new(1.05, 0.08, 200.0, -0.06, 1.02, 30.0, -4e-4, 6e-5, 1.0));
+        let in_a = [(0.0, 0.0), (640.0, 10.0), (600.0, 480.0), (20.0, 400.0)].map(|(x, y)| Vector2::new(x, y));
+        let points = MatchedPoints { in_a: in_a.to_vec(), in_b: in_a.map(|p| h.apply(p)).to_vec() };
+        let found = through_sample(&points, &[0, 1, 2, 3]).expect("general position");
+        assert!((found.0 / found.0[(2, 2)] - h.0).amax() < 1e-9);
+        let swapped =
+            MatchedPoints { in_b: vec![points.in_b[1], points.in_b[0], points.in_b[2], points.in_b[3]], ..points };
+        assert!(through_sample(&swapped, &[0, 1, 2, 3]).is_none());
+    }
 }

@@ -146,3 +146,58 @@ fn centre_and_spread(points: &[Vector2<f64>]) -> Option<(Vector2<f64>, f64)> {
     let spread = (points.iter().map(|point| (point - centre).norm_squared()).sum::<f64>() / count).sqrt();
     (spread > f64::EPSILON).then_some((centre, spread))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn example() -> Homography {
+        Homography(Matrix3::new(1.05, 0.08, 200.0, -0.06, 1.02, 30.0, -4e-4, 6e-5, 1.0))
+    }
+
+    /// Points of a quasi-regular grid, those in b displaced by up to about `noise_px`.
+    fn points(noise_px: f64) -> MatchedPoints {
+        let in_a: Vec<Vector2<f64>> =
+            (0..60).map(|k| Vector2::new(f64::from(k * 97 % 640), f64::from(k * 61 % 480))).collect();
+        let noise = |k: usize| Vector2::new((k as f64 * 1.7).sin(), (k as f64 * 2.3).cos()) * noise_px;
+        let in_b = in_a.iter().enumerate().map(|(k, &p)| example().apply(p) + noise(k)).collect();
+        MatchedPoints { in_a, in_b }
+    }
+
+    fn symmetric_error(map: &Homography, points: &MatchedPoints) -> f64 {
+        let inverse = map.inverse().expect("regular");
+        let pairs = points.in_a.iter().zip(&points.in_b);
+        pairs.map(|(&a, &b)| (b - map.apply(a)).norm_squared() + (a - inverse.apply(b)).norm_squared()).sum()
+    }
+
+    #[test]
+    fn exact_matches_give_the_exact_map_from_a_rough_start() {
+        let start = Homography(example().0 + Matrix3::new(0.02, -0.01, 4.0, 0.01, 0.02, -3.0, 1e-5, -1e-5, 0.0));
+        let refined = minimise_symmetric_error(&start, &points(0.0)).expect("regular");
+        assert!((refined.0 / refined.0[(2, 2)] - example().0).amax() < 1e-6);
+    }
+
+    #[test]
+    fn the_result_is_a_minimum() {
+        let points = points(1.5);
+        let refined = minimise_symmetric_error(&example(), &points).expect("regular");
+        let refined = Homography(refined.0 / refined.0[(2, 2)]);
+        let least = symmetric_error(&refined, &points);
+        assert!(least < symmetric_error(&example(), &points));
+        for entry in 0..8 {
+            let scale = [1e-3, 1e-3, 0.3, 1e-3, 1e-3, 0.3, 2e-6, 2e-6][entry];
+            for step in [-scale, scale] {
+                let mut moved = refined;
+                moved.0[(entry / 3, entry % 3)] += step;
+                assert!(symmetric_error(&moved, &points) > least, "entry {entry}");
+            }
+        }
+    }
+
+    #[test]
+    fn coincident_points_and_singular_maps_are_refused() {
+        let same = MatchedPoints { in_a: vec![Vector2::new(1.0, 2.0); 5], in_b: vec![Vector2::new(1.0, 2.0); 5] };
+        assert!(minimise_symmetric_error(&example(), &same).is_none());
+        assert!(minimise_symmetric_error(&Homography(Matrix3::zeros()), &points(0.0)).is_none());
+    }
+}

@@ -1,1 +1,324 @@
+use nalgebra::{Matrix3, Vector2};
+use proptest::prelude::*;
+use rand::{Rng, RngExt};
 
+use super::*;
+use crate::features::{DESCRIPTOR_LENGTH, Descriptor, FeaturePoint};
+
+const WIDTH: f64 = 800.0;
+const HEIGHT: f64 = 600.0;
+
+/// Two pictures under construction.
+#[derive(Default)]
+struct Scene {
+    a: Features,
+    b: Features,
+}
+
+impl Scene {
+    /// A point seen in both pictures.
+    fn add(&mut self, in_a: Vector2<f64>, in_b: Vector2<f64>, generator: &mut impl Rng) {
+        let descriptor = random_descriptor(generator);
+        push(&mut self.a, in_a, &[descriptor]);
+        push(&mut self.b, in_b, &[descriptor.map(|element| element.saturating_add(1))]);
+    }
+
+    /// Points of one plane that both pictures see, with noise of up to `noise_px`.
+    fn add_plane(&mut self, b_from_a: &Homography, count: usize, noise_px: f64, generator: &mut impl Rng) {
+        let mut left = count;
+        while left > 0 {
+            let in_a = random_place(generator);
+            let noise = Vector2::from_fn(|_, _| generator.random_range(-noise_px..=noise_px));
+            let in_b = b_from_a.apply(in_a) + noise;
+            if frame().contains(in_b.x, in_b.y) {
+                self.add(in_a, in_b, generator);
+                left -= 1;
+            }
+        }
+    }
+
+    /// Points that look alike but are not the same.
+    fn add_outliers(&mut self, count: usize, generator: &mut impl Rng) {
+        for _ in 0..count {
+            let (in_a, in_b) = (random_place(generator), random_place(generator));
+            self.add(in_a, in_b, generator);
+        }
+    }
+
+    fn matched(&self, forced: bool, options: &MatchingOptions) -> PairMatches {
+        let frame = frame();
+        let a = Picture { index: 0, features: &self.a, frame: &frame };
+        let b = Picture { index: 1, features: &self.b, frame: &frame };
+        match_pair(a, b, forced, options, &StageContext::default()).expect("valid scene")
+    }
+
+    fn putative(&self, options: &MatchingOptions) -> Vec<(usize, usize)> {
+        let putative = putative_matches(&self.a, &self.b, options);
+        putative.iter().map(|found| (found.point_a, found.point_b)).collect()
+    }
+}
+
+fn frame() -> WorkingFrame {
+    WorkingFrame { width: WIDTH, height: HEIGHT, working_from_full: 1.0 }
+}
+
+fn generator(subject: u64) -> impl Rng {
+    StageContext::default().generator("test", subject)
+}
+
+fn random_descriptor(generator: &mut impl Rng) -> Descriptor {
+    let mut descriptor = [0; DESCRIPTOR_LENGTH];
+    generator.fill_bytes(&mut descriptor);
+    descriptor
+}
+
+fn random_place(generator: &mut impl Rng) -> Vector2<f64> {
+    Vector2::new(generator.random_range(0.0..WIDTH), generator.random_range(0.0..HEIGHT))
+}
+
+fn push(features: &mut Features, position: Vector2<f64>, descriptors: &[Descriptor]) {
+    let owner = features.points.len() as u32;
+    features.points.push(FeaturePoint { position: position.into(), scale_px: 2.0, response: 10.0 });
+    features.descriptors.extend_from_slice(descriptors);
+    features.descriptor_points.extend(descriptors.iter().map(|_| owner));
+}
+
+/// A turn to the right by a third of the width, with some roll.
+fn example_map() -> Homography {
+    Homography(Matrix3::new(0.98, -0.05, -260.0, 0.06, 1.01, -20.0, 1.5e-4, 2e-5, 1.0))
+}
+
+/// Largest distance between where two maps take the points of a grid that the first takes into b.
+fn largest_difference(truth: &Homography, rows: &[[f64; 3]; 3]) -> f64 {
+    let found = Homography::from_rows(rows);
+    let grid = (0..=8).flat_map(|x| (0..=6).map(move |y| Vector2::new(f64::from(x) * 100.0, f64::from(y) * 100.0)));
+    let pairs = grid.map(|point| (truth.apply(point), found.apply(point)));
+    let inside = pairs.filter(|(expected, _)| frame().contains(expected.x, expected.y));
+    inside.map(|(expected, found)| (expected - found).norm()).fold(0.0, f64::max)
+}
+
+/// A descriptor of which only the first element is `level`: distances between them are differences of levels.
+fn level(level: u8) -> Descriptor {
+    let mut descriptor = [0; DESCRIPTOR_LENGTH];
+    descriptor[0] = level;
+    descriptor
+}
+
+fn levels(places: &[(f64, &[u8])]) -> Features {
+    let mut features = Features::default();
+    for (x, of_point) in places {
+        let descriptors: Vec<Descriptor> = of_point.iter().map(|&value| level(value)).collect();
+        push(&mut features, Vector2::new(*x, 0.0), &descriptors);
+    }
+    features
+}
+
+#[test]
+fn the_second_neighbour_decides_by_its_distance() {
+    let options = MatchingOptions::default();
+    let a = levels(&[(0.0, &[100])]);
+    // 16 / 20 = 0.8 passes, 17 / 20 does not.
+    for (nearest, expected) in [(116, vec![(0, 0)]), (117, vec![])] {
+        let scene = Scene { a: a.clone(), b: levels(&[(0.0, &[nearest]), (50.0, &[80])]) };
+        assert_eq!(scene.putative(&options), expected);
+    }
+}
+
+#[test]
+fn a_second_neighbour_at_the_same_place_does_not_count() {
+    let options = MatchingOptions::default();
+    let a = levels(&[(0.0, &[100])]);
+    let near = Scene { a: a.clone(), b: levels(&[(0.0, &[101]), (2.9, &[102]), (50.0, &[150])]) };
+    assert_eq!(near.putative(&options), [(0, 0)]);
+    let far = Scene { a, b: levels(&[(0.0, &[101]), (3.1, &[101]), (50.0, &[150])]) };
+    assert_eq!(far.putative(&options), []);
+}
+
+#[test]
+fn points_are_as_far_as_their_nearest_descriptors() {
+    let options = MatchingOptions::default();
+    // The second point's second descriptor is nearest; its other one is no rival.
+    let scene = Scene { a: levels(&[(0.0, &[10, 200])]), b: levels(&[(0.0, &[150]), (50.0, &[90, 198])]) };
+    let found = putative_matches(&scene.a, &scene.b, &options);
+    assert_eq!(found.len(), 1);
+    assert_eq!((found[0].point_b, found[0].squared_distance), (1, 4));
+    assert!((found[0].ratio - 2.0 / 50.0).abs() < 1e-12);
+}
+
+#[test]
+fn mutual_matches_are_asked_for_by_default() {
+    let scene = Scene { a: levels(&[(0.0, &[100]), (60.0, &[110])]), b: levels(&[(0.0, &[108]), (50.0, &[250])]) };
+    assert_eq!(scene.putative(&MatchingOptions::default()), [(1, 0)]);
+    let one_way = MatchingOptions { mutual: false, ..MatchingOptions::default() };
+    assert_eq!(scene.putative(&one_way), [(0, 0), (1, 0)]);
+}
+
+#[test]
+fn of_duplicates_the_nearest_stays() {
+    let a = levels(&[(0.0, &[50]), (0.4, &[150]), (30.0, &[240])]);
+    let b = levels(&[(10.0, &[52]), (10.3, &[151]), (90.0, &[240])]);
+    assert_eq!(Scene { a, b }.putative(&MatchingOptions::default()), [(1, 1), (2, 2)]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    #[test]
+    fn a_homography_is_found_among_sixty_percent_outliers(seed in 0_u64..1000) {
+        let mut generator = generator(seed);
+        let mut scene = Scene::default();
+        scene.add_plane(&example_map(), 80, 0.5, &mut generator);
+        scene.add_outliers(120, &mut generator);
+        // Noise may push matches at the border out of the predicted overlap.
+        let pair = scene.matched(false, &MatchingOptions { brown_lowe_beta: 0.2, ..MatchingOptions::default() });
+        prop_assert_eq!(pair.verdict, PairVerdict::Joined);
+        prop_assert!((76..=86).contains(&pair.agreeing));
+        let rows = pair.b_from_a.expect("joined");
+        prop_assert!(largest_difference(&example_map(), &rows) < 1.0);
+    }
+}
+
+#[test]
+fn both_planes_of_a_scene_are_found() {
+    let mut generator = generator(1);
+    let shift = |x: f64| Homography(Matrix3::new(1.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0));
+    let mut scene = Scene::default();
+    scene.add_plane(&shift(-200.0), 120, 0.3, &mut generator);
+    scene.add_plane(&shift(-230.0), 70, 0.3, &mut generator);
+    let pair = scene.matched(false, &MatchingOptions::default());
+    assert_eq!(pair.verdict, PairVerdict::Joined);
+    assert!((120..130).contains(&pair.agreeing));
+    assert!(pair.inliers.len() >= 188, "{}", pair.inliers.len());
+    let one_plane = MatchingOptions { min_plane_inliers: 1000, guided: false, ..MatchingOptions::default() };
+    assert_eq!(scene.matched(false, &one_plane).inliers.len(), pair.agreeing);
+}
+
+#[test]
+fn a_plane_far_from_the_global_homography_is_left_out() {
+    let mut generator = generator(1);
+    let shift = |x: f64| Homography(Matrix3::new(1.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0));
+    let mut scene = Scene::default();
+    scene.add_plane(&shift(-100.0), 120, 0.3, &mut generator);
+    scene.add_plane(&shift(-400.0), 70, 0.3, &mut generator);
+    assert_eq!(scene.matched(false, &MatchingOptions::default()).inliers.len(), 120);
+}
+
+#[test]
+fn unrelated_pictures_are_not_joined() {
+    let mut generator = generator(2);
+    let mut scene = Scene::default();
+    for _ in 0..300 {
+        push(&mut scene.a, random_place(&mut generator), &[random_descriptor(&mut generator)]);
+        push(&mut scene.b, random_place(&mut generator), &[random_descriptor(&mut generator)]);
+    }
+    let pair = scene.matched(false, &MatchingOptions::default());
+    assert_eq!((pair.verdict, pair.b_from_a), (PairVerdict::TooFewMatches, None));
+    for seed in 0..20 {
+        let mut scene = Scene::default();
+        scene.add_outliers(60, &mut StageContext::default().generator("outliers", seed));
+        for forced in [false, true] {
+            let pair = scene.matched(forced, &MatchingOptions::default());
+            assert!(!pair.verdict.is_joined() && pair.inliers.is_empty() && pair.agreeing < 8, "{pair:?}");
+        }
+    }
+}
+
+#[test]
+fn nothing_matches_nothing() {
+    let mut scene = Scene::default();
+    assert_eq!(scene.matched(false, &MatchingOptions::default()).verdict, PairVerdict::TooFewMatches);
+    let mut generator = generator(3);
+    scene.add_plane(&example_map(), 3, 0.0, &mut generator);
+    let pair = scene.matched(true, &MatchingOptions::default());
+    assert_eq!((pair.putative, pair.verdict, pair.confidence()), (3, PairVerdict::TooFewMatches, 0.0));
+}
+
+#[test]
+fn collinear_matches_have_no_homography() {
+    let mut generator = generator(4);
+    let mut scene = Scene::default();
+    for k in 0..40 {
+        let place = Vector2::new(f64::from(k) * 12.0, 300.0);
+        scene.add(place, place, &mut generator);
+    }
+    let pair = scene.matched(false, &MatchingOptions::default());
+    assert_eq!((pair.verdict, pair.b_from_a), (PairVerdict::TooFewInliers, None));
+}
+
+#[test]
+fn a_homography_that_explodes_the_picture_is_not_believed() {
+    let mut generator = generator(4);
+    let mut scene = Scene::default();
+    let explosion = Homography(Matrix3::new(6.0, 0.0, -2000.0, 0.0, 6.0, -1500.0, 0.0, 0.0, 1.0));
+    scene.add_plane(&explosion, 60, 0.3, &mut generator);
+    let pair = scene.matched(true, &MatchingOptions::default());
+    assert_eq!((pair.verdict, pair.b_from_a), (PairVerdict::ImplausibleHomography, None));
+}
+
+#[test]
+fn the_users_graph_joins_pairs_with_fewer_inliers() {
+    let mut generator = generator(5);
+    let mut scene = Scene::default();
+    scene.add_plane(&example_map(), 10, 0.3, &mut generator);
+    let alone = scene.matched(false, &MatchingOptions::default());
+    assert_eq!((alone.verdict, alone.agreeing, alone.needed), (PairVerdict::TooFewInliers, 10, 15));
+    let forced = scene.matched(true, &MatchingOptions::default());
+    assert_eq!((forced.verdict, forced.needed, forced.inliers.len()), (PairVerdict::JoinedByGraph, 8, 10));
+}
+
+#[test]
+fn ambiguous_points_are_matched_near_their_predicted_places() {
+    let mut generator = generator(6);
+    let mut scene = Scene::default();
+    scene.add_plane(&example_map(), 60, 0.3, &mut generator);
+    // Twenty windows that all look the same.
+    let window = random_descriptor(&mut generator);
+    for k in 0..20 {
+        let in_a = Vector2::new(350.0 + 40.0 * f64::from(k % 10), 200.0 + 150.0 * f64::from(k / 10));
+        push(&mut scene.a, in_a, &[window]);
+        push(&mut scene.b, example_map().apply(in_a), &[window]);
+    }
+    let unguided = MatchingOptions { guided: false, ..MatchingOptions::default() };
+    assert_eq!(scene.matched(false, &unguided).inliers.len(), 60);
+    assert_eq!(scene.matched(false, &MatchingOptions { guided: true, ..unguided }).inliers.len(), 80);
+}
+
+#[test]
+fn results_do_not_depend_on_threads_and_follow_the_order_of_pairs() {
+    let mut generator = generator(7);
+    let mut scene = Scene::default();
+    scene.add_plane(&example_map(), 100, 1.0, &mut generator);
+    scene.add_outliers(80, &mut generator);
+    let features = [scene.a.clone(), scene.b, scene.a];
+    let (frames, pairs) = ([frame(); 3], [(1, 2), (0, 2), (1, 0)]);
+    let run_on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        let context = StageContext::default();
+        let options = MatchingOptions::default();
+        let matched = pool.install(|| run(&features, &frames, &pairs, &BTreeSet::new(), &options, &context));
+        (matched.expect("valid pictures"), context.take_diagnostics())
+    };
+    let (matched, diagnostics) = run_on(1);
+    assert_eq!((matched.clone(), diagnostics.clone()), run_on(2));
+    assert_eq!(matched.iter().map(|pair| (pair.a, pair.b)).collect::<Vec<_>>(), [(1, 2), (0, 2), (0, 1)]);
+    assert!(matched.iter().all(|pair| pair.verdict.is_joined()));
+    assert_eq!(diagnostics.len(), 1);
+    assert_eq!((diagnostics[0].code.as_str(), diagnostics[0].subject.as_str()), ("near-duplicate", "0 - 2"));
+}
+
+#[test]
+fn contradictory_input_is_an_error() {
+    let (frame, context) = (frame(), StageContext::default());
+    let match_with = |features: &Features, index: usize| {
+        let a = Picture { index: 0, features, frame: &frame };
+        match_pair(a, Picture { index, ..a }, false, &MatchingOptions::default(), &context)
+    };
+    let good = levels(&[(0.0, &[1])]);
+    assert!(matches!(match_with(&good, 0), Err(Error::Input { .. })));
+    let ownerless = Features { descriptor_points: vec![1], ..good.clone() };
+    assert!(matches!(match_with(&ownerless, 1), Err(Error::Input { .. })));
+    let nowhere = levels(&[(f64::NAN, &[1])]);
+    assert!(matches!(match_with(&nowhere, 1), Err(Error::Input { .. })));
+    let missing = run(&[good], &[frame], &[(0, 1)], &BTreeSet::new(), &MatchingOptions::default(), &context);
+    assert!(matches!(missing, Err(Error::Input { .. })));
+}

@@ -44,10 +44,14 @@ impl Kernel {
         Self::available().last().copied().unwrap_or(Self::Portable)
     }
 
-    /// Whether the kernel multiplies unsigned column bytes by signed row bytes, four to a word. The others multiply
-    /// 16-bit numbers, two to a word.
-    pub fn multiplies_bytes(self) -> bool {
-        matches!(self, Self::AvxVnni | Self::Avx512Vnni)
+    /// Elements of a descriptor in one packed word: four bytes (unsigned columns, signed rows), two 16-bit numbers, or
+    /// one 32-bit floating-point number, in which whole numbers up to 2^24, and so all products here, are exact.
+    pub fn elements_per_word(self) -> usize {
+        match self {
+            Self::Portable => 1,
+            Self::Avx2 => 2,
+            Self::AvxVnni | Self::Avx512Vnni => 4,
+        }
     }
 }
 
@@ -104,15 +108,15 @@ pub fn lower(kernel: Kernel, tile: &Tile<'_>, row_best: &mut [LaneBest; ROWS], c
 fn portable(tile: &Tile<'_>, row_best: &mut [LaneBest; ROWS], column_best: &mut Lanes) {
     let words = tile.block.len();
     for (row, best) in row_best.iter_mut().enumerate() {
-        let mut dots = [0_u32; LANES];
+        let mut dots = [0.0_f32; LANES];
         for (&word, columns) in tile.rows[row * words..(row + 1) * words].iter().zip(tile.block) {
-            let (low, high) = (word & 0xffff, word >> 16);
+            let element = f32::from_bits(word);
             for (dot, column) in dots.iter_mut().zip(columns.0) {
-                *dot += low * (column & 0xffff) + high * (column >> 16);
+                *dot += element * f32::from_bits(column);
             }
         }
-        for lane in 0..LANES {
-            let key = tile.column_terms.0[lane].wrapping_sub(dots[lane] << (SHIFT + 1));
+        for (lane, dot) in dots.into_iter().enumerate() {
+            let key = tile.column_terms.0[lane].wrapping_sub((dot as u32) << (SHIFT + 1));
             let row_key = key.wrapping_add(tile.row_terms[row]).wrapping_add(tile.block_number);
             best.second.0[lane] = best.second.0[lane].min(best.first.0[lane].max(row_key));
             best.first.0[lane] = best.first.0[lane].min(row_key);

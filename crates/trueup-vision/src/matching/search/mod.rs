@@ -78,7 +78,8 @@ impl<'a> Nearest<'a> {
         Self::search_with(Kernel::best(), rows, columns)
     }
 
-    fn search_with(kernel: Kernel, rows: &'a [Descriptor], columns: &'a [Descriptor]) -> Option<Self> {
+    /// The same on a kernel of choice, which this processor must be able to run ([`Kernel::available`]).
+    pub fn search_with(kernel: Kernel, rows: &'a [Descriptor], columns: &'a [Descriptor]) -> Option<Self> {
         if rows.is_empty() || columns.is_empty() {
             return None;
         }
@@ -167,7 +168,7 @@ impl PackedRows {
     fn new(kernel: Kernel, descriptors: &[Descriptor]) -> Self {
         let last = descriptors.len() - 1;
         let padded = descriptors.len().next_multiple_of(ROWS);
-        let offset = if kernel.multiplies_bytes() { BYTE_OFFSET } else { 0 };
+        let offset = row_offset(kernel);
         let mut packed = Self {
             kernel,
             count: descriptors.len(),
@@ -247,8 +248,8 @@ impl PackedColumns {
             for (word, value) in packed_words(kernel, descriptor, 0).enumerate() {
                 packed.words[block * words + word].0[lane] = value;
             }
-            // The kernels that multiply bytes see rows less an offset: ab = (a - offset) b + offset sum(b).
-            let missing = if kernel.multiplies_bytes() { 2 * BYTE_OFFSET * sum(descriptor) } else { 0 };
+            // Kernels may see rows less an offset: ab = (a - offset) b + offset sum(b).
+            let missing = 2 * row_offset(kernel) * sum(descriptor);
             packed.terms[block].0[lane] = squared_norm(descriptor).wrapping_sub(missing) << SHIFT;
         }
         packed
@@ -270,15 +271,24 @@ fn nearest_rows(task_nearest: &[Vec<Lanes>]) -> Vec<Neighbour> {
 }
 
 fn words_per_descriptor(kernel: Kernel) -> usize {
-    DESCRIPTOR_LENGTH / if kernel.multiplies_bytes() { 4 } else { 2 }
+    DESCRIPTOR_LENGTH / kernel.elements_per_word()
 }
 
-/// The words a kernel multiplies: four bytes (less `offset`, as two's complement) or two 16-bit numbers each.
+/// What rows are packed less, to make bytes signed where the kernel multiplies unsigned by signed bytes.
+fn row_offset(kernel: Kernel) -> u32 {
+    if kernel.elements_per_word() == 4 { BYTE_OFFSET } else { 0 }
+}
+
+/// The words a kernel multiplies; bytes less `offset` as two's complement.
 fn packed_words(kernel: Kernel, descriptor: &Descriptor, offset: u32) -> impl Iterator<Item = u32> + '_ {
-    let (elements, bits) = if kernel.multiplies_bytes() { (4, 8) } else { (2, 16) };
-    let mask = (1_u32 << bits) - 1;
-    descriptor.chunks_exact(elements).map(move |chunk| {
-        chunk.iter().rev().fold(0, |word, &element| (word << bits) | (u32::from(element).wrapping_sub(offset) & mask))
+    let elements = kernel.elements_per_word();
+    descriptor.chunks_exact(elements).map(move |chunk| match chunk {
+        [element] => f32::from(*element).to_bits(),
+        _ => {
+            let bits = (u32::BITS as usize / elements) as u32;
+            let packed = |&element: &u8| u32::from(element).wrapping_sub(offset) & ((1 << bits) - 1);
+            chunk.iter().rev().fold(0, |word, element| (word << bits) | packed(element))
+        }
     })
 }
 

@@ -1,0 +1,83 @@
+//! Speed of the exhaustive search and of the verification of a pair, on generated descriptors.
+
+use divan::Bencher;
+use rand::{Rng, RngExt};
+use rayon::ThreadPool;
+use trueup_core::StageContext;
+use trueup_core::source::WorkingFrame;
+use trueup_vision::features::{DESCRIPTOR_LENGTH, Descriptor, FeaturePoint, Features};
+use trueup_vision::matching::{Kernel, MatchingOptions, Nearest, Picture, match_pair, putative_matches};
+
+/// Features of a picture at the detector's cap.
+const FEATURES: usize = 8000;
+
+fn main() {
+    divan::main();
+}
+
+fn pool(threads: usize) -> ThreadPool {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool")
+}
+
+fn descriptors(subject: u64, count: usize) -> Vec<Descriptor> {
+    let mut generator = StageContext::default().generator("bench", subject);
+    let mut descriptors = vec![[0; DESCRIPTOR_LENGTH]; count];
+    descriptors.iter_mut().for_each(|descriptor| generator.fill_bytes(descriptor));
+    descriptors
+}
+
+/// Pictures of which `matched` features look alike, the first `inliers` of them shifted by 200 pixels.
+fn pictures(count: usize, matched: usize, inliers: usize) -> [Features; 2] {
+    let mut generator = StageContext::default().generator("bench", 0);
+    let mut b = descriptors(2, count);
+    let a = descriptors(1, count);
+    b[..matched].copy_from_slice(&a[..matched]);
+    let mut place = || [generator.random_range(200.0..800.0), generator.random_range(0.0..600.0)];
+    let places_a: Vec<[f64; 2]> = (0..count).map(|_| place()).collect();
+    let mut places_b: Vec<[f64; 2]> = (0..count).map(|_| place()).collect();
+    for (b, a) in places_b.iter_mut().zip(&places_a).take(inliers) {
+        *b = [a[0] - 200.0, a[1]];
+    }
+    [(a, places_a), (b, places_b)].map(|(descriptors, places)| Features {
+        points: places.iter().map(|&position| FeaturePoint { position, scale_px: 2.0, response: 10.0 }).collect(),
+        descriptor_points: (0..count as u32).collect(),
+        descriptors,
+    })
+}
+
+/// Both directions' nearest neighbours of 8000 x 8000 descriptors.
+#[divan::bench(args = [1, 2])]
+fn search_8000_by_8000(bencher: Bencher, threads: usize) {
+    let (a, b) = (descriptors(1, FEATURES), descriptors(2, FEATURES));
+    let pool = pool(threads);
+    bencher.bench_local(|| pool.install(|| Nearest::search(&a, &b)));
+}
+
+/// The same on one thread with every instruction set.
+#[divan::bench(args = Kernel::available(), sample_count = 10)]
+fn search_by_kernel(bencher: Bencher, kernel: Kernel) {
+    let (a, b) = (descriptors(1, FEATURES), descriptors(2, FEATURES));
+    let pool = pool(1);
+    bencher.bench_local(|| pool.install(|| Nearest::search_with(kernel, &a, &b)));
+}
+
+/// The same up to the putative matches, 3000 of them.
+#[divan::bench(args = [1, 2])]
+fn putative_8000_by_8000(bencher: Bencher, threads: usize) {
+    let [a, b] = pictures(FEATURES, 3000, 1500);
+    let (pool, options) = (pool(threads), MatchingOptions::default());
+    bencher.bench_local(|| pool.install(|| putative_matches(&a, &b, &options)));
+}
+
+/// A whole pair of 600 matches, half of them outliers, without guided matches.
+#[divan::bench(args = [true, false])]
+fn verify_half_outliers(bencher: Bencher, guided: bool) {
+    let [a, b] = pictures(600, 600, 300);
+    let frame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
+    let options = MatchingOptions { guided, ..MatchingOptions::default() };
+    let context = StageContext::default();
+    let a = Picture { index: 0, features: &a, frame: &frame };
+    let b = Picture { index: 1, features: &b, frame: &frame };
+    let pool = pool(1);
+    bencher.bench_local(|| pool.install(|| match_pair(a, b, false, &options, &context)));
+}
