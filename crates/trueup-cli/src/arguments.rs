@@ -39,17 +39,15 @@ pub(crate) struct LowArgs {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Stitch photographs into a panorama
+    ///
+    /// Finds out by itself which photographs overlap. Those that belong elsewhere are left out, and the summary says why.
     Stitch(StitchArgs),
-    /// Print what a project file says of its panorama
+    /// Print what a project file says of its panorama: the summary that `stitch` printed
     Inspect(InspectArgs),
     /// List every option of every stage: default, range, unit, meaning
     Options(OptionsArgs),
 }
 
-/// Stitch photographs into a panorama.
-///
-/// Finds out by itself which photographs overlap and in what order; those that belong elsewhere are left out, and the
-/// summary says why.
 #[derive(Debug, Args)]
 #[command(after_help = STITCH_EXAMPLES)]
 pub(crate) struct StitchArgs {
@@ -124,7 +122,6 @@ pub(crate) struct StitchArgs {
     pub verbose: bool,
 }
 
-/// Print what a project file says of its panorama: the summary that `stitch` printed.
 #[derive(Debug, Args)]
 pub(crate) struct InspectArgs {
     /// A file that `trueup stitch --project` wrote
@@ -136,7 +133,6 @@ pub(crate) struct InspectArgs {
     pub verbose: bool,
 }
 
-/// List every option of every stage with its default, range, unit and meaning.
 #[derive(Debug, Args)]
 pub(crate) struct OptionsArgs {
     /// Only the options of this stage

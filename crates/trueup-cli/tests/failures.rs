@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::pictures::{self, STREET_NAMES, claiming, noise, plain, street, street_desk};
+use crate::pictures::{STREET_NAMES, claiming, noise, plain, street, street_desk};
 use crate::run::{Desk, Run, finish, trueup};
 
 /// Stitches one file of the given content beside nothing else.

@@ -328,7 +328,8 @@ impl Matched {
         Ok(wished.filter(|wished| members.contains(wished)).unwrap_or_else(|| self.graph.central_picture(members)))
     }
 
-    /// Why a photograph that is in none of the `stitched` groups was left out.
+    /// Why a photograph is left out of the panorama at hand: it cannot be read, is in another one of those stitched, or in
+    /// none of them.
     fn why_left_out(&self, index: usize, stitched: &[Vec<usize>]) -> LeftOut {
         if let Some(error) = &self.undecodable[index] {
             let (reason, hint) = match error {
@@ -336,6 +337,10 @@ impl Matched {
                 other => (other.to_string(), "Check the file, or copy it again.".to_owned()),
             };
             return LeftOut { code: "picture-damaged", reason, hint };
+        }
+        if let Some(position) = stitched.iter().position(|members| members.contains(&index)) {
+            let reason = format!("it is in panorama {} of {}", position + 1, stitched.len());
+            return LeftOut { code: "other-panorama", reason, hint: String::new() };
         }
         let component = stitched.first().map_or(&[][..], Vec::as_slice);
         left_out::explain(index, component, &self.pairs, &self.names())
