@@ -34,8 +34,6 @@ trueup_core::options! {
         /// Photographs are measured on a copy reduced to at most this many pixels; the panorama itself is made from
         /// the full photographs.
         working_pixels: f64 = 480000.0, between(10000.0, 100000000.0), "px";
-        /// Line segments are found on a copy of at most this many pixels.
-        line_pixels: f64 = 480000.0, between(10000.0, 100000000.0), "px";
         /// Size of the small pictures that exposure is compared on.
         thumbnail_pixels: f64 = 30000.0, between(100.0, 1000000.0), "px";
         /// Decoded photographs are kept up to this much memory so that they need not be decoded twice.

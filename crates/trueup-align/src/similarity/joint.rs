@@ -66,14 +66,21 @@ impl LineVote {
         self.pictures.iter().map(|picture| picture.planes.total_weight).sum()
     }
 
-    /// Refines a frame (columns are directions in the common frame) over SO(3).
-    pub fn refine_frame(&self, start: &Matrix3<f64>, options: &SimilarityOptions) -> Matrix3<f64> {
+    /// Refines a frame (columns are directions in the common frame) over SO(3); `axis_weights` multiply the weights of
+    /// the segments of each axis.
+    pub fn refine_frame(
+        &self,
+        start: &Matrix3<f64>,
+        axis_weights: &[f64; 3],
+        options: &SimilarityOptions,
+    ) -> Matrix3<f64> {
         let mut frame = *start;
         for scale in scales(options) {
             for _ in 0..ITERATIONS_PER_SCALE {
                 let (mut matrix, mut gradient) = (Matrix3::identity() * DAMPING, Vector3::zeros());
                 self.for_each_supporter(&frame, 3, scale, options, |axis, moment, residual, weight, reach| {
                     let jacobian = Vector3::ith(axis, 1.0).cross(&frame.tr_mul(&moment)) / reach;
+                    let weight = weight * axis_weights[axis];
                     matrix += jacobian * jacobian.transpose() * weight;
                     gradient += jacobian * (weight * residual);
                 });

@@ -104,6 +104,9 @@ trueup_core::options! {
         joint_scale_px: f64 = 0.7, between(0.01, 100.0), "working px";
         /// Largest angle between a segment and a direction for the segment to vote.
         joint_tolerance_deg: f64 = 3.0, between(0.1, 30.0), "degrees";
+        /// Root mean square misorientation of the pictures' directions that is detection noise; beyond, the horizontal
+        /// directions lose weight in the joint refinement.
+        ordinary_misorientation_deg: f64 = 1.0, between(0.01, 90.0), "degrees";
         /// Whether each picture's own roll may deviate from the cameras' within their expected error.
         picture_refinement: bool = false, Allowed::Any, "";
         /// Expected error of a camera's rotation about each axis.
@@ -119,7 +122,12 @@ trueup_core::options! {
         /// Largest score of a rival direction, relative to the vertical's.
         max_vertical_rivalry: f64 = 0.5, between(0.0, 1.0), "";
         /// Least share of the segments' weight that supports the vertical.
-        min_vertical_share: f64 = 0.08, between(0.0, 1.0), "";
+        min_vertical_share: f64 = 0.15, between(0.0, 1.0), "";
+        /// Least share of the pictures with at least three supporting segments.
+        min_vertical_pictures: f64 = 0.6, between(0.0, 1.0), "";
+        /// Roll and pitch that straightening expects of a photographer, as the ratio of their standard deviations
+        /// squared: 0 takes the cameras' x axes to be level and knows nothing of pitch, as published.
+        pitch_prior: f64 = 0.0, between(0.0, 1.0), "";
     }
 }
 
@@ -162,7 +170,7 @@ pub struct Guidance {
     /// The gate's clause that refused the dominant directions, in words.
     pub failed_clause: Option<String>,
     /// Rows of the dominant directions (columns) in the level world, if accepted: one column is (0, 1, 0) up to sign,
-    /// rounding and, without joint refinement, nothing else.
+    /// rounding.
     pub dominant: Option<[[f64; 3]; 3]>,
     /// Pictures that agree with the dominant directions (the paper's Psi), ascending.
     pub inliers: Vec<usize>,
@@ -171,9 +179,9 @@ pub struct Guidance {
     /// Per picture the weight psi_i of its own roll; 0 for pictures without one.
     pub weights: Vec<f64>,
     /// Score of the strongest rival of the vertical over the vertical's own, from the segments of all pictures; `None`
-    /// without segments.
+    /// where the dominant directions were accepted and where there are no segments.
     pub vertical_rivalry: Option<f64>,
-    /// Share of the segments' weight that supports the vertical; `None` without segments.
+    /// Share of the segments' weight that supports the vertical; `None` as above.
     pub vertical_share: Option<f64>,
 }
 
@@ -217,7 +225,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     context.check_cancelled()?;
     let rotations: Vec<Matrix3<f64>> = input.cameras.iter().map(Camera::rotation).collect();
     let focals: Vec<f64> = input.cameras.iter().map(|camera| camera.focal_px).collect();
-    let straightened = straighten::straighten(&rotations);
+    let straightened = straighten::straighten(&rotations, options.pitch_prior);
     let (guidance, guided) = match options.prior {
         PriorMethod::VanishingPoints => vpg::guide(input, &rotations, &straightened, options, context)?,
         PriorMethod::Straightening => (vpg::unguided(input.cameras.len(), options), None),

@@ -24,10 +24,18 @@ pub(super) struct Straightened {
 /// # Departures
 /// With parallel x axes (one picture, a tiny pan, a vertical sweep) that eigenvector is arbitrary; the mean of the y
 /// axes, made orthogonal to the mean x axis, takes its place.
-pub(super) fn straighten(rotations: &[Matrix3<f64>]) -> Straightened {
+pub(super) fn straighten(rotations: &[Matrix3<f64>], pitch_prior: f64) -> Straightened {
     let x_axes = || rotations.iter().map(|rotation| rotation.row(0).transpose());
     let y_sum: Vector3<f64> = rotations.iter().map(|rotation| rotation.row(1).transpose()).sum();
     let moment: Matrix3<f64> = x_axes().map(|x| x * x.transpose()).sum();
+    if pitch_prior > 0.0 {
+        let views = rotations.iter().map(|rotation| rotation.row(2).transpose());
+        let moment = moment + views.map(|z| z * z.transpose() * pitch_prior).sum::<Matrix3<f64>>();
+        let eigen = moment.symmetric_eigen();
+        let axis: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        let down = if axis.dot(&y_sum) > 0.0 { axis } else { -axis };
+        return Straightened { down, conditioned: true };
+    }
     let eigen = moment.symmetric_eigen();
     let least = eigen.eigenvalues.imin();
     let second = eigen.eigenvalues.iter().enumerate().filter(|&(k, _)| k != least).map(|(_, &value)| value);

@@ -40,6 +40,10 @@ pub(super) fn vertical_peak(
         }
     }
     let down = vote.refine_direction(&best.1, options);
+    // A few segments can carry the refinement away from where the search found them.
+    if down.dot(&best.1) < (PEAK_RADIUS * tolerance).cos() {
+        return None;
+    }
     let support = vote.support(&down, tolerance);
     let radius = (PEAK_RADIUS * tolerance).cos();
     let outside = scored.iter().filter(|(_, direction)| direction.dot(&down) < radius);

@@ -76,29 +76,28 @@ pub(super) fn guide(
         Some(dominant) => scene.judge(dominant, straightened, &mut guidance),
         None => Some("no picture has vanishing directions".to_owned()),
     };
-    let peak = scene.peak(dominant.as_ref().filter(|_| guidance.failed_clause.is_none()), straightened);
+    context.check_cancelled()?;
+    if let Some(dominant) = dominant.filter(|_| guidance.failed_clause.is_none()) {
+        let upright = scene.solve_dominant(dominant, &mut guidance);
+        return Ok((guidance, upright));
+    }
+    let peak = vertical_peak(&scene.vote, &straightened.down, options).filter(|_| options.vertical_only);
     if let Some(peak) = &peak {
         guidance.vertical_rivalry = Some(peak.rivalry);
         guidance.vertical_share = Some(peak.support.score / scene.vote.total_weight());
     }
-    context.check_cancelled()?;
-    match (dominant, peak) {
-        (Some(dominant), _) if guidance.failed_clause.is_none() => {
-            let upright = scene.solve_dominant(dominant, &mut guidance);
-            Ok((guidance, upright))
-        }
-        (_, Some(peak)) if options.vertical_only && clear(&peak, &scene) => {
-            let upright = scene.solve_vertical(&peak.down, &mut guidance);
-            Ok((guidance, upright))
-        }
-        _ => Ok((guidance, None)),
-    }
+    let upright =
+        peak.filter(|peak| clear(peak, &scene)).and_then(|peak| scene.solve_vertical(&peak.down, &mut guidance));
+    Ok((guidance, upright))
 }
 
 /// Whether the segments leave no doubt about the vertical.
 fn clear(peak: &VerticalPeak, scene: &Scene<'_>) -> bool {
     let share = peak.support.score / scene.vote.total_weight();
-    peak.rivalry <= scene.options.max_vertical_rivalry && share >= scene.options.min_vertical_share
+    let pictures = scene.options.min_vertical_pictures * scene.rotations.len() as f64;
+    peak.rivalry <= scene.options.max_vertical_rivalry
+        && share >= scene.options.min_vertical_share
+        && peak.support.pictures as f64 >= pictures.max(2.0)
 }
 
 fn interpretation_planes(input: &PriorInput<'_>) -> Vec<InterpretationPlanes> {
@@ -159,12 +158,6 @@ impl Scene<'_> {
         failed_clause(&evidence, self.options)
     }
 
-    /// The vertical that all segments vote for, near the accepted one or the cameras' own.
-    fn peak(&self, accepted: Option<&Dominant>, straightened: &Straightened) -> Option<VerticalPeak> {
-        let expected = accepted.map_or(straightened.down, |dominant| vertical_of(&dominant.frame, self.rotations));
-        vertical_peak(&self.vote, &expected, self.options)
-    }
-
     /// The prior of accepted dominant directions.
     fn solve_dominant(&mut self, mut dominant: Dominant, guidance: &mut Guidance) -> Option<Upright> {
         if self.options.guided_redetection {
@@ -175,7 +168,8 @@ impl Scene<'_> {
         let mut frame = dominant.frame;
         let has_lines = self.vote.total_weight() > 0.0;
         if self.options.joint_refinement && has_lines {
-            frame = self.vote.refine_frame(&frame, self.options);
+            let axis_weights = self.axis_weights(&frame, guidance);
+            frame = self.vote.refine_frame(&frame, &axis_weights, self.options);
         }
         let down = vertical_of(&frame, self.rotations);
         guidance.dominant = Some(rows_of(&frame));
@@ -186,6 +180,19 @@ impl Scene<'_> {
             self.own_rolls(&frame, &down, &guidance.inliers)
         };
         self.solve(&down, &own, guidance)
+    }
+
+    /// Full weight for the vertical; for the horizontals as much as the pictures' directions agree: where buildings
+    /// stand at several angles, what passes for one horizontal direction would pull the vertical along.
+    fn axis_weights(&self, frame: &Matrix3<f64>, guidance: &Guidance) -> [f64; 3] {
+        let residuals = guidance.inliers.iter().filter_map(|&index| guidance.residuals[index]);
+        let mean = residuals.sum::<f64>() / guidance.inliers.len().max(1) as f64;
+        // r = 4 (1 - cos phi) of the misorientation phi that is ordinary detection noise.
+        let ordinary = 4.0 * (1.0 - self.options.ordinary_misorientation_deg.to_radians().cos());
+        let horizontal = if mean > ordinary { (ordinary / mean).powi(2) } else { 1.0 };
+        let down = vertical_of(frame, self.rotations);
+        let vertical = frame.tr_mul(&down).iamax();
+        std::array::from_fn(|axis| if axis == vertical { 1.0 } else { horizontal })
     }
 
     /// The prior of a vertical alone.

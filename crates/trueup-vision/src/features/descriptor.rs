@@ -2,6 +2,7 @@
 
 use std::sync::LazyLock;
 
+use super::patch::{Grid, gradients, sample};
 use super::scale_space::Plane;
 use super::simd::{Kernel, Lanes};
 use super::{DESCRIPTOR_LENGTH, Descriptor};
@@ -16,7 +17,7 @@ const DIRECTION_BINS: usize = 8;
 const BIN_WIDTH: f64 = 3.0;
 
 /// Gradients sampled on a side; they cover the bins and the half bin around them that interpolation reaches.
-const GRID: usize = 24;
+const GRID: usize = 16;
 
 /// Spatial bins that the grid covers.
 const COVERED_BINS: f64 = SPATIAL_BINS as f64 + 1.0;
@@ -38,7 +39,7 @@ const QUANTISATION: f32 = 512.0;
 /// # Departures
 /// Lowe takes the gradients of all pixels around the point and rotates them. Here grey values are sampled on a grid of
 /// [`CORNERS`] x [`CORNERS`] that is already turned and scaled with the point, and gradients are differences on that
-/// grid. Its step is 0.625 times the blur, so that the blur leaves nothing to see between the samples, and the
+/// grid. Its step is 0.94 times the blur, so that the blur leaves little to see between the samples, and the
 /// weights of interpolation are the same for all points.
 pub(super) struct Describe<'a> {
     pub(super) plane: &'a Plane,
@@ -57,54 +58,14 @@ impl Kernel for Describe<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Option<Descriptor> {
-        let corners = sample(self.plane, self.position, self.sigma, self.angle);
-        let histogram = histogram(&corners);
-        quantised(histogram, self.root_sift)
+        let grid = Grid {
+            centre: self.position,
+            step: BIN_WIDTH * self.sigma * COVERED_BINS / GRID as f64,
+            angle: self.angle,
+        };
+        let corners = sample::<CORNERS>(self.plane, &grid);
+        quantised(histogram(&corners), self.root_sift)
     }
-}
-
-/// Grey values on the turned grid, row by row. Outside the picture its edge is continued.
-#[inline(always)]
-fn sample(plane: &Plane, position: [f64; 2], sigma: f64, angle: f64) -> [[f32; CORNERS]; CORNERS] {
-    let step = BIN_WIDTH * sigma * COVERED_BINS / GRID as f64;
-    let (sin, cos) = angle.sin_cos();
-    let (sin, cos) = ((sin * step) as f32, (cos * step) as f32);
-    let half = GRID as f32 / 2.0;
-    let (centre_x, centre_y) = (position[0] as f32, position[1] as f32);
-    // The last sample is left to the one before it, with a weight of nearly one.
-    let (last_x, last_y) = ((plane.width - 1) as f32 - 1e-3, (plane.height - 1) as f32 - 1e-3);
-    let mut corners = [[0.0; CORNERS]; CORNERS];
-    for (v, row) in corners.iter_mut().enumerate() {
-        let v = v as f32 - half;
-        let (mut index, mut fraction_x, mut fraction_y) = ([0_u32; CORNERS], [0.0_f32; CORNERS], [0.0_f32; CORNERS]);
-        for u in 0..CORNERS {
-            let offset = u as f32 - half;
-            let x = (centre_x + cos * offset - sin * v).clamp(0.0, last_x);
-            let y = (centre_y + sin * offset + cos * v).clamp(0.0, last_y);
-            let (whole_x, whole_y) = (x as u32, y as u32);
-            index[u] = whole_y * plane.stride as u32 + whole_x;
-            fraction_x[u] = x - whole_x as f32;
-            fraction_y[u] = y - whole_y as f32;
-        }
-        let (mut top, mut bottom) = ([[0.0_f32; 2]; CORNERS], [[0.0_f32; 2]; CORNERS]);
-        for u in 0..CORNERS {
-            let at = index[u] as usize;
-            top[u] = pair(&plane.data, at);
-            bottom[u] = pair(&plane.data, at + plane.stride);
-        }
-        for u in 0..CORNERS {
-            let upper = top[u][0] + fraction_x[u] * (top[u][1] - top[u][0]);
-            let lower = bottom[u][0] + fraction_x[u] * (bottom[u][1] - bottom[u][0]);
-            row[u] = upper + fraction_y[u] * (lower - upper);
-        }
-    }
-    corners
-}
-
-#[inline(always)]
-fn pair(samples: &[f32], at: usize) -> [f32; 2] {
-    let pair = &samples[at..at + 2];
-    [pair[0], pair[1]]
 }
 
 /// Gradient magnitudes shared between the nearest bins of place and direction, weighed by the Gaussian window.
@@ -114,14 +75,9 @@ fn histogram(corners: &[[f32; CORNERS]; CORNERS]) -> [f32; DESCRIPTOR_LENGTH] {
     // Summed over the rows of the grid first: by row of bins, direction and column of the grid.
     let mut by_column = [[[0.0_f32; GRID]; DIRECTION_BINS]; SPATIAL_BINS];
     for v in 0..GRID {
-        let (upper, lower) = (&corners[v], &corners[v + 1]);
-        let (mut magnitude, mut direction) = ([0.0_f32; GRID], [0.0_f32; GRID]);
-        for u in 0..GRID {
-            let (main, other) = (lower[u + 1] - upper[u], lower[u] - upper[u + 1]);
-            let (gx, gy) = (main - other, main + other);
-            magnitude[u] = (gx * gx + gy * gy).sqrt();
-            direction[u] = super::maths::turns(gy, gx) * DIRECTION_BINS as f32;
-        }
+        let (magnitude, turns) = gradients::<CORNERS, GRID>(&corners[v], &corners[v + 1]);
+        let direction = turns.map(|turns| turns * DIRECTION_BINS as f32);
+        #[allow(clippy::needless_range_loop, reason = "the index is also the direction, and indexes two arrays deep")]
         for bin in 0..DIRECTION_BINS {
             let mut share = [0.0_f32; GRID];
             for u in 0..GRID {
@@ -197,7 +153,7 @@ fn quantised(mut histogram: [f32; DESCRIPTOR_LENGTH], root_sift: bool) -> Option
     } else {
         let length = dot(&histogram, &histogram).sqrt();
         for component in &mut histogram {
-            *component = *component / length;
+            *component /= length;
         }
     }
     // The conversion to a byte stops at 255.

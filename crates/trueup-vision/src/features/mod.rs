@@ -1,12 +1,13 @@
 //! Scale-invariant features (SIFT).
 //!
-//! The stages of [`detect`] are one file each: the Gaussian [scale space](scale_space), [extrema] of its differences,
-//! their [orientations](orientation) and [descriptors](descriptor).
+//! The steps of [`detect`] are one file each: the Gaussian scale space, the extrema of its differences, their
+//! orientations and their descriptors.
 
 mod descriptor;
 mod extrema;
 mod maths;
 mod orientation;
+mod patch;
 mod scale_space;
 mod simd;
 
@@ -83,10 +84,14 @@ const MAX_PIXELS: usize = 1 << 28;
 /// Points described by one task.
 const POINTS_PER_TASK: usize = 64;
 
+/// Rows within which points count as neighbours in the order of work.
+const NEIGHBOUR_ROWS: usize = 16;
+
 /// Finds and describes the features of a picture.
 ///
 /// `image` has one channel of 0 to 255. A picture too small or too flat has no features. The result is the same for
-/// any number of threads and on every processor.
+/// any number of threads and every vector width; only the system's sine and cosine may differ between machines, in the
+/// last bit.
 ///
 /// # Errors
 /// [`Error::Options`] for options out of range, [`Error::Input`] for a picture of several channels,
@@ -117,14 +122,39 @@ fn detect_with(
     // A stable sort: equal responses stay in the order of octave, row and column.
     extrema.sort_by(|a, b| b.response.abs().total_cmp(&a.response.abs()));
     extrema.truncate(options.max_points);
-    let described: Result<Vec<Vec<Described>>> = extrema
+    Ok(gathered(described(&octaves, &extrema, options, instructions, context)?))
+}
+
+/// What [`describe`] finds for each extremum, in their order.
+///
+/// The work goes from place to place, not from strong to weak: the planes are far larger than any cache, and
+/// neighbours share what is in it.
+fn described(
+    octaves: &[Octave],
+    extrema: &[Extremum],
+    options: &FeatureOptions,
+    instructions: InstructionSet,
+    context: &StageContext,
+) -> Result<Vec<Option<Described>>> {
+    let place = |extremum: &Extremum| {
+        let [x, y] = extremum.sample;
+        (extremum.octave, extremum.level, y / NEIGHBOUR_ROWS, x)
+    };
+    let mut order: Vec<usize> = (0..extrema.len()).collect();
+    order.sort_by_key(|&index| place(&extrema[index]));
+    let found: Result<Vec<Vec<_>>> = order
         .par_chunks(POINTS_PER_TASK)
-        .map(|extrema| {
+        .map(|indices| {
             context.check_cancelled()?;
-            Ok(extrema.iter().filter_map(|extremum| describe(&octaves, extremum, options, instructions)).collect())
+            Ok(indices.iter().map(|&index| describe(octaves, &extrema[index], options, instructions)).collect())
         })
         .collect();
-    Ok(gathered(described?))
+    let mut described: Vec<Option<Described>> = Vec::new();
+    described.resize_with(extrema.len(), || None);
+    for (index, found) in order.into_iter().zip(found?.into_iter().flatten()) {
+        described[index] = found;
+    }
+    Ok(described)
 }
 
 fn check(image: &Raster<f32>, options: &FeatureOptions) -> Result<()> {
@@ -183,7 +213,7 @@ fn describe(
     (!descriptors.is_empty()).then_some(Described { point, descriptors })
 }
 
-fn gathered(described: Vec<Vec<Described>>) -> Features {
+fn gathered(described: Vec<Option<Described>>) -> Features {
     let mut features = Features::default();
     for (index, Described { point, descriptors }) in described.into_iter().flatten().enumerate() {
         features.points.push(point);

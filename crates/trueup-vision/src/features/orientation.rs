@@ -1,5 +1,8 @@
 //! The dominant gradient directions around a point.
 
+use std::sync::LazyLock;
+
+use super::patch::{Grid, gradients, sample};
 use super::scale_space::Plane;
 use super::simd::{Kernel, Lanes};
 
@@ -15,12 +18,23 @@ const WINDOW_REACH: f64 = 3.0;
 /// A peak counts from this share of the greatest on (Lowe 2004, section 5).
 const PEAK_SHARE: f32 = 0.8;
 
-/// Samples handled together.
-const CHUNK: usize = 16;
+/// Gradients sampled on a side of the window.
+const GRID: usize = 16;
 
-/// Finds the directions at (x, y), in samples, of a plane whose blur is about `sigma` samples.
+/// Grey values sampled on a side: the corners of the gradient cells.
+const CORNERS: usize = GRID + 1;
+
+/// Finds the directions at a point in a plane whose blur is about `sigma` samples.
+///
+/// # Source
+/// Lowe 2004, section 5.
+///
+/// # Departures
+/// Lowe takes the gradients of all pixels in the window. Here they are taken on a grid of [`GRID`] x [`GRID`] cells that
+/// is centred on the point and 0.5625 times the blur apart, as for the descriptor. The histogram is smoothed.
 pub(super) struct Orientations<'a> {
     pub(super) plane: &'a Plane,
+    /// Position (x, y) in samples.
     pub(super) position: [f64; 2],
     pub(super) sigma: f64,
     /// Most directions returned, strongest first.
@@ -33,52 +47,31 @@ impl Kernel for Orientations<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Vec<f64> {
-        let histogram = smoothed(&histogram(self.plane, self.position, self.sigma));
-        peaks(&histogram, self.limit)
+        let step = 2.0 * WINDOW_REACH * WINDOW * self.sigma / GRID as f64;
+        let corners = sample::<CORNERS>(self.plane, &Grid { centre: self.position, step, angle: 0.0 });
+        peaks(&smoothed(&histogram(&corners)), self.limit)
     }
 }
 
 /// Gradient magnitudes by direction, weighed by a Gaussian window and shared between the two nearest bins.
 #[inline(always)]
-fn histogram(plane: &Plane, position: [f64; 2], sigma: f64) -> [f32; BINS] {
-    let window = WINDOW * sigma;
-    let reach = WINDOW_REACH * window;
-    let range = |centre: f64, size: usize| {
-        let first = (centre - reach).ceil().max(1.0) as usize;
-        let end = ((centre + reach).floor().max(0.0) as usize + 1).min(size.saturating_sub(1));
-        first..end.max(first)
-    };
-    let (columns, rows) = (range(position[0], plane.width), range(position[1], plane.height));
-    let falloff = (-0.5 / (window * window)) as f32;
-    let reach_squared = (reach * reach) as f32;
-    // Neighbouring samples often fall into one bin; two histograms halve the wait for the previous addition.
+fn histogram(corners: &[[f32; CORNERS]; CORNERS]) -> [f32; BINS] {
+    let window = &*WINDOW_WEIGHTS;
+    // Neighbouring cells often fall into one bin; two histograms halve the wait for the previous addition.
     let mut histograms = [[0.0_f32; BINS + 2]; 2];
-    for y in rows {
-        let dy = (y as f64 - position[1]) as f32;
-        for first in columns.clone().step_by(CHUNK) {
-            let at = y * plane.stride + first;
-            let middle: &[f32; CHUNK + 2] = window_of(&plane.data, at - 1);
-            let above: &[f32; CHUNK] = window_of(&plane.data, at - plane.stride);
-            let below: &[f32; CHUNK] = window_of(&plane.data, at + plane.stride);
-            let (mut bins, mut weights) = ([0.0_f32; CHUNK], [0.0_f32; CHUNK]);
-            let start = (first as f64 - position[0]) as f32;
-            for k in 0..CHUNK {
-                let (gx, gy) = (middle[k + 2] - middle[k], below[k] - above[k]);
-                let dx = start + k as f32;
-                let distance_squared = dx * dx + dy * dy;
-                let inside = distance_squared <= reach_squared;
-                let weight = (gx * gx + gy * gy).sqrt() * super::maths::exp(distance_squared * falloff);
-                weights[k] = if inside { weight } else { 0.0 };
-                bins[k] = super::maths::turns(gy, gx) * BINS as f32;
-            }
-            let used = CHUNK.min(columns.end - first);
-            for k in 0..used {
-                let bin = (bins[k] as usize).min(BINS);
-                let share = bins[k] - bin as f32;
-                let histogram = &mut histograms[k % 2];
-                histogram[bin] += weights[k] * (1.0 - share);
-                histogram[bin + 1] += weights[k] * share;
-            }
+    for v in 0..GRID {
+        let (mut weights, turns) = gradients::<CORNERS, GRID>(&corners[v], &corners[v + 1]);
+        let (mut bins, mut shares) = ([0_u32; GRID], [0.0_f32; GRID]);
+        for u in 0..GRID {
+            let place = turns[u] * BINS as f32;
+            weights[u] *= window[v][u];
+            bins[u] = place as u32;
+            shares[u] = weights[u] * (place - bins[u] as f32);
+        }
+        for u in 0..GRID {
+            let bin = (bins[u] as usize).min(BINS);
+            histograms[u % 2][bin] += weights[u] - shares[u];
+            histograms[u % 2][bin + 1] += shares[u];
         }
     }
     let [even, odd] = histograms;
@@ -89,14 +82,16 @@ fn histogram(plane: &Plane, position: [f64; 2], sigma: f64) -> [f32; BINS] {
     total
 }
 
-/// `N` samples from `at` on. The padding of a [`Plane`] makes room for a chunk that begins inside the picture.
-#[inline(always)]
-fn window_of<const N: usize>(samples: &[f32], at: usize) -> &[f32; N] {
-    match samples[at..].first_chunk() {
-        Some(window) => window,
-        None => &[0.0; N],
-    }
-}
+/// The Gaussian window on the grid, zero outside the circle of its reach.
+static WINDOW_WEIGHTS: LazyLock<[[f32; GRID]; GRID]> = LazyLock::new(|| {
+    let place = |line: usize| ((line as f64 + 0.5) / GRID as f64 - 0.5) * 2.0 * WINDOW_REACH;
+    std::array::from_fn(|v| {
+        std::array::from_fn(|u| {
+            let squared = place(u).powi(2) + place(v).powi(2);
+            if squared <= WINDOW_REACH.powi(2) { (-0.5 * squared).exp() as f32 } else { 0.0 }
+        })
+    })
+});
 
 /// The histogram after the binomial filter of five bins, around the circle.
 fn smoothed(histogram: &[f32; BINS]) -> [f32; BINS] {

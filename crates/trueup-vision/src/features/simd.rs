@@ -7,7 +7,7 @@
 //! # Safety
 //! This is the only module of the feature stage with `unsafe` code. It rests on two invariants: a value of
 //! [`InstructionSet`] other than the portable one exists only after the processor was asked for its features, and
-//! the vector types are private to this module, so they are only reached through [`dispatch!`].
+//! the vector types are private to this module, so they are only reached through [`InstructionSet::run`].
 #![allow(unsafe_code, reason = "vector instructions need it; each block states why it is sound")]
 
 use std::ops::{Add, Mul, Sub};
