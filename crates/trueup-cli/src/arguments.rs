@@ -41,7 +41,7 @@ pub(crate) enum Command {
     /// Stitch photographs into a panorama
     ///
     /// Finds out by itself which photographs overlap. Those that belong elsewhere are left out, and the summary says why.
-    Stitch(StitchArgs),
+    Stitch(Box<StitchArgs>),
     /// Print what a project file says of its panorama: the summary that `stitch` printed
     Inspect(InspectArgs),
     /// List every option of every stage: default, range, unit, meaning

@@ -22,7 +22,7 @@ use arguments::{Command, LowArgs};
 
 fn main() -> ExitCode {
     let outcome = match LowArgs::parse().command {
-        Command::Stitch(args) => stitch::run(args),
+        Command::Stitch(args) => stitch::run(*args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Options(args) => option_list::run(&args),
     };

@@ -122,7 +122,7 @@ mod tests {
     fn checked(arguments: &[&str]) -> Result<CheckedStitch, Failure> {
         let all = ["trueup", "stitch", "a.jpg", "-o", "p.jpg"].iter().chain(arguments);
         match LowArgs::try_parse_from(all).expect("arguments of the right form").command {
-            Command::Stitch(args) => CheckedStitch::new(args),
+            Command::Stitch(args) => CheckedStitch::new(*args),
             other => panic!("{other:?}"),
         }
     }

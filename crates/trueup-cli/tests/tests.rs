@@ -2,6 +2,7 @@
 
 mod cli;
 mod determinism;
+mod documented;
 mod failures;
 mod options;
 mod pictures;

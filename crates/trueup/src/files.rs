@@ -73,8 +73,8 @@ impl StitchJob {
             let bytes = encode::write(&output, &panorama, &options.output, context)?;
             alignment.record_seconds("output", start.elapsed());
             drop(panorama);
-            let mut project = alignment.project;
-            project.diagnostics.extend(context.take_diagnostics());
+            alignment.record_findings(context.take_diagnostics());
+            let project = alignment.project;
             let project_file = self.project.as_deref().map(|path| numbered(path, number));
             if let Some(path) = &project_file {
                 encode::write_atomically(path, project.to_json()?.as_bytes())?;

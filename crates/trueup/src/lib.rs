@@ -25,6 +25,7 @@ mod files;
 mod inputs;
 mod left_out;
 mod measure;
+mod names;
 mod options;
 mod project;
 mod stitcher;
