@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use trueup_align::cameras::{self, CameraPrior, Cameras};
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points;
-use trueup_align::mesh::{self, LocalTarget, WarpedMesh};
+use trueup_align::mesh::{self, WantedSimilarity, WarpedMesh};
 use trueup_align::similarity::{self, PriorInput, SimilarityPrior};
 use trueup_align::stitch_graph::{GraphEdge, StitchGraph};
 use trueup_align::vanishing::{self, TriadOutcome};
@@ -147,10 +147,13 @@ pub(crate) fn run(
             warps.into_iter().filter(|warp| !severed(warp.from, warp.to)).collect()
         }
     };
-    let targets: Vec<LocalTarget> =
-        (0..grids.len()).map(|k| LocalTarget::uniform(prior.scale[k], prior.theta[k])).collect();
-    let mesh =
-        clock.time("mesh", || mesh::run(&grids, &kept, &targets, component.reference, &options.mesh, context))?;
+    let bases: Vec<_> = (0..grids.len())
+        .map(|k| {
+            let wanted = WantedSimilarity { scale: prior.scale[k], theta: prior.theta[k] };
+            mesh::base_grid(options.mesh.base, &cameras.cameras[k], &grids[k], &prior.level_from_world(), wanted)
+        })
+        .collect();
+    let mesh = clock.time("mesh", || mesh::run(&grids, &kept, &bases, component.reference, &options.mesh, context))?;
     Ok(Geometry { cameras, triads, prior, cut, mesh })
 }
 

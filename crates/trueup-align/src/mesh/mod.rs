@@ -7,6 +7,7 @@
 //! Chen and Chuang (2016), section 3; VPG section IV with its global similarity.
 
 mod alignment;
+mod base;
 mod normal_equations;
 mod similarity;
 
@@ -17,14 +18,17 @@ use trueup_core::{Error, Result, StageContext};
 
 use crate::match_points::OverlapWarp;
 pub use alignment::{AlignmentEnergy, MatchPoint};
+pub use base::{BaseShape, WantedSimilarity, base_grid};
 pub use normal_equations::NormalEquations;
-pub use similarity::{LocalTarget, SimilarityEnergy};
+pub use similarity::SimilarityEnergy;
 
 trueup_core::options! {
     /// How the grids are deformed.
     pub struct MeshOptions("mesh") {
         /// Largest side of a grid cell.
         cell_px: f64 = 40.0, between(4.0, 1000.0), "working px";
+        /// The shape that the similarity prior asks of each picture.
+        base: BaseShape = BaseShape::Sphere, Allowed::Any, "";
         /// Weight of the alignment of overlaps.
         alignment_weight: f64 = 1.0, between(0.0, 1000.0), "";
         /// Weight of local similarity (on residuals).
@@ -52,10 +56,10 @@ pub struct WarpedMesh {
     pub relative_gradient: f64,
 }
 
-/// Deforms the undeformed `grids` so that overlaps align and every edge follows its `targets` similarity.
+/// Deforms the undeformed `grids` so that overlaps align and every edge keeps to its picture's base.
 ///
 /// * `warps`: match points, two directions a pair; pairs across the cut of a full turn are left out by the caller.
-/// * `targets`: for every picture the similarity wanted along its grid.
+/// * `bases`: for every picture the places of its vertices, up to translation, that the prior asks for ([`base_grid`]).
 /// * `reference`: the picture whose first vertex stays in place (translation is otherwise free).
 ///
 /// # Errors
@@ -64,7 +68,7 @@ pub struct WarpedMesh {
 pub fn run(
     grids: &[GridMesh],
     warps: &[OverlapWarp],
-    targets: &[LocalTarget],
+    bases: &[Vec<Vector2<f64>>],
     reference: usize,
     options: &MeshOptions,
     context: &StageContext,
@@ -77,7 +81,7 @@ pub fn run(
     alignment.add(options.alignment_weight, &mut equations, grids);
     let overlap = alignment.overlap_cells(grids);
     for (picture, grid) in grids.iter().enumerate() {
-        SimilarityEnergy::new(grid, &targets[picture], &overlap[picture], options).add(picture, &mut equations);
+        SimilarityEnergy::new(grid, &bases[picture], &overlap[picture], options).add(picture, &mut equations);
     }
     let anchored = anchors(grids.len(), warps, reference);
     for picture in anchored {

@@ -7,30 +7,8 @@ use trueup_core::mesh::GridMesh;
 use super::normal_equations::Coefficient;
 use super::{MeshOptions, NormalEquations, PUBLISHED_CELL_PX};
 
-/// The similarity wanted of one picture.
-#[derive(Debug, Clone, PartialEq)]
-pub enum LocalTarget {
-    /// One similarity for the whole picture: s (cos theta, sin theta). The paper's (s_i, theta_i).
-    Uniform(Vector2<f64>),
-    /// A similarity for every vertex of the grid, row-major; an edge takes the mean of its ends.
-    PerVertex(Vec<Vector2<f64>>),
-}
-
-impl LocalTarget {
-    /// A uniform similarity of scale `scale` and clockwise rotation `theta` (radians).
-    pub fn uniform(scale: f64, theta: f64) -> Self {
-        Self::Uniform(Vector2::new(scale * theta.cos(), scale * theta.sin()))
-    }
-
-    fn along(&self, a: usize, b: usize) -> Vector2<f64> {
-        match self {
-            Self::Uniform(similarity) => *similarity,
-            Self::PerVertex(similarities) => 0.5 * (similarities[a] + similarities[b]),
-        }
-    }
-}
-
-/// E_l and E_g of one picture.
+/// E_l and E_g of one picture, both relative to a base grid: with a base that is a similarity of the picture they are the
+/// published energies.
 ///
 /// For an edge from a to b the neighbourhood is the 4-neighbours of a and of b without a. The similarity c + i s that
 /// maps the undeformed differences from a to the deformed ones best is linear in the vertices:
@@ -38,20 +16,20 @@ impl LocalTarget {
 #[derive(Debug)]
 pub struct SimilarityEnergy<'a> {
     grid: &'a GridMesh,
-    target: &'a LocalTarget,
+    base: &'a [Vector2<f64>],
     local_weight: f64,
     /// Weight of the prior for every cell, row-major.
     cell_weights: Vec<f64>,
 }
 
 impl<'a> SimilarityEnergy<'a> {
-    /// `overlap` tells for every cell whether match points lie in it: the prior's weight grows with the distance to the
+    /// `base` holds a place for every vertex of `grid`, up to translation: the shape without cost. `overlap` tells for every cell whether match points lie in it: the prior's weight grows with the distance to the
     /// nearest such cell.
     ///
     /// # Departures
     /// The distance is the exact one to the nearest cell with match points; the published code propagates it from cell
     /// to cell, which can miss the nearest.
-    pub fn new(grid: &'a GridMesh, target: &'a LocalTarget, overlap: &[bool], options: &MeshOptions) -> Self {
+    pub fn new(grid: &'a GridMesh, base: &'a [Vector2<f64>], overlap: &[bool], options: &MeshOptions) -> Self {
         let columns = grid.columns - 1;
         let centre = |cell: usize| {
             Vector2::new(
@@ -70,7 +48,7 @@ impl<'a> SimilarityEnergy<'a> {
                 unit * (options.prior_weight + options.prior_slope * nearest.unwrap_or(0.0) / diagonal)
             })
             .collect();
-        Self { grid, target, local_weight: options.local_weight, cell_weights }
+        Self { grid, base, local_weight: options.local_weight, cell_weights }
     }
 
     /// Adds both energies for every edge of the grid of `picture`.
@@ -141,11 +119,16 @@ impl<'a> SimilarityEnergy<'a> {
                 (m, coefficient * self.local_weight)
             })
             .collect();
-        equations.add_inside(picture, &local, Vector2::zeros());
+        equations.add_inside(picture, &local, self.of_base(&local));
         for (_, factor) in &mut similarity {
             *factor *= weight;
         }
-        equations.add_inside(picture, &similarity, self.target.along(a, b) * weight);
+        equations.add_inside(picture, &similarity, self.of_base(&similarity));
+    }
+
+    /// What a combination of vertices amounts to on the base.
+    fn of_base(&self, members: &[(usize, Coefficient)]) -> Vector2<f64> {
+        members.iter().fold(Vector2::zeros(), |sum, &(m, factor)| sum + product(factor, self.base[m]))
     }
 
     /// The 4-neighbours of a and b without a, ascending, each once.

@@ -150,17 +150,6 @@ impl LineVote {
         }
         total
     }
-
-    /// Turns every picture's camera slightly so that its own segments fit `frame` better: the rotation vector w of the
-    /// camera-side turn exp([w]x) R, for a prior of standard deviation `options.picture_prior_deg` on each component.
-    pub fn refine_pictures(
-        &self,
-        frame: &Matrix3<f64>,
-        axes_used: usize,
-        options: &SimilarityOptions,
-    ) -> Vec<Vector3<f64>> {
-        self.pictures.iter().map(|picture| picture.small_turn(frame, axes_used, options)).collect()
-    }
 }
 
 impl PictureLines {
@@ -194,33 +183,6 @@ impl PictureLines {
             }
         }
         (score, count)
-    }
-
-    fn small_turn(&self, frame: &Matrix3<f64>, axes_used: usize, options: &SimilarityOptions) -> Vector3<f64> {
-        let widest = options.joint_tolerance_deg.to_radians().sin();
-        let scale = options.joint_scale_px;
-        let prior = (options.joint_noise_px / options.picture_prior_deg.to_radians()).powi(2);
-        let mut turn = Vector3::zeros();
-        for _ in 0..2 * ITERATIONS_PER_SCALE {
-            let axes = exp_rotation(&turn) * self.rotation * frame;
-            let mut matrix = Matrix3::identity() * prior;
-            let mut gradient = turn * prior;
-            for line in 0..self.planes.len() {
-                let Some((axis, residual, reach)) = self.nearest_axis(&axes, axes_used, line) else { continue };
-                if residual.abs() * 2.0 > widest * self.planes.lengths[line] {
-                    continue;
-                }
-                // d (w x v) . c = w . (v x c).
-                let jacobian = axes.column(axis).into_owned().cross(&self.planes.moments[line]) / reach;
-                let weight = 1.0 / (1.0 + (residual / scale).powi(2)).powi(2);
-                matrix += jacobian * jacobian.transpose() * weight;
-                gradient += jacobian * (weight * residual);
-            }
-            let Some(inverse) = matrix.try_inverse() else { return Vector3::zeros() };
-            let step: Vector3<f64> = inverse * gradient;
-            turn -= step;
-        }
-        turn
     }
 }
 

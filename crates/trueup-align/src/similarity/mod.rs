@@ -16,13 +16,14 @@ mod vpg;
 mod weighted_solve;
 
 #[cfg(test)]
-mod synthetic;
+pub(crate) mod synthetic;
 #[cfg(test)]
 mod tests;
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
+use trueup_core::diagnostics::Diagnostic;
 use trueup_core::geometry::wrap_angle;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
@@ -101,18 +102,12 @@ trueup_core::options! {
         /// Scale of the robust loss at which the joint refinement starts.
         joint_start_scale_px: f64 = 4.0, between(0.01, 100.0), "working px";
         /// Scale of the robust loss at which the joint refinement ends.
-        joint_scale_px: f64 = 0.7, between(0.01, 100.0), "working px";
+        joint_scale_px: f64 = 0.5, between(0.01, 100.0), "working px";
         /// Largest angle between a segment and a direction for the segment to vote.
         joint_tolerance_deg: f64 = 3.0, between(0.1, 30.0), "degrees";
         /// Root mean square misorientation of the pictures' directions that is detection noise; beyond, the horizontal
         /// directions lose weight in the joint refinement.
         ordinary_misorientation_deg: f64 = 1.0, between(0.01, 90.0), "degrees";
-        /// Whether each picture's own roll may deviate from the cameras' within their expected error.
-        picture_refinement: bool = false, Allowed::Any, "";
-        /// Expected error of a camera's rotation about each axis.
-        picture_prior_deg: f64 = 0.1, between(1e-4, 30.0), "degrees";
-        /// Standard deviation of a segment's ends, including what is common to neighbouring segments.
-        joint_noise_px: f64 = 2.0, between(0.01, 100.0), "working px";
         /// Whether a vertical alone may guide where the horizontal directions do not agree.
         vertical_only: bool = true, Allowed::Any, "";
         /// How far from the cameras' own vertical the segments' is sought.
@@ -125,9 +120,9 @@ trueup_core::options! {
         min_vertical_share: f64 = 0.15, between(0.0, 1.0), "";
         /// Least share of the pictures with at least three supporting segments.
         min_vertical_pictures: f64 = 0.6, between(0.0, 1.0), "";
-        /// Roll and pitch that straightening expects of a photographer, as the ratio of their standard deviations
-        /// squared: 0 takes the cameras' x axes to be level and knows nothing of pitch, as published.
-        pitch_prior: f64 = 0.0, between(0.0, 1.0), "";
+        /// How much straightening expects pictures to look level: variance of the roll over that of the pitch among
+        /// photographers. 0 is the published form, which lets a short sweep with some roll pitch by tens of degrees.
+        pitch_prior: f64 = 0.1, between(0.0, 1.0), "";
     }
 }
 
@@ -207,6 +202,10 @@ impl SimilarityPrior {
     }
 }
 
+/// What a user can do when lines do not guide the panorama.
+const REFUSED_HINT: &str =
+    "The panorama is levelled by the cameras alone; pictures that show upright edges level it better";
+
 /// The stage's name in errors and generators.
 const STAGE: &str = "similarity";
 
@@ -216,7 +215,7 @@ const STAGE: &str = "similarity";
 ///
 /// # Errors
 /// [`Error::Unsolvable`] if there are no pictures, the lists differ in length, an edge names a picture that does not
-/// exist, or a camera is not finite; [`Error::Cancelled`].
+/// exist, a camera is not finite, or overlaps come without a usable grid; [`Error::Cancelled`].
 ///
 /// # Source
 /// The paper's sections on the vanishing point guided prior; see the modules for equations and departures.
@@ -225,12 +224,16 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     context.check_cancelled()?;
     let rotations: Vec<Matrix3<f64>> = input.cameras.iter().map(Camera::rotation).collect();
     let focals: Vec<f64> = input.cameras.iter().map(|camera| camera.focal_px).collect();
-    let straightened = straighten::straighten(&rotations, options.pitch_prior);
+    let straightened = straighten::straighten(&rotations);
+    let level = straighten::straighten_with_pitch(&rotations, options.pitch_prior);
     let (guidance, guided) = match options.prior {
-        PriorMethod::VanishingPoints => vpg::guide(input, &rotations, &straightened, options, context)?,
+        PriorMethod::VanishingPoints => vpg::guide(input, &rotations, &straightened, &level, options, context)?,
         PriorMethod::Straightening => (vpg::unguided(input.cameras.len(), options), None),
     };
-    let guided = guided.unwrap_or_else(|| fallback(input, &rotations, &straightened.down));
+    if let Some(clause) = guidance.failed_clause.as_ref().filter(|_| !guidance.used) {
+        context.report(Diagnostic::note("vanishing-guidance-refused", STAGE, clause, REFUSED_HINT));
+    }
+    let guided = guided.unwrap_or_else(|| fallback(input, &rotations, &level));
     let level_from_world = straighten::level_from_world(&guided.down, &rotations);
     let mut guidance = guidance;
     guidance.dominant =
@@ -280,6 +283,11 @@ fn check(input: &PriorInput<'_>) -> Result<()> {
             && camera.focal_px.is_finite()
             && camera.camera_from_world.iter().flatten().all(|value| value.is_finite())
     };
+    let frame_is_sane = |frame: &WorkingFrame| frame.width > 0.0 && frame.height > 0.0 && frame.diagonal().is_finite();
+    let has_grid = input.cell_px >= 1.0 && input.frames.iter().all(frame_is_sane);
+    if !input.overlaps.is_empty() && !has_grid {
+        return unsolvable(format!("there is no grid of cells of {} pixels on every picture", input.cell_px));
+    }
     match input.cameras.iter().position(|camera| !finite(camera)) {
         Some(index) => unsolvable(format!("camera {index} is not finite")),
         None => Ok(()),

@@ -24,18 +24,10 @@ pub(super) struct Straightened {
 /// # Departures
 /// With parallel x axes (one picture, a tiny pan, a vertical sweep) that eigenvector is arbitrary; the mean of the y
 /// axes, made orthogonal to the mean x axis, takes its place.
-pub(super) fn straighten(rotations: &[Matrix3<f64>], pitch_prior: f64) -> Straightened {
+pub(super) fn straighten(rotations: &[Matrix3<f64>]) -> Straightened {
     let x_axes = || rotations.iter().map(|rotation| rotation.row(0).transpose());
     let y_sum: Vector3<f64> = rotations.iter().map(|rotation| rotation.row(1).transpose()).sum();
     let moment: Matrix3<f64> = x_axes().map(|x| x * x.transpose()).sum();
-    if pitch_prior > 0.0 {
-        let views = rotations.iter().map(|rotation| rotation.row(2).transpose());
-        let moment = moment + views.map(|z| z * z.transpose() * pitch_prior).sum::<Matrix3<f64>>();
-        let eigen = moment.symmetric_eigen();
-        let axis: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
-        let down = if axis.dot(&y_sum) > 0.0 { axis } else { -axis };
-        return Straightened { down, conditioned: true };
-    }
     let eigen = moment.symmetric_eigen();
     let least = eigen.eigenvalues.imin();
     let second = eigen.eigenvalues.iter().enumerate().filter(|&(k, _)| k != least).map(|(_, &value)| value);
@@ -48,6 +40,26 @@ pub(super) fn straighten(rotations: &[Matrix3<f64>], pitch_prior: f64) -> Straig
     let greatest: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
     let down = (y_sum - greatest * y_sum.dot(&greatest)).try_normalize(f64::EPSILON).unwrap_or_else(Vector3::y);
     Straightened { down, conditioned: false }
+}
+
+/// [`straighten`] for cameras that are expected to look level as well, though `pitch_prior` times less surely than not
+/// to be rolled: the eigenvector of least eigenvalue of sum x_i x_i^T + `pitch_prior` z_i z_i^T. The vertical in the
+/// common frame, pointing down.
+///
+/// A prior of 0 yields [`straighten`]. On short sweeps with a roll of 5 degrees a prior of 0.1 divides the error of the
+/// vertical by about three; on full circles it changes little, since the pitch is common to all directions.
+pub(super) fn straighten_with_pitch(rotations: &[Matrix3<f64>], pitch_prior: f64) -> Vector3<f64> {
+    if pitch_prior <= 0.0 {
+        return straighten(rotations).down;
+    }
+    let moments = rotations.iter().map(|rotation| {
+        let (x, z) = (rotation.row(0).transpose(), rotation.row(2).transpose());
+        x * x.transpose() + z * z.transpose() * pitch_prior
+    });
+    let eigen = moments.sum::<Matrix3<f64>>().symmetric_eigen();
+    let axis: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+    let y_sum: Vector3<f64> = rotations.iter().map(|rotation| rotation.row(1).transpose()).sum();
+    if axis.dot(&y_sum) > 0.0 { axis } else { -axis }
 }
 
 /// The rotation from the common frame to the level world: `down` becomes y, and the mean viewing direction lies in the

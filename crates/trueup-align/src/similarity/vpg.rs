@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
-use trueup_core::geometry::{exp_rotation, wrap_angle};
+use trueup_core::geometry::wrap_angle;
 use trueup_core::{Result, StageContext};
 
 use super::dominant::{Dominant, dominant_frame};
@@ -19,6 +19,8 @@ use crate::vanishing::{InterpretationPlanes, RefinedTriad, rows_of};
 
 /// Share of a picture's best score that its search near the dominant directions must reach to replace its triad.
 const REDETECTION_SHARE: f64 = 0.9;
+/// Farthest that the joint refinement may move the vertical, in tolerances of a segment's vote.
+const MAX_REFINEMENT_TOLERANCES: f64 = 2.0;
 /// Length of a solved vector below which its terms contradict each other.
 const CONTRADICTED: f64 = 0.1;
 
@@ -50,11 +52,13 @@ struct Scene<'a> {
     vote: LineVote,
 }
 
-/// Finds the vertical and the turns that the lines mean, if they are believed.
+/// Finds the vertical and the turns that the lines mean, if they are believed. `straightened` is what the gate compares
+/// with; near `level` the vertical is sought where the gate refuses.
 pub(super) fn guide(
     input: &PriorInput<'_>,
     rotations: &[Matrix3<f64>],
     straightened: &Straightened,
+    level: &Vector3<f64>,
     options: &SimilarityOptions,
     context: &StageContext<'_>,
 ) -> Result<(Guidance, Option<Upright>)> {
@@ -64,7 +68,10 @@ pub(super) fn guide(
     let triads = rotations
         .iter()
         .zip(input.triads)
-        .map(|(rotation, outcome)| outcome.triad().map(|triad| rotation.tr_mul(&triad.matrix())))
+        .map(|(rotation, outcome)| {
+            let matrix = outcome.triad()?.matrix();
+            matrix.iter().all(|value| value.is_finite()).then(|| rotation.tr_mul(&matrix))
+        })
         .collect();
     let mut scene = Scene { input, options, rotations, triads, vote: LineVote::new(rotations, &focals, planes) };
     context.check_cancelled()?;
@@ -81,7 +88,7 @@ pub(super) fn guide(
         let upright = scene.solve_dominant(dominant, &mut guidance);
         return Ok((guidance, upright));
     }
-    let peak = vertical_peak(&scene.vote, &straightened.down, options).filter(|_| options.vertical_only);
+    let peak = vertical_peak(&scene.vote, level, options).filter(|_| options.vertical_only);
     if let Some(peak) = &peak {
         guidance.vertical_rivalry = Some(peak.rivalry);
         guidance.vertical_share = Some(peak.support.score / scene.vote.total_weight());
@@ -160,25 +167,19 @@ impl Scene<'_> {
 
     /// The prior of accepted dominant directions.
     fn solve_dominant(&mut self, mut dominant: Dominant, guidance: &mut Guidance) -> Option<Upright> {
+        let axis_weights = self.axis_weights(&dominant.frame, guidance);
         if self.options.guided_redetection {
             self.redetect(&mut dominant);
             guidance.inliers = self.inliers(&dominant);
             guidance.residuals.clone_from(&dominant.residuals);
         }
-        let mut frame = dominant.frame;
         let has_lines = self.vote.total_weight() > 0.0;
-        if self.options.joint_refinement && has_lines {
-            let axis_weights = self.axis_weights(&frame, guidance);
-            frame = self.vote.refine_frame(&frame, &axis_weights, self.options);
-        }
+        let joint = has_lines && self.options.joint_refinement;
+        let frame = if joint { self.refined(&dominant.frame, &axis_weights) } else { dominant.frame };
         let down = vertical_of(&frame, self.rotations);
         guidance.dominant = Some(rows_of(&frame));
         guidance.used = true;
-        let own = if self.options.joint_refinement && has_lines {
-            self.refined_rolls(&frame, &down, 3)
-        } else {
-            self.own_rolls(&frame, &down, &guidance.inliers)
-        };
+        let own = if joint { self.common_rolls(&down) } else { self.own_rolls(&frame, &down, &guidance.inliers) };
         self.solve(&down, &own, guidance)
     }
 
@@ -195,24 +196,26 @@ impl Scene<'_> {
         std::array::from_fn(|axis| if axis == vertical { 1.0 } else { horizontal })
     }
 
+    /// The frame that all segments vote for, unless it left the neighbourhood of the pictures' own.
+    fn refined(&self, frame: &Matrix3<f64>, axis_weights: &[f64; 3]) -> Matrix3<f64> {
+        let refined = self.vote.refine_frame(frame, axis_weights, self.options);
+        let limit = MAX_REFINEMENT_TOLERANCES * self.options.joint_tolerance_deg.to_radians();
+        let (before, after) = (vertical_of(frame, self.rotations), vertical_of(&refined, self.rotations));
+        // A comparison with NaN is false: a refinement that is not finite is dropped too.
+        if before.angle(&after) <= limit { refined } else { *frame }
+    }
+
     /// The prior of a vertical alone.
     fn solve_vertical(&self, down: &Vector3<f64>, guidance: &mut Guidance) -> Option<Upright> {
         guidance.used = true;
         guidance.vertical_only = true;
-        let (first, second) = crate::vanishing::orthonormal_complement(down);
-        let frame = Matrix3::from_columns(&[*down, first, second]);
-        let own = self.refined_rolls(&frame, down, 1);
+        let own = self.common_rolls(down);
         self.solve(down, &own, guidance)
     }
 
-    /// Each picture's roll by the common vertical and, if asked for, by its own segments within its camera's error.
-    fn refined_rolls(&self, frame: &Matrix3<f64>, down: &Vector3<f64>, axes_used: usize) -> Vec<Option<f64>> {
-        if !self.options.picture_refinement {
-            return self.rotations.iter().map(|rotation| roll_of(&(rotation * down))).collect();
-        }
-        let turns = self.vote.refine_pictures(frame, axes_used, self.options);
-        let roll = |(turn, rotation): (&Vector3<f64>, &Matrix3<f64>)| roll_of(&(exp_rotation(turn) * rotation * down));
-        turns.iter().zip(self.rotations).map(roll).collect()
+    /// Each picture's roll by the common vertical: after the joint refinement no picture's own segments know better.
+    fn common_rolls(&self, down: &Vector3<f64>) -> Vec<Option<f64>> {
+        self.rotations.iter().map(|rotation| roll_of(&(rotation * down))).collect()
     }
 
     /// Searches pictures that disagree, or have no triad, again near the dominant directions.

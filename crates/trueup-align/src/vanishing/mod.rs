@@ -76,7 +76,7 @@ pub struct Triad {
     pub line_counts: [usize; 3],
     /// For every segment given, the direction (0, 1, 2) whose cluster it belongs to; `None` if in none or not used.
     pub clusters: Vec<Option<u8>>,
-    /// Covariance of the rotation vector d, in radians squared, for the perturbation V exp([d]x) of the matrix V.
+    /// Covariance of the rotation vector d, in radians squared, for the perturbation `V exp([d]x)` of the matrix V.
     pub covariance: [[f64; 3]; 3],
     /// Standard deviation in radians of the roll that the direction closest to the picture's vertical predicts; `None`
     /// if none is within 45 degrees of the picture plane's vertical.

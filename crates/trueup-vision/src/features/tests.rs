@@ -1,6 +1,3 @@
-<<<<<<< HEAD
-
-=======
 use proptest::prelude::*;
 use rand::RngExt;
 use trueup_core::context::{CancelToken, Silent};
@@ -246,4 +243,3 @@ fn unusable_input_is_refused() {
     let cancelled = StageContext::new(&Silent, &token, 0);
     assert!(matches!(detect(&Raster::new(20, 20, 1), &options, &cancelled), Err(Error::Cancelled)));
 }
->>>>>>> sift
