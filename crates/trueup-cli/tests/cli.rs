@@ -199,3 +199,11 @@ fn gray_deep_and_transparent_photographs_are_photographs() {
         assert!(run.expect_success().contains("pictures  3 of 3 used"), "{name}: {}", run.stdout);
     }
 }
+
+#[test]
+fn the_example_stands_upright() {
+    let examples = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples");
+    let run = Desk::new().stitch(&[examples]);
+    assert!(run.expect_success().contains("pictures  5 of 5 used"), "{}", run.stdout);
+    assert!(run.stdout.contains("upright   guided by vanishing points (divergence "), "{}", run.stdout);
+}
