@@ -1,53 +1,36 @@
-//! The `trueup` command.
-fn main() {
-    let mut args = std::env::args().skip(2);
-    let (mut photos, mut out, mut project, mut set, mut threads) = (vec![], None, None, vec![], 0);
-    while let Some(a) = args.next() {
-        match a.as_str() {
-            "-o" => out = args.next(),
-            "--project" => project = args.next(),
-            "--set" => set.push(args.next().unwrap()),
-            "--threads" => threads = args.next().unwrap().parse().unwrap(),
-            "--quiet" => {}
-            _ => photos.push(a),
-        }
-    }
-    let mut options = trueup::StitchOptions::default();
-    for s in set {
-        options.set(&s).unwrap();
-    }
-    let job = trueup::StitchJob {
-        inputs: trueup::Inputs::new(photos),
-        output: out.unwrap().into(),
-        project: project.map(Into::into),
-        threads,
+//! The `trueup` command: reads arguments, calls the `trueup` library, prints what it decided and why.
+//!
+//! No algorithm and no default lives here; [`trueup::StitchOptions`] holds every default.
+#![forbid(unsafe_code)]
+
+mod arguments;
+mod failure;
+mod inspect;
+mod interrupt;
+mod option_list;
+mod output;
+mod progress;
+mod stitch;
+mod summary;
+mod words;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use arguments::{Command, LowArgs};
+
+fn main() -> ExitCode {
+    let outcome = match LowArgs::parse().command {
+        Command::Stitch(args) => stitch::run(*args),
+        Command::Inspect(args) => inspect::run(&args),
+        Command::Options(args) => option_list::run(&args),
     };
-    let context = trueup::StageContext::default();
-    match job.run(&options, &context) {
-        Ok(w) => {
-            for w in w {
-                let p = w.project;
-                println!(
-                    "{} {}/{} {:?} {:?} {:?}",
-                    w.output.display(),
-                    p.used(),
-                    p.images.len(),
-                    p.canvas,
-                    p.manhattan.divergence,
-                    p.manhattan.failed_clause
-                );
-                for (k, v) in p.seconds {
-                    print!("{k} {v:.3}; ");
-                }
-                println!();
-                for d in p.diagnostics {
-                    println!("{:?} {} {} {} {}", d.severity, d.code, d.subject, d.message, d.hint);
-                }
-            }
-        }
-        Err(e) => {
-            eprintln!("{e}");
-            std::process::exit(1);
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprint!("{failure}");
+            failure.exit_code()
         }
     }
 }

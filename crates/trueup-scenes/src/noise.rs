@@ -50,7 +50,7 @@ pub(crate) fn fractal_noise(
         total += strength;
         let visible = (width / (2.0 * footprint) - 1.0).clamp(0.0, 1.0);
         if visible > 0.0 {
-            sum += strength * visible * value_noise(point / width, seed.wrapping_add(octave * 0x51ed_270b));
+            sum += strength * visible * value_noise(point / width, seed.wrapping_add(octave.wrapping_mul(0x51ed_270b)));
         }
         strength *= gain;
         width *= 0.5;

@@ -8,7 +8,7 @@ use trueup_io::encode;
 
 use crate::inputs::Inputs;
 use crate::options::StitchOptions;
-use crate::project::Project;
+use crate::project::{ImageRecord, Project};
 use crate::stitcher::Stitcher;
 
 /// What to stitch and where to put it.
@@ -42,7 +42,8 @@ impl StitchJob {
     /// Runs the job. Outputs are checked before work starts, written beside their place and renamed.
     ///
     /// # Errors
-    /// Those of [`Stitcher::align`] and [`Stitcher::compose`], and those of writing. Panoramas already written stay.
+    /// Those of [`Stitcher::align`] and [`Stitcher::compose`], and those of writing; [`Error::Input`] if the output is one
+    /// of the photographs. Panoramas already written stay.
     pub fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<Written>> {
         options.validate()?;
         encode::check_writable(&self.output)?;
@@ -63,16 +64,17 @@ impl StitchJob {
         let mut written = Vec::new();
         for (index, mut alignment) in aligned.alignments.into_iter().enumerate() {
             let number = several.then_some(index + 1);
+            let output = numbered(&self.output, number);
+            spare_photographs(&output, &alignment.project)?;
             let start = Instant::now();
             let panorama = stitcher.compose(&alignment)?;
             alignment.record_seconds("render", start.elapsed());
-            let output = numbered(&self.output, number);
             let start = Instant::now();
             let bytes = encode::write(&output, &panorama, &options.output, context)?;
             alignment.record_seconds("output", start.elapsed());
             drop(panorama);
-            let mut project = alignment.project;
-            project.diagnostics.extend(context.take_diagnostics());
+            alignment.record_findings(context.take_diagnostics());
+            let project = alignment.project;
             let project_file = self.project.as_deref().map(|path| numbered(path, number));
             if let Some(path) = &project_file {
                 encode::write_atomically(path, project.to_json()?.as_bytes())?;
@@ -92,6 +94,21 @@ fn numbered(path: &Path, number: Option<usize>) -> PathBuf {
         None => format!("{stem}-{number}"),
     };
     path.with_file_name(name)
+}
+
+/// Refuses to write a panorama over one of the photographs, which may be the only copy. An older panorama in the folder
+/// of the photographs is met here, too.
+fn spare_photographs(output: &Path, project: &Project) -> Result<()> {
+    let Ok(existing) = output.canonicalize() else { return Ok(()) };
+    let is_output = |image: &&ImageRecord| Path::new(&image.path).canonicalize().is_ok_and(|path| path == existing);
+    match project.images.iter().find(is_output) {
+        None => Ok(()),
+        Some(_) => Err(Error::input(
+            output.display(),
+            "this file is one of the photographs to be stitched",
+            "Give the panorama another name or folder, or move an older panorama away from the photographs.",
+        )),
+    }
 }
 
 fn check_folder(path: &Path) -> Result<()> {

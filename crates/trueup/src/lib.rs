@@ -9,7 +9,7 @@
 //!
 //! let options = StitchOptions::default();
 //! let context = StageContext::default();
-//! let stitcher = Stitcher::new(&options, &context)?;
+//! let stitcher = Stitcher::new(&options, &context);
 //! let inputs = Inputs::new(["holiday/"]);
 //! for alignment in stitcher.align(&inputs)?.alignments {
 //!     let panorama = stitcher.compose(&alignment)?;
@@ -25,6 +25,7 @@ mod files;
 mod inputs;
 mod left_out;
 mod measure;
+mod names;
 mod options;
 mod project;
 mod stitcher;

@@ -168,17 +168,28 @@ impl StitchOptions {
             toml::Value::Boolean(_) => value.parse().ok().map(toml::Value::Boolean),
             _ => Some(toml::Value::String(value.to_owned())),
         };
-        let parsed = parsed.ok_or_else(|| wrong(format!("\"{value}\" is not {}", in_words(&known))))?;
+        let allowed = || allowed_values(stage, option);
+        let parsed =
+            parsed.ok_or_else(|| wrong(format!("\"{value}\" is not {} (allowed: {})", in_words(&known), allowed())))?;
         if let Some(values) = table.get_mut(stage).and_then(toml::Value::as_table_mut) {
             values.insert(option.to_owned(), parsed);
         }
-        *self = table.try_into().map_err(|error: toml::de::Error| wrong(first_line(&error)))?;
+        // A number beyond its type (jpeg_quality=300) or an unknown choice fails here, before any range is looked at.
+        let merged = table.try_into();
+        *self =
+            merged.map_err(|_: toml::de::Error| wrong(format!("\"{value}\" cannot be (allowed: {})", allowed())))?;
         Ok(())
     }
 
     fn to_table(&self) -> Result<toml::Table> {
         toml::Table::try_from(self).map_err(|error| Error::input("options", error, "Report this as a defect."))
     }
+}
+
+/// The allowed values of an option, in words.
+fn allowed_values(stage: &str, option: &str) -> String {
+    let name = format!("{stage}.{option}");
+    StitchOptions::describe().into_iter().find(|row| row.name == name).map_or(String::new(), |row| row.allowed)
 }
 
 fn in_words(value: &toml::Value) -> &'static str {
@@ -226,7 +237,8 @@ mod tests {
             ("cell_px=3", "there is no \".\""),
             ("mesh.cell=3", "there is no option \"mesh.cell\""),
             ("mesh.cell_px=wide", "\"wide\" is not a number"),
-            ("stitch.method=magic", "unknown variant"),
+            ("stitch.method=magic", "\"magic\" cannot be (allowed: vpg"),
+            ("output.jpeg_quality=300", "\"300\" cannot be (allowed: 1 to 100)"),
         ] {
             let message = options.set(assignment).expect_err("must fail").to_string();
             assert!(message.contains(reason), "{message}");

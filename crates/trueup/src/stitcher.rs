@@ -21,6 +21,7 @@ use crate::clock::Clock;
 use crate::inputs::{Inputs, Reference};
 use crate::left_out::{self, LeftOut};
 use crate::measure::{self, Measured};
+use crate::names;
 use crate::options::StitchOptions;
 use crate::project::{
     Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
@@ -52,6 +53,12 @@ pub struct Alignment {
 }
 
 impl Alignment {
+    /// Adds what composing found to the record.
+    pub(crate) fn record_findings(&mut self, findings: Vec<Diagnostic>) {
+        let names: Vec<String> = self.photographs.images().iter().map(|image| image.name.clone()).collect();
+        self.project.diagnostics.extend(findings.into_iter().map(|one| names::by_name(one, &names)));
+    }
+
     /// Adds the wall seconds that a later stage took to the record.
     pub(crate) fn record_seconds(&mut self, stage: &str, duration: std::time::Duration) {
         self.clock.add(stage, duration);
@@ -103,7 +110,9 @@ impl<'a> Stitcher<'a> {
         for rejected in &matched.sources.rejected {
             self.report_rejected(rejected);
         }
-        let shared_diagnostics = self.context.take_diagnostics();
+        let file_names = matched.names();
+        let found = self.context.take_diagnostics();
+        let shared_diagnostics: Vec<_> = found.into_iter().map(|one| names::by_name(one, &file_names)).collect();
 
         let mut alignments = Vec::new();
         for component in &components {
@@ -133,23 +142,14 @@ impl<'a> Stitcher<'a> {
         if !sources.images.is_empty() {
             return Ok(());
         }
-        match sources.rejected.as_slice() {
-            [] => Err(Error::input(
+        if sources.rejected.is_empty() {
+            return Err(Error::input(
                 if inputs.photographs.is_empty() { "photographs".to_owned() } else { inputs.photographs.join(", ") },
                 "no photographs were given",
                 "Name at least two overlapping photographs, or a folder that holds them.",
-            )),
-            [only] => Err(only.to_error()),
-            [first, rest @ ..] => {
-                let others: Vec<String> =
-                    rest.iter().map(|rejected| format!("{}: {}", rejected.name, rejected.reason)).collect();
-                Err(Error::input(
-                    &first.name,
-                    format!("{}; {}", first.reason, others.join("; ")),
-                    "None of the files given can be used; name at least two overlapping photographs.",
-                ))
-            }
+            ));
         }
+        Err(none_usable(sources.rejected.iter().cloned().map(reason_of_rejected).collect()))
     }
 
     fn match_all(
@@ -209,10 +209,7 @@ impl<'a> Stitcher<'a> {
         let decodable: Vec<usize> =
             (0..matched.measured.len()).filter(|&index| matched.measured[index].is_some()).collect();
         match decodable.as_slice() {
-            [] => {
-                let reasons: Vec<String> = matched.undecodable.iter().flatten().map(ToString::to_string).collect();
-                return Err(Error::input("photographs", reasons.join("; "), "None of the files given can be used."));
-            }
+            [] => return Err(matched.none_usable()),
             [only] => {
                 let name = &matched.sources.images[*only].name;
                 self.context.report(Diagnostic::warning(
@@ -328,7 +325,17 @@ impl Matched {
         Ok(wished.filter(|wished| members.contains(wished)).unwrap_or_else(|| self.graph.central_picture(members)))
     }
 
-    /// Why a photograph that is in none of the `stitched` groups was left out.
+    /// The error when not one photograph could be decoded.
+    fn none_usable(&self) -> Error {
+        let undecodable = (0..self.sources.images.len()).map(|index| {
+            let LeftOut { reason, hint, .. } = self.why_left_out(index, &[]);
+            (self.sources.images[index].name.clone(), reason, hint)
+        });
+        none_usable(undecodable.chain(self.sources.rejected.iter().cloned().map(reason_of_rejected)).collect())
+    }
+
+    /// Why a photograph is left out of the panorama at hand: it cannot be read, is in another one of those stitched, or in
+    /// none of them.
     fn why_left_out(&self, index: usize, stitched: &[Vec<usize>]) -> LeftOut {
         if let Some(error) = &self.undecodable[index] {
             let (reason, hint) = match error {
@@ -336,6 +343,10 @@ impl Matched {
                 other => (other.to_string(), "Check the file, or copy it again.".to_owned()),
             };
             return LeftOut { code: "picture-damaged", reason, hint };
+        }
+        if let Some(position) = stitched.iter().position(|members| members.contains(&index)) {
+            let reason = format!("it is in panorama {} of {}", position + 1, stitched.len());
+            return LeftOut { code: "other-panorama", reason, hint: String::new() };
         }
         let component = stitched.first().map_or(&[][..], Vec::as_slice);
         left_out::explain(index, component, &self.pairs, &self.names())
@@ -389,6 +400,26 @@ impl Matched {
             canvas: Canvas { width: 0, height: 0 },
             seconds: std::collections::BTreeMap::new(),
             diagnostics: Vec::new(),
+        }
+    }
+}
+
+/// Name, reason and hint of an input that cannot be used.
+fn reason_of_rejected(rejected: RejectedSource) -> (String, String, String) {
+    (rejected.name, rejected.reason, rejected.hint)
+}
+
+/// The error when none of the inputs, each with name, reason and hint, can be used.
+fn none_usable(inputs: Vec<(String, String, String)>) -> Error {
+    match inputs.as_slice() {
+        [(name, reason, hint)] => Error::input(name, reason, hint),
+        _ => {
+            let reasons: Vec<String> = inputs.iter().map(|(name, reason, _)| format!("{name}: {reason}")).collect();
+            Error::input(
+                format!("{} files", inputs.len()),
+                format!("none of them can be used: {}", reasons.join("; ")),
+                "Name at least two overlapping photographs, or a folder that holds them.",
+            )
         }
     }
 }
@@ -480,7 +511,7 @@ fn rows(matrix: &nalgebra::Matrix3<f64>) -> [[f64; 3]; 3] {
 fn no_overlap(matched: &Matched) -> Error {
     let names = matched.names();
     let best = matched.pairs.iter().max_by(|one, two| left_out::strength(one).total_cmp(&left_out::strength(two)));
-    let why = match best {
+    let why = match best.filter(|pair| pair.putative > 0) {
         Some(pair) => format!(
             "no overlapping photographs found; the best pair is {} and {}: {}",
             names[pair.a],

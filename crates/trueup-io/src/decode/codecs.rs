@@ -12,6 +12,7 @@ use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
 
+use super::jpeg_scans::has_separate_subsampled_scans;
 use crate::format::{PictureFormat, SIGNATURE_BYTES, SUPPORTED};
 
 /// Largest width and height a JPEG can state (ITU-T T.81 table B.2).
@@ -62,6 +63,9 @@ fn decode_jpeg(image: &SourceImage, bytes: &[u8]) -> Result<Photograph> {
             "Copy it again from the camera or leave it out.",
         ));
     }
+    if has_separate_subsampled_scans(bytes) {
+        return decode_separate_scans(image, bytes, width, height);
+    }
     let (space, channels) = match decoder.input_colorspace() {
         Some(ColorSpace::Luma) => (ColorSpace::Luma, 1),
         _ => (ColorSpace::RGB, 3),
@@ -69,6 +73,20 @@ fn decode_jpeg(image: &SourceImage, bytes: &[u8]) -> Result<Photograph> {
     decoder.set_options(jpeg_options().jpeg_set_out_colorspace(space));
     let pixels = decoder.decode().map_err(|error| damaged(image, format!("{error:?}")))?;
     Ok(Photograph::Eight(Raster::from_data(width, height, channels, pixels)?))
+}
+
+/// Decodes a sequential JPEG that stores each component in a scan of its own and some at a lower resolution.
+///
+/// # Departures
+/// zune-jpeg 0.5.15 turns these into stripes without an error (its issue 422), so that another decoder reads them.
+fn decode_separate_scans(image: &SourceImage, bytes: &[u8], width: usize, height: usize) -> Result<Photograph> {
+    let mut decoder = jpeg_decoder::Decoder::new(bytes);
+    decoder.set_max_decoding_buffer_size(width.saturating_mul(height).saturating_mul(MAX_PIXEL_BYTES as usize));
+    let pixels = decoder.decode().map_err(|error| damaged(image, error))?;
+    match decoder.info().map(|info| info.pixel_format) {
+        Some(jpeg_decoder::PixelFormat::RGB24) => Ok(Photograph::Eight(Raster::from_data(width, height, 3, pixels)?)),
+        _ => Err(Error::input(&image.name, "its kind of pixels is not read", "Export it as an RGB JPEG.")),
+    }
 }
 
 /// Whether an end-of-image marker follows the first scan header. The thumbnail's own marker lies before that, in EXIF;

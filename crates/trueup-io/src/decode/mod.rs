@@ -2,6 +2,7 @@
 
 mod codecs;
 mod files;
+mod jpeg_scans;
 mod orientation;
 mod reduce;
 #[cfg(test)]

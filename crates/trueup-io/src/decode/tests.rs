@@ -140,6 +140,31 @@ fn every_kind_of_jpeg_is_decoded_but_none_that_is_cut_off() {
     }
 }
 
+/// Optimised tables make the encoder write a scan per component. The coefficients are the same, so that the pixels are,
+/// but for how colour is interpolated.
+#[test]
+fn jpegs_with_a_scan_per_component_and_reduced_colour_are_decoded() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let smooth = |x: u32, y: u32| [x * 5, y * 7, 100 + x].map(|value| value as u8);
+    let pixels: Vec<u8> = (0..HEIGHT).flat_map(|y| (0..WIDTH).flat_map(move |x| smooth(x, y))).collect();
+    for factor in [(2, 1), (2, 2), (1, 2), (1, 1)] {
+        let decoded = [false, true].map(|separate| {
+            let mut bytes = Vec::new();
+            let mut encoder = jpeg_encoder::Encoder::new(&mut bytes, 95);
+            let factor = jpeg_encoder::SamplingFactor::from_factors(factor.0, factor.1).expect("known factors");
+            encoder.set_sampling_factor(factor);
+            encoder.set_optimized_huffman_tables(separate);
+            encoder.encode(&pixels, WIDTH as u16, HEIGHT as u16, jpeg_encoder::ColorType::Rgb).expect("encoded");
+            let image = examine(write(&folder, "scans.jpg", &bytes));
+            let Photograph::Eight(raster) = photograph(&image).expect("a photograph") else { panic!("16 bit") };
+            raster
+        });
+        for (together, separate) in decoded[0].data().iter().zip(decoded[1].data()) {
+            assert!(together.abs_diff(*separate) <= 12, "{factor:?}: {together} {separate}");
+        }
+    }
+}
+
 #[test]
 fn data_after_the_end_of_a_jpeg_are_ignored() {
     let folder = TempDir::new().expect("a temporary folder");

@@ -1,0 +1,157 @@
+//! What may be typed, before any of it is checked against the options' ranges or the disk.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+/// More threads than this are a typing mistake, and starting them would hang the machine.
+const MAX_THREADS: i64 = 1024;
+
+const EXAMPLES: &str = "\
+Examples:
+  trueup stitch holiday/ -o holiday.jpg
+  trueup stitch IMG_01*.jpg -o pano.png --scale 0.5 --project pano.json
+  trueup inspect pano.json --verbose
+  trueup options mesh";
+
+const STITCH_EXAMPLES: &str = "\
+Examples:
+  trueup stitch a.jpg b.jpg c.jpg -o pano.jpg
+  trueup stitch holiday/ -o pano.tif                     every picture of a folder
+  trueup stitch 'holiday/IMG_*.jpg' -o pano.jpg --all    pano-1.jpg, pano-2.jpg, ...
+  trueup stitch holiday/ -o small.webp --scale 0.25      a quick preview
+  trueup stitch holiday/ -o pano.jpg --set mesh.cell_px=30 --set exposure.enabled=false
+  trueup stitch holiday/ -o pano.jpg --config mine.toml  [mesh] cell_px = 30.0
+
+Defaults are overruled by --config, that by --set, and that by the flags of their own (--scale, --quality, ...).
+
+Exit status: 0 a panorama was written, 1 the input or the system failed, 2 wrong usage, 130 stopped by Ctrl-C.
+The first Ctrl-C stops at the next safe place and leaves nothing half written; the second kills at once.";
+
+/// Panoramas that stand upright: photographs in, a natural panorama out, and the reasons why it looks as it does.
+#[derive(Debug, Parser)]
+#[command(name = "trueup", version, after_help = EXAMPLES, max_term_width = 110)]
+pub(crate) struct LowArgs {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Stitch photographs into a panorama
+    ///
+    /// Finds out by itself which photographs overlap. Those that belong elsewhere are left out, and the summary says why.
+    Stitch(Box<StitchArgs>),
+    /// Print what a project file says of its panorama: the summary that `stitch` printed
+    Inspect(InspectArgs),
+    /// List every option of every stage: default, range, unit, meaning
+    Options(OptionsArgs),
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = STITCH_EXAMPLES)]
+pub(crate) struct StitchArgs {
+    /// Files, folders (their pictures, not those of folders inside) or glob patterns; JPEG, PNG, TIFF, WebP
+    #[arg(value_name = "PHOTOS", required = true)]
+    pub photographs: Vec<String>,
+
+    /// The panorama; .jpg, .png, .tif or .webp chooses the format
+    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    pub output: PathBuf,
+
+    /// Write the record of the stitch (geometry, pairs, reasons, timings) as JSON
+    #[arg(long, value_name = "FILE.json", help_heading = "Output")]
+    pub project: Option<PathBuf>,
+
+    /// Size of the panorama: 1 keeps the pixel scale of the reference photograph (canvas.scale)
+    #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Output")]
+    pub scale: Option<String>,
+
+    /// JPEG quality (output.jpeg_quality)
+    #[arg(long, value_name = "Q", allow_hyphen_values = true, help_heading = "Output")]
+    pub quality: Option<String>,
+
+    /// Stitch every group of overlapping photographs, not only the largest; several panoramas are numbered
+    #[arg(long, help_heading = "Photographs")]
+    pub all: bool,
+
+    /// Fail unless every photograph given is used
+    #[arg(long, help_heading = "Photographs")]
+    pub require_all: bool,
+
+    /// The photograph that sets the pixel scale and stays in place: auto, or its name
+    #[arg(long, value_name = "auto|NAME", help_heading = "Photographs")]
+    pub reference: Option<String>,
+
+    /// Match only the pairs in this file, one `NAME -- NAME` a line
+    #[arg(long, value_name = "FILE", help_heading = "Photographs")]
+    pub graph: Option<PathBuf>,
+
+    /// How the panorama's shape is found (stitch.method; `trueup options stitch` names the methods)
+    #[arg(long, value_name = "METHOD", help_heading = "Tuning")]
+    pub method: Option<String>,
+
+    /// Every random choice derives from this number (stitch.seed)
+    #[arg(long, value_name = "N", allow_hyphen_values = true, help_heading = "Tuning")]
+    pub seed: Option<String>,
+
+    /// Set any option of any stage; may be repeated
+    #[arg(long, value_name = "STAGE.OPTION=VALUE", allow_hyphen_values = true, help_heading = "Tuning")]
+    pub set: Vec<String>,
+
+    /// Read options from a TOML file with a table per stage
+    #[arg(long, value_name = "FILE.toml", help_heading = "Tuning")]
+    pub config: Option<PathBuf>,
+
+    /// Number of threads; 0 for one per core. The panorama is the same for any number
+    #[arg(
+        long,
+        value_name = "N",
+        allow_hyphen_values = true,
+        value_parser = clap::value_parser!(u16).range(0..=MAX_THREADS),
+        help_heading = "Tuning"
+    )]
+    pub threads: Option<u16>,
+
+    /// Print nothing but errors
+    #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]
+    pub quiet: bool,
+
+    /// Print also the pairs' verdicts, each picture's geometry, notes, and a line per stage's time
+    #[arg(short, long, help_heading = "Messages")]
+    pub verbose: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct InspectArgs {
+    /// A file that `trueup stitch --project` wrote
+    #[arg(value_name = "PROJECT.json")]
+    pub project: PathBuf,
+
+    /// Print also the pairs' verdicts, each picture's geometry, notes, and a line per stage's time
+    #[arg(short, long)]
+    pub verbose: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct OptionsArgs {
+    /// Only the options of this stage
+    #[arg(value_name = "STAGE")]
+    pub stage: Option<String>,
+
+    /// As a JSON array of {name, default, allowed, unit, meaning}
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_is_well_formed() {
+        LowArgs::command().debug_assert();
+    }
+}

@@ -1,0 +1,96 @@
+//! What the command says when it fails, and with which status it ends.
+
+use std::fmt;
+use std::process::ExitCode;
+
+use trueup::{Error, InvalidOption};
+
+/// The input or the system failed.
+const STATUS_FAILURE: u8 = 1;
+/// Wrong usage: arguments or options that cannot be.
+const STATUS_USAGE: u8 = 2;
+/// 128 + SIGINT, as shells count a program that Ctrl-C ended.
+pub(crate) const STATUS_INTERRUPTED: u8 = 130;
+
+/// An error as the user sees it, printed once.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct Failure {
+    status: u8,
+    message: String,
+    /// Further findings, a line each.
+    details: Vec<String>,
+    /// What to do about it; empty when there is nothing to say.
+    hint: String,
+}
+
+impl Failure {
+    /// Wrong usage.
+    pub(crate) fn usage(message: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self { status: STATUS_USAGE, message: message.into(), details: Vec::new(), hint: hint.into() }
+    }
+
+    /// Options that cannot be, all of them.
+    pub(crate) fn options(mut wrong: Vec<String>) -> Self {
+        let hint = "List the options with their ranges with `trueup options`.";
+        match wrong.len() {
+            1 => Self::usage(wrong.remove(0), hint),
+            count => Self { details: wrong, ..Self::usage(format!("{count} options cannot be used:"), hint) },
+        }
+    }
+
+    pub(crate) fn exit_code(&self) -> ExitCode {
+        ExitCode::from(self.status)
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        let failed =
+            |message: String, hint: String| Self { status: STATUS_FAILURE, message, details: Vec::new(), hint };
+        match error {
+            Error::Input { subject, reason, hint } => failed(format!("{subject}: {reason}"), hint),
+            Error::Options(invalid) => Self::options(invalid.iter().map(InvalidOption::to_string).collect()),
+            Error::Limits { subject, needed, allowed, hint } => {
+                failed(format!("{subject}: {needed} needed, {allowed} allowed"), hint)
+            }
+            Error::Unsupported { what, hint } => Self::usage(format!("{what} is not supported"), hint),
+            Error::Unsolvable { stage, subject, why, hint } => failed(format!("{stage}: {subject}: {why}"), hint),
+            Error::Cancelled => Self { status: STATUS_INTERRUPTED, ..failed(error.to_string(), String::new()) },
+            other => failed(other.to_string(), String::new()),
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(formatter, "trueup: error: {}", self.message)?;
+        for detail in &self.details {
+            writeln!(formatter, "  {detail}")?;
+        }
+        if self.hint.is_empty() { Ok(()) } else { writeln!(formatter, "trueup: hint: {}", self.hint) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hint_has_a_line_of_its_own() {
+        let failure = Failure::from(Error::input("a.jpg", "it is a text", "Give a picture."));
+        assert_eq!(failure.to_string(), "trueup: error: a.jpg: it is a text\ntrueup: hint: Give a picture.\n");
+        assert_eq!(failure.status, STATUS_FAILURE);
+    }
+
+    #[test]
+    fn several_wrong_options_are_listed_below_each_other() {
+        let text = Failure::options(vec!["one".to_owned(), "two".to_owned()]).to_string();
+        assert!(text.starts_with("trueup: error: 2 options cannot be used:\n  one\n  two\n"), "{text}");
+    }
+
+    #[test]
+    fn a_request_to_stop_has_its_own_status_and_no_hint() {
+        let failure = Failure::from(Error::Cancelled);
+        assert_eq!((failure.status, failure.to_string()), (130, "trueup: error: stopped on request\n".to_owned()));
+    }
+}

@@ -1,0 +1,17 @@
+//! `trueup inspect`: the summary of a project file.
+
+use trueup::{Error, Project};
+
+use crate::arguments::InspectArgs;
+use crate::failure::Failure;
+use crate::output;
+use crate::summary;
+
+pub(crate) fn run(args: &InspectArgs) -> Result<(), Failure> {
+    let path = &args.project;
+    let bytes = std::fs::read(path).map_err(|source| Error::Io { action: "reading", path: path.clone(), source })?;
+    // What is no text is no JSON either; the project's own reader says so.
+    let text = String::from_utf8_lossy(&bytes);
+    let project = Project::from_json(&text, &path.display().to_string())?;
+    output::print(&summary::text(&project, None, args.verbose))
+}

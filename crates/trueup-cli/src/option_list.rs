@@ -1,0 +1,70 @@
+//! `trueup options`: the reference of all options.
+
+use std::fmt::Write;
+
+use trueup::{Error, OptionDescription, StitchOptions};
+
+use crate::arguments::OptionsArgs;
+use crate::failure::Failure;
+use crate::output;
+use crate::words::wrap;
+
+/// Width of a line of the list, in characters.
+const WIDTH: usize = 100;
+const INDENT: &str = "      ";
+
+pub(crate) fn run(args: &OptionsArgs) -> Result<(), Failure> {
+    let mut rows = StitchOptions::describe();
+    if let Some(stage) = &args.stage {
+        let stages = StitchOptions::stages();
+        if !stages.contains(&stage.as_str()) {
+            return Err(Failure::usage(
+                format!("there is no stage \"{stage}\""),
+                format!("The stages are {}.", stages.join(", ")),
+            ));
+        }
+        rows.retain(|row| stage_of(row) == stage);
+    }
+    if args.json {
+        let json = serde_json::to_string_pretty(&rows)
+            .map_err(|error| Error::input("options", error, "Report this as a defect."))?;
+        return output::print(&format!("{json}\n"));
+    }
+    output::print(&text(&rows))
+}
+
+/// One paragraph an option, a blank line between stages.
+fn text(rows: &[OptionDescription]) -> String {
+    let mut text = String::new();
+    for (position, row) in rows.iter().enumerate() {
+        if position > 0 && stage_of(row) != stage_of(&rows[position - 1]) {
+            text.push('\n');
+        }
+        let unit = if row.unit.is_empty() { String::new() } else { format!(" {}", row.unit) };
+        let _ = writeln!(text, "{} = {}{unit}   (allowed: {})", row.name, row.default, row.allowed);
+        for line in wrap(&row.meaning, WIDTH - INDENT.len()) {
+            let _ = writeln!(text, "{INDENT}{line}");
+        }
+    }
+    text
+}
+
+fn stage_of(row: &OptionDescription) -> &str {
+    row.name.split_once('.').map_or(row.name.as_str(), |(stage, _)| stage)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_option_is_listed_with_default_range_and_meaning() {
+        let rows = StitchOptions::describe();
+        let listed = text(&rows);
+        for row in &rows {
+            assert!(listed.contains(&format!("{} = {}", row.name, row.default)), "{}", row.name);
+            assert!(listed.contains(&row.allowed), "{}", row.name);
+        }
+        assert!(listed.lines().all(|line| line.chars().count() <= WIDTH || !line.starts_with(INDENT)));
+    }
+}

@@ -1,0 +1,158 @@
+//! `trueup stitch`: from arguments to a checked job, from the job's result to the summary.
+
+use std::path::Path;
+
+use trueup::{Error, Inputs, Reference, StageContext, StitchJob, StitchOptions, Written};
+
+use crate::arguments::StitchArgs;
+use crate::failure::Failure;
+use crate::interrupt;
+use crate::output;
+use crate::progress::Bars;
+use crate::summary::{self, PanoramaFile};
+
+/// The word that leaves the choice of the reference to the program.
+const AUTO: &str = "auto";
+
+pub(crate) fn run(args: StitchArgs) -> Result<(), Failure> {
+    let (quiet, verbose) = (args.quiet, args.verbose);
+    let CheckedStitch { job, options } = CheckedStitch::new(args)?;
+    let cancel = interrupt::cancel_token();
+    let bars = Bars::new(quiet);
+    let context = StageContext::new(&bars, &cancel, options.stitch.seed);
+    let written = job.run(&options, &context);
+    bars.clear();
+    let written = written?;
+    if quiet { Ok(()) } else { output::print(&summaries(&written, verbose)) }
+}
+
+/// A blank line between panoramas.
+fn summaries(written: &[Written], verbose: bool) -> String {
+    let one = |written: &Written| {
+        let file =
+            PanoramaFile { panorama: &written.output, bytes: written.bytes, project: written.project_file.as_deref() };
+        summary::text(&written.project, Some(&file), verbose)
+    };
+    written.iter().map(one).collect::<Vec<_>>().join("\n")
+}
+
+/// Arguments that make sense: what the library needs.
+struct CheckedStitch {
+    job: StitchJob,
+    options: StitchOptions,
+}
+
+impl CheckedStitch {
+    fn new(args: StitchArgs) -> Result<Self, Failure> {
+        let options = options(&args)?;
+        if args.project.as_ref() == Some(&args.output) {
+            let message = format!("{} cannot be both the panorama and the project", args.output.display());
+            return Err(Failure::usage(message, "Give --output and --project different names."));
+        }
+        let reference = match args.reference {
+            Some(name) if name != AUTO => Reference::Named(name),
+            _ => Reference::Auto,
+        };
+        let inputs = Inputs {
+            photographs: args.photographs,
+            reference,
+            graph: args.graph,
+            all: args.all,
+            require_all: args.require_all,
+        };
+        // The library reads 0 as one thread per core.
+        let threads = args.threads.map_or(0, usize::from);
+        Ok(Self { job: StitchJob { inputs, output: args.output, project: args.project, threads }, options })
+    }
+}
+
+/// Defaults, overruled by the configuration file, by `--set`, by the flags of their own, in this order. Every value that
+/// cannot be is listed.
+fn options(args: &StitchArgs) -> Result<StitchOptions, Failure> {
+    let mut options = StitchOptions::default();
+    if let Some(path) = &args.config {
+        read_config(&mut options, path)?;
+    }
+    let flags = [
+        ("--method", "stitch.method", &args.method),
+        ("--scale", "canvas.scale", &args.scale),
+        ("--quality", "output.jpeg_quality", &args.quality),
+        ("--seed", "stitch.seed", &args.seed),
+    ];
+    let set = args.set.iter().map(|assignment| (format!("--set {assignment}"), assignment.clone()));
+    let flags = flags.into_iter().filter_map(|(flag, option, value)| {
+        let value = value.as_ref()?;
+        Some((format!("{flag} {value}"), format!("{option}={value}")))
+    });
+    let mut wrong = Vec::new();
+    for (typed, assignment) in set.chain(flags) {
+        if let Err(error) = options.set(&assignment) {
+            wrong.push(format!("{typed}: {}", reason(error)));
+        }
+    }
+    wrong.extend(options.invalid().iter().map(ToString::to_string));
+    if wrong.is_empty() { Ok(options) } else { Err(Failure::options(wrong)) }
+}
+
+fn read_config(options: &mut StitchOptions, path: &Path) -> Result<(), Failure> {
+    let shown = path.display();
+    let text = std::fs::read_to_string(path).map_err(|error| {
+        Failure::usage(format!("{shown}: the configuration cannot be read ({error})"), "Check the path after --config.")
+    })?;
+    options
+        .merge_toml(&text, &shown.to_string())
+        .map_err(|error| Failure::options(vec![format!("{shown}: {}", reason(error))]))
+}
+
+/// Why an option was refused, without the subject and the hint, which the command has in its own words.
+fn reason(error: Error) -> String {
+    match error {
+        Error::Input { reason, .. } => reason,
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::arguments::{Command, LowArgs};
+
+    fn checked(arguments: &[&str]) -> Result<CheckedStitch, Failure> {
+        let all = ["trueup", "stitch", "a.jpg", "-o", "p.jpg"].iter().chain(arguments);
+        match LowArgs::try_parse_from(all).expect("arguments of the right form").command {
+            Command::Stitch(args) => CheckedStitch::new(*args),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn flags_overrule_set_and_set_overrules_the_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("c.toml");
+        std::fs::write(&file, "[canvas]\nscale = 0.5\n[stitch]\nseed = 3\n[output]\njpeg_quality = 70\n")
+            .expect("written");
+        let config = file.to_str().expect("UTF-8");
+        let given = ["--config", config, "--scale", "2", "--set", "canvas.scale=0.25", "--set", "stitch.seed=4"];
+        let options = checked(&given).map(|checked| checked.options).expect("valid");
+        assert_eq!((options.canvas.scale, options.stitch.seed, options.output.jpeg_quality), (2.0, 4, 70));
+    }
+
+    #[test]
+    fn without_flags_every_option_has_its_default() {
+        let CheckedStitch { job, options } = checked(&["--reference", "auto"]).expect("valid");
+        assert_eq!(options, StitchOptions::default());
+        assert_eq!(job.inputs, Inputs::new(["a.jpg"]));
+        assert_eq!(job.threads, 0);
+    }
+
+    #[test]
+    fn every_wrong_value_is_listed() {
+        let failure = checked(&["--scale", "-1", "--seed", "x", "--set", "mesh.cell=3"]).err().expect("three mistakes");
+        let text = failure.to_string();
+        for part in ["3 options", "canvas.scale = -1 (allowed: ", "--seed x: ", "no option \"mesh.cell\""] {
+            assert!(text.contains(part), "{text}");
+        }
+    }
+}

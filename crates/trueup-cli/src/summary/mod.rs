@@ -1,0 +1,156 @@
+//! The summary of a panorama, printed after a stitch and by `trueup inspect`.
+
+mod details;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::Path;
+
+use trueup::{Diagnostic, ImageRecord, ImageStatus, Project, Severity};
+
+use crate::words::file_size;
+
+/// Where a panorama was written; a project file does not say.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PanoramaFile<'a> {
+    pub panorama: &'a Path,
+    pub bytes: u64,
+    pub project: Option<&'a Path>,
+}
+
+/// Stages faster than this, in seconds, are not named in the short list.
+const WORTH_NAMING_SECONDS: f64 = 0.05;
+
+/// What was made of which photographs, and why. `verbose` adds every pair, picture, note and stage.
+pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool) -> String {
+    let mut page = Page::default();
+    panorama(&mut page, project, file);
+    let names = names(&project.images);
+    pictures(&mut page, project, &names);
+    if verbose {
+        details::pictures(&mut page, project, &names);
+        details::pairs(&mut page, project, &names);
+    }
+    page.entry("upright", &upright(project));
+    findings(&mut page, project, verbose);
+    match verbose {
+        true => details::seconds(&mut page, &project.seconds),
+        false => page.entry("time", &seconds_in_short(&project.seconds)),
+    }
+    page.0
+}
+
+/// Lines of a label and a text; texts stand below each other.
+#[derive(Debug, Default)]
+struct Page(String);
+
+impl Page {
+    fn entry(&mut self, label: &str, text: &str) {
+        let _ = writeln!(self.0, "{label:<9} {text}");
+    }
+
+    /// A line that belongs to the entry above, with its own label.
+    fn item(&mut self, label: &str, text: &str) {
+        let _ = writeln!(self.0, "  {label:<9} {text}");
+    }
+}
+
+/// The file name of each photograph; the whole path where names collide.
+fn names(images: &[ImageRecord]) -> Vec<String> {
+    let short = |image: &ImageRecord| match Path::new(&image.path).file_name() {
+        Some(name) => name.to_string_lossy().into_owned(),
+        None => image.path.clone(),
+    };
+    let mut count: BTreeMap<String, usize> = BTreeMap::new();
+    for image in images {
+        *count.entry(short(image)).or_default() += 1;
+    }
+    images
+        .iter()
+        .map(|image| Some(short(image)).filter(|name| count[name] == 1).unwrap_or(image.path.clone()))
+        .collect()
+}
+
+fn panorama(page: &mut Page, project: &Project, file: Option<&PanoramaFile>) {
+    let size = format!("{} x {} px", project.canvas.width, project.canvas.height);
+    let Some(file) = file else {
+        page.entry("panorama", &size);
+        return;
+    };
+    page.entry("panorama", &format!("{}  {size}, {}", file.panorama.display(), file_size(file.bytes)));
+    if let Some(path) = file.project {
+        page.entry("project", &path.display().to_string());
+    }
+}
+
+/// How many were used, and each one left out with its reason and what to do about it.
+fn pictures(page: &mut Page, project: &Project, names: &[String]) {
+    let reference = project.images.iter().position(|image| image.path == project.reference);
+    let reference = reference.map_or(String::new(), |index| format!("; the reference is {}", names[index]));
+    page.entry("pictures", &format!("{} of {} used{reference}", project.used(), project.images.len()));
+    for (image, name) in project.images.iter().zip(names) {
+        if image.status == ImageStatus::LeftOut {
+            page.item("left out", &format!("{name}: {}", image.reason));
+            if !image.hint.is_empty() {
+                page.item("", &image.hint);
+            }
+        }
+    }
+}
+
+/// Whether vanishing points guided the panorama, with the divergence against its threshold.
+fn upright(project: &Project) -> String {
+    let manhattan = &project.manhattan;
+    let trusted = format!("up to {} is trusted", manhattan.threshold);
+    let divergence = manhattan.divergence.map(|divergence| format!("divergence {divergence:.3}, {trusted}"));
+    match (manhattan.accepted, &manhattan.failed_clause) {
+        (true, _) => format!(
+            "guided by vanishing points ({}; {} of {} pictures agree)",
+            divergence.unwrap_or(trusted),
+            manhattan.inliers.len(),
+            project.used()
+        ),
+        (false, clause) => {
+            let why = clause.as_ref().map_or(String::new(), |clause| format!(": {clause}"));
+            let numbers = divergence.map_or(String::new(), |numbers| format!(" ({numbers})"));
+            format!("not guided by vanishing points{why}{numbers}")
+        }
+    }
+}
+
+/// Warnings, and with `verbose` notes, that are not told elsewhere.
+fn findings(page: &mut Page, project: &Project, verbose: bool) {
+    for diagnostic in &project.diagnostics {
+        let label = match diagnostic.severity {
+            Severity::Warning => "warning",
+            Severity::Note => "note",
+        };
+        if (diagnostic.severity == Severity::Note && !verbose) || tells_of_left_out(diagnostic, project) {
+            continue;
+        }
+        page.entry(label, &format!("{}: {}", diagnostic.subject, diagnostic.message));
+        if !diagnostic.hint.is_empty() {
+            page.entry("", &diagnostic.hint);
+        }
+    }
+}
+
+/// Whether a finding is the reason of a left-out photograph, which stands with that photograph.
+fn tells_of_left_out(diagnostic: &Diagnostic, project: &Project) -> bool {
+    project.images.iter().any(|image| image.status == ImageStatus::LeftOut && image.reason == diagnostic.message)
+}
+
+/// "3.2 s: features 1.1, matching 0.7": the longest first.
+fn seconds_in_short(seconds: &BTreeMap<String, f64>) -> String {
+    let mut stages: Vec<(&String, f64)> = seconds.iter().map(|(stage, &seconds)| (stage, seconds)).collect();
+    stages.sort_by(|one, two| two.1.total_cmp(&one.1));
+    let named: Vec<String> = stages
+        .iter()
+        .filter(|(_, seconds)| *seconds >= WORTH_NAMING_SECONDS)
+        .map(|(stage, seconds)| format!("{stage} {seconds:.1}"))
+        .collect();
+    let colon = if named.is_empty() { "" } else { ": " };
+    format!("{:.1} s{colon}{}", seconds.values().sum::<f64>(), named.join(", "))
+}

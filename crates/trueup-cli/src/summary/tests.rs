@@ -1,0 +1,77 @@
+use super::*;
+
+/// A project file by hand: two photographs used, one left out, one note.
+fn project() -> Project {
+    let image = |path: &str, rest: &str| {
+        format!(
+            r#"{{"path": "{path}", "width": 40, "height": 30, {rest}, "focal_px": null, "rotation": null,
+            "theta_deg": 1.5, "scale": null, "gain": null, "vanishing_points": null, "mesh": null}}"#
+        )
+    };
+    let used = r#""status": "used", "reason": "", "hint": "", "component": 0"#;
+    let left_out = r#""status": "left_out", "reason": "no overlap found", "hint": "Shoot one.", "component": 1"#;
+    let text = format!(
+        r#"{{"format": "trueup-project", "version": 1, "method": "vpg", "options": {{}}, "reference": "x/b.jpg",
+        "images": [{}, {}, {}],
+        "pairs": [{{"a": 0, "b": 1, "matches": 50, "inliers": 40, "needed": 15, "verdict": "joined"}}],
+        "manhattan": {{"divergence": 0.0031, "threshold": 0.1, "accepted": true, "failed_clause": null,
+                       "dominant": null, "inliers": ["x/a.jpg"]}},
+        "canvas": {{"width": 70, "height": 31}},
+        "seconds": {{"features": 0.5, "render": 2.0, "mesh": 0.01}},
+        "diagnostics": [
+            {{"code": "no-overlap", "severity": "warning", "subject": "c.jpg", "message": "no overlap found", "hint": "Shoot one."}},
+            {{"code": "full-turn", "severity": "note", "subject": "mesh", "message": "all the way round", "hint": ""}}]}}"#,
+        image("x/a.jpg", used),
+        image("x/b.jpg", used),
+        image("x/c.jpg", left_out)
+    );
+    Project::from_json(&text, "test").expect("a valid project")
+}
+
+#[test]
+fn the_short_summary_says_what_was_made_of_what_and_why() {
+    let file = PanoramaFile { panorama: Path::new("p.jpg"), bytes: 4_200_000, project: Some(Path::new("p.json")) };
+    let expected = "\
+panorama  p.jpg  70 x 31 px, 4.2 MB
+project   p.json
+pictures  2 of 3 used; the reference is b.jpg
+  left out  c.jpg: no overlap found
+            Shoot one.
+upright   guided by vanishing points (divergence 0.003, up to 0.1 is trusted; 1 of 2 pictures agree)
+time      2.5 s: render 2.0, features 0.5
+";
+    assert_eq!(text(&project(), Some(&file), false), expected);
+}
+
+#[test]
+fn the_long_summary_adds_pictures_pairs_notes_and_stages() {
+    let long = text(&project(), None, true);
+    for part in [
+        "panorama  70 x 31 px\n",
+        "used      a.jpg: 40 x 30 px, turned by 1.50 degrees\n",
+        "pairs     1 joined of 1 tried\n",
+        "a.jpg - b.jpg: joined, 40 of 50 matches agree (15 needed)\n",
+        "note      mesh: all the way round\n",
+        "0.010 s  mesh\n",
+    ] {
+        assert!(long.contains(part), "{part} is not in\n{long}");
+    }
+}
+
+#[test]
+fn refused_guidance_is_explained_with_its_numbers() {
+    let mut project = project();
+    project.manhattan.accepted = false;
+    project.manhattan.failed_clause = Some("2 of 9 pictures agree".to_owned());
+    let expected = "not guided by vanishing points: 2 of 9 pictures agree (divergence 0.003, up to 0.1 is trusted)";
+    assert_eq!(upright(&project), expected);
+    project.manhattan.divergence = None;
+    assert_eq!(upright(&project), "not guided by vanishing points: 2 of 9 pictures agree");
+}
+
+#[test]
+fn photographs_of_the_same_name_are_told_apart_by_their_paths() {
+    let mut project = project();
+    project.images[1].path = "y/a.jpg".to_owned();
+    assert_eq!(names(&project.images), ["x/a.jpg", "y/a.jpg", "c.jpg"]);
+}

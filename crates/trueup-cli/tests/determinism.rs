@@ -1,0 +1,46 @@
+//! The same photographs give the same files: in every run, for any number of threads, and nearly so in any order.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use crate::pictures::street_desk;
+use crate::run::Desk;
+
+/// The panorama's bytes and the project without its timings.
+fn stitch(desk: &Desk, arguments: &[&str]) -> (Vec<u8>, Value) {
+    desk.stitch(&[arguments, &["--project", "pano.json"]].concat()).expect_success();
+    let mut project = desk.json("pano.json");
+    project.as_object_mut().expect("an object").remove("seconds");
+    (desk.read("pano.jpg"), project)
+}
+
+#[test]
+fn threads_and_runs_change_no_byte() {
+    let desk = street_desk();
+    let photographs = ["a.jpg", "b.jpg", "c.jpg", "d.jpg"];
+    let one_thread = stitch(&desk, &[&photographs[..], &["--threads", "1"]].concat());
+    for threads in ["2", "2", "0"] {
+        let again = stitch(&desk, &[&photographs[..], &["--threads", threads]].concat());
+        assert!(again.0 == one_thread.0, "the panoramas differ at {threads} threads");
+        assert_eq!(again.1, one_thread.1, "the projects differ at {threads} threads");
+    }
+}
+
+#[test]
+fn the_order_of_the_photographs_hardly_matters() {
+    let desk = street_desk();
+    let rotations = |order: &[&str]| -> BTreeMap<String, f64> {
+        let (_, project) = stitch(&desk, &[order, &["--reference", "b.jpg"]].concat());
+        let images = project["images"].as_array().expect("images").clone();
+        let entry = |image: &Value| Some((image["path"].as_str()?.to_owned(), image["theta_deg"].as_f64()?));
+        images.iter().map(|image| entry(image).expect("a used photograph")).collect()
+    };
+    let in_order = rotations(&["a.jpg", "b.jpg", "c.jpg", "d.jpg"]);
+    for order in [["d.jpg", "c.jpg", "b.jpg", "a.jpg"], ["c.jpg", "a.jpg", "d.jpg", "b.jpg"]] {
+        for (path, theta_deg) in rotations(&order) {
+            let change = (theta_deg - in_order[&path]).abs();
+            assert!(change < 0.2, "{path} turns by {change} degrees more in the order {order:?}");
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! The table of bad inputs in docs/command-line.md holds what is really printed.
+
+use crate::pictures::{claiming, noise, plain, put_street, street};
+use crate::run::{Desk, finish, trueup};
+
+const PAGE: &str = include_str!("../../../docs/command-line.md");
+
+/// A way to go wrong, and the end of the part of the message that does not depend on counts of matches.
+struct Mistake {
+    what: &'static str,
+    arguments: &'static [&'static str],
+    up_to: Option<&'static str>,
+}
+
+const fn mistake(what: &'static str, arguments: &'static [&'static str]) -> Mistake {
+    Mistake { what, arguments, up_to: None }
+}
+
+const MISTAKES: &[Mistake] = &[
+    mistake("no such file", &["stitch", "none.jpg", "-o", "pano.jpg"]),
+    mistake("pattern without match", &["stitch", "none*.jpg", "-o", "pano.jpg"]),
+    mistake("folder without pictures", &["stitch", "notes", "-o", "pano.jpg"]),
+    mistake("text file named .jpg", &["stitch", "text.jpg", "-o", "pano.jpg"]),
+    mistake("another format", &["stitch", "movie.gif", "-o", "pano.jpg"]),
+    mistake("empty file", &["stitch", "empty.jpg", "-o", "pano.jpg"]),
+    mistake("truncated JPEG", &["stitch", "cut.jpg", "-o", "pano.jpg"]),
+    mistake("header that claims 60000 x 60000", &["stitch", "giant.jpg", "-o", "pano.jpg"]),
+    mistake("8 x 8 pixels", &["stitch", "dot.jpg", "-o", "pano.jpg"]),
+    mistake("several files, none usable", &["stitch", "text.jpg", "empty.jpg", "-o", "pano.jpg"]),
+    mistake("black pictures", &["stitch", "black.jpg", "white.jpg", "-o", "pano.jpg"]),
+    Mistake {
+        what: "unrelated pictures",
+        arguments: &["stitch", "noise1.jpg", "noise2.jpg", "noise3.jpg", "-o", "pano.jpg"],
+        up_to: Some("the best pair is"),
+    },
+    Mistake {
+        what: "`--require-all`, one unrelated",
+        arguments: &["stitch", "a.jpg", "b.jpg", "noise1.jpg", "-o", "pano.jpg", "--require-all"],
+        up_to: Some("noise1.jpg: no overlap found"),
+    },
+    mistake("`--graph` with an unknown name", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--graph", "graph.txt"]),
+    mistake("`--graph` without a file", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--graph", "none.txt"]),
+    mistake("unknown `--reference`", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--reference", "q.jpg"]),
+    mistake("output folder does not exist", &["stitch", "a.jpg", "b.jpg", "-o", "none/pano.jpg"]),
+    mistake("output is a folder", &["stitch", "a.jpg", "b.jpg", "-o", "notes.jpg"]),
+    mistake("output is a photograph", &["stitch", "a.jpg", "b.jpg", "-o", "a.jpg"]),
+    mistake("output format unknown", &["stitch", "a.jpg", "b.jpg", "-o", "pano.gif"]),
+    mistake("option out of range", &["stitch", "a.jpg", "-o", "pano.jpg", "--scale", "-1"]),
+    mistake("option of the wrong kind", &["stitch", "a.jpg", "-o", "pano.jpg", "--seed", "soon"]),
+    mistake("unknown option", &["stitch", "a.jpg", "-o", "pano.jpg", "--set", "mesh.cell=3"]),
+    mistake("no configuration file", &["stitch", "a.jpg", "-o", "pano.jpg", "--config", "none.toml"]),
+    mistake("unknown stage in it", &["stitch", "a.jpg", "-o", "pano.jpg", "--config", "mine.toml"]),
+    mistake("no project file", &["inspect", "none.json"]),
+    mistake("not a project file", &["inspect", "other.json"]),
+    mistake("project of a later version", &["inspect", "later.json"]),
+];
+
+fn desk() -> Desk {
+    let desk = Desk::new();
+    put_street(&desk);
+    for folder in ["notes", "notes.jpg"] {
+        std::fs::create_dir(desk.join(folder)).expect("a folder");
+    }
+    let whole = &street()[0];
+    desk.put("text.jpg", "Dear diary");
+    desk.put("movie.gif", "GIF89a....");
+    desk.put("empty.jpg", "");
+    desk.put("cut.jpg", &whole[..whole.len() / 2]);
+    desk.put("giant.jpg", claiming(whole, 60_000, 60_000));
+    desk.put("dot.jpg", plain(8, 8, 90));
+    desk.put("black.jpg", plain(320, 240, 0));
+    desk.put("white.jpg", plain(320, 240, 255));
+    for seed in 1..4 {
+        desk.put(&format!("noise{seed}.jpg"), noise(seed, 320, 240));
+    }
+    desk.put("graph.txt", "a.jpg -- q.jpg\n");
+    desk.put("mine.toml", "[mash]\ncell_px = 30\n");
+    desk.put("other.json", "{}");
+    desk.put("later.json", "{\"format\": \"trueup-project\", \"version\": 99}");
+    desk
+}
+
+#[test]
+fn the_table_of_bad_inputs_is_what_is_printed() {
+    let desk = desk();
+    let files = desk.files();
+    let mut missing = Vec::new();
+    for Mistake { what, arguments, up_to } in MISTAKES {
+        let run = finish(trueup(desk.path(), arguments));
+        assert_eq!(run.stdout, "", "{what}");
+        let mut lines = run.stderr.lines();
+        let message = lines.next().and_then(|line| line.strip_prefix("trueup: error: ")).expect("an error");
+        let hint = lines.next().map_or("", |line| line.strip_prefix("trueup: hint: ").expect("a hint"));
+        assert_eq!(lines.next(), None, "{what}: {}", run.stderr);
+        let message = match up_to.map(|end| message.split_once(end).expect("the known part of the message")) {
+            Some((start, _)) => format!("{start}{} ...", up_to.unwrap_or_default()),
+            None => message.to_owned(),
+        };
+        let row = format!("| {what} | {message} | {hint} | {} |", run.status);
+        if !PAGE.contains(&row) {
+            missing.push(row);
+        }
+    }
+    assert!(missing.is_empty(), "docs/command-line.md lacks these rows:\n{}", missing.join("\n"));
+    assert_eq!(desk.files(), files, "nothing is left behind");
+}

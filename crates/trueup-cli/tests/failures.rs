@@ -1,0 +1,249 @@
+//! Bad input: what is said, with which exit status, and that nothing is left behind.
+
+use std::path::Path;
+
+use crate::pictures::{STREET_NAMES, claiming, noise, plain, street, street_desk};
+use crate::run::{Desk, Run, finish, trueup};
+
+/// Stitches one file of the given content beside nothing else.
+fn stitch_alone(name: &str, bytes: impl AsRef<[u8]>) -> Run {
+    let desk = Desk::new();
+    desk.put(name, bytes);
+    let run = desk.stitch(&[name]);
+    assert_eq!(desk.files(), [name], "nothing is left behind");
+    run
+}
+
+#[test]
+fn a_text_in_disguise() {
+    stitch_alone("text.jpg", "Dear diary").expect_failure(
+        1,
+        &[
+            "trueup: error: text.jpg: its content is not a JPEG, PNG, TIFF or WebP picture, whatever its name says\n",
+            "trueup: hint: Give photographs in JPEG, PNG, TIFF or WebP.\n",
+        ],
+    );
+}
+
+#[test]
+fn a_truncated_photograph() {
+    let whole = &street()[0];
+    stitch_alone("cut.jpg", &whole[..whole.len() / 2]).expect_failure(1, &["cut.jpg: "]);
+}
+
+#[test]
+fn a_header_that_claims_a_giant() {
+    stitch_alone("giant.jpg", claiming(&street()[0], 60_000, 60_000)).expect_failure(
+        1,
+        &["giant.jpg: 60000 x 60000 px are 3600 megapixels, at most 300 are accepted", "source.max_megapixels"],
+    );
+}
+
+#[test]
+fn an_empty_file() {
+    stitch_alone("empty.jpg", "").expect_failure(1, &["empty.jpg: the file is empty (0 bytes)"]);
+}
+
+#[test]
+fn a_photograph_of_eight_pixels() {
+    stitch_alone("dot.jpg", plain(8, 8, 90))
+        .expect_failure(1, &["dot.jpg: 8 x 8 px are too few to stitch, each side needs 16"]);
+}
+
+#[test]
+fn missing_files_folders_and_patterns() {
+    let desk = Desk::new();
+    std::fs::create_dir(desk.join("empty")).expect("a folder");
+    desk.put("empty/notes.txt", "no picture");
+    desk.stitch(&["none.jpg"]).expect_failure(1, &["none.jpg: there is no such file or folder"]);
+    desk.stitch(&["empty"]).expect_failure(1, &["empty: the folder holds no JPEG, PNG, TIFF or WebP files"]);
+    desk.stitch(&["none*.jpg"]).expect_failure(1, &["none*.jpg: no JPEG, PNG, TIFF or WebP file matches the pattern"]);
+    let both = desk.stitch(&["none.jpg", "empty"]);
+    both.expect_failure(1, &["none.jpg: there is no such file", "empty: the folder holds no"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_unreadable_file() {
+    use std::os::unix::fs::PermissionsExt;
+    // A socket can be opened as a file by nobody, not even by root, who may read everything else.
+    let desk = Desk::new();
+    let _socket = std::os::unix::net::UnixListener::bind(desk.join("socket.jpg")).expect("a socket");
+    desk.stitch(&["socket.jpg"]).expect_failure(1, &["socket.jpg: it is not a regular file"]);
+
+    desk.put("secret.jpg", &street()[0]);
+    let private = std::fs::Permissions::from_mode(0o000);
+    std::fs::set_permissions(desk.join("secret.jpg"), private).expect("own file");
+    if std::fs::File::open(desk.join("secret.jpg")).is_ok() {
+        eprintln!("skipped: this user may read files without permission");
+        return;
+    }
+    desk.stitch(&["secret.jpg"]).expect_failure(1, &["secret.jpg: it cannot be read (Permission denied"]);
+}
+
+#[test]
+fn two_identical_files_are_one_photograph() {
+    let desk = Desk::new();
+    desk.put("one.jpg", &street()[0]);
+    desk.put("two.jpg", &street()[0]);
+    let run = desk.stitch(&["one.jpg", "two.jpg"]);
+    for part in
+        ["pictures  1 of 2 used", "two.jpg: it has the same bytes as one.jpg, which is used", "only one photograph"]
+    {
+        assert!(run.expect_success().contains(part), "\"{part}\" is not in\n{}", run.stdout);
+    }
+}
+
+#[test]
+fn photographs_that_do_not_overlap() {
+    let desk = Desk::new();
+    for seed in 1..4 {
+        desk.put(&format!("{seed}.jpg"), noise(seed, 320, 240));
+    }
+    let run = desk.stitch(&["1.jpg", "2.jpg", "3.jpg"]);
+    run.expect_failure(
+        1,
+        &["no overlapping photographs found; the best pair is ", "trueup: hint: Photographs must share"],
+    );
+    assert!(run.stderr.contains(" matches agree (") || run.stderr.contains(" matching points"), "{}", run.stderr);
+    assert_eq!(desk.files(), ["1.jpg", "2.jpg", "3.jpg"]);
+}
+
+#[test]
+fn black_photographs() {
+    let desk = Desk::new();
+    desk.put("black.jpg", plain(320, 240, 0));
+    desk.put("white.jpg", plain(320, 240, 255));
+    desk.stitch(&["black.jpg", "white.jpg"]).expect_failure(1, &["no overlapping photographs found"]);
+}
+
+#[test]
+fn all_required_but_one_bad() {
+    let desk = street_desk();
+    desk.put("text.jpg", "no picture");
+    desk.put("noise.jpg", noise(5, 320, 240));
+    let photographs = [&STREET_NAMES[..], &["text.jpg", "noise.jpg", "--require-all"]].concat();
+    desk.stitch(&photographs).expect_failure(
+        1,
+        &[
+            "2 of 6 photographs: they cannot be used although all are required",
+            "text.jpg: its content",
+            "noise.jpg: no overlap",
+        ],
+    );
+    assert!(!desk.files().contains(&"pano.jpg".to_owned()));
+    assert!(desk.stitch(&[&STREET_NAMES[..], &["--require-all"]].concat()).expect_success().contains("4 of 4 used"));
+}
+
+#[test]
+fn graphs_and_references_that_fit_no_photograph() {
+    let desk = street_desk();
+    desk.put("graph.txt", "# who overlaps whom\na.jpg -- b.jpg\nb.jpg -- q.jpg\n");
+    desk.stitch(&["a.jpg", "b.jpg", "--graph", "graph.txt"])
+        .expect_failure(1, &["graph.txt, line 3: \"q.jpg\" is none of the 2 pictures given"]);
+    desk.stitch(&["a.jpg", "b.jpg", "--graph", "none.txt"])
+        .expect_failure(1, &["reading none.txt: No such file or directory"]);
+    desk.stitch(&["a.jpg", "b.jpg", "--reference", "q.jpg"])
+        .expect_failure(1, &["q.jpg: no photograph of this name was given, so it cannot be the reference"]);
+}
+
+#[test]
+fn outputs_that_cannot_be_written() {
+    let desk = street_desk();
+    std::fs::create_dir(desk.join("folder.jpg")).expect("a folder");
+    let to = |output: &str| finish(trueup(desk.path(), &["stitch", "a.jpg", "b.jpg", "-o", output]));
+    to("none/pano.jpg").expect_failure(1, &["none/pano.jpg: the folder none does not exist", "Create it"]);
+    to("folder.jpg").expect_failure(1, &["folder.jpg: it is a folder"]);
+    to("pano.gif").expect_failure(2, &["writing pano.gif as .gif is not supported", ".jpg, .jpeg, .png"]);
+    to("pano").expect_failure(2, &["writing pano without an extension is not supported"]);
+    let project = desk.stitch(&["a.jpg", "b.jpg", "--project", "none/p.json"]);
+    project.expect_failure(1, &["none/p.json: the folder none does not exist"]);
+    if Path::new("/proc/self").is_dir() {
+        // A file system that takes no files, not even from root.
+        to("/proc/pano.jpg").expect_failure(1, &["writing into /proc: "]);
+    }
+    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "folder.jpg"]);
+}
+
+/// A limit on the size of files stops the writing half way, as a full disk does.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_leaves_the_old_panorama_as_it_was() {
+    let desk = street_desk();
+    desk.put("pano.jpg", "the old panorama");
+    let mut command = std::process::Command::new("sh");
+    let script = "trap '' XFSZ; ulimit -f 8; exec \"$0\" stitch a.jpg b.jpg -o pano.jpg";
+    command.current_dir(desk.path()).args(["-c", script, env!("CARGO_BIN_EXE_trueup")]);
+    finish(command).expect_failure(1, &["pano.jpg: File too large"]);
+    assert_eq!(desk.read("pano.jpg"), b"the old panorama");
+    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "pano.jpg"]);
+}
+
+#[test]
+fn a_failure_leaves_the_old_panorama_as_it_was() {
+    let desk = Desk::new();
+    desk.put("pano.jpg", "the old panorama");
+    desk.put("text.jpg", "no picture");
+    desk.stitch(&["text.jpg"]).expect_failure(1, &["text.jpg"]);
+    assert_eq!(desk.read("pano.jpg"), b"the old panorama");
+}
+
+/// Ctrl-C while the photographs are worked on.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_stitch_leaves_nothing_behind() {
+    use std::io::Read;
+    use std::process::Stdio;
+    let desk = Desk::new();
+    // Large enough to take a good while at full scale.
+    for (name, seed) in [("1.jpg", 1), ("2.jpg", 2), ("3.jpg", 3), ("4.jpg", 4)] {
+        desk.put(name, noise(seed, 2400, 1800));
+    }
+    let arguments = [
+        "stitch",
+        "1.jpg",
+        "2.jpg",
+        "3.jpg",
+        "4.jpg",
+        "-o",
+        "pano.jpg",
+        "--set",
+        "stitch.working_pixels=4e6",
+        "--threads",
+        "1",
+    ];
+    let mut child = trueup(desk.path(), &arguments).stderr(Stdio::piped()).spawn().expect("the command starts");
+    std::thread::sleep(std::time::Duration::from_millis(400));
+    let signalled = std::process::Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status();
+    assert!(signalled.expect("sh runs").success(), "the command was still at work");
+    let status = child.wait().expect("it ends");
+    let mut said = String::new();
+    child.stderr.take().expect("piped").read_to_string(&mut said).expect("UTF-8");
+    assert_eq!((status.code(), said.as_str()), (Some(130), "trueup: error: stopped on request\n"));
+    assert_eq!(desk.files(), ["1.jpg", "2.jpg", "3.jpg", "4.jpg"]);
+}
+
+#[test]
+fn project_files_that_are_none() {
+    let desk = Desk::new();
+    desk.put("noise.json", [0xff, 0x00, 0x80]);
+    desk.put("other.json", "{\"format\": \"something\"}");
+    desk.put("later.json", "{\"format\": \"trueup-project\", \"version\": 99}");
+    desk.put("damaged.json", "{\"format\": \"trueup-project\", \"version\": 1, \"images\": 3}");
+    let inspect = |name: &str| finish(trueup(desk.path(), &["inspect", name]));
+    inspect("noise.json")
+        .expect_failure(1, &["noise.json: not a project file", "that `trueup stitch --project` wrote"]);
+    inspect("other.json").expect_failure(1, &["other.json: its format is not \"trueup-project\""]);
+    inspect("later.json").expect_failure(1, &["later.json: its version is 99, this program reads version 1"]);
+    inspect("damaged.json").expect_failure(1, &["damaged.json: the project is damaged ("]);
+    inspect("none.json").expect_failure(1, &["reading none.json: No such file or directory"]);
+}
+
+#[test]
+fn a_project_cut_short_is_refused() {
+    let desk = street_desk();
+    desk.stitch(&["a.jpg", "b.jpg", "--project", "p.json"]).expect_success();
+    let whole = desk.read("p.json");
+    desk.put("cut.json", &whole[..whole.len() / 2]);
+    finish(trueup(desk.path(), &["inspect", "cut.json"])).expect_failure(1, &["cut.json: not a project file ("]);
+}

@@ -1,0 +1,134 @@
+//! Photographs for the tests, all made here: a rendered street, noise, and files that are broken in known ways.
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use jpeg_encoder::{ColorType, Encoder};
+use trueup_scenes::{LightQuality, Quality, RigOptions, Scene, SceneKind, SceneOptions, render, rig};
+
+use crate::run::Desk;
+
+/// Size of the rendered photographs.
+pub const WIDTH: usize = 480;
+/// Size of the rendered photographs.
+pub const HEIGHT: usize = 360;
+
+/// Four overlapping photographs of a street, from left to right, as JPEG files.
+pub fn street() -> &'static [Vec<u8>] {
+    static FILES: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
+    FILES.get_or_init(|| street_pixels().iter().map(|rgb| jpeg(rgb, WIDTH, HEIGHT)).collect())
+}
+
+/// The RGB pixels of [`street`].
+pub fn street_pixels() -> &'static [Vec<u8>] {
+    static PIXELS: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
+    PIXELS.get_or_init(|| photograph_scene(SceneKind::Street, 7, 4))
+}
+
+/// Three overlapping photographs of a room, as JPEG files.
+pub fn room() -> &'static [Vec<u8>] {
+    static FILES: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
+    FILES.get_or_init(|| photograph_scene(SceneKind::Room, 3, 3).iter().map(|rgb| jpeg(rgb, WIDTH, HEIGHT)).collect())
+}
+
+fn photograph_scene(kind: SceneKind, seed: u64, pictures: usize) -> Vec<Vec<u8>> {
+    let scene = Scene::new(&SceneOptions { kind, seed, light: LightQuality::Fast }).expect("a valid scene");
+    let options = RigOptions { seed, pictures, width: WIDTH, height: HEIGHT, ..RigOptions::default() };
+    let cameras = rig(&options, &scene.viewpoint()).expect("valid options");
+    cameras.iter().map(|camera| render(&scene, camera, Quality::Preview).data().to_vec()).collect()
+}
+
+/// Puts the street's photographs into a folder, as `a.jpg`, `b.jpg`, `c.jpg`, `d.jpg`.
+pub fn put_street(desk: &Desk) {
+    for (name, bytes) in STREET_NAMES.iter().zip(street()) {
+        desk.put(name, bytes);
+    }
+}
+
+/// The names that [`put_street`] gives.
+pub const STREET_NAMES: [&str; 4] = ["a.jpg", "b.jpg", "c.jpg", "d.jpg"];
+
+/// A folder with the street's photographs.
+pub fn street_desk() -> Desk {
+    let desk = Desk::new();
+    put_street(&desk);
+    desk
+}
+
+/// RGB pixels as a JPEG file.
+pub fn jpeg(rgb: &[u8], width: usize, height: usize) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let side = |length: usize| u16::try_from(length).expect("a small picture");
+    Encoder::new(&mut bytes, 95).encode(rgb, side(width), side(height), ColorType::Rgb).expect("encodable");
+    bytes
+}
+
+/// A picture of one colour.
+pub fn plain(width: usize, height: usize, value: u8) -> Vec<u8> {
+    jpeg(&vec![value; width * height * 3], width, height)
+}
+
+/// A picture full of detail that is found in no picture of another seed: patches of random brightness in many sizes.
+pub fn noise(seed: u64, width: usize, height: usize) -> Vec<u8> {
+    let mut gray = vec![128.0_f64; width * height];
+    for (octave, patch) in [64, 32, 16, 8, 4].into_iter().enumerate() {
+        for y in 0..height {
+            for x in 0..width {
+                let cell = (seed << 40) ^ ((octave as u64) << 32) ^ ((y / patch) << 16 | (x / patch)) as u64;
+                gray[y * width + x] += 50.0 * (scramble(cell) - 0.5);
+            }
+        }
+    }
+    let rgb: Vec<u8> = gray.iter().flat_map(|&value| [value.clamp(0.0, 255.0) as u8; 3]).collect();
+    jpeg(&rgb, width, height)
+}
+
+/// A number in 0..1 that looks random: the output function of SplitMix64.
+fn scramble(seed: u64) -> f64 {
+    let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// A JPEG file whose header claims another size.
+pub fn claiming(bytes: &[u8], width: u16, height: u16) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    // Start of frame, baseline: FF C0, length (2), precision (1), height (2), width (2).
+    let frame = bytes.windows(2).position(|pair| pair == [0xff, 0xc0]).expect("a baseline JPEG");
+    bytes[frame + 5..frame + 7].copy_from_slice(&height.to_be_bytes());
+    bytes[frame + 7..frame + 9].copy_from_slice(&width.to_be_bytes());
+    bytes
+}
+
+/// A JPEG file with EXIF: the focal length in millimetres as a fraction, and its 35 mm equivalent.
+pub fn with_focal_length(bytes: &[u8], millimetres: (u32, u32), equivalent: u16) -> Vec<u8> {
+    const HEADER: [u8; 8] = *b"II\x2a\0\x08\0\0\0";
+    let mut tiff = HEADER.to_vec();
+    let entry = |tiff: &mut Vec<u8>, tag: u16, kind: u16, value: u32| {
+        tiff.extend(tag.to_le_bytes());
+        tiff.extend(kind.to_le_bytes());
+        tiff.extend(1_u32.to_le_bytes());
+        tiff.extend(value.to_le_bytes());
+    };
+    // First directory at 8: one entry, the pointer to the EXIF directory behind it (8 + 2 + 12 + 4 = 26).
+    tiff.extend(1_u16.to_le_bytes());
+    entry(&mut tiff, 0x8769, 4, 26);
+    tiff.extend(0_u32.to_le_bytes());
+    // EXIF directory: two entries; the fraction lies behind it (26 + 2 + 24 + 4 = 56).
+    tiff.extend(2_u16.to_le_bytes());
+    entry(&mut tiff, 0x920a, 5, 56);
+    entry(&mut tiff, 0xa405, 3, u32::from(equivalent));
+    tiff.extend(0_u32.to_le_bytes());
+    tiff.extend(millimetres.0.to_le_bytes());
+    tiff.extend(millimetres.1.to_le_bytes());
+
+    let length = u16::try_from(2 + 6 + tiff.len()).expect("short metadata");
+    let segment = [&[0xff, 0xe1], &length.to_be_bytes()[..], b"Exif\0\0", &tiff].concat();
+    [&bytes[..2], &segment, &bytes[2..]].concat()
+}
+
+/// Width and height of a PNG, TIFF or WebP file.
+pub fn picture_size(path: &Path) -> (u32, u32) {
+    image::image_dimensions(path).expect("a readable picture")
+}

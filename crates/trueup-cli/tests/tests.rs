@@ -1,0 +1,9 @@
+//! The `trueup` command as users run it: its messages, its exit status, and what it leaves on the disk.
+
+mod cli;
+mod determinism;
+mod documented;
+mod failures;
+mod options;
+mod pictures;
+mod run;
