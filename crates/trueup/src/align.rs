@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use trueup_align::cameras::{self, CameraPrior, Cameras};
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points;
-use trueup_align::mesh::{self, Base, WantedSimilarity, WarpedMesh};
+use trueup_align::mesh::{self, WarpedMesh};
 use trueup_align::similarity::{self, PriorInput, SimilarityPrior};
 use trueup_align::stitch_graph::{GraphEdge, StitchGraph};
 use trueup_align::vanishing::{self, TriadOutcome};
@@ -39,7 +39,6 @@ pub(crate) struct Geometry {
     pub cameras: Cameras,
     pub triads: Vec<TriadOutcome>,
     pub prior: SimilarityPrior,
-    pub cut: Option<FullTurnCut>,
     pub mesh: WarpedMesh,
 }
 
@@ -147,17 +146,9 @@ pub(crate) fn run(
             warps.into_iter().filter(|warp| !severed(warp.from, warp.to)).collect()
         }
     };
-    let scaled_focal: f64 =
-        cameras.cameras.iter().zip(&prior.scale).map(|(camera, scale)| camera.focal_px * scale).sum();
-    let units_per_radian = scaled_focal / grids.len() as f64;
-    let bases: Vec<Base> = (0..grids.len())
-        .map(|k| {
-            let wanted = WantedSimilarity { scale: prior.scale[k], theta: prior.theta[k], units_per_radian };
-            Base::new(options.mesh.base, &cameras.cameras[k], &grids[k], &prior.level_from_world(), wanted)
-        })
-        .collect();
+    let bases = mesh::bases(options.mesh.base, &cameras.cameras, &grids, &prior);
     let mesh = clock.time("mesh", || mesh::run(&grids, &kept, &bases, component.reference, &options.mesh, context))?;
-    Ok(Geometry { cameras, triads, prior, cut, mesh })
+    Ok(Geometry { cameras, triads, prior, mesh })
 }
 
 fn find_triads(

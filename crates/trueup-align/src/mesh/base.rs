@@ -4,7 +4,10 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 use trueup_core::camera::Camera;
+use trueup_core::geometry::rotation_about_x;
 use trueup_core::mesh::GridMesh;
+
+use crate::similarity::SimilarityPrior;
 
 trueup_core::choice! {
     /// The shape that the similarity prior asks of each picture.
@@ -20,13 +23,48 @@ trueup_core::choice! {
 
 /// What the prior wants of one picture.
 #[derive(Debug, Clone, Copy)]
-pub struct WantedSimilarity {
+struct WantedSimilarity {
     /// Scale s_i.
-    pub scale: f64,
+    scale: f64,
     /// Clockwise rotation theta_i in radians.
-    pub theta: f64,
+    theta: f64,
     /// Panorama units per radian of the sphere, the same for all pictures: the mean of s_i f_i.
-    pub units_per_radian: f64,
+    units_per_radian: f64,
+}
+
+/// The bases of all pictures under a similarity prior.
+///
+/// Where the pictures together look more than 40 degrees up or down and reach the pole, the sphere is tilted so that
+/// their mean direction is level: verticals then converge as they do for the eye, and nothing is torn.
+pub fn bases(shape: BaseShape, cameras: &[Camera], grids: &[GridMesh], prior: &SimilarityPrior) -> Vec<Base> {
+    let scaled_focal: f64 = cameras.iter().zip(&prior.scale).map(|(camera, scale)| camera.focal_px * scale).sum();
+    let units_per_radian = scaled_focal / cameras.len().max(1) as f64;
+    let level_from_world = prior.level_from_world();
+    let tilt = tilt_from_level(cameras, grids, &level_from_world);
+    let frame = tilt.unwrap_or_else(Matrix3::identity) * level_from_world;
+    (0..grids.len())
+        .map(|k| {
+            // The prior's deviation from the cameras' own roll holds in the tilted frame too.
+            let down = cameras[k].rotation() * frame.row(1).transpose();
+            let theta = match tilt {
+                Some(_) => down.x.atan2(down.y) + prior.theta[k] - prior.roll[k],
+                None => prior.theta[k],
+            };
+            let wanted = WantedSimilarity { scale: prior.scale[k], theta, units_per_radian };
+            Base::new(shape, &cameras[k], &grids[k], &frame, wanted)
+        })
+        .collect()
+}
+
+/// The turn about the horizontal axis that brings a steep panorama's mean direction level; `None` if it is not steep.
+fn tilt_from_level(cameras: &[Camera], grids: &[GridMesh], level_from_world: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    /// Radians, 40 degrees.
+    const STEEP: f64 = 0.7;
+    let view = |k: usize| SphereView::new(BaseShape::Sphere, &cameras[k], level_from_world);
+    let forward: Vector3<f64> = (0..cameras.len()).map(|k| view(k).forward).sum();
+    let pitch = forward.y.atan2(forward.z);
+    let reaches_pole = (0..cameras.len()).any(|k| !view(k).is_moderate_all_over(&grids[k]));
+    (reaches_pole && pitch.abs() > STEEP).then(|| rotation_about_x(pitch))
 }
 
 /// The base of one picture: a smooth map from its pixels to panorama units, up to translation.
@@ -54,7 +92,7 @@ struct SphereView {
 impl Base {
     /// The base of a picture: on the level sphere, turned so that its rotation at the picture's centre is the wanted one.
     /// A picture that reaches within 20 degrees of a pole cannot be unrolled; it gets the plain similarity.
-    pub fn new(
+    fn new(
         shape: BaseShape,
         camera: &Camera,
         grid: &GridMesh,
@@ -66,13 +104,11 @@ impl Base {
         if shape == BaseShape::Similarity {
             return plain;
         }
-        let level_from_camera = level_from_world * camera.rotation().transpose();
-        let forward: Vector3<f64> = level_from_camera.column(2).into_owned();
-        let view = SphereView { shape, camera: *camera, level_from_camera, forward };
-        if !(0..grid.len()).all(|vertex| view.is_moderate(grid.source(vertex))) {
+        let view = SphereView::new(shape, camera, level_from_world);
+        if !view.is_moderate_all_over(grid) {
             return plain;
         }
-        let at_centre = derivative_at_centre(shape, &level_from_camera, camera.focal_px);
+        let at_centre = derivative_at_centre(shape, &view.level_from_camera, camera.focal_px);
         let turn = product(similarity, Vector2::new(at_centre.x, -at_centre.y)).normalize();
         Self { factor: turn * wanted.units_per_radian, sphere: Some(view) }
     }
@@ -104,6 +140,15 @@ impl Base {
 }
 
 impl SphereView {
+    fn new(shape: BaseShape, camera: &Camera, level_from_world: &Matrix3<f64>) -> Self {
+        let level_from_camera = level_from_world * camera.rotation().transpose();
+        Self { shape, camera: *camera, level_from_camera, forward: level_from_camera.column(2).into_owned() }
+    }
+
+    fn is_moderate_all_over(&self, grid: &GridMesh) -> bool {
+        (0..grid.len()).all(|vertex| self.is_moderate(grid.source(vertex)))
+    }
+
     fn ray(&self, pixel: Vector2<f64>) -> Vector3<f64> {
         self.level_from_camera * self.camera.bearing(pixel)
     }
@@ -154,7 +199,7 @@ fn product(a: Vector2<f64>, b: Vector2<f64>) -> Vector2<f64> {
 
 #[cfg(test)]
 mod tests {
-    use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z};
+    use trueup_core::geometry::{rotation_about_y, rotation_about_z};
 
     use super::*;
 

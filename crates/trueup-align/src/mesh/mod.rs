@@ -18,7 +18,7 @@ use trueup_core::{Error, Result, StageContext};
 
 use crate::match_points::OverlapWarp;
 pub use alignment::{AlignmentEnergy, MatchPoint};
-pub use base::{Base, BaseShape, WantedSimilarity};
+pub use base::{Base, BaseShape, bases};
 pub use normal_equations::NormalEquations;
 pub use similarity::SimilarityEnergy;
 
@@ -28,7 +28,7 @@ trueup_core::options! {
         /// Largest side of a grid cell.
         cell_px: f64 = 40.0, between(4.0, 1000.0), "working px";
         /// The shape that the similarity prior asks of each picture.
-        base: BaseShape = BaseShape::Sphere, Allowed::Any, "";
+        base: BaseShape = BaseShape::Mercator, Allowed::Any, "";
         /// Cells of the delivered grid per cell of the solved one, along each axis: the finer grid follows the base's
         /// curves between the solved vertices.
         subdivision: usize = 2, between(1.0, 16.0), "";

@@ -18,6 +18,21 @@ pub(super) struct GateEvidence {
     pub median_roll: f64,
 }
 
+/// Largest number of pictures among which unrelated directions can agree by chance.
+const VERY_FEW_PICTURES: usize = 3;
+
+/// The largest divergence that is believed with this many pictures.
+///
+/// # Departures
+/// The paper has one threshold. Two or three unrelated triads meet within it once in ten times; the chance falls with the
+/// cube of the angle they must meet within, so that very few pictures have to agree more closely.
+pub(super) fn allowed_divergence(pictures: usize, options: &SimilarityOptions) -> f64 {
+    match options.gate {
+        GateMode::Full if pictures <= VERY_FEW_PICTURES => options.max_divergence.min(options.max_divergence_few),
+        _ => options.max_divergence,
+    }
+}
+
 /// Largest number of pictures that counts as few.
 const FEW_PICTURES: usize = 6;
 
@@ -48,8 +63,8 @@ pub(super) fn divergence(inlier_residuals: &[f64], pictures: usize) -> f64 {
 pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions) -> Option<String> {
     let GateEvidence { pictures, inliers, divergence, straightening_angle, median_roll } = *evidence;
     // Not-a-number fails.
-    if divergence.is_nan() || divergence > options.max_divergence {
-        let allowed = options.max_divergence;
+    let allowed = allowed_divergence(pictures, options);
+    if divergence.is_nan() || divergence > allowed {
         return Some(format!("the vanishing directions diverge by {divergence:.3} ({allowed:.3} allowed)"));
     }
     if options.gate == GateMode::Paper {

@@ -87,6 +87,8 @@ trueup_core::options! {
         gate: GateMode = GateMode::Full, Allowed::Any, "";
         /// Largest divergence of the vanishing directions.
         max_divergence: f64 = 0.10, between(0.0, 1e3), "";
+        /// The same with three pictures or fewer.
+        max_divergence_few: f64 = 0.02, between(0.0, 1e3), "";
         /// Least share of agreeing pictures with 6 pictures or fewer.
         min_inlier_share_few: f64 = 0.6, between(0.0, 1.0), "";
         /// Least share of agreeing pictures with more than 6.

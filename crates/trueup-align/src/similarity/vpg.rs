@@ -6,7 +6,7 @@ use trueup_core::geometry::wrap_angle;
 use trueup_core::{Result, StageContext};
 
 use super::dominant::{Dominant, dominant_frame};
-use super::gate::{GateEvidence, divergence, failed_clause};
+use super::gate::{GateEvidence, allowed_divergence, divergence, failed_clause};
 use super::joint::LineVote;
 use super::path_voting::PathVote;
 use super::signed_permutation::{match_triad, triad_residual};
@@ -30,7 +30,7 @@ pub(super) fn unguided(count: usize, options: &SimilarityOptions) -> Guidance {
         used: false,
         vertical_only: false,
         divergence: None,
-        threshold: options.max_divergence,
+        threshold: allowed_divergence(count, options),
         inlier_ratio: 0.0,
         failed_clause: None,
         dominant: None,
