@@ -50,7 +50,7 @@ impl Finish {
             picture: add(Material::new(Pattern::Picture, 1.0, [0xff_ffff; 3]).glossy(0.01)),
             ceramic: add(Material::new(Pattern::Tiles, 0.09, [0xc8_d4d0, 0x3a_6a84, 0xe0_dcd0]).glossy(0.06)),
             leaves: add(Material::new(Pattern::Foliage, 1.0, [0x2e_5a26, 0x78_a048, 0])),
-            shade: add(Material::new(Pattern::Fabric, 0.01, [0xf0_dcb0, 0xe8_d0a0, 0]).emitting(0.35)),
+            shade: add(Material::new(Pattern::Fabric, 0.01, [0xc8_9860, 0xa8_6a3c, 0]).emitting(0.25)),
         }
     }
 }
