@@ -20,12 +20,12 @@ pub(super) fn plaster(material: &Material, spot: &Spot) -> Rgb {
         13,
     );
     // Dents, specks and knocked-off chips of several sizes: what a detector holds on to on a bare wall.
-    let speck = specks(spot, 0.12, 0.006, 14).max(0.6 * specks(spot, 0.27, 0.022, 15));
+    let speck = specks(spot, 0.12, 0.006, 14).max(0.5 * specks(spot, 0.27, 0.013, 15));
     let stain = stain(spot, 1.3, 16);
     let brown = Vector3::new(0.78, 0.68, 0.5);
     let wall = material.colours[0] * (1.0 + 0.1 * blotch + 0.2 * limewash + 0.12 * stipple + 0.06 * trowel);
-    let wall = mix(wall, wall.component_mul(&brown), 0.75 * stain);
-    wall * (1.0 - 0.4 * speck) * (1.0 - 0.35 * crack(spot, 1.1, 17))
+    let wall = mix(wall, wall.component_mul(&brown), 0.3 * stain);
+    wall * (1.0 - 0.4 * speck) * (1.0 - 0.3 * crack(spot, 1.1, 17))
 }
 
 /// Hairline cracks, 0 to 1: where slow noise crosses zero, in the places where a second noise lets it show.
@@ -50,7 +50,7 @@ fn stain(spot: &Spot, cell_m: f64, salt: u32) -> f64 {
     let radius = lerp(0.08, 0.26, chance(3));
     let soft = 0.008 + spot.footprint / cell_m;
     let inside = 1.0 - edge(ragged, radius, 2.0 * soft);
-    let rim = band(ragged, 0.88 * radius, radius, soft).max(0.6 * band(ragged, 0.6 * radius, 0.66 * radius, soft));
+    let rim = band(ragged, 0.9 * radius, radius, soft);
     (0.35 * inside + 0.65 * rim).min(1.0)
 }
 
@@ -99,7 +99,7 @@ fn knot(along: f64, across: f64, footprint: f64, seed: u32) -> (f64, f64) {
     if chance(0) < 0.55 {
         return (0.0, 0.0);
     }
-    let radius = lerp(0.006, 0.022, chance(1) * chance(1));
+    let radius = lerp(0.005, 0.017, chance(1) * chance(1));
     let (u, v) = (
         along - (column + lerp(0.35, 0.65, chance(2))) * CELL_M[0],
         across - (row + lerp(0.4, 0.6, chance(3))) * CELL_M[1],

@@ -56,16 +56,24 @@ impl Sprig {
     }
 }
 
-/// A sprig in its cell, `width` metres wide: stem, leaves, blossoms, all by the cell's own numbers.
+/// One plant, drawn by seed, about a unit wide and 1.6 high about the origin, over a ground.
+pub(super) fn plant(at: [f64; 2], soft: f64, seed: u32, ground: Rgb) -> Rgb {
+    drawn(at, soft, &|k| lattice(k, 3, 3, seed)).over(ground, by_hue(0.28, 0.45, 0.45), 0.95)
+}
+
+/// A sprig in its cell, `width` metres wide.
 fn sprig(spot: &Spot, width: f64, salt: u32) -> Sprig {
     let height = CELL_ASPECT * width;
     let column = (spot.across / width).floor();
     let shifted = spot.down + height * lattice(column as i64, 7, 0, salt);
     let row = (shifted / height).floor();
-    let chance = |k: i64| lattice(column as i64, row as i64, k, salt);
-    let soft = spot.footprint / width;
-    // In widths from the cell's middle, then upright, unmirrored and of standard size.
-    let (x, y) = (spot.across / width - column - 0.5, CELL_ASPECT * (shifted / height - row - 0.5));
+    let at = [spot.across / width - column - 0.5, CELL_ASPECT * (shifted / height - row - 0.5)];
+    drawn(at, spot.footprint / width, &|k| lattice(column as i64, row as i64, k, salt))
+}
+
+/// A sprig of random numbers: stem, leaves, blossoms. The place is in cell widths from the cell's middle.
+fn drawn([x, y]: [f64; 2], soft: f64, chance: &dyn Fn(i64) -> f64) -> Sprig {
+    // Upright, unmirrored and of standard size.
     let (sine, cosine) = lerp(-0.3, 0.3, chance(1)).sin_cos();
     let size = lerp(0.85, 1.2, chance(2));
     let mirror = if chance(3) < 0.5 { -1.0 } else { 1.0 };

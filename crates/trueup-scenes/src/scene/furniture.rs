@@ -37,8 +37,8 @@ impl Finish {
         let cushion = fabrics[builder.dice.index(fabrics.len())];
         let mut add = |material: Material| builder.material(material);
         Self {
-            timber: add(Material::new(Pattern::Wood, 1.0, [timber; 3]).glossy(0.02)),
-            dark_timber: add(Material::new(Pattern::Wood, 1.0, [0x5a_3820; 3]).glossy(0.03)),
+            timber: add(Material::new(Pattern::Wood, 1.0, [timber; 3]).glossy(0.008)),
+            dark_timber: add(Material::new(Pattern::Wood, 1.0, [0x5a_3820; 3]).glossy(0.01)),
             white_paint: add(Material::new(Pattern::Paint, 1.0, [0xe8_e4da; 3]).glossy(0.02)),
             metal: add(Material::new(Pattern::Paint, 1.0, [0x8a_8a88; 3]).glossy(0.25)),
             fabric: add(Material::new(Pattern::Fabric, 0.008, [fabric[0], fabric[1], 0])),
