@@ -13,7 +13,7 @@ use crate::rig::PosedCamera;
 use crate::scene::Scene;
 
 /// JPEG quality of the pictures written, of 100.
-pub const JPEG_QUALITY: u8 = 88;
+pub const JPEG_QUALITY: u8 = 87;
 
 /// What is true of a set: the content of its `truth.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -149,3 +149,34 @@ pub(super) fn rug(material: &Material, spot: &Spot) -> Rgb {
     let wear = spot.noise(0.5, 4, 0.6, 63);
     colour * (1.0 + 0.3 * pile + 0.15 * wear)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::Pattern;
+
+    /// Grey levels of one cell of wallpaper, `column` and `row` cells away.
+    fn cell(column: f64, row: f64) -> Vec<f64> {
+        const WIDTH: f64 = 0.25;
+        let material = Material::new(Pattern::Wallpaper, WIDTH, [0xf0_f0f0, 0xf0_f0f0, 0x20_2020]);
+        let spot = |k: u32| {
+            let (x, y) = (f64::from(k % 24) / 24.0, f64::from(k / 24) / 36.0);
+            let (across, down) = (WIDTH * (column + x), WIDTH * CELL_ASPECT * (row + y));
+            let point = Vector3::new(across, down, 0.0);
+            Spot { point, across, down, unit: [x, y], size: [4.0, 3.0], grain: 0, footprint: 0.005, seed: 5 }
+        };
+        (0..24 * 36).map(|k| wallpaper(&material, &spot(k)).y).collect()
+    }
+
+    #[test]
+    fn no_two_cells_of_wallpaper_look_alike() {
+        let places = [(0.0, 0.0), (2.0, 0.0), (4.0, 0.0), (0.0, 1.0), (2.0, 2.0), (-6.0, -3.0)];
+        let cells: Vec<Vec<f64>> = places.iter().map(|&(column, row)| cell(column, row)).collect();
+        for (k, first) in cells.iter().enumerate() {
+            for second in &cells[k + 1..] {
+                let apart = first.iter().zip(second).filter(|(a, b)| (*a - *b).abs() > 0.2).count();
+                assert!(apart * 10 > first.len(), "{apart} of {}", first.len());
+            }
+        }
+    }
+}
