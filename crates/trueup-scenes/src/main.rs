@@ -24,7 +24,7 @@ enum Command {
     Render(RenderArguments),
     /// Renders the committed example set.
     Examples {
-        /// Folder to write to.
+        /// Folder to write to; the set goes into its own folder there, `room`.
         #[arg(long, default_value = "examples")]
         out: PathBuf,
     },
@@ -149,7 +149,7 @@ fn run(command: &Command) -> Result<()> {
         }
         Command::Examples { out } => {
             let (scene, rig) = example_set();
-            write(out, &scene, &rig, Quality::Fine)
+            write(&out.join("room"), &scene, &rig, Quality::Fine)
         }
         Command::Study { out, sets } => {
             let numbers = if sets.is_empty() { (1..=12).collect() } else { sets.clone() };

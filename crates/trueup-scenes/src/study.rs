@@ -6,8 +6,17 @@ use crate::scene::{SceneKind, SceneOptions};
 /// The committed example: a room in five hand-held pictures.
 pub fn example_set() -> (SceneOptions, RigOptions) {
     let scene = SceneOptions { seed: 3, ..SceneOptions::default() };
-    let rig =
-        RigOptions { seed: 3, pictures: 5, yaw_step_deg: 27.0, roll_sd_deg: 5.0, noise: 0.8, ..RigOptions::default() };
+    let rig = RigOptions {
+        seed: 3,
+        pictures: 5,
+        yaw_step_deg: 26.0,
+        yaw_sd_deg: 0.8,
+        pitch_deg: 0.0,
+        roll_sd_deg: 4.0,
+        translation_fraction: 0.003,
+        noise: 0.8,
+        ..RigOptions::default()
+    };
     (scene, rig)
 }
 

@@ -2,6 +2,7 @@
 
 mod exterior;
 mod interior;
+mod ornament;
 mod print;
 
 use nalgebra::Vector3;
@@ -15,9 +16,9 @@ pub(crate) type MaterialId = usize;
 /// A kind of surface. Unless said otherwise `colours[0]` is the main colour and `scale_m` the size of the motif.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Pattern {
-    /// Lime or gypsum plaster: blotches, trowel marks, stipple.
+    /// Lime or gypsum plaster: blotches, trowel marks, stipple, cracks, water stains.
     Plaster,
-    /// Printed paper: stripes of `colours[0]` and `[1]` with a leaf motif of `[2]`.
+    /// Printed paper: stripes of `colours[0]` and `[1]` with sprigs of `[2]`, no two alike.
     Wallpaper,
     /// Timber with the grain along the body's longest axis.
     Wood,
@@ -94,13 +95,13 @@ impl Material {
     pub(crate) fn albedo(&self, spot: &Spot) -> Rgb {
         let colour = match self.pattern {
             Pattern::Plaster => interior::plaster(self, spot),
-            Pattern::Wallpaper => interior::wallpaper(self, spot),
+            Pattern::Wallpaper => ornament::wallpaper(self, spot),
             Pattern::Wood => interior::wood(self.colours[0], spot.point, spot.grain, spot),
             Pattern::Planks => interior::planks(self, spot),
             Pattern::Tiles => interior::tiles(self, spot),
-            Pattern::Rug => interior::rug(self, spot),
+            Pattern::Rug => ornament::rug(self, spot),
             Pattern::Fabric => interior::fabric(self, spot),
-            Pattern::Curtain => interior::curtain(self, spot),
+            Pattern::Curtain => ornament::curtain(self, spot),
             Pattern::Paint => interior::paint(self, spot),
             Pattern::Foliage => exterior::foliage(self, spot),
             Pattern::Picture => print::picture(spot),

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Material, Spot};
+use super::{Material, Spot, ornament};
 use crate::colour::{Rgb, by_hue, luminance, mix, srgb};
 use crate::noise::{band, edge, fractal_noise, lattice, lerp, pulse};
 
@@ -58,10 +58,13 @@ fn letter(index: usize, x: f64, y: f64) -> f64 {
     f64::from((LETTERS[index % 26] >> bit) & 1)
 }
 
-/// Coverage of lines of random words in cells of `height` metres at (x, y) metres.
-fn text(x: f64, y: f64, height: f64, footprint: f64, seed: u32) -> f64 {
+/// Coverage of lines of random words, `length` metres long, in cells of `height` metres at (x, y) metres.
+fn text(x: f64, y: f64, length: f64, height: f64, footprint: f64, seed: u32) -> f64 {
     let width = 0.7 * height;
     let (column, row) = ((x / width).floor(), (y / height).floor());
+    if x < 0.0 || (column + 1.0) * width > length {
+        return 0.0;
+    }
     let chance = |k| lattice(column as i64, row as i64, k, seed);
     if chance(0) < 0.16 {
         return 0.0;
@@ -71,39 +74,45 @@ fn text(x: f64, y: f64, height: f64, footprint: f64, seed: u32) -> f64 {
     lerp(drawn, 0.3, (3.0 * footprint / height).min(1.0))
 }
 
-pub(super) fn sign(material: &Material, spot: &Spot) -> Rgb {
+/// Coverage of one word, drawn by seed, in the middle of a field of this size at (x, y) from its corner, metres.
+fn word([x, y]: [f64; 2], [width, height]: [f64; 2], spot: &Spot) -> f64 {
     let word = WORDS[((spot.chance(1) * WORDS.len() as f64) as usize).min(WORDS.len() - 1)];
-    let [width, height] = spot.size;
-    let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);
-    let rim = x.min(width - x).min(y).min(height - y);
     let size = (0.62 * height).min(0.9 * width / (0.66 * word.len() as f64));
     let (left, top) = (0.5 * (width - 0.66 * size * word.len() as f64), 0.5 * (height - 0.83 * size));
     let cell = (x - left) / (0.66 * size);
-    let drawn = word
-        .as_bytes()
+    word.as_bytes()
         .get(cell.floor().max(0.0) as usize)
         .filter(|_| cell >= 0.0)
-        .map_or(0.0, |&byte| letter(usize::from(byte - b'A'), cell.fract(), (y - top) / size));
+        .map_or(0.0, |&byte| letter(usize::from(byte - b'A'), cell.fract(), (y - top) / size))
+}
+
+pub(super) fn sign(material: &Material, spot: &Spot) -> Rgb {
+    let [width, height] = spot.size;
+    let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);
+    let rim = x.min(width - x).min(y).min(height - y);
     let border = band(rim, 0.03, 0.045, spot.footprint);
     let base = material.colours[0] * (1.0 + 0.08 * spot.noise(0.2, 5, 0.6, 201));
-    mix(base, material.colours[1], drawn.max(border))
+    mix(base, material.colours[1], word([x, y], spot.size, spot).max(border))
 }
 
 pub(super) fn page(material: &Material, spot: &Spot) -> Rgb {
     let [width, height] = spot.size;
     let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);
     let margin = 0.08 * width;
-    let inside = band(x, margin, width - margin, spot.footprint) * band(y, margin, height - margin, spot.footprint);
-    let hue = spot.chance(4);
-    let head = text(x - margin, y - margin, 0.16 * height, spot.footprint, spot.seed ^ 1)
-        * band(y, margin, 0.3 * height, 1e-4);
-    let picture = band(y, 0.32 * height, 0.6 * height, spot.footprint);
-    let body = text(x - margin, y, 0.028 * height, spot.footprint, spot.seed ^ 2) * edge(y, 0.63 * height, 1e-4);
-    let print = fractal_noise(spot.point, 0.2 * height, 5, 0.6, spot.footprint, spot.seed ^ 3);
+    let measure = width - 2.0 * margin;
+    // From the top: a heading, a picture, lines of text.
+    let (heading, top, bottom) = (0.24 * height, 0.26 * height, 0.66 * height);
+    let inside = band(x, margin, width - margin, spot.footprint);
+    let head = word([x - margin, y - 0.5 * margin], [measure, heading], spot);
+    let line = 0.03 * height;
+    let body = text(x - margin, y - 0.7 * height, measure, line, spot.footprint, spot.seed ^ 2)
+        * band(y, 0.7 * height, 0.7 * height + 8.0 * line, 1e-4);
     let paper = material.colours[0] * (1.0 + 0.04 * spot.noise(0.05, 4, 0.6, 211));
-    let image = by_hue(hue + 0.3 * print, 0.6, 0.6 + 0.4 * print);
-    let colour = mix(paper, image, picture * inside);
-    mix(colour, mix(material.colours[1], by_hue(hue, 0.8, 0.5), 0.5), head.max(body) * inside)
+    let field =
+        Spot { unit: [(x - margin) / measure, (y - top) / (bottom - top)], size: [measure, bottom - top], ..*spot };
+    let colour = mix(paper, picture(&field), inside * band(y, top, bottom, spot.footprint));
+    let ink = mix(material.colours[1], by_hue(spot.chance(4), 0.8, 0.5), 0.5);
+    mix(colour, ink, head.max(body) * inside)
 }
 
 pub(super) fn spine(material: &Material, spot: &Spot) -> Rgb {
@@ -122,7 +131,7 @@ pub(super) fn spine(material: &Material, spot: &Spot) -> Rgb {
     // Lettering runs down the spine.
     let size = (0.55 * width).min(0.03);
     let inside = band(y, 0.2 * height, 0.8 * height, 1e-4) * band(x, 0.5 * (width - size), 0.5 * (width + size), 1e-4);
-    let title = text(y, width - x - 0.5 * (width - size), size, soft, spot.seed) * inside;
+    let title = text(y, width - x - 0.5 * (width - size), 0.8 * height, size, soft, spot.seed) * inside;
     let rounding = 1.0 - 0.45 * (2.0 * spot.unit[0] - 1.0).powi(4);
     let mut colour = mix(cloth, label_colour, label);
     colour = mix(colour, ink, lines.max(0.9 * title));
@@ -130,9 +139,11 @@ pub(super) fn spine(material: &Material, spot: &Spot) -> Rgb {
 }
 
 pub(super) fn picture(spot: &Spot) -> Rgb {
-    let painted = match (spot.chance(1) * 4.0) as u32 {
+    let painted = match (spot.chance(11) * 5.0) as u32 {
         0 => blocks(spot),
         1 => discs(spot),
+        2 => houses(spot),
+        3 => herbarium(spot),
         _ => landscape(spot),
     };
     painted * (1.0 + 0.1 * spot.noise(0.01, 3, 0.8, 231))
@@ -185,6 +196,50 @@ fn blocks(spot: &Spot) -> Rgb {
     let field =
         if chance(0) < 0.35 { pale } else { by_hue(chance(1), lerp(0.4, 0.9, chance(2)), lerp(0.4, 0.95, chance(3))) };
     mix(field * (1.0 + 0.12 * spot.noise(0.06, 4, 0.6, 241)), srgb(0x1c_1a1a), bar)
+}
+
+/// Gabled houses in a row, with windows, in front of others.
+fn houses(spot: &Spot) -> Rgb {
+    let [width, height] = spot.size;
+    let soft = spot.footprint / height.max(1e-3);
+    let (x, y) = (spot.unit[0] * width / height.max(1e-3), spot.unit[1]);
+    let cloud = fractal_noise(Vector3::new(x, 2.0 * y, 0.0), 0.3, 4, 0.6, soft, spot.seed);
+    let mut colour = mix(by_hue(0.55, 0.35, 0.95), srgb(0xff_f6e8), (0.5 * y + 0.6 * cloud).clamp(0.0, 1.0));
+    for row in 0..3_i64 {
+        let size = 0.13 + 0.035 * row as f64;
+        let place = x / size + 0.37 * row as f64;
+        let column = place.floor();
+        let chance = |k: i64| lattice(column as i64, row, k, spot.seed ^ 7);
+        let across = place - column - 0.5;
+        let eaves = 0.36 + 0.17 * row as f64 - 0.16 * chance(0);
+        let gable = eaves - lerp(0.3, 0.9, chance(1)) * size * (0.5 - across.abs()).max(0.0);
+        let plaster = by_hue(lerp(0.02, 0.16, chance(2)), lerp(0.2, 0.6, chance(3)), lerp(0.6, 1.0, chance(4)));
+        let (column_at, row_at) = (3.0 * (across + 0.5), (y - eaves) / (0.5 * size));
+        let pane = band(column_at.fract(), 0.28, 0.72, 3.0 * soft / size)
+            * band(row_at.rem_euclid(1.0), 0.3, 0.75, 2.0 * soft / size)
+            * edge(y, eaves, soft);
+        let lit = lattice((3.0 * place).floor() as i64, row_at.floor() as i64, row, spot.seed ^ 8);
+        let glass = if lit < 0.3 { srgb(0xff_e090) } else { by_hue(0.6, 0.4, 0.35) };
+        let roof = by_hue(lerp(0.0, 0.07, chance(5)), 0.6, lerp(0.35, 0.65, chance(6)));
+        let wall = mix(mix(roof, plaster, edge(y, eaves, soft)), glass, pane);
+        let seam = 1.0 - 0.5 * edge(across.abs(), 0.48, soft / size);
+        colour = mix(colour, wall * seam, edge(y, gable, soft));
+    }
+    let quay = srgb(0x8a_7c6c) * (1.0 + 0.3 * spot.noise(0.04, 3, 0.7, 261));
+    mix(colour, quay, edge(y, 0.93, soft))
+}
+
+/// A pressed plant on laid paper.
+fn herbarium(spot: &Spot) -> Rgb {
+    let [width, height] = spot.size;
+    let side = width.min(height / 1.6);
+    let ground = mix(srgb(0xf0_e8d0), srgb(0xdc_dccc), spot.chance(2)) * (1.0 + 0.1 * spot.noise(0.1, 4, 0.6, 271));
+    ornament::plant(
+        [(spot.unit[0] - 0.5) * width / side, (spot.unit[1] - 0.5) * height / side],
+        spot.footprint / side,
+        spot.seed,
+        ground,
+    )
 }
 
 /// Overlapping rings on a pale ground.

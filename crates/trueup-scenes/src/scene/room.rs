@@ -89,7 +89,12 @@ fn shell(builder: &mut Builder, [x, z]: [f64; 2], height: f64, finish: &Finish) 
         Material::new(Pattern::Tiles, 0.4, [0xc8_bca8, 0x9a_8878, 0x6a_645c]).glossy(0.04)
     };
     let floor = builder.material(floor);
-    let ceiling = builder.material(Material::new(Pattern::Plaster, 1.0, [0xf2_efe8; 3]));
+    let ceiling = if builder.dice.chance(0.5) {
+        Material::new(Pattern::Planks, 0.14, [0xe6_d8bc; 3])
+    } else {
+        Material::new(Pattern::Plaster, 1.0, [0xf2_efe8; 3])
+    };
+    let ceiling = builder.material(ceiling);
     let (x, z) = (x + THICK, z + THICK);
     builder.block([Vector3::new(-x, 0.0, -z), Vector3::new(x, THICK, z)], floor);
     builder.block([Vector3::new(-x, -height - THICK, -z), Vector3::new(x, -height, z)], ceiling);
@@ -107,10 +112,13 @@ fn shell(builder: &mut Builder, [x, z]: [f64; 2], height: f64, finish: &Finish) 
 
 fn wall_covering(builder: &mut Builder) -> MaterialId {
     let papers =
-        [[0xe4_dcc4, 0xd8_ccac, 0x9a_8a5c], [0xc8_d4d0, 0xb8_c8c4, 0x5a_7c7a], [0xe0_ccc4, 0xd4_bab0, 0x9a_5c54]];
+        [[0xe8_e0c8, 0xdc_d0b0, 0x6a_6034], [0xd0_dcd8, 0xc0_d0cc, 0x2e_5654], [0xe6_d2ca, 0xd8_beb4, 0x7a_3c38]];
     let plasters = [0xe6_dcc8, 0xc4_ccc4, 0xd8_c0a4, 0xb8_c4d0];
-    let material = if builder.dice.chance(0.45) {
-        Material::new(Pattern::Wallpaper, 0.16, papers[builder.dice.index(papers.len())])
+    let kind = builder.dice.unit();
+    let material = if kind < 0.5 {
+        Material::new(Pattern::Wallpaper, builder.dice.range(0.22, 0.28), papers[builder.dice.index(papers.len())])
+    } else if kind < 0.7 {
+        Material::new(Pattern::Brick, 0.075, [0xa8_6248, 0xc4_b8a6, 0xc8_906c])
     } else {
         Material::new(Pattern::Plaster, 1.0, [plasters[builder.dice.index(plasters.len())]; 3])
     };

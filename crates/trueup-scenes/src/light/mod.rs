@@ -4,19 +4,25 @@
 //! directions, turned by a hash of its index, and neighbours are averaged. Direct sun is left to the renderer, whose
 //! shadow edges are finer than the grid.
 
+mod direct;
+mod grid;
+
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 use crate::bvh::Ray;
 use crate::colour::Rgb;
 use crate::dice::{mix, unit_of};
 use crate::scene::Scene;
 use crate::solid::Solid;
-
+use direct::direct_light;
+use grid::{binomial, grid_points, spread};
+use rayon::prelude::*;
 /// Distance by which rays start off a surface, metres.
 pub(crate) const SURFACE_OFFSET_M: f64 = 1e-4;
+
 /// Grid points keep this distance from a face's border, metres: right in a corner everything is dark.
 const BORDER_M: f64 = 0.015;
+
 /// More grid points than this along one side of a face are not worth their time.
 const MAX_GRID: usize = 320;
 
@@ -220,24 +226,6 @@ impl LightField {
     }
 }
 
-/// Grid points along a side of this length: two at least, and one in the middle of what is not tiny.
-fn grid_points(size_m: f64, spacing_m: f64) -> usize {
-    const TINY_M: f64 = 0.12;
-    let least = if size_m < TINY_M { 2 } else { 3 };
-    ((size_m / spacing_m).ceil() as usize + 1).clamp(least, MAX_GRID)
-}
-
-/// Weighs every `stride`-th value 1/2 and its two neighbours 1/4 each; border values count as their own neighbours.
-fn binomial(values: &mut [Vector3<f32>], stride: usize) {
-    let mut before = values[0];
-    for index in (0..values.len()).step_by(stride) {
-        let here = values[index];
-        let after = values.get(index + stride).copied().unwrap_or(here);
-        values[index] = here * 0.5 + (before + after) * 0.25;
-        before = here;
-    }
-}
-
 /// The pattern a place deserves: nobody sees what is turned away, nor much of what is far off.
 fn importance(point: Vector3<f64>, normal: Vector3<f64>, eye: Vector3<f64>) -> usize {
     /// The camera wanders about the eye by this much at most, metres.
@@ -245,72 +233,6 @@ fn importance(point: Vector3<f64>, normal: Vector3<f64>, eye: Vector3<f64>) -> u
     const FAR_M: f64 = 22.0;
     let to_eye = eye - point;
     if normal.dot(&to_eye) < -WANDER_M { 2 } else { usize::from(to_eye.norm() > FAR_M) }
-}
-
-/// One pass of filling unknown values with the mean of their known neighbours; returns what is known now.
-fn spread(values: &mut [Vector3<f32>], known: &[bool], columns: usize) -> Vec<bool> {
-    let mut now_known = known.to_vec();
-    for index in 0..values.len() {
-        if known[index] {
-            continue;
-        }
-        let column = index % columns;
-        let neighbours = [
-            (column > 0).then(|| index - 1),
-            (column + 1 < columns).then_some(index + 1),
-            index.checked_sub(columns),
-            (index + columns < values.len()).then_some(index + columns),
-        ];
-        let lit: Vec<usize> = neighbours.into_iter().flatten().filter(|&neighbour| known[neighbour]).collect();
-        if !lit.is_empty() {
-            let sum: Vector3<f32> = lit.iter().map(|&neighbour| values[neighbour]).sum();
-            values[index] = sum / lit.len() as f32;
-            now_known[index] = true;
-        }
-    }
-    now_known
-}
-
-/// Irradiance from the portals, and from the sun.
-fn direct_light(scene: &Scene, place: &Place, samples: usize) -> (Rgb, Rgb) {
-    if place.buried {
-        return (Rgb::zeros(), Rgb::zeros());
-    }
-    let portals = scene.portals.iter().map(|portal| portal_light(scene, place, portal, samples)).sum();
-    let sun = scene.sun.map_or(Rgb::zeros(), |sun| {
-        let cosine = place.normal.dot(&sun.towards);
-        let lit =
-            cosine > 0.0 && !scene.hierarchy.blocked(&scene.solids, &Ray::new(place.point, sun.towards), f64::INFINITY);
-        if lit { sun.irradiance * cosine } else { Rgb::zeros() }
-    });
-    (portals, sun)
-}
-
-fn portal_light(scene: &Scene, place: &Place, portal: &Portal, samples: usize) -> Rgb {
-    const SKY_BLUR: f64 = 0.1;
-    /// Windows give more light than they show, so that room and view fit into one exposure.
-    const WINDOW_GAIN: f64 = 3.5;
-    let patch = portal.side_s.cross(&portal.side_t).norm() / (samples * samples) as f64;
-    let mut sum = Rgb::zeros();
-    for k in 0..samples * samples {
-        let (s, t) = ((k % samples) as f64 + 0.5, (k / samples) as f64 + 0.5);
-        let target = portal.corner + (portal.side_s * s + portal.side_t * t) / samples as f64;
-        let path = target - place.point;
-        let distance_squared = path.norm_squared().max(1e-6);
-        let direction = path / distance_squared.sqrt();
-        let (here, there) = (place.normal.dot(&direction), -portal.normal.dot(&direction));
-        if here <= 0.0 || there <= 0.0 {
-            continue;
-        }
-        let limit = distance_squared.sqrt() - 2.0 * SURFACE_OFFSET_M;
-        if scene.hierarchy.blocked(&scene.solids, &Ray::new(place.point, direction), limit) {
-            continue;
-        }
-        let radiance = portal.radiance.unwrap_or_else(|| scene.sky.radiance(direction, SKY_BLUR) * WINDOW_GAIN);
-        // A patch nearer than its own size would count as a point source too close: bound it.
-        sum += radiance * (here * there * patch / distance_squared.max(patch));
-    }
-    sum
 }
 
 /// The mean albedo of every face, for the light it returns.

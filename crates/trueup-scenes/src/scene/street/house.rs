@@ -1,111 +1,11 @@
-//! Streets of town houses.
+//! Town houses with shops.
 
 use nalgebra::Vector3;
 
-use super::builder::Builder;
-use super::wall::{Opening, Wall};
-use crate::colour::srgb;
+use super::{Finish, KERB};
 use crate::material::{Material, MaterialId, Pattern};
-use crate::sky::Sun;
-
-/// Half the width of the roadway and of the whole street, and how far it runs either way, metres.
-const ROAD: f64 = 3.6;
-const FRONT: f64 = 6.4;
-const REACH: f64 = 75.0;
-const KERB: f64 = 0.13;
-
-/// Materials shared along the street.
-#[derive(Debug, Clone, Copy)]
-struct Finish {
-    stone: MaterialId,
-    trim: MaterialId,
-    pane: MaterialId,
-    window_paint: MaterialId,
-    iron: MaterialId,
-    door: MaterialId,
-    timber: MaterialId,
-    leaves: MaterialId,
-    poster: MaterialId,
-    rubber: MaterialId,
-    windscreen: MaterialId,
-}
-
-/// Builds a street along z with the eye on its roadway.
-pub(super) fn build(seed: u64) -> Builder {
-    let mut builder = Builder::new(seed, 2);
-    let finish = finish(&mut builder);
-    ground(&mut builder, finish.stone);
-    let right =
-        Wall { corner: Vector3::new(FRONT, 0.0, REACH), along: -Vector3::z(), out: -Vector3::x(), length: 2.0 * REACH };
-    let left =
-        Wall { corner: Vector3::new(-FRONT, 0.0, -REACH), along: Vector3::z(), out: Vector3::x(), length: 2.0 * REACH };
-    let far =
-        Wall { corner: Vector3::new(-24.0, 0.0, REACH + 9.0), along: Vector3::x(), out: -Vector3::z(), length: 48.0 };
-    let near =
-        Wall { corner: Vector3::new(24.0, 0.0, -REACH - 9.0), along: -Vector3::x(), out: Vector3::z(), length: 48.0 };
-    for front in [right, left, far, near] {
-        row_of_houses(&mut builder, &front, &finish);
-    }
-    for side in [-1.0, 1.0] {
-        pavement(&mut builder, side, &finish);
-    }
-    builder.eye = Vector3::new(-1.2, -1.6, 0.0);
-    let towards = Vector3::new(0.55, -0.75, -0.37).normalize();
-    builder.sun = Some(Sun { towards, irradiance: srgb(0xff_f0dc) * 6.5 });
-    builder
-}
-
-fn finish(builder: &mut Builder) -> Finish {
-    let mut add = |material: Material| builder.material(material);
-    Finish {
-        stone: add(Material::new(Pattern::Ashlar, 0.42, [0xb8_ac98; 3])),
-        trim: add(Material::new(Pattern::Stucco, 1.0, [0xd8_d0c0; 3])),
-        pane: add(Material::new(Pattern::Pane, 1.0, [0x1c_2228; 3]).glossy(0.12)),
-        window_paint: add(Material::new(Pattern::Paint, 1.0, [0xe8_e6e0; 3])),
-        iron: add(Material::new(Pattern::Paint, 1.0, [0x2c_302e; 3]).glossy(0.04)),
-        door: add(Material::new(Pattern::Wood, 1.0, [0x6a_3c24; 3]).glossy(0.03)),
-        timber: add(Material::new(Pattern::Wood, 1.0, [0x8a_6a48; 3])),
-        leaves: add(Material::new(Pattern::Foliage, 1.0, [0x30_541e, 0x80_a044, 0])),
-        poster: add(Material::new(Pattern::Page, 1.0, [0xee_e6d4, 0x22_2222, 0])),
-        rubber: add(Material::new(Pattern::Paint, 1.0, [0x20_2022; 3])),
-        windscreen: add(Material::new(Pattern::Paint, 1.0, [0x1a_2024; 3]).glossy(0.15)),
-    }
-}
-
-fn ground(builder: &mut Builder, stone: MaterialId) {
-    let asphalt = builder.material(Material::new(Pattern::Asphalt, 1.0, [0x6a_6866; 3]));
-    let paving = builder.material(Material::new(Pattern::Paving, 0.5, [0xa8_a094; 3]));
-    let white = builder.material(Material::new(Pattern::Stucco, 1.0, [0xdc_dcd6; 3]));
-    let far = REACH + 40.0;
-    let at = |x: f64, up: f64, z: f64| Vector3::new(x, -up, z);
-    builder.block([at(-60.0, -1.0, -far), at(60.0, 0.0, far)], asphalt);
-    for side in [-1.0, 1.0] {
-        builder.block([at(side * ROAD, 0.0, -REACH), at(side * (FRONT + 1.0), KERB, REACH)], paving);
-        builder.block([at(side * ROAD, 0.0, -REACH), at(side * (ROAD - 0.16), KERB + 0.01, REACH)], stone);
-    }
-    let mut z = -REACH;
-    while z < REACH {
-        builder.piece([at(-0.06, 0.0, z), at(0.06, 0.003, z + 2.0)], white);
-        z += 5.0;
-    }
-    for k in 0..8 {
-        let x = -3.0 + 0.8 * f64::from(k);
-        builder.piece([at(x, 0.0, 9.0), at(x + 0.42, 0.003, 12.0)], white);
-    }
-}
-
-/// Houses of different widths, heights and walls along a front.
-fn row_of_houses(builder: &mut Builder, front: &Wall, finish: &Finish) {
-    let mut from = 0.0;
-    while from < front.length - 4.0 {
-        let width = builder.dice.range(7.0, 12.5).min(front.length - from);
-        let bays = (width / 2.6).floor().max(2.0);
-        let floors = 3 + builder.dice.index(3);
-        let house = Wall { corner: front.at(from, 0.0, 0.0), along: front.along, out: front.out, length: width };
-        self::house(builder, &house, bays as usize, floors, finish);
-        from += width;
-    }
-}
+use crate::scene::builder::Builder;
+use crate::scene::wall::{Opening, Wall};
 
 fn house_surface(builder: &mut Builder) -> MaterialId {
     let bricks =
@@ -120,7 +20,7 @@ fn house_surface(builder: &mut Builder) -> MaterialId {
 }
 
 /// One house: shops or a door below, rows of windows above, string courses, a cornice, chimneys.
-fn house(builder: &mut Builder, wall: &Wall, bays: usize, floors: usize, finish: &Finish) {
+pub(super) fn house(builder: &mut Builder, wall: &Wall, bays: usize, floors: usize, finish: &Finish) {
     const GROUND: f64 = 3.7;
     let storey = builder.dice.range(2.9, 3.4);
     let (surface, height) = (house_surface(builder), GROUND + storey * floors as f64 + 0.5);
@@ -282,90 +182,4 @@ fn shop_sign(builder: &mut Builder, wall: &Wall, ground: f64, finish: &Finish) {
     let x = 0.9 * wall.length;
     builder.piece(wall.span([x - 0.03, x + 0.03], [ground - 0.9, ground - 0.35], [0.25, 1.25]), sign);
     builder.piece(wall.span([x - 0.02, x + 0.02], [ground - 0.32, ground - 0.28], [0.0, 1.3]), finish.iron);
-}
-
-/// Lamps, trees, bollards, posts and parked cars along one side.
-fn pavement(builder: &mut Builder, side: f64, finish: &Finish) {
-    let mut z = -REACH + 4.0;
-    let mut k = 0;
-    while z < REACH - 4.0 {
-        let foot = Vector3::new(side * (ROAD + 0.45), -KERB, z);
-        match k % 3 {
-            0 => street_lamp(builder, foot, side, finish),
-            1 => tree(builder, foot, finish),
-            _ => traffic_sign(builder, foot, finish),
-        }
-        if builder.dice.chance(0.62) && z.abs() > 5.0 {
-            car(builder, Vector3::new(side * (ROAD - 1.15), 0.0, z + 3.2), finish);
-        }
-        for offset in [1.6, 3.2, 4.8] {
-            builder.cylinder(foot + Vector3::new(0.0, 0.0, offset), 0.05, 0.9, finish.iron);
-        }
-        z += 6.4;
-        k += 1;
-    }
-}
-
-fn street_lamp(builder: &mut Builder, foot: Vector3<f64>, side: f64, finish: &Finish) {
-    builder.cylinder(foot, 0.14, 0.5, finish.iron);
-    builder.cylinder(foot, 0.06, 5.2, finish.iron);
-    let top = foot - Vector3::new(0.0, 5.2, 0.0);
-    builder.piece([top - Vector3::new(0.03, 0.0, 0.03), top + Vector3::new(-side * 1.2, 0.06, 0.03)], finish.iron);
-    let head = top + Vector3::new(-side * 1.2, 0.05, 0.0);
-    builder.piece([head - Vector3::new(0.3, 0.06, 0.12), head + Vector3::new(0.3, 0.06, 0.12)], finish.window_paint);
-}
-
-fn tree(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
-    let height = builder.dice.range(2.6, 3.4);
-    builder.cylinder(foot, 0.11, height, finish.timber);
-    let crown = foot - Vector3::new(0.0, height + 0.6, 0.0);
-    for _ in 0..80 {
-        let offset =
-            Vector3::new(0.5 * builder.dice.normal(), 0.55 * builder.dice.normal(), 0.5 * builder.dice.normal());
-        let size = builder.dice.range(0.1, 0.34);
-        builder.ellipsoid(crown + offset, Vector3::new(size, 0.7 * size, size), finish.leaves);
-    }
-}
-
-fn traffic_sign(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
-    let colours = [[0x2a_4c9a, 0xf0_f0f0], [0xf0_eee8, 0xa0_2420], [0xe8_c840, 0x20_2020]];
-    let [board, ink] = colours[builder.dice.index(colours.len())];
-    let plate = builder.material(Material::new(Pattern::Sign, 1.0, [board, ink, 0]).glossy(0.03));
-    builder.cylinder(foot, 0.035, 2.7, finish.iron);
-    let top = foot - Vector3::new(0.0, 2.6, 0.0);
-    builder.piece([top + Vector3::new(-0.35, 0.0, -0.05), top + Vector3::new(0.35, 0.5, -0.04)], plate);
-    builder.piece([top + Vector3::new(-0.3, 0.56, -0.05), top + Vector3::new(0.3, 0.75, -0.04)], plate);
-}
-
-/// A parked car: body, cabin, windows, lights, wheels.
-fn car(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
-    let colours = [0x8a_1f1c, 0x24_3a5c, 0xc8_c8c4, 0x2a_2c2e, 0x4a_5c48, 0xd8_d0b8];
-    let colour = colours[builder.dice.index(colours.len())];
-    let paint = builder.material(Material::new(Pattern::Paint, 1.0, [colour; 3]).glossy(0.08));
-    let mut part = |low: [f64; 3], high: [f64; 3], material| {
-        let corner = |[x, up, z]: [f64; 3]| foot + Vector3::new(x, -up, z);
-        builder.piece([corner(low), corner(high)], material);
-    };
-    part([-0.86, 0.26, -2.05], [0.86, 0.82, 2.05], paint);
-    part([-0.82, 0.82, -1.9], [0.82, 0.9, 1.95], paint);
-    part([-0.72, 0.9, -1.45], [0.72, 1.4, 0.75], finish.windscreen);
-    part([-0.74, 1.4, -1.4], [0.74, 1.46, 0.7], paint);
-    for z in [-1.45, -0.4, 0.68] {
-        part([-0.745, 0.9, z], [-0.72, 1.42, z + 0.08], paint);
-        part([0.72, 0.9, z], [0.745, 1.42, z + 0.08], paint);
-    }
-    for end in [[-2.08, -2.05], [2.05, 2.08]] {
-        part([-0.8, 0.3, end[0]], [0.8, 0.45, end[1]], finish.rubber);
-        part([-0.76, 0.58, end[0]], [-0.5, 0.72, end[1]], finish.window_paint);
-        part([0.5, 0.58, end[0]], [0.76, 0.72, end[1]], finish.window_paint);
-        part([-0.26, 0.5, end[0]], [0.26, 0.62, end[1]], finish.poster);
-    }
-    let lying = trueup_core::geometry::rotation_about_z(std::f64::consts::FRAC_PI_2);
-    for (x, z) in [(-0.78, -1.3), (0.78, -1.3), (-0.78, 1.3), (0.78, 1.3)] {
-        for (radius, width, material) in [(0.32, 0.11, finish.rubber), (0.2, 0.12, finish.window_paint)] {
-            let wheel = builder.cylinder(foot, radius, 2.0 * width, material);
-            wheel.centre = foot + Vector3::new(x, -0.32, z);
-            wheel.world_from_body = Some(lying);
-        }
-    }
 }

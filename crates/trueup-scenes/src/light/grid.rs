@@ -1,0 +1,47 @@
+//! Values on the grid of a face.
+
+use nalgebra::Vector3;
+
+use super::MAX_GRID;
+
+/// Grid points along a side of this length: two at least, and one in the middle of what is not tiny.
+pub(super) fn grid_points(size_m: f64, spacing_m: f64) -> usize {
+    const TINY_M: f64 = 0.12;
+    let least = if size_m < TINY_M { 2 } else { 3 };
+    ((size_m / spacing_m).ceil() as usize + 1).clamp(least, MAX_GRID)
+}
+
+/// Weighs every `stride`-th value 1/2 and its two neighbours 1/4 each; border values count as their own neighbours.
+pub(super) fn binomial(values: &mut [Vector3<f32>], stride: usize) {
+    let mut before = values[0];
+    for index in (0..values.len()).step_by(stride) {
+        let here = values[index];
+        let after = values.get(index + stride).copied().unwrap_or(here);
+        values[index] = here * 0.5 + (before + after) * 0.25;
+        before = here;
+    }
+}
+
+/// One pass of filling unknown values with the mean of their known neighbours; returns what is known now.
+pub(super) fn spread(values: &mut [Vector3<f32>], known: &[bool], columns: usize) -> Vec<bool> {
+    let mut now_known = known.to_vec();
+    for index in 0..values.len() {
+        if known[index] {
+            continue;
+        }
+        let column = index % columns;
+        let neighbours = [
+            (column > 0).then(|| index - 1),
+            (column + 1 < columns).then_some(index + 1),
+            index.checked_sub(columns),
+            (index + columns < values.len()).then_some(index + columns),
+        ];
+        let lit: Vec<usize> = neighbours.into_iter().flatten().filter(|&neighbour| known[neighbour]).collect();
+        if !lit.is_empty() {
+            let sum: Vector3<f32> = lit.iter().map(|&neighbour| values[neighbour]).sum();
+            values[index] = sum / lit.len() as f32;
+            now_known[index] = true;
+        }
+    }
+    now_known
+}
