@@ -65,8 +65,8 @@ fn a_marker_shows_where_the_camera_projects_it() {
 
     let mut marked = room().clone();
     marked.add_marker(marker, 0.01);
-    let before = render(room(), &posed, Quality::Fine);
-    let after = render(&marked, &posed, Quality::Fine);
+    let before = render(room(), &posed, Quality::Standard);
+    let after = render(&marked, &posed, Quality::Standard);
     let (mut sum, mut x_sum, mut y_sum) = (0.0, 0.0, 0.0);
     for y in 71..97 {
         for x in 88..115 {
