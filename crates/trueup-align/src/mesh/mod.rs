@@ -19,7 +19,7 @@ use trueup_core::{Error, Result, StageContext};
 use crate::match_points::OverlapWarp;
 pub use alignment::{AlignmentEnergy, MatchPoint};
 pub use base::{Base, BaseShape, bases};
-pub use normal_equations::NormalEquations;
+pub use normal_equations::{MeshSolution, NormalEquations};
 pub use similarity::SimilarityEnergy;
 
 trueup_core::options! {
@@ -101,11 +101,11 @@ pub fn run(
         )
     };
     let solution = equations.solve().ok_or_else(|| unsolvable("the equations are not positive definite"))?;
-    let relative_gradient = equations.relative_gradient(&solution);
-    if !solution.iter().all(|coordinate| coordinate.is_finite()) {
+    let relative_gradient = solution.relative_gradient;
+    if !solution.coordinates.iter().all(|coordinate| coordinate.is_finite()) {
         return Err(unsolvable("the solution is not finite"));
     }
-    let solved = equations.meshes(grids, &solution);
+    let solved = equations.meshes(grids, &solution.coordinates);
     let alignment_rms = alignment.rms(&solved);
     let meshes: Vec<GridMesh> =
         (0..grids.len()).map(|k| subdivided(&solved[k], &bases[k], &places[k], options.subdivision)).collect();

@@ -19,6 +19,15 @@ pub type Coefficient = Vector2<f64>;
 /// A 2 x 2 block [[a, b], [c, d]] of the normal matrix, row-major.
 type Block = [f64; 4];
 
+/// What [`NormalEquations::solve`] finds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshSolution {
+    /// x and y of every vertex in turn.
+    pub coordinates: Vec<f64>,
+    /// |A^T A x - A^T b| / |A^T b|.
+    pub relative_gradient: f64,
+}
+
 /// A^T A and A^T b of a least-squares problem in the vertices of several grids.
 ///
 /// Unknown 2 v is the x and 2 v + 1 the y coordinate of vertex v, vertices numbered through all grids, row-major in
@@ -110,8 +119,8 @@ impl NormalEquations {
         self.add_block_inside(picture, 0, 0, [weight, 0.0, 0.0, weight]);
     }
 
-    /// The least-squares solution, or `None` if the matrix is not positive definite.
-    pub fn solve(&self) -> Option<Vec<f64>> {
+    /// The least-squares solution; `None` if the matrix is not positive definite.
+    pub fn solve(&self) -> Option<MeshSolution> {
         let matrix = self.matrix()?;
         let symbolic = SymbolicLlt::try_new(matrix.symbolic(), faer::Side::Lower).ok()?;
         let factor = Llt::try_new_with_symbolic(symbolic, matrix.as_ref(), faer::Side::Lower).ok()?;
@@ -120,17 +129,11 @@ impl NormalEquations {
         // One step of refinement recovers the digits that the normal equations lose.
         let residual = &right - self.multiply(&matrix, &solution);
         solution += factor.solve(&residual);
-        Some((0..self.unknowns()).map(|row| solution[(row, 0)]).collect())
-    }
-
-    /// |A^T A x - A^T b| / |A^T b|.
-    pub fn relative_gradient(&self, solution: &[f64]) -> f64 {
-        let Some(matrix) = self.matrix() else { return f64::INFINITY };
-        let x = faer::Mat::from_fn(solution.len(), 1, |row, _| solution[row]);
-        let product = self.multiply(&matrix, &x);
-        let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>().sqrt();
-        let gradient = norm(&mut (0..self.unknowns()).map(|row| product[(row, 0)] - self.right[row]));
-        gradient / norm(&mut self.right.iter().copied()).max(f64::MIN_POSITIVE)
+        let gradient = &right - self.multiply(&matrix, &solution);
+        Some(MeshSolution {
+            relative_gradient: gradient.norm_l2() / right.norm_l2().max(f64::MIN_POSITIVE),
+            coordinates: (0..self.unknowns()).map(|row| solution[(row, 0)]).collect(),
+        })
     }
 
     /// The grids with the solution as their targets.
@@ -184,8 +187,7 @@ impl NormalEquations {
                 _ => blocks.push((row, column, block)),
             }
         }
-        blocks.sort_unstable_by_key(|&(row, column, _)| (column, row));
-        blocks
+        by_column(&blocks, self.inside.len())
     }
 
     /// The lower triangle as a sparse matrix.
@@ -230,6 +232,25 @@ impl NormalEquations {
         }
         product
     }
+}
+
+/// Blocks in the order of their columns, in their given order within a column (counting sort). Inside a grid blocks are
+/// listed by rising row; rows in a later grid are larger still: so each column comes out sorted.
+fn by_column(blocks: &[(u32, u32, Block)], columns: usize) -> Vec<(u32, u32, Block)> {
+    let mut next = vec![0_usize; columns + 1];
+    for block in blocks {
+        next[block.1 as usize + 1] += 1;
+    }
+    for column in 0..columns {
+        next[column + 1] += next[column];
+    }
+    let mut sorted = vec![(0, 0, [0.0; 4]); blocks.len()];
+    for block in blocks {
+        let place = &mut next[block.1 as usize];
+        sorted[*place] = *block;
+        *place += 1;
+    }
+    sorted
 }
 
 /// conj(a) b of complex numbers.
