@@ -202,7 +202,7 @@ fn gray_deep_and_transparent_photographs_are_photographs() {
 
 #[test]
 fn the_example_stands_upright() {
-    let examples = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples");
+    let examples = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
     let run = Desk::new().stitch(&[examples]);
     assert!(run.expect_success().contains("pictures  5 of 5 used"), "{}", run.stdout);
     assert!(run.stdout.contains("upright   guided by vanishing points (divergence "), "{}", run.stdout);
