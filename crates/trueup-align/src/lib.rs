@@ -5,6 +5,8 @@ pub mod cameras;
 pub mod full_turn;
 pub mod match_points;
 pub mod mesh;
+pub mod metrics;
 pub mod similarity;
 pub mod stitch_graph;
 pub mod vanishing;
+pub mod warps;

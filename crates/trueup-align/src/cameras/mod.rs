@@ -1,8 +1,8 @@
 //! Focal lengths and rotations of the pictures of one component: the paper's R_i.
 //!
 //! Start values come from metadata, from the pair homographies and from a search over a common focal length
-//! ([`focal`]); rotations from the spanning tree and from averaging over all edges ([`rotations`]); both are refined
-//! together by bundle adjustment ([`bundle`]).
+//! (`focal`); rotations from the spanning tree and from averaging over all edges (`rotations`); both are refined
+//! together by bundle adjustment (`bundle`).
 
 mod bundle;
 pub mod focal;

@@ -1,6 +1,6 @@
 //! The deformed grids of all pictures: one sparse least-squares problem.
 //!
-//! Energies, one file each: alignment of the overlaps ([`alignment`]), and of the grid's edges ([`similarity`]) local
+//! Energies, one file each: alignment of the overlaps (`alignment`), and of the grid's edges (`similarity`) local
 //! similarity and agreement with the similarity prior. Unknown are the vertices of all grids in the panorama.
 //!
 //! # Source

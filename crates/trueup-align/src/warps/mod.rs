@@ -1,0 +1,5 @@
+//! Warp models of a pair that are no mesh energy.
+
+mod sphp;
+
+pub use sphp::SphpWarp;
