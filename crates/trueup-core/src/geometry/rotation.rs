@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, RngExt};
 
-/// The matrix [v]x with `cross_matrix(v) * w == v.cross(w)`.
+/// The cross product with v as a matrix: `cross_matrix(v) * w == v.cross(w)`.
 pub fn cross_matrix(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
