@@ -24,10 +24,12 @@ mod clock;
 mod files;
 mod inputs;
 mod left_out;
+mod matched;
 mod measure;
 mod names;
 mod options;
 mod project;
+mod record;
 mod stitcher;
 
 pub use files::{StitchJob, Written};

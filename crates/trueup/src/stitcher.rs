@@ -4,28 +4,27 @@ use std::collections::BTreeSet;
 
 use trueup_align::stitch_graph::{GraphFile, StitchGraph, parse_graph_file};
 use trueup_compose::exposure::{self, Thumbnail};
-use trueup_compose::layout::{self, CanvasLayout, Placed};
+use trueup_compose::layout::{self, CanvasLayout};
 use trueup_compose::render::{self, Panorama};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::matches::PairMatches;
-use trueup_core::mesh::GridMesh;
-use trueup_core::source::{SourceImage, WorkingFrame};
+use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 use trueup_io::source::{self, RejectedSource, Sources};
 use trueup_vision::features::Features;
 use trueup_vision::{matching, pairing};
 
-use crate::align::{self, Component, Geometry};
+use crate::align::{self, Component};
 use crate::clock::Clock;
 use crate::inputs::{Inputs, Reference};
-use crate::left_out::{self, LeftOut};
-use crate::measure::{self, Measured};
+use crate::left_out::LeftOut;
+use crate::matched::{Matched, no_overlap, none_usable, reason_of_rejected, require_all};
+use crate::measure;
 use crate::names;
 use crate::options::StitchOptions;
-use crate::project::{
-    Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
-};
+use crate::project::Project;
+use crate::record::{fill_geometry, place};
 
 /// Runs the stages with one set of options.
 #[derive(Debug)]
@@ -64,17 +63,6 @@ impl Alignment {
         self.clock.add(stage, duration);
         self.project.seconds.clone_from(self.clock.seconds());
     }
-}
-
-/// Everything known after matching.
-struct Matched {
-    sources: Sources,
-    /// `None` for photographs that could not be decoded, whose reason is in `undecodable`.
-    measured: Vec<Option<Measured>>,
-    undecodable: Vec<Option<Error>>,
-    pairs: Vec<PairMatches>,
-    graph: StitchGraph,
-    graph_file: GraphFile,
 }
 
 impl<'a> Stitcher<'a> {
@@ -293,257 +281,4 @@ impl<'a> Stitcher<'a> {
     fn report_rejected(&self, rejected: &RejectedSource) {
         self.context.report(Diagnostic::warning(&rejected.code, &rejected.name, &rejected.reason, &rejected.hint));
     }
-}
-
-impl Matched {
-    fn names(&self) -> Vec<String> {
-        self.sources.images.iter().map(|image| image.name.clone()).collect()
-    }
-
-    /// The photograph the user calls `name`: by name, by path, or by the end of its path.
-    fn picture_named(&self, name: &str) -> Result<usize> {
-        let called = |image: &SourceImage| image.name == name || image.path.as_os_str() == name;
-        let images = &self.sources.images;
-        images
-            .iter()
-            .position(called)
-            .or_else(|| images.iter().position(|image| image.path.ends_with(name)))
-            .ok_or_else(|| {
-                Error::input(
-                    name,
-                    "no photograph of this name was given, so it cannot be the reference",
-                    "Write the name of one of the photographs, with its extension.",
-                )
-            })
-    }
-
-    fn reference_of(&self, members: &[usize], inputs: &Inputs) -> Result<usize> {
-        let wished = match &inputs.reference {
-            Reference::Named(name) => Some(self.picture_named(name)?),
-            Reference::Auto => self.graph_file.reference,
-        };
-        Ok(wished.filter(|wished| members.contains(wished)).unwrap_or_else(|| self.graph.central_picture(members)))
-    }
-
-    /// The error when not one photograph could be decoded.
-    fn none_usable(&self) -> Error {
-        let undecodable = (0..self.sources.images.len()).map(|index| {
-            let LeftOut { reason, hint, .. } = self.why_left_out(index, &[]);
-            (self.sources.images[index].name.clone(), reason, hint)
-        });
-        none_usable(undecodable.chain(self.sources.rejected.iter().cloned().map(reason_of_rejected)).collect())
-    }
-
-    /// Why a photograph is left out of the panorama at hand: it cannot be read, is in another one of those stitched, or in
-    /// none of them.
-    fn why_left_out(&self, index: usize, stitched: &[Vec<usize>]) -> LeftOut {
-        if let Some(error) = &self.undecodable[index] {
-            let (reason, hint) = match error {
-                Error::Input { reason, hint, .. } => (reason.clone(), hint.clone()),
-                other => (other.to_string(), "Check the file, or copy it again.".to_owned()),
-            };
-            return LeftOut { code: "picture-damaged", reason, hint };
-        }
-        if let Some(position) = stitched.iter().position(|members| members.contains(&index)) {
-            let reason = format!("it is in panorama {} of {}", position + 1, stitched.len());
-            return LeftOut { code: "other-panorama", reason, hint: String::new() };
-        }
-        let component = stitched.first().map_or(&[][..], Vec::as_slice);
-        left_out::explain(index, component, &self.pairs, &self.names())
-    }
-
-    /// The record of all photographs and pairs, without geometry.
-    fn project(&self, options: &StitchOptions, stitched: &[Vec<usize>]) -> Project {
-        let images = self
-            .sources
-            .images
-            .iter()
-            .enumerate()
-            .map(|(index, image)| {
-                let why = self.why_left_out(index, stitched);
-                let component = self.graph.components.iter().position(|component| component.contains(&index));
-                ImageRecord {
-                    width: image.width,
-                    height: image.height,
-                    component: component.filter(|_| self.measured[index].is_some()),
-                    ..left_out_record(image.path.display().to_string(), why.reason, why.hint)
-                }
-            })
-            .chain(self.sources.rejected.iter().map(|rejected| {
-                left_out_record(rejected.path.display().to_string(), rejected.reason.clone(), rejected.hint.clone())
-            }))
-            .collect();
-        let pairs = self.pairs.iter().map(|pair| PairRecord {
-            a: pair.a,
-            b: pair.b,
-            matches: pair.putative,
-            inliers: pair.agreeing,
-            needed: pair.needed,
-            verdict: pair.verdict,
-        });
-        Project {
-            format: PROJECT_FORMAT.to_owned(),
-            version: PROJECT_VERSION,
-            method: trueup_core::options::OptionValue::display(&options.stitch.method),
-            options: options.clone(),
-            reference: String::new(),
-            images,
-            pairs: pairs.collect(),
-            manhattan: ManhattanRecord {
-                divergence: None,
-                threshold: options.similarity.max_divergence,
-                accepted: false,
-                failed_clause: Some("a single photograph is left as it is".to_owned()),
-                dominant: None,
-                inliers: Vec::new(),
-            },
-            canvas: Canvas { width: 0, height: 0 },
-            seconds: std::collections::BTreeMap::new(),
-            diagnostics: Vec::new(),
-        }
-    }
-}
-
-/// Name, reason and hint of an input that cannot be used.
-fn reason_of_rejected(rejected: RejectedSource) -> (String, String, String) {
-    (rejected.name, rejected.reason, rejected.hint)
-}
-
-/// The error when none of the inputs, each with name, reason and hint, can be used.
-fn none_usable(inputs: Vec<(String, String, String)>) -> Error {
-    match inputs.as_slice() {
-        [(name, reason, hint)] => Error::input(name, reason, hint),
-        _ => {
-            let reasons: Vec<String> = inputs.iter().map(|(name, reason, _)| format!("{name}: {reason}")).collect();
-            Error::input(
-                format!("{} files", inputs.len()),
-                format!("none of them can be used: {}", reasons.join("; ")),
-                "Name at least two overlapping photographs, or a folder that holds them.",
-            )
-        }
-    }
-}
-
-fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
-    ImageRecord {
-        path,
-        width: 0,
-        height: 0,
-        status: ImageStatus::LeftOut,
-        reason,
-        hint,
-        component: None,
-        focal_px: None,
-        rotation: None,
-        theta_deg: None,
-        scale: None,
-        gain: None,
-        vanishing_points: None,
-        mesh: None,
-    }
-}
-
-/// The deformed grids over the full-resolution photographs; a single photograph stays as it is.
-fn place(component: &Component, geometry: Option<&Geometry>) -> Vec<Placed> {
-    (0..component.members.len())
-        .map(|k| {
-            let (width, height) = (component.images[k].width as f64, component.images[k].height as f64);
-            let mesh = match geometry {
-                Some(geometry) => GridMesh { width, height, ..geometry.mesh.meshes[k].clone() },
-                None => GridMesh::regular(width, height, width.max(height)),
-            };
-            Placed { photograph: component.members[k], mesh }
-        })
-        .collect()
-}
-
-fn fill_geometry(
-    project: &mut Project,
-    component: &Component,
-    geometry: Option<&Geometry>,
-    layout: &CanvasLayout,
-    gains: &[f64],
-) {
-    project.canvas = Canvas { width: layout.width, height: layout.height };
-    project.reference = component.images[component.reference].path.display().to_string();
-    for (k, &picture) in component.members.iter().enumerate() {
-        let record = &mut project.images[picture];
-        let mesh = &layout.placed[k].mesh;
-        record.status = ImageStatus::Used;
-        record.reason.clear();
-        record.hint.clear();
-        record.gain = Some(gains[k]);
-        record.mesh = Some(MeshRecord {
-            rows: mesh.rows,
-            cols: mesh.columns,
-            source: (0..mesh.len()).map(|vertex| mesh.source(vertex).into()).collect(),
-            target: mesh.target.clone(),
-        });
-        let Some(geometry) = geometry else { continue };
-        let camera = &geometry.cameras.cameras[k];
-        let camera_from_level = camera.rotation() * geometry.prior.level_from_world().transpose();
-        record.focal_px = Some(camera.focal_px / component.frames[k].working_from_full);
-        record.rotation = Some(rows(&camera_from_level));
-        record.theta_deg = Some(geometry.prior.theta[k].to_degrees());
-        record.scale = Some(geometry.prior.scale[k]);
-        record.vanishing_points = geometry.triads[k].triad().map(|triad| {
-            let matrix = triad.matrix();
-            std::array::from_fn(|direction| matrix.column(direction).into_owned().into())
-        });
-    }
-    if let Some(geometry) = geometry {
-        let guidance = &geometry.prior.guidance;
-        project.manhattan = ManhattanRecord {
-            divergence: guidance.divergence,
-            threshold: guidance.threshold,
-            accepted: guidance.used,
-            failed_clause: guidance.failed_clause.clone(),
-            dominant: guidance.dominant,
-            inliers: guidance.inliers.iter().map(|&k| component.images[k].path.display().to_string()).collect(),
-        };
-    }
-}
-
-fn rows(matrix: &nalgebra::Matrix3<f64>) -> [[f64; 3]; 3] {
-    std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
-}
-
-fn no_overlap(matched: &Matched) -> Error {
-    let names = matched.names();
-    let best = matched.pairs.iter().max_by(|one, two| left_out::strength(one).total_cmp(&left_out::strength(two)));
-    let why = match best.filter(|pair| pair.putative > 0) {
-        Some(pair) => format!(
-            "no overlapping photographs found; the best pair is {} and {}: {}",
-            names[pair.a],
-            names[pair.b],
-            left_out::counts(pair)
-        ),
-        None => "no overlapping photographs found".to_owned(),
-    };
-    Error::unsolvable(
-        "matching",
-        format!("{} photographs", names.len()),
-        why,
-        "Photographs must share a third of their view, with detail in it; join pairs by hand in a --graph file.",
-    )
-}
-
-fn require_all(matched: &Matched, stitched: &[Vec<usize>]) -> Result<()> {
-    let used: usize = stitched.iter().map(Vec::len).sum();
-    let given = matched.sources.images.len() + matched.sources.rejected.len();
-    if used == given {
-        return Ok(());
-    }
-    let mut reasons: Vec<String> = (0..matched.sources.images.len())
-        .filter(|index| !stitched.iter().any(|component| component.contains(index)))
-        .map(|index| {
-            format!("{}: {}", matched.sources.images[index].name, matched.why_left_out(index, stitched).reason)
-        })
-        .collect();
-    reasons.extend(matched.sources.rejected.iter().map(|one| format!("{}: {}", one.name, one.reason)));
-    Err(Error::input(
-        format!("{} of {given} photographs", given - used),
-        format!("they cannot be used although all are required: {}", reasons.join("; ")),
-        "Leave --require-all out to stitch the others.",
-    ))
 }

@@ -7,6 +7,8 @@ use trueup_core::camera::Camera;
 use trueup_core::geometry::rotation_about_x;
 use trueup_core::mesh::GridMesh;
 
+use super::complex::{conjugate_product, product};
+
 use crate::similarity::SimilarityPrior;
 
 trueup_core::choice! {
@@ -109,7 +111,7 @@ impl Base {
             return plain;
         }
         let at_centre = derivative_at_centre(shape, &view.level_from_camera, camera.focal_px);
-        let turn = product(similarity, Vector2::new(at_centre.x, -at_centre.y)).normalize();
+        let turn = conjugate_product(at_centre, similarity).normalize();
         Self { factor: turn * wanted.units_per_radian, sphere: Some(view) }
     }
 
@@ -190,11 +192,6 @@ fn derivative_at_centre(shape: BaseShape, level_from_camera: &Matrix3<f64>, foca
     };
     let (dx, dy) = (derivative(0), derivative(1));
     Vector2::new(0.5 * (dx.x + dy.y), 0.5 * (dx.y - dy.x))
-}
-
-/// a b of complex numbers.
-fn product(a: Vector2<f64>, b: Vector2<f64>) -> Vector2<f64> {
-    Vector2::new(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x)
 }
 
 #[cfg(test)]

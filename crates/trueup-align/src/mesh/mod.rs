@@ -8,6 +8,7 @@
 
 mod alignment;
 mod base;
+mod complex;
 mod normal_equations;
 mod similarity;
 

@@ -6,6 +6,8 @@ use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
+use super::complex::conjugate_product;
+
 /// Largest distance, in grid steps along an axis, of two vertices that one energy row couples.
 const REACH: usize = 3;
 const SPAN: usize = 2 * REACH + 1;
@@ -251,9 +253,4 @@ fn by_column(blocks: &[(u32, u32, Block)], columns: usize) -> Vec<(u32, u32, Blo
         *place += 1;
     }
     sorted
-}
-
-/// conj(a) b of complex numbers.
-fn conjugate_product(a: Vector2<f64>, b: Vector2<f64>) -> Vector2<f64> {
-    Vector2::new(a.x * b.x + a.y * b.y, a.x * b.y - a.y * b.x)
 }

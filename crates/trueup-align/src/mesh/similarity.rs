@@ -4,6 +4,8 @@
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
+use super::complex::product;
+
 use super::normal_equations::Coefficient;
 use super::{MeshOptions, NormalEquations, PUBLISHED_CELL_PX};
 
@@ -147,9 +149,4 @@ impl<'a> SimilarityEnergy<'a> {
         found.retain(|&vertex| vertex != a);
         found
     }
-}
-
-/// a b of complex numbers.
-fn product(a: Vector2<f64>, b: Vector2<f64>) -> Vector2<f64> {
-    Vector2::new(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x)
 }

@@ -9,17 +9,7 @@ use super::*;
 
 /// Rotation of the similarity that maps a grid best onto its target, in degrees.
 fn rotation_deg(mesh: &GridMesh) -> f64 {
-    let count = mesh.len() as f64;
-    let source: Vec<Vector2<f64>> = (0..mesh.len()).map(|k| mesh.source(k)).collect();
-    let target: Vec<Vector2<f64>> = mesh.target.iter().map(|&v| Vector2::from(v)).collect();
-    let (source_mean, target_mean) =
-        (source.iter().sum::<Vector2<f64>>() / count, target.iter().sum::<Vector2<f64>>() / count);
-    let (mut cross, mut dot) = (0.0, 0.0);
-    for (s, t) in source.iter().zip(&target) {
-        cross += (s - source_mean).perp(&(t - target_mean));
-        dot += (s - source_mean).dot(&(t - target_mean));
-    }
-    cross.atan2(dot).to_degrees()
+    crate::metrics::best_rotation(mesh).to_degrees()
 }
 
 /// Two 400 x 300 pictures 20 degrees apart, rolled by 5 and 17 degrees, as in the numeric check of the specification.

@@ -1,0 +1,148 @@
+//! Fills the project: what is recorded of photographs, pairs and geometry.
+
+use trueup_compose::layout::{CanvasLayout, Placed};
+use trueup_core::mesh::GridMesh;
+
+use crate::align::{Component, Geometry};
+use crate::matched::Matched;
+use crate::options::StitchOptions;
+use crate::project::{
+    Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
+};
+
+impl Matched {
+    /// The record of all photographs and pairs, without geometry.
+    pub fn project(&self, options: &StitchOptions, stitched: &[Vec<usize>]) -> Project {
+        let images = self
+            .sources
+            .images
+            .iter()
+            .enumerate()
+            .map(|(index, image)| {
+                let why = self.why_left_out(index, stitched);
+                let component = self.graph.components.iter().position(|component| component.contains(&index));
+                ImageRecord {
+                    width: image.width,
+                    height: image.height,
+                    component: component.filter(|_| self.measured[index].is_some()),
+                    ..left_out_record(image.path.display().to_string(), why.reason, why.hint)
+                }
+            })
+            .chain(self.sources.rejected.iter().map(|rejected| {
+                left_out_record(rejected.path.display().to_string(), rejected.reason.clone(), rejected.hint.clone())
+            }))
+            .collect();
+        let pairs = self.pairs.iter().map(|pair| PairRecord {
+            a: pair.a,
+            b: pair.b,
+            matches: pair.putative,
+            inliers: pair.agreeing,
+            needed: pair.needed,
+            verdict: pair.verdict,
+        });
+        Project {
+            format: PROJECT_FORMAT.to_owned(),
+            version: PROJECT_VERSION,
+            method: trueup_core::options::OptionValue::display(&options.stitch.method),
+            options: options.clone(),
+            reference: String::new(),
+            images,
+            pairs: pairs.collect(),
+            manhattan: ManhattanRecord {
+                divergence: None,
+                threshold: options.similarity.max_divergence,
+                accepted: false,
+                failed_clause: Some("a single photograph is left as it is".to_owned()),
+                dominant: None,
+                inliers: Vec::new(),
+            },
+            canvas: Canvas { width: 0, height: 0 },
+            seconds: std::collections::BTreeMap::new(),
+            diagnostics: Vec::new(),
+        }
+    }
+}
+
+fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
+    ImageRecord {
+        path,
+        width: 0,
+        height: 0,
+        status: ImageStatus::LeftOut,
+        reason,
+        hint,
+        component: None,
+        focal_px: None,
+        rotation: None,
+        theta_deg: None,
+        scale: None,
+        gain: None,
+        vanishing_points: None,
+        mesh: None,
+    }
+}
+
+/// The deformed grids over the full-resolution photographs; a single photograph stays as it is.
+pub(crate) fn place(component: &Component, geometry: Option<&Geometry>) -> Vec<Placed> {
+    (0..component.members.len())
+        .map(|k| {
+            let (width, height) = (component.images[k].width as f64, component.images[k].height as f64);
+            let mesh = match geometry {
+                Some(geometry) => GridMesh { width, height, ..geometry.mesh.meshes[k].clone() },
+                None => GridMesh::regular(width, height, width.max(height)),
+            };
+            Placed { photograph: component.members[k], mesh }
+        })
+        .collect()
+}
+
+pub(crate) fn fill_geometry(
+    project: &mut Project,
+    component: &Component,
+    geometry: Option<&Geometry>,
+    layout: &CanvasLayout,
+    gains: &[f64],
+) {
+    project.canvas = Canvas { width: layout.width, height: layout.height };
+    project.reference = component.images[component.reference].path.display().to_string();
+    for (k, &picture) in component.members.iter().enumerate() {
+        let record = &mut project.images[picture];
+        let mesh = &layout.placed[k].mesh;
+        record.status = ImageStatus::Used;
+        record.reason.clear();
+        record.hint.clear();
+        record.gain = Some(gains[k]);
+        record.mesh = Some(MeshRecord {
+            rows: mesh.rows,
+            cols: mesh.columns,
+            source: (0..mesh.len()).map(|vertex| mesh.source(vertex).into()).collect(),
+            target: mesh.target.clone(),
+        });
+        let Some(geometry) = geometry else { continue };
+        let camera = &geometry.cameras.cameras[k];
+        let camera_from_level = camera.rotation() * geometry.prior.level_from_world().transpose();
+        record.focal_px = Some(camera.focal_px / component.frames[k].working_from_full);
+        record.rotation = Some(rows(&camera_from_level));
+        record.theta_deg = Some(geometry.prior.theta[k].to_degrees());
+        record.scale = Some(geometry.prior.scale[k]);
+        record.vanishing_points = geometry.triads[k].triad().map(|triad| {
+            let matrix = triad.matrix();
+            std::array::from_fn(|direction| matrix.column(direction).into_owned().into())
+        });
+    }
+    if let Some(geometry) = geometry {
+        let guidance = &geometry.prior.guidance;
+        project.manhattan = ManhattanRecord {
+            divergence: guidance.divergence,
+            threshold: guidance.threshold,
+            accepted: guidance.used,
+            failed_clause: guidance.failed_clause.clone(),
+            dominant: guidance.dominant,
+            inliers: guidance.inliers.iter().map(|&k| component.images[k].path.display().to_string()).collect(),
+        };
+    }
+}
+
+fn rows(matrix: &nalgebra::Matrix3<f64>) -> [[f64; 3]; 3] {
+    std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
+}
