@@ -104,7 +104,7 @@ pub(crate) fn run(
 ) -> Result<Geometry> {
     let names = component.names();
     let priors = component.camera_priors();
-    let cameras = clock.time("cameras", || {
+    let cameras = in_one_step("cameras", context, clock, || {
         cameras::run(&priors, &names, &component.pairs, component.reference, &options.cameras, context)
     })?;
     let pairs: Vec<PairMatches> = (0..component.pairs.len())
@@ -120,7 +120,7 @@ pub(crate) fn run(
         match_points::run(&component.frames, &grids, &cameras.cameras, &pairs, &options.match_points, context)
     })?;
     let triads = clock.time("vanishing points", || find_triads(component, &cameras, options, context))?;
-    let prior = clock.time("prior", || {
+    let prior = in_one_step("prior", context, clock, || {
         let input = PriorInput {
             cameras: &cameras.cameras,
             triads: &triads,
@@ -147,8 +147,19 @@ pub(crate) fn run(
         }
     };
     let bases = mesh::bases(options.mesh.base, &cameras.cameras, &grids, &prior);
-    let mesh = clock.time("mesh", || mesh::run(&grids, &kept, &bases, component.reference, &options.mesh, context))?;
+    let mesh = in_one_step("mesh", context, clock, || {
+        mesh::run(&grids, &kept, &bases, component.reference, &options.mesh, context)
+    })?;
     Ok(Geometry { cameras, triads, prior, mesh })
+}
+
+/// Times a stage that is one step and reports it as such.
+fn in_one_step<T>(stage: &str, context: &StageContext, clock: &mut Clock, work: impl FnOnce() -> T) -> T {
+    context.progress().begin(stage, 1);
+    let result = clock.time(stage, work);
+    context.progress().advance(stage, 1);
+    context.progress().finish(stage);
+    result
 }
 
 fn find_triads(
