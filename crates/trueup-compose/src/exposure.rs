@@ -146,10 +146,7 @@ fn check(
     reference: usize,
     options: &ExposureOptions,
 ) -> Result<()> {
-    let invalid = options.invalid();
-    if !invalid.is_empty() {
-        return Err(Error::Options(invalid));
-    }
+    options.check()?;
     layout.placed.iter().try_for_each(check_mesh)?;
     let usable = |thumbnail: &Thumbnail| {
         thumbnail.raster.channels() == 3

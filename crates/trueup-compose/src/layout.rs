@@ -60,7 +60,7 @@ pub fn run(
     options: &CanvasOptions,
     context: &StageContext,
 ) -> Result<CanvasLayout> {
-    check_options(options)?;
+    options.check()?;
     for item in &placed {
         check_mesh(item)?;
     }
@@ -110,11 +110,6 @@ pub fn run(
         *vertex = ((Vector2::from(*vertex) - low) * canvas_from_target).into();
     }
     Ok(CanvasLayout { width: width as usize, height: height as usize, canvas_from_target, placed })
-}
-
-fn check_options(options: &CanvasOptions) -> Result<()> {
-    let invalid = options.invalid();
-    if invalid.is_empty() { Ok(()) } else { Err(Error::Options(invalid)) }
 }
 
 /// Refuses grids no later step could walk.

@@ -156,10 +156,7 @@ pub fn run(
 }
 
 fn check(layout: &CanvasLayout, gains: &[f64], options: &RenderOptions) -> Result<()> {
-    let invalid = options.invalid();
-    if !invalid.is_empty() {
-        return Err(Error::Options(invalid));
-    }
+    options.check()?;
     layout.placed.iter().try_for_each(check_mesh)?;
     if gains.len() != layout.placed.len() || gains.iter().any(|gain| !(gain.is_finite() && *gain > 0.0)) {
         return Err(Error::input(

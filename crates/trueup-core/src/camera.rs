@@ -3,6 +3,8 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::geometry::{matrix_from_rows, rows_of};
+
 /// A rotating pinhole camera: square pixels, no skew, no lens distortion, principal point at the picture's centre.
 ///
 /// Bearings `(u - c_x, v - c_y, f)` are in the camera frame (x right, y down, z forward).
@@ -19,25 +21,17 @@ pub struct Camera {
 impl Camera {
     /// A camera of focal length `focal_px` looking at the centre of a `width` x `height` picture.
     pub fn new(focal_px: f64, width: f64, height: f64, camera_from_world: &Matrix3<f64>) -> Self {
-        let mut camera =
-            Self { focal_px, principal_point: [width / 2.0, height / 2.0], camera_from_world: [[0.0; 3]; 3] };
-        camera.set_rotation(camera_from_world);
-        camera
+        Self { focal_px, principal_point: [width / 2.0, height / 2.0], camera_from_world: rows_of(camera_from_world) }
     }
 
     /// The rotation from world to camera.
     pub fn rotation(&self) -> Matrix3<f64> {
-        let rows = &self.camera_from_world;
-        Matrix3::from_fn(|row, column| rows[row][column])
+        matrix_from_rows(&self.camera_from_world)
     }
 
     /// Replaces the rotation from world to camera.
     pub fn set_rotation(&mut self, camera_from_world: &Matrix3<f64>) {
-        for row in 0..3 {
-            for column in 0..3 {
-                self.camera_from_world[row][column] = camera_from_world[(row, column)];
-            }
-        }
+        self.camera_from_world = rows_of(camera_from_world);
     }
 
     /// The bearing of a pixel in the camera frame, z = 1 (not normalised).

@@ -25,8 +25,6 @@ pub enum PairVerdict {
     ImplausibleHomography,
     /// Too few of the matches in the predicted overlap agree.
     TooFewInliers,
-    /// Too few, and many candidates elsewhere: the pair was not tried because a quick look found nothing.
-    NotProposed,
 }
 
 impl PairVerdict {

@@ -8,6 +8,8 @@ use std::fmt;
 
 use serde::Serialize;
 
+use crate::error::{Error, Result};
+
 /// The values an option may take.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Allowed {
@@ -107,6 +109,15 @@ pub trait StageOptions: Default {
 
     /// The options outside their ranges; empty when all is well.
     fn invalid(&self) -> Vec<InvalidOption>;
+
+    /// Refuses options outside their ranges.
+    ///
+    /// # Errors
+    /// [`Error::Options`] with all of them.
+    fn check(&self) -> Result<()> {
+        let invalid = self.invalid();
+        if invalid.is_empty() { Ok(()) } else { Err(Error::Options(invalid)) }
+    }
 
     /// A row per option, in the order of declaration, with the defaults.
     fn describe() -> Vec<OptionDescription>;

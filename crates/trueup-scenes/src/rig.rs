@@ -2,10 +2,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
+use trueup_core::Result;
 use trueup_core::camera::Camera;
+use trueup_core::geometry::roll_from_down;
 use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z};
 use trueup_core::options::StageOptions;
-use trueup_core::{Error, Result};
 
 use crate::dice::Dice;
 use crate::scene::Viewpoint;
@@ -105,8 +106,7 @@ impl PosedCamera {
     /// The angle at which the world's vertical shows in the picture: from the picture's down towards its right,
     /// radians. Turning the picture clockwise by it puts the vertical upright.
     pub fn vertical_angle(&self) -> f64 {
-        let down = self.camera.rotation() * Vector3::y();
-        down.x.atan2(down.y)
+        roll_from_down(&(self.camera.rotation() * Vector3::y()))
     }
 }
 
@@ -129,10 +129,7 @@ pub fn camera_from_world(yaw_deg: f64, pitch_deg: f64, roll_deg: f64) -> Matrix3
 /// # Errors
 /// [`Error::Options`] listing every option outside its range.
 pub fn rig(options: &RigOptions, viewpoint: &Viewpoint) -> Result<Vec<PosedCamera>> {
-    let invalid = options.invalid();
-    if !invalid.is_empty() {
-        return Err(Error::Options(invalid));
-    }
+    options.check()?;
     let columns = options.pictures.div_ceil(options.rows);
     Ok((0..options.pictures).map(|index| posed(options, viewpoint, index, columns)).collect())
 }

@@ -8,7 +8,7 @@ use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points;
 use trueup_align::mesh::{self, WarpedMesh};
 use trueup_align::similarity::{self, PriorInput, SimilarityPrior};
-use trueup_align::stitch_graph::{GraphEdge, StitchGraph};
+use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::{self, TriadOutcome};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::lines::LineSegment;
@@ -199,15 +199,8 @@ fn name_seed(path: &Path) -> u64 {
 }
 
 fn report_cut(cut: &FullTurnCut, component: &Component, context: &StageContext) {
-    let graph = StitchGraph::from_edges(
-        component.images.len(),
-        cut.severed.iter().map(|&(a, b)| GraphEdge { a, b, weight: 1 }).collect(),
-    );
-    let pairs: Vec<String> = graph
-        .edges
-        .iter()
-        .map(|edge| format!("{} - {}", component.images[edge.a].name, component.images[edge.b].name))
-        .collect();
+    let name = |k: usize| &component.images[k].name;
+    let pairs: Vec<String> = cut.severed.iter().map(|&(a, b)| format!("{} - {}", name(a), name(b))).collect();
     context.report(Diagnostic::note(
         "full-turn",
         "mesh",

@@ -48,7 +48,7 @@ impl StitchJob {
         options.validate()?;
         encode::check_writable(&self.output)?;
         if let Some(project) = &self.project {
-            check_folder(project)?;
+            encode::check_place(project)?;
         }
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads)
@@ -109,18 +109,6 @@ fn spare_photographs(output: &Path, project: &Project) -> Result<()> {
             "Give the panorama another name or folder, or move an older panorama away from the photographs.",
         )),
     }
-}
-
-fn check_folder(path: &Path) -> Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if folder.is_dir() {
-        return Ok(());
-    }
-    Err(Error::input(
-        path.display(),
-        format!("the folder {} does not exist", folder.display()),
-        "Create it, or choose another place for the project file.",
-    ))
 }
 
 #[cfg(test)]

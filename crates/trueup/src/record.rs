@@ -1,6 +1,7 @@
 //! Fills the project: what is recorded of photographs, pairs and geometry.
 
 use trueup_compose::layout::{CanvasLayout, Placed};
+use trueup_core::geometry::rows_of;
 use trueup_core::mesh::GridMesh;
 
 use crate::align::{Component, Geometry};
@@ -11,21 +12,28 @@ use crate::project::{
 };
 
 impl Matched {
-    /// The record of all photographs and pairs, without geometry.
-    pub fn project(&self, options: &StitchOptions, stitched: &[Vec<usize>]) -> Project {
+    /// The record of all photographs and pairs, without geometry, for the panorama of `members`; `stitched` are the
+    /// members of all panoramas.
+    pub fn project(&self, options: &StitchOptions, members: &[usize], stitched: &[Vec<usize>]) -> Project {
         let images = self
             .sources
             .images
             .iter()
             .enumerate()
             .map(|(index, image)| {
-                let why = self.why_left_out(index, stitched);
+                let (reason, hint) = match members.contains(&index) {
+                    true => Default::default(),
+                    false => {
+                        let why = self.why_left_out(index, stitched);
+                        (why.reason, why.hint)
+                    }
+                };
                 let component = self.graph.components.iter().position(|component| component.contains(&index));
                 ImageRecord {
                     width: image.width,
                     height: image.height,
                     component: component.filter(|_| self.measured[index].is_some()),
-                    ..left_out_record(image.path.display().to_string(), why.reason, why.hint)
+                    ..left_out_record(image.path.display().to_string(), reason, hint)
                 }
             })
             .chain(self.sources.rejected.iter().map(|rejected| {
@@ -109,8 +117,6 @@ pub(crate) fn fill_geometry(
         let record = &mut project.images[picture];
         let mesh = &layout.placed[k].mesh;
         record.status = ImageStatus::Used;
-        record.reason.clear();
-        record.hint.clear();
         record.gain = Some(gains[k]);
         record.mesh = Some(MeshRecord {
             rows: mesh.rows,
@@ -122,7 +128,7 @@ pub(crate) fn fill_geometry(
         let camera = &geometry.cameras.cameras[k];
         let camera_from_level = camera.rotation() * geometry.prior.level_from_world().transpose();
         record.focal_px = Some(camera.focal_px / component.frames[k].working_from_full);
-        record.rotation = Some(rows(&camera_from_level));
+        record.rotation = Some(rows_of(&camera_from_level));
         record.theta_deg = Some(geometry.prior.theta[k].to_degrees());
         record.scale = Some(geometry.prior.scale[k]);
         record.vanishing_points = geometry.triads[k].triad().map(|triad| {
@@ -141,8 +147,4 @@ pub(crate) fn fill_geometry(
             inliers: guidance.inliers.iter().map(|&k| component.images[k].path.display().to_string()).collect(),
         };
     }
-}
-
-fn rows(matrix: &nalgebra::Matrix3<f64>) -> [[f64; 3]; 3] {
-    std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
 }

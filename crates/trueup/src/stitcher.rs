@@ -268,7 +268,7 @@ impl<'a> Stitcher<'a> {
                 exposure::run(&layout, &thumbnails, component.reference, &self.options.exposure, self.context)
             })?
             .gains;
-        let mut project = matched.project(self.options, stitched);
+        let mut project = matched.project(self.options, members, stitched);
         fill_geometry(&mut project, &component, geometry.as_ref(), &layout, &gains);
         project.seconds.clone_from(clock.seconds());
         Ok(Alignment { project, layout, gains, photographs: photographs.clone(), clock })

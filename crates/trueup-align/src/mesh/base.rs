@@ -4,7 +4,7 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 use trueup_core::camera::Camera;
-use trueup_core::geometry::rotation_about_x;
+use trueup_core::geometry::{roll_from_down, rotation_about_x};
 use trueup_core::mesh::GridMesh;
 
 use super::complex::{conjugate_product, product};
@@ -49,7 +49,7 @@ pub fn bases(shape: BaseShape, cameras: &[Camera], grids: &[GridMesh], prior: &S
             // The prior's deviation from the cameras' own roll holds in the tilted frame too.
             let down = cameras[k].rotation() * frame.row(1).transpose();
             let theta = match tilt {
-                Some(_) => down.x.atan2(down.y) + prior.theta[k] - prior.roll[k],
+                Some(_) => roll_from_down(&down) + prior.theta[k] - prior.roll[k],
                 None => prior.theta[k],
             };
             let wanted = WantedSimilarity { scale: prior.scale[k], theta, units_per_radian };

@@ -2,14 +2,13 @@
 
 use geo::{ConvexHull, MultiPoint};
 use nalgebra::{Matrix3, Vector2, Vector3};
-use trueup_core::geometry::wrap_angle;
+use trueup_core::geometry::{roll_from_down, wrap_angle};
 use trueup_core::mesh::GridMesh;
 
 /// gamma_i: the angle in the picture between its downward axis and the world's vertical, radians; the clockwise turn that
 /// stands the picture upright. `camera_from_world` must belong to a level world (y down).
 pub fn vertical_angle(camera_from_world: &Matrix3<f64>) -> f64 {
-    let down = camera_from_world * Vector3::y();
-    down.x.atan2(down.y)
+    roll_from_down(&(camera_from_world * Vector3::y()))
 }
 
 /// Clockwise rotation of the similarity that maps a grid best onto its target, radians.

@@ -24,14 +24,14 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
 use trueup_core::diagnostics::Diagnostic;
-use trueup_core::geometry::wrap_angle;
+use trueup_core::geometry::{matrix_from_rows, roll_from_down, rows_of, wrap_angle};
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 
 use crate::match_points::OverlapWarp;
-use crate::vanishing::{TriadOutcome, VanishingOptions, matrix_from_rows};
+use crate::vanishing::{TriadOutcome, VanishingOptions};
 
 trueup_core::choice! {
     /// Where the turns and scales come from.
@@ -238,13 +238,12 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     let guided = guided.unwrap_or_else(|| fallback(input, &rotations, &level));
     let level_from_world = straighten::level_from_world(&guided.down, &rotations);
     let mut guidance = guidance;
-    guidance.dominant =
-        guidance.dominant.map(|world| crate::vanishing::rows_of(&(level_from_world * matrix_from_rows(&world))));
+    guidance.dominant = guidance.dominant.map(|world| rows_of(&(level_from_world * matrix_from_rows(&world))));
     Ok(SimilarityPrior {
         theta: guided.theta.iter().map(|theta| wrap_angle(theta + input.turn)).collect(),
         scale: scale::scales(input.edges, &focals),
         guidance,
-        level_from_world: crate::vanishing::rows_of(&level_from_world),
+        level_from_world: rows_of(&level_from_world),
         roll: rolls(&guided.down, &rotations),
     })
 }
@@ -259,7 +258,7 @@ struct Upright {
 
 /// The roll of each camera for a vertical in their world.
 fn rolls(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> Vec<f64> {
-    rotations.iter().map(|rotation| vertical::plane_roll(&(rotation * down))).collect()
+    rotations.iter().map(|rotation| roll_from_down(&(rotation * down))).collect()
 }
 
 /// Straightened cameras, corrected where an overlap contradicts them.

@@ -10,7 +10,8 @@ use trueup_core::matches::{PairMatches, PairVerdict, PointMatch};
 use trueup_core::source::WorkingFrame;
 
 use super::{PriorInput, SimilarityOptions, SimilarityPrior, run};
-use crate::vanishing::{Triad, TriadOutcome, VanishingOptions, rows_of};
+use crate::vanishing::{Triad, TriadOutcome, VanishingOptions};
+use trueup_core::geometry::rows_of;
 
 /// A normally distributed number (Box and Muller).
 pub(crate) fn normal(generator: &mut impl Rng) -> f64 {

@@ -8,7 +8,7 @@ use trueup_core::matches::PointMatch;
 
 use super::synthetic::{Scene, Sweep, World, joined, noise_rotation, picture_lines};
 use super::*;
-use crate::vanishing::rows_of;
+use trueup_core::geometry::{roll_from_down, rows_of};
 
 const CLEAN: World = World::Manhattan { noise_deg: 0.0, bad_share: 0.0 };
 
@@ -46,7 +46,7 @@ fn one_camera_of_known_roll_is_told_to_turn_by_it() {
         * rotation_about_x(-12_f64.to_radians())
         * rotation_about_z(17_f64.to_radians());
     let down = world_from_camera.transpose() * Vector3::y();
-    assert!((vertical::plane_roll(&down).to_degrees() - 17.0).abs() < 1e-9);
+    assert!((roll_from_down(&down).to_degrees() - 17.0).abs() < 1e-9);
     assert!(vertical::roll_of(&Vector3::new(0.01, 0.1, 1.0)).is_none());
 }
 

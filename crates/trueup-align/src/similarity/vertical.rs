@@ -1,6 +1,7 @@
 //! Which dominant direction is the vertical, and what roll a vertical means for a picture.
 
 use nalgebra::{Matrix3, Vector3};
+use trueup_core::geometry::roll_from_down;
 
 /// Difference of mean squared cosines within which two directions are equally perpendicular to the cameras' x axes.
 const TIE: f64 = 0.05;
@@ -38,10 +39,5 @@ pub(super) fn vertical_of(frame: &Matrix3<f64>, rotations: &[Matrix3<f64>]) -> V
 /// picture must be turned clockwise to stand upright. `None` if the camera looks within 15 degrees of straight up or
 /// down.
 pub(super) fn roll_of(down: &Vector3<f64>) -> Option<f64> {
-    (down.x.hypot(down.y) >= MIN_SINE * down.norm()).then(|| plane_roll(down))
-}
-
-/// [`roll_of`] however steep the camera; 0 straight up or down.
-pub(super) fn plane_roll(down: &Vector3<f64>) -> f64 {
-    down.x.atan2(down.y)
+    (down.x.hypot(down.y) >= MIN_SINE * down.norm()).then(|| roll_from_down(down))
 }

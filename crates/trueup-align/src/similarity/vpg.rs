@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
-use trueup_core::geometry::wrap_angle;
+use trueup_core::geometry::{rows_of, wrap_angle};
 use trueup_core::{Result, StageContext};
 
 use super::dominant::{Dominant, dominant_frame};
@@ -15,7 +15,7 @@ use super::vertical::{roll_of, vertical_of};
 use super::vertical_vote::{VerticalPeak, vertical_peak};
 use super::weighted_solve::{DataTerm, TurnTerm, solve_unit_vectors};
 use super::{BetaMode, Guidance, PriorInput, STAGE, SimilarityOptions, Upright, rolls};
-use crate::vanishing::{InterpretationPlanes, RefinedTriad, rows_of};
+use crate::vanishing::{InterpretationPlanes, RefinedTriad};
 
 /// Share of a picture's best score that its search near the dominant directions must reach to replace its triad.
 const REDETECTION_SHARE: f64 = 0.9;

@@ -18,6 +18,7 @@ mod tests;
 use nalgebra::{Matrix3, Vector3};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
+use trueup_core::geometry::{matrix_from_rows, rows_of};
 use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
 
@@ -234,14 +235,4 @@ fn roll_sd(triad: &Matrix3<f64>, column: usize, covariance: &Matrix3<f64>) -> f6
     let squared = g.x * g.x + g.y * g.y;
     let gradient = (derivative.row(0) * g.y - derivative.row(1) * g.x) / squared;
     (gradient * covariance * gradient.transpose())[(0, 0)].max(0.0).sqrt()
-}
-
-/// The rows of a matrix.
-pub(crate) fn rows_of(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
-    std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
-}
-
-/// The matrix of given rows.
-pub(crate) fn matrix_from_rows(rows: &[[f64; 3]; 3]) -> Matrix3<f64> {
-    Matrix3::from_fn(|row, column| rows[row][column])
 }

@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 
+use super::rotation::{matrix_from_rows, rows_of};
+
 /// A projective map of the plane, `target_from_source`, scaled so that its largest entry has modulus about 1 or its
 /// last entry is 1 where that is well away from zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,12 +17,12 @@ impl Homography {
 
     /// From rows.
     pub fn from_rows(rows: &[[f64; 3]; 3]) -> Self {
-        Self(Matrix3::from_fn(|row, column| rows[row][column]))
+        Self(matrix_from_rows(rows))
     }
 
     /// To rows.
     pub fn to_rows(self) -> [[f64; 3]; 3] {
-        std::array::from_fn(|row| std::array::from_fn(|column| self.0[(row, column)]))
+        rows_of(&self.0)
     }
 
     /// The denominator w = h31 x + h32 y + h33 at a point; its sign tells the side of the horizon.

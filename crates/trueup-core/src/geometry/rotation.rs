@@ -8,6 +8,22 @@ pub fn cross_matrix(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
 
+/// The rows of a matrix, as records and files hold them.
+pub fn rows_of(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
+}
+
+/// The matrix of given rows.
+pub fn matrix_from_rows(rows: &[[f64; 3]; 3]) -> Matrix3<f64> {
+    Matrix3::from_fn(|row, column| rows[row][column])
+}
+
+/// The roll of a camera that sees "down" in direction `down` of its own frame: the clockwise turn, in radians, that stands
+/// its picture upright. 0 straight up or down.
+pub fn roll_from_down(down: &Vector3<f64>) -> f64 {
+    down.x.atan2(down.y)
+}
+
 /// The rotation by |v| radians about v (Rodrigues).
 pub fn exp_rotation(v: &Vector3<f64>) -> Matrix3<f64> {
     const SMALL: f64 = 1e-12;

@@ -102,10 +102,7 @@ trueup_core::options! {
 /// pictures larger than the format can hold; [`Error::Input`] for an empty picture or a folder that does not exist;
 /// [`Error::Io`] if the operating system refuses; [`Error::Cancelled`].
 pub fn write(path: &Path, picture: &dyn RowSource, options: &OutputOptions, context: &StageContext) -> Result<u64> {
-    let invalid = options.invalid();
-    if !invalid.is_empty() {
-        return Err(Error::Options(invalid));
-    }
+    options.check()?;
     let format = output_format(path)?;
     check_size(path, format, picture.width(), picture.height())?;
     let mut pending = PendingFile::create(path)?;
@@ -129,6 +126,15 @@ pub fn write(path: &Path, picture: &dyn RowSource, options: &OutputOptions, cont
 /// As [`write()`].
 pub fn check_writable(path: &Path) -> Result<()> {
     output_format(path)?;
+    check_place(path)
+}
+
+/// Checks that a file of any kind could be written to `path`: the folder exists and takes files, and `path` is no folder
+/// itself. Nothing is left behind.
+///
+/// # Errors
+/// As [`write_atomically`].
+pub fn check_place(path: &Path) -> Result<()> {
     PendingFile::create(path).map(drop)
 }
 

@@ -109,10 +109,7 @@ impl Rejection {
 /// # Errors
 /// [`Error::Options`] for options out of range, [`Error::Cancelled`]. Never for what is in the files.
 pub fn scan(inputs: &[String], options: &SourceOptions, context: &StageContext) -> Result<Sources> {
-    let invalid = options.invalid();
-    if !invalid.is_empty() {
-        return Err(Error::Options(invalid));
-    }
+    options.check()?;
     let candidates = inputs::expand(inputs);
     let paths: Vec<&Path> = candidates.iter().map(Candidate::path).collect();
     let names = names::unique_names(&paths);

@@ -8,8 +8,8 @@ mod street;
 mod wall;
 
 use nalgebra::Vector3;
+use trueup_core::Result;
 use trueup_core::options::StageOptions;
-use trueup_core::{Error, Result};
 
 use crate::bvh::{Hierarchy, Ray};
 use crate::colour::{Rgb, luminance};
@@ -84,10 +84,7 @@ impl Scene {
     /// # Errors
     /// [`Error::Options`] listing every option outside its range.
     pub fn new(options: &SceneOptions) -> Result<Self> {
-        let invalid = options.invalid();
-        if !invalid.is_empty() {
-            return Err(Error::Options(invalid));
-        }
+        options.check()?;
         let builder = match options.kind {
             SceneKind::Room => room::build(options.seed),
             SceneKind::Street => street::build(options.seed),

@@ -171,10 +171,7 @@ fn described(
 }
 
 fn check(image: &Raster<f32>, options: &FeatureOptions) -> Result<()> {
-    let invalid = options.invalid();
-    if !invalid.is_empty() {
-        return Err(Error::Options(invalid));
-    }
+    options.check()?;
     if image.channels() != 1 {
         return Err(Error::input(
             "picture for feature detection",

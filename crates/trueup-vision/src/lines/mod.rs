@@ -121,10 +121,7 @@ pub fn detect(image: &Raster<f32>, options: &LineOptions, context: &StageContext
 }
 
 fn check(image: &Raster<f32>, options: &LineOptions) -> Result<()> {
-    let invalid = options.invalid();
-    if !invalid.is_empty() {
-        return Err(Error::Options(invalid));
-    }
+    options.check()?;
     // An empty raster has no meaningful number of channels.
     if image.channels() != 1 && !image.data().is_empty() {
         return Err(Error::input(

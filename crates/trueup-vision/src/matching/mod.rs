@@ -244,10 +244,7 @@ fn scaled_rows(map: &Homography) -> [[f64; 3]; 3] {
 }
 
 fn check(a: Picture<'_>, b: Picture<'_>, options: &MatchingOptions) -> Result<()> {
-    let invalid = options.invalid();
-    if !invalid.is_empty() {
-        return Err(Error::Options(invalid));
-    }
+    options.check()?;
     if a.index == b.index {
         return Err(Error::input(
             format!("picture {}", a.index),

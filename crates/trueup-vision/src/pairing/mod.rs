@@ -6,7 +6,7 @@ mod tests;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_core::options::StageOptions;
-use trueup_core::{Error, Result, StageContext};
+use trueup_core::{Result, StageContext};
 
 use crate::features::Features;
 use crate::matching::{MatchingOptions, check_features, putative_matches};
@@ -44,10 +44,7 @@ pub struct CandidatePairs {
 /// Brown and Lowe (section 3.1) take the 6 neighbours with most matches; we take 8, as the quick look is coarser, and
 /// propose consecutive pictures, which photographers overlap.
 pub fn propose(features: &[Features], options: &PairingOptions, context: &StageContext<'_>) -> Result<CandidatePairs> {
-    let invalid = options.invalid();
-    if !invalid.is_empty() {
-        return Err(Error::Options(invalid));
-    }
+    options.check()?;
     let count = features.len();
     if count <= options.exhaustive_up_to {
         return Ok(CandidatePairs { pairs: all_pairs(count), exhaustive: true });

@@ -1,5 +1,7 @@
 use rand::Rng;
 
+use trueup_core::Error;
+
 use super::*;
 use crate::features::{DESCRIPTOR_LENGTH, FeaturePoint};
 
