@@ -127,7 +127,7 @@ pub fn camera_from_world(yaw_deg: f64, pitch_deg: f64, roll_deg: f64) -> Matrix3
 /// The cameras of a hand-held panorama from a viewpoint.
 ///
 /// # Errors
-/// [`Error::Options`] listing every option outside its range.
+/// [`trueup_core::Error::Options`] listing every option outside its range.
 pub fn rig(options: &RigOptions, viewpoint: &Viewpoint) -> Result<Vec<PosedCamera>> {
     options.check()?;
     let columns = options.pictures.div_ceil(options.rows);

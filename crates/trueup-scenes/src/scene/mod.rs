@@ -82,7 +82,7 @@ impl Scene {
     /// Builds and lights a scene. The same options give the same scene for any number of threads.
     ///
     /// # Errors
-    /// [`Error::Options`] listing every option outside its range.
+    /// [`trueup_core::Error::Options`] listing every option outside its range.
     pub fn new(options: &SceneOptions) -> Result<Self> {
         options.check()?;
         let builder = match options.kind {

@@ -38,7 +38,7 @@ pub struct CandidatePairs {
 /// have most putative matches (the smaller index winning ties, none with no match at all).
 ///
 /// # Errors
-/// [`Error::Options`]; [`Error::Input`] if features contradict themselves; [`Error::Cancelled`].
+/// [`trueup_core::Error::Options`]; [`trueup_core::Error::Input`] if features contradict themselves; [`trueup_core::Error::Cancelled`].
 ///
 /// # Departures
 /// Brown and Lowe (section 3.1) take the 6 neighbours with most matches; we take 8, as the quick look is coarser, and
