@@ -26,6 +26,7 @@ pub mod mesh;
 pub mod options;
 pub mod raster;
 pub mod source;
+pub mod truth;
 
 pub use context::StageContext;
 pub use error::{Error, Result};

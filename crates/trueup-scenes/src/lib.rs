@@ -35,5 +35,5 @@ mod tests;
 pub use render::{Quality, depth_map, render};
 pub use rig::{PosedCamera, RigOptions, camera_from_world, rig};
 pub use scene::{LightQuality, Scene, SceneKind, SceneOptions, Viewpoint};
-pub use set::{ImageTruth, JPEG_QUALITY, Truth, write_set};
+pub use set::{JPEG_QUALITY, truth_of, write_set};
 pub use study::{example_set, study_set};

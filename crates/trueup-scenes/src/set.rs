@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
-use serde::{Deserialize, Serialize};
 use trueup_core::raster::Raster;
+use trueup_core::truth::{ImageTruth, Truth};
 use trueup_core::{Error, Result, StageContext};
 
 use crate::render::{Quality, render};
@@ -15,47 +15,17 @@ use crate::scene::Scene;
 /// JPEG quality of the pictures written, of 100.
 pub const JPEG_QUALITY: u8 = 87;
 
-/// What is true of a set: the content of its `truth.json`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Truth {
-    /// What the pictures show.
-    pub source: String,
-    /// One a picture, in order.
-    pub images: Vec<ImageTruth>,
-}
-
-/// What is true of one picture.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ImageTruth {
-    /// File name beside `truth.json`.
-    pub file: String,
-    /// Width, pixels.
-    pub width: usize,
-    /// Height, pixels.
-    pub height: usize,
-    /// Focal length, pixels.
-    pub focal_px: f64,
-    /// Rows of the rotation from world to camera (x right, y down, z forward; world y is down).
-    #[serde(rename = "R")]
-    pub rotation: [[f64; 3]; 3],
-    /// Angle from the picture's down to the world's vertical, positive towards the right, degrees.
-    pub gamma_deg: f64,
-    /// Centre of projection in the world, metres.
-    pub centre: [f64; 3],
-}
-
-impl ImageTruth {
-    /// The truth of a camera whose picture is stored as `file`.
-    pub fn of(posed: &PosedCamera, file: String) -> Self {
-        Self {
-            file,
-            width: posed.width,
-            height: posed.height,
-            focal_px: posed.camera.focal_px,
-            rotation: posed.camera.camera_from_world,
-            gamma_deg: posed.vertical_angle().to_degrees(),
-            centre: posed.centre,
-        }
+/// The truth of a camera whose picture is stored as `file`.
+pub fn truth_of(posed: &PosedCamera, file: String) -> ImageTruth {
+    ImageTruth {
+        file,
+        width: posed.width,
+        height: posed.height,
+        focal_px: posed.camera.focal_px,
+        rotation: posed.camera.camera_from_world,
+        gamma_deg: posed.vertical_angle().to_degrees(),
+        centre: Some(posed.centre),
+        depth: None,
     }
 }
 
@@ -82,7 +52,7 @@ pub fn write_set(
         let path = directory.join(&file);
         let bytes = jpeg(&render(scene, posed, quality))?;
         fs::write(&path, bytes).map_err(|error| Error::io("writing", &path, error))?;
-        truth.images.push(ImageTruth::of(posed, file));
+        truth.images.push(truth_of(posed, file));
         context.progress().advance(STAGE, 1);
     }
     context.progress().finish(STAGE);

@@ -143,7 +143,10 @@ fn truth_is_written_as_the_readers_expect_it() {
     let context = StageContext::default();
     let truth = write_set(folder.path(), "room 1", room(), &cameras[..2], Quality::Preview, &context).expect("written");
     let text = std::fs::read_to_string(folder.path().join("truth.json")).expect("there");
-    assert_eq!(serde_json::from_str::<Truth>(&text).expect("parses").images.len(), truth.images.len());
+    assert_eq!(
+        serde_json::from_str::<trueup_core::truth::Truth>(&text).expect("parses").images.len(),
+        truth.images.len()
+    );
     let value: serde_json::Value = serde_json::from_str(&text).expect("parses");
     let image = &value["images"][1];
     assert_eq!(image["file"], "01.jpg");

@@ -38,11 +38,12 @@ pub use options::{Method, StitchOptions, WorkingOptions};
 pub use project::{
     Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
 };
-pub use stitcher::{Aligned, Alignment, Stitcher};
+pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use trueup_compose::render::Panorama;
 pub use trueup_core::context::{CancelToken, Progress, Silent};
 pub use trueup_core::diagnostics::{Diagnostic, Severity};
 pub use trueup_core::options::{InvalidOption, OptionDescription};
 pub use trueup_core::raster::RowSource;
+pub use trueup_core::truth::{ImageTruth, Truth};
 pub use trueup_core::{Error, Result, StageContext};
 pub use trueup_io::encode::{OutputOptions, write as write_picture};

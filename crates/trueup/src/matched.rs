@@ -11,6 +11,7 @@ use crate::left_out::{self, LeftOut};
 use crate::measure::Measured;
 
 /// Everything known after matching.
+#[derive(Debug)]
 pub(crate) struct Matched {
     pub sources: Sources,
     /// `None` for photographs that could not be decoded, whose reason is in `undecodable`.

@@ -40,6 +40,15 @@ pub struct Aligned {
     pub alignments: Vec<Alignment>,
 }
 
+/// Photographs that were found, measured and matched, ready to be aligned.
+#[derive(Debug)]
+pub struct MatchedPhotographs {
+    matched: Matched,
+    photographs: std::sync::Arc<FilePhotographs>,
+    clock: Clock,
+    findings: Vec<Diagnostic>,
+}
+
 /// The geometry of one panorama, ready to be composed.
 #[derive(Debug)]
 pub struct Alignment {
@@ -71,13 +80,22 @@ impl<'a> Stitcher<'a> {
         Self { options, context }
     }
 
-    /// Finds, measures and matches the photographs and estimates the panoramas' geometry.
+    /// Finds, measures and matches the photographs and estimates the panoramas' geometry:
+    /// [`Stitcher::match_photographs`], then [`Stitcher::align_matched`].
     ///
     /// # Errors
-    /// [`Error::Options`]; [`Error::Input`] when no photograph can be read, the graph or the reference does not fit the
-    /// photographs, or `require_all` is not met; [`Error::Unsolvable`] when no two photographs overlap;
-    /// [`Error::Cancelled`].
+    /// Those of the two.
     pub fn align(&self, inputs: &Inputs) -> Result<Aligned> {
+        self.align_matched(&self.match_photographs(inputs)?, inputs)
+    }
+
+    /// Finds, measures and matches the photographs. What comes of it can be aligned several times, with other references
+    /// or other options of the later stages.
+    ///
+    /// # Errors
+    /// [`Error::Options`]; [`Error::Input`] when no photograph can be read or the graph does not fit the photographs;
+    /// [`Error::Cancelled`].
+    pub fn match_photographs(&self, inputs: &Inputs) -> Result<MatchedPhotographs> {
         self.options.validate()?;
         let mut clock = Clock::default();
         let sources = clock.time("source", || source::scan(&inputs.photographs, &self.options.source, self.context))?;
@@ -85,9 +103,23 @@ impl<'a> Stitcher<'a> {
         let cache_bytes = (self.options.stitch.photograph_cache * 1e6) as usize;
         let photographs = std::sync::Arc::new(FilePhotographs::new(sources.images.clone(), cache_bytes));
         let matched = self.match_all(sources, &photographs, inputs, &mut clock)?;
-        let components = self.components_to_stitch(&matched, inputs)?;
+        Ok(MatchedPhotographs { matched, photographs, clock, findings: self.context.take_diagnostics() })
+    }
+
+    /// Estimates the geometry of the panoramas that matched photographs make.
+    ///
+    /// Of `inputs`, the photographs and the graph are those that were matched; the reference, `all` and `require_all` are
+    /// heeded.
+    ///
+    /// # Errors
+    /// [`Error::Options`]; [`Error::Input`] when the reference does not fit the photographs, or `require_all` is not met;
+    /// [`Error::Unsolvable`] when no two photographs overlap; [`Error::Cancelled`].
+    pub fn align_matched(&self, photographs: &MatchedPhotographs, inputs: &Inputs) -> Result<Aligned> {
+        self.options.validate()?;
+        let MatchedPhotographs { matched, photographs, clock, findings } = photographs;
+        let components = self.components_to_stitch(matched, inputs)?;
         if inputs.require_all {
-            require_all(&matched, &components)?;
+            require_all(matched, &components)?;
         }
         for (index, image) in matched.sources.images.iter().enumerate() {
             if !components.iter().any(|component| component.contains(&index)) {
@@ -99,12 +131,12 @@ impl<'a> Stitcher<'a> {
             self.report_rejected(rejected);
         }
         let file_names = matched.names();
-        let found = self.context.take_diagnostics();
-        let shared_diagnostics: Vec<_> = found.into_iter().map(|one| names::by_name(one, &file_names)).collect();
+        let found = findings.iter().cloned().chain(self.context.take_diagnostics());
+        let shared_diagnostics: Vec<_> = found.map(|one| names::by_name(one, &file_names)).collect();
 
         let mut alignments = Vec::new();
         for component in &components {
-            let mut alignment = self.align_component(component, &components, &matched, inputs, &photographs, &clock)?;
+            let mut alignment = self.align_component(component, &components, matched, inputs, photographs, clock)?;
             alignment.project.diagnostics =
                 shared_diagnostics.iter().cloned().chain(self.context.take_diagnostics()).collect();
             alignments.push(alignment);

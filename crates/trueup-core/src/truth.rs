@@ -1,0 +1,135 @@
+//! What is exactly known of a set of pictures: the content of a `truth.json`.
+
+use std::collections::BTreeSet;
+
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::matrix_from_rows;
+use crate::{Error, Result};
+
+/// What is true of a set of pictures.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Truth {
+    /// What the pictures show, or what they were cut from.
+    pub source: String,
+    /// One a picture, in order.
+    pub images: Vec<ImageTruth>,
+}
+
+/// What is true of one picture.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ImageTruth {
+    /// File name beside `truth.json`.
+    pub file: String,
+    /// Width, pixels.
+    pub width: usize,
+    /// Height, pixels.
+    pub height: usize,
+    /// Focal length, pixels.
+    pub focal_px: f64,
+    /// Rows of the rotation from world to camera (x right, y down, z forward; world y is down).
+    #[serde(rename = "R")]
+    pub rotation: [[f64; 3]; 3],
+    /// Angle from the picture's down to the world's vertical, positive towards the right, degrees.
+    pub gamma_deg: f64,
+    /// Centre of projection in the world, metres; absent where all pictures share one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub centre: Option<[f64; 3]>,
+    /// File name of the depth map beside `truth.json`, where one was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth: Option<String>,
+}
+
+impl ImageTruth {
+    /// The rotation from world to camera.
+    pub fn camera_from_world(&self) -> Matrix3<f64> {
+        matrix_from_rows(&self.rotation)
+    }
+}
+
+impl Truth {
+    /// The truth of the picture stored as `file` (a name without folders).
+    pub fn of_file(&self, file: &str) -> Option<&ImageTruth> {
+        self.images.iter().find(|image| image.file == file)
+    }
+
+    /// Checks what a file may get wrong: sizes, focal lengths, angles, rotations that are none, names given twice.
+    ///
+    /// # Errors
+    /// [`Error::Input`] about `subject` with the first picture at fault.
+    pub fn check(&self, subject: &str) -> Result<()> {
+        let wrong = |reason: String| {
+            Error::input(subject, reason, "Give the truth.json that was written together with the pictures.")
+        };
+        if self.images.is_empty() {
+            return Err(wrong("it lists no pictures".to_owned()));
+        }
+        let mut names = BTreeSet::new();
+        for image in &self.images {
+            let file = &image.file;
+            if !names.insert(file) {
+                return Err(wrong(format!("{file} is listed twice")));
+            }
+            if image.width == 0 || image.height == 0 {
+                return Err(wrong(format!("{file} has no size")));
+            }
+            if !(image.focal_px.is_finite() && image.focal_px > 0.0) {
+                return Err(wrong(format!("the focal length of {file} is {}", image.focal_px)));
+            }
+            if !image.gamma_deg.is_finite() {
+                return Err(wrong(format!("gamma_deg of {file} is no number")));
+            }
+            if !is_rotation(&image.camera_from_world()) {
+                return Err(wrong(format!("R of {file} is no rotation")));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether rows are orthonormal and right-handed, within what printing to six digits loses.
+fn is_rotation(matrix: &Matrix3<f64>) -> bool {
+    const TOLERANCE: f64 = 1e-4;
+    let error = matrix * matrix.transpose() - Matrix3::identity();
+    error.iter().all(|entry| entry.abs() < TOLERANCE) && matrix.determinant() > 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(file: &str) -> ImageTruth {
+        ImageTruth {
+            file: file.to_owned(),
+            width: 4,
+            height: 3,
+            focal_px: 4.0,
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            gamma_deg: 0.0,
+            centre: None,
+            depth: None,
+        }
+    }
+
+    fn complaint(images: Vec<ImageTruth>) -> String {
+        let truth = Truth { source: "test".to_owned(), images };
+        truth.check("truth.json").map_or_else(|error| error.to_string(), |()| String::new())
+    }
+
+    #[test]
+    fn good_truth_passes() {
+        assert_eq!(complaint(vec![picture("a.jpg"), picture("b.jpg")]), "");
+    }
+
+    #[test]
+    fn every_fault_is_named() {
+        let mirrored = [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        assert!(complaint(Vec::new()).contains("no pictures"));
+        assert!(complaint(vec![picture("a.jpg"), picture("a.jpg")]).contains("a.jpg is listed twice"));
+        assert!(complaint(vec![ImageTruth { width: 0, ..picture("a.jpg") }]).contains("no size"));
+        assert!(complaint(vec![ImageTruth { focal_px: -1.0, ..picture("a.jpg") }]).contains("focal length"));
+        assert!(complaint(vec![ImageTruth { gamma_deg: f64::NAN, ..picture("a.jpg") }]).contains("gamma_deg"));
+        assert!(complaint(vec![ImageTruth { rotation: mirrored, ..picture("a.jpg") }]).contains("no rotation"));
+    }
+}
