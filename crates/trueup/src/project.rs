@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::matches::PairVerdict;
 
+use crate::measures::Measures;
 use crate::options::StitchOptions;
 
 /// The `format` field of every project file.
@@ -131,6 +132,10 @@ pub struct Project {
     pub pairs: Vec<PairRecord>,
     /// Vanishing-point guidance.
     pub manhattan: ManhattanRecord,
+    /// How upright, straight and well aligned it is, by its own lines and matches; `None` for a single photograph, and in
+    /// files of programs that did not measure.
+    #[serde(default)]
+    pub measures: Option<Measures>,
     /// Size of the panorama.
     pub canvas: Canvas,
     /// Wall seconds per stage.
@@ -139,10 +144,22 @@ pub struct Project {
     pub diagnostics: Vec<Diagnostic>,
 }
 
+impl ImageRecord {
+    /// The file's name without folders; paths written on another system are understood.
+    pub fn file_name(&self) -> &str {
+        self.path.rsplit(['/', '\\']).next().unwrap_or(&self.path)
+    }
+}
+
 impl Project {
+    /// The photographs in the panorama, in the order given.
+    pub fn used_images(&self) -> impl Iterator<Item = &ImageRecord> {
+        self.images.iter().filter(|image| image.status == ImageStatus::Used)
+    }
+
     /// Number of photographs in the panorama.
     pub fn used(&self) -> usize {
-        self.images.iter().filter(|image| image.status == ImageStatus::Used).count()
+        self.used_images().count()
     }
 
     /// The project as JSON text.
