@@ -43,8 +43,8 @@ trueup_core::options! {
         /// Scale of the robust (Geman-McClure) loss of the refinement. Stitched panoramas bend their verticals by half a
         /// degree; with a smaller scale the loss settles on the lines of a few places and the halves agree less.
         refine_scale_deg: f64 = 1.0, between(0.01, 10.0), "degrees";
-        /// Fewer vertical lines, in all or in a half, are no measurement.
-        min_lines: usize = 40, between(3.0, 1e6), "lines";
+        /// Fewer vertical lines in either half are no measurement.
+        min_lines: usize = 20, between(3.0, 1e6), "lines";
         /// Largest angle between the verticals of the two halves. They look at different parts of the scene, so that the
         /// vertical of all views errs by about half of it.
         max_halves_deg: f64 = 0.5, between(0.001, 90.0), "degrees";
@@ -78,9 +78,9 @@ fn judge([all, even, odd]: &[Option<Fit>; 3], options: &LevelOptions) -> Level {
     };
     let halves_deg = even.down.cross(&odd.down).norm().atan2(even.down.dot(&odd.down)).to_degrees();
     let error_deg = all.standard_error.to_degrees();
-    let (fewest, needed) = (all.support.min(even.support).min(odd.support), options.min_lines);
+    let (fewest, needed) = (even.support.min(odd.support), options.min_lines);
     let reason = if fewest < needed {
-        Some(format!("{fewest} vertical lines in all or in a half of the views, {needed} needed"))
+        Some(format!("{fewest} vertical lines in one half of the views, {needed} needed"))
     } else if halves_deg > options.max_halves_deg {
         let allowed = options.max_halves_deg;
         Some(format!("two halves of the views disagree by {halves_deg:.2} degrees, at most {allowed} are trusted"))
