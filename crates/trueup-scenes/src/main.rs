@@ -1,13 +1,15 @@
 //! Renders sets of pictures with exactly known cameras.
 #![forbid(unsafe_code)]
 
+mod study_command;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use trueup_core::{Error, Result, StageContext};
+use trueup_core::{Result, StageContext};
 use trueup_scenes::{
-    LightQuality, Quality, RigOptions, Scene, SceneKind, SceneOptions, example_set, rig, study_set, write_set,
+    LightQuality, Quality, RigOptions, Scene, SceneKind, SceneOptions, SetOutput, example_set, rig, write_set,
 };
 
 /// Renders photographs of rooms, streets and open country with exactly known cameras.
@@ -28,15 +30,8 @@ enum Command {
         #[arg(long, default_value = "examples")]
         out: PathBuf,
     },
-    /// Renders the study's synthetic sets, each into its own folder.
-    Study {
-        /// Folder to write to.
-        #[arg(long)]
-        out: PathBuf,
-        /// Only these sets, 1 to 12; all when absent.
-        #[arg(long, value_delimiter = ',')]
-        sets: Vec<usize>,
-    },
+    /// Renders the study's sets, each into its own folder. What is there already is kept.
+    Study(study_command::StudyArguments),
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -44,6 +39,9 @@ enum Kind {
     Room,
     Street,
     Nature,
+    Boxes,
+    TurnedRoom,
+    TurnedStreet,
 }
 
 /// Options left out keep the library's defaults.
@@ -107,6 +105,9 @@ impl RenderArguments {
                 Kind::Room => SceneKind::Room,
                 Kind::Street => SceneKind::Street,
                 Kind::Nature => SceneKind::Nature,
+                Kind::Boxes => SceneKind::Boxes,
+                Kind::TurnedRoom => SceneKind::TurnedRoom,
+                Kind::TurnedStreet => SceneKind::TurnedStreet,
             }),
         );
         set(&mut scene.seed, self.seed);
@@ -151,16 +152,7 @@ fn run(command: &Command) -> Result<()> {
             let (scene, rig) = example_set();
             write(&out.join("room"), &scene, &rig, Quality::Fine)
         }
-        Command::Study { out, sets } => {
-            let numbers = if sets.is_empty() { (1..=12).collect() } else { sets.clone() };
-            for number in numbers {
-                let (scene, rig) = study_set(number).ok_or_else(|| {
-                    Error::input(format!("set {number}"), "there is no such set", "Choose from 1 to 12.")
-                })?;
-                write(&out.join(format!("{number:02}")), &scene, &rig, Quality::Standard)?;
-            }
-            Ok(())
-        }
+        Command::Study(arguments) => study_command::run(arguments),
     }
 }
 
@@ -169,7 +161,8 @@ fn write(out: &std::path::Path, scene: &SceneOptions, options: &RigOptions, qual
     let source = format!("{} {}", scene.kind.display(), scene.seed);
     let scene = Scene::new(scene)?;
     let cameras = rig(options, &scene.viewpoint())?;
-    write_set(out, &source, &scene, &cameras, quality, &StageContext::default())?;
+    let output = SetOutput { quality, depth: false };
+    write_set(out, &source, &scene, &cameras, output, &StageContext::default())?;
     println!("{}: {} pictures", out.display(), cameras.len());
     Ok(())
 }
