@@ -21,7 +21,8 @@ struct Node {
 #[derive(Debug, Clone, Copy)]
 struct Body {
     centre: Vector3<f64>,
-    half: Vector3<f64>,
+    /// Half extents of a block; one over them for round shapes.
+    extents: Vector3<f64>,
     shape: Shape,
     /// Index of the body among the scene's solids.
     solid: u32,
@@ -91,8 +92,9 @@ impl Hierarchy {
                 hierarchy.rotations.push(rotation);
                 hierarchy.rotations.len() as u32
             });
-            let (centre, half, shape) = (solid.centre, solid.half, solid.shape);
-            hierarchy.bodies.push(Body { centre, half, shape, solid: index, rotation });
+            let (centre, shape) = (solid.centre, solid.shape);
+            let extents = if shape == Shape::Block { solid.half } else { solid.half.map(f64::recip) };
+            hierarchy.bodies.push(Body { centre, extents, shape, solid: index, rotation });
         }
         hierarchy
     }
@@ -100,18 +102,16 @@ impl Hierarchy {
     /// Where a ray from outside enters a body within (0, limit].
     #[inline]
     fn enter(&self, body: &Body, ray: &Ray, limit: f64) -> Option<Entry> {
-        let origin = ray.origin - body.centre;
-        let entry = if body.rotation == 0 && body.shape == Shape::Block {
-            enter_aligned(origin, ray.direction, ray.inverse, body.half)
-        } else if body.rotation == 0 {
-            enter_round(body.shape, origin, ray.direction, body.half)
-        } else {
+        let mut origin = ray.origin - body.centre;
+        let (mut direction, mut inverse) = (ray.direction, ray.inverse);
+        if body.rotation > 0 {
             let rotation = &self.rotations[body.rotation as usize - 1];
-            let turned = Ray::new(rotation.tr_mul(&origin), rotation.tr_mul(&ray.direction));
-            match body.shape {
-                Shape::Block => enter_aligned(turned.origin, turned.direction, turned.inverse, body.half),
-                shape => enter_round(shape, turned.origin, turned.direction, body.half),
-            }
+            (origin, direction) = (rotation.tr_mul(&origin), rotation.tr_mul(&direction));
+            inverse = direction.map(f64::recip);
+        }
+        let entry = match body.shape {
+            Shape::Block => enter_aligned(origin, direction, inverse, body.extents),
+            shape => enter_round(shape, origin, direction, body.extents),
         }?;
         (entry.distance > 0.0 && entry.distance <= limit).then_some(entry)
     }

@@ -66,7 +66,9 @@ impl Scene {
     pub(super) fn measure(&mut self) {
         const TURNS: usize = 96;
         const ELEVATIONS: [f64; 5] = [-0.35, -0.15, 0.0, 0.15, 0.35];
-        const MIDDLE_GREY: f64 = 0.2;
+        const MIDDLE_GREY_INDOORS: f64 = 0.2;
+        /// Lower, as the sky is much brighter than the rest.
+        const MIDDLE_GREY_OUTDOORS: f64 = 0.15;
         /// Angle over which brightness is measured, radians.
         const ANGLE: f64 = 0.02;
         let eye = Vector3::from(self.viewpoint.eye);
@@ -87,6 +89,7 @@ impl Scene {
         }
         depths.sort_by(f64::total_cmp);
         self.viewpoint.depth_m = depths.get(depths.len() / 2).copied().unwrap_or(100.0);
-        self.exposure = MIDDLE_GREY / (logarithms / count).exp();
+        let grey = if self.portals.is_empty() { MIDDLE_GREY_OUTDOORS } else { MIDDLE_GREY_INDOORS };
+        self.exposure = grey / (logarithms / count).exp();
     }
 }
