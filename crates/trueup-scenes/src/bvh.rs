@@ -206,3 +206,90 @@ impl Hierarchy {
         false
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::geometry::exp_rotation;
+
+    use super::*;
+    use crate::dice::Dice;
+
+    fn vector(dice: &mut Dice, reach: f64) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| dice.range(-reach, reach))
+    }
+
+    fn bodies(dice: &mut Dice, count: usize) -> Vec<Solid> {
+        (0..count)
+            .map(|_| Solid {
+                shape: [Shape::Block, Shape::Cylinder, Shape::Ellipsoid][dice.index(3)],
+                centre: vector(dice, 10.0),
+                half: Vector3::from_fn(|_, _| dice.range(0.02, 0.9)),
+                world_from_body: dice.chance(0.5).then(|| exp_rotation(&vector(dice, 2.0))),
+                faces: [0; 6],
+                texture_centre: Vector3::zeros(),
+                seed: 0,
+            })
+            .collect()
+    }
+
+    /// The tree must find what asking every body in turn finds.
+    #[test]
+    fn the_tree_finds_what_all_bodies_together_find() {
+        let mut dice = Dice::new(4, 0);
+        for count in [0, 1, 5, 300] {
+            let solids = bodies(&mut dice, count);
+            let tree = Hierarchy::new(&solids);
+            let alone: Vec<Hierarchy> =
+                solids.iter().map(|solid| Hierarchy::new(std::slice::from_ref(solid))).collect();
+            for _ in 0..400 {
+                let ray = Ray::new(vector(&mut dice, 12.0), vector(&mut dice, 1.0).normalize());
+                let limit = dice.range(1.0, 30.0);
+                let expected = alone
+                    .iter()
+                    .enumerate()
+                    .filter_map(|(index, one)| one.nearest(&ray, limit).map(|(_, entry)| (index, entry.distance)))
+                    .min_by(|a, b| a.1.total_cmp(&b.1));
+                let found = tree.nearest(&ray, limit).map(|(index, entry)| (index, entry.distance));
+                assert_eq!(found, expected);
+                assert_eq!(tree.blocked(&ray, limit), expected.is_some());
+                let inside = solids.iter().any(|solid| solid.contains(ray.origin));
+                assert_eq!(tree.covers(&solids, ray.origin), inside);
+            }
+        }
+    }
+
+    /// A unit block seen along z from 3 m, and past its edge; a ball of radius 1/2 behind it, worked out by hand.
+    #[test]
+    fn distances_and_faces_are_those_of_the_drawing_board() {
+        let plain = |shape, centre: [f64; 3]| Solid {
+            shape,
+            centre: Vector3::from(centre),
+            half: Vector3::repeat(0.5),
+            world_from_body: None,
+            faces: [0; 6],
+            texture_centre: Vector3::zeros(),
+            seed: 0,
+        };
+        let tree = Hierarchy::new(&[plain(Shape::Block, [0.0, 0.0, 3.5]), plain(Shape::Ellipsoid, [0.8, 0.0, 6.0])]);
+        let ahead = |x: f64| tree.nearest(&Ray::new(Vector3::new(x, 0.0, 0.0), Vector3::z()), f64::INFINITY);
+        let (index, entry) = ahead(0.2).expect("the block");
+        assert_eq!((index, entry.face, entry.distance), (0, 4, 3.0));
+        // Beside the block the ball's surface is at 6 - sqrt(1/4 - 1/100) = 5.510102...
+        let (index, entry) = ahead(0.7).expect("the ball");
+        assert!(index == 1 && (entry.distance - 5.510_102_051_443_364).abs() < 1e-12);
+        assert!(ahead(-0.51).is_none());
+    }
+
+    #[test]
+    fn of_bodies_at_one_distance_the_first_counts() {
+        let mut dice = Dice::new(5, 0);
+        let mut solids = bodies(&mut dice, 40);
+        let twin = Solid { shape: Shape::Block, world_from_body: None, ..solids[3].clone() };
+        (solids[3], solids[31]) = (twin.clone(), twin);
+        let tree = Hierarchy::new(&solids);
+        let to = solids[3].centre;
+        let ray = Ray::new(to + Vector3::new(0.0, 0.0, -2.0), Vector3::z());
+        let first = tree.nearest(&ray, f64::INFINITY).expect("something").0;
+        assert_ne!(first, 31);
+    }
+}
