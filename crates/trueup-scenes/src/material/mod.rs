@@ -64,6 +64,8 @@ pub(crate) enum Pattern {
     Sign,
     /// A page of text: notices, posters, newspapers.
     Page,
+    /// A meadow: tufts and blades of `colours[0]` and `[1]` in patches of width `scale_m`, flowers of `[2]`.
+    Grass,
     /// Rough rock.
     Rock,
 }
@@ -124,6 +126,7 @@ impl Material {
             Pattern::Paving => exterior::paving(self, spot),
             Pattern::Pane => exterior::pane(self, spot),
             Pattern::Louvres => exterior::louvres(self, spot),
+            Pattern::Grass => exterior::grass(self, spot),
             Pattern::Rock => exterior::rock(self, spot),
         };
         // No real surface returns everything or nothing.

@@ -18,7 +18,7 @@ pub(super) fn build(seed: u64) -> Builder {
     /// Half the diameter of a block as a share of its distance.
     const SIZES: [f64; 2] = [0.035, 0.13];
     let mut builder = Builder::new(seed, 5);
-    let turf = builder.material(Material::new(Pattern::Rock, 2.5, [0x6a_7040, 0x8a_7a50, 0]));
+    let turf = builder.material(Material::new(Pattern::Grass, 2.5, [0x4c_5c2c, 0x8c_8450, 0xd8_d0b0]));
     builder.block([Vector3::new(-150.0, 0.0, -150.0), Vector3::new(150.0, 1.0, 150.0)], turf);
     for _ in 0..30 {
         let (distance, turn) = (builder.dice.range(14.0, 60.0), builder.dice.range(0.0, std::f64::consts::TAU));

@@ -16,7 +16,7 @@ pub(super) fn build(seed: u64) -> Builder {
     let bark = builder.material(Material::new(Pattern::Rock, 0.3, [0x5a_4a3a, 0x5a_6040, 0]));
     let leaves = [[0x2a_4a1e, 0x7a_9a40, 0], [0x3a_5228, 0x9a_a04a, 0]]
         .map(|colours| builder.material(Material::new(Pattern::Foliage, 1.0, colours)));
-    let turf = builder.material(Material::new(Pattern::Rock, 2.5, [0x6a_7040, 0x8a_7a50, 0]));
+    let turf = builder.material(Material::new(Pattern::Grass, 2.5, [0x4c_5c2c, 0x8c_8450, 0xd8_d0b0]));
     builder.block([Vector3::new(-150.0, 0.0, -150.0), Vector3::new(150.0, 1.0, 150.0)], turf);
     // Humps hide the plane's own horizon.
     for _ in 0..40 {
