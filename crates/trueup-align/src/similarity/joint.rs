@@ -8,6 +8,7 @@
 //! it is v . c / (2 |f v_xy - m v_z|), exactly.
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use rayon::prelude::*;
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
 
 use super::SimilarityOptions;
@@ -19,6 +20,12 @@ const ITERATIONS_PER_SCALE: usize = 4;
 const SHRINK: f64 = 0.7;
 /// Damping in px^2 per rad^2 and segment: keeps an axis without segments where it is.
 const DAMPING: f64 = 1e-6;
+/// Most groups that pictures are left out in to learn how sure the refinement is.
+const MAX_GROUPS: usize = 8;
+/// A deviation estimated from k groups is too small for Student's t by about this over k - 1 (one standard deviation).
+const FEW_GROUPS: f64 = 0.66;
+/// Rounds of iterations at the last scale that a refinement without a group takes from the full one's result.
+const REPEATS: usize = 3;
 
 /// The usable segments of all pictures with their cameras.
 #[derive(Debug)]
@@ -87,11 +94,54 @@ impl LineVote {
         axis_weights: &[f64; 3],
         options: &SimilarityOptions,
     ) -> Matrix3<f64> {
+        self.refine_frame_without(None, start, axis_weights, scales(options), options)
+    }
+
+    /// Standard deviation in radians, by a delete-a-group jackknife over the pictures, of each axis (a column) of a frame
+    /// that [`Self::refine_frame`] found: how much it depends on which pictures are asked. Infinite for a single picture.
+    ///
+    /// # Source
+    /// Efron and Tibshirani, An Introduction to the Bootstrap, chapter 11. Pictures, not segments, are left out, because
+    /// the segments of one picture err together.
+    pub fn axis_deviations(
+        &self,
+        frame: &Matrix3<f64>,
+        axis_weights: &[f64; 3],
+        options: &SimilarityOptions,
+    ) -> [f64; 3] {
+        let groups = self.pictures.len().min(MAX_GROUPS);
+        if groups < 2 {
+            return [f64::INFINITY; 3];
+        }
+        let last = || std::iter::repeat_n(options.joint_scale_px, REPEATS);
+        let frames: Vec<Matrix3<f64>> = (0..groups)
+            .into_par_iter()
+            .map(|group| self.refine_frame_without(Some((group, groups)), frame, axis_weights, last(), options))
+            .collect();
+        std::array::from_fn(|axis| {
+            let mean: Vector3<f64> =
+                frames.iter().map(|frame| frame.column(axis).into_owned()).sum::<Vector3<f64>>() / groups as f64;
+            let spread: f64 = frames.iter().map(|frame| (frame.column(axis) - mean).norm_squared()).sum();
+            let few = 1.0 + FEW_GROUPS / (groups - 1) as f64;
+            few * (spread * (groups - 1) as f64 / groups as f64).sqrt()
+        })
+    }
+
+    /// `left_out`: every picture whose position is (first) modulo (second) is not asked.
+    fn refine_frame_without(
+        &self,
+        left_out: Option<(usize, usize)>,
+        start: &Matrix3<f64>,
+        axis_weights: &[f64; 3],
+        scales: impl Iterator<Item = f64>,
+        options: &SimilarityOptions,
+    ) -> Matrix3<f64> {
+        let asked = |index: usize| left_out.is_none_or(|(group, groups)| index % groups != group);
         let mut frame = *start;
-        for scale in scales(options) {
+        for scale in scales {
             for _ in 0..ITERATIONS_PER_SCALE {
                 let (mut matrix, mut gradient) = (Matrix3::identity() * DAMPING, Vector3::zeros());
-                self.for_each_supporter(&frame, 3, scale, options, |axis, moment, residual, weight, reach| {
+                self.for_each_supporter(&frame, 3, scale, options, asked, |axis, moment, residual, weight, reach| {
                     let jacobian = Vector3::ith(axis, 1.0).cross(&frame.tr_mul(&moment)) / reach;
                     let weight = weight * axis_weights[axis];
                     matrix += jacobian * jacobian.transpose() * weight;
@@ -113,11 +163,18 @@ impl LineVote {
                 let (first, second) = orthonormal_complement(&direction);
                 let frame = Matrix3::from_columns(&[direction, first, second]);
                 let (mut matrix, mut gradient) = (Matrix2::identity() * DAMPING, Vector2::zeros());
-                self.for_each_supporter(&frame, 1, scale, options, |_, moment, residual, weight, reach| {
-                    let jacobian = Vector2::new(first.dot(&moment), second.dot(&moment)) / reach;
-                    matrix += jacobian * jacobian.transpose() * weight;
-                    gradient += jacobian * (weight * residual);
-                });
+                self.for_each_supporter(
+                    &frame,
+                    1,
+                    scale,
+                    options,
+                    |_| true,
+                    |_, moment, residual, weight, reach| {
+                        let jacobian = Vector2::new(first.dot(&moment), second.dot(&moment)) / reach;
+                        matrix += jacobian * jacobian.transpose() * weight;
+                        gradient += jacobian * (weight * residual);
+                    },
+                );
                 let Some(inverse) = matrix.try_inverse() else { return direction };
                 let step: Vector2<f64> = -(inverse * gradient);
                 direction = (direction + first * step.x + second * step.y).normalize();
@@ -126,7 +183,7 @@ impl LineVote {
         direction
     }
 
-    /// Calls `visit(axis, moment in the common frame, residual, weight, reach)` for every segment that supports one of
+    /// Calls, for the pictures `asked`, `visit(axis, moment in the common frame, residual, weight, reach)` for every segment that supports one of
     /// the first `axes_used` axes of `frame`; residual = axis . moment / reach in pixels.
     fn for_each_supporter(
         &self,
@@ -134,10 +191,14 @@ impl LineVote {
         axes_used: usize,
         scale: f64,
         options: &SimilarityOptions,
+        asked: impl Fn(usize) -> bool,
         mut visit: impl FnMut(usize, Vector3<f64>, f64, f64, f64),
     ) {
         let widest = options.joint_tolerance_deg.to_radians().sin();
-        for picture in &self.pictures {
+        for (index, picture) in self.pictures.iter().enumerate() {
+            if !asked(index) {
+                continue;
+            }
             let axes = picture.rotation * frame;
             for line in 0..picture.planes.len() {
                 let Some((axis, residual, reach)) = picture.nearest_axis(&axes, axes_used, line) else { continue };

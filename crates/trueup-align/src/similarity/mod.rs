@@ -128,6 +128,8 @@ trueup_core::options! {
         min_significance: f64 = 5.0, between(0.0, 1e3), "standard deviations";
         /// How far it must stand out to guide where the pictures do not agree.
         pooled_significance: f64 = 7.0, between(0.0, 1e3), "standard deviations";
+        /// Largest standard deviation of the vertical, by asking different pictures; straightening is wrong by 1 to 2 degrees.
+        max_vertical_deviation_deg: f64 = 1.0, between(0.0, 180.0), "degrees";
         /// Whether a vertical alone may guide where the horizontal directions do not agree.
         vertical_only: bool = true, Allowed::Any, "";
         /// How far from the cameras' own vertical the segments' is sought.
@@ -180,6 +182,8 @@ pub struct Guidance {
     /// How far the best frame of the pooled search stands out, in standard deviations over all frames tried; `None`
     /// without enough segments.
     pub significance: Option<f64>,
+    /// Standard deviation of the vertical in radians, by a jackknife over the pictures; `None` where it was not asked for.
+    pub vertical_deviation: Option<f64>,
     /// Whether the vertical alone guides, since the gate refused the dominant directions.
     pub vertical_only: bool,
     /// The divergence epsilon; `None` without any agreeing picture.

@@ -15,7 +15,7 @@ use super::straighten::Straightened;
 use super::vertical::{roll_of, vertical_of};
 use super::vertical_vote::{VerticalPeak, vertical_peak};
 use super::weighted_solve::{DataTerm, TurnTerm, solve_unit_vectors};
-use super::{BetaMode, Guidance, PriorInput, STAGE, SimilarityOptions, Upright, rolls};
+use super::{BetaMode, GateMode, Guidance, PriorInput, STAGE, SimilarityOptions, Upright, rolls};
 use crate::vanishing::{InterpretationPlanes, RefinedTriad};
 
 /// Share of a picture's best score that its search near the dominant directions must reach to replace its triad.
@@ -31,6 +31,7 @@ pub(super) fn unguided(count: usize, options: &SimilarityOptions) -> Guidance {
         used: false,
         pooled: false,
         significance: None,
+        vertical_deviation: None,
         vertical_only: false,
         divergence: None,
         threshold: allowed_divergence(count, options),
@@ -95,7 +96,9 @@ pub(super) fn guide(
     };
     if let Some(dominant) = accepted {
         let upright = scene.solve_dominant(dominant, &mut guidance);
-        return Ok((guidance, upright));
+        if upright.is_some() {
+            return Ok((guidance, upright));
+        }
     }
     let peak = vertical_peak(&scene.vote, level, options).filter(|_| options.vertical_only);
     if let Some(peak) = &peak {
@@ -204,6 +207,18 @@ impl Scene<'_> {
         let joint = has_lines && self.options.joint_refinement;
         let frame = if joint { self.refined(&dominant.frame, &axis_weights) } else { dominant.frame };
         let down = vertical_of(&frame, self.rotations);
+        if joint && self.options.gate == GateMode::Full {
+            let deviation = self.vote.axis_deviations(&frame, &axis_weights, self.options)[frame.tr_mul(&down).iamax()];
+            guidance.vertical_deviation = Some(deviation).filter(|deviation| deviation.is_finite());
+            let allowed = self.options.max_vertical_deviation_deg;
+            if deviation.to_degrees() > allowed {
+                guidance.failed_clause = Some(format!(
+                    "the lines leave the vertical uncertain by {:.1} degrees ({allowed:.1} allowed)",
+                    deviation.to_degrees()
+                ));
+                return None;
+            }
+        }
         guidance.dominant = Some(rows_of(&frame));
         guidance.used = true;
         let own = if joint { self.common_rolls(&down) } else { self.own_rolls(&frame, &down, &guidance.inliers) };

@@ -1,12 +1,14 @@
-//! The subcommands that cut views out of panoramas.
+//! The subcommands that have a file of their own.
 
 mod cut;
 mod level;
 mod specs;
+mod study;
 
 pub(crate) use cut::CutArguments;
 pub(crate) use level::LevelArguments;
 pub(crate) use specs::SpecsArguments;
+pub(crate) use study::StudyArguments;
 
 use trueup_core::StageContext;
 use trueup_core::truth::{Level, LevelOrigin};

@@ -124,6 +124,17 @@ pub(super) fn foliage(material: &Material, spot: &Spot) -> Rgb {
     mix(material.colours[0], material.colours[1], (0.5 + leaves).clamp(0.0, 1.0)) * shade
 }
 
+pub(super) fn grass(material: &Material, spot: &Spot) -> Rgb {
+    let patches = spot.noise(material.scale_m, 4, 0.6, 191);
+    let tufts = spot.noise(0.45, 4, 0.75, 192);
+    let blades = spot.noise(0.06, 4, 0.85, 193);
+    let green = mix(material.colours[0], material.colours[1], (0.5 + 0.9 * patches).clamp(0.0, 1.0));
+    let meadow = green * (0.85 + 0.55 * tufts + 0.75 * blades).clamp(0.15, 1.8);
+    let bloom = edge(spot.noise(2.2, 3, 0.6, 194), -0.1, 0.5);
+    let flowers = specks(spot, 0.16, 0.022, 195).max(specks(spot, 0.4, 0.05, 196));
+    mix(meadow, material.colours[2], 0.8 * bloom * flowers)
+}
+
 pub(super) fn rock(material: &Material, spot: &Spot) -> Rgb {
     let scale = material.scale_m;
     let layers =

@@ -101,4 +101,53 @@ impl Builder {
     pub(crate) fn ellipsoid(&mut self, centre: Vector3<f64>, half: Vector3<f64>, material: MaterialId) -> &mut Solid {
         self.push(Shape::Ellipsoid, centre, half, material)
     }
+
+    /// Where the scene stands now, for [`Builder::turn_since`].
+    pub(crate) fn mark(&self) -> Mark {
+        Mark { solids: self.solids.len(), portals: self.portals.len() }
+    }
+
+    /// Turns all that was added since the mark about the vertical through `pivot` by `yaw` radians, from z towards x.
+    pub(crate) fn turn_since(&mut self, mark: Mark, pivot: Vector3<f64>, yaw: f64) {
+        let rotation = rotation_about_y(yaw);
+        for solid in &mut self.solids[mark.solids..] {
+            solid.centre = pivot + rotation * (solid.centre - pivot);
+            solid.world_from_body = Some(solid.world_from_body.map_or(rotation, |own| rotation * own));
+        }
+        for portal in &mut self.portals[mark.portals..] {
+            portal.corner = pivot + rotation * (portal.corner - pivot);
+            for vector in [&mut portal.side_s, &mut portal.side_t, &mut portal.normal] {
+                *vector = rotation * *vector;
+            }
+        }
+    }
+}
+
+/// How much of a scene there was at some moment.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Mark {
+    solids: usize,
+    portals: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::Pattern;
+
+    /// A block 2 m ahead (z) of the pivot at (1, 0, 1), turned by 90 degrees from z towards x, lies 2 m to its right
+    /// (x); what was there before the mark stays.
+    #[test]
+    fn what_was_added_since_the_mark_turns_about_the_pivot() {
+        let mut builder = Builder::new(1, 0);
+        let paint = builder.material(Material::new(Pattern::Paint, 1.0, [0xff_ffff; 3]));
+        let block = [Vector3::new(0.9, -1.0, 2.9), Vector3::new(1.1, 0.0, 3.1)];
+        builder.block(block, paint);
+        let mark = builder.mark();
+        builder.block(block, paint);
+        builder.turn_since(mark, Vector3::new(1.0, 0.0, 1.0), std::f64::consts::FRAC_PI_2);
+        assert!((builder.solids[0].centre - Vector3::new(1.0, -0.5, 3.0)).norm() < 1e-12);
+        assert!((builder.solids[1].centre - Vector3::new(3.0, -0.5, 1.0)).norm() < 1e-12);
+        assert!(builder.solids[1].contains(Vector3::new(3.05, -0.9, 1.05)));
+    }
 }

@@ -1,23 +1,27 @@
 //! Scenes: bodies, materials, light, and the place from which to photograph them.
 
+mod boxes;
 mod builder;
+mod furnish;
 mod furniture;
 mod nature;
 mod room;
 mod street;
+mod style;
+mod viewpoint;
 mod wall;
 
 use nalgebra::Vector3;
 use trueup_core::Result;
 use trueup_core::options::StageOptions;
 
-use crate::bvh::{Hierarchy, Ray};
-use crate::colour::{Rgb, luminance};
+use crate::bvh::Hierarchy;
 use crate::light::{LightDetail, LightField, Portal};
 use crate::material::{Material, Spot};
 use crate::sky::{Sky, Sun};
 use crate::solid::{Shape, Solid};
-use builder::Builder;
+pub use style::RoomStyle;
+pub use viewpoint::Viewpoint;
 
 trueup_core::choice! {
     /// What is built.
@@ -28,6 +32,12 @@ trueup_core::choice! {
         Street = "street",
         /// Rocks and trees at random turns on rough ground: no dominant directions at all.
         Nature = "nature",
+        /// Blocks at random turns in the air: many straight edges, no dominant directions.
+        Boxes = "boxes",
+        /// A room of five or six walls at free angles: one vertical, no shared horizontals.
+        TurnedRoom = "turned-room",
+        /// A square between houses at free angles: one vertical, no shared horizontals.
+        TurnedStreet = "turned-street",
     }
 }
 
@@ -36,7 +46,9 @@ trueup_core::choice! {
     pub enum LightQuality {
         /// A fraction of a second; blurred shadows. For tests.
         Fast = "fast",
-        /// Several seconds. For pictures to look at.
+        /// Two or three seconds of one processor. For sets to stitch.
+        Standard = "standard",
+        /// Ten seconds of one processor. For pictures to look at.
         Fine = "fine",
     }
 }
@@ -46,22 +58,13 @@ trueup_core::options! {
     pub struct SceneOptions("scene") {
         /// Kind of scene.
         kind: SceneKind = SceneKind::Room, Allowed::Any, "";
+        /// What a room is for; nothing else heeds it.
+        style: RoomStyle = RoomStyle::Living, Allowed::Any, "";
         /// Seed of its layout, colours and textures.
         seed: u64 = 1, Allowed::Any, "";
         /// How finely light is worked out.
         light: LightQuality = LightQuality::Fine, Allowed::Any, "";
     }
-}
-
-/// A place from which a scene can be photographed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Viewpoint {
-    /// The photographer's eye in the world, metres; y points down and the floor is at y = 0.
-    pub eye: [f64; 3],
-    /// The direction first looked at: turn about the vertical from world z towards world x, degrees.
-    pub yaw_deg: f64,
-    /// Median distance of what is seen at eye level all round, metres.
-    pub depth_m: f64,
 }
 
 /// A scene ready to be photographed. Its Manhattan directions, where it has them, are the axes of the world.
@@ -84,13 +87,36 @@ impl Scene {
     /// # Errors
     /// [`trueup_core::Error::Options`] listing every option outside its range.
     pub fn new(options: &SceneOptions) -> Result<Self> {
+        let mut scene = Self::unlit(options)?;
+        scene.illuminate(options.light);
+        Ok(scene)
+    }
+
+    /// Builds a scene in the dark: bodies and viewpoint only.
+    pub(crate) fn unlit(options: &SceneOptions) -> Result<Self> {
         options.check()?;
         let builder = match options.kind {
-            SceneKind::Room => room::build(options.seed),
+            SceneKind::Room => room::build(options.seed, options.style),
             SceneKind::Street => street::build(options.seed),
             SceneKind::Nature => nature::build(options.seed),
+            SceneKind::Boxes => boxes::build(options.seed),
+            SceneKind::TurnedRoom => room::build_turned(options.seed, options.style),
+            SceneKind::TurnedStreet => street::build_turned(options.seed),
         };
-        Ok(Self::lit(builder, options.light))
+        let mut scene = Self {
+            hierarchy: Hierarchy::new(&builder.solids),
+            solids: builder.solids,
+            materials: builder.materials,
+            portals: builder.portals,
+            sky: builder.sky,
+            sun: builder.sun,
+            light: LightField::default(),
+            exposure: 1.0,
+            viewpoint: Viewpoint { eye: builder.eye.into(), yaw_deg: builder.yaw_deg, depth_m: 1.0 },
+        };
+        scene.step_clear();
+        scene.measure_depth();
+        Ok(scene)
     }
 
     /// From where, and in which direction first, the scene is meant to be photographed.
@@ -114,55 +140,29 @@ impl Scene {
         self.hierarchy = Hierarchy::new(&self.solids);
     }
 
-    fn lit(builder: Builder, quality: LightQuality) -> Self {
-        let outdoors = builder.portals.is_empty();
-        let detail = match (quality, outdoors) {
-            (LightQuality::Fast, false) => LightDetail { spacing_m: 0.4, directions: 24, portal_samples: 2 },
-            (LightQuality::Fast, true) => LightDetail { spacing_m: 3.0, directions: 16, portal_samples: 1 },
-            (LightQuality::Fine, false) => LightDetail { spacing_m: 0.08, directions: 128, portal_samples: 4 },
-            (LightQuality::Fine, true) => LightDetail { spacing_m: 0.6, directions: 64, portal_samples: 1 },
+    /// Works the light out, and the exposure that suits it.
+    fn illuminate(&mut self, quality: LightQuality) {
+        let light = |spacing_m, directions, least_directions, portal_samples| LightDetail {
+            spacing_m,
+            directions,
+            least_directions,
+            portal_samples,
         };
-        let mut scene = Self {
-            hierarchy: Hierarchy::new(&builder.solids),
-            solids: builder.solids,
-            materials: builder.materials,
-            portals: builder.portals,
-            sky: builder.sky,
-            sun: builder.sun,
-            light: LightField::default(),
-            exposure: 1.0,
-            viewpoint: Viewpoint { eye: builder.eye.into(), yaw_deg: builder.yaw_deg, depth_m: 1.0 },
+        let detail = match (quality, self.is_outdoors()) {
+            (LightQuality::Fast, false) => light(0.4, 24, 8, 2),
+            (LightQuality::Fast, true) => light(3.0, 16, 4, 1),
+            (LightQuality::Standard, false) => light(0.12, 64, 8, 3),
+            (LightQuality::Standard, true) => light(0.9, 32, 8, 1),
+            (LightQuality::Fine, false) => light(0.08, 128, 8, 4),
+            (LightQuality::Fine, true) => light(0.6, 64, 8, 1),
         };
-        scene.light = LightField::gather(&scene, &detail);
-        scene.measure();
-        scene
+        self.light = LightField::gather(self, &detail);
+        self.measure_exposure();
     }
 
-    /// Measures depth and brightness round the eye, as a photographer would before a panorama.
-    fn measure(&mut self) {
-        const TURNS: usize = 96;
-        const ELEVATIONS: [f64; 5] = [-0.35, -0.15, 0.0, 0.15, 0.35];
-        const MIDDLE_GREY: f64 = 0.2;
-        let eye = Vector3::from(self.viewpoint.eye);
-        let (mut depths, mut logarithms, mut count) = (Vec::new(), 0.0, 0.0);
-        for turn in 0..TURNS {
-            let (sine, cosine) = (turn as f64 / TURNS as f64 * std::f64::consts::TAU).sin_cos();
-            for elevation in ELEVATIONS {
-                let direction = Vector3::new(sine, elevation, cosine).normalize();
-                if elevation == 0.0 {
-                    depths.extend(
-                        self.hierarchy
-                            .nearest(&self.solids, &Ray::new(eye, direction), f64::INFINITY)
-                            .map(|(_, entry)| entry.distance),
-                    );
-                }
-                logarithms += luminance(self.radiance(eye, direction, 0.02)).max(1e-3).ln();
-                count += 1.0;
-            }
-        }
-        depths.sort_by(f64::total_cmp);
-        self.viewpoint.depth_m = depths.get(depths.len() / 2).copied().unwrap_or(100.0);
-        self.exposure = MIDDLE_GREY / (logarithms / count).exp();
+    /// Whether the sky lights the scene from all sides rather than through windows.
+    fn is_outdoors(&self) -> bool {
+        self.portals.is_empty()
     }
 
     /// The coordinates of a place on a face, for its pattern. `point` is in the body's frame.
@@ -180,10 +180,5 @@ impl Scene {
         };
         let grain = solid.half.imax();
         Spot { point: texture, across, down, unit, size, grain, footprint, seed: solid.seed }
-    }
-
-    /// Radiance along a ray; `angle` is the pixel's, in radians. Without soft sun, for measuring.
-    fn radiance(&self, origin: Vector3<f64>, direction: Vector3<f64>, angle: f64) -> Rgb {
-        crate::render::trace(self, origin, direction, angle, [0.0, 0.0], 0)
     }
 }

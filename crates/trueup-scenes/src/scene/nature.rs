@@ -16,7 +16,7 @@ pub(super) fn build(seed: u64) -> Builder {
     let bark = builder.material(Material::new(Pattern::Rock, 0.3, [0x5a_4a3a, 0x5a_6040, 0]));
     let leaves = [[0x2a_4a1e, 0x7a_9a40, 0], [0x3a_5228, 0x9a_a04a, 0]]
         .map(|colours| builder.material(Material::new(Pattern::Foliage, 1.0, colours)));
-    let turf = builder.material(Material::new(Pattern::Rock, 2.5, [0x6a_7040, 0x8a_7a50, 0]));
+    let turf = builder.material(Material::new(Pattern::Grass, 2.5, [0x4c_5c2c, 0x8c_8450, 0xd8_d0b0]));
     builder.block([Vector3::new(-150.0, 0.0, -150.0), Vector3::new(150.0, 1.0, 150.0)], turf);
     // Humps hide the plane's own horizon.
     for _ in 0..40 {
@@ -43,7 +43,7 @@ pub(super) fn build(seed: u64) -> Builder {
         let foot = ring(&mut builder, 6.0, 55.0);
         tree(&mut builder, foot, bark, leaves[usize::from(foot.x > 0.0)]);
     }
-    builder.sun = Some(Sun { towards: Vector3::new(0.5, -0.7, 0.45).normalize(), irradiance: srgb(0xff_f0dc) * 7.0 });
+    builder.sun = Some(Sun { towards: Vector3::new(0.5, -0.7, 0.45).normalize(), irradiance: srgb(0xff_f0dc) * 4.5 });
     builder
 }
 
@@ -62,10 +62,12 @@ fn tree(builder: &mut Builder, foot: Vector3<f64>, bark: usize, leaves: usize) {
     trunk.centre = foot + rotation * Vector3::new(0.0, -height / 2.0, 0.0);
     trunk.world_from_body = Some(rotation);
     let top = foot + rotation * Vector3::new(0.0, -height, 0.0);
-    for _ in 0..12 {
+    for _ in 0..60 {
         let offset =
             Vector3::new(builder.dice.normal(), 0.7 * builder.dice.normal(), builder.dice.normal()) * (0.22 * height);
-        let size = height * builder.dice.range(0.1, 0.24);
-        builder.ellipsoid(top + offset, Vector3::new(size, 0.75 * size, size), leaves);
+        let size = height * builder.dice.range(0.03, 0.15);
+        let tilt = Vector3::from_fn(|_, _| 0.5 * builder.dice.normal());
+        let half = Vector3::new(size, builder.dice.range(0.35, 0.8) * size, size);
+        builder.ellipsoid(top + offset, half, leaves).world_from_body = Some(exp_rotation(&tilt));
     }
 }

@@ -2,6 +2,7 @@
 
 mod house;
 mod pavement;
+mod square;
 
 use nalgebra::Vector3;
 
@@ -12,6 +13,7 @@ use crate::material::{Material, MaterialId, Pattern};
 use crate::sky::Sun;
 use house::house;
 use pavement::pavement;
+pub(super) use square::build as build_turned;
 /// Half the width of the roadway and of the whole street, and how far it runs either way, metres.
 const ROAD: f64 = 3.6;
 
@@ -55,7 +57,7 @@ pub(super) fn build(seed: u64) -> Builder {
     }
     builder.eye = Vector3::new(-1.2, -1.6, 0.0);
     let towards = Vector3::new(0.55, -0.75, -0.37).normalize();
-    builder.sun = Some(Sun { towards, irradiance: srgb(0xff_f0dc) * 6.5 });
+    builder.sun = Some(Sun { towards, irradiance: srgb(0xff_f0dc) * 4.2 });
     builder
 }
 

@@ -1,6 +1,7 @@
 //! What stands between the houses and the road, and beside it.
 
 use nalgebra::Vector3;
+use trueup_core::geometry::exp_rotation;
 
 use super::{Finish, KERB, REACH, ROAD};
 use crate::material::{Material, Pattern};
@@ -28,7 +29,7 @@ pub(super) fn pavement(builder: &mut Builder, side: f64, finish: &Finish) {
     }
 }
 
-fn street_lamp(builder: &mut Builder, foot: Vector3<f64>, side: f64, finish: &Finish) {
+pub(super) fn street_lamp(builder: &mut Builder, foot: Vector3<f64>, side: f64, finish: &Finish) {
     builder.cylinder(foot, 0.14, 0.5, finish.iron);
     builder.cylinder(foot, 0.06, 5.2, finish.iron);
     let top = foot - Vector3::new(0.0, 5.2, 0.0);
@@ -37,19 +38,21 @@ fn street_lamp(builder: &mut Builder, foot: Vector3<f64>, side: f64, finish: &Fi
     builder.piece([head - Vector3::new(0.3, 0.06, 0.12), head + Vector3::new(0.3, 0.06, 0.12)], finish.window_paint);
 }
 
-fn tree(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
+pub(super) fn tree(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
     let height = builder.dice.range(2.6, 3.4);
     builder.cylinder(foot, 0.11, height, finish.timber);
     let crown = foot - Vector3::new(0.0, height + 0.6, 0.0);
-    for _ in 0..80 {
+    for _ in 0..130 {
         let offset =
             Vector3::new(0.5 * builder.dice.normal(), 0.55 * builder.dice.normal(), 0.5 * builder.dice.normal());
-        let size = builder.dice.range(0.1, 0.34);
-        builder.ellipsoid(crown + offset, Vector3::new(size, 0.7 * size, size), finish.leaves);
+        let size = builder.dice.range(0.06, 0.26);
+        let tilt = Vector3::from_fn(|_, _| 0.5 * builder.dice.normal());
+        let half = Vector3::new(size, builder.dice.range(0.3, 0.7) * size, size);
+        builder.ellipsoid(crown + offset, half, finish.leaves).world_from_body = Some(exp_rotation(&tilt));
     }
 }
 
-fn traffic_sign(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
+pub(super) fn traffic_sign(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
     let colours = [[0x2a_4c9a, 0xf0_f0f0], [0xf0_eee8, 0xa0_2420], [0xe8_c840, 0x20_2020]];
     let [board, ink] = colours[builder.dice.index(colours.len())];
     let plate = builder.material(Material::new(Pattern::Sign, 1.0, [board, ink, 0]).glossy(0.03));
