@@ -12,6 +12,7 @@ Examples:
   trueup stitch holiday/ -o holiday.jpg
   trueup stitch IMG_01*.jpg -o pano.png --scale 0.5 --project pano.json
   trueup inspect pano.json --verbose
+  trueup evaluate pano.json --truth truth.json
   trueup options mesh";
 
 const STITCH_EXAMPLES: &str = "\
@@ -42,8 +43,10 @@ pub(crate) enum Command {
     ///
     /// Finds out by itself which photographs overlap. Those that belong elsewhere are left out, and the summary says why.
     Stitch(Box<StitchArgs>),
-    /// Print what a project file says of its panorama: the summary that `stitch` printed
+    /// Print what a project file says of its panorama: the summary that `stitch` printed, with each picture's measures
     Inspect(InspectArgs),
+    /// Print every measure of a panorama: its own, against the truth, and of the pixels where photographs overlap
+    Evaluate(EvaluateArgs),
     /// List every option of every stage: default, range, unit, meaning
     Options(OptionsArgs),
 }
@@ -131,6 +134,25 @@ pub(crate) struct InspectArgs {
     /// Print also the pairs' verdicts, each picture's geometry, notes, and a line per stage's time
     #[arg(short, long)]
     pub verbose: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateArgs {
+    /// A file that `trueup stitch --project` wrote
+    #[arg(value_name = "PROJECT.json")]
+    pub project: PathBuf,
+
+    /// What is exactly known of the photographs: cameras and directions, as `trueup-scenes` writes them
+    #[arg(long, value_name = "TRUTH.json")]
+    pub truth: Option<PathBuf>,
+
+    /// As a JSON object
+    #[arg(long)]
+    pub json: bool,
+
+    /// Do not read the photographs again to compare their pixels
+    #[arg(long)]
+    pub no_pixels: bool,
 }
 
 #[derive(Debug, Args)]

@@ -1,5 +1,7 @@
 //! `trueup inspect`: the summary of a project file.
 
+use std::path::Path;
+
 use trueup::{Error, Project};
 
 use crate::arguments::InspectArgs;
@@ -8,10 +10,14 @@ use crate::output;
 use crate::summary;
 
 pub(crate) fn run(args: &InspectArgs) -> Result<(), Failure> {
-    let path = &args.project;
-    let bytes = std::fs::read(path).map_err(|source| Error::Io { action: "reading", path: path.clone(), source })?;
+    let project = read(&args.project)?;
+    output::print(&summary::text(&project, None, args.verbose))
+}
+
+/// Reads a project file.
+pub(crate) fn read(path: &Path) -> Result<Project, Error> {
+    let bytes = std::fs::read(path).map_err(|source| Error::Io { action: "reading", path: path.to_owned(), source })?;
     // What is no text is no JSON either; the project's own reader says so.
     let text = String::from_utf8_lossy(&bytes);
-    let project = Project::from_json(&text, &path.display().to_string())?;
-    output::print(&summary::text(&project, None, args.verbose))
+    Project::from_json(&text, &path.display().to_string())
 }

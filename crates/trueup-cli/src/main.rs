@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod evaluate;
 mod failure;
 mod inspect;
 mod interrupt;
@@ -24,6 +25,7 @@ fn main() -> ExitCode {
     let outcome = match LowArgs::parse().command {
         Command::Stitch(args) => stitch::run(*args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Evaluate(args) => evaluate::run(&args),
         Command::Options(args) => option_list::run(&args),
     };
     match outcome {

@@ -1,6 +1,6 @@
 //! The table of bad inputs in docs/command-line.md holds what is really printed.
 
-use crate::pictures::{claiming, noise, plain, put_street, street};
+use crate::pictures::{claiming, noise, plain, put_street, street, street_truth};
 use crate::run::{Desk, finish, trueup};
 
 const PAGE: &str = include_str!("../../../docs/command-line.md");
@@ -53,6 +53,12 @@ const MISTAKES: &[Mistake] = &[
     mistake("no project file", &["inspect", "none.json"]),
     mistake("not a project file", &["inspect", "other.json"]),
     mistake("project of a later version", &["inspect", "later.json"]),
+    mistake("no truth file", &["evaluate", "pano.json", "--truth", "none.json"]),
+    mistake("not a truth file", &["evaluate", "pano.json", "--truth", "other.json"]),
+    mistake("truth with a rotation that is none", &["evaluate", "pano.json", "--truth", "bent.json"]),
+    mistake("truth of other pictures", &["evaluate", "pano.json", "--truth", "strange.json"]),
+    mistake("truth of pictures of another size", &["evaluate", "pano.json", "--truth", "small.json"]),
+    mistake("truth that knows one picture", &["evaluate", "pano.json", "--truth", "one.json"]),
 ];
 
 fn desk() -> Desk {
@@ -76,6 +82,13 @@ fn desk() -> Desk {
     desk.put("graph.txt", "a.jpg -- q.jpg\n");
     desk.put("mine.toml", "[mash]\ncell_px = 30\n");
     desk.put("other.json", "{}");
+    desk.stitch(&["a.jpg", "b.jpg", "--project", "pano.json"]).expect_success();
+    std::fs::remove_file(desk.join("pano.jpg")).expect("removed");
+    let truth = street_truth();
+    desk.put("bent.json", truth.replacen("\"R\":[[", "\"R\":[[7", 1));
+    desk.put("strange.json", truth.replace(".jpg", ".png"));
+    desk.put("small.json", truth.replace("\"width\":480", "\"width\":240"));
+    desk.put("one.json", truth.replace("b.jpg", "b.png"));
     desk.put("later.json", "{\"format\": \"trueup-project\", \"version\": 99}");
     desk
 }

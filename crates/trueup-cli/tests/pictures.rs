@@ -4,7 +4,9 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use jpeg_encoder::{ColorType, Encoder};
-use trueup_scenes::{LightQuality, Quality, RigOptions, Scene, SceneKind, SceneOptions, render, rig};
+use trueup_scenes::{
+    LightQuality, PosedCamera, Quality, RigOptions, Scene, SceneKind, SceneOptions, render, rig, truth_of,
+};
 
 use crate::run::Desk;
 
@@ -22,7 +24,7 @@ pub fn street() -> &'static [Vec<u8>] {
 /// The RGB pixels of [`street`].
 pub fn street_pixels() -> &'static [Vec<u8>] {
     static PIXELS: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
-    PIXELS.get_or_init(|| photograph_scene(SceneKind::Street, 7, 4))
+    PIXELS.get_or_init(|| photograph_scene(STREET.0, STREET.1, STREET_NAMES.len()))
 }
 
 /// Three overlapping photographs of a room, as JPEG files.
@@ -33,10 +35,26 @@ pub fn room() -> &'static [Vec<u8>] {
 
 fn photograph_scene(kind: SceneKind, seed: u64, pictures: usize) -> Vec<Vec<u8>> {
     let scene = Scene::new(&SceneOptions { kind, seed, light: LightQuality::Fast }).expect("a valid scene");
-    let options = RigOptions { seed, pictures, width: WIDTH, height: HEIGHT, ..RigOptions::default() };
-    let cameras = rig(&options, &scene.viewpoint()).expect("valid options");
+    let cameras = cameras(&scene, seed, pictures);
     cameras.iter().map(|camera| render(&scene, camera, Quality::Preview).data().to_vec()).collect()
 }
+
+fn cameras(scene: &Scene, seed: u64, pictures: usize) -> Vec<PosedCamera> {
+    let options = RigOptions { seed, pictures, width: WIDTH, height: HEIGHT, ..RigOptions::default() };
+    rig(&options, &scene.viewpoint()).expect("valid options")
+}
+
+/// The truth of the street's photographs, as JSON.
+pub fn street_truth() -> String {
+    let (kind, seed) = STREET;
+    let scene = Scene::new(&SceneOptions { kind, seed, light: LightQuality::Fast }).expect("a valid scene");
+    let cameras = cameras(&scene, seed, STREET_NAMES.len());
+    let images = cameras.iter().zip(STREET_NAMES).map(|(camera, name)| truth_of(camera, name.to_owned())).collect();
+    serde_json::to_string(&trueup::Truth { source: "a street".to_owned(), images }).expect("serialisable")
+}
+
+/// Kind and seed of the street.
+const STREET: (SceneKind, u64) = (SceneKind::Street, 7);
 
 /// Puts the street's photographs into a folder, as `a.jpg`, `b.jpg`, `c.jpg`, `d.jpg`.
 pub fn put_street(desk: &Desk) {

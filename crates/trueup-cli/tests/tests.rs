@@ -3,6 +3,7 @@
 mod cli;
 mod determinism;
 mod documented;
+mod evaluate;
 mod failures;
 mod options;
 mod pictures;

@@ -212,6 +212,7 @@ impl Scene<'_> {
             guidance.vertical_deviation = Some(deviation).filter(|deviation| deviation.is_finite());
             let allowed = self.options.max_vertical_deviation_deg;
             if deviation.to_degrees() > allowed {
+                guidance.pooled = false;
                 guidance.failed_clause = Some(format!(
                     "the lines leave the vertical uncertain by {:.1} degrees ({allowed:.1} allowed)",
                     deviation.to_degrees()

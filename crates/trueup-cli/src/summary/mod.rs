@@ -1,6 +1,7 @@
 //! The summary of a panorama, printed after a stitch and by `trueup inspect`.
 
 mod details;
+mod measures;
 #[cfg(test)]
 mod tests;
 
@@ -23,7 +24,8 @@ pub(crate) struct PanoramaFile<'a> {
 /// Stages faster than this, in seconds, are not named in the short list.
 const WORTH_NAMING_SECONDS: f64 = 0.05;
 
-/// What was made of which photographs, and why. `verbose` adds every pair, picture, note and stage.
+/// What was made of which photographs, and why. `verbose` adds every pair, picture, note and stage. Without a panorama's
+/// file, the measures are given for each picture.
 pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool) -> String {
     let mut page = Page::default();
     panorama(&mut page, project, file);
@@ -34,25 +36,40 @@ pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool
         details::pairs(&mut page, project, &names);
     }
     page.entry("upright", &upright(project));
+    measures::short(&mut page, project, &names);
+    if verbose || file.is_none() {
+        measures::table(&mut page, project, &names);
+    }
     findings(&mut page, project, verbose);
     match verbose {
         true => details::seconds(&mut page, &project.seconds),
         false => page.entry("time", &seconds_in_short(&project.seconds)),
     }
-    page.0
+    page.into_text()
+}
+
+/// The measures that the project file holds, all of them.
+pub(crate) fn measures(page: &mut Page, project: &Project) {
+    let names = names(&project.images);
+    measures::short(page, project, &names);
+    measures::table(page, project, &names);
 }
 
 /// Lines of a label and a text; texts stand below each other.
 #[derive(Debug, Default)]
-struct Page(String);
+pub(crate) struct Page(String);
 
 impl Page {
-    fn entry(&mut self, label: &str, text: &str) {
+    pub(crate) fn into_text(self) -> String {
+        self.0
+    }
+
+    pub(crate) fn entry(&mut self, label: &str, text: &str) {
         let _ = writeln!(self.0, "{label:<9} {text}");
     }
 
     /// A line that belongs to the entry above, with its own label.
-    fn item(&mut self, label: &str, text: &str) {
+    pub(crate) fn item(&mut self, label: &str, text: &str) {
         let _ = writeln!(self.0, "  {label:<9} {text}");
     }
 }
@@ -71,6 +88,11 @@ fn names(images: &[ImageRecord]) -> Vec<String> {
         .iter()
         .map(|image| Some(short(image)).filter(|name| count[name] == 1).unwrap_or(image.path.clone()))
         .collect()
+}
+
+/// The name that stands for a photograph's path.
+fn name_of<'a>(path: &'a str, project: &Project, names: &'a [String]) -> &'a str {
+    project.images.iter().position(|image| image.path == path).map_or(path, |index| &names[index])
 }
 
 fn panorama(page: &mut Page, project: &Project, file: Option<&PanoramaFile>) {

@@ -75,3 +75,43 @@ fn photographs_of_the_same_name_are_told_apart_by_their_paths() {
     project.images[1].path = "y/a.jpg".to_owned();
     assert_eq!(names(&project.images), ["x/a.jpg", "y/a.jpg", "c.jpg"]);
 }
+
+fn measured(upright: serde_json::Value, pictures: serde_json::Value, longest_bent: serde_json::Value) -> Project {
+    let mut project = project();
+    let measures = serde_json::json!({
+        "upright": upright, "estimated_gdic_deg": 0.5, "ld": 0.8, "ld_mean": 0.7, "folds": 0, "pictures": pictures,
+        "reprojection": {"matches": 40, "mean_px": 0.36, "rms_px": 0.5, "percentile_95_px": 1.24},
+        "long_lines": {"lines": 12, "mean_bend": 0.001, "bent": 3, "longest_bent": longest_bent}
+    });
+    project.measures = serde_json::from_value(measures).expect("measures");
+    project
+}
+
+#[test]
+fn measures_take_two_lines_and_uncertain_pictures_are_named() {
+    let picture = |path: &str, lines: usize, certain: bool| {
+        serde_json::json!({"path": path, "vertical_lines": lines, "lean_deg": 0.61, "standard_error_deg": 0.04,
+                           "gamma_deg": 1.0, "certain": certain})
+    };
+    let bent = serde_json::json!({"path": "x/a.jpg", "length_px": 412.3, "off_px": 1.94});
+    let upright = serde_json::json!({"mean_deg": 0.31, "max_deg": 0.61, "measured": 1});
+    let project =
+        measured(upright, serde_json::json!([picture("x/a.jpg", 34, true), picture("x/b.jpg", 5, false)]), bent);
+    let file = PanoramaFile { panorama: Path::new("p.jpg"), bytes: 1, project: None };
+    let short = "\
+measured  upright within 0.6 degrees, 0.3 on average (1 picture measured, 1 uncertain: b.jpg)
+          points meet within 0.4 px on average, 95 of 100 within 1.2; longest bent line: 412 px, 1.9 px off, in a.jpg
+time ";
+    let printed = text(&project, Some(&file), false);
+    assert!(printed.contains(short), "{printed}");
+    let long = text(&project, None, false);
+    assert!(long.contains("a.jpg: leans by 0.61 degrees (+- 0.04, 34 vertical lines)"), "{long}");
+    assert!(long.contains("b.jpg: uncertain: leans by"), "{long}");
+}
+
+#[test]
+fn without_vertical_lines_the_summary_says_so() {
+    let printed = text(&measured(serde_json::Value::Null, serde_json::json!([]), serde_json::Value::Null), None, false);
+    assert!(printed.contains("measured  no vertical lines to judge by\n"), "{printed}");
+    assert!(printed.contains("; none of 12 long lines is bent\n"), "{printed}");
+}

@@ -107,7 +107,7 @@ pub fn read_truth(path: &Path) -> Result<Truth> {
 /// one of another size, or two of the project's pictures have one name; if the truth is impossible; if the project's grids
 /// are damaged.
 pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
-    truth.check(&truth.source)?;
+    truth.check(&subject(truth))?;
     let known = match_pictures(project, truth)?;
     let records: Vec<&ImageRecord> = known.iter().map(|one| one.record).collect();
     let meshes = used_grids(&records)?;
@@ -146,6 +146,10 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     })
 }
 
+fn subject(truth: &Truth) -> String {
+    format!("the truth of {}", truth.source)
+}
+
 fn largest(angles: &[f64]) -> f64 {
     angles.iter().fold(0.0, |largest, &angle| largest.max(wrap_angle(angle).abs()))
 }
@@ -175,8 +179,8 @@ fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Know
     }
     match known.len() {
         0 => Err(Error::input(
-            &truth.source,
-            format!("the truth names none of the {} pictures that the project uses", used.len()),
+            subject(truth),
+            format!("it names none of the {} pictures that the project uses", used.len()),
             "Give the truth of the pictures that were stitched; pictures are told apart by their file names.",
         )),
         1 => Err(too_few(1)),
@@ -186,8 +190,8 @@ fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Know
 
 fn too_few(count: usize) -> Error {
     Error::input(
-        "evaluation",
-        format!("{count} picture that the truth knows is used, and it takes two to compare"),
+        "the truth",
+        format!("of the pictures it names, the project uses {count}, and it takes two to compare"),
         "Give a project of at least two pictures of the set.",
     )
 }

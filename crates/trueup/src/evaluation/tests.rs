@@ -68,7 +68,7 @@ fn a_truth_that_does_not_fit_is_refused_by_name() {
     other.images[1].file = "c.jpg".to_owned();
     assert!(complaint(&whole, &other).contains("it takes two to compare"));
     other.images[0].file = "d.jpg".to_owned();
-    assert!(complaint(&whole, &other).contains("test set: the truth names none of the 2 pictures"));
+    assert!(complaint(&whole, &other).contains("the truth of test set: it names none of the 2 pictures"));
     let mut twice = whole.clone();
     twice.images[0].path = "else/a.jpg".to_owned();
     assert!(complaint(&twice, &truth([0.0, 0.0])).contains("two pictures of this name"));

@@ -1,0 +1,123 @@
+//! `trueup evaluate`: every measure of a panorama, against the truth where there is one.
+
+use std::path::Path;
+
+use serde_json::json;
+use trueup::{Error, Evaluation, PixelEvaluation, Project, StageContext};
+
+use crate::arguments::EvaluateArgs;
+use crate::failure::Failure;
+use crate::inspect;
+use crate::interrupt;
+use crate::output;
+use crate::progress::Bars;
+use crate::summary::{self, Page};
+
+/// The pixel measures, or why there are none.
+type Pixels = Result<PixelEvaluation, String>;
+
+pub(crate) fn run(args: &EvaluateArgs) -> Result<(), Failure> {
+    let project = inspect::read(&args.project)?;
+    let evaluation = args.truth.as_deref().map(|truth| against(&project, &args.project, truth)).transpose()?;
+    let pixels = match args.no_pixels {
+        true => None,
+        false => Some(pixels(&project, &args.project)?),
+    };
+    if args.json {
+        let whole = json!({
+            "project": args.project.display().to_string(),
+            "measures": project.measures,
+            "truth": evaluation,
+            "pixels": pixels.as_ref().and_then(|pixels| pixels.as_ref().ok()),
+            "pixels_skipped": pixels.as_ref().and_then(|pixels| pixels.as_ref().err()),
+        });
+        return output::print(&format!("{whole:#}\n"));
+    }
+    output::print(&text(&project, evaluation.as_ref(), pixels.as_ref()))
+}
+
+/// Measures against a truth file; what does not fit is told of both files.
+fn against(project: &Project, project_file: &Path, truth_file: &Path) -> Result<Evaluation, Error> {
+    let truth = trueup::read_truth(truth_file)?;
+    trueup::evaluate(project, &truth).map_err(|error| match error {
+        Error::Input { subject, reason, hint } => {
+            let files = format!("{} against {}", project_file.display(), truth_file.display());
+            Error::Input { subject: format!("{files}: {subject}"), reason, hint }
+        }
+        other => other,
+    })
+}
+
+/// Photographs that are gone or cannot be compared leave the other measures as they are.
+fn pixels(project: &Project, project_file: &Path) -> Result<Pixels, Error> {
+    let cancel = interrupt::cancel_token();
+    let bars = Bars::new(false);
+    let context = StageContext::new(&bars, &cancel, project.options.stitch.seed);
+    let folder = project_file.parent().unwrap_or(Path::new(""));
+    let compared = trueup::evaluate_pixels(project, folder, &context);
+    bars.clear();
+    match compared {
+        Ok(pixels) => Ok(Ok(pixels)),
+        Err(Error::Input { subject, reason, .. }) => Ok(Err(format!("{reason}: {subject}"))),
+        Err(Error::Unsolvable { why, .. }) => Ok(Err(why)),
+        Err(other) => Err(other),
+    }
+}
+
+fn text(project: &Project, evaluation: Option<&Evaluation>, pixels: Option<&Pixels>) -> String {
+    let mut page = Page::default();
+    summary::measures(&mut page, project);
+    if project.measures.is_none() {
+        page.entry("measured", "the project file holds no measures: stitch again with this program");
+    }
+    if let Some(evaluation) = evaluation {
+        truth(&mut page, evaluation);
+    }
+    match pixels {
+        None => {}
+        Some(Err(why)) => page.entry("pixels", &format!("skipped: {why}")),
+        Some(Ok(found)) => compared(&mut page, found),
+    }
+    page.into_text()
+}
+
+fn truth(page: &mut Page, found: &Evaluation) {
+    page.entry("truth", &format!("{} of {} pictures measured", found.used, found.given));
+    let (mean, most, spread) = (found.upright_deg, found.upright_max_deg, found.spread_deg);
+    page.item("upright", &format!("{mean:.3} degrees off on average, {most:.3} at most; spread {spread:.3}"));
+    let by_reference = found
+        .gdic_reference_deg
+        .map_or(String::new(), |degrees| format!(", {degrees:.3} from the project's reference"));
+    let (gdic, similarity) = (found.gdic_deg, found.gdic_similarity_deg);
+    page.item("GDIC", &format!("{gdic:.3} degrees from the first picture{by_reference}"));
+    page.item("GDIC-P", &format!("{similarity:.3} degrees, by similarities instead of rectangles"));
+    if let Some((mean, most)) = found.theta_error_deg.zip(found.theta_error_max_deg) {
+        page.item("theta", &format!("{mean:.3} degrees off on average, {most:.3} at most"));
+    }
+    let (ld, mean, corners) = (found.ld, found.ld_mean, found.ld_corners);
+    page.item("LD", &format!("{ld:.3}e-2 at most, {mean:.3}e-2 on average; {corners:.3}e-2 by centre and corners"));
+    page.item("folds", &format!("{} folded cells", found.folds));
+    page.item(
+        "alignment",
+        &match found.align_px {
+            Some(pixels) => format!("{pixels:.3} px"),
+            None => "unknown: no overlaps, or photographs from different places".to_owned(),
+        },
+    );
+    for picture in &found.pictures {
+        let theta = picture.theta_error_deg.map_or(String::new(), |degrees| format!(", theta {degrees:+.3}"));
+        page.item("", &format!("{}: {:+.3} degrees off upright{theta}", picture.file, picture.upright_deg));
+    }
+}
+
+fn compared(page: &mut Page, found: &PixelEvaluation) {
+    let (pairs, scale) = (found.pairs, found.scale);
+    page.entry("pixels", &format!("{} in {pairs} overlaps, at {scale:.3} of the panorama's size", found.pixels));
+    page.item("NCC", &format!("RMSE {:.4}, MSE {:.4}", found.ncc_rmse, found.ncc_mse));
+    page.item("grey", &format!("MSE {:.2}", found.intensity_mse));
+    let quality = [
+        found.psnr_db.map(|decibels| format!("PSNR {decibels:.2} dB")),
+        found.ssim.map(|similarity| format!("SSIM {similarity:.4}")),
+    ];
+    page.item("", &quality.into_iter().flatten().collect::<Vec<_>>().join(", "));
+}

@@ -1,0 +1,102 @@
+//! What the panorama's own lines and matches say of it.
+
+use trueup::{Measures, PictureMeasures, Project};
+
+use super::{Page, name_of};
+
+/// Uncertain pictures named before the rest are counted.
+const NAMED: usize = 4;
+
+/// One or two lines: how upright, how well aligned, how straight.
+pub(crate) fn short(page: &mut Page, project: &Project, names: &[String]) {
+    let Some(measures) = &project.measures else { return };
+    page.entry("measured", &upright(measures, project, names));
+    let rest: Vec<String> = [alignment(measures), bent_line(measures, project, names)].into_iter().flatten().collect();
+    if !rest.is_empty() {
+        page.entry("", &rest.join("; "));
+    }
+}
+
+/// "upright within 0.6 degrees, 0.3 on average (8 pictures measured, 2 uncertain: 03.jpg, 07.jpg)"
+fn upright(measures: &Measures, project: &Project, names: &[String]) -> String {
+    let Some(upright) = &measures.upright else {
+        return "no vertical lines to judge by".to_owned();
+    };
+    let uncertain: Vec<&str> = measures
+        .pictures
+        .iter()
+        .filter(|picture| !picture.certain)
+        .map(|picture| name_of(&picture.path, project, names))
+        .collect();
+    let measured = format!("{} measured", pictures_in_words(upright.measured));
+    let uncertain = match uncertain.len() {
+        0 => String::new(),
+        count => format!(", {count} uncertain: {}", listed(&uncertain)),
+    };
+    let (most, mean) = (upright.max_deg, upright.mean_deg);
+    format!("upright within {most:.1} degrees, {mean:.1} on average ({measured}{uncertain})")
+}
+
+fn pictures_in_words(count: usize) -> String {
+    if count == 1 { "1 picture".to_owned() } else { format!("{count} pictures") }
+}
+
+/// Names separated by commas; many are cut short.
+fn listed(names: &[&str]) -> String {
+    match names.len() {
+        count if count > NAMED + 1 => format!("{} and {} others", names[..NAMED].join(", "), count - NAMED),
+        _ => names.join(", "),
+    }
+}
+
+fn alignment(measures: &Measures) -> Option<String> {
+    let found = measures.reprojection.as_ref()?;
+    Some(format!(
+        "points meet within {:.1} px on average, 95 of 100 within {:.1}",
+        found.mean_px, found.percentile_95_px
+    ))
+}
+
+fn bent_line(measures: &Measures, project: &Project, names: &[String]) -> Option<String> {
+    let lines = measures.long_lines.as_ref()?;
+    Some(match &lines.longest_bent {
+        None => format!("none of {} long lines is bent", lines.lines),
+        Some(line) => format!(
+            "longest bent line: {:.0} px, {:.1} px off, in {}",
+            line.length_px,
+            line.off_px,
+            name_of(&line.path, project, names)
+        ),
+    })
+}
+
+/// The figures that the short form leaves out, and a line per picture.
+pub(super) fn table(page: &mut Page, project: &Project, names: &[String]) {
+    let Some(measures) = &project.measures else { return };
+    if let Some(degrees) = measures.estimated_gdic_deg {
+        page.item("GDIC", &format!("{degrees:.2} degrees, estimated from the pictures' own vertical lines"));
+    }
+    let (ld, mean, folds) = (measures.ld, measures.ld_mean, measures.folds);
+    page.item("LD", &format!("{ld:.3}e-2 at most, {mean:.3}e-2 on average; {folds} folded cells"));
+    if let Some(lines) = &measures.long_lines {
+        let bend = 1000.0 * lines.mean_bend;
+        page.item("lines", &format!("{} of {} long lines bent; {bend:.2} in 1000 off", lines.bent, lines.lines));
+    }
+    for picture in &measures.pictures {
+        page.item("", &format!("{}: {}", name_of(&picture.path, project, names), lean(picture)));
+    }
+}
+
+/// "leans by 0.21 degrees (+- 0.05, 34 vertical lines)"
+fn lean(picture: &PictureMeasures) -> String {
+    let lines = match picture.vertical_lines {
+        0 => "no vertical lines".to_owned(),
+        1 => "1 vertical line".to_owned(),
+        count => format!("{count} vertical lines"),
+    };
+    let Some((lean, error)) = picture.lean_deg.zip(picture.standard_error_deg) else {
+        return lines;
+    };
+    let uncertain = if picture.certain { "" } else { "uncertain: " };
+    format!("{uncertain}leans by {lean:.2} degrees (+- {error:.2}, {lines})")
+}
