@@ -1,0 +1,148 @@
+//! A document as one HTML page that needs nothing else.
+
+use std::fmt::Write;
+
+use super::document::{Block, Document, Table};
+use super::markdown::verdict;
+
+/// The page's looks.
+const STYLE: &str = include_str!("page.css");
+
+/// The whole page.
+pub(crate) fn render(document: &Document) -> String {
+    let title = escape(&document.title);
+    let mut page = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n\
+         <style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n<h1>{title}</h1>\n<nav><ol>\n"
+    );
+    for section in &document.sections {
+        let _ = writeln!(page, "<li><a href=\"#{}\">{}</a></li>", section.id, escape(&section.title));
+    }
+    page.push_str("</ol></nav>\n");
+    for section in &document.sections {
+        let _ = writeln!(page, "<section id=\"{}\">\n<h2>{}</h2>", section.id, escape(&section.title));
+        for block in &section.blocks {
+            page.push_str(&block_text(block));
+        }
+        page.push_str("</section>\n");
+    }
+    page.push_str("</main>\n</body>\n</html>\n");
+    page
+}
+
+fn block_text(block: &Block) -> String {
+    match block {
+        Block::Paragraph(words) => format!("<p>{}</p>\n", inline(words)),
+        Block::List(points) => {
+            let points: String = points.iter().map(|point| format!("<li>{}</li>\n", inline(point))).collect();
+            format!("<ul>\n{points}</ul>\n")
+        }
+        Block::Table(table) => table_text(table),
+        Block::Figure(figure) => {
+            format!("<figure>\n{}\n<figcaption>{}</figcaption>\n</figure>\n", figure.svg, inline(&figure.caption))
+        }
+        Block::Claim(claim) => {
+            let class = match claim.holds {
+                Some(true) => "holds",
+                Some(false) => "fails",
+                None => "untried",
+            };
+            format!(
+                "<p class=\"claim {class}\"><strong>{}</strong> {} <span class=\"evidence\">{}</span></p>\n",
+                verdict(claim),
+                inline(&claim.text),
+                inline(&claim.evidence)
+            )
+        }
+        Block::Skipped(reason) => format!("<p class=\"skipped\">Skipped: {}</p>\n", inline(reason)),
+    }
+}
+
+fn table_text(table: &Table) -> String {
+    let mut text = String::from("<div class=\"table\"><table>\n");
+    if !table.caption.is_empty() {
+        let _ = writeln!(text, "<caption>{}</caption>", inline(&table.caption));
+    }
+    let headings: String = table.columns.iter().map(|name| format!("<th>{}</th>", inline(name))).collect();
+    let _ = writeln!(text, "<thead><tr>{headings}</tr></thead>\n<tbody>");
+    for row in &table.rows {
+        let class = if row.from_paper { " class=\"paper\"" } else { "" };
+        let cells: String = row.cells.iter().map(|cell| cell_text(cell)).collect();
+        let _ = writeln!(text, "<tr{class}>{cells}</tr>");
+    }
+    text.push_str("</tbody></table></div>\n");
+    text
+}
+
+/// Numbers stand at the right, words at the left.
+fn cell_text(cell: &str) -> String {
+    let numeric = cell == "-" || cell.starts_with(|first: char| first.is_ascii_digit() || "+-<".contains(first));
+    let class = if numeric { " class=\"number\"" } else { "" };
+    format!("<td{class}>{}</td>", inline(cell))
+}
+
+/// Escaped text with `words` in backticks as code.
+fn inline(text: &str) -> String {
+    let parts: Vec<String> = text.split('`').map(escape).collect();
+    let pairs = parts.len().is_multiple_of(2);
+    let mut html = String::new();
+    for (index, part) in parts.iter().enumerate() {
+        match (index % 2, pairs && index + 1 == parts.len()) {
+            (1, false) => {
+                let _ = write!(html, "<code>{part}</code>");
+            }
+            // A backtick without a partner stays as it is.
+            (1, true) => {
+                let _ = write!(html, "`{part}");
+            }
+            _ => html.push_str(part),
+        }
+    }
+    html
+}
+
+/// Text with the characters that mean something in HTML replaced.
+pub(crate) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::document::{Claim, Section};
+
+    #[test]
+    fn words_of_tables_are_escaped_and_code_is_marked() {
+        assert_eq!(inline("a < b & `x=\"1\"`"), "a &lt; b &amp; <code>x=&quot;1&quot;</code>");
+        assert_eq!(inline("one ` alone"), "one ` alone");
+    }
+
+    #[test]
+    fn every_block_has_its_mark_up() {
+        let mut section = Section::new("one", "One & all");
+        let mut table = Table::new("t", "", ["set", "LD"]);
+        table.push_paper(["01", "0.82"]);
+        section.blocks = vec![
+            Block::List(vec!["point".to_owned()]),
+            Block::Table(table),
+            Block::Claim(Claim {
+                text: "It is so.".to_owned(),
+                holds: Some(false),
+                evidence: "1 > 2".to_owned(),
+                brief: String::new(),
+            }),
+            Block::Skipped("no data".to_owned()),
+        ];
+        let page = render(&Document { title: "T".to_owned(), sections: vec![section] });
+        for part in [
+            "<a href=\"#one\">One &amp; all</a>",
+            "<ul>\n<li>point</li>",
+            "<tr class=\"paper\"><td class=\"number\">01</td><td class=\"number\">0.82</td></tr>",
+            "<p class=\"claim fails\"><strong>Does not hold:</strong> It is so.",
+            "Skipped: no data",
+        ] {
+            assert!(page.contains(part), "{part} is not in {page}");
+        }
+    }
+}
