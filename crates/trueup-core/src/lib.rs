@@ -20,6 +20,7 @@ pub mod context;
 pub mod diagnostics;
 pub mod error;
 pub mod geometry;
+pub mod interpolation;
 pub mod lines;
 pub mod matches;
 pub mod mesh;

@@ -15,6 +15,56 @@ pub struct Truth {
     pub source: String,
     /// One a picture, in order.
     pub images: Vec<ImageTruth>,
+    /// What the world's vertical rests on; absent where it is exact, as in rendered scenes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub level: Option<Level>,
+}
+
+/// Where the vertical of a set's world comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LevelOrigin {
+    /// Stated by whoever described the set.
+    Given,
+    /// Measured from the scene's vertical lines.
+    Measured,
+    /// The vertical of the panorama the pictures were cut from, for want of a better one.
+    Panorama,
+}
+
+/// The vertical that defines a set's world, and how sure it is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Level {
+    /// Where it comes from.
+    pub origin: LevelOrigin,
+    /// The direction "down" in the frame of the panorama that the pictures were cut from, a unit vector.
+    pub down: [f64; 3],
+    /// Angle by which the measurement's two components together err, one standard deviation, degrees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub standard_error_deg: Option<f64>,
+    /// Angle between the measurements on the two halves of the views, degrees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub halves_deg: Option<f64>,
+    /// Vertical lines that the measurement found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lines: Option<usize>,
+    /// Why a measurement was refused.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+impl Level {
+    /// A level without figures.
+    pub fn plain(origin: LevelOrigin, down: [f64; 3]) -> Self {
+        Self { origin, down, standard_error_deg: None, halves_deg: None, lines: None, reason: None }
+    }
+
+    /// Angle between the level's "down" and the panorama's own, degrees.
+    pub fn tilt_deg(&self) -> f64 {
+        let [x, y, z] = self.down;
+        x.hypot(z).atan2(y).to_degrees()
+    }
 }
 
 /// What is true of one picture.
@@ -113,7 +163,7 @@ mod tests {
     }
 
     fn complaint(images: Vec<ImageTruth>) -> String {
-        let truth = Truth { source: "test".to_owned(), images };
+        let truth = Truth { source: "test".to_owned(), images, level: None };
         truth.check("truth.json").map_or_else(|error| error.to_string(), |()| String::new())
     }
 

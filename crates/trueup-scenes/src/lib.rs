@@ -1,4 +1,5 @@
-//! Pictures with exactly known cameras: rendered scenes for examples, tests and experiments.
+//! Pictures with exactly known cameras for examples, tests and experiments: rendered scenes, and views cut out of
+//! panoramas of real places ([`cut`]).
 //!
 //! A [`Scene`] (a room, a street, or open country) is built from a seed; [`rig`] places the cameras of a hand-held
 //! panorama in it; [`render`] takes the photographs and [`write_set`] stores them with their truth.
@@ -18,6 +19,7 @@
 
 mod bvh;
 mod colour;
+pub mod cut;
 mod dice;
 mod light;
 mod material;

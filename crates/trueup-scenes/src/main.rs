@@ -1,16 +1,19 @@
-//! Renders sets of pictures with exactly known cameras.
+//! Makes sets of pictures with exactly known cameras.
 #![forbid(unsafe_code)]
+
+mod commands;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use commands::{CutArguments, LevelArguments, SpecsArguments};
 use trueup_core::{Error, Result, StageContext};
 use trueup_scenes::{
     LightQuality, Quality, RigOptions, Scene, SceneKind, SceneOptions, example_set, rig, study_set, write_set,
 };
 
-/// Renders photographs of rooms, streets and open country with exactly known cameras.
+/// Makes photographs with exactly known cameras: rendered, or cut out of panoramas.
 #[derive(Debug, Parser)]
 #[command(version)]
 struct Arguments {
@@ -37,6 +40,12 @@ enum Command {
         #[arg(long, value_delimiter = ',')]
         sets: Vec<usize>,
     },
+    /// Cuts views of known pose out of a panorama.
+    Cut(CutArguments),
+    /// Measures where the scene's vertical points in panoramas.
+    Level(LevelArguments),
+    /// Writes specs of views to cut out of panoramas.
+    Specs(SpecsArguments),
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -143,6 +152,9 @@ fn main() -> ExitCode {
 
 fn run(command: &Command) -> Result<()> {
     match command {
+        Command::Cut(arguments) => arguments.run(),
+        Command::Level(arguments) => arguments.run(),
+        Command::Specs(arguments) => arguments.run(),
         Command::Render(arguments) => {
             let (scene, rig, quality) = arguments.options();
             write(&arguments.out, &scene, &rig, quality)

@@ -24,9 +24,15 @@ pub(crate) fn lerp(a: f64, b: f64, t: f64) -> f64 {
     a + (b - a) * t
 }
 
+/// The largest integer not above a number of moderate size: `f64::floor` is a call on processors assumed by default.
+pub(crate) fn floor(x: f64) -> f64 {
+    let whole = x as i64 as f64;
+    if whole > x { whole - 1.0 } else { whole }
+}
+
 /// Smooth noise in [-1, 1] with features about one unit wide.
 pub(crate) fn value_noise(point: Vector3<f64>, seed: u32) -> f64 {
-    let cell = point.map(f64::floor);
+    let cell = point.map(floor);
     let (x, y, z) = (cell.x as i64, cell.y as i64, cell.z as i64);
     let (u, v, w) = (fade(point.x - cell.x), fade(point.y - cell.y), fade(point.z - cell.z));
     let edge = |dy: i64, dz: i64| lerp(lattice(x, y + dy, z + dz, seed), lattice(x + 1, y + dy, z + dz, seed), u);
@@ -62,7 +68,7 @@ pub(crate) fn fractal_noise(
 /// exact box filtering, in [0, 1].
 pub(crate) fn pulse(x: f64, width: f64, period: f64, footprint: f64) -> f64 {
     let integral = |x: f64| {
-        let cell = (x / period).floor();
+        let cell = floor(x / period);
         cell * width + (x - cell * period).min(width)
     };
     let half = 0.5 * footprint.max(1e-6);

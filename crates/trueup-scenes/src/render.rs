@@ -73,7 +73,7 @@ pub fn depth_map(scene: &Scene, posed: &PosedCamera) -> Raster<f32> {
     depths.data_mut().par_chunks_mut(posed.width).enumerate().for_each(|(y, row)| {
         for (x, depth) in row.iter_mut().enumerate() {
             let ray = Ray::new(eye.centre, eye.direction(x as f64 + 0.5, y as f64 + 0.5));
-            let hit = scene.hierarchy.nearest(&scene.solids, &ray, f64::INFINITY);
+            let hit = scene.hierarchy.nearest(&ray, f64::INFINITY);
             *depth = hit.map_or(f32::INFINITY, |(_, entry)| (entry.distance * ray.direction.dot(&eye.axis)) as f32);
         }
     });
@@ -139,7 +139,7 @@ pub(crate) fn trace(
     const MIN_COSINE: f64 = 0.08;
     const GRAZING_GAIN: f64 = 8.0;
     let ray = Ray::new(origin, direction);
-    let Some((index, entry)) = scene.hierarchy.nearest(&scene.solids, &ray, f64::INFINITY) else {
+    let Some((index, entry)) = scene.hierarchy.nearest(&ray, f64::INFINITY) else {
         return scene.sky.radiance(direction, angle);
     };
     let solid = &scene.solids[index];
@@ -175,7 +175,7 @@ fn sunlight(scene: &Scene, surface: Vector3<f64>, normal: Vector3<f64>, [s, t]: 
     }
     let (right, up) = tangents(sun.towards);
     let towards = sun.towards + (right * s + up * t) * SUN_RADIUS;
-    if scene.hierarchy.blocked(&scene.solids, &Ray::new(surface, towards), f64::INFINITY) {
+    if scene.hierarchy.blocked(&Ray::new(surface, towards), f64::INFINITY) {
         return Rgb::zeros();
     }
     sun.irradiance * cosine

@@ -111,7 +111,7 @@ impl PosedCamera {
 }
 
 /// Focal length of a picture of this width and horizontal field of view.
-fn focal_px(width: usize, hfov_deg: f64) -> f64 {
+pub(crate) fn focal_px(width: usize, hfov_deg: f64) -> f64 {
     width as f64 / 2.0 / (hfov_deg.to_radians() / 2.0).tan()
 }
 

@@ -45,7 +45,7 @@ pub fn write_set(
     const STAGE: &str = "rendering";
     fs::create_dir_all(directory).map_err(|error| Error::io("making the folder", directory, error))?;
     context.progress().begin(STAGE, cameras.len() as u64);
-    let mut truth = Truth { source: source.to_owned(), images: Vec::with_capacity(cameras.len()) };
+    let mut truth = Truth { source: source.to_owned(), images: Vec::with_capacity(cameras.len()), level: None };
     for (index, posed) in cameras.iter().enumerate() {
         context.check_cancelled()?;
         let file = format!("{index:02}.jpg");
@@ -56,16 +56,21 @@ pub fn write_set(
         context.progress().advance(STAGE, 1);
     }
     context.progress().finish(STAGE);
-    let path = directory.join("truth.json");
-    let text = serde_json::to_string_pretty(&truth)
-        .map_err(|error| Error::io("writing", &path, std::io::Error::other(error)))?;
-    fs::write(&path, text + "\n").map_err(|error| Error::io("writing", &path, error))?;
+    write_truth(directory, &truth)?;
     Ok(truth)
+}
+
+/// Writes `truth.json` into the folder of its pictures.
+pub(crate) fn write_truth(directory: &Path, truth: &Truth) -> Result<()> {
+    let path = directory.join("truth.json");
+    let text = serde_json::to_string_pretty(truth)
+        .map_err(|error| Error::io("writing", &path, std::io::Error::other(error)))?;
+    fs::write(&path, text + "\n").map_err(|error| Error::io("writing", &path, error))
 }
 
 /// A baseline JPEG at [`JPEG_QUALITY`] with halved chroma, in one scan: the encoder's optimised Huffman tables would come
 /// with a scan for each component, which cameras never write and some decoders misread.
-fn jpeg(picture: &Raster<u8>) -> Result<Vec<u8>> {
+pub(crate) fn jpeg(picture: &Raster<u8>) -> Result<Vec<u8>> {
     let too_large = || Error::Limits {
         subject: "a JPEG picture".to_owned(),
         needed: format!("{} x {} px", picture.width(), picture.height()),

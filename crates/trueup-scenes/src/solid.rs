@@ -89,18 +89,6 @@ impl Solid {
         }
     }
 
-    /// Where a ray from outside enters within (0, limit).
-    pub(crate) fn enter(&self, origin: Vector3<f64>, direction: Vector3<f64>, limit: f64) -> Option<Entry> {
-        let origin = self.to_body(origin - self.centre);
-        let direction = self.to_body(direction);
-        let entry = match self.shape {
-            Shape::Block => enter_block(origin, direction, self.half),
-            Shape::Cylinder => enter_cylinder(origin.component_div(&self.half), direction.component_div(&self.half)),
-            Shape::Ellipsoid => enter_ball(origin.component_div(&self.half), direction.component_div(&self.half)),
-        }?;
-        (entry.distance > 0.0 && entry.distance < limit).then_some(entry)
-    }
-
     /// Width and height of a face's chart, metres.
     pub(crate) fn face_size(&self, face: usize) -> [f64; 2] {
         let half = self.half;
@@ -170,7 +158,14 @@ impl Solid {
     }
 }
 
-fn enter_block(origin: Vector3<f64>, direction: Vector3<f64>, half: Vector3<f64>) -> Option<Entry> {
+/// Where a ray enters a block about the origin; `inverse` is one over each component of the direction.
+#[inline]
+pub(crate) fn enter_aligned(
+    origin: Vector3<f64>,
+    direction: Vector3<f64>,
+    inverse: Vector3<f64>,
+    half: Vector3<f64>,
+) -> Option<Entry> {
     let (mut near, mut far, mut face) = (f64::NEG_INFINITY, f64::INFINITY, 0);
     for axis in 0..3 {
         if direction[axis] == 0.0 {
@@ -179,16 +174,32 @@ fn enter_block(origin: Vector3<f64>, direction: Vector3<f64>, half: Vector3<f64>
             }
             continue;
         }
-        let inverse = 1.0 / direction[axis];
+        let inverse = inverse[axis];
         let (low, high) = ((-half[axis] - origin[axis]) * inverse, (half[axis] - origin[axis]) * inverse);
         // Entering through the low side exactly when the ray runs towards larger coordinates.
         let (enter, leave, entered) = if inverse > 0.0 { (low, high, 2 * axis) } else { (high, low, 2 * axis + 1) };
         if enter > near {
             (near, face) = (enter, entered);
         }
-        far = far.min(leave);
+        if leave < far {
+            far = leave;
+        }
     }
     (near <= far && near.is_finite()).then_some(Entry { distance: near, face })
+}
+
+/// Where a ray enters a round body about the origin (or a block, which [`enter_aligned`] does faster).
+pub(crate) fn enter_round(
+    shape: Shape,
+    origin: Vector3<f64>,
+    direction: Vector3<f64>,
+    half: Vector3<f64>,
+) -> Option<Entry> {
+    match shape {
+        Shape::Block => enter_aligned(origin, direction, direction.map(f64::recip), half),
+        Shape::Cylinder => enter_cylinder(origin.component_div(&half), direction.component_div(&half)),
+        Shape::Ellipsoid => enter_ball(origin.component_div(&half), direction.component_div(&half)),
+    }
 }
 
 /// The smaller root of the unit circle or sphere; `None` if missed.

@@ -177,13 +177,16 @@ fn find_triads(
             // Seeded by the photograph's own content-independent name, so that the order of inputs does not matter.
             let mut generator = context.generator(STAGE, name_seed(&component.images[k].path));
             let focal_px = cameras.cameras[k].focal_px;
-            let outcome = vanishing::detect_triad(
+            let mut outcome = vanishing::detect_triad(
                 &component.lines[k],
                 focal_px,
                 &component.frames[k],
                 &options.vanishing,
                 &mut generator,
             );
+            if options.vanishing.outlier_share > 0.0 {
+                vanishing::spoil(&mut outcome, options.vanishing.outlier_share, &mut generator);
+            }
             context.progress().advance(STAGE, 1);
             Ok(outcome)
         })

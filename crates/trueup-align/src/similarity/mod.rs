@@ -77,6 +77,8 @@ trueup_core::options! {
         beta_mode: BetaMode = BetaMode::World, Allowed::Any, "";
         /// Weight of the relative rolls against the pictures' own.
         relative_weight: f64 = 10.0, between(0.0, 1e6), "";
+        /// Whether pictures vote along paths on how much a picture's own roll weighs; otherwise all weigh the same.
+        path_voting: bool = true, Allowed::Any, "";
         /// Longest path by which pictures vote on each other.
         max_path_edges: usize = 3, between(1.0, 6.0), "edges";
         /// Most paths that vote on one picture.

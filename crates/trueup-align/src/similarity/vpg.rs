@@ -258,7 +258,10 @@ impl Scene<'_> {
             tolerance: self.options.path_tolerance_deg.to_radians(),
             max_paths: self.options.max_paths,
         };
-        guidance.weights = vote.weights(own, &neighbours);
+        guidance.weights = match self.options.path_voting {
+            true => vote.weights(own, &neighbours),
+            false => own.iter().map(|roll| f64::from(u8::from(roll.is_some()))).collect(),
+        };
         let data: Vec<DataTerm> = own
             .iter()
             .zip(&guidance.weights)

@@ -16,7 +16,7 @@ mod search;
 mod tests;
 
 use nalgebra::{Matrix3, Vector3};
-use rand::Rng;
+use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 use trueup_core::geometry::{matrix_from_rows, rows_of};
 use trueup_core::lines::LineSegment;
@@ -62,14 +62,16 @@ trueup_core::options! {
         min_cluster_lines: usize = 3, between(1.0, 1e5), "segments";
         /// A triad whose orientation is less certain than this is dropped.
         max_rotation_sd_deg: f64 = 5.0, between(0.01, 90.0), "degrees";
+        /// Share of the directions found that are replaced by random ones: for experiments on robustness.
+        outlier_share: f64 = 0.0, between(0.0, 1.0), "";
     }
 }
 
 /// Three vanishing directions of a picture, the paper's v_i.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Triad {
-    /// Rows of the 3 x 3 matrix whose columns are the three directions in the camera frame: orthonormal, of arbitrary
-    /// order and sign.
+    /// Rows of the 3 x 3 matrix whose columns are the three directions in the camera frame: orthonormal (unless
+    /// [`spoil`] replaced some), of arbitrary order and sign.
     pub camera_from_triad: [[f64; 3]; 3],
     /// Fraction of the segments' weight that supports the triad, 0..1.
     pub quality: f64,
@@ -185,6 +187,27 @@ pub fn detect_triad(
         Some(best) => judge(&best, &planes, lines.len(), options),
         None => TriadOutcome::Missing(MissingTriad::LowQuality { quality: 0.0, needed: options.min_quality }),
     }
+}
+
+/// Replaces each direction of a triad, independently with probability `share`, by one drawn uniformly from the sphere;
+/// the others stay, so that the triad is no longer orthogonal.
+///
+/// # Source
+/// The noise of the paper's experiment on its robust scheme; the paper does not say how its noise is drawn.
+pub fn spoil(outcome: &mut TriadOutcome, share: f64, generator: &mut impl Rng) {
+    let TriadOutcome::Found(triad) = outcome else { return };
+    let mut matrix = triad.matrix();
+    for column in 0..3 {
+        // Drawn whether used or not, so that a larger share spoils the same directions and more.
+        let chance: f64 = generator.random();
+        let (height, turn): (f64, f64) =
+            (generator.random_range(-1.0..1.0), generator.random_range(0.0..std::f64::consts::TAU));
+        if chance < share {
+            let radius = (1.0 - height * height).sqrt();
+            matrix.set_column(column, &Vector3::new(radius * turn.cos(), radius * turn.sin(), height));
+        }
+    }
+    triad.camera_from_triad = rows_of(&matrix);
 }
 
 /// Accepts a refined triad or says why not.

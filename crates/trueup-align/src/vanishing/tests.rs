@@ -73,3 +73,34 @@ fn nothing_and_nonsense_have_no_triad() {
     assert!(outcome_of(&parallel, f64::NAN).triad().is_none());
     assert!(outcome_of(&vec![parallel[0]; 50], 700.0).triad().is_none());
 }
+
+/// Of 3 x 400 directions a share of 0.25 is 300 in the mean with a standard deviation of 15; those replaced stay unit
+/// vectors, those of a smaller share are among those of a larger one.
+#[test]
+fn spoiling_replaces_the_share_asked_for() {
+    let triad = Triad {
+        camera_from_triad: rows_of(&Matrix3::identity()),
+        quality: 1.0,
+        line_counts: [9; 3],
+        clusters: Vec::new(),
+        covariance: rows_of(&Matrix3::zeros()),
+        roll_sd: None,
+    };
+    let replaced = |share: f64| -> Vec<bool> {
+        let of_picture = |subject| {
+            let mut outcome = TriadOutcome::Found(triad.clone());
+            spoil(&mut outcome, share, &mut StageContext::default().generator("spoil test", subject));
+            let matrix = outcome.triad().expect("still there").matrix();
+            (0..3).map(move |column| {
+                assert!((matrix.column(column).norm() - 1.0).abs() < 1e-12);
+                matrix.column(column) != Matrix3::identity().column(column)
+            })
+        };
+        (0..400).flat_map(of_picture).collect()
+    };
+    let (few, many) = (replaced(0.25), replaced(0.6));
+    let count = |list: &[bool]| list.iter().filter(|&&one| one).count();
+    assert!((240..360).contains(&count(&few)), "{}", count(&few));
+    assert!(few.iter().zip(&many).all(|(few, many)| !few || *many));
+    assert_eq!((count(&replaced(0.0)), count(&replaced(1.0))), (0, 1200));
+}

@@ -1,5 +1,7 @@
 //! Interpolation kernels.
 
+use trueup_core::interpolation::cubic_convolution_taps;
+
 /// A separable, even interpolation kernel over at most four samples.
 pub(crate) trait Kernel {
     /// Half its width in samples.
@@ -53,14 +55,7 @@ impl Kernel for Bicubic {
 
     #[inline(always)]
     fn taps(fraction: f32) -> [f32; 4] {
-        // Coefficients of fraction^3, fraction^2, fraction and 1, a column for each tap: exact at both ends.
-        const CUBE: [f32; 4] = [-0.5, 1.5, -1.5, 0.5];
-        const SQUARE: [f32; 4] = [1.0, -2.5, 2.0, -0.5];
-        const LINE: [f32; 4] = [-0.5, 0.0, 0.5, 0.0];
-        const CONSTANT: [f32; 4] = [0.0, 1.0, 0.0, 0.0];
-        std::array::from_fn(|tap| {
-            ((CUBE[tap] * fraction + SQUARE[tap]) * fraction + LINE[tap]) * fraction + CONSTANT[tap]
-        })
+        cubic_convolution_taps(fraction)
     }
 }
 

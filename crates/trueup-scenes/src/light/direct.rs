@@ -14,7 +14,7 @@ pub(super) fn direct_light(scene: &Scene, place: &Place, samples: usize) -> (Rgb
     let sun = scene.sun.map_or(Rgb::zeros(), |sun| {
         let cosine = place.normal.dot(&sun.towards);
         let lit =
-            cosine > 0.0 && !scene.hierarchy.blocked(&scene.solids, &Ray::new(place.point, sun.towards), f64::INFINITY);
+            cosine > 0.0 && !scene.hierarchy.blocked(&Ray::new(place.point, sun.towards), f64::INFINITY);
         if lit { sun.irradiance * cosine } else { Rgb::zeros() }
     });
     (portals, sun)
@@ -37,7 +37,7 @@ fn portal_light(scene: &Scene, place: &Place, portal: &Portal, samples: usize) -
             continue;
         }
         let limit = distance_squared.sqrt() - 2.0 * SURFACE_OFFSET_M;
-        if scene.hierarchy.blocked(&scene.solids, &Ray::new(place.point, direction), limit) {
+        if scene.hierarchy.blocked(&Ray::new(place.point, direction), limit) {
             continue;
         }
         let radiance = portal.radiance.unwrap_or_else(|| scene.sky.radiance(direction, SKY_BLUR) * WINDOW_GAIN);

@@ -7,7 +7,8 @@ use super::MAX_GRID;
 /// Grid points along a side of this length: two at least, and one in the middle of what is not tiny.
 pub(super) fn grid_points(size_m: f64, spacing_m: f64) -> usize {
     const TINY_M: f64 = 0.12;
-    let least = if size_m < TINY_M { 2 } else { 3 };
+    const TINY_SHARE: f64 = 0.25;
+    let least = if size_m < TINY_M.max(TINY_SHARE * spacing_m) { 2 } else { 3 };
     ((size_m / spacing_m).ceil() as usize + 1).clamp(least, MAX_GRID)
 }
 

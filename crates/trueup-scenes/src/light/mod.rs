@@ -45,6 +45,8 @@ pub(crate) struct LightDetail {
     pub(crate) spacing_m: f64,
     /// Directions gathered in the last pass; the first takes half.
     pub(crate) directions: usize,
+    /// Directions gathered at least, where it matters little.
+    pub(crate) least_directions: usize,
     /// Samples along each side of a portal.
     pub(crate) portal_samples: usize,
 }
@@ -98,7 +100,7 @@ impl LightField {
         let albedo = mean_albedo(scene);
         field.fill(&places, direct.iter().map(|(portals, sun)| portals + sun));
         for directions in [detail.directions / 2, detail.directions] {
-            let patterns = THINNING.map(|thinning| cosine_pattern((directions / thinning).max(8)));
+            let patterns = THINNING.map(|thinning| cosine_pattern((directions / thinning).max(detail.least_directions)));
             let bounced: Vec<Rgb> = places
                 .par_iter()
                 .enumerate()
@@ -212,7 +214,7 @@ impl LightField {
         for local in pattern {
             let direction = tangent * local.x + bitangent * local.y + place.normal * local.z;
             let ray = Ray::new(place.point, direction);
-            if let Some((solid, entry)) = scene.hierarchy.nearest(&scene.solids, &ray, f64::INFINITY) {
+            if let Some((solid, entry)) = scene.hierarchy.nearest(&ray, f64::INFINITY) {
                 let body = &scene.solids[solid];
                 let at = body.to_body(place.point + direction * entry.distance - body.centre);
                 let (chart, _) = body.chart(entry.face, at);

@@ -36,7 +36,9 @@ trueup_core::choice! {
     pub enum LightQuality {
         /// A fraction of a second; blurred shadows. For tests.
         Fast = "fast",
-        /// Several seconds. For pictures to look at.
+        /// Two or three seconds of one processor. For sets to stitch.
+        Standard = "standard",
+        /// Ten seconds of one processor. For pictures to look at.
         Fine = "fine",
     }
 }
@@ -115,12 +117,20 @@ impl Scene {
     }
 
     fn lit(builder: Builder, quality: LightQuality) -> Self {
+        let light = |spacing_m, directions, least_directions, portal_samples| LightDetail {
+            spacing_m,
+            directions,
+            least_directions,
+            portal_samples,
+        };
         let outdoors = builder.portals.is_empty();
         let detail = match (quality, outdoors) {
-            (LightQuality::Fast, false) => LightDetail { spacing_m: 0.4, directions: 24, portal_samples: 2 },
-            (LightQuality::Fast, true) => LightDetail { spacing_m: 3.0, directions: 16, portal_samples: 1 },
-            (LightQuality::Fine, false) => LightDetail { spacing_m: 0.08, directions: 128, portal_samples: 4 },
-            (LightQuality::Fine, true) => LightDetail { spacing_m: 0.6, directions: 64, portal_samples: 1 },
+            (LightQuality::Fast, false) => light(0.4, 24, 8, 2),
+            (LightQuality::Fast, true) => light(3.0, 16, 4, 1),
+            (LightQuality::Standard, false) => light(0.12, 64, 8, 3),
+            (LightQuality::Standard, true) => light(0.9, 32, 8, 1),
+            (LightQuality::Fine, false) => light(0.08, 128, 8, 4),
+            (LightQuality::Fine, true) => light(0.6, 64, 8, 1),
         };
         let mut scene = Self {
             hierarchy: Hierarchy::new(&builder.solids),
@@ -152,7 +162,7 @@ impl Scene {
                 if elevation == 0.0 {
                     depths.extend(
                         self.hierarchy
-                            .nearest(&self.solids, &Ray::new(eye, direction), f64::INFINITY)
+                            .nearest(&Ray::new(eye, direction), f64::INFINITY)
                             .map(|(_, entry)| entry.distance),
                     );
                 }
