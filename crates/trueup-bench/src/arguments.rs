@@ -100,10 +100,6 @@ pub(crate) struct QualityArguments {
     #[arg(long, value_name = "PATH")]
     pub trueup: Option<PathBuf>,
 
-    /// Folder of the rendered sets, kept between runs; leave it out to keep none
-    #[arg(long, value_name = "DIR")]
-    pub data: Option<PathBuf>,
-
     /// Print nothing but the outcome
     #[arg(short, long)]
     pub quiet: bool,

@@ -24,17 +24,21 @@ struct State {
 }
 
 impl Store {
-    /// Opens the file, which is made if need be, and reads what it holds. A last line that was cut off is dropped.
+    /// Opens the file, which is made if need be, and reads what it holds. A last line that was cut off is dropped. With
+    /// `adopting` a version, rows of every version count as that one's.
     ///
     /// # Errors
     /// [`Error::Io`] if the file cannot be read or written.
-    pub(crate) fn open(path: &Path) -> Result<Self> {
+    pub(crate) fn open(path: &Path, adopting: Option<&str>) -> Result<Self> {
         let text = match std::fs::read_to_string(path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
             Err(error) => return Err(Error::io("reading", path, error)),
         };
-        let rows: Vec<Row> = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+        let mut rows: Vec<Row> = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+        if let Some(version) = adopting {
+            rows.iter_mut().for_each(|row| version.clone_into(&mut row.key.version));
+        }
         let mut file = OpenOptions::new()
             .create(true)
             .append(true)
@@ -85,26 +89,37 @@ mod tests {
     fn what_was_stored_is_known_after_opening_again() {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("rows.jsonl");
-        let store = Store::open(&path).expect("opens");
+        let store = Store::open(&path, None).expect("opens");
         assert_eq!(store.get(&row("01").key), None);
         store.add(row("01")).expect("writes");
         drop(store);
-        let again = Store::open(&path).expect("opens");
+        let again = Store::open(&path, None).expect("opens");
         assert_eq!(again.get(&row("01").key), Some(row("01")));
         assert_eq!(again.get(&row("02").key), None);
+    }
+
+    #[test]
+    fn rows_of_another_version_count_only_when_adopted() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("rows.jsonl");
+        Store::open(&path, None).expect("opens").add(row("01")).expect("writes");
+        let key = Key { version: "2".to_owned(), ..row("01").key };
+        assert_eq!(Store::open(&path, None).expect("opens").get(&key), None);
+        let adopted = Store::open(&path, Some("2")).expect("opens").get(&key).expect("adopted");
+        assert_eq!(adopted.measures, row("01").measures);
     }
 
     #[test]
     fn a_line_that_was_cut_off_is_run_again_and_spoils_no_other() {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("rows.jsonl");
-        Store::open(&path).expect("opens").add(row("01")).expect("writes");
+        Store::open(&path, None).expect("opens").add(row("01")).expect("writes");
         let whole = std::fs::read_to_string(&path).expect("text");
         std::fs::write(&path, format!("{whole}{}", &whole[..whole.len() / 2])).expect("writes");
-        let store = Store::open(&path).expect("opens");
+        let store = Store::open(&path, None).expect("opens");
         store.add(row("02")).expect("writes");
         drop(store);
-        let again = Store::open(&path).expect("opens");
+        let again = Store::open(&path, None).expect("opens");
         assert_eq!(again.get(&row("01").key), Some(row("01")));
         assert_eq!(again.get(&row("02").key), Some(row("02")));
     }

@@ -82,22 +82,23 @@ fn cell_text(cell: &str) -> String {
     format!("<td{class}>{}</td>", inline(cell))
 }
 
-/// Escaped text with `words` in backticks as code.
+/// Escaped text with `words` in backticks as code and **words** between double stars in bold.
 fn inline(text: &str) -> String {
-    let parts: Vec<String> = text.split('`').map(escape).collect();
-    let pairs = parts.len().is_multiple_of(2);
+    let bold = between(&escape(text), "**", "strong");
+    between(&bold, "`", "code")
+}
+
+/// Puts what stands between two marks into an element; a mark without a partner stays as it is.
+fn between(text: &str, mark: &str, element: &str) -> String {
+    let parts: Vec<&str> = text.split(mark).collect();
+    let lonely = parts.len().is_multiple_of(2);
     let mut html = String::new();
     for (index, part) in parts.iter().enumerate() {
-        match (index % 2, pairs && index + 1 == parts.len()) {
-            (1, false) => {
-                let _ = write!(html, "<code>{part}</code>");
-            }
-            // A backtick without a partner stays as it is.
-            (1, true) => {
-                let _ = write!(html, "`{part}");
-            }
-            _ => html.push_str(part),
-        }
+        let _ = match (index % 2 == 1, lonely && index + 1 == parts.len()) {
+            (true, false) => write!(html, "<{element}>{part}</{element}>"),
+            (true, true) => write!(html, "{mark}{part}"),
+            (false, _) => write!(html, "{part}"),
+        };
     }
     html
 }

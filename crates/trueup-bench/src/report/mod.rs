@@ -5,6 +5,7 @@ pub(crate) mod csv;
 pub(crate) mod document;
 pub(crate) mod html;
 pub(crate) mod markdown;
+pub(crate) mod overview;
 
 use std::path::Path;
 

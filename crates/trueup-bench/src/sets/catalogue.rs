@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use trueup::{Error, Result};
 use trueup_scenes::{LightQuality, Quality, RigOptions, SceneKind, SceneOptions, study_set};
 
-use super::{Recipe, SetSpec, truth_folders};
+use super::{Recipe, SetSpec, from_panorama, truth_folders};
 
 /// The sets of a run, by what they are for.
 #[derive(Debug, Default)]
@@ -50,11 +50,12 @@ pub(crate) struct FocalSet {
 const GATE_SETS: usize = 65;
 
 impl Catalogue {
-    /// The sets of the whole study; `truth_sets` are folders that hold given ones.
+    /// The sets of the whole study; `panoramas` is a folder of panoramas to cut sets from, `truth_sets` are folders that
+    /// hold given ones.
     ///
     /// # Errors
     /// Those of reading the folders.
-    pub(crate) fn full(truth_sets: &[PathBuf]) -> Result<Self> {
+    pub(crate) fn full(panoramas: Option<&Path>, truth_sets: &[PathBuf]) -> Result<Self> {
         let study = (1..=12).filter_map(|number| {
             let (scene, rig) = study_set(number)?;
             let recipe = Recipe { scene, rig, quality: Quality::Standard };
@@ -64,7 +65,7 @@ impl Catalogue {
         Ok(Self {
             focal: focal_sets(&study),
             study,
-            given: given_sets(truth_sets)?,
+            given: given_sets(panoramas, truth_sets)?,
             gate: (0..GATE_SETS).flat_map(|index| [gate_set(true, index), gate_set(false, index)]).collect(),
             pitch: pitch_sets(),
             reference_sets: vec!["03", "05", "08", "11"],
@@ -154,9 +155,9 @@ fn focal_sets(study: &[SetSpec]) -> Vec<FocalSet> {
     originals.flat_map(copies).collect()
 }
 
-/// The sets inside the given folders, named after theirs.
-fn given_sets(parents: &[PathBuf]) -> Result<Vec<SetSpec>> {
-    let mut sets: Vec<SetSpec> = Vec::new();
+/// The sets cut from panoramas and those inside the given folders, named after theirs.
+fn given_sets(panoramas: Option<&Path>, parents: &[PathBuf]) -> Result<Vec<SetSpec>> {
+    let mut sets: Vec<SetSpec> = panoramas.map_or_else(|| Ok(Vec::new()), from_panorama::sets)?;
     for parent in parents {
         for folder in truth_folders(parent)? {
             let name = format!("given/{}", name_of(&folder));
@@ -180,7 +181,7 @@ mod tests {
 
     #[test]
     fn every_set_has_a_name_of_its_own() {
-        for catalogue in [Catalogue::full(&[]).expect("no folders"), Catalogue::quick()] {
+        for catalogue in [Catalogue::full(None, &[]).expect("no folders"), Catalogue::quick()] {
             let mut names: Vec<&str> = catalogue.all().iter().map(|set| set.name.as_str()).collect();
             let count = names.len();
             names.sort_unstable();
@@ -191,7 +192,7 @@ mod tests {
 
     #[test]
     fn the_gate_has_as_many_sets_as_in_the_paper() {
-        let catalogue = Catalogue::full(&[]).expect("no folders");
+        let catalogue = Catalogue::full(None, &[]).expect("no folders");
         let manhattan = catalogue.gate.iter().filter(|set| set.manhattan == Some(true)).count();
         assert_eq!((catalogue.study.len(), catalogue.gate.len(), manhattan), (12, 130, 65));
     }

@@ -2,12 +2,14 @@
 
 mod catalogue;
 mod focal_claim;
+mod from_panorama;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use trueup::{Error, Result, StageContext, Truth};
+use trueup_scenes::cut::SpecKind;
 use trueup_scenes::{Quality, RigOptions, Scene, SceneOptions, rig, write_set};
 
 pub(crate) use catalogue::Catalogue;
@@ -33,6 +35,8 @@ pub(crate) struct SetSpec {
 pub(crate) enum SetSource {
     /// It is rendered.
     Rendered(Box<Recipe>),
+    /// It is cut from a panorama.
+    Cut(PathBuf, SpecKind),
     /// It lies in a folder with its `truth.json`.
     Folder(PathBuf),
     /// Another set, whose metadata claim a focal length that is wrong by this factor.
@@ -91,6 +95,7 @@ impl SetSpec {
     pub(crate) fn pictures(&self) -> Result<usize> {
         match &self.source {
             SetSource::Rendered(recipe) => Ok(recipe.rig.pictures),
+            SetSource::Cut(_, kind) => Ok(from_panorama::views_of(*kind)),
             SetSource::Folder(folder) => Ok(read_truth(folder)?.0.images.len()),
             SetSource::FocalClaimed(original, _) => original.pictures(),
         }
@@ -107,6 +112,11 @@ impl SetSpec {
             SetSource::Folder(folder) => ready(folder),
             SetSource::Rendered(recipe) => {
                 made(&folder, &recipe.fingerprint(), || recipe.render(&folder, &self.name, context))
+            }
+            SetSource::Cut(panorama, kind) => {
+                made(&folder, &from_panorama::fingerprint(panorama, *kind)?, || {
+                    from_panorama::cut(panorama, *kind, &folder, context)
+                })
             }
             SetSource::FocalClaimed(original, factor) => {
                 let original = original.prepare(data, context)?;
