@@ -21,6 +21,7 @@
 
 mod align;
 mod clock;
+mod evaluation;
 mod files;
 mod inputs;
 mod left_out;
@@ -32,6 +33,7 @@ mod project;
 mod record;
 mod stitcher;
 
+pub use evaluation::{Evaluation, PictureEvaluation, evaluate, read_truth};
 pub use files::{StitchJob, Written};
 pub use inputs::{Inputs, Reference};
 pub use options::{Method, StitchOptions, WorkingOptions};

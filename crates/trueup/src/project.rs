@@ -139,10 +139,22 @@ pub struct Project {
     pub diagnostics: Vec<Diagnostic>,
 }
 
+impl ImageRecord {
+    /// The file's name without folders; paths written on another system are understood.
+    pub fn file_name(&self) -> &str {
+        self.path.rsplit(['/', '\\']).next().unwrap_or(&self.path)
+    }
+}
+
 impl Project {
+    /// The photographs in the panorama, in the order given.
+    pub fn used_images(&self) -> impl Iterator<Item = &ImageRecord> {
+        self.images.iter().filter(|image| image.status == ImageStatus::Used)
+    }
+
     /// Number of photographs in the panorama.
     pub fn used(&self) -> usize {
-        self.images.iter().filter(|image| image.status == ImageStatus::Used).count()
+        self.used_images().count()
     }
 
     /// The project as JSON text.

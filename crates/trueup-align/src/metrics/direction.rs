@@ -54,21 +54,34 @@ pub fn rectangle_rotation(mesh: &GridMesh) -> f64 {
     smallest.1 + FRAC_PI_2 * ((expected - smallest.1) / FRAC_PI_2).round()
 }
 
-/// Mean over the pictures but `reference` of |(kappa_i - kappa_r) - (gamma_i - gamma_r)|, radians; `None` with fewer than
-/// two pictures or without the reference.
+/// By how much each picture is turned differently from `reference` than its true angle says, radians in [-pi, pi):
+/// (rotation_i - rotation_r) - (gamma_i - gamma_r). `None` with fewer than two pictures or without the reference.
 ///
-/// `gammas` are the true [`vertical_angle`]s of the pictures of `meshes`.
-///
-/// # Source
-/// VPG equation 14.
-pub fn global_direction_inconsistency(meshes: &[GridMesh], gammas: &[f64], reference: usize) -> Option<f64> {
-    if meshes.len() < 2 || meshes.len() != gammas.len() || reference >= meshes.len() {
+/// With [`rectangle_rotation`]s these are the terms of the paper's GDIC, with [`best_rotation`]s those of its variant
+/// without the rectangle, and with the prior's own angles the error of the prior before the mesh. `gammas` are the true
+/// [`vertical_angle`]s.
+pub fn relative_turns(rotations: &[f64], gammas: &[f64], reference: usize) -> Option<Vec<f64>> {
+    if rotations.len() < 2 || rotations.len() != gammas.len() || reference >= rotations.len() {
         return None;
     }
-    let deviation: Vec<f64> = meshes.iter().zip(gammas).map(|(mesh, gamma)| rectangle_rotation(mesh) - gamma).collect();
-    let others = (0..meshes.len()).filter(|&k| k != reference);
-    let sum: f64 = others.map(|k| wrap_angle(deviation[k] - deviation[reference]).abs()).sum();
-    Some(sum / (meshes.len() - 1) as f64)
+    let deviation = |k: usize| rotations[k] - gammas[k];
+    Some((0..rotations.len()).map(|k| wrap_angle(deviation(k) - deviation(reference))).collect())
+}
+
+/// Mean of |[`relative_turns`]| over the pictures but `reference`, radians; `None` where those are.
+///
+/// # Source
+/// VPG equation 14, with `rotations` from [`rectangle_rotation`].
+pub fn mean_relative_turn(rotations: &[f64], gammas: &[f64], reference: usize) -> Option<f64> {
+    let turns = relative_turns(rotations, gammas, reference)?;
+    let sum: f64 = turns.iter().map(|turn| turn.abs()).sum();
+    Some(sum / (turns.len() - 1) as f64)
+}
+
+/// The paper's GDIC: [`mean_relative_turn`] of the [`rectangle_rotation`]s.
+pub fn global_direction_inconsistency(meshes: &[GridMesh], gammas: &[f64], reference: usize) -> Option<f64> {
+    let rotations: Vec<f64> = meshes.iter().map(rectangle_rotation).collect();
+    mean_relative_turn(&rotations, gammas, reference)
 }
 
 #[cfg(test)]

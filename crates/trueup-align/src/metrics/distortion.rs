@@ -1,12 +1,24 @@
 //! Local distortion (LD): how unevenly the cells of a grid are stretched.
 
-use geo::{Contains, LineString, Point, Polygon};
 use nalgebra::Vector2;
 use trueup_core::geometry::Homography;
 use trueup_core::mesh::GridMesh;
 
+use super::outline::{Outline, cells, is_sound, target};
+
 /// Samples per axis of a cell, at most.
 const SAMPLES: usize = 16;
+/// Mean change of area below which a cell counts as collapsed.
+const COLLAPSED: f64 = 1e-6;
+
+/// When a cell counts as lying outside a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outside {
+    /// Its centre and its four corners do.
+    CentreAndCorners,
+    /// Its centre does. A little larger at the border of overlaps, where meshes bend most.
+    Centre,
+}
 
 /// The local distortion of a panorama.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,35 +29,37 @@ pub struct LocalDistortion {
     pub mean: f64,
     /// Mean coefficient of variation of every picture's cells outside all others; `None` without such cells.
     pub pictures: Vec<Option<f64>>,
-    /// Cells that could not be judged: turned over, crossed or collapsed. Figures with different counts do not compare.
+    /// Cells outside all others that could not be judged: turned over, crossed or collapsed. Figures with different
+    /// counts do not compare.
     pub folds: usize,
 }
 
 /// The local distortion of pictures deformed by `meshes`.
 ///
 /// In every cell that lies outside all other pictures, the area's change under the homography through its four corners is
-/// sampled at pixel centres; its standard deviation over its mean is the cell's distortion. Similarities and affine maps
-/// have none. The figure grows with the size of the cells: compare grids of equal cells only.
+/// sampled at evenly spaced points, one a pixel but at most 16 x 16; its standard deviation over its mean is the cell's
+/// distortion. Similarities and affine maps have none. The figure grows with the size of the cells: compare grids of equal
+/// cells only.
 ///
 /// # Source
 /// VPG equations 12 and 13.
 ///
 /// # Departures
-/// Outside means that a cell's centre and corners are; the paper does not say.
-pub fn local_distortion(meshes: &[GridMesh]) -> LocalDistortion {
-    let outlines: Vec<Polygon<f64>> = meshes.iter().map(outline).collect();
+/// The paper does not say when a cell is outside; `outside` does.
+pub fn local_distortion(meshes: &[GridMesh], outside: Outside) -> LocalDistortion {
+    let outlines: Vec<Outline> = meshes.iter().map(Outline::new).collect();
     let mut folds = 0;
     let mut pictures = Vec::with_capacity(meshes.len());
     for (k, mesh) in meshes.iter().enumerate() {
+        let alone = |point: Vector2<f64>| (0..meshes.len()).all(|other| other == k || !outlines[other].contains(point));
+        let vertices_alone: Vec<bool> = match outside {
+            Outside::CentreAndCorners => (0..mesh.len()).map(|vertex| alone(target(mesh, vertex))).collect(),
+            Outside::Centre => vec![true; mesh.len()],
+        };
         let (mut sum, mut count) = (0.0, 0_usize);
         for cell in cells(mesh) {
             let centre = cell.iter().map(|&corner| target(mesh, corner)).sum::<Vector2<f64>>() / 4.0;
-            let mut probes = cell.iter().map(|&corner| target(mesh, corner)).chain([centre]);
-            let outside = probes.all(|probe| {
-                let point = Point::new(probe.x, probe.y);
-                (0..meshes.len()).all(|other| other == k || !outlines[other].contains(&point))
-            });
-            if !outside {
+            if !cell.iter().all(|&corner| vertices_alone[corner]) || !alone(centre) {
                 continue;
             }
             match cell_distortion(mesh, cell) {
@@ -67,33 +81,13 @@ pub fn local_distortion(meshes: &[GridMesh]) -> LocalDistortion {
     }
 }
 
-/// The vertices of each cell: top left, top right, bottom right, bottom left.
-fn cells(mesh: &GridMesh) -> impl Iterator<Item = [usize; 4]> {
-    let columns = mesh.columns;
-    (0..mesh.rows - 1).flat_map(move |row| {
-        (0..columns - 1).map(move |column| {
-            let first = row * columns + column;
-            [first, first + 1, first + columns + 1, first + columns]
-        })
-    })
-}
-
-fn target(mesh: &GridMesh, vertex: usize) -> Vector2<f64> {
-    Vector2::from(mesh.target[vertex])
-}
-
 /// Standard deviation over mean of the area's change in a cell; `None` for a degenerate one.
 fn cell_distortion(mesh: &GridMesh, cell: [usize; 4]) -> Option<f64> {
-    const COLLAPSED: f64 = 1e-6;
-    let origin = mesh.source(cell[0]);
-    let corners = cell.map(|vertex| target(mesh, vertex));
-    let convex = (0..4).all(|k| {
-        let (one, two) = (corners[(k + 1) % 4] - corners[k], corners[(k + 2) % 4] - corners[(k + 1) % 4]);
-        one.perp(&two) > 0.0
-    });
-    if !convex {
+    if !is_sound(mesh, cell) {
         return None;
     }
+    let origin = mesh.source(cell[0]);
+    let corners = cell.map(|vertex| target(mesh, vertex));
     let homography = Homography::from_four_points(&cell.map(|vertex| mesh.source(vertex) - origin), &corners)?;
     let determinant = homography.0.determinant();
     let (width, height) = (mesh.cell_width(), mesh.cell_height());
@@ -111,18 +105,6 @@ fn cell_distortion(mesh: &GridMesh, cell: [usize; 4]) -> Option<f64> {
     let mean = changes.iter().sum::<f64>() / count;
     let variance = changes.iter().map(|change| (change - mean).powi(2)).sum::<f64>() / count;
     (mean.abs() > COLLAPSED).then(|| variance.sqrt() / mean.abs())
-}
-
-/// The deformed border of a picture.
-fn outline(mesh: &GridMesh) -> Polygon<f64> {
-    let (rows, columns) = (mesh.rows, mesh.columns);
-    let top = 0..columns;
-    let right = (1..rows).map(|row| row * columns + columns - 1);
-    let bottom = (0..columns - 1).rev().map(|column| (rows - 1) * columns + column);
-    let left = (1..rows - 1).rev().map(|row| row * columns);
-    let ring: Vec<(f64, f64)> =
-        top.chain(right).chain(bottom).chain(left).map(|vertex| mesh.target[vertex].into()).collect();
-    Polygon::new(LineString::from(ring), Vec::new())
 }
 
 #[cfg(test)]
@@ -144,17 +126,34 @@ mod tests {
         let mut mesh = GridMesh::regular(16.0, 16.0, 16.0);
         let map = |p: Vector2<f64>| p / (1.0 - p.x / 100.0);
         mesh.target = (0..4).map(|vertex| map(mesh.source(vertex)).into()).collect();
-        assert!((local_distortion(&[mesh]).worst - 0.196748261 / 1.303776091).abs() < 1e-8);
+        assert!((local_distortion(&[mesh], Outside::CentreAndCorners).worst - 0.196748261 / 1.303776091).abs() < 1e-8);
     }
 
     #[test]
     fn covered_cells_are_not_judged_and_turned_ones_are_counted() {
         let whole = mapped(|p| p);
         let hidden = mapped(|p| p * 0.5 + Vector2::new(50.0, 50.0));
-        assert_eq!(local_distortion(&[hidden, whole.clone()]).pictures[0], None);
+        assert_eq!(local_distortion(&[hidden, whole.clone()], Outside::Centre).pictures[0], None);
         let mut folded = whole;
         folded.target[12] = [390.0, 290.0];
-        assert!(local_distortion(&[folded]).folds > 0);
+        assert!(local_distortion(&[folded], Outside::Centre).folds > 0);
+    }
+
+    /// Two pictures of 100 x 100 px overlap by 14 px: of ten columns of cells, the ninth has its centre outside the other
+    /// picture and two corners inside.
+    #[test]
+    fn the_corners_rule_leaves_out_cells_that_the_other_picture_cuts() {
+        let bent = |p: Vector2<f64>| Vector2::new(p.x + 1e-3 * p.x * p.x, p.y + 1e-4 * p.x * p.x * p.y);
+        let mut left = GridMesh::regular(100.0, 100.0, 10.0);
+        left.target = (0..left.len()).map(|vertex| bent(left.source(vertex)).into()).collect();
+        let mut right = GridMesh::regular(100.0, 100.0, 10.0);
+        for vertex in &mut right.target {
+            vertex[0] += bent(Vector2::new(86.0, 0.0)).x;
+        }
+        let meshes = [left, right];
+        let strict = local_distortion(&meshes, Outside::CentreAndCorners).pictures[0].expect("cells");
+        let loose = local_distortion(&meshes, Outside::Centre).pictures[0].expect("cells");
+        assert!(loose > strict, "the distortion grows to the right: {loose} {strict}");
     }
 
     proptest! {
@@ -162,7 +161,7 @@ mod tests {
         #[test]
         fn affine_maps_have_none(a in 0.5..2.0_f64, b in -0.4..0.4_f64, c in -0.4..0.4_f64, d in 0.5..2.0_f64) {
             let mesh = mapped(|p| Vector2::new(a * p.x + b * p.y + 17.0, c * p.x + d * p.y - 3.0));
-            let distortion = local_distortion(&[mesh]);
+            let distortion = local_distortion(&[mesh], Outside::CentreAndCorners);
             prop_assert!(distortion.worst < 1e-9 && distortion.folds == 0);
         }
     }

@@ -1,0 +1,140 @@
+//! Cells and the deformed border of a grid.
+
+use nalgebra::Vector2;
+use trueup_core::mesh::GridMesh;
+
+/// Where a vertex goes.
+pub(super) fn target(mesh: &GridMesh, vertex: usize) -> Vector2<f64> {
+    Vector2::from(mesh.target[vertex])
+}
+
+/// The vertices of each cell, row-major: top left, top right, bottom right, bottom left.
+pub(super) fn cells(mesh: &GridMesh) -> impl Iterator<Item = [usize; 4]> {
+    let columns = mesh.columns;
+    (0..mesh.rows - 1).flat_map(move |row| {
+        (0..columns - 1).map(move |column| {
+            let first = row * columns + column;
+            [first, first + 1, first + columns + 1, first + columns]
+        })
+    })
+}
+
+/// Whether a cell's target is convex and not turned over: each corner turns clockwise on the screen.
+pub(super) fn is_sound(mesh: &GridMesh, cell: [usize; 4]) -> bool {
+    let corners = cell.map(|vertex| target(mesh, vertex));
+    (0..4).all(|k| {
+        let (one, two) = (corners[(k + 1) % 4] - corners[k], corners[(k + 2) % 4] - corners[(k + 1) % 4]);
+        one.perp(&two) > 0.0
+    })
+}
+
+/// The number of cells of a grid that are folded: turned over, crossed, bent inwards or collapsed.
+pub fn folded_cells(mesh: &GridMesh) -> usize {
+    cells(mesh).filter(|&cell| !is_sound(mesh, cell)).count()
+}
+
+/// The deformed border of a picture, a closed polygon, ready to be asked for many points.
+#[derive(Debug)]
+pub(super) struct Outline {
+    ring: Vec<Vector2<f64>>,
+    low: Vector2<f64>,
+    high: Vector2<f64>,
+    /// For each of equal strips from top to bottom, the edges that touch it, as numbers of their first corners.
+    strips: Vec<Vec<usize>>,
+}
+
+impl Outline {
+    pub fn new(mesh: &GridMesh) -> Self {
+        let (rows, columns) = (mesh.rows, mesh.columns);
+        let top = 0..columns;
+        let right = (1..rows).map(|row| row * columns + columns - 1);
+        let bottom = (0..columns - 1).rev().map(|column| (rows - 1) * columns + column);
+        let left = (1..rows - 1).rev().map(|row| row * columns);
+        let ring: Vec<_> = top.chain(right).chain(bottom).chain(left).map(|vertex| target(mesh, vertex)).collect();
+        let start = (Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY));
+        let (low, high) = ring.iter().fold(start, |(low, high), corner| (low.inf(corner), high.sup(corner)));
+        let mut outline = Self { strips: vec![Vec::new(); ring.len()], ring, low, high };
+        for edge in 0..outline.ring.len() {
+            let (from, to) = outline.edge(edge);
+            for strip in outline.strip_of(from.y.min(to.y))..=outline.strip_of(from.y.max(to.y)) {
+                outline.strips[strip].push(edge);
+            }
+        }
+        outline
+    }
+
+    fn edge(&self, edge: usize) -> (Vector2<f64>, Vector2<f64>) {
+        (self.ring[edge], self.ring[(edge + 1) % self.ring.len()])
+    }
+
+    /// The strip of a height; the cast saturates, and an outline without height has one strip in use.
+    fn strip_of(&self, y: f64) -> usize {
+        let share = (y - self.low.y) / (self.high.y - self.low.y);
+        ((share * self.strips.len() as f64) as usize).min(self.strips.len() - 1)
+    }
+
+    /// Whether a point lies inside, by the even-odd rule.
+    pub fn contains(&self, point: Vector2<f64>) -> bool {
+        let beyond = |axis: usize| !(self.low[axis]..=self.high[axis]).contains(&point[axis]);
+        if beyond(0) || beyond(1) {
+            return false;
+        }
+        let crossed = self.strips[self.strip_of(point.y)].iter().filter(|&&edge| {
+            let (from, to) = self.edge(edge);
+            (from.y > point.y) != (to.y > point.y)
+                && point.x < from.x + (point.y - from.y) * ((to.x - from.x) / (to.y - from.y))
+        });
+        crossed.count() % 2 == 1
+    }
+
+    /// The area inside, by the shoelace formula, at least 0.
+    pub fn area(&self) -> f64 {
+        let twice: f64 = (0..self.ring.len()).map(|edge| self.edge(edge)).map(|(from, to)| from.perp(&to)).sum();
+        0.5 * twice.abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use geo::{Contains, LineString, Point, Polygon};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn the_area_of_a_sheared_picture_is_its_own() {
+        let mut mesh = GridMesh::regular(40.0, 30.0, 10.0);
+        for vertex in &mut mesh.target {
+            vertex[0] += 3.0 * vertex[1] - 500.0;
+        }
+        assert!((Outline::new(&mesh).area() - 1200.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn only_the_cells_around_a_misplaced_vertex_are_folded() {
+        let mut mesh = GridMesh::regular(50.0, 50.0, 10.0);
+        assert_eq!(folded_cells(&mesh), 0);
+        // Vertex (2, 2) goes beyond the diagonal of the cell to its lower right, which becomes concave; then out of it,
+        // which turns that cell over and crosses its two neighbours.
+        mesh.target[2 * 6 + 2] = [27.0, 27.0];
+        assert_eq!(folded_cells(&mesh), 1);
+        mesh.target[2 * 6 + 2] = [45.0, 45.0];
+        assert_eq!(folded_cells(&mesh), 3);
+    }
+
+    proptest! {
+        #[test]
+        fn inside_agrees_with_a_polygon_library(
+            shift in proptest::collection::vec(-4.0..4.0_f64, 40), x in -5.0..45.0_f64, y in -5.0..35.0_f64,
+        ) {
+            let mut mesh = GridMesh::regular(40.0, 30.0, 10.0);
+            for (vertex, shift) in mesh.target.iter_mut().zip(shift.chunks(2)) {
+                *vertex = [vertex[0] + shift[0], vertex[1] + shift[1]];
+            }
+            let outline = Outline::new(&mesh);
+            let ring: Vec<(f64, f64)> = outline.ring.iter().map(|corner| (corner.x, corner.y)).collect();
+            let polygon = Polygon::new(LineString::from(ring), Vec::new());
+            prop_assert_eq!(outline.contains(Vector2::new(x, y)), polygon.contains(&Point::new(x, y)));
+        }
+    }
+}

@@ -1,0 +1,92 @@
+use super::*;
+
+/// Two pictures of 40 x 30 px whose middles are turned by these angles in degrees, on grids of one cell.
+fn project(turns: [f64; 2]) -> Project {
+    let image = |name: &str, turn: f64| {
+        let (sine, cosine) = turn.to_radians().sin_cos();
+        let source = [[0.0, 0.0], [40.0, 0.0], [0.0, 30.0], [40.0, 30.0]];
+        let target = source.map(|[x, y]: [f64; 2]| [cosine * x - sine * y, sine * x + cosine * y]);
+        serde_json::json!({
+            "path": format!("some/where\\{name}"), "width": 40, "height": 30, "status": "used", "reason": "", "hint": "",
+            "component": 0, "focal_px": 40.0, "rotation": null, "theta_deg": turn + 0.5, "scale": 1.0, "gain": 1.0,
+            "vanishing_points": null, "mesh": {"rows": 2, "cols": 2, "source": source, "target": target}
+        })
+    };
+    let value = serde_json::json!({
+        "format": "trueup-project", "version": 1, "method": "vpg", "options": {}, "reference": "some/where\\b.jpg",
+        "images": [image("b.jpg", turns[1]), image("a.jpg", turns[0])], "pairs": [],
+        "manhattan": {"divergence": null, "threshold": 0.1, "accepted": false, "failed_clause": null, "dominant": null,
+                      "inliers": []},
+        "canvas": {"width": 70, "height": 31}, "seconds": {}, "diagnostics": []
+    });
+    Project::from_json(&value.to_string(), "test").expect("a valid project")
+}
+
+fn truth(gammas: [f64; 2]) -> Truth {
+    let image = |name: &str, gamma_deg: f64| ImageTruth {
+        file: name.to_owned(),
+        width: 40,
+        height: 30,
+        focal_px: 40.0,
+        rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        gamma_deg,
+        centre: None,
+        depth: None,
+    };
+    Truth { source: "test set".to_owned(), images: vec![image("a.jpg", gammas[0]), image("b.jpg", gammas[1])] }
+}
+
+/// Turned by 3 and -1 degrees where 2 and 1 stand upright: off by 1 and -2, so 1.5 on average and 3 between them.
+#[test]
+fn known_turns_have_known_figures() {
+    let evaluation = evaluate(&project([3.0, -1.0]), &truth([2.0, 1.0])).expect("two pictures");
+    let near = |value: f64, expected: f64| assert!((value - expected).abs() < 1e-9, "{value} {expected}");
+    assert_eq!((evaluation.used, evaluation.given, evaluation.folds), (2, 2, 0));
+    near(evaluation.upright_deg, 1.5);
+    near(evaluation.upright_max_deg, 2.0);
+    near(evaluation.spread_deg, 1.5);
+    near(evaluation.gdic_deg, 3.0);
+    near(evaluation.gdic_similarity_deg, 3.0);
+    near(evaluation.gdic_reference_deg.expect("b.jpg is known"), 3.0);
+    near(evaluation.theta_error_deg.expect("rotations"), 3.0);
+    near(evaluation.theta_error_max_deg.expect("rotations"), 3.0);
+    assert_eq!(evaluation.pictures[0].file, "a.jpg");
+    near(evaluation.pictures[1].upright_deg, -2.0);
+    near(evaluation.pictures[1].theta_error_deg.expect("rotations"), -3.0);
+}
+
+fn complaint(project: &Project, truth: &Truth) -> String {
+    evaluate(project, truth).expect_err("it does not fit").to_string()
+}
+
+#[test]
+fn a_truth_that_does_not_fit_is_refused_by_name() {
+    let whole = project([0.0, 0.0]);
+    let mut other = truth([0.0, 0.0]);
+    other.images[1].width = 80;
+    assert!(complaint(&whole, &other).contains("b.jpg: the project has it at 40 x 30 px, the truth at 80 x 30 px"));
+    other.images[1].file = "c.jpg".to_owned();
+    assert!(complaint(&whole, &other).contains("it takes two to compare"));
+    other.images[0].file = "d.jpg".to_owned();
+    assert!(complaint(&whole, &other).contains("test set: the truth names none of the 2 pictures"));
+    let mut twice = whole.clone();
+    twice.images[0].path = "else/a.jpg".to_owned();
+    assert!(complaint(&twice, &truth([0.0, 0.0])).contains("two pictures of this name"));
+}
+
+#[test]
+fn damaged_grids_are_refused_by_name() {
+    let mut broken = project([0.0, 0.0]);
+    broken.images[0].mesh.as_mut().expect("a grid").target.pop();
+    assert!(complaint(&broken, &truth([0.0, 0.0])).contains("b.jpg: its grid of 2 x 2 with 3 vertices"));
+    broken.images[0].mesh = None;
+    assert!(complaint(&broken, &truth([0.0, 0.0])).contains("no grid of it"));
+}
+
+#[test]
+fn pictures_from_different_places_have_no_alignment() {
+    let mut moved = truth([0.0, 0.0]);
+    assert!(evaluate(&project([0.0, 0.0]), &moved).expect("fits").align_px.is_some());
+    moved.images[0].centre = Some([0.0, 0.0, 1.0]);
+    assert_eq!(evaluate(&project([0.0, 0.0]), &moved).expect("fits").align_px, None);
+}
