@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 use trueup::{Error, Project, Result, Truth};
 
-/// Everything that is measured of a panorama with known cameras: the numbers of [`trueup::evaluate`], the gate's and the
-/// time after matching. What could not be measured is absent.
+/// Everything that is measured of a panorama with known cameras: the numbers of [`trueup::evaluate`] and the gate's.
+/// `accepted`: the dominant directions guide; `guided`: they or the vertical alone do. What could not be measured is
+/// absent.
 ///
 /// # Errors
 /// Those of [`trueup::evaluate`].
@@ -15,7 +16,11 @@ pub(crate) fn figures(project: &Project, truth: &Truth) -> Result<BTreeMap<Strin
     let value = serde_json::to_value(&evaluation)
         .map_err(|error| Error::input("evaluation", error, "Report this as a defect."))?;
     let mut figures = numbers_of(&value);
-    figures.insert("accepted".to_owned(), f64::from(u8::from(project.manhattan.accepted)));
+    // Where the vertical alone guides, the clause that kept the other directions out is stated.
+    let guided = project.manhattan.accepted;
+    let accepted = guided && project.manhattan.failed_clause.is_none();
+    figures.insert("guided".to_owned(), f64::from(u8::from(guided)));
+    figures.insert("accepted".to_owned(), f64::from(u8::from(accepted)));
     if let Some(divergence) = project.manhattan.divergence.filter(|divergence| divergence.is_finite()) {
         figures.insert("divergence".to_owned(), divergence);
     }

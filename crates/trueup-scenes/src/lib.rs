@@ -18,6 +18,7 @@
 #![forbid(unsafe_code)]
 
 mod bvh;
+mod catalogue;
 mod colour;
 pub mod cut;
 mod dice;
@@ -34,8 +35,9 @@ mod study;
 #[cfg(test)]
 mod tests;
 
+pub use catalogue::{SetOutcome, SetRequest};
 pub use render::{Quality, depth_map, render};
 pub use rig::{PosedCamera, RigOptions, camera_from_world, rig};
-pub use scene::{LightQuality, Scene, SceneKind, SceneOptions, Viewpoint};
-pub use set::{JPEG_QUALITY, truth_of, write_set};
-pub use study::{example_set, study_set};
+pub use scene::{LightQuality, RoomStyle, Scene, SceneKind, SceneOptions, Viewpoint};
+pub use set::{JPEG_QUALITY, SetOutput, truth_of, write_set};
+pub use study::{GATE_SETS, SetKind, example_set, gate_set, mixed_set, study_set, twin_set};

@@ -2,15 +2,16 @@
 #![forbid(unsafe_code)]
 
 mod commands;
+mod study_command;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use commands::{CutArguments, LevelArguments, SpecsArguments};
-use trueup_core::{Error, Result, StageContext};
+use trueup_core::{Result, StageContext};
 use trueup_scenes::{
-    LightQuality, Quality, RigOptions, Scene, SceneKind, SceneOptions, example_set, rig, study_set, write_set,
+    LightQuality, Quality, RigOptions, Scene, SceneKind, SceneOptions, SetOutput, example_set, rig, write_set,
 };
 
 /// Makes photographs with exactly known cameras: rendered, or cut out of panoramas.
@@ -31,15 +32,8 @@ enum Command {
         #[arg(long, default_value = "examples")]
         out: PathBuf,
     },
-    /// Renders the study's synthetic sets, each into its own folder.
-    Study {
-        /// Folder to write to.
-        #[arg(long)]
-        out: PathBuf,
-        /// Only these sets, 1 to 12; all when absent.
-        #[arg(long, value_delimiter = ',')]
-        sets: Vec<usize>,
-    },
+    /// Renders the study's sets, each into its own folder. What is there already is kept.
+    Study(study_command::StudyArguments),
     /// Cuts views of known pose out of a panorama.
     Cut(CutArguments),
     /// Measures where the scene's vertical points in panoramas.
@@ -53,6 +47,9 @@ enum Kind {
     Room,
     Street,
     Nature,
+    Boxes,
+    TurnedRoom,
+    TurnedStreet,
 }
 
 /// Options left out keep the library's defaults.
@@ -116,6 +113,9 @@ impl RenderArguments {
                 Kind::Room => SceneKind::Room,
                 Kind::Street => SceneKind::Street,
                 Kind::Nature => SceneKind::Nature,
+                Kind::Boxes => SceneKind::Boxes,
+                Kind::TurnedRoom => SceneKind::TurnedRoom,
+                Kind::TurnedStreet => SceneKind::TurnedStreet,
             }),
         );
         set(&mut scene.seed, self.seed);
@@ -163,16 +163,10 @@ fn run(command: &Command) -> Result<()> {
             let (scene, rig) = example_set();
             write(&out.join("room"), &scene, &rig, Quality::Fine)
         }
-        Command::Study { out, sets } => {
-            let numbers = if sets.is_empty() { (1..=12).collect() } else { sets.clone() };
-            for number in numbers {
-                let (scene, rig) = study_set(number).ok_or_else(|| {
-                    Error::input(format!("set {number}"), "there is no such set", "Choose from 1 to 12.")
-                })?;
-                write(&out.join(format!("{number:02}")), &scene, &rig, Quality::Standard)?;
-            }
-            Ok(())
-        }
+        Command::Study(arguments) => study_command::run(arguments),
+        Command::Cut(arguments) => arguments.run(),
+        Command::Level(arguments) => arguments.run(),
+        Command::Specs(arguments) => arguments.run(),
     }
 }
 
@@ -181,7 +175,8 @@ fn write(out: &std::path::Path, scene: &SceneOptions, options: &RigOptions, qual
     let source = format!("{} {}", scene.kind.display(), scene.seed);
     let scene = Scene::new(scene)?;
     let cameras = rig(options, &scene.viewpoint())?;
-    write_set(out, &source, &scene, &cameras, quality, &StageContext::default())?;
+    let output = SetOutput { quality, depth: false };
+    write_set(out, &source, &scene, &cameras, output, &StageContext::default())?;
     println!("{}: {} pictures", out.display(), cameras.len());
     Ok(())
 }

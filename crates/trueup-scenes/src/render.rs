@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use trueup_core::raster::Raster;
 
 use crate::bvh::Ray;
-use crate::colour::{Rgb, encode};
+use crate::colour::{Rgb, encode, luminance};
 use crate::dice::{mix, unit_of};
 use crate::light::{SURFACE_OFFSET_M, tangents};
 use crate::rig::PosedCamera;
@@ -17,7 +17,9 @@ trueup_core::choice! {
     pub enum Quality {
         /// One sample a pixel, no reflections: for tests.
         Preview = "preview",
-        /// Four samples a pixel.
+        /// One sample a pixel, and four more where something ends; no reflections.
+        Draft = "draft",
+        /// One sample a pixel, and four more where something ends.
         Standard = "standard",
         /// Nine samples a pixel.
         Fine = "fine",
@@ -25,19 +27,24 @@ trueup_core::choice! {
 }
 
 impl Quality {
-    /// Samples along each side of a pixel.
+    /// Samples along each side of a pixel that gets many.
     fn side(self) -> usize {
         match self {
             Self::Preview => 1,
-            Self::Standard => 2,
+            Self::Draft | Self::Standard => 2,
             Self::Fine => 3,
         }
+    }
+
+    /// Whether pixels amid even ones do with one sample.
+    fn adapts(self) -> bool {
+        matches!(self, Self::Draft | Self::Standard)
     }
 
     /// How often a ray may be mirrored.
     fn mirrors(self) -> u32 {
         match self {
-            Self::Preview => 0,
+            Self::Preview | Self::Draft => 0,
             Self::Standard | Self::Fine => 1,
         }
     }
@@ -53,14 +60,44 @@ pub fn render(scene: &Scene, posed: &PosedCamera, quality: Quality) -> Raster<u8
         return picture;
     }
     let eye = Eye::new(posed);
+    let glances = if quality.adapts() { eye.glances(scene, quality) } else { Vec::new() };
     let row_length = 3 * posed.width;
     picture.data_mut().par_chunks_mut(row_length).enumerate().for_each(|(y, row)| {
         for (x, pixel) in row.chunks_exact_mut(3).enumerate() {
-            let light = eye.pixel(scene, x, y, quality);
+            let light = match glances.get(y * posed.width + x) {
+                Some(glance) if is_even(&glances, x, y, posed.width) => glance.light,
+                _ => eye.pixel(scene, x, y, quality),
+            };
             pixel.copy_from_slice(&develop(light * scene.exposure, posed, x, y));
         }
     });
     picture
+}
+
+/// What one sample through a pixel's centre shows.
+#[derive(Debug, Clone, Copy)]
+struct Glance {
+    light: Rgb,
+    /// Body and face, or sky.
+    surface: u64,
+    /// Perceived brightness, 0 to 1.
+    tone: f64,
+}
+
+/// Whether a pixel shows the same surface as its four neighbours and is about as bright: then one sample will do,
+/// as textures are filtered to the pixel.
+fn is_even(glances: &[Glance], x: usize, y: usize, width: usize) -> bool {
+    /// Steps below this are lost in grain and texture.
+    const STEP: f64 = 0.07;
+    let index = y * width + x;
+    let here = &glances[index];
+    let even = |other: usize| {
+        glances.get(other).is_none_or(|other| other.surface == here.surface && (other.tone - here.tone).abs() < STEP)
+    };
+    (x == 0 || even(index - 1))
+        && (x + 1 == width || even(index + 1))
+        && (y == 0 || even(index - width))
+        && even(index + width)
 }
 
 /// Depth along the optical axis, metres, through every pixel's centre; infinite where there is only sky.
@@ -97,6 +134,27 @@ impl Eye {
 
     fn direction(&self, x: f64, y: f64) -> Vector3<f64> {
         (self.world_from_camera * self.posed.camera.bearing(Vector2::new(x, y))).normalize()
+    }
+
+    /// One sample through every pixel's centre.
+    fn glances(&self, scene: &Scene, quality: Quality) -> Vec<Glance> {
+        /// Textures are filtered to this share of a pixel: narrower than one sample's place would deserve, as sharp as
+        /// what four samples show.
+        const SHARPNESS: f64 = 0.7;
+        const BRIGHTEST: f64 = 6.0;
+        let angle = SHARPNESS / self.posed.camera.focal_px;
+        (0..self.posed.height * self.posed.width)
+            .into_par_iter()
+            .map(|index| {
+                let (x, y) = (index % self.posed.width, index / self.posed.width);
+                let direction = self.direction(x as f64 + 0.5, y as f64 + 0.5);
+                let (light, surface) =
+                    trace_surface(scene, self.centre, direction, angle, [0.0, 0.0], quality.mirrors());
+                let light = light.map(|channel| channel.min(BRIGHTEST / scene.exposure));
+                let tone = (luminance(light) * scene.exposure).clamp(0.0, 1.0).sqrt();
+                Glance { light, surface, tone }
+            })
+            .collect()
     }
 
     /// Mean light over a pixel: a grid of samples, slightly turned so that all rows and columns differ.
@@ -136,11 +194,24 @@ pub(crate) fn trace(
     sun_at: [f64; 2],
     mirrors: u32,
 ) -> Rgb {
+    trace_surface(scene, origin, direction, angle, sun_at, mirrors).0
+}
+
+/// As [`trace`], with the body and face that was met as one number; 0 for the sky.
+fn trace_surface(
+    scene: &Scene,
+    origin: Vector3<f64>,
+    direction: Vector3<f64>,
+    angle: f64,
+    sun_at: [f64; 2],
+    mirrors: u32,
+) -> (Rgb, u64) {
+    const FACES: u64 = 6;
     const MIN_COSINE: f64 = 0.08;
     const GRAZING_GAIN: f64 = 8.0;
     let ray = Ray::new(origin, direction);
     let Some((index, entry)) = scene.hierarchy.nearest(&ray, f64::INFINITY) else {
-        return scene.sky.radiance(direction, angle);
+        return (scene.sky.radiance(direction, angle), 0);
     };
     let solid = &scene.solids[index];
     let point = origin + direction * entry.distance;
@@ -163,7 +234,7 @@ pub(crate) fn trace(
         let seen = trace(scene, surface, mirrored, angle * 2.0, sun_at, mirrors - 1);
         light = light * (1.0 - reflectance) + seen * reflectance;
     }
-    light
+    (light, 1 + FACES * index as u64 + entry.face as u64)
 }
 
 /// Irradiance by the sun, looking at one place of its disc.

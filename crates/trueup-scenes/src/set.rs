@@ -8,7 +8,7 @@ use trueup_core::raster::Raster;
 use trueup_core::truth::{ImageTruth, Truth};
 use trueup_core::{Error, Result, StageContext};
 
-use crate::render::{Quality, render};
+use crate::render::{Quality, depth_map, render};
 use crate::rig::PosedCamera;
 use crate::scene::Scene;
 
@@ -29,7 +29,18 @@ pub fn truth_of(posed: &PosedCamera, file: String) -> ImageTruth {
     }
 }
 
-/// Renders a set into a folder, which is made if need be: `00.jpg`, `01.jpg`, ... and `truth.json`.
+/// How a set is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SetOutput {
+    /// How carefully pictures are rendered.
+    pub quality: Quality,
+    /// Whether every picture gets a depth map: metres along the optical axis through pixel centres, infinite where
+    /// there is only sky, as a portable float map (`00.pfm`).
+    pub depth: bool,
+}
+
+/// Renders a set into a folder, which is made if need be: `00.jpg`, `01.jpg`, ..., depth maps if wanted, and last
+/// `truth.json`, so that a folder with it is complete.
 ///
 /// # Errors
 /// [`Error::Io`] if a file cannot be written, [`Error::Limits`] for a picture too large for JPEG,
@@ -39,7 +50,7 @@ pub fn write_set(
     source: &str,
     scene: &Scene,
     cameras: &[PosedCamera],
-    quality: Quality,
+    output: SetOutput,
     context: &StageContext,
 ) -> Result<Truth> {
     const STAGE: &str = "rendering";
@@ -50,9 +61,17 @@ pub fn write_set(
         context.check_cancelled()?;
         let file = format!("{index:02}.jpg");
         let path = directory.join(&file);
-        let bytes = jpeg(&render(scene, posed, quality))?;
+        let bytes = jpeg(&render(scene, posed, output.quality))?;
         fs::write(&path, bytes).map_err(|error| Error::io("writing", &path, error))?;
-        truth.images.push(truth_of(posed, file));
+        let mut image = truth_of(posed, file);
+        if output.depth {
+            let file = format!("{index:02}.pfm");
+            let path = directory.join(&file);
+            fs::write(&path, float_map(&depth_map(scene, posed)))
+                .map_err(|error| Error::io("writing", &path, error))?;
+            image.depth = Some(file);
+        }
+        truth.images.push(image);
         context.progress().advance(STAGE, 1);
     }
     context.progress().finish(STAGE);
@@ -60,12 +79,27 @@ pub fn write_set(
     Ok(truth)
 }
 
-/// Writes `truth.json` into the folder of its pictures.
+/// Writes `truth.json` into the folder of its pictures, beside and renamed: half a truth is none.
 pub(crate) fn write_truth(directory: &Path, truth: &Truth) -> Result<()> {
     let path = directory.join("truth.json");
     let text = serde_json::to_string_pretty(truth)
         .map_err(|error| Error::io("writing", &path, std::io::Error::other(error)))?;
-    fs::write(&path, text + "\n").map_err(|error| Error::io("writing", &path, error))
+    let beside = directory.join("truth.json.part");
+    fs::write(&beside, text + "\n").map_err(|error| Error::io("writing", &beside, error))?;
+    fs::rename(&beside, &path).map_err(|error| Error::io("renaming to", &path, error))
+}
+
+/// A portable float map: three lines of text, then rows from the bottom up of little-endian 32-bit numbers (the minus
+/// in the third line says so).
+///
+/// # Source
+/// Debevec, "PFM: portable float map", 2001; read by OpenCV, ImageMagick and the stereo benchmarks.
+fn float_map(depths: &Raster<f32>) -> Vec<u8> {
+    let mut bytes = format!("Pf\n{} {}\n-1.0\n", depths.width(), depths.height()).into_bytes();
+    for y in (0..depths.height()).rev() {
+        bytes.extend(depths.row(y).iter().flat_map(|depth| depth.to_le_bytes()));
+    }
+    bytes
 }
 
 /// A baseline JPEG at [`JPEG_QUALITY`] with halved chroma, in one scan: the encoder's optimised Huffman tables would come

@@ -141,7 +141,8 @@ fn truth_is_written_as_the_readers_expect_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let cameras = small_rig(0.01);
     let context = StageContext::default();
-    let truth = write_set(folder.path(), "room 1", room(), &cameras[..2], Quality::Preview, &context).expect("written");
+    let output = SetOutput { quality: Quality::Preview, depth: false };
+    let truth = write_set(folder.path(), "room 1", room(), &cameras[..2], output, &context).expect("written");
     let text = std::fs::read_to_string(folder.path().join("truth.json")).expect("there");
     assert_eq!(
         serde_json::from_str::<trueup_core::truth::Truth>(&text).expect("parses").images.len(),

@@ -16,7 +16,7 @@ pub(crate) fn section(results: &Results) -> Section {
     section.say(
         "The paper adds dual-feature warping (DFW) or content-preserving warping (GCPW) to VPG and finds the alignment error fall \
          while GDIC stays. Neither exists here yet; the table shows every method that does. `align` is the distance between the \
-         two places of one point at infinity, in source pixels: rendered cameras wander, so it contains true parallax.",
+         two places of one point, in source pixels; it is known where all photographs were taken from one place.",
     );
     table(results, &results.catalogue.study, "t7-alignment", "Means over the study's sets.", &mut section);
     if !results.catalogue.given.is_empty() {

@@ -101,7 +101,7 @@ pub(crate) fn section(results: &Results) -> Section {
     for (measure, title) in [
         ("theta_error_deg", "Error of the prior's turn relative to the reference (theta error), degrees, mean over the pictures"),
         ("upright_deg", "Deviation from upright in the panorama, degrees, mean over the pictures"),
-        ("align_px", "Alignment: distance in source pixels between the two places of one point at infinity"),
+        ("align_px", "Alignment: distance in source pixels between the two places of one point, where all photographs were taken from one place"),
     ] {
         let caption = format!("{title}.");
         let rows = ours(results, sets, measure);

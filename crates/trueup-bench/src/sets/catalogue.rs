@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use trueup::{Error, Result};
-use trueup_scenes::{LightQuality, Quality, RigOptions, SceneKind, SceneOptions, study_set};
+use trueup_scenes::{LightQuality, Quality, RigOptions, SceneKind, SceneOptions, SetKind};
 
 use super::{Recipe, SetSpec, from_panorama, truth_folders};
 
@@ -12,6 +12,10 @@ use super::{Recipe, SetSpec, from_panorama, truth_folders};
 pub(crate) struct Catalogue {
     /// The study's synthetic sets, 01 to 12.
     pub study: Vec<SetSpec>,
+    /// The same cameras in scenes without dominant directions.
+    pub twins: Vec<SetSpec>,
+    /// Sets with one vertical and horizontals at free angles.
+    pub mixed: Vec<SetSpec>,
     /// Sets cut from panoramas, or given with their truth.
     pub given: Vec<SetSpec>,
     /// Many small sets with and without dominant directions.
@@ -46,9 +50,6 @@ pub(crate) struct FocalSet {
     pub set: SetSpec,
 }
 
-/// Sets of the gate experiment with dominant directions, and as many without: 130 in all, as in the paper.
-const GATE_SETS: usize = 65;
-
 impl Catalogue {
     /// The sets of the whole study; `panoramas` is a folder of panoramas to cut sets from, `truth_sets` are folders that
     /// hold given ones.
@@ -56,17 +57,14 @@ impl Catalogue {
     /// # Errors
     /// Those of reading the folders.
     pub(crate) fn full(panoramas: Option<&Path>, truth_sets: &[PathBuf]) -> Result<Self> {
-        let study = (1..=12).filter_map(|number| {
-            let (scene, rig) = study_set(number)?;
-            let recipe = Recipe { scene, rig, quality: Quality::Standard };
-            Some(SetSpec::rendered(format!("study/{number:02}"), true, recipe))
-        });
-        let study: Vec<SetSpec> = study.collect();
+        let study = rendered_sets(SetKind::Manhattan, "study", Some(true));
         Ok(Self {
             focal: focal_sets(&study),
             study,
             given: given_sets(panoramas, truth_sets)?,
-            gate: (0..GATE_SETS).flat_map(|index| [gate_set(true, index), gate_set(false, index)]).collect(),
+            twins: rendered_sets(SetKind::Twins, "twins", Some(false)),
+            mixed: rendered_sets(SetKind::Mixed, "mixed", None),
+            gate: gate_sets(usize::MAX, Quality::Standard),
             pitch: pitch_sets(),
             reference_sets: vec!["03", "05", "08", "11"],
             seeds: 10,
@@ -79,13 +77,23 @@ impl Catalogue {
         const EACH_GATE_CLASS: usize = 6;
         let study = (0..SETS).map(|index| {
             let kind = if index % 2 == 0 { SceneKind::Room } else { SceneKind::Street };
-            let mut recipe = small(kind, 300 + index as u64, 7);
-            recipe.rig.pitch_deg = 5.0;
-            SetSpec::rendered(format!("quick/{:02}", index + 1), true, recipe)
+            let seed = 300 + index as u64;
+            let scene = SceneOptions { kind, seed, light: LightQuality::Fast, ..SceneOptions::default() };
+            let rig = RigOptions {
+                seed,
+                pictures: 6,
+                width: 640,
+                height: 480,
+                pitch_deg: 5.0,
+                roll_sd_deg: 6.0,
+                ..RigOptions::default()
+            };
+            let recipe = Recipe { scene, rig, quality: Quality::Preview };
+            SetSpec::rendered(format!("quick/{:02}", index + 1), Some(true), recipe)
         });
         Self {
             study: study.collect(),
-            gate: (0..EACH_GATE_CLASS).flat_map(|index| [gate_set(true, index), gate_set(false, index)]).collect(),
+            gate: gate_sets(EACH_GATE_CLASS, Quality::Preview),
             reference_sets: vec!["01", "02"],
             seeds: 3,
             ..Self::default()
@@ -96,24 +104,33 @@ impl Catalogue {
     pub(crate) fn all(&self) -> Vec<&SetSpec> {
         let pitch = self.pitch.iter().map(|one| &one.set);
         let focal = self.focal.iter().map(|one| &one.set);
-        self.study.iter().chain(&self.given).chain(&self.gate).chain(pitch).chain(focal).collect()
+        let plain = [&self.study, &self.twins, &self.mixed, &self.given, &self.gate];
+        plain.into_iter().flatten().chain(pitch).chain(focal).collect()
     }
 }
 
-fn gate_set(manhattan: bool, index: usize) -> SetSpec {
-    let kind = match (manhattan, index % 2) {
-        (true, 0) => SceneKind::Room,
-        (true, _) => SceneKind::Street,
-        (false, _) => SceneKind::Nature,
+/// The sets of a kind, named `folder/01` and so on.
+fn rendered_sets(kind: SetKind, folder: &str, manhattan: Option<bool>) -> Vec<SetSpec> {
+    let one = |number| {
+        let (scene, rig) = kind.set(number)?;
+        let recipe = Recipe { scene, rig, quality: Quality::Standard };
+        Some(SetSpec::rendered(format!("{folder}/{number:02}"), manhattan, recipe))
     };
-    let class = if manhattan { "manhattan" } else { "other" };
-    SetSpec::rendered(format!("gate/{class}-{index:02}"), manhattan, small(kind, 500 + index as u64, 6))
+    (1..=kind.count()).filter_map(one).collect()
 }
 
-fn small(kind: SceneKind, seed: u64, pictures: usize) -> Recipe {
-    let scene = SceneOptions { kind, seed, light: LightQuality::Fast };
-    let rig = RigOptions { seed, pictures, width: 480, height: 360, roll_sd_deg: 6.0, ..RigOptions::default() };
-    Recipe { scene, rig, quality: Quality::Preview }
+/// The first so many sets with dominant directions, and as many without.
+fn gate_sets(each: usize, quality: Quality) -> Vec<SetSpec> {
+    let classes = [(SetKind::GateManhattan, "gate/manhattan", true), (SetKind::GateRandom, "gate/random", false)];
+    let of_class = |(kind, name, manhattan): (SetKind, &str, bool)| -> Vec<SetSpec> {
+        let one = |number| {
+            let (scene, rig) = kind.set(number)?;
+            let recipe = Recipe { scene, rig, quality };
+            Some(SetSpec::rendered(format!("{name}-{number:02}"), Some(manhattan), recipe))
+        };
+        (1..=kind.count().min(each)).filter_map(one).collect()
+    };
+    classes.into_iter().flat_map(of_class).collect()
 }
 
 fn pitch_sets() -> Vec<PitchSet> {
@@ -121,7 +138,8 @@ fn pitch_sets() -> Vec<PitchSet> {
     for pitch_deg in [0.0, 10.0, 20.0, 30.0, 40.0] {
         for (kind, name) in [(SceneKind::Room, "room"), (SceneKind::Street, "street")] {
             for seed in 701..=702 {
-                let scene = SceneOptions { kind, seed, ..SceneOptions::default() };
+                let light = LightQuality::Standard;
+                let scene = SceneOptions { kind, seed, light, ..SceneOptions::default() };
                 let rig = RigOptions {
                     seed,
                     pictures: 7,
@@ -133,7 +151,7 @@ fn pitch_sets() -> Vec<PitchSet> {
                     ..RigOptions::default()
                 };
                 let recipe = Recipe { scene, rig, quality: Quality::Standard };
-                let set = SetSpec::rendered(format!("pitch/{name}-{pitch_deg:02.0}-{seed}"), true, recipe);
+                let set = SetSpec::rendered(format!("pitch/{name}-{pitch_deg:02.0}-{seed}"), Some(true), recipe);
                 sets.push(PitchSet { pitch_deg, set });
             }
         }

@@ -77,7 +77,7 @@ fn focal_exif(focal_px: f64, width: usize) -> Vec<u8> {
 mod tests {
     use super::*;
     use trueup::StageContext;
-    use trueup_scenes::{LightQuality, Quality, RigOptions, Scene, SceneOptions, rig, write_set};
+    use trueup_scenes::{LightQuality, Quality, RigOptions, Scene, SceneOptions, SetOutput, rig, write_set};
 
     #[test]
     fn the_stitcher_believes_the_claim() {
@@ -86,7 +86,8 @@ mod tests {
         let options = RigOptions { pictures: 1, width: 160, height: 120, ..RigOptions::default() };
         let cameras = rig(&options, &scene.viewpoint()).expect("cameras");
         let context = StageContext::default();
-        write_set(&folder.path().join("true"), "test", &scene, &cameras, Quality::Preview, &context).expect("set");
+        let output = SetOutput { quality: Quality::Preview, ..SetOutput::default() };
+        write_set(&folder.path().join("true"), "test", &scene, &cameras, &output, &context).expect("set");
         let original = super::super::ready(&folder.path().join("true")).expect("truth");
         let claimed = folder.path().join("claimed");
         fs::create_dir(&claimed).expect("folder");

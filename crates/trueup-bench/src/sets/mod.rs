@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 use trueup::{Error, Result, StageContext, Truth};
 use trueup_scenes::cut::SpecKind;
-use trueup_scenes::{Quality, RigOptions, Scene, SceneOptions, rig, write_set};
+use trueup_scenes::{Quality, RigOptions, Scene, SceneKind, SceneOptions, SetOutput, rig, write_set};
 
 pub(crate) use catalogue::Catalogue;
 
@@ -67,9 +67,9 @@ pub(crate) struct ReadySet {
 
 impl SetSpec {
     /// A set to be rendered.
-    pub(crate) fn rendered(name: String, manhattan: bool, recipe: Recipe) -> Self {
+    pub(crate) fn rendered(name: String, manhattan: Option<bool>, recipe: Recipe) -> Self {
         let content = recipe.describe();
-        Self { name, content, manhattan: Some(manhattan), source: SetSource::Rendered(Box::new(recipe)) }
+        Self { name, content, manhattan, source: SetSource::Rendered(Box::new(recipe)) }
     }
 
     /// A set in a folder.
@@ -131,7 +131,8 @@ impl Recipe {
     fn render(&self, folder: &Path, name: &str, context: &StageContext) -> Result<()> {
         let scene = Scene::new(&self.scene)?;
         let cameras = rig(&self.rig, &scene.viewpoint())?;
-        write_set(folder, name, &scene, &cameras, self.quality, context).map(drop)
+        let output = SetOutput { quality: self.quality, ..SetOutput::default() };
+        write_set(folder, name, &scene, &cameras, &output, context).map(drop)
     }
 
     fn fingerprint(&self) -> String {
@@ -143,8 +144,10 @@ impl Recipe {
     fn describe(&self) -> String {
         use trueup_core::options::OptionValue;
         let rig = &self.rig;
-        let mut parts =
-            vec![format!("{}, {} of {} x {} px", self.scene.kind.display(), rig.pictures, rig.width, rig.height)];
+        let indoors = matches!(self.scene.kind, SceneKind::Room | SceneKind::TurnedRoom);
+        let style = if indoors { format!(" ({})", self.scene.style.display()) } else { String::new() };
+        let kind = self.scene.kind.display();
+        let mut parts = vec![format!("{kind}{style}, {} of {} x {} px", rig.pictures, rig.width, rig.height)];
         if rig.rows > 1 {
             parts.push(format!("{} rows", rig.rows));
         }

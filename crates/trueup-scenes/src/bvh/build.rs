@@ -87,8 +87,7 @@ impl Grower<'_> {
             Some((axis, bin)) => {
                 let boxes = &self.boxes;
                 // A stable sort keeps the order of the bodies: the tree depends on nothing but them.
-                self.order[start..end]
-                    .sort_by_key(|&body| bin_of(boxes[body as usize].1[axis], axis, &centres) >= bin);
+                self.order[start..end].sort_by_key(|&body| bin_of(boxes[body as usize].1[axis], axis, &centres) >= bin);
                 start
                     + self.order[start..end]
                         .partition_point(|&body| bin_of(boxes[body as usize].1[axis], axis, &centres) < bin)
@@ -96,9 +95,8 @@ impl Grower<'_> {
             None => {
                 let axis = (centres.high - centres.low).imax();
                 let boxes = &self.boxes;
-                self.order[start..end].sort_by(|&a, &b| {
-                    boxes[a as usize].1[axis].total_cmp(&boxes[b as usize].1[axis]).then(a.cmp(&b))
-                });
+                self.order[start..end]
+                    .sort_by(|&a, &b| boxes[a as usize].1[axis].total_cmp(&boxes[b as usize].1[axis]).then(a.cmp(&b)));
                 start + (end - start) / 2
             }
         };

@@ -13,8 +13,7 @@ pub(super) fn direct_light(scene: &Scene, place: &Place, samples: usize) -> (Rgb
     let portals = scene.portals.iter().map(|portal| portal_light(scene, place, portal, samples)).sum();
     let sun = scene.sun.map_or(Rgb::zeros(), |sun| {
         let cosine = place.normal.dot(&sun.towards);
-        let lit =
-            cosine > 0.0 && !scene.hierarchy.blocked(&Ray::new(place.point, sun.towards), f64::INFINITY);
+        let lit = cosine > 0.0 && !scene.hierarchy.blocked(&Ray::new(place.point, sun.towards), f64::INFINITY);
         if lit { sun.irradiance * cosine } else { Rgb::zeros() }
     });
     (portals, sun)

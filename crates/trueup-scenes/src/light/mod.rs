@@ -100,7 +100,8 @@ impl LightField {
         let albedo = mean_albedo(scene);
         field.fill(&places, direct.iter().map(|(portals, sun)| portals + sun));
         for directions in [detail.directions / 2, detail.directions] {
-            let patterns = THINNING.map(|thinning| cosine_pattern((directions / thinning).max(detail.least_directions)));
+            let patterns =
+                THINNING.map(|thinning| cosine_pattern((directions / thinning).max(detail.least_directions)));
             let bounced: Vec<Rgb> = places
                 .par_iter()
                 .enumerate()

@@ -164,3 +164,35 @@ pub(super) fn paint(material: &Material, spot: &Spot) -> Rgb {
     let scratch = specks(spot, 0.15, 0.004, 93);
     mix(material.colours[0], srgb(0x30_2c28), 0.25 * scratch) * (1.0 + 0.05 * dirt + 0.05 * fine)
 }
+
+/// Carpet tiles, every other one turned.
+pub(super) fn carpet(material: &Material, spot: &Spot) -> Rgb {
+    let size = material.scale_m;
+    let (x, z) = (spot.point.x, spot.point.z);
+    let (column, row) = ((x / size).floor(), (z / size).floor());
+    let own = lattice(column as i64, row as i64, 0, 301);
+    let (along, across) = if (column + row).rem_euclid(2.0) < 1.0 { (x, z) } else { (z, x) };
+    let drawn = Vector3::new(across, 0.08 * along, 7.0 * own);
+    let stripes = fractal_noise(drawn, 0.09, 5, 0.75, spot.footprint, 302);
+    let loops = spot.noise(0.012, 3, 0.85, 303);
+    let flat = Spot { across: x, down: z, ..*spot };
+    let spots = specks(&flat, 0.35, 0.03, 304).max(0.6 * stain(&flat, 1.1, 305));
+    let seam = pulse(x, 0.006, size, spot.footprint).max(pulse(z, 0.006, size, spot.footprint));
+    let wool =
+        mix(material.colours[0], material.colours[1], (0.5 + 1.1 * stripes).clamp(0.0, 1.0)) * (0.85 + 0.3 * own);
+    mix(wool * (1.0 + 0.35 * loops), material.colours[2], (0.5 * spots).max(0.5 * seam))
+}
+
+/// Mineral panels in a metal grid, each with its own stains.
+pub(super) fn ceiling_panels(material: &Material, spot: &Spot) -> Rgb {
+    let size = material.scale_m;
+    let (x, z) = (spot.point.x, spot.point.z);
+    let own = lattice((x / size).floor() as i64, (z / size).floor() as i64, 0, 311);
+    let bar = pulse(x, 0.024, size, spot.footprint).max(pulse(z, 0.024, size, spot.footprint));
+    let flat = Spot { across: x, down: z, ..*spot };
+    let holes = specks(&flat, 0.035, 0.006, 312).max(specks(&flat, 0.06, 0.011, 313));
+    let water = stain(&flat, 1.7, 314);
+    let panel = material.colours[0] * (0.93 + 0.1 * own) * (1.0 - 0.55 * holes);
+    let panel = mix(panel, panel.component_mul(&Vector3::new(0.75, 0.62, 0.42)), 0.5 * water);
+    mix(panel * (1.0 + 0.05 * spot.noise(0.2, 4, 0.6, 315)), material.colours[1], bar)
+}

@@ -26,6 +26,12 @@ pub(crate) enum Pattern {
     Planks,
     /// Square tiles of `colours[0]` and `[1]` with joints of `[2]`.
     Tiles,
+    /// Carpet tiles of size `scale_m`: loops of `colours[0]`, `[1]` and `[2]`, laid crosswise, worn and spotted.
+    Carpet,
+    /// Panels of size `scale_m` with holes, in a grid of `colours[1]`.
+    CeilingPanels,
+    /// Handwriting and sketches of `colours[1]` and `[2]` on a board.
+    Writing,
     /// A rug with border and diamonds.
     Rug,
     /// A framed picture, drawn by seed: landscape, blocks, discs, still life.
@@ -99,6 +105,9 @@ impl Material {
             Pattern::Wood => interior::wood(self.colours[0], spot.point, spot.grain, spot),
             Pattern::Planks => interior::planks(self, spot),
             Pattern::Tiles => interior::tiles(self, spot),
+            Pattern::Carpet => interior::carpet(self, spot),
+            Pattern::CeilingPanels => interior::ceiling_panels(self, spot),
+            Pattern::Writing => print::writing(self, spot),
             Pattern::Rug => ornament::rug(self, spot),
             Pattern::Fabric => interior::fabric(self, spot),
             Pattern::Curtain => ornament::curtain(self, spot),

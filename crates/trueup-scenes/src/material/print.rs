@@ -115,6 +115,29 @@ pub(super) fn page(material: &Material, spot: &Spot) -> Rgb {
     mix(colour, ink, head.max(body) * inside)
 }
 
+/// A board somebody wrote and drew on.
+pub(super) fn writing(material: &Material, spot: &Spot) -> Rgb {
+    let [width, height] = spot.size;
+    let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);
+    let soft = spot.footprint;
+    let line = material.scale_m;
+    let mut colour = material.colours[0] * (1.0 + 0.06 * spot.noise(0.3, 5, 0.6, 321));
+    let left = text(x - 0.08 * width, y - 0.12 * height, 0.45 * width, line, soft, spot.seed)
+        * band(y, 0.12 * height, 0.8 * height, 1e-4);
+    colour = mix(colour, material.colours[1], left);
+    // Boxes and circles on the right, joined by nothing.
+    for k in 0..6 {
+        let chance = |salt| lattice(k, 50, salt, spot.seed);
+        let (at_x, at_y) = (width * lerp(0.6, 0.92, chance(0)), height * lerp(0.15, 0.85, chance(1)));
+        let radius = height * lerp(0.05, 0.14, chance(2));
+        let (dx, dy) = ((x - at_x).abs(), (y - at_y).abs());
+        let distance = if chance(3) < 0.5 { dx.hypot(dy) } else { dx.max(1.6 * dy) };
+        let stroke = band(distance, radius - 0.006, radius + 0.006, soft);
+        colour = mix(colour, material.colours[if chance(4) < 0.5 { 1 } else { 2 }], 0.9 * stroke);
+    }
+    colour
+}
+
 pub(super) fn spine(material: &Material, spot: &Spot) -> Rgb {
     let [width, height] = spot.size;
     let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);

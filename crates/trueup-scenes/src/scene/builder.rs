@@ -101,4 +101,31 @@ impl Builder {
     pub(crate) fn ellipsoid(&mut self, centre: Vector3<f64>, half: Vector3<f64>, material: MaterialId) -> &mut Solid {
         self.push(Shape::Ellipsoid, centre, half, material)
     }
+
+    /// Where the scene stands now, for [`Builder::turn_since`].
+    pub(crate) fn mark(&self) -> Mark {
+        Mark { solids: self.solids.len(), portals: self.portals.len() }
+    }
+
+    /// Turns all that was added since the mark about the vertical through `pivot` by `yaw` radians, from z towards x.
+    pub(crate) fn turn_since(&mut self, mark: Mark, pivot: Vector3<f64>, yaw: f64) {
+        let rotation = rotation_about_y(yaw);
+        for solid in &mut self.solids[mark.solids..] {
+            solid.centre = pivot + rotation * (solid.centre - pivot);
+            solid.world_from_body = Some(solid.world_from_body.map_or(rotation, |own| rotation * own));
+        }
+        for portal in &mut self.portals[mark.portals..] {
+            portal.corner = pivot + rotation * (portal.corner - pivot);
+            for vector in [&mut portal.side_s, &mut portal.side_t, &mut portal.normal] {
+                *vector = rotation * *vector;
+            }
+        }
+    }
+}
+
+/// How much of a scene there was at some moment.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Mark {
+    solids: usize,
+    portals: usize,
 }

@@ -1,23 +1,28 @@
 //! Scenes: bodies, materials, light, and the place from which to photograph them.
 
+mod boxes;
 mod builder;
+mod furnish;
 mod furniture;
 mod nature;
 mod room;
 mod street;
+mod style;
+mod viewpoint;
 mod wall;
 
 use nalgebra::Vector3;
 use trueup_core::Result;
 use trueup_core::options::StageOptions;
 
-use crate::bvh::{Hierarchy, Ray};
-use crate::colour::{Rgb, luminance};
+use crate::bvh::Hierarchy;
 use crate::light::{LightDetail, LightField, Portal};
 use crate::material::{Material, Spot};
 use crate::sky::{Sky, Sun};
 use crate::solid::{Shape, Solid};
 use builder::Builder;
+pub use style::RoomStyle;
+pub use viewpoint::Viewpoint;
 
 trueup_core::choice! {
     /// What is built.
@@ -28,6 +33,12 @@ trueup_core::choice! {
         Street = "street",
         /// Rocks and trees at random turns on rough ground: no dominant directions at all.
         Nature = "nature",
+        /// Blocks at random turns in the air: many straight edges, no dominant directions.
+        Boxes = "boxes",
+        /// A room of five or six walls at free angles: one vertical, no shared horizontals.
+        TurnedRoom = "turned-room",
+        /// A square between houses at free angles: one vertical, no shared horizontals.
+        TurnedStreet = "turned-street",
     }
 }
 
@@ -48,22 +59,13 @@ trueup_core::options! {
     pub struct SceneOptions("scene") {
         /// Kind of scene.
         kind: SceneKind = SceneKind::Room, Allowed::Any, "";
+        /// What a room is for; nothing else heeds it.
+        style: RoomStyle = RoomStyle::Living, Allowed::Any, "";
         /// Seed of its layout, colours and textures.
         seed: u64 = 1, Allowed::Any, "";
         /// How finely light is worked out.
         light: LightQuality = LightQuality::Fine, Allowed::Any, "";
     }
-}
-
-/// A place from which a scene can be photographed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Viewpoint {
-    /// The photographer's eye in the world, metres; y points down and the floor is at y = 0.
-    pub eye: [f64; 3],
-    /// The direction first looked at: turn about the vertical from world z towards world x, degrees.
-    pub yaw_deg: f64,
-    /// Median distance of what is seen at eye level all round, metres.
-    pub depth_m: f64,
 }
 
 /// A scene ready to be photographed. Its Manhattan directions, where it has them, are the axes of the world.
@@ -88,9 +90,12 @@ impl Scene {
     pub fn new(options: &SceneOptions) -> Result<Self> {
         options.check()?;
         let builder = match options.kind {
-            SceneKind::Room => room::build(options.seed),
+            SceneKind::Room => room::build(options.seed, options.style),
             SceneKind::Street => street::build(options.seed),
             SceneKind::Nature => nature::build(options.seed),
+            SceneKind::Boxes => boxes::build(options.seed),
+            SceneKind::TurnedRoom => room::build_turned(options.seed, options.style),
+            SceneKind::TurnedStreet => street::build_turned(options.seed),
         };
         Ok(Self::lit(builder, options.light))
     }
@@ -143,36 +148,10 @@ impl Scene {
             exposure: 1.0,
             viewpoint: Viewpoint { eye: builder.eye.into(), yaw_deg: builder.yaw_deg, depth_m: 1.0 },
         };
+        scene.step_clear(outdoors);
         scene.light = LightField::gather(&scene, &detail);
         scene.measure();
         scene
-    }
-
-    /// Measures depth and brightness round the eye, as a photographer would before a panorama.
-    fn measure(&mut self) {
-        const TURNS: usize = 96;
-        const ELEVATIONS: [f64; 5] = [-0.35, -0.15, 0.0, 0.15, 0.35];
-        const MIDDLE_GREY: f64 = 0.2;
-        let eye = Vector3::from(self.viewpoint.eye);
-        let (mut depths, mut logarithms, mut count) = (Vec::new(), 0.0, 0.0);
-        for turn in 0..TURNS {
-            let (sine, cosine) = (turn as f64 / TURNS as f64 * std::f64::consts::TAU).sin_cos();
-            for elevation in ELEVATIONS {
-                let direction = Vector3::new(sine, elevation, cosine).normalize();
-                if elevation == 0.0 {
-                    depths.extend(
-                        self.hierarchy
-                            .nearest(&Ray::new(eye, direction), f64::INFINITY)
-                            .map(|(_, entry)| entry.distance),
-                    );
-                }
-                logarithms += luminance(self.radiance(eye, direction, 0.02)).max(1e-3).ln();
-                count += 1.0;
-            }
-        }
-        depths.sort_by(f64::total_cmp);
-        self.viewpoint.depth_m = depths.get(depths.len() / 2).copied().unwrap_or(100.0);
-        self.exposure = MIDDLE_GREY / (logarithms / count).exp();
     }
 
     /// The coordinates of a place on a face, for its pattern. `point` is in the body's frame.
@@ -190,10 +169,5 @@ impl Scene {
         };
         let grain = solid.half.imax();
         Spot { point: texture, across, down, unit, size, grain, footprint, seed: solid.seed }
-    }
-
-    /// Radiance along a ray; `angle` is the pixel's, in radians. Without soft sun, for measuring.
-    fn radiance(&self, origin: Vector3<f64>, direction: Vector3<f64>, angle: f64) -> Rgb {
-        crate::render::trace(self, origin, direction, angle, [0.0, 0.0], 0)
     }
 }

@@ -1,5 +1,6 @@
 //! What stands along walls and in the middle of rooms. Heights and depths are metres.
 
+mod fittings;
 mod openings;
 mod shelves;
 mod tables;
@@ -9,9 +10,12 @@ use nalgebra::Vector3;
 use super::builder::Builder;
 use super::wall::{Opening, Wall};
 use crate::material::{Material, MaterialId, Pattern};
+pub(super) use fittings::{lockers, painting, refrigerator, sculptures, white_board, workbench, worktop};
 pub(super) use openings::{door, door_opening, window, window_opening};
 pub(super) use shelves::{bookcase, cabinet};
+use tables::chair;
 pub(super) use tables::{desk, table};
+
 /// Materials that the pieces of one room share.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Finish {
@@ -29,6 +33,7 @@ pub(super) struct Finish {
     pub(super) ceramic: MaterialId,
     pub(super) leaves: MaterialId,
     pub(super) shade: MaterialId,
+    pub(super) iron: MaterialId,
 }
 
 impl Finish {
@@ -55,6 +60,7 @@ impl Finish {
             ceramic: add(Material::new(Pattern::Tiles, 0.09, [0xc8_d4d0, 0x3a_6a84, 0xe0_dcd0]).glossy(0.06)),
             leaves: add(Material::new(Pattern::Foliage, 1.0, [0x2e_5a26, 0x78_a048, 0])),
             shade: add(Material::new(Pattern::Fabric, 0.01, [0xc8_9860, 0xa8_6a3c, 0]).emitting(0.25)),
+            iron: add(Material::new(Pattern::Paint, 1.0, [0x2a_2c2e; 3]).glossy(0.03)),
         }
     }
 }

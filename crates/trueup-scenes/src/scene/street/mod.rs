@@ -2,6 +2,7 @@
 
 mod house;
 mod pavement;
+mod square;
 
 use nalgebra::Vector3;
 
@@ -12,6 +13,7 @@ use crate::material::{Material, MaterialId, Pattern};
 use crate::sky::Sun;
 use house::house;
 use pavement::pavement;
+pub(super) use square::build as build_turned;
 /// Half the width of the roadway and of the whole street, and how far it runs either way, metres.
 const ROAD: f64 = 3.6;
 

@@ -28,7 +28,7 @@ pub(super) fn pavement(builder: &mut Builder, side: f64, finish: &Finish) {
     }
 }
 
-fn street_lamp(builder: &mut Builder, foot: Vector3<f64>, side: f64, finish: &Finish) {
+pub(super) fn street_lamp(builder: &mut Builder, foot: Vector3<f64>, side: f64, finish: &Finish) {
     builder.cylinder(foot, 0.14, 0.5, finish.iron);
     builder.cylinder(foot, 0.06, 5.2, finish.iron);
     let top = foot - Vector3::new(0.0, 5.2, 0.0);
@@ -37,7 +37,7 @@ fn street_lamp(builder: &mut Builder, foot: Vector3<f64>, side: f64, finish: &Fi
     builder.piece([head - Vector3::new(0.3, 0.06, 0.12), head + Vector3::new(0.3, 0.06, 0.12)], finish.window_paint);
 }
 
-fn tree(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
+pub(super) fn tree(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
     let height = builder.dice.range(2.6, 3.4);
     builder.cylinder(foot, 0.11, height, finish.timber);
     let crown = foot - Vector3::new(0.0, height + 0.6, 0.0);
@@ -49,7 +49,7 @@ fn tree(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
     }
 }
 
-fn traffic_sign(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
+pub(super) fn traffic_sign(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
     let colours = [[0x2a_4c9a, 0xf0_f0f0], [0xf0_eee8, 0xa0_2420], [0xe8_c840, 0x20_2020]];
     let [board, ink] = colours[builder.dice.index(colours.len())];
     let plate = builder.material(Material::new(Pattern::Sign, 1.0, [board, ink, 0]).glossy(0.03));
