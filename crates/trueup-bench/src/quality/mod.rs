@@ -15,7 +15,7 @@ use crate::arguments::QualityArguments;
 use crate::interrupt::cancel_token;
 use crate::progress::Tracker;
 use child::{Measured, measure};
-use discover::{Part, StitchSet, find_sets};
+use discover::{StitchSet, find_sets};
 use row::{QualityRow, read_rows, write_rows};
 
 /// Stitches the sets, then writes the table and its CSV file.
@@ -108,6 +108,7 @@ impl Drop for Scratch {
 
 #[cfg(test)]
 mod tests {
+    use super::discover::Part;
     use super::*;
 
     #[test]

@@ -64,7 +64,7 @@ impl Catalogue {
             given: given_sets(panoramas, truth_sets)?,
             twins: rendered_sets(SetKind::Twins, "twins", Some(false)),
             mixed: rendered_sets(SetKind::Mixed, "mixed", None),
-            gate: gate_sets(usize::MAX, Quality::Standard),
+            gate: gate_sets(usize::MAX, Quality::Draft),
             pitch: pitch_sets(),
             reference_sets: vec!["03", "05", "08", "11"],
             seeds: 10,

@@ -12,7 +12,7 @@ pub(super) fn write(original: &ReadySet, factor: f64, folder: &Path) -> Result<(
     for (photograph, truth) in original.photographs.iter().zip(&original.truth.images) {
         let source = Path::new(photograph);
         let bytes = fs::read(source).map_err(|error| Error::io("reading", source, error))?;
-        let claimed = with_exif(&bytes, &focal_exif(factor * truth.focal_px, truth.width)).ok_or_else(|| {
+        let claimed = with_exif(&bytes, &focal_exif(factor * truth.focal_px, (truth.width, truth.height))).ok_or_else(|| {
             Error::input(photograph, "it is no JPEG file", "Give the set as JPEG files, or leave --sets out.")
         })?;
         let target = folder.join(&truth.file);
@@ -36,8 +36,9 @@ fn with_exif(jpeg: &[u8], exif: &[u8]) -> Option<Vec<u8>> {
 
 const EXIF_HEADER: &[u8] = b"Exif\0\0";
 
-/// The TIFF structure of an EXIF block (EXIF 3.0, section 4.6) with FocalLength and the resolution of a sensor 36 mm wide.
-fn focal_exif(focal_px: f64, width: usize) -> Vec<u8> {
+/// The TIFF structure of an EXIF block (EXIF 3.0, section 4.6): the focal length on a sensor 36 mm wide, the picture's size,
+/// the sensor's resolution.
+fn focal_exif(focal_px: f64, (width, height): (usize, usize)) -> Vec<u8> {
     const SENSOR_MM: f64 = 36.0;
     /// Denominator of the rationals: numbers to a ten-thousandth.
     const DENOMINATOR: u32 = 10_000;
@@ -45,9 +46,9 @@ fn focal_exif(focal_px: f64, width: usize) -> Vec<u8> {
     const SHORT: u16 = 3;
     const LONG: u16 = 4;
     const RATIONAL: u16 = 5;
-    /// Directory 0 has one entry and starts at 8, the EXIF directory with its three follows, then the rationals.
+    /// Directory 0 has one entry and starts at 8, the EXIF directory with its five follows, then the rationals.
     const EXIF_AT: u32 = 8 + 2 + 12 + 4;
-    const VALUES_AT: u32 = EXIF_AT + 2 + 3 * 12 + 4;
+    const VALUES_AT: u32 = EXIF_AT + 2 + 5 * 12 + 4;
     let pixels_per_mm = width as f64 / SENSOR_MM;
     let rational = |value: f64| ((value * f64::from(DENOMINATOR)).round() as u32, DENOMINATOR);
     let mut bytes = b"II*\0".to_vec();
@@ -61,8 +62,10 @@ fn focal_exif(focal_px: f64, width: usize) -> Vec<u8> {
     bytes.extend(1_u16.to_le_bytes());
     entry(&mut bytes, 0x8769, LONG, EXIF_AT);
     bytes.extend(0_u32.to_le_bytes());
-    bytes.extend(3_u16.to_le_bytes());
+    bytes.extend(5_u16.to_le_bytes());
     entry(&mut bytes, 0x920a, RATIONAL, VALUES_AT);
+    entry(&mut bytes, 0xa002, LONG, width as u32);
+    entry(&mut bytes, 0xa003, LONG, height as u32);
     entry(&mut bytes, 0xa20e, RATIONAL, VALUES_AT + 8);
     entry(&mut bytes, 0xa210, SHORT, u32::from(MILLIMETRE));
     bytes.extend(0_u32.to_le_bytes());
@@ -86,8 +89,8 @@ mod tests {
         let options = RigOptions { pictures: 1, width: 160, height: 120, ..RigOptions::default() };
         let cameras = rig(&options, &scene.viewpoint()).expect("cameras");
         let context = StageContext::default();
-        let output = SetOutput { quality: Quality::Preview, ..SetOutput::default() };
-        write_set(&folder.path().join("true"), "test", &scene, &cameras, &output, &context).expect("set");
+        let output = SetOutput { quality: Quality::Preview, depth: false };
+        write_set(&folder.path().join("true"), "test", &scene, &cameras, output, &context).expect("set");
         let original = super::super::ready(&folder.path().join("true")).expect("truth");
         let claimed = folder.path().join("claimed");
         fs::create_dir(&claimed).expect("folder");

@@ -66,10 +66,21 @@ pub(super) fn cut(panorama: &Path, kind: SpecKind, folder: &Path, context: &Stag
 #[cfg(test)]
 mod tests {
     use super::*;
-    use trueup_core::raster::Raster;
 
     #[test]
-    fn views_are_counted_as_they_are_cut() {
-        let _ = Raster::<u8>::new(1, 1, 1);
+    fn views_are_counted_as_they_are_cut_and_are_not_cut_again() {
+        let folder = tempfile::tempdir().expect("folder");
+        let panorama = folder.path().join("panoramas").join("gray.png");
+        std::fs::create_dir(folder.path().join("panoramas")).expect("folder");
+        image::RgbImage::from_pixel(256, 128, image::Rgb([128; 3])).save(&panorama).expect("picture");
+        let data = folder.path().join("data");
+        for set in sets(&folder.path().join("panoramas")).expect("panoramas") {
+            let ready = set.prepare(&data, &StageContext::default()).expect("cut");
+            assert_eq!(ready.photographs.len(), set.pictures().expect("count"), "{}", set.name);
+            // What is there is taken as it is.
+            std::fs::remove_file(&ready.photographs[0]).expect("removed");
+            assert_eq!(set.prepare(&data, &StageContext::default()).expect("there").fingerprint, ready.fingerprint);
+            assert!(!Path::new(&ready.photographs[0]).exists());
+        }
     }
 }

@@ -131,8 +131,8 @@ impl Recipe {
     fn render(&self, folder: &Path, name: &str, context: &StageContext) -> Result<()> {
         let scene = Scene::new(&self.scene)?;
         let cameras = rig(&self.rig, &scene.viewpoint())?;
-        let output = SetOutput { quality: self.quality, ..SetOutput::default() };
-        write_set(folder, name, &scene, &cameras, &output, context).map(drop)
+        let output = SetOutput { quality: self.quality, depth: false };
+        write_set(folder, name, &scene, &cameras, output, context).map(drop)
     }
 
     fn fingerprint(&self) -> String {
