@@ -317,5 +317,9 @@ fn halvings_before_sampling(grid: &DeformedGrid, minification_threshold: f64) ->
     if wanted >= 2.0 { wanted.log2().floor().min(16.0) as u32 } else { 0 }
 }
 
+mod layer;
+
+pub use layer::{Layer, layer};
+
 #[cfg(test)]
 mod tests;

@@ -2,6 +2,12 @@
 
 use crate::error::{Error, Result};
 
+/// Rec. 601 luma weights of red, green and blue, applied to encoded values.
+///
+/// # Source
+/// ITU-R BT.601-7, section 2.5.1.
+pub const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
+
 /// A picture of `width` x `height` pixels with `channels` interleaved samples each.
 ///
 /// Sample `c` of the pixel whose centre is at (x + 0.5, y + 0.5) is `data[(y * width + x) * channels + c]`.

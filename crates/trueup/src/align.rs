@@ -40,6 +40,8 @@ pub(crate) struct Geometry {
     pub triads: Vec<TriadOutcome>,
     pub prior: SimilarityPrior,
     pub mesh: WarpedMesh,
+    /// The pairs whose overlaps were to coincide.
+    pub met: Vec<PairMatches>,
 }
 
 impl<'a> Component<'a> {
@@ -138,19 +140,22 @@ pub(crate) fn run(
     let edges: Vec<GraphEdge> =
         pairs.iter().map(|pair| GraphEdge { a: pair.a, b: pair.b, weight: pair.agreeing }).collect();
     let cut = full_turn::find_cut(&cameras.cameras, &edges, &prior.level_from_world());
-    let kept: Vec<_> = match &cut {
-        None => warps,
+    let (kept, met): (Vec<_>, Vec<_>) = match &cut {
+        None => (warps, pairs),
         Some(cut) => {
             report_cut(cut, component, context);
-            let severed = |from: usize, to: usize| cut.severed.binary_search(&(from.min(to), from.max(to))).is_ok();
-            warps.into_iter().filter(|warp| !severed(warp.from, warp.to)).collect()
+            let met = |from: usize, to: usize| cut.severed.binary_search(&(from.min(to), from.max(to))).is_err();
+            (
+                warps.into_iter().filter(|warp| met(warp.from, warp.to)).collect(),
+                pairs.into_iter().filter(|pair| met(pair.a, pair.b)).collect(),
+            )
         }
     };
     let bases = mesh::bases(options.mesh.base, &cameras.cameras, &grids, &prior);
     let mesh = in_one_step("mesh", context, clock, || {
         mesh::run(&grids, &kept, &bases, component.reference, &options.mesh, context)
     })?;
-    Ok(Geometry { cameras, triads, prior, mesh })
+    Ok(Geometry { cameras, triads, prior, mesh, met })
 }
 
 /// Times a stage that is one step and reports it as such.

@@ -27,15 +27,17 @@ mod inputs;
 mod left_out;
 mod matched;
 mod measure;
+mod measures;
 mod names;
 mod options;
 mod project;
 mod record;
 mod stitcher;
 
-pub use evaluation::{Evaluation, PictureEvaluation, evaluate, read_truth};
+pub use evaluation::{Evaluation, PictureEvaluation, PixelEvaluation, evaluate, evaluate_pixels, read_truth};
 pub use files::{StitchJob, Written};
 pub use inputs::{Inputs, Reference};
+pub use measures::{BentLine, LongLines, Measures, PictureMeasures, ReprojectionMeasures, UprightMeasures};
 pub use options::{Method, StitchOptions, WorkingOptions};
 pub use project::{
     Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,

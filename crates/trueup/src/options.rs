@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use trueup_align::cameras::CameraOptions;
 use trueup_align::match_points::MatchPointOptions;
 use trueup_align::mesh::MeshOptions;
+use trueup_align::metrics::MeasureOptions;
 use trueup_align::similarity::SimilarityOptions;
 use trueup_align::vanishing::VanishingOptions;
 use trueup_compose::exposure::ExposureOptions;
@@ -106,6 +107,8 @@ stage_options! {
     render: RenderOptions,
     /// How the panorama is encoded.
     output: OutputOptions,
+    /// How the panorama is measured.
+    measures: MeasureOptions,
 }
 
 impl StitchOptions {

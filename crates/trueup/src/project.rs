@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::matches::PairVerdict;
 
+use crate::measures::Measures;
 use crate::options::StitchOptions;
 
 /// The `format` field of every project file.
@@ -131,6 +132,10 @@ pub struct Project {
     pub pairs: Vec<PairRecord>,
     /// Vanishing-point guidance.
     pub manhattan: ManhattanRecord,
+    /// How upright, straight and well aligned it is, by its own lines and matches; `None` for a single photograph, and in
+    /// files of programs that did not measure.
+    #[serde(default)]
+    pub measures: Option<Measures>,
     /// Size of the panorama.
     pub canvas: Canvas,
     /// Wall seconds per stage.

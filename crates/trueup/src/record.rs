@@ -64,6 +64,7 @@ impl Matched {
                 dominant: None,
                 inliers: Vec::new(),
             },
+            measures: None,
             canvas: Canvas { width: 0, height: 0 },
             seconds: std::collections::BTreeMap::new(),
             diagnostics: Vec::new(),

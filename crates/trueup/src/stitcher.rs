@@ -21,6 +21,7 @@ use crate::inputs::{Inputs, Reference};
 use crate::left_out::LeftOut;
 use crate::matched::{Matched, no_overlap, none_usable, reason_of_rejected, require_all};
 use crate::measure;
+use crate::measures;
 use crate::names;
 use crate::options::StitchOptions;
 use crate::project::Project;
@@ -302,6 +303,9 @@ impl<'a> Stitcher<'a> {
             .gains;
         let mut project = matched.project(self.options, members, stitched);
         fill_geometry(&mut project, &component, geometry.as_ref(), &layout, &gains);
+        project.measures = geometry
+            .as_ref()
+            .map(|geometry| clock.time("measures", || measures::run(&component, geometry, &layout, self.options)));
         project.seconds.clone_from(clock.seconds());
         Ok(Alignment { project, layout, gains, photographs: photographs.clone(), clock })
     }

@@ -294,3 +294,33 @@ proptest! {
         }
     }
 }
+
+/// A gradient of grey moved by (30, 20): its layer is that box, with the levels it has.
+#[test]
+fn a_layer_is_one_photograph_where_it_lies() {
+    let photographs = Memory(vec![
+        gradient(100, 80, |x, _| x),
+        gradient(60, 40, |x, y| 50.0 + x + 2.0 * y),
+    ]);
+    let placed =
+        vec![moved(0, 100.0, 80.0, |p| p.into()), moved(1, 60.0, 40.0, |p| [p.x + 30.0, p.y + 20.0])];
+    let context = StageContext::default();
+    let layout = layout::run(placed, 0, &CanvasOptions::default(), &context).expect("two grids");
+    let found = layer(&layout, &[1.0, 1.0], 1, &photographs, &RenderOptions::default()).expect("a layer");
+    // The extrapolated rim may reach a pixel beyond the photograph; it is not covered.
+    for y in 0..layout.height {
+        for x in 0..layout.width {
+            let inside = (30..90).contains(&x) && (20..60).contains(&y);
+            let in_box = x >= found.left && y >= found.top
+                && x < found.left + found.gray.width() && y < found.top + found.gray.height();
+            assert!(in_box || !inside, "{x} {y}");
+            if in_box {
+                let (column, row) = (x - found.left, y - found.top);
+                assert_eq!(found.covered.pixel(column, row)[0], inside, "{x} {y}");
+                let expected = 50.0 + (x as f32 - 29.5) + 2.0 * (y as f32 - 19.5);
+                assert!(!inside || (found.gray.pixel(column, row)[0] - expected).abs() <= 1.0, "{x} {y}");
+            }
+        }
+    }
+    assert!(layer(&layout, &[1.0, 1.0], 2, &photographs, &RenderOptions::default()).is_err());
+}

@@ -8,18 +8,12 @@ mod reduce;
 #[cfg(test)]
 mod tests;
 
-use trueup_core::raster::{Photograph, Raster};
+use trueup_core::raster::{LUMA, Photograph, Raster};
 use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::{Error, Result};
 
 pub(crate) use codecs::jpeg_options;
 pub use files::FilePhotographs;
-
-/// Rec. 601 luma weights of red, green and blue, applied to encoded values.
-///
-/// # Source
-/// ITU-R BT.601-7, section 2.5.1.
-const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
 
 /// A photograph reduced to the sizes that measurement works on.
 #[derive(Debug, Clone, PartialEq)]

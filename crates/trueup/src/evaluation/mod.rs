@@ -1,6 +1,7 @@
 //! How good a panorama is, against the exactly known truth of its photographs.
 
 mod grids;
+mod pixels;
 #[cfg(test)]
 mod tests;
 
@@ -19,8 +20,10 @@ use trueup_core::{Error, Result};
 use crate::project::{ImageRecord, Project};
 use grids::used_grids;
 
+pub use pixels::{PixelEvaluation, evaluate_pixels};
+
 /// The paper prints LD in hundredths.
-const HUNDREDTHS: f64 = 100.0;
+pub(crate) const HUNDREDTHS: f64 = 100.0;
 
 /// A panorama measured against the truth. Angles in degrees.
 ///
@@ -50,12 +53,12 @@ pub struct Evaluation {
     /// The largest such error.
     pub theta_error_max_deg: Option<f64>,
     /// The paper's local distortion LD (equations 12 and 13), times 100: the largest over the pictures. Judged are cells
-    /// whose centre and corners lie outside all other pictures.
+    /// whose centre lies outside all other pictures.
     pub ld: f64,
     /// Mean over the pictures of the same.
     pub ld_mean: f64,
-    /// As `ld`, of the cells whose centre lies outside all other pictures.
-    pub ld_centre: f64,
+    /// As `ld`, of the cells whose four corners lie outside all other pictures, too: up to 7 % more.
+    pub ld_corners: f64,
     /// Cells that are folded, in all pictures. LD leaves them out; figures with different counts do not compare.
     pub folds: usize,
     /// Root mean square distance in the panorama of the two places of what two pictures both show, in the pictures' own
@@ -117,7 +120,7 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     let turn = |rotations: &[f64], reference| mean_relative_turn(rotations, &gammas, reference).map(f64::to_degrees);
     let thetas: Option<Vec<f64>> = records.iter().map(|record| Some(record.theta_deg?.to_radians())).collect();
     let theta_errors = thetas.as_ref().and_then(|thetas| relative_turns(thetas, &gammas, 0));
-    let distortion = metrics::local_distortion(&meshes, Outside::CentreAndCorners);
+    let distortion = metrics::local_distortion(&meshes, Outside::Centre);
     let pictures = (0..known.len()).map(|k| PictureEvaluation {
         file: known[k].truth.file.clone(),
         upright_deg: upright.pictures[k].to_degrees(),
@@ -136,7 +139,7 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
         theta_error_max_deg: theta_errors.as_ref().map(|errors| largest(errors).to_degrees()),
         ld: HUNDREDTHS * distortion.worst,
         ld_mean: HUNDREDTHS * distortion.mean,
-        ld_centre: HUNDREDTHS * metrics::local_distortion(&meshes, Outside::Centre).worst,
+        ld_corners: HUNDREDTHS * metrics::local_distortion(&meshes, Outside::CentreAndCorners).worst,
         folds: meshes.iter().map(folded_cells).sum(),
         align_px: alignment(&known, &meshes),
         pictures: pictures.collect(),

@@ -1,0 +1,112 @@
+//! How well matched points meet in the panorama.
+
+use nalgebra::{Matrix2, Vector2};
+use trueup_core::matches::PointMatch;
+use trueup_core::mesh::GridMesh;
+
+/// Distances of matched points in the panorama, in the pictures' own pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reprojection {
+    /// Matches measured.
+    pub matches: usize,
+    /// Mean distance.
+    pub mean_px: f64,
+    /// Root mean square distance.
+    pub rms_px: f64,
+    /// 95 of 100 are not farther apart.
+    pub percentile_95_px: f64,
+}
+
+/// The matches of one pair of pictures, in the pixels that the grids lie over.
+#[derive(Debug, Clone)]
+pub struct MatchedPair<'a> {
+    /// The first picture's grid.
+    pub a: &'a GridMesh,
+    /// The second picture's grid.
+    pub b: &'a GridMesh,
+    /// The matches.
+    pub matches: Vec<PointMatch>,
+}
+
+/// Measures how far apart matched points land, each distance divided by the local scale there, the root mean square of the
+/// two pictures' own. `None` without a match that lies in unfolded places of both.
+pub fn reprojection(pairs: &[MatchedPair]) -> Option<Reprojection> {
+    let mut distances: Vec<f64> = pairs
+        .iter()
+        .flat_map(|pair| {
+            pair.matches.iter().filter_map(|one| {
+                let (p, q) = (Vector2::from(one.in_a), Vector2::from(one.in_b));
+                let scale = ((squared_scale(pair.a, p) + squared_scale(pair.b, q)) / 2.0).sqrt();
+                let distance = (pair.a.warp(p) - pair.b.warp(q)).norm() / scale;
+                distance.is_finite().then_some(distance)
+            })
+        })
+        .collect();
+    if distances.is_empty() {
+        return None;
+    }
+    distances.sort_by(f64::total_cmp);
+    let count = distances.len() as f64;
+    let rank = (PERCENTILE * count).ceil() as usize;
+    Some(Reprojection {
+        matches: distances.len(),
+        mean_px: distances.iter().sum::<f64>() / count,
+        rms_px: (distances.iter().map(|distance| distance * distance).sum::<f64>() / count).sqrt(),
+        percentile_95_px: distances[rank.clamp(1, distances.len()) - 1],
+    })
+}
+
+/// The share of the distances below the percentile, by its nearest rank.
+const PERCENTILE: f64 = 0.95;
+
+/// How much the grid magnifies areas at a point of the picture; NaN where it is folded.
+fn squared_scale(mesh: &GridMesh, point: Vector2<f64>) -> f64 {
+    let ([a, b, c, d], _) = mesh.bilinear(point);
+    let [a, b, c, d] = [a, b, c, d].map(|vertex| Vector2::from(mesh.target[vertex]));
+    // The bilinear map's derivatives at the point, by the cell's own coordinates.
+    let cell = Vector2::new(mesh.cell_width(), mesh.cell_height());
+    let origin = mesh.source(mesh.bilinear(point).0[0]);
+    let (u, v) = ((point.x - origin.x) / cell.x, (point.y - origin.y) / cell.y);
+    let along_x = ((b - a) * (1.0 - v) + (c - d) * v) / cell.x;
+    let along_y = ((d - a) * (1.0 - u) + (c - b) * u) / cell.y;
+    let area = Matrix2::from_columns(&[along_x, along_y]).determinant();
+    if area > 0.0 { area } else { f64::NAN }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Grids of twice the pictures' size, the second shifted by what the match is off.
+    #[test]
+    fn distances_are_in_the_pictures_own_pixels() {
+        let mut a = GridMesh::regular(100.0, 100.0, 10.0);
+        for vertex in &mut a.target {
+            *vertex = [2.0 * vertex[0], 2.0 * vertex[1]];
+        }
+        let b = a.clone();
+        // 20 matches, off by 1 .. 20 px: mean 10.5, mean square 143.5, the 19th of 20 is 19.
+        let matches = (1..=20).map(|k| PointMatch { in_a: [50.0, 37.0], in_b: [50.0, 37.0 + f64::from(k)] }).collect();
+        let found = reprojection(&[MatchedPair { a: &a, b: &b, matches }]).expect("twenty matches");
+        assert_eq!(found.matches, 20);
+        assert!((found.mean_px - 10.5).abs() < 1e-9);
+        assert!((found.rms_px - 143.5_f64.sqrt()).abs() < 1e-9);
+        assert!((found.percentile_95_px - 19.0).abs() < 1e-9);
+    }
+
+    /// x to x^2 / 100, y kept: at x = 25 areas are halved, at x = 75 enlarged by one and a half.
+    #[test]
+    fn the_scale_is_that_of_the_place() {
+        let mut mesh = GridMesh::regular(100.0, 100.0, 1.0);
+        for vertex in &mut mesh.target {
+            vertex[0] = vertex[0] * vertex[0] / 100.0;
+        }
+        assert!((squared_scale(&mesh, Vector2::new(24.5, 50.0)) - 0.49).abs() < 1e-9);
+        assert!((squared_scale(&mesh, Vector2::new(74.5, 50.0)) - 1.49).abs() < 1e-9);
+    }
+
+    #[test]
+    fn no_matches_have_no_figure() {
+        assert_eq!(reprojection(&[]), None);
+    }
+}

@@ -1,0 +1,92 @@
+//! Whether lines that are straight in a picture stay straight in the panorama.
+
+use nalgebra::{Matrix2, Vector2};
+use trueup_core::lines::LineSegment;
+use trueup_core::mesh::GridMesh;
+
+/// How straight a line is in the panorama. Panorama pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Straightness {
+    /// Distance of its ends.
+    pub length_px: f64,
+    /// Root mean square distance of its points from their least-squares line.
+    pub rms_px: f64,
+    /// Largest such distance.
+    pub largest_px: f64,
+}
+
+impl Straightness {
+    /// Carries a segment to the panorama point by point, `step_px` apart at most and at least three, and measures their
+    /// distances from the straight line that fits them best (total least squares). `None` if that is no line: no length,
+    /// or not finite.
+    ///
+    /// `mesh` lies over the picture that the segment's pixels are of.
+    pub fn of(line: &LineSegment, mesh: &GridMesh, step_px: f64) -> Option<Self> {
+        let (start, end) = (Vector2::from(line.start), Vector2::from(line.end));
+        // The cast saturates, and a length that is not finite or a step of 0 is refused below.
+        let steps = ((line.length() / step_px).ceil() as usize).clamp(2, MAX_STEPS);
+        let points: Vec<Vector2<f64>> =
+            (0..=steps).map(|k| mesh.warp(start.lerp(&end, k as f64 / steps as f64))).collect();
+        let length_px = (points[steps] - points[0]).norm();
+        if !(length_px.is_finite() && length_px > 0.0) {
+            return None;
+        }
+        let count = points.len() as f64;
+        let centre = points.iter().sum::<Vector2<f64>>() / count;
+        let moment: Matrix2<f64> = points.iter().map(|point| (point - centre) * (point - centre).transpose()).sum();
+        let eigen = moment.symmetric_eigen();
+        let across: Vector2<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        let distances = points.iter().map(|point| (point - centre).dot(&across).abs());
+        let (squares, largest_px) =
+            distances.fold((0.0, 0.0_f64), |(sum, largest), one| (sum + one * one, largest.max(one)));
+        Some(Self { length_px, rms_px: (squares / count).sqrt(), largest_px })
+    }
+
+    /// The largest distance from straight as a share of the length.
+    pub fn bend(&self) -> f64 {
+        self.largest_px / self.length_px
+    }
+}
+
+/// Most steps along a line.
+const MAX_STEPS: usize = 10_000;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(length: f64) -> LineSegment {
+        LineSegment { start: [0.0, 50.0], end: [length, 50.0], width_px: 1.0, significance: 1.0 }
+    }
+
+    fn mapped(map: impl Fn(Vector2<f64>) -> Vector2<f64>) -> GridMesh {
+        let mut mesh = GridMesh::regular(300.0, 100.0, 1.0);
+        mesh.target = (0..mesh.len()).map(|vertex| map(mesh.source(vertex)).into()).collect();
+        mesh
+    }
+
+    #[test]
+    fn similarities_keep_lines_straight() {
+        let mesh = mapped(|p| Vector2::new(2.0 * p.x - p.y, p.x + 2.0 * p.y));
+        let straight = Straightness::of(&line(300.0), &mesh, 3.0).expect("a line");
+        assert!((straight.length_px - 300.0 * 5.0_f64.sqrt()).abs() < 1e-9);
+        assert!(straight.largest_px < 1e-9 && straight.rms_px < 1e-9);
+    }
+
+    /// y = a x^2 over 0 to L about its best line: a (t^2 - L^2 / 12), t from the middle; largest a L^2 / 6 at the ends, RMS
+    /// a L^2 / sqrt(180). a = 1e-4, L = 300: 1.5 and 0.67082 px, for points close together.
+    #[test]
+    fn a_parabola_has_its_known_bend() {
+        let mesh = mapped(|p| Vector2::new(p.x, 1e-4 * p.x * p.x));
+        let bent = Straightness::of(&line(300.0), &mesh, 0.5).expect("a line");
+        assert!((bent.largest_px - 1.5).abs() < 0.01, "{}", bent.largest_px);
+        assert!((bent.rms_px - 0.67082).abs() < 0.01, "{}", bent.rms_px);
+        assert!((bent.bend() - 1.5 / 300.0_f64.hypot(9.0)).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_point_is_no_line() {
+        assert_eq!(Straightness::of(&line(0.0), &mapped(|p| p), 3.0), None);
+        assert_eq!(Straightness::of(&line(f64::NAN), &mapped(|p| p), 3.0), None);
+    }
+}

@@ -1,0 +1,211 @@
+//! The direction of the vertical lines of a picture: a measure of how upright it stands that needs no truth.
+
+use nalgebra::{Matrix3, Vector2, Vector3};
+use trueup_core::geometry::{circular_mean, roll_from_down, wrap_angle};
+use trueup_core::lines::LineSegment;
+use trueup_core::mesh::GridMesh;
+use trueup_core::source::WorkingFrame;
+
+use super::MeasureOptions;
+use crate::vanishing::{InterpretationPlanes, VanishingOptions};
+
+/// Steps of the search for the vertical, each with a smaller scale of the robust loss, then as many at the last scale.
+const STEPS: usize = 10;
+/// Sine of the angle between viewing direction and vertical below which a picture has no upright: sin 15 degrees.
+const MIN_SINE: f64 = 0.258_819_045_102_520_74;
+
+/// What a picture's own vertical lines say of its direction. Radians.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VerticalLines {
+    /// Mean direction of the lines in the panorama: by how much they lean clockwise, in [-pi/2, pi/2).
+    pub lean: f64,
+    /// Standard error of `lean`, as if the lines were independent.
+    pub standard_error: f64,
+    /// Segments that point to the vertical vanishing direction.
+    pub lines: usize,
+    /// The angle in the picture between its downward axis and the vertical, from the lines' common vanishing direction:
+    /// an estimate of [`super::vertical_angle`].
+    pub gamma: f64,
+}
+
+impl VerticalLines {
+    /// Whether there are enough lines, and they agree.
+    pub fn is_certain(&self, options: &MeasureOptions) -> bool {
+        self.lines >= options.min_vertical_lines
+            && self.standard_error <= options.max_standard_error_deg.to_radians()
+    }
+}
+
+/// A picture whose vertical lines are sought, in the working pixels of `frame`.
+#[derive(Debug, Clone, Copy)]
+pub struct LinedPicture<'a> {
+    /// All segments found.
+    pub lines: &'a [LineSegment],
+    /// The working frame.
+    pub frame: &'a WorkingFrame,
+    /// Focal length.
+    pub focal_px: f64,
+    /// Where the cameras expect down, in the camera's frame: a unit vector. Segments decide where it is.
+    pub expected_down: Vector3<f64>,
+}
+
+/// Finds the vertical lines of a picture and their direction in the panorama.
+///
+/// The vertical vanishing direction is the one that the picture's segments point to nearest to where it is expected, by
+/// iteratively reweighted least squares on the segments' interpretation planes; its lines are those within
+/// `vanishing.tolerance_deg`. Each is carried to the panorama by `mesh`, which lies over the working frame; `lean` is the
+/// circular mean of their angles to the panorama's vertical, weighted by length up to `vanishing.weight_cap_px`.
+///
+/// `None` if fewer than two segments point to it, or if the picture looks within 15 degrees of straight up or down, where
+/// there is no upright.
+pub fn vertical_lines(
+    picture: &LinedPicture,
+    mesh: &GridMesh,
+    vanishing: &VanishingOptions,
+    options: &MeasureOptions,
+) -> Option<VerticalLines> {
+    let planes = InterpretationPlanes::new(picture.lines, picture.focal_px, picture.frame, vanishing);
+    let down = vertical_direction(&planes, &picture.expected_down, vanishing, options)?;
+    if down.x.hypot(down.y) < MIN_SINE {
+        return None;
+    }
+    let tolerance = vanishing.tolerance_deg.to_radians().sin();
+    let leans: Vec<(f64, f64)> = (0..planes.len())
+        .filter(|&k| planes.normals[k].dot(&down).abs() <= tolerance)
+        .filter_map(|k| Some((lean_of(&picture.lines[planes.indices[k]], mesh)?, planes.weights[k])))
+        .collect();
+    // A line has no sense: its angle counts modulo a half turn, so that twice the angle lies on the circle.
+    let lean = circular_mean(leans.iter().map(|&(lean, weight)| (2.0 * lean, weight)))? / 2.0;
+    let standard_error = standard_error(&leans, lean)?;
+    Some(VerticalLines { lean, standard_error, lines: leans.len(), gamma: roll_from_down(&down) })
+}
+
+/// By how much a segment leans clockwise in the panorama; `None` if it has no length there.
+fn lean_of(line: &LineSegment, mesh: &GridMesh) -> Option<f64> {
+    let along = mesh.warp(Vector2::from(line.end)) - mesh.warp(Vector2::from(line.start));
+    let downward = if along.y < 0.0 { -along } else { along };
+    (downward.norm() > 0.0).then(|| -roll_from_down(&downward.push(0.0)))
+}
+
+/// Standard error of the weighted mean of angles; `None` of fewer than two.
+fn standard_error(leans: &[(f64, f64)], mean: f64) -> Option<f64> {
+    let count = leans.len() as f64;
+    let total: f64 = leans.iter().map(|(_, weight)| weight).sum();
+    let squares: f64 =
+        leans.iter().map(|(lean, weight)| (weight * wrap_angle(2.0 * (lean - mean)) / 2.0).powi(2)).sum();
+    (leans.len() >= 2 && total > 0.0).then(|| (squares * count / (count - 1.0)).sqrt() / total)
+}
+
+/// The direction that the segments' planes share, near the expected one, down in the camera's frame.
+fn vertical_direction(
+    planes: &InterpretationPlanes,
+    expected: &Vector3<f64>,
+    vanishing: &VanishingOptions,
+    options: &MeasureOptions,
+) -> Option<Vector3<f64>> {
+    let (first, last) = (options.vertical_search_deg.to_radians(), vanishing.refine_scale_deg.to_radians());
+    let prior = (last / options.vertical_prior_deg.to_radians()).powi(2);
+    let mut down = expected.try_normalize(f64::MIN_POSITIVE)?;
+    let anchor = (Matrix3::identity() - down * down.transpose()) * prior;
+    for step in 0..2 * STEPS {
+        let share = (step as f64 / STEPS as f64).min(1.0);
+        let scale = first * (last / first).powf(share);
+        let moment = (0..planes.len()).fold(anchor, |moment, k| {
+            let normal = &planes.normals[k];
+            let off = normal.dot(&down).clamp(-1.0, 1.0).asin() / scale;
+            // Geman and McClure's weight; a line of full length has weight 1 beside the expectation's.
+            let weight = planes.weights[k] / vanishing.weight_cap_px / (1.0 + off * off).powi(2);
+            moment + normal * normal.transpose() * weight
+        });
+        let eigen = moment.symmetric_eigen();
+        let axis: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        down = if axis.dot(&down) < 0.0 { -axis } else { axis };
+    }
+    down.iter().all(|entry| entry.is_finite()).then_some(down)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Rotation2;
+    use trueup_core::camera::Camera;
+    use trueup_core::geometry::{rotation_about_x, rotation_about_z};
+
+    use super::*;
+
+    const FOCAL_PX: f64 = 700.0;
+
+    /// A camera rolled by 5 degrees and raised by 10 sees ten plumb lines, and as many level ones.
+    fn picture() -> (Vec<LineSegment>, WorkingFrame, Camera) {
+        let frame = WorkingFrame::new(800, 600, 480_000.0);
+        let world_from_camera =
+            rotation_about_x(10.0_f64.to_radians()) * rotation_about_z(5.0_f64.to_radians());
+        let camera = Camera::new(FOCAL_PX, 800.0, 600.0, &world_from_camera.transpose());
+        let segment = |from: Vector3<f64>, to: Vector3<f64>| {
+            let at = |point: Vector3<f64>| camera.project(camera.rotation() * point).expect("in front").into();
+            LineSegment { start: at(from), end: at(to), width_px: 2.0, significance: 10.0 }
+        };
+        let mut lines = Vec::new();
+        for k in 0..10 {
+            let x = -2.0 + 0.4 * f64::from(k);
+            lines.push(segment(Vector3::new(x, -0.5, 5.0), Vector3::new(x, 0.5, 5.0)));
+            let y = -1.5 + 0.15 * f64::from(k);
+            lines.push(segment(Vector3::new(-1.0, y, 5.0), Vector3::new(1.0, y, 6.0)));
+        }
+        (lines, frame, camera)
+    }
+
+    /// A grid that unrolls the camera to level longitude and height, where plumb lines are plumb, then turns it.
+    fn unrolled(camera: &Camera, turn: f64) -> GridMesh {
+        let mut mesh = GridMesh::regular(800.0, 600.0, 5.0);
+        mesh.target = (0..mesh.len())
+            .map(|vertex| camera.world_direction(mesh.source(vertex)))
+            .map(|to| Vector2::new(700.0 * to.x.atan2(to.z), 700.0 * (to.y / to.x.hypot(to.z)).asinh()))
+            .map(|at| (Rotation2::new(turn) * at).into())
+            .collect();
+        mesh
+    }
+
+    fn measured(expected: Vector3<f64>, turn: f64) -> VerticalLines {
+        let (lines, frame, camera) = picture();
+        let picture = LinedPicture { lines: &lines, frame: &frame, focal_px: FOCAL_PX, expected_down: expected };
+        let mesh = unrolled(&camera, turn);
+        let (vanishing, options) = (VanishingOptions::default(), MeasureOptions::default());
+        vertical_lines(&picture, &mesh, &vanishing, &options).expect("ten lines")
+    }
+
+    #[test]
+    fn plumb_lines_tell_how_far_the_picture_leans_whatever_was_expected() {
+        let (_, _, camera) = picture();
+        let down = camera.rotation() * Vector3::y();
+        let true_gamma = roll_from_down(&down);
+        for (error_deg, turn_deg) in [(0.0, 0.0), (4.0, 0.0), (-3.0, 2.0), (2.0, -7.0)] {
+            let expected = rotation_about_z(f64::to_radians(error_deg)) * down;
+            let found = measured(expected, f64::to_radians(turn_deg));
+            assert_eq!(found.lines, 10);
+            assert!((found.lean.to_degrees() - turn_deg).abs() < 0.02, "{} {turn_deg}", found.lean.to_degrees());
+            assert!((found.gamma - true_gamma).to_degrees().abs() < 0.05, "{error_deg}");
+            assert!(found.standard_error.to_degrees() < 0.02 && found.is_certain(&MeasureOptions::default()));
+        }
+    }
+
+    #[test]
+    fn without_lines_or_straight_down_there_is_no_direction() {
+        let (lines, frame, camera) = picture();
+        let (vanishing, options) = (VanishingOptions::default(), MeasureOptions::default());
+        let mesh = unrolled(&camera, 0.0);
+        let find = |lines: &[LineSegment], expected_down| {
+            let picture = LinedPicture { lines, frame: &frame, focal_px: FOCAL_PX, expected_down };
+            vertical_lines(&picture, &mesh, &vanishing, &options)
+        };
+        assert_eq!(find(&[], Vector3::y()), None);
+        assert_eq!(find(&lines[..1], Vector3::y()), None);
+        assert_eq!(find(&lines[..0], Vector3::z()), None);
+    }
+
+    /// Two lines of equal weight, 0.01 rad either side of their mean: variance 2e-4, of the mean 1e-4.
+    #[test]
+    fn the_standard_error_is_that_of_a_mean() {
+        let error = standard_error(&[(0.31, 5.0), (0.29, 5.0)], 0.30).expect("two lines");
+        assert!((error - 0.01).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,214 @@
+//! How alike the photographs look where two of them lie on the panorama.
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use trueup_align::metrics::{Overlap, OverlapMeasures, mean_over_overlaps};
+use trueup_compose::layout::{CanvasLayout, Placed};
+use trueup_compose::render::{self, Layer};
+use trueup_core::mesh::GridMesh;
+use trueup_core::raster::Raster;
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result, StageContext};
+use trueup_io::decode::FilePhotographs;
+use trueup_io::source;
+
+use super::grids::used_grids;
+use crate::project::{ImageRecord, Project};
+
+/// Progress is reported as this.
+const STAGE: &str = "comparing";
+/// Overlaps of fewer pixels, without their border, are passed over.
+const MIN_OVERLAP_PX: usize = 100;
+/// Most pixels that the photographs' bounding boxes on the canvas may have together; each takes five bytes.
+const MAX_LAYER_PX: f64 = 40e6;
+
+/// How alike photographs look where they overlap on the panorama, means over the overlapping pairs weighted by their
+/// overlaps' size.
+///
+/// Grey values (Rec. 601 luma) go from 0 to 255, after the exposures were evened out as in the panorama.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PixelEvaluation {
+    /// Size of the canvas that was compared on, relative to the panorama's. The figures depend on it.
+    pub scale: f64,
+    /// Overlapping pairs compared.
+    pub pairs: usize,
+    /// Pixels compared, over all pairs.
+    pub pixels: usize,
+    /// Root mean square of 1 - NCC over windows of 3 x 3 pixels.
+    pub ncc_rmse: f64,
+    /// Mean square of the same.
+    pub ncc_mse: f64,
+    /// Mean square difference of grey values.
+    pub intensity_mse: f64,
+    /// Peak signal to noise ratio after evening out each pair's brightness, decibels; `None` if all are equal.
+    pub psnr_db: Option<f64>,
+    /// Structural similarity after the same; `None` if all overlaps are narrower than its windows.
+    pub ssim: Option<f64>,
+}
+
+/// Compares the photographs of a panorama, read again from their files, where they overlap.
+///
+/// Paths are tried as recorded, then beside `project_folder`, first with their folders and then without. Parallel work
+/// runs on the current thread pool; memory for the layers is bounded by reducing the canvas.
+///
+/// # Errors
+/// [`Error::Input`] if a photograph is not found, is not the one that was stitched, cannot be read, or if the grids are
+/// damaged; [`Error::Unsolvable`] if no overlap has anything to compare; [`Error::Options`]; [`Error::Cancelled`].
+pub fn evaluate_pixels(project: &Project, project_folder: &Path, context: &StageContext) -> Result<PixelEvaluation> {
+    project.options.validate()?;
+    let records: Vec<&ImageRecord> = project.used_images().collect();
+    let images = records
+        .iter()
+        .map(|record| photograph(record, project_folder, project, context))
+        .collect::<Result<Vec<SourceImage>>>()?;
+    let photographs = FilePhotographs::new(images, 0);
+    let meshes = used_grids(&records)?;
+    let scale = scale(&meshes, project.options.measures.canvas_pixels);
+    let layout = layout(meshes, scale);
+    let gains: Vec<f64> = records.iter().map(|record| record.gain.unwrap_or(1.0)).collect();
+
+    context.progress().begin(STAGE, records.len() as u64);
+    let layers: Vec<Layer> = (0..records.len())
+        .into_par_iter()
+        .map(|position| {
+            context.check_cancelled()?;
+            let layer = render::layer(&layout, &gains, position, &photographs, &project.options.render)?;
+            context.progress().advance(STAGE, 1);
+            Ok(layer)
+        })
+        .collect::<Result<_>>()?;
+    context.progress().finish(STAGE);
+
+    let pairs: Vec<(usize, usize)> =
+        (0..layers.len()).flat_map(|a| (a + 1..layers.len()).map(move |b| (a, b))).collect();
+    let measured: Vec<OverlapMeasures> = pairs
+        .par_iter()
+        .map(|&(a, b)| {
+            context.check_cancelled()?;
+            Ok(compare(&layers[a], &layers[b]).filter(|one| one.pixels >= MIN_OVERLAP_PX))
+        })
+        .collect::<Result<Vec<_>>>()?
+        .into_iter()
+        .flatten()
+        .collect();
+    let mean = mean_over_overlaps(&measured).ok_or_else(|| {
+        Error::unsolvable(
+            STAGE,
+            format!("{} photographs", records.len()),
+            "no two of them overlap with anything to compare",
+            "Measure a panorama of overlapping photographs.",
+        )
+    })?;
+    Ok(PixelEvaluation {
+        scale,
+        pairs: measured.len(),
+        pixels: mean.pixels,
+        ncc_rmse: mean.ncc_rmse,
+        ncc_mse: mean.ncc_mse,
+        intensity_mse: mean.intensity_mse,
+        psnr_db: mean.psnr_db,
+        ssim: mean.ssim,
+    })
+}
+
+/// The file of a recorded photograph, checked to be of its size.
+fn photograph(
+    record: &ImageRecord,
+    project_folder: &Path,
+    project: &Project,
+    context: &StageContext,
+) -> Result<SourceImage> {
+    let recorded = Path::new(&record.path);
+    let places = [recorded.to_owned(), project_folder.join(recorded), project_folder.join(record.file_name())];
+    let Some(path): Option<PathBuf> = places.into_iter().find(|path| path.is_file()) else {
+        return Err(Error::input(
+            &record.path,
+            "photograph not found, neither here nor beside the project file",
+            "Run the command in the folder that the stitch was made in.",
+        ));
+    };
+    let path = path.display().to_string();
+    // The size was accepted when it was stitched; the file is decoded with the same limits.
+    let mut found = source::scan(std::slice::from_ref(&path), &project.options.source, context)?;
+    let Some(image) = found.images.pop() else {
+        return Err(found.rejected.first().map_or_else(
+            || Error::input(&path, "it cannot be read", "Check the file and its permissions."),
+            source::RejectedSource::to_error,
+        ));
+    };
+    if (image.width, image.height) == (record.width, record.height) {
+        return Ok(image);
+    }
+    Err(Error::input(
+        &path,
+        format!(
+            "it is {} x {} px, the project has it at {} x {} px",
+            image.width, image.height, record.width, record.height
+        ),
+        "Give back the photograph that was stitched.",
+    ))
+}
+
+/// The largest scale, at most 1, that keeps the canvas within `canvas_pixels` and the layers within their limit.
+fn scale(meshes: &[GridMesh], canvas_pixels: f64) -> f64 {
+    let area = |mesh: &GridMesh| {
+        let (low, high) = mesh.bounds();
+        (high - low).product()
+    };
+    let (low, high) = bounds(meshes);
+    let canvas = (canvas_pixels / (high - low).product()).sqrt();
+    let layers = (MAX_LAYER_PX / meshes.iter().map(area).sum::<f64>()).sqrt();
+    canvas.min(layers).min(1.0)
+}
+
+fn bounds(meshes: &[GridMesh]) -> (nalgebra::Vector2<f64>, nalgebra::Vector2<f64>) {
+    let all = meshes.iter().map(GridMesh::bounds);
+    all.reduce(|all, one| (all.0.inf(&one.0), all.1.sup(&one.1))).unwrap_or_default()
+}
+
+/// The grids on a canvas of this scale.
+fn layout(meshes: Vec<GridMesh>, scale: f64) -> CanvasLayout {
+    let (low, high) = bounds(&meshes);
+    let placed = meshes.into_iter().enumerate().map(|(photograph, mut mesh)| {
+        for vertex in &mut mesh.target {
+            *vertex = [(vertex[0] - low.x) * scale, (vertex[1] - low.y) * scale];
+        }
+        Placed { photograph, mesh }
+    });
+    // The casts saturate.
+    let side = |length: f64| (length * scale).ceil().max(1.0) as usize;
+    CanvasLayout {
+        width: side(high.x - low.x),
+        height: side(high.y - low.y),
+        canvas_from_target: scale,
+        placed: placed.collect(),
+    }
+}
+
+/// Two layers where their boxes overlap.
+fn compare(a: &Layer, b: &Layer) -> Option<OverlapMeasures> {
+    let (left, top) = (a.left.max(b.left), a.top.max(b.top));
+    let end = |layer: &Layer| [layer.left + layer.gray.width(), layer.top + layer.gray.height()];
+    let (end_a, end_b) = (end(a), end(b));
+    let width = end_a[0].min(end_b[0]).checked_sub(left).filter(|&width| width > 0)?;
+    let height = end_a[1].min(end_b[1]).checked_sub(top).filter(|&height| height > 0)?;
+    let mut covered = cut(&a.covered, left - a.left, top - a.top, width, height);
+    let other = cut(&b.covered, left - b.left, top - b.top, width, height);
+    for (covered, other) in covered.data_mut().iter_mut().zip(other.data()) {
+        *covered &= other;
+    }
+    let gray_a = cut(&a.gray, left - a.left, top - a.top, width, height);
+    let gray_b = cut(&b.gray, left - b.left, top - b.top, width, height);
+    Overlap { a: &gray_a, b: &gray_b, covered: &covered }.measure()
+}
+
+/// A box of a raster of one channel.
+fn cut<T: Copy + Default>(raster: &Raster<T>, left: usize, top: usize, width: usize, height: usize) -> Raster<T> {
+    let mut cut = Raster::new(width, height, 1);
+    for y in 0..height {
+        cut.row_mut(y).copy_from_slice(&raster.row(top + y)[left..left + width]);
+    }
+    cut
+}
