@@ -44,8 +44,8 @@ pub(crate) struct PaperArguments {
     #[arg(long, value_name = "DIR")]
     pub data: Option<PathBuf>,
 
-    /// The three claims on a few small sets, for a check of every change
-    #[arg(long, conflicts_with_all = ["panoramas", "truth_sets", "only"])]
+    /// A few small sets; without --only, the experiments of the three claims: a check of every change
+    #[arg(long, conflicts_with_all = ["panoramas", "truth_sets"])]
     pub quick: bool,
 
     /// Folder of 360 x 180 degree panoramas that sets are cut from

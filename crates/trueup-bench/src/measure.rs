@@ -1,11 +1,13 @@
 //! The figures of one run, by name.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde_json::Value;
-use trueup::{Error, Project, Result, Truth};
+use trueup::{Error, Project, Result, StageContext, Truth};
 
-/// Everything that is measured of a panorama with known cameras: the numbers of [`trueup::evaluate`] and the gate's.
+/// Everything that is measured of a panorama with known cameras: the numbers of [`trueup::evaluate`], the gate's, and the distance
+/// of matched points.
 /// `accepted`: the dominant directions guide; `guided`: they or the vertical alone do. What could not be measured is
 /// absent.
 ///
@@ -24,7 +26,21 @@ pub(crate) fn figures(project: &Project, truth: &Truth) -> Result<BTreeMap<Strin
     if let Some(divergence) = project.manhattan.divergence.filter(|divergence| divergence.is_finite()) {
         figures.insert("divergence".to_owned(), divergence);
     }
+    if let Some(reprojection) = project.measures.as_ref().and_then(|measures| measures.reprojection) {
+        figures.insert("match_rms_px".to_owned(), reprojection.rms_px);
+    }
     Ok(figures)
+}
+
+/// How alike the photographs look where they overlap: the numbers of [`trueup::evaluate_pixels`].
+///
+/// # Errors
+/// Those of [`trueup::evaluate_pixels`].
+pub(crate) fn pixel_figures(project: &Project, context: &StageContext) -> Result<BTreeMap<String, f64>> {
+    let evaluation = trueup::evaluate_pixels(project, Path::new(""), context)?;
+    serde_json::to_value(evaluation)
+        .map(|value| numbers_of(&value))
+        .map_err(|error| Error::input("evaluation", error, "Report this as a defect."))
 }
 
 /// The finite numbers on the top level of a JSON object; truth values count 1 and 0.

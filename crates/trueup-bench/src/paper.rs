@@ -63,11 +63,8 @@ pub(crate) fn run(arguments: &PaperArguments) -> Result<ExitCode> {
 /// The names of the experiments to be run.
 fn wanted(arguments: &PaperArguments) -> Result<Vec<&'static str>> {
     let all: Vec<&'static str> = EXPERIMENTS.iter().map(|one| one.name).chain([runtime::NAME]).collect();
-    if arguments.quick {
-        return Ok(CLAIM_EXPERIMENTS.to_vec());
-    }
     if arguments.only.is_empty() {
-        return Ok(all);
+        return Ok(if arguments.quick { CLAIM_EXPERIMENTS.to_vec() } else { all });
     }
     let known = |name: &String| {
         all.iter().find(|known| *known == name).copied().ok_or_else(|| {

@@ -145,7 +145,10 @@ impl Runner<'_> {
         let aligned = Stitcher::new(&options, &context).align_matched(photographs, &inputs_of(ready, trial))?;
         let first = aligned.alignments.into_iter().next();
         let project = first.ok_or_else(|| Error::input(&trial.set, "nothing was aligned", "Look at the set."))?.project;
-        let figures = measure::figures(&project, &ready.truth)?;
+        let mut figures = measure::figures(&project, &ready.truth)?;
+        if trial.pixels {
+            figures.extend(measure::pixel_figures(&project, &context)?);
+        }
         Ok((figures, project.manhattan.failed_clause.unwrap_or_default()))
     }
 }

@@ -23,6 +23,8 @@ pub(crate) struct Trial {
     pub reference: Option<usize>,
     /// Only the first so many photographs of the set; `None` for all.
     pub pictures: Option<usize>,
+    /// Whether the photographs are also compared pixel by pixel.
+    pub pixels: bool,
 }
 
 impl Trial {
@@ -36,6 +38,7 @@ impl Trial {
             seed: 0,
             reference: None,
             pictures: None,
+            pixels: false,
         }
     }
 

@@ -104,7 +104,7 @@ pub(crate) fn section(results: &Results) -> Section {
                 cells.push(number(mean(&values("theta_error_deg")), 3));
                 cells.push(number(worst, 2));
                 cells.push(number(mean(&values("gdic_deg")), 3));
-                cells.push(number(mean(&values("accepted")).map(|share| 100.0 * share), 0));
+                cells.push(number(mean(&values("guided")).map(|share| 100.0 * share), 0));
             }
             table.push(cells);
         }

@@ -58,7 +58,7 @@ pub(crate) fn section(results: &Results) -> Section {
                 number(figure("upright_deg"), 3),
                 number(figure("gdic_deg"), 3),
                 number(figure("divergence"), 4),
-                number(figure("accepted").map(|share| 100.0 * share), 0),
+                number(figure("guided").map(|share| 100.0 * share), 0),
             ]);
         }
     }

@@ -9,7 +9,7 @@ use crate::results::Results;
 use crate::roc::{self, RocPoint};
 use crate::sets::{Catalogue, SetSpec};
 use crate::statistics::{median, quantile};
-use crate::trial::Trial;
+use crate::trial::{Row, Trial};
 
 /// The experiment's name.
 pub(crate) const NAME: &str = "gate";
@@ -32,14 +32,17 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
 struct Class {
     /// Divergence per set that was stitched; infinite where no directions were found.
     divergences: Vec<f64>,
+    /// Sets whose dominant directions guide.
     accepted: usize,
+    /// Sets that the vertical alone guides.
+    vertical_only: usize,
     stitched: usize,
     /// Sets that could not be stitched at all.
     failed: usize,
 }
 
 fn class(results: &Results, manhattan: bool, variant: &str) -> Class {
-    let mut class = Class { divergences: Vec::new(), accepted: 0, stitched: 0, failed: 0 };
+    let mut class = Class { divergences: Vec::new(), accepted: 0, vertical_only: 0, stitched: 0, failed: 0 };
     for set in results.catalogue.gate.iter().filter(|set| set.manhattan == Some(manhattan)) {
         for row in results.of(NAME).filter(|row| row.key.set == set.name && row.key.variant == variant) {
             match row.measure("accepted") {
@@ -47,6 +50,7 @@ fn class(results: &Results, manhattan: bool, variant: &str) -> Class {
                 Some(accepted) => {
                     class.stitched += 1;
                     class.accepted += usize::from(accepted > 0.0);
+                    class.vertical_only += usize::from(accepted == 0.0 && row.measure("guided") == Some(1.0));
                     class.divergences.push(row.measure("divergence").unwrap_or(f64::INFINITY));
                 }
             }
@@ -129,7 +133,10 @@ pub(crate) fn section(results: &Results) -> Section {
 
 fn counts(results: &Results) -> Table {
     let columns =
-        ["class", "sets stitched", "full gate accepts", "divergence alone accepts", "median divergence", "10 %", "90 %", "not stitched"];
+        [
+        "class", "sets stitched", "full gate accepts", "vertical alone", "divergence alone accepts", "median divergence", "10 %",
+        "90 %", "upright deg, accepted", "upright deg, others", "not stitched",
+    ];
     let mut table = Table::new("t5-counts", "Divergence by class of scenes.", columns);
     for (manhattan, name) in [(true, "Manhattan"), (false, "others")] {
         let (full, paper) = (class(results, manhattan, FULL), class(results, manhattan, PAPER));
@@ -138,10 +145,13 @@ fn counts(results: &Results) -> Table {
             name.to_owned(),
             full.stitched.to_string(),
             full.accepted.to_string(),
+            full.vertical_only.to_string(),
             paper.accepted.to_string(),
             share(0.5),
             share(0.1),
             share(0.9),
+            number(median(&upright(results, manhattan, true)), 2),
+            number(median(&upright(results, manhattan, false)), 2),
             full.failed.to_string(),
         ]);
     }
@@ -153,14 +163,31 @@ fn counts(results: &Results) -> Table {
             format!("paper: {name}"),
             figures.len().to_string(),
             String::new(),
+            String::new(),
             accepted.to_string(),
             number(median(figures), 4),
             format!("{} (least)", number(lowest, 4)),
             format!("{} (most)", number(highest, 4)),
             String::new(),
+            String::new(),
+            String::new(),
         ]);
     }
     table
+}
+
+/// Deviations from upright of the sets whose dominant directions the full gate accepted, or of the others.
+fn upright(results: &Results, manhattan: bool, accepted: bool) -> Vec<f64> {
+    let class = |row: &&Row| {
+        let set = results.catalogue.gate.iter().find(|set| set.name == row.key.set);
+        set.is_some_and(|set| set.manhattan == Some(manhattan))
+    };
+    results
+        .of(NAME)
+        .filter(|row| row.key.variant == FULL && row.measure("accepted") == Some(f64::from(u8::from(accepted))))
+        .filter(class)
+        .filter_map(|row| row.measure("upright_deg"))
+        .collect()
 }
 
 /// Sets per bin of divergence, the classes side by side.

@@ -53,8 +53,10 @@ pub(super) fn table(id: &str, caption: &str, sets: &[SetSpec], rows: &[GridRow])
         let columns = std::iter::once(String::new()).chain(names).chain(["mean".to_owned()]);
         let mut table = Table::new(id, caption, columns);
         for row in rows {
-            let label = std::iter::once(row.label.clone());
-            let cells = label.chain(row.cells.iter().cloned()).chain([number(row.mean, 2)]).collect();
+            // The paper's sets stand below ours only where there are as many; its mean always does.
+            let fits = row.cells.len() == sets.len();
+            let figures = (0..sets.len()).map(|index| if fits { row.cells[index].clone() } else { String::new() });
+            let cells = std::iter::once(row.label.clone()).chain(figures).chain([number(row.mean, 2)]).collect();
             table.rows.push(TableRow { cells, from_paper: row.from_paper });
         }
         return table;
@@ -67,4 +69,38 @@ pub(super) fn table(id: &str, caption: &str, sets: &[SetSpec], rows: &[GridRow])
     }
     table.push(std::iter::once("mean".to_owned()).chain(rows.iter().map(|row| number(row.mean, 2))));
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+
+    fn sets(count: usize) -> Vec<SetSpec> {
+        (1..=count).map(|number| SetSpec::folder(format!("x/{number:02}"), PathBuf::new())).collect()
+    }
+
+    fn ours(count: usize) -> GridRow {
+        let cells = (0..count).map(|index| index.to_string()).collect();
+        GridRow { label: "ours".to_owned(), cells, mean: Some(1.0), from_paper: false }
+    }
+
+    #[test]
+    fn the_papers_sets_stand_below_as_many_of_ours_or_as_a_mean_alone() {
+        let paper = GridRow::paper("VPG", &[1.0, 3.0]);
+        let two = table("t", "", &sets(2), &[ours(2), paper.clone()]);
+        assert_eq!(two.columns, ["", "01", "02", "mean"]);
+        assert_eq!(two.rows[1].cells, ["paper: VPG", "1.00", "3.00", "2.00"]);
+        let three = table("t", "", &sets(3), &[ours(3), paper]);
+        assert_eq!(three.rows[1].cells, ["paper: VPG", "", "", "", "2.00"]);
+    }
+
+    #[test]
+    fn many_sets_become_rows() {
+        let table = table("t", "", &sets(13), &[ours(13)]);
+        assert_eq!(table.columns, ["set", "ours"]);
+        assert_eq!((table.rows.len(), table.rows[12].cells[0].as_str()), (14, "13"));
+        assert_eq!(table.rows[13].cells, ["mean", "1.00"]);
+    }
 }

@@ -25,7 +25,7 @@ use crate::trial::Trial;
 pub(crate) struct Experiment {
     /// Its name in rows and on the command line.
     pub name: &'static str,
-    /// What it needs to be run; empty for one that reads what others ran.
+    /// What it needs to be run.
     pub trials: fn(&Catalogue) -> Result<Vec<Trial>>,
     /// What it says.
     pub section: fn(&Results) -> Section,
@@ -55,7 +55,7 @@ pub(crate) const EXPERIMENTS: [Experiment; 9] = [
         claims: reference_choice::claims,
     },
     Experiment { name: gate::NAME, trials: gate::trials, section: gate::section, claims: gate::claims },
-    Experiment { name: alignment::NAME, trials: no_trials, section: alignment::section, claims: no_claims },
+    Experiment { name: alignment::NAME, trials: alignment::trials, section: alignment::section, claims: no_claims },
     Experiment { name: ablations::NAME, trials: ablations::trials, section: ablations::section, claims: no_claims },
     Experiment { name: pitch_sweep::NAME, trials: pitch_sweep::trials, section: pitch_sweep::section, claims: no_claims },
     Experiment {
@@ -69,10 +69,6 @@ pub(crate) const EXPERIMENTS: [Experiment; 9] = [
 
 /// The experiments that test the three claims of the method: those of a quick run.
 pub(crate) const CLAIM_EXPERIMENTS: [&str; 3] = [robust_scheme::NAME, reference_choice::NAME, gate::NAME];
-
-fn no_trials(_: &Catalogue) -> Result<Vec<Trial>> {
-    Ok(Vec::new())
-}
 
 fn no_claims(_: &Results) -> Vec<Claim> {
     Vec::new()

@@ -141,7 +141,7 @@ fn means(results: &Results, sets: &[SetSpec], id: &str, caption: &str) -> Table 
                 number(mean(&values("theta_error_deg")), 2),
                 number(worst, 1),
                 number(mean(&values("upright_deg")), 2),
-                number(mean(&values("accepted")).map(|accepted| 100.0 * accepted), 0),
+                number(mean(&values("guided")).map(|accepted| 100.0 * accepted), 0),
             ]);
         }
     }

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use trueup::{Error, Evaluation, Project, Result};
+use trueup::{Error, Evaluation, Measures, Project, Result};
 
 use super::child::Measured;
 use super::discover::{Part, StitchSet};
@@ -27,15 +27,15 @@ pub(super) struct QualityRow {
     pub guided: String,
     /// Vanishing point divergence.
     pub divergence: Option<f64>,
-    /// Deviation from upright, degrees.
+    /// Deviation from upright, degrees: of the scene's vertical where it is known, else of the panorama's vertical lines.
     pub upright_deg: Option<f64>,
     /// The same of the worst photograph.
     pub upright_max_deg: Option<f64>,
     /// Local distortion, x 1e-2.
     pub ld: Option<f64>,
-    /// Global direction inconsistency, degrees.
+    /// Global direction inconsistency, degrees; estimated from vertical lines where the cameras are not known.
     pub gdic_deg: Option<f64>,
-    /// Alignment, source pixels.
+    /// Alignment, source pixels: of true correspondences where they are known, else of matches.
     pub align_px: Option<f64>,
     /// Width and height of the panorama.
     pub size: String,
@@ -97,17 +97,30 @@ impl QualityRow {
         row.guided = guided(&project).to_owned();
         row.divergence = project.manhattan.divergence;
         row.size = format!("{} x {}", project.canvas.width, project.canvas.height);
-        if set.part == Part::Known {
-            let (truth, _) = read_truth(&set.folder)?;
-            match trueup::evaluate(&project, &truth) {
-                Ok(evaluation) => row.take(&evaluation),
+        match set.part {
+            Part::Known => match trueup::evaluate(&project, &read_truth(&set.folder)?.0) {
+                Ok(evaluation) => row.take_truth(&evaluation),
                 Err(error) => row.note = error.to_string(),
+            },
+            Part::Photographs => {
+                if let Some(measures) = &project.measures {
+                    row.take_measures(measures);
+                }
             }
         }
         Ok(row)
     }
 
-    fn take(&mut self, evaluation: &Evaluation) {
+    /// What the panorama's own lines and matches say.
+    fn take_measures(&mut self, measures: &Measures) {
+        self.upright_deg = measures.upright.map(|upright| upright.mean_deg);
+        self.upright_max_deg = measures.upright.map(|upright| upright.max_deg);
+        self.ld = Some(measures.ld);
+        self.gdic_deg = measures.estimated_gdic_deg;
+        self.align_px = measures.reprojection.map(|reprojection| reprojection.rms_px);
+    }
+
+    fn take_truth(&mut self, evaluation: &Evaluation) {
         self.upright_deg = Some(evaluation.upright_deg);
         self.upright_max_deg = Some(evaluation.upright_max_deg);
         self.ld = Some(evaluation.ld);

@@ -25,7 +25,7 @@ const PEAK: Column = Column { heading: "MB", decimals: 0, figure: |row| Some(row
 fn columns(part: Part) -> &'static [Column] {
     match part {
         Part::Known => &[DIVERGENCE, UPRIGHT, WORST, LD, GDIC, ALIGN, SECONDS, PEAK],
-        Part::Photographs => &[DIVERGENCE, SECONDS, PEAK],
+        Part::Photographs => &[DIVERGENCE, UPRIGHT, LD, GDIC, ALIGN, SECONDS, PEAK],
     }
 }
 
@@ -138,6 +138,6 @@ mod tests {
     fn a_set_that_failed_says_why() {
         let failed = QualityRow { note: "no overlap".to_owned(), given: 2, ..QualityRow::empty(Part::Photographs, "a", "pair") };
         let text = every_set(Part::Photographs, &[failed], &[row("a", 0.1)]);
-        assert!(text.ends_with("| a | pair | 0/2 | - | - | 0.0 | 0 | no overlap |\n"), "{text}");
+        assert!(text.ends_with("| a | pair | 0/2 | - | - | - | - | - | - | 0.0 | 0 | no overlap |\n"), "{text}");
     }
 }

@@ -64,7 +64,14 @@ fn table_text(table: &Table) -> String {
     if !table.caption.is_empty() {
         let _ = writeln!(text, "<caption>{}</caption>", inline(&table.caption));
     }
-    let headings: String = table.columns.iter().map(|name| format!("<th>{}</th>", inline(name))).collect();
+    // A heading stands where the figures or words below it stand.
+    let numeric = |index: usize| table.rows.iter().any(|row| row.cells.get(index).is_some_and(|cell| is_number(cell)));
+    let headings: String = table
+        .columns
+        .iter()
+        .enumerate()
+        .map(|(index, name)| format!("<th{}>{}</th>", if numeric(index) { NUMBER } else { "" }, inline(name)))
+        .collect();
     let _ = writeln!(text, "<thead><tr>{headings}</tr></thead>\n<tbody>");
     for row in &table.rows {
         let class = if row.from_paper { " class=\"paper\"" } else { "" };
@@ -77,9 +84,16 @@ fn table_text(table: &Table) -> String {
 
 /// Numbers stand at the right, words at the left.
 fn cell_text(cell: &str) -> String {
-    let numeric = cell == "-" || cell.starts_with(|first: char| first.is_ascii_digit() || "+-<".contains(first));
-    let class = if numeric { " class=\"number\"" } else { "" };
+    let class = if cell == "-" || is_number(cell) { NUMBER } else { "" };
     format!("<td{class}>{}</td>", inline(cell))
+}
+
+/// The attribute of cells at the right.
+const NUMBER: &str = " class=\"number\"";
+
+/// Whether a cell begins with a number.
+fn is_number(cell: &str) -> bool {
+    cell.trim_start_matches(['-', '+', '<']).starts_with(|first: char| first.is_ascii_digit())
 }
 
 /// Escaped text with `words` in backticks as code and **words** between double stars in bold.

@@ -91,8 +91,10 @@ impl Catalogue {
             let recipe = Recipe { scene, rig, quality: Quality::Preview };
             SetSpec::rendered(format!("quick/{:02}", index + 1), Some(true), recipe)
         });
+        let study: Vec<SetSpec> = study.collect();
         Self {
-            study: study.collect(),
+            focal: focal_sets(&study),
+            study,
             gate: gate_sets(EACH_GATE_CLASS, Quality::Preview),
             reference_sets: vec!["01", "02"],
             seeds: 3,
