@@ -21,7 +21,8 @@ struct Node {
 #[derive(Debug, Clone, Copy)]
 struct Body {
     centre: Vector3<f64>,
-    half: Vector3<f64>,
+    /// Half extents of a block; one over them for round shapes.
+    extents: Vector3<f64>,
     shape: Shape,
     /// Index of the body among the scene's solids.
     solid: u32,
@@ -91,8 +92,9 @@ impl Hierarchy {
                 hierarchy.rotations.push(rotation);
                 hierarchy.rotations.len() as u32
             });
-            let (centre, half, shape) = (solid.centre, solid.half, solid.shape);
-            hierarchy.bodies.push(Body { centre, half, shape, solid: index, rotation });
+            let (centre, shape) = (solid.centre, solid.shape);
+            let extents = if shape == Shape::Block { solid.half } else { solid.half.map(f64::recip) };
+            hierarchy.bodies.push(Body { centre, extents, shape, solid: index, rotation });
         }
         hierarchy
     }
@@ -100,18 +102,16 @@ impl Hierarchy {
     /// Where a ray from outside enters a body within (0, limit].
     #[inline]
     fn enter(&self, body: &Body, ray: &Ray, limit: f64) -> Option<Entry> {
-        let origin = ray.origin - body.centre;
-        let entry = if body.rotation == 0 && body.shape == Shape::Block {
-            enter_aligned(origin, ray.direction, ray.inverse, body.half)
-        } else if body.rotation == 0 {
-            enter_round(body.shape, origin, ray.direction, body.half)
-        } else {
+        let mut origin = ray.origin - body.centre;
+        let (mut direction, mut inverse) = (ray.direction, ray.inverse);
+        if body.rotation > 0 {
             let rotation = &self.rotations[body.rotation as usize - 1];
-            let turned = Ray::new(rotation.tr_mul(&origin), rotation.tr_mul(&ray.direction));
-            match body.shape {
-                Shape::Block => enter_aligned(turned.origin, turned.direction, turned.inverse, body.half),
-                shape => enter_round(shape, turned.origin, turned.direction, body.half),
-            }
+            (origin, direction) = (rotation.tr_mul(&origin), rotation.tr_mul(&direction));
+            inverse = direction.map(f64::recip);
+        }
+        let entry = match body.shape {
+            Shape::Block => enter_aligned(origin, direction, inverse, body.extents),
+            shape => enter_round(shape, origin, direction, body.extents),
         }?;
         (entry.distance > 0.0 && entry.distance <= limit).then_some(entry)
     }
@@ -204,5 +204,92 @@ impl Hierarchy {
             }
         }
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::geometry::exp_rotation;
+
+    use super::*;
+    use crate::dice::Dice;
+
+    fn vector(dice: &mut Dice, reach: f64) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| dice.range(-reach, reach))
+    }
+
+    fn bodies(dice: &mut Dice, count: usize) -> Vec<Solid> {
+        (0..count)
+            .map(|_| Solid {
+                shape: [Shape::Block, Shape::Cylinder, Shape::Ellipsoid][dice.index(3)],
+                centre: vector(dice, 10.0),
+                half: Vector3::from_fn(|_, _| dice.range(0.02, 0.9)),
+                world_from_body: dice.chance(0.5).then(|| exp_rotation(&vector(dice, 2.0))),
+                faces: [0; 6],
+                texture_centre: Vector3::zeros(),
+                seed: 0,
+            })
+            .collect()
+    }
+
+    /// The tree must find what asking every body in turn finds.
+    #[test]
+    fn the_tree_finds_what_all_bodies_together_find() {
+        let mut dice = Dice::new(4, 0);
+        for count in [0, 1, 5, 300] {
+            let solids = bodies(&mut dice, count);
+            let tree = Hierarchy::new(&solids);
+            let alone: Vec<Hierarchy> =
+                solids.iter().map(|solid| Hierarchy::new(std::slice::from_ref(solid))).collect();
+            for _ in 0..400 {
+                let ray = Ray::new(vector(&mut dice, 12.0), vector(&mut dice, 1.0).normalize());
+                let limit = dice.range(1.0, 30.0);
+                let expected = alone
+                    .iter()
+                    .enumerate()
+                    .filter_map(|(index, one)| one.nearest(&ray, limit).map(|(_, entry)| (index, entry.distance)))
+                    .min_by(|a, b| a.1.total_cmp(&b.1));
+                let found = tree.nearest(&ray, limit).map(|(index, entry)| (index, entry.distance));
+                assert_eq!(found, expected);
+                assert_eq!(tree.blocked(&ray, limit), expected.is_some());
+                let inside = solids.iter().any(|solid| solid.contains(ray.origin));
+                assert_eq!(tree.covers(&solids, ray.origin), inside);
+            }
+        }
+    }
+
+    /// A unit block seen along z from 3 m, and past its edge; a ball of radius 1/2 behind it, worked out by hand.
+    #[test]
+    fn distances_and_faces_are_those_of_the_drawing_board() {
+        let plain = |shape, centre: [f64; 3]| Solid {
+            shape,
+            centre: Vector3::from(centre),
+            half: Vector3::repeat(0.5),
+            world_from_body: None,
+            faces: [0; 6],
+            texture_centre: Vector3::zeros(),
+            seed: 0,
+        };
+        let tree = Hierarchy::new(&[plain(Shape::Block, [0.0, 0.0, 3.5]), plain(Shape::Ellipsoid, [0.8, 0.0, 6.0])]);
+        let ahead = |x: f64| tree.nearest(&Ray::new(Vector3::new(x, 0.0, 0.0), Vector3::z()), f64::INFINITY);
+        let (index, entry) = ahead(0.2).expect("the block");
+        assert_eq!((index, entry.face, entry.distance), (0, 4, 3.0));
+        // Beside the block the ball's surface is at 6 - sqrt(1/4 - 1/100) = 5.510102...
+        let (index, entry) = ahead(0.7).expect("the ball");
+        assert!(index == 1 && (entry.distance - 5.510_102_051_443_364).abs() < 1e-12);
+        assert!(ahead(-0.51).is_none());
+    }
+
+    #[test]
+    fn of_bodies_at_one_distance_the_first_counts() {
+        let mut dice = Dice::new(5, 0);
+        let mut solids = bodies(&mut dice, 40);
+        let twin = Solid { shape: Shape::Block, world_from_body: None, ..solids[3].clone() };
+        (solids[3], solids[31]) = (twin.clone(), twin);
+        let tree = Hierarchy::new(&solids);
+        let to = solids[3].centre;
+        let ray = Ray::new(to + Vector3::new(0.0, 0.0, -2.0), Vector3::z());
+        let first = tree.nearest(&ray, f64::INFINITY).expect("something").0;
+        assert_ne!(first, 31);
     }
 }

@@ -2,13 +2,21 @@
 
 use nalgebra::Vector3;
 
+// Three odd multipliers spread neighbouring lattice points.
+const SPREAD: [u32; 3] = [0x8da6_b343, 0xd816_3841, 0xcb1a_b31f];
+const SEED_SPREAD: u32 = 0x9e37_79b1;
+
 /// A random number in [0, 1) for a lattice point.
 pub(crate) fn lattice(x: i64, y: i64, z: i64, seed: u32) -> f64 {
-    // Three odd multipliers spread neighbouring points; two xor-shift rounds mix them.
-    let mut hash = (x as u32).wrapping_mul(0x8da6_b343)
-        ^ (y as u32).wrapping_mul(0xd816_3841)
-        ^ (z as u32).wrapping_mul(0xcb1a_b31f)
-        ^ seed.wrapping_mul(0x9e37_79b1);
+    let spread = (x as u32).wrapping_mul(SPREAD[0])
+        ^ (y as u32).wrapping_mul(SPREAD[1])
+        ^ (z as u32).wrapping_mul(SPREAD[2])
+        ^ seed.wrapping_mul(SEED_SPREAD);
+    mixed(spread)
+}
+
+/// Two xor-shift rounds mix a word; the result as a number in [0, 1).
+fn mixed(mut hash: u32) -> f64 {
     hash = (hash ^ (hash >> 15)).wrapping_mul(0x2c1b_3c6d);
     hash = (hash ^ (hash >> 12)).wrapping_mul(0x297a_2d39);
     hash ^= hash >> 15;
@@ -33,11 +41,16 @@ pub(crate) fn floor(x: f64) -> f64 {
 /// Smooth noise in [-1, 1] with features about one unit wide.
 pub(crate) fn value_noise(point: Vector3<f64>, seed: u32) -> f64 {
     let cell = point.map(floor);
-    let (x, y, z) = (cell.x as i64, cell.y as i64, cell.z as i64);
-    let (u, v, w) = (fade(point.x - cell.x), fade(point.y - cell.y), fade(point.z - cell.z));
-    let edge = |dy: i64, dz: i64| lerp(lattice(x, y + dy, z + dz, seed), lattice(x + 1, y + dy, z + dz, seed), u);
-    let face = |dz: i64| lerp(edge(0, dz), edge(1, dz), v);
-    2.0 * lerp(face(0), face(1), w) - 1.0
+    let [u, v, w] = [0, 1, 2].map(|axis| fade(point[axis] - cell[axis]));
+    // The words of `lattice` for both corners along each axis.
+    let [x, y, z]: [[u32; 2]; 3] = [0, 1, 2].map(|axis| {
+        let low = (cell[axis] as i64 as u32).wrapping_mul(SPREAD[axis]);
+        [low, low.wrapping_add(SPREAD[axis])]
+    });
+    let seed = seed.wrapping_mul(SEED_SPREAD);
+    let edge = |word: u32| lerp(mixed(x[0] ^ word), mixed(x[1] ^ word), u);
+    let face = |word: u32| lerp(edge(y[0] ^ word), edge(y[1] ^ word), v);
+    2.0 * lerp(face(z[0] ^ seed), face(z[1] ^ seed), w) - 1.0
 }
 
 /// Sum of octaves of [`value_noise`], each half as wide and `gain` times as strong as the one before, in about
@@ -104,6 +117,15 @@ mod tests {
             assert!(here.abs() <= 1.0);
             assert!((value_noise(point + Vector3::repeat(1e-6), 7) - here).abs() < 1e-4);
         }
+    }
+
+    #[test]
+    fn noise_at_a_lattice_point_is_the_points_number() {
+        for [x, y, z] in [[0, 0, 0], [3, -7, 12], [-1, -1, 100_000]] {
+            let point = Vector3::new(x as f64, y as f64, z as f64);
+            assert!((value_noise(point, 9) - (2.0 * lattice(x, y, z, 9) - 1.0)).abs() < 1e-12);
+        }
+        assert_eq!([floor(-0.5), floor(-2.0), floor(1.7), floor(0.0)], [-1.0, -2.0, 1.0, 0.0]);
     }
 
     #[test]

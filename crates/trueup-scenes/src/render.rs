@@ -17,9 +17,9 @@ trueup_core::choice! {
     pub enum Quality {
         /// One sample a pixel, no reflections: for tests.
         Preview = "preview",
-        /// One sample a pixel, and four more where something ends; no reflections.
+        /// One sample a pixel, and four instead where a surface ends; no reflections: for statistics over many sets.
         Draft = "draft",
-        /// One sample a pixel, and four more where something ends.
+        /// One sample a pixel, and four instead where a surface, a shadow or a drawn line ends.
         Standard = "standard",
         /// Nine samples a pixel.
         Fine = "fine",
@@ -36,9 +36,14 @@ impl Quality {
         }
     }
 
-    /// Whether pixels amid even ones do with one sample.
-    fn adapts(self) -> bool {
-        matches!(self, Self::Draft | Self::Standard)
+    /// For those that give one sample to pixels amid even ones: the step of tone, of 1, up to which one surface is
+    /// even. Steps below that of [`Quality::Standard`] are lost in grain and texture.
+    fn even_step(self) -> Option<f64> {
+        match self {
+            Self::Draft => Some(f64::INFINITY),
+            Self::Standard => Some(0.07),
+            Self::Preview | Self::Fine => None,
+        }
     }
 
     /// How often a ray may be mirrored.
@@ -60,12 +65,14 @@ pub fn render(scene: &Scene, posed: &PosedCamera, quality: Quality) -> Raster<u8
         return picture;
     }
     let eye = Eye::new(posed);
-    let glances = if quality.adapts() { eye.glances(scene, quality) } else { Vec::new() };
+    let step = quality.even_step();
+    let glances = step.map_or_else(Vec::new, |_| eye.glances(scene, quality));
+    let step = step.unwrap_or_default();
     let row_length = 3 * posed.width;
     picture.data_mut().par_chunks_mut(row_length).enumerate().for_each(|(y, row)| {
         for (x, pixel) in row.chunks_exact_mut(3).enumerate() {
             let light = match glances.get(y * posed.width + x) {
-                Some(glance) if is_even(&glances, x, y, posed.width) => glance.light,
+                Some(glance) if is_even(&glances, x, y, posed.width, step) => glance.light,
                 _ => eye.pixel(scene, x, y, quality),
             };
             pixel.copy_from_slice(&develop(light * scene.exposure, posed, x, y));
@@ -86,13 +93,11 @@ struct Glance {
 
 /// Whether a pixel shows the same surface as its four neighbours and is about as bright: then one sample will do,
 /// as textures are filtered to the pixel.
-fn is_even(glances: &[Glance], x: usize, y: usize, width: usize) -> bool {
-    /// Steps below this are lost in grain and texture.
-    const STEP: f64 = 0.07;
+fn is_even(glances: &[Glance], x: usize, y: usize, width: usize, step: f64) -> bool {
     let index = y * width + x;
     let here = &glances[index];
     let even = |other: usize| {
-        glances.get(other).is_none_or(|other| other.surface == here.surface && (other.tone - here.tone).abs() < STEP)
+        glances.get(other).is_none_or(|other| other.surface == here.surface && (other.tone - here.tone).abs() < step)
     };
     (x == 0 || even(index - 1))
         && (x + 1 == width || even(index + 1))

@@ -188,18 +188,15 @@ pub(crate) fn enter_aligned(
     (near <= far && near.is_finite()).then_some(Entry { distance: near, face })
 }
 
-/// Where a ray enters a round body about the origin (or a block, which [`enter_aligned`] does faster).
+/// Where a ray enters a cylinder or an ellipsoid about the origin; `inverse_half` is one over each half extent.
 pub(crate) fn enter_round(
     shape: Shape,
     origin: Vector3<f64>,
     direction: Vector3<f64>,
-    half: Vector3<f64>,
+    inverse_half: Vector3<f64>,
 ) -> Option<Entry> {
-    match shape {
-        Shape::Block => enter_aligned(origin, direction, direction.map(f64::recip), half),
-        Shape::Cylinder => enter_cylinder(origin.component_div(&half), direction.component_div(&half)),
-        Shape::Ellipsoid => enter_ball(origin.component_div(&half), direction.component_div(&half)),
-    }
+    let (origin, direction) = (origin.component_mul(&inverse_half), direction.component_mul(&inverse_half));
+    if shape == Shape::Cylinder { enter_cylinder(origin, direction) } else { enter_ball(origin, direction) }
 }
 
 /// The smaller root of the unit circle or sphere; `None` if missed.

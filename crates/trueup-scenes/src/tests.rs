@@ -184,3 +184,32 @@ fn the_study_has_twelve_sets_of_5_to_72_pictures() {
         assert_eq!(rig(&options, &room().viewpoint()).expect("valid options").len(), options.pictures);
     }
 }
+
+/// One sample where nothing ends must come closer to nine everywhere than one everywhere does.
+#[test]
+fn adaptive_sampling_comes_close_to_many_samples() {
+    let mut posed = small_rig(0.0)[2];
+    posed.noise = 0.0;
+    let error = |quality| {
+        let (picture, fine) = (render(room(), &posed, quality), render(room(), &posed, Quality::Fine));
+        let differences = picture.data().iter().zip(fine.data()).map(|(&a, &b)| f64::from(a.abs_diff(b)));
+        differences.sum::<f64>() / picture.data().len() as f64
+    };
+    let (rough, adaptive) = (error(Quality::Preview), error(Quality::Standard));
+    assert!(adaptive < 0.6 * rough && adaptive < 4.0, "{adaptive} against {rough}");
+}
+
+/// Bodies stand upright at five different turns at least, where a quarter turn counts as none.
+#[test]
+fn a_turned_room_keeps_its_vertical_and_gives_up_its_horizontals() {
+    let scene = Scene::unlit(&SceneOptions { kind: SceneKind::TurnedRoom, ..SceneOptions::default() });
+    let scene = scene.expect("valid options");
+    let mut quarter_turns = std::collections::BTreeSet::new();
+    for rotation in scene.solids.iter().filter_map(|solid| solid.world_from_body) {
+        if (rotation[(1, 1)] - 1.0).abs() < 1e-9 {
+            let yaw = rotation[(0, 2)].atan2(rotation[(2, 2)]).to_degrees().rem_euclid(90.0);
+            quarter_turns.insert((10.0 * yaw) as i64);
+        }
+    }
+    assert!(quarter_turns.len() >= 5, "{quarter_turns:?}");
+}

@@ -10,16 +10,16 @@ use crate::sky::Sun;
 
 /// Blocks of many materials hanging in the air round the eye, over rolling ground.
 pub(super) fn build(seed: u64) -> Builder {
-    const BLOCKS: usize = 620;
+    const BLOCKS: usize = 520;
     const NEAREST_M: f64 = 4.5;
     const FURTHEST_M: f64 = 34.0;
     /// Sines of the elevations between which blocks hang.
-    const ELEVATIONS: [f64; 2] = [-0.15, 0.95];
+    const ELEVATIONS: [f64; 2] = [-0.12, 0.95];
     /// Half the diameter of a block as a share of its distance.
     const SIZES: [f64; 2] = [0.035, 0.13];
     let mut builder = Builder::new(seed, 5);
     let turf = builder.material(Material::new(Pattern::Rock, 2.5, [0x6a_7040, 0x8a_7a50, 0]));
-    builder.ellipsoid(Vector3::new(0.0, 300.0, 0.0), Vector3::repeat(300.0), turf);
+    builder.block([Vector3::new(-150.0, 0.0, -150.0), Vector3::new(150.0, 1.0, 150.0)], turf);
     for _ in 0..30 {
         let (distance, turn) = (builder.dice.range(14.0, 60.0), builder.dice.range(0.0, std::f64::consts::TAU));
         let half =
@@ -44,7 +44,7 @@ pub(super) fn build(seed: u64) -> Builder {
         block.world_from_body = Some(exp_rotation(&axis));
         block.texture_centre = offset;
     }
-    builder.sun = Some(Sun { towards: Vector3::new(0.5, -0.7, 0.45).normalize(), irradiance: srgb(0xff_f0dc) * 5.0 });
+    builder.sun = Some(Sun { towards: Vector3::new(0.5, -0.7, 0.45).normalize(), irradiance: srgb(0xff_f0dc) * 2.5 });
     builder
 }
 

@@ -129,3 +129,25 @@ pub(crate) struct Mark {
     solids: usize,
     portals: usize,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::Pattern;
+
+    /// A block 2 m ahead (z) of the pivot at (1, 0, 1), turned by 90 degrees from z towards x, lies 2 m to its right
+    /// (x); what was there before the mark stays.
+    #[test]
+    fn what_was_added_since_the_mark_turns_about_the_pivot() {
+        let mut builder = Builder::new(1, 0);
+        let paint = builder.material(Material::new(Pattern::Paint, 1.0, [0xff_ffff; 3]));
+        let block = [Vector3::new(0.9, -1.0, 2.9), Vector3::new(1.1, 0.0, 3.1)];
+        builder.block(block, paint);
+        let mark = builder.mark();
+        builder.block(block, paint);
+        builder.turn_since(mark, Vector3::new(1.0, 0.0, 1.0), std::f64::consts::FRAC_PI_2);
+        assert!((builder.solids[0].centre - Vector3::new(1.0, -0.5, 3.0)).norm() < 1e-12);
+        assert!((builder.solids[1].centre - Vector3::new(3.0, -0.5, 1.0)).norm() < 1e-12);
+        assert!(builder.solids[1].contains(Vector3::new(3.05, -0.9, 1.05)));
+    }
+}

@@ -20,7 +20,6 @@ use crate::light::{LightDetail, LightField, Portal};
 use crate::material::{Material, Spot};
 use crate::sky::{Sky, Sun};
 use crate::solid::{Shape, Solid};
-use builder::Builder;
 pub use style::RoomStyle;
 pub use viewpoint::Viewpoint;
 
@@ -88,6 +87,13 @@ impl Scene {
     /// # Errors
     /// [`trueup_core::Error::Options`] listing every option outside its range.
     pub fn new(options: &SceneOptions) -> Result<Self> {
+        let mut scene = Self::unlit(options)?;
+        scene.illuminate(options.light);
+        Ok(scene)
+    }
+
+    /// Builds a scene in the dark: bodies and viewpoint only.
+    pub(crate) fn unlit(options: &SceneOptions) -> Result<Self> {
         options.check()?;
         let builder = match options.kind {
             SceneKind::Room => room::build(options.seed, options.style),
@@ -97,7 +103,20 @@ impl Scene {
             SceneKind::TurnedRoom => room::build_turned(options.seed, options.style),
             SceneKind::TurnedStreet => street::build_turned(options.seed),
         };
-        Ok(Self::lit(builder, options.light))
+        let mut scene = Self {
+            hierarchy: Hierarchy::new(&builder.solids),
+            solids: builder.solids,
+            materials: builder.materials,
+            portals: builder.portals,
+            sky: builder.sky,
+            sun: builder.sun,
+            light: LightField::default(),
+            exposure: 1.0,
+            viewpoint: Viewpoint { eye: builder.eye.into(), yaw_deg: builder.yaw_deg, depth_m: 1.0 },
+        };
+        scene.step_clear();
+        scene.measure_depth();
+        Ok(scene)
     }
 
     /// From where, and in which direction first, the scene is meant to be photographed.
@@ -121,15 +140,15 @@ impl Scene {
         self.hierarchy = Hierarchy::new(&self.solids);
     }
 
-    fn lit(builder: Builder, quality: LightQuality) -> Self {
+    /// Works the light out, and the exposure that suits it.
+    fn illuminate(&mut self, quality: LightQuality) {
         let light = |spacing_m, directions, least_directions, portal_samples| LightDetail {
             spacing_m,
             directions,
             least_directions,
             portal_samples,
         };
-        let outdoors = builder.portals.is_empty();
-        let detail = match (quality, outdoors) {
+        let detail = match (quality, self.is_outdoors()) {
             (LightQuality::Fast, false) => light(0.4, 24, 8, 2),
             (LightQuality::Fast, true) => light(3.0, 16, 4, 1),
             (LightQuality::Standard, false) => light(0.12, 64, 8, 3),
@@ -137,21 +156,13 @@ impl Scene {
             (LightQuality::Fine, false) => light(0.08, 128, 8, 4),
             (LightQuality::Fine, true) => light(0.6, 64, 8, 1),
         };
-        let mut scene = Self {
-            hierarchy: Hierarchy::new(&builder.solids),
-            solids: builder.solids,
-            materials: builder.materials,
-            portals: builder.portals,
-            sky: builder.sky,
-            sun: builder.sun,
-            light: LightField::default(),
-            exposure: 1.0,
-            viewpoint: Viewpoint { eye: builder.eye.into(), yaw_deg: builder.yaw_deg, depth_m: 1.0 },
-        };
-        scene.step_clear(outdoors);
-        scene.light = LightField::gather(&scene, &detail);
-        scene.measure();
-        scene
+        self.light = LightField::gather(self, &detail);
+        self.measure_exposure();
+    }
+
+    /// Whether the sky lights the scene from all sides rather than through windows.
+    fn is_outdoors(&self) -> bool {
+        self.portals.is_empty()
     }
 
     /// The coordinates of a place on a face, for its pattern. `point` is in the body's frame.

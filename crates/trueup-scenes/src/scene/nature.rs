@@ -43,7 +43,7 @@ pub(super) fn build(seed: u64) -> Builder {
         let foot = ring(&mut builder, 6.0, 55.0);
         tree(&mut builder, foot, bark, leaves[usize::from(foot.x > 0.0)]);
     }
-    builder.sun = Some(Sun { towards: Vector3::new(0.5, -0.7, 0.45).normalize(), irradiance: srgb(0xff_f0dc) * 7.0 });
+    builder.sun = Some(Sun { towards: Vector3::new(0.5, -0.7, 0.45).normalize(), irradiance: srgb(0xff_f0dc) * 4.5 });
     builder
 }
 
@@ -62,10 +62,12 @@ fn tree(builder: &mut Builder, foot: Vector3<f64>, bark: usize, leaves: usize) {
     trunk.centre = foot + rotation * Vector3::new(0.0, -height / 2.0, 0.0);
     trunk.world_from_body = Some(rotation);
     let top = foot + rotation * Vector3::new(0.0, -height, 0.0);
-    for _ in 0..12 {
+    for _ in 0..60 {
         let offset =
             Vector3::new(builder.dice.normal(), 0.7 * builder.dice.normal(), builder.dice.normal()) * (0.22 * height);
-        let size = height * builder.dice.range(0.1, 0.24);
-        builder.ellipsoid(top + offset, Vector3::new(size, 0.75 * size, size), leaves);
+        let size = height * builder.dice.range(0.03, 0.15);
+        let tilt = Vector3::from_fn(|_, _| 0.5 * builder.dice.normal());
+        let half = Vector3::new(size, builder.dice.range(0.35, 0.8) * size, size);
+        builder.ellipsoid(top + offset, half, leaves).world_from_body = Some(exp_rotation(&tilt));
     }
 }

@@ -54,11 +54,13 @@ pub(super) fn build_turned(seed: u64, style: RoomStyle) -> Builder {
     const JITTER: f64 = 0.17;
     /// Walls run on into one another's thickness, so that no light comes through the corners.
     const OVERLAP_M: f64 = 0.1;
+    const SLAB_THICK_M: f64 = 0.25;
+    const SLAB_STEP_M: f64 = 2e-4;
     let mut builder = Builder::new(seed, 4);
     let height = builder.dice.range(style.extents()[2][0], style.extents()[2][1]);
     let finish = Finish::new(&mut builder);
-    let reach = 2.0 * FURTHEST_M;
-    shell(&mut builder, [reach, reach], height, style, &finish);
+    let [floor, ceiling] = [style.floor(&mut builder), style.ceiling(&mut builder)];
+    let [floor, ceiling] = [floor, ceiling].map(|material| builder.material(material));
     let count = 5 + builder.dice.index(2);
     let step = std::f64::consts::TAU / count as f64;
     let start = builder.dice.range(0.0, step);
@@ -80,10 +82,23 @@ pub(super) fn build_turned(seed: u64, style: RoomStyle) -> Builder {
         let wall = Wall { corner, along: Vector3::x(), out: -Vector3::z(), length: to - from };
         let mark = builder.mark();
         furnish(&mut builder, &wall, style.walls()[k % 4], height, coverings[k % 2], &finish);
+        // Floor and ceiling are laid from every wall to the middle, each a trace nearer than the last.
+        let trace = SLAB_STEP_M * k as f64;
+        let (near, far) = (-SLAB_THICK_M, distance + SLAB_THICK_M);
+        builder.block([Vector3::new(from, -trace, near), Vector3::new(to, SLAB_THICK_M, far)], floor);
+        let (under, over) = (trace - height, -height - SLAB_THICK_M);
+        builder.block([Vector3::new(from, over, near), Vector3::new(to, under, far)], ceiling);
         builder.turn_since(mark, Vector3::zeros(), turn);
     }
     let (mark, turn) = (builder.mark(), builder.dice.range(0.0, std::f64::consts::TAU));
     middle(&mut builder, style, [NEAREST_M, NEAREST_M], height, &finish);
+    ceiling_lamps(
+        &mut builder,
+        [NEAREST_M, NEAREST_M].map(|reach| 0.7 * reach),
+        height,
+        style.ceiling_lamps(),
+        &finish,
+    );
     let pivot = Vector3::new(0.0, 0.0, 0.4);
     builder.turn_since(mark, pivot, turn);
     let place = rotation_about_y(turn) * Vector3::new(0.0, 0.0, -0.45 * NEAREST_M);

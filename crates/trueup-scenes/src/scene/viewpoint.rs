@@ -38,13 +38,13 @@ impl Scene {
 
     /// Moves the eye to the nearest place of a spiral where it is clear of everything: a hand-held camera wanders about
     /// it, and what is too near cannot be stitched. If nowhere is clear, to the clearest place.
-    pub(super) fn step_clear(&mut self, outdoors: bool) {
+    pub(super) fn step_clear(&mut self) {
         const CLEAR_INDOORS_M: f64 = 0.8;
         const CLEAR_OUTDOORS_M: f64 = 1.3;
         const STEP_M: f64 = 0.2;
         const RINGS: usize = 12;
         const TURNS: usize = 8;
-        let wanted = if outdoors { CLEAR_OUTDOORS_M } else { CLEAR_INDOORS_M };
+        let wanted = if self.is_outdoors() { CLEAR_OUTDOORS_M } else { CLEAR_INDOORS_M };
         let [x, y, z] = self.viewpoint.eye;
         let mut best = (self.clearance([x, y, z]), [x, y, z]);
         for place in 0..RINGS * TURNS {
@@ -62,31 +62,45 @@ impl Scene {
         self.viewpoint.eye = best.1;
     }
 
-    /// Measures depth and brightness round the eye, as a photographer would before a panorama.
-    pub(super) fn measure(&mut self) {
-        const TURNS: usize = 96;
+    /// Measures the depth round the eye.
+    pub(super) fn measure_depth(&mut self) {
+        /// What is as far as this need not be told from infinity, metres.
+        const ENDLESS_M: f64 = 100.0;
+        let eye = Vector3::from(self.viewpoint.eye);
+        let mut depths: Vec<f64> = round_about(0.0)
+            .filter_map(|direction| self.hierarchy.nearest(&Ray::new(eye, direction), f64::INFINITY))
+            .map(|(_, entry)| entry.distance)
+            .collect();
+        depths.sort_by(f64::total_cmp);
+        self.viewpoint.depth_m = depths.get(depths.len() / 2).copied().unwrap_or(ENDLESS_M);
+    }
+
+    /// Measures the brightness round the eye, as a photographer would before a panorama.
+    pub(super) fn measure_exposure(&mut self) {
         const ELEVATIONS: [f64; 5] = [-0.35, -0.15, 0.0, 0.15, 0.35];
-        const MIDDLE_GREY: f64 = 0.2;
+        const MIDDLE_GREY_INDOORS: f64 = 0.2;
+        /// Lower, as the sky is much brighter than the rest.
+        const MIDDLE_GREY_OUTDOORS: f64 = 0.15;
         /// Angle over which brightness is measured, radians.
         const ANGLE: f64 = 0.02;
         let eye = Vector3::from(self.viewpoint.eye);
-        let (mut depths, mut logarithms, mut count) = (Vec::new(), 0.0, 0.0);
-        for turn in 0..TURNS {
-            let (sine, cosine) = (turn as f64 / TURNS as f64 * std::f64::consts::TAU).sin_cos();
-            for elevation in ELEVATIONS {
-                let direction = Vector3::new(sine, elevation, cosine).normalize();
-                if elevation == 0.0 {
-                    let hit = self.hierarchy.nearest(&Ray::new(eye, direction), f64::INFINITY);
-                    depths.extend(hit.map(|(_, entry)| entry.distance));
-                }
-                // Without soft sun and without mirrors.
-                let light = crate::render::trace(self, eye, direction, ANGLE, [0.0, 0.0], 0);
-                logarithms += luminance(light).max(1e-3).ln();
-                count += 1.0;
-            }
+        let (mut logarithms, mut count) = (0.0, 0.0);
+        for direction in ELEVATIONS.into_iter().flat_map(round_about) {
+            // Without soft sun and without mirrors.
+            let light = crate::render::trace(self, eye, direction, ANGLE, [0.0, 0.0], 0);
+            logarithms += luminance(light).max(1e-3).ln();
+            count += 1.0;
         }
-        depths.sort_by(f64::total_cmp);
-        self.viewpoint.depth_m = depths.get(depths.len() / 2).copied().unwrap_or(100.0);
-        self.exposure = MIDDLE_GREY / (logarithms / count).exp();
+        let grey = if self.is_outdoors() { MIDDLE_GREY_OUTDOORS } else { MIDDLE_GREY_INDOORS };
+        self.exposure = grey / (logarithms / count).exp();
     }
+}
+
+/// Unit vectors all round at one elevation (its tangent; negative is up).
+fn round_about(elevation: f64) -> impl Iterator<Item = Vector3<f64>> {
+    const TURNS: usize = 96;
+    (0..TURNS).map(move |turn| {
+        let (sine, cosine) = (turn as f64 / TURNS as f64 * std::f64::consts::TAU).sin_cos();
+        Vector3::new(sine, elevation, cosine).normalize()
+    })
 }

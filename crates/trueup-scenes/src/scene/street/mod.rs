@@ -57,7 +57,7 @@ pub(super) fn build(seed: u64) -> Builder {
     }
     builder.eye = Vector3::new(-1.2, -1.6, 0.0);
     let towards = Vector3::new(0.55, -0.75, -0.37).normalize();
-    builder.sun = Some(Sun { towards, irradiance: srgb(0xff_f0dc) * 6.5 });
+    builder.sun = Some(Sun { towards, irradiance: srgb(0xff_f0dc) * 4.2 });
     builder
 }
 

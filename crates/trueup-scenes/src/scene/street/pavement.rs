@@ -1,6 +1,7 @@
 //! What stands between the houses and the road, and beside it.
 
 use nalgebra::Vector3;
+use trueup_core::geometry::exp_rotation;
 
 use super::{Finish, KERB, REACH, ROAD};
 use crate::material::{Material, Pattern};
@@ -41,11 +42,13 @@ pub(super) fn tree(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
     let height = builder.dice.range(2.6, 3.4);
     builder.cylinder(foot, 0.11, height, finish.timber);
     let crown = foot - Vector3::new(0.0, height + 0.6, 0.0);
-    for _ in 0..80 {
+    for _ in 0..130 {
         let offset =
             Vector3::new(0.5 * builder.dice.normal(), 0.55 * builder.dice.normal(), 0.5 * builder.dice.normal());
-        let size = builder.dice.range(0.1, 0.34);
-        builder.ellipsoid(crown + offset, Vector3::new(size, 0.7 * size, size), finish.leaves);
+        let size = builder.dice.range(0.06, 0.26);
+        let tilt = Vector3::from_fn(|_, _| 0.5 * builder.dice.normal());
+        let half = Vector3::new(size, builder.dice.range(0.3, 0.7) * size, size);
+        builder.ellipsoid(crown + offset, half, finish.leaves).world_from_body = Some(exp_rotation(&tilt));
     }
 }
 

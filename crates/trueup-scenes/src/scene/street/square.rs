@@ -53,7 +53,7 @@ pub(in crate::scene) fn build(seed: u64) -> Builder {
     }
     builder.eye = Vector3::new(0.0, -1.6, 0.0);
     let towards = Vector3::new(0.5, -0.75, -0.43).normalize();
-    builder.sun = Some(Sun { towards, irradiance: srgb(0xff_f0dc) * 6.0 });
+    builder.sun = Some(Sun { towards, irradiance: srgb(0xff_f0dc) * 4.0 });
     builder
 }
 
