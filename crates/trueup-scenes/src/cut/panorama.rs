@@ -58,7 +58,8 @@ impl Panorama360 {
     /// # Errors
     /// As [`photograph`] and [`new`](Self::new).
     pub fn decode(image: &SourceImage) -> Result<Self> {
-        let name = image.path.file_name().map_or_else(|| image.name.clone(), |name| name.to_string_lossy().into_owned());
+        let name =
+            image.path.file_name().map_or_else(|| image.name.clone(), |name| name.to_string_lossy().into_owned());
         Self::new(&name, photograph(image)?)
     }
 

@@ -55,9 +55,8 @@ fn search(lines: &[UprightLine], options: &LevelOptions) -> Option<Vector3<f64>>
                 continue;
             }
             let direction = Vector3::new(x, 1.0, z).normalize();
-            let support = |line: &UprightLine| {
-                line.weight * (1.0 - (line.normal.dot(&direction) / tolerance).powi(2)).max(0.0)
-            };
+            let support =
+                |line: &UprightLine| line.weight * (1.0 - (line.normal.dot(&direction) / tolerance).powi(2)).max(0.0);
             let score: f64 = lines.iter().map(support).sum();
             if score > best.0 {
                 best = (score, Some(direction));
@@ -75,8 +74,8 @@ struct System {
     gradient: Vector2<f64>,
     /// Second derivative of the robust loss.
     curvature: Matrix2<f64>,
-    /// The gradient's part of each view that has lines here.
-    by_view: Vec<Vector2<f64>>,
+    /// The gradient's part of each column of views, and whether the column has lines here.
+    by_column: Vec<(Vector2<f64>, bool)>,
     /// Lines within the tolerance.
     support: usize,
 }
@@ -84,23 +83,18 @@ struct System {
 impl System {
     fn at(down: &Vector3<f64>, lines: &[UprightLine], tolerance: f64, scale: f64) -> Self {
         let (first, second) = tangents(*down);
+        let columns = lines.iter().map(|line| line.column + 1).max().unwrap_or(0);
         let mut system = Self {
             weighted: Matrix2::zeros(),
             gradient: Vector2::zeros(),
             curvature: Matrix2::zeros(),
-            by_view: Vec::new(),
+            by_column: vec![(Vector2::zeros(), false); columns],
             support: 0,
         };
-        let mut view = None;
         for line in lines {
             let residual = line.normal.dot(down);
             if residual.abs() >= tolerance {
                 continue;
-            }
-            // Lines come view after view.
-            if view != Some(line.view) {
-                view = Some(line.view);
-                system.by_view.push(Vector2::zeros());
             }
             let jacobian = Vector2::new(line.normal.dot(&first), line.normal.dot(&second));
             let ratio = (residual / scale).powi(2);
@@ -109,27 +103,27 @@ impl System {
             system.weighted += jacobian * jacobian.transpose() * weight;
             system.curvature += jacobian * jacobian.transpose() * (weight * (1.0 - 3.0 * ratio) / (1.0 + ratio));
             system.gradient += pull;
-            if let Some(part) = system.by_view.last_mut() {
-                *part += pull;
-            }
+            let (part, populated) = &mut system.by_column[line.column];
+            *part += pull;
+            *populated = true;
             system.support += 1;
         }
         system
     }
 
-    /// The sandwich estimator with one cluster a view: lines of a view share the errors of the panorama's stitching.
+    /// The sandwich estimator with one cluster a column of views: its lines share the errors of the panorama's stitching.
     ///
     /// # Source
     /// Liang and Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73, 1986; small-sample
     /// factor c / (c - 1).
     fn standard_error(&self) -> f64 {
-        let clusters = self.by_view.len() as f64;
+        let clusters = self.by_column.iter().filter(|(_, populated)| *populated).count() as f64;
         let Some(inverse) = self.curvature.try_inverse() else { return f64::INFINITY };
         // A saddle is no minimum: the loss does not hold the direction.
         if clusters < 2.0 || self.curvature.determinant() <= 0.0 || self.curvature.trace() <= 0.0 {
             return f64::INFINITY;
         }
-        let spread: Matrix2<f64> = self.by_view.iter().map(|part| part * part.transpose()).sum();
+        let spread: Matrix2<f64> = self.by_column.iter().map(|(part, _)| part * part.transpose()).sum();
         ((inverse * spread * inverse).trace() * clusters / (clusters - 1.0)).sqrt()
     }
 }

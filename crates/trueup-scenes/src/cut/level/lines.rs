@@ -19,13 +19,6 @@ use super::LevelOptions;
 /// The name of the work in progress reports.
 const STAGE: &str = "measuring the level";
 
-/// One of two interleaved halves of the views.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Half {
-    Even,
-    Odd,
-}
-
 /// A line that may be vertical.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct UprightLine {
@@ -33,10 +26,9 @@ pub(super) struct UprightLine {
     pub normal: Vector3<f64>,
     /// Weight: the line's length, capped.
     pub weight: f64,
-    /// The view it was found in; lines of one view share its errors.
-    pub view: usize,
-    /// The half of the views it belongs to.
-    pub half: Half,
+    /// The column of views it was found in: columns alternate between the halves, and lines of a column share the errors
+    /// of the panorama's stitching.
+    pub column: usize,
 }
 
 /// Lines whose planes come within reach of the panorama's own down, view after view.
@@ -94,14 +86,13 @@ fn lines_of_view(
     // The view's border is no frame of a photograph.
     let line_options = LineOptions { border_distance_px: 0.0, ..LineOptions::default() };
     let segments = detect(&gray, &line_options, context)?;
-    let half = if index % options.views_around % 2 == 0 { Half::Even } else { Half::Odd };
     let lines = segments.iter().filter_map(|segment| {
         let (normal, length) = plane_of(segment, views, index)?;
         let steepest = normal.y.abs().min(1.0).asin();
         let used = length >= options.min_length_deg.to_radians()
             && steepest <= (options.search_deg + options.tolerance_deg).to_radians();
         let weight = length.min(options.weight_cap_deg.to_radians());
-        used.then_some(UprightLine { normal, weight, view: index, half })
+        used.then_some(UprightLine { normal, weight, column: index % options.views_around })
     });
     Ok(lines.collect())
 }
@@ -110,10 +101,8 @@ fn lines_of_view(
 /// another view sees its middle closer to its own.
 fn plane_of(segment: &LineSegment, views: &[View], index: usize) -> Option<(Vector3<f64>, f64)> {
     let camera = &views[index].camera;
-    let (start, end) = (
-        camera.world_direction(Vector2::from(segment.start)),
-        camera.world_direction(Vector2::from(segment.end)),
-    );
+    let (start, end) =
+        (camera.world_direction(Vector2::from(segment.start)), camera.world_direction(Vector2::from(segment.end)));
     let middle = start + end;
     let closeness = |view: &View| (view.camera.rotation() * middle).z;
     let here = closeness(&views[index]);
