@@ -70,10 +70,11 @@ pub(super) fn measure(
     let seconds = start.elapsed().as_secs_f64();
     let written = ended.status.success() && project.is_file();
     let complaint = fs::read_to_string(&complaints).unwrap_or_default();
+    let first = complaint.lines().next().unwrap_or("it ended without a word");
     let _ = fs::remove_file(&panorama);
     Ok(Measured {
         project: written.then_some(project),
-        complaint: if written { String::new() } else { complaint.lines().next().unwrap_or("it ended").to_owned() },
+        complaint: if written { String::new() } else { first.trim_start_matches("trueup: error: ").to_owned() },
         seconds,
         peak_bytes: ended.rusage.maxrss,
     })

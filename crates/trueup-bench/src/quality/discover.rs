@@ -17,6 +17,13 @@ pub(super) enum Part {
     Photographs,
 }
 
+impl StitchSet {
+    /// Name and kind in one.
+    pub(super) fn title(&self) -> String {
+        if self.kind.is_empty() { self.name.clone() } else { format!("{} {}", self.name, self.kind) }
+    }
+}
+
 impl Part {
     /// Both, in the order of the page.
     pub(super) const ALL: [Self; 2] = [Self::Known, Self::Photographs];
@@ -65,6 +72,7 @@ pub(super) fn find_sets(truth: &[PathBuf], real: &[PathBuf], manifest: Option<&P
     for parent in truth {
         sets.extend(truth_folders(parent)?.into_iter().map(known_set));
     }
+    sets.sort_by(|a, b| (&a.kind, &a.name).cmp(&(&b.kind, &b.name)));
     for parent in real {
         sets.extend(real_sets(parent, manifest)?);
     }

@@ -66,10 +66,10 @@ fn measure_all(
         if cancel.is_cancelled() {
             return Err(Error::Cancelled);
         }
-        tracker.working_on(&set.name);
+        tracker.working_on(&set.title());
         measured.push(measure(command, set, scratch, index, cancel)?);
         tracker.advance(1);
-        tracker.finished(&set.name);
+        tracker.finished(&set.title());
     }
     tracker.close();
     Ok(measured)
