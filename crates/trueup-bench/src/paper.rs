@@ -27,7 +27,8 @@ use crate::trial::{Row, Trial, fingerprint};
 pub(crate) fn run(arguments: &PaperArguments) -> Result<ExitCode> {
     let start = Instant::now();
     let wanted = wanted(arguments)?;
-    let make = |folder: &Path| fs::create_dir_all(folder).map_err(|error| Error::io("making the folder", folder, error));
+    let make =
+        |folder: &Path| fs::create_dir_all(folder).map_err(|error| Error::io("making the folder", folder, error));
     make(&arguments.out)?;
     let data = arguments.data.clone().unwrap_or_else(|| arguments.out.join("data"));
     make(&data)?;
@@ -97,7 +98,11 @@ fn document(
     let failed: Vec<&Row> = results.rows.iter().filter(|row| row.measures.contains_key("failed")).collect();
     if !failed.is_empty() {
         let mut section = Section::new("failed", "Runs without a result");
-        section.say(format!("{} of {} runs ended with an error; they are missing above.", failed.len(), results.rows.len()));
+        section.say(format!(
+            "{} of {} runs ended with an error; they are missing above.",
+            failed.len(),
+            results.rows.len()
+        ));
         let mut counts: BTreeMap<(&str, &str), usize> = BTreeMap::new();
         for row in failed {
             *counts.entry((&row.key.set, &row.note)).or_default() += 1;
@@ -106,7 +111,10 @@ fn document(
         section.blocks.push(Block::List(points.collect()));
         sections.push(section);
     }
-    Document { title: "Vanishing Point Guided Natural Image Stitching: the paper's experiments on our sets".to_owned(), sections }
+    Document {
+        title: "Vanishing Point Guided Natural Image Stitching: the paper's experiments on our sets".to_owned(),
+        sections,
+    }
 }
 
 /// Every result, a column per measure.

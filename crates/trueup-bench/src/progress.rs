@@ -26,7 +26,14 @@ impl Tracker {
             .unwrap_or_else(|_| ProgressStyle::default_bar());
         let bar = ProgressBar::with_draw_target(Some(total), target).with_style(style).with_prefix(title.to_owned());
         let lines = !on_terminal && !quiet;
-        Self { bar, on_terminal: !lines, title: title.to_owned(), done: AtomicU64::new(0), total, start: Instant::now() }
+        Self {
+            bar,
+            on_terminal: !lines,
+            title: title.to_owned(),
+            done: AtomicU64::new(0),
+            total,
+            start: Instant::now(),
+        }
     }
 
     /// Says what is being worked on.

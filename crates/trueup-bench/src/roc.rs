@@ -58,11 +58,8 @@ pub(crate) fn best_threshold(curve: &[RocPoint]) -> Option<RocPoint> {
     let best = best?;
     let point = curve[best];
     let next = curve.get(best + 1).map_or(point.threshold, |next| next.threshold);
-    let threshold = if point.threshold.is_finite() && next.is_finite() {
-        (point.threshold + next) / 2.0
-    } else {
-        point.threshold
-    };
+    let threshold =
+        if point.threshold.is_finite() && next.is_finite() { (point.threshold + next) / 2.0 } else { point.threshold };
     Some(RocPoint { threshold, ..point })
 }
 

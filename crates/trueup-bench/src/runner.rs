@@ -69,7 +69,10 @@ impl Runner<'_> {
         };
         let outcomes: Vec<Result<()>> = std::thread::scope(|scope| {
             let workers: Vec<_> = (0..self.jobs.max(1)).map(|_| scope.spawn(work)).collect();
-            workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+            workers
+                .into_iter()
+                .map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+                .collect()
         });
         tracker.close();
         outcomes.into_iter().collect::<Result<()>>()?;

@@ -183,8 +183,7 @@ fn solve(
     let graph = StitchGraph::from_edges(priors.len(), used.iter().map(|&pair| edge_of(pair)).collect());
     let rotations = rotations::average(&graph, &used, &relative, anchor);
     let start = Parameters { focal_px: start_focal.clone(), rotations };
-    let (parameters, per_picture_focal, focal_failed) =
-        refine(priors, &observations, start, anchor, options, context)?;
+    let (parameters, per_picture_focal, focal_failed) = refine(priors, &observations, start, anchor, options, context)?;
 
     let cameras: Vec<Camera> = (0..priors.len())
         .map(|k| {
@@ -205,7 +204,8 @@ fn refine(
     options: &CameraOptions,
     context: &StageContext,
 ) -> Result<(Parameters, bool, bool)> {
-    let problem = bundle::Problem { priors, observations, start_focal: start.focal_px.clone(), reference: anchor, options };
+    let problem =
+        bundle::Problem { priors, observations, start_focal: start.focal_px.clone(), reference: anchor, options };
     // Start values that already differ (metadata of a zoom) keep their ratios inside a shared model.
     let shared = FocalModel::shared(priors);
     let own = FocalModel::per_picture(priors.len());

@@ -19,7 +19,8 @@ mod vertical_lines;
 
 pub use alignment::true_alignment;
 pub use direction::{
-    best_rotation, global_direction_inconsistency, mean_relative_turn, rectangle_rotation, relative_turns, vertical_angle,
+    best_rotation, global_direction_inconsistency, mean_relative_turn, rectangle_rotation, relative_turns,
+    vertical_angle,
 };
 pub use distortion::{LocalDistortion, Outside, local_distortion};
 pub use options::MeasureOptions;

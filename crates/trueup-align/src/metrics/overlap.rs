@@ -107,9 +107,7 @@ impl Overlap<'_> {
 
 /// The 3 x 3 grey values around a pixel that is not on the raster's border.
 fn window(gray: &Raster<f32>, x: usize, y: usize) -> [f64; WINDOW * WINDOW] {
-    std::array::from_fn(|k| {
-        f64::from(gray.pixel(x + k % WINDOW - WINDOW / 2, y + k / WINDOW - WINDOW / 2)[0])
-    })
+    std::array::from_fn(|k| f64::from(gray.pixel(x + k % WINDOW - WINDOW / 2, y + k / WINDOW - WINDOW / 2)[0]))
 }
 
 /// A window of mean 0 and length 1; `None` if it is flat.

@@ -31,8 +31,7 @@ pub(super) fn mean(overlap: &Overlap, gains: [f64; 2]) -> Option<f64> {
         let (a, b) = (mean_a[index], mean_b[index]);
         let (variance_a, variance_b) = (square_a[index] - a * a, square_b[index] - b * b);
         let covariance = cross[index] - a * b;
-        sum += (2.0 * a * b + C1) * (2.0 * covariance + C2)
-            / ((a * a + b * b + C1) * (variance_a + variance_b + C2));
+        sum += (2.0 * a * b + C1) * (2.0 * covariance + C2) / ((a * a + b * b + C1) * (variance_a + variance_b + C2));
         count += 1;
     }
     Some(sum / count as f64)
@@ -45,7 +44,8 @@ fn blurred(values: &[f64], width: usize, height: usize) -> Vec<f64> {
     for y in 0..height {
         for x in RADIUS..width.saturating_sub(RADIUS) {
             let first = y * width + x - RADIUS;
-            along_rows[y * width + x] = weights.iter().zip(&values[first..]).map(|(weight, value)| weight * value).sum();
+            along_rows[y * width + x] =
+                weights.iter().zip(&values[first..]).map(|(weight, value)| weight * value).sum();
         }
     }
     let mut blurred = vec![0.0; values.len()];

@@ -31,8 +31,7 @@ pub struct VerticalLines {
 impl VerticalLines {
     /// Whether there are enough lines, and they agree.
     pub fn is_certain(&self, options: &MeasureOptions) -> bool {
-        self.lines >= options.min_vertical_lines
-            && self.standard_error <= options.max_standard_error_deg.to_radians()
+        self.lines >= options.min_vertical_lines && self.standard_error <= options.max_standard_error_deg.to_radians()
     }
 }
 
@@ -137,8 +136,7 @@ mod tests {
     /// A camera rolled by 5 degrees and raised by 10 sees ten plumb lines, and as many level ones.
     fn picture() -> (Vec<LineSegment>, WorkingFrame, Camera) {
         let frame = WorkingFrame::new(800, 600, 480_000.0);
-        let world_from_camera =
-            rotation_about_x(10.0_f64.to_radians()) * rotation_about_z(5.0_f64.to_radians());
+        let world_from_camera = rotation_about_x(10.0_f64.to_radians()) * rotation_about_z(5.0_f64.to_radians());
         let camera = Camera::new(FOCAL_PX, 800.0, 600.0, &world_from_camera.transpose());
         let segment = |from: Vector3<f64>, to: Vector3<f64>| {
             let at = |point: Vector3<f64>| camera.project(camera.rotation() * point).expect("in front").into();

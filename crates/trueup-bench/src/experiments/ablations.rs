@@ -20,7 +20,10 @@ struct Ablation {
 
 const ABLATIONS: [Ablation; 16] = [
     Ablation { name: "nothing changed", overrides: &[] },
-    Ablation { name: "beta: twist of the relative rotation, as published", overrides: &["similarity.beta_mode=relative"] },
+    Ablation {
+        name: "beta: twist of the relative rotation, as published",
+        overrides: &["similarity.beta_mode=relative"],
+    },
     Ablation { name: "lambda 0 (no relative rolls)", overrides: &["similarity.relative_weight=0"] },
     Ablation { name: "lambda 1", overrides: &["similarity.relative_weight=1"] },
     Ablation { name: "lambda 100", overrides: &["similarity.relative_weight=100"] },
@@ -41,13 +44,8 @@ const ABLATIONS: [Ablation; 16] = [
 ];
 
 /// What the changes are made to.
-const BASES: [(&str, &[&str]); 2] = [
-    ("default", &[]),
-    (
-        "published",
-        &["similarity.guided_redetection=false", "similarity.joint_refinement=false"],
-    ),
-];
+const BASES: [(&str, &[&str]); 2] =
+    [("default", &[]), ("published", &["similarity.guided_redetection=false", "similarity.joint_refinement=false"])];
 
 const NOISE_SHARES: [f64; 2] = [0.0, 0.1];
 /// Seeds under noise.
@@ -88,10 +86,18 @@ pub(crate) fn section(results: &Results) -> Section {
          published form takes each picture's own and keeps one similarity per picture.",
     );
     for (base, _) in BASES {
-        let caption = format!("Changes to the {base} form. Means over the study's sets; worst: the worst picture of any set.");
+        let caption =
+            format!("Changes to the {base} form. Means over the study's sets; worst: the worst picture of any set.");
         let columns = [
-            "change", "theta error deg", "worst deg", "GDIC deg", "guided %", "theta error deg, 10 % noise", "worst deg, 10 % noise",
-            "GDIC deg, 10 % noise", "guided %, 10 % noise",
+            "change",
+            "theta error deg",
+            "worst deg",
+            "GDIC deg",
+            "guided %",
+            "theta error deg, 10 % noise",
+            "worst deg, 10 % noise",
+            "GDIC deg, 10 % noise",
+            "guided %, 10 % noise",
         ];
         let mut table = Table::new(&format!("ablations-{base}"), &caption, columns);
         for ablation in &ABLATIONS {

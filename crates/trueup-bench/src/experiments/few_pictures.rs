@@ -66,8 +66,15 @@ pub(crate) fn section(results: &Results) -> Section {
          Fallback means that cameras were levelled without vanishing points: wrong for a Manhattan scene, right for another.",
     );
     let columns = [
-        "pictures", "gate", "Manhattan sets", "fallback %", "upright deg, median", "upright deg, worst", "other sets",
-        "fallback %, others", "upright deg, others, median",
+        "pictures",
+        "gate",
+        "Manhattan sets",
+        "fallback %",
+        "upright deg, median",
+        "upright deg, worst",
+        "other sets",
+        "fallback %, others",
+        "upright deg, others, median",
     ];
     let mut table = Table::new("few-pictures", "Fallback by number of pictures.", columns);
     for count in COUNTS {
@@ -91,9 +98,8 @@ pub(crate) fn section(results: &Results) -> Section {
     let mut series = Vec::new();
     for (manhattan, class) in [(true, "Manhattan"), (false, "others")] {
         for (variant, _) in VARIANTS {
-            let points = COUNTS.filter_map(|count| {
-                Some((count as f64, fallback_percent(&rows(results, manhattan, count, variant))?))
-            });
+            let points = COUNTS
+                .filter_map(|count| Some((count as f64, fallback_percent(&rows(results, manhattan, count, variant))?)));
             series.push(Series::plain(&format!("{class}, {variant}"), Mark::Line, points));
         }
     }

@@ -43,9 +43,8 @@ pub(crate) fn section(results: &Results) -> Section {
          the matches overrule; trusted to 0.1 % it holds against them.",
         originals.join(", ")
     ));
-    let value = |variant: &str, factor: f64, measure: &str| {
-        mean(&results.values_of_all(NAME, &of(factor), variant, measure))
-    };
+    let value =
+        |variant: &str, factor: f64, measure: &str| mean(&results.values_of_all(NAME, &of(factor), variant, measure));
     let columns = ["claimed / true", "variant", "theta error deg", "upright deg", "GDIC deg", "divergence", "guided %"];
     let mut table = Table::new("focal-error", "Means over the sets.", columns);
     for factor in &factors {
@@ -64,8 +63,7 @@ pub(crate) fn section(results: &Results) -> Section {
     }
     section.blocks.push(Block::Table(table));
     let series = VARIANTS.map(|(variant, _)| {
-        let points =
-            factors.iter().filter_map(|factor| Some((*factor, value(variant, *factor, "theta_error_deg")?)));
+        let points = factors.iter().filter_map(|factor| Some((*factor, value(variant, *factor, "theta_error_deg")?)));
         Series::plain(variant, Mark::Line, points)
     });
     let chart = Chart::new("claimed / true focal length", "theta error, degrees", series.into());

@@ -69,8 +69,7 @@ impl Class {
 pub(crate) fn claims(results: &Results) -> Vec<Claim> {
     let (manhattan, other) = (class(results, true, FULL), class(results, false, FULL));
     let rates = manhattan.rate().zip(other.rate());
-    let counts =
-        format!("{}/{} from {}/{}", manhattan.accepted, manhattan.stitched, other.accepted, other.stitched);
+    let counts = format!("{}/{} from {}/{}", manhattan.accepted, manhattan.stitched, other.accepted, other.stitched);
     vec![Claim {
         text: "The gate accepts Manhattan scenes and refuses others.".to_owned(),
         holds: rates.map(|(accepted, wrongly)| accepted - wrongly >= SEPARATED),
@@ -108,8 +107,11 @@ pub(crate) fn section(results: &Results) -> Section {
         roc_chart(results, &curve),
     );
     let at = |threshold: f64| curve.iter().rev().find(|point| point.threshold <= threshold).copied();
-    let mut table =
-        Table::new("t5-thresholds", "Thresholds on the divergence alone, and the full gate.", ["rule", "threshold", "Manhattan accepted", "others accepted"]);
+    let mut table = Table::new(
+        "t5-thresholds",
+        "Thresholds on the divergence alone, and the full gate.",
+        ["rule", "threshold", "Manhattan accepted", "others accepted"],
+    );
     let percent = |rate: Option<f64>| rate.map_or("-".to_owned(), |rate| format!("{:.1} %", 100.0 * rate));
     let mut rule = |name: &str, threshold: Option<f64>, point: Option<RocPoint>| {
         let rates = [point.map(|point| point.true_rate), point.map(|point| point.false_rate)].map(percent);
@@ -132,10 +134,18 @@ pub(crate) fn section(results: &Results) -> Section {
 }
 
 fn counts(results: &Results) -> Table {
-    let columns =
-        [
-        "class", "sets stitched", "full gate accepts", "vertical alone", "divergence alone accepts", "median divergence", "10 %",
-        "90 %", "upright deg, accepted", "upright deg, others", "not stitched",
+    let columns = [
+        "class",
+        "sets stitched",
+        "full gate accepts",
+        "vertical alone",
+        "divergence alone accepts",
+        "median divergence",
+        "10 %",
+        "90 %",
+        "upright deg, accepted",
+        "upright deg, others",
+        "not stitched",
     ];
     let mut table = Table::new("t5-counts", "Divergence by class of scenes.", columns);
     for (manhattan, name) in [(true, "Manhattan"), (false, "others")] {
@@ -155,7 +165,8 @@ fn counts(results: &Results) -> Table {
             full.failed.to_string(),
         ]);
     }
-    for (name, figures) in [("Manhattan, gallery", &MANHATTAN_DIVERGENCES[..]), ("others, gallery", &OTHER_DIVERGENCES)] {
+    for (name, figures) in [("Manhattan, gallery", &MANHATTAN_DIVERGENCES[..]), ("others, gallery", &OTHER_DIVERGENCES)]
+    {
         let lowest = figures.iter().copied().min_by(f64::total_cmp);
         let highest = figures.iter().copied().max_by(f64::total_cmp);
         let accepted = figures.iter().filter(|figure| **figure <= THRESHOLD).count();

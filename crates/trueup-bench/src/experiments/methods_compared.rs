@@ -5,8 +5,8 @@ use trueup::Result;
 use super::grid::{GridRow, table};
 use super::paper_figures::{NATURAL, WARPS};
 use crate::methods::{LEVELLED_PUBLISHED, METHODS, VPG, VPG_PUBLISHED};
-use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::report::charts::{Chart, Mark, Series};
+use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::{Results, short_name};
 use crate::sets::{Catalogue, SetSpec};
 use crate::statistics::{mean, median};
@@ -18,9 +18,7 @@ pub(crate) const NAME: &str = "methods";
 /// Every method on every set of the study and every given one.
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let sets = catalogue.study.iter().chain(&catalogue.given);
-    Ok(sets
-        .flat_map(|set| METHODS.iter().map(|one| Trial::new(NAME, &set.name, one.name, one.overrides)))
-        .collect())
+    Ok(sets.flat_map(|set| METHODS.iter().map(|one| Trial::new(NAME, &set.name, one.name, one.overrides))).collect())
 }
 
 /// GDIC of the default method and of the levelled one on each set, where both have it.
@@ -99,9 +97,15 @@ pub(crate) fn section(results: &Results) -> Section {
          and how far what stands vertical in the pictures deviates from the panorama's vertical.",
     );
     for (measure, title) in [
-        ("theta_error_deg", "Error of the prior's turn relative to the reference (theta error), degrees, mean over the pictures"),
+        (
+            "theta_error_deg",
+            "Error of the prior's turn relative to the reference (theta error), degrees, mean over the pictures",
+        ),
         ("upright_deg", "Deviation from upright in the panorama, degrees, mean over the pictures"),
-        ("align_px", "Alignment: distance in source pixels between the two places of one point, where all photographs were taken from one place"),
+        (
+            "align_px",
+            "Alignment: distance in source pixels between the two places of one point, where all photographs were taken from one place",
+        ),
     ] {
         let caption = format!("{title}.");
         let rows = ours(results, sets, measure);
@@ -112,9 +116,11 @@ pub(crate) fn section(results: &Results) -> Section {
 }
 
 fn list_of_methods() -> Table {
-    let mut list = Table::new("methods", "The methods that exist, and the options that make them.", [
-        "method", "what it is", "stands beside the paper's", "options",
-    ]);
+    let mut list = Table::new(
+        "methods",
+        "The methods that exist, and the options that make them.",
+        ["method", "what it is", "stands beside the paper's", "options"],
+    );
     for one in METHODS {
         let options: Vec<String> = one.overrides.iter().map(|option| format!("`{option}`")).collect();
         list.push([one.name, one.meaning, one.paper.unwrap_or("none"), &options.join(" ")]);
@@ -149,9 +155,11 @@ fn given_tables(results: &Results, section: &mut Section) {
     }
     let measures = ["ld", "gdic_deg", "theta_error_deg", "upright_deg", "align_px"];
     let caption = format!("Medians over {} given sets.", sets.len());
-    let mut medians = Table::new("given-medians", &caption, [
-        "method", "LD x 1e-2", "GDIC deg", "theta error deg", "upright deg", "align px",
-    ]);
+    let mut medians = Table::new(
+        "given-medians",
+        &caption,
+        ["method", "LD x 1e-2", "GDIC deg", "theta error deg", "upright deg", "align px"],
+    );
     for one in METHODS {
         let values = measures.map(|measure| number(median(&results.values_of_all(NAME, sets, one.name, measure)), 2));
         medians.push(std::iter::once(one.name.to_owned()).chain(values));
@@ -161,7 +169,10 @@ fn given_tables(results: &Results, section: &mut Section) {
     section.blocks.push(Block::Table(table("given-gdic", "GDIC on the given sets, degrees.", sets, &gdic)));
     let all = pairs(results, sets, VPG);
     let wins = all.iter().filter(|(ours, other)| ours < other).count();
-    section.say(format!("On {wins} of {} given sets the default is less inconsistent than `{LEVELLED_PUBLISHED}`.", all.len()));
+    section.say(format!(
+        "On {wins} of {} given sets the default is less inconsistent than `{LEVELLED_PUBLISHED}`.",
+        all.len()
+    ));
 }
 
 /// A measure's name as part of a file name.

@@ -57,14 +57,24 @@ pub(crate) const EXPERIMENTS: [Experiment; 9] = [
     Experiment { name: gate::NAME, trials: gate::trials, section: gate::section, claims: gate::claims },
     Experiment { name: alignment::NAME, trials: alignment::trials, section: alignment::section, claims: no_claims },
     Experiment { name: ablations::NAME, trials: ablations::trials, section: ablations::section, claims: no_claims },
-    Experiment { name: pitch_sweep::NAME, trials: pitch_sweep::trials, section: pitch_sweep::section, claims: no_claims },
+    Experiment {
+        name: pitch_sweep::NAME,
+        trials: pitch_sweep::trials,
+        section: pitch_sweep::section,
+        claims: no_claims,
+    },
     Experiment {
         name: few_pictures::NAME,
         trials: few_pictures::trials,
         section: few_pictures::section,
         claims: no_claims,
     },
-    Experiment { name: focal_error::NAME, trials: focal_error::trials, section: focal_error::section, claims: no_claims },
+    Experiment {
+        name: focal_error::NAME,
+        trials: focal_error::trials,
+        section: focal_error::section,
+        claims: no_claims,
+    },
 ];
 
 /// The experiments that test the three claims of the method: those of a quick run.

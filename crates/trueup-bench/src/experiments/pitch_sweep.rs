@@ -17,7 +17,8 @@ const TWIST: &str = "vpg-published, published beta";
 
 fn variants() -> Vec<(&'static str, Vec<&'static str>)> {
     let of_methods = METHODS.iter().map(|one| (one.name, one.overrides.to_vec()));
-    let twist = ["similarity.beta_mode=relative", "similarity.joint_refinement=false", "similarity.guided_redetection=false"];
+    let twist =
+        ["similarity.beta_mode=relative", "similarity.joint_refinement=false", "similarity.guided_redetection=false"];
     of_methods.chain([(TWIST, [&PUBLISHED_MESH[..], &twist].concat())]).collect()
 }
 
@@ -55,7 +56,8 @@ pub(crate) fn section(results: &Results) -> Section {
         ("ld", "LD x 1e-2"),
     ] {
         let columns = std::iter::once("method".to_owned()).chain(pitches.iter().map(|pitch| format!("{pitch:.0} deg")));
-        let mut table = Table::new(&format!("pitch-{}", measure.replace('_', "-")), &format!("{title}, by pitch."), columns);
+        let mut table =
+            Table::new(&format!("pitch-{}", measure.replace('_', "-")), &format!("{title}, by pitch."), columns);
         for (name, _) in variants() {
             let cells = pitches.iter().map(|pitch| number(value(name, *pitch, measure), 2));
             table.push(std::iter::once(name.to_owned()).chain(cells));

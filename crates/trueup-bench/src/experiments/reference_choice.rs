@@ -49,8 +49,7 @@ fn values(results: &Results, set: &SetSpec, method: &str) -> Vec<f64> {
 
 /// VPG does not depend on the reference.
 pub(crate) fn claims(results: &Results) -> Vec<Claim> {
-    let spreads: Vec<f64> =
-        sets(results.catalogue).filter_map(|set| spread(&values(results, set, VPG))).collect();
+    let spreads: Vec<f64> = sets(results.catalogue).filter_map(|set| spread(&values(results, set, VPG))).collect();
     let widest = spreads.iter().copied().max_by(f64::total_cmp);
     vec![Claim {
         text: "The panorama's directions do not depend on the choice of the reference.".to_owned(),

@@ -72,7 +72,8 @@ pub(crate) fn claims(results: &Results) -> Vec<Claim> {
         number(value(DEFAULT), 2)
     );
     vec![Claim {
-        text: "Outlier rejection and path voting keep the panorama straight when vanishing points are wrong.".to_owned(),
+        text: "Outlier rejection and path voting keep the panorama straight when vanishing points are wrong."
+            .to_owned(),
         holds: with.zip(without).map(|(with, without)| with < without),
         evidence,
         brief: format!("robust {} < {} deg at {:.0} %", number(with, 2), number(without, 2), 100.0 * share),
@@ -128,7 +129,8 @@ fn grid_rows(results: &Results, sets: &[SetSpec], share: f64, measure: &str) -> 
 }
 
 fn means(results: &Results, sets: &[SetSpec], id: &str, caption: &str) -> Table {
-    let columns = ["scheme", "noise", "GDIC deg", "theta error deg", "theta error, worst deg", "upright deg", "guided %"];
+    let columns =
+        ["scheme", "noise", "GDIC deg", "theta error deg", "theta error, worst deg", "upright deg", "guided %"];
     let mut table = Table::new(id, caption, columns);
     for share in NOISE_SHARES {
         for scheme in [WITHOUT, WITH, DEFAULT] {
@@ -156,7 +158,5 @@ fn bars(results: &Results, sets: &[SetSpec], share: f64, measure: &str, label: &
         });
         Series { name: scheme.to_owned(), mark: Mark::Bars, points: points.collect() }
     });
-    Chart::new("set", label, series.into())
-        .with_categories(sets.iter().map(|set| short_name(&set.name)))
-        .svg()
+    Chart::new("set", label, series.into()).with_categories(sets.iter().map(|set| short_name(&set.name))).svg()
 }

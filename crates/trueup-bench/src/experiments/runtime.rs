@@ -85,7 +85,8 @@ fn fastest(job: &StitchJob, trial: &Trial, runner: &Runner) -> Result<BTreeMap<S
     for _ in 0..REPEATS {
         let context = StageContext::new(&Silent, runner.cancel, 0);
         let written = job.run(&options, &context)?;
-        let first = written.first().ok_or_else(|| Error::input(&trial.set, "nothing was written", "Look at the set."))?;
+        let first =
+            written.first().ok_or_else(|| Error::input(&trial.set, "nothing was written", "Look at the set."))?;
         let seconds = &first.project.seconds;
         let total: f64 = seconds.values().sum();
         if best.as_ref().is_none_or(|known| total < known["total"]) {
@@ -116,7 +117,8 @@ pub(crate) fn section(results: &Results) -> Section {
         for (_, threads) in THREADS {
             let mut totals: Vec<(f64, f64)> = Vec::new();
             for set in &results.catalogue.study {
-                let total = |method| results.values(NAME, &set.name, &variant(method, threads), "total").first().copied();
+                let total =
+                    |method| results.values(NAME, &set.name, &variant(method, threads), "total").first().copied();
                 let Some((with, without)) = total(ours).zip(total(other)) else { continue };
                 totals.push((with, without));
                 each.push(cells(short_name(&set.name), &format!("{ours} / {other}"), threads, (with, without)));

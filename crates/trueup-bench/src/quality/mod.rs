@@ -81,7 +81,8 @@ fn find_command(given: Option<&Path>) -> Result<PathBuf> {
     let path = match given {
         Some(path) => path.to_owned(),
         None => {
-            let own = std::env::current_exe().map_err(|error| Error::io("finding", Path::new("trueup-bench"), error))?;
+            let own =
+                std::env::current_exe().map_err(|error| Error::io("finding", Path::new("trueup-bench"), error))?;
             own.with_file_name(format!("trueup{}", std::env::consts::EXE_SUFFIX))
         }
     };

@@ -23,7 +23,9 @@ pub(super) fn write(path: &Path, rows: &[QualityRow], previous: &[QualityRow]) -
         Err(error) => return Err(Error::io("reading", path, error)),
     };
     for part in Part::ALL {
-        for (suffix, render) in [("-medians", medians as fn(Part, &[QualityRow], &[QualityRow]) -> String), ("", every_set)] {
+        for (suffix, render) in
+            [("-medians", medians as fn(Part, &[QualityRow], &[QualityRow]) -> String), ("", every_set)]
+        {
             let name = format!("{}{suffix}", part.name());
             page = replaced(&page, &name, &content(part, rows, previous, render)).ok_or_else(|| {
                 let (start, end) = markers(&name);

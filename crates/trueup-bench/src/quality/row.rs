@@ -50,8 +50,23 @@ pub(super) struct QualityRow {
 }
 
 const HEADS: [&str; 17] = [
-    "part", "set", "kind", "used", "given", "guided", "divergence", "upright_deg", "upright_max_deg", "ld", "gdic_deg",
-    "align_px", "size", "seconds", "peak_mb", "version", "note",
+    "part",
+    "set",
+    "kind",
+    "used",
+    "given",
+    "guided",
+    "divergence",
+    "upright_deg",
+    "upright_max_deg",
+    "ld",
+    "gdic_deg",
+    "align_px",
+    "size",
+    "seconds",
+    "peak_mb",
+    "version",
+    "note",
 ];
 
 impl QualityRow {

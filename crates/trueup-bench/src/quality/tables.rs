@@ -50,7 +50,8 @@ pub(super) fn medians(part: Part, rows: &[QualityRow], previous: &[QualityRow]) 
         );
         let mut cells = vec![named(kind).to_owned(), new.len().to_string(), totals, guided.to_string()];
         for column in columns {
-            let middle = |rows: &[&QualityRow]| median(&rows.iter().filter_map(|row| (column.figure)(row)).collect::<Vec<_>>());
+            let middle =
+                |rows: &[&QualityRow]| median(&rows.iter().filter_map(|row| (column.figure)(row)).collect::<Vec<_>>());
             cells.push(compared(middle(&new), middle(&old), column.decimals));
         }
         table.push(cells);
@@ -136,7 +137,8 @@ mod tests {
 
     #[test]
     fn a_set_that_failed_says_why() {
-        let failed = QualityRow { note: "no overlap".to_owned(), given: 2, ..QualityRow::empty(Part::Photographs, "a", "pair") };
+        let failed =
+            QualityRow { note: "no overlap".to_owned(), given: 2, ..QualityRow::empty(Part::Photographs, "a", "pair") };
         let text = every_set(Part::Photographs, &[failed], &[row("a", 0.1)]);
         assert!(text.ends_with("| a | pair | 0/2 | - | - | - | - | - | - | 0.0 | 0 | no overlap |\n"), "{text}");
     }

@@ -12,9 +12,10 @@ pub(super) fn write(original: &ReadySet, factor: f64, folder: &Path) -> Result<(
     for (photograph, truth) in original.photographs.iter().zip(&original.truth.images) {
         let source = Path::new(photograph);
         let bytes = fs::read(source).map_err(|error| Error::io("reading", source, error))?;
-        let claimed = with_exif(&bytes, &focal_exif(factor * truth.focal_px, (truth.width, truth.height))).ok_or_else(|| {
-            Error::input(photograph, "it is no JPEG file", "Give the set as JPEG files, or leave --sets out.")
-        })?;
+        let claimed =
+            with_exif(&bytes, &focal_exif(factor * truth.focal_px, (truth.width, truth.height))).ok_or_else(|| {
+                Error::input(photograph, "it is no JPEG file", "Give the set as JPEG files, or leave --sets out.")
+            })?;
         let target = folder.join(&truth.file);
         fs::write(&target, claimed).map_err(|error| Error::io("writing", &target, error))?;
     }
@@ -95,7 +96,8 @@ mod tests {
         let claimed = folder.path().join("claimed");
         fs::create_dir(&claimed).expect("folder");
         write(&original, 1.1, &claimed).expect("copy");
-        let sources = trueup_io::source::scan(&[claimed.join("00.jpg").display().to_string()], &Default::default(), &context);
+        let sources =
+            trueup_io::source::scan(&[claimed.join("00.jpg").display().to_string()], &Default::default(), &context);
         let prior = sources.expect("readable").images[0].focal_prior.expect("a focal length");
         assert!((prior.focal_px / original.truth.images[0].focal_px - 1.1).abs() < 1e-4);
     }

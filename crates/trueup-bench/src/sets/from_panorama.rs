@@ -10,13 +10,8 @@ use trueup_scenes::cut::{
 use super::{SetSource, SetSpec};
 
 /// What is cut from every panorama, and of how many views each consists.
-const KINDS: [(SpecKind, usize); 5] = [
-    (SpecKind::Row, 9),
-    (SpecKind::Tilt, 6),
-    (SpecKind::Grid, 21),
-    (SpecKind::Full, 16),
-    (SpecKind::Few, 3),
-];
+const KINDS: [(SpecKind, usize); 5] =
+    [(SpecKind::Row, 9), (SpecKind::Tilt, 6), (SpecKind::Grid, 21), (SpecKind::Full, 16), (SpecKind::Few, 3)];
 
 /// The sets of a folder's panoramas.
 ///

@@ -113,11 +113,9 @@ impl SetSpec {
             SetSource::Rendered(recipe) => {
                 made(&folder, &recipe.fingerprint(), || recipe.render(&folder, &self.name, context))
             }
-            SetSource::Cut(panorama, kind) => {
-                made(&folder, &from_panorama::fingerprint(panorama, *kind)?, || {
-                    from_panorama::cut(panorama, *kind, &folder, context)
-                })
-            }
+            SetSource::Cut(panorama, kind) => made(&folder, &from_panorama::fingerprint(panorama, *kind)?, || {
+                from_panorama::cut(panorama, *kind, &folder, context)
+            }),
             SetSource::FocalClaimed(original, factor) => {
                 let original = original.prepare(data, context)?;
                 let claim = crate::trial::fingerprint(&(&original.fingerprint, factor.to_bits()));

@@ -190,8 +190,7 @@ impl Chart {
             let path: Vec<String> =
                 points.iter().map(|point| format!("{:.1},{:.1}", x.place(point.x), y.place(point.y))).collect();
             let path = path.join(" ");
-            let _ =
-                writeln!(svg, "<polyline points=\"{path}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>");
+            let _ = writeln!(svg, "<polyline points=\"{path}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>");
         }
         for point in points {
             let mut at = x.place(point.x);
