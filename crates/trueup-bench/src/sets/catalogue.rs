@@ -64,7 +64,7 @@ impl Catalogue {
             given: given_sets(panoramas, truth_sets)?,
             twins: rendered_sets(SetKind::Twins, "twins", Some(false)),
             mixed: rendered_sets(SetKind::Mixed, "mixed", None),
-            gate: gate_sets(usize::MAX, Quality::Draft),
+            gate: gate_sets(None),
             pitch: pitch_sets(),
             reference_sets: vec!["03", "05", "08", "11"],
             seeds: 10,
@@ -95,7 +95,7 @@ impl Catalogue {
         Self {
             focal: focal_sets(&study),
             study,
-            gate: gate_sets(EACH_GATE_CLASS, Quality::Preview),
+            gate: gate_sets(Some(EACH_GATE_CLASS)),
             reference_sets: vec!["01", "02"],
             seeds: 3,
             ..Self::default()
@@ -113,22 +113,19 @@ impl Catalogue {
 
 /// The sets of a kind, named `folder/01` and so on.
 fn rendered_sets(kind: SetKind, folder: &str, manhattan: Option<bool>) -> Vec<SetSpec> {
-    let one = |number| {
-        let (scene, rig) = kind.set(number)?;
-        let recipe = Recipe { scene, rig, quality: Quality::Standard };
-        Some(SetSpec::rendered(format!("{folder}/{number:02}"), manhattan, recipe))
-    };
-    (1..=kind.count()).filter_map(one).collect()
+    (1..=kind.count()).filter_map(|number| SetSpec::catalogue(kind, number, folder, manhattan)).collect()
 }
 
-/// The first so many sets with dominant directions, and as many without.
-fn gate_sets(each: usize, quality: Quality) -> Vec<SetSpec> {
+/// Sets for the gate with dominant directions, and as many without: of each class the first so many in a quick version,
+/// or all as they are.
+fn gate_sets(quick: Option<usize>) -> Vec<SetSpec> {
     let classes = [(SetKind::GateManhattan, "gate/manhattan", true), (SetKind::GateRandom, "gate/random", false)];
-    let of_class = |(kind, name, manhattan): (SetKind, &str, bool)| -> Vec<SetSpec> {
+    let of_class = |(kind, folder, manhattan): (SetKind, &str, bool)| -> Vec<SetSpec> {
+        let Some(each) = quick else { return rendered_sets(kind, folder, Some(manhattan)) };
         let one = |number| {
             let (scene, rig) = kind.set(number)?;
-            let recipe = Recipe { scene, rig, quality };
-            Some(SetSpec::rendered(format!("{name}-{number:02}"), Some(manhattan), recipe))
+            let recipe = Recipe { scene, rig, quality: Quality::Preview };
+            Some(SetSpec::rendered(format!("quick-{folder}-{number:02}"), Some(manhattan), recipe))
         };
         (1..=kind.count().min(each)).filter_map(one).collect()
     };

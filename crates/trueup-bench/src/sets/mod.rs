@@ -10,7 +10,9 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 use trueup::{Error, Result, StageContext, Truth};
 use trueup_scenes::cut::SpecKind;
-use trueup_scenes::{Quality, RigOptions, Scene, SceneKind, SceneOptions, SetOutput, rig, write_set};
+use trueup_scenes::{
+    Quality, RECIPE, RigOptions, Scene, SceneKind, SceneOptions, SetKind, SetOutput, SetRequest, rig, write_set,
+};
 
 pub(crate) use catalogue::Catalogue;
 
@@ -33,6 +35,8 @@ pub(crate) struct SetSpec {
 /// Where a set comes from.
 #[derive(Debug, Clone)]
 pub(crate) enum SetSource {
+    /// It is one of the catalogue of `trueup-scenes`, whose command `study` writes to the same places.
+    Catalogue(SetRequest),
     /// It is rendered.
     Rendered(Box<Recipe>),
     /// It is cut from a panorama.
@@ -68,8 +72,16 @@ pub(crate) struct ReadySet {
 impl SetSpec {
     /// A set to be rendered.
     pub(crate) fn rendered(name: String, manhattan: Option<bool>, recipe: Recipe) -> Self {
-        let content = recipe.describe();
+        let content = describe(&recipe.scene, &recipe.rig);
         Self { name, content, manhattan, source: SetSource::Rendered(Box::new(recipe)) }
+    }
+
+    /// A set of the catalogue, in a folder below `parent`.
+    pub(crate) fn catalogue(kind: SetKind, number: usize, parent: &str, manhattan: Option<bool>) -> Option<Self> {
+        let (scene, rig) = kind.set(number)?;
+        let content = describe(&scene, &rig);
+        let source = SetSource::Catalogue(SetRequest { kind, number, preview: false, depth: false });
+        Some(Self { name: format!("{parent}/{number:02}"), content, manhattan, source })
     }
 
     /// A set in a folder.
@@ -94,6 +106,7 @@ impl SetSpec {
     /// Those of reading a folder's truth.
     pub(crate) fn pictures(&self) -> Result<usize> {
         match &self.source {
+            SetSource::Catalogue(request) => Ok(request.kind.set(request.number).map_or(0, |(_, rig)| rig.pictures)),
             SetSource::Rendered(recipe) => Ok(recipe.rig.pictures),
             SetSource::Cut(_, kind) => Ok(from_panorama::views_of(*kind)),
             SetSource::Folder(folder) => Ok(read_truth(folder)?.0.images.len()),
@@ -110,6 +123,11 @@ impl SetSpec {
         let folder = self.name.split('/').fold(data.to_owned(), |path, part| path.join(part));
         match &self.source {
             SetSource::Folder(folder) => ready(folder),
+            SetSource::Catalogue(request) => {
+                let parent = folder.parent().unwrap_or(data);
+                request.write(parent, context)?;
+                ready(&request.folder(parent))
+            }
             SetSource::Rendered(recipe) => {
                 made(&folder, &recipe.fingerprint(), || recipe.render(&folder, &self.name, context))
             }
@@ -134,32 +152,31 @@ impl Recipe {
     }
 
     fn fingerprint(&self) -> String {
-        let recipe = json!({ "scene": self.scene, "rig": self.rig, "quality": format!("{:?}", self.quality) });
+        let recipe = json!({ "recipe": RECIPE, "scene": self.scene, "rig": self.rig, "quality": self.quality });
         crate::trial::fingerprint(&recipe.to_string())
     }
+}
 
-    /// "room, 5 pictures of 1024 x 768, ..."
-    fn describe(&self) -> String {
-        use trueup_core::options::OptionValue;
-        let rig = &self.rig;
-        let indoors = matches!(self.scene.kind, SceneKind::Room | SceneKind::TurnedRoom);
-        let style = if indoors { format!(" ({})", self.scene.style.display()) } else { String::new() };
-        let kind = self.scene.kind.display();
-        let mut parts = vec![format!("{kind}{style}, {} of {} x {} px", rig.pictures, rig.width, rig.height)];
-        if rig.rows > 1 {
-            parts.push(format!("{} rows", rig.rows));
-        }
-        parts.push(format!("pitch {:.0} deg", rig.pitch_deg));
-        parts.push(format!("roll sd {:.0} deg", rig.roll_sd_deg));
-        if rig.second_hfov_deg > 0.0 {
-            parts.push("two focal lengths".to_owned());
-        }
-        parts.push(match rig.translation_fraction {
-            0.0 => "no parallax".to_owned(),
-            share => format!("wandering {:.1} % of the depth", 100.0 * share),
-        });
-        parts.join(", ")
+/// "room (office), 5 of 1024 x 768 px, ..."
+fn describe(scene: &SceneOptions, rig: &RigOptions) -> String {
+    use trueup_core::options::OptionValue;
+    let indoors = matches!(scene.kind, SceneKind::Room | SceneKind::TurnedRoom);
+    let style = if indoors { format!(" ({})", scene.style.display()) } else { String::new() };
+    let mut parts =
+        vec![format!("{}{style}, {} of {} x {} px", scene.kind.display(), rig.pictures, rig.width, rig.height)];
+    if rig.rows > 1 {
+        parts.push(format!("{} rows", rig.rows));
     }
+    parts.push(format!("pitch {:.0} deg", rig.pitch_deg));
+    parts.push(format!("roll sd {:.0} deg", rig.roll_sd_deg));
+    if rig.second_hfov_deg > 0.0 {
+        parts.push("two focal lengths".to_owned());
+    }
+    parts.push(match rig.translation_fraction {
+        0.0 => "no parallax".to_owned(),
+        share => format!("wandering {:.1} % of the depth", 100.0 * share),
+    });
+    parts.join(", ")
 }
 
 /// Makes a folder's content unless it was made completely from the same recipe; the recipe is written last.
@@ -196,8 +213,12 @@ const UNFINISHED: &str = "unfinished.txt";
 
 fn ready(folder: &Path) -> Result<ReadySet> {
     let (truth, text) = read_truth(folder)?;
-    let photographs = truth.images.iter().map(|image| folder.join(&image.file).display().to_string()).collect();
-    Ok(ReadySet { photographs, truth, fingerprint: crate::trial::fingerprint(&text) })
+    let paths: Vec<PathBuf> = truth.images.iter().map(|image| folder.join(&image.file)).collect();
+    // Pictures that were made anew from the same truth differ in their size.
+    let size = |path: &PathBuf| fs::metadata(path).map_or(0, |found| found.len());
+    let sizes: Vec<u64> = paths.iter().map(size).collect();
+    let photographs = paths.iter().map(|path| path.display().to_string()).collect();
+    Ok(ReadySet { photographs, truth, fingerprint: crate::trial::fingerprint(&(text, sizes)) })
 }
 
 /// A folder's truth and the text it was read from.

@@ -44,7 +44,7 @@ pub(super) fn build(seed: u64) -> Builder {
         block.world_from_body = Some(exp_rotation(&axis));
         block.texture_centre = offset;
     }
-    builder.sun = Some(Sun { towards: Vector3::new(0.5, -0.7, 0.45).normalize(), irradiance: srgb(0xff_f0dc) * 2.5 });
+    builder.sun = Some(Sun { towards: Vector3::new(0.5, -0.7, 0.45).normalize(), irradiance: srgb(0xff_f0dc) * 1.1 });
     builder
 }
 
