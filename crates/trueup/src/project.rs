@@ -94,8 +94,15 @@ pub struct ManhattanRecord {
     pub divergence: Option<f64>,
     /// Largest divergence that is accepted.
     pub threshold: f64,
+    /// How far the best directions stand out when the lines of all photographs are searched together, in standard
+    /// deviations over all directions tried; `None` with too few lines.
+    #[serde(default)]
+    pub significance: Option<f64>,
     /// Whether vanishing points guided the panorama.
     pub accepted: bool,
+    /// Whether the lines of all photographs together guided it, since the photographs' own vanishing points did not agree.
+    #[serde(default)]
+    pub pooled: bool,
     /// The clause of the gate that failed, in words.
     pub failed_clause: Option<String>,
     /// Dominant directions as columns, in the levelled world.

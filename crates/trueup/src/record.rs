@@ -59,7 +59,9 @@ impl Matched {
             manhattan: ManhattanRecord {
                 divergence: None,
                 threshold: options.similarity.max_divergence,
+                significance: None,
                 accepted: false,
+                pooled: false,
                 failed_clause: Some("a single photograph is left as it is".to_owned()),
                 dominant: None,
                 inliers: Vec::new(),
@@ -142,7 +144,9 @@ pub(crate) fn fill_geometry(
         project.manhattan = ManhattanRecord {
             divergence: guidance.divergence,
             threshold: guidance.threshold,
+            significance: guidance.significance,
             accepted: guidance.used,
+            pooled: guidance.pooled,
             failed_clause: guidance.failed_clause.clone(),
             dominant: guidance.dominant,
             inliers: guidance.inliers.iter().map(|&k| component.images[k].path.display().to_string()).collect(),

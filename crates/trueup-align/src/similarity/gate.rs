@@ -14,6 +14,8 @@ pub(super) struct GateEvidence {
     pub divergence: f64,
     /// Angle in radians between the dominant and the straightened vertical, if the latter is well conditioned.
     pub straightening_angle: Option<f64>,
+    /// How far the best frame of the pooled search stands out, standard deviations; `None` without that search.
+    pub significance: Option<f64>,
     /// Median over the inliers of |alpha_i|, radians.
     pub median_roll: f64,
 }
@@ -61,7 +63,7 @@ pub(super) fn divergence(inlier_residuals: &[f64], pictures: usize) -> f64 {
 /// The paper has clause (a) alone, which cannot tell with few pictures: one picture always fits its own triad.
 /// [`GateMode::Paper`] keeps to it.
 pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions) -> Option<String> {
-    let GateEvidence { pictures, inliers, divergence, straightening_angle, median_roll } = *evidence;
+    let GateEvidence { pictures, inliers, divergence, straightening_angle, significance, median_roll } = *evidence;
     // Not-a-number fails.
     let allowed = allowed_divergence(pictures, options);
     if divergence.is_nan() || divergence > allowed {
@@ -74,6 +76,12 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
     let needed = ((share * pictures as f64).ceil() as usize).max(2);
     if inliers < needed {
         return Some(format!("{inliers} of {pictures} pictures agree on the dominant directions ({needed} needed)"));
+    }
+    let needed = options.min_significance;
+    if let Some(significance) = significance.filter(|&significance| significance < needed) {
+        return Some(format!(
+            "the lines of all pictures together prefer no direction clearly ({significance:.1} standard deviations, {needed:.1} needed)"
+        ));
     }
     let allowed = options.max_straightening_angle_deg;
     if let Some(angle) = straightening_angle.map(f64::to_degrees).filter(|&angle| angle.is_nan() || angle > allowed) {

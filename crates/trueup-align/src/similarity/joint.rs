@@ -61,6 +61,19 @@ impl LineVote {
         &self.pictures[index].planes
     }
 
+    /// Normals in the common frame and weights of about `most` segments, the longest of every picture.
+    pub fn longest(&self, most: usize) -> Vec<(Vector3<f64>, f64)> {
+        let of_each = most.div_ceil(self.pictures.len().max(1));
+        let of_picture = |picture: &PictureLines| -> Vec<(Vector3<f64>, f64)> {
+            let normals = picture.planes.normals.iter().take(of_each);
+            normals
+                .zip(&picture.planes.weights)
+                .map(|(normal, &weight)| (picture.rotation.tr_mul(normal), weight))
+                .collect()
+        };
+        self.pictures.iter().flat_map(of_picture).collect()
+    }
+
     /// The sum of the segments' weights.
     pub fn total_weight(&self) -> f64 {
         self.pictures.iter().map(|picture| picture.planes.total_weight).sum()

@@ -4,6 +4,7 @@
 
 mod dominant;
 mod edge_range;
+mod frame_search;
 mod gate;
 mod joint;
 mod path_voting;
@@ -112,6 +113,21 @@ trueup_core::options! {
         /// Root mean square misorientation of the pictures' directions that is detection noise; beyond, the horizontal
         /// directions lose weight in the joint refinement.
         ordinary_misorientation_deg: f64 = 1.0, between(0.01, 90.0), "degrees";
+        /// Whether the segments of all pictures are searched together for one frame: to confirm the directions that the
+        /// pictures agree on, and in their place where they do not agree.
+        pooled_search: bool = true, Allowed::Any, "";
+        /// Segments in the pooled search, shared out evenly among the pictures, the longest first.
+        max_pooled_lines: usize = 3000, between(10.0, 1e6), "segments";
+        /// Fewer segments in all pictures together are no evidence.
+        min_pooled_lines: usize = 10, between(3.0, 1e6), "segments";
+        /// Largest angle between a segment and a direction for the segment to support it in the pooled search.
+        pooled_tolerance_deg: f64 = 1.5, between(0.1, 30.0), "degrees";
+        /// Step of the vertical in the pooled search.
+        pooled_step_deg: f64 = 2.0, between(0.2, 10.0), "degrees";
+        /// How far the best frame must stand out in the pooled search to confirm the pictures' own directions.
+        min_significance: f64 = 5.0, between(0.0, 1e3), "standard deviations";
+        /// How far it must stand out to guide where the pictures do not agree.
+        pooled_significance: f64 = 7.0, between(0.0, 1e3), "standard deviations";
         /// Whether a vertical alone may guide where the horizontal directions do not agree.
         vertical_only: bool = true, Allowed::Any, "";
         /// How far from the cameras' own vertical the segments' is sought.
@@ -158,6 +174,12 @@ pub struct PriorInput<'a> {
 pub struct Guidance {
     /// Whether lines guide the prior; otherwise straightening does.
     pub used: bool,
+    /// Whether the frame guides that the segments of all pictures together stand for, since the pictures' own directions
+    /// did not agree.
+    pub pooled: bool,
+    /// How far the best frame of the pooled search stands out, in standard deviations over all frames tried; `None`
+    /// without enough segments.
+    pub significance: Option<f64>,
     /// Whether the vertical alone guides, since the gate refused the dominant directions.
     pub vertical_only: bool,
     /// The divergence epsilon; `None` without any agreeing picture.

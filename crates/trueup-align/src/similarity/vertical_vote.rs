@@ -52,7 +52,7 @@ pub(super) fn vertical_peak(
 }
 
 /// Directions within `radius` of `axis`, on rings `step` apart (radians).
-fn cone(axis: &Vector3<f64>, radius: f64, step: f64) -> Vec<Vector3<f64>> {
+pub(super) fn cone(axis: &Vector3<f64>, radius: f64, step: f64) -> Vec<Vector3<f64>> {
     let (first, second) = orthonormal_complement(axis);
     let frame = Matrix3::from_columns(&[first, second, *axis]);
     let mut directions = vec![*axis];

@@ -6,6 +6,7 @@ use trueup_core::geometry::{rows_of, wrap_angle};
 use trueup_core::{Result, StageContext};
 
 use super::dominant::{Dominant, dominant_frame};
+use super::frame_search::{PooledFrame, search_frame};
 use super::gate::{GateEvidence, allowed_divergence, divergence, failed_clause};
 use super::joint::LineVote;
 use super::path_voting::PathVote;
@@ -28,6 +29,8 @@ const CONTRADICTED: f64 = 0.1;
 pub(super) fn unguided(count: usize, options: &SimilarityOptions) -> Guidance {
     Guidance {
         used: false,
+        pooled: false,
+        significance: None,
         vertical_only: false,
         divergence: None,
         threshold: allowed_divergence(count, options),
@@ -79,12 +82,18 @@ pub(super) fn guide(
     let dominant =
         dominant_frame(&scene.triads, options.rejection, options.max_cross_pairs, &mut context.generator(STAGE, 0));
     context.check_cancelled()?;
+    let pooled = options.pooled_search.then(|| search_frame(&scene.vote, level, options)).flatten();
+    guidance.significance = pooled.map(|pooled| pooled.significance);
     guidance.failed_clause = match &dominant {
         Some(dominant) => scene.judge(dominant, straightened, &mut guidance),
         None => Some("no picture has vanishing directions".to_owned()),
     };
     context.check_cancelled()?;
-    if let Some(dominant) = dominant.filter(|_| guidance.failed_clause.is_none()) {
+    let accepted = match guidance.failed_clause {
+        None => dominant,
+        Some(_) => pooled.and_then(|pooled| scene.pooled(&pooled, straightened, &mut guidance)),
+    };
+    if let Some(dominant) = accepted {
         let upright = scene.solve_dominant(dominant, &mut guidance);
         return Ok((guidance, upright));
     }
@@ -156,6 +165,7 @@ impl Scene<'_> {
             inliers: inliers.len(),
             divergence: divergence(&residuals, pictures),
             straightening_angle: straightened.conditioned.then(|| down.angle(&straightened.down)),
+            significance: guidance.significance,
             median_roll: magnitudes.get(magnitudes.len() / 2).copied().unwrap_or(f64::INFINITY),
         };
         guidance.divergence = Some(evidence.divergence).filter(|divergence| divergence.is_finite());
@@ -163,6 +173,23 @@ impl Scene<'_> {
         guidance.residuals.clone_from(&dominant.residuals);
         guidance.inliers = inliers;
         failed_clause(&evidence, self.options)
+    }
+
+    /// The frame of the pooled search in place of one that the pictures agree on, if it stands out far enough.
+    fn pooled(&self, pooled: &PooledFrame, straightened: &Straightened, guidance: &mut Guidance) -> Option<Dominant> {
+        let down = vertical_of(&pooled.frame, self.rotations);
+        let limit = self.options.max_straightening_angle_deg.to_radians();
+        let stands_out = pooled.significance >= self.options.pooled_significance;
+        if !stands_out || (straightened.conditioned && down.angle(&straightened.down) > limit) {
+            return None;
+        }
+        let residuals =
+            self.triads.iter().map(|triad| triad.map(|triad| triad_residual(&pooled.frame, &triad))).collect();
+        let dominant = Dominant { frame: pooled.frame, residuals };
+        guidance.pooled = true;
+        guidance.inliers = self.inliers(&dominant);
+        guidance.residuals.clone_from(&dominant.residuals);
+        Some(dominant)
     }
 
     /// The prior of accepted dominant directions.

@@ -1,0 +1,111 @@
+//! The frame that the segments of all pictures vote for together, and whether the vote could be chance.
+//!
+//! A picture with a handful of segments has no triad of its own, or a wrong one; seen through the cameras, the segments
+//! of all pictures are one set on one sphere. Every level or tilted frame near the cameras' own vertical is scored on
+//! them. Where the scene has dominant directions, one frame stands out from all the others; where it has none, the best
+//! is a little better than the rest.
+
+use std::f64::consts::FRAC_PI_2;
+
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+use super::SimilarityOptions;
+use super::joint::LineVote;
+use super::vertical_vote::cone;
+use crate::vanishing::orthonormal_complement;
+
+/// Turns about a vertical that are scored: steps of 1.5 degrees over the quarter turn after which a frame repeats.
+const TURNS: usize = 60;
+
+/// The best frame and how far it stands out.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PooledFrame {
+    /// Columns are the directions in the common frame, the vertical first; a rotation.
+    pub frame: Matrix3<f64>,
+    /// Score of the frame above the mean over all frames tried, in standard deviations of these.
+    pub significance: f64,
+}
+
+/// Sums over the turns about one vertical.
+struct Ring {
+    sum: f64,
+    squares: f64,
+    best: f64,
+    turn: usize,
+}
+
+/// Scores all frames whose vertical is within `options.vertical_search_deg` of `expected`.
+///
+/// The score of a frame is the sum over segments of weight times (1 - (sine / sine of the tolerance)^2) for the frame's
+/// direction that fits best. `None` with fewer than `options.min_pooled_lines` segments.
+pub(super) fn search_frame(
+    vote: &LineVote,
+    expected: &Vector3<f64>,
+    options: &SimilarityOptions,
+) -> Option<PooledFrame> {
+    let segments = vote.longest(options.max_pooled_lines);
+    if segments.len() < options.min_pooled_lines {
+        return None;
+    }
+    let tolerance = options.pooled_tolerance_deg.to_radians().sin();
+    let step = options.pooled_step_deg.to_radians();
+    let verticals = cone(expected, options.vertical_search_deg.to_radians(), step);
+    let rings: Vec<Ring> = verticals.par_iter().map(|vertical| ring(vertical, &segments, tolerance)).collect();
+    let count = (rings.len() * TURNS) as f64;
+    let mean = rings.iter().map(|ring| ring.sum).sum::<f64>() / count;
+    let variance = rings.iter().map(|ring| ring.squares).sum::<f64>() / count - mean * mean;
+    let mut best = 0;
+    for (index, ring) in rings.iter().enumerate() {
+        if ring.best > rings[best].best {
+            best = index;
+        }
+    }
+    let significance = (rings[best].best - mean) / variance.sqrt();
+    significance.is_finite().then(|| {
+        let vertical = verticals[best];
+        let (first, second) = orthonormal_complement(&vertical);
+        let (sine, cosine) = turn_of(rings[best].turn).sin_cos();
+        let horizontal = first * cosine + second * sine;
+        PooledFrame { frame: Matrix3::from_columns(&[vertical, horizontal, vertical.cross(&horizontal)]), significance }
+    })
+}
+
+fn turn_of(index: usize) -> f64 {
+    (index as f64 + 0.5) * FRAC_PI_2 / TURNS as f64
+}
+
+/// Scores the frames of one vertical. Each segment reaches only the few turns that it fits.
+fn ring(vertical: &Vector3<f64>, segments: &[(Vector3<f64>, f64)], tolerance: f64) -> Ring {
+    let (first, second) = orthonormal_complement(vertical);
+    let step = FRAC_PI_2 / TURNS as f64;
+    let mut scores = [0.0; TURNS];
+    let mut common = 0.0;
+    for (normal, weight) in segments {
+        let fit = |sine: f64| (1.0 - (sine / tolerance).powi(2)).max(0.0);
+        let upright = fit(normal.dot(vertical));
+        common += weight * upright;
+        let (along, across) = (normal.dot(&first), normal.dot(&second));
+        let reach = along.hypot(across);
+        // The horizontal directions orthogonal to the normal stand at this turn, and a quarter turn on.
+        let turn = (-along).atan2(across).rem_euclid(FRAC_PI_2);
+        let half = if reach > tolerance { (tolerance / reach).asin() } else { FRAC_PI_2 };
+        let from = ((turn - half) / step - 0.5).ceil() as i64;
+        let to = (((turn + half) / step - 0.5).floor() as i64).min(from + TURNS as i64 - 1);
+        for place in from..=to {
+            let level = fit(reach * ((place as f64 + 0.5) * step - turn).sin());
+            if level > upright {
+                scores[place.rem_euclid(TURNS as i64) as usize] += weight * (level - upright);
+            }
+        }
+    }
+    let mut ring = Ring { sum: 0.0, squares: 0.0, best: f64::NEG_INFINITY, turn: 0 };
+    for (turn, score) in scores.iter().map(|score| score + common).enumerate() {
+        ring.sum += score;
+        ring.squares += score * score;
+        if score > ring.best {
+            (ring.best, ring.turn) = (score, turn);
+        }
+    }
+    ring
+}
