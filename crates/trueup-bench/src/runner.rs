@@ -196,3 +196,62 @@ pub(crate) fn thread_pool(threads: usize) -> Result<rayon::ThreadPool> {
         .build()
         .map_err(|error| Error::input("threads", error, "Ask for fewer with --jobs."))
 }
+
+#[cfg(test)]
+mod tests {
+    use trueup_scenes::{LightQuality, Quality, RigOptions, SceneOptions};
+
+    use super::*;
+    use crate::sets::Recipe;
+
+    fn small_set() -> SetSpec {
+        let scene = SceneOptions { seed: 3, light: LightQuality::Fast, ..SceneOptions::default() };
+        let rig = RigOptions { seed: 3, pictures: 2, width: 320, height: 240, ..RigOptions::default() };
+        SetSpec::rendered("test/small".to_owned(), Some(true), Recipe { scene, rig, quality: Quality::Preview })
+    }
+
+    #[test]
+    fn a_second_run_takes_everything_from_the_store_in_the_order_of_the_trials() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("rows.jsonl");
+        let cancel = CancelToken::default();
+        let set = small_set();
+        let trials = [
+            Trial::new("test", &set.name, "default", &[]),
+            Trial::new("test", &set.name, "small working copy", &["stitch.working_pixels=50000"]),
+            Trial { seed: 1, ..Trial::new("test", &set.name, "default", &[]) },
+        ];
+        let run = || {
+            let store = Store::open(&path, None).expect("opens");
+            let runner = Runner {
+                data: folder.path().join("data"),
+                store: &store,
+                version: "1".to_owned(),
+                jobs: 2,
+                threads: 1,
+                cancel: &cancel,
+                quiet: true,
+            };
+            runner.run(&[&set], &trials).expect("runs")
+        };
+        let (first, stored) = (run(), std::fs::read_to_string(&path).expect("rows"));
+        assert_eq!(stored.lines().count(), 3);
+        let order: Vec<(&str, u64)> = first.iter().map(|row| (row.key.variant.as_str(), row.key.seed)).collect();
+        assert_eq!(order, [("default", 0), ("small working copy", 0), ("default", 1)]);
+        assert_eq!(first[0].measure("used"), Some(2.0), "{first:?}");
+        assert_eq!(run(), first);
+        assert_eq!(std::fs::read_to_string(&path).expect("rows"), stored);
+        cancel.cancel();
+        let store = Store::open(&path, None).expect("opens");
+        let runner = Runner {
+            data: folder.path().join("data"),
+            store: &store,
+            version: "2".to_owned(),
+            jobs: 1,
+            threads: 1,
+            cancel: &cancel,
+            quiet: true,
+        };
+        assert!(matches!(runner.run(&[&set], &trials), Err(Error::Cancelled)));
+    }
+}

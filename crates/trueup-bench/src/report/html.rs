@@ -60,10 +60,11 @@ fn block_text(block: &Block) -> String {
 }
 
 fn table_text(table: &Table) -> String {
-    let mut text = String::from("<div class=\"table\"><table>\n");
+    let mut text = String::from("<div class=\"table\">\n");
     if !table.caption.is_empty() {
-        let _ = writeln!(text, "<caption>{}</caption>", inline(&table.caption));
+        let _ = writeln!(text, "<p class=\"caption\">{}</p>", inline(&table.caption));
     }
+    text.push_str("<table>\n");
     // A heading stands where the figures or words below it stand.
     let numeric = |index: usize| table.rows.iter().any(|row| row.cells.get(index).is_some_and(|cell| is_number(cell)));
     let headings: String = table
