@@ -164,9 +164,6 @@ fn run(command: &Command) -> Result<()> {
             write(&out.join("room"), &scene, &rig, Quality::Fine)
         }
         Command::Study(arguments) => study_command::run(arguments),
-        Command::Cut(arguments) => arguments.run(),
-        Command::Level(arguments) => arguments.run(),
-        Command::Specs(arguments) => arguments.run(),
     }
 }
 

@@ -25,7 +25,7 @@ pub(crate) fn line<'a>(cells: impl IntoIterator<Item = &'a str>) -> String {
     quoted.join(",") + "\n"
 }
 
-/// The cells of one line that [`line`] wrote.
+/// The cells of one line that [`line()`] wrote.
 pub(crate) fn cells(line: &str) -> Vec<String> {
     let (mut cells, mut cell, mut quoted) = (Vec::new(), String::new(), false);
     let mut characters = line.trim_end_matches(['\r', '\n']).chars().peekable();
