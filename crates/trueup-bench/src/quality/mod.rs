@@ -114,7 +114,8 @@ mod tests {
 
     #[test]
     fn parts_that_were_not_run_keep_their_figures() {
-        let row = |part, set: &str, seconds| QualityRow { seconds, ..QualityRow::empty(part, set, "row") };
+        let row =
+            |part, set: &str, seconds| QualityRow { seconds: Some(seconds), ..QualityRow::empty(part, set, "row") };
         let new = [row(Part::Known, "a", 1.0)];
         let old = [row(Part::Known, "gone", 9.0), row(Part::Photographs, "b", 2.0)];
         let kept: Vec<String> = kept(&new, &old).into_iter().map(|row| row.set).collect();

@@ -40,14 +40,17 @@ pub(super) struct QualityRow {
     /// Width and height of the panorama.
     pub size: String,
     /// Wall seconds of the whole process.
-    pub seconds: f64,
+    pub seconds: Option<f64>,
     /// Its largest resident set, MB.
-    pub peak_mb: f64,
+    pub peak_mb: Option<f64>,
     /// The program's version.
     pub version: String,
     /// What went wrong.
     pub note: String,
 }
+
+/// Decimal, as file managers count.
+const BYTES_PER_MB: f64 = 1e6;
 
 const HEADS: [&str; 17] = [
     "part",
@@ -86,8 +89,8 @@ impl QualityRow {
             gdic_deg: None,
             align_px: None,
             size: String::new(),
-            seconds: 0.0,
-            peak_mb: 0.0,
+            seconds: None,
+            peak_mb: None,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             note: String::new(),
         }
@@ -99,8 +102,8 @@ impl QualityRow {
     /// Those of reading the record and the truth.
     pub(super) fn new(set: &StitchSet, measured: &Measured) -> Result<Self> {
         let mut row = Self {
-            seconds: measured.seconds,
-            peak_mb: measured.peak_bytes as f64 / 1e6,
+            seconds: Some(measured.seconds),
+            peak_mb: Some(measured.peak_bytes as f64 / BYTES_PER_MB),
             note: measured.complaint.clone(),
             given: pictures_in(&set.folder)?,
             ..Self::empty(set.part, &set.name, &set.kind)
@@ -159,8 +162,8 @@ impl QualityRow {
             optional(self.gdic_deg),
             optional(self.align_px),
             self.size.clone(),
-            format!("{:.3}", self.seconds),
-            format!("{:.1}", self.peak_mb),
+            optional(self.seconds),
+            optional(self.peak_mb),
             self.version.clone(),
             self.note.clone(),
         ]
@@ -187,8 +190,8 @@ impl QualityRow {
             gdic_deg: optional(gdic),
             align_px: optional(align),
             size: size.clone(),
-            seconds: seconds.parse().ok()?,
-            peak_mb: peak_mb.parse().ok()?,
+            seconds: optional(seconds),
+            peak_mb: optional(peak_mb),
             version: version.clone(),
             note: note.clone(),
         })
@@ -251,8 +254,8 @@ mod tests {
             used: 3,
             given: 4,
             upright_deg: Some(0.125),
-            seconds: 1.5,
-            peak_mb: 64.0,
+            seconds: Some(1.5),
+            peak_mb: Some(64.0),
             note: "a, \"b\"".to_owned(),
             ..QualityRow::empty(Part::Known, "library", "row")
         };

@@ -19,8 +19,8 @@ const LD: Column = Column { heading: "LD x 1e-2", decimals: 2, figure: |row| row
 const GDIC: Column = Column { heading: "GDIC deg", decimals: 2, figure: |row| row.gdic_deg };
 const ALIGN: Column = Column { heading: "align px", decimals: 2, figure: |row| row.align_px };
 const DIVERGENCE: Column = Column { heading: "divergence", decimals: 4, figure: |row| row.divergence };
-const SECONDS: Column = Column { heading: "s", decimals: 1, figure: |row| Some(row.seconds) };
-const PEAK: Column = Column { heading: "MB", decimals: 0, figure: |row| Some(row.peak_mb) };
+const SECONDS: Column = Column { heading: "s", decimals: 1, figure: |row| row.seconds };
+const PEAK: Column = Column { heading: "MB", decimals: 0, figure: |row| row.peak_mb };
 
 fn columns(part: Part) -> &'static [Column] {
     match part {
@@ -113,8 +113,8 @@ mod tests {
             given: 9,
             guided: "yes".to_owned(),
             upright_deg: Some(upright),
-            seconds: 1.0,
-            peak_mb: 100.0,
+            seconds: Some(1.0),
+            peak_mb: Some(100.0),
             size: "10 x 5".to_owned(),
             ..QualityRow::empty(Part::Known, set, "row")
         }
@@ -140,6 +140,6 @@ mod tests {
         let failed =
             QualityRow { note: "no overlap".to_owned(), given: 2, ..QualityRow::empty(Part::Photographs, "a", "pair") };
         let text = every_set(Part::Photographs, &[failed], &[row("a", 0.1)]);
-        assert!(text.ends_with("| a | pair | 0/2 | - | - | - | - | - | - | 0.0 | 0 | no overlap |\n"), "{text}");
+        assert!(text.ends_with("| a | pair | 0/2 | - | - | - | - | - | - | - | - | no overlap |\n"), "{text}");
     }
 }
