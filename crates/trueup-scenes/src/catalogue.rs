@@ -14,7 +14,7 @@ use crate::set::{SetOutput, write_set};
 use crate::study::SetKind;
 
 /// Raised whenever the same options make other pictures than before.
-const RECIPE: u32 = 1;
+pub const RECIPE: u32 = 1;
 
 /// Name of the record of how a set was made.
 const RECORD: &str = "set.json";

@@ -35,7 +35,7 @@ mod study;
 #[cfg(test)]
 mod tests;
 
-pub use catalogue::{SetOutcome, SetRequest};
+pub use catalogue::{RECIPE, SetOutcome, SetRequest};
 pub use render::{Quality, depth_map, render};
 pub use rig::{PosedCamera, RigOptions, camera_from_world, rig};
 pub use scene::{LightQuality, RoomStyle, Scene, SceneKind, SceneOptions, Viewpoint};

@@ -84,7 +84,6 @@ pub(crate) fn write_truth(directory: &Path, truth: &Truth) -> Result<()> {
     let path = directory.join("truth.json");
     let text = serde_json::to_string_pretty(truth)
         .map_err(|error| Error::io("writing", &path, std::io::Error::other(error)))?;
-    // Written beside and renamed: half a truth is none.
     let beside = directory.join("truth.json.part");
     fs::write(&beside, text + "\n").map_err(|error| Error::io("writing", &beside, error))?;
     fs::rename(&beside, &path).map_err(|error| Error::io("renaming to", &path, error))

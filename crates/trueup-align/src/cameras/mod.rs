@@ -89,8 +89,9 @@ pub struct Cameras {
 
 /// Finds the cameras of pictures 0..N that `pairs` connect.
 ///
-/// `names` are for messages. The rotations are relative to picture `reference`; the result depends on the choice of the
-/// reference by rounding only.
+/// `names` are for messages. The rotations are relative to picture `reference`. Everything is solved relative to the
+/// central picture and turned in the end, so that the shape does not depend on the reference: a solution that starts
+/// from another picture may end in another local minimum where parallax leaves several.
 ///
 /// A focal length that metadata or pictures get wrong never ends the run: non-finite or absurd results are replaced by a
 /// solution with the focal lengths fixed to their median, and a diagnostic says so.
@@ -113,8 +114,11 @@ pub fn run(
     options: &CameraOptions,
     context: &StageContext,
 ) -> Result<Cameras> {
+    let everything: Vec<usize> = (0..priors.len()).collect();
+    let anchor =
+        StitchGraph::from_edges(priors.len(), pairs.iter().map(edge_of).collect()).central_picture(&everything);
     let mut active: Vec<usize> = (0..pairs.len()).collect();
-    let mut solution = solve(priors, pairs, &active, reference, options, context)?;
+    let mut solution = solve(priors, pairs, &active, anchor, options, context)?;
     let contradicting = contradicting_pairs(priors.len(), pairs, &solution.pair_rms_px, options);
     if !contradicting.is_empty() {
         active.retain(|position| contradicting.binary_search(position).is_err());
@@ -130,8 +134,9 @@ pub fn run(
                 "",
             ));
         }
-        solution = solve(priors, pairs, &active, reference, options, context)?;
+        solution = solve(priors, pairs, &active, anchor, options, context)?;
     }
+    turn_to(&mut solution.cameras, reference);
     if solution.focal_failed {
         context.report(Diagnostic::warning(
             "focal-uncertain",
@@ -148,6 +153,14 @@ pub fn run(
     })
 }
 
+/// Makes the rotation of picture `reference` the identity.
+fn turn_to(cameras: &mut [Camera], reference: usize) {
+    let Some(back) = cameras.get(reference).map(|camera| camera.rotation().transpose()) else { return };
+    for camera in cameras {
+        camera.set_rotation(&(camera.rotation() * back));
+    }
+}
+
 struct Solution {
     cameras: Vec<Camera>,
     per_picture_focal: bool,
@@ -159,7 +172,7 @@ fn solve(
     priors: &[CameraPrior],
     pairs: &[PairMatches],
     active: &[usize],
-    reference: usize,
+    anchor: usize,
     options: &CameraOptions,
     context: &StageContext,
 ) -> Result<Solution> {
@@ -168,10 +181,9 @@ fn solve(
     let start_focal = focal::initial_focal_lengths(priors, &used, &observations, options);
     let relative = rotations::relative_rotations(priors, &used, &observations, &start_focal);
     let graph = StitchGraph::from_edges(priors.len(), used.iter().map(|&pair| edge_of(pair)).collect());
-    let rotations = rotations::average(&graph, &used, &relative, reference);
+    let rotations = rotations::average(&graph, &used, &relative, anchor);
     let start = Parameters { focal_px: start_focal.clone(), rotations };
-    let (parameters, per_picture_focal, focal_failed) =
-        refine(priors, &observations, start, reference, options, context)?;
+    let (parameters, per_picture_focal, focal_failed) = refine(priors, &observations, start, anchor, options, context)?;
 
     let cameras: Vec<Camera> = (0..priors.len())
         .map(|k| {
@@ -188,11 +200,12 @@ fn refine(
     priors: &[CameraPrior],
     observations: &Observations,
     start: Parameters,
-    reference: usize,
+    anchor: usize,
     options: &CameraOptions,
     context: &StageContext,
 ) -> Result<(Parameters, bool, bool)> {
-    let problem = bundle::Problem { priors, observations, start_focal: start.focal_px.clone(), reference, options };
+    let problem =
+        bundle::Problem { priors, observations, start_focal: start.focal_px.clone(), reference: anchor, options };
     // Start values that already differ (metadata of a zoom) keep their ratios inside a shared model.
     let shared = FocalModel::shared(priors);
     let own = FocalModel::per_picture(priors.len());

@@ -125,7 +125,8 @@ fn another_reference_gives_the_same_shape() {
         let context = StageContext::default();
         run(&priors, &names, &pairs, reference, &CameraOptions::default(), &context).expect("solvable").cameras
     };
-    assert!(worst_rotation_error(&solved(0), &solved(3)) < 1e-3);
+    // By rounding only: another start could end in another local minimum.
+    assert!(worst_rotation_error(&solved(0), &solved(3)) < 1e-6);
 }
 
 #[test]

@@ -1,0 +1,85 @@
+//! The experiments: which trials each needs, and what it says of their results.
+
+pub(crate) mod ablations;
+pub(crate) mod alignment;
+pub(crate) mod few_pictures;
+pub(crate) mod focal_error;
+pub(crate) mod gate;
+mod grid;
+pub(crate) mod methods_compared;
+mod paper_figures;
+pub(crate) mod pitch_sweep;
+pub(crate) mod reference_choice;
+pub(crate) mod robust_scheme;
+pub(crate) mod runtime;
+
+use trueup::Result;
+
+use crate::report::document::{Claim, Section};
+use crate::results::Results;
+use crate::sets::Catalogue;
+use crate::trial::Trial;
+
+/// An experiment.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Experiment {
+    /// Its name in rows and on the command line.
+    pub name: &'static str,
+    /// What it needs to be run.
+    pub trials: fn(&Catalogue) -> Result<Vec<Trial>>,
+    /// What it says.
+    pub section: fn(&Results) -> Section,
+    /// The claims it tests.
+    pub claims: fn(&Results) -> Vec<Claim>,
+}
+
+/// Every experiment whose trials are run side by side, in the order of the report. Times are taken apart from them
+/// ([`runtime`]).
+pub(crate) const EXPERIMENTS: [Experiment; 9] = [
+    Experiment {
+        name: methods_compared::NAME,
+        trials: methods_compared::trials,
+        section: methods_compared::section,
+        claims: methods_compared::claims,
+    },
+    Experiment {
+        name: robust_scheme::NAME,
+        trials: robust_scheme::trials,
+        section: robust_scheme::section,
+        claims: robust_scheme::claims,
+    },
+    Experiment {
+        name: reference_choice::NAME,
+        trials: reference_choice::trials,
+        section: reference_choice::section,
+        claims: reference_choice::claims,
+    },
+    Experiment { name: gate::NAME, trials: gate::trials, section: gate::section, claims: gate::claims },
+    Experiment { name: alignment::NAME, trials: alignment::trials, section: alignment::section, claims: no_claims },
+    Experiment { name: ablations::NAME, trials: ablations::trials, section: ablations::section, claims: no_claims },
+    Experiment {
+        name: pitch_sweep::NAME,
+        trials: pitch_sweep::trials,
+        section: pitch_sweep::section,
+        claims: no_claims,
+    },
+    Experiment {
+        name: few_pictures::NAME,
+        trials: few_pictures::trials,
+        section: few_pictures::section,
+        claims: no_claims,
+    },
+    Experiment {
+        name: focal_error::NAME,
+        trials: focal_error::trials,
+        section: focal_error::section,
+        claims: no_claims,
+    },
+];
+
+/// The experiments that test the three claims of the method: those of a quick run.
+pub(crate) const CLAIM_EXPERIMENTS: [&str; 3] = [robust_scheme::NAME, reference_choice::NAME, gate::NAME];
+
+fn no_claims(_: &Results) -> Vec<Claim> {
+    Vec::new()
+}

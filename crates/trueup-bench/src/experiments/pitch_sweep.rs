@@ -1,0 +1,76 @@
+//! Cameras that look up: where the published relative roll and one similarity per picture fail.
+
+use trueup::Result;
+
+use crate::methods::{LEVELLED, METHODS, PUBLISHED_MESH, VPG, VPG_PUBLISHED, method};
+use crate::report::charts::{Chart, Mark, Series};
+use crate::report::document::{Block, Section, Table, number};
+use crate::results::Results;
+use crate::sets::{Catalogue, SetSpec};
+use crate::statistics::mean;
+use crate::trial::Trial;
+
+/// The experiment's name.
+pub(crate) const NAME: &str = "pitch-sweep";
+
+const TWIST: &str = "vpg-published, published beta";
+
+fn variants() -> Vec<(&'static str, Vec<&'static str>)> {
+    let of_methods = METHODS.iter().map(|one| (one.name, one.overrides.to_vec()));
+    let twist =
+        ["similarity.beta_mode=relative", "similarity.joint_refinement=false", "similarity.guided_redetection=false"];
+    of_methods.chain([(TWIST, [&PUBLISHED_MESH[..], &twist].concat())]).collect()
+}
+
+/// Every method at every pitch.
+pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
+    let each = |set: &SetSpec| -> Vec<Trial> {
+        variants().iter().map(|(name, overrides)| Trial::new(NAME, &set.name, name, overrides)).collect()
+    };
+    Ok(catalogue.pitch.iter().flat_map(|one| each(&one.set)).collect())
+}
+
+/// Table and lines.
+pub(crate) fn section(results: &Results) -> Section {
+    let mut section = Section::new(NAME, "Pitch sweep");
+    section.say(
+        "Rows of seven photographs whose cameras look up by the stated angle, rooms and streets. Two level cameras that look up \
+         have a relative rotation with a twist of its own: taken for a roll, as published, it bends the row. One similarity per \
+         picture cannot follow verticals that converge.",
+    );
+    let mut pitches: Vec<f64> = results.catalogue.pitch.iter().map(|one| one.pitch_deg).collect();
+    pitches.sort_by(f64::total_cmp);
+    pitches.dedup();
+    if pitches.is_empty() {
+        section.blocks.push(Block::Skipped("no sets of other pitches in this run".to_owned()));
+        return section;
+    }
+    let sets_at = |pitch: f64| -> Vec<SetSpec> {
+        results.catalogue.pitch.iter().filter(|one| one.pitch_deg == pitch).map(|one| one.set.clone()).collect()
+    };
+    let value = |variant: &str, pitch, measure| mean(&results.values_of_all(NAME, &sets_at(pitch), variant, measure));
+    for (measure, title) in [
+        ("theta_error_deg", "Error of the prior's turn, degrees"),
+        ("upright_deg", "Deviation from upright in the panorama, degrees"),
+        ("gdic_deg", "GDIC, degrees"),
+        ("ld", "LD x 1e-2"),
+    ] {
+        let columns = std::iter::once("method".to_owned()).chain(pitches.iter().map(|pitch| format!("{pitch:.0} deg")));
+        let mut table =
+            Table::new(&format!("pitch-{}", measure.replace('_', "-")), &format!("{title}, by pitch."), columns);
+        for (name, _) in variants() {
+            let cells = pitches.iter().map(|pitch| number(value(name, *pitch, measure), 2));
+            table.push(std::iter::once(name.to_owned()).chain(cells));
+        }
+        section.blocks.push(Block::Table(table));
+    }
+    let drawn = [VPG, VPG_PUBLISHED, TWIST, LEVELLED];
+    let series = drawn.map(|name| {
+        let points = pitches.iter().filter_map(|pitch| Some((*pitch, value(name, *pitch, "upright_deg")?)));
+        Series::plain(name, Mark::Line, points)
+    });
+    debug_assert!(drawn.iter().all(|name| *name == TWIST || method(name).is_some()));
+    let chart = Chart::new("pitch of the cameras, degrees", "deviation from upright, degrees", series.into());
+    section.draw("Deviation from upright as the cameras look up.", chart.svg());
+    section
+}

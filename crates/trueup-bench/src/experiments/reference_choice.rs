@@ -1,0 +1,95 @@
+//! T4: every picture in turn as the reference.
+
+use trueup::Result;
+
+use crate::methods::{METHODS, VPG};
+use crate::report::charts::{Chart, Mark, Series};
+use crate::report::document::{Block, Claim, Section, Table, number};
+use crate::results::{Results, short_name};
+use crate::sets::{Catalogue, SetSpec};
+use crate::statistics::{mean, spread};
+use crate::trial::Trial;
+
+/// The experiment's name.
+pub(crate) const NAME: &str = "reference-choice";
+
+/// A spread of GDIC that counts as flat, degrees: a fifth of what the rectangle in GDIC costs by itself.
+const FLAT_DEG: f64 = 0.1;
+
+fn sets(catalogue: &Catalogue) -> impl Iterator<Item = &SetSpec> {
+    catalogue.study.iter().filter(|set| catalogue.reference_sets.contains(&short_name(&set.name)))
+}
+
+/// Every method with every reference.
+pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
+    let mut trials = Vec::new();
+    for set in sets(catalogue) {
+        for reference in 0..set.pictures()? {
+            for one in METHODS {
+                let trial = Trial::new(NAME, &set.name, one.name, one.overrides);
+                trials.push(Trial { reference: Some(reference), ..trial });
+            }
+        }
+    }
+    Ok(trials)
+}
+
+/// GDIC by reference, in their order.
+fn by_reference(results: &Results, set: &SetSpec, method: &str) -> Vec<(f64, f64)> {
+    results
+        .of(NAME)
+        .filter(|row| row.key.set == set.name && row.key.variant == method)
+        .filter_map(|row| Some((row.key.reference? as f64 + 1.0, row.measure("gdic_deg")?)))
+        .collect()
+}
+
+fn values(results: &Results, set: &SetSpec, method: &str) -> Vec<f64> {
+    by_reference(results, set, method).into_iter().map(|(_, value)| value).collect()
+}
+
+/// VPG does not depend on the reference.
+pub(crate) fn claims(results: &Results) -> Vec<Claim> {
+    let spreads: Vec<f64> = sets(results.catalogue).filter_map(|set| spread(&values(results, set, VPG))).collect();
+    let widest = spreads.iter().copied().max_by(f64::total_cmp);
+    vec![Claim {
+        text: "The panorama's directions do not depend on the choice of the reference.".to_owned(),
+        holds: widest.map(|widest| widest <= FLAT_DEG),
+        evidence: format!(
+            "Over all references of a set, VPG's GDIC differs by at most {} degrees ({FLAT_DEG} counts as flat).",
+            number(widest, 3)
+        ),
+        brief: format!("spread over references {} deg", number(widest, 3)),
+    }]
+}
+
+/// A table and a drawing per set.
+pub(crate) fn section(results: &Results) -> Section {
+    let mut section = Section::new(NAME, "T4: choice of the reference");
+    section.say(
+        "Every photograph in turn is the reference of the stitch, while GDIC is measured against one fixed photograph. The paper \
+         shows VPG flat, GSP-2D varying, GSP-3D flat but higher.",
+    );
+    section.blocks.extend(claims(results).into_iter().map(Block::Claim));
+    let columns = ["set", "method", "mean GDIC deg", "smallest", "largest", "spread"];
+    let mut table = Table::new("t4-reference", "GDIC over all references of a set, degrees.", columns);
+    for set in sets(results.catalogue) {
+        for one in METHODS {
+            let values = values(results, set, one.name);
+            table.push([
+                short_name(&set.name).to_owned(),
+                one.name.to_owned(),
+                number(mean(&values), 3),
+                number(values.iter().copied().min_by(f64::total_cmp), 3),
+                number(values.iter().copied().max_by(f64::total_cmp), 3),
+                number(spread(&values), 3),
+            ]);
+        }
+    }
+    section.blocks.push(Block::Table(table));
+    for set in sets(results.catalogue) {
+        let lines = METHODS.iter().map(|one| Series::plain(one.name, Mark::Line, by_reference(results, set, one.name)));
+        let chart = Chart::new("reference photograph", "GDIC, degrees", lines.collect());
+        section.draw(&format!("Set {}: GDIC for every reference.", short_name(&set.name)), chart.svg());
+    }
+    section
+}

@@ -1,0 +1,162 @@
+//! T3: outlier rejection and path voting under noise on the vanishing points.
+
+use trueup::Result;
+
+use super::grid::{GridRow, table};
+use super::paper_figures::NOISE;
+use crate::methods::PUBLISHED_MESH;
+use crate::report::charts::{Chart, Mark, Point, Series};
+use crate::report::document::{Block, Claim, Section, Table, number};
+use crate::results::{Results, short_name};
+use crate::sets::{Catalogue, SetSpec};
+use crate::statistics::{mean, summary};
+use crate::trial::Trial;
+
+/// The experiment's name.
+pub(crate) const NAME: &str = "robust-scheme";
+
+/// Shares of the vanishing directions that are replaced by random ones.
+const NOISE_SHARES: [f64; 3] = [0.0, 0.1, 0.2];
+
+const WITHOUT: &str = "without";
+const WITH: &str = "with";
+const DEFAULT: &str = "default";
+
+/// The gate is held open so that the scheme itself is seen, and what goes beyond the paper is off.
+const AS_PUBLISHED: [&str; 5] = [
+    "similarity.gate=paper",
+    "similarity.max_divergence=1000",
+    "similarity.max_divergence_few=1000",
+    "similarity.guided_redetection=false",
+    "similarity.joint_refinement=false",
+];
+const NO_SCHEME: [&str; 2] = ["similarity.rejection=1e9", "similarity.path_voting=false"];
+
+fn variant(scheme: &str, share: f64) -> String {
+    format!("{scheme}, {:.0} %", 100.0 * share)
+}
+
+/// Each scheme at each noise with each seed, on the study's sets and the given ones.
+pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
+    let with = [&PUBLISHED_MESH[..], &AS_PUBLISHED].concat();
+    let without = [&with[..], &NO_SCHEME].concat();
+    let schemes: [(&str, &[&str]); 3] = [(WITHOUT, &without), (WITH, &with), (DEFAULT, &[])];
+    let mut trials = Vec::new();
+    for set in catalogue.study.iter().chain(&catalogue.given) {
+        for share in NOISE_SHARES {
+            let noise = format!("vanishing.outlier_share={share}");
+            for (name, overrides) in schemes {
+                let overrides = [overrides, &[noise.as_str()]].concat();
+                for seed in 0..catalogue.seeds {
+                    trials.push(Trial { seed, ..Trial::new(NAME, &set.name, &variant(name, share), &overrides) });
+                }
+            }
+        }
+    }
+    Ok(trials)
+}
+
+/// The scheme lowers GDIC under noise.
+pub(crate) fn claims(results: &Results) -> Vec<Claim> {
+    let share = NOISE_SHARES[NOISE_SHARES.len() - 1];
+    let value = |scheme| {
+        let values = results.values_of_all(NAME, &results.catalogue.study, &variant(scheme, share), "gdic_deg");
+        mean(&values)
+    };
+    let (with, without) = (value(WITH), value(WITHOUT));
+    let evidence = format!(
+        "Mean GDIC at {:.0} % replaced vanishing points: {} degrees with the scheme, {} without, {} by default.",
+        100.0 * share,
+        number(with, 2),
+        number(without, 2),
+        number(value(DEFAULT), 2)
+    );
+    vec![Claim {
+        text: "Outlier rejection and path voting keep the panorama straight when vanishing points are wrong."
+            .to_owned(),
+        holds: with.zip(without).map(|(with, without)| with < without),
+        evidence,
+        brief: format!("robust {} < {} deg at {:.0} %", number(with, 2), number(without, 2), 100.0 * share),
+    }]
+}
+
+/// Tables and bars.
+pub(crate) fn section(results: &Results) -> Section {
+    let mut section = Section::new(NAME, "T3: the robust scheme under noise");
+    section.say(format!(
+        "Every vanishing direction of every picture is replaced by a random one with the stated probability, {} seeds each. \
+         `with` and `without` are the paper's scheme (rejection at tau, path voting psi) on the mesh as published, the gate held \
+         open; `default` is the whole method with its gate, its search for directions near the common ones and its joint \
+         refinement. Means and standard deviations over the seeds.",
+        results.catalogue.seeds
+    ));
+    section.blocks.extend(claims(results).into_iter().map(Block::Claim));
+    let sets = &results.catalogue.study;
+    for (share, paper) in NOISE_SHARES.iter().zip(&NOISE) {
+        let mut rows = grid_rows(results, sets, *share, "gdic_deg");
+        debug_assert_eq!(*share, paper.share);
+        rows.push(GridRow::paper("without", &paper.without_deg));
+        rows.push(GridRow::paper("with", &paper.with_deg));
+        let percent = 100.0 * share;
+        let caption = format!("GDIC at {percent:.0} % noise, degrees.");
+        section.blocks.push(Block::Table(table(&format!("t3-gdic-{percent:.0}"), &caption, sets, &rows)));
+    }
+    let highest = NOISE_SHARES[NOISE_SHARES.len() - 1];
+    section.draw(
+        "GDIC at 20 % noise per set: mean over the seeds, the thin lines reach one standard deviation to both sides.",
+        bars(results, sets, highest, "gdic_deg", "GDIC, degrees"),
+    );
+    section.blocks.push(Block::Table(means(results, sets, "t3-means", "Means over the study's sets.")));
+    section.draw(
+        "Error of the turns that the prior wants, at 20 % noise: the same without mesh and rectangle.",
+        bars(results, sets, highest, "theta_error_deg", "theta error, degrees"),
+    );
+    let given = &results.catalogue.given;
+    match given.is_empty() {
+        true => section.blocks.push(Block::Skipped("sets cut from panoramas: no data given".to_owned())),
+        false => {
+            let caption = format!("Means over {} given sets.", given.len());
+            section.blocks.push(Block::Table(means(results, given, "t3-given", &caption)));
+        }
+    }
+    section
+}
+
+fn grid_rows(results: &Results, sets: &[SetSpec], share: f64, measure: &str) -> Vec<GridRow> {
+    [WITHOUT, WITH, DEFAULT]
+        .map(|scheme| GridRow::measured(results, NAME, sets, (scheme, &variant(scheme, share), measure)))
+        .into()
+}
+
+fn means(results: &Results, sets: &[SetSpec], id: &str, caption: &str) -> Table {
+    let columns =
+        ["scheme", "noise", "GDIC deg", "theta error deg", "theta error, worst deg", "upright deg", "guided %"];
+    let mut table = Table::new(id, caption, columns);
+    for share in NOISE_SHARES {
+        for scheme in [WITHOUT, WITH, DEFAULT] {
+            let values = |measure| results.values_of_all(NAME, sets, &variant(scheme, share), measure);
+            let worst = values("theta_error_max_deg").into_iter().max_by(f64::total_cmp);
+            table.push([
+                scheme.to_owned(),
+                format!("{:.0} %", 100.0 * share),
+                number(mean(&values("gdic_deg")), 2),
+                number(mean(&values("theta_error_deg")), 2),
+                number(worst, 1),
+                number(mean(&values("upright_deg")), 2),
+                number(mean(&values("guided")).map(|accepted| 100.0 * accepted), 0),
+            ]);
+        }
+    }
+    table
+}
+
+fn bars(results: &Results, sets: &[SetSpec], share: f64, measure: &str, label: &str) -> String {
+    let series = [WITHOUT, WITH, DEFAULT].map(|scheme| {
+        let points = sets.iter().enumerate().filter_map(|(index, set)| {
+            let found = summary(&results.values(NAME, &set.name, &variant(scheme, share), measure))?;
+            Some(Point { x: index as f64, y: found.mean, deviation: found.deviation })
+        });
+        Series { name: scheme.to_owned(), mark: Mark::Bars, points: points.collect() }
+    });
+    Chart::new("set", label, series.into()).with_categories(sets.iter().map(|set| short_name(&set.name))).svg()
+}

@@ -1,0 +1,44 @@
+//! The `trueup-bench` command: experiments on sets with known cameras, and the table of quality.
+#![forbid(unsafe_code)]
+
+mod arguments;
+mod experiments;
+mod interrupt;
+mod measure;
+mod methods;
+mod paper;
+mod progress;
+mod quality;
+mod report;
+mod results;
+mod roc;
+mod runner;
+mod sets;
+mod statistics;
+mod store;
+mod trial;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use trueup::Error;
+
+use arguments::{Arguments, Command};
+
+fn main() -> ExitCode {
+    let outcome = match Arguments::parse().command {
+        Command::Paper(arguments) => paper::run(&arguments),
+        Command::Quality(arguments) => quality::run(&arguments),
+    };
+    match outcome {
+        Ok(status) => status,
+        Err(error) => {
+            eprintln!("trueup-bench: error: {error}");
+            match error {
+                Error::Cancelled => ExitCode::from(interrupt::STATUS_INTERRUPTED),
+                Error::Options(_) | Error::Unsupported { .. } => ExitCode::from(2),
+                _ => ExitCode::FAILURE,
+            }
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! `trueup-bench quality`: every set stitched by the `trueup` command, one committed table.
+
+mod child;
+mod discover;
+mod page;
+mod row;
+mod tables;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use trueup::{CancelToken, Error, Result};
+
+use crate::arguments::QualityArguments;
+use crate::interrupt::cancel_token;
+use crate::progress::Tracker;
+use child::{Measured, measure};
+use discover::{StitchSet, find_sets};
+use row::{QualityRow, read_rows, write_rows};
+
+/// Stitches the sets, then writes the table and its CSV file.
+///
+/// # Errors
+/// Those of finding the sets and the command, of writing; [`Error::Cancelled`]. A set that cannot be stitched is a row.
+pub(crate) fn run(arguments: &QualityArguments) -> Result<ExitCode> {
+    let cancel = cancel_token();
+    let command = find_command(arguments.trueup.as_deref())?;
+    let sets = find_sets(&arguments.truth_sets, &arguments.real, arguments.manifest.as_deref())?;
+    let csv_path = arguments.out.with_extension("csv");
+    let previous = match &arguments.previous {
+        Some(path) => read_rows(path)?,
+        None if csv_path.exists() => read_rows(&csv_path)?,
+        None => Vec::new(),
+    };
+    let scratch = Scratch::new()?;
+    let measured = measure_all(&sets, &command, &scratch.0, &cancel, arguments.quiet)?;
+    // Only now: what this process held while a child was started would count as the child's memory.
+    let rows = sets
+        .iter()
+        .zip(&measured)
+        .map(|(set, measured)| QualityRow::new(set, measured))
+        .collect::<Result<Vec<QualityRow>>>()?;
+    page::write(&arguments.out, &rows, &previous)?;
+    write_rows(&csv_path, &kept(&rows, &previous))?;
+    let stitched = rows.iter().filter(|row| row.used > 0).count();
+    println!("quality: {stitched} of {} sets stitched; {}", rows.len(), arguments.out.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+/// This run's rows, and of the previous ones those of parts that were not run.
+fn kept(rows: &[QualityRow], previous: &[QualityRow]) -> Vec<QualityRow> {
+    let skipped = |row: &&QualityRow| !rows.iter().any(|new| new.part == row.part);
+    rows.iter().chain(previous.iter().filter(skipped)).cloned().collect()
+}
+
+fn measure_all(
+    sets: &[StitchSet],
+    command: &Path,
+    scratch: &Path,
+    cancel: &CancelToken,
+    quiet: bool,
+) -> Result<Vec<Measured>> {
+    let tracker = Tracker::new("sets", sets.len() as u64, quiet);
+    let mut measured = Vec::new();
+    for (index, set) in sets.iter().enumerate() {
+        if cancel.is_cancelled() {
+            return Err(Error::Cancelled);
+        }
+        tracker.working_on(&set.title());
+        measured.push(measure(command, set, scratch, index, cancel)?);
+        tracker.advance(1);
+        tracker.finished(&set.title());
+    }
+    tracker.close();
+    Ok(measured)
+}
+
+/// The command given, or the one beside this program.
+fn find_command(given: Option<&Path>) -> Result<PathBuf> {
+    let hint = "Build it with `cargo build --release`, or name it with --trueup.";
+    let path = match given {
+        Some(path) => path.to_owned(),
+        None => {
+            let own =
+                std::env::current_exe().map_err(|error| Error::io("finding", Path::new("trueup-bench"), error))?;
+            own.with_file_name(format!("trueup{}", std::env::consts::EXE_SUFFIX))
+        }
+    };
+    if path.is_file() { Ok(path) } else { Err(Error::input(path.display(), "there is no such program", hint)) }
+}
+
+/// A folder for panoramas and records, removed in the end.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new() -> Result<Self> {
+        let path = std::env::temp_dir().join(format!("trueup-quality-{}", std::process::id()));
+        std::fs::create_dir_all(&path).map_err(|error| Error::io("making the folder", &path, error))?;
+        Ok(Self(path))
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // Nothing depends on it, and the system clears its folder of temporary files.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::discover::Part;
+    use super::*;
+
+    #[test]
+    fn parts_that_were_not_run_keep_their_figures() {
+        let row =
+            |part, set: &str, seconds| QualityRow { seconds: Some(seconds), ..QualityRow::empty(part, set, "row") };
+        let new = [row(Part::Known, "a", 1.0)];
+        let old = [row(Part::Known, "gone", 9.0), row(Part::Photographs, "b", 2.0)];
+        let kept: Vec<String> = kept(&new, &old).into_iter().map(|row| row.set).collect();
+        assert_eq!(kept, ["a", "b"]);
+    }
+}

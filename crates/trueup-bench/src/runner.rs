@@ -1,0 +1,257 @@
+//! Runs trials: set by set, sets in parallel, each photograph matched as seldom as possible.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::sync::PoisonError;
+
+use trueup::{CancelToken, Error, Inputs, MatchedPhotographs, Reference, Result, Silent, StageContext, Stitcher};
+
+use crate::measure;
+use crate::progress::Tracker;
+use crate::sets::{ReadySet, SetSpec};
+use crate::store::Store;
+use crate::trial::{Row, Trial};
+
+/// What every trial needs beside itself.
+#[derive(Debug)]
+pub(crate) struct Runner<'a> {
+    /// Folder of the sets that are made.
+    pub data: PathBuf,
+    /// Where results go.
+    pub store: &'a Store,
+    /// Version and fingerprint of the program.
+    pub version: String,
+    /// Sets that are worked on at a time.
+    pub jobs: usize,
+    /// Threads of each.
+    pub threads: usize,
+    /// Set by Ctrl-C.
+    pub cancel: &'a CancelToken,
+    /// Whether progress is kept quiet.
+    pub quiet: bool,
+}
+
+/// The trials of one set.
+type Group<'t> = (&'t SetSpec, Vec<&'t Trial>);
+
+impl Runner<'_> {
+    /// Runs what is not stored yet and returns all rows in the order of the trials.
+    ///
+    /// A trial whose photographs cannot be stitched has a row that says why; sets that cannot be made or read end the run.
+    ///
+    /// # Errors
+    /// Those of making and reading sets, of options that cannot be, of writing; [`Error::Cancelled`].
+    pub(crate) fn run(&self, sets: &[&SetSpec], trials: &[Trial]) -> Result<Vec<Row>> {
+        let mut groups: Vec<Group> = Vec::new();
+        for set in sets {
+            let members: Vec<&Trial> = trials.iter().filter(|trial| trial.set == set.name).collect();
+            if !members.is_empty() && !groups.iter().any(|(known, _)| known.name == set.name) {
+                groups.push((set, members));
+            }
+        }
+        let tracker = Tracker::new("trials", trials.len() as u64, self.quiet);
+        // The largest sets first, so that none is left over for one worker at the end.
+        groups.sort_by_key(|(set, _)| set.pictures().unwrap_or(0));
+        let queue = Mutex::new(groups);
+        let found: Mutex<BTreeMap<(String, usize), Row>> = Mutex::default();
+        let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let work = || -> Result<()> {
+            let pool = thread_pool(self.threads)?;
+            while let Some((set, members)) = next() {
+                tracker.working_on(&set.name);
+                let rows = pool.install(|| self.run_group(set, &members, &tracker))?;
+                let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
+                found.extend(rows.into_iter().enumerate().map(|(index, row)| ((set.name.clone(), index), row)));
+                tracker.finished(&set.name);
+            }
+            Ok(())
+        };
+        let outcomes: Vec<Result<()>> = std::thread::scope(|scope| {
+            let workers: Vec<_> = (0..self.jobs.max(1)).map(|_| scope.spawn(work)).collect();
+            workers
+                .into_iter()
+                .map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+                .collect()
+        });
+        tracker.close();
+        outcomes.into_iter().collect::<Result<()>>()?;
+        let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let mut position: BTreeMap<&str, usize> = BTreeMap::new();
+        let in_order = trials.iter().filter_map(|trial| {
+            let index = position.entry(&trial.set).or_default();
+            *index += 1;
+            found.remove(&(trial.set.clone(), *index - 1))
+        });
+        Ok(in_order.collect())
+    }
+
+    /// The rows of one set's trials, in their order.
+    fn run_group(&self, set: &SetSpec, trials: &[&Trial], tracker: &Tracker) -> Result<Vec<Row>> {
+        let context = StageContext::new(&Silent, self.cancel, 0);
+        let ready = set.prepare(&self.data, &context)?;
+        let mut matched: Option<(MatchingOf, Result<MatchedPhotographs>)> = None;
+        let mut rows = vec![None; trials.len()];
+        // Trials that share their matches lie side by side, so that one matching is held at a time.
+        let mut order: Vec<usize> = (0..trials.len()).collect();
+        order.sort_by_key(|&index| MatchingOf::new(trials[index]));
+        for index in order {
+            context.check_cancelled()?;
+            let trial = trials[index];
+            let key = trial.key(&ready.fingerprint, &self.version);
+            let row = match self.store.get(&key) {
+                Some(row) => row,
+                None => {
+                    let wanted = MatchingOf::new(trial);
+                    if matched.as_ref().is_none_or(|(known, _)| *known != wanted) {
+                        // The old one goes before the new one is made: both together may be large.
+                        drop(matched.take());
+                        let found = self.match_set(&ready, trial);
+                        matched = Some((wanted, found));
+                    }
+                    let outcome = match &matched {
+                        Some((_, Ok(photographs))) => self.align(&ready, photographs, trial),
+                        Some((_, Err(error))) => Err(again(error)),
+                        None => Err(Error::Cancelled),
+                    };
+                    let (measures, note) = match outcome {
+                        Ok(found) => found,
+                        Err(error @ (Error::Cancelled | Error::Options(_))) => return Err(error),
+                        Err(error) => (BTreeMap::from([("failed".to_owned(), 1.0)]), error.to_string()),
+                    };
+                    let row = Row { key, measures, note };
+                    self.store.add(row.clone())?;
+                    row
+                }
+            };
+            rows[index] = Some(row);
+            tracker.advance(1);
+        }
+        Ok(rows.into_iter().flatten().collect())
+    }
+
+    fn match_set(&self, ready: &ReadySet, trial: &Trial) -> Result<MatchedPhotographs> {
+        let unseeded = Trial { seed: 0, overrides: trial.matching_overrides(), ..trial.clone() };
+        let options = unseeded.options()?;
+        let context = StageContext::new(&Silent, self.cancel, 0);
+        Stitcher::new(&options, &context).match_photographs(&inputs_of(ready, trial))
+    }
+
+    fn align(
+        &self,
+        ready: &ReadySet,
+        photographs: &MatchedPhotographs,
+        trial: &Trial,
+    ) -> Result<(BTreeMap<String, f64>, String)> {
+        let options = trial.options()?;
+        let context = StageContext::new(&Silent, self.cancel, trial.seed);
+        let aligned = Stitcher::new(&options, &context).align_matched(photographs, &inputs_of(ready, trial))?;
+        let first = aligned.alignments.into_iter().next();
+        let project = first.ok_or_else(|| Error::input(&trial.set, "nothing was aligned", "Look at the set."))?.project;
+        let mut figures = measure::figures(&project, &ready.truth)?;
+        if trial.pixels {
+            figures.extend(measure::pixel_figures(&project, &context)?);
+        }
+        Ok((figures, project.manhattan.failed_clause.unwrap_or_default()))
+    }
+}
+
+/// What decides whether two trials can share their matches.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct MatchingOf {
+    pictures: Option<usize>,
+    overrides: Vec<String>,
+}
+
+impl MatchingOf {
+    fn new(trial: &Trial) -> Self {
+        Self { pictures: trial.pictures, overrides: trial.matching_overrides() }
+    }
+}
+
+fn inputs_of(ready: &ReadySet, trial: &Trial) -> Inputs {
+    let count = trial.pictures.unwrap_or(ready.photographs.len());
+    let mut inputs = Inputs::new(ready.photographs.iter().take(count).cloned());
+    if let Some(photograph) = trial.reference.and_then(|reference| ready.photographs.get(reference)) {
+        inputs.reference = Reference::Named(photograph.clone());
+    }
+    inputs
+}
+
+/// The same error once more, for the next trial that shares the failed matching.
+fn again(error: &Error) -> Error {
+    match error {
+        Error::Cancelled => Error::Cancelled,
+        other => Error::input("matching", other.to_string().trim_end_matches('.'), ""),
+    }
+}
+
+/// A pool of this many threads.
+///
+/// # Errors
+/// [`Error::Input`] if they cannot be started.
+pub(crate) fn thread_pool(threads: usize) -> Result<rayon::ThreadPool> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| Error::input("threads", error, "Ask for fewer with --jobs."))
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_scenes::{LightQuality, Quality, RigOptions, SceneOptions};
+
+    use super::*;
+    use crate::sets::Recipe;
+
+    fn small_set() -> SetSpec {
+        let scene = SceneOptions { seed: 3, light: LightQuality::Fast, ..SceneOptions::default() };
+        let rig = RigOptions { seed: 3, pictures: 2, width: 320, height: 240, ..RigOptions::default() };
+        SetSpec::rendered("test/small".to_owned(), Some(true), Recipe { scene, rig, quality: Quality::Preview })
+    }
+
+    #[test]
+    fn a_second_run_takes_everything_from_the_store_in_the_order_of_the_trials() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("rows.jsonl");
+        let cancel = CancelToken::default();
+        let set = small_set();
+        let trials = [
+            Trial::new("test", &set.name, "default", &[]),
+            Trial::new("test", &set.name, "small working copy", &["stitch.working_pixels=50000"]),
+            Trial { seed: 1, ..Trial::new("test", &set.name, "default", &[]) },
+        ];
+        let run = || {
+            let store = Store::open(&path, None).expect("opens");
+            let runner = Runner {
+                data: folder.path().join("data"),
+                store: &store,
+                version: "1".to_owned(),
+                jobs: 2,
+                threads: 1,
+                cancel: &cancel,
+                quiet: true,
+            };
+            runner.run(&[&set], &trials).expect("runs")
+        };
+        let (first, stored) = (run(), std::fs::read_to_string(&path).expect("rows"));
+        assert_eq!(stored.lines().count(), 3);
+        let order: Vec<(&str, u64)> = first.iter().map(|row| (row.key.variant.as_str(), row.key.seed)).collect();
+        assert_eq!(order, [("default", 0), ("small working copy", 0), ("default", 1)]);
+        assert_eq!(first[0].measure("used"), Some(2.0), "{first:?}");
+        assert_eq!(run(), first);
+        assert_eq!(std::fs::read_to_string(&path).expect("rows"), stored);
+        cancel.cancel();
+        let store = Store::open(&path, None).expect("opens");
+        let runner = Runner {
+            data: folder.path().join("data"),
+            store: &store,
+            version: "2".to_owned(),
+            jobs: 1,
+            threads: 1,
+            cancel: &cancel,
+            quiet: true,
+        };
+        assert!(matches!(runner.run(&[&set], &trials), Err(Error::Cancelled)));
+    }
+}

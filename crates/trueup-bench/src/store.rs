@@ -1,0 +1,126 @@
+//! Results on disk, one JSON object a line, written as they come: an interrupted run goes on where it stopped.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use trueup::{Error, Result};
+
+use crate::trial::{Key, Row};
+
+/// The results known so far, and the file they are appended to. Shared by all workers.
+#[derive(Debug)]
+pub(crate) struct Store {
+    path: PathBuf,
+    state: Mutex<State>,
+}
+
+#[derive(Debug)]
+struct State {
+    file: File,
+    rows: BTreeMap<Key, Row>,
+}
+
+impl Store {
+    /// Opens the file, which is made if need be, and reads what it holds. A last line that was cut off is dropped. With
+    /// `adopting` a version, rows of every version count as that one's.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the file cannot be read or written.
+    pub(crate) fn open(path: &Path, adopting: Option<&str>) -> Result<Self> {
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(error) => return Err(Error::io("reading", path, error)),
+        };
+        let mut rows: Vec<Row> = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+        if let Some(version) = adopting {
+            rows.iter_mut().for_each(|row| version.clone_into(&mut row.key.version));
+        }
+        let mut file = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(path)
+            .map_err(|error| Error::io("opening", path, error))?;
+        if !text.is_empty() && !text.ends_with('\n') {
+            file.write_all(b"\n").map_err(|error| Error::io("writing", path, error))?;
+        }
+        let rows = rows.into_iter().map(|row| (row.key.clone(), row)).collect();
+        Ok(Self { path: path.to_owned(), state: Mutex::new(State { file, rows }) })
+    }
+
+    /// The stored result of this run, if there is one.
+    pub(crate) fn get(&self, key: &Key) -> Option<Row> {
+        self.locked().rows.get(key).cloned()
+    }
+
+    /// Stores a result.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be written.
+    pub(crate) fn add(&self, row: Row) -> Result<()> {
+        let line = serde_json::to_string(&row)
+            .map_err(|error| Error::io("writing", &self.path, std::io::Error::other(error)))?;
+        let mut state = self.locked();
+        state.file.write_all((line + "\n").as_bytes()).map_err(|error| Error::io("writing", &self.path, error))?;
+        state.rows.insert(row.key.clone(), row);
+        Ok(())
+    }
+
+    fn locked(&self) -> std::sync::MutexGuard<'_, State> {
+        // A worker that panicked has at worst left its own row out.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trial::Trial;
+
+    fn row(set: &str) -> Row {
+        let key = Trial::new("test", set, "plain", &[]).key("content", "1");
+        Row { key, measures: BTreeMap::from([("gdic_deg".to_owned(), 0.5)]), note: String::new() }
+    }
+
+    #[test]
+    fn what_was_stored_is_known_after_opening_again() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("rows.jsonl");
+        let store = Store::open(&path, None).expect("opens");
+        assert_eq!(store.get(&row("01").key), None);
+        store.add(row("01")).expect("writes");
+        drop(store);
+        let again = Store::open(&path, None).expect("opens");
+        assert_eq!(again.get(&row("01").key), Some(row("01")));
+        assert_eq!(again.get(&row("02").key), None);
+    }
+
+    #[test]
+    fn rows_of_another_version_count_only_when_adopted() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("rows.jsonl");
+        Store::open(&path, None).expect("opens").add(row("01")).expect("writes");
+        let key = Key { version: "2".to_owned(), ..row("01").key };
+        assert_eq!(Store::open(&path, None).expect("opens").get(&key), None);
+        let adopted = Store::open(&path, Some("2")).expect("opens").get(&key).expect("adopted");
+        assert_eq!(adopted.measures, row("01").measures);
+    }
+
+    #[test]
+    fn a_line_that_was_cut_off_is_run_again_and_spoils_no_other() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("rows.jsonl");
+        Store::open(&path, None).expect("opens").add(row("01")).expect("writes");
+        let whole = std::fs::read_to_string(&path).expect("text");
+        std::fs::write(&path, format!("{whole}{}", &whole[..whole.len() / 2])).expect("writes");
+        let store = Store::open(&path, None).expect("opens");
+        store.add(row("02")).expect("writes");
+        drop(store);
+        let again = Store::open(&path, None).expect("opens");
+        assert_eq!(again.get(&row("01").key), Some(row("01")));
+        assert_eq!(again.get(&row("02").key), Some(row("02")));
+    }
+}

@@ -1,0 +1,163 @@
+//! One run of the stitcher on one set, and what came of it.
+
+use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use serde::{Deserialize, Serialize};
+use trueup::{Result, StitchOptions};
+
+/// What is to be run.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Trial {
+    /// The experiment it belongs to.
+    pub experiment: &'static str,
+    /// The set's name.
+    pub set: String,
+    /// Name of the options in the experiment's tables.
+    pub variant: String,
+    /// Departures from the default options, each `stage.option=value`.
+    pub overrides: Vec<String>,
+    /// Seed of everything after matching.
+    pub seed: u64,
+    /// Position of the reference photograph; `None` leaves it to the stitcher.
+    pub reference: Option<usize>,
+    /// Only the first so many photographs of the set; `None` for all.
+    pub pictures: Option<usize>,
+    /// Whether the photographs are also compared pixel by pixel.
+    pub pixels: bool,
+}
+
+impl Trial {
+    /// A run with these overrides on a whole set.
+    pub(crate) fn new(experiment: &'static str, set: &str, variant: &str, overrides: &[&str]) -> Self {
+        Self {
+            experiment,
+            set: set.to_owned(),
+            variant: variant.to_owned(),
+            overrides: overrides.iter().map(|one| (*one).to_owned()).collect(),
+            seed: 0,
+            reference: None,
+            pictures: None,
+            pixels: false,
+        }
+    }
+
+    /// The options of the run. Photographs are decoded once here, so none are kept.
+    ///
+    /// # Errors
+    /// Those of an override that does not exist or is out of range.
+    pub(crate) fn options(&self) -> Result<StitchOptions> {
+        let mut options = StitchOptions::default();
+        options.set("stitch.photograph_cache=0")?;
+        options.stitch.seed = self.seed;
+        for assignment in &self.overrides {
+            options.set(assignment)?;
+        }
+        options.validate()?;
+        Ok(options)
+    }
+
+    /// The overrides that change what is measured and matched; the others act on what was matched already.
+    pub(crate) fn matching_overrides(&self) -> Vec<String> {
+        const STAGES: [&str; 6] = ["stitch", "source", "features", "lines", "pairing", "matching"];
+        let concerns = |assignment: &&String| STAGES.iter().any(|stage| assignment.starts_with(&format!("{stage}.")));
+        self.overrides.iter().filter(concerns).cloned().collect()
+    }
+
+    /// What identifies the run. `set_fingerprint` stands for the set's content.
+    pub(crate) fn key(&self, set_fingerprint: &str, version: &str) -> Key {
+        Key {
+            experiment: self.experiment.to_owned(),
+            set: self.set.clone(),
+            variant: self.variant.clone(),
+            seed: self.seed,
+            reference: self.reference,
+            pictures: self.pictures,
+            inputs: fingerprint(&(&self.overrides, set_fingerprint)),
+            version: version.to_owned(),
+        }
+    }
+}
+
+/// What identifies a result: the same key, the same figures.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub(crate) struct Key {
+    /// [`Trial::experiment`].
+    pub experiment: String,
+    /// [`Trial::set`].
+    pub set: String,
+    /// [`Trial::variant`].
+    pub variant: String,
+    /// [`Trial::seed`].
+    pub seed: u64,
+    /// [`Trial::reference`].
+    pub reference: Option<usize>,
+    /// [`Trial::pictures`].
+    pub pictures: Option<usize>,
+    /// Fingerprint of the overrides and the set.
+    pub inputs: String,
+    /// Version and fingerprint of the program.
+    pub version: String,
+}
+
+/// A result as it is stored.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Row {
+    /// What was run.
+    #[serde(flatten)]
+    pub key: Key,
+    /// The figures by name, units in the names. What could not be measured is absent.
+    pub measures: BTreeMap<String, f64>,
+    /// Why vanishing points were not believed, or what went wrong; often empty.
+    pub note: String,
+}
+
+impl Row {
+    /// A figure, if it was measured.
+    pub(crate) fn measure(&self, name: &str) -> Option<f64> {
+        self.measures.get(name).copied()
+    }
+}
+
+/// 16 hexadecimal digits that differ wherever the value does.
+pub(crate) fn fingerprint(value: &impl Hash) -> String {
+    let mut hasher = DefaultHasher::new();
+    value.hash(&mut hasher);
+    format!("{:016x}", hasher.finish())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn overrides_reach_the_options_and_wrong_ones_are_named() {
+        let trial = Trial { seed: 7, ..Trial::new("test", "01", "loose", &["similarity.rejection=0.5"]) };
+        let options = trial.options().expect("valid");
+        assert_eq!((options.similarity.rejection, options.stitch.seed), (0.5, 7));
+        let wrong = Trial::new("test", "01", "wrong", &["similarity.rejektion=1"]);
+        assert!(wrong.options().expect_err("no such option").to_string().contains("similarity.rejektion"));
+    }
+
+    #[test]
+    fn only_early_stages_need_matching_anew() {
+        let trial = Trial::new("test", "01", "mixed", &["mesh.cell_px=20", "matching.ratio=0.7", "lines.scale=1"]);
+        assert_eq!(trial.matching_overrides(), ["matching.ratio=0.7", "lines.scale=1"]);
+    }
+
+    #[test]
+    fn the_key_changes_with_everything_that_changes_the_figures() {
+        let trial = Trial::new("test", "01", "plain", &["mesh.cell_px=20"]);
+        let key = trial.key("set", "1");
+        assert_eq!(key, trial.clone().key("set", "1"));
+        let others = [
+            trial.key("other set", "1"),
+            trial.key("set", "2"),
+            Trial { seed: 1, ..trial.clone() }.key("set", "1"),
+            Trial { reference: Some(0), ..trial.clone() }.key("set", "1"),
+            Trial { pictures: Some(2), ..trial.clone() }.key("set", "1"),
+            Trial { overrides: vec!["mesh.cell_px=21".to_owned()], ..trial }.key("set", "1"),
+        ];
+        assert!(others.iter().all(|other| *other != key));
+    }
+}
