@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &PaperArguments) -> Result<ExitCode> {
     }
     let mut rows = runner.run(&catalogue.all(), &trials)?;
     if wanted.contains(&runtime::NAME) {
-        rows.extend(runtime::run(&runner, &catalogue, &arguments.out)?);
+        rows.extend(runtime::run(&runner, &catalogue)?);
     }
     let results = Results { catalogue: &catalogue, rows };
     let claims: Vec<Claim> = experiments.iter().flat_map(|one| (one.claims)(&results)).collect();

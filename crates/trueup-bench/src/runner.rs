@@ -134,7 +134,9 @@ impl Runner<'_> {
         let unseeded = Trial { seed: 0, overrides: trial.matching_overrides(), ..trial.clone() };
         let options = unseeded.options()?;
         let context = StageContext::new(&Silent, self.cancel, 0);
-        Stitcher::new(&options, &context).match_photographs(&inputs_of(ready, trial))
+        Stitcher::new(&options, &context)
+            .match_photographs(&inputs_of(ready, trial))
+            .map(MatchedPhotographs::remembering)
     }
 
     fn align(

@@ -1,11 +1,13 @@
 //! From matches to deformed grids for one group of overlapping photographs.
 
+use std::borrow::Cow;
 use std::path::Path;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use trueup_align::cameras::{self, CameraPrior, Cameras};
 use trueup_align::full_turn::{self, FullTurnCut};
-use trueup_align::match_points;
+use trueup_align::match_points::{self, OverlapWarp};
 use trueup_align::mesh::{self, WarpedMesh};
 use trueup_align::similarity::{self, PriorInput, SimilarityPrior};
 use trueup_align::stitch_graph::GraphEdge;
@@ -19,6 +21,7 @@ use trueup_core::{Result, StageContext};
 
 use crate::clock::Clock;
 use crate::measure::Measured;
+use crate::memory::{OverlapMemory, Overlaps};
 use crate::options::StitchOptions;
 
 /// One group of overlapping photographs with everything the geometry stages need; indices are local, 0..N.
@@ -97,39 +100,33 @@ impl<'a> Component<'a> {
     }
 }
 
-/// Runs the geometry stages in their order.
+/// Runs the geometry stages in their order. With a `memory`, cameras and overlaps that it holds are not found again.
 pub(crate) fn run(
     component: &Component,
     options: &StitchOptions,
     context: &StageContext,
     clock: &mut Clock,
+    memory: Option<&OverlapMemory>,
 ) -> Result<Geometry> {
-    let names = component.names();
-    let priors = component.camera_priors();
-    let cameras = in_one_step("cameras", context, clock, || {
-        cameras::run(&priors, &names, &component.pairs, component.reference, &options.cameras, context)
-    })?;
-    let pairs: Vec<PairMatches> = (0..component.pairs.len())
-        .filter(|position| cameras.contradicting.binary_search(position).is_err())
-        .map(|position| component.pairs[position].clone())
-        .collect();
     let grids: Vec<GridMesh> = component
         .frames
         .iter()
         .map(|frame| GridMesh::regular(frame.width, frame.height, options.mesh.cell_px))
         .collect();
-    let warps = clock.time("match points", || {
-        match_points::run(&component.frames, &grids, &cameras.cameras, &pairs, &options.match_points, context)
-    })?;
-    let triads = clock.time("vanishing points", || find_triads(component, &cameras, options, context))?;
+    let overlaps = match memory {
+        None => Arc::new(find_overlaps(component, &grids, options, context, clock)?),
+        Some(memory) => recall_overlaps(memory, component, &grids, options, context, clock)?,
+    };
+    let Overlaps { cameras, pairs, warps, .. } = overlaps.as_ref();
+    let triads = clock.time("vanishing points", || find_triads(component, cameras, options, context))?;
     let prior = in_one_step("prior", context, clock, || {
         let input = PriorInput {
             cameras: &cameras.cameras,
             triads: &triads,
             lines: &component.lines,
             frames: &component.frames,
-            edges: &pairs,
-            overlaps: &warps,
+            edges: pairs,
+            overlaps: warps,
             cell_px: options.mesh.cell_px,
             vanishing: &options.vanishing,
             turn: component.reference_rotation,
@@ -140,14 +137,14 @@ pub(crate) fn run(
     let edges: Vec<GraphEdge> =
         pairs.iter().map(|pair| GraphEdge { a: pair.a, b: pair.b, weight: pair.agreeing }).collect();
     let cut = full_turn::find_cut(&cameras.cameras, &edges, &prior.level_from_world());
-    let (kept, met): (Vec<_>, Vec<_>) = match &cut {
-        None => (warps, pairs),
+    let (kept, met): (Cow<'_, [OverlapWarp]>, Vec<PairMatches>) = match &cut {
+        None => (warps.into(), pairs.clone()),
         Some(cut) => {
             report_cut(cut, component, context);
             let met = |from: usize, to: usize| cut.severed.binary_search(&(from.min(to), from.max(to))).is_err();
             (
-                warps.into_iter().filter(|warp| met(warp.from, warp.to)).collect(),
-                pairs.into_iter().filter(|pair| met(pair.a, pair.b)).collect(),
+                warps.iter().filter(|warp| met(warp.from, warp.to)).cloned().collect(),
+                pairs.iter().filter(|pair| met(pair.a, pair.b)).cloned().collect(),
             )
         }
     };
@@ -155,7 +152,55 @@ pub(crate) fn run(
     let mesh = in_one_step("mesh", context, clock, || {
         mesh::run(&grids, &kept, &bases, component.reference, &options.mesh, context)
     })?;
-    Ok(Geometry { cameras, triads, prior, mesh, met })
+    Ok(Geometry { cameras: cameras.clone(), triads, prior, mesh, met })
+}
+
+/// Cameras, the pairs that agree with them, and the grids carried across these.
+fn find_overlaps(
+    component: &Component,
+    grids: &[GridMesh],
+    options: &StitchOptions,
+    context: &StageContext,
+    clock: &mut Clock,
+) -> Result<Overlaps> {
+    let names = component.names();
+    let priors = component.camera_priors();
+    let cameras = in_one_step("cameras", context, clock, || {
+        cameras::run(&priors, &names, &component.pairs, component.reference, &options.cameras, context)
+    })?;
+    let pairs: Vec<PairMatches> = (0..component.pairs.len())
+        .filter(|position| cameras.contradicting.binary_search(position).is_err())
+        .map(|position| component.pairs[position].clone())
+        .collect();
+    let warps = clock.time("match points", || {
+        match_points::run(&component.frames, grids, &cameras.cameras, &pairs, &options.match_points, context)
+    })?;
+    Ok(Overlaps { cameras, pairs, warps, findings: Vec::new() })
+}
+
+fn recall_overlaps(
+    memory: &OverlapMemory,
+    component: &Component,
+    grids: &[GridMesh],
+    options: &StitchOptions,
+    context: &StageContext,
+    clock: &mut Clock,
+) -> Result<Arc<Overlaps>> {
+    let key = OverlapMemory::key(&component.members, component.reference, options);
+    let overlaps = match memory.recall(&key) {
+        Some(overlaps) => overlaps,
+        None => {
+            let before = context.take_diagnostics();
+            let mut overlaps = find_overlaps(component, grids, options, context, clock)?;
+            overlaps.findings = context.take_diagnostics();
+            before.into_iter().for_each(|one| context.report(one));
+            let overlaps = Arc::new(overlaps);
+            memory.keep(key, &overlaps);
+            overlaps
+        }
+    };
+    overlaps.findings.iter().for_each(|one| context.report(one.clone()));
+    Ok(overlaps)
 }
 
 /// Times a stage that is one step and reports it as such.

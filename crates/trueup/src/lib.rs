@@ -28,6 +28,7 @@ mod left_out;
 mod matched;
 mod measure;
 mod measures;
+mod memory;
 mod names;
 mod options;
 mod project;

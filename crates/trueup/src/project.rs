@@ -98,6 +98,9 @@ pub struct ManhattanRecord {
     /// deviations over all directions tried; `None` with too few lines.
     #[serde(default)]
     pub significance: Option<f64>,
+    /// Standard deviation of the vertical by asking different photographs, degrees; `None` where lines were not asked.
+    #[serde(default)]
+    pub vertical_deviation_deg: Option<f64>,
     /// Whether vanishing points guided the panorama.
     pub accepted: bool,
     /// Whether the lines of all photographs together guided it, since the photographs' own vanishing points did not agree.

@@ -22,6 +22,7 @@ use crate::left_out::LeftOut;
 use crate::matched::{Matched, no_overlap, none_usable, reason_of_rejected, require_all};
 use crate::measure;
 use crate::measures;
+use crate::memory::OverlapMemory;
 use crate::names;
 use crate::options::StitchOptions;
 use crate::project::Project;
@@ -48,6 +49,15 @@ pub struct MatchedPhotographs {
     photographs: std::sync::Arc<FilePhotographs>,
     clock: Clock,
     findings: Vec<Diagnostic>,
+    memory: Option<OverlapMemory>,
+}
+
+impl MatchedPhotographs {
+    /// Lets alignments share the cameras and overlaps that they have in common: for experiments that align the same
+    /// photographs many times. The seconds of a shared stage are counted in the first alignment alone.
+    pub fn remembering(self) -> Self {
+        Self { memory: Some(OverlapMemory::default()), ..self }
+    }
 }
 
 /// The geometry of one panorama, ready to be composed.
@@ -104,7 +114,7 @@ impl<'a> Stitcher<'a> {
         let cache_bytes = (self.options.stitch.photograph_cache * 1e6) as usize;
         let photographs = std::sync::Arc::new(FilePhotographs::new(sources.images.clone(), cache_bytes));
         let matched = self.match_all(sources, &photographs, inputs, &mut clock)?;
-        Ok(MatchedPhotographs { matched, photographs, clock, findings: self.context.take_diagnostics() })
+        Ok(MatchedPhotographs { matched, photographs, clock, findings: self.context.take_diagnostics(), memory: None })
     }
 
     /// Estimates the geometry of the panoramas that matched photographs make.
@@ -115,9 +125,9 @@ impl<'a> Stitcher<'a> {
     /// # Errors
     /// [`Error::Options`]; [`Error::Input`] when the reference does not fit the photographs, or `require_all` is not met;
     /// [`Error::Unsolvable`] when no two photographs overlap; [`Error::Cancelled`].
-    pub fn align_matched(&self, photographs: &MatchedPhotographs, inputs: &Inputs) -> Result<Aligned> {
+    pub fn align_matched(&self, set: &MatchedPhotographs, inputs: &Inputs) -> Result<Aligned> {
         self.options.validate()?;
-        let MatchedPhotographs { matched, photographs, clock, findings } = photographs;
+        let MatchedPhotographs { matched, photographs, findings, .. } = set;
         let components = self.components_to_stitch(matched, inputs)?;
         if inputs.require_all {
             require_all(matched, &components)?;
@@ -137,7 +147,7 @@ impl<'a> Stitcher<'a> {
 
         let mut alignments = Vec::new();
         for component in &components {
-            let mut alignment = self.align_component(component, &components, matched, inputs, photographs, clock)?;
+            let mut alignment = self.align_component(component, &components, set, inputs)?;
             alignment.project.diagnostics =
                 shared_diagnostics.iter().cloned().chain(self.context.take_diagnostics()).collect();
             alignments.push(alignment);
@@ -272,11 +282,10 @@ impl<'a> Stitcher<'a> {
         &self,
         members: &[usize],
         stitched: &[Vec<usize>],
-        matched: &Matched,
+        set: &MatchedPhotographs,
         inputs: &Inputs,
-        photographs: &std::sync::Arc<FilePhotographs>,
-        clock: &Clock,
     ) -> Result<Alignment> {
+        let MatchedPhotographs { matched, photographs, clock, memory, .. } = set;
         let mut clock = clock.clone();
         let reference = matched.reference_of(members, inputs)?;
         let rotation = match matched.graph_file.reference == Some(reference) {
@@ -287,7 +296,7 @@ impl<'a> Stitcher<'a> {
             Component::new(members, reference, rotation, &matched.sources.images, &matched.measured, &matched.pairs);
         let geometry = match members.len() {
             1 => None,
-            _ => Some(align::run(&component, self.options, self.context, &mut clock)?),
+            _ => Some(align::run(&component, self.options, self.context, &mut clock, memory.as_ref())?),
         };
         let placed = place(&component, geometry.as_ref());
         let layout = layout::run(placed, component.reference, &self.options.canvas, self.context)?;

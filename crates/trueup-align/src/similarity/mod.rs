@@ -117,7 +117,7 @@ trueup_core::options! {
         /// pictures agree on, and in their place where they do not agree.
         pooled_search: bool = true, Allowed::Any, "";
         /// Segments in the pooled search, shared out evenly among the pictures, the longest first.
-        max_pooled_lines: usize = 3000, between(10.0, 1e6), "segments";
+        max_pooled_lines: usize = 1200, between(10.0, 1e6), "segments";
         /// Fewer segments in all pictures together are no evidence.
         min_pooled_lines: usize = 10, between(3.0, 1e6), "segments";
         /// Largest angle between a segment and a direction for the segment to support it in the pooled search.
@@ -129,7 +129,9 @@ trueup_core::options! {
         /// How far it must stand out to guide where the pictures do not agree.
         pooled_significance: f64 = 7.0, between(0.0, 1e3), "standard deviations";
         /// Largest standard deviation of the vertical, by asking different pictures; straightening is wrong by 1 to 2 degrees.
-        max_vertical_deviation_deg: f64 = 1.0, between(0.0, 180.0), "degrees";
+        max_vertical_deviation_deg: f64 = 1.5, between(0.0, 180.0), "degrees";
+        /// The same for the pooled search in place of directions that the pictures agree on.
+        max_pooled_deviation_deg: f64 = 1.0, between(0.0, 180.0), "degrees";
         /// Whether a vertical alone may guide where the horizontal directions do not agree.
         vertical_only: bool = true, Allowed::Any, "";
         /// How far from the cameras' own vertical the segments' is sought.

@@ -207,10 +207,14 @@ impl Scene<'_> {
         let joint = has_lines && self.options.joint_refinement;
         let frame = if joint { self.refined(&dominant.frame, &axis_weights) } else { dominant.frame };
         let down = vertical_of(&frame, self.rotations);
-        if joint && self.options.gate == GateMode::Full {
+        if joint {
             let deviation = self.vote.axis_deviations(&frame, &axis_weights, self.options)[frame.tr_mul(&down).iamax()];
             guidance.vertical_deviation = Some(deviation).filter(|deviation| deviation.is_finite());
-            let allowed = self.options.max_vertical_deviation_deg;
+            let allowed = match guidance.pooled {
+                true => self.options.max_pooled_deviation_deg,
+                false if self.options.gate == GateMode::Paper => f64::INFINITY,
+                false => self.options.max_vertical_deviation_deg,
+            };
             if deviation.to_degrees() > allowed {
                 guidance.pooled = false;
                 guidance.failed_clause = Some(format!(
