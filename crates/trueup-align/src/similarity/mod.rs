@@ -17,6 +17,8 @@ mod vpg;
 mod weighted_solve;
 
 #[cfg(test)]
+mod pooled_tests;
+#[cfg(test)]
 pub(crate) mod synthetic;
 #[cfg(test)]
 mod tests;

@@ -128,6 +128,12 @@ fn upright(project: &Project) -> String {
     let trusted = format!("up to {} is trusted", manhattan.threshold);
     let divergence = manhattan.divergence.map(|divergence| format!("divergence {divergence:.3}, {trusted}"));
     match (manhattan.accepted, &manhattan.failed_clause) {
+        (true, _) if manhattan.pooled => format!(
+            "guided by the lines of all photographs together{}",
+            manhattan
+                .vertical_deviation_deg
+                .map_or(String::new(), |deviation| format!(", certain to {deviation:.1} degrees"))
+        ),
         (true, _) => format!(
             "guided by vanishing points ({}; {} of {} pictures agree)",
             divergence.unwrap_or(trusted),

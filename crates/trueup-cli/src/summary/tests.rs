@@ -59,6 +59,14 @@ fn the_long_summary_adds_pictures_pairs_notes_and_stages() {
 }
 
 #[test]
+fn guidance_by_all_lines_together_says_how_certain_it_is() {
+    let mut project = project();
+    project.manhattan.pooled = true;
+    project.manhattan.vertical_deviation_deg = Some(0.34);
+    assert_eq!(upright(&project), "guided by the lines of all photographs together, certain to 0.3 degrees");
+}
+
+#[test]
 fn refused_guidance_is_explained_with_its_numbers() {
     let mut project = project();
     project.manhattan.accepted = false;

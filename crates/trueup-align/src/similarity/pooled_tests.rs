@@ -1,0 +1,76 @@
+//! Tests of what the segments of all pictures say together.
+
+use trueup_core::camera::Camera;
+use trueup_core::geometry::rotation_about_z;
+
+use super::SimilarityOptions;
+use super::joint::LineVote;
+use super::synthetic::{Scene, Sweep, World};
+use super::tests::{missing, with_lines};
+use crate::vanishing::{InterpretationPlanes, VanishingOptions};
+
+fn max(values: &[f64]) -> f64 {
+    values.iter().copied().fold(0.0, f64::max)
+}
+
+/// Eight pictures of 60 segments each, none with vanishing directions of its own.
+fn without_triads(per_direction: usize, clutter: usize) -> Scene {
+    let mut scene = with_lines(Scene::new(Sweep::default(), World::Random, 0.0, 12), clutter, 0.5);
+    scene.triads = vec![missing(); scene.triads.len()];
+    for lines in &mut scene.lines {
+        // `with_lines` draws 20 along each axis, the clutter after them.
+        for axis in (0..3).rev() {
+            lines.drain(20 * axis + per_direction..20 * (axis + 1));
+        }
+    }
+    scene
+}
+
+#[test]
+fn the_segments_of_all_pictures_guide_where_no_picture_has_directions() {
+    let scene = without_triads(6, 30);
+    let prior = scene.prior(&SimilarityOptions::default());
+    assert!(prior.guidance.used && prior.guidance.pooled && !prior.guidance.vertical_only);
+    assert!(max(&scene.errors_deg(&prior)) < 0.2, "{:?}", scene.errors_deg(&prior));
+    assert!(prior.guidance.vertical_deviation.is_some_and(|deviation| deviation < 0.2_f64.to_radians()));
+    let alone = SimilarityOptions { pooled_search: false, vertical_only: false, ..SimilarityOptions::default() };
+    assert!(!scene.prior(&alone).guidance.used);
+}
+
+#[test]
+fn clutter_stands_out_nowhere() {
+    for clutter in [5, 20, 60] {
+        let scene = without_triads(0, clutter);
+        let guidance = scene.prior(&SimilarityOptions::default()).guidance;
+        let options = SimilarityOptions::default();
+        assert!(!guidance.used && guidance.significance.is_some_and(|figure| figure < options.pooled_significance));
+    }
+}
+
+#[test]
+fn pictures_that_contradict_each_other_leave_the_vertical_uncertain() {
+    let mut scene = with_lines(Scene::new(Sweep::default(), World::Random, 0.0, 11), 0, 0.3);
+    let deviation = |scene: &Scene| {
+        let planes = |k: usize| {
+            let (focal_px, frame) = (scene.cameras[k].focal_px, &scene.frames[k]);
+            InterpretationPlanes::new(&scene.lines[k], focal_px, frame, &VanishingOptions::default())
+        };
+        let rotations: Vec<_> = scene.cameras.iter().map(Camera::rotation).collect();
+        let focals: Vec<f64> = scene.cameras.iter().map(|camera| camera.focal_px).collect();
+        let vote = LineVote::new(&rotations, &focals, (0..rotations.len()).map(planes).collect());
+        let options = SimilarityOptions::default();
+        // The true frame in the cameras' world.
+        let frame = rotations[0].transpose() * scene.world_from_camera[0].transpose();
+        vote.axis_deviations(&vote.refine_frame(&frame, &[1.0; 3], &options), &[1.0; 3], &options)[1]
+    };
+    let agreed = deviation(&scene);
+    assert!(agreed < 0.1_f64.to_radians(), "{agreed}");
+    // Half of the cameras are told to be rolled by two degrees more than they are.
+    for k in (0..scene.cameras.len()).step_by(2) {
+        let turned = rotation_about_z(2_f64.to_radians()) * scene.cameras[k].rotation();
+        scene.cameras[k].set_rotation(&turned);
+    }
+    assert!(deviation(&scene) > 2.0 * agreed, "{} and {agreed}", deviation(&scene));
+    scene.cameras.truncate(1);
+    assert!(deviation(&scene).is_infinite());
+}
