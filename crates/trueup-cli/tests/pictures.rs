@@ -34,7 +34,8 @@ pub fn room() -> &'static [Vec<u8>] {
 }
 
 fn photograph_scene(kind: SceneKind, seed: u64, pictures: usize) -> Vec<Vec<u8>> {
-    let scene = Scene::new(&SceneOptions { kind, seed, light: LightQuality::Fast }).expect("a valid scene");
+    let scene = Scene::new(&SceneOptions { kind, seed, light: LightQuality::Fast, ..SceneOptions::default() })
+        .expect("a valid scene");
     let cameras = cameras(&scene, seed, pictures);
     cameras.iter().map(|camera| render(&scene, camera, Quality::Preview).data().to_vec()).collect()
 }
@@ -47,10 +48,11 @@ fn cameras(scene: &Scene, seed: u64, pictures: usize) -> Vec<PosedCamera> {
 /// The truth of the street's photographs, as JSON.
 pub fn street_truth() -> String {
     let (kind, seed) = STREET;
-    let scene = Scene::new(&SceneOptions { kind, seed, light: LightQuality::Fast }).expect("a valid scene");
+    let scene = Scene::new(&SceneOptions { kind, seed, light: LightQuality::Fast, ..SceneOptions::default() })
+        .expect("a valid scene");
     let cameras = cameras(&scene, seed, STREET_NAMES.len());
     let images = cameras.iter().zip(STREET_NAMES).map(|(camera, name)| truth_of(camera, name.to_owned())).collect();
-    serde_json::to_string(&trueup::Truth { source: "a street".to_owned(), images }).expect("serialisable")
+    serde_json::to_string(&trueup::Truth { source: "a street".to_owned(), images, level: None }).expect("serialisable")
 }
 
 /// Kind and seed of the street.

@@ -33,7 +33,11 @@ fn truth(gammas: [f64; 2]) -> Truth {
         centre: None,
         depth: None,
     };
-    Truth { source: "test set".to_owned(), images: vec![image("a.jpg", gammas[0]), image("b.jpg", gammas[1])] }
+    Truth {
+        source: "test set".to_owned(),
+        images: vec![image("a.jpg", gammas[0]), image("b.jpg", gammas[1])],
+        level: None,
+    }
 }
 
 /// Turned by 3 and -1 degrees where 2 and 1 stand upright: off by 1 and -2, so 1.5 on average and 3 between them.
