@@ -23,7 +23,7 @@ pub(super) struct QualityRow {
     pub used: usize,
     /// Photographs in the folder.
     pub given: usize,
-    /// `yes`, `vertical only`, `no`, or `-` without a panorama.
+    /// `yes`, `all lines` (of all pictures together), `vertical only`, `no`, or `-` without a panorama.
     pub guided: String,
     /// Vanishing point divergence.
     pub divergence: Option<f64>,
@@ -202,6 +202,7 @@ impl QualityRow {
 fn guided(project: &Project) -> &'static str {
     match (project.manhattan.accepted, &project.manhattan.failed_clause) {
         (true, None) => "yes",
+        (true, Some(_)) if project.manhattan.pooled => "all lines",
         (true, Some(_)) => "vertical only",
         (false, _) => "no",
     }

@@ -42,7 +42,8 @@ pub(super) fn medians(part: Part, rows: &[QualityRow], previous: &[QualityRow]) 
     }
     for kind in kinds {
         let (new, old) = (of_kind(rows, kind), of_kind(previous, kind));
-        let guided = new.iter().filter(|row| ["yes", "vertical only"].contains(&row.guided.as_str())).count();
+        let guided =
+            new.iter().filter(|row| ["yes", "all lines", "vertical only"].contains(&row.guided.as_str())).count();
         let totals = format!(
             "{}/{}",
             new.iter().map(|row| row.used).sum::<usize>(),
