@@ -62,11 +62,14 @@ pub fn bases(shape: BaseShape, cameras: &[Camera], grids: &[GridMesh], prior: &S
 fn tilt_from_level(cameras: &[Camera], grids: &[GridMesh], level_from_world: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     /// Radians, 40 degrees.
     const STEEP: f64 = 0.7;
+    /// Length of the mean direction below which the pictures look all round and have none.
+    const ONE_WAY: f64 = 0.5;
     let view = |k: usize| SphereView::new(BaseShape::Sphere, &cameras[k], level_from_world);
     let forward: Vector3<f64> = (0..cameras.len()).map(|k| view(k).forward).sum();
     let pitch = forward.y.atan2(forward.z);
     let reaches_pole = (0..cameras.len()).any(|k| !view(k).is_moderate_all_over(&grids[k]));
-    (reaches_pole && pitch.abs() > STEEP).then(|| rotation_about_x(pitch))
+    let one_way = forward.norm() >= ONE_WAY * cameras.len() as f64;
+    (reaches_pole && one_way && pitch.abs() > STEEP).then(|| rotation_about_x(pitch))
 }
 
 /// The base of one picture: a smooth map from its pixels to panorama units, up to translation.
@@ -221,6 +224,21 @@ mod tests {
             let moved = by_x * down.x + by_y * down.y;
             assert!((moved.x / moved.y).abs() < 1e-4, "{shape:?}: {moved}");
         }
+    }
+
+    /// A full turn that looks up a little has its mean direction near the pole without looking there.
+    #[test]
+    fn only_pictures_that_look_one_way_are_tilted_level() {
+        let tilt = |cameras: &[Camera]| {
+            let grids = vec![GridMesh::regular(800.0, 600.0, 40.0); cameras.len()];
+            tilt_from_level(cameras, &grids, &Matrix3::identity())
+        };
+        let turn: Vec<Camera> =
+            (0..12).map(|k| camera(f64::from(k) * std::f64::consts::TAU / 12.0, 0.9, 0.0)).collect();
+        assert!(tilt(&turn[..1]).is_some());
+        let lower: Vec<Camera> =
+            (0..12).map(|k| camera(f64::from(k) * std::f64::consts::TAU / 12.0, -0.5, 0.0)).collect();
+        assert!(tilt(&[turn, lower].concat()).is_none());
     }
 
     #[test]
