@@ -18,10 +18,16 @@ trueup_core::choice! {
         Sphere = "sphere",
         /// The picture on the level sphere, unrolled so that shapes stay similar everywhere (Mercator).
         Mercator = "mercator",
+        /// The picture on the level sphere, unrolled between the two (Miller): the Mercator projection of four fifths of
+        /// the latitude, stretched by five fourths. Steep pictures grow less than Mercator's.
+        Miller = "miller",
         /// A similarity of the whole picture, as published.
         Similarity = "similarity",
     }
 }
+
+/// Share of the latitude in the Miller projection.
+const MILLER: f64 = 0.8;
 
 /// What the prior wants of one picture.
 #[derive(Debug, Clone, Copy)]
@@ -36,9 +42,12 @@ struct WantedSimilarity {
 
 /// The bases of all pictures under a similarity prior.
 ///
+/// `cameras` are those that the prior was made from; the bases follow them as the prior's lines correct them.
+///
 /// Where the pictures together look more than 40 degrees up or down and reach the pole, the sphere is tilted so that
 /// their mean direction is level: verticals then converge as they do for the eye, and nothing is torn.
 pub fn bases(shape: BaseShape, cameras: &[Camera], grids: &[GridMesh], prior: &SimilarityPrior) -> Vec<Base> {
+    let cameras = &prior.corrected_cameras(cameras);
     let scaled_focal: f64 = cameras.iter().zip(&prior.scale).map(|(camera, scale)| camera.focal_px * scale).sum();
     let units_per_radian = scaled_focal / cameras.len().max(1) as f64;
     let level_from_world = prior.level_from_world();
@@ -173,6 +182,7 @@ impl SphereView {
         let longitude = (ray.x * forward.z - ray.z * forward.x).atan2(ray.x * forward.x + ray.z * forward.z);
         let latitude = match self.shape {
             BaseShape::Mercator => (ray.y / horizontal).asinh(),
+            BaseShape::Miller => (MILLER * ray.y.atan2(horizontal)).tan().asinh() / MILLER,
             _ => ray.y.atan2(horizontal),
         };
         Vector2::new(longitude, latitude)
@@ -187,6 +197,8 @@ fn derivative_at_centre(shape: BaseShape, level_from_camera: &Matrix3<f64>, foca
     let south = forward.cross(&east);
     let (east_scale, south_scale) = match shape {
         BaseShape::Mercator => (1.0 / horizontal, 1.0 / horizontal),
+        // Down is positive, so forward.y is the sine of the latitude.
+        BaseShape::Miller => (1.0 / horizontal, 1.0 / (MILLER * forward.y.atan2(horizontal)).cos()),
         _ => (1.0 / horizontal, 1.0),
     };
     let derivative = |axis: usize| {
@@ -212,7 +224,7 @@ mod tests {
     #[test]
     fn a_picture_turned_by_its_roll_stands_upright_at_the_centre() {
         let grid = GridMesh::regular(800.0, 600.0, 2.0);
-        for shape in [BaseShape::Sphere, BaseShape::Mercator] {
+        for shape in [BaseShape::Sphere, BaseShape::Mercator, BaseShape::Miller] {
             let camera = camera(0.7, -0.4, 0.2);
             let wanted = WantedSimilarity { scale: 1.0, theta: 0.2, units_per_radian: 700.0 };
             let base = Base::new(shape, &camera, &grid, &Matrix3::identity(), wanted).places(&grid);

@@ -29,7 +29,7 @@ trueup_core::options! {
         /// Largest side of a grid cell.
         cell_px: f64 = 40.0, between(4.0, 1000.0), "working px";
         /// The shape that the similarity prior asks of each picture.
-        base: BaseShape = BaseShape::Mercator, Allowed::Any, "";
+        base: BaseShape = BaseShape::Miller, Allowed::Any, "";
         /// Cells of the delivered grid per cell of the solved one, along each axis: the finer grid follows the base's
         /// curves between the solved vertices.
         subdivision: usize = 2, between(1.0, 16.0), "";

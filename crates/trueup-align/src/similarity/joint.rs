@@ -97,6 +97,11 @@ impl LineVote {
         self.refine_frame_without(None, start, axis_weights, scales(options), options)
     }
 
+    fn mean_weight(&self) -> f64 {
+        let segments: usize = self.pictures.iter().map(|picture| picture.planes.len()).sum();
+        self.total_weight() / segments.max(1) as f64
+    }
+
     /// Standard deviation in radians, by a delete-a-group jackknife over the pictures, of each axis (a column) of a frame
     /// that [`Self::refine_frame`] found: how much it depends on which pictures are asked. Infinite for a single picture.
     ///
@@ -155,6 +160,30 @@ impl LineVote {
         frame
     }
 
+    /// Normal matrix and gradient, in px^2 per rad^2 and px^2 per rad, of the squared residuals of picture `index` under a
+    /// small turn in the common frame, for the camera `rotation` in place of the picture's own. Segments weigh 1 on
+    /// average, times the robust loss of `scale` pixels and their axis' weight.
+    pub fn turn_equations(
+        &self,
+        index: usize,
+        rotation: &Matrix3<f64>,
+        frame: &Matrix3<f64>,
+        axis_weights: &[f64; 3],
+        scale: f64,
+        options: &SimilarityOptions,
+    ) -> (Matrix3<f64>, Vector3<f64>) {
+        let (mut matrix, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
+        let picture = &self.pictures[index];
+        let mean = self.mean_weight();
+        picture.for_each_supporter(rotation, frame, 3, scale, options, |axis, moment, residual, weight, reach| {
+            let jacobian = frame.column(axis).cross(&moment) / reach;
+            let weight = weight * axis_weights[axis] / mean;
+            matrix += jacobian * jacobian.transpose() * weight;
+            gradient += jacobian * (weight * residual);
+        });
+        (matrix, gradient)
+    }
+
     /// Refines one direction of the common frame alone, over the sphere.
     pub fn refine_direction(&self, start: &Vector3<f64>, options: &SimilarityOptions) -> Vector3<f64> {
         let mut direction = *start;
@@ -194,21 +223,9 @@ impl LineVote {
         asked: impl Fn(usize) -> bool,
         mut visit: impl FnMut(usize, Vector3<f64>, f64, f64, f64),
     ) {
-        let widest = options.joint_tolerance_deg.to_radians().sin();
         for (index, picture) in self.pictures.iter().enumerate() {
-            if !asked(index) {
-                continue;
-            }
-            let axes = picture.rotation * frame;
-            for line in 0..picture.planes.len() {
-                let Some((axis, residual, reach)) = picture.nearest_axis(&axes, axes_used, line) else { continue };
-                if residual.abs() * 2.0 > widest * picture.planes.lengths[line] {
-                    continue;
-                }
-                // Geman-McClure.
-                let robust = 1.0 / (1.0 + (residual / scale).powi(2)).powi(2);
-                let moment = picture.rotation.tr_mul(&picture.planes.moments[line]);
-                visit(axis, moment, residual, picture.planes.weights[line] * robust, reach);
+            if asked(index) {
+                picture.for_each_supporter(&picture.rotation, frame, axes_used, scale, options, &mut visit);
             }
         }
     }
@@ -241,6 +258,30 @@ impl PictureLines {
         best
     }
 
+    /// [`LineVote::for_each_supporter`] of one picture, for a camera of this rotation.
+    fn for_each_supporter(
+        &self,
+        rotation: &Matrix3<f64>,
+        frame: &Matrix3<f64>,
+        axes_used: usize,
+        scale: f64,
+        options: &SimilarityOptions,
+        mut visit: impl FnMut(usize, Vector3<f64>, f64, f64, f64),
+    ) {
+        let widest = options.joint_tolerance_deg.to_radians().sin();
+        let axes = rotation * frame;
+        for line in 0..self.planes.len() {
+            let Some((axis, residual, reach)) = self.nearest_axis(&axes, axes_used, line) else { continue };
+            if residual.abs() * 2.0 > widest * self.planes.lengths[line] {
+                continue;
+            }
+            // Geman-McClure.
+            let robust = 1.0 / (1.0 + (residual / scale).powi(2)).powi(2);
+            let moment = rotation.tr_mul(&self.planes.moments[line]);
+            visit(axis, moment, residual, self.planes.weights[line] * robust, reach);
+        }
+    }
+
     fn reach(&self, direction: &Vector3<f64>, line: usize) -> f64 {
         2.0 * (direction.xy() * self.focal_px - self.planes.midpoints[line] * direction.z).norm()
     }
@@ -261,7 +302,7 @@ impl PictureLines {
 }
 
 /// The scales of the loss in pixels, from coarse to fine.
-fn scales(options: &SimilarityOptions) -> impl Iterator<Item = f64> {
+pub(super) fn scales(options: &SimilarityOptions) -> impl Iterator<Item = f64> {
     let last = options.joint_scale_px;
     let steps = (options.joint_start_scale_px / last).max(1.0).ln() / -SHRINK.ln();
     let steps = steps.ceil() as i32;

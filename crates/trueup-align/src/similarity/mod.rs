@@ -2,6 +2,7 @@
 //!
 //! One file a prior; all share straightening, scales and the least squares over unit vectors.
 
+mod camera_correction;
 mod dominant;
 mod edge_range;
 mod frame_search;
@@ -115,6 +116,13 @@ trueup_core::options! {
         /// Root mean square misorientation of the pictures' directions that is detection noise; beyond, the horizontal
         /// directions lose weight in the joint refinement.
         ordinary_misorientation_deg: f64 = 1.0, between(0.01, 90.0), "degrees";
+        /// Whether each camera is turned so that its own segments point to the common directions, as far as its overlaps
+        /// allow.
+        camera_correction: bool = true, Allowed::Any, "";
+        /// What the segments of one picture together leave uncertain, as if each erred alone by this much.
+        line_error_px: f64 = 0.5, between(0.01, 1000.0), "working px";
+        /// Least error of an overlap's relative rotation; where the matches show parallax, that counts.
+        min_overlap_error_px: f64 = 0.1, between(0.01, 1000.0), "working px";
         /// Whether the segments of all pictures are searched together for one frame: to confirm the directions that the
         /// pictures agree on, and in their place where they do not agree.
         pooled_search: bool = true, Allowed::Any, "";
@@ -225,7 +233,10 @@ pub struct SimilarityPrior {
     pub guidance: Guidance,
     /// Rows of the rotation that takes the cameras' world to a level one: y down, the mean viewing direction above z.
     pub level_from_world: [[f64; 3]; 3],
-    /// Roll rho_i in radians of each camera in the level world: the turn that stands it upright.
+    /// Per picture the rows of the rotation from the cameras' world to the camera as its own segments correct it; the
+    /// rotation given where nothing does.
+    pub camera_from_world: Vec<[[f64; 3]; 3]>,
+    /// Roll rho_i in radians of each of these cameras in the level world: the turn that stands it upright.
     pub roll: Vec<f64>,
 }
 
@@ -233,6 +244,12 @@ impl SimilarityPrior {
     /// The rotation that levels the cameras' world.
     pub fn level_from_world(&self) -> Matrix3<f64> {
         matrix_from_rows(&self.level_from_world)
+    }
+
+    /// The cameras as the segments correct them: `cameras` must be those that the prior was made from.
+    pub fn corrected_cameras(&self, cameras: &[Camera]) -> Vec<Camera> {
+        let corrected = |(camera, &camera_from_world): (&Camera, _)| Camera { camera_from_world, ..*camera };
+        cameras.iter().zip(&self.camera_from_world).map(corrected).collect()
     }
 }
 
@@ -276,7 +293,8 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
         scale: scale::scales(input.edges, &focals),
         guidance,
         level_from_world: rows_of(&level_from_world),
-        roll: rolls(&guided.down, &rotations),
+        roll: rolls(&guided.down, &guided.rotations),
+        camera_from_world: guided.rotations.iter().map(rows_of).collect(),
     })
 }
 
@@ -286,6 +304,8 @@ struct Upright {
     down: Vector3<f64>,
     /// Turns in radians.
     theta: Vec<f64>,
+    /// The cameras' rotations, as far as lines correct them.
+    rotations: Vec<Matrix3<f64>>,
 }
 
 /// The roll of each camera for a vertical in their world.
@@ -296,7 +316,7 @@ fn rolls(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> Vec<f64> {
 /// Straightened cameras, corrected where an overlap contradicts them.
 fn fallback(input: &PriorInput<'_>, rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> Upright {
     let theta = edge_range::correct_by_edges(input, &rolls(down, rotations));
-    Upright { down: *down, theta }
+    Upright { down: *down, theta, rotations: rotations.to_vec() }
 }
 
 fn check(input: &PriorInput<'_>) -> Result<()> {

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use trueup_core::geometry::{rows_of, wrap_angle};
 use trueup_core::{Result, StageContext};
 
+use super::camera_correction::{corrected_rotations, relative_certainties};
 use super::dominant::{Dominant, dominant_frame};
 use super::frame_search::{PooledFrame, search_frame};
 use super::gate::{GateEvidence, allowed_divergence, divergence, failed_clause};
@@ -92,6 +93,8 @@ pub(super) fn guide(
     context.check_cancelled()?;
     let accepted = match guidance.failed_clause {
         None => dominant,
+        // The published gate knows no other frame than the one that the pictures agree on.
+        Some(_) if options.gate == GateMode::Paper => None,
         Some(_) => pooled.and_then(|pooled| scene.pooled(&pooled, straightened, &mut guidance)),
     };
     if let Some(dominant) = accepted {
@@ -226,8 +229,18 @@ impl Scene<'_> {
         }
         guidance.dominant = Some(rows_of(&frame));
         guidance.used = true;
-        let own = if joint { self.common_rolls(&down) } else { self.own_rolls(&frame, &down, &guidance.inliers) };
-        self.solve(&down, &own, guidance)
+        let rotations = match joint && self.options.camera_correction {
+            true => self.corrected(&frame, &axis_weights),
+            false => self.rotations.to_vec(),
+        };
+        let own =
+            if joint { common_rolls(&down, &rotations) } else { self.own_rolls(&frame, &down, &guidance.inliers) };
+        self.solve(&down, &own, &rotations, guidance)
+    }
+
+    fn corrected(&self, frame: &Matrix3<f64>, axis_weights: &[f64; 3]) -> Vec<Matrix3<f64>> {
+        let certainties = relative_certainties(self.input.cameras, self.input.edges, self.options);
+        corrected_rotations(self.rotations, &certainties, &self.vote, frame, axis_weights, self.options)
     }
 
     /// Full weight for the vertical; for the horizontals as much as the pictures' directions agree: where buildings
@@ -256,13 +269,8 @@ impl Scene<'_> {
     fn solve_vertical(&self, down: &Vector3<f64>, guidance: &mut Guidance) -> Option<Upright> {
         guidance.used = true;
         guidance.vertical_only = true;
-        let own = self.common_rolls(down);
-        self.solve(down, &own, guidance)
-    }
-
-    /// Each picture's roll by the common vertical: after the joint refinement no picture's own segments know better.
-    fn common_rolls(&self, down: &Vector3<f64>) -> Vec<Option<f64>> {
-        self.rotations.iter().map(|rotation| roll_of(&(rotation * down))).collect()
+        let own = common_rolls(down, self.rotations);
+        self.solve(down, &own, self.rotations, guidance)
     }
 
     /// Searches pictures that disagree, or have no triad, again near the dominant directions.
@@ -291,8 +299,14 @@ impl Scene<'_> {
     }
 
     /// The paper's weighted least squares: own rolls against relative rolls.
-    fn solve(&self, down: &Vector3<f64>, own: &[Option<f64>], guidance: &mut Guidance) -> Option<Upright> {
-        let predicted = rolls(down, self.rotations);
+    fn solve(
+        &self,
+        down: &Vector3<f64>,
+        own: &[Option<f64>],
+        rotations: &[Matrix3<f64>],
+        guidance: &mut Guidance,
+    ) -> Option<Upright> {
+        let predicted = rolls(down, rotations);
         let turns: Vec<(usize, usize, f64)> =
             self.input.edges.iter().map(|edge| self.turn(edge.a, edge.b, &predicted)).collect();
         let mut neighbours = vec![Vec::new(); own.len()];
@@ -323,7 +337,7 @@ impl Scene<'_> {
             // Some picture has neither a roll of its own nor a neighbour.
             None => predicted,
         };
-        Some(Upright { down: *down, theta })
+        Some(Upright { down: *down, theta, rotations: rotations.to_vec() })
     }
 
     /// (i, j, beta_ij) of an edge, beta_ij predicting theta_j - theta_i.
@@ -341,6 +355,11 @@ impl Scene<'_> {
         };
         (i, j, beta)
     }
+}
+
+/// Each picture's roll by the common vertical: after the joint refinement no picture's own triad knows better.
+fn common_rolls(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> Vec<Option<f64>> {
+    rotations.iter().map(|rotation| roll_of(&(rotation * down))).collect()
 }
 
 fn angle_of(vector: &[f64; 2], otherwise: f64) -> f64 {

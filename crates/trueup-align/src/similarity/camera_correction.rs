@@ -1,0 +1,267 @@
+//! What the segments of a picture say against its camera: turns of single cameras.
+//!
+//! With parallax the matches of an overlap turn cameras by a fraction of a degree, a little differently at every overlap.
+//! The vertical and horizontal segments of a picture feel no parallax. Once the scene's frame is known, every camera is
+//! turned so that its own segments point to the frame's directions, as far as its overlaps allow: both are weighed by
+//! what they leave uncertain.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
+use trueup_core::camera::Camera;
+use trueup_core::geometry::{exp_rotation, nearest_rotation};
+use trueup_core::matches::PairMatches;
+
+use super::SimilarityOptions;
+use super::joint::{LineVote, scales};
+
+/// Where there is parallax, a relative rotation absorbs most of it: the mean of the reciprocal depths of an overlap, which
+/// acts like a rotation about the picture's axes, is several times their spread, which is what remains to be seen.
+const ABSORBED_ACROSS: f64 = 4.0;
+/// The same for the rotation about the viewing direction, which parallax resembles less.
+const ABSORBED_ALONG: f64 = 1.5;
+
+/// Information, 1 / rad^2, that holds the common turn: a standard deviation of a ten-thousandth of a degree.
+const COMMON_TURN_INFORMATION: f64 = 3e11;
+
+/// How sure an overlap is of the relative rotation of two cameras.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RelativeCertainty {
+    pub i: usize,
+    pub j: usize,
+    /// Inverse covariance of the relative rotation in the common frame, 1 / rad^2.
+    pub information: Matrix3<f64>,
+}
+
+/// The certainty of every overlap from how its matches deviate from where the cameras put them.
+///
+/// Independent errors of matches average out; parallax moves whole regions together and is all the more wrong about the
+/// rotation for it.
+pub(super) fn relative_certainties(
+    cameras: &[Camera],
+    edges: &[PairMatches],
+    options: &SimilarityOptions,
+) -> Vec<RelativeCertainty> {
+    edges
+        .iter()
+        .map(|edge| {
+            let (a, b) = (&cameras[edge.a], &cameras[edge.b]);
+            let Variance { noise, parallax } = Deviations::of(a, b, edge).variance();
+            let focal_px = 0.5 * (a.focal_px + b.focal_px);
+            let about = |absorbed: f64| {
+                let variance = noise + absorbed.powi(2) * parallax;
+                focal_px.powi(2) / variance.max(options.min_overlap_error_px.powi(2))
+            };
+            let in_camera = Vector3::new(about(ABSORBED_ACROSS), about(ABSORBED_ACROSS), about(ABSORBED_ALONG));
+            let rotation = a.rotation();
+            let information = rotation.tr_mul(&Matrix3::from_diagonal(&in_camera)) * rotation;
+            RelativeCertainty { i: edge.a, j: edge.b, information }
+        })
+        .collect()
+}
+
+/// Mean squared deviations of an overlap, in square pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Variance {
+    /// What independent errors of the matches leave in their mean.
+    noise: f64,
+    /// What whole regions deviate by together.
+    parallax: f64,
+}
+
+/// The deviations of an overlap's matches from the cameras, summed per region of the first picture.
+struct Deviations {
+    /// Number and sum of the deviations of every region.
+    regions: Vec<(usize, Vector2<f64>)>,
+    /// Sum of all squared deviations.
+    squares: f64,
+}
+
+impl Deviations {
+    /// Regions along each side of a picture.
+    const REGIONS: usize = 8;
+
+    fn of(a: &Camera, b: &Camera, edge: &PairMatches) -> Self {
+        let region = |position: f64, middle: f64| {
+            (position / (2.0 * middle) * Self::REGIONS as f64).clamp(0.0, (Self::REGIONS - 1) as f64) as usize
+        };
+        let mut deviations = Self { regions: vec![(0, Vector2::zeros()); Self::REGIONS * Self::REGIONS], squares: 0.0 };
+        for one in &edge.inliers {
+            let Some(place) = a.transfer(b, Vector2::from(one.in_a)) else { continue };
+            let deviation = Vector2::from(one.in_b) - place;
+            let (column, row) = (region(one.in_a[0], a.principal_point[0]), region(one.in_a[1], a.principal_point[1]));
+            let (count, sum) = &mut deviations.regions[row * Self::REGIONS + column];
+            *count += 1;
+            *sum += deviation;
+            deviations.squares += deviation.norm_squared();
+        }
+        deviations
+    }
+
+    /// Analysis of variance: within the regions there is noise alone, between them noise and parallax. Infinite without
+    /// matches.
+    fn variance(&self) -> Variance {
+        let populated = || self.regions.iter().filter(|(count, _)| *count > 0);
+        let matches: usize = populated().map(|(count, _)| count).sum();
+        let regions = populated().count();
+        if matches == 0 {
+            return Variance { noise: f64::INFINITY, parallax: 0.0 };
+        }
+        let explained: f64 = populated().map(|(count, sum)| sum.norm_squared() / *count as f64).sum();
+        let noise = match matches > regions {
+            true => (self.squares - explained).max(0.0) / (matches - regions) as f64,
+            false => 0.0,
+        };
+        let parallax = (explained - regions as f64 * noise).max(0.0) / matches as f64;
+        Variance { noise: noise / matches as f64, parallax }
+    }
+}
+
+/// The rotations with the turns that the segments ask for. The common frame stays; `frame`'s columns are the scene's
+/// directions in it.
+///
+/// Minimises sum over segments of weight (Geman-McClure) (residual / `line_error_px`)^2 plus sum over overlaps of
+/// (w_i - w_j)^T information (w_i - w_j) over turns w_i in the common frame that sum to zero, by reweighted Gauss-Newton steps from a coarse to a
+/// fine scale of the loss. A turn of all cameras together is not sought: `frame` is the segments' own choice for these.
+pub(super) fn corrected_rotations(
+    rotations: &[Matrix3<f64>],
+    certainties: &[RelativeCertainty],
+    vote: &LineVote,
+    frame: &Matrix3<f64>,
+    axis_weights: &[f64; 3],
+    options: &SimilarityOptions,
+) -> Vec<Matrix3<f64>> {
+    let count = rotations.len();
+    let mut turns = vec![Vector3::<f64>::zeros(); count];
+    let line_information = options.line_error_px.powi(-2);
+    for scale in scales(options) {
+        let mut matrix = DMatrix::<f64>::zeros(3 * count, 3 * count);
+        let mut right = DVector::<f64>::zeros(3 * count);
+        for (index, rotation) in rotations.iter().enumerate() {
+            let turned = rotation * exp_rotation(&turns[index]);
+            let (normal, gradient) = vote.turn_equations(index, &turned, frame, axis_weights, scale, options);
+            let mut block = matrix.fixed_view_mut::<3, 3>(3 * index, 3 * index);
+            block += normal * line_information;
+            // The residual is linearised at the present turn; the unknown is the whole turn.
+            let mut part = right.fixed_rows_mut::<3>(3 * index);
+            part += (normal * turns[index] - gradient) * line_information;
+        }
+        for edge in certainties {
+            for (row, column, sign) in
+                [(edge.i, edge.i, 1.0), (edge.j, edge.j, 1.0), (edge.i, edge.j, -1.0), (edge.j, edge.i, -1.0)]
+            {
+                let mut block = matrix.fixed_view_mut::<3, 3>(3 * row, 3 * column);
+                block += edge.information * sign;
+            }
+        }
+        // The penalty holds the sum of the turns at zero.
+        for row in 0..3 * count {
+            for column in (row % 3..3 * count).step_by(3) {
+                matrix[(row, column)] += COMMON_TURN_INFORMATION;
+            }
+        }
+        // Directions that neither segments nor overlaps fix stay as they are.
+        for entry in 0..3 * count {
+            matrix[(entry, entry)] += 1.0;
+        }
+        let Some(factor) = matrix.cholesky() else { return rotations.to_vec() };
+        let solution = factor.solve(&right);
+        for (index, turn) in turns.iter_mut().enumerate() {
+            *turn = solution.fixed_rows::<3>(3 * index).into_owned();
+        }
+    }
+    if turns.iter().any(|turn| !turn.iter().all(|value| value.is_finite())) {
+        return rotations.to_vec();
+    }
+    rotations.iter().zip(&turns).map(|(rotation, turn)| nearest_rotation(&(rotation * exp_rotation(turn)))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::matches::PointMatch;
+
+    use super::super::synthetic::{FOCAL_PX, SIZE, Scene, Sweep, World, joined};
+    use super::super::tests::with_lines;
+    use super::*;
+
+    fn still() -> Camera {
+        Camera::new(FOCAL_PX, SIZE.0, SIZE.1, &Matrix3::identity())
+    }
+
+    /// Matches of two equal cameras that deviate as `deviation` says of each of 8 x 8 regions, twice in each.
+    fn pair(deviation: impl Fn(usize, usize) -> f64) -> PairMatches {
+        let mut matches = Vec::new();
+        for region in 0..64 {
+            let in_a = [(f64::from(region % 8) + 0.5) * SIZE.0 / 8.0, (f64::from(region / 8) + 0.5) * SIZE.1 / 8.0];
+            for turn in 0..2 {
+                matches.push(PointMatch { in_a, in_b: [in_a[0] + deviation(region as usize, turn), in_a[1]] });
+            }
+        }
+        joined(0, 1, matches)
+    }
+
+    /// By hand: regions that deviate by 2 px to alternating sides have a variance of 4 square pixels and no noise;
+    /// matches that deviate by 2 px to alternating sides inside every region have 128 x 4 square pixels on 64 degrees of
+    /// freedom, 8, over 128 matches.
+    #[test]
+    fn regions_show_parallax_and_their_insides_show_noise() {
+        let camera = still();
+        let sign = |number: usize| if number % 2 == 0 { 2.0 } else { -2.0 };
+        let of = |pair: &PairMatches| Deviations::of(&camera, &camera, pair).variance();
+        let together = of(&pair(|region, _| sign(region)));
+        assert!((together.parallax - 4.0).abs() < 1e-9 && together.noise.abs() < 1e-9, "{together:?}");
+        let apart = of(&pair(|_, turn| sign(turn)));
+        assert!(apart.parallax.abs() < 1e-9 && (apart.noise - 8.0 / 128.0).abs() < 1e-9, "{apart:?}");
+        assert!(of(&joined(0, 1, Vec::new())).noise.is_infinite());
+    }
+
+    /// A sweep whose overlaps hold matches at their true places.
+    fn sweep(camera_noise_deg: f64) -> Scene {
+        let world = World::Manhattan { noise_deg: 1.0, bad_share: 0.0 };
+        let mut scene = with_lines(Scene::new(Sweep::default(), world, camera_noise_deg, 21), 20, 0.3);
+        let truth: Vec<Camera> = scene
+            .world_from_camera
+            .iter()
+            .map(|world_from_camera| Camera::new(FOCAL_PX, SIZE.0, SIZE.1, &world_from_camera.transpose()))
+            .collect();
+        for edge in &mut scene.edges {
+            for place in 0..400 {
+                let in_a = [f64::from(place % 20) * SIZE.0 / 20.0, f64::from(place / 20) * SIZE.1 / 20.0];
+                let Some(there) = truth[edge.a].transfer(&truth[edge.b], Vector2::from(in_a)) else { continue };
+                if (0.0..SIZE.0).contains(&there.x) && (0.0..SIZE.1).contains(&there.y) {
+                    edge.inliers.push(PointMatch { in_a, in_b: there.into() });
+                }
+            }
+        }
+        scene
+    }
+
+    fn largest(values: &[f64]) -> f64 {
+        values.iter().copied().fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn segments_correct_cameras_that_their_overlaps_contradict() {
+        let scene = sweep(0.5);
+        let errors = |camera_correction: bool| {
+            let options = SimilarityOptions { camera_correction, ..SimilarityOptions::default() };
+            largest(&scene.errors_deg(&scene.prior(&options)))
+        };
+        let (corrected, given) = (errors(true), errors(false));
+        assert!(given > 0.5 && corrected < 0.2, "{corrected} and {given} degrees");
+    }
+
+    /// All segments of one picture are turned by half a degree against what its overlaps know for certain.
+    #[test]
+    fn segments_do_not_turn_cameras_that_overlaps_are_sure_of() {
+        let mut scene = sweep(0.0);
+        let (sine, cosine) = 0.5_f64.to_radians().sin_cos();
+        let centre = Vector2::new(SIZE.0, SIZE.1) / 2.0;
+        for line in &mut scene.lines[3] {
+            for end in [&mut line.start, &mut line.end] {
+                let from = Vector2::from(*end) - centre;
+                *end = (centre + Vector2::new(cosine * from.x - sine * from.y, sine * from.x + cosine * from.y)).into();
+            }
+        }
+        let errors = scene.errors_deg(&scene.prior(&SimilarityOptions::default()));
+        assert!(largest(&errors) < 0.15, "{errors:?}");
+    }
+}
