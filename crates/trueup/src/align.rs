@@ -130,6 +130,7 @@ pub(crate) fn run(
             cell_px: options.mesh.cell_px,
             vanishing: &options.vanishing,
             turn: component.reference_rotation,
+            reference: component.reference,
         };
         similarity::run(&input, &options.similarity, context)
     })?;
