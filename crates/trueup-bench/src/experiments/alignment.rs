@@ -2,7 +2,7 @@
 
 use trueup::Result;
 
-use crate::methods::METHODS;
+use crate::methods::{Family, Method, methods_of};
 use crate::report::document::{Block, Section, Table, number};
 use crate::results::Results;
 use crate::sets::{Catalogue, SetSpec};
@@ -20,11 +20,16 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let mut trials = Vec::new();
     for set in catalogue.study.iter().chain(&catalogue.given) {
         if set.pictures()? <= MAX_PICTURES {
-            let of_method = |one: &crate::methods::Method| Trial::new(NAME, &set.name, one.name, one.overrides);
-            trials.extend(METHODS.iter().map(|one| Trial { pixels: true, ..of_method(one) }));
+            let of_method = |one: &Method| Trial::new(NAME, &set.name, one.name, one.overrides);
+            trials.extend(methods().map(|one| Trial { pixels: true, ..of_method(one) }));
         }
     }
     Ok(trials)
+}
+
+/// The methods of the tables: each prior, and what bends the mesh further.
+fn methods() -> impl Iterator<Item = &'static Method> {
+    methods_of(Family::Prior)
 }
 
 /// A table per family of sets.
@@ -49,7 +54,7 @@ pub(crate) fn section(results: &Results) -> Section {
 fn table(results: &Results, sets: &[SetSpec], id: &str, caption: &str) -> Table {
     let columns = ["method", "NCC MSE", "grey MSE", "PSNR dB", "SSIM", "matches px", "GDIC deg", "LD x 1e-2", "folds"];
     let mut table = Table::new(id, caption, columns);
-    for one in METHODS {
+    for one in methods() {
         let value = |measure| mean(&results.values_of_all(NAME, sets, one.name, measure));
         table.push([
             one.name.to_owned(),

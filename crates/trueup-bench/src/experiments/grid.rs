@@ -35,6 +35,11 @@ impl GridRow {
         Self { label: label.to_owned(), cells: cells.collect(), mean: mean(&means), from_paper: false }
     }
 
+    /// Cells made elsewhere, and their mean.
+    pub(super) fn stated(label: &str, cells: Vec<String>, mean: Option<f64>) -> Self {
+        Self { label: label.to_owned(), cells, mean, from_paper: false }
+    }
+
     /// The paper's figures for as many sets.
     pub(super) fn paper(label: &str, figures: &[f64]) -> Self {
         Self {
@@ -44,6 +49,11 @@ impl GridRow {
             from_paper: true,
         }
     }
+}
+
+/// A measure's name as part of a file name.
+pub(super) fn id_of(measure: &str) -> String {
+    measure.replace('_', "-")
 }
 
 /// A table with a column per set and a mean; with many sets, a row per set and a mean below.
