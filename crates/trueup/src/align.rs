@@ -17,13 +17,16 @@ use trueup_core::diagnostics::Diagnostic;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
+use trueup_core::raster::Raster;
 use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::{Result, StageContext};
+use trueup_io::decode::FilePhotographs;
 
 use crate::clock::Clock;
 use crate::measure::Measured;
 use crate::memory::{OverlapMemory, Overlaps};
 use crate::options::{Shape, StitchOptions};
+use crate::refinement::Pixels;
 
 /// One group of overlapping photographs with everything the geometry stages need; indices are local, 0..N.
 pub(crate) struct Component<'a> {
@@ -32,6 +35,8 @@ pub(crate) struct Component<'a> {
     pub images: Vec<&'a SourceImage>,
     pub frames: Vec<WorkingFrame>,
     pub lines: Vec<Vec<LineSegment>>,
+    /// Grey values at the working size, for those that were kept.
+    pub grays: Vec<Option<&'a Raster<u8>>>,
     pub pairs: Vec<PairMatches>,
     pub reference: usize,
     /// Rotation that the user's graph wants of the reference photograph, radians clockwise.
@@ -55,7 +60,7 @@ impl<'a> Component<'a> {
         reference: usize,
         reference_rotation: f64,
         images: &'a [SourceImage],
-        measured: &[Option<Measured>],
+        measured: &'a [Option<Measured>],
         pairs: &[PairMatches],
     ) -> Self {
         let local = |picture: usize| members.binary_search(&picture).ok();
@@ -70,6 +75,7 @@ impl<'a> Component<'a> {
             images: members.iter().map(|&picture| &images[picture]).collect(),
             frames: members.iter().filter_map(known).map(|one| one.frame).collect(),
             lines: members.iter().filter_map(known).map(|one| one.lines.clone()).collect(),
+            grays: members.iter().filter_map(known).map(|one| one.gray.as_ref()).collect(),
             pairs,
             reference: local(reference).unwrap_or(0),
             reference_rotation,
@@ -107,12 +113,14 @@ impl<'a> Component<'a> {
 }
 
 /// Runs the geometry stages in their order. With a `memory`, cameras and overlaps that it holds are not found again.
+/// `photographs` are looked at again only if the options ask for pixels that were not kept.
 pub(crate) fn run(
     component: &Component,
     options: &StitchOptions,
     context: &StageContext,
     clock: &mut Clock,
     memory: Option<&OverlapMemory>,
+    photographs: &FilePhotographs,
 ) -> Result<Geometry> {
     let grids: Vec<GridMesh> = component
         .frames
@@ -159,7 +167,9 @@ pub(crate) fn run(
     let mesh = in_one_step("mesh", context, clock, || match shape {
         Shape::Mesh(_) => {
             let bases = mesh::bases(options.mesh.base, &cameras.cameras, &grids, &prior);
-            mesh::run(&grids, &kept, &bases, component.reference, &options.mesh, context)
+            let pixels = Pixels::new(component, photographs, options, context)?;
+            let refinements = pixels.refinements(options);
+            mesh::run_refined(&grids, &kept, &bases, component.reference, &options.mesh, &refinements, context)
         }
         Shape::Warp(model) => {
             let fine: Vec<GridMesh> = grids.iter().map(|grid| mesh::divided(grid, options.mesh.subdivision)).collect();

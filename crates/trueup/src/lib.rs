@@ -33,6 +33,7 @@ mod names;
 mod options;
 mod project;
 mod record;
+mod refinement;
 mod stitcher;
 
 pub use evaluation::{Evaluation, PictureEvaluation, PixelEvaluation, evaluate, evaluate_pixels, read_truth};

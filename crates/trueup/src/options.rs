@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use trueup_align::cameras::CameraOptions;
 use trueup_align::match_points::MatchPointOptions;
-use trueup_align::mesh::MeshOptions;
+use trueup_align::mesh::{MeshOptions, PhotometricOptions};
 use trueup_align::metrics::MeasureOptions;
 use trueup_align::similarity::{PriorMethod, SimilarityOptions};
 use trueup_align::vanishing::VanishingOptions;
@@ -50,11 +50,51 @@ impl Method {
     }
 }
 
+trueup_core::choice! {
+    /// What draws overlapping photographs together.
+    pub enum Alignment {
+        /// Matched points, carried to the whole overlap.
+        Points = "points",
+        /// And matched lines.
+        Lines = "lines",
+        /// And the pixels themselves.
+        Photometric = "photometric",
+        /// And both, lines first.
+        LinesPhotometric = "lines+photometric",
+    }
+}
+
+impl Alignment {
+    /// Whether matched lines take part.
+    pub fn uses_lines(self) -> bool {
+        matches!(self, Self::Lines | Self::LinesPhotometric)
+    }
+
+    /// Whether pixels take part.
+    pub fn uses_pixels(self) -> bool {
+        matches!(self, Self::Photometric | Self::LinesPhotometric)
+    }
+}
+
+trueup_core::choice! {
+    /// What of the photographs' structure is kept, beyond the neighbourhoods of grid vertices.
+    pub enum Structure {
+        /// Nothing.
+        None = "none",
+        /// Long straight lines.
+        Lines = "lines",
+    }
+}
+
 trueup_core::options! {
     /// What holds for the whole run.
     pub struct WorkingOptions("stitch") {
         /// How the panorama's shape is found.
         method: Method = Method::Vpg, Allowed::Any, "";
+        /// What draws overlapping photographs together: more is slower and shows fewer ghosts.
+        align: Alignment = Alignment::Points, Allowed::Any, "";
+        /// What of the photographs' structure is kept, beyond the neighbourhoods of grid vertices.
+        structure: Structure = Structure::None, Allowed::Any, "";
         /// Photographs are measured on a copy reduced to at most this many pixels; the panorama itself is made from
         /// the full photographs.
         working_pixels: f64 = 480000.0, between(10000.0, 100000000.0), "px";
@@ -122,6 +162,8 @@ stage_options! {
     match_points: MatchPointOptions,
     /// How the grids are deformed.
     mesh: MeshOptions,
+    /// How pixels align the grids.
+    photometric: PhotometricOptions,
     /// How the methods that are warp models place the photographs.
     warps: WarpOptions,
     /// How large the panorama is.
