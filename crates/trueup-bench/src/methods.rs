@@ -20,6 +20,8 @@ pub(crate) struct Method {
 pub(crate) enum Family {
     /// A similarity prior and the mesh: on whole sets, and in every table.
     Prior,
+    /// The default with more energies that draw overlaps together: on whole sets, in the table of alignment.
+    Alignment,
     /// Warps without a prior: on reduced sets, since they cannot make a panorama of a wide field of view.
     Warp,
 }
@@ -41,7 +43,7 @@ pub(crate) const PUBLISHED_MESH: [&str; 3] =
     ["mesh.base=similarity", "mesh.subdivision=1", "match_points.model=moving-dlt"];
 
 /// Every method that exists.
-pub(crate) const METHODS: [Method; 8] = [
+pub(crate) const METHODS: [Method; 9] = [
     Method {
         name: VPG,
         meaning: "vanishing points, level sphere (the default)",
@@ -101,6 +103,13 @@ pub(crate) const METHODS: [Method; 8] = [
         ],
         paper: Some("GSP-3D"),
         family: Family::Prior,
+    },
+    Method {
+        name: "vpg+photometric",
+        meaning: "the default, and the pixels of overlaps drawn together",
+        overrides: &["stitch.align=photometric"],
+        paper: Some("VPG+GCPW"),
+        family: Family::Alignment,
     },
     Method {
         name: "homography",

@@ -64,7 +64,7 @@ impl Trial {
     pub(crate) fn matching_overrides(&self) -> Vec<String> {
         const STAGES: [&str; 6] = ["stitch", "source", "features", "lines", "pairing", "matching"];
         /// Options of the whole run that decide what is made of the matches.
-        const LATER: [&str; 1] = ["stitch.method="];
+        const LATER: [&str; 3] = ["stitch.method=", "stitch.align=", "stitch.structure="];
         let concerns = |assignment: &&String| {
             STAGES.iter().any(|stage| assignment.starts_with(&format!("{stage}.")))
                 && !LATER.iter().any(|option| assignment.starts_with(option))
@@ -153,7 +153,7 @@ mod tests {
             "test",
             "01",
             "mixed",
-            &["mesh.cell_px=20", "matching.ratio=0.7", "lines.scale=1", "stitch.method=vpg"],
+            &["mesh.cell_px=20", "matching.ratio=0.7", "lines.scale=1", "stitch.align=points"],
         );
         assert_eq!(trial.matching_overrides(), ["matching.ratio=0.7", "lines.scale=1"]);
     }

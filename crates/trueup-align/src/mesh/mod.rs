@@ -160,8 +160,7 @@ impl Problem<'_> {
                 "Raise mesh.prior_weight, or leave out pictures that hardly overlap.",
             )
         };
-        let solution =
-            solver.solve(equations).ok_or_else(|| unsolvable("the equations are not positive definite"))?;
+        let solution = solver.solve(equations).ok_or_else(|| unsolvable("the equations are not positive definite"))?;
         if !solution.coordinates.iter().all(|coordinate| coordinate.is_finite()) {
             return Err(unsolvable("the solution is not finite"));
         }

@@ -62,7 +62,12 @@ pub(crate) const EXPERIMENTS: [Experiment; 10] = [
         claims: reference_choice::claims,
     },
     Experiment { name: gate::NAME, trials: gate::trials, section: gate::section, claims: gate::claims },
-    Experiment { name: alignment::NAME, trials: alignment::trials, section: alignment::section, claims: no_claims },
+    Experiment {
+        name: alignment::NAME,
+        trials: alignment::trials,
+        section: alignment::section,
+        claims: alignment::claims,
+    },
     Experiment { name: ablations::NAME, trials: ablations::trials, section: ablations::section, claims: no_claims },
     Experiment {
         name: pitch_sweep::NAME,

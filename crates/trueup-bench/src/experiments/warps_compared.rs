@@ -4,7 +4,7 @@ use trueup::Result;
 
 use super::grid::{GridRow, id_of, table};
 use super::paper_figures::WARPS;
-use crate::methods::{Family, METHODS, Method, VPG, VPG_PUBLISHED, methods_of};
+use crate::methods::{Family, Method, VPG, VPG_PUBLISHED, methods_of};
 use crate::report::document::{Block, Claim, Section, number};
 use crate::results::{Results, short_name};
 use crate::sets::{Catalogue, SetSpec};
@@ -27,6 +27,11 @@ fn sets(catalogue: &Catalogue) -> Vec<SetSpec> {
     catalogue.study.iter().filter(|set| ("04"..="09").contains(&short_name(&set.name))).cloned().collect()
 }
 
+/// The methods of the tables.
+fn methods() -> impl Iterator<Item = &'static Method> {
+    methods_of(Family::Prior).chain(methods_of(Family::Warp))
+}
+
 /// Whether a method is run on every size of a set, not only the largest: the warps, and what they are compared with.
 fn on_every_size(one: &Method) -> bool {
     one.family == Family::Warp || [VPG, VPG_PUBLISHED].contains(&one.name)
@@ -37,7 +42,7 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let mut trials = Vec::new();
     for set in sets(catalogue) {
         let largest = set.pictures()?.min(LARGEST);
-        for one in &METHODS {
+        for one in methods() {
             let smallest = if on_every_size(one) { SMALLEST.min(largest) } else { largest };
             for pictures in smallest..=largest {
                 let trial = Trial::new(NAME, &set.name, one.name, one.overrides);
@@ -119,7 +124,7 @@ pub(crate) fn section(results: &Results) -> Section {
     ));
     section.blocks.extend(claims(results).into_iter().map(Block::Claim));
     for (measure, title) in [("ld", "LD x 1e-2"), ("gdic_deg", "GDIC, degrees")] {
-        let mut rows: Vec<GridRow> = METHODS.iter().map(|one| grid_row(results, &sets, one, measure)).collect();
+        let mut rows: Vec<GridRow> = methods().map(|one| grid_row(results, &sets, one, measure)).collect();
         rows.extend(WARPS.iter().map(|row| match measure {
             "ld" => GridRow::paper(row.method, &row.ld),
             _ => GridRow::paper(row.method, &row.gdic_deg),
@@ -201,7 +206,7 @@ mod tests {
         assert_eq!(largest(&results, set, "homography").map(|(pictures, _)| pictures), Some(4));
         assert_eq!(same_pictures(&results, "homography", VPG_PUBLISHED), [(8.0, 1.0)]);
         assert_eq!(refusals(&results, std::slice::from_ref(set)), ["`homography` on 5 photographs of 05: too wide"]);
-        let one = Method { name: "apap", ..METHODS[0] };
+        let one = Method { name: "apap", ..*methods().next().expect("a method") };
         let none =
             table("t", "", std::slice::from_ref(set), &[grid_row(&results, std::slice::from_ref(set), &one, "ld")]);
         assert_eq!(none.rows[0].cells, ["apap", "n/a", "-"]);
