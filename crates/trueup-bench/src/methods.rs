@@ -22,8 +22,10 @@ pub(crate) enum Family {
     Prior,
     /// The default with more energies that draw overlaps together: on whole sets, in the table of alignment.
     Alignment,
-    /// Warps without a prior: on reduced sets, since they cannot make a panorama of a wide field of view.
+    /// Warps without a prior that cannot show a wide field of view: on reduced sets alone.
     Warp,
+    /// Warps without a prior that are tried on whole sets too.
+    WideWarp,
 }
 
 /// The name of the default method in [`METHODS`].
@@ -38,12 +40,18 @@ pub(crate) const VPG_PUBLISHED: &str = "vpg-published";
 pub(crate) const GSP_2D_PUBLISHED: &str = "gsp-2d-published";
 pub(crate) const GSP_3D_PUBLISHED: &str = "gsp-3d-published";
 
+/// The warps that the paper compares with.
+pub(crate) const APAP: &str = "apap";
+pub(crate) const SPHP: &str = "sphp";
+pub(crate) const SPHP_FREE: &str = "sphp-free";
+pub(crate) const AANAP: &str = "aanap";
+
 /// Options of the mesh as published: one similarity per picture, moving DLT, undivided cells.
 pub(crate) const PUBLISHED_MESH: [&str; 3] =
     ["mesh.base=similarity", "mesh.subdivision=1", "match_points.model=moving-dlt"];
 
 /// Every method that exists.
-pub(crate) const METHODS: [Method; 9] = [
+pub(crate) const METHODS: [Method; 15] = [
     Method {
         name: VPG,
         meaning: "vanishing points, level sphere (the default)",
@@ -118,6 +126,48 @@ pub(crate) const METHODS: [Method; 9] = [
         paper: None,
         family: Family::Warp,
     },
+    Method {
+        name: "quasi-homography",
+        meaning: "homographies whose scale grows only linearly outside the overlaps",
+        overrides: &["stitch.method=quasi-homography", "mesh.subdivision=1", "match_points.model=moving-dlt"],
+        paper: None,
+        family: Family::Warp,
+    },
+    Method {
+        name: APAP,
+        meaning: "as-projective-as-possible: a homography for every grid vertex",
+        overrides: &["stitch.method=apap", "mesh.subdivision=1", "match_points.model=moving-dlt"],
+        paper: Some("APAP"),
+        family: Family::Warp,
+    },
+    Method {
+        name: SPHP,
+        meaning: "shape-preserving half-projective, its similarity upright",
+        overrides: &["stitch.method=sphp", "mesh.subdivision=1", "match_points.model=moving-dlt"],
+        paper: Some("SPHP"),
+        family: Family::Warp,
+    },
+    Method {
+        name: SPHP_FREE,
+        meaning: "the same, its similarity free to turn",
+        overrides: &["stitch.method=sphp-free", "mesh.subdivision=1", "match_points.model=moving-dlt"],
+        paper: Some("SPHP*"),
+        family: Family::Warp,
+    },
+    Method {
+        name: AANAP,
+        meaning: "adaptive as-natural-as-possible: homographies that turn into similarities",
+        overrides: &["stitch.method=aanap", "mesh.subdivision=1", "match_points.model=moving-dlt"],
+        paper: Some("AANAP"),
+        family: Family::WideWarp,
+    },
+    Method {
+        name: "autostitch",
+        meaning: "straightened cameras on a sphere",
+        overrides: &["stitch.method=autostitch", "mesh.subdivision=1", "match_points.model=moving-dlt"],
+        paper: None,
+        family: Family::WideWarp,
+    },
 ];
 
 /// The method of this name.
@@ -141,7 +191,19 @@ mod tests {
             Trial::new("test", "set", one.name, one.overrides).options().expect(one.name);
             assert!(METHODS[..index].iter().all(|other| other.name != one.name), "{}", one.name);
         }
-        let named = [VPG, GSP_2D, GSP_3D, LEVELLED, VPG_PUBLISHED, GSP_2D_PUBLISHED, GSP_3D_PUBLISHED];
+        let named = [
+            VPG,
+            GSP_2D,
+            GSP_3D,
+            LEVELLED,
+            VPG_PUBLISHED,
+            GSP_2D_PUBLISHED,
+            GSP_3D_PUBLISHED,
+            APAP,
+            SPHP,
+            SPHP_FREE,
+            AANAP,
+        ];
         assert!(named.iter().all(|name| method(name).is_some()));
     }
 }

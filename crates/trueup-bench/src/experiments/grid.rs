@@ -27,7 +27,9 @@ impl GridRow {
     ) -> Self {
         let per_set: Vec<_> =
             sets.iter().map(|set| summary(&results.values(experiment, &set.name, variant, measure))).collect();
-        let cells = per_set.iter().map(|found| match found {
+        let refused = |set: &SetSpec| !results.values(experiment, &set.name, variant, "refused").is_empty();
+        let cells = sets.iter().zip(&per_set).map(|(set, found)| match found {
+            None if refused(set) => "n/a".to_owned(),
             Some(found) if found.count > 1 => format!("{:.2} ±{:.2}", found.mean, found.deviation),
             found => number(found.map(|found| found.mean), 2),
         });

@@ -5,14 +5,14 @@ use trueup::Result;
 use super::grid::{GridRow, id_of, table};
 use super::paper_figures::NATURAL;
 use crate::methods::{
-    Family, GSP_2D, GSP_2D_PUBLISHED, GSP_3D, GSP_3D_PUBLISHED, METHODS, VPG, VPG_PUBLISHED, methods_of,
+    AANAP, Family, GSP_2D, GSP_2D_PUBLISHED, GSP_3D, GSP_3D_PUBLISHED, METHODS, VPG, VPG_PUBLISHED, methods_of,
 };
 use crate::report::charts::{Chart, Mark, Series};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::{Results, short_name};
 use crate::sets::{Catalogue, SetSpec};
 use crate::statistics::{mean, median};
-use crate::trial::Trial;
+use crate::trial::{Row, Trial};
 
 /// The experiment's name.
 pub(crate) const NAME: &str = "methods";
@@ -26,12 +26,16 @@ const PAPER_BEST: (usize, usize) = (11, 12);
 struct Contest {
     mesh: &'static str,
     ours: &'static str,
-    others: [&'static str; 2],
+    others: &'static [&'static str],
 }
 
 const CONTESTS: [Contest; 2] = [
-    Contest { mesh: "the mesh as published", ours: VPG_PUBLISHED, others: [GSP_2D_PUBLISHED, GSP_3D_PUBLISHED] },
-    Contest { mesh: "the default mesh", ours: VPG, others: [GSP_2D, GSP_3D] },
+    Contest {
+        mesh: "the mesh as published",
+        ours: VPG_PUBLISHED,
+        others: &[GSP_2D_PUBLISHED, GSP_3D_PUBLISHED, AANAP],
+    },
+    Contest { mesh: "the default mesh", ours: VPG, others: &[GSP_2D, GSP_3D] },
 ];
 
 /// Every method with a prior on every set of the study and every given one.
@@ -44,7 +48,7 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
 
 /// The methods of the tables.
 fn methods() -> impl Iterator<Item = &'static crate::methods::Method> + Clone {
-    methods_of(Family::Prior)
+    methods_of(Family::Prior).chain(methods_of(Family::WideWarp))
 }
 
 /// GDIC of one method and of another on each set, where both have it.
@@ -93,7 +97,9 @@ impl Contest {
     fn claim_distortion(&self, results: &Results, sets: &[SetSpec]) -> Claim {
         let ld = |method| mean(&results.values_of_all(NAME, sets, method, "ld"));
         let ours = ld(self.ours);
-        let others: Vec<(&str, f64)> = self.others.iter().filter_map(|other| Some((*other, ld(other)?))).collect();
+        // AANAP's mean would be over other sets where it refuses some.
+        let others = self.others.iter().filter(|other| **other != AANAP);
+        let others: Vec<(&str, f64)> = others.filter_map(|other| Some((*other, ld(other)?))).collect();
         let alike = |other: f64| ours.map(|ours| ours <= other * COMPARABLE && other <= ours * COMPARABLE);
         let verdicts: Option<Vec<bool>> = others.iter().map(|(_, other)| alike(*other)).collect();
         let list: Vec<String> = others.iter().map(|(name, value)| format!("`{name}` {value:.2}")).collect();
@@ -135,6 +141,11 @@ pub(crate) fn section(results: &Results) -> Section {
         let caption = format!("T2: {title}.");
         section.blocks.push(Block::Table(table(&format!("t2-{}", id_of(measure)), &caption, sets, &rows)));
     }
+    let refused = refusals(results, sets);
+    if !refused.is_empty() {
+        section.say("What was refused (n/a above), and why:");
+        section.blocks.push(Block::List(refused));
+    }
     section.draw("Direction inconsistency of every method on the study's sets.", gdic_chart(results, sets));
     section.say(
         "GDIC contains the deviation of the smallest rectangle around a perspective grid, half a degree or so even for a \
@@ -158,6 +169,13 @@ pub(crate) fn section(results: &Results) -> Section {
     }
     given_tables(results, &mut section);
     section
+}
+
+/// The sets that a method refused.
+fn refusals(results: &Results, sets: &[SetSpec]) -> Vec<String> {
+    let of_study = |row: &&Row| row.measure("refused").is_some() && sets.iter().any(|set| set.name == row.key.set);
+    let rows = results.of(NAME).filter(of_study);
+    rows.map(|row| format!("`{}` on {}: {}", row.key.variant, short_name(&row.key.set), row.note)).collect()
 }
 
 fn list_of_methods() -> Table {
