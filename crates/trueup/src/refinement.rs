@@ -71,6 +71,6 @@ impl Pixels {
             .align
             .uses_pixels()
             .then_some(PhotometricInput { pyramids: &self.pyramids, options: &options.photometric });
-        Refinements { photometric }
+        Refinements { photometric, outline_weight: options.mesh.outline_weight }
     }
 }

@@ -47,6 +47,9 @@ trueup_core::options! {
         prior_weight: f64 = 6.0, between(0.001, 1000.0), "";
         /// Growth of that weight with the distance from the overlap, per picture diagonal.
         prior_slope: f64 = 20.0, between(0.0, 1000.0), "";
+        /// Weight with which a refinement (`stitch.align`) keeps each picture's outline where the plain mesh has it (on
+        /// residuals).
+        outline_weight: f64 = 10.0, between(0.0, 1000.0), "";
     }
 }
 
