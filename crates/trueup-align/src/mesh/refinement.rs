@@ -4,44 +4,87 @@ use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Error, Result};
 
-use super::{MeshSolver, NormalEquations, PhotometricInput, Problem, Solved, count_folds};
+use super::line_alignment::Present;
+use super::{
+    LineAlignmentInput, MeshSolver, NormalEquations, PhotometricInput, Problem, Solved, StructureInput, count_folds,
+};
 
 /// Energies beyond those of the plain mesh; by default none.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Refinements<'a> {
+    /// Long lines that keep their shape.
+    pub structure: Option<StructureInput<'a>>,
+    /// Lines and points that align overlaps.
+    pub lines: Option<LineAlignmentInput<'a>>,
     /// Pixels that align overlaps.
     pub photometric: Option<PhotometricInput<'a>>,
-    /// Weight with which every picture's outline stays where the plain mesh has it (on residuals).
+    /// Weight with which every picture's outline stays where the plain mesh has it while lines or pixels align overlaps
+    /// (on residuals).
     pub outline_weight: f64,
 }
 
 impl Refinements<'_> {
     /// Refuses lists that do not have an entry for every one of `pictures`.
     pub(super) fn check(&self, pictures: usize) -> Result<()> {
-        let wrong = |what: &str, given: usize| {
-            Error::input(what, format!("{given} are given for {pictures} pictures"), "Give one for every picture.")
-        };
-        match self.photometric {
-            Some(input) if input.pyramids.len() != pictures => Err(wrong("pyramids", input.pyramids.len())),
-            _ => Ok(()),
+        let given = [
+            ("pyramids", self.photometric.map(|input| input.pyramids.len())),
+            ("lists of lines", self.lines.map(|input| input.lines.len())),
+            ("lists of chains", self.structure.map(|input| input.chains.len())),
+        ];
+        for (what, given) in given {
+            if let Some(given) = given.filter(|&given| given != pictures) {
+                let reason = format!("{given} are given for {pictures} pictures");
+                return Err(Error::input(what, reason, "Give one for every picture."));
+            }
         }
+        Ok(())
     }
 }
 
 impl Problem<'_> {
     /// Solves the plain `equations`, then with one refinement after the other.
-    pub(super) fn solve_refined(&self, equations: NormalEquations, refinements: &Refinements) -> Result<Solved> {
+    pub(super) fn solve_refined(&self, mut equations: NormalEquations, refinements: &Refinements) -> Result<Solved> {
         let mut solver = MeshSolver::default();
-        let mut solved = self.solve(&mut solver, &equations)?;
-        if refinements.photometric.is_none() {
-            return Ok(solved);
+        if let Some(structure) = &refinements.structure {
+            let present = Present { solved: self.grids, fine: self.grids, places: self.places };
+            structure.add(&mut equations, &present);
         }
-        let mut equations = equations;
-        self.hold_outlines(&mut equations, &solved.meshes, refinements.outline_weight);
+        let mut solved = self.solve(&mut solver, &equations)?;
+        if refinements.photometric.is_some() || refinements.lines.is_some() {
+            self.hold_outlines(&mut equations, &solved.meshes, refinements.outline_weight);
+        }
+        if let Some(input) = &refinements.lines {
+            (equations, solved) = self.align_lines(&mut solver, equations, input, solved)?;
+        }
         if let Some(input) = &refinements.photometric {
             solved = self.align_pixels(&mut solver, &equations, input, solved)?;
         }
         Ok(solved)
+    }
+
+    /// Rounds of line alignment; with the last round's equations. A step that folds the grids is shortened; if that does
+    /// not help it is undone and ends the rounds.
+    fn align_lines(
+        &self,
+        solver: &mut MeshSolver,
+        equations: NormalEquations,
+        input: &LineAlignmentInput,
+        start: Solved,
+    ) -> Result<(NormalEquations, Solved)> {
+        let mut best = start;
+        let mut fine = self.delivered(&best.meshes);
+        let folds = total_folds(&fine);
+        let mut last = None;
+        for _ in 0..input.options.rounds {
+            let mut with_lines = equations.clone();
+            let present = Present { solved: &best.meshes, fine: &fine, places: self.places };
+            input.add(&mut with_lines, &present);
+            let next = self.solve(solver, &with_lines)?;
+            let Some(step) = self.longest_step(&best, next, |_, fine| total_folds(fine) <= folds) else { break };
+            (best, fine) = step;
+            last = Some(with_lines);
+        }
+        Ok((last.unwrap_or(equations), best))
     }
 
     /// Keeps the outlines of the pictures where they are in `meshes`.

@@ -110,7 +110,7 @@ impl Overlap<'_> {
 
     fn sample(&self, point: Vector2<f64>, level: usize, min_gradient: f64) -> Option<Sample> {
         let (corners_here, shares_here) = self.solved[0].bilinear(point);
-        let start = self.guess(point, corners_here)?;
+        let start = self.warp.at(self.solved[0], point)?;
         let there = self.fine[1].source_of(self.fine[0].warp(point), start)?;
         let here_grey = self.pyramids[0].at(level, point)?;
         let there_grey = self.pyramids[1].at(level, there)?;
@@ -127,14 +127,6 @@ impl Overlap<'_> {
             shares: [shares_here, shares_there],
             grey,
             gap: self.solved[0].warp(point) - self.solved[1].warp(there),
-        })
-    }
-
-    /// Where the match points around say that a pixel lies in the other picture, up to their distance from it.
-    fn guess(&self, point: Vector2<f64>, corners: [usize; 4]) -> Option<Vector2<f64>> {
-        corners.iter().find_map(|&corner| {
-            let place = self.warp.vertices.get(corner).copied().flatten()?;
-            Some(Vector2::from(place) + point - self.solved[0].source(corner))
         })
     }
 }
