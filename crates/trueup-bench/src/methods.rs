@@ -51,7 +51,7 @@ pub(crate) const PUBLISHED_MESH: [&str; 3] =
     ["mesh.base=similarity", "mesh.subdivision=1", "match_points.model=moving-dlt"];
 
 /// Every method that exists.
-pub(crate) const METHODS: [Method; 15] = [
+pub(crate) const METHODS: [Method; 17] = [
     Method {
         name: VPG,
         meaning: "vanishing points, level sphere (the default)",
@@ -113,10 +113,24 @@ pub(crate) const METHODS: [Method; 15] = [
         family: Family::Prior,
     },
     Method {
+        name: "vpg+lines",
+        meaning: "the default, and matched lines drawn together and held straight",
+        overrides: &["stitch.align=lines"],
+        paper: Some("VPG+DFW"),
+        family: Family::Alignment,
+    },
+    Method {
         name: "vpg+photometric",
         meaning: "the default, and the pixels of overlaps drawn together",
         overrides: &["stitch.align=photometric"],
         paper: Some("VPG+GCPW"),
+        family: Family::Alignment,
+    },
+    Method {
+        name: "vpg+lines+photometric",
+        meaning: "both",
+        overrides: &["stitch.align=lines+photometric"],
+        paper: None,
         family: Family::Alignment,
     },
     Method {

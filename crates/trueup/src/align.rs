@@ -26,7 +26,7 @@ use crate::clock::Clock;
 use crate::measure::Measured;
 use crate::memory::{OverlapMemory, Overlaps};
 use crate::options::{Shape, StitchOptions};
-use crate::refinement::Pixels;
+use crate::refinement::Material;
 
 /// One group of overlapping photographs with everything the geometry stages need; indices are local, 0..N.
 pub(crate) struct Component<'a> {
@@ -167,8 +167,8 @@ pub(crate) fn run(
     let mesh = in_one_step("mesh", context, clock, || match shape {
         Shape::Mesh(_) => {
             let bases = mesh::bases(options.mesh.base, &cameras.cameras, &grids, &prior);
-            let pixels = Pixels::new(component, photographs, options, context)?;
-            let refinements = pixels.refinements(options);
+            let material = Material::new(component, (&grids, &kept), photographs, options, context)?;
+            let refinements = material.refinements(component, &met, options);
             mesh::run_refined(&grids, &kept, &bases, component.reference, &options.mesh, &refinements, context)
         }
         Shape::Warp(model) => {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use trueup_align::cameras::CameraOptions;
 use trueup_align::match_points::MatchPointOptions;
-use trueup_align::mesh::{MeshOptions, PhotometricOptions};
+use trueup_align::mesh::{LineAlignmentOptions, MeshOptions, PhotometricOptions, StructureOptions};
 use trueup_align::metrics::MeasureOptions;
 use trueup_align::similarity::{PriorMethod, SimilarityOptions};
 use trueup_align::vanishing::VanishingOptions;
@@ -16,6 +16,7 @@ use trueup_core::{Error, Result};
 use trueup_io::encode::OutputOptions;
 use trueup_io::source::SourceOptions;
 use trueup_vision::features::FeatureOptions;
+use trueup_vision::line_matching::LineMatchingOptions;
 use trueup_vision::lines::LineOptions;
 use trueup_vision::matching::MatchingOptions;
 use trueup_vision::pairing::PairingOptions;
@@ -180,6 +181,12 @@ stage_options! {
     match_points: MatchPointOptions,
     /// How the grids are deformed.
     mesh: MeshOptions,
+    /// How segments of overlapping pictures are matched.
+    line_matching: LineMatchingOptions,
+    /// How matched lines align the grids.
+    line_alignment: LineAlignmentOptions,
+    /// How long lines keep their shape.
+    structure: StructureOptions,
     /// How pixels align the grids.
     photometric: PhotometricOptions,
     /// How the methods that are warp models place the photographs.

@@ -9,11 +9,13 @@
 mod alignment;
 mod base;
 mod complex;
+mod line_alignment;
 mod normal_equations;
 mod photometric;
 mod refinement;
 mod similarity;
 mod solver;
+mod structure;
 
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
@@ -23,11 +25,13 @@ use trueup_core::{Error, Result, StageContext};
 use crate::match_points::OverlapWarp;
 pub use alignment::{AlignmentEnergy, MatchPoint};
 pub use base::{Base, BaseShape, bases};
+pub use line_alignment::{LineAlignmentInput, LineAlignmentOptions};
 pub use normal_equations::{MeshSolution, Metric, NormalEquations, Share};
 pub use photometric::{PhotometricInput, PhotometricOptions, Pyramid};
 pub use refinement::Refinements;
 pub use similarity::SimilarityEnergy;
 pub use solver::MeshSolver;
+pub use structure::{StructureInput, StructureOptions};
 
 trueup_core::options! {
     /// How the grids are deformed.
@@ -47,6 +51,9 @@ trueup_core::options! {
         prior_weight: f64 = 6.0, between(0.001, 1000.0), "";
         /// Growth of that weight with the distance from the overlap, per picture diagonal.
         prior_slope: f64 = 20.0, between(0.0, 1000.0), "";
+        /// Weight with which a refinement (`stitch.align`) keeps each picture's outline where the plain mesh has it (on
+        /// residuals).
+        outline_weight: f64 = 10.0, between(0.0, 1000.0), "";
     }
 }
 

@@ -116,8 +116,7 @@ impl NormalEquations {
         self.right.len()
     }
 
-    /// Adds |sum_m coefficient_m v_m - value|^2 for vertices `members` of grid `picture`, which lie within three grid
-    /// steps of each other.
+    /// Adds |sum_m coefficient_m v_m - value|^2 for vertices `members` of grid `picture`, each of which occurs once.
     pub fn add_inside(&mut self, picture: usize, members: &[(usize, Coefficient)], value: Vector2<f64>) {
         let first = self.first[picture];
         for &(m, factor_m) in members {
@@ -211,14 +210,6 @@ impl NormalEquations {
             return;
         }
         let (low, high) = (one.vertex.min(other.vertex), one.vertex.max(other.vertex));
-        let columns = self.columns[one.picture];
-        let (rows_apart, across) = (high / columns - low / columns, (high % columns).abs_diff(low % columns));
-        if rows_apart > REACH || across > REACH {
-            let first = self.first[one.picture];
-            self.between.push(((first + high) as u32, (first + low) as u32, block));
-            self.far_inside = true;
-            return;
-        }
         let times = if low == high && !same_member { 2.0 } else { 1.0 };
         self.add_block_inside(one.picture, high, low, block.map(|entry| times * entry));
     }
@@ -241,10 +232,17 @@ impl NormalEquations {
             .collect()
     }
 
+    /// Adds a block for vertices m >= n of a grid: to the table if they are near each other, else to the list.
     fn add_block_inside(&mut self, picture: usize, m: usize, n: usize, block: Block) {
         let columns = self.columns[picture];
         let (m_row, m_column) = (m / columns, m % columns);
         let (n_row, n_column) = (n / columns, n % columns);
+        if m_row - n_row > REACH || m_column.abs_diff(n_column) > REACH {
+            let first = self.first[picture];
+            self.between.push(((first + m) as u32, (first + n) as u32, block));
+            self.far_inside = true;
+            return;
+        }
         let slot = (m_row - n_row) * SPAN + (m_column + REACH - n_column);
         let entry = &mut self.inside[self.first[picture] + m][slot];
         for (sum, value) in entry.iter_mut().zip(block) {

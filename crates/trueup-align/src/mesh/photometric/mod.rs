@@ -26,6 +26,10 @@ trueup_core::options! {
     pub struct PhotometricOptions("photometric") {
         /// Weight of a squared difference of grey levels, for samples 4 px apart.
         weight: f64 = 0.01, between(0.0, 1000.0), "per grey level squared";
+        /// Standard deviation of the difference that the weight belongs to: overlaps that agree better weigh more.
+        noise_level: f64 = 10.0, between(0.1, 255.0), "grey levels";
+        /// Smaller deviations are not believed: rounding and compression differ from place to place.
+        least_noise: f64 = 3.0, between(0.1, 255.0), "grey levels";
         /// Distance of the samples in the finest pictures; twice as far in each coarser one.
         spacing_px: f64 = 4.0, between(1.0, 1000.0), "working px";
         /// Samples with a smaller change of grey in both pictures are passed over.

@@ -68,8 +68,10 @@ impl Overlap<'_> {
         }
         let colours = Colours::of(&samples, self.solved[0], options);
         let residuals: Vec<f64> = samples.iter().map(|sample| colours.residual(sample)).collect();
-        let weights = tukey_weights(&residuals);
-        let share = options.weight * (spacing_px(level, options) / super::PUBLISHED_SPACING_PX).powi(2);
+        let sigma = spread(&residuals);
+        let weights: Vec<f64> = residuals.iter().map(|residual| tukey_weight(residual / sigma)).collect();
+        let noise = (options.noise_level / sigma.max(options.least_noise)).powi(2);
+        let share = options.weight * noise * (spacing_px(level, options) / super::PUBLISHED_SPACING_PX).powi(2);
         let mut order: Vec<usize> = (0..samples.len()).filter(|&k| weights[k] > 0.0).collect();
         let cells_of = |k: usize| (samples[k].corners[0][0], samples[k].corners[1][0]);
         order.sort_by_key(|&k| cells_of(k));
@@ -109,7 +111,7 @@ impl Overlap<'_> {
 
     fn sample(&self, point: Vector2<f64>, level: usize, min_gradient: f64) -> Option<Sample> {
         let (corners_here, shares_here) = self.solved[0].bilinear(point);
-        let start = self.guess(point, corners_here)?;
+        let start = self.warp.at(self.solved[0], point)?;
         let there = self.fine[1].source_of(self.fine[0].warp(point), start)?;
         let here_grey = self.pyramids[0].at(level, point)?;
         let there_grey = self.pyramids[1].at(level, there)?;
@@ -128,14 +130,6 @@ impl Overlap<'_> {
             gap: self.solved[0].warp(point) - self.solved[1].warp(there),
         })
     }
-
-    /// Where the match points around say that a pixel lies in the other picture, up to their distance from it.
-    fn guess(&self, point: Vector2<f64>, corners: [usize; 4]) -> Option<Vector2<f64>> {
-        corners.iter().find_map(|&corner| {
-            let place = self.warp.vertices.get(corner).copied().flatten()?;
-            Some(Vector2::from(place) + point - self.solved[0].source(corner))
-        })
-    }
 }
 
 /// Distance of samples at a level: twice as far at the next.
@@ -148,21 +142,19 @@ fn on_panorama(grey: Grey, derivative: &Matrix2<f64>) -> Option<Grey> {
     Some(Grey { slope: derivative.try_inverse()?.transpose() * grey.slope, ..grey })
 }
 
-/// Tukey's biweights of residuals by their own spread.
-fn tukey_weights(residuals: &[f64]) -> Vec<f64> {
-    /// Least standard deviation, grey levels: that of rounding both pictures.
+/// Standard deviation of residuals, grey levels, of which less than half are outliers.
+fn spread(residuals: &[f64]) -> f64 {
+    /// Least standard deviation: that of rounding both pictures.
     const ROUNDING: f64 = 0.5;
     let mut sizes: Vec<f64> = residuals.iter().map(|residual| residual.abs()).collect();
     let middle = sizes.len() / 2;
-    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let limit = TUKEY * (SIGMA_PER_MAD * median).max(ROUNDING);
-    residuals
-        .iter()
-        .map(|residual| {
-            let share = residual / limit;
-            if share.abs() < 1.0 { (1.0 - share * share).powi(2) } else { 0.0 }
-        })
-        .collect()
+    (SIGMA_PER_MAD * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(ROUNDING)
+}
+
+/// Tukey's biweight of a residual in standard deviations.
+fn tukey_weight(residual: f64) -> f64 {
+    let share = residual / TUKEY;
+    if share.abs() < 1.0 { (1.0 - share * share).powi(2) } else { 0.0 }
 }
 
 /// A colour model for every cell of the first picture.
