@@ -143,3 +143,94 @@ fn too_wide_a_field_of_view_is_refused_with_its_angle() {
         assert!(message.contains("reaches 118 degrees from the axis of 0.jpg"), "{message}");
     }
 }
+
+/// Every model; what is asked of each below holds for all.
+const MODELS: [WarpModel; 7] = [
+    WarpModel::Homography,
+    WarpModel::Autostitch,
+    WarpModel::Apap,
+    WarpModel::Sphp,
+    WarpModel::SphpFree,
+    WarpModel::Aanap,
+    WarpModel::QuasiHomography,
+];
+
+/// A pair that differs by a turn and a shift has nothing to be distorted for.
+#[test]
+fn models_by_matches_keep_a_similar_pair_rigid() {
+    let (sine, cosine) = 0.1_f64.sin_cos();
+    let turned = |point: Vector2<f64>| {
+        Some(Vector2::new(cosine * point.x - sine * point.y - 350.0, sine * point.x + cosine * point.y + 10.0))
+    };
+    let cameras = Example::panned(&[0.0, 28.0], 0).cameras;
+    let example = Example::with_pairs(cameras, vec![matched(0, 1, turned)], 0);
+    let options = WarpOptions { homographies: HomographySource::Pairs, ..WarpOptions::default() };
+    for model in MODELS.into_iter().filter(|model| *model != WarpModel::Autostitch) {
+        let placed = example.place_with(model, &options).expect("a pair");
+        assert_eq!(placed.folds, 0, "{model:?}");
+        assert!(misalignment(&example, &placed.meshes) < 1e-2, "{model:?}");
+        for (mesh, grid) in placed.meshes.iter().zip(&example.grids) {
+            let first = Vector2::from(mesh.target[0]);
+            for vertex in 0..mesh.len() {
+                let (far, own) = ((Vector2::from(mesh.target[vertex]) - first).norm(), grid.source(vertex).norm());
+                assert!((far - own).abs() < 1e-2, "{model:?}: {far} for {own} px");
+            }
+        }
+    }
+}
+
+#[test]
+fn models_on_one_plane_refuse_a_half_turn_with_its_angle_and_others_place_it() {
+    let example = Example::panned(&[0.0, 30.0, 60.0, 90.0], 0);
+    for model in MODELS {
+        match (model, example.place(model)) {
+            (WarpModel::Homography | WarpModel::Apap | WarpModel::Sphp | WarpModel::SphpFree, Err(error)) => {
+                assert!(matches!(error, Error::NotApplicable { .. }), "{model:?}: {error}");
+                assert!(error.to_string().contains(" degrees from the axis of 0.jpg"), "{model:?}: {error}");
+            }
+            (WarpModel::Autostitch | WarpModel::Aanap | WarpModel::QuasiHomography, Ok(placed)) => {
+                assert_eq!(placed.folds, 0, "{model:?}");
+            }
+            (_, other) => panic!("{model:?}: {:?}", other.map(|placed| placed.folds)),
+        }
+    }
+}
+
+#[test]
+fn pictures_that_grow_or_reach_beyond_the_limits_are_refused_by_every_model() {
+    let example = Example::panned(&[0.0, 25.0, 50.0], 0);
+    for model in MODELS {
+        let near = WarpOptions { max_reach: 1.0, ..WarpOptions::default() };
+        let error = example.place_with(model, &near).expect_err("reaches 1.5 diagonals").to_string();
+        assert!(error.contains("diagonals of the reference away") && error.contains("degrees"), "{model:?}: {error}");
+    }
+    // Pair by pair the quasi-homography grows too: eight pictures to one side are too many.
+    let long = Example::panned(&(0..9).map(|k| f64::from(k) * 28.0).collect::<Vec<_>>(), 0);
+    let error = long.place(WarpModel::QuasiHomography).expect_err("224 degrees from the reference").to_string();
+    assert!(error.contains("times as large as the reference") || error.contains("diagonals"), "{error}");
+}
+
+#[test]
+fn threads_change_no_vertex_and_the_order_of_the_pictures_hardly_any() {
+    let yaws = [-20.0, 0.0, 28.0];
+    let (example, reversed) = (Example::panned(&yaws, 1), {
+        let mut reversed = Example::panned(&[yaws[2], yaws[1], yaws[0]], 1);
+        reversed.seeds.reverse();
+        reversed
+    });
+    for model in MODELS {
+        let with_threads = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            pool.install(|| example.place(model)).expect("a narrow set")
+        };
+        let one = with_threads(1);
+        assert_eq!(one, with_threads(3), "{model:?}");
+        let other = reversed.place(model).expect("a narrow set");
+        for (mesh, same) in one.meshes.iter().zip(other.meshes.iter().rev()) {
+            for (vertex, moved) in mesh.target.iter().zip(&same.target) {
+                let apart = (Vector2::from(*vertex) - Vector2::from(*moved)).norm();
+                assert!(apart < 0.05, "{model:?}: {apart} px");
+            }
+        }
+    }
+}
