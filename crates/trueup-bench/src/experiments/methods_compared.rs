@@ -100,14 +100,14 @@ impl Contest {
         // AANAP's mean would be over other sets where it refuses some.
         let others = self.others.iter().filter(|other| **other != AANAP);
         let others: Vec<(&str, f64)> = others.filter_map(|other| Some((*other, ld(other)?))).collect();
-        let alike = |other: f64| ours.map(|ours| ours <= other * COMPARABLE && other <= ours * COMPARABLE);
-        let verdicts: Option<Vec<bool>> = others.iter().map(|(_, other)| alike(*other)).collect();
+        let comparable = |other: f64| ours.map(|ours| ours <= other * COMPARABLE);
+        let verdicts: Option<Vec<bool>> = others.iter().map(|(_, other)| comparable(*other)).collect();
         let list: Vec<String> = others.iter().map(|(name, value)| format!("`{name}` {value:.2}")).collect();
         Claim {
-            text: format!("On {}, the local distortion of VPG and GSP is alike.", self.mesh),
-            holds: verdicts.filter(|verdicts| !verdicts.is_empty()).map(|verdicts| verdicts.iter().all(|alike| *alike)),
+            text: format!("On {}, VPG does not pay for its directions with more local distortion than GSP.", self.mesh),
+            holds: verdicts.filter(|verdicts| !verdicts.is_empty()).map(|verdicts| verdicts.iter().all(|holds| *holds)),
             evidence: format!(
-                "Mean LD x 1e-2: `{}` {}, {}; alike means within a factor of {COMPARABLE}.",
+                "Mean LD x 1e-2: `{}` {}, {}; up to {COMPARABLE} times counts as no more.",
                 self.ours,
                 number(ours, 2),
                 list.join(", ")
