@@ -92,6 +92,7 @@ fn prior(bencher: divan::Bencher<'_, '_>, count: usize) {
         cell_px: 40.0,
         vanishing: &vanishing,
         turn: 0.0,
+        reference: 0,
     };
     bencher.bench(|| run(&input, &SimilarityOptions::default(), &context));
 }

@@ -54,7 +54,10 @@ pub(crate) fn run(arguments: &PaperArguments) -> Result<ExitCode> {
         rows.extend(runtime::run(&runner, &catalogue)?);
     }
     let results = Results { catalogue: &catalogue, rows };
-    let claims: Vec<Claim> = experiments.iter().flat_map(|one| (one.claims)(&results)).collect();
+    let mut claims: Vec<Claim> = experiments.iter().flat_map(|one| (one.claims)(&results)).collect();
+    if wanted.contains(&runtime::NAME) {
+        claims.extend(runtime::claims(&results));
+    }
     let document = document(&results, &experiments, &claims, &runner, &wanted);
     report::write(&document, &arguments.out)?;
     write_rows(&results.rows, &arguments.out.join("rows.csv"))?;

@@ -9,7 +9,7 @@ use trueup::{CancelToken, Error, Inputs, MatchedPhotographs, Reference, Result, 
 
 use crate::measure;
 use crate::progress::Tracker;
-use crate::sets::{ReadySet, SetSpec};
+use crate::sets::{ReadySet, SetSpec, central};
 use crate::store::Store;
 use crate::trial::{Row, Trial};
 
@@ -38,7 +38,7 @@ type Group<'t> = (&'t SetSpec, Vec<&'t Trial>);
 impl Runner<'_> {
     /// Runs what is not stored yet and returns all rows in the order of the trials.
     ///
-    /// A trial whose photographs cannot be stitched has a row that says why; sets that cannot be made or read end the run.
+    /// A trial whose photographs cannot be stitched has a row that says why, marked `refused` if another method could; sets that cannot be made or read end the run.
     ///
     /// # Errors
     /// Those of making and reading sets, of options that cannot be, of writing; [`Error::Cancelled`].
@@ -117,7 +117,8 @@ impl Runner<'_> {
                     let (measures, note) = match outcome {
                         Ok(found) => found,
                         Err(error @ (Error::Cancelled | Error::Options(_))) => return Err(error),
-                        Err(error) => (BTreeMap::from([("failed".to_owned(), 1.0)]), error.to_string()),
+                        Err(error @ Error::NotApplicable { .. }) => (mark("refused"), error.to_string()),
+                        Err(error) => (mark("failed"), error.to_string()),
                     };
                     let row = Row { key, measures, note };
                     self.store.add(row.clone())?;
@@ -162,22 +163,33 @@ impl Runner<'_> {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct MatchingOf {
     pictures: Option<usize>,
+    central: bool,
     overrides: Vec<String>,
 }
 
 impl MatchingOf {
     fn new(trial: &Trial) -> Self {
-        Self { pictures: trial.pictures, overrides: trial.matching_overrides() }
+        Self { pictures: trial.pictures, central: trial.central, overrides: trial.matching_overrides() }
     }
 }
 
 fn inputs_of(ready: &ReadySet, trial: &Trial) -> Inputs {
     let count = trial.pictures.unwrap_or(ready.photographs.len());
+    if let Some((middle, around)) = central(&ready.truth, count).filter(|_| trial.central) {
+        let mut inputs = Inputs::new(around.iter().map(|&position| ready.photographs[position].clone()));
+        inputs.reference = Reference::Named(ready.photographs[middle].clone());
+        return inputs;
+    }
     let mut inputs = Inputs::new(ready.photographs.iter().take(count).cloned());
     if let Some(photograph) = trial.reference.and_then(|reference| ready.photographs.get(reference)) {
         inputs.reference = Reference::Named(photograph.clone());
     }
     inputs
+}
+
+/// In place of figures: what became of a run that has none.
+fn mark(name: &str) -> BTreeMap<String, f64> {
+    BTreeMap::from([(name.to_owned(), 1.0)])
 }
 
 /// The same error once more, for the next trial that shares the failed matching.

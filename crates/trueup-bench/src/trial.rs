@@ -21,8 +21,10 @@ pub(crate) struct Trial {
     pub seed: u64,
     /// Position of the reference photograph; `None` leaves it to the stitcher.
     pub reference: Option<usize>,
-    /// Only the first so many photographs of the set; `None` for all.
+    /// Only so many photographs of the set; `None` for all.
     pub pictures: Option<usize>,
+    /// Whether these are the ones around the middle of the set, with the middle one for the reference, instead of the first.
+    pub central: bool,
     /// Whether the photographs are also compared pixel by pixel.
     pub pixels: bool,
 }
@@ -38,6 +40,7 @@ impl Trial {
             seed: 0,
             reference: None,
             pictures: None,
+            central: false,
             pixels: false,
         }
     }
@@ -60,7 +63,12 @@ impl Trial {
     /// The overrides that change what is measured and matched; the others act on what was matched already.
     pub(crate) fn matching_overrides(&self) -> Vec<String> {
         const STAGES: [&str; 6] = ["stitch", "source", "features", "lines", "pairing", "matching"];
-        let concerns = |assignment: &&String| STAGES.iter().any(|stage| assignment.starts_with(&format!("{stage}.")));
+        /// Options of the whole run that decide what is made of the matches.
+        const LATER: [&str; 3] = ["stitch.method=", "stitch.align=", "stitch.structure="];
+        let concerns = |assignment: &&String| {
+            STAGES.iter().any(|stage| assignment.starts_with(&format!("{stage}.")))
+                && !LATER.iter().any(|option| assignment.starts_with(option))
+        };
         self.overrides.iter().filter(concerns).cloned().collect()
     }
 
@@ -73,7 +81,7 @@ impl Trial {
             seed: self.seed,
             reference: self.reference,
             pictures: self.pictures,
-            inputs: fingerprint(&(&self.overrides, set_fingerprint)),
+            inputs: fingerprint(&(&self.overrides, set_fingerprint, self.central)),
             version: version.to_owned(),
         }
     }
@@ -141,7 +149,12 @@ mod tests {
 
     #[test]
     fn only_early_stages_need_matching_anew() {
-        let trial = Trial::new("test", "01", "mixed", &["mesh.cell_px=20", "matching.ratio=0.7", "lines.scale=1"]);
+        let trial = Trial::new(
+            "test",
+            "01",
+            "mixed",
+            &["mesh.cell_px=20", "matching.ratio=0.7", "lines.scale=1", "stitch.align=points"],
+        );
         assert_eq!(trial.matching_overrides(), ["matching.ratio=0.7", "lines.scale=1"]);
     }
 
@@ -156,6 +169,7 @@ mod tests {
             Trial { seed: 1, ..trial.clone() }.key("set", "1"),
             Trial { reference: Some(0), ..trial.clone() }.key("set", "1"),
             Trial { pictures: Some(2), ..trial.clone() }.key("set", "1"),
+            Trial { central: true, ..trial.clone() }.key("set", "1"),
             Trial { overrides: vec!["mesh.cell_px=21".to_owned()], ..trial }.key("set", "1"),
         ];
         assert!(others.iter().all(|other| *other != key));

@@ -94,6 +94,14 @@ pub(crate) struct StitchArgs {
     #[arg(long, value_name = "METHOD", help_heading = "Tuning")]
     pub method: Option<String>,
 
+    /// What draws overlapping photographs together: points, lines, photometric or lines+photometric (stitch.align)
+    #[arg(long, value_name = "ALIGN", help_heading = "Tuning")]
+    pub align: Option<String>,
+
+    /// What is kept of the photographs' structure: none or lines (stitch.structure)
+    #[arg(long, value_name = "STRUCTURE", help_heading = "Tuning")]
+    pub structure: Option<String>,
+
     /// Every random choice derives from this number (stitch.seed)
     #[arg(long, value_name = "N", allow_hyphen_values = true, help_heading = "Tuning")]
     pub seed: Option<String>,

@@ -77,6 +77,8 @@ fn options(args: &StitchArgs) -> Result<StitchOptions, Failure> {
         ("--method", "stitch.method", &args.method),
         ("--scale", "canvas.scale", &args.scale),
         ("--quality", "output.jpeg_quality", &args.quality),
+        ("--align", "stitch.align", &args.align),
+        ("--structure", "stitch.structure", &args.structure),
         ("--seed", "stitch.seed", &args.seed),
     ];
     let set = args.set.iter().map(|assignment| (format!("--set {assignment}"), assignment.clone()));

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 
 use crate::pictures::street_desk;
-use crate::run::Desk;
+use crate::run::{Desk, finish, trueup};
 
 /// The panorama's bytes and the project without its timings.
 fn stitch(desk: &Desk, arguments: &[&str]) -> (Vec<u8>, Value) {
@@ -42,5 +42,24 @@ fn the_order_of_the_photographs_hardly_matters() {
             let change = (theta_deg - in_order[&path]).abs();
             assert!(change < 0.2, "{path} turns by {change} degrees more in the order {order:?}");
         }
+    }
+}
+
+#[test]
+fn threads_change_no_byte_of_any_method() {
+    let desk = street_desk();
+    for method in ["homography", "autostitch", "apap", "sphp", "sphp-free", "aanap", "quasi-homography"] {
+        let arguments = ["a.jpg", "b.jpg", "c.jpg", "--method", method];
+        let one_thread = stitch(&desk, &[&arguments[..], &["--threads", "1"]].concat());
+        let three = stitch(&desk, &[&arguments[..], &["--threads", "3"]].concat());
+        assert!(one_thread.0 == three.0, "the panoramas differ by {method}");
+        assert_eq!(one_thread.1, three.1, "the projects differ by {method}");
+        assert_eq!(one_thread.1["method"], method);
+        assert_eq!(one_thread.1["manhattan"]["accepted"], false, "{method} asks no vanishing points");
+        assert!(one_thread.1["measures"]["reprojection"].is_object(), "{method} is measured");
+        let summary = finish(trueup(desk.path(), &["inspect", "pano.json", "--verbose"]));
+        let asked = format!("the method {method} does not ask them");
+        assert!(summary.expect_success().contains(&asked), "{}", summary.stdout);
+        finish(trueup(desk.path(), &["evaluate", "pano.json"])).expect_success();
     }
 }

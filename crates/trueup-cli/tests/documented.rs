@@ -34,6 +34,21 @@ const MISTAKES: &[Mistake] = &[
         up_to: Some("the best pair is"),
     },
     Mistake {
+        what: "a method that cannot place them",
+        arguments: &[
+            "stitch",
+            "a.jpg",
+            "b.jpg",
+            "-o",
+            "pano.jpg",
+            "--method",
+            "homography",
+            "--set",
+            "warps.min_depth=0.9",
+        ],
+        up_to: Some("is not applicable"),
+    },
+    Mistake {
         what: "`--require-all`, one unrelated",
         arguments: &["stitch", "a.jpg", "b.jpg", "noise1.jpg", "-o", "pano.jpg", "--require-all"],
         up_to: Some("noise1.jpg: no overlap found"),

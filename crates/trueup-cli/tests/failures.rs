@@ -118,6 +118,24 @@ fn black_photographs() {
 }
 
 #[test]
+fn a_method_that_cannot_place_the_photographs() {
+    let desk = street_desk();
+    // 0.9 is the cosine of 25.8 degrees: the corners of the photographs beside the reference reach farther.
+    let limits = ["--method", "homography", "--set", "warps.min_depth=0.9"];
+    let run = desk.stitch(&[&STREET_NAMES[..], &limits].concat());
+    run.expect_failure(
+        1,
+        &[
+            "trueup: error: the method homography is not applicable: ",
+            " does not lie in front of the panorama's plane; it reaches ",
+            " degrees from the axis of ",
+            "trueup: hint: Use the method vpg or autostitch, or stitch fewer photographs.",
+        ],
+    );
+    assert_eq!(desk.files(), STREET_NAMES, "nothing is left behind");
+}
+
+#[test]
 fn all_required_but_one_bad() {
     let desk = street_desk();
     desk.put("text.jpg", "no picture");

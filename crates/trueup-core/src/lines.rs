@@ -22,3 +22,14 @@ impl LineSegment {
         (self.end[0] - self.start[0]).hypot(self.end[1] - self.start[1])
     }
 }
+
+/// Segments of two pictures that show the same edge.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairLines {
+    /// Index of the first picture.
+    pub a: usize,
+    /// Index of the second picture.
+    pub b: usize,
+    /// The matched segments, in the working pixels of the first and of the second.
+    pub lines: Vec<[LineSegment; 2]>,
+}

@@ -1,6 +1,6 @@
 //! The deformed grid of one picture: what every warp model yields and the renderer and the metrics consume.
 
-use nalgebra::Vector2;
+use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
 /// A grid over one picture and where its vertices go in the panorama.
@@ -83,6 +83,40 @@ impl GridMesh {
             .fold(Vector2::zeros(), |sum, (&corner, weight)| sum + Vector2::from(self.target[corner]) * weight)
     }
 
+    /// How the place in the panorama changes with the pixel: the columns are its derivatives by x and y, those of the cell
+    /// that [`Self::bilinear`] uses.
+    pub fn derivative(&self, point: Vector2<f64>) -> Matrix2<f64> {
+        let ([a, b, c, d], _) = self.bilinear(point);
+        let origin = self.source(a);
+        let [a, b, c, d] = [a, b, c, d].map(|vertex| Vector2::from(self.target[vertex]));
+        let cell = Vector2::new(self.cell_width(), self.cell_height());
+        let (u, v) = ((point.x - origin.x) / cell.x, (point.y - origin.y) / cell.y);
+        let along_x = ((b - a) * (1.0 - v) + (c - d) * v) / cell.x;
+        let along_y = ((d - a) * (1.0 - u) + (c - b) * u) / cell.y;
+        Matrix2::from_columns(&[along_x, along_y])
+    }
+
+    /// The pixel that goes to `place`, by Newton's method from the pixel `start`; `None` if it is not found, which is
+    /// usual far outside the picture. The pixel may lie outside.
+    pub fn source_of(&self, place: Vector2<f64>, start: Vector2<f64>) -> Option<Vector2<f64>> {
+        /// Steps; each squares the error once it is in the right cell.
+        const STEPS: usize = 12;
+        /// Distance in the panorama that counts as met.
+        const MET_PX: f64 = 1e-3;
+        let mut pixel = start;
+        for _ in 0..STEPS {
+            let miss = place - self.warp(pixel);
+            if miss.norm_squared() <= MET_PX * MET_PX {
+                return Some(pixel);
+            }
+            pixel += self.derivative(pixel).try_inverse()? * miss;
+            if !(pixel.x.is_finite() && pixel.y.is_finite()) {
+                return None;
+            }
+        }
+        None
+    }
+
     /// Smallest and largest target coordinates.
     pub fn bounds(&self) -> (Vector2<f64>, Vector2<f64>) {
         let start = (Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY));
@@ -103,6 +137,28 @@ mod tests {
     fn regular_grid_of_the_working_size_has_the_published_vertex_count() {
         let mesh = GridMesh::regular(800.0, 600.0, 40.0);
         assert_eq!((mesh.columns, mesh.rows, mesh.len()), (21, 16, 336));
+    }
+
+    /// A smooth bend: the derivative agrees with differences, and the inverse with the warp, from a start a cell away.
+    #[test]
+    fn derivative_and_inverse_belong_to_the_warp() {
+        let mut mesh = GridMesh::regular(400.0, 300.0, 40.0);
+        for vertex in &mut mesh.target {
+            let [x, y] = *vertex;
+            *vertex = [1.1 * x - 0.2 * y + 2e-4 * x * y, 0.2 * x + 0.9 * y + 1e-4 * x * x];
+        }
+        for k in 0..50 {
+            let point = Vector2::new((f64::from(k) * 0.618).fract() * 400.0, (f64::from(k) * 0.755).fract() * 300.0);
+            let step = 1e-6;
+            let derivative = mesh.derivative(point);
+            for (axis, offset) in [Vector2::new(step, 0.0), Vector2::new(0.0, step)].iter().enumerate() {
+                let difference = (mesh.warp(point + offset) - mesh.warp(point)) / step;
+                assert!((difference - derivative.column(axis)).norm() < 1e-6);
+            }
+            let found = mesh.source_of(mesh.warp(point), point + Vector2::new(35.0, -40.0)).expect("invertible");
+            assert!((found - point).norm() < 2e-3, "{found} instead of {point}");
+        }
+        assert_eq!(mesh.source_of(Vector2::repeat(f64::NAN), Vector2::zeros()), None);
     }
 
     proptest! {

@@ -4,6 +4,7 @@
 //! the first pixel at (0.5, 0.5).
 
 pub mod features;
+pub mod line_matching;
 pub mod lines;
 pub mod matching;
 pub mod pairing;

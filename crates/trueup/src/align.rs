@@ -9,20 +9,24 @@ use trueup_align::cameras::{self, CameraPrior, Cameras};
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points::{self, OverlapWarp};
 use trueup_align::mesh::{self, WarpedMesh};
-use trueup_align::similarity::{self, PriorInput, SimilarityPrior};
+use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityOptions, SimilarityPrior};
 use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::{self, TriadOutcome};
+use trueup_align::warps::{self, WarpInput};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
+use trueup_core::raster::Raster;
 use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::{Result, StageContext};
+use trueup_io::decode::FilePhotographs;
 
 use crate::clock::Clock;
 use crate::measure::Measured;
 use crate::memory::{OverlapMemory, Overlaps};
-use crate::options::StitchOptions;
+use crate::options::{Shape, StitchOptions};
+use crate::refinement::Material;
 
 /// One group of overlapping photographs with everything the geometry stages need; indices are local, 0..N.
 pub(crate) struct Component<'a> {
@@ -31,6 +35,8 @@ pub(crate) struct Component<'a> {
     pub images: Vec<&'a SourceImage>,
     pub frames: Vec<WorkingFrame>,
     pub lines: Vec<Vec<LineSegment>>,
+    /// Grey values at the working size, for those that were kept.
+    pub grays: Vec<Option<&'a Raster<u8>>>,
     pub pairs: Vec<PairMatches>,
     pub reference: usize,
     /// Rotation that the user's graph wants of the reference photograph, radians clockwise.
@@ -54,7 +60,7 @@ impl<'a> Component<'a> {
         reference: usize,
         reference_rotation: f64,
         images: &'a [SourceImage],
-        measured: &[Option<Measured>],
+        measured: &'a [Option<Measured>],
         pairs: &[PairMatches],
     ) -> Self {
         let local = |picture: usize| members.binary_search(&picture).ok();
@@ -69,6 +75,7 @@ impl<'a> Component<'a> {
             images: members.iter().map(|&picture| &images[picture]).collect(),
             frames: members.iter().filter_map(known).map(|one| one.frame).collect(),
             lines: members.iter().filter_map(known).map(|one| one.lines.clone()).collect(),
+            grays: members.iter().filter_map(known).map(|one| one.gray.as_ref()).collect(),
             pairs,
             reference: local(reference).unwrap_or(0),
             reference_rotation,
@@ -77,6 +84,11 @@ impl<'a> Component<'a> {
 
     fn names(&self) -> Vec<String> {
         self.images.iter().map(|image| image.name.clone()).collect()
+    }
+
+    /// A number for each photograph that depends neither on its folder nor on the order of the inputs.
+    fn seeds(&self) -> Vec<u64> {
+        self.images.iter().map(|image| name_seed(&image.path)).collect()
     }
 
     /// What metadata say of the cameras, in working pixels.
@@ -101,12 +113,14 @@ impl<'a> Component<'a> {
 }
 
 /// Runs the geometry stages in their order. With a `memory`, cameras and overlaps that it holds are not found again.
+/// `photographs` are looked at again only if the options ask for pixels that were not kept.
 pub(crate) fn run(
     component: &Component,
     options: &StitchOptions,
     context: &StageContext,
     clock: &mut Clock,
     memory: Option<&OverlapMemory>,
+    photographs: &FilePhotographs,
 ) -> Result<Geometry> {
     let grids: Vec<GridMesh> = component
         .frames
@@ -119,6 +133,7 @@ pub(crate) fn run(
     };
     let Overlaps { cameras, pairs, warps, .. } = overlaps.as_ref();
     let triads = clock.time("vanishing points", || find_triads(component, cameras, options, context))?;
+    let shape = options.stitch.method.shape();
     let prior = in_one_step("prior", context, clock, || {
         let input = PriorInput {
             cameras: &cameras.cameras,
@@ -130,8 +145,9 @@ pub(crate) fn run(
             cell_px: options.mesh.cell_px,
             vanishing: &options.vanishing,
             turn: component.reference_rotation,
+            reference: component.reference,
         };
-        similarity::run(&input, &options.similarity, context)
+        similarity::run(&input, &wanted_prior(shape, options), context)
     })?;
 
     let edges: Vec<GraphEdge> =
@@ -148,11 +164,42 @@ pub(crate) fn run(
             )
         }
     };
-    let bases = mesh::bases(options.mesh.base, &cameras.cameras, &grids, &prior);
-    let mesh = in_one_step("mesh", context, clock, || {
-        mesh::run(&grids, &kept, &bases, component.reference, &options.mesh, context)
+    let mesh = in_one_step("mesh", context, clock, || match shape {
+        Shape::Mesh(_) => {
+            let bases = mesh::bases(options.mesh.base, &cameras.cameras, &grids, &prior);
+            let material = Material::new(component, (&grids, &kept), photographs, options, context)?;
+            let refinements = material.refinements(component, &met, options);
+            mesh::run_refined(&grids, &kept, &bases, component.reference, &options.mesh, &refinements, context)
+        }
+        Shape::Warp(model) => {
+            let fine: Vec<GridMesh> = grids.iter().map(|grid| mesh::divided(grid, options.mesh.subdivision)).collect();
+            let input = WarpInput {
+                cameras: &cameras.cameras,
+                frames: &component.frames,
+                grids: &fine,
+                pairs: &met,
+                overlaps: &kept,
+                names: &component.names(),
+                seeds: &component.seeds(),
+                reference: component.reference,
+                level_from_world: prior.level_from_world(),
+                cut_yaw: cut.as_ref().map(|cut| cut.yaw),
+                turn: component.reference_rotation,
+            };
+            warps::run(model, &input, &options.warps, context)
+        }
     })?;
     Ok(Geometry { cameras: cameras.clone(), triads, prior, mesh, met })
+}
+
+/// The options of the prior that a method means.
+fn wanted_prior(shape: Shape, options: &StitchOptions) -> SimilarityOptions {
+    let prior = match shape {
+        Shape::Mesh(None) => options.similarity.prior,
+        Shape::Mesh(Some(prior)) => prior,
+        Shape::Warp(_) => PriorMethod::Straightening,
+    };
+    SimilarityOptions { prior, ..options.similarity.clone() }
 }
 
 /// Cameras, the pairs that agree with them, and the grids carried across these.

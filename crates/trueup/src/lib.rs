@@ -33,6 +33,7 @@ mod names;
 mod options;
 mod project;
 mod record;
+mod refinement;
 mod stitcher;
 
 pub use evaluation::{Evaluation, PictureEvaluation, PixelEvaluation, evaluate, evaluate_pixels, read_truth};
@@ -44,6 +45,7 @@ pub use project::{
     Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
 };
 pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};
+pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::render::Panorama;
 pub use trueup_core::context::{CancelToken, Progress, Silent};
 pub use trueup_core::diagnostics::{Diagnostic, Severity};

@@ -13,6 +13,7 @@ use trueup_vision::lines;
 
 use crate::clock::Clock;
 use crate::options::StitchOptions;
+use crate::refinement;
 
 const STAGE: &str = "measuring";
 
@@ -23,6 +24,8 @@ pub(crate) struct Measured {
     pub features: Features,
     /// In working pixels.
     pub lines: Vec<LineSegment>,
+    /// Grey values at the working size, kept if the mesh is to be refined by pixels.
+    pub gray: Option<Raster<u8>>,
     pub thumbnail: Raster<u8>,
     pub thumbnail_frame: WorkingFrame,
 }
@@ -89,7 +92,15 @@ fn measure(
     busy.features = next_lap();
     let lines = lines::detect(&picture.gray, &options.lines, context)?;
     busy.lines = next_lap();
-    Ok(Measured { frame, features, lines, thumbnail: picture.thumbnail, thumbnail_frame: picture.thumbnail_frame })
+    let gray = refinement::needs_pixels(options).then(|| refinement::eight_bit(&picture.gray));
+    Ok(Measured {
+        frame,
+        features,
+        lines,
+        gray,
+        thumbnail: picture.thumbnail,
+        thumbnail_frame: picture.thumbnail_frame,
+    })
 }
 
 /// Whether an error is about one photograph, so that the others can still be stitched.

@@ -3,10 +3,11 @@
 use serde::{Deserialize, Serialize};
 use trueup_align::cameras::CameraOptions;
 use trueup_align::match_points::MatchPointOptions;
-use trueup_align::mesh::MeshOptions;
+use trueup_align::mesh::{LineAlignmentOptions, MeshOptions, PhotometricOptions, StructureOptions};
 use trueup_align::metrics::MeasureOptions;
-use trueup_align::similarity::SimilarityOptions;
+use trueup_align::similarity::{PriorMethod, SimilarityOptions};
 use trueup_align::vanishing::VanishingOptions;
+use trueup_align::warps::{WarpModel, WarpOptions};
 use trueup_compose::exposure::ExposureOptions;
 use trueup_compose::layout::CanvasOptions;
 use trueup_compose::render::RenderOptions;
@@ -15,6 +16,7 @@ use trueup_core::{Error, Result};
 use trueup_io::encode::OutputOptions;
 use trueup_io::source::SourceOptions;
 use trueup_vision::features::FeatureOptions;
+use trueup_vision::line_matching::LineMatchingOptions;
 use trueup_vision::lines::LineOptions;
 use trueup_vision::matching::MatchingOptions;
 use trueup_vision::pairing::PairingOptions;
@@ -24,6 +26,82 @@ trueup_core::choice! {
     pub enum Method {
         /// Vanishing-point-guided natural stitching: upright wherever the scene has straight lines to tell.
         Vpg = "vpg",
+        /// One homography per photograph, onto the plane of the reference.
+        Homography = "homography",
+        /// Straightened cameras on a sphere, a cylinder or a plane (warps.projection), as AutoStitch has them.
+        Autostitch = "autostitch",
+        /// As-projective-as-possible: a homography for every grid vertex.
+        Apap = "apap",
+        /// Shape-preserving half-projective: a homography on one side, an upright similarity on the other.
+        Sphp = "sphp",
+        /// The same with a similarity that may turn.
+        SphpFree = "sphp-free",
+        /// Adaptive as-natural-as-possible: homographies that turn into similarities away from the overlaps.
+        Aanap = "aanap",
+        /// Homographies whose scale grows only linearly outside the overlaps.
+        QuasiHomography = "quasi-homography",
+    }
+}
+
+/// What makes a method: how the grids are deformed, and under which prior.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Shape {
+    /// The mesh energies under this prior; `None` leaves the prior to `similarity.prior`.
+    Mesh(Option<PriorMethod>),
+    /// A warp model. Level and roll are those of the straightened cameras.
+    Warp(WarpModel),
+}
+
+impl Method {
+    /// The one place that says what a method is made of.
+    pub(crate) fn shape(self) -> Shape {
+        match self {
+            Self::Vpg => Shape::Mesh(None),
+            // Methods that are a prior: Self::Name => Shape::Mesh(Some(PriorMethod::Name)).
+            Self::Homography => Shape::Warp(WarpModel::Homography),
+            Self::Autostitch => Shape::Warp(WarpModel::Autostitch),
+            Self::Apap => Shape::Warp(WarpModel::Apap),
+            Self::Sphp => Shape::Warp(WarpModel::Sphp),
+            Self::SphpFree => Shape::Warp(WarpModel::SphpFree),
+            Self::Aanap => Shape::Warp(WarpModel::Aanap),
+            Self::QuasiHomography => Shape::Warp(WarpModel::QuasiHomography),
+        }
+    }
+}
+
+trueup_core::choice! {
+    /// What draws overlapping photographs together.
+    pub enum Alignment {
+        /// Matched points, carried to the whole overlap.
+        Points = "points",
+        /// And matched lines.
+        Lines = "lines",
+        /// And the pixels themselves.
+        Photometric = "photometric",
+        /// And both, lines first.
+        LinesPhotometric = "lines+photometric",
+    }
+}
+
+impl Alignment {
+    /// Whether matched lines take part.
+    pub fn uses_lines(self) -> bool {
+        matches!(self, Self::Lines | Self::LinesPhotometric)
+    }
+
+    /// Whether pixels take part.
+    pub fn uses_pixels(self) -> bool {
+        matches!(self, Self::Photometric | Self::LinesPhotometric)
+    }
+}
+
+trueup_core::choice! {
+    /// What of the photographs' structure is kept, beyond the neighbourhoods of grid vertices.
+    pub enum Structure {
+        /// Nothing.
+        None = "none",
+        /// Long straight lines.
+        Lines = "lines",
     }
 }
 
@@ -32,6 +110,10 @@ trueup_core::options! {
     pub struct WorkingOptions("stitch") {
         /// How the panorama's shape is found.
         method: Method = Method::Vpg, Allowed::Any, "";
+        /// What draws overlapping photographs together: more is slower and shows fewer ghosts.
+        align: Alignment = Alignment::Points, Allowed::Any, "";
+        /// What of the photographs' structure is kept, beyond the neighbourhoods of grid vertices.
+        structure: Structure = Structure::None, Allowed::Any, "";
         /// Photographs are measured on a copy reduced to at most this many pixels; the panorama itself is made from
         /// the full photographs.
         working_pixels: f64 = 480000.0, between(10000.0, 100000000.0), "px";
@@ -99,6 +181,16 @@ stage_options! {
     match_points: MatchPointOptions,
     /// How the grids are deformed.
     mesh: MeshOptions,
+    /// How segments of overlapping pictures are matched.
+    line_matching: LineMatchingOptions,
+    /// How matched lines align the grids.
+    line_alignment: LineAlignmentOptions,
+    /// How long lines keep their shape.
+    structure: StructureOptions,
+    /// How pixels align the grids.
+    photometric: PhotometricOptions,
+    /// How the methods that are warp models place the photographs.
+    warps: WarpOptions,
     /// How large the panorama is.
     canvas: CanvasOptions,
     /// How exposures are evened out.

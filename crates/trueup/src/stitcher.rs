@@ -296,7 +296,7 @@ impl<'a> Stitcher<'a> {
             Component::new(members, reference, rotation, &matched.sources.images, &matched.measured, &matched.pairs);
         let geometry = match members.len() {
             1 => None,
-            _ => Some(align::run(&component, self.options, self.context, &mut clock, memory.as_ref())?),
+            _ => Some(align::run(&component, self.options, self.context, &mut clock, memory.as_ref(), photographs)?),
         };
         let placed = place(&component, geometry.as_ref());
         let layout = layout::run(placed, component.reference, &self.options.canvas, self.context)?;

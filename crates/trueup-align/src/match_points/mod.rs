@@ -30,6 +30,22 @@ pub struct OverlapWarp {
     pub vertices: Vec<Option<[f64; 2]>>,
 }
 
+impl OverlapWarp {
+    /// Where a pixel of picture `from` is in `to`, by the vertices of `grid` around it: interpolated, or at the overlap's
+    /// border moved like the nearest vertex that is carried. `None` outside the overlap.
+    pub fn at(&self, grid: &GridMesh, point: Vector2<f64>) -> Option<Vector2<f64>> {
+        let (corners, shares) = grid.bilinear(point);
+        let places = corners.map(|corner| self.vertices.get(corner).copied().flatten().map(Vector2::from));
+        if let [Some(a), Some(b), Some(c), Some(d)] = places {
+            return Some(a * shares[0] + b * shares[1] + c * shares[2] + d * shares[3]);
+        }
+        let known = corners.iter().zip(shares).zip(places).filter_map(|((corner, share), place)| {
+            Some((share, place? + point - grid.source(*corner)))
+        });
+        known.max_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, place)| place)
+    }
+}
+
 trueup_core::choice! {
     /// How a grid vertex is carried into another picture.
     pub enum TransferModel {

@@ -9,8 +9,13 @@
 mod alignment;
 mod base;
 mod complex;
+mod line_alignment;
 mod normal_equations;
+mod photometric;
+mod refinement;
 mod similarity;
+mod solver;
+mod structure;
 
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
@@ -20,8 +25,13 @@ use trueup_core::{Error, Result, StageContext};
 use crate::match_points::OverlapWarp;
 pub use alignment::{AlignmentEnergy, MatchPoint};
 pub use base::{Base, BaseShape, bases};
-pub use normal_equations::{MeshSolution, NormalEquations};
+pub use line_alignment::{LineAlignmentInput, LineAlignmentOptions};
+pub use normal_equations::{MeshSolution, Metric, NormalEquations, Share};
+pub use photometric::{PhotometricInput, PhotometricOptions, Pyramid};
+pub use refinement::Refinements;
 pub use similarity::SimilarityEnergy;
+pub use solver::MeshSolver;
+pub use structure::{StructureInput, StructureOptions};
 
 trueup_core::options! {
     /// How the grids are deformed.
@@ -41,6 +51,9 @@ trueup_core::options! {
         prior_weight: f64 = 6.0, between(0.001, 1000.0), "";
         /// Growth of that weight with the distance from the overlap, per picture diagonal.
         prior_slope: f64 = 20.0, between(0.0, 1000.0), "";
+        /// Weight with which a refinement (`stitch.align`) keeps each picture's outline where the plain mesh has it (on
+        /// residuals).
+        outline_weight: f64 = 10.0, between(0.0, 1000.0), "";
     }
 }
 
@@ -77,9 +90,26 @@ pub fn run(
     options: &MeshOptions,
     context: &StageContext,
 ) -> Result<WarpedMesh> {
+    run_refined(grids, warps, bases, reference, options, &Refinements::default(), context)
+}
+
+/// As [`run`], and with the energies of `refinements`; none of them leave the grids exactly as [`run`] makes them.
+///
+/// # Errors
+/// As [`run`]; [`Error::Input`] if a refinement's lists do not have an entry per picture.
+pub fn run_refined(
+    grids: &[GridMesh],
+    warps: &[OverlapWarp],
+    bases: &[Base],
+    reference: usize,
+    options: &MeshOptions,
+    refinements: &Refinements,
+    context: &StageContext,
+) -> Result<WarpedMesh> {
     /// Any positive weight anchors the one free translation exactly; 1 keeps the system well conditioned.
     const ANCHOR_WEIGHT: f64 = 1.0;
     context.check_cancelled()?;
+    refinements.check(grids.len())?;
     let mut equations = NormalEquations::new(grids);
     let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(grids).map(|(base, grid)| base.places(grid)).collect();
     let alignment = AlignmentEnergy::new(grids, warps, bases, &places);
@@ -92,36 +122,70 @@ pub fn run(
     for picture in anchored {
         equations.anchor(picture, ANCHOR_WEIGHT);
     }
-    context.check_cancelled()?;
-    let unsolvable = |why: &str| {
-        Error::unsolvable(
-            "mesh",
-            "the panorama's grid",
-            why,
-            "Raise mesh.prior_weight, or leave out pictures that hardly overlap.",
-        )
-    };
-    let solution = equations.solve().ok_or_else(|| unsolvable("the equations are not positive definite"))?;
-    let relative_gradient = solution.relative_gradient;
-    if !solution.coordinates.iter().all(|coordinate| coordinate.is_finite()) {
-        return Err(unsolvable("the solution is not finite"));
-    }
-    let solved = equations.meshes(grids, &solution.coordinates);
+    let problem = Problem { grids, warps, bases, places: &places, alignment: &alignment, options, context };
+    let Solved { meshes: solved, relative_gradient } = problem.solve_refined(equations, refinements)?;
     let alignment_rms = alignment.rms(&solved);
-    let meshes: Vec<GridMesh> =
-        (0..grids.len()).map(|k| subdivided(&solved[k], &bases[k], &places[k], options.subdivision)).collect();
+    let meshes = problem.delivered(&solved);
     let folds = meshes.iter().map(count_folds).sum();
     Ok(WarpedMesh { meshes, alignment_rms, folds, relative_gradient })
 }
 
+/// The undeformed grid with `factor` cells per cell of `grid` along each axis.
+pub fn divided(grid: &GridMesh, factor: usize) -> GridMesh {
+    let (rows, columns) = ((grid.rows - 1) * factor + 1, (grid.columns - 1) * factor + 1);
+    let mut fine = GridMesh { rows, columns, target: Vec::new(), ..*grid };
+    fine.target = (0..fine.len()).map(|vertex| fine.source(vertex).into()).collect();
+    fine
+}
+
+/// What all rounds of solving have in common.
+struct Problem<'a> {
+    grids: &'a [GridMesh],
+    warps: &'a [OverlapWarp],
+    bases: &'a [Base],
+    /// The bases' places of the grids' vertices.
+    places: &'a [Vec<Vector2<f64>>],
+    alignment: &'a AlignmentEnergy,
+    options: &'a MeshOptions,
+    context: &'a StageContext<'a>,
+}
+
+/// Grids whose vertices are a solution.
+struct Solved {
+    meshes: Vec<GridMesh>,
+    relative_gradient: f64,
+}
+
+impl Problem<'_> {
+    fn solve(&self, solver: &mut MeshSolver, equations: &NormalEquations) -> Result<Solved> {
+        self.context.check_cancelled()?;
+        let unsolvable = |why: &str| {
+            Error::unsolvable(
+                "mesh",
+                "the panorama's grid",
+                why,
+                "Raise mesh.prior_weight, or leave out pictures that hardly overlap.",
+            )
+        };
+        let solution = solver.solve(equations).ok_or_else(|| unsolvable("the equations are not positive definite"))?;
+        if !solution.coordinates.iter().all(|coordinate| coordinate.is_finite()) {
+            return Err(unsolvable("the solution is not finite"));
+        }
+        let meshes = equations.meshes(self.grids, &solution.coordinates);
+        Ok(Solved { meshes, relative_gradient: solution.relative_gradient })
+    }
+
+    /// Solved grids with the subdivision that they are delivered with.
+    fn delivered(&self, solved: &[GridMesh]) -> Vec<GridMesh> {
+        (0..solved.len())
+            .map(|k| subdivided(&solved[k], &self.bases[k], &self.places[k], self.options.subdivision))
+            .collect()
+    }
+}
+
 /// A solved grid with more vertices: the base's own curves plus the bilinear deviation from it.
 fn subdivided(solved: &GridMesh, base: &Base, places: &[Vector2<f64>], factor: usize) -> GridMesh {
-    let mut fine = GridMesh {
-        rows: (solved.rows - 1) * factor + 1,
-        columns: (solved.columns - 1) * factor + 1,
-        target: Vec::new(),
-        ..*solved
-    };
+    let mut fine = divided(solved, factor);
     let place = |pixel: Vector2<f64>| solved.warp(pixel) + base.sag(solved, places, pixel);
     fine.target = (0..fine.len()).map(|vertex| place(fine.source(vertex)).into()).collect();
     fine

@@ -1,12 +1,11 @@
 //! Normal equations of the mesh: assembled block by block, solved by sparse Cholesky.
 
-use faer::linalg::solvers::Solve;
-use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
 use super::complex::conjugate_product;
+use super::solver::MeshSolver;
 
 /// Largest distance, in grid steps along an axis, of two vertices that one energy row couples.
 const REACH: usize = 3;
@@ -33,8 +32,8 @@ pub struct MeshSolution {
 /// A^T A and A^T b of a least-squares problem in the vertices of several grids.
 ///
 /// Unknown 2 v is the x and 2 v + 1 the y coordinate of vertex v, vertices numbered through all grids, row-major in
-/// each. Couplings inside a grid reach a few vertices only and live in tables; couplings between grids in a list.
-#[derive(Debug)]
+/// each. Couplings of near vertices of a grid live in tables; those farther apart, or between grids, in a list.
+#[derive(Debug, Clone)]
 pub struct NormalEquations {
     /// First vertex of every grid, and the total at the end.
     first: Vec<usize>,
@@ -42,7 +41,56 @@ pub struct NormalEquations {
     inside: Vec<[Block; SLOTS]>,
     /// (larger vertex, smaller vertex, block), unsorted.
     between: Vec<(u32, u32, Block)>,
-    right: Vec<f64>,
+    /// Whether `between` holds couplings inside a grid, so that its order is not that of the columns.
+    far_inside: bool,
+    pub(super) right: Vec<f64>,
+}
+
+/// A symmetric 2 x 2 matrix [[xx, xy], [xy, yy]] that weighs a residual of the plane.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Metric {
+    /// Weight of the square of x.
+    pub xx: f64,
+    /// Weight of the product of x and y.
+    pub xy: f64,
+    /// Weight of the square of y.
+    pub yy: f64,
+}
+
+impl Metric {
+    /// All directions alike.
+    pub fn isotropic(weight: f64) -> Self {
+        Self { xx: weight, xy: 0.0, yy: weight }
+    }
+
+    /// Only what goes along `direction`: weight (direction . residual)^2.
+    pub fn along(direction: Vector2<f64>, weight: f64) -> Self {
+        Self {
+            xx: weight * direction.x * direction.x,
+            xy: weight * direction.x * direction.y,
+            yy: weight * direction.y * direction.y,
+        }
+    }
+
+    /// The matrix times a vector.
+    pub fn apply(&self, value: Vector2<f64>) -> Vector2<f64> {
+        Vector2::new(self.xx * value.x + self.xy * value.y, self.xy * value.x + self.yy * value.y)
+    }
+
+    fn block(&self, factor: f64) -> Block {
+        [factor * self.xx, factor * self.xy, factor * self.xy, factor * self.yy]
+    }
+}
+
+/// A vertex by its grid and its index there, with its share in a sum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Share {
+    /// The grid.
+    pub picture: usize,
+    /// The vertex.
+    pub vertex: usize,
+    /// The factor.
+    pub share: f64,
 }
 
 impl NormalEquations {
@@ -58,6 +106,7 @@ impl NormalEquations {
             columns: grids.iter().map(|grid| grid.columns).collect(),
             inside: vec![[[0.0; 4]; SLOTS]; vertices],
             between: Vec::new(),
+            far_inside: false,
             right: vec![0.0; 2 * vertices],
         }
     }
@@ -67,8 +116,7 @@ impl NormalEquations {
         self.right.len()
     }
 
-    /// Adds |sum_m coefficient_m v_m - value|^2 for vertices `members` of grid `picture`, which lie within three grid
-    /// steps of each other.
+    /// Adds |sum_m coefficient_m v_m - value|^2 for vertices `members` of grid `picture`, each of which occurs once.
     pub fn add_inside(&mut self, picture: usize, members: &[(usize, Coefficient)], value: Vector2<f64>) {
         let first = self.first[picture];
         for &(m, factor_m) in members {
@@ -121,21 +169,54 @@ impl NormalEquations {
         self.add_block_inside(picture, 0, 0, [weight, 0.0, 0.0, weight]);
     }
 
+    /// Adds |sum_m share_m v_m - value|^2, weighed by `metric`, for any vertices; a vertex may occur more than once.
+    pub fn add_sum(&mut self, members: &[Share], metric: Metric, value: Vector2<f64>) {
+        let pull = metric.apply(value);
+        for (position, one) in members.iter().enumerate() {
+            self.add_right(one.picture, one.vertex, pull * one.share);
+            for (earlier, other) in members[..=position].iter().enumerate() {
+                self.add_coupling(one, other, earlier == position, metric.block(one.share * other.share));
+            }
+        }
+    }
+
+    /// Adds the normal equations of several residuals over the same `members` at once: `metrics` holds the lower triangle,
+    /// row by row, of the members' couplings, `right` the right side of each. The members' shares do not count.
+    ///
+    /// Slices that are too short leave the rest out.
+    pub fn add_summed(&mut self, members: &[Share], metrics: &[Metric], right: &[Vector2<f64>]) {
+        let mut metrics = metrics.iter();
+        for (position, (one, &pull)) in members.iter().zip(right).enumerate() {
+            self.add_right(one.picture, one.vertex, pull);
+            for (earlier, other) in members[..=position].iter().enumerate() {
+                let Some(metric) = metrics.next() else { return };
+                self.add_coupling(one, other, earlier == position, metric.block(1.0));
+            }
+        }
+    }
+
+    fn add_right(&mut self, picture: usize, vertex: usize, pull: Vector2<f64>) {
+        let unknown = 2 * (self.first[picture] + vertex);
+        self.right[unknown] += pull.x;
+        self.right[unknown + 1] += pull.y;
+    }
+
+    /// Adds a symmetric block for an unordered pair of members. Two different members that are the same vertex couple in
+    /// both orders.
+    fn add_coupling(&mut self, one: &Share, other: &Share, same_member: bool, block: Block) {
+        if one.picture != other.picture {
+            let (m, n) = (self.first[one.picture] + one.vertex, self.first[other.picture] + other.vertex);
+            self.between.push((m.max(n) as u32, m.min(n) as u32, block));
+            return;
+        }
+        let (low, high) = (one.vertex.min(other.vertex), one.vertex.max(other.vertex));
+        let times = if low == high && !same_member { 2.0 } else { 1.0 };
+        self.add_block_inside(one.picture, high, low, block.map(|entry| times * entry));
+    }
+
     /// The least-squares solution; `None` if the matrix is not positive definite.
     pub fn solve(&self) -> Option<MeshSolution> {
-        let matrix = self.matrix()?;
-        let symbolic = SymbolicLlt::try_new(matrix.symbolic(), faer::Side::Lower).ok()?;
-        let factor = Llt::try_new_with_symbolic(symbolic, matrix.as_ref(), faer::Side::Lower).ok()?;
-        let right = faer::Mat::from_fn(self.unknowns(), 1, |row, _| self.right[row]);
-        let mut solution = factor.solve(&right);
-        // One step of refinement recovers the digits that the normal equations lose.
-        let residual = &right - self.multiply(&matrix, &solution);
-        solution += factor.solve(&residual);
-        let gradient = &right - self.multiply(&matrix, &solution);
-        Some(MeshSolution {
-            relative_gradient: gradient.norm_l2() / right.norm_l2().max(f64::MIN_POSITIVE),
-            coordinates: (0..self.unknowns()).map(|row| solution[(row, 0)]).collect(),
-        })
+        MeshSolver::default().solve(self)
     }
 
     /// The grids with the solution as their targets.
@@ -151,10 +232,17 @@ impl NormalEquations {
             .collect()
     }
 
+    /// Adds a block for vertices m >= n of a grid: to the table if they are near each other, else to the list.
     fn add_block_inside(&mut self, picture: usize, m: usize, n: usize, block: Block) {
         let columns = self.columns[picture];
         let (m_row, m_column) = (m / columns, m % columns);
         let (n_row, n_column) = (n / columns, n % columns);
+        if m_row - n_row > REACH || m_column.abs_diff(n_column) > REACH {
+            let first = self.first[picture];
+            self.between.push(((first + m) as u32, (first + n) as u32, block));
+            self.far_inside = true;
+            return;
+        }
         let slot = (m_row - n_row) * SPAN + (m_column + REACH - n_column);
         let entry = &mut self.inside[self.first[picture] + m][slot];
         for (sum, value) in entry.iter_mut().zip(block) {
@@ -189,11 +277,17 @@ impl NormalEquations {
                 _ => blocks.push((row, column, block)),
             }
         }
-        by_column(&blocks, self.inside.len())
+        let mut blocks = by_column(&blocks, self.inside.len());
+        if self.far_inside {
+            for column in blocks.chunk_by_mut(|one, other| one.1 == other.1) {
+                column.sort_by_key(|&(row, ..)| row);
+            }
+        }
+        blocks
     }
 
     /// The lower triangle as a sparse matrix.
-    fn matrix(&self) -> Option<SparseColMat<usize, f64>> {
+    pub(super) fn matrix(&self) -> Option<SparseColMat<usize, f64>> {
         let blocks = self.blocks();
         let unknowns = self.unknowns();
         let mut column_starts = Vec::with_capacity(unknowns + 1);
@@ -219,20 +313,6 @@ impl NormalEquations {
             let pattern = SymbolicSparseColMat::new_checked(unknowns, unknowns, column_starts, None, rows);
             SparseColMat::new(pattern, values)
         })
-    }
-
-    /// The product of the symmetric matrix, given by its lower triangle, with a column.
-    fn multiply(&self, lower: &SparseColMat<usize, f64>, x: &faer::Mat<f64>) -> faer::Mat<f64> {
-        let mut product = faer::Mat::<f64>::zeros(self.unknowns(), 1);
-        for column in 0..self.unknowns() {
-            for (row, value) in lower.row_idx_of_col(column).zip(lower.val_of_col(column)) {
-                product[(row, 0)] += value * x[(column, 0)];
-                if row != column {
-                    product[(column, 0)] += value * x[(row, 0)];
-                }
-            }
-        }
-        product
     }
 }
 

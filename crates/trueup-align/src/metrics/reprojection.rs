@@ -1,6 +1,6 @@
 //! How well matched points meet in the panorama.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Vector2;
 use trueup_core::matches::PointMatch;
 use trueup_core::mesh::GridMesh;
 
@@ -61,15 +61,7 @@ const PERCENTILE: f64 = 0.95;
 
 /// How much the grid magnifies areas at a point of the picture; NaN where it is folded.
 fn squared_scale(mesh: &GridMesh, point: Vector2<f64>) -> f64 {
-    let ([a, b, c, d], _) = mesh.bilinear(point);
-    let [a, b, c, d] = [a, b, c, d].map(|vertex| Vector2::from(mesh.target[vertex]));
-    // The bilinear map's derivatives at the point, by the cell's own coordinates.
-    let cell = Vector2::new(mesh.cell_width(), mesh.cell_height());
-    let origin = mesh.source(mesh.bilinear(point).0[0]);
-    let (u, v) = ((point.x - origin.x) / cell.x, (point.y - origin.y) / cell.y);
-    let along_x = ((b - a) * (1.0 - v) + (c - d) * v) / cell.x;
-    let along_y = ((d - a) * (1.0 - u) + (c - b) * u) / cell.y;
-    let area = Matrix2::from_columns(&[along_x, along_y]).determinant();
+    let area = mesh.derivative(point).determinant();
     if area > 0.0 { area } else { f64::NAN }
 }
 

@@ -3,10 +3,12 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::Vector2;
+use rayon::prelude::*;
 use trueup_core::geometry::{Homography, circular_mean, wrap_angle};
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
+use trueup_core::source::WorkingFrame;
 
 use super::PriorInput;
 use super::weighted_solve::{DataTerm, TurnTerm, solve_unit_vectors};
@@ -51,21 +53,52 @@ impl TurnRange {
     pub fn contains(&self, turn: f64) -> bool {
         /// Slack for turns that were computed on two ways, radians.
         const ROUNDING: f64 = 1e-9;
-        self.extent >= PI || (turn - self.start + ROUNDING).rem_euclid(TAU) <= self.extent + 2.0 * ROUNDING
+        self.contains_within(turn, ROUNDING)
+    }
+
+    /// The range of the turns the other way.
+    pub fn reversed(&self) -> Self {
+        Self { start: -self.start - self.extent, extent: self.extent }
+    }
+
+    /// Whether the range, longer by `slack` (radians) at both ends, holds `turn`.
+    pub fn contains_within(&self, turn: f64, slack: f64) -> bool {
+        self.extent >= PI || (turn - self.start + slack).rem_euclid(TAU) <= self.extent + 2.0 * slack
     }
 }
 
-/// Corrects `rolls` (of straightened cameras) where an overlap contradicts their difference.
-///
-/// # Source
-/// GSP's three-dimensional prior (Chen and Chuang, Natural Image Stitching with the Global Similarity Prior, section
-/// 4): turns inside the range of the overlap stay, others give way to the turn of least line distortion.
+/// What the overlap of a joined pair says of the turn theta_b - theta_a.
+#[derive(Debug, Clone)]
+pub(super) struct OverlapTurns {
+    /// The turns at which one grid edge of the overlap would be parallel to its image in the other picture.
+    candidates: Vec<f64>,
+    /// The range of the candidates; `None` without a warped overlap.
+    pub range: Option<TurnRange>,
+}
+
+impl OverlapTurns {
+    /// Asks the grid edges of both directions.
+    pub fn of(input: &PriorInput<'_>, edge: &PairMatches) -> Self {
+        let candidates = overlap_turns(input, edge.a, edge.b);
+        let range = TurnRange::around(&candidates);
+        Self { candidates, range }
+    }
+
+    /// The turn of least line distortion, or the middle candidate where no segment crosses the overlap; `None` without
+    /// either.
+    pub fn best(&self, input: &PriorInput<'_>, edge: &PairMatches) -> Option<f64> {
+        least_line_distortion(input, edge).or_else(|| circular_median(&self.candidates))
+    }
+}
+
+/// Corrects `rolls` (of straightened cameras) where an overlap contradicts their difference: the fallback's form of
+/// [`allowed_turns`].
 ///
 /// # Departures
 /// Every picture is tied weakly to its own roll instead of the reference alone strongly: the result does not depend on
 /// the reference, and the panorama keeps the level that straightening gave it.
 pub(super) fn correct_by_edges(input: &PriorInput<'_>, rolls: &[f64]) -> Vec<f64> {
-    let turns: Vec<TurnTerm> = input.edges.iter().map(|edge| turn_term(input, edge, rolls)).collect();
+    let turns = allowed_turns(input, rolls);
     if turns.iter().all(|term| term.weight > OUT_OF_RANGE_WEIGHT * OUT_OF_RANGE_WEIGHT) {
         // Every difference stays, and so does every roll.
         return rolls.to_vec();
@@ -81,20 +114,24 @@ pub(super) fn correct_by_edges(input: &PriorInput<'_>, rolls: &[f64]) -> Vec<f64
     }
 }
 
-fn turn_term(input: &PriorInput<'_>, edge: &PairMatches, rolls: &[f64]) -> TurnTerm {
+/// The turns of all edges, weighed: that of `rolls` (of straightened cameras) where the overlap allows it, otherwise the
+/// turn of least line distortion with a weight far smaller.
+///
+/// # Source
+/// GSP's three-dimensional prior (Chen and Chuang, Natural Image Stitching with the Global Similarity Prior, section 4).
+pub(super) fn allowed_turns(input: &PriorInput<'_>, rolls: &[f64]) -> Vec<TurnTerm> {
+    input.edges.par_iter().map(|edge| allowed_turn(input, edge, rolls)).collect()
+}
+
+fn allowed_turn(input: &PriorInput<'_>, edge: &PairMatches, rolls: &[f64]) -> TurnTerm {
     let (i, j) = (edge.a, edge.b);
     let turn = wrap_angle(rolls[j] - rolls[i]);
     let term = |turn, weight: f64| TurnTerm { i, j, turn, weight: weight * weight };
-    let candidates = overlap_turns(input, i, j);
-    match TurnRange::around(&candidates) {
-        Some(range) if !range.contains(turn) => {
-            match least_line_distortion(input, edge).or_else(|| circular_median(&candidates)) {
-                Some(better) => term(better, OUT_OF_RANGE_WEIGHT),
-                None => term(turn, IN_RANGE_WEIGHT),
-            }
-        }
-        // Without a warped overlap nothing contradicts the cameras.
-        _ => term(turn, IN_RANGE_WEIGHT),
+    let overlap = OverlapTurns::of(input, edge);
+    // Without a warped overlap nothing contradicts the cameras.
+    match overlap.range.filter(|range| !range.contains(turn)).and_then(|_| overlap.best(input, edge)) {
+        Some(better) => term(better, OUT_OF_RANGE_WEIGHT),
+        None => term(turn, IN_RANGE_WEIGHT),
     }
 }
 
@@ -148,8 +185,7 @@ fn least_line_distortion(input: &PriorInput<'_>, edge: &PairMatches) -> Option<f
                 continue;
             }
             let (warped_start, warped_end) = (map.apply(start), map.apply(end));
-            let middle = (warped_start + warped_end) / 2.0;
-            if !frame.contains(middle.x, middle.y) {
+            if !crosses(frame, warped_start, warped_end) {
                 continue;
             }
             let (original, warped) = (end - start, warped_end - warped_start);
@@ -158,6 +194,25 @@ fn least_line_distortion(input: &PriorInput<'_>, edge: &PairMatches) -> Option<f
         }
     }
     circular_mean(turns)
+}
+
+/// Whether the segment between two points shares a point with the picture (Liang and Barsky's clipping).
+pub(super) fn crosses(frame: &WorkingFrame, start: Vector2<f64>, end: Vector2<f64>) -> bool {
+    let along = end - start;
+    // The part of the segment, from 0 to 1, that lies inside every side so far.
+    let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
+    for (direction, from, extent) in [(along.x, start.x, frame.width), (along.y, start.y, frame.height)] {
+        if direction == 0.0 {
+            if !(0.0..=extent).contains(&from) {
+                return false;
+            }
+            continue;
+        }
+        let (first, second) = (-from / direction, (extent - from) / direction);
+        enter = enter.max(first.min(second));
+        leave = leave.min(first.max(second));
+    }
+    enter <= leave
 }
 
 /// The segments at least as long as the mean and as wide as half way between the narrowest and the mean.

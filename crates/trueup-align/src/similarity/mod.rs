@@ -7,6 +7,8 @@ mod dominant;
 mod edge_range;
 mod frame_search;
 mod gate;
+mod gsp_2d;
+mod gsp_3d;
 mod joint;
 mod path_voting;
 mod scale;
@@ -17,6 +19,8 @@ mod vertical_vote;
 mod vpg;
 mod weighted_solve;
 
+#[cfg(test)]
+mod gsp_tests;
 #[cfg(test)]
 mod pooled_tests;
 #[cfg(test)]
@@ -44,6 +48,12 @@ trueup_core::choice! {
         VanishingPoints = "vpg",
         /// Straightening and the range of turns that each overlap allows.
         Straightening = "straightening",
+        /// The global similarity prior in two dimensions, as published: the reference is upright, and so is every picture
+        /// that its overlaps let be.
+        Gsp2d = "gsp-2d",
+        /// The global similarity prior in three dimensions, as published: cameras straightened without a prior on their
+        /// pitch, corrected by overlaps from the reference outwards.
+        Gsp3d = "gsp-3d",
     }
 }
 
@@ -155,7 +165,8 @@ trueup_core::options! {
         /// Least share of the pictures with at least three supporting segments.
         min_vertical_pictures: f64 = 0.6, between(0.0, 1.0), "";
         /// How much straightening expects pictures to look level: variance of the roll over that of the pitch among
-        /// photographers. 0 is the published form, which lets a short sweep with some roll pitch by tens of degrees.
+        /// photographers. 0 is the published form, which lets a short sweep with some roll pitch by tens of degrees; it is
+        /// what the priors of the published methods always take.
         pitch_prior: f64 = 0.1, between(0.0, 1.0), "";
     }
 }
@@ -181,6 +192,8 @@ pub struct PriorInput<'a> {
     pub vanishing: &'a VanishingOptions,
     /// Clockwise turn in radians that the user wants on top of upright for the whole panorama.
     pub turn: f64,
+    /// The reference picture; only the published global similarity priors heed it.
+    pub reference: usize,
 }
 
 /// How the vanishing directions took part.
@@ -262,11 +275,12 @@ const STAGE: &str = "similarity";
 
 /// Finds the similarity prior of a connected set of pictures.
 ///
-/// The world frame of the cameras is arbitrary and no picture is a reference: neither affects the result.
+/// The world frame of the cameras is arbitrary and does not affect the result. The reference affects the published global
+/// similarity priors alone.
 ///
 /// # Errors
-/// [`Error::Unsolvable`] if there are no pictures, the lists differ in length, an edge names a picture that does not
-/// exist, a camera is not finite, or overlaps come without a usable grid; [`Error::Cancelled`].
+/// [`Error::Unsolvable`] if there are no pictures, the lists differ in length, an edge or the reference names a picture
+/// that does not exist, a camera is not finite, or overlaps come without a usable grid; [`Error::Cancelled`].
 ///
 /// # Source
 /// The paper's sections on the vanishing point guided prior; see the modules for equations and departures.
@@ -277,24 +291,30 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     let focals: Vec<f64> = input.cameras.iter().map(|camera| camera.focal_px).collect();
     let straightened = straighten::straighten(&rotations);
     let level = straighten::straighten_with_pitch(&rotations, options.pitch_prior);
-    let (guidance, guided) = match options.prior {
+    let unguided = || vpg::unguided(input.cameras.len(), options);
+    let (guidance, upright) = match options.prior {
         PriorMethod::VanishingPoints => vpg::guide(input, &rotations, &straightened, &level, options, context)?,
-        PriorMethod::Straightening => (vpg::unguided(input.cameras.len(), options), None),
+        PriorMethod::Straightening => (unguided(), None),
+        PriorMethod::Gsp2d => (unguided(), Some(gsp_2d::upright(input, straightened.down))),
+        PriorMethod::Gsp3d => (unguided(), Some(gsp_3d::upright(input, &rotations, straightened.down))),
     };
     if let Some(clause) = guidance.failed_clause.as_ref().filter(|_| !guidance.used) {
         context.report(Diagnostic::note("vanishing-guidance-refused", STAGE, clause, REFUSED_HINT));
     }
-    let guided = guided.unwrap_or_else(|| fallback(input, &rotations, &level));
-    let level_from_world = straighten::level_from_world(&guided.down, &rotations);
+    let upright = upright.unwrap_or_else(|| fallback(input, &rotations, &level));
+    let level_from_world = straighten::level_from_world(&upright.down, &rotations);
     let mut guidance = guidance;
     guidance.dominant = guidance.dominant.map(|world| rows_of(&(level_from_world * matrix_from_rows(&world))));
     Ok(SimilarityPrior {
-        theta: guided.theta.iter().map(|theta| wrap_angle(theta + input.turn)).collect(),
-        scale: scale::scales(input.edges, &focals),
+        theta: upright.theta.iter().map(|theta| wrap_angle(theta + input.turn)).collect(),
+        scale: match options.prior {
+            PriorMethod::Gsp2d | PriorMethod::Gsp3d => scale::focal_scales(&focals),
+            PriorMethod::VanishingPoints | PriorMethod::Straightening => scale::scales(input.edges, &focals),
+        },
         guidance,
         level_from_world: rows_of(&level_from_world),
-        roll: rolls(&guided.down, &guided.rotations),
-        camera_from_world: guided.rotations.iter().map(rows_of).collect(),
+        roll: rolls(&upright.down, &upright.rotations),
+        camera_from_world: upright.rotations.iter().map(rows_of).collect(),
     })
 }
 
@@ -302,7 +322,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
 struct Upright {
     /// Down, in the cameras' world.
     down: Vector3<f64>,
-    /// Turns in radians.
+    /// Turns in radians, without the one that the user wants.
     theta: Vec<f64>,
     /// The cameras' rotations, as far as lines correct them.
     rotations: Vec<Matrix3<f64>>,
@@ -330,6 +350,9 @@ fn check(input: &PriorInput<'_>) -> Result<()> {
     }
     if let Some(edge) = input.edges.iter().find(|edge| edge.a >= count || edge.b >= count || edge.a == edge.b) {
         return unsolvable(format!("there is no pair {} - {} among {count} pictures", edge.a, edge.b));
+    }
+    if input.reference >= count {
+        return unsolvable(format!("there is no reference {} among {count} pictures", input.reference));
     }
     let finite = |camera: &Camera| {
         camera.focal_px > 0.0

@@ -29,7 +29,14 @@ pub(super) fn scales(edges: &[PairMatches], focals: &[f64]) -> Vec<f64> {
 }
 
 /// s_i proportional to 1 / f_i, of mean 1.
-fn focal_scales(focals: &[f64]) -> Vec<f64> {
+///
+/// # Source
+/// The scales of the global similarity prior, s_i = f_r / f_i.
+///
+/// # Departures
+/// Divided by their mean, as all priors' scales are: the reference does not matter, and the mesh has the working
+/// pictures' size.
+pub(super) fn focal_scales(focals: &[f64]) -> Vec<f64> {
     let inverse: f64 = focals.iter().map(|focal| 1.0 / focal).sum();
     let mean = inverse / focals.len() as f64;
     focals.iter().map(|focal| if mean > 0.0 && mean.is_finite() { 1.0 / focal / mean } else { 1.0 }).collect()

@@ -103,6 +103,7 @@ impl Scene {
             cell_px: 40.0,
             vanishing: &VanishingOptions::default(),
             turn: 0.0,
+            reference: 0,
         };
         run(&input, options, &StageContext::default()).expect("a well-formed scene")
     }

@@ -258,6 +258,7 @@ fn malformed_input_is_an_error() {
         cell_px: 40.0,
         vanishing: &VanishingOptions::default(),
         turn: 0.0,
+        reference: 0,
     };
     let options = SimilarityOptions::default();
     assert!(run(&input, &options, &StageContext::default()).is_err());
@@ -317,7 +318,7 @@ fn the_overlap_range_takes_the_shortest_arc() {
 }
 
 /// The grid vertices of one camera carried into another.
-fn overlap(scene: &Scene, from: usize, to: usize) -> OverlapWarp {
+pub(super) fn overlap(scene: &Scene, from: usize, to: usize) -> OverlapWarp {
     let frame = scene.frames[from];
     let grid = trueup_core::mesh::GridMesh::regular(frame.width, frame.height, 40.0);
     let carry = |vertex| {
@@ -342,6 +343,7 @@ fn overlaps_keep_true_turns_and_correct_a_wrong_one() {
         cell_px: 40.0,
         vanishing: &VanishingOptions::default(),
         turn: 0.0,
+        reference: 0,
     };
     let kept = edge_range::correct_by_edges(&input, &scene.roll);
     for (theta, roll) in kept.iter().zip(&scene.roll) {

@@ -27,12 +27,19 @@ impl GridRow {
     ) -> Self {
         let per_set: Vec<_> =
             sets.iter().map(|set| summary(&results.values(experiment, &set.name, variant, measure))).collect();
-        let cells = per_set.iter().map(|found| match found {
+        let refused = |set: &SetSpec| !results.values(experiment, &set.name, variant, "refused").is_empty();
+        let cells = sets.iter().zip(&per_set).map(|(set, found)| match found {
+            None if refused(set) => "n/a".to_owned(),
             Some(found) if found.count > 1 => format!("{:.2} ±{:.2}", found.mean, found.deviation),
             found => number(found.map(|found| found.mean), 2),
         });
         let means: Vec<f64> = per_set.iter().flatten().map(|found| found.mean).collect();
         Self { label: label.to_owned(), cells: cells.collect(), mean: mean(&means), from_paper: false }
+    }
+
+    /// Cells made elsewhere, and their mean.
+    pub(super) fn stated(label: &str, cells: Vec<String>, mean: Option<f64>) -> Self {
+        Self { label: label.to_owned(), cells, mean, from_paper: false }
     }
 
     /// The paper's figures for as many sets.
@@ -44,6 +51,11 @@ impl GridRow {
             from_paper: true,
         }
     }
+}
+
+/// A measure's name as part of a file name.
+pub(super) fn id_of(measure: &str) -> String {
+    measure.replace('_', "-")
 }
 
 /// A table with a column per set and a mean; with many sets, a row per set and a mean below.

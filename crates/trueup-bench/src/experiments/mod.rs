@@ -12,6 +12,7 @@ pub(crate) mod pitch_sweep;
 pub(crate) mod reference_choice;
 pub(crate) mod robust_scheme;
 pub(crate) mod runtime;
+pub(crate) mod warps_compared;
 
 use trueup::Result;
 
@@ -35,7 +36,13 @@ pub(crate) struct Experiment {
 
 /// Every experiment whose trials are run side by side, in the order of the report. Times are taken apart from them
 /// ([`runtime`]).
-pub(crate) const EXPERIMENTS: [Experiment; 9] = [
+pub(crate) const EXPERIMENTS: [Experiment; 10] = [
+    Experiment {
+        name: warps_compared::NAME,
+        trials: warps_compared::trials,
+        section: warps_compared::section,
+        claims: warps_compared::claims,
+    },
     Experiment {
         name: methods_compared::NAME,
         trials: methods_compared::trials,
@@ -55,7 +62,12 @@ pub(crate) const EXPERIMENTS: [Experiment; 9] = [
         claims: reference_choice::claims,
     },
     Experiment { name: gate::NAME, trials: gate::trials, section: gate::section, claims: gate::claims },
-    Experiment { name: alignment::NAME, trials: alignment::trials, section: alignment::section, claims: no_claims },
+    Experiment {
+        name: alignment::NAME,
+        trials: alignment::trials,
+        section: alignment::section,
+        claims: alignment::claims,
+    },
     Experiment { name: ablations::NAME, trials: ablations::trials, section: ablations::section, claims: no_claims },
     Experiment {
         name: pitch_sweep::NAME,

@@ -2,7 +2,7 @@
 
 use trueup::Result;
 
-use crate::methods::{LEVELLED, METHODS, PUBLISHED_MESH, VPG, VPG_PUBLISHED, method};
+use crate::methods::{Family, LEVELLED, PUBLISHED_MESH, VPG, VPG_PUBLISHED, method, methods_of};
 use crate::report::charts::{Chart, Mark, Series};
 use crate::report::document::{Block, Section, Table, number};
 use crate::results::Results;
@@ -16,13 +16,13 @@ pub(crate) const NAME: &str = "pitch-sweep";
 const TWIST: &str = "vpg-published, published beta";
 
 fn variants() -> Vec<(&'static str, Vec<&'static str>)> {
-    let of_methods = METHODS.iter().map(|one| (one.name, one.overrides.to_vec()));
+    let of_methods = methods_of(Family::Prior).map(|one| (one.name, one.overrides.to_vec()));
     let twist =
         ["similarity.beta_mode=relative", "similarity.joint_refinement=false", "similarity.guided_redetection=false"];
     of_methods.chain([(TWIST, [&PUBLISHED_MESH[..], &twist].concat())]).collect()
 }
 
-/// Every method at every pitch.
+/// Every method with a prior at every pitch.
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let each = |set: &SetSpec| -> Vec<Trial> {
         variants().iter().map(|(name, overrides)| Trial::new(NAME, &set.name, name, overrides)).collect()

@@ -74,9 +74,7 @@ pub(crate) fn how_it_was_made(results: &Results, version: &str, jobs: usize, thr
     ));
     section.blocks.push(Block::List(
         [
-            "T1's warps of single homographies (APAP, SPHP), AANAP, GSP-2D and GSP-3D do not exist here yet; the rows `levelled` \
-             stand in for GSP-3D, whose prior also starts from straightened cameras.",
-            "T7's dual-feature and content-preserving warps do not exist here yet.",
+            "Methods of the paper without a row of ours beside their figures do not exist here yet.",
             "T8, the user study, cannot be repeated by a machine; `upright` is what it comes down to.",
         ]
         .map(str::to_owned)

@@ -1,6 +1,7 @@
 //! The sets of photographs with known cameras that experiments run on, made when they are first needed.
 
 mod catalogue;
+mod central;
 mod focal_claim;
 mod from_panorama;
 
@@ -15,6 +16,7 @@ use trueup_scenes::{
 };
 
 pub(crate) use catalogue::Catalogue;
+pub(crate) use central::central;
 
 /// Name of the file that holds what is true of a set.
 pub(crate) const TRUTH_FILE: &str = "truth.json";

@@ -38,6 +38,7 @@ use gradient::GradientField;
 use rectangle::{Rectangle, improve};
 use region::RegionGrower;
 use significance::FalseAlarms;
+pub use tidy::merged;
 
 trueup_core::options! {
     /// How line segments are found. The defaults up to `magnitude_bins` are those of the papers.

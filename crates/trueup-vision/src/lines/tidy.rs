@@ -9,12 +9,19 @@ pub(super) fn tidy(mut segments: Vec<LineSegment>, width: f64, height: f64, opti
     segments.retain(|segment| !follows_border(segment, width, height, options));
     sort(&mut segments);
     if options.merge {
-        segments = merge(&segments, options);
-        sort(&mut segments);
+        segments = merged(&segments, options);
     }
     segments.retain(|segment| segment.length() >= options.min_length_px);
     segments.truncate(options.max_segments);
     segments
+}
+
+/// Segments with neighbours on one line joined within the `merge_` options, whatever [`LineOptions::merge`] says; longest
+/// first. The segments must be ordered so.
+pub fn merged(segments: &[LineSegment], options: &LineOptions) -> Vec<LineSegment> {
+    let mut joined = merge(segments, options);
+    sort(&mut joined);
+    joined
 }
 
 /// Longest first; equal lengths by position, so that the order is total.

@@ -1,0 +1,270 @@
+//! One overlap seen through its pixels: samples, the colour model between the two pictures, and their equations.
+
+use nalgebra::{Matrix2, Vector2};
+use rayon::prelude::*;
+use trueup_core::mesh::GridMesh;
+
+use super::super::normal_equations::{Metric, Share};
+use super::PhotometricOptions;
+use super::pyramid::{Grey, Pyramid};
+use crate::match_points::OverlapWarp;
+
+/// Vertices of one cell in each picture.
+pub(super) const MEMBERS: usize = 8;
+/// Unordered couplings of them.
+const COUPLINGS: usize = MEMBERS * (MEMBERS + 1) / 2;
+/// Half the width of a Tukey weight, in standard deviations: 95 % efficient for a Gaussian.
+const TUKEY: f64 = 4.685;
+/// Standard deviation of a Gaussian per median absolute deviation.
+const SIGMA_PER_MAD: f64 = 1.4826;
+
+/// One direction of a pair: the picture whose pixels are sampled, and the one they are looked up in.
+pub(super) struct Overlap<'a> {
+    pub warp: &'a OverlapWarp,
+    /// The solved grids, whose vertices are unknown.
+    pub solved: [&'a GridMesh; 2],
+    /// The same, subdivided along the base.
+    pub fine: [&'a GridMesh; 2],
+    pub pyramids: [&'a Pyramid; 2],
+}
+
+/// A pixel of the first picture and what lies on it in the panorama.
+struct Sample {
+    corners: [[u32; 4]; 2],
+    shares: [[f64; 4]; 2],
+    /// Grey values; their slopes are per panorama unit.
+    grey: [Grey; 2],
+    /// Bilinear place by the solved vertices in the first picture minus that in the second: what the bases' sags differ by.
+    gap: Vector2<f64>,
+}
+
+/// The second picture's grey values as the first would show them: gain times value plus bias.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Colour {
+    gain: f64,
+    bias: f64,
+}
+
+/// The equations of all samples in one cell of each picture.
+pub(super) struct CellPair {
+    pub members: [Share; MEMBERS],
+    pub metrics: [Metric; COUPLINGS],
+    pub right: [Vector2<f64>; MEMBERS],
+}
+
+/// What one overlap says in one round.
+pub(super) struct OverlapEquations {
+    pub cells: Vec<CellPair>,
+    /// Sum over the samples of |residual| that the robust weight lets count, and of those weights.
+    pub misfit: [f64; 2],
+}
+
+impl Overlap<'_> {
+    /// The linearised photometric equations around the present grids, at a level of the pyramids.
+    pub fn equations(&self, level: usize, options: &PhotometricOptions) -> OverlapEquations {
+        let samples = self.samples(level, options);
+        if samples.len() < options.min_samples {
+            return OverlapEquations { cells: Vec::new(), misfit: [0.0; 2] };
+        }
+        let colours = Colours::of(&samples, self.solved[0], options);
+        let residuals: Vec<f64> = samples.iter().map(|sample| colours.residual(sample)).collect();
+        let sigma = spread(&residuals);
+        let weights: Vec<f64> = residuals.iter().map(|residual| tukey_weight(residual / sigma)).collect();
+        let noise = (options.noise_level / sigma.max(options.least_noise)).powi(2);
+        let share = options.weight * noise * (spacing_px(level, options) / super::PUBLISHED_SPACING_PX).powi(2);
+        let mut order: Vec<usize> = (0..samples.len()).filter(|&k| weights[k] > 0.0).collect();
+        let cells_of = |k: usize| (samples[k].corners[0][0], samples[k].corners[1][0]);
+        order.sort_by_key(|&k| cells_of(k));
+        let groups: Vec<&[usize]> = order.chunk_by(|&one, &other| cells_of(one) == cells_of(other)).collect();
+        let pictures = [self.warp.from, self.warp.to];
+        let cells = groups
+            .into_iter()
+            .map(|group| {
+                let mut cells = CellPair::empty(pictures, &samples[group[0]]);
+                for &k in group {
+                    let gain = colours.of_sample(&samples[k]).gain;
+                    cells.add(&samples[k], gain, residuals[k], share * weights[k]);
+                }
+                cells
+            })
+            .collect();
+        let misfit = residuals
+            .iter()
+            .zip(&weights)
+            .fold([0.0; 2], |[sum, count], (residual, weight)| [sum + weight * residual.abs(), count + weight]);
+        OverlapEquations { cells, misfit }
+    }
+
+    fn samples(&self, level: usize, options: &PhotometricOptions) -> Vec<Sample> {
+        let spacing = spacing_px(level, options);
+        let (columns, rows) = (self.solved[0].width / spacing, self.solved[0].height / spacing);
+        (0..rows as usize)
+            .into_par_iter()
+            .flat_map_iter(|row| {
+                (0..columns as usize).filter_map(move |column| {
+                    let point = Vector2::new((column as f64 + 0.5) * spacing, (row as f64 + 0.5) * spacing);
+                    self.sample(point, level, options.min_gradient)
+                })
+            })
+            .collect()
+    }
+
+    fn sample(&self, point: Vector2<f64>, level: usize, min_gradient: f64) -> Option<Sample> {
+        let (corners_here, shares_here) = self.solved[0].bilinear(point);
+        let start = self.warp.at(self.solved[0], point)?;
+        let there = self.fine[1].source_of(self.fine[0].warp(point), start)?;
+        let here_grey = self.pyramids[0].at(level, point)?;
+        let there_grey = self.pyramids[1].at(level, there)?;
+        if here_grey.slope.norm().max(there_grey.slope.norm()) < min_gradient {
+            return None;
+        }
+        let (corners_there, shares_there) = self.solved[1].bilinear(there);
+        let grey = [
+            on_panorama(here_grey, &self.fine[0].derivative(point))?,
+            on_panorama(there_grey, &self.fine[1].derivative(there))?,
+        ];
+        Some(Sample {
+            corners: [corners_here, corners_there].map(|corners| corners.map(|corner| corner as u32)),
+            shares: [shares_here, shares_there],
+            grey,
+            gap: self.solved[0].warp(point) - self.solved[1].warp(there),
+        })
+    }
+}
+
+/// Distance of samples at a level: twice as far at the next.
+fn spacing_px(level: usize, options: &PhotometricOptions) -> f64 {
+    options.spacing_px * 2.0_f64.powi(level as i32)
+}
+
+/// The grey value with its slope per panorama unit.
+fn on_panorama(grey: Grey, derivative: &Matrix2<f64>) -> Option<Grey> {
+    Some(Grey { slope: derivative.try_inverse()?.transpose() * grey.slope, ..grey })
+}
+
+/// Standard deviation of residuals, grey levels, of which less than half are outliers.
+fn spread(residuals: &[f64]) -> f64 {
+    /// Least standard deviation: that of rounding both pictures.
+    const ROUNDING: f64 = 0.5;
+    let mut sizes: Vec<f64> = residuals.iter().map(|residual| residual.abs()).collect();
+    let middle = sizes.len() / 2;
+    (SIGMA_PER_MAD * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(ROUNDING)
+}
+
+/// Tukey's biweight of a residual in standard deviations.
+fn tukey_weight(residual: f64) -> f64 {
+    let share = residual / TUKEY;
+    if share.abs() < 1.0 { (1.0 - share * share).powi(2) } else { 0.0 }
+}
+
+/// A colour model for every cell of the first picture.
+struct Colours {
+    overall: Colour,
+    /// By the cell's first vertex.
+    cells: Vec<Option<Colour>>,
+}
+
+/// Sums from which a colour model follows.
+#[derive(Clone, Copy, Default)]
+struct Moments {
+    count: f64,
+    sums: [f64; 2],
+    squares: [f64; 2],
+}
+
+impl Moments {
+    fn add(&mut self, sample: &Sample) {
+        self.count += 1.0;
+        for side in 0..2 {
+            self.sums[side] += sample.grey[side].value;
+            self.squares[side] += sample.grey[side].value.powi(2);
+        }
+    }
+
+    /// Sums of squared deviations from the mean.
+    fn deviations(&self) -> [f64; 2] {
+        [0, 1].map(|side| (self.squares[side] - self.sums[side].powi(2) / self.count.max(1.0)).max(0.0))
+    }
+}
+
+impl Colours {
+    /// # Departures
+    /// The gain is the quotient of the standard deviations. The least-squares gain of one picture on the other shrinks
+    /// while the pictures are not yet aligned, and would explain the misalignment as lack of contrast.
+    fn of(samples: &[Sample], grid: &GridMesh, options: &PhotometricOptions) -> Self {
+        let mut all = Moments::default();
+        let mut cells = vec![Moments::default(); grid.len()];
+        for sample in samples {
+            all.add(sample);
+            cells[sample.corners[0][0] as usize].add(sample);
+        }
+        let [here, there] = all.deviations();
+        let gain = if here > 0.0 && there > 0.0 { (here / there).sqrt() } else { 1.0 };
+        let gain = gain.clamp(1.0 / options.max_gain, options.max_gain);
+        let overall = Colour { gain, bias: (all.sums[0] - gain * all.sums[1]) / all.count.max(1.0) };
+        let variance = there / all.count.max(1.0);
+        let cells = cells
+            .iter()
+            .map(|cell| {
+                let [here, there] = cell.deviations();
+                let ridge = options.colour_ridge;
+                let drawn = (here + ridge * gain * gain * variance) / (there + ridge * variance);
+                let gain = if drawn.is_finite() && drawn > 0.0 { drawn.sqrt() } else { gain };
+                let gain = gain.clamp(1.0 / options.max_gain, options.max_gain);
+                let count = cell.count + ridge;
+                // What the ridge contributes is the overall model at the overlap's mean grey value.
+                let mean = all.sums[1] / all.count.max(1.0);
+                let wanted = ridge * (overall.bias + (overall.gain - gain) * mean);
+                let bias = (cell.sums[0] - gain * cell.sums[1] + wanted) / count;
+                (cell.count > 0.0 && count > 0.0).then_some(Colour { gain, bias })
+            })
+            .collect();
+        Self { overall, cells }
+    }
+
+    fn of_sample(&self, sample: &Sample) -> Colour {
+        self.cells[sample.corners[0][0] as usize].unwrap_or(self.overall)
+    }
+
+    fn residual(&self, sample: &Sample) -> f64 {
+        let Colour { gain, bias } = self.of_sample(sample);
+        gain * sample.grey[1].value + bias - sample.grey[0].value
+    }
+}
+
+impl CellPair {
+    fn empty(pictures: [usize; 2], sample: &Sample) -> Self {
+        let members = std::array::from_fn(|k| Share {
+            picture: pictures[k / 4],
+            vertex: sample.corners[k / 4][k % 4] as usize,
+            share: 1.0,
+        });
+        Self { members, metrics: [Metric::default(); COUPLINGS], right: [Vector2::zeros(); MEMBERS] }
+    }
+
+    /// Adds weight (residual + slope . (change of the first place - change of the second))^2.
+    ///
+    /// The slope is the mean of both pictures': with it a step errs in the third order of the misalignment, with one
+    /// picture's alone in the second.
+    fn add(&mut self, sample: &Sample, gain: f64, residual: f64, weight: f64) {
+        let slope = 0.5 * (gain * sample.grey[1].slope + sample.grey[0].slope);
+        let metric = Metric::along(slope, weight);
+        let value = slope.dot(&sample.gap) - residual;
+        let shares: [f64; MEMBERS] = std::array::from_fn(|k| {
+            let share = sample.shares[k / 4][k % 4];
+            if k < 4 { share } else { -share }
+        });
+        let mut coupling = 0;
+        for (k, &share) in shares.iter().enumerate() {
+            self.right[k] += slope * (weight * value * share);
+            for &other in &shares[..=k] {
+                let product = share * other;
+                let sum = &mut self.metrics[coupling];
+                sum.xx += product * metric.xx;
+                sum.xy += product * metric.xy;
+                sum.yy += product * metric.yy;
+                coupling += 1;
+            }
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! Sparse Cholesky that keeps its elimination order over several solves.
+
+use faer::linalg::solvers::Solve;
+use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
+use faer::sparse::{SparseColMat, SymbolicSparseColMat};
+
+use super::normal_equations::{MeshSolution, NormalEquations};
+
+/// Solves normal equations of the same grids again and again: the symbolic factorisation is made anew only when vertices
+/// couple that never coupled before.
+#[derive(Debug, Default)]
+pub struct MeshSolver {
+    known: Option<Known>,
+}
+
+/// All couplings met so far and the order in which they are eliminated.
+#[derive(Debug)]
+struct Known {
+    pattern: SymbolicSparseColMat<usize>,
+    symbolic: SymbolicLlt<usize>,
+}
+
+impl MeshSolver {
+    /// The least-squares solution; `None` if the matrix is not positive definite.
+    pub fn solve(&mut self, equations: &NormalEquations) -> Option<MeshSolution> {
+        let matrix = self.in_known_pattern(equations.matrix()?)?;
+        let known = self.known.as_ref()?;
+        let factor = Llt::try_new_with_symbolic(known.symbolic.clone(), matrix.as_ref(), faer::Side::Lower).ok()?;
+        let right = faer::Mat::from_fn(equations.unknowns(), 1, |row, _| equations.right[row]);
+        let mut solution = factor.solve(&right);
+        // One step of refinement recovers the digits that the normal equations lose.
+        let residual = &right - multiply(&matrix, &solution);
+        solution += factor.solve(&residual);
+        let gradient = &right - multiply(&matrix, &solution);
+        Some(MeshSolution {
+            relative_gradient: gradient.norm_l2() / right.norm_l2().max(f64::MIN_POSITIVE),
+            coordinates: (0..equations.unknowns()).map(|row| solution[(row, 0)]).collect(),
+        })
+    }
+
+    /// The matrix with explicit zeros where earlier ones had couplings; new couplings are remembered.
+    fn in_known_pattern(&mut self, matrix: SparseColMat<usize, f64>) -> Option<SparseColMat<usize, f64>> {
+        let matrix = match &self.known {
+            Some(known) if known.pattern.ncols() == matrix.ncols() => widened(&matrix, &known.pattern),
+            _ => matrix,
+        };
+        let pattern = matrix.symbolic();
+        let is_known = self.known.as_ref().is_some_and(|known| known.pattern.row_idx() == pattern.row_idx());
+        if !is_known {
+            let symbolic = SymbolicLlt::try_new(pattern, faer::Side::Lower).ok()?;
+            self.known = Some(Known { pattern: pattern.to_owned().ok()?, symbolic });
+        }
+        Some(matrix)
+    }
+}
+
+/// The matrix over the union of its own pattern and another of the same size, rows ascending in every column of both.
+fn widened(matrix: &SparseColMat<usize, f64>, pattern: &SymbolicSparseColMat<usize>) -> SparseColMat<usize, f64> {
+    let columns = matrix.ncols();
+    let capacity = pattern.row_idx().len().max(matrix.row_idx().len());
+    let (mut starts, mut rows, mut values) =
+        (Vec::with_capacity(columns + 1), Vec::with_capacity(capacity), Vec::with_capacity(capacity));
+    starts.push(0);
+    for column in 0..columns {
+        let mut known = pattern.row_idx_of_col(column).peekable();
+        for (row, &value) in matrix.row_idx_of_col(column).zip(matrix.val_of_col(column)) {
+            while let Some(zero) = known.next_if(|&zero| zero < row) {
+                rows.push(zero);
+                values.push(0.0);
+            }
+            known.next_if_eq(&row);
+            rows.push(row);
+            values.push(value);
+        }
+        for zero in known {
+            rows.push(zero);
+            values.push(0.0);
+        }
+        starts.push(rows.len());
+    }
+    SparseColMat::new(SymbolicSparseColMat::new_checked(columns, columns, starts, None, rows), values)
+}
+
+/// The product of the symmetric matrix, given by its lower triangle, with a column.
+fn multiply(lower: &SparseColMat<usize, f64>, x: &faer::Mat<f64>) -> faer::Mat<f64> {
+    let mut product = faer::Mat::<f64>::zeros(lower.ncols(), 1);
+    for column in 0..lower.ncols() {
+        for (row, value) in lower.row_idx_of_col(column).zip(lower.val_of_col(column)) {
+            product[(row, 0)] += value * x[(column, 0)];
+            if row != column {
+                product[(column, 0)] += value * x[(row, 0)];
+            }
+        }
+    }
+    product
+}

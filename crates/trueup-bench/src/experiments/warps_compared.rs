@@ -1,0 +1,220 @@
+//! T1: warps without a prior beside those with one, on sets reduced to what the warps can do.
+
+use trueup::Result;
+
+use super::grid::{GridRow, id_of, table};
+use super::paper_figures::WARPS;
+use crate::methods::{APAP, Family, Method, SPHP, SPHP_FREE, VPG, VPG_PUBLISHED, methods_of};
+use crate::report::document::{Block, Claim, Section, number};
+use crate::results::{Results, short_name};
+use crate::sets::{Catalogue, SetSpec};
+use crate::statistics::mean;
+use crate::trial::{Row, Trial};
+
+/// The experiment's name.
+pub(crate) const NAME: &str = "warps";
+
+/// The paper reduced its sets to 3 to 9 photographs for these methods.
+const LARGEST: usize = 9;
+const SMALLEST: usize = 3;
+/// GDIC counts as far worse from this multiple of VPG's; among the paper's single sets the least is 3.3.
+const FAR_WORSE: f64 = 3.0;
+/// The methods that the claim is about.
+const CLAIMED: [&str; 3] = [APAP, SPHP, SPHP_FREE];
+
+/// The sets that the paper reduced.
+fn sets(catalogue: &Catalogue) -> Vec<SetSpec> {
+    catalogue.study.iter().filter(|set| ("04"..="09").contains(&short_name(&set.name))).cloned().collect()
+}
+
+/// The methods without a prior.
+fn warps() -> impl Iterator<Item = &'static Method> {
+    methods_of(Family::Warp).chain(methods_of(Family::WideWarp))
+}
+
+/// The methods of the tables.
+fn methods() -> impl Iterator<Item = &'static Method> {
+    methods_of(Family::Prior).chain(warps())
+}
+
+/// Whether a method is run on every size of a set, not only the largest: the warps, and what they are compared with.
+fn on_every_size(one: &Method) -> bool {
+    one.family != Family::Prior || [VPG, VPG_PUBLISHED].contains(&one.name)
+}
+
+/// Every method on the photographs around the middle one of each set.
+pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
+    let mut trials = Vec::new();
+    for set in sets(catalogue) {
+        let largest = set.pictures()?.min(LARGEST);
+        for one in methods() {
+            let smallest = if on_every_size(one) { SMALLEST.min(largest) } else { largest };
+            for pictures in smallest..=largest {
+                let trial = Trial::new(NAME, &set.name, one.name, one.overrides);
+                trials.push(Trial { pictures: Some(pictures), central: true, ..trial });
+            }
+        }
+    }
+    Ok(trials)
+}
+
+/// The result of a method on so many photographs of a set.
+fn row<'a>(results: &'a Results, set: &SetSpec, method: &str, pictures: usize) -> Option<&'a Row> {
+    results
+        .of(NAME)
+        .find(|row| row.key.set == set.name && row.key.variant == method && row.key.pictures == Some(pictures))
+}
+
+/// The sizes that were tried, the largest first.
+fn sizes(results: &Results, set: &SetSpec, method: &str) -> Vec<usize> {
+    let rows = results.of(NAME).filter(|row| row.key.set == set.name && row.key.variant == method);
+    let mut sizes: Vec<usize> = rows.filter_map(|row| row.key.pictures).collect();
+    sizes.sort_unstable_by(|a, b| b.cmp(a));
+    sizes
+}
+
+/// The result on the largest number of photographs that the method makes a panorama of.
+fn largest<'a>(results: &'a Results, set: &SetSpec, method: &str) -> Option<(usize, &'a Row)> {
+    sizes(results, set, method).into_iter().find_map(|pictures| {
+        let row = row(results, set, method, pictures)?;
+        row.measure("gdic_deg").map(|_| (pictures, row))
+    })
+}
+
+/// GDIC of a warp and of VPG, in that order, on the same photographs, for every set that the warp does.
+fn same_pictures(results: &Results, warp: &str, ours: &str) -> Vec<(f64, f64)> {
+    let of_set = |set: &SetSpec| {
+        let (pictures, found) = largest(results, set, warp)?;
+        Some((found.measure("gdic_deg")?, row(results, set, ours, pictures)?.measure("gdic_deg")?))
+    };
+    sets(results.catalogue).iter().filter_map(of_set).collect()
+}
+
+/// Mean GDIC of a warp, that of VPG on the same photographs, and the number of sets.
+fn compared(results: &Results, warp: &str) -> Option<(f64, f64, usize)> {
+    let (theirs, ours): (Vec<f64>, Vec<f64>) = same_pictures(results, warp, VPG_PUBLISHED).into_iter().unzip();
+    Some((mean(&theirs)?, mean(&ours)?, ours.len()))
+}
+
+/// Warps of single homographies turn the photographs far more wrongly.
+pub(crate) fn claims(results: &Results) -> Vec<Claim> {
+    let found: Vec<(&str, (f64, f64, usize))> =
+        CLAIMED.iter().filter_map(|name| Some((*name, compared(results, name)?))).collect();
+    let list = found
+        .iter()
+        .map(|(name, (theirs, ours, count))| format!("`{name}` {theirs:.2} against {ours:.2} degrees ({count} sets)"));
+    let list: Vec<String> = list.collect();
+    let brief = found.iter().map(|(name, (theirs, ours, _))| format!("{name} {theirs:.1} against {ours:.1} deg"));
+    vec![Claim {
+        text: "Warps of homographies (APAP, SPHP) turn the photographs far more wrongly than VPG turns the same ones."
+            .to_owned(),
+        holds: (!found.is_empty()).then(|| found.iter().all(|(_, (theirs, ours, _))| *theirs >= FAR_WORSE * ours)),
+        evidence: format!(
+            "Mean GDIC on the mesh as published: {}; far worse means {FAR_WORSE} times.",
+            if list.is_empty() { "no warp was run".to_owned() } else { list.join(", ") }
+        ),
+        brief: brief.collect::<Vec<_>>().join(", "),
+    }]
+}
+
+/// The tables, and what the warps refused.
+pub(crate) fn section(results: &Results) -> Section {
+    let mut section = Section::new(NAME, "T1: warps of homographies");
+    let sets = sets(results.catalogue);
+    section.say(format!(
+        "Sets 04 to 09, reduced to the {LARGEST} photographs around the middle one, which is the reference: one homography \
+         cannot show a wide field of view. What a method cannot do is tried with fewer, down to {SMALLEST}; the number stands in \
+         brackets behind a figure where it is smaller, and n/a where none will do. The rows of VPG and GSP are for all of the \
+         reduced set."
+    ));
+    section.blocks.extend(claims(results).into_iter().map(Block::Claim));
+    for (measure, title) in [("ld", "LD x 1e-2"), ("gdic_deg", "GDIC, degrees")] {
+        let mut rows: Vec<GridRow> = methods().map(|one| grid_row(results, &sets, one, measure)).collect();
+        rows.extend(WARPS.iter().map(|row| match measure {
+            "ld" => GridRow::paper(row.method, &row.ld),
+            _ => GridRow::paper(row.method, &row.gdic_deg),
+        }));
+        section.blocks.push(Block::Table(table(
+            &format!("t1-{}", id_of(measure)),
+            &format!("T1: {title}."),
+            &sets,
+            &rows,
+        )));
+    }
+    let refused = refusals(results, &sets);
+    if !refused.is_empty() {
+        section.say("Why methods were given fewer photographs, or none:");
+        section.blocks.push(Block::List(refused));
+    }
+    section
+}
+
+/// A method's figures on the largest number of photographs each.
+fn grid_row(results: &Results, sets: &[SetSpec], one: &Method, measure: &str) -> GridRow {
+    let mut values = Vec::new();
+    let cells = sets.iter().map(|set| {
+        let most = sizes(results, set, one.name).into_iter().max();
+        match largest(results, set, one.name) {
+            None if most.is_some() => "n/a".to_owned(),
+            None => number(None, 2),
+            Some((pictures, row)) => {
+                values.extend(row.measure(measure));
+                let figure = number(row.measure(measure), 2);
+                if Some(pictures) == most { figure } else { format!("{figure} ({pictures})") }
+            }
+        }
+    });
+    let cells = cells.collect();
+    GridRow::stated(one.name, cells, mean(&values))
+}
+
+/// Per warp and set the reason why one photograph more is not done.
+fn refusals(results: &Results, sets: &[SetSpec]) -> Vec<String> {
+    let mut points = Vec::new();
+    for one in warps() {
+        for set in sets {
+            let done = largest(results, set, one.name).map(|(pictures, _)| pictures);
+            let next = sizes(results, set, one.name).into_iter().rfind(|size| done.is_none_or(|done| *size > done));
+            let Some(row) = next.and_then(|size| row(results, set, one.name, size)) else { continue };
+            let (name, size) = (short_name(&set.name), row.key.pictures.unwrap_or(0));
+            points.push(format!("`{}` on {size} photographs of {name}: {}", one.name, row.note));
+        }
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+
+    fn result(variant: &str, pictures: usize, outcome: (&str, f64)) -> Row {
+        let trial = Trial { pictures: Some(pictures), ..Trial::new(NAME, "study/05", variant, &[]) };
+        let note = if outcome.0 == "refused" { "too wide".to_owned() } else { String::new() };
+        Row { key: trial.key("set", "1"), measures: BTreeMap::from([(outcome.0.to_owned(), outcome.1)]), note }
+    }
+
+    #[test]
+    fn the_largest_reduction_counts_and_refusals_are_stated() {
+        let catalogue = Catalogue::full(None, &[]).expect("no folders");
+        let rows = vec![
+            result("homography", 5, ("refused", 1.0)),
+            result("homography", 3, ("gdic_deg", 6.0)),
+            result("homography", 4, ("gdic_deg", 8.0)),
+            result(VPG_PUBLISHED, 4, ("gdic_deg", 1.0)),
+            result(VPG_PUBLISHED, 5, ("gdic_deg", 2.0)),
+            result("apap", 5, ("refused", 1.0)),
+        ];
+        let results = Results { catalogue: &catalogue, rows };
+        let set = &catalogue.study[4];
+        assert_eq!(largest(&results, set, "homography").map(|(pictures, _)| pictures), Some(4));
+        assert_eq!(same_pictures(&results, "homography", VPG_PUBLISHED), [(8.0, 1.0)]);
+        assert_eq!(refusals(&results, std::slice::from_ref(set)), ["`homography` on 5 photographs of 05: too wide"]);
+        let one = Method { name: "apap", ..*methods().next().expect("a method") };
+        let none =
+            table("t", "", std::slice::from_ref(set), &[grid_row(&results, std::slice::from_ref(set), &one, "ld")]);
+        assert_eq!(none.rows[0].cells, ["apap", "n/a", "-"]);
+        assert_eq!(claims(&results)[0].holds, None);
+    }
+}

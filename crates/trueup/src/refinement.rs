@@ -1,0 +1,119 @@
+//! What the refinements of the mesh are made from: the working pictures' pixels, matched lines, long lines.
+
+use std::borrow::Cow;
+
+use rayon::prelude::*;
+use trueup_align::match_points::OverlapWarp;
+use trueup_align::mesh::{LineAlignmentInput, PhotometricInput, Pyramid, Refinements, StructureInput};
+use trueup_core::lines::{LineSegment, PairLines};
+use trueup_core::matches::PairMatches;
+use trueup_core::mesh::GridMesh;
+use trueup_core::raster::Raster;
+use trueup_core::{Result, StageContext};
+use trueup_io::decode::FilePhotographs;
+use trueup_vision::line_matching::{self, LinedPicture};
+use trueup_vision::lines;
+
+use crate::align::Component;
+use crate::options::{StitchOptions, Structure};
+
+/// Whether the mesh is refined by the photographs' pixels, so that they are worth keeping.
+pub(crate) fn needs_pixels(options: &StitchOptions) -> bool {
+    options.stitch.align.uses_lines() || options.stitch.align.uses_pixels()
+}
+
+/// Grey values rounded to eight bits.
+pub(crate) fn eight_bit(gray: &Raster<f32>) -> Raster<u8> {
+    let mut rounded = Raster::new(gray.width(), gray.height(), 1);
+    for (rounded, &value) in rounded.data_mut().iter_mut().zip(gray.data()) {
+        // The cast saturates.
+        *rounded = (value + 0.5) as u8;
+    }
+    rounded
+}
+
+/// What the refinements that the options ask for are made from.
+#[derive(Debug, Default)]
+pub(crate) struct Material {
+    pyramids: Vec<Pyramid>,
+    matched: Vec<PairLines>,
+    chains: Vec<Vec<LineSegment>>,
+}
+
+impl Material {
+    /// Pyramids and line matches from the pixels that were kept; photographs that were measured without keeping theirs are
+    /// decoded again.
+    ///
+    /// # Errors
+    /// Those of decoding; [`trueup_core::Error::Cancelled`].
+    pub fn new(
+        component: &Component,
+        (grids, warps): (&[GridMesh], &[OverlapWarp]),
+        photographs: &FilePhotographs,
+        options: &StitchOptions,
+        context: &StageContext,
+    ) -> Result<Self> {
+        let mut material = Self::default();
+        if options.stitch.structure == Structure::Lines {
+            material.chains = component.lines.par_iter().map(|lines| lines::merged(lines, &options.lines)).collect();
+        }
+        if !needs_pixels(options) {
+            return Ok(material);
+        }
+        let grays: Vec<Cow<Raster<u8>>> = (0..component.members.len())
+            .into_par_iter()
+            .map(|k| {
+                context.check_cancelled()?;
+                if let Some(kept) = component.grays[k] {
+                    return Ok(Cow::Borrowed(kept));
+                }
+                let (frame, thumbnail) = (&component.frames[k], options.stitch.thumbnail_pixels);
+                let picture = photographs.working(component.members[k], frame, thumbnail)?;
+                Ok(Cow::Owned(eight_bit(&picture.gray)))
+            })
+            .collect::<Result<_>>()?;
+        if options.stitch.align.uses_lines() {
+            let each_once: Vec<&OverlapWarp> = warps.iter().filter(|warp| warp.from < warp.to).collect();
+            material.matched = each_once
+                .into_par_iter()
+                .map(|warp| {
+                    context.check_cancelled()?;
+                    let side = |k: usize| LinedPicture { gray: &grays[k], lines: &component.lines[k] };
+                    let (a, b) = (side(warp.from), side(warp.to));
+                    let carry = |point| warp.at(&grids[warp.from], point);
+                    let found = line_matching::find(a, b, carry, &options.line_matching);
+                    let lines = found.iter().map(|one| [a.lines[one.in_a], b.lines[one.in_b]]).collect();
+                    Ok(PairLines { a: warp.from, b: warp.to, lines })
+                })
+                .collect::<Result<_>>()?;
+        }
+        if options.stitch.align.uses_pixels() {
+            material.pyramids = grays.par_iter().map(|gray| Pyramid::new(gray, options.photometric.levels)).collect();
+        }
+        Ok(material)
+    }
+
+    /// The refinements that the options ask for. `met` are the pairs whose overlaps are to coincide.
+    pub fn refinements<'a>(
+        &'a self,
+        component: &'a Component,
+        met: &'a [PairMatches],
+        options: &'a StitchOptions,
+    ) -> Refinements<'a> {
+        let align = options.stitch.align;
+        Refinements {
+            structure: (options.stitch.structure == Structure::Lines)
+                .then_some(StructureInput { chains: &self.chains, options: &options.structure }),
+            lines: align.uses_lines().then_some(LineAlignmentInput {
+                matched: &self.matched,
+                points: met,
+                lines: &component.lines,
+                options: &options.line_alignment,
+            }),
+            photometric: align
+                .uses_pixels()
+                .then_some(PhotometricInput { pyramids: &self.pyramids, options: &options.photometric }),
+            outline_weight: options.mesh.outline_weight,
+        }
+    }
+}
