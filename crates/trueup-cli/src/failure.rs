@@ -54,6 +54,9 @@ impl From<Error> for Failure {
             }
             Error::Unsupported { what, hint } => Self::usage(format!("{what} is not supported"), hint),
             Error::Unsolvable { stage, subject, why, hint } => failed(format!("{stage}: {subject}: {why}"), hint),
+            Error::NotApplicable { method, reason, hint } => {
+                failed(format!("the method {method} is not applicable: {reason}"), hint)
+            }
             Error::Cancelled => Self { status: STATUS_INTERRUPTED, ..failed(error.to_string(), String::new()) },
             other => failed(other.to_string(), String::new()),
         }

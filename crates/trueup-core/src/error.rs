@@ -58,6 +58,17 @@ pub enum Error {
         /// What the user can do about it, a whole sentence.
         hint: String,
     },
+    /// The method that was chosen cannot make a panorama of these pictures; another one can.
+    #[error("the method {method} is not applicable: {reason}. {hint}")]
+    NotApplicable {
+        /// The method, as in the options.
+        method: String,
+        /// Which picture it cannot place and why, with the angle where the field of view is at fault, without a closing
+        /// full stop.
+        reason: String,
+        /// What the user can do about it, a whole sentence.
+        hint: String,
+    },
     /// The user asked to stop.
     #[error("stopped on request")]
     Cancelled,
@@ -82,6 +93,11 @@ impl Error {
     /// An [`Error::Unsolvable`]: `stage` found no answer for `subject` because of `why`.
     pub fn unsolvable(stage: &'static str, subject: impl ToString, why: impl ToString, hint: impl ToString) -> Self {
         Self::Unsolvable { stage, subject: subject.to_string(), why: why.to_string(), hint: hint.to_string() }
+    }
+
+    /// An [`Error::NotApplicable`]: `method` cannot place the pictures because of `reason`; `hint` says what to do.
+    pub fn not_applicable(method: impl ToString, reason: impl ToString, hint: impl ToString) -> Self {
+        Self::NotApplicable { method: method.to_string(), reason: reason.to_string(), hint: hint.to_string() }
     }
 
     /// An [`Error::Io`] for `path`: `action` is what was being done, e.g. "reading".

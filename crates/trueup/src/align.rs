@@ -10,9 +10,10 @@ use trueup_align::cameras::{self, CameraPrior, Cameras};
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points::{self, OverlapWarp};
 use trueup_align::mesh::{self, WarpedMesh};
-use trueup_align::similarity::{self, PriorInput, SimilarityPrior};
+use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityOptions, SimilarityPrior};
 use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::{self, TriadOutcome};
+use trueup_align::warps::{self, WarpInput};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
@@ -23,7 +24,7 @@ use trueup_core::{Result, StageContext};
 use crate::clock::Clock;
 use crate::measure::Measured;
 use crate::memory::{OverlapMemory, Overlaps};
-use crate::options::StitchOptions;
+use crate::options::{Shape, StitchOptions};
 
 /// One group of overlapping photographs with everything the geometry stages need; indices are local, 0..N.
 pub(crate) struct Component<'a> {
@@ -80,6 +81,11 @@ impl<'a> Component<'a> {
         self.images.iter().map(|image| image.name.clone()).collect()
     }
 
+    /// A number for each photograph that depends neither on its folder nor on the order of the inputs.
+    fn seeds(&self) -> Vec<u64> {
+        self.images.iter().map(|image| name_seed(&image.path)).collect()
+    }
+
     /// What metadata say of the cameras, in working pixels.
     fn camera_priors(&self) -> Vec<CameraPrior> {
         let key = |image: &SourceImage| {
@@ -120,6 +126,7 @@ pub(crate) fn run(
     };
     let Overlaps { cameras, pairs, warps, .. } = overlaps.as_ref();
     let triads = clock.time("vanishing points", || find_triads(component, cameras, options, context))?;
+    let shape = options.stitch.method.shape();
     let prior = in_one_step("prior", context, clock, || {
         let input = PriorInput {
             cameras: &cameras.cameras,
@@ -132,7 +139,7 @@ pub(crate) fn run(
             vanishing: &options.vanishing,
             turn: component.reference_rotation,
         };
-        similarity::run(&input, &options.similarity, context)
+        similarity::run(&input, &wanted_prior(shape, options), context)
     })?;
 
     let edges: Vec<GraphEdge> =
@@ -149,11 +156,40 @@ pub(crate) fn run(
             )
         }
     };
-    let bases = mesh::bases(options.mesh.base, &cameras.cameras, &grids, &prior);
-    let mesh = in_one_step("mesh", context, clock, || {
-        mesh::run(&grids, &kept, &bases, component.reference, &options.mesh, context)
+    let mesh = in_one_step("mesh", context, clock, || match shape {
+        Shape::Mesh(_) => {
+            let bases = mesh::bases(options.mesh.base, &cameras.cameras, &grids, &prior);
+            mesh::run(&grids, &kept, &bases, component.reference, &options.mesh, context)
+        }
+        Shape::Warp(model) => {
+            let fine: Vec<GridMesh> = grids.iter().map(|grid| mesh::divided(grid, options.mesh.subdivision)).collect();
+            let input = WarpInput {
+                cameras: &cameras.cameras,
+                frames: &component.frames,
+                grids: &fine,
+                pairs: &met,
+                overlaps: &kept,
+                names: &component.names(),
+                seeds: &component.seeds(),
+                reference: component.reference,
+                level_from_world: prior.level_from_world(),
+                cut_yaw: cut.as_ref().map(|cut| cut.yaw),
+                turn: component.reference_rotation,
+            };
+            warps::run(model, &input, &options.warps, context)
+        }
     })?;
     Ok(Geometry { cameras: cameras.clone(), triads, prior, mesh, met })
+}
+
+/// The options of the prior that a method means.
+fn wanted_prior(shape: Shape, options: &StitchOptions) -> SimilarityOptions {
+    let prior = match shape {
+        Shape::Mesh(None) => options.similarity.prior,
+        Shape::Mesh(Some(prior)) => prior,
+        Shape::Warp(_) => PriorMethod::Straightening,
+    };
+    SimilarityOptions { prior, ..options.similarity.clone() }
 }
 
 /// Cameras, the pairs that agree with them, and the grids carried across these.

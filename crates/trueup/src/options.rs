@@ -5,8 +5,9 @@ use trueup_align::cameras::CameraOptions;
 use trueup_align::match_points::MatchPointOptions;
 use trueup_align::mesh::MeshOptions;
 use trueup_align::metrics::MeasureOptions;
-use trueup_align::similarity::SimilarityOptions;
+use trueup_align::similarity::{PriorMethod, SimilarityOptions};
 use trueup_align::vanishing::VanishingOptions;
+use trueup_align::warps::{WarpModel, WarpOptions};
 use trueup_compose::exposure::ExposureOptions;
 use trueup_compose::layout::CanvasOptions;
 use trueup_compose::render::RenderOptions;
@@ -26,6 +27,28 @@ trueup_core::choice! {
     pub enum Method {
         /// Vanishing-point-guided natural stitching: upright wherever the scene has straight lines to tell.
         Vpg = "vpg",
+        /// One homography per photograph, onto the plane of the reference.
+        Homography = "homography",
+    }
+}
+
+/// What makes a method: how the grids are deformed, and under which prior.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Shape {
+    /// The mesh energies under this prior; `None` leaves the prior to `similarity.prior`.
+    Mesh(Option<PriorMethod>),
+    /// A warp model. Level and roll are those of the straightened cameras.
+    Warp(WarpModel),
+}
+
+impl Method {
+    /// The one place that says what a method is made of.
+    pub(crate) fn shape(self) -> Shape {
+        match self {
+            Self::Vpg => Shape::Mesh(None),
+            // Methods that are a prior: Self::Name => Shape::Mesh(Some(PriorMethod::Name)).
+            Self::Homography => Shape::Warp(WarpModel::Homography),
+        }
     }
 }
 
@@ -101,6 +124,8 @@ stage_options! {
     match_points: MatchPointOptions,
     /// How the grids are deformed.
     mesh: MeshOptions,
+    /// How the methods that are warp models place the photographs.
+    warps: WarpOptions,
     /// How large the panorama is.
     canvas: CanvasOptions,
     /// How exposures are evened out.

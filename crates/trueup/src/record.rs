@@ -6,7 +6,7 @@ use trueup_core::mesh::GridMesh;
 
 use crate::align::{Component, Geometry};
 use crate::matched::Matched;
-use crate::options::StitchOptions;
+use crate::options::{Shape, StitchOptions};
 use crate::project::{
     Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
 };
@@ -117,6 +117,8 @@ pub(crate) fn fill_geometry(
 ) {
     project.canvas = Canvas { width: layout.width, height: layout.height };
     project.reference = component.images[component.reference].path.display().to_string();
+    let method = project.options.stitch.method;
+    let is_warp = matches!(method.shape(), Shape::Warp(_));
     for (k, &picture) in component.members.iter().enumerate() {
         let record = &mut project.images[picture];
         let mesh = &layout.placed[k].mesh;
@@ -133,8 +135,11 @@ pub(crate) fn fill_geometry(
         let camera_from_level = camera.rotation() * geometry.prior.level_from_world().transpose();
         record.focal_px = Some(camera.focal_px / component.frames[k].working_from_full);
         record.rotation = Some(rows_of(&camera_from_level));
-        record.theta_deg = Some(geometry.prior.theta[k].to_degrees());
-        record.scale = Some(geometry.prior.scale[k]);
+        // A warp model asks no prior; what straightening would want is not what was done.
+        if !is_warp {
+            record.theta_deg = Some(geometry.prior.theta[k].to_degrees());
+            record.scale = Some(geometry.prior.scale[k]);
+        }
         record.vanishing_points = geometry.triads[k].triad().map(|triad| {
             let matrix = triad.matrix();
             std::array::from_fn(|direction| matrix.column(direction).into_owned().into())
@@ -149,7 +154,10 @@ pub(crate) fn fill_geometry(
             vertical_deviation_deg: guidance.vertical_deviation.map(f64::to_degrees),
             accepted: guidance.used,
             pooled: guidance.pooled,
-            failed_clause: guidance.failed_clause.clone(),
+            failed_clause: match method.shape() {
+                Shape::Mesh(_) => guidance.failed_clause.clone(),
+                Shape::Warp(_) => Some(format!("the method {} does not ask them", project.method)),
+            },
             dominant: guidance.dominant,
             inliers: guidance.inliers.iter().map(|&k| component.images[k].path.display().to_string()).collect(),
         };

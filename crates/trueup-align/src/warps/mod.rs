@@ -1,5 +1,155 @@
-//! Warp models of a pair that are no mesh energy.
+//! Warp models: methods that place the pictures by closed formulas instead of the mesh energies.
+//!
+//! One file a model. All start from the same matches, cameras and grids and yield the same [`WarpedMesh`] as the mesh
+//! energies do, so that renderer and measures are shared. A set of pictures that a model cannot place is refused with
+//! [`trueup_core::Error::NotApplicable`]: what cannot lie on one plane is not torn or blown up instead.
 
+mod homography;
+mod limits;
+mod options;
 mod sphp;
 
+use nalgebra::{Matrix3, Vector2};
+use trueup_core::camera::Camera;
+use trueup_core::matches::PairMatches;
+use trueup_core::mesh::GridMesh;
+use trueup_core::options::StageOptions;
+use trueup_core::source::WorkingFrame;
+use trueup_core::{Error, Result, StageContext};
+
+use crate::match_points::OverlapWarp;
+use crate::mesh::{WarpedMesh, count_folds};
+pub use options::{HomographySource, WarpOptions};
 pub use sphp::SphpWarp;
+
+/// The stage's name in progress and generators.
+const STAGE: &str = WarpOptions::STAGE;
+
+trueup_core::choice! {
+    /// A method that is a warp model.
+    pub enum WarpModel {
+        /// One homography per picture, onto the plane of the reference.
+        Homography = "homography",
+    }
+}
+
+/// What a warp model is made from. Pictures are counted 0..N; `cameras`, `frames`, `grids`, `names` and `seeds` have N
+/// entries.
+#[derive(Debug, Clone, Copy)]
+pub struct WarpInput<'a> {
+    /// Cameras in working pixels, in any common world frame.
+    pub cameras: &'a [Camera],
+    /// Each picture's working frame.
+    pub frames: &'a [WorkingFrame],
+    /// Undeformed grids, as fine as they are to be delivered.
+    pub grids: &'a [GridMesh],
+    /// The pairs whose overlaps are to meet, with their matches; they connect all pictures.
+    pub pairs: &'a [PairMatches],
+    /// Match points, by which the alignment is measured.
+    pub overlaps: &'a [OverlapWarp],
+    /// Names of the pictures, for messages.
+    pub names: &'a [String],
+    /// For each picture a number that does not depend on the order of the pictures; random choices derive from it.
+    pub seeds: &'a [u64],
+    /// The picture that stays in place in models that have such a one.
+    pub reference: usize,
+    /// The rotation that levels the cameras' world: y down, the mean viewing direction above z.
+    pub level_from_world: Matrix3<f64>,
+    /// Direction of the cut in the level world where the pictures go all the way round, radians from z towards x.
+    pub cut_yaw: Option<f64>,
+    /// Clockwise turn in radians that the user wants of the whole panorama.
+    pub turn: f64,
+}
+
+/// Places the pictures by a warp model.
+///
+/// # Errors
+/// [`Error::Options`]; [`Error::Unsolvable`] for lists of different lengths; [`Error::NotApplicable`] if the model cannot
+/// place these pictures, with the angle they reach; [`Error::Cancelled`].
+pub fn run(
+    model: WarpModel,
+    input: &WarpInput<'_>,
+    options: &WarpOptions,
+    context: &StageContext<'_>,
+) -> Result<WarpedMesh> {
+    options.check()?;
+    check(input)?;
+    context.check_cancelled()?;
+    let mut meshes = match model {
+        WarpModel::Homography => homography::place(input, options)?,
+    };
+    limits::check(model, input, &meshes, options)?;
+    turn(&mut meshes, input.turn);
+    Ok(WarpedMesh {
+        alignment_rms: alignment_rms(&meshes, input.overlaps),
+        folds: meshes.iter().map(count_folds).sum(),
+        relative_gradient: 0.0,
+        meshes,
+    })
+}
+
+fn check(input: &WarpInput<'_>) -> Result<()> {
+    let count = input.grids.len();
+    let lengths = [input.cameras.len(), input.frames.len(), input.names.len(), input.seeds.len()];
+    let known = |picture: usize| picture < count;
+    let whole = lengths.iter().all(|&length| length == count)
+        && known(input.reference)
+        && input.pairs.iter().all(|pair| known(pair.a) && known(pair.b) && pair.a != pair.b)
+        && input.overlaps.iter().all(|overlap| known(overlap.from) && known(overlap.to));
+    match whole {
+        true => Ok(()),
+        false => Err(Error::unsolvable(
+            STAGE,
+            "warp model",
+            format!("cameras, frames, names, pairs or the reference do not fit {count} pictures"),
+            "Give one entry per picture.",
+        )),
+    }
+}
+
+/// The grid whose vertices go where `place` says.
+fn deformed(grid: &GridMesh, place: impl Fn(Vector2<f64>) -> Vector2<f64>) -> GridMesh {
+    let target = (0..grid.len()).map(|vertex| place(grid.source(vertex)).into()).collect();
+    GridMesh { target, ..grid.clone() }
+}
+
+/// Turns the panorama clockwise by `angle` radians.
+fn turn(meshes: &mut [GridMesh], angle: f64) {
+    if angle == 0.0 {
+        return;
+    }
+    let (sine, cosine) = angle.sin_cos();
+    for vertex in meshes.iter_mut().flat_map(|mesh| &mut mesh.target) {
+        let [x, y] = *vertex;
+        *vertex = [cosine * x - sine * y, sine * x + cosine * y];
+    }
+}
+
+/// Root mean square distance between the two places of a match point; 0 without any.
+fn alignment_rms(meshes: &[GridMesh], overlaps: &[OverlapWarp]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for overlap in overlaps {
+        // The match points were carried from the undivided grid, which spans the same picture.
+        let (from, to) = (&meshes[overlap.from], &meshes[overlap.to]);
+        let Some(coarse) = coarse_grid(from, overlap.vertices.len()) else { continue };
+        for (vertex, place) in overlap.vertices.iter().enumerate() {
+            let Some(place) = place else { continue };
+            let apart = from.warp(coarse.source(vertex)) - to.warp(Vector2::from(*place));
+            sum += apart.norm_squared();
+            count += 1;
+        }
+    }
+    if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
+}
+
+/// The grid with this many vertices that `fine` is a division of.
+fn coarse_grid(fine: &GridMesh, vertices: usize) -> Option<GridMesh> {
+    let (rows, columns) = (fine.rows - 1, fine.columns - 1);
+    (1..=rows.min(columns))
+        .filter(|factor| rows % factor == 0 && columns % factor == 0)
+        .map(|factor| GridMesh { rows: rows / factor + 1, columns: columns / factor + 1, target: Vec::new(), ..*fine })
+        .find(|grid| grid.len() == vertices)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,93 @@
+//! One homography per picture, onto the plane of the reference.
+
+use nalgebra::{Matrix3, Vector2};
+use trueup_core::camera::Camera;
+use trueup_core::geometry::Homography;
+use trueup_core::mesh::GridMesh;
+use trueup_core::{Error, Result};
+
+use super::limits::{check_depth, with_depth};
+use super::{HomographySource, STAGE, WarpInput, WarpModel, WarpOptions, deformed};
+use crate::stitch_graph::StitchGraph;
+
+/// Places every picture by its homography onto the reference's plane.
+///
+/// # Source
+/// Szeliski, "Image alignment and stitching: a tutorial" (2006), sections 2.1 and 6.1.
+pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions) -> Result<Vec<GridMesh>> {
+    let model = WarpModel::Homography;
+    let homographies = onto(input, input.reference, options.homographies)?;
+    for (picture, homography) in homographies.iter().enumerate() {
+        check_depth(model, input, picture, homography, options)?;
+    }
+    Ok(homographies.iter().zip(input.grids).map(|(h, grid)| deformed(grid, |point| h.apply(point))).collect())
+}
+
+/// For every picture the homography onto the plane of picture `target`, its denominator the depth.
+pub(super) fn onto(input: &WarpInput<'_>, target: usize, source: HomographySource) -> Result<Vec<Homography>> {
+    match source {
+        HomographySource::Cameras => {
+            let to = &input.cameras[target];
+            Ok(input.cameras.iter().map(|from| between(from, to)).collect())
+        }
+        HomographySource::Pairs => chained(input, target),
+    }
+}
+
+/// `K_to R_to R_from^T K_from^-1`: where the picture of one camera appears in that of the other, both at one place.
+pub(super) fn between(from: &Camera, to: &Camera) -> Homography {
+    let intrinsic = |camera: &Camera| {
+        let ([x, y], f) = (camera.principal_point, camera.focal_px);
+        (
+            Matrix3::new(f, 0.0, x, 0.0, f, y, 0.0, 0.0, 1.0),
+            Matrix3::new(1.0 / f, 0.0, -x / f, 0.0, 1.0 / f, -y / f, 0.0, 0.0, 1.0),
+        )
+    };
+    Homography(intrinsic(to).0 * to.rotation() * from.rotation().transpose() * intrinsic(from).1)
+}
+
+/// The homographies of the pairs, chained along the spanning tree of the strongest overlaps.
+fn chained(input: &WarpInput<'_>, target: usize) -> Result<Vec<Homography>> {
+    let count = input.grids.len();
+    let graph = StitchGraph::new(count, input.pairs);
+    let all: Vec<usize> = (0..count).collect();
+    let mut onto_target: Vec<Option<Homography>> = vec![None; count];
+    onto_target[target] = Some(Homography::identity());
+    for step in graph.spanning_tree(&all, target) {
+        let Some(parent) = onto_target[step.parent] else { continue };
+        let to_parent = of_pair(input, step.child, step.parent)?;
+        onto_target[step.child] = Some(parent.after(&to_parent));
+    }
+    onto_target
+        .into_iter()
+        .enumerate()
+        .map(|(picture, found)| found.ok_or_else(|| undetermined(input, picture)))
+        .collect()
+}
+
+/// The homography from picture `from` to picture `to` by their matches, its denominator the depth.
+pub(super) fn of_pair(input: &WarpInput<'_>, from: usize, to: usize) -> Result<Homography> {
+    let pair = input.pairs.iter().find(|pair| (pair.a, pair.b) == (from.min(to), from.max(to)));
+    let b_from_a = pair.and_then(|pair| match &pair.b_from_a {
+        Some(rows) => Some(Homography::from_rows(rows)),
+        None => {
+            let points = |of: fn(&trueup_core::matches::PointMatch) -> [f64; 2]| -> Vec<Vector2<f64>> {
+                pair.inliers.iter().map(|one| Vector2::from(of(one))).collect()
+            };
+            Homography::fit(&points(|one| one.in_a), &points(|one| one.in_b), None)
+        }
+    });
+    let directed = if from < to { b_from_a } else { b_from_a.and_then(|homography| homography.inverse()) };
+    directed
+        .and_then(|found| with_depth(&found, input.cameras[from].focal_px, input.cameras[to].focal_px))
+        .ok_or_else(|| undetermined(input, from))
+}
+
+pub(super) fn undetermined(input: &WarpInput<'_>, picture: usize) -> Error {
+    Error::unsolvable(
+        STAGE,
+        &input.names[picture],
+        "its matches determine no homography",
+        "Leave this photograph out, or choose another method.",
+    )
+}

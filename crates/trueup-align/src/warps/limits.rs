@@ -1,0 +1,125 @@
+//! What a warp model refuses: pictures that it cannot place without tearing, folding or blowing them up.
+
+use nalgebra::Vector2;
+use trueup_core::geometry::Homography;
+use trueup_core::mesh::GridMesh;
+use trueup_core::options::OptionValue;
+use trueup_core::{Error, Result};
+
+use super::{WarpInput, WarpModel, WarpOptions};
+use crate::mesh::count_folds;
+
+/// What a user can do about a field of view that is too wide.
+const TOO_WIDE: &str = "Use the method vpg or autostitch, or stitch fewer photographs.";
+
+/// The refusal of a set by a model. `reason` says which picture and why; the angle that the picture reaches is added.
+pub(super) fn refuse(model: WarpModel, input: &WarpInput<'_>, picture: usize, reason: &str) -> Error {
+    let angle = farthest_angle(input, picture).to_degrees();
+    let (name, reference) = (&input.names[picture], &input.names[input.reference]);
+    Error::not_applicable(
+        model.display(),
+        format!("{name} {reason}; it reaches {angle:.0} degrees from the axis of {reference}"),
+        TOO_WIDE,
+    )
+}
+
+/// The largest angle in radians between the reference's axis and a direction that a picture's border sees.
+pub(super) fn farthest_angle(input: &WarpInput<'_>, picture: usize) -> f64 {
+    let axis = input.cameras[input.reference].rotation().row(2).transpose();
+    let frame = &input.frames[picture];
+    let corners = [(0.0, 0.0), (frame.width, 0.0), (frame.width, frame.height), (0.0, frame.height)];
+    corners
+        .into_iter()
+        .map(|(x, y)| input.cameras[picture].world_direction(Vector2::new(x, y)).angle(&axis))
+        .fold(0.0, f64::max)
+}
+
+/// The homography scaled so that its denominator is the depth of a viewing direction of unit depth in the picture:
+/// what it is for `K_to R K_from^-1` with a rotation R. `None` if it mirrors or is singular.
+///
+/// For other homographies (parallax) the determinant defines the same scale.
+pub(super) fn with_depth(homography: &Homography, focal_from: f64, focal_to: f64) -> Option<Homography> {
+    let ratio = homography.0.determinant() * (focal_from / focal_to).powi(2);
+    let scaled = homography.0 / ratio.cbrt();
+    scaled.iter().all(|entry| entry.is_finite()).then_some(Homography(scaled))
+}
+
+/// The smallest depth over a picture's corners, relative to the distance along the viewing direction.
+///
+/// `homography` as of [`with_depth`]. Where no corner is behind the plane, no point of the picture is.
+pub(super) fn least_depth(homography: &Homography, input: &WarpInput<'_>, picture: usize) -> f64 {
+    let (frame, camera) = (&input.frames[picture], &input.cameras[picture]);
+    [(0.0, 0.0), (frame.width, 0.0), (frame.width, frame.height), (0.0, frame.height)]
+        .into_iter()
+        .map(|(x, y)| Vector2::new(x, y))
+        .map(|corner| homography.denominator(corner) / camera.bearing(corner).norm())
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Refuses a homography that carries part of a picture behind the panorama's plane.
+pub(super) fn check_depth(
+    model: WarpModel,
+    input: &WarpInput<'_>,
+    picture: usize,
+    homography: &Homography,
+    options: &WarpOptions,
+) -> Result<()> {
+    match least_depth(homography, input, picture) > options.min_depth {
+        true => Ok(()),
+        false => Err(refuse(model, input, picture, "does not lie in front of the panorama's plane")),
+    }
+}
+
+/// Refuses placed pictures that are not finite, too far away, too large or folded.
+pub(super) fn check(model: WarpModel, input: &WarpInput<'_>, meshes: &[GridMesh], options: &WarpOptions) -> Result<()> {
+    let anchor = &meshes[input.reference];
+    let centre = anchor.warp(Vector2::new(anchor.width / 2.0, anchor.height / 2.0));
+    let area = target_area(anchor);
+    // The reference's own scale in the panorama.
+    let scale = (area / (anchor.width * anchor.height)).sqrt();
+    let reach = options.max_reach * anchor.width.hypot(anchor.height) * scale;
+    for (picture, mesh) in meshes.iter().enumerate() {
+        let finite = mesh.target.iter().flatten().all(|coordinate| coordinate.is_finite());
+        if !finite {
+            return Err(refuse(model, input, picture, "cannot be placed"));
+        }
+        let farthest = mesh.target.iter().map(|&vertex| (Vector2::from(vertex) - centre).norm()).fold(0.0, f64::max);
+        if !(farthest <= reach) {
+            let reason = format!(
+                "would lie {:.0} diagonals of the reference away (warps.max_reach allows {})",
+                farthest / reach * options.max_reach,
+                options.max_reach
+            );
+            return Err(refuse(model, input, picture, &reason));
+        }
+        let growth = target_area(mesh) / area;
+        if !(growth <= options.max_area_ratio) {
+            let reason = format!(
+                "would be {growth:.0} times as large as the reference (warps.max_area_ratio allows {})",
+                options.max_area_ratio
+            );
+            return Err(refuse(model, input, picture, &reason));
+        }
+        let triangles = 2 * (mesh.rows - 1) * (mesh.columns - 1);
+        let folded = count_folds(mesh);
+        if folded as f64 > options.max_folded_share * triangles as f64 {
+            let percent = 100.0 * folded as f64 / triangles as f64;
+            return Err(refuse(model, input, picture, &format!("would be folded over {percent:.0} % of it")));
+        }
+    }
+    Ok(())
+}
+
+/// Area of a grid in the panorama: over its cells the sum of the areas, whatever their orientation.
+fn target_area(mesh: &GridMesh) -> f64 {
+    let vertex = |row: usize, column: usize| Vector2::from(mesh.target[row * mesh.columns + column]);
+    (0..mesh.rows - 1)
+        .flat_map(|row| (0..mesh.columns - 1).map(move |column| (row, column)))
+        .map(|(row, column)| {
+            // Area of a quadrilateral from its diagonals.
+            let falling = vertex(row + 1, column + 1) - vertex(row, column);
+            let rising = vertex(row, column + 1) - vertex(row + 1, column);
+            0.5 * falling.perp(&rising).abs()
+        })
+        .sum()
+}
