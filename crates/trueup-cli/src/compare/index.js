@@ -1,6 +1,8 @@
 const { comparison, drawings } = data;
 const made = comparison.entries.map((entry, index) => ({ entry, drawing: drawings[index] })).filter((one) => one.entry.panorama);
 const refused = comparison.entries.filter((entry) => entry.refusal);
+// What no panorama could be measured by is not worth a row.
+const figures = comparison.figures.filter(({ key }) => made.some(({ entry }) => key in entry.figures));
 const fileName = (path) => path.split(/[/\\]/).pop();
 
 /** Where a panorama lies about the middle of the reference photograph, in that photograph's pixels. */
@@ -45,7 +47,7 @@ const arrow = { lower: "↓", higher: "↑", neither: "" };
 
 function figureList(entry) {
   const list = make("dl");
-  for (const figure of comparison.figures.filter((one) => one.main)) {
+  for (const figure of figures.filter((one) => one.main)) {
     const value = shown(figure, entry.figures[figure.key]);
     const best = isBest(entry, figure);
     list.append(make("div", { class: best ? "best" : null, title: figure.meaning },
@@ -71,11 +73,9 @@ function card(one, index) {
   const { file, project, width, height, used } = entry.panorama;
   const view = new View(gaze, aspect, `Panorama by ${entry.name}: arrow keys move, plus and minus zoom`);
   view.add(plane(one), boxes[index], frameOf(index));
-  const wins = entry.best.length;
   return make("article", { class: "card" },
     make("header", null,
-      make("div", null, make("h3", null, entry.name), make("p", { class: "meaning dim" }, entry.meaning)),
-      wins ? make("span", { class: "wins", title: "Figures in which nothing is better" }, `★ ${wins} best`) : null),
+      make("h3", null, entry.name), make("p", { class: "meaning dim" }, entry.meaning)),
     view.element,
     make("footer", null, figureList(entry),
       make("div", { class: "row no-print" },
@@ -88,7 +88,7 @@ function card(one, index) {
 
 function table() {
   const head = make("tr", null, make("th", { scope: "col" }, ""), ...made.map(({ entry }) => make("th", { scope: "col" }, entry.name)));
-  const rows = comparison.figures.map((figure) => make("tr", null,
+  const rows = figures.map((figure) => make("tr", null,
     make("th", { scope: "row" }, `${figure.name}${figure.unit ? `, ${figure.unit}` : ""} ${arrow[figure.better]}`, make("small", null, figure.meaning)),
     ...made.map(({ entry }) => {
       const value = entry.figures[figure.key];
@@ -103,7 +103,7 @@ function about() {
   const parts = [
     `${used} of ${comparison.photographs.length} photographs`,
     `${made.length} ${made.length === 1 ? "panorama" : "panoramas"}`,
-    refused.length ? `${refused.length} not applicable` : null,
+    refused.length ? `${refused.length} without a panorama` : null,
     `reference ${fileName(comparison.reference)}`,
     comparison.truth ? `measured against ${fileName(comparison.truth)}` : null,
     `${comparison.seconds.toFixed(1)} s`,
@@ -115,7 +115,7 @@ function about() {
   for (const { name, meaning, refusal } of refused) {
     const subject = refusal.subject ? `${refusal.subject}: ` : "";
     list.append(make("dt", null, name), make("dd", { class: "dim" }, meaning),
-      make("dd", null, `not applicable: ${subject}${refusal.reason}`), refusal.hint ? make("dd", { class: "dim" }, refusal.hint) : "");
+      make("dd", null, `${refusal.not_applicable ? "not applicable" : "failed"}: ${subject}${refusal.reason}`), refusal.hint ? make("dd", { class: "dim" }, refusal.hint) : "");
   }
   byId("refused").hidden = refused.length === 0;
   byId("inputs").append(make("h2", null, "Photographs"), make("ul", null, ...comparison.photographs.map((one) =>

@@ -53,10 +53,11 @@ pub(crate) fn blind_ranking(comparison: &Comparison, ranking: &Ranking) -> Resul
 
 /// A template with its parts filled in; the data last, so that nothing in them is taken for a place to fill in.
 fn page(template: &str, styles: &[&str], scripts: &[&str], data: &Value) -> String {
-    template
-        .replacen("/*STYLE*/", &styles.concat(), 1)
-        .replacen("/*SCRIPT*/", &scripts.concat(), 1)
-        .replacen("/*DATA*/", &in_script(data), 1)
+    template.replacen("/*STYLE*/", &styles.concat(), 1).replacen("/*SCRIPT*/", &scripts.concat(), 1).replacen(
+        "/*DATA*/",
+        &in_script(data),
+        1,
+    )
 }
 
 /// JSON that can stand in a `script` element: no name of a file ends the element or begins a comment.

@@ -43,7 +43,9 @@ fn heading(figure: &Figure) -> String {
 }
 
 fn told(refusal: &Refusal) -> String {
-    format!("not applicable: {}", refusal.reason)
+    let what = if refusal.not_applicable { "not applicable" } else { "failed" };
+    let subject = if refusal.subject.is_empty() { String::new() } else { format!("{}: ", refusal.subject) };
+    format!("{what}: {subject}{}", refusal.reason)
 }
 
 /// A figure as wide as its heading, with the gap that follows.

@@ -61,8 +61,7 @@ impl PendingFolder {
         }
         // The temporary folder makes room for the old one: moved into a second temporary, it goes when that is dropped.
         let parent = temporary.path().parent().unwrap_or(Path::new("."));
-        let aside =
-            tempfile::Builder::new().prefix(".trueup-").suffix(".old").tempdir_in(parent).map_err(failed)?;
+        let aside = tempfile::Builder::new().prefix(".trueup-").suffix(".old").tempdir_in(parent).map_err(failed)?;
         let old = aside.path().join("old");
         std::fs::rename(&target, &old).map_err(failed)?;
         if let Err(error) = std::fs::rename(temporary.path(), &target) {

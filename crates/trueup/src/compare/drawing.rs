@@ -70,8 +70,7 @@ fn verticals(image: &ImageRecord, lines: &[LineSegment], frame: &WorkingFrame, o
     let Some(focal_px) = image.focal_px else { return Vec::new() };
     // Down is the levelled world's second axis; without a rotation, cameras are expected to be held level.
     let down = image.rotation.map_or(Vector3::y(), |rows| Vector3::new(rows[0][1], rows[1][1], rows[2][1]));
-    let picture =
-        LinedPicture { lines, frame, focal_px: focal_px * frame.working_from_full, expected_down: down };
+    let picture = LinedPicture { lines, frame, focal_px: focal_px * frame.working_from_full, expected_down: down };
     vertical_segments(&picture, &options.vanishing, &options.measures)
 }
 
@@ -124,12 +123,8 @@ mod tests {
 
     #[test]
     fn the_longest_lines_are_drawn_where_the_grid_carries_them() {
-        let line = |x: f64, length: f64| LineSegment {
-            start: [x, 0.0],
-            end: [x, length],
-            width_px: 1.0,
-            significance: 1.0,
-        };
+        let line =
+            |x: f64, length: f64| LineSegment { start: [x, 0.0], end: [x, length], width_px: 1.0, significance: 1.0 };
         assert_eq!(longest(&[line(0.0, 5.0), line(1.0, 9.0), line(2.0, 7.0)], 2), [1, 2]);
         let mut mesh = GridMesh::regular(100.0, 60.0, 10.0);
         for vertex in &mut mesh.target {

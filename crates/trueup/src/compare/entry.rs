@@ -106,7 +106,9 @@ mod tests {
         assert_eq!(entry.overrides, ["mesh.cell_px=20", "mesh.subdivision=1"]);
         let options = entry.options(&StitchOptions::default()).expect("valid");
         assert_eq!((options.mesh.cell_px, options.mesh.subdivision), (20.0, 1));
-        for (text, reason) in [("mesh.cell_px=20", "no \":\""), (": mesh.cell_px=20", "no name"), ("thin:", "no options")] {
+        for (text, reason) in
+            [("mesh.cell_px=20", "no \":\""), (": mesh.cell_px=20", "no name"), ("thin:", "no options")]
+        {
             assert!(Entry::parse(text).expect_err("must fail").to_string().contains(reason), "{text}");
         }
     }
@@ -114,7 +116,9 @@ mod tests {
     #[test]
     fn what_all_share_cannot_depart() {
         let common = StitchOptions::default();
-        for shared in ["matching.ratio=0.5", "features.levels_per_octave=4", "stitch.working_pixels=100000", "stitch.seed=3"] {
+        for shared in
+            ["matching.ratio=0.5", "features.levels_per_octave=4", "stitch.working_pixels=100000", "stitch.seed=3"]
+        {
             let entry = Entry::parse(&format!("other: {shared}")).expect("well formed");
             assert!(entry.options(&common).expect_err("shared").to_string().contains("shares features"), "{shared}");
         }

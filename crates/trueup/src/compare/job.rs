@@ -92,8 +92,7 @@ impl CompareJob {
             .num_threads(self.threads)
             .build()
             .map_err(|error| Error::input("threads", error, "Ask for fewer threads."))?;
-        let comparison =
-            pool.install(|| self.compare(options, truth.as_ref(), folder.path(), context, pages))?;
+        let comparison = pool.install(|| self.compare(options, truth.as_ref(), folder.path(), context, pages))?;
         context.check_cancelled()?;
         // Work took its time: the folder may have been filled since.
         check_replaceable(&self.output)?;
@@ -147,8 +146,7 @@ impl CompareJob {
         let drawings: Vec<Drawing> = made.iter_mut().map(|one| std::mem::take(&mut one.drawing)).collect();
         let entries = made.into_iter().map(|one| one.compared).collect();
         let mut comparison = self.record(options, truth.is_some(), entries, &project, context);
-        comparison.ranking =
-            ranking::choose(self.ranked.as_deref(), &comparison.entries, &options.compare, context);
+        comparison.ranking = ranking::choose(self.ranked.as_deref(), &comparison.entries, &options.compare, context);
         copy_ranked(&comparison, folder)?;
         comparison.seconds = start.elapsed().as_secs_f64();
         write_pages(&mut comparison, &drawings, folder, pages)?;
@@ -220,8 +218,7 @@ impl Common<'_> {
             Err(error) => Err(error),
             Ok(alignment) => {
                 // A truth that does not fit one entry fits none.
-                made.compared.evaluation =
-                    self.truth.map(|truth| evaluate(&alignment.project, truth)).transpose()?;
+                made.compared.evaluation = self.truth.map(|truth| evaluate(&alignment.project, truth)).transpose()?;
                 self.finish(alignment, stem, &stitcher, &mut made)
             }
         };
@@ -299,6 +296,7 @@ fn reference_place(project: &Project) -> Result<([f64; 2], f64)> {
 /// What concerns one entry alone; `None` for what ends the whole comparison.
 fn refusal(error: &Error) -> Option<Refusal> {
     let (subject, reason, hint) = match error {
+        Error::NotApplicable { reason, hint, .. } => (String::new(), reason.clone(), hint),
         Error::Input { subject, reason, hint } => (subject.clone(), reason.clone(), hint),
         Error::Unsolvable { stage, subject, why, hint } => (format!("{stage}: {subject}"), why.clone(), hint),
         Error::Unsupported { what, hint } => (String::new(), format!("{what} is not supported"), hint),
@@ -307,7 +305,8 @@ fn refusal(error: &Error) -> Option<Refusal> {
         }
         _ => return None,
     };
-    Some(Refusal { subject, reason, hint: hint.clone() })
+    let not_applicable = matches!(error, Error::NotApplicable { .. });
+    Some(Refusal { not_applicable, subject, reason, hint: hint.clone() })
 }
 
 /// The error when there is not one panorama: the first entry's, which is most often that of all.

@@ -89,7 +89,8 @@ mod tests {
 
     #[test]
     fn file_names_are_plain_and_unlike_each_other() {
-        let stems = file_stems(&["vpg", "VPG", "thin mesh (20 px)", "../../etc", "Größe", "index", "写真", "ranking-1"]);
+        let stems =
+            file_stems(&["vpg", "VPG", "thin mesh (20 px)", "../../etc", "Größe", "index", "写真", "ranking-1"]);
         assert_eq!(stems, ["vpg", "vpg-2", "thin-mesh-20-px", "etc", "gr-e", "index-2", "entry", "entry-2"]);
     }
 }

@@ -113,7 +113,9 @@ pub struct PanoramaRecord {
 /// Why an entry has no panorama.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Refusal {
-    /// What it concerns.
+    /// Whether the method cannot place these photographs, rather than that something failed.
+    pub not_applicable: bool,
+    /// What it concerns; empty where that is the entry itself.
     pub subject: String,
     /// The reason.
     pub reason: String,

@@ -101,7 +101,10 @@ fn parse(bytes: &[u8], file: &str) -> Result<RankingResults> {
         return Err(wrong(format!("its format is not \"{RANKING_FORMAT}\"")));
     }
     if value["version"] != RANKING_VERSION {
-        return Err(wrong(format!("its version is {}, this program reads version {RANKING_VERSION}", value["version"])));
+        return Err(wrong(format!(
+            "its version is {}, this program reads version {RANKING_VERSION}",
+            value["version"]
+        )));
     }
     let results: RankingResults =
         serde_json::from_value(value).map_err(|error| wrong(format!("the file is damaged ({error})")))?;
@@ -139,7 +142,8 @@ pub fn tally(results: &[RankingResults]) -> Result<Tally> {
     let mut comparisons: BTreeSet<&str> = BTreeSet::new();
     let mut scores: BTreeMap<&str, Scores> = BTreeMap::new();
     let mut repeated = 0;
-    for (result, answer) in results.iter().flat_map(|result| result.answers.iter().map(move |answer| (result, answer))) {
+    for (result, answer) in results.iter().flat_map(|result| result.answers.iter().map(move |answer| (result, answer)))
+    {
         if !known.insert((&result.comparison, &answer.id)) {
             repeated += 1;
             continue;
