@@ -29,6 +29,18 @@ trueup_core::choice! {
         Vpg = "vpg",
         /// One homography per photograph, onto the plane of the reference.
         Homography = "homography",
+        /// Straightened cameras on a sphere, a cylinder or a plane (warps.projection), as AutoStitch has them.
+        Autostitch = "autostitch",
+        /// As-projective-as-possible: a homography for every grid vertex.
+        Apap = "apap",
+        /// Shape-preserving half-projective: a homography on one side, an upright similarity on the other.
+        Sphp = "sphp",
+        /// The same with a similarity that may turn.
+        SphpFree = "sphp-free",
+        /// Adaptive as-natural-as-possible: homographies that turn into similarities away from the overlaps.
+        Aanap = "aanap",
+        /// Homographies whose scale grows only linearly outside the overlaps.
+        QuasiHomography = "quasi-homography",
     }
 }
 
@@ -48,6 +60,12 @@ impl Method {
             Self::Vpg => Shape::Mesh(None),
             // Methods that are a prior: Self::Name => Shape::Mesh(Some(PriorMethod::Name)).
             Self::Homography => Shape::Warp(WarpModel::Homography),
+            Self::Autostitch => Shape::Warp(WarpModel::Autostitch),
+            Self::Apap => Shape::Warp(WarpModel::Apap),
+            Self::Sphp => Shape::Warp(WarpModel::Sphp),
+            Self::SphpFree => Shape::Warp(WarpModel::SphpFree),
+            Self::Aanap => Shape::Warp(WarpModel::Aanap),
+            Self::QuasiHomography => Shape::Warp(WarpModel::QuasiHomography),
         }
     }
 }

@@ -6,7 +6,7 @@ use trueup_core::geometry::Homography;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Error, Result};
 
-use super::limits::{check_depth, with_depth};
+use super::limits::{farthest_angle, least_depth, refuse, with_depth};
 use super::{HomographySource, STAGE, WarpInput, WarpModel, WarpOptions, deformed};
 use crate::stitch_graph::StitchGraph;
 
@@ -15,10 +15,13 @@ use crate::stitch_graph::StitchGraph;
 /// # Source
 /// Szeliski, "Image alignment and stitching: a tutorial" (2006), sections 2.1 and 6.1.
 pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions) -> Result<Vec<GridMesh>> {
-    let model = WarpModel::Homography;
     let homographies = onto(input, input.reference, options.homographies)?;
-    for (picture, homography) in homographies.iter().enumerate() {
-        check_depth(model, input, picture, homography, options)?;
+    let behind = |picture: &usize| least_depth(&homographies[*picture], input, *picture) <= options.min_depth;
+    let widest = (0..homographies.len())
+        .filter(behind)
+        .max_by(|&a, &b| farthest_angle(input, a).total_cmp(&farthest_angle(input, b)));
+    if let Some(picture) = widest {
+        return Err(refuse(WarpModel::Homography, input, picture, "does not lie in front of the panorama's plane"));
     }
     Ok(homographies.iter().zip(input.grids).map(|(h, grid)| deformed(grid, |point| h.apply(point))).collect())
 }
@@ -35,7 +38,7 @@ pub(super) fn onto(input: &WarpInput<'_>, target: usize, source: HomographySourc
 }
 
 /// `K_to R_to R_from^T K_from^-1`: where the picture of one camera appears in that of the other, both at one place.
-pub(super) fn between(from: &Camera, to: &Camera) -> Homography {
+fn between(from: &Camera, to: &Camera) -> Homography {
     let intrinsic = |camera: &Camera| {
         let ([x, y], f) = (camera.principal_point, camera.focal_px);
         (
@@ -66,7 +69,7 @@ fn chained(input: &WarpInput<'_>, target: usize) -> Result<Vec<Homography>> {
 }
 
 /// The homography from picture `from` to picture `to` by their matches, its denominator the depth.
-pub(super) fn of_pair(input: &WarpInput<'_>, from: usize, to: usize) -> Result<Homography> {
+fn of_pair(input: &WarpInput<'_>, from: usize, to: usize) -> Result<Homography> {
     let pair = input.pairs.iter().find(|pair| (pair.a, pair.b) == (from.min(to), from.max(to)));
     let b_from_a = pair.and_then(|pair| match &pair.b_from_a {
         Some(rows) => Some(Homography::from_rows(rows)),
@@ -83,6 +86,20 @@ pub(super) fn of_pair(input: &WarpInput<'_>, from: usize, to: usize) -> Result<H
         .ok_or_else(|| undetermined(input, from))
 }
 
+/// The homography from one picture to a neighbour, its denominator the depth.
+pub(super) fn of_pair_or_cameras(
+    input: &WarpInput<'_>,
+    from: usize,
+    to: usize,
+    source: HomographySource,
+) -> Result<Homography> {
+    match source {
+        HomographySource::Cameras => Ok(between(&input.cameras[from], &input.cameras[to])),
+        HomographySource::Pairs => of_pair(input, from, to),
+    }
+}
+
+/// The error for a picture whose matches are too few or degenerate.
 pub(super) fn undetermined(input: &WarpInput<'_>, picture: usize) -> Error {
     Error::unsolvable(
         STAGE,

@@ -1,6 +1,7 @@
 //! What a warp model refuses: pictures that it cannot place without tearing, folding or blowing them up.
 
 use nalgebra::Vector2;
+use trueup_core::camera::Camera;
 use trueup_core::geometry::Homography;
 use trueup_core::mesh::GridMesh;
 use trueup_core::options::OptionValue;
@@ -11,6 +12,8 @@ use crate::mesh::count_folds;
 
 /// What a user can do about a field of view that is too wide.
 const TOO_WIDE: &str = "Use the method vpg or autostitch, or stitch fewer photographs.";
+/// What a user can do where the sphere does not help either.
+const TOO_STEEP: &str = "Use the method vpg, or leave this photograph out.";
 
 /// The refusal of a set by a model. `reason` says which picture and why; the angle that the picture reaches is added.
 pub(super) fn refuse(model: WarpModel, input: &WarpInput<'_>, picture: usize, reason: &str) -> Error {
@@ -19,7 +22,7 @@ pub(super) fn refuse(model: WarpModel, input: &WarpInput<'_>, picture: usize, re
     Error::not_applicable(
         model.display(),
         format!("{name} {reason}; it reaches {angle:.0} degrees from the axis of {reference}"),
-        TOO_WIDE,
+        if model == WarpModel::Autostitch { TOO_STEEP } else { TOO_WIDE },
     )
 }
 
@@ -52,21 +55,28 @@ pub(super) fn least_depth(homography: &Homography, input: &WarpInput<'_>, pictur
     [(0.0, 0.0), (frame.width, 0.0), (frame.width, frame.height), (0.0, frame.height)]
         .into_iter()
         .map(|(x, y)| Vector2::new(x, y))
-        .map(|corner| homography.denominator(corner) / camera.bearing(corner).norm())
+        .map(|corner| depth_at(homography, camera, corner))
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Refuses a homography that carries part of a picture behind the panorama's plane.
-pub(super) fn check_depth(
+/// The depth of a point relative to its distance along the viewing direction; `homography` as of [`with_depth`].
+pub(super) fn depth_at(homography: &Homography, camera: &Camera, point: Vector2<f64>) -> f64 {
+    homography.denominator(point) / camera.bearing(point).norm()
+}
+
+/// Refuses a homography that carries a point of an overlap behind its neighbour's plane.
+pub(super) fn check_depth_in_overlap(
     model: WarpModel,
     input: &WarpInput<'_>,
     picture: usize,
     homography: &Homography,
+    overlap: &[Vector2<f64>],
     options: &WarpOptions,
 ) -> Result<()> {
-    match least_depth(homography, input, picture) > options.min_depth {
+    let camera = &input.cameras[picture];
+    match overlap.iter().all(|&point| depth_at(homography, camera, point) > options.min_depth) {
         true => Ok(()),
-        false => Err(refuse(model, input, picture, "does not lie in front of the panorama's plane")),
+        false => Err(refuse(model, input, picture, "has matches that do not lie in front of its neighbour")),
     }
 }
 

@@ -4,9 +4,15 @@
 //! energies do, so that renderer and measures are shared. A set of pictures that a model cannot place is refused with
 //! [`trueup_core::Error::NotApplicable`]: what cannot lie on one plane is not torn or blown up instead.
 
+mod aanap;
+mod apap;
+mod autostitch;
+mod half_projective;
 mod homography;
 mod limits;
 mod options;
+mod placement;
+mod quasi_homography;
 mod sphp;
 
 use nalgebra::{Matrix3, Vector2};
@@ -19,7 +25,10 @@ use trueup_core::{Error, Result, StageContext};
 
 use crate::match_points::OverlapWarp;
 use crate::mesh::{WarpedMesh, count_folds};
+pub use apap::Kernel;
+pub use autostitch::Projection;
 pub use options::{HomographySource, WarpOptions};
+pub use quasi_homography::QuasiHomography;
 pub use sphp::SphpWarp;
 
 /// The stage's name in progress and generators.
@@ -30,6 +39,18 @@ trueup_core::choice! {
     pub enum WarpModel {
         /// One homography per picture, onto the plane of the reference.
         Homography = "homography",
+        /// Straightened cameras on a sphere, a cylinder or a plane.
+        Autostitch = "autostitch",
+        /// As-projective-as-possible: moving DLT.
+        Apap = "apap",
+        /// Shape-preserving half-projective, its similarity upright.
+        Sphp = "sphp",
+        /// Shape-preserving half-projective, its similarity free to turn.
+        SphpFree = "sphp-free",
+        /// Adaptive as-natural-as-possible.
+        Aanap = "aanap",
+        /// Homographies of linear scale outside the overlaps.
+        QuasiHomography = "quasi-homography",
     }
 }
 
@@ -77,6 +98,11 @@ pub fn run(
     context.check_cancelled()?;
     let mut meshes = match model {
         WarpModel::Homography => homography::place(input, options)?,
+        WarpModel::Autostitch => autostitch::place(input, options)?,
+        WarpModel::Apap => apap::place(input, options, context)?,
+        WarpModel::Sphp | WarpModel::SphpFree => half_projective::place(model, input, options, context)?,
+        WarpModel::Aanap => aanap::place(input, options, context)?,
+        WarpModel::QuasiHomography => quasi_homography::place(input, options, context)?,
     };
     limits::check(model, input, &meshes, options)?;
     turn(&mut meshes, input.turn);

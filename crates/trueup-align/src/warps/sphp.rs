@@ -1,7 +1,7 @@
 //! The shape-preserving half-projective warp (SPHP): a homography on one side, a similarity on the other, and a quadratic
 //! or cubic transition between.
 
-use nalgebra::{Matrix3, Matrix4, Vector2, Vector4};
+use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector4};
 use trueup_core::geometry::Homography;
 
 /// A homography that turns into a similarity across the lines u = `first` and u = `second`, u being the direction in
@@ -34,15 +34,14 @@ impl SphpWarp {
     /// `None` if the homography is affine (it has no direction u and needs no warp), if a line crosses the horizon
     /// 1 = c u, or if `second` is not larger than `first`.
     pub fn new(homography: &Homography, first: f64, second: f64, zero_rotation: bool) -> Option<Self> {
-        const AFFINE: f64 = 1e-8;
         let h = homography.0 / homography.0[(2, 2)];
         let c = h[(2, 0)].hypot(h[(2, 1)]);
         let w = 1.0 - c * first;
-        if !(c >= AFFINE && w > 0.0 && second > first) {
+        let direction = Self::growth(homography)?;
+        if !(w > 0.0 && second > first) {
             return None;
         }
-        let angle = (-h[(2, 1)]).atan2(-h[(2, 0)]);
-        let (sine, cosine) = angle.sin_cos();
+        let (cosine, sine) = (direction.x, direction.y);
         let p = [0, 1].map(|k| h[(k, 0)] * cosine + h[(k, 1)] * sine);
         let q = [0, 1].map(|k| -h[(k, 0)] * sine + h[(k, 1)] * cosine);
 
@@ -74,6 +73,34 @@ impl SphpWarp {
         Some(Self { homography: Homography(h), direction: (cosine, sine), first, second, a, b, e, f, similarity })
     }
 
+    /// The direction u of a homography with h33 = 1: that in which its denominator falls, unit length. `None` if it is
+    /// affine.
+    pub fn growth(homography: &Homography) -> Option<Vector2<f64>> {
+        const AFFINE: f64 = 1e-8;
+        let h = homography.0 / homography.0[(2, 2)];
+        Vector2::new(-h[(2, 0)], -h[(2, 1)]).try_normalize(AFFINE)
+    }
+
+    /// The derivative of [`Self::apply`] at a point.
+    pub fn jacobian(&self, point: Vector2<f64>) -> Matrix2<f64> {
+        let (cosine, sine) = self.direction;
+        let (u, v) = (cosine * point.x + sine * point.y, -sine * point.x + cosine * point.y);
+        if u <= self.first {
+            self.homography.jacobian(point)
+        } else if u > self.second {
+            self.similarity.fixed_view::<2, 2>(0, 0).into_owned()
+        } else {
+            let along = |a: &Vector4<f64>, b: &Vector4<f64>| slope(a, u) * v + slope(b, u);
+            let by_uv = Matrix2::new(
+                along(&self.a, &self.b),
+                polynomial(&self.a, u),
+                along(&self.e, &self.f),
+                polynomial(&self.e, u),
+            );
+            by_uv * Matrix2::new(cosine, sine, -sine, cosine)
+        }
+    }
+
     /// Where a point goes.
     pub fn apply(&self, point: Vector2<f64>) -> Vector2<f64> {
         let (cosine, sine) = self.direction;
@@ -103,6 +130,10 @@ impl SphpWarp {
 
 fn polynomial(coefficients: &Vector4<f64>, u: f64) -> f64 {
     coefficients.dot(&Vector4::new(1.0, u, u * u, u * u * u))
+}
+
+fn slope(coefficients: &Vector4<f64>, u: f64) -> f64 {
+    coefficients.dot(&Vector4::new(0.0, 1.0, 2.0 * u, 3.0 * u * u))
 }
 
 /// The quadratic with this value and slope at `first` and this slope at `second`.
@@ -157,6 +188,17 @@ mod tests {
     fn the_similarity_is_upright_with_the_switch() {
         assert!((example(false).similarity_rotation().to_degrees().abs() - 4.689).abs() < 1e-3);
         assert!(example(true).similarity_rotation().abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_derivative_is_that_of_finite_differences() {
+        let (warp, step) = (example(true), 1e-4);
+        for point in [(-300.0, 50.0), (80.0, -120.0), (400.0, 10.0)].map(|(x, y)| Vector2::new(x, y)) {
+            let along =
+                |axis: Vector2<f64>| (warp.apply(point + axis * step) - warp.apply(point - axis * step)) / (2.0 * step);
+            let numeric = Matrix2::from_columns(&[along(Vector2::x()), along(Vector2::y())]);
+            assert!((warp.jacobian(point) - numeric).amax() < 1e-6);
+        }
     }
 
     #[test]
