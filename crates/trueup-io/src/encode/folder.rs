@@ -19,9 +19,9 @@ impl PendingFolder {
     /// [`Error::Input`] if `target` is a file, has no name, or its parent does not exist; [`Error::Io`] if the operating
     /// system refuses.
     pub fn create(target: &Path) -> Result<Self> {
+        let shown = target.display();
         // A link is followed, so that the folder behind it is replaced and not the link; this names ".", too.
         let target = target.canonicalize().unwrap_or_else(|_| target.to_owned());
-        let shown = target.display();
         if target.exists() && !target.is_dir() {
             return Err(Error::input(shown, "it is a file", "Give the name of a folder."));
         }
