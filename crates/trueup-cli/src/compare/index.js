@@ -10,10 +10,15 @@ function boxOf({ width, height, scale, anchor }) {
   return { left: -anchor[0] / scale, top: -anchor[1] / scale, width: width / scale, height: height / scale };
 }
 
-/** What holds all panoramas but those that are far larger than most. */
+/** Which boxes are about as large as the smallest: some methods stretch the borders without end. */
+function alike(boxes) {
+  const areas = boxes.map((box) => box.width * box.height);
+  return boxes.filter((_, index) => areas[index] <= 2.5 * Math.min(...areas));
+}
+
+/** What holds all boxes that are alike. */
 function commonFrame(boxes) {
-  const areas = boxes.map((box) => box.width * box.height).sort((one, two) => one - two);
-  const usual = boxes.filter((box) => box.width * box.height <= 2.5 * areas[Math.floor((areas.length - 1) / 2)]);
+  const usual = alike(boxes);
   const least = (value) => Math.min(...usual.map(value));
   const most = (value) => Math.max(...usual.map(value));
   const [left, top] = [least((box) => box.left), least((box) => box.top)];
@@ -24,7 +29,8 @@ const boxes = made.map(({ entry }) => boxOf(entry.panorama));
 const frame = commonFrame(boxes);
 const aspect = Math.max(0.9, Math.min(3.6, frame.width / frame.height));
 const gaze = new Gaze();
-let inRegister = true;
+// Beside one that is much larger, the others would be seen small: then each fills its window.
+let inRegister = alike(boxes).length === boxes.length;
 const frameOf = (index) => (inRegister ? frame : boxes[index]);
 
 /** A panorama with its lines and grids. */
@@ -153,12 +159,12 @@ const flicker = {
     this.dialog.showModal();
     this.view.element.focus();
   },
+  /** Both lie in register, whatever the page shows. */
   lay() {
+    const chosen = [this.first, this.second].map((select) => Number(select.value));
+    const both = commonFrame(chosen.map((index) => boxes[index]));
     this.view.clear();
-    for (const select of [this.first, this.second]) {
-      const index = Number(select.value);
-      this.view.add(plane(made[index]), boxes[index], frameOf(index));
-    }
+    for (const index of chosen) this.view.add(plane(made[index]), boxes[index], both);
     this.tell();
   },
   swap() {
@@ -202,11 +208,10 @@ function toggle(id, style) {
   });
 }
 
-function toggleRegister() {
-  inRegister = !inRegister;
+function setRegister(wanted) {
+  inRegister = wanted;
   byId("register").setAttribute("aria-pressed", String(inRegister));
   cardViews.forEach((view, index) => view.reframe(0, frameOf(index)));
-  if (flicker.dialog.open) flicker.lay();
 }
 
 function listen() {
@@ -216,7 +221,7 @@ function listen() {
   byId("closer").addEventListener("click", () => gaze.zoomBy(1.25));
   byId("farther").addEventListener("click", () => gaze.zoomBy(0.8));
   byId("whole").addEventListener("click", () => gaze.reset());
-  byId("register").addEventListener("click", toggleRegister);
+  byId("register").addEventListener("click", () => setRegister(!inRegister));
   byId("open-flicker").addEventListener("click", () => flicker.open());
   byId("open-flicker").disabled = made.length < 2;
   byId("columns").addEventListener("change", (event) => {
@@ -230,7 +235,7 @@ function listen() {
     if (isTyping(event)) return;
     const open = flicker.dialog.open;
     const act = {
-      l: () => byId("lines").click(), g: () => byId("grid").click(), p: () => byId("plumb").click(), r: toggleRegister,
+      l: () => byId("lines").click(), g: () => byId("grid").click(), p: () => byId("plumb").click(), r: () => byId("register").click(),
       "+": () => gaze.zoomBy(1.25), "=": () => gaze.zoomBy(1.25), "-": () => gaze.zoomBy(0.8), "0": () => gaze.reset(),
       ...(open
         ? { " ": () => flicker.toggle(), x: () => byId("switch").click(), "[": () => flicker.faster(-0.5), "]": () => flicker.faster(0.5) }
@@ -249,4 +254,5 @@ table();
 about();
 flicker.setUp();
 listen();
+setRegister(inRegister);
 themeButton(byId("theme"));

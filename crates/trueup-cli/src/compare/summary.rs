@@ -62,9 +62,10 @@ fn cell(entry: &Compared, figure: &Figure, heading: &str) -> String {
 pub(crate) fn scores(tally: &Tally) -> String {
     let mut text = String::new();
     let Tally { answers, participants, comparisons, repeated, methods } = tally;
-    let _ = writeln!(text, "{answers} answers of {participants} participants to {comparisons} comparisons");
+    let (participants, comparisons) = (counted(*participants, "participant"), counted(*comparisons, "comparison"));
+    let _ = writeln!(text, "{} of {participants} to {comparisons}", counted(*answers, "answer"));
     if *repeated > 0 {
-        let _ = writeln!(text, "{repeated} answers were given more than once and counted once");
+        let _ = writeln!(text, "{} left out that came more than once", counted(*repeated, "answer"));
     }
     let width = methods.iter().map(|method| method.name.chars().count()).max().unwrap_or(0);
     let _ = writeln!(text, "\n{:width$}  score  std. error  answers  1st 2nd 3rd 4th", "");
@@ -75,4 +76,9 @@ pub(crate) fn scores(tally: &Tally) -> String {
         let _ = writeln!(text, "{name:width$}  {score:>5.3}  {error:>10}  {answers:>7}  {}", ranks.join(" "));
     }
     text
+}
+
+/// "1 answer", "3 answers".
+fn counted(count: usize, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
 }

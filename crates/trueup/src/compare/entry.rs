@@ -94,7 +94,7 @@ mod tests {
             let options = entry.options(&common).expect("valid");
             assert_eq!(options.stitch.method.display(), entry.name);
             assert!(!entry.meaning.is_empty(), "{} has no meaning", entry.name);
-            assert_eq!(Entry::method(&entry.name), Ok(entry));
+            assert_eq!(Entry::method(&entry.name).expect("known"), entry);
         }
         assert!(Entry::method("magic").expect_err("no such method").to_string().contains("no such method"));
     }
