@@ -140,7 +140,7 @@ fn what_cannot_be_compared_is_refused_before_work_and_leaves_nothing() {
         (&["--entry", "mesh.cell_px=20"], 2, &["there is no \":\" after a name"]),
         (&["--entry", "x: mesh.cell=20"], 2, &["there is no option \"mesh.cell\""]),
         (&["--entry", "x: mesh.cell_px=-20"], 2, &["invalid mesh.cell_px = -20"]),
-        (&["--entry", "x: matching.ratio=0.5"], 2, &["shares features and matches"]),
+        (&["--entry", "x: matching.max_distance_ratio=0.5"], 2, &["shares features and matches"]),
         (&["--entry", "vpg: mesh.cell_px=20"], 1, &["two entries have this name"]),
         (&["--rank", "vpg,magic"], 1, &["magic: it is not compared", "Name entries that are compared"]),
         (&["--rank", "vpg"], 1, &["1 entries cannot be ranked"]),

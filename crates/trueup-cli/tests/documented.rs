@@ -54,7 +54,7 @@ const MISTAKES: &[Mistake] = &[
     mistake("entry without a name", &["compare", "a.jpg", "b.jpg", "-o", "out", "--entry", "mesh.cell_px=20"]),
     mistake(
         "entry that departs in matching",
-        &["compare", "a.jpg", "b.jpg", "-o", "out", "--entry", "x: matching.ratio=0.5"],
+        &["compare", "a.jpg", "b.jpg", "-o", "out", "--entry", "x: matching.max_distance_ratio=0.5"],
     ),
     mistake(
         "ranking of what is not compared",

@@ -116,9 +116,12 @@ mod tests {
     #[test]
     fn what_all_share_cannot_depart() {
         let common = StitchOptions::default();
-        for shared in
-            ["matching.ratio=0.5", "features.levels_per_octave=4", "stitch.working_pixels=100000", "stitch.seed=3"]
-        {
+        for shared in [
+            "matching.max_distance_ratio=0.5",
+            "features.levels_per_octave=4",
+            "stitch.working_pixels=100000",
+            "stitch.seed=3",
+        ] {
             let entry = Entry::parse(&format!("other: {shared}")).expect("well formed");
             assert!(entry.options(&common).expect_err("shared").to_string().contains("shares features"), "{shared}");
         }

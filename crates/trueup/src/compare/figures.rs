@@ -64,14 +64,17 @@ macro_rules! figure {
 
 /// Every figure, in the order to be shown.
 #[rustfmt::skip]
-const FIGURES: [Figure; 22] = [
+const FIGURES: [Figure; 23] = [
     figure!("upright_deg", "upright", "°", 2, Lower, true, false,
         |c| Some(c.measures.as_ref()?.upright.as_ref()?.mean_deg),
         "How far the vertical lines lean, mean over the pictures that have enough of them."),
     figure!("upright_max_deg", "upright, worst picture", "°", 2, Lower, true, false,
         |c| Some(c.measures.as_ref()?.upright.as_ref()?.max_deg),
         "The same of the picture that leans most."),
-    figure!("vertical_lines", "vertical lines", "", 0, Neither, true, false,
+    figure!("lean_deg", "vertical lines lean by", "°", 2, Lower, true, false,
+        |c| mean(c.measures.as_ref()?.pictures.iter().filter_map(|picture| picture.lean_deg)),
+        "The same as upright over all pictures with vertical lines, however much these disagree: rough, but there for every method."),
+    figure!("vertical_lines", "vertical lines", "", 0, Neither, false, false,
         |c| Some(c.measures.as_ref()?.pictures.iter().map(|picture| picture.vertical_lines as f64).sum()),
         "Line segments that point to the vertical: what upright is judged by."),
     figure!("upright_pictures", "pictures judged upright", "", 0, Neither, false, false,
@@ -139,6 +142,12 @@ const FIGURES: [Figure; 22] = [
 /// The figures worth showing: all, or those that need no truth.
 pub(crate) fn shown(with_truth: bool) -> Vec<Figure> {
     FIGURES.iter().filter(|figure| with_truth || !figure.needs_truth).cloned().collect()
+}
+
+/// Mean of the magnitudes of some angles; `None` without any.
+fn mean(angles: impl Iterator<Item = f64>) -> Option<f64> {
+    let magnitudes: Vec<f64> = angles.map(f64::abs).collect();
+    (!magnitudes.is_empty()).then(|| magnitudes.iter().sum::<f64>() / magnitudes.len() as f64)
 }
 
 impl Figure {
