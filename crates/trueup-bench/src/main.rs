@@ -3,7 +3,6 @@
 
 mod arguments;
 mod experiments;
-mod interrupt;
 mod measure;
 mod methods;
 mod paper;
@@ -19,9 +18,10 @@ mod store;
 mod trial;
 
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use clap::Parser;
-use trueup::Error;
+use trueup::{CancelToken, Error};
 
 use arguments::{Arguments, Command};
 
@@ -35,10 +35,15 @@ fn main() -> ExitCode {
         Err(error) => {
             eprintln!("trueup-bench: error: {error}");
             match error {
-                Error::Cancelled => ExitCode::from(interrupt::STATUS_INTERRUPTED),
+                Error::Cancelled => ExitCode::from(trueup_terminal::STATUS_INTERRUPTED),
                 Error::Options(_) | Error::Unsupported { .. } => ExitCode::from(2),
                 _ => ExitCode::FAILURE,
             }
         }
     }
+}
+
+/// A token that the first Ctrl-C cancels; the second ends the program.
+fn cancel_token() -> Arc<CancelToken> {
+    trueup_terminal::cancel_token("trueup-bench", "stopping; what is done is kept")
 }

@@ -10,7 +10,6 @@ use trueup::{Error, Result};
 
 use crate::arguments::PaperArguments;
 use crate::experiments::{CLAIM_EXPERIMENTS, EXPERIMENTS, Experiment, runtime};
-use crate::interrupt::cancel_token;
 use crate::report::csv;
 use crate::report::document::{Block, Claim, Document, Section};
 use crate::report::{self, overview};
@@ -38,7 +37,7 @@ pub(crate) fn run(arguments: &PaperArguments) -> Result<ExitCode> {
     };
     let version = program_version()?;
     let store = Store::open(&arguments.out.join("rows.jsonl"), arguments.reuse.then_some(version.as_str()))?;
-    let cancel = cancel_token();
+    let cancel = crate::cancel_token();
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = if arguments.jobs == 0 { cores } else { arguments.jobs };
     let threads = (cores / jobs).max(1);

@@ -13,6 +13,7 @@ Examples:
   trueup stitch IMG_01*.jpg -o pano.png --scale 0.5 --project pano.json
   trueup inspect pano.json --verbose
   trueup evaluate pano.json --truth truth.json
+  trueup compare holiday/ -o holiday-compared
   trueup options mesh";
 
 const STITCH_EXAMPLES: &str = "\
@@ -43,6 +44,11 @@ pub(crate) enum Command {
     ///
     /// Finds out by itself which photographs overlap. Those that belong elsewhere are left out, and the summary says why.
     Stitch(Box<StitchArgs>),
+    /// Compare methods side by side: every method's panorama of the same photographs, with its measures, in one folder
+    ///
+    /// Photographs are measured and matched once. The folder holds a page to look at (index.html), a page on which people
+    /// rank unnamed panoramas (ranking.html), every figure as JSON, the panoramas and their project files.
+    Compare(Box<CompareArgs>),
     /// Print what a project file says of its panorama: the summary that `stitch` printed, with each picture's measures
     Inspect(InspectArgs),
     /// Print every measure of a panorama: its own, against the truth, and of the pixels where photographs overlap
@@ -131,6 +137,109 @@ pub(crate) struct StitchArgs {
     /// Print also the pairs' verdicts, each picture's geometry, notes, and a line per stage's time
     #[arg(short, long, help_heading = "Messages")]
     pub verbose: bool,
+}
+
+const COMPARE_EXAMPLES: &str = "\
+Examples:
+  trueup compare holiday/ -o compared                     every method; open compared/index.html
+  trueup compare holiday/ -o compared --methods vpg,apap
+  trueup compare holiday/ -o compared --entry 'thin mesh: mesh.cell_px=20'
+  trueup compare set/ -o compared --truth set/truth.json  with GDIC and theta error
+  trueup compare --tally results-*.json                   mean scores of what people ranked
+
+Exit status: 0 at least one panorama was made, 1 the input or the system failed, 2 wrong usage, 130 stopped by Ctrl-C.
+The folder appears when it is complete. An older comparison of that name is replaced then; no other folder is.";
+
+#[derive(Debug, Args)]
+#[command(after_help = COMPARE_EXAMPLES)]
+pub(crate) struct CompareArgs {
+    /// Files, folders (their pictures, not those of folders inside) or glob patterns; JPEG, PNG, TIFF, WebP
+    #[arg(value_name = "PHOTOS", required_unless_present = "tally")]
+    pub photographs: Vec<String>,
+
+    /// The folder to write
+    #[arg(short, long, value_name = "DIR", required_unless_present = "tally", help_heading = "Output")]
+    pub output: Option<PathBuf>,
+
+    /// The methods to compare; without it, all (`trueup options stitch` names them)
+    #[arg(long, value_name = "METHOD,...", value_delimiter = ',', help_heading = "What is compared")]
+    pub methods: Vec<String>,
+
+    /// A panorama with options of its own beside the methods; may be repeated
+    #[arg(long, value_name = "NAME: STAGE.OPTION=VALUE, ...", help_heading = "What is compared")]
+    pub entry: Vec<String>,
+
+    /// What is exactly known of the photographs, to measure against
+    #[arg(long, value_name = "TRUTH.json", help_heading = "What is compared")]
+    pub truth: Option<PathBuf>,
+
+    /// Two to four entries to be ranked on ranking.html
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', help_heading = "What is compared")]
+    pub rank: Option<Vec<String>>,
+
+    /// Size of the panoramas, relative to the reference photograph's pixels; without it, one that suits a page (compare.scale)
+    #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Output")]
+    pub scale: Option<String>,
+
+    /// The panoramas' format (compare.format)
+    #[arg(long, value_name = "FORMAT", help_heading = "Output")]
+    pub format: Option<String>,
+
+    /// JPEG quality (output.jpeg_quality)
+    #[arg(long, value_name = "Q", allow_hyphen_values = true, help_heading = "Output")]
+    pub quality: Option<String>,
+
+    /// Fail unless every photograph given is used
+    #[arg(long, help_heading = "Photographs")]
+    pub require_all: bool,
+
+    /// The photograph that sets the pixel scale and stays in place: auto, or its name
+    #[arg(long, value_name = "auto|NAME", help_heading = "Photographs")]
+    pub reference: Option<String>,
+
+    /// Match only the pairs in this file, one `NAME -- NAME` a line
+    #[arg(long, value_name = "FILE", help_heading = "Photographs")]
+    pub graph: Option<PathBuf>,
+
+    /// Every random choice derives from this number (stitch.seed)
+    #[arg(long, value_name = "N", allow_hyphen_values = true, help_heading = "Tuning")]
+    pub seed: Option<String>,
+
+    /// Set any option of any stage, for all that is compared; may be repeated
+    #[arg(long, value_name = "STAGE.OPTION=VALUE", allow_hyphen_values = true, help_heading = "Tuning")]
+    pub set: Vec<String>,
+
+    /// Read options from a TOML file with a table per stage
+    #[arg(long, value_name = "FILE.toml", help_heading = "Tuning")]
+    pub config: Option<PathBuf>,
+
+    /// Number of threads; 0 for one per core. The panoramas are the same for any number
+    #[arg(
+        long,
+        value_name = "N",
+        allow_hyphen_values = true,
+        value_parser = clap::value_parser!(u16).range(0..=MAX_THREADS),
+        help_heading = "Tuning"
+    )]
+    pub threads: Option<u16>,
+
+    /// Sum up what ranking.html saved: the mean score of every method
+    #[arg(
+        long,
+        value_name = "RESULTS.json",
+        num_args = 1..,
+        conflicts_with_all = ["photographs", "output"],
+        help_heading = "Rankings"
+    )]
+    pub tally: Vec<PathBuf>,
+
+    /// With --tally: as a JSON object
+    #[arg(long, requires = "tally", help_heading = "Rankings")]
+    pub json: bool,
+
+    /// Print nothing but errors
+    #[arg(short, long, help_heading = "Messages")]
+    pub quiet: bool,
 }
 
 #[derive(Debug, Args)]

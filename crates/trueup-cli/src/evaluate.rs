@@ -8,7 +8,6 @@ use trueup::{Error, Evaluation, PixelEvaluation, Project, StageContext};
 use crate::arguments::EvaluateArgs;
 use crate::failure::Failure;
 use crate::inspect;
-use crate::interrupt;
 use crate::output;
 use crate::progress::Bars;
 use crate::summary::{self, Page};
@@ -50,7 +49,7 @@ fn against(project: &Project, project_file: &Path, truth_file: &Path) -> Result<
 
 /// Photographs that are gone or cannot be compared leave the other measures as they are.
 fn pixels(project: &Project, project_file: &Path) -> Result<Pixels, Error> {
-    let cancel = interrupt::cancel_token();
+    let cancel = crate::cancel_token();
     let bars = Bars::new(false);
     let context = StageContext::new(&bars, &cancel, project.options.stitch.seed);
     let folder = project_file.parent().unwrap_or(Path::new(""));

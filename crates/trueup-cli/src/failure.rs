@@ -4,13 +4,12 @@ use std::fmt;
 use std::process::ExitCode;
 
 use trueup::{Error, InvalidOption};
+use trueup_terminal::STATUS_INTERRUPTED;
 
 /// The input or the system failed.
 const STATUS_FAILURE: u8 = 1;
 /// Wrong usage: arguments or options that cannot be.
 const STATUS_USAGE: u8 = 2;
-/// 128 + SIGINT, as shells count a program that Ctrl-C ended.
-pub(crate) const STATUS_INTERRUPTED: u8 = 130;
 
 /// An error as the user sees it, printed once.
 #[derive(Debug, PartialEq, Eq)]

@@ -4,10 +4,10 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod compare;
 mod evaluate;
 mod failure;
 mod inspect;
-mod interrupt;
 mod option_list;
 mod output;
 mod progress;
@@ -16,14 +16,18 @@ mod summary;
 mod words;
 
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use clap::Parser;
+
+use trueup::CancelToken;
 
 use arguments::{Command, LowArgs};
 
 fn main() -> ExitCode {
     let outcome = match LowArgs::parse().command {
         Command::Stitch(args) => stitch::run(*args),
+        Command::Compare(args) => compare::run(*args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Options(args) => option_list::run(&args),
@@ -35,4 +39,9 @@ fn main() -> ExitCode {
             failure.exit_code()
         }
     }
+}
+
+/// A token that the first Ctrl-C cancels; the second ends the program.
+fn cancel_token() -> Arc<CancelToken> {
+    trueup_terminal::cancel_token("trueup", "")
 }

@@ -12,6 +12,10 @@ use crate::words::wrap;
 /// Width of a line of the list, in characters.
 const WIDTH: usize = 100;
 const INDENT: &str = "      ";
+/// Width of a choice's name with its colon; longer names push their first line to the right.
+const CHOICE_WIDTH: usize = 20;
+/// Where the meaning of a choice begins.
+const CHOICE_INDENT: usize = INDENT.len() + 2 + CHOICE_WIDTH;
 
 pub(crate) fn run(args: &OptionsArgs) -> Result<(), Failure> {
     let mut rows = StitchOptions::describe();
@@ -44,6 +48,12 @@ fn text(rows: &[OptionDescription]) -> String {
         let _ = writeln!(text, "{} = {}{unit}   (allowed: {})", row.name, row.default, row.allowed);
         for line in wrap(&row.meaning, WIDTH - INDENT.len()) {
             let _ = writeln!(text, "{INDENT}{line}");
+        }
+        for choice in &row.choices {
+            for (position, line) in wrap(&choice.meaning, WIDTH - CHOICE_INDENT).iter().enumerate() {
+                let name = if position == 0 { format!("{}: ", choice.name) } else { String::new() };
+                let _ = writeln!(text, "{INDENT}  {name:CHOICE_WIDTH$}{line}");
+            }
         }
     }
     text

@@ -33,8 +33,7 @@ impl Bars {
     }
 
     fn with(&self, stage: &str, act: impl Fn(&ProgressBar)) {
-        // A stage that ran for an earlier panorama has an older bar of the same name.
-        if let Some((_, bar)) = self.stages().iter().rev().find(|(name, _)| name == stage) {
+        if let Some((_, bar)) = self.stages().iter().find(|(name, _)| name == stage) {
             act(bar);
         }
     }
@@ -42,9 +41,16 @@ impl Bars {
 
 impl Progress for Bars {
     fn begin(&self, stage: &str, total: u64) {
+        let mut stages = self.stages();
+        // A stage that ran for an earlier panorama begins again: a comparison would fill the screen with bars.
+        if let Some((_, bar)) = stages.iter().find(|(name, _)| name == stage) {
+            bar.set_length(total);
+            bar.reset();
+            return;
+        }
         let style = ProgressStyle::with_template(TEMPLATE).unwrap_or_else(|_| ProgressStyle::default_bar());
         let bar = self.drawn.add(ProgressBar::new(total).with_style(style).with_prefix(stage.to_owned()));
-        self.stages().push((stage.to_owned(), bar));
+        stages.push((stage.to_owned(), bar));
     }
 
     fn advance(&self, stage: &str, steps: u64) {
@@ -61,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stage_may_run_twice_and_steps_of_unknown_stages_are_ignored() {
+    fn a_stage_that_runs_twice_has_one_bar_and_steps_of_unknown_stages_are_ignored() {
         let bars = Bars::new(true);
         bars.advance("nothing", 1);
         for _ in 0..2 {
@@ -69,7 +75,8 @@ mod tests {
             bars.advance("render", 2);
             bars.finish("render");
         }
-        assert_eq!(bars.stages().len(), 2);
+        assert_eq!(bars.stages().len(), 1);
+        bars.with("render", |bar| assert_eq!((bar.position(), bar.is_finished()), (3, true)));
         bars.clear();
         assert!(bars.stages().is_empty());
     }

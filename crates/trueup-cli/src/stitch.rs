@@ -6,7 +6,6 @@ use trueup::{Error, Inputs, Reference, StageContext, StitchJob, StitchOptions, W
 
 use crate::arguments::StitchArgs;
 use crate::failure::Failure;
-use crate::interrupt;
 use crate::output;
 use crate::progress::Bars;
 use crate::summary::{self, PanoramaFile};
@@ -17,7 +16,7 @@ const AUTO: &str = "auto";
 pub(crate) fn run(args: StitchArgs) -> Result<(), Failure> {
     let (quiet, verbose) = (args.quiet, args.verbose);
     let CheckedStitch { job, options } = CheckedStitch::new(args)?;
-    let cancel = interrupt::cancel_token();
+    let cancel = crate::cancel_token();
     let bars = Bars::new(quiet);
     let context = StageContext::new(&bars, &cancel, options.stitch.seed);
     let written = job.run(&options, &context);
@@ -44,15 +43,20 @@ struct CheckedStitch {
 
 impl CheckedStitch {
     fn new(args: StitchArgs) -> Result<Self, Failure> {
-        let options = options(&args)?;
+        let flags = [
+            ("--method", "stitch.method", &args.method),
+            ("--scale", "canvas.scale", &args.scale),
+            ("--quality", "output.jpeg_quality", &args.quality),
+            ("--align", "stitch.align", &args.align),
+            ("--structure", "stitch.structure", &args.structure),
+            ("--seed", "stitch.seed", &args.seed),
+        ];
+        let options = chosen_options(args.config.as_deref(), &args.set, &flags)?;
         if args.project.as_ref() == Some(&args.output) {
             let message = format!("{} cannot be both the panorama and the project", args.output.display());
             return Err(Failure::usage(message, "Give --output and --project different names."));
         }
-        let reference = match args.reference {
-            Some(name) if name != AUTO => Reference::Named(name),
-            _ => Reference::Auto,
-        };
+        let reference = chosen_reference(args.reference);
         let inputs = Inputs {
             photographs: args.photographs,
             reference,
@@ -66,23 +70,30 @@ impl CheckedStitch {
     }
 }
 
+/// The reference that was typed, if any.
+pub(crate) fn chosen_reference(typed: Option<String>) -> Reference {
+    match typed {
+        Some(name) if name != AUTO => Reference::Named(name),
+        _ => Reference::Auto,
+    }
+}
+
+/// A flag of its own, the option it sets, and what was typed after it.
+pub(crate) type OptionFlag<'a> = (&'a str, &'a str, &'a Option<String>);
+
 /// Defaults, overruled by the configuration file, by `--set`, by the flags of their own, in this order. Every value that
 /// cannot be is listed.
-fn options(args: &StitchArgs) -> Result<StitchOptions, Failure> {
+pub(crate) fn chosen_options(
+    config: Option<&Path>,
+    set: &[String],
+    flags: &[OptionFlag],
+) -> Result<StitchOptions, Failure> {
     let mut options = StitchOptions::default();
-    if let Some(path) = &args.config {
+    if let Some(path) = config {
         read_config(&mut options, path)?;
     }
-    let flags = [
-        ("--method", "stitch.method", &args.method),
-        ("--scale", "canvas.scale", &args.scale),
-        ("--quality", "output.jpeg_quality", &args.quality),
-        ("--align", "stitch.align", &args.align),
-        ("--structure", "stitch.structure", &args.structure),
-        ("--seed", "stitch.seed", &args.seed),
-    ];
-    let set = args.set.iter().map(|assignment| (format!("--set {assignment}"), assignment.clone()));
-    let flags = flags.into_iter().filter_map(|(flag, option, value)| {
+    let set = set.iter().map(|assignment| (format!("--set {assignment}"), assignment.clone()));
+    let flags = flags.iter().filter_map(|(flag, option, value)| {
         let value = value.as_ref()?;
         Some((format!("{flag} {value}"), format!("{option}={value}")))
     });
@@ -107,7 +118,7 @@ fn read_config(options: &mut StitchOptions, path: &Path) -> Result<(), Failure> 
 }
 
 /// Why an option was refused, without the subject and the hint, which the command has in its own words.
-fn reason(error: Error) -> String {
+pub(crate) fn reason(error: Error) -> String {
     match error {
         Error::Input { reason, .. } => reason,
         other => other.to_string(),

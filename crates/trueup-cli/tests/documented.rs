@@ -65,6 +65,19 @@ const MISTAKES: &[Mistake] = &[
     mistake("unknown option", &["stitch", "a.jpg", "-o", "pano.jpg", "--set", "mesh.cell=3"]),
     mistake("no configuration file", &["stitch", "a.jpg", "-o", "pano.jpg", "--config", "none.toml"]),
     mistake("unknown stage in it", &["stitch", "a.jpg", "-o", "pano.jpg", "--config", "mine.toml"]),
+    mistake("unknown method to compare", &["compare", "a.jpg", "b.jpg", "-o", "out", "--methods", "magic"]),
+    mistake("entry without a name", &["compare", "a.jpg", "b.jpg", "-o", "out", "--entry", "mesh.cell_px=20"]),
+    mistake(
+        "entry that departs in matching",
+        &["compare", "a.jpg", "b.jpg", "-o", "out", "--entry", "x: matching.max_distance_ratio=0.5"],
+    ),
+    mistake(
+        "ranking of what is not compared",
+        &["compare", "a.jpg", "b.jpg", "-o", "out", "--methods", "vpg", "--rank", "vpg,magic"],
+    ),
+    mistake("comparison over other files", &["compare", "a.jpg", "b.jpg", "-o", "notes"]),
+    mistake("comparison over a file", &["compare", "b.jpg", "c.jpg", "-o", "a.jpg"]),
+    mistake("tally of other files", &["compare", "--tally", "other.json"]),
     mistake("no project file", &["inspect", "none.json"]),
     mistake("not a project file", &["inspect", "other.json"]),
     mistake("project of a later version", &["inspect", "later.json"]),
@@ -83,6 +96,7 @@ fn desk() -> Desk {
         std::fs::create_dir(desk.join(folder)).expect("a folder");
     }
     let whole = &street()[0];
+    desk.put("notes/diary.txt", "Dear diary");
     desk.put("text.jpg", "Dear diary");
     desk.put("movie.gif", "GIF89a....");
     desk.put("empty.jpg", "");

@@ -147,8 +147,8 @@ pub(crate) fn check_mesh(placed: &Placed) -> Result<()> {
     Ok(())
 }
 
-/// Median over the cells of the square root of target area per source area.
-fn median_cell_scale(mesh: &GridMesh) -> f64 {
+/// Target pixels per source pixel: median over the cells of the square root of target area per source area.
+pub fn median_cell_scale(mesh: &GridMesh) -> f64 {
     let cell_area = mesh.cell_width() * mesh.cell_height();
     let mut scales: Vec<f64> = (0..(mesh.rows - 1) * (mesh.columns - 1))
         .map(|cell| {

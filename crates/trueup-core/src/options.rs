@@ -44,6 +44,34 @@ pub trait OptionValue {
     {
         &[]
     }
+    /// The alternatives of a choice with their meanings; empty for other types.
+    fn described_choices() -> Vec<ChoiceDescription>
+    where
+        Self: Sized,
+    {
+        Vec::new()
+    }
+}
+
+/// One alternative of a choice.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ChoiceDescription {
+    /// The alternative as the user writes it.
+    pub name: &'static str,
+    /// What it means.
+    pub meaning: String,
+}
+
+impl ChoiceDescription {
+    /// An alternative whose meaning is given in the lines of its documentation.
+    pub fn new(name: &'static str, documentation: &[&str]) -> Self {
+        Self { name, meaning: joined(documentation) }
+    }
+}
+
+/// The lines of a documentation comment as one text.
+pub fn joined(documentation: &[&str]) -> String {
+    documentation.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ").trim().to_owned()
 }
 
 macro_rules! number_option_values {
@@ -83,6 +111,8 @@ pub struct OptionDescription {
     pub unit: &'static str,
     /// What it means and when it matters.
     pub meaning: String,
+    /// The alternatives of a choice with their meanings; empty for other options.
+    pub choices: Vec<ChoiceDescription>,
 }
 
 /// An option whose value is outside its allowed range.
@@ -208,7 +238,8 @@ macro_rules! options {
                         default: defaults.$field.display(),
                         allowed: $crate::options::allowed_in_words::<$type>($allowed),
                         unit: $unit,
-                        meaning: [$($doc),*].map(str::trim).join(" ").trim().to_owned(),
+                        meaning: $crate::options::joined(&[$($doc),*]),
+                        choices: <$type>::described_choices(),
                     },
                 )*]
             }
@@ -252,6 +283,9 @@ macro_rules! choice {
             fn choices() -> &'static [&'static str] {
                 &[$($text),*]
             }
+            fn described_choices() -> Vec<$crate::options::ChoiceDescription> {
+                vec![$($crate::options::ChoiceDescription::new($text, &[$($doc),*]),)*]
+            }
         }
     };
 }
@@ -265,7 +299,8 @@ mod tests {
         pub enum Mode {
             /// First.
             Fast = "fast",
-            /// Second.
+            /// Second,
+            /// over two lines.
             Exact = "exact",
         }
     }
@@ -304,6 +339,10 @@ mod tests {
         assert_eq!(rows[0].meaning, "A length over two lines.");
         assert_eq!(rows[2].default, "exact");
         assert_eq!(rows[2].allowed, "fast | exact");
+        let choices: Vec<(&str, &str)> =
+            rows[2].choices.iter().map(|choice| (choice.name, choice.meaning.as_str())).collect();
+        assert_eq!(choices, [("fast", "First."), ("exact", "Second, over two lines.")]);
+        assert!(rows[0].choices.is_empty());
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! From matches to deformed grids for one group of overlapping photographs.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -222,7 +223,7 @@ fn find_overlaps(
     let warps = clock.time("match points", || {
         match_points::run(&component.frames, grids, &cameras.cameras, &pairs, &options.match_points, context)
     })?;
-    Ok(Overlaps { cameras, pairs, warps, findings: Vec::new() })
+    Ok(Overlaps { cameras, pairs, warps, findings: Vec::new(), seconds: BTreeMap::new() })
 }
 
 fn recall_overlaps(
@@ -238,7 +239,9 @@ fn recall_overlaps(
         Some(overlaps) => overlaps,
         None => {
             let before = context.take_diagnostics();
-            let mut overlaps = find_overlaps(component, grids, options, context, clock)?;
+            let mut own_clock = Clock::default();
+            let mut overlaps = find_overlaps(component, grids, options, context, &mut own_clock)?;
+            overlaps.seconds = own_clock.into_seconds();
             overlaps.findings = context.take_diagnostics();
             before.into_iter().for_each(|one| context.report(one));
             let overlaps = Arc::new(overlaps);
@@ -247,6 +250,7 @@ fn recall_overlaps(
         }
     };
     overlaps.findings.iter().for_each(|one| context.report(one.clone()));
+    clock.add_all(&overlaps.seconds);
     Ok(overlaps)
 }
 

@@ -31,6 +31,18 @@ impl Clock {
         }
     }
 
+    /// Adds seconds that were counted elsewhere.
+    pub fn add_all(&mut self, seconds: &BTreeMap<String, f64>) {
+        for (stage, seconds) in seconds {
+            *self.0.entry(stage.clone()).or_default() += seconds;
+        }
+    }
+
+    /// Wall seconds by stage name, taken out.
+    pub fn into_seconds(self) -> BTreeMap<String, f64> {
+        self.0
+    }
+
     /// Wall seconds by stage name.
     pub fn seconds(&self) -> &BTreeMap<String, f64> {
         &self.0

@@ -21,6 +21,7 @@
 
 mod align;
 mod clock;
+pub mod compare;
 mod evaluation;
 mod files;
 mod inputs;

@@ -1,5 +1,6 @@
 //! What earlier alignments of the same matches found, so that experiments need not find it again.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use trueup_align::cameras::Cameras;
@@ -21,6 +22,8 @@ pub(crate) struct Overlaps {
     pub warps: Vec<OverlapWarp>,
     /// What was reported on the way.
     pub findings: Vec<Diagnostic>,
+    /// Wall seconds that finding them took, by stage.
+    pub seconds: BTreeMap<String, f64>,
 }
 
 /// A few [`Overlaps`] by what they were made from.

@@ -21,6 +21,8 @@ use trueup_vision::lines::LineOptions;
 use trueup_vision::matching::MatchingOptions;
 use trueup_vision::pairing::PairingOptions;
 
+use crate::compare::CompareOptions;
+
 trueup_core::choice! {
     /// How the panorama's shape is found.
     pub enum Method {
@@ -201,6 +203,8 @@ stage_options! {
     output: OutputOptions,
     /// How the panorama is measured.
     measures: MeasureOptions,
+    /// How methods are compared side by side.
+    compare: CompareOptions,
 }
 
 impl StitchOptions {
@@ -211,6 +215,21 @@ impl StitchOptions {
     pub fn validate(&self) -> Result<()> {
         let invalid = self.invalid();
         if invalid.is_empty() { Ok(()) } else { Err(Error::Options(invalid)) }
+    }
+
+    /// Whether photographs are found, measured and matched by these options as by `other`, so that what was matched by the
+    /// one can be aligned by the other.
+    pub fn matches_alike(&self, other: &Self) -> bool {
+        let working = |options: &Self| {
+            let WorkingOptions { working_pixels, thumbnail_pixels, photograph_cache, seed, .. } = options.stitch;
+            (working_pixels, thumbnail_pixels, photograph_cache, seed)
+        };
+        working(self) == working(other)
+            && self.source == other.source
+            && self.features == other.features
+            && self.lines == other.lines
+            && self.pairing == other.pairing
+            && self.matching == other.matching
     }
 
     /// Reads a TOML text with a table per stage over the present values; what it does not name stays as it is.

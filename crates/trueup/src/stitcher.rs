@@ -7,6 +7,7 @@ use trueup_compose::exposure::{self, Thumbnail};
 use trueup_compose::layout::{self, CanvasLayout};
 use trueup_compose::render::{self, Panorama};
 use trueup_core::diagnostics::Diagnostic;
+use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
@@ -54,9 +55,20 @@ pub struct MatchedPhotographs {
 
 impl MatchedPhotographs {
     /// Lets alignments share the cameras and overlaps that they have in common: for experiments that align the same
-    /// photographs many times. The seconds of a shared stage are counted in the first alignment alone.
+    /// photographs many times. The seconds that a shared stage took when it ran are counted in every alignment.
     pub fn remembering(self) -> Self {
         Self { memory: Some(OverlapMemory::default()), ..self }
+    }
+
+    /// The photographs, in the order of [`Project::images`].
+    pub(crate) fn photographs(&self) -> &FilePhotographs {
+        &self.photographs
+    }
+
+    /// The line segments of a photograph, in the pixels of its working frame; `None` if it could not be decoded.
+    pub(crate) fn lines_of(&self, photograph: usize) -> Option<(&[LineSegment], WorkingFrame)> {
+        let measured = self.matched.measured.get(photograph)?.as_ref()?;
+        Some((&measured.lines, measured.frame))
     }
 }
 

@@ -68,9 +68,7 @@ pub fn vertical_lines(
     if down.x.hypot(down.y) < MIN_SINE {
         return None;
     }
-    let tolerance = options.vertical_tolerance_deg.to_radians().sin();
-    let leans: Vec<Lean> = (0..planes.len())
-        .filter(|&k| planes.normals[k].dot(&down).abs() <= tolerance)
+    let leans: Vec<Lean> = pointing_down(&planes, &down, options)
         .filter_map(|k| {
             let share = planes.midpoints[k].x / picture.frame.width + 0.5;
             // The cast saturates.
@@ -83,6 +81,31 @@ pub fn vertical_lines(
     let lean = circular_mean(leans.iter().map(|one| (2.0 * one.angle, one.weight)))? / 2.0;
     let standard_error = standard_error(&leans, lean, options.strips)?;
     Some(VerticalLines { lean, standard_error, lines: leans.len(), gamma: roll_from_down(&down) })
+}
+
+/// Which of a picture's segments are its vertical lines: those whose direction [`vertical_lines`] measures, by their
+/// positions in `picture.lines`, ascending. Empty where that finds none to measure.
+pub fn vertical_segments(picture: &LinedPicture, vanishing: &VanishingOptions, options: &MeasureOptions) -> Vec<usize> {
+    let planes = InterpretationPlanes::new(picture.lines, picture.focal_px, picture.frame, vanishing);
+    match vertical_direction(&planes, &picture.expected_down, vanishing, options) {
+        Some(down) if down.x.hypot(down.y) >= MIN_SINE => {
+            let mut segments: Vec<usize> =
+                pointing_down(&planes, &down, options).map(|plane| planes.indices[plane]).collect();
+            segments.sort_unstable();
+            segments
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// The planes whose segments point to the vertical vanishing direction `down`.
+fn pointing_down<'a>(
+    planes: &'a InterpretationPlanes,
+    down: &'a Vector3<f64>,
+    options: &MeasureOptions,
+) -> impl Iterator<Item = usize> + 'a {
+    let tolerance = options.vertical_tolerance_deg.to_radians().sin();
+    (0..planes.len()).filter(move |&plane| planes.normals[plane].dot(down).abs() <= tolerance)
 }
 
 /// A vertical line in the panorama.
@@ -209,6 +232,18 @@ mod tests {
             assert!((found.gamma - true_gamma).to_degrees().abs() < 0.05, "{error_deg}");
             assert!(found.standard_error.to_degrees() < 0.02 && found.is_certain(&MeasureOptions::default()));
         }
+    }
+
+    #[test]
+    fn the_vertical_segments_are_the_plumb_lines() {
+        let (lines, frame, camera) = picture();
+        let found = |down: Vector3<f64>| {
+            let picture = LinedPicture { lines: &lines, frame: &frame, focal_px: FOCAL_PX, expected_down: down };
+            vertical_segments(&picture, &VanishingOptions::default(), &MeasureOptions::default())
+        };
+        // Plumb and level lines take turns in the picture.
+        assert_eq!(found(camera.rotation() * Vector3::y()), [0, 2, 4, 6, 8, 10, 12, 14, 16, 18]);
+        assert!(found(Vector3::zeros()).is_empty());
     }
 
     #[test]

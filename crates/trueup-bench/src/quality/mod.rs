@@ -12,7 +12,6 @@ use std::process::ExitCode;
 use trueup::{CancelToken, Error, Result};
 
 use crate::arguments::QualityArguments;
-use crate::interrupt::cancel_token;
 use crate::progress::Tracker;
 use child::{Measured, measure};
 use discover::{StitchSet, find_sets};
@@ -23,7 +22,7 @@ use row::{QualityRow, read_rows, write_rows};
 /// # Errors
 /// Those of finding the sets and the command, of writing; [`Error::Cancelled`]. A set that cannot be stitched is a row.
 pub(crate) fn run(arguments: &QualityArguments) -> Result<ExitCode> {
-    let cancel = cancel_token();
+    let cancel = crate::cancel_token();
     let command = find_command(arguments.trueup.as_deref())?;
     let sets = find_sets(&arguments.truth_sets, &arguments.real, arguments.manifest.as_deref())?;
     let csv_path = arguments.out.with_extension("csv");

@@ -1,6 +1,7 @@
 //! Panoramas to files, row by row. A file appears complete or not at all.
 
 mod codecs;
+mod folder;
 mod jpeg;
 mod pending;
 #[cfg(test)]
@@ -16,6 +17,8 @@ use trueup_core::{Error, Result, StageContext};
 use crate::format::PictureFormat;
 
 use pending::PendingFile;
+
+pub use folder::PendingFolder;
 
 trueup_core::choice! {
     /// How finely JPEG stores colour, relative to brightness.

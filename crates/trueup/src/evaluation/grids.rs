@@ -13,7 +13,11 @@ pub(crate) fn used_grids(records: &[&ImageRecord]) -> Result<Vec<GridMesh>> {
     records.iter().map(|record| grid(record)).collect()
 }
 
-fn grid(record: &ImageRecord) -> Result<GridMesh> {
+/// The grid of one used picture over the original photograph.
+///
+/// # Errors
+/// [`Error::Input`] if it is missing or damaged.
+pub(crate) fn grid(record: &ImageRecord) -> Result<GridMesh> {
     let damaged = |reason: String| {
         Error::input(&record.path, reason, "Give a project file as `trueup stitch --project` wrote it.")
     };

@@ -20,7 +20,9 @@ use trueup_core::{Error, Result};
 use crate::project::{ImageRecord, Project};
 use grids::used_grids;
 
+pub(crate) use grids::grid;
 pub use pixels::{PixelEvaluation, evaluate_pixels};
+pub(crate) use pixels::{compare_overlaps, scale_up_to};
 
 /// The paper prints LD in hundredths.
 pub(crate) const HUNDREDTHS: f64 = 100.0;

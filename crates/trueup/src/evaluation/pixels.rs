@@ -9,7 +9,7 @@ use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_compose::render::{self, Layer};
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
-use trueup_core::source::SourceImage;
+use trueup_core::source::{PhotographSource, SourceImage};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 use trueup_io::source;
@@ -66,7 +66,33 @@ pub fn evaluate_pixels(project: &Project, project_folder: &Path, context: &Stage
     let photographs = FilePhotographs::new(images, 0);
     let meshes = used_grids(&records)?;
     let scale = scale(&meshes, project.options.measures.canvas_pixels);
-    let layout = layout(meshes, scale);
+    let positions: Vec<usize> = (0..records.len()).collect();
+    compare_overlaps(project, &photographs, &positions, scale, context)
+}
+
+/// The largest scale up to `wanted` that a panorama can be compared at, relative to its own size.
+///
+/// # Errors
+/// [`Error::Input`] if the project's grids are damaged.
+pub(crate) fn scale_up_to(project: &Project, wanted: f64) -> Result<f64> {
+    let records: Vec<&ImageRecord> = project.used_images().collect();
+    Ok(wanted.min(layers_scale(&used_grids(&records)?)))
+}
+
+/// Compares the used photographs of a project, which are at `positions` of `photographs`, where they overlap, at a scale
+/// relative to the panorama's size.
+///
+/// # Errors
+/// As [`evaluate_pixels`].
+pub(crate) fn compare_overlaps(
+    project: &Project,
+    photographs: &dyn PhotographSource,
+    positions: &[usize],
+    scale: f64,
+    context: &StageContext,
+) -> Result<PixelEvaluation> {
+    let records: Vec<&ImageRecord> = project.used_images().collect();
+    let layout = layout(used_grids(&records)?, positions, scale);
     let gains: Vec<f64> = records.iter().map(|record| record.gain.unwrap_or(1.0)).collect();
 
     context.progress().begin(STAGE, records.len() as u64);
@@ -74,7 +100,7 @@ pub fn evaluate_pixels(project: &Project, project_folder: &Path, context: &Stage
         .into_par_iter()
         .map(|position| {
             context.check_cancelled()?;
-            let layer = render::layer(&layout, &gains, position, &photographs, &project.options.render)?;
+            let layer = render::layer(&layout, &gains, position, photographs, &project.options.render)?;
             context.progress().advance(STAGE, 1);
             Ok(layer)
         })
@@ -153,14 +179,18 @@ fn photograph(
 
 /// The largest scale, at most 1, that keeps the canvas within `canvas_pixels` and the layers within their limit.
 fn scale(meshes: &[GridMesh], canvas_pixels: f64) -> f64 {
+    let (low, high) = bounds(meshes);
+    let canvas = (canvas_pixels / (high - low).product()).sqrt();
+    canvas.min(layers_scale(meshes)).min(1.0)
+}
+
+/// The largest scale that keeps the layers within their limit.
+fn layers_scale(meshes: &[GridMesh]) -> f64 {
     let area = |mesh: &GridMesh| {
         let (low, high) = mesh.bounds();
         (high - low).product()
     };
-    let (low, high) = bounds(meshes);
-    let canvas = (canvas_pixels / (high - low).product()).sqrt();
-    let layers = (MAX_LAYER_PX / meshes.iter().map(area).sum::<f64>()).sqrt();
-    canvas.min(layers).min(1.0)
+    (MAX_LAYER_PX / meshes.iter().map(area).sum::<f64>()).sqrt()
 }
 
 fn bounds(meshes: &[GridMesh]) -> (nalgebra::Vector2<f64>, nalgebra::Vector2<f64>) {
@@ -168,10 +198,10 @@ fn bounds(meshes: &[GridMesh]) -> (nalgebra::Vector2<f64>, nalgebra::Vector2<f64
     all.reduce(|all, one| (all.0.inf(&one.0), all.1.sup(&one.1))).unwrap_or_default()
 }
 
-/// The grids on a canvas of this scale.
-fn layout(meshes: Vec<GridMesh>, scale: f64) -> CanvasLayout {
+/// The grids of the photographs at `positions` on a canvas of this scale.
+fn layout(meshes: Vec<GridMesh>, positions: &[usize], scale: f64) -> CanvasLayout {
     let (low, high) = bounds(&meshes);
-    let placed = meshes.into_iter().enumerate().map(|(photograph, mut mesh)| {
+    let placed = positions.iter().zip(meshes).map(|(&photograph, mut mesh)| {
         for vertex in &mut mesh.target {
             *vertex = [(vertex[0] - low.x) * scale, (vertex[1] - low.y) * scale];
         }

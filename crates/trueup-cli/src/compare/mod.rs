@@ -1,0 +1,90 @@
+//! `trueup compare`: methods side by side, and the sums of what people ranked.
+
+mod pages;
+mod summary;
+
+use trueup::compare::{CompareJob, Comparison, Drawing, Entry, Page, read_rankings, tally};
+use trueup::{Error, Inputs, StageContext, StitchOptions};
+
+use crate::arguments::CompareArgs;
+use crate::failure::Failure;
+use crate::output;
+use crate::progress::Bars;
+use crate::stitch::{chosen_options, chosen_reference, reason};
+
+pub(crate) fn run(args: CompareArgs) -> Result<(), Failure> {
+    if !args.tally.is_empty() {
+        return sum_up(&args);
+    }
+    let quiet = args.quiet;
+    let (job, options) = checked(args)?;
+    let cancel = crate::cancel_token();
+    let bars = Bars::new(quiet);
+    let context = StageContext::new(&bars, &cancel, options.stitch.seed);
+    let compared = job.run(&options, &context, &pages);
+    bars.clear();
+    let compared = compared?;
+    if quiet { Ok(()) } else { output::print(&summary::text(&compared, &job.output)) }
+}
+
+/// The pages of a comparison.
+fn pages(comparison: &Comparison, drawings: &[Drawing]) -> Result<Vec<Page>, Error> {
+    let mut pages = vec![Page { name: "index.html".to_owned(), text: pages::side_by_side(comparison, drawings)? }];
+    if let Some(ranking) = &comparison.ranking {
+        pages.push(Page { name: "ranking.html".to_owned(), text: pages::blind_ranking(comparison, ranking)? });
+    }
+    Ok(pages)
+}
+
+fn sum_up(args: &CompareArgs) -> Result<(), Failure> {
+    let results = args.tally.iter().map(|path| read_rankings(path)).collect::<Result<Vec<_>, _>>()?;
+    let tally = tally(&results)?;
+    match args.json {
+        true => {
+            let json = serde_json::to_string_pretty(&tally)
+                .map_err(|error| Error::input("tally", error, "Report this as a defect."))?;
+            output::print(&format!("{json}\n"))
+        }
+        false => output::print(&summary::scores(&tally)),
+    }
+}
+
+/// Arguments that make sense: what the library needs.
+fn checked(args: CompareArgs) -> Result<(CompareJob, StitchOptions), Failure> {
+    let flags = [
+        ("--scale", "compare.scale", &args.scale),
+        ("--format", "compare.format", &args.format),
+        ("--quality", "output.jpeg_quality", &args.quality),
+        ("--seed", "stitch.seed", &args.seed),
+    ];
+    let options = chosen_options(args.config.as_deref(), &args.set, &flags)?;
+    let entries = entries(&args.methods, &args.entry, &options)?;
+    let inputs = Inputs {
+        photographs: args.photographs,
+        reference: chosen_reference(args.reference),
+        graph: args.graph,
+        all: false,
+        require_all: args.require_all,
+    };
+    // The library reads 0 as one thread per core.
+    let threads = args.threads.map_or(0, usize::from);
+    // The command demands an output wherever this is called.
+    let output = args.output.unwrap_or_default();
+    Ok((CompareJob { inputs, entries, truth: args.truth, ranked: args.rank, output, threads }, options))
+}
+
+/// The methods that were named, or all, then the entries that were typed. Every one that cannot be is listed.
+fn entries(methods: &[String], typed: &[String], options: &StitchOptions) -> Result<Vec<Entry>, Failure> {
+    let mut wrong = Vec::new();
+    let mut entries = if methods.is_empty() { Entry::methods() } else { Vec::new() };
+    let named = methods.iter().map(|name| (format!("--methods {name}"), Entry::method(name.trim())));
+    let typed = typed.iter().map(|text| (format!("--entry \"{text}\""), Entry::parse(text)));
+    for (argument, entry) in named.chain(typed) {
+        match entry.and_then(|entry| entry.options(options).map(|_| entry)) {
+            Ok(entry) => entries.push(entry),
+            Err(Error::Options(invalid)) => wrong.extend(invalid.iter().map(|one| format!("{argument}: {one}"))),
+            Err(error) => wrong.push(format!("{argument}: {}", reason(error))),
+        }
+    }
+    if wrong.is_empty() { Ok(entries) } else { Err(Failure::options(wrong)) }
+}

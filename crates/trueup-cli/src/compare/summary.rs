@@ -1,0 +1,84 @@
+//! What the command prints.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use trueup::compare::{Better, Compared, Comparison, Figure, Refusal, Tally};
+
+/// Figures in the table: more do not fit beside each other.
+const COLUMNS: usize = 6;
+
+/// A line per entry with the first figures; the page has them all.
+pub(crate) fn text(comparison: &Comparison, folder: &Path) -> String {
+    let mut text = String::new();
+    let used = comparison.photographs.iter().filter(|photograph| photograph.reason.is_empty()).count();
+    let (given, seconds) = (comparison.photographs.len(), comparison.seconds);
+    let _ = writeln!(text, "page      {}", folder.join("index.html").display());
+    if comparison.ranking.is_some() {
+        let _ = writeln!(text, "ranking   {}", folder.join("ranking.html").display());
+    }
+    let _ = writeln!(text, "pictures  {used} of {given} used; {seconds:.1} s");
+    for photograph in comparison.photographs.iter().filter(|photograph| !photograph.reason.is_empty()) {
+        let _ = writeln!(text, "  left out  {}: {}", photograph.path, photograph.reason);
+    }
+    let shown = |figure: &&Figure| figure.main && figure.better != Better::Neither;
+    let figures: Vec<&Figure> = comparison.figures.iter().filter(shown).take(COLUMNS).collect();
+    let width = comparison.entries.iter().map(|entry| entry.name.chars().count()).max().unwrap_or(0);
+    let headings: Vec<String> = figures.iter().map(|figure| heading(figure)).collect();
+    let _ = writeln!(text, "\n{:width$}  {}", "", headings.join("  "));
+    for entry in &comparison.entries {
+        let told = match &entry.refusal {
+            Some(refusal) => told(refusal),
+            None => figures.iter().zip(&headings).map(|(figure, heading)| cell(entry, figure, heading)).collect(),
+        };
+        let _ = writeln!(text, "{:width$}  {}", entry.name, told.trim_end());
+    }
+    let _ = writeln!(text, "\n* the best of a column; index.html has every figure and what it means.");
+    text
+}
+
+fn heading(figure: &Figure) -> String {
+    let unit = if figure.unit.is_empty() { String::new() } else { format!(" {}", figure.unit) };
+    format!("{}{unit}", figure.name)
+}
+
+fn told(refusal: &Refusal) -> String {
+    let what = if refusal.not_applicable { "not applicable" } else { "failed" };
+    let subject = if refusal.subject.is_empty() { String::new() } else { format!("{}: ", refusal.subject) };
+    format!("{what}: {subject}{}", refusal.reason)
+}
+
+/// A figure as wide as its heading, with the gap that follows.
+fn cell(entry: &Compared, figure: &Figure, heading: &str) -> String {
+    let value = match entry.figures.get(figure.key) {
+        Some(value) => format!("{value:.*}", figure.decimals),
+        None => "-".to_owned(),
+    };
+    let mark = if entry.best.contains(&figure.key) { "*" } else { " " };
+    format!("{value:>width$}{mark} ", width = heading.chars().count())
+}
+
+/// The methods' mean scores, the best first.
+pub(crate) fn scores(tally: &Tally) -> String {
+    let mut text = String::new();
+    let Tally { answers, participants, comparisons, repeated, methods } = tally;
+    let (participants, comparisons) = (counted(*participants, "participant"), counted(*comparisons, "comparison"));
+    let _ = writeln!(text, "{} of {participants} to {comparisons}", counted(*answers, "answer"));
+    if *repeated > 0 {
+        let _ = writeln!(text, "{} left out that came more than once", counted(*repeated, "answer"));
+    }
+    let width = methods.iter().map(|method| method.name.chars().count()).max().unwrap_or(0);
+    let _ = writeln!(text, "\n{:width$}  score  std. error  answers  1st 2nd 3rd 4th", "");
+    for method in methods {
+        let error = method.standard_error.map_or("-".to_owned(), |error| format!("{error:.3}"));
+        let ranks: Vec<String> = method.ranks.iter().map(|count| format!("{count:>3}")).collect();
+        let (name, score, answers) = (&method.name, method.mean_score, method.answers);
+        let _ = writeln!(text, "{name:width$}  {score:>5.3}  {error:>10}  {answers:>7}  {}", ranks.join(" "));
+    }
+    text
+}
+
+/// "1 answer", "3 answers".
+fn counted(count: usize, what: &str) -> String {
+    if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
+}

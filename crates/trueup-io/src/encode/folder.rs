@@ -1,0 +1,136 @@
+//! A folder that appears complete or not at all.
+
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+use trueup_core::{Error, Result};
+
+/// A folder under a temporary name beside its target; dropped uncommitted, it is removed with everything in it.
+#[derive(Debug)]
+pub struct PendingFolder {
+    temporary: TempDir,
+    target: PathBuf,
+}
+
+impl PendingFolder {
+    /// Makes an empty folder beside `target`, whose parent folder must exist. What is at `target` stays as it is.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if `target` is a file, has no name, or its parent does not exist; [`Error::Io`] if the operating
+    /// system refuses.
+    pub fn create(target: &Path) -> Result<Self> {
+        let shown = target.display();
+        // A link is followed, so that the folder behind it is replaced and not the link; this names ".", too.
+        let target = target.canonicalize().unwrap_or_else(|_| target.to_owned());
+        if target.exists() && !target.is_dir() {
+            return Err(Error::input(shown, "it is a file", "Give the name of a folder."));
+        }
+        let parent = match target.parent() {
+            Some(parent) if parent.as_os_str().is_empty() => Path::new("."),
+            Some(parent) if target.file_name().is_some() => parent,
+            _ => return Err(Error::input(shown, "it is no folder that can be made", "Give the name of a new folder.")),
+        };
+        if !parent.is_dir() {
+            let reason = format!("the folder {} does not exist", parent.display());
+            return Err(Error::input(shown, reason, "Create it or choose another folder."));
+        }
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".trueup-").suffix(".part");
+        allow_umask(&mut builder);
+        let temporary = builder.tempdir_in(parent).map_err(|error| Error::io("writing into", parent, error))?;
+        Ok(Self { temporary, target })
+    }
+
+    /// Where files are to be written until the folder has its name.
+    pub fn path(&self) -> &Path {
+        self.temporary.path()
+    }
+
+    /// Gives the folder its name. A folder of that name is replaced, with all that it holds: whether that may be is for
+    /// the caller to judge. If the new one cannot take its place, the old one is put back.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the operating system refuses.
+    pub fn commit(self) -> Result<()> {
+        let Self { temporary, target } = self;
+        let failed = |error: std::io::Error| Error::io("writing", &target, error);
+        if !target.exists() {
+            std::fs::rename(temporary.path(), &target).map_err(failed)?;
+            let _ = temporary.keep();
+            return Ok(());
+        }
+        // The temporary folder makes room for the old one: moved into a second temporary, it goes when that is dropped.
+        let parent = temporary.path().parent().unwrap_or(Path::new("."));
+        let aside = tempfile::Builder::new().prefix(".trueup-").suffix(".old").tempdir_in(parent).map_err(failed)?;
+        let old = aside.path().join("old");
+        std::fs::rename(&target, &old).map_err(failed)?;
+        if let Err(error) = std::fs::rename(temporary.path(), &target) {
+            // The first failure is the one to tell of; should this fail, too, the old folder must not be dropped.
+            if std::fs::rename(&old, &target).is_err() {
+                let _ = aside.keep();
+            }
+            return Err(failed(error));
+        }
+        let _ = temporary.keep();
+        Ok(())
+    }
+}
+
+#[cfg(unix)]
+fn allow_umask(builder: &mut tempfile::Builder) {
+    use std::os::unix::fs::PermissionsExt;
+    builder.permissions(std::fs::Permissions::from_mode(0o777));
+}
+
+#[cfg(not(unix))]
+fn allow_umask(_builder: &mut tempfile::Builder) {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(folder).expect("readable");
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_folder_appears_whole_and_takes_the_place_of_an_older_one() {
+        let desk = tempfile::tempdir().expect("a folder");
+        let target = desk.path().join("out");
+        for round in ["first", "second"] {
+            let pending = PendingFolder::create(&target).expect("possible");
+            std::fs::write(pending.path().join(round), round).expect("written");
+            pending.commit().expect("committed");
+            assert_eq!(names(desk.path()), ["out"]);
+            assert_eq!(names(&target), [round]);
+        }
+    }
+
+    #[test]
+    fn a_folder_given_up_leaves_nothing_and_the_old_one_as_it_was() {
+        let desk = tempfile::tempdir().expect("a folder");
+        let target = desk.path().join("out");
+        std::fs::create_dir(&target).expect("made");
+        std::fs::write(target.join("kept"), "kept").expect("written");
+        let pending = PendingFolder::create(&target).expect("possible");
+        std::fs::write(pending.path().join("new"), "new").expect("written");
+        drop(pending);
+        assert_eq!((names(desk.path()), names(&target)), (vec!["out".to_owned()], vec!["kept".to_owned()]));
+    }
+
+    #[test]
+    fn impossible_places_are_refused() {
+        let desk = tempfile::tempdir().expect("a folder");
+        std::fs::write(desk.path().join("file"), "").expect("written");
+        for (name, reason) in [("file", "it is a file"), ("none/out", "does not exist")] {
+            let message = PendingFolder::create(&desk.path().join(name)).expect_err("must fail").to_string();
+            assert!(message.contains(reason), "{message}");
+        }
+        assert!(PendingFolder::create(Path::new("/")).is_err());
+        assert_eq!(names(desk.path()), ["file"]);
+    }
+}
