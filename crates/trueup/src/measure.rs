@@ -93,7 +93,14 @@ fn measure(
     let lines = lines::detect(&picture.gray, &options.lines, context)?;
     busy.lines = next_lap();
     let gray = refinement::needs_pixels(options).then(|| refinement::eight_bit(&picture.gray));
-    Ok(Measured { frame, features, lines, gray, thumbnail: picture.thumbnail, thumbnail_frame: picture.thumbnail_frame })
+    Ok(Measured {
+        frame,
+        features,
+        lines,
+        gray,
+        thumbnail: picture.thumbnail,
+        thumbnail_frame: picture.thumbnail_frame,
+    })
 }
 
 /// Whether an error is about one photograph, so that the others can still be stitched.

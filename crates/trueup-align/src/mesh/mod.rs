@@ -159,8 +159,7 @@ impl Problem<'_> {
                 "Raise mesh.prior_weight, or leave out pictures that hardly overlap.",
             )
         };
-        let solution =
-            solver.solve(equations).ok_or_else(|| unsolvable("the equations are not positive definite"))?;
+        let solution = solver.solve(equations).ok_or_else(|| unsolvable("the equations are not positive definite"))?;
         if !solution.coordinates.iter().all(|coordinate| coordinate.is_finite()) {
             return Err(unsolvable("the solution is not finite"));
         }
@@ -222,5 +221,7 @@ pub fn count_folds(mesh: &GridMesh) -> usize {
     folds
 }
 
+#[cfg(test)]
+mod refinement_tests;
 #[cfg(test)]
 mod tests;

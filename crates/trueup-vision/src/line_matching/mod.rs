@@ -143,7 +143,8 @@ impl Carried {
         let carried: Vec<(Vector2<f64>, Vector2<f64>)> =
             points.filter_map(|point| Some((point, b_from_a(point)?))).collect();
         let (first, last) = (carried.first()?, carried.last()?);
-        let long_enough = (last.0 - first.0).norm() >= min_length_px && (last.1 - first.1).norm() >= min_length_px / 2.0;
+        let long_enough =
+            (last.0 - first.0).norm() >= min_length_px && (last.1 - first.1).norm() >= min_length_px / 2.0;
         long_enough.then_some(Self { here: [first.0, last.0], there: [first.1, last.1] })
     }
 

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use trueup_core::mesh::GridMesh;
 
 use super::super::normal_equations::{Metric, Share};
-use super::pyramid::{Grey, Pyramid};
 use super::PhotometricOptions;
+use super::pyramid::{Grey, Pyramid};
 use crate::match_points::OverlapWarp;
 
 /// Vertices of one cell in each picture.
@@ -88,9 +88,10 @@ impl Overlap<'_> {
                 cells
             })
             .collect();
-        let misfit = residuals.iter().zip(&weights).fold([0.0; 2], |[sum, count], (residual, weight)| {
-            [sum + weight * residual.abs(), count + weight]
-        });
+        let misfit = residuals
+            .iter()
+            .zip(&weights)
+            .fold([0.0; 2], |[sum, count], (residual, weight)| [sum + weight * residual.abs(), count + weight]);
         OverlapEquations { cells, misfit }
     }
 
