@@ -54,6 +54,9 @@ pub struct LinedPicture<'a> {
     pub lines: &'a [LineSegment],
 }
 
+/// How far the likeness of the same edge varies by noise: edges that are both this alike cannot be told apart.
+const UNSURE: f64 = 0.05;
+
 /// Two segments that could be the same edge.
 struct Candidate {
     in_a: usize,
@@ -80,7 +83,7 @@ pub fn find(
             if same {
                 return other.likeness <= one.likeness;
             }
-            1.0 - one.likeness <= options.max_ratio * (1.0 - other.likeness)
+            UNSURE + 1.0 - one.likeness <= options.max_ratio * (UNSURE + 1.0 - other.likeness)
         })
     };
     candidates
