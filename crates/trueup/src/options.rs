@@ -28,6 +28,10 @@ trueup_core::choice! {
     pub enum Method {
         /// Vanishing-point-guided natural stitching: upright wherever the scene has straight lines to tell.
         Vpg = "vpg",
+        /// The two-dimensional global similarity prior: as many photographs as possible are not turned at all.
+        Gsp2d = "gsp-2d",
+        /// The three-dimensional global similarity prior: straightened cameras, corrected where overlaps contradict them.
+        Gsp3d = "gsp-3d",
         /// One homography per photograph, onto the plane of the reference.
         Homography = "homography",
         /// Straightened cameras on a sphere, a cylinder or a plane (warps.projection), as AutoStitch has them.
@@ -36,7 +40,7 @@ trueup_core::choice! {
         Apap = "apap",
         /// Shape-preserving half-projective: a homography on one side, an upright similarity on the other.
         Sphp = "sphp",
-        /// The same with a similarity that may turn.
+        /// Shape-preserving half-projective with a similarity that may turn.
         SphpFree = "sphp-free",
         /// Adaptive as-natural-as-possible: homographies that turn into similarities away from the overlaps.
         Aanap = "aanap",
@@ -59,7 +63,8 @@ impl Method {
     pub(crate) fn shape(self) -> Shape {
         match self {
             Self::Vpg => Shape::Mesh(None),
-            // Methods that are a prior: Self::Name => Shape::Mesh(Some(PriorMethod::Name)).
+            Self::Gsp2d => Shape::Mesh(Some(PriorMethod::Gsp2d)),
+            Self::Gsp3d => Shape::Mesh(Some(PriorMethod::Gsp3d)),
             Self::Homography => Shape::Warp(WarpModel::Homography),
             Self::Autostitch => Shape::Warp(WarpModel::Autostitch),
             Self::Apap => Shape::Warp(WarpModel::Apap),

@@ -39,9 +39,11 @@ impl OverlapWarp {
         if let [Some(a), Some(b), Some(c), Some(d)] = places {
             return Some(a * shares[0] + b * shares[1] + c * shares[2] + d * shares[3]);
         }
-        let known = corners.iter().zip(shares).zip(places).filter_map(|((corner, share), place)| {
-            Some((share, place? + point - grid.source(*corner)))
-        });
+        let known = corners
+            .iter()
+            .zip(shares)
+            .zip(places)
+            .filter_map(|((corner, share), place)| Some((share, place? + point - grid.source(*corner))));
         known.max_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, place)| place)
     }
 }

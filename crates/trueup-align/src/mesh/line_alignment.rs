@@ -22,7 +22,7 @@ trueup_core::options! {
     /// How matched lines align the grids (`stitch.align = lines`).
     pub struct LineAlignmentOptions("line_alignment") {
         /// Weight of a squared distance of a line's sample from the matched line.
-        weight: f64 = 5.0, between(0.0, 10000.0), "per working px squared";
+        weight: f64 = 20.0, between(0.0, 10000.0), "per working px squared";
         /// Distance of the samples.
         spacing_px: f64 = 20.0, between(1.0, 1000.0), "working px";
         /// Weight of a squared deviation from straight of a sample of any long line.
@@ -30,9 +30,9 @@ trueup_core::options! {
         /// Lines from this length on are kept straight.
         straight_length_px: f64 = 50.0, between(1.0, 100000.0), "working px";
         /// Weight of the squared distance of matched points.
-        point_weight: f64 = 1.0, between(0.0, 10000.0), "per working px squared";
+        point_weight: f64 = 4.0, between(0.0, 10000.0), "per working px squared";
         /// Most matched points of a pair.
-        max_points: usize = 300, between(0.0, 1000000.0), "";
+        max_points: usize = 1000, between(0.0, 1000000.0), "";
         /// Distances beyond this count linearly instead of squared.
         robust_px: f64 = 3.0, between(0.01, 1000.0), "panorama units";
         /// Times the mesh is solved with lines and weights found on the solution before.

@@ -225,4 +225,6 @@ pub fn count_folds(mesh: &GridMesh) -> usize {
 }
 
 #[cfg(test)]
+mod refinement_tests;
+#[cfg(test)]
 mod tests;

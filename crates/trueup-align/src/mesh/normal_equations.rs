@@ -334,3 +334,7 @@ fn by_column(blocks: &[(u32, u32, Block)], columns: usize) -> Vec<(u32, u32, Blo
     }
     sorted
 }
+
+#[cfg(test)]
+#[path = "normal_equations_tests.rs"]
+mod tests;

@@ -54,6 +54,9 @@ pub struct LinedPicture<'a> {
     pub lines: &'a [LineSegment],
 }
 
+/// How far the likeness of the same edge varies by noise: edges that are both this alike cannot be told apart.
+const UNSURE: f64 = 0.05;
+
 /// Two segments that could be the same edge.
 struct Candidate {
     in_a: usize,
@@ -80,7 +83,7 @@ pub fn find(
             if same {
                 return other.likeness <= one.likeness;
             }
-            1.0 - one.likeness <= options.max_ratio * (1.0 - other.likeness)
+            UNSURE + 1.0 - one.likeness <= options.max_ratio * (UNSURE + 1.0 - other.likeness)
         })
     };
     candidates
@@ -143,7 +146,8 @@ impl Carried {
         let carried: Vec<(Vector2<f64>, Vector2<f64>)> =
             points.filter_map(|point| Some((point, b_from_a(point)?))).collect();
         let (first, last) = (carried.first()?, carried.last()?);
-        let long_enough = (last.0 - first.0).norm() >= min_length_px && (last.1 - first.1).norm() >= min_length_px / 2.0;
+        let long_enough =
+            (last.0 - first.0).norm() >= min_length_px && (last.1 - first.1).norm() >= min_length_px / 2.0;
         long_enough.then_some(Self { here: [first.0, last.0], there: [first.1, last.1] })
     }
 

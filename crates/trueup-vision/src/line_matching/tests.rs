@@ -1,6 +1,6 @@
 //! A wall of planks of random brightness seen twice, the second time shifted, brighter and with less contrast.
 
-use rand::Rng;
+use rand::RngExt;
 use trueup_core::StageContext;
 
 use super::*;
@@ -8,13 +8,13 @@ use super::*;
 const WIDTH: usize = 400;
 const HEIGHT: usize = 200;
 
-/// Vertical planks from 12 to 30 px wide: their grey values and the edges between them. Every edge is a step, so that
+/// Vertical planks from 5 to 14 px wide: their grey values and the edges between them. Every edge is a step, so that
 /// most look alike but for the planks' brightness.
 fn planks(shift: f64, gain: f64, bias: f64) -> (Raster<u8>, Vec<LineSegment>) {
     let mut generator = StageContext::default().generator("planks", 7);
     let mut edges = vec![(-100.0, 120.0)];
     while edges[edges.len() - 1].0 < 600.0 {
-        let next = edges[edges.len() - 1].0 + generator.random_range(12.0..30.0);
+        let next = edges[edges.len() - 1].0 + generator.random_range(5.0..14.0);
         edges.push((next, generator.random_range(30.0..220.0)));
     }
     let mut gray = Raster::new(WIDTH, HEIGHT, 1);
@@ -46,14 +46,14 @@ fn nearly_every_edge_finds_itself_and_hardly_any_another() {
     let (gray_a, lines_a) = planks(0.0, 1.0, 0.0);
     let (gray_b, lines_b) = planks(60.0, 0.7, 30.0);
     let carry = |point: Vector2<f64>| (point.x > 56.0).then(|| Vector2::new(point.x - 56.0, point.y));
-    let options = LineMatchingOptions { max_distance_px: 25.0, ..LineMatchingOptions::default() };
+    let options = LineMatchingOptions { max_distance_px: 20.0, ..LineMatchingOptions::default() };
     let a = LinedPicture { gray: &gray_a, lines: &lines_a };
     let b = LinedPicture { gray: &gray_b, lines: &lines_b };
     let matches = find(a, b, carry, &options);
     let right = |one: &&LineMatch| (lines_a[one.in_a].start[0] - 60.0 - lines_b[one.in_b].start[0]).abs() < 1e-9;
     let correct = matches.iter().filter(right).count();
     let visible = lines_a.iter().filter(|line| line.start[0] > 75.0 && line.start[0] < 385.0).count();
-    assert!(correct * 10 >= visible * 8, "{correct} of {visible} edges were found");
+    assert!(correct * 10 >= visible * 6, "{correct} of {visible} edges were found");
     assert!((matches.len() - correct) * 50 <= matches.len(), "{} wrong of {}", matches.len() - correct, matches.len());
 }
 

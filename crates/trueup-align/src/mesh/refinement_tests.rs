@@ -1,0 +1,188 @@
+//! Refinements on synthetic pairs whose true misalignment is known.
+
+use nalgebra::Vector2;
+use trueup_core::StageContext;
+use trueup_core::lines::{LineSegment, PairLines};
+use trueup_core::matches::PairMatches;
+use trueup_core::mesh::GridMesh;
+use trueup_core::raster::Raster;
+
+use super::*;
+use crate::match_points::OverlapWarp;
+
+const WIDTH: usize = 320;
+const HEIGHT: usize = 240;
+/// The second picture starts this far to the right of the first.
+const SHIFT: f64 = 100.0;
+
+/// Where the second picture shows what the first has at a pixel: shifted, and pushed aside smoothly by up to 3 px.
+fn second_from_first(point: Vector2<f64>) -> Vector2<f64> {
+    let bump = (-((point - Vector2::new(210.0, 120.0)).norm() / 60.0).powi(2)).exp();
+    point - Vector2::new(SHIFT, 0.0) + Vector2::new(3.0, -2.0) * bump
+}
+
+/// A smooth scene with detail at several scales.
+fn scene(point: Vector2<f64>) -> f64 {
+    let waves = [(0.11, 0.05, 0.0), (-0.06, 0.13, 1.0), (0.23, -0.19, 2.0), (0.31, 0.27, 0.5), (0.03, 0.02, 4.0)];
+    waves.iter().map(|&(x, y, phase)| 22.0 * (x * point.x + y * point.y + phase).sin()).sum::<f64>() + 125.0
+}
+
+/// The first picture, and the second by solving its map at every pixel, darker and with less contrast.
+fn pictures() -> [Raster<u8>; 2] {
+    let mut pair = [Raster::new(WIDTH, HEIGHT, 1), Raster::new(WIDTH, HEIGHT, 1)];
+    for y in 0..HEIGHT {
+        for x in 0..WIDTH {
+            let pixel = Vector2::new(x as f64 + 0.5, y as f64 + 0.5);
+            let mut first = pixel + Vector2::new(SHIFT, 0.0);
+            for _ in 0..20 {
+                first += pixel - second_from_first(first);
+            }
+            pair[0].pixel_mut(x, y)[0] = scene(pixel) as u8;
+            pair[1].pixel_mut(x, y)[0] = (0.7 * scene(first) - 10.0) as u8;
+        }
+    }
+    pair
+}
+
+/// Two grids and match points that know the shift and nothing of the bump.
+fn shifted() -> (Vec<GridMesh>, Vec<OverlapWarp>) {
+    let grids = vec![GridMesh::regular(WIDTH as f64, HEIGHT as f64, 40.0); 2];
+    let warps = [(0, 1, -SHIFT), (1, 0, SHIFT)]
+        .map(|(from, to, shift)| OverlapWarp {
+            from,
+            to,
+            vertices: (0..grids[0].len())
+                .map(|vertex| grids[0].source(vertex) + Vector2::new(shift, 0.0))
+                .map(|place| (0.0..=WIDTH as f64).contains(&place.x).then_some(place.into()))
+                .collect(),
+        })
+        .to_vec();
+    (grids, warps)
+}
+
+fn bases() -> [Base; 2] {
+    [Base::similarity(1.0, 0.0), Base::similarity(1.0, 0.0)]
+}
+
+fn refined(refinements: &Refinements) -> WarpedMesh {
+    let (grids, warps) = shifted();
+    run_refined(&grids, &warps, &bases(), 0, &MeshOptions::default(), refinements, &StageContext::default())
+        .expect("solvable")
+}
+
+/// Root mean square distance in the panorama of what both pictures truly show, away from the overlap's border.
+fn true_distance(meshes: &[GridMesh]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for k in 0..400 {
+        let point = Vector2::new(120.0 + f64::from(k % 20) * 9.0, 20.0 + f64::from(k / 20) * 10.0);
+        let there = second_from_first(point);
+        sum += (meshes[0].warp(point) - meshes[1].warp(there)).norm_squared();
+        count += 1.0;
+    }
+    (sum / count as f64).sqrt()
+}
+
+fn pyramids() -> Vec<Pyramid> {
+    pictures().iter().map(|gray| Pyramid::new(gray, 3)).collect()
+}
+
+#[test]
+fn pixels_bring_a_pair_together_in_spite_of_gain_and_bias() {
+    let pyramids = pyramids();
+    // The match points hold on to the wrong place: pixels must outweigh them.
+    let options = PhotometricOptions { weight: 0.1, ..PhotometricOptions::default() };
+    let photometric = Some(PhotometricInput { pyramids: &pyramids, options: &options });
+    let before = true_distance(&refined(&Refinements::default()).meshes);
+    let warped = refined(&Refinements { photometric, outline_weight: 1.0, ..Refinements::default() });
+    let after = true_distance(&warped.meshes);
+    assert!(before > 1.0, "the bump is {before} px");
+    assert!(after < 0.35 * before, "{before} px became {after} px");
+    assert_eq!(warped.folds, 0);
+}
+
+#[test]
+fn pixels_align_alike_on_any_number_of_threads() {
+    let pyramids = pyramids();
+    let options = PhotometricOptions::default();
+    let input = Refinements {
+        photometric: Some(PhotometricInput { pyramids: &pyramids, options: &options }),
+        outline_weight: 1.0,
+        ..Refinements::default()
+    };
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| refined(&input))
+    };
+    assert_eq!(on(1), on(4));
+}
+
+#[test]
+fn without_refinements_the_plain_mesh_is_left_as_it_is() {
+    let (grids, warps) = shifted();
+    let plain = run(&grids, &warps, &bases(), 0, &MeshOptions::default(), &StageContext::default()).expect("solvable");
+    assert_eq!(refined(&Refinements { outline_weight: 7.0, ..Refinements::default() }), plain);
+}
+
+fn segment(start: [f64; 2], end: [f64; 2]) -> LineSegment {
+    LineSegment { start, end, width_px: 1.0, significance: 1.0 }
+}
+
+/// An edge that runs 3 px beside its match, which the match points do not know of.
+#[test]
+fn matched_lines_are_drawn_onto_each_other() {
+    let options = LineAlignmentOptions { robust_px: 10.0, ..LineAlignmentOptions::default() };
+    let (in_a, in_b) = (segment([200.0, 30.0], [200.0, 210.0]), segment([103.0, 30.0], [103.0, 210.0]));
+    let matched = [PairLines { a: 0, b: 1, lines: vec![[in_a, in_b]] }];
+    let lines = [vec![in_a], vec![in_b]];
+    let input = LineAlignmentInput { matched: &matched, points: &[], lines: &lines, options: &options };
+    let apart = |meshes: &[GridMesh]| {
+        (meshes[0].warp(Vector2::new(200.0, 120.0)) - meshes[1].warp(Vector2::new(103.0, 120.0))).x.abs()
+    };
+    let before = apart(&refined(&Refinements::default()).meshes);
+    let after = apart(&refined(&Refinements { lines: Some(input), ..Refinements::default() }).meshes);
+    assert!((before - 3.0).abs() < 0.2 && after < 0.6, "{before} px became {after} px");
+}
+
+/// Match points with a bump bend a line that crosses it; straightness and structure each pull it straight again.
+#[test]
+fn a_bent_line_is_pulled_straight() {
+    let (grids, mut warps) = shifted();
+    for warp in &mut warps {
+        let sign = if warp.from == 0 { 1.0 } else { -1.0 };
+        for (vertex, place) in warp.vertices.iter_mut().enumerate() {
+            let y = grids[0].source(vertex).y;
+            if let Some(place) = place {
+                place[0] += sign * 6.0 * (-((y - 120.0) / 40.0).powi(2)).exp();
+            }
+        }
+    }
+    let lines = vec![vec![segment([200.0, 10.0], [200.0, 230.0])], Vec::new()];
+    let bend = |refinements: &Refinements| {
+        let warped =
+            run_refined(&grids, &warps, &bases(), 0, &MeshOptions::default(), refinements, &StageContext::default());
+        let mesh = &warped.expect("solvable").meshes[0];
+        crate::metrics::Straightness::of(&lines[0][0], mesh, 3.0).expect("a line").rms_px
+    };
+    let plain = bend(&Refinements::default());
+    let structure = StructureOptions { weight: 100.0, ..StructureOptions::default() };
+    let structure = Some(StructureInput { chains: &lines, options: &structure });
+    let strict = LineAlignmentOptions { straightness: 100.0, ..LineAlignmentOptions::default() };
+    let strict =
+        Some(LineAlignmentInput { matched: &[], points: &[] as &[PairMatches], lines: &lines, options: &strict });
+    assert!(plain > 0.3, "{plain}");
+    let kept = bend(&Refinements { structure, ..Refinements::default() });
+    let straightened = bend(&Refinements { lines: strict, ..Refinements::default() });
+    assert!(kept < 0.25 * plain, "structure: {plain} px became {kept} px");
+    assert!(straightened < 0.25 * plain, "straightness: {plain} px became {straightened} px");
+}
+
+#[test]
+fn lists_must_have_an_entry_per_picture() {
+    let (grids, warps) = shifted();
+    let (pyramids, options) = (pyramids(), PhotometricOptions::default());
+    let photometric = Some(PhotometricInput { pyramids: &pyramids[..1], options: &options });
+    let refinements = Refinements { photometric, ..Refinements::default() };
+    let context = StageContext::default();
+    let error = run_refined(&grids, &warps, &bases(), 0, &MeshOptions::default(), &refinements, &context);
+    assert!(error.expect_err("too few").to_string().contains("1 are given for 2 pictures"));
+}
