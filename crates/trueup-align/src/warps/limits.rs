@@ -94,7 +94,7 @@ pub(super) fn check(model: WarpModel, input: &WarpInput<'_>, meshes: &[GridMesh]
             return Err(refuse(model, input, picture, "cannot be placed"));
         }
         let farthest = mesh.target.iter().map(|&vertex| (Vector2::from(vertex) - centre).norm()).fold(0.0, f64::max);
-        if !(farthest <= reach) {
+        if farthest > reach {
             let reason = format!(
                 "would lie {:.0} diagonals of the reference away (warps.max_reach allows {})",
                 farthest / reach * options.max_reach,
@@ -103,7 +103,7 @@ pub(super) fn check(model: WarpModel, input: &WarpInput<'_>, meshes: &[GridMesh]
             return Err(refuse(model, input, picture, &reason));
         }
         let growth = target_area(mesh) / area;
-        if !(growth <= options.max_area_ratio) {
+        if growth.is_nan() || growth > options.max_area_ratio {
             let reason = format!(
                 "would be {growth:.0} times as large as the reference (warps.max_area_ratio allows {})",
                 options.max_area_ratio

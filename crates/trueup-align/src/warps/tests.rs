@@ -48,6 +48,23 @@ impl Example {
         }
     }
 
+    /// The same pictures and matches counted from the other end.
+    pub fn reversed(&self) -> Self {
+        let last = self.cameras.len() - 1;
+        let swapped = |one: &PointMatch| PointMatch { in_a: one.in_b, in_b: one.in_a };
+        let turned = |pair: &PairMatches| PairMatches {
+            a: last - pair.b,
+            b: last - pair.a,
+            inliers: pair.inliers.iter().map(swapped).collect(),
+            ..pair.clone()
+        };
+        let pairs = self.pairs.iter().rev().map(turned).collect();
+        let mut reversed = Self::with_pairs(self.cameras.iter().rev().copied().collect(), pairs, last - self.reference);
+        reversed.names = self.names.iter().rev().cloned().collect();
+        reversed.seeds = self.seeds.iter().rev().copied().collect();
+        reversed
+    }
+
     pub fn input(&self) -> WarpInput<'_> {
         WarpInput {
             cameras: &self.cameras,
@@ -212,12 +229,8 @@ fn pictures_that_grow_or_reach_beyond_the_limits_are_refused_by_every_model() {
 
 #[test]
 fn threads_change_no_vertex_and_the_order_of_the_pictures_hardly_any() {
-    let yaws = [-20.0, 0.0, 28.0];
-    let (example, reversed) = (Example::panned(&yaws, 1), {
-        let mut reversed = Example::panned(&[yaws[2], yaws[1], yaws[0]], 1);
-        reversed.seeds.reverse();
-        reversed
-    });
+    let example = Example::panned(&[-20.0, 0.0, 28.0], 1);
+    let reversed = example.reversed();
     for model in MODELS {
         let with_threads = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
