@@ -188,6 +188,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
+    use crate::methods::method;
 
     fn result(variant: &str, pictures: usize, outcome: (&str, f64)) -> Row {
         let trial = Trial { pictures: Some(pictures), ..Trial::new(NAME, "study/05", variant, &[]) };
@@ -210,10 +211,11 @@ mod tests {
         let set = &catalogue.study[4];
         assert_eq!(largest(&results, set, "homography").map(|(pictures, _)| pictures), Some(4));
         assert_eq!(same_pictures(&results, "homography", VPG_PUBLISHED), [(8.0, 1.0)]);
-        assert_eq!(refusals(&results, std::slice::from_ref(set)), ["`homography` on 5 photographs of 05: too wide"]);
-        let one = Method { name: "apap", ..*methods().next().expect("a method") };
+        let expected = ["`homography` on 5 photographs of 05: too wide", "`apap` on 5 photographs of 05: too wide"];
+        assert_eq!(refusals(&results, std::slice::from_ref(set)), expected);
+        let one = method(APAP).expect("a method");
         let none =
-            table("t", "", std::slice::from_ref(set), &[grid_row(&results, std::slice::from_ref(set), &one, "ld")]);
+            table("t", "", std::slice::from_ref(set), &[grid_row(&results, std::slice::from_ref(set), one, "ld")]);
         assert_eq!(none.rows[0].cells, ["apap", "n/a", "-"]);
         assert_eq!(claims(&results)[0].holds, None);
     }
