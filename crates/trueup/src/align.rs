@@ -167,7 +167,7 @@ pub(crate) fn run(
     };
     let mesh = in_one_step("mesh", context, clock, || match shape {
         Shape::Mesh(_) => {
-            let bases = mesh::bases(options.mesh.base, &cameras.cameras, &grids, &prior);
+            let bases = mesh::bases(&cameras.cameras, &grids, &prior, &options.mesh);
             let material = Material::new(component, (&grids, &kept), photographs, options, context)?;
             let refinements = material.refinements(component, &met, options);
             mesh::run_refined(&grids, &kept, &bases, component.reference, &options.mesh, &refinements, context)

@@ -7,6 +7,7 @@ use trueup_core::camera::Camera;
 use trueup_core::geometry::{roll_from_down, rotation_about_x};
 use trueup_core::mesh::GridMesh;
 
+use super::MeshOptions;
 use super::complex::{conjugate_product, product};
 
 use crate::similarity::SimilarityPrior;
@@ -14,20 +15,27 @@ use crate::similarity::SimilarityPrior;
 trueup_core::choice! {
     /// The shape that the similarity prior asks of each picture.
     pub enum BaseShape {
-        /// The picture on the level sphere, unrolled; nearly a similarity around the picture's centre.
+        /// The picture on the level sphere, unrolled between the equirectangular and the Mercator projection
+        /// (`mesh.conformality`); nearly a similarity around the picture's centre.
         Sphere = "sphere",
-        /// The picture on the level sphere, unrolled so that shapes stay similar everywhere (Mercator).
-        Mercator = "mercator",
-        /// The picture on the level sphere, unrolled between the two (Miller): the Mercator projection of four fifths of
-        /// the latitude, stretched by five fourths. Steep pictures grow less than Mercator's.
-        Miller = "miller",
         /// A similarity of the whole picture, as published.
         Similarity = "similarity",
     }
 }
 
-/// Share of the latitude in the Miller projection.
-const MILLER: f64 = 0.8;
+/// The conformality of Mercator's projection.
+const MERCATOR: f64 = 1.0;
+
+/// The unrolled place of a latitude (radians): Mercator's projection of a share of it, stretched back to the whole, so that
+/// the scale at the horizon is 1. A share of 4/5 is Miller's projection; its derivative is 1 / cos(share latitude).
+///
+/// # Source
+/// O. M. Miller, "Notes on cylindrical world map projections" (1942).
+fn unrolled_latitude(latitude: f64, conformality: f64) -> f64 {
+    /// Below this share the limit, the latitude itself, is as exact.
+    const EQUIRECTANGULAR: f64 = 1e-4;
+    if conformality < EQUIRECTANGULAR { latitude } else { (conformality * latitude).tan().asinh() / conformality }
+}
 
 /// What the prior wants of one picture.
 #[derive(Debug, Clone, Copy)]
@@ -46,7 +54,7 @@ struct WantedSimilarity {
 ///
 /// Where the pictures together look more than 40 degrees up or down and reach the pole, the sphere is tilted so that
 /// their mean direction is level: verticals then converge as they do for the eye, and nothing is torn.
-pub fn bases(shape: BaseShape, cameras: &[Camera], grids: &[GridMesh], prior: &SimilarityPrior) -> Vec<Base> {
+pub fn bases(cameras: &[Camera], grids: &[GridMesh], prior: &SimilarityPrior, options: &MeshOptions) -> Vec<Base> {
     let cameras = &prior.corrected_cameras(cameras);
     let scaled_focal: f64 = cameras.iter().zip(&prior.scale).map(|(camera, scale)| camera.focal_px * scale).sum();
     let units_per_radian = scaled_focal / cameras.len().max(1) as f64;
@@ -62,7 +70,7 @@ pub fn bases(shape: BaseShape, cameras: &[Camera], grids: &[GridMesh], prior: &S
                 None => prior.theta[k],
             };
             let wanted = WantedSimilarity { scale: prior.scale[k], theta, units_per_radian };
-            Base::new(shape, &cameras[k], &grids[k], &frame, wanted)
+            Base::new(options, &cameras[k], &grids[k], &frame, wanted)
         })
         .collect()
 }
@@ -73,7 +81,7 @@ fn tilt_from_level(cameras: &[Camera], grids: &[GridMesh], level_from_world: &Ma
     const STEEP: f64 = 0.7;
     /// Length of the mean direction below which the pictures look all round and have none.
     const ONE_WAY: f64 = 0.5;
-    let view = |k: usize| SphereView::new(BaseShape::Sphere, &cameras[k], level_from_world);
+    let view = |k: usize| SphereView::new(MERCATOR, &cameras[k], level_from_world);
     let forward: Vector3<f64> = (0..cameras.len()).map(|k| view(k).forward).sum();
     let pitch = forward.y.atan2(forward.z);
     let reaches_pole = (0..cameras.len()).any(|k| !view(k).is_moderate_all_over(&grids[k]));
@@ -97,7 +105,8 @@ pub struct Base {
 /// A picture on the level sphere.
 #[derive(Debug, Clone)]
 struct SphereView {
-    shape: BaseShape,
+    /// 0 for the equirectangular projection, 1 for Mercator's.
+    conformality: f64,
     camera: Camera,
     level_from_camera: Matrix3<f64>,
     forward: Vector3<f64>,
@@ -107,7 +116,7 @@ impl Base {
     /// The base of a picture: on the level sphere, turned so that its rotation at the picture's centre is the wanted one.
     /// A picture that reaches within 20 degrees of a pole cannot be unrolled; it gets the plain similarity.
     fn new(
-        shape: BaseShape,
+        options: &MeshOptions,
         camera: &Camera,
         grid: &GridMesh,
         level_from_world: &Matrix3<f64>,
@@ -115,14 +124,14 @@ impl Base {
     ) -> Self {
         let similarity = Vector2::new(wanted.theta.cos(), wanted.theta.sin()) * wanted.scale;
         let plain = Self { factor: similarity, sphere: None };
-        if shape == BaseShape::Similarity {
+        if options.base == BaseShape::Similarity {
             return plain;
         }
-        let view = SphereView::new(shape, camera, level_from_world);
+        let view = SphereView::new(options.conformality, camera, level_from_world);
         if !view.is_moderate_all_over(grid) {
             return plain;
         }
-        let at_centre = derivative_at_centre(shape, &view.level_from_camera, camera.focal_px);
+        let at_centre = derivative_at_centre(options.conformality, &view.level_from_camera, camera.focal_px);
         let turn = conjugate_product(at_centre, similarity).normalize();
         Self { factor: turn * wanted.units_per_radian, sphere: Some(view) }
     }
@@ -154,9 +163,9 @@ impl Base {
 }
 
 impl SphereView {
-    fn new(shape: BaseShape, camera: &Camera, level_from_world: &Matrix3<f64>) -> Self {
+    fn new(conformality: f64, camera: &Camera, level_from_world: &Matrix3<f64>) -> Self {
         let level_from_camera = level_from_world * camera.rotation().transpose();
-        Self { shape, camera: *camera, level_from_camera, forward: level_from_camera.column(2).into_owned() }
+        Self { conformality, camera: *camera, level_from_camera, forward: level_from_camera.column(2).into_owned() }
     }
 
     fn is_moderate_all_over(&self, grid: &GridMesh) -> bool {
@@ -180,27 +189,19 @@ impl SphereView {
         let (ray, forward) = (self.ray(pixel), &self.forward);
         let horizontal = ray.x.hypot(ray.z);
         let longitude = (ray.x * forward.z - ray.z * forward.x).atan2(ray.x * forward.x + ray.z * forward.z);
-        let latitude = match self.shape {
-            BaseShape::Mercator => (ray.y / horizontal).asinh(),
-            BaseShape::Miller => (MILLER * ray.y.atan2(horizontal)).tan().asinh() / MILLER,
-            _ => ray.y.atan2(horizontal),
-        };
+        let latitude = unrolled_latitude(ray.y.atan2(horizontal), self.conformality);
         Vector2::new(longitude, latitude)
     }
 }
 
 /// The similarity closest to the projection's derivative at the picture's centre, per pixel.
-fn derivative_at_centre(shape: BaseShape, level_from_camera: &Matrix3<f64>, focal_px: f64) -> Vector2<f64> {
+fn derivative_at_centre(conformality: f64, level_from_camera: &Matrix3<f64>, focal_px: f64) -> Vector2<f64> {
     let forward: Vector3<f64> = level_from_camera.column(2).into_owned();
     let horizontal = forward.x.hypot(forward.z);
     let east = Vector3::new(forward.z, 0.0, -forward.x) / horizontal;
     let south = forward.cross(&east);
-    let (east_scale, south_scale) = match shape {
-        BaseShape::Mercator => (1.0 / horizontal, 1.0 / horizontal),
-        // Down is positive, so forward.y is the sine of the latitude.
-        BaseShape::Miller => (1.0 / horizontal, 1.0 / (MILLER * forward.y.atan2(horizontal)).cos()),
-        _ => (1.0 / horizontal, 1.0),
-    };
+    let latitude = forward.y.atan2(horizontal);
+    let (east_scale, south_scale) = (1.0 / horizontal, 1.0 / (conformality * latitude).cos());
     let derivative = |axis: usize| {
         let step = level_from_camera.column(axis) / focal_px;
         Vector2::new(step.dot(&east) * east_scale, step.dot(&south) * south_scale)
@@ -224,17 +225,18 @@ mod tests {
     #[test]
     fn a_picture_turned_by_its_roll_stands_upright_at_the_centre() {
         let grid = GridMesh::regular(800.0, 600.0, 2.0);
-        for shape in [BaseShape::Sphere, BaseShape::Mercator, BaseShape::Miller] {
+        for conformality in [0.0, 0.8, MERCATOR] {
+            let options = MeshOptions { conformality, ..MeshOptions::default() };
             let camera = camera(0.7, -0.4, 0.2);
             let wanted = WantedSimilarity { scale: 1.0, theta: 0.2, units_per_radian: 700.0 };
-            let base = Base::new(shape, &camera, &grid, &Matrix3::identity(), wanted).places(&grid);
+            let base = Base::new(&options, &camera, &grid, &Matrix3::identity(), wanted).places(&grid);
             // Down in the picture is (sin roll, cos roll) where the camera's roll is 0.2.
             let centre = grid.columns * (grid.rows / 2) + grid.columns / 2;
             let down = Vector2::new(0.2_f64.sin(), 0.2_f64.cos());
             let by_x = (base[centre + 1] - base[centre - 1]) / (2.0 * grid.cell_width());
             let by_y = (base[centre + grid.columns] - base[centre - grid.columns]) / (2.0 * grid.cell_height());
             let moved = by_x * down.x + by_y * down.y;
-            assert!((moved.x / moved.y).abs() < 1e-4, "{shape:?}: {moved}");
+            assert!((moved.x / moved.y).abs() < 1e-4, "{conformality}: {moved}");
         }
     }
 
@@ -253,12 +255,22 @@ mod tests {
         assert!(tilt(&[turn, lower].concat()).is_none());
     }
 
+    /// Latitude 60 degrees: ln(2 + sqrt(3)) in Mercator's projection; in Miller's 5/4 ln(tan(45 + 24 degrees)).
+    #[test]
+    fn conformality_leads_from_the_equirectangular_to_the_mercator_projection() {
+        let at = |conformality: f64| unrolled_latitude(60_f64.to_radians(), conformality);
+        assert!((at(0.0) - 60_f64.to_radians()).abs() < 1e-12);
+        assert!((at(1.0) - (2.0 + 3_f64.sqrt()).ln()).abs() < 1e-12);
+        assert!((at(0.8) - 1.25 * 69_f64.to_radians().tan().ln()).abs() < 1e-12);
+        assert!((at(2e-4) - at(0.0)).abs() < 1e-6);
+    }
+
     #[test]
     fn pictures_near_a_pole_get_the_plain_similarity() {
         let grid = GridMesh::regular(800.0, 600.0, 40.0);
         let wanted = WantedSimilarity { scale: 1.0, theta: 0.0, units_per_radian: 700.0 };
-        let base =
-            Base::new(BaseShape::Sphere, &camera(0.0, -1.3, 0.0), &grid, &Matrix3::identity(), wanted).places(&grid);
+        let base = Base::new(&MeshOptions::default(), &camera(0.0, -1.3, 0.0), &grid, &Matrix3::identity(), wanted)
+            .places(&grid);
         assert!((base[grid.len() - 1] - grid.source(grid.len() - 1)).norm() < 1e-9);
     }
 }

@@ -39,7 +39,10 @@ trueup_core::options! {
         /// Largest side of a grid cell.
         cell_px: f64 = 40.0, between(4.0, 1000.0), "working px";
         /// The shape that the similarity prior asks of each picture.
-        base: BaseShape = BaseShape::Miller, Allowed::Any, "";
+        base: BaseShape = BaseShape::Sphere, Allowed::Any, "";
+        /// How the sphere is unrolled: 0 is the equirectangular projection, which stretches steep pictures sideways; 1 is
+        /// Mercator's, which keeps shapes and enlarges steep pictures.
+        conformality: f64 = 0.85, between(0.0, 1.0), "";
         /// Cells of the delivered grid per cell of the solved one, along each axis: the finer grid follows the base's
         /// curves between the solved vertices.
         subdivision: usize = 2, between(1.0, 16.0), "";
