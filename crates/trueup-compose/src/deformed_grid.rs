@@ -128,16 +128,28 @@ impl DeformedGrid {
     /// The runs of canvas row `y` in order of columns, from `candidates` (see [`Self::cells_in_rows`]). No column is in
     /// two runs. `owner` is scratch space.
     pub(crate) fn runs(&self, y: usize, candidates: &[u32], owner: &mut Vec<u32>, runs: &mut Vec<Run>) {
-        let start = self.columns.start;
+        self.runs_within(y, &self.columns, candidates, owner, runs);
+    }
+
+    /// [`Self::runs`] cut to `columns`, a part of [`Self::columns`].
+    pub(crate) fn runs_within(
+        &self,
+        y: usize,
+        columns: &Range<usize>,
+        candidates: &[u32],
+        owner: &mut Vec<u32>,
+        runs: &mut Vec<Run>,
+    ) {
+        let start = columns.start;
         owner.clear();
-        owner.resize(self.columns.len(), NO_CELL);
+        owner.resize(columns.len(), NO_CELL);
         runs.clear();
         let centre_y = y as f64 + 0.5;
         for &index in candidates {
             let (crossings, count) = self.cells[index as usize].crossings(centre_y);
             for pair in crossings[..count].chunks_exact(2) {
-                let first = first_centre_from(pair[0], self.columns.end).max(start);
-                let end = first_centre_from(pair[1], self.columns.end).max(first);
+                let first = first_centre_from(pair[0], columns.end).max(start);
+                let end = first_centre_from(pair[1], columns.end).max(first);
                 owner[first - start..end - start].fill(index);
             }
         }
