@@ -5,17 +5,20 @@
 //! * [`layout`]: deformed grids in any common unit to one canvas in pixels;
 //! * [`exposure`]: reduced photographs to gain, colour cast and vignetting of each;
 //! * [`render`]: full-resolution photographs, layout and corrections to a [`render::Panorama`], along the seams that
-//!   [`seam`] finds.
+//!   [`seam`] finds;
+//! * [`fidelity`]: how true a panorama is to its photographs.
 //!
 //! Every photograph is resampled exactly once, from its own samples straight to the canvas.
 
 pub mod exposure;
+pub mod fidelity;
 pub mod layout;
 pub mod render;
 pub mod seam;
 
 mod blend;
 mod deformed_grid;
+mod distance;
 mod sampling;
 #[allow(unsafe_code)] // Vector instructions chosen at run time; every other module is safe code.
 mod simd;

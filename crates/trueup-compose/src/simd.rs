@@ -3,7 +3,7 @@
 //! Every function chooses at run time and has a portable form with the same order of operations and no fused
 //! multiply-add, so that both give the same bits.
 
-use crate::exposure::LightTable;
+use crate::exposure::{LightTable, exposed};
 use crate::sampling::Kernel;
 use crate::transfer_curve::Linearise;
 use crate::weights::{Feather, weight};
@@ -200,10 +200,10 @@ fn accumulate_portable(
         let inside = if combine == Combine::Equal { 1.0 } else { feather.at(column, row, fraction_x, fraction_y) };
         let weight = weight(share, inside);
         let lift = if varies { light.at(column as f32 + 0.5 + fraction_x, row as f32 + 0.5 + fraction_y) } else { 1.0 };
-        let scale = weight * lift;
-        let (r, g, b) = (linearise.linear(r) * gain[0], linearise.linear(g) * gain[1], linearise.linear(b) * gain[2]);
+        let light = |level: f32, gain: f32| exposed(linearise.linear(level), gain * lift);
+        let (r, g, b) = (light(r, gain[0]), light(g, gain[1]), light(b, gain[2]));
         let sum = &mut sums[index];
-        *sum = [sum[0] + r * scale, sum[1] + g * scale, sum[2] + b * scale, sum[3] + weight];
+        *sum = [sum[0] + r * weight, sum[1] + g * weight, sum[2] + b * weight, sum[3] + weight];
     }
 }
 
@@ -246,7 +246,7 @@ fn develop_portable(development: Development<'_>, positions: &Positions, samples
             share *= feather.coverage(position, footprint);
         }
         let lift = if varies { light.at(position[0], position[1]) } else { 1.0 };
-        let root = |level: f32, gain: f32| (linearise.linear(level) * (gain * lift)).sqrt();
+        let root = |level: f32, gain: f32| exposed(linearise.linear(level), gain * lift).sqrt();
         *sample = [root(r, gain[0]), root(g, gain[1]), root(b, gain[2]), share];
     }
 }

@@ -44,6 +44,7 @@ pub use project::{
     Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
 };
 pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};
+pub use trueup_compose::fidelity::Fidelity;
 pub use trueup_compose::render::Panorama;
 pub use trueup_core::context::{CancelToken, Progress, Silent};
 pub use trueup_core::diagnostics::{Diagnostic, Severity};

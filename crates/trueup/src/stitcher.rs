@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use trueup_align::stitch_graph::{GraphFile, StitchGraph, parse_graph_file};
 use trueup_compose::exposure::{self, Correction, Thumbnail};
+use trueup_compose::fidelity::{self, Fidelity};
 use trueup_compose::layout::{self, CanvasLayout};
 use trueup_compose::render::{self, Panorama};
 use trueup_core::diagnostics::Diagnostic;
@@ -168,6 +169,28 @@ impl<'a> Stitcher<'a> {
             &self.options.seam,
             self.context,
         )
+    }
+
+    /// Measures how true `panorama`, composed of `alignment`, is to its photographs: steps across its seams, and ghosts.
+    /// Renders every photograph alone on the canvas, five bytes a pixel of each.
+    ///
+    /// # Errors
+    /// Those of reading the photographs; [`Error::Input`] if the two do not belong together; [`Error::Cancelled`].
+    pub fn fidelity(&self, alignment: &Alignment, panorama: &Panorama) -> Result<Fidelity> {
+        let layout = &alignment.layout;
+        let layers = (0..layout.placed.len())
+            .map(|position| {
+                self.context.check_cancelled()?;
+                let photographs = alignment.photographs.as_ref();
+                render::layer(layout, &alignment.corrections, position, photographs, &self.options.render)
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let size = [layout.width, layout.height];
+        let shown = match panorama.seams() {
+            Some(seams) => seams.on_canvas(size),
+            None => fidelity::deepest(&layers, size)?,
+        };
+        fidelity::measure(panorama, &layers, &shown)
     }
 
     fn check_any(&self, sources: &Sources, inputs: &Inputs) -> Result<()> {

@@ -26,7 +26,7 @@ use trueup_core::{Result, StageContext};
 use crate::exposure::Correction;
 use crate::layout::CanvasLayout;
 use crate::render::RenderOptions;
-use crate::render::prepared::{Prepared, Scratch};
+use crate::render::prepared::{Prepared, Scratch, check_photograph};
 use crate::seam::{self, Label, SeamOptions, Seams};
 use coarse::FIRST_LEVEL;
 use pyramid::Plane;
@@ -85,7 +85,7 @@ pub(crate) fn run(
     let canvas = [layout.width, layout.height];
     // Small pictures, seams, and the photographs themselves.
     context.progress().begin(stage, 2 * count as u64);
-    let levels = if cut { None } else { Some(levels_above(layout, options)) };
+    let levels = if cut || count == 1 { None } else { Some(levels_above(layout, options)) };
     let views::Small { views, size, bases, mut kept } =
         views::make(layout, corrections, photographs, options, seam_options, levels.is_some(), context)?;
     let seams = if count == 1 {
@@ -115,7 +115,8 @@ pub(crate) fn run(
                     Some(photograph) => photograph,
                     None => photographs.photograph(placed.photograph)?,
                 };
-                let prepared = Prepared::new(Cow::Owned(photograph), placed, &placed.mesh, canvas, &corrections[at], options)?;
+                check_photograph(placed, &photograph)?;
+                let prepared = Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, &corrections[at], options);
                 context.progress().advance(stage, 1);
                 Ok((at, prepared))
             })

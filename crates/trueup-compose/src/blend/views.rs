@@ -1,6 +1,7 @@
 //! The first pass: small pictures of all photographs.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use rayon::prelude::*;
 use trueup_core::mesh::GridMesh;
@@ -14,8 +15,8 @@ use super::coarse::{FIRST_LEVEL, spread};
 use super::pyramid::Plane;
 use crate::exposure::Correction;
 use crate::layout::{CanvasLayout, Placed};
-use crate::render::RenderOptions;
-use crate::render::prepared::{Prepared, Scratch, Window};
+use crate::render::{Interpolation, RenderOptions};
+use crate::render::prepared::{Prepared, Scratch, Window, check_photograph};
 use crate::seam::{CLIPPED, PARTLY, SeamOptions, View, WHOLLY};
 use crate::weights::WHOLE;
 
@@ -46,6 +47,10 @@ pub(super) fn make(
     let canvas = [layout.width, layout.height];
     let size = small_size(canvas, seam_options.fine_pixels);
     let mut small = Small { views: Vec::new(), size, bases: Vec::new(), kept: Vec::new() };
+    // Halved as often as can be, then read between samples: nothing here is ever looked at.
+    let halving =
+        RenderOptions { interpolation: Interpolation::Bilinear, minification_threshold: 1.0, ..options.clone() };
+    let sampling = RenderOptions { minification_threshold: 4.0, ..halving.clone() };
     let mut room = options.kept_photographs * 1e6;
     let at_a_time = rayon::current_num_threads().max(1);
     for (placed, corrections) in layout.placed.chunks(at_a_time).zip(corrections.chunks(at_a_time)) {
@@ -55,12 +60,13 @@ pub(super) fn make(
             .zip(corrections)
             .map(|(placed, correction)| {
                 let photograph = photographs.photograph(placed.photograph)?;
-                let view = match layout.placed.len() {
-                    1 => View::default(),
-                    _ => view(&photograph, placed, correction, (canvas, size), options)?,
-                };
+                check_photograph(placed, &photograph)?;
+                // The larger picture first: the smaller is made from what is left of the photograph then.
+                let mesh = scaled(&placed.mesh, [0, 1].map(|axis| size[axis] as f64 / canvas[axis] as f64), 0.0);
+                let prepared = Prepared::new(Cow::Borrowed(&photograph), &mesh, size, correction, &halving);
+                let view = if layout.placed.len() == 1 { View::default() } else { view(&prepared, &sampling) };
                 let base = match with_bases {
-                    true => base(&photograph, placed, correction, canvas, options)?,
+                    true => base(&prepared, placed, correction, canvas, [&halving, &sampling]),
                     false => Base::default(),
                 };
                 context.progress().advance(RenderOptions::STAGE, 1);
@@ -94,63 +100,55 @@ fn scaled(mesh: &GridMesh, scale: [f64; 2], shift: f64) -> GridMesh {
     mesh
 }
 
-fn view(
-    photograph: &Photograph,
-    placed: &Placed,
-    correction: &Correction,
-    (canvas, size): ([usize; 2], [usize; 2]),
-    options: &RenderOptions,
-) -> Result<View> {
-    let mesh = scaled(&placed.mesh, [0, 1].map(|axis| size[axis] as f64 / canvas[axis] as f64), 0.0);
-    let prepared = Prepared::new(Cow::Borrowed(photograph), placed, &mesh, size, correction, options)?;
-        let (columns, rows) = (prepared.columns(), prepared.rows());
-        let mut samples = vec![[0.0; 4]; columns.len() * rows.len()];
-        let mut clipped = vec![false; samples.len()];
-        let window = Window { columns: &columns, rows: &rows };
-        prepared.sample_with(window, &mut samples, options, &mut Scratch::default(), |first, raw| {
-            for (clipped, sample) in clipped[first..].iter_mut().zip(raw) {
-                *clipped = sample[..3].iter().any(|&level| level >= SATURATED);
-            }
-        });
-        let pixels = samples
-            .iter()
-            .zip(clipped)
-            .map(|(&[r, g, b, share], clipped)| {
-                // The casts saturate.
-                let level = |root: f32| (root * 255.0 + 0.5) as u8;
-                let flags = u8::from(share > 0.0) * PARTLY
-                    | u8::from(share >= WHOLE) * WHOLLY
-                    | u8::from(clipped && share > 0.0) * CLIPPED;
-                [level(r), level(g), level(b), flags]
-            })
-            .collect();
-        Ok(View { columns, rows, pixels })
+fn view(prepared: &Prepared<'_>, options: &RenderOptions) -> View {
+    let (columns, rows) = (prepared.columns(), prepared.rows());
+    let mut samples = vec![[0.0; 4]; columns.len() * rows.len()];
+    let mut clipped = vec![false; samples.len()];
+    let window = Window { columns: &columns, rows: &rows };
+    prepared.sample_with(window, &mut samples, options, &mut Scratch::default(), |first, raw| {
+        for (clipped, sample) in clipped[first..].iter_mut().zip(raw) {
+            *clipped = sample[..3].iter().any(|&level| level >= SATURATED);
+        }
+    });
+    let pixels = samples
+        .iter()
+        .zip(clipped)
+        .map(|(&[r, g, b, share], clipped)| {
+            // The casts saturate.
+            let level = |root: f32| (root * 255.0 + 0.5) as u8;
+            let flags = u8::from(share > 0.0) * PARTLY
+                | u8::from(share >= WHOLE) * WHOLLY
+                | u8::from(clipped && share > 0.0) * CLIPPED;
+            [level(r), level(g), level(b), flags]
+        })
+        .collect();
+    View { columns, rows, pixels }
 }
 
 /// The photograph at the samples of level [`FIRST_LEVEL`].
 fn base(
-    photograph: &Photograph,
+    larger: &Prepared<'_>,
     placed: &Placed,
     correction: &Correction,
     canvas: [usize; 2],
-    options: &RenderOptions,
-) -> Result<Base> {
+    [halving, sampling]: [&RenderOptions; 2],
+) -> Base {
     let step = f64::from(1_u32 << FIRST_LEVEL);
     // Sample i lies on the middle of pixel i * step.
     let mesh = scaled(&placed.mesh, [step.recip(); 2], 0.5 - 0.5 / step);
+    let (photograph, [width, height]) = larger.photograph();
+    let mesh = GridMesh { width, height, ..mesh };
     let size = canvas.map(|length| length.div_ceil(1 << FIRST_LEVEL));
-    let prepared = Prepared::new(Cow::Borrowed(photograph), placed, &mesh, size, correction, options)?;
-        let grown = |range: std::ops::Range<usize>, length: usize| {
-            range.start.saturating_sub(1)..(range.end + 1).min(length)
-        };
-        let (columns, rows) = (grown(prepared.columns(), size[0]), grown(prepared.rows(), size[1]));
-        let mut plane = Plane::new(columns.clone(), rows.clone());
-        let window = Window { columns: &columns, rows: &rows };
-        prepared.sample(window, &mut plane.texels, options, &mut Scratch::default());
-        for texel in &mut plane.texels {
-            let [r, g, b, share] = *texel;
-            *texel = [r * share, g * share, b * share, share];
-        }
-        spread(&mut plane);
-        Ok(Base { plane })
+    let prepared = Prepared::new(Cow::Borrowed(photograph), &mesh, size, correction, halving);
+    let grown = |range: Range<usize>, length: usize| range.start.saturating_sub(1)..(range.end + 1).min(length);
+    let (columns, rows) = (grown(prepared.columns(), size[0]), grown(prepared.rows(), size[1]));
+    let mut plane = Plane::new(columns.clone(), rows.clone());
+    let window = Window { columns: &columns, rows: &rows };
+    prepared.sample(window, &mut plane.texels, sampling, &mut Scratch::default());
+    for texel in &mut plane.texels {
+        let [r, g, b, share] = *texel;
+        *texel = [r * share, g * share, b * share, share];
+    }
+    spread(&mut plane);
+    Base { plane }
 }

@@ -10,7 +10,7 @@ mod samples;
 mod solve;
 
 pub use correction::{Correction, VIGNETTING_TERMS};
-pub(crate) use correction::LightTable;
+pub(crate) use correction::{LightTable, exposed};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

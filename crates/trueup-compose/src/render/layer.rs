@@ -6,7 +6,7 @@ use trueup_core::Result;
 use trueup_core::raster::{LUMA, Raster};
 use trueup_core::source::PhotographSource;
 
-use super::prepared::{Prepared, Scratch, Window};
+use super::prepared::{Prepared, Scratch, Window, check_photograph};
 use super::{BAND_ROWS, RenderOptions, check};
 use crate::exposure::Correction;
 use crate::layout::CanvasLayout;
@@ -45,9 +45,10 @@ pub fn layer(
             "Ask for one of the photographs placed.",
         ));
     };
-    let photograph = Cow::Owned(photographs.photograph(placed.photograph)?);
+    let photograph = photographs.photograph(placed.photograph)?;
+    check_photograph(placed, &photograph)?;
     let size = [layout.width, layout.height];
-    let prepared = Prepared::new(photograph, placed, &placed.mesh, size, &corrections[position], options)?;
+    let prepared = Prepared::new(Cow::Owned(photograph), &placed.mesh, size, &corrections[position], options);
     let (columns, rows) = (prepared.columns(), prepared.rows());
     let (width, height) = (columns.len(), rows.len());
     let mut layer = Layer {

@@ -24,7 +24,7 @@ use crate::deformed_grid::count_folded_triangles;
 use crate::exposure::Correction;
 use crate::layout::{CanvasLayout, check_mesh};
 use crate::seam::SeamOptions;
-use prepared::{Prepared, Scratch};
+use prepared::{Prepared, Scratch, check_photograph};
 
 const STAGE: &str = RenderOptions::STAGE;
 
@@ -65,7 +65,7 @@ trueup_core::options! {
         blend: Blend = Blend::MultiBand, Allowed::Any, "";
         /// Widest transition of multi-band blending, as a share of the photographs' shorter side on the canvas. Higher
         /// evens out more of what differs in brightness and colour.
-        transition: f64 = 0.1, between(0.0, 1.0), "";
+        transition: f64 = 0.25, between(0.0, 1.0), "";
         /// Decoded photographs are kept up to this much memory between the search of the seams and the blending, so that
         /// they need not be decoded again.
         kept_photographs: f64 = 512.0, between(0.0, 1000000.0), "MB";
@@ -130,8 +130,9 @@ fn mean(
             .par_iter()
             .zip(corrections)
             .map(|(placed, correction)| {
-                let photograph = Cow::Owned(photographs.photograph(placed.photograph)?);
-                Prepared::new(photograph, placed, &placed.mesh, [width, height], correction, options)
+                let photograph = photographs.photograph(placed.photograph)?;
+                check_photograph(placed, &photograph)?;
+                Ok(Prepared::new(Cow::Owned(photograph), &placed.mesh, [width, height], correction, options))
             })
             .collect::<Result<_>>()?;
         sums.par_chunks_mut(width * BAND_ROWS).enumerate().try_for_each(|(band, sums)| {
@@ -187,4 +188,4 @@ fn report_folds(layout: &CanvasLayout, context: &StageContext) {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -44,16 +44,15 @@ pub(crate) struct Window<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    /// `placed`'s photograph on a canvas of `size` pixels (width, height), where `mesh` puts it.
+    /// A photograph on a canvas of `size` pixels (width, height), where `mesh` puts it; the two fit together, see
+    /// [`check_photograph`].
     pub(crate) fn new(
         mut photograph: Cow<'a, Photograph>,
-        placed: &Placed,
         mesh: &GridMesh,
         size: [usize; 2],
         correction: &Correction,
         options: &RenderOptions,
-    ) -> Result<Self> {
-        check_photograph(placed, &photograph)?;
+    ) -> Self {
         let grid_of = |mesh: &GridMesh| DeformedGrid::new(mesh, 1.0, true, size[0], size[1]);
         let mut grid = grid_of(mesh);
         let halvings = halvings_before_sampling(&grid, options.minification_threshold);
@@ -68,7 +67,12 @@ impl<'a> Prepared<'a> {
         }
         let feather = Feather::new(grid.size, options.feather_exponent);
         let light = LightTable::new(correction, grid.size);
-        Ok(Self { photograph, grid, feather, light })
+        Self { photograph, grid, feather, light }
+    }
+
+    /// The photograph as it is sampled, maybe reduced, and its exact size.
+    pub(crate) fn photograph(&self) -> (&Photograph, [f64; 2]) {
+        (&self.photograph, self.grid.size)
     }
 
     /// Columns of the canvas that may be covered.
@@ -193,7 +197,8 @@ impl<'a> Prepared<'a> {
     }
 }
 
-fn check_photograph(placed: &Placed, photograph: &Photograph) -> Result<()> {
+/// Refuses a photograph that is not the one its grid was made for.
+pub(crate) fn check_photograph(placed: &Placed, photograph: &Photograph) -> Result<()> {
     let (width, height) = (photograph.width(), photograph.height());
     let fits = width as f64 == placed.mesh.width.round() && height as f64 == placed.mesh.height.round();
     if fits && matches!(photograph.channels(), 1 | 3 | 4) {

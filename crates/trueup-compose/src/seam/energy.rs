@@ -4,17 +4,17 @@ use super::SeamOptions;
 use super::view::{CLIPPED, IGNORED, KEPT, PARTLY, View, WHOLLY};
 
 /// Costs are whole numbers; one grey level of 255 is this many.
-pub(super) const UNIT: f64 = 16.0;
+pub(super) const UNIT: i32 = 16;
 
 /// Cost of a pixel that the user does not want so: no seam that saves it is too long.
 const UNWANTED: i32 = 1 << 16;
 
-/// Difference taken for a pixel that only one of the two photographs shows, grey levels: half of [`MAX_DIFFERENCE`], so
-/// that the differences of three photographs obey the triangle inequality.
-const UNSEEN: f64 = 64.0;
+/// Difference taken for a pixel that only one of the two photographs shows: no less than any other, since at the border of
+/// a photograph there is no room to blend.
+const UNSEEN: i32 = MAX_DIFFERENCE;
 
-/// Largest difference of a pixel, grey levels.
-const MAX_DIFFERENCE: f64 = 128.0;
+/// Largest difference of a pixel; that of three photographs obeys the triangle inequality with it, too.
+const MAX_DIFFERENCE: i32 = 128 * UNIT;
 
 /// One level of the pyramid of small canvases: the photographs, and what is derived from them.
 pub(super) struct Scene<'a> {
@@ -28,10 +28,10 @@ pub(super) struct Scene<'a> {
     anyone: Vec<u8>,
     /// Number of the moving thing that covers a canvas pixel; 0 for none.
     pub(super) moving: &'a [u32],
-    length: f64,
-    gradient_weight: f64,
-    depth_weight: f64,
-    clipped_cost: f64,
+    length: i32,
+    gradient_weight: i32,
+    depth_weight: i32,
+    clipped_cost: i32,
     moving_cost: i32,
 }
 
@@ -70,11 +70,11 @@ impl<'a> Scene<'a> {
             depths: views.iter().map(View::depths).collect(),
             anyone,
             moving,
-            length: options.length,
-            gradient_weight: options.gradient_weight,
-            depth_weight: options.depth_weight,
-            clipped_cost: options.clipped_cost,
-            moving_cost: (options.moving_cost * UNIT) as i32,
+            length: in_units(options.length),
+            gradient_weight: in_units(options.gradient_weight),
+            depth_weight: in_units(options.depth_weight),
+            clipped_cost: in_units(options.clipped_cost),
+            moving_cost: in_units(options.moving_cost),
         }
     }
 
@@ -94,13 +94,12 @@ impl<'a> Scene<'a> {
     pub(super) fn data_cost(&self, label: usize, x: usize, y: usize) -> i32 {
         let flags = self.views[label].flags(x, y);
         let anyone = self.anyone[y * self.width + x];
-        let outside = 1.0 - f64::from(self.depth(label, x, y)) / 255.0;
-        let mut cost = self.depth_weight * outside;
+        let mut cost = self.depth_weight * (255 - i32::from(self.depth(label, x, y))) / 255;
         if flags & CLIPPED != 0 && anyone & ANY_UNCLIPPED != 0 {
             cost += self.clipped_cost;
         }
         let unwanted = flags & IGNORED != 0 || anyone & ANY_KEPT != 0 && flags & KEPT == 0;
-        (cost * UNIT) as i32 + if unwanted { UNWANTED } else { 0 }
+        cost + if unwanted { UNWANTED } else { 0 }
     }
 
     /// Cost of a seam between neighbouring canvas pixels, `a` shown at `p` and `b` at `q`; 0 for equal labels.
@@ -112,14 +111,19 @@ impl<'a> Scene<'a> {
         if a == b {
             return 0;
         }
-        let difference = self.difference(a, b, p) + self.difference(a, b, q);
-        let (at_p, at_q) = (self.moving[p.1 * self.width + p.0], self.moving[q.1 * self.width + q.0]);
-        let through = if at_p != 0 && at_p == at_q { self.moving_cost } else { 0 };
-        ((self.length + difference) * UNIT) as i32 + through
+        self.cost_of(p, q, self.difference(a, b, p) + self.difference(a, b, q))
     }
 
-    /// How differently two photographs show a canvas pixel, grey levels.
-    fn difference(&self, a: usize, b: usize, (x, y): (usize, usize)) -> f64 {
+    /// Cost of a seam between neighbouring pixels from the sum of the differences at both.
+    #[inline]
+    pub(super) fn cost_of(&self, p: (usize, usize), q: (usize, usize), difference: i32) -> i32 {
+        let (at_p, at_q) = (self.moving[p.1 * self.width + p.0], self.moving[q.1 * self.width + q.0]);
+        let through = if at_p != 0 && at_p == at_q { self.moving_cost } else { 0 };
+        self.length + difference + through
+    }
+
+    /// How differently two photographs show a canvas pixel.
+    pub(super) fn difference(&self, a: usize, b: usize, (x, y): (usize, usize)) -> i32 {
         let (Some(i), Some(j)) = (self.views[a].index(x, y), self.views[b].index(x, y)) else { return UNSEEN };
         let (first, second) = (self.views[a].pixels[i], self.views[b].pixels[j]);
         if first[3] & second[3] & PARTLY == 0 {
@@ -128,9 +132,13 @@ impl<'a> Scene<'a> {
         let colour: i32 = (0..3).map(|c| i32::from(first[c].abs_diff(second[c]))).sum();
         let (g, h) = (self.gradients[a][i], self.gradients[b][j]);
         let gradient: i32 = (0..2).map(|axis| i32::from(g[axis] - h[axis]).abs()).sum();
-        let sum = f64::from(colour) / 3.0 + self.gradient_weight * 0.5 * f64::from(gradient);
-        sum.min(MAX_DIFFERENCE)
+        (colour * UNIT / 3 + gradient * self.gradient_weight / 2).min(MAX_DIFFERENCE)
     }
+}
+
+/// Grey levels as a cost.
+fn in_units(levels: f64) -> i32 {
+    (levels * f64::from(UNIT)).round() as i32
 }
 
 /// Central differences of the luma over covered pixels; one-sided or zero at the border.

@@ -15,8 +15,13 @@ use super::{Label, NOBODY};
 #[derive(Default)]
 pub(super) struct Expansions {
     flow: GridFlow,
-    is_node: Vec<bool>,
+    /// For each pixel of the box the difference of the photograph shown and the one that expands; [`FIXED`] where the
+    /// pixel does not take part.
+    change: Vec<i32>,
 }
+
+/// See [`Expansions::change`].
+const FIXED: i32 = -1;
 
 /// The labelling that shows everywhere the photograph that lies deepest.
 pub(super) fn deepest(scene: &Scene<'_>) -> Vec<Label> {
@@ -48,15 +53,16 @@ impl Expansions {
         free: &dyn Fn(usize) -> bool,
     ) -> bool {
         let (width, height) = (columns.len(), rows.len());
-        self.is_node.clear();
-        self.is_node.resize(width * height, false);
+        self.change.clear();
+        self.change.resize(width * height, FIXED);
         let mut nodes = 0;
         for y in rows.clone() {
             for x in columns.clone() {
                 let at = y * scene.width + x;
                 let old = labels[at];
                 if old != NOBODY && usize::from(old) != label && free(at) && scene.allowed(label, x, y) {
-                    self.is_node[(y - rows.start) * width + x - columns.start] = true;
+                    let difference = scene.difference(usize::from(old), label, (x, y));
+                    self.change[(y - rows.start) * width + x - columns.start] = difference;
                     nodes += 1;
                 }
             }
@@ -67,7 +73,7 @@ impl Expansions {
         self.flow.reset(width, height);
         for (v, y) in rows.clone().enumerate() {
             for (u, x) in columns.clone().enumerate() {
-                if self.is_node[v * width + u] {
+                if self.change[v * width + u] != FIXED {
                     let old = usize::from(labels[y * scene.width + x]);
                     let change = scene.data_cost(label, x, y) - scene.data_cost(old, x, y);
                     self.flow.add_sink_side_cost(self.flow.node(u, v), change);
@@ -98,7 +104,7 @@ impl Expansions {
         let mut changed = false;
         for (v, y) in rows.clone().enumerate() {
             for (u, x) in columns.clone().enumerate() {
-                if self.is_node[v * width + u] && self.flow.on_sink_side(self.flow.node(u, v)) {
+                if self.change[v * width + u] != FIXED && self.flow.on_sink_side(self.flow.node(u, v)) {
                     labels[y * scene.width + x] = label as Label;
                     changed = true;
                 }
@@ -117,19 +123,30 @@ impl Expansions {
         [p, q]: [(usize, usize); 2],
         direction: usize,
     ) {
+        let node = |(x, y): (usize, usize)| {
+            if !(columns.contains(&x) && rows.contains(&y)) {
+                return None;
+            }
+            let (u, v) = (x - columns.start, y - rows.start);
+            let change = self.change[v * columns.len() + u];
+            (change != FIXED).then(|| (self.flow.node(u, v), change))
+        };
+        let (node_p, node_q) = (node(p), node(q));
+        if node_p.is_none() && node_q.is_none() {
+            return;
+        }
         let old = |(x, y): (usize, usize)| labels[y * scene.width + x];
         let (a, b) = (old(p), old(q));
         if a == NOBODY || b == NOBODY {
             return;
         }
-        let node = |(x, y): (usize, usize)| {
-            let inside = columns.contains(&x) && rows.contains(&y);
-            let (u, v) = (x.wrapping_sub(columns.start), y.wrapping_sub(rows.start));
-            (inside && self.is_node[v * columns.len() + u]).then(|| self.flow.node(u, v))
-        };
         let (a, b) = (usize::from(a), usize::from(b));
-        match (node(p), node(q)) {
-            (Some(at_p), Some(at_q)) => {
+        match (node_p, node_q) {
+            (Some((at_p, change_p)), Some((_, change_q))) if a == b => {
+                let seam = scene.cost_of(p, q, change_p + change_q);
+                self.flow.add_arcs(at_p, direction, seam, seam);
+            }
+            (Some((at_p, _)), Some((at_q, _))) => {
                 let keep_both = scene.seam_cost(p, a, q, b);
                 let q_changes = scene.seam_cost(p, a, q, label);
                 let p_changes = scene.seam_cost(p, label, q, b);
@@ -138,11 +155,11 @@ impl Expansions {
                 // Rounding may miss the triangle inequality by one.
                 self.flow.add_arcs(at_p, direction, (q_changes + p_changes - keep_both).max(0), 0);
             }
-            (Some(at_p), None) => {
+            (Some((at_p, _)), None) => {
                 let change = scene.seam_cost(p, label, q, b) - scene.seam_cost(p, a, q, b);
                 self.flow.add_sink_side_cost(at_p, change);
             }
-            (None, Some(at_q)) => {
+            (None, Some((at_q, _))) => {
                 let change = scene.seam_cost(p, a, q, label) - scene.seam_cost(p, a, q, b);
                 self.flow.add_sink_side_cost(at_q, change);
             }

@@ -113,6 +113,17 @@ impl Seams {
         out.extend(columns.clone().map(|x| self.at((x as f64 + 0.5) * across, v)));
     }
 
+    /// Labels of all pixels of a canvas of `full` pixels (width, height), row by row.
+    pub fn on_canvas(&self, full: [usize; 2]) -> Vec<Label> {
+        let mut row = Vec::new();
+        let mut labels = Vec::with_capacity(full[0] * full[1]);
+        for y in 0..full[1] {
+            self.row(y, &(0..full[0]), full, &mut row);
+            labels.extend_from_slice(&row);
+        }
+        labels
+    }
+
     /// The photographs that a box of a canvas of `full` pixels may show, in order.
     pub(crate) fn shown_in(&self, columns: &Range<usize>, rows: &Range<usize>, full: [usize; 2]) -> Vec<Label> {
         let low = |at: usize, of: usize, full: usize| (at * of / full).saturating_sub(1);

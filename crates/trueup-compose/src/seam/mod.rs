@@ -11,6 +11,8 @@ mod max_flow;
 mod moving;
 mod view;
 
+use std::ops::Range;
+
 use trueup_core::options::StageOptions;
 use trueup_core::{Error, Result, StageContext};
 
@@ -37,7 +39,7 @@ trueup_core::options! {
         /// Half width of the band in which a seam may move when it is followed to a canvas of twice the size.
         band_px: usize = 3, between(1.0, 64.0), "px";
         /// Rounds over all photographs on the coarse canvas, at most.
-        rounds: usize = 3, between(1.0, 100.0), "";
+        rounds: usize = 2, between(1.0, 100.0), "";
         /// Cost of a seam for its length alone, grey levels of difference. Higher makes seams shorter.
         length: f64 = 2.0, between(0.0, 255.0), "level";
         /// Weight of the difference of gradients beside that of colours. Higher keeps seams from crossing contours that do
@@ -45,9 +47,9 @@ trueup_core::options! {
         gradient_weight: f64 = 1.0, between(0.0, 100.0), "";
         /// Cost of showing a photograph at its border instead of in its middle, per pixel of the canvas. Higher moves seams
         /// towards the middle of overlaps.
-        depth_weight: f64 = 0.5, between(0.0, 100.0), "level";
+        depth_weight: f64 = 2.5, between(0.0, 100.0), "level";
         /// Cost of showing a photograph where its highlights are clipped and another one's are not, per pixel.
-        clipped_cost: f64 = 4.0, between(0.0, 255.0), "level";
+        clipped_cost: f64 = 1.5, between(0.0, 255.0), "level";
         /// Further cost of a seam through a thing that moved.
         moving_cost: f64 = 60.0, between(0.0, 1000.0), "level";
         /// Difference from which on photographs are taken to show different things.
@@ -133,17 +135,32 @@ fn search(
     context: &StageContext,
 ) -> Result<Vec<Label>> {
     let mut labels = deepest(scene);
+    // A photograph whose surroundings stayed as it left them would take nothing.
+    let mut last_change = vec![1_usize; scene.views.len()];
+    let mut last_try = vec![0_usize; scene.views.len()];
+    let mut clock = 1;
     for _ in 0..options.rounds {
-        let mut changed = false;
         for (label, view) in scene.views.iter().enumerate() {
             context.check_cancelled()?;
-            changed |= expansions.expand(scene, &mut labels, label, (&view.columns, &view.rows), &|_| true);
-        }
-        if !changed {
-            break;
+            if last_try[label] >= last_change[label] {
+                continue;
+            }
+            clock += 1;
+            last_try[label] = clock;
+            if expansions.expand(scene, &mut labels, label, (&view.columns, &view.rows), &|_| true) {
+                for (other, neighbour) in scene.views.iter().enumerate() {
+                    if other != label && meet(&view.columns, &neighbour.columns) && meet(&view.rows, &neighbour.rows) {
+                        last_change[other] = clock;
+                    }
+                }
+            }
         }
     }
     Ok(labels)
+}
+
+fn meet(a: &Range<usize>, b: &Range<usize>) -> bool {
+    a.start <= b.end && b.start <= a.end
 }
 
 /// The labelling of a finer canvas from that of a coarser one: seams move within a band.

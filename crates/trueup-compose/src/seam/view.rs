@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::distance::border_distances;
+
 /// What is known of one pixel of a [`View`] beside its colour.
 ///
 /// The photograph covers it in part.
@@ -74,31 +76,10 @@ impl View {
         [r, g, b, any & !WHOLLY | all & WHOLLY]
     }
 
-    /// Distance of every pixel to the border of what is covered wholly, relative to the largest, 0 to 255. City-block
-    /// steps of 3 and diagonal ones of 4 (Borgefors, "Distance transformations in digital images", CVGIP 34, 1986).
+    /// Distance of every pixel to the border of what is covered wholly, relative to the largest, 0 to 255.
     pub(super) fn depths(&self) -> Vec<u8> {
-        let (width, height) = (self.columns.len(), self.rows.len());
-        let mut distance = vec![0_u32; width * height];
-        let at = |distance: &[u32], x: isize, y: isize| {
-            let inside = x >= 0 && y >= 0 && (x as usize) < width && (y as usize) < height;
-            if inside { distance[y as usize * width + x as usize] } else { 0 }
-        };
-        let covered = |index: usize| self.pixels[index][3] & WHOLLY != 0;
-        for forward in [true, false] {
-            let sign = if forward { -1 } else { 1 };
-            for step in 0..width * height {
-                let index = if forward { step } else { width * height - 1 - step };
-                if !covered(index) {
-                    continue;
-                }
-                let (x, y) = ((index % width) as isize, (index / width) as isize);
-                let near = (at(&distance, x + sign, y) + 3)
-                    .min(at(&distance, x, y + sign) + 3)
-                    .min(at(&distance, x + sign, y + sign) + 4)
-                    .min(at(&distance, x - sign, y + sign) + 4);
-                distance[index] = if forward { near } else { near.min(distance[index]) };
-            }
-        }
+        let covered: Vec<bool> = self.pixels.iter().map(|pixel| pixel[3] & WHOLLY != 0).collect();
+        let distance = border_distances(&covered, self.columns.len());
         let largest = distance.iter().copied().max().unwrap_or(0).max(1);
         distance.iter().map(|&one| (u64::from(one) * 255 / u64::from(largest)) as u8).collect()
     }
