@@ -6,8 +6,8 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use trueup_compose::exposure::Correction;
 use trueup_compose::layout::{CanvasLayout, CanvasOptions, Placed, run as lay_out};
-use trueup_compose::seam::SeamOptions;
 use trueup_compose::render::{Blend, Interpolation, Panorama, RenderOptions, run as render};
+use trueup_compose::seam::SeamOptions;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::{Photograph, Raster, RowSource};
 use trueup_core::source::PhotographSource;
@@ -58,9 +58,7 @@ fn bench_render(bencher: Bencher, scale: f64, threads: usize, options: RenderOpt
     let (photographs, layout) = (photographs(), layout(scale));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
     let samples = (2.0 * (WIDTH * HEIGHT) as f64 * scale * scale) as usize;
-    bencher
-        .counter(ItemsCount::new(samples))
-        .bench(|| pool.install(|| compose(&layout, &photographs, &options)));
+    bencher.counter(ItemsCount::new(samples)).bench(|| pool.install(|| compose(&layout, &photographs, &options)));
 }
 
 fn feather(interpolation: Interpolation) -> RenderOptions {

@@ -91,9 +91,26 @@ fn mask(base: &Base, label: usize, seams: &Seams, canvas: [usize; 2]) -> Plane<f
     mask
 }
 
+/// Log2 of the canvas pixels per sample at which photographs are sampled for the coarse levels.
+pub(super) const SAMPLED_LEVEL: u32 = 2;
+
+/// The level [`FIRST_LEVEL`] of a photograph from its samples at [`SAMPLED_LEVEL`]: what of it is coarser than two samples.
+///
+/// Photographs are read at different places between their own samples; what they say of the finest contours there differs
+/// although they agree. The band that is left out here is blended with the fine levels.
+pub(super) fn base(sampled: Plane<[f32; 4]>) -> Plane<[f32; 4]> {
+    let mut level = sampled;
+    for _ in SAMPLED_LEVEL..FIRST_LEVEL {
+        level = level.reduced();
+    }
+    let mut base = level.reduced().expanded(&level.columns, &level.rows);
+    spread(&mut base);
+    base
+}
+
 /// Gives samples beside covered ones their neighbours' colour with next to no share, so that finer samples between the two
 /// always have something to be compared with.
-pub(super) fn spread(plane: &mut Plane<[f32; 4]>) {
+fn spread(plane: &mut Plane<[f32; 4]>) {
     const NEXT_TO_NOTHING: f32 = 1e-3;
     let (width, height) = (plane.columns.len(), plane.rows.len());
     let old = plane.texels.clone();

@@ -56,6 +56,14 @@ struct Levels {
     bases: Vec<Base>,
 }
 
+impl Levels {
+    fn new(mut bases: Vec<Base>, seams: &Seams, canvas: [usize; 2], levels: u32) -> Self {
+        let blended = coarse::blend(&bases, seams, canvas, levels);
+        bases.par_iter_mut().for_each(|base| pyramid::level_shares(&mut base.plane));
+        Self { blended, bases }
+    }
+}
+
 /// What all tiles need.
 struct Work<'a> {
     options: &'a RenderOptions,
@@ -88,18 +96,14 @@ pub(crate) fn run(
     let levels = if cut || count == 1 { None } else { Some(levels_above(layout, options)) };
     let views::Small { views, size, bases, mut kept } =
         views::make(layout, corrections, photographs, options, seam_options, levels.is_some(), context)?;
-    let seams = if count == 1 {
-        Seams::of_one(size[0], size[1])
-    } else {
-        seam::run(views, size, seam_options, context)?
-    };
-    let levels = levels.map(|levels| Levels { blended: coarse::blend(&bases, &seams, canvas, levels), bases });
+    let seams =
+        if count == 1 { Seams::of_one(size[0], size[1]) } else { seam::run(views, size, seam_options, context)? };
+    let levels = levels.map(|levels| Levels::new(bases, &seams, canvas, levels));
     let work = Work { options, seams: &seams, canvas, levels };
 
     let strips = strips(&work, count);
-    let last_strip: Vec<Option<usize>> = (0..count)
-        .map(|picture| strips.iter().rposition(|strip| strip.shown.contains(&(picture as Label))))
-        .collect();
+    let last_strip: Vec<Option<usize>> =
+        (0..count).map(|picture| strips.iter().rposition(|strip| strip.shown.contains(&(picture as Label)))).collect();
     let mut pictures: Vec<Option<Prepared<'_>>> = (0..count).map(|_| None).collect();
     let mut pixels = vec![[0; 4]; layout.width * layout.height];
     for (index, strip) in strips.iter().enumerate() {

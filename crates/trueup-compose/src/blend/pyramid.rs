@@ -74,7 +74,8 @@ impl<T: Texel> Plane<T> {
         let from = first.max(self.columns.start as isize);
         let to = (first + out.len() as isize).min(self.columns.end as isize);
         if from < to {
-            let source = &row[(from - self.columns.start as isize) as usize..(to - self.columns.start as isize) as usize];
+            let source =
+                &row[(from - self.columns.start as isize) as usize..(to - self.columns.start as isize) as usize];
             out[(from - first) as usize..(to - first) as usize].copy_from_slice(source);
         }
     }
@@ -178,14 +179,27 @@ pub(super) fn colour(texel: [f32; 4]) -> Option<[f32; 3]> {
     })
 }
 
+/// Makes every sample that is covered at all count the same when it is interpolated.
+pub(super) fn level_shares(plane: &mut Plane<[f32; 4]>) {
+    for texel in &mut plane.texels {
+        *texel = match colour(*texel) {
+            Some([r, g, b]) => [r, g, b, 1.0],
+            None => [0.0; 4],
+        };
+    }
+}
+
 /// Adds to `sum` the level's detail of one picture, `level` minus its interpolated coarser level, weighted by `mask` and by
-/// the share covered.
+/// the share covered (its fourth power).
 pub(super) fn add_detail(
     sum: &mut Plane<[f32; 4]>,
     level: &Plane<[f32; 4]>,
     coarser: &Plane<[f32; 4]>,
     mask: &Plane<f32>,
 ) {
+    // What is added back is interpolated with even shares, too.
+    let mut coarser = coarser.clone();
+    level_shares(&mut coarser);
     let smooth = coarser.expanded(&level.columns, &level.rows);
     for_each_weighted(sum, level, mask, |index, own| match colour(smooth.texels[index]) {
         Some(base) => [own[0] - base[0], own[1] - base[1], own[2] - base[2]],
@@ -217,7 +231,9 @@ fn for_each_weighted(
         let sums = &mut sum.row_mut(y)[shift..shift + width];
         for (x, (sum, (own, mask))) in sums.iter_mut().zip(own.iter().zip(mask)).enumerate() {
             if let Some(own_colour) = colour(*own) {
-                let weight = (mask + LEAST_WEIGHT) * own[3];
+                // Where a picture ends, its samples are means of one side only: they soon count nothing beside others.
+                let share = own[3] * own[3];
+                let weight = (mask + LEAST_WEIGHT) * (share * share);
                 let [r, g, b] = value(start + x, own_colour);
                 *sum = sum.plus([r, g, b, 1.0], weight);
             }

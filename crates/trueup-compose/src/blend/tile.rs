@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::coarse::FIRST_LEVEL;
-use super::pyramid::{Plane, add_detail, collapse, colour};
+use super::pyramid::{Plane, add_detail, collapse, colour, level_shares};
 use super::{Base, Finished, Work};
 use crate::render::prepared::{Prepared, Scratch, Window};
 use crate::seam::{Label, NOBODY};
@@ -34,7 +34,12 @@ impl Tile {
     }
 
     /// The finished pixels, row by row.
-    pub(super) fn finish(&self, work: &Work<'_>, pictures: &[Option<Prepared<'_>>], scratch: &mut Scratch) -> Vec<Finished> {
+    pub(super) fn finish(
+        &self,
+        work: &Work<'_>,
+        pictures: &[Option<Prepared<'_>>],
+        scratch: &mut Scratch,
+    ) -> Vec<Finished> {
         let picture = |label: &Label| pictures.get(usize::from(*label)).and_then(Option::as_ref);
         match self.shown.as_slice() {
             [] => vec![[0; 4]; self.columns.len() * self.rows.len()],
@@ -43,9 +48,12 @@ impl Tile {
                 None => vec![[0; 4]; self.columns.len() * self.rows.len()],
             },
             several => {
-                let shown: Vec<_> =
-                    several.iter().filter_map(|label| Some((*label, picture(label)?))).collect();
-                if work.levels.is_some() { self.blended(work, &shown, scratch) } else { self.cut(work, &shown, scratch) }
+                let shown: Vec<_> = several.iter().filter_map(|label| Some((*label, picture(label)?))).collect();
+                if work.levels.is_some() {
+                    self.blended(work, &shown, scratch)
+                } else {
+                    self.cut(work, &shown, scratch)
+                }
             }
         }
     }
@@ -99,7 +107,7 @@ impl Tile {
             let columns = within(&self.columns, finest[0]);
             let rows = within(&self.rows, finest[1]);
             plane = plane.expanded(&columns, &rows);
-            normalise(&mut plane);
+            level_shares(&mut plane);
         }
         Some(plane)
     }
@@ -218,15 +226,6 @@ const NO_CHANGE: f32 = 1e-6;
 /// Samples of a level along a side of `length` samples at [`FIRST_LEVEL`], at least as many as the canvas has.
 fn work_length(length: usize, level: u32) -> usize {
     length << (FIRST_LEVEL - level)
-}
-
-fn normalise(plane: &mut Plane<[f32; 4]>) {
-    for texel in &mut plane.texels {
-        *texel = match colour(*texel) {
-            Some([r, g, b]) => [r, g, b, 1.0],
-            None => [0.0; 4],
-        };
-    }
 }
 
 /// A pixel of the panorama from the square root of linear light and the share covered.

@@ -11,12 +11,12 @@ use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 
 use super::Base;
-use super::coarse::{FIRST_LEVEL, spread};
+use super::coarse::{self, SAMPLED_LEVEL};
 use super::pyramid::Plane;
 use crate::exposure::Correction;
 use crate::layout::{CanvasLayout, Placed};
-use crate::render::{Interpolation, RenderOptions};
 use crate::render::prepared::{Prepared, Scratch, Window, check_photograph};
+use crate::render::{Interpolation, RenderOptions};
 use crate::seam::{CLIPPED, PARTLY, SeamOptions, View, WHOLLY};
 use crate::weights::WHOLE;
 
@@ -125,7 +125,7 @@ fn view(prepared: &Prepared<'_>, options: &RenderOptions) -> View {
     View { columns, rows, pixels }
 }
 
-/// The photograph at the samples of level [`FIRST_LEVEL`].
+/// The coarse level of a photograph.
 fn base(
     larger: &Prepared<'_>,
     placed: &Placed,
@@ -133,14 +133,17 @@ fn base(
     canvas: [usize; 2],
     [halving, sampling]: [&RenderOptions; 2],
 ) -> Base {
-    let step = f64::from(1_u32 << FIRST_LEVEL);
+    let step = f64::from(1_u32 << SAMPLED_LEVEL);
     // Sample i lies on the middle of pixel i * step.
     let mesh = scaled(&placed.mesh, [step.recip(); 2], 0.5 - 0.5 / step);
     let (photograph, [width, height]) = larger.photograph();
     let mesh = GridMesh { width, height, ..mesh };
-    let size = canvas.map(|length| length.div_ceil(1 << FIRST_LEVEL));
+    let size = canvas.map(|length| length.div_ceil(1 << SAMPLED_LEVEL));
     let prepared = Prepared::new(Cow::Borrowed(photograph), &mesh, size, correction, halving);
-    let grown = |range: Range<usize>, length: usize| range.start.saturating_sub(1)..(range.end + 1).min(length);
+    // Room for the interpolated rim, from a sample that every coarser level has.
+    let grown = |range: Range<usize>, length: usize| {
+        (range.start / RIM * RIM).saturating_sub(RIM)..(range.end + RIM).min(length)
+    };
     let (columns, rows) = (grown(prepared.columns(), size[0]), grown(prepared.rows(), size[1]));
     let mut plane = Plane::new(columns.clone(), rows.clone());
     let window = Window { columns: &columns, rows: &rows };
@@ -149,6 +152,8 @@ fn base(
         let [r, g, b, share] = *texel;
         *texel = [r * share, g * share, b * share, share];
     }
-    spread(&mut plane);
-    Base { plane }
+    Base { plane: coarse::base(plane) }
 }
+
+/// Samples at [`SAMPLED_LEVEL`] around a photograph that its coarser levels reach.
+const RIM: usize = 8;

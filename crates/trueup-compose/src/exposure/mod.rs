@@ -73,7 +73,7 @@ trueup_core::options! {
         cast_deviation: f64 = 0.2, between(1e-3, 100.0), "";
         /// How strong vignetting is expected to be, as a standard deviation of every coefficient of its natural logarithm.
         /// Lower trusts that the lenses are good, higher follows the overlaps.
-        vignetting_deviation: f64 = 0.3, between(1e-4, 100.0), "";
+        vignetting_deviation: f64 = 0.6, between(1e-4, 100.0), "";
         /// Largest gain; the smallest is its inverse.
         max_gain: f64 = 8.0, between(1.0, 1000.0), "";
     }
@@ -218,15 +218,14 @@ fn sampling_scale(layout: &CanvasLayout, samples: f64) -> f64 {
 }
 
 /// Compares two photographs by what they share; `None` if that is too little.
-fn compare(
-    mut samples: Vec<Shared>,
-    first: usize,
-    second: usize,
-    options: &ExposureOptions,
-) -> Option<Observed> {
+fn compare(mut samples: Vec<Shared>, first: usize, second: usize, options: &ExposureOptions) -> Option<Observed> {
     if samples.len() < options.min_shared.max(1) {
         return None;
     }
+    let channel_medians = std::array::from_fn(|channel| {
+        let mut ratios: Vec<f32> = samples.iter().map(|sample| sample.log_ratio[channel]).collect();
+        median(&mut ratios)
+    });
     let mut ratios: Vec<f32> = samples.iter().map(Shared::brightness).collect();
     let log_ratio = median(&mut ratios);
     for ratio in &mut ratios {
@@ -244,7 +243,7 @@ fn compare(
         index += 1;
         (index - 1).is_multiple_of(step)
     });
-    Some(Observed { pair, samples })
+    Some(Observed { pair, channel_medians, samples })
 }
 
 /// The median of at least one number (the upper one of an even count).

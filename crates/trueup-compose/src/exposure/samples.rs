@@ -87,10 +87,7 @@ pub(super) fn shared(first: &Patch, second: &Patch) -> Vec<Shared> {
         return Vec::new();
     }
     rows.flat_map(|y| first.row(y, &columns).iter().zip(second.row(y, &columns)))
-        .map(|(a, b)| Shared {
-            log_ratio: [a[0] - b[0], a[1] - b[1], a[2] - b[2]],
-            radius: [a[3], b[3]],
-        })
+        .map(|(a, b)| Shared { log_ratio: [a[0] - b[0], a[1] - b[1], a[2] - b[2]], radius: [a[3], b[3]] })
         .filter(|shared| shared.log_ratio.iter().all(|ratio| ratio.is_finite()))
         .collect()
 }

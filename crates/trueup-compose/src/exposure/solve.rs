@@ -2,7 +2,7 @@
 //!
 //! Brightness and vignetting first: unknowns x_k (ln gain of photograph k) and a_c (coefficients of camera c), one equation
 //! per sample, `x_i - x_j + a (p(r_i) - p(r_j)) = -ln(I_i / I_j)`, repeated with weights from the residuals. The colour cast
-//! follows with the weights that came out: the same equations for what each channel differs from the mean.
+//! follows with the same weights: the same equations for what each channel differs from the mean.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use trueup_core::{Result, StageContext};
@@ -14,6 +14,8 @@ use super::{ExposureModel, ExposureOptions, GainAnchor, PairExposure};
 /// An overlap and its samples.
 pub(super) struct Observed {
     pub(super) pair: PairExposure,
+    /// Medians of the samples' logarithms, by channel.
+    pub(super) channel_medians: [f32; 3],
     pub(super) samples: Vec<Shared>,
 }
 
@@ -46,15 +48,15 @@ pub(super) fn solve(
     let mut lenses: Vec<usize> = cameras.to_vec();
     lenses.sort_unstable();
     lenses.dedup();
-    let lens_of: Vec<usize> =
-        cameras.iter().map(|camera| lenses.binary_search(camera).unwrap_or_default()).collect();
+    let lens_of: Vec<usize> = cameras.iter().map(|camera| lenses.binary_search(camera).unwrap_or_default()).collect();
     let problem = Problem { count, terms, unknowns: count + terms * lenses.len(), lens_of, observed, options };
     let mut weights: Vec<Vec<f64>> = observed.iter().map(|one| vec![1.0; one.samples.len()]).collect();
     let mut brightness = DVector::zeros(problem.unknowns);
+    let mut casts = [(); 3].map(|()| DVector::zeros(count));
     for repetition in 0..REPETITIONS {
         context.check_cancelled()?;
         if repetition > 0 {
-            problem.weigh(&brightness, &mut weights);
+            problem.weigh(&brightness, &casts, &mut weights);
         } else {
             problem.weigh_by_medians(&mut weights);
         }
@@ -62,11 +64,10 @@ pub(super) fn solve(
             return Ok(vec![Correction::default(); count]);
         };
         brightness = solver.solve(&right);
+        if options.model == ExposureModel::Full {
+            casts = problem.casts(&weights);
+        }
     }
-    let casts = match options.model {
-        ExposureModel::Gain => [DVector::zeros(count), DVector::zeros(count), DVector::zeros(count)],
-        ExposureModel::Full => problem.casts(&weights),
-    };
     Ok(problem.corrections(&brightness, &casts, reference))
 }
 
@@ -115,20 +116,28 @@ impl Problem<'_> {
     fn weigh_by_medians(&self, weights: &mut [Vec<f64>]) {
         for (one, weights) in self.observed.iter().zip(weights) {
             for (sample, weight) in one.samples.iter().zip(weights) {
-                *weight = cauchy(f64::from(sample.brightness()) - one.pair.log_ratio, one.pair.deviation);
+                let residuals: [f64; 3] =
+                    std::array::from_fn(|channel| f64::from(sample.log_ratio[channel] - one.channel_medians[channel]));
+                *weight = cauchy(residuals, one.pair.deviation);
             }
         }
     }
 
-    fn weigh(&self, solution: &DVector<f64>, weights: &mut [Vec<f64>]) {
+    fn weigh(&self, solution: &DVector<f64>, casts: &[DVector<f64>; 3], weights: &mut [Vec<f64>]) {
         let mut row = Vec::new();
         for (one, weights) in self.observed.iter().zip(weights) {
             for (sample, weight) in one.samples.iter().zip(weights) {
                 self.row(&one.pair, sample, &mut row);
-                let residual = row.iter().fold(f64::from(sample.brightness()), |sum, &(at, factor)| {
-                    sum + factor * solution[at]
+                let model = row.iter().fold(0.0, |sum, &(at, factor)| sum + factor * solution[at]);
+                // Without casts, what the channels differ from their mean is not looked at.
+                let residuals = std::array::from_fn(|channel| match self.options.model {
+                    ExposureModel::Gain => f64::from(sample.brightness()) + model,
+                    ExposureModel::Full => {
+                        let cast = casts[channel][one.pair.first] - casts[channel][one.pair.second];
+                        f64::from(sample.log_ratio[channel]) + model + cast
+                    }
                 });
-                *weight = cauchy(residual, one.pair.deviation);
+                *weight = cauchy(residuals, one.pair.deviation);
             }
         }
     }
@@ -223,7 +232,8 @@ impl Problem<'_> {
     }
 }
 
-/// Weight from 0 to 1 of a residual.
-fn cauchy(residual: f64, deviation: f64) -> f64 {
-    1.0 / (1.0 + (residual / (CAUCHY * deviation.max(LEAST_DEVIATION))).powi(2))
+/// Weight from 0 to 1 of the residuals of the three channels.
+fn cauchy(residuals: [f64; 3], deviation: f64) -> f64 {
+    let mean_square = residuals.iter().map(|residual| residual * residual).sum::<f64>() / 3.0;
+    1.0 / (1.0 + mean_square / (CAUCHY * deviation.max(LEAST_DEVIATION)).powi(2))
 }

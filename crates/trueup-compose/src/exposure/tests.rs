@@ -108,7 +108,8 @@ fn gains_from_a_quarter_to_four_are_recovered() {
         let exposure = estimate(&shifts, &rasters, &ExposureOptions { anchor, ..ExposureOptions::default() });
         assert_eq!(exposure.pairs.len(), 3);
         let corrections = exposure.corrections.iter();
-        let products: Vec<f64> = corrections.clone().zip(lights).flat_map(|(one, light)| one.gain.map(|gain| gain * light)).collect();
+        let products: Vec<f64> =
+            corrections.clone().zip(lights).flat_map(|(one, light)| one.gain.map(|gain| gain * light)).collect();
         for product in &products {
             assert!((product / products[0] - 1.0).abs() < 0.02, "{products:?}");
         }

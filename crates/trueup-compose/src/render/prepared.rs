@@ -154,7 +154,7 @@ impl<'a> Prepared<'a> {
             return;
         }
         let Scratch { candidates, owner, runs, positions, at_border, .. } = scratch;
-        self.grid.cells_in_rows(&rows, candidates);
+        self.grid.cells_in_window(&columns, &rows, candidates);
         for y in rows {
             self.grid.runs_within(y, &columns, candidates, owner, runs);
             let start = (y - window.rows.start) * width;

@@ -158,8 +158,7 @@ fn gains_act_on_linear_light() {
     let photographs = Memory(vec![gradient(30, 30, |_, _| 100.0)]);
     let options = RenderOptions::default();
     let context = StageContext::default();
-    let panorama =
-        compose(&layout, &[Correction::uniform(2.0)], &photographs, &options, &context).expect("renders");
+    let panorama = compose(&layout, &[Correction::uniform(2.0)], &photographs, &options, &context).expect("renders");
     // sRGB 100 is 0.127438 in linear light; twice that, levelled off by 0.1 %, is level 137.6.
     assert!((panorama.linear_pixel(15, 15)[0] - 0.254_876 / 1.000_987).abs() < 2e-5);
     assert_eq!(&rows(&panorama)[..4], [138, 138, 138, 255]);
@@ -324,7 +323,8 @@ fn a_layer_is_one_photograph_where_it_lies() {
     let placed = vec![moved(0, 100.0, 80.0, |p| p.into()), moved(1, 60.0, 40.0, |p| [p.x + 30.0, p.y + 20.0])];
     let context = StageContext::default();
     let layout = layout::run(placed, 0, &CanvasOptions::default(), &context).expect("two grids");
-    let found = layer(&layout, &[Correction::default(); 2], 1, &photographs, &RenderOptions::default()).expect("a layer");
+    let found =
+        layer(&layout, &[Correction::default(); 2], 1, &photographs, &RenderOptions::default()).expect("a layer");
     // The extrapolated rim may reach a pixel beyond the photograph; it is not covered.
     for y in 0..layout.height {
         for x in 0..layout.width {

@@ -148,7 +148,13 @@ fn gradients(view: &View) -> Vec<[i16; 2]> {
     let luma: Vec<i16> = view
         .pixels
         .iter()
-        .map(|p| if p[3] & PARTLY == 0 { -1 } else { ((77 * i32::from(p[0]) + 150 * i32::from(p[1]) + 29 * i32::from(p[2])) >> 8) as i16 })
+        .map(|p| {
+            if p[3] & PARTLY == 0 {
+                -1
+            } else {
+                ((77 * i32::from(p[0]) + 150 * i32::from(p[1]) + 29 * i32::from(p[2])) >> 8) as i16
+            }
+        })
         .collect();
     let mut out = vec![[0; 2]; width * height];
     for (index, out) in out.iter_mut().enumerate() {

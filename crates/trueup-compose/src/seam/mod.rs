@@ -71,12 +71,7 @@ trueup_core::options! {
 /// # Departures
 /// Coarse to fine as Lombaert, Sun, Grady, Xu, "A multilevel banded graph cuts method for fast image segmentation", ICCV
 /// 2005; things that moved are found first, and their parts kept together.
-pub fn run(
-    views: Vec<View>,
-    size: [usize; 2],
-    options: &SeamOptions,
-    context: &StageContext,
-) -> Result<Seams> {
+pub fn run(views: Vec<View>, size: [usize; 2], options: &SeamOptions, context: &StageContext) -> Result<Seams> {
     options.check()?;
     check(&views, size)?;
     let mut levels = vec![(views, size)];
@@ -117,7 +112,10 @@ fn check(views: &[View], [width, height]: [usize; 2]) -> Result<()> {
             && view.rows.end <= height
             && view.columns.len().checked_mul(view.rows.len()) == Some(view.pixels.len())
     };
-    if views.len() < usize::from(NOBODY) && width.checked_mul(height).is_some_and(|pixels| pixels > 0) && views.iter().all(fits) {
+    if views.len() < usize::from(NOBODY)
+        && width.checked_mul(height).is_some_and(|pixels| pixels > 0)
+        && views.iter().all(fits)
+    {
         return Ok(());
     }
     Err(Error::input(

@@ -35,8 +35,10 @@ fn a_thing_that_moved_is_shown_whole_or_not_at_all() {
         for coarse_pixels in [1e6, 4_000.0] {
             let options = SeamOptions { coarse_pixels, ..SeamOptions::default() };
             let seams = find(vec![first.clone(), second.clone()], [160, 100], &options);
-            let labels: Vec<Label> =
-                (0..16_000).filter(|at| inside(at % 160, at / 160) && at % 160 >= 40 && at % 160 < 120).map(|at| seams.labels()[at]).collect();
+            let labels: Vec<Label> = (0..16_000)
+                .filter(|at| inside(at % 160, at / 160) && at % 160 >= 40 && at % 160 < 120)
+                .map(|at| seams.labels()[at])
+                .collect();
             let shown = labels.iter().filter(|&&label| label == 0).count();
             assert!(shown == 0 || shown == labels.len(), "{left}: {shown} of {} at {coarse_pixels}", labels.len());
             // What only one view covers is that view's.
@@ -76,7 +78,8 @@ fn wishes_of_the_user_are_obeyed() {
 
 #[test]
 fn finer_canvases_ask_the_same_labels() {
-    let seams = find(vec![view(0..50, 0..20, texture), view(30..80, 0..20, texture)], [80, 20], &SeamOptions::default());
+    let seams =
+        find(vec![view(0..50, 0..20, texture), view(30..80, 0..20, texture)], [80, 20], &SeamOptions::default());
     let mut row = Vec::new();
     seams.row(40, &(0..320), [320, 80], &mut row);
     for (x, label) in row.iter().enumerate() {

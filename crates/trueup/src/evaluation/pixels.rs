@@ -68,7 +68,8 @@ pub fn evaluate_pixels(project: &Project, project_folder: &Path, context: &Stage
     let meshes = used_grids(&records)?;
     let scale = scale(&meshes, project.options.measures.canvas_pixels);
     let layout = layout(meshes, scale);
-    let correction = |record: &&ImageRecord| record.correction.unwrap_or(Correction::uniform(record.gain.unwrap_or(1.0)));
+    let correction =
+        |record: &&ImageRecord| record.correction.unwrap_or(Correction::uniform(record.gain.unwrap_or(1.0)));
     let corrections: Vec<Correction> = records.iter().map(correction).collect();
 
     context.progress().begin(STAGE, records.len() as u64);
