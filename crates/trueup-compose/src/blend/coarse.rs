@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::Base;
-use super::pyramid::{Plane, add_base, add_detail, collapse};
+use super::pyramid::{LEAST_SHARE, Plane, add_base, add_detail, collapse};
 use crate::seam::{NOBODY, Seams};
 
 /// Log2 of the canvas pixels per sample of the finest level that is blended as a whole.
@@ -115,7 +115,7 @@ fn spread(plane: &mut Plane<[f32; 4]>) {
     let (width, height) = (plane.columns.len(), plane.rows.len());
     let old = plane.texels.clone();
     for (at, texel) in plane.texels.iter_mut().enumerate() {
-        if old[at][3] > 0.0 {
+        if old[at][3] > LEAST_SHARE {
             continue;
         }
         let (x, y) = (at % width, at / width);
@@ -127,7 +127,7 @@ fn spread(plane: &mut Plane<[f32; 4]>) {
                 }
             }
         }
-        if sum[3] > 0.0 {
+        if sum[3] > LEAST_SHARE {
             *texel = sum.map(|value| value / sum[3] * NEXT_TO_NOTHING);
         }
     }

@@ -170,13 +170,22 @@ fn two<T: Texel>(a: T, b: T) -> T {
     T::default().plus(a, 0.5).plus(b, 0.5)
 }
 
+/// A smaller share of a sample, a 64th of a step of 16 bits, is none: its colour would be made of rounding.
+pub(super) const LEAST_SHARE: f32 = 1.0 / (1 << 22) as f32;
+
 /// Colour divided by the share; `None` where nothing is covered.
 #[inline(always)]
 pub(super) fn colour(texel: [f32; 4]) -> Option<[f32; 3]> {
-    (texel[3] > 0.0).then(|| {
+    (texel[3] > LEAST_SHARE).then(|| {
         let scale = 1.0 / texel[3];
         [texel[0] * scale, texel[1] * scale, texel[2] * scale]
     })
+}
+
+/// A weighted sum divided by its weight; `None` without any.
+#[inline(always)]
+fn mean([r, g, b, weight]: [f32; 4]) -> Option<[f32; 3]> {
+    (weight > 0.0).then(|| [r / weight, g / weight, b / weight])
 }
 
 /// Makes every sample that is covered at all count the same when it is interpolated.
@@ -215,6 +224,9 @@ pub(super) fn add_base(sum: &mut Plane<[f32; 4]>, level: &Plane<[f32; 4]>, mask:
 /// A picture that covers a place counts this much there even where its mask is zero: it shows where no other does.
 const LEAST_WEIGHT: f32 = 1e-6;
 
+/// Smallest share that weights tell apart; their products stay far from where numbers lose digits.
+const LEAST_TRUST: f32 = 1e-3;
+
 #[inline(always)]
 fn for_each_weighted(
     sum: &mut Plane<[f32; 4]>,
@@ -232,8 +244,8 @@ fn for_each_weighted(
         for (x, (sum, (own, mask))) in sums.iter_mut().zip(own.iter().zip(mask)).enumerate() {
             if let Some(own_colour) = colour(*own) {
                 // Where a picture ends, its samples are means of one side only: they soon count nothing beside others.
-                let share = own[3] * own[3];
-                let weight = (mask + LEAST_WEIGHT) * (share * share);
+                let share = own[3].max(LEAST_TRUST);
+                let weight = (mask + LEAST_WEIGHT) * (share * share) * (share * share);
                 let [r, g, b] = value(start + x, own_colour);
                 *sum = sum.plus([r, g, b, 1.0], weight);
             }
@@ -247,7 +259,7 @@ pub(super) fn collapse(sum: &mut Plane<[f32; 4]>, coarser: Option<&Plane<[f32; 4
     let smooth = coarser.map(|coarser| coarser.expanded(&sum.columns, &sum.rows));
     for (index, texel) in sum.texels.iter_mut().enumerate() {
         let base = smooth.as_ref().map_or(Some([0.0; 3]), |smooth| colour(smooth.texels[index]));
-        *texel = match (colour(*texel), base) {
+        *texel = match (mean(*texel), base) {
             (Some(detail), Some(base)) => [detail[0] + base[0], detail[1] + base[1], detail[2] + base[2], 1.0],
             _ => [0.0; 4],
         };

@@ -231,8 +231,6 @@ fn compare(mut samples: Vec<Shared>, first: usize, second: usize, options: &Expo
     for ratio in &mut ratios {
         *ratio = (*ratio - log_ratio).abs();
     }
-    // Ratio of the standard deviation to the median absolute deviation of a normal distribution.
-    const NORMAL: f64 = 1.4826;
     let deviation = NORMAL * f64::from(median(&mut ratios));
     let pair = PairExposure { first, second, log_ratio: f64::from(log_ratio), deviation, samples: samples.len() };
     // Neighbouring samples say the same; a few hundred of an overlap settle seven unknowns.
@@ -245,6 +243,9 @@ fn compare(mut samples: Vec<Shared>, first: usize, second: usize, options: &Expo
     });
     Some(Observed { pair, channel_medians, samples })
 }
+
+/// Ratio of the standard deviation to the median absolute deviation of a normal distribution.
+const NORMAL: f64 = 1.4826;
 
 /// The median of at least one number (the upper one of an even count).
 fn median(values: &mut [f32]) -> f32 {

@@ -9,7 +9,7 @@ use trueup_core::{Result, StageContext};
 
 use super::correction::{Correction, VIGNETTING_TERMS};
 use super::samples::Shared;
-use super::{ExposureModel, ExposureOptions, GainAnchor, PairExposure};
+use super::{ExposureModel, ExposureOptions, GainAnchor, NORMAL, PairExposure};
 
 /// An overlap and its samples.
 pub(super) struct Observed {
@@ -116,10 +116,11 @@ impl Problem<'_> {
     fn weigh_by_medians(&self, weights: &mut [Vec<f64>]) {
         for (one, weights) in self.observed.iter().zip(weights) {
             for (sample, weight) in one.samples.iter().zip(weights) {
-                let residuals: [f64; 3] =
-                    std::array::from_fn(|channel| f64::from(sample.log_ratio[channel] - one.channel_medians[channel]));
-                *weight = cauchy(residuals, one.pair.deviation);
+                *weight = magnitude(std::array::from_fn(|channel| {
+                    f64::from(sample.log_ratio[channel] - one.channel_medians[channel])
+                }));
             }
+            weights_of(weights);
         }
     }
 
@@ -137,8 +138,9 @@ impl Problem<'_> {
                         f64::from(sample.log_ratio[channel]) + model + cast
                     }
                 });
-                *weight = cauchy(residuals, one.pair.deviation);
+                *weight = magnitude(residuals);
             }
+            weights_of(weights);
         }
     }
 
@@ -232,8 +234,21 @@ impl Problem<'_> {
     }
 }
 
-/// Weight from 0 to 1 of the residuals of the three channels.
-fn cauchy(residuals: [f64; 3], deviation: f64) -> f64 {
-    let mean_square = residuals.iter().map(|residual| residual * residual).sum::<f64>() / 3.0;
-    1.0 / (1.0 + mean_square / (CAUCHY * deviation.max(LEAST_DEVIATION)).powi(2))
+/// Root mean square of the residuals of the three channels.
+fn magnitude(residuals: [f64; 3]) -> f64 {
+    (residuals.iter().map(|residual| residual * residual).sum::<f64>() / 3.0).sqrt()
+}
+
+/// Turns the residuals of an overlap's samples into weights from 0 to 1, by their own spread.
+fn weights_of(residuals: &mut [f64]) {
+    let mut sorted = residuals.to_vec();
+    let middle = sorted.len() / 2;
+    if sorted.is_empty() {
+        return;
+    }
+    let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let scale = CAUCHY * (NORMAL * median).max(LEAST_DEVIATION);
+    for residual in residuals {
+        *residual = 1.0 / (1.0 + (*residual / scale).powi(2));
+    }
 }
