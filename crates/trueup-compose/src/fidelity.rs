@@ -4,6 +4,8 @@
 //! photograph it resembles most there. A panorama that shows one photograph at a time has a distance of 0 but at its seams;
 //! a mean of photographs that do not fit shows the contours of both, each at half its strength, and is far from either.
 
+use std::collections::BTreeMap;
+
 use trueup_core::raster::{LUMA, Raster, RowSource};
 use trueup_core::{Error, Result};
 
@@ -31,12 +33,16 @@ pub const GHOST_LEVEL: f64 = 8.0;
 /// Half width, in pixels, of the means whose difference is the step across a line: a step is seen over several pixels.
 const STEP_REACH: usize = 8;
 
+/// Side, in pixels, of the squares within which the steps along a line are averaged.
+const STRETCH_PX: usize = 32;
+
 /// Measures `panorama` against `layers`, its photographs on the same canvas; `shown` is the position of the photograph
 /// that each canvas pixel shows, or shows most, row by row.
 ///
 /// The step at a place on a line between two photographs is the mean of the eight pixels on one side minus that of the
-/// eight on the other; the panorama's is compared with that of both photographs, and the nearer one counts. Places count
-/// where both photographs cover all sixteen.
+/// eight on the other, where both photographs cover all sixteen. It is averaged over the places of a line within a square
+/// of 32 pixels: what the eye takes for a seam has one sign along it, while contours that are a little out of place change
+/// theirs. The panorama's is then compared with that of both photographs, and the nearer one counts.
 ///
 /// # Errors
 /// [`Error::Input`] if the sizes do not fit.
@@ -55,6 +61,10 @@ pub fn measure(panorama: &dyn RowSource, layers: &[Layer], shown: &[u16]) -> Res
     let measured = Measured { gray: &gray, layers, shown };
     measured.lines(&mut sums);
     measured.gradients(&mut sums);
+    for [own, a, b, count] in sums.stretches.values() {
+        sums.line_px += *count as usize;
+        sums.step += (own - a).abs().min((own - b).abs());
+    }
     let mean = |sum: f64, count: usize| if count > 0 { sum / count as f64 } else { 0.0 };
     Ok(Fidelity {
         line_px: sums.line_px,
@@ -108,8 +118,13 @@ fn luma(panorama: &dyn RowSource) -> Raster<f32> {
     gray
 }
 
+/// Where a stretch of a line lies, whether it runs down, and between whom.
+type Stretch = (usize, usize, bool, u16, u16);
+
 #[derive(Default)]
 struct Sums {
+    /// Steps of the panorama and of both photographs, and their number.
+    stretches: BTreeMap<Stretch, [f64; 4]>,
     line_px: usize,
     step: f64,
     overlap_px: usize,
@@ -170,6 +185,7 @@ impl Measured<'_> {
         if a == b {
             return;
         }
+        let (first, second) = (a, b);
         let (Some(a), Some(b)) = (self.layers.get(usize::from(a)), self.layers.get(usize::from(b))) else { return };
         let step_of = |value: &dyn Fn(usize, usize) -> Option<f64>| -> Option<f64> {
             let mut step = 0.0;
@@ -184,9 +200,13 @@ impl Measured<'_> {
             inside.then(|| f64::from(self.gray.pixel(x, y)[0]))
         };
         let steps = (step_of(&|x, y| level(a, x, y)), step_of(&|x, y| level(b, x, y)), step_of(&of_panorama));
-        if let (Some(a), Some(b), Some(own)) = steps {
-            sums.line_px += 1;
-            sums.step += (own - a).abs().min((own - b).abs());
+        if let (Some(step_a), Some(step_b), Some(own)) = steps {
+            let place = |at: Option<usize>| at.unwrap_or(0) / STRETCH_PX;
+            let down = column(0) != column(1);
+            let sum = sums.stretches.entry((place(row(0)), place(column(0)), down, first, second)).or_default();
+            for (sum, value) in sum.iter_mut().zip([own, step_a, step_b, 1.0]) {
+                *sum += value;
+            }
         }
     }
 

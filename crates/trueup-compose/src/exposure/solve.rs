@@ -115,7 +115,7 @@ impl Problem<'_> {
 
     fn weigh_by_medians(&self, weights: &mut [Vec<f64>]) {
         for (one, weights) in self.observed.iter().zip(weights) {
-            for (sample, weight) in one.samples.iter().zip(weights) {
+            for (sample, weight) in one.samples.iter().zip(weights.iter_mut()) {
                 *weight = magnitude(std::array::from_fn(|channel| {
                     f64::from(sample.log_ratio[channel] - one.channel_medians[channel])
                 }));
@@ -127,7 +127,7 @@ impl Problem<'_> {
     fn weigh(&self, solution: &DVector<f64>, casts: &[DVector<f64>; 3], weights: &mut [Vec<f64>]) {
         let mut row = Vec::new();
         for (one, weights) in self.observed.iter().zip(weights) {
-            for (sample, weight) in one.samples.iter().zip(weights) {
+            for (sample, weight) in one.samples.iter().zip(weights.iter_mut()) {
                 self.row(&one.pair, sample, &mut row);
                 let model = row.iter().fold(0.0, |sum, &(at, factor)| sum + factor * solution[at]);
                 // Without casts, what the channels differ from their mean is not looked at.
