@@ -131,14 +131,14 @@ impl<T: Texel> Plane<T> {
                     let x = columns.start + index;
                     let at = (x / 2) as isize - first;
                     let taps = &padded[at as usize - 1..at as usize + 2];
-                    *out = if x % 2 == 0 { three(taps[0], taps[1], taps[2]) } else { two(taps[1], taps[2]) };
+                    *out = if x.is_multiple_of(2) { three(taps[0], taps[1], taps[2]) } else { two(taps[1], taps[2]) };
                 }
                 next += 1;
             }
             let at = |row: isize| &window[row.rem_euclid(3) as usize][..width];
             let (above, here, below) = (at(middle - 1), at(middle), at(middle + 1));
             let out = expanded.row_mut(y);
-            if y % 2 == 0 {
+            if y.is_multiple_of(2) {
                 for (x, out) in out.iter_mut().enumerate() {
                     *out = three(above[x], here[x], below[x]);
                 }

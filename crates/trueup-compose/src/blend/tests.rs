@@ -13,7 +13,7 @@ const HEIGHT: usize = 110;
 /// A scene with contours and texture, 8-bit levels.
 fn scene(x: usize, y: usize) -> [u8; 3] {
     let texture = (x * 7 + y * 13) % 23;
-    let block = if (x / 17 + y / 13) % 2 == 0 { 60 } else { 150 };
+    let block = if (x / 17 + y / 13).is_multiple_of(2) { 60 } else { 150 };
     [(block + texture) as u8, (block / 2 + 40 + y / 4) as u8, (200 - block + x / 8) as u8]
 }
 

@@ -116,9 +116,9 @@ fn view(prepared: &Prepared<'_>, options: &RenderOptions) -> View {
         .map(|(&[r, g, b, share], clipped)| {
             // The casts saturate.
             let level = |root: f32| (root * 255.0 + 0.5) as u8;
-            let flags = u8::from(share > 0.0) * PARTLY
-                | u8::from(share >= WHOLE) * WHOLLY
-                | u8::from(clipped && share > 0.0) * CLIPPED;
+            let flags = (u8::from(share > 0.0) * PARTLY)
+                | (u8::from(share >= WHOLE) * WHOLLY)
+                | (u8::from(clipped && share > 0.0) * CLIPPED);
             [level(r), level(g), level(b), flags]
         })
         .collect();

@@ -56,9 +56,9 @@ impl<'a> Scene<'a> {
                     let flags = pixel[3];
                     let whole = flags & WHOLLY != 0;
                     let shown = whole && flags & (CLIPPED | IGNORED) == 0;
-                    *anyone |= u8::from(whole) * ANY_WHOLE
-                        | u8::from(shown) * ANY_UNCLIPPED
-                        | u8::from(whole && flags & KEPT != 0) * ANY_KEPT;
+                    *anyone |= (u8::from(whole) * ANY_WHOLE)
+                        | (u8::from(shown) * ANY_UNCLIPPED)
+                        | (u8::from(whole && flags & KEPT != 0) * ANY_KEPT);
                 }
             }
         }
