@@ -4,8 +4,10 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
+use trueup_compose::exposure::Correction;
 use trueup_compose::layout::{CanvasLayout, CanvasOptions, Placed, run as lay_out};
-use trueup_compose::render::{Interpolation, Panorama, RenderOptions, run as render};
+use trueup_compose::render::{Blend, Interpolation, Panorama, RenderOptions, run as render};
+use trueup_compose::seam::SeamOptions;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::{Photograph, Raster, RowSource};
 use trueup_core::source::PhotographSource;
@@ -47,37 +49,53 @@ fn layout(scale: f64) -> CanvasLayout {
     lay_out(placed, 0, &options, &StageContext::default()).expect("two grids")
 }
 
-fn bench_render(bencher: Bencher, scale: f64, threads: usize, interpolation: Interpolation) {
+fn compose(layout: &CanvasLayout, photographs: &Memory, options: &RenderOptions) -> Result<Panorama> {
+    let corrections = [Correction::uniform(0.9), Correction::uniform(1.1)];
+    render(layout, &corrections, photographs, options, &SeamOptions::default(), &StageContext::default())
+}
+
+fn bench_render(bencher: Bencher, scale: f64, threads: usize, options: RenderOptions) {
     let (photographs, layout) = (photographs(), layout(scale));
-    let options = RenderOptions { interpolation, ..RenderOptions::default() };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
     let samples = (2.0 * (WIDTH * HEIGHT) as f64 * scale * scale) as usize;
-    bencher
-        .counter(ItemsCount::new(samples))
-        .bench(|| pool.install(|| render(&layout, &[0.9, 1.1], &photographs, &options, &StageContext::default())));
+    bencher.counter(ItemsCount::new(samples)).bench(|| pool.install(|| compose(&layout, &photographs, &options)));
+}
+
+fn feather(interpolation: Interpolation) -> RenderOptions {
+    RenderOptions { interpolation, blend: Blend::Feather, ..RenderOptions::default() }
 }
 
 #[divan::bench(args = [1, 2], sample_count = 10)]
 fn bicubic(bencher: Bencher, threads: usize) {
-    bench_render(bencher, 1.0, threads, Interpolation::Bicubic);
+    bench_render(bencher, 1.0, threads, feather(Interpolation::Bicubic));
 }
 
 #[divan::bench(args = [1, 2], sample_count = 10)]
 fn bilinear(bencher: Bencher, threads: usize) {
-    bench_render(bencher, 1.0, threads, Interpolation::Bilinear);
+    bench_render(bencher, 1.0, threads, feather(Interpolation::Bilinear));
 }
 
 #[divan::bench(args = [1, 2], sample_count = 10)]
 fn reduced_to_0_6(bencher: Bencher, threads: usize) {
-    bench_render(bencher, 0.6, threads, Interpolation::Bicubic);
+    bench_render(bencher, 0.6, threads, feather(Interpolation::Bicubic));
+}
+
+/// Seams and multi-band blending.
+#[divan::bench(args = [1, 2], sample_count = 10)]
+fn multiband(bencher: Bencher, threads: usize) {
+    bench_render(bencher, 1.0, threads, RenderOptions::default());
+}
+
+/// Seams alone.
+#[divan::bench(args = [1, 2], sample_count = 10)]
+fn cut(bencher: Bencher, threads: usize) {
+    bench_render(bencher, 1.0, threads, RenderOptions { blend: Blend::None, ..RenderOptions::default() });
 }
 
 #[divan::bench(sample_count = 10)]
 fn encode_rows(bencher: Bencher) {
     let layout = layout(1.0);
-    let panorama: Panorama =
-        render(&layout, &[0.9, 1.1], &photographs(), &RenderOptions::default(), &StageContext::default())
-            .expect("renders");
+    let panorama: Panorama = compose(&layout, &photographs(), &RenderOptions::default()).expect("renders");
     let mut row = vec![0; 4 * panorama.width()];
     bencher.counter(ItemsCount::new(panorama.width() * panorama.height())).bench_local(|| {
         for y in 0..panorama.height() {

@@ -32,6 +32,8 @@ pub(crate) struct Cell {
     pub(crate) footprint: [f64; 2],
     /// Whether a canvas pixel of the cell may be cut by the photograph's border.
     pub(crate) near_border: bool,
+    /// Lowest and highest x of the corners.
+    x_range: [f64; 2],
     /// Lowest and highest y of the corners.
     y_range: [f64; 2],
 }
@@ -115,12 +117,18 @@ impl DeformedGrid {
 
     /// Indices of the cells that may cover a pixel of `rows`, in order.
     pub(crate) fn cells_in_rows(&self, rows: &Range<usize>, indices: &mut Vec<u32>) {
+        self.cells_in_window(&self.columns, rows, indices);
+    }
+
+    /// Indices of the cells that may cover a pixel of `columns` and `rows`, in order.
+    pub(crate) fn cells_in_window(&self, columns: &Range<usize>, rows: &Range<usize>, indices: &mut Vec<u32>) {
         indices.clear();
-        let (top, bottom) = (rows.start as f64, rows.end as f64);
+        let meets =
+            |range: [f64; 2], pixels: &Range<usize>| range[0] < pixels.end as f64 && range[1] > pixels.start as f64;
         indices.extend(
             (0_u32..)
                 .zip(&self.cells)
-                .filter(|(_, cell)| cell.y_range[0] < bottom && cell.y_range[1] > top)
+                .filter(|(_, cell)| meets(cell.y_range, rows) && meets(cell.x_range, columns))
                 .map(|(index, _)| index),
         );
     }
@@ -128,16 +136,32 @@ impl DeformedGrid {
     /// The runs of canvas row `y` in order of columns, from `candidates` (see [`Self::cells_in_rows`]). No column is in
     /// two runs. `owner` is scratch space.
     pub(crate) fn runs(&self, y: usize, candidates: &[u32], owner: &mut Vec<u32>, runs: &mut Vec<Run>) {
-        let start = self.columns.start;
+        self.runs_within(y, &self.columns, candidates, owner, runs);
+    }
+
+    /// [`Self::runs`] cut to `columns`, a part of [`Self::columns`].
+    pub(crate) fn runs_within(
+        &self,
+        y: usize,
+        columns: &Range<usize>,
+        candidates: &[u32],
+        owner: &mut Vec<u32>,
+        runs: &mut Vec<Run>,
+    ) {
+        let start = columns.start;
         owner.clear();
-        owner.resize(self.columns.len(), NO_CELL);
+        owner.resize(columns.len(), NO_CELL);
         runs.clear();
         let centre_y = y as f64 + 0.5;
         for &index in candidates {
-            let (crossings, count) = self.cells[index as usize].crossings(centre_y);
+            let cell = &self.cells[index as usize];
+            if cell.y_range[0] > centre_y || cell.y_range[1] <= centre_y {
+                continue;
+            }
+            let (crossings, count) = cell.crossings(centre_y);
             for pair in crossings[..count].chunks_exact(2) {
-                let first = first_centre_from(pair[0], self.columns.end).max(start);
-                let end = first_centre_from(pair[1], self.columns.end).max(first);
+                let first = first_centre_from(pair[0], columns.end).max(start);
+                let end = first_centre_from(pair[1], columns.end).max(first);
                 owner[first - start..end - start].fill(index);
             }
         }
@@ -167,10 +191,12 @@ impl Cell {
             let far = size[axis] - (source[axis] + source_size[axis]);
             source[axis].min(far) < footprint[axis]
         });
-        let ys = corners.map(|corner| corner.y);
-        let y_range =
-            [ys.iter().copied().fold(f64::INFINITY, f64::min), ys.iter().copied().fold(f64::NEG_INFINITY, f64::max)];
-        Self { corners, source, source_size, footprint, near_border, y_range }
+        let range = |values: [f64; 4]| {
+            let (low, high) = (values.into_iter().reduce(f64::min), values.into_iter().reduce(f64::max));
+            [low.unwrap_or(f64::INFINITY), high.unwrap_or(f64::NEG_INFINITY)]
+        };
+        let (x_range, y_range) = (range(corners.map(|corner| corner.x)), range(corners.map(|corner| corner.y)));
+        Self { corners, source, source_size, footprint, near_border, x_range, y_range }
     }
 
     /// Where the cell's outline crosses the line y = `centre_y`, from left to right: an even number of places.

@@ -101,6 +101,32 @@ impl Encode {
     }
 }
 
+/// 8-bit sRGB from the square root of linear light in 16 bits.
+#[derive(Debug)]
+pub(crate) struct EncodeRoots {
+    levels: Vec<u8>,
+}
+
+impl EncodeRoots {
+    /// The table of the process.
+    pub(crate) fn table() -> &'static Self {
+        static TABLE: LazyLock<EncodeRoots> = LazyLock::new(|| {
+            let level = |root: u16| {
+                let root = f32::from(root) / 65535.0;
+                Encode::table().level(root * root)
+            };
+            EncodeRoots { levels: (0..=u16::MAX).map(level).collect() }
+        });
+        &TABLE
+    }
+
+    /// The nearest 8-bit level; 65535 is white.
+    #[inline(always)]
+    pub(crate) fn level(&self, root: u16) -> u8 {
+        self.levels[usize::from(root)]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,7 +138,9 @@ mod tests {
     #[test]
     fn every_level_survives_the_round_trip() {
         for level in 0..=255_u8 {
-            assert_eq!(Encode::table().level(Linearise::table().linear(f32::from(level))), level);
+            let linear = Linearise::table().linear(f32::from(level));
+            assert_eq!(Encode::table().level(linear), level);
+            assert_eq!(EncodeRoots::table().level((linear.sqrt() * 65535.0 + 0.5) as u16), level);
         }
     }
 

@@ -11,7 +11,7 @@
 pub(crate) const EDGE_WEIGHT: f32 = 1.0 / 1_048_576.0;
 
 /// A share of the pixel closer to 1 than this counts as whole.
-const WHOLE: f32 = 1.0 - 1e-3;
+pub(crate) const WHOLE: f32 = 1.0 - 1e-3;
 
 /// The feather of one photograph: a product of a profile along x and one along y, both 1 at the middle and 0 at the
 /// borders.

@@ -123,6 +123,14 @@ impl Photograph {
         }
     }
 
+    /// Bytes that its samples take.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Eight(raster) => size_of_val(raster.data()),
+            Self::Sixteen(raster) => size_of_val(raster.data()),
+        }
+    }
+
     /// Samples per pixel: 1, 3 or 4.
     pub fn channels(&self) -> usize {
         match self {

@@ -92,8 +92,8 @@ impl<'a> Component<'a> {
         self.images.iter().map(|image| name_seed(&image.path)).collect()
     }
 
-    /// What metadata say of the cameras, in working pixels.
-    fn camera_priors(&self) -> Vec<CameraPrior> {
+    /// Which photographs one camera took, as far as models and sizes tell: a number for each.
+    pub(crate) fn camera_groups(&self) -> Vec<usize> {
         let key = |image: &SourceImage| {
             let (short, long) = (image.width.min(image.height), image.width.max(image.height));
             (image.camera_model.clone(), short, long)
@@ -101,13 +101,19 @@ impl<'a> Component<'a> {
         let mut keys: Vec<_> = self.images.iter().map(|image| key(image)).collect();
         keys.sort();
         keys.dedup();
+        self.images.iter().map(|image| keys.binary_search(&key(image)).unwrap_or(0)).collect()
+    }
+
+    /// What metadata say of the cameras, in working pixels.
+    fn camera_priors(&self) -> Vec<CameraPrior> {
         self.images
             .iter()
             .zip(&self.frames)
-            .map(|(image, frame)| CameraPrior {
+            .zip(self.camera_groups())
+            .map(|((image, frame), camera_group)| CameraPrior {
                 frame: *frame,
                 focal_px: image.focal_prior.map(|prior| prior.focal_px * frame.working_from_full),
-                camera_group: keys.binary_search(&key(image)).unwrap_or(0),
+                camera_group,
             })
             .collect()
     }

@@ -47,6 +47,7 @@ pub use project::{
 };
 pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use trueup_align::similarity::PriorMethod;
+pub use trueup_compose::fidelity::Fidelity;
 pub use trueup_compose::render::Panorama;
 pub use trueup_core::context::{CancelToken, Progress, Silent};
 pub use trueup_core::diagnostics::{Diagnostic, Severity};

@@ -11,6 +11,7 @@ use trueup_align::warps::{WarpModel, WarpOptions};
 use trueup_compose::exposure::ExposureOptions;
 use trueup_compose::layout::CanvasOptions;
 use trueup_compose::render::RenderOptions;
+use trueup_compose::seam::SeamOptions;
 use trueup_core::options::{InvalidOption, OptionDescription, StageOptions};
 use trueup_core::{Error, Result};
 use trueup_io::encode::OutputOptions;
@@ -202,6 +203,8 @@ stage_options! {
     canvas: CanvasOptions,
     /// How exposures are evened out.
     exposure: ExposureOptions,
+    /// Where one photograph ends and the next begins.
+    seam: SeamOptions,
     /// How photographs are resampled and blended.
     render: RenderOptions,
     /// How the panorama is encoded.

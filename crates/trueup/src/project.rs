@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+use trueup_compose::exposure::Correction;
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::matches::PairVerdict;
 
@@ -62,8 +63,11 @@ pub struct ImageRecord {
     pub theta_deg: Option<f64>,
     /// Scale that the similarity prior wants, relative to the others.
     pub scale: Option<f64>,
-    /// Factor on linear light that evens out the exposure.
+    /// Factor on linear light that evens out the exposure: the mean over the channels, in the photograph's middle.
     pub gain: Option<f64>,
+    /// All that was done to its light; `None` in files of programs that knew gains only.
+    #[serde(default)]
+    pub correction: Option<Correction>,
     /// Three orthogonal vanishing directions in the camera frame, if found.
     pub vanishing_points: Option<[[f64; 3]; 3]>,
     /// The deformed grid.

@@ -1,5 +1,6 @@
 //! Fills the project: what is recorded of photographs, pairs and geometry.
 
+use trueup_compose::exposure::Correction;
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_core::geometry::rows_of;
 use trueup_core::mesh::GridMesh;
@@ -89,6 +90,7 @@ fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
         theta_deg: None,
         scale: None,
         gain: None,
+        correction: None,
         vanishing_points: None,
         mesh: None,
     }
@@ -113,7 +115,7 @@ pub(crate) fn fill_geometry(
     component: &Component,
     geometry: Option<&Geometry>,
     layout: &CanvasLayout,
-    gains: &[f64],
+    corrections: &[Correction],
 ) {
     project.canvas = Canvas { width: layout.width, height: layout.height };
     project.reference = component.images[component.reference].path.display().to_string();
@@ -123,7 +125,8 @@ pub(crate) fn fill_geometry(
         let record = &mut project.images[picture];
         let mesh = &layout.placed[k].mesh;
         record.status = ImageStatus::Used;
-        record.gain = Some(gains[k]);
+        record.gain = Some(corrections[k].brightness());
+        record.correction = Some(corrections[k]);
         record.mesh = Some(MeshRecord {
             rows: mesh.rows,
             cols: mesh.columns,

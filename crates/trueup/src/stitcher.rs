@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use trueup_align::stitch_graph::{GraphFile, StitchGraph, parse_graph_file};
-use trueup_compose::exposure::{self, Thumbnail};
+use trueup_compose::exposure::{self, Correction, Thumbnail};
+use trueup_compose::fidelity::{self, Fidelity};
 use trueup_compose::layout::{self, CanvasLayout};
 use trueup_compose::render::{self, Panorama};
 use trueup_core::diagnostics::Diagnostic;
@@ -78,7 +79,7 @@ pub struct Alignment {
     /// The record so far; complete but for the seconds that composing and writing take.
     pub project: Project,
     layout: CanvasLayout,
-    gains: Vec<f64>,
+    corrections: Vec<Correction>,
     photographs: std::sync::Arc<FilePhotographs>,
     clock: Clock,
 }
@@ -174,11 +175,34 @@ impl<'a> Stitcher<'a> {
     pub fn compose(&self, alignment: &Alignment) -> Result<Panorama> {
         render::run(
             &alignment.layout,
-            &alignment.gains,
+            &alignment.corrections,
             alignment.photographs.as_ref(),
             &self.options.render,
+            &self.options.seam,
             self.context,
         )
+    }
+
+    /// Measures how true `panorama`, composed of `alignment`, is to its photographs: steps across its seams, and ghosts.
+    /// Renders every photograph alone on the canvas, five bytes a pixel of each.
+    ///
+    /// # Errors
+    /// Those of reading the photographs; [`Error::Input`] if the two do not belong together; [`Error::Cancelled`].
+    pub fn fidelity(&self, alignment: &Alignment, panorama: &Panorama) -> Result<Fidelity> {
+        let layout = &alignment.layout;
+        let layers = (0..layout.placed.len())
+            .map(|position| {
+                self.context.check_cancelled()?;
+                let photographs = alignment.photographs.as_ref();
+                render::layer(layout, &alignment.corrections, position, photographs, &self.options.render)
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let size = [layout.width, layout.height];
+        let shown = match panorama.seams() {
+            Some(seams) => seams.on_canvas(size),
+            None => fidelity::deepest(&layers, size)?,
+        };
+        fidelity::measure(panorama, &layers, &shown)
     }
 
     fn check_any(&self, sources: &Sources, inputs: &Inputs) -> Result<()> {
@@ -314,21 +338,22 @@ impl<'a> Stitcher<'a> {
         let layout = layout::run(placed, component.reference, &self.options.canvas, self.context)?;
         let thumbnails: Vec<Thumbnail> = members
             .iter()
-            .filter_map(|&picture| matched.measured[picture].as_ref())
-            .map(|one| Thumbnail { raster: &one.thumbnail, frame: one.thumbnail_frame })
+            .zip(component.camera_groups())
+            .filter_map(|(&picture, camera)| Some((camera, matched.measured[picture].as_ref()?)))
+            .map(|(camera, one)| Thumbnail { raster: &one.thumbnail, frame: one.thumbnail_frame, camera })
             .collect();
-        let gains = clock
+        let corrections = clock
             .time("exposure", || {
                 exposure::run(&layout, &thumbnails, component.reference, &self.options.exposure, self.context)
             })?
-            .gains;
+            .corrections;
         let mut project = matched.project(self.options, members, stitched);
-        fill_geometry(&mut project, &component, geometry.as_ref(), &layout, &gains);
+        fill_geometry(&mut project, &component, geometry.as_ref(), &layout, &corrections);
         project.measures = geometry
             .as_ref()
             .map(|geometry| clock.time("measures", || measures::run(&component, geometry, &layout, self.options)));
         project.seconds.clone_from(clock.seconds());
-        Ok(Alignment { project, layout, gains, photographs: photographs.clone(), clock })
+        Ok(Alignment { project, layout, corrections, photographs: photographs.clone(), clock })
     }
 
     fn report_left_out(&self, name: &str, left_out: &LeftOut) {

@@ -1,6 +1,7 @@
 use trueup_core::mesh::GridMesh;
 
 use super::*;
+use crate::layout::Placed;
 
 /// The scene's linear light, smooth with some texture.
 fn scene(x: f64, y: f64) -> f64 {
@@ -42,8 +43,60 @@ fn layout(shifts: &[f64]) -> CanvasLayout {
 
 fn estimate(shifts: &[f64], rasters: &[Raster<u8>], options: &ExposureOptions) -> Exposure {
     let frame = WorkingFrame::new(WIDTH, HEIGHT, 480_000.0);
-    let thumbnails: Vec<Thumbnail> = rasters.iter().map(|raster| Thumbnail { raster, frame }).collect();
+    let thumbnails: Vec<Thumbnail> = rasters.iter().map(|raster| Thumbnail { raster, frame, camera: 0 }).collect();
     run(&layout(shifts), &thumbnails, 0, options, &StageContext::default()).expect("estimates")
+}
+
+fn gains(exposure: &Exposure) -> Vec<f64> {
+    exposure.corrections.iter().map(Correction::brightness).collect()
+}
+
+/// ln of the light that reaches the sensor at the squared radius `r2`, relative to the middle.
+fn falloff(r2: f64) -> f64 {
+    -0.5 * r2 - 0.2 * r2 * r2
+}
+
+#[test]
+fn gain_colour_and_vignetting_are_recovered_together() {
+    let shifts = [0.0, 110.0, 190.0, 300.0, 400.0];
+    let lights = [1.0, 0.25, 1.9, 4.0, 0.6];
+    let casts = [[1.0, 1.0, 1.0], [1.1, 1.0, 0.9], [0.92, 1.0, 1.05], [1.0, 1.05, 1.1], [0.95, 1.0, 1.0]];
+    let rasters: Vec<Raster<u8>> = (0..shifts.len())
+        .map(|k| {
+            let mut raster = Raster::new(WIDTH, HEIGHT, 3);
+            for y in 0..HEIGHT {
+                for x in 0..WIDTH {
+                    let (u, v) = (x as f64 + 0.5 - WIDTH as f64 / 2.0, y as f64 + 0.5 - HEIGHT as f64 / 2.0);
+                    let r2 = (u * u + v * v) * 4.0 / ((WIDTH * WIDTH + HEIGHT * HEIGHT) as f64);
+                    let light = lights[k] * falloff(r2).exp() * scene(x as f64 + shifts[k], y as f64);
+                    raster.pixel_mut(x, y).copy_from_slice(&casts[k].map(|cast| encoded(cast * light)));
+                }
+            }
+            raster
+        })
+        .collect();
+    // A passer-by in one photograph does not count.
+    let mut rasters = rasters;
+    for y in 60..120 {
+        for x in 130..170 {
+            rasters[1].pixel_mut(x, y).copy_from_slice(&[20, 60, 20]);
+        }
+    }
+    let exposure = estimate(&shifts, &rasters, &ExposureOptions::default());
+    let truth = |k: usize, c: usize| lights[0] * casts[0][c] / (lights[k] * casts[k][c]);
+    for (k, correction) in exposure.corrections.iter().enumerate() {
+        for c in 0..3 {
+            assert!((correction.gain[c] / truth(k, c) - 1.0).abs() < 0.02, "{k}: {correction:?}");
+        }
+        for r2 in [0.25, 0.5, 0.75, 1.0_f64] {
+            let lifted = correction.at_radius(r2) * falloff(r2).exp();
+            assert!((lifted - 1.0).abs() < 0.02, "{lifted} at {r2}: {correction:?}");
+        }
+    }
+    let plain = ExposureOptions { model: ExposureModel::Gain, ..ExposureOptions::default() };
+    for correction in estimate(&shifts, &rasters, &plain).corrections {
+        assert_eq!(correction, Correction::uniform(correction.gain[0]));
+    }
 }
 
 #[test]
@@ -54,15 +107,15 @@ fn gains_from_a_quarter_to_four_are_recovered() {
     for anchor in [GainAnchor::Mean, GainAnchor::Reference] {
         let exposure = estimate(&shifts, &rasters, &ExposureOptions { anchor, ..ExposureOptions::default() });
         assert_eq!(exposure.pairs.len(), 3);
-        let products: Vec<f64> = exposure.gains.iter().zip(lights).map(|(gain, light)| gain * light).collect();
+        let corrections = exposure.corrections.iter();
+        let products: Vec<f64> =
+            corrections.clone().zip(lights).flat_map(|(one, light)| one.gain.map(|gain| gain * light)).collect();
         for product in &products {
             assert!((product / products[0] - 1.0).abs() < 0.02, "{products:?}");
         }
         match anchor {
-            GainAnchor::Reference => assert_eq!(exposure.gains[0], 1.0),
-            GainAnchor::Mean => {
-                assert!(exposure.gains.iter().map(|gain| gain.ln()).sum::<f64>().abs() < 1e-9);
-            }
+            GainAnchor::Reference => assert_eq!(exposure.corrections[0].gain, [1.0; 3]),
+            GainAnchor::Mean => assert!(corrections.map(|one| one.brightness().ln()).sum::<f64>().abs() < 1e-9),
         }
     }
 }
@@ -83,28 +136,30 @@ fn saturated_and_moving_things_do_not_count() {
         }
     }
     let exposure = estimate(&shifts, &rasters, &ExposureOptions::default());
-    assert!((exposure.gains[0] / exposure.gains[1] - 2.0).abs() < 0.04, "{exposure:?}");
+    assert!((gains(&exposure)[0] / gains(&exposure)[1] - 2.0).abs() < 0.04, "{exposure:?}");
 }
 
 #[test]
 fn photographs_without_overlap_keep_their_brightness() {
     let rasters = [picture(0.0, 1.0), picture(150.0, 2.0), picture(900.0, 3.0)];
     let exposure = estimate(&[0.0, 150.0, 900.0], &rasters, &ExposureOptions::default());
-    assert_eq!(exposure.gains[2], 1.0);
-    assert!((exposure.gains[0] / exposure.gains[1] - 2.0).abs() < 0.04);
+    assert_eq!(gains(&exposure)[2], 1.0);
+    assert!((gains(&exposure)[0] / gains(&exposure)[1] - 2.0).abs() < 0.04);
     let alone = estimate(&[0.0], &rasters[..1], &ExposureOptions::default());
-    assert_eq!(alone.gains, [1.0]);
+    assert_eq!(gains(&alone), [1.0]);
     let off = ExposureOptions { enabled: false, ..ExposureOptions::default() };
-    assert_eq!(estimate(&[0.0, 150.0, 900.0], &rasters, &off).gains, [1.0; 3]);
+    assert_eq!(estimate(&[0.0, 150.0, 900.0], &rasters, &off).corrections, [Correction::default(); 3]);
 }
 
 #[test]
 fn gains_stay_within_their_limit_and_black_says_nothing() {
     let rasters = [picture(0.0, 1.0), picture(150.0, 8.0)];
     let options = ExposureOptions { max_gain: 1.5, ..ExposureOptions::default() };
-    assert_eq!(estimate(&[0.0, 150.0], &rasters, &options).gains, [1.5, 1.5_f64.recip()]);
+    let bounded = estimate(&[0.0, 150.0], &rasters, &ExposureOptions { anchor: GainAnchor::Mean, ..options });
+    assert!((gains(&bounded)[0] - 1.5).abs() < 1e-9 && (gains(&bounded)[1] - 1.5_f64.recip()).abs() < 1e-9);
     let black = Raster::new(WIDTH, HEIGHT, 3);
-    assert_eq!(estimate(&[0.0, 150.0], &[black, picture(150.0, 1.0)], &ExposureOptions::default()).gains, [1.0; 2]);
+    let exposure = estimate(&[0.0, 150.0], &[black, picture(150.0, 1.0)], &ExposureOptions::default());
+    assert_eq!(gains(&exposure), [1.0; 2]);
 }
 
 #[test]

@@ -1,13 +1,17 @@
 //! One photograph alone on the canvas, for measuring.
 
+use std::borrow::Cow;
+
 use trueup_core::Result;
 use trueup_core::raster::{LUMA, Raster};
 use trueup_core::source::PhotographSource;
 
-use super::{BAND_ROWS, Prepared, RenderOptions, Scratch, check};
+use super::prepared::{Prepared, Scratch, Window, check_photograph};
+use super::{BAND_ROWS, RenderOptions, check};
+use crate::exposure::Correction;
 use crate::layout::CanvasLayout;
 use crate::transfer_curve::Encode;
-use crate::weights::alpha;
+use crate::weights::WHOLE;
 
 /// What one photograph shows of the canvas: its bounding box there.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,18 +26,18 @@ pub struct Layer {
     pub covered: Raster<bool>,
 }
 
-/// Renders photograph `layout.placed[position]` alone, multiplied by its gain, as [`super::run`] would.
+/// Renders photograph `layout.placed[position]` alone, corrected, as [`super::run`] would.
 ///
 /// # Errors
 /// Those of [`super::run`], and [`trueup_core::Error::Input`] if there is no such position.
 pub fn layer(
     layout: &CanvasLayout,
-    gains: &[f64],
+    corrections: &[Correction],
     position: usize,
     photographs: &dyn PhotographSource,
     options: &RenderOptions,
 ) -> Result<Layer> {
-    check(layout, gains, options)?;
+    check(layout, corrections, options)?;
     let Some(placed) = layout.placed.get(position) else {
         return Err(trueup_core::Error::input(
             "canvas",
@@ -41,8 +45,11 @@ pub fn layer(
             "Ask for one of the photographs placed.",
         ));
     };
-    let prepared = Prepared::new(placed, gains[position], layout, photographs, options)?;
-    let (columns, rows) = (prepared.grid.columns.clone(), prepared.grid.rows.clone());
+    let photograph = photographs.photograph(placed.photograph)?;
+    check_photograph(placed, &photograph)?;
+    let size = [layout.width, layout.height];
+    let prepared = Prepared::new(Cow::Owned(photograph), &placed.mesh, size, &corrections[position], options);
+    let (columns, rows) = (prepared.columns(), prepared.rows());
     let (width, height) = (columns.len(), rows.len());
     let mut layer = Layer {
         left: columns.start,
@@ -52,19 +59,20 @@ pub fn layer(
     };
     let encode = Encode::table();
     let mut scratch = Scratch::default();
+    let mut samples = Vec::new();
     for first in rows.clone().step_by(BAND_ROWS) {
         let band = first..(first + BAND_ROWS).min(rows.end);
-        let mut sums = vec![[0.0; 4]; layout.width * band.len()];
-        prepared.add_to_band(&band, &mut sums, layout.width, options, &mut scratch);
-        for (y, sums) in band.zip(sums.chunks_exact(layout.width)) {
+        samples.resize(width * band.len(), [0.0; 4]);
+        prepared.sample(Window { columns: &columns, rows: &band }, &mut samples, options, &mut scratch);
+        for (y, samples) in band.zip(samples.chunks_exact(width.max(1))) {
             let gray = layer.gray.row_mut(y - rows.start);
             let covered = layer.covered.row_mut(y - rows.start);
-            for ((gray, covered), sum) in gray.iter_mut().zip(covered).zip(&sums[columns.clone()]) {
-                let [r, g, b, weight] = *sum;
-                if weight > 0.0 {
-                    let levels = [r, g, b].map(|light| f32::from(encode.level(light / weight)));
+            for ((gray, covered), sample) in gray.iter_mut().zip(covered).zip(samples) {
+                let [r, g, b, share] = *sample;
+                if share > 0.0 {
+                    let levels = [r, g, b].map(|root| f32::from(encode.level(root * root)));
                     *gray = levels.iter().zip(LUMA).map(|(level, share)| level * share).sum();
-                    *covered = alpha(weight) >= 1.0;
+                    *covered = share >= WHOLE;
                 }
             }
         }

@@ -1,9 +1,13 @@
 use nalgebra::Vector2;
 use proptest::prelude::*;
-use trueup_core::raster::Raster;
+use trueup_core::mesh::GridMesh;
+use trueup_core::raster::{Photograph, Raster, RowSource};
 
+use super::panorama::Pixels;
 use super::*;
-use crate::layout::{self, CanvasOptions};
+use crate::deformed_grid::DeformedGrid;
+use crate::layout::{self, CanvasOptions, Placed};
+use crate::simd::{Positions, invert_row};
 
 /// Photographs in memory.
 pub(crate) struct Memory(pub(crate) Vec<Photograph>);
@@ -39,8 +43,18 @@ fn canvas(width: usize, height: usize, placed: Vec<Placed>) -> CanvasLayout {
 }
 
 fn render(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Panorama {
-    let gains = vec![1.0; layout.placed.len()];
-    run(layout, &gains, &Memory(pictures), options, &StageContext::default()).expect("renders")
+    let corrections = vec![Correction::default(); layout.placed.len()];
+    compose(layout, &corrections, &Memory(pictures), options, &StageContext::default()).expect("renders")
+}
+
+fn compose(
+    layout: &CanvasLayout,
+    corrections: &[Correction],
+    photographs: &Memory,
+    options: &RenderOptions,
+    context: &StageContext,
+) -> Result<Panorama> {
+    run(layout, corrections, photographs, options, &SeamOptions::default(), context)
 }
 
 fn rows(panorama: &Panorama) -> Vec<u8> {
@@ -55,7 +69,7 @@ fn rows(panorama: &Panorama) -> Vec<u8> {
 fn an_undeformed_grid_returns_the_photograph() {
     let raster = noise(83, 61, 3);
     for interpolation in [Interpolation::Bilinear, Interpolation::Bicubic] {
-        for blend in [Blend::Feather, Blend::Average, Blend::None] {
+        for blend in [Blend::MultiBand, Blend::Feather, Blend::Average, Blend::None] {
             let options = RenderOptions { interpolation, blend, ..RenderOptions::default() };
             let placed = vec![moved(0, 83.0, 61.0, |p| p.into())];
             let context = StageContext::default();
@@ -144,12 +158,13 @@ fn gains_act_on_linear_light() {
     let photographs = Memory(vec![gradient(30, 30, |_, _| 100.0)]);
     let options = RenderOptions::default();
     let context = StageContext::default();
-    let panorama = run(&layout, &[2.0], &photographs, &options, &context).expect("renders");
-    // sRGB 100 is 0.127438 in linear light; twice that is level 137.6.
-    assert!((panorama.linear_pixel(15, 15)[0] - 0.254_876).abs() < 1e-5);
+    let panorama = compose(&layout, &[Correction::uniform(2.0)], &photographs, &options, &context).expect("renders");
+    // sRGB 100 is 0.127438 in linear light; twice that, levelled off by 0.1 %, is level 137.6.
+    assert!((panorama.linear_pixel(15, 15)[0] - 0.254_876 / 1.000_987).abs() < 2e-5);
     assert_eq!(&rows(&panorama)[..4], [138, 138, 138, 255]);
-    assert!(matches!(run(&layout, &[], &photographs, &options, &context), Err(Error::Input { .. })));
-    assert!(matches!(run(&layout, &[f64::NAN], &photographs, &options, &context), Err(Error::Input { .. })));
+    assert!(matches!(compose(&layout, &[], &photographs, &options, &context), Err(Error::Input { .. })));
+    let bad = [Correction::uniform(f64::NAN)];
+    assert!(matches!(compose(&layout, &bad, &photographs, &options, &context), Err(Error::Input { .. })));
 }
 
 #[test]
@@ -177,8 +192,9 @@ fn folds_are_counted_and_every_pixel_is_hit_once() {
     let context = StageContext::default();
     let options = RenderOptions { blend: Blend::Average, ..RenderOptions::default() };
     let photographs = Memory(vec![gradient(60, 60, |_, _| 90.0)]);
-    let panorama = run(&layout, &[1.0], &photographs, &options, &context).expect("renders");
-    assert!(panorama.sums.iter().all(|sum| sum[3] <= 1.0));
+    let panorama = compose(&layout, &[Correction::default()], &photographs, &options, &context).expect("renders");
+    let Pixels::Sums(sums) = &panorama.pixels else { panic!("a mean") };
+    assert!(sums.iter().all(|sum| sum[3] <= 1.0));
     let diagnostics = context.take_diagnostics();
     assert_eq!(diagnostics[0].code, "grid-folded");
     assert!(diagnostics[0].message.starts_with("2 of 18"), "{}", diagnostics[0].message);
@@ -197,8 +213,11 @@ fn pictures_outside_or_far_too_small_are_harmless() {
             moved(0, 30.0, 30.0, |p| (p * 1e15).into()),
         ],
     );
-    let panorama = render(&layout, vec![picture], &RenderOptions::default());
-    assert!(panorama.sums.iter().flatten().all(|sum| sum.is_finite()));
+    for blend in [Blend::Feather, Blend::MultiBand, Blend::None] {
+        let options = RenderOptions { blend, ..RenderOptions::default() };
+        let panorama = render(&layout, vec![picture.clone()], &options);
+        assert!((0..400).all(|at| panorama.linear_pixel(at % 20, at / 20).iter().all(|value| value.is_finite())));
+    }
 }
 
 #[test]
@@ -207,17 +226,18 @@ fn photographs_of_another_size_are_refused() {
     let options = RenderOptions::default();
     for picture in [noise(30, 29, 3), noise(30, 30, 2)] {
         let photographs = Memory(vec![Photograph::Eight(picture)]);
-        let result = run(&layout, &[1.0], &photographs, &options, &StageContext::default());
+        let result = compose(&layout, &[Correction::default()], &photographs, &options, &StageContext::default());
         assert!(matches!(result, Err(Error::Input { .. })));
     }
 }
 
 #[test]
-fn the_sums_take_sixteen_bytes_a_pixel() {
+fn sums_take_sixteen_bytes_a_pixel() {
     assert_eq!(Panorama::required_bytes(1000, 500), 8_000_000);
     let layout = canvas(70, 30, vec![]);
     let panorama = render(&layout, vec![], &RenderOptions::default());
-    assert_eq!(size_of_val(panorama.sums.as_slice()), Panorama::required_bytes(70, 30));
+    let Pixels::Sums(sums) = &panorama.pixels else { panic!("nothing to seek seams between") };
+    assert_eq!(size_of_val(sums.as_slice()), Panorama::required_bytes(70, 30));
     assert!(rows(&panorama).iter().all(|&byte| byte == 0));
 }
 
@@ -229,7 +249,8 @@ fn any_number_of_threads_gives_the_same_bits() {
     let layout = canvas(160, 110, placed);
     let of_threads = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
-        pool.install(|| render(&layout, pictures.clone(), &RenderOptions::default()))
+        let of = |blend| render(&layout, pictures.clone(), &RenderOptions { blend, ..RenderOptions::default() });
+        pool.install(|| [of(Blend::MultiBand), of(Blend::Feather), of(Blend::None)])
     };
     let single = of_threads(1);
     for threads in [2, 3] {
@@ -302,7 +323,8 @@ fn a_layer_is_one_photograph_where_it_lies() {
     let placed = vec![moved(0, 100.0, 80.0, |p| p.into()), moved(1, 60.0, 40.0, |p| [p.x + 30.0, p.y + 20.0])];
     let context = StageContext::default();
     let layout = layout::run(placed, 0, &CanvasOptions::default(), &context).expect("two grids");
-    let found = layer(&layout, &[1.0, 1.0], 1, &photographs, &RenderOptions::default()).expect("a layer");
+    let found =
+        layer(&layout, &[Correction::default(); 2], 1, &photographs, &RenderOptions::default()).expect("a layer");
     // The extrapolated rim may reach a pixel beyond the photograph; it is not covered.
     for y in 0..layout.height {
         for x in 0..layout.width {
@@ -320,5 +342,5 @@ fn a_layer_is_one_photograph_where_it_lies() {
             }
         }
     }
-    assert!(layer(&layout, &[1.0, 1.0], 2, &photographs, &RenderOptions::default()).is_err());
+    assert!(layer(&layout, &[Correction::default(); 2], 2, &photographs, &RenderOptions::default()).is_err());
 }

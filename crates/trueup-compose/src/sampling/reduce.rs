@@ -25,8 +25,16 @@ fn halve<T: Copy + Default + Send + Sync>(
         let rows = [raster.row(2 * y), raster.row((2 * y + 1).min(raster.height() - 1))];
         for (x, pixel) in row.chunks_exact_mut(channels).enumerate() {
             let columns = [2 * x, (2 * x + 1).min(raster.width() - 1)];
+            if channels != 4 {
+                let [left, right] = columns.map(|column| column * channels);
+                for (channel, out) in pixel.iter_mut().enumerate() {
+                    let at = |row: usize, column: usize| value(rows[row][column + channel]);
+                    *out = sample(u64::from((at(0, left) + at(0, right) + at(1, left) + at(1, right) + 2) / 4));
+                }
+                continue;
+            }
             let quad = [0, 1, 2, 3].map(|i| &rows[i / 2][columns[i % 2] * channels..][..channels]);
-            let weights = quad.map(|source| if channels == 4 { u64::from(value(source[3])) } else { 1 });
+            let weights = quad.map(|source| u64::from(value(source[3])));
             let total: u64 = weights.iter().sum();
             for (channel, out) in pixel.iter_mut().enumerate() {
                 let levels = quad.map(|source| u64::from(value(source[channel])));

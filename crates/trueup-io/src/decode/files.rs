@@ -62,7 +62,7 @@ impl FilePhotographs {
     }
 
     fn keep(&self, index: usize, photograph: Photograph) {
-        let bytes = byte_size(&photograph);
+        let bytes = photograph.bytes();
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let Kept { photographs, free_bytes } = &mut *kept;
         let Some(place) = photographs.get_mut(index) else { return };
@@ -75,7 +75,7 @@ impl FilePhotographs {
     fn take(&self, index: usize) -> Option<Photograph> {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let photograph = kept.photographs.get_mut(index)?.take()?;
-        kept.free_bytes += byte_size(&photograph);
+        kept.free_bytes += photograph.bytes();
         Some(photograph)
     }
 }
@@ -88,12 +88,5 @@ impl PhotographSource for FilePhotographs {
             Some(photograph) => Ok(photograph),
             None => photograph(image),
         }
-    }
-}
-
-fn byte_size(photograph: &Photograph) -> usize {
-    match photograph {
-        Photograph::Eight(raster) => size_of_val(raster.data()),
-        Photograph::Sixteen(raster) => size_of_val(raster.data()),
     }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_align::metrics::{Overlap, OverlapMeasures, mean_over_overlaps};
+use trueup_compose::exposure::Correction;
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_compose::render::{self, Layer};
 use trueup_core::mesh::GridMesh;
@@ -93,14 +94,16 @@ pub(crate) fn compare_overlaps(
 ) -> Result<PixelEvaluation> {
     let records: Vec<&ImageRecord> = project.used_images().collect();
     let layout = layout(used_grids(&records)?, positions, scale);
-    let gains: Vec<f64> = records.iter().map(|record| record.gain.unwrap_or(1.0)).collect();
+    let correction =
+        |record: &&ImageRecord| record.correction.unwrap_or(Correction::uniform(record.gain.unwrap_or(1.0)));
+    let corrections: Vec<Correction> = records.iter().map(correction).collect();
 
     context.progress().begin(STAGE, records.len() as u64);
     let layers: Vec<Layer> = (0..records.len())
         .into_par_iter()
         .map(|position| {
             context.check_cancelled()?;
-            let layer = render::layer(&layout, &gains, position, photographs, &project.options.render)?;
+            let layer = render::layer(&layout, &corrections, position, photographs, &project.options.render)?;
             context.progress().advance(STAGE, 1);
             Ok(layer)
         })

@@ -1,0 +1,324 @@
+//! Levels of pyramids whose pictures do not cover every sample.
+//!
+//! Sample i of level l sits on pixel 2^l i of the canvas, whatever part of the canvas a plane holds: two planes that both
+//! hold what a sample is made of give it the same bits.
+//!
+//! # Source
+//! Burt, Adelson, "A multiresolution spline with application to image mosaics", ACM TOG 2(4), 1983; kernel 1 4 6 4 1.
+//!
+//! # Departures
+//! Samples carry the share that is covered, colours are multiplied by it, and sums are divided by the sum of the shares
+//! (normalised convolution: Knutsson, Westin, CVPR 1993), so that what lies beside a picture never bleeds into it.
+
+use std::ops::Range;
+
+/// Something that can be summed with weights.
+pub(super) trait Texel: Copy + Default {
+    /// `self + weight * other`.
+    fn plus(self, other: Self, weight: f32) -> Self;
+}
+
+impl Texel for f32 {
+    #[inline(always)]
+    fn plus(self, other: Self, weight: f32) -> Self {
+        self + weight * other
+    }
+}
+
+impl Texel for [f32; 4] {
+    #[inline(always)]
+    fn plus(self, other: Self, weight: f32) -> Self {
+        [
+            self[0] + weight * other[0],
+            self[1] + weight * other[1],
+            self[2] + weight * other[2],
+            self[3] + weight * other[3],
+        ]
+    }
+}
+
+/// A part of one level; all outside is zero. Four channels are three of colour times the share, and the share.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Plane<T> {
+    pub(super) columns: Range<usize>,
+    pub(super) rows: Range<usize>,
+    pub(super) texels: Vec<T>,
+}
+
+impl<T: Texel> Plane<T> {
+    /// Zeros.
+    pub(super) fn new(columns: Range<usize>, rows: Range<usize>) -> Self {
+        let texels = vec![T::default(); columns.len() * rows.len()];
+        Self { columns, rows, texels }
+    }
+
+    /// The samples of row `y`, which the plane holds.
+    pub(super) fn row(&self, y: usize) -> &[T] {
+        let width = self.columns.len();
+        &self.texels[(y - self.rows.start) * width..][..width]
+    }
+
+    pub(super) fn row_mut(&mut self, y: usize) -> &mut [T] {
+        let width = self.columns.len();
+        &mut self.texels[(y - self.rows.start) * width..][..width]
+    }
+
+    /// Copies the samples `first..first + out.len()` of row `y` to `out`; zeros where the plane holds none. `first` may
+    /// lie left of the canvas.
+    fn copy_row(&self, y: isize, first: isize, out: &mut [T]) {
+        out.fill(T::default());
+        if y < self.rows.start as isize || y >= self.rows.end as isize {
+            return;
+        }
+        let row = self.row(y as usize);
+        let from = first.max(self.columns.start as isize);
+        let to = (first + out.len() as isize).min(self.columns.end as isize);
+        if from < to {
+            let source =
+                &row[(from - self.columns.start as isize) as usize..(to - self.columns.start as isize) as usize];
+            out[(from - first) as usize..(to - first) as usize].copy_from_slice(source);
+        }
+    }
+
+    /// The next coarser level: every sample whose middle this plane holds.
+    pub(super) fn reduced(&self) -> Self {
+        let half = |range: &Range<usize>| range.start.div_ceil(2)..range.end.div_ceil(2);
+        let mut reduced = Self::new(half(&self.columns), half(&self.rows));
+        let width = reduced.columns.len();
+        if width == 0 {
+            return reduced;
+        }
+        // Rows of this level, reduced along x: a window of five of them.
+        let mut padded = vec![T::default(); 2 * width + 3];
+        let mut window: [Vec<T>; 5] = std::array::from_fn(|_| vec![T::default(); width]);
+        let first = 2 * reduced.columns.start as isize - 2;
+        let mut next = 2 * reduced.rows.start as isize - 2;
+        for y in reduced.rows.clone() {
+            while next <= 2 * y as isize + 2 {
+                self.copy_row(next, first, &mut padded);
+                let row = &mut window[next.rem_euclid(5) as usize];
+                for (out, taps) in row.iter_mut().zip(padded.windows(5).step_by(2)) {
+                    *out = five(taps[0], taps[1], taps[2], taps[3], taps[4]);
+                }
+                next += 1;
+            }
+            let at = |offset: isize| &window[(2 * y as isize + offset).rem_euclid(5) as usize][..width];
+            let (a, b, c, d, e) = (at(-2), at(-1), at(0), at(1), at(2));
+            for (x, out) in reduced.row_mut(y).iter_mut().enumerate() {
+                *out = five(a[x], b[x], c[x], d[x], e[x]);
+            }
+        }
+        reduced
+    }
+
+    /// The part `columns` x `rows` of the next finer level, interpolated; sums not divided by their shares.
+    pub(super) fn expanded(&self, columns: &Range<usize>, rows: &Range<usize>) -> Self {
+        let mut expanded = Self::new(columns.clone(), rows.clone());
+        let width = columns.len();
+        if width == 0 {
+            return expanded;
+        }
+        let first = columns.start as isize / 2 - 1;
+        let mut padded = vec![T::default(); width / 2 + 4];
+        let mut window: [Vec<T>; 3] = std::array::from_fn(|_| vec![T::default(); width]);
+        let mut next = rows.start as isize / 2 - 1;
+        for y in rows.clone() {
+            let middle = (y / 2) as isize;
+            while next <= middle + 1 {
+                self.copy_row(next, first, &mut padded);
+                let row = &mut window[next.rem_euclid(3) as usize];
+                for (index, out) in row.iter_mut().enumerate() {
+                    let x = columns.start + index;
+                    let at = (x / 2) as isize - first;
+                    let taps = &padded[at as usize - 1..at as usize + 2];
+                    *out = if x.is_multiple_of(2) { three(taps[0], taps[1], taps[2]) } else { two(taps[1], taps[2]) };
+                }
+                next += 1;
+            }
+            let at = |row: isize| &window[row.rem_euclid(3) as usize][..width];
+            let (above, here, below) = (at(middle - 1), at(middle), at(middle + 1));
+            let out = expanded.row_mut(y);
+            if y.is_multiple_of(2) {
+                for (x, out) in out.iter_mut().enumerate() {
+                    *out = three(above[x], here[x], below[x]);
+                }
+            } else {
+                for (x, out) in out.iter_mut().enumerate() {
+                    *out = two(here[x], below[x]);
+                }
+            }
+        }
+        expanded
+    }
+}
+
+#[inline(always)]
+fn five<T: Texel>(a: T, b: T, c: T, d: T, e: T) -> T {
+    const OUTER: f32 = 1.0 / 16.0;
+    const INNER: f32 = 4.0 / 16.0;
+    const MIDDLE: f32 = 6.0 / 16.0;
+    T::default().plus(a, OUTER).plus(b, INNER).plus(c, MIDDLE).plus(d, INNER).plus(e, OUTER)
+}
+
+#[inline(always)]
+fn three<T: Texel>(a: T, b: T, c: T) -> T {
+    T::default().plus(a, 0.125).plus(b, 0.75).plus(c, 0.125)
+}
+
+#[inline(always)]
+fn two<T: Texel>(a: T, b: T) -> T {
+    T::default().plus(a, 0.5).plus(b, 0.5)
+}
+
+/// A smaller share of a sample, a 64th of a step of 16 bits, is none: its colour would be made of rounding.
+pub(super) const LEAST_SHARE: f32 = 1.0 / (1 << 22) as f32;
+
+/// Colour divided by the share; `None` where nothing is covered.
+#[inline(always)]
+pub(super) fn colour(texel: [f32; 4]) -> Option<[f32; 3]> {
+    (texel[3] > LEAST_SHARE).then(|| {
+        let scale = 1.0 / texel[3];
+        [texel[0] * scale, texel[1] * scale, texel[2] * scale]
+    })
+}
+
+/// A weighted sum divided by its weight; `None` without any.
+#[inline(always)]
+fn mean([r, g, b, weight]: [f32; 4]) -> Option<[f32; 3]> {
+    (weight > 0.0).then(|| [r / weight, g / weight, b / weight])
+}
+
+/// Makes every sample that is covered at all count the same when it is interpolated.
+pub(super) fn level_shares(plane: &mut Plane<[f32; 4]>) {
+    for texel in &mut plane.texels {
+        *texel = match colour(*texel) {
+            Some([r, g, b]) => [r, g, b, 1.0],
+            None => [0.0; 4],
+        };
+    }
+}
+
+/// Adds to `sum` the level's detail of one picture, `level` minus its interpolated coarser level, weighted by `mask` and by
+/// the share covered (its fourth power).
+pub(super) fn add_detail(
+    sum: &mut Plane<[f32; 4]>,
+    level: &Plane<[f32; 4]>,
+    coarser: &Plane<[f32; 4]>,
+    mask: &Plane<f32>,
+) {
+    // What is added back is interpolated with even shares, too.
+    let mut coarser = coarser.clone();
+    level_shares(&mut coarser);
+    let smooth = coarser.expanded(&level.columns, &level.rows);
+    for_each_weighted(sum, level, mask, |index, own| match colour(smooth.texels[index]) {
+        Some(base) => [own[0] - base[0], own[1] - base[1], own[2] - base[2]],
+        None => [0.0; 3],
+    });
+}
+
+/// Adds to `sum` one picture at the coarsest level.
+pub(super) fn add_base(sum: &mut Plane<[f32; 4]>, level: &Plane<[f32; 4]>, mask: &Plane<f32>) {
+    for_each_weighted(sum, level, mask, |_, own| own);
+}
+
+/// A picture that covers a place counts this much there even where its mask is zero: it shows where no other does.
+const LEAST_WEIGHT: f32 = 1e-6;
+
+/// Smallest share that weights tell apart; their products stay far from where numbers lose digits.
+const LEAST_TRUST: f32 = 1e-3;
+
+#[inline(always)]
+fn for_each_weighted(
+    sum: &mut Plane<[f32; 4]>,
+    level: &Plane<[f32; 4]>,
+    mask: &Plane<f32>,
+    value: impl Fn(usize, [f32; 3]) -> [f32; 3],
+) {
+    debug_assert_eq!((&level.columns, &level.rows), (&mask.columns, &mask.rows));
+    let width = level.columns.len();
+    for y in level.rows.clone() {
+        let start = (y - level.rows.start) * width;
+        let (own, mask) = (level.row(y), mask.row(y));
+        let shift = level.columns.start - sum.columns.start;
+        let sums = &mut sum.row_mut(y)[shift..shift + width];
+        for (x, (sum, (own, mask))) in sums.iter_mut().zip(own.iter().zip(mask)).enumerate() {
+            if let Some(own_colour) = colour(*own) {
+                // Where a picture ends, its samples are means of one side only: they soon count nothing beside others.
+                let share = own[3].max(LEAST_TRUST);
+                let weight = (mask + LEAST_WEIGHT) * (share * share) * (share * share);
+                let [r, g, b] = value(start + x, own_colour);
+                *sum = sum.plus([r, g, b, 1.0], weight);
+            }
+        }
+    }
+}
+
+/// Turns weighted sums into the blended level: their mean, on top of what the coarser blended level interpolates to. The
+/// fourth channel becomes 1 where there is something.
+pub(super) fn collapse(sum: &mut Plane<[f32; 4]>, coarser: Option<&Plane<[f32; 4]>>) {
+    let smooth = coarser.map(|coarser| coarser.expanded(&sum.columns, &sum.rows));
+    for (index, texel) in sum.texels.iter_mut().enumerate() {
+        let base = smooth.as_ref().map_or(Some([0.0; 3]), |smooth| colour(smooth.texels[index]));
+        *texel = match (mean(*texel), base) {
+            (Some(detail), Some(base)) => [detail[0] + base[0], detail[1] + base[1], detail[2] + base[2], 1.0],
+            _ => [0.0; 4],
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plane(width: usize, height: usize, value: impl Fn(usize, usize) -> [f32; 4]) -> Plane<[f32; 4]> {
+        let mut plane = Plane::new(0..width, 0..height);
+        for y in 0..height {
+            for (x, texel) in plane.row_mut(y).iter_mut().enumerate() {
+                *texel = value(x, y);
+            }
+        }
+        plane
+    }
+
+    #[test]
+    fn an_even_picture_stays_even_up_to_its_border() {
+        // Covered in an odd box only; the colour is 0.3 wherever anything is covered.
+        let source = plane(29, 23, |x, y| if x > 4 && y < 17 { [0.3, 0.6, 0.9, 1.0] } else { [0.0; 4] });
+        let reduced = source.reduced();
+        assert_eq!((reduced.columns.clone(), reduced.rows.clone()), (0..15, 0..12));
+        let back = reduced.expanded(&source.columns, &source.rows);
+        for (texel, original) in back.texels.iter().zip(&source.texels) {
+            if original[3] > 0.0 {
+                let [r, g, b] = colour(*texel).expect("covered");
+                assert!((r - 0.3).abs() < 1e-6 && (g - 0.6).abs() < 1e-6 && (b - 0.9).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn parts_give_the_same_bits_as_the_whole() {
+        let source = plane(64, 48, |x, y| [(x * 7 % 13) as f32 * 0.07, y as f32 * 0.013, 0.4, 1.0]);
+        let whole = source.reduced();
+        let mut part = Plane::new(16..40, 8..32);
+        for y in 8..32 {
+            part.row_mut(y).copy_from_slice(&source.row(y)[16..40]);
+        }
+        let part = part.reduced();
+        for y in 5..15 {
+            assert_eq!(&part.row(y)[1..11], &whole.row(y)[9..19]);
+        }
+        let all = whole.expanded(&(0..64), &(0..48));
+        let some = whole.expanded(&(13..27), &(5..22));
+        for y in 5..22 {
+            assert_eq!(some.row(y), &all.row(y)[13..27]);
+        }
+    }
+
+    #[test]
+    fn the_kernel_is_that_of_burt_and_adelson() {
+        let impulse = plane(9, 1, |x, _| if x == 4 { [1.0; 4] } else { [0.0; 4] });
+        // Middle row: 6/16 along y.
+        let taps: Vec<f32> = impulse.reduced().texels.iter().map(|texel| texel[0] * 16.0 / 6.0).collect();
+        assert_eq!(taps, [0.0, 0.0625, 0.375, 0.0625, 0.0]);
+    }
+}

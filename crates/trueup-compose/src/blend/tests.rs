@@ -1,0 +1,212 @@
+use proptest::prelude::*;
+use trueup_core::mesh::GridMesh;
+use trueup_core::raster::Raster;
+
+use super::*;
+use crate::layout::Placed;
+use crate::render::tests::Memory;
+use crate::render::{Blend, run as render};
+
+const WIDTH: usize = 150;
+const HEIGHT: usize = 110;
+
+/// A scene with contours and texture, 8-bit levels.
+fn scene(x: usize, y: usize) -> [u8; 3] {
+    let texture = (x * 7 + y * 13) % 23;
+    let block = if (x / 17 + y / 13).is_multiple_of(2) { 60 } else { 150 };
+    [(block + texture) as u8, (block / 2 + 40 + y / 4) as u8, (200 - block + x / 8) as u8]
+}
+
+/// A photograph of the scene at column `left`, its levels changed by `look`.
+fn picture(left: usize, look: impl Fn(u8) -> u8) -> Photograph {
+    let data = (0..WIDTH * HEIGHT).flat_map(|at| scene(left + at % WIDTH, at / WIDTH).map(&look)).collect();
+    Photograph::Eight(Raster::from_data(WIDTH, HEIGHT, 3, data).expect("as many samples"))
+}
+
+fn layout(lefts: &[usize]) -> CanvasLayout {
+    let placed = lefts
+        .iter()
+        .enumerate()
+        .map(|(photograph, &left)| {
+            let mut mesh = GridMesh::regular(WIDTH as f64, HEIGHT as f64, 40.0);
+            for vertex in &mut mesh.target {
+                vertex[0] += left as f64;
+            }
+            Placed { photograph, mesh }
+        })
+        .collect();
+    let width = WIDTH + lefts.iter().copied().max().unwrap_or(0);
+    CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, placed }
+}
+
+fn composed(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Vec<Finished> {
+    let corrections = vec![Correction::default(); pictures.len()];
+    let seam_options = SeamOptions::default();
+    let context = StageContext::default();
+    let cut = options.blend == Blend::None;
+    run(layout, &corrections, &Memory(pictures), (options, &seam_options), cut, &context).expect("renders").pixels
+}
+
+fn root_of(level: u8) -> u16 {
+    (crate::transfer_curve::Linearise::table().linear(f32::from(level)).sqrt() * 65535.0 + 0.5) as u16
+}
+
+#[test]
+fn blending_photographs_that_agree_changes_nothing() {
+    let lefts = [0, 70, 130, 200];
+    let layout = layout(&lefts);
+    // Photographs taken from different places agree but for what their own samples lost; the same one agrees with itself.
+    let half_a_level = 65535 / 255 / 2;
+    for (blend, tolerance) in [(Blend::MultiBand, half_a_level), (Blend::None, 1)] {
+        let options = RenderOptions { blend, ..RenderOptions::default() };
+        let pixels = composed(&layout, lefts.map(|left| picture(left, |level| level)).to_vec(), &options);
+        for (at, pixel) in pixels.iter().enumerate() {
+            let expected = scene(at % layout.width, at / layout.width).map(root_of);
+            for (got, expected) in pixel.iter().zip(expected) {
+                assert!(got.abs_diff(expected) <= tolerance, "{at}: {got} {expected}");
+            }
+            assert_eq!(pixel[3], 65535, "{at}");
+        }
+    }
+    let layout = self::layout(&[0, 0, 0]);
+    let pixels = composed(&layout, vec![picture(9, |level| level); 3], &RenderOptions::default());
+    for (at, pixel) in pixels.iter().enumerate() {
+        let expected = scene(9 + at % WIDTH, at / WIDTH).map(root_of);
+        assert!(pixel.iter().zip(expected).all(|(got, expected)| got.abs_diff(expected) <= 1), "{at}");
+    }
+}
+
+#[test]
+fn a_difference_in_brightness_fades_over_the_seam() {
+    let lefts = [0, 60];
+    let layout = layout(&lefts);
+    let flat = |level: u8| picture(0, move |_| level);
+    let options = RenderOptions::default();
+    let pixels = composed(&layout, vec![flat(100), flat(120)], &options);
+    let row: Vec<u16> = (0..layout.width).map(|x| pixels[55 * layout.width + x][0]).collect();
+    let (low, high) = (root_of(100), root_of(120));
+    assert!(row.iter().all(|level| (low - 2..=high + 2).contains(level)));
+    let steepest = row.windows(2).map(|pair| pair[0].abs_diff(pair[1])).max().unwrap_or(0);
+    assert!(steepest < (high - low) / 8, "{steepest} of {}", high - low);
+    let cut = composed(&layout, vec![flat(100), flat(120)], &RenderOptions { blend: Blend::None, ..options });
+    assert!((0..layout.width).all(|x| [low, high].contains(&cut[55 * layout.width + x][0])));
+}
+
+#[test]
+fn no_border_of_the_panorama_is_darker_than_its_photographs() {
+    let mut layout = layout(&[0, 80]);
+    layout.placed[1].mesh.target.iter_mut().for_each(|vertex| {
+        *vertex = [vertex[0] + 0.1 * vertex[1] + 3.3, 0.9 * vertex[1] + 0.07 * vertex[0]];
+    });
+    layout.width += 20;
+    let options = RenderOptions::default();
+    let pixels = composed(&layout, vec![picture(0, |_| 140), picture(0, |_| 150)], &options);
+    let covered = pixels.iter().filter(|pixel| pixel[3] > 0);
+    let (low, high) = (root_of(140) - 8, root_of(150) + 8);
+    assert!(covered.clone().all(|pixel| pixel[..3].iter().all(|level| (low..=high).contains(level))));
+    assert!(covered.count() > WIDTH * HEIGHT);
+}
+
+/// Everything that tiles need, of photographs that differ in brightness.
+fn with_work<T>(lefts: &[usize], test: impl FnOnce(&Work<'_>, &[Option<Prepared<'_>>]) -> T) -> T {
+    let layout = layout(lefts);
+    let pictures: Vec<Photograph> = (0..lefts.len())
+        .map(|index| picture(lefts[index], |level| (usize::from(level) * (10 + index) / 12) as u8))
+        .collect();
+    let corrections = vec![Correction::default(); lefts.len()];
+    let (options, seam_options) = (RenderOptions::default(), SeamOptions::default());
+    let context = StageContext::default();
+    let memory = Memory(pictures.clone());
+    let small = views::make(&layout, &corrections, &memory, &options, &seam_options, true, &context).expect("small");
+    let seams = seam::run(small.views, small.size, &seam_options, &context).expect("seams");
+    let canvas = [layout.width, layout.height];
+    let levels = Some(Levels::new(small.bases, &seams, canvas, 2));
+    let work = Work { options: &options, seams: &seams, canvas, levels };
+    let prepared: Vec<Option<Prepared<'_>>> = pictures
+        .into_iter()
+        .zip(&layout.placed)
+        .map(|(photograph, placed)| {
+            Some(Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, &Correction::default(), &options))
+        })
+        .collect();
+    test(&work, &prepared)
+}
+
+fn blended(
+    work: &Work<'_>,
+    pictures: &[Option<Prepared<'_>>],
+    columns: Range<usize>,
+    rows: Range<usize>,
+) -> Vec<Finished> {
+    let shown: Vec<(Label, &Prepared<'_>)> =
+        pictures.iter().enumerate().filter_map(|(label, picture)| Some((label as Label, picture.as_ref()?))).collect();
+    Tile { columns, rows, shown: Vec::new() }.blended(work, &shown, &mut Scratch::default())
+}
+
+#[test]
+fn tiles_of_any_size_give_the_same_bits_as_the_whole() {
+    with_work(&[0, 60, 130], |work, pictures| {
+        let [width, height] = work.canvas;
+        let whole = blended(work, pictures, 0..width, 0..height);
+        for side in [16, 40, 64, 128] {
+            for top in (0..height).step_by(side) {
+                for left in (0..width).step_by(side) {
+                    let (columns, rows) = (left..(left + side).min(width), top..(top + side).min(height));
+                    let tile = blended(work, pictures, columns.clone(), rows.clone());
+                    for (y, row) in rows.zip(tile.chunks_exact(columns.len())) {
+                        assert_eq!(row, &whole[y * width..][columns.clone()], "tile of {side} at ({left}, {top})");
+                    }
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn a_tile_of_one_photograph_is_what_blending_would_give() {
+    with_work(&[0, 60, 130], |work, pictures| {
+        let mut compared = 0;
+        for left in (0..work.canvas[0] - 24).step_by(8) {
+            let tile = tile(work, left..left + 24, 40..64);
+            if tile.shown.len() == 1 {
+                let fast = tile.finish(work, pictures, &mut Scratch::default());
+                let full = blended(work, pictures, tile.columns.clone(), tile.rows.clone());
+                for (fast, full) in fast.iter().flatten().zip(full.iter().flatten()) {
+                    assert!(fast.abs_diff(*full) <= 1, "{fast} {full} at {left}");
+                }
+                compared += 1;
+            }
+        }
+        assert!(compared >= 5, "{compared}");
+    });
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn blended_levels_stay_between_the_photographs(
+        lefts in prop::collection::vec(0..260_usize, 1..5),
+        levels in prop::collection::vec(20..235_u8, 5),
+    ) {
+        let layout = layout(&lefts);
+        let pictures: Vec<Photograph> = (0..lefts.len()).map(|index| { let level = levels[index]; picture(0, move |_| level) }).collect();
+        let corrections = vec![Correction::default(); lefts.len()];
+        let context = StageContext::default();
+        let options = RenderOptions::default();
+        let panorama = render(&layout, &corrections, &Memory(pictures), &options, &SeamOptions::default(), &context);
+        let panorama = panorama.expect("renders");
+        let used = &levels[..lefts.len()];
+        let linear = |level: u8| crate::transfer_curve::Linearise::table().linear(f32::from(level));
+        let low = used.iter().map(|&level| linear(level)).fold(f32::INFINITY, f32::min) - 1e-4;
+        let high = used.iter().map(|&level| linear(level)).fold(0.0, f32::max) + 1e-4;
+        for y in 0..layout.height {
+            for x in 0..layout.width {
+                let covered = lefts.iter().any(|&left| (left..left + WIDTH).contains(&x));
+                let [r, _, _, alpha] = panorama.linear_pixel(x, y);
+                prop_assert_eq!(alpha > 0.0, covered);
+                prop_assert!(!covered || (low..=high).contains(&r), "{} at ({}, {})", r, x, y);
+            }
+        }
+    }
+}

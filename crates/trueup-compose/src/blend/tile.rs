@@ -1,0 +1,236 @@
+//! One tile of the canvas, finished.
+
+use std::ops::Range;
+
+use super::coarse::FIRST_LEVEL;
+use super::pyramid::{Plane, add_detail, collapse, colour, level_shares};
+use super::{Base, Finished, Work};
+use crate::render::prepared::{Prepared, Scratch, Window};
+use crate::seam::{Label, NOBODY};
+
+/// Canvas pixels beside a tile that its fine levels are made of: a sample of the coarsest of them is 4 pixels wide, its
+/// own support 6 pixels, and interpolation reaches two samples further. A multiple of 2^[`FIRST_LEVEL`].
+pub(super) const MARGIN: usize = 16;
+
+/// A part of the canvas; `columns` and `rows` start at multiples of 2^[`FIRST_LEVEL`].
+#[derive(Debug, Clone)]
+pub(super) struct Tile {
+    pub(super) columns: Range<usize>,
+    pub(super) rows: Range<usize>,
+    /// The photographs it is made of.
+    pub(super) shown: Vec<Label>,
+}
+
+impl Tile {
+    /// The tile with its margin, cut at the canvas.
+    pub(super) fn with_margin(
+        columns: &Range<usize>,
+        rows: &Range<usize>,
+        canvas: [usize; 2],
+    ) -> (Range<usize>, Range<usize>) {
+        let grown =
+            |range: &Range<usize>, length: usize| range.start.saturating_sub(MARGIN)..(range.end + MARGIN).min(length);
+        (grown(columns, canvas[0]), grown(rows, canvas[1]))
+    }
+
+    /// The finished pixels, row by row.
+    pub(super) fn finish(
+        &self,
+        work: &Work<'_>,
+        pictures: &[Option<Prepared<'_>>],
+        scratch: &mut Scratch,
+    ) -> Vec<Finished> {
+        let picture = |label: &Label| pictures.get(usize::from(*label)).and_then(Option::as_ref);
+        match self.shown.as_slice() {
+            [] => vec![[0; 4]; self.columns.len() * self.rows.len()],
+            [only] => match picture(only) {
+                Some(picture) => self.of_one(work, picture, usize::from(*only), scratch),
+                None => vec![[0; 4]; self.columns.len() * self.rows.len()],
+            },
+            several => {
+                let shown: Vec<_> = several.iter().filter_map(|label| Some((*label, picture(label)?))).collect();
+                if work.levels.is_some() {
+                    self.blended(work, &shown, scratch)
+                } else {
+                    self.cut(work, &shown, scratch)
+                }
+            }
+        }
+    }
+
+    fn window<'a>(&self, columns: &'a Range<usize>, rows: &'a Range<usize>) -> Window<'a> {
+        Window { columns, rows }
+    }
+
+    /// A tile that shows one photograph: its fine levels are that photograph's, its coarse ones may not be.
+    fn of_one(&self, work: &Work<'_>, picture: &Prepared<'_>, label: usize, scratch: &mut Scratch) -> Vec<Finished> {
+        let mut pixels = vec![[0.0; 4]; self.columns.len() * self.rows.len()];
+        picture.sample(self.window(&self.columns, &self.rows), &mut pixels, work.options, scratch);
+        let offset = work.levels.as_ref().and_then(|levels| self.offset(&levels.blended, &levels.bases[label]));
+        let offsets = offset.iter().flat_map(|plane| &plane.texels).map(|texel| colour(*texel).unwrap_or_default());
+        let offsets = offsets.chain(std::iter::repeat([0.0; 3]));
+        pixels.iter().zip(offsets).map(|(pixel, offset)| finished(*pixel, offset)).collect()
+    }
+
+    /// What the coarse levels change of a photograph, on the pixels of the tile; `None` if nothing.
+    fn offset(&self, blended: &Plane<[f32; 4]>, base: &Base) -> Option<Plane<[f32; 4]>> {
+        let reach = |range: &Range<usize>, length: usize| {
+            (range.start >> FIRST_LEVEL).saturating_sub(2)..(((range.end - 1) >> FIRST_LEVEL) + 3).min(length)
+        };
+        let columns = reach(&self.columns, blended.columns.end);
+        let rows = reach(&self.rows, blended.rows.end);
+        let mut plane = Plane::new(columns.clone(), rows.clone());
+        let mut any = false;
+        for y in rows.clone().filter(|y| base.plane.rows.contains(y)) {
+            let (own, all) = (base.plane.row(y), blended.row(y));
+            for (x, texel) in columns.clone().zip(plane.row_mut(y)) {
+                if !base.plane.columns.contains(&x) {
+                    continue;
+                }
+                let own = colour(own[x - base.plane.columns.start]);
+                if let (Some(own), Some(all)) = (own, colour(all[x - blended.columns.start])) {
+                    *texel = [all[0] - own[0], all[1] - own[1], all[2] - own[2], 1.0];
+                    any |= texel[..3].iter().any(|channel| channel.abs() > NO_CHANGE);
+                }
+            }
+        }
+        if !any {
+            return None;
+        }
+        for level in (0..FIRST_LEVEL).rev() {
+            let within = |range: &Range<usize>, length: usize| {
+                // One sample more than the next finer level asks for, two in the end none.
+                let more = if level == 0 { 0 } else { 2 };
+                (range.start >> level).saturating_sub(more)..(((range.end - 1) >> level) + 1 + more).min(length)
+            };
+            let finest = [work_length(blended.columns.end, level), work_length(blended.rows.end, level)];
+            let columns = within(&self.columns, finest[0]);
+            let rows = within(&self.rows, finest[1]);
+            plane = plane.expanded(&columns, &rows);
+            level_shares(&mut plane);
+        }
+        Some(plane)
+    }
+
+    /// Every pixel from the photograph that the seams give it to.
+    fn cut(&self, work: &Work<'_>, shown: &[(Label, &Prepared<'_>)], scratch: &mut Scratch) -> Vec<Finished> {
+        let width = self.columns.len();
+        let mut out = vec![[0; 4]; width * self.rows.len()];
+        let mut taken = vec![0.0_f32; out.len()];
+        let mut labels = Vec::new();
+        for (label, picture) in shown {
+            let mut pixels = vec![[0.0; 4]; out.len()];
+            picture.sample(self.window(&self.columns, &self.rows), &mut pixels, work.options, scratch);
+            for (row, y) in self.rows.clone().enumerate() {
+                work.seams.row(y, &self.columns, work.canvas, &mut labels);
+                for (x, own) in labels.iter().enumerate() {
+                    let at = row * width + x;
+                    // Where the owner covers nothing, whoever covers most.
+                    let claim = pixels[at][3] * if own == label { 2.0 } else { 1.0 };
+                    if claim > taken[at] {
+                        taken[at] = claim;
+                        out[at] = finished(pixels[at], [0.0; 3]);
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// The fine levels of several photographs blended, on top of the blended coarse ones.
+    pub(super) fn blended(
+        &self,
+        work: &Work<'_>,
+        shown: &[(Label, &Prepared<'_>)],
+        scratch: &mut Scratch,
+    ) -> Vec<Finished> {
+        let Some(levels) = &work.levels else { return Vec::new() };
+        let (columns, rows) = Self::with_margin(&self.columns, &self.rows, work.canvas);
+        let mut opacity = vec![0.0_f32; self.columns.len() * self.rows.len()];
+        let mut sums: Vec<Plane<[f32; 4]>> = Vec::new();
+        let masks = self.masks(work, shown, &columns, &rows);
+        for ((label, picture), mask) in shown.iter().zip(masks) {
+            let mut plane = Plane::new(columns.clone(), rows.clone());
+            picture.sample(self.window(&columns, &rows), &mut plane.texels, work.options, scratch);
+            for texel in &mut plane.texels {
+                let [r, g, b, share] = *texel;
+                *texel = [r * share, g * share, b * share, share];
+            }
+            self.add_opacity(&plane, &mut opacity);
+            let mut mask = mask;
+            for level in 0..FIRST_LEVEL {
+                if sums.len() <= level as usize {
+                    sums.push(Plane::new(plane.columns.clone(), plane.rows.clone()));
+                }
+                let last = level + 1 == FIRST_LEVEL;
+                let reduced = if last { Plane::default() } else { plane.reduced() };
+                let coarser = if last { &levels.bases[usize::from(*label)].plane } else { &reduced };
+                add_detail(&mut sums[level as usize], &plane, coarser, &mask);
+                if !last {
+                    mask = mask.reduced();
+                    plane = reduced;
+                }
+            }
+        }
+        let mut blended: Option<Plane<[f32; 4]>> = None;
+        while let Some(mut sum) = sums.pop() {
+            collapse(&mut sum, Some(blended.as_ref().unwrap_or(&levels.blended)));
+            blended = Some(sum);
+        }
+        let Some(blended) = blended else { return vec![[0; 4]; opacity.len()] };
+        let shift = self.columns.start - columns.start;
+        let mut out = Vec::with_capacity(opacity.len());
+        for (y, opacity) in self.rows.clone().zip(opacity.chunks_exact(self.columns.len())) {
+            for (texel, &opacity) in blended.row(y)[shift..].iter().zip(opacity) {
+                let opacity = if texel[3] > 0.0 { opacity } else { 0.0 };
+                out.push(finished([texel[0], texel[1], texel[2], opacity], [0.0; 3]));
+            }
+        }
+        out
+    }
+
+    /// Where each photograph is shown, 0 or 1.
+    fn masks(
+        &self,
+        work: &Work<'_>,
+        shown: &[(Label, &Prepared<'_>)],
+        columns: &Range<usize>,
+        rows: &Range<usize>,
+    ) -> Vec<Plane<f32>> {
+        let mut masks: Vec<Plane<f32>> = shown.iter().map(|_| Plane::new(columns.clone(), rows.clone())).collect();
+        let mut labels = Vec::new();
+        for y in rows.clone() {
+            work.seams.row(y, columns, work.canvas, &mut labels);
+            for (mask, (label, _)) in masks.iter_mut().zip(shown) {
+                for (weight, own) in mask.row_mut(y).iter_mut().zip(&labels) {
+                    *weight = if own == label && own != &NOBODY { 1.0 } else { 0.0 };
+                }
+            }
+        }
+        masks
+    }
+
+    fn add_opacity(&self, plane: &Plane<[f32; 4]>, opacity: &mut [f32]) {
+        let shift = self.columns.start - plane.columns.start;
+        for (y, opacity) in self.rows.clone().zip(opacity.chunks_exact_mut(self.columns.len())) {
+            for (opacity, texel) in opacity.iter_mut().zip(&plane.row(y)[shift..]) {
+                *opacity += texel[3];
+            }
+        }
+    }
+}
+
+/// A change of the square root of linear light too small for 16 bits.
+const NO_CHANGE: f32 = 1e-6;
+
+/// Samples of a level along a side of `length` samples at [`FIRST_LEVEL`], at least as many as the canvas has.
+fn work_length(length: usize, level: u32) -> usize {
+    length << (FIRST_LEVEL - level)
+}
+
+/// A pixel of the panorama from the square root of linear light and the share covered.
+fn finished([r, g, b, share]: [f32; 4], offset: [f32; 3]) -> Finished {
+    // The casts saturate; NaN becomes 0.
+    let whole = |value: f32| (value * 65535.0 + 0.5) as u16;
+    [whole(r + offset[0]), whole(g + offset[1]), whole(b + offset[2]), whole(share)]
+}

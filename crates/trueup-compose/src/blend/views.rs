@@ -1,0 +1,159 @@
+//! The first pass: small pictures of all photographs.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use rayon::prelude::*;
+use trueup_core::mesh::GridMesh;
+use trueup_core::options::StageOptions;
+use trueup_core::raster::Photograph;
+use trueup_core::source::PhotographSource;
+use trueup_core::{Result, StageContext};
+
+use super::Base;
+use super::coarse::{self, SAMPLED_LEVEL};
+use super::pyramid::Plane;
+use crate::exposure::Correction;
+use crate::layout::{CanvasLayout, Placed};
+use crate::render::prepared::{Prepared, Scratch, Window, check_photograph};
+use crate::render::{Interpolation, RenderOptions};
+use crate::seam::{CLIPPED, PARTLY, SeamOptions, View, WHOLLY};
+use crate::weights::WHOLE;
+
+/// What the first pass makes.
+pub(super) struct Small {
+    /// For the seams; empty boxes for a single photograph.
+    pub(super) views: Vec<View>,
+    /// Size of their canvas.
+    pub(super) size: [usize; 2],
+    /// For the coarse levels; empty without.
+    pub(super) bases: Vec<Base>,
+    /// Decoded photographs, as far as there is room for them.
+    pub(super) kept: Vec<Option<Photograph>>,
+}
+
+/// Level of the camera's own values (0 to 255) from which on a channel counts as saturated.
+const SATURATED: f32 = 252.0;
+
+pub(super) fn make(
+    layout: &CanvasLayout,
+    corrections: &[Correction],
+    photographs: &dyn PhotographSource,
+    options: &RenderOptions,
+    seam_options: &SeamOptions,
+    with_bases: bool,
+    context: &StageContext,
+) -> Result<Small> {
+    let canvas = [layout.width, layout.height];
+    let size = small_size(canvas, seam_options.fine_pixels);
+    let mut small = Small { views: Vec::new(), size, bases: Vec::new(), kept: Vec::new() };
+    // Halved as often as can be, then read between samples: nothing here is ever looked at.
+    let halving =
+        RenderOptions { interpolation: Interpolation::Bilinear, minification_threshold: 1.0, ..options.clone() };
+    let sampling = RenderOptions { minification_threshold: 4.0, ..halving.clone() };
+    let mut room = options.kept_photographs * 1e6;
+    let at_a_time = rayon::current_num_threads().max(1);
+    for (placed, corrections) in layout.placed.chunks(at_a_time).zip(corrections.chunks(at_a_time)) {
+        context.check_cancelled()?;
+        let made: Vec<(View, Base, Photograph)> = placed
+            .par_iter()
+            .zip(corrections)
+            .map(|(placed, correction)| {
+                let photograph = photographs.photograph(placed.photograph)?;
+                check_photograph(placed, &photograph)?;
+                // The larger picture first: the smaller is made from what is left of the photograph then.
+                let mesh = scaled(&placed.mesh, [0, 1].map(|axis| size[axis] as f64 / canvas[axis] as f64), 0.0);
+                let prepared = Prepared::new(Cow::Borrowed(&photograph), &mesh, size, correction, &halving);
+                let view = if layout.placed.len() == 1 { View::default() } else { view(&prepared, &sampling) };
+                let base = match with_bases {
+                    true => base(&prepared, placed, correction, canvas, [&halving, &sampling]),
+                    false => Base::default(),
+                };
+                context.progress().advance(RenderOptions::STAGE, 1);
+                Ok((view, base, photograph))
+            })
+            .collect::<Result<_>>()?;
+        for (view, base, photograph) in made {
+            small.views.push(view);
+            small.bases.push(base);
+            let bytes = photograph.bytes() as f64;
+            let fits = bytes <= room;
+            room -= if fits { bytes } else { 0.0 };
+            small.kept.push(fits.then_some(photograph));
+        }
+    }
+    Ok(small)
+}
+
+/// The size of a canvas of at most `pixels` pixels, and at most half of the canvas along each side.
+fn small_size(canvas: [usize; 2], pixels: f64) -> [usize; 2] {
+    let scale = (pixels / (canvas[0] as f64 * canvas[1] as f64)).sqrt().min(0.5);
+    canvas.map(|length| ((length as f64 * scale) as usize).max(1))
+}
+
+/// The grid with its targets scaled by `scale` and then moved by `shift`.
+fn scaled(mesh: &GridMesh, scale: [f64; 2], shift: f64) -> GridMesh {
+    let mut mesh = mesh.clone();
+    for vertex in &mut mesh.target {
+        *vertex = [vertex[0] * scale[0] + shift, vertex[1] * scale[1] + shift];
+    }
+    mesh
+}
+
+fn view(prepared: &Prepared<'_>, options: &RenderOptions) -> View {
+    let (columns, rows) = (prepared.columns(), prepared.rows());
+    let mut samples = vec![[0.0; 4]; columns.len() * rows.len()];
+    let mut clipped = vec![false; samples.len()];
+    let window = Window { columns: &columns, rows: &rows };
+    prepared.sample_with(window, &mut samples, options, &mut Scratch::default(), |first, raw| {
+        for (clipped, sample) in clipped[first..].iter_mut().zip(raw) {
+            *clipped = sample[..3].iter().any(|&level| level >= SATURATED);
+        }
+    });
+    let pixels = samples
+        .iter()
+        .zip(clipped)
+        .map(|(&[r, g, b, share], clipped)| {
+            // The casts saturate.
+            let level = |root: f32| (root * 255.0 + 0.5) as u8;
+            let flags = (u8::from(share > 0.0) * PARTLY)
+                | (u8::from(share >= WHOLE) * WHOLLY)
+                | (u8::from(clipped && share > 0.0) * CLIPPED);
+            [level(r), level(g), level(b), flags]
+        })
+        .collect();
+    View { columns, rows, pixels }
+}
+
+/// The coarse level of a photograph.
+fn base(
+    larger: &Prepared<'_>,
+    placed: &Placed,
+    correction: &Correction,
+    canvas: [usize; 2],
+    [halving, sampling]: [&RenderOptions; 2],
+) -> Base {
+    let step = f64::from(1_u32 << SAMPLED_LEVEL);
+    // Sample i lies on the middle of pixel i * step.
+    let mesh = scaled(&placed.mesh, [step.recip(); 2], 0.5 - 0.5 / step);
+    let (photograph, [width, height]) = larger.photograph();
+    let mesh = GridMesh { width, height, ..mesh };
+    let size = canvas.map(|length| length.div_ceil(1 << SAMPLED_LEVEL));
+    let prepared = Prepared::new(Cow::Borrowed(photograph), &mesh, size, correction, halving);
+    // Room for the interpolated rim, from a sample that every coarser level has.
+    let grown = |range: Range<usize>, length: usize| {
+        (range.start / RIM * RIM).saturating_sub(RIM)..(range.end + RIM).min(length)
+    };
+    let (columns, rows) = (grown(prepared.columns(), size[0]), grown(prepared.rows(), size[1]));
+    let mut plane = Plane::new(columns.clone(), rows.clone());
+    let window = Window { columns: &columns, rows: &rows };
+    prepared.sample(window, &mut plane.texels, sampling, &mut Scratch::default());
+    for texel in &mut plane.texels {
+        let [r, g, b, share] = *texel;
+        *texel = [r * share, g * share, b * share, share];
+    }
+    Base { plane: coarse::base(plane) }
+}
+
+/// Samples at [`SAMPLED_LEVEL`] around a photograph that its coarser levels reach.
+const RIM: usize = 8;

@@ -1,0 +1,123 @@
+//! The light of the photographs where they overlap, on a common grid of samples.
+
+use std::ops::{Range, RangeInclusive};
+
+use trueup_core::raster::Raster;
+
+use super::{ExposureOptions, Thumbnail};
+use crate::deformed_grid::{DeformedGrid, Run};
+use crate::layout::Placed;
+use crate::simd::{Positions, invert_row};
+use crate::transfer_curve::Linearise;
+
+/// Natural logarithms of the light of one photograph on the grid of samples; NaN where it says nothing.
+pub(super) struct Patch {
+    rows: Range<usize>,
+    columns: Range<usize>,
+    /// Logarithms of red, green and blue, and the squared radius (1 in the photograph's corners).
+    samples: Vec<[f32; 4]>,
+}
+
+/// What two photographs show of the same place.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shared {
+    /// ln(first / second) of red, green and blue.
+    pub(super) log_ratio: [f32; 3],
+    /// Squared radius in the first and in the second photograph.
+    pub(super) radius: [f32; 2],
+}
+
+impl Shared {
+    /// The mean over the channels: the ratio of brightness.
+    pub(super) fn brightness(&self) -> f32 {
+        (self.log_ratio[0] + self.log_ratio[1] + self.log_ratio[2]) / 3.0
+    }
+}
+
+impl Patch {
+    pub(super) fn new(
+        placed: &Placed,
+        thumbnail: &Thumbnail<'_>,
+        scale: f64,
+        [width, height]: [usize; 2],
+        options: &ExposureOptions,
+    ) -> Self {
+        let grid = DeformedGrid::new(&placed.mesh, scale, false, width, height);
+        let mut footprints: Vec<f64> = grid.cells.iter().map(|cell| cell.footprint[0].min(cell.footprint[1])).collect();
+        footprints.sort_by(f64::total_cmp);
+        let footprint = footprints.get(footprints.len() / 2).copied().unwrap_or(1.0);
+        let block = (footprint * thumbnail.frame.working_from_full).round().max(1.0) as usize;
+        let light = block_means(thumbnail.raster, block, options.darkest..=options.brightest);
+        let from_full = thumbnail.frame.working_from_full / block as f64;
+        let half = grid.size.map(|length| 0.5 * length);
+        let corner = half[0] * half[0] + half[1] * half[1];
+
+        let mut samples = vec![[f32::NAN; 4]; grid.rows.len() * grid.columns.len()];
+        let all: Vec<u32> = (0..grid.cells.len() as u32).collect();
+        let (mut owner, mut runs, mut positions) = (Vec::new(), Vec::<Run>::new(), Positions::default());
+        for y in grid.rows.clone() {
+            grid.runs(y, &all, &mut owner, &mut runs);
+            let row = &mut samples[(y - grid.rows.start) * grid.columns.len()..][..grid.columns.len()];
+            for run in &runs {
+                positions.resize(run.columns.len());
+                invert_row(&grid.cells[run.cell].inverse_along_row(y), run.columns.start, &mut positions);
+                for (index, column) in run.columns.clone().enumerate() {
+                    let x = f64::from(positions.column[index]) + 0.5 + f64::from(positions.fraction_x[index]);
+                    let y = f64::from(positions.row[index]) + 0.5 + f64::from(positions.fraction_y[index]);
+                    let radius = ((x - half[0]).powi(2) + (y - half[1]).powi(2)) / corner;
+                    let (x, y) = ((x * from_full).max(0.0) as usize, (y * from_full).max(0.0) as usize);
+                    let light = light.pixel(x.min(light.width() - 1), y.min(light.height() - 1));
+                    row[column - grid.columns.start] = [light[0], light[1], light[2], radius as f32];
+                }
+            }
+        }
+        Self { rows: grid.rows, columns: grid.columns, samples }
+    }
+
+    fn row(&self, y: usize, columns: &Range<usize>) -> &[[f32; 4]] {
+        let start = (y - self.rows.start) * self.columns.len();
+        &self.samples[start + columns.start - self.columns.start..start + columns.end - self.columns.start]
+    }
+}
+
+/// The places where both photographs tell their light.
+pub(super) fn shared(first: &Patch, second: &Patch) -> Vec<Shared> {
+    let (rows, columns) = (intersect(&first.rows, &second.rows), intersect(&first.columns, &second.columns));
+    if rows.is_empty() || columns.is_empty() {
+        return Vec::new();
+    }
+    rows.flat_map(|y| first.row(y, &columns).iter().zip(second.row(y, &columns)))
+        .map(|(a, b)| Shared { log_ratio: [a[0] - b[0], a[1] - b[1], a[2] - b[2]], radius: [a[3], b[3]] })
+        .filter(|shared| shared.log_ratio.iter().all(|ratio| ratio.is_finite()))
+        .collect()
+}
+
+fn intersect(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    a.start.max(b.start)..a.end.min(b.end)
+}
+
+/// Natural logarithm of the mean linear light of blocks of `block` x `block` pixels, by channel; NaN where a sample lies
+/// outside `telling`.
+fn block_means(raster: &Raster<u8>, block: usize, telling: RangeInclusive<u8>) -> Raster<f32> {
+    let linearise = Linearise::table();
+    let (width, height) = (raster.width().div_ceil(block), raster.height().div_ceil(block));
+    let mut means = Raster::new(width, height, 3);
+    for y in 0..height {
+        for x in 0..width {
+            let (mut sum, mut count, mut tells) = ([0.0_f32; 3], 0, true);
+            for row in y * block..((y + 1) * block).min(raster.height()) {
+                let end = ((x + 1) * block).min(raster.width());
+                for pixel in raster.row(row)[3 * x * block..3 * end].as_chunks::<3>().0 {
+                    for (sum, &level) in sum.iter_mut().zip(pixel) {
+                        *sum += linearise.linear(f32::from(level));
+                        tells &= telling.contains(&level);
+                    }
+                    count += 1;
+                }
+            }
+            let mean = |sum: f32| if tells { (sum / count as f32).ln() } else { f32::NAN };
+            means.pixel_mut(x, y).copy_from_slice(&sum.map(mean));
+        }
+    }
+    means
+}

@@ -1,0 +1,174 @@
+//! What a seam costs.
+
+use super::SeamOptions;
+use super::view::{CLIPPED, IGNORED, KEPT, PARTLY, View, WHOLLY};
+
+/// Costs are whole numbers; one grey level of 255 is this many.
+pub(super) const UNIT: i32 = 16;
+
+/// Cost of a pixel that the user does not want so: no seam that saves it is too long.
+const UNWANTED: i32 = 1 << 16;
+
+/// Difference taken for a pixel that only one of the two photographs shows: no less than any other, since at the border of
+/// a photograph there is no room to blend.
+const UNSEEN: i32 = MAX_DIFFERENCE;
+
+/// Largest difference of a pixel; that of three photographs obeys the triangle inequality with it, too.
+const MAX_DIFFERENCE: i32 = 128 * UNIT;
+
+/// One level of the pyramid of small canvases: the photographs, and what is derived from them.
+pub(super) struct Scene<'a> {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) views: &'a [View],
+    /// Horizontal and vertical differences of the luma, for every pixel of every view.
+    gradients: Vec<Vec<[i16; 2]>>,
+    depths: Vec<Vec<u8>>,
+    /// For every canvas pixel: bit flags of what all photographs say of it, see [`Self::has_whole`].
+    anyone: Vec<u8>,
+    /// Number of the moving thing that covers a canvas pixel; 0 for none.
+    pub(super) moving: &'a [u32],
+    length: i32,
+    gradient_weight: i32,
+    depth_weight: i32,
+    clipped_cost: i32,
+    moving_cost: i32,
+}
+
+/// Someone covers the pixel wholly.
+const ANY_WHOLE: u8 = 1;
+/// Someone who may be shown covers it wholly without being clipped.
+const ANY_UNCLIPPED: u8 = 2;
+/// Someone is to be kept there.
+const ANY_KEPT: u8 = 4;
+
+impl<'a> Scene<'a> {
+    pub(super) fn new(
+        views: &'a [View],
+        [width, height]: [usize; 2],
+        moving: &'a [u32],
+        options: &SeamOptions,
+    ) -> Self {
+        let mut anyone = vec![0_u8; width * height];
+        for view in views {
+            for (y, row) in view.rows.clone().zip(view.pixels.chunks_exact(view.columns.len().max(1))) {
+                for (anyone, pixel) in anyone[y * width..][view.columns.clone()].iter_mut().zip(row) {
+                    let flags = pixel[3];
+                    let whole = flags & WHOLLY != 0;
+                    let shown = whole && flags & (CLIPPED | IGNORED) == 0;
+                    *anyone |= (u8::from(whole) * ANY_WHOLE)
+                        | (u8::from(shown) * ANY_UNCLIPPED)
+                        | (u8::from(whole && flags & KEPT != 0) * ANY_KEPT);
+                }
+            }
+        }
+        Self {
+            width,
+            height,
+            views,
+            gradients: views.iter().map(gradients).collect(),
+            depths: views.iter().map(View::depths).collect(),
+            anyone,
+            moving,
+            length: in_units(options.length),
+            gradient_weight: in_units(options.gradient_weight),
+            depth_weight: in_units(options.depth_weight),
+            clipped_cost: in_units(options.clipped_cost),
+            moving_cost: in_units(options.moving_cost),
+        }
+    }
+
+    /// Whether photograph `label` may be shown at a canvas pixel: where no one covers it wholly, those that cover it in
+    /// part may.
+    pub(super) fn allowed(&self, label: usize, x: usize, y: usize) -> bool {
+        let wanted = if self.anyone[y * self.width + x] & ANY_WHOLE != 0 { WHOLLY } else { PARTLY };
+        self.views[label].flags(x, y) & wanted != 0
+    }
+
+    /// How deep inside photograph `label` a canvas pixel lies, 0 to 255.
+    pub(super) fn depth(&self, label: usize, x: usize, y: usize) -> u8 {
+        self.views[label].index(x, y).map_or(0, |index| self.depths[label][index])
+    }
+
+    /// Cost of showing photograph `label`, which is allowed there, at a canvas pixel.
+    pub(super) fn data_cost(&self, label: usize, x: usize, y: usize) -> i32 {
+        let flags = self.views[label].flags(x, y);
+        let anyone = self.anyone[y * self.width + x];
+        let mut cost = self.depth_weight * (255 - i32::from(self.depth(label, x, y))) / 255;
+        if flags & CLIPPED != 0 && anyone & ANY_UNCLIPPED != 0 {
+            cost += self.clipped_cost;
+        }
+        let unwanted = flags & IGNORED != 0 || anyone & ANY_KEPT != 0 && flags & KEPT == 0;
+        cost + if unwanted { UNWANTED } else { 0 }
+    }
+
+    /// Cost of a seam between neighbouring canvas pixels, `a` shown at `p` and `b` at `q`; 0 for equal labels.
+    ///
+    /// The differences at both pixels, of colours and of gradients: Kwatra and others, "Graphcut textures", SIGGRAPH
+    /// 2003, equation 1, with the gradients added instead of divided by: a division draws seams into textured parts,
+    /// which in photographs taken from different places fit worst.
+    pub(super) fn seam_cost(&self, p: (usize, usize), a: usize, q: (usize, usize), b: usize) -> i32 {
+        if a == b {
+            return 0;
+        }
+        self.cost_of(p, q, self.difference(a, b, p) + self.difference(a, b, q))
+    }
+
+    /// Cost of a seam between neighbouring pixels from the sum of the differences at both.
+    #[inline]
+    pub(super) fn cost_of(&self, p: (usize, usize), q: (usize, usize), difference: i32) -> i32 {
+        let (at_p, at_q) = (self.moving[p.1 * self.width + p.0], self.moving[q.1 * self.width + q.0]);
+        let through = if at_p != 0 && at_p == at_q { self.moving_cost } else { 0 };
+        self.length + difference + through
+    }
+
+    /// How differently two photographs show a canvas pixel.
+    pub(super) fn difference(&self, a: usize, b: usize, (x, y): (usize, usize)) -> i32 {
+        let (Some(i), Some(j)) = (self.views[a].index(x, y), self.views[b].index(x, y)) else { return UNSEEN };
+        let (first, second) = (self.views[a].pixels[i], self.views[b].pixels[j]);
+        if first[3] & second[3] & PARTLY == 0 {
+            return UNSEEN;
+        }
+        let colour: i32 = (0..3).map(|c| i32::from(first[c].abs_diff(second[c]))).sum();
+        let (g, h) = (self.gradients[a][i], self.gradients[b][j]);
+        let gradient: i32 = (0..2).map(|axis| i32::from(g[axis] - h[axis]).abs()).sum();
+        (colour * UNIT / 3 + gradient * self.gradient_weight / 2).min(MAX_DIFFERENCE)
+    }
+}
+
+/// Grey levels as a cost.
+fn in_units(levels: f64) -> i32 {
+    (levels * f64::from(UNIT)).round() as i32
+}
+
+/// Central differences of the luma over covered pixels; one-sided or zero at the border.
+fn gradients(view: &View) -> Vec<[i16; 2]> {
+    let (width, height) = (view.columns.len(), view.rows.len());
+    // Rec. 601 in 256ths.
+    let luma: Vec<i16> = view
+        .pixels
+        .iter()
+        .map(|p| {
+            if p[3] & PARTLY == 0 {
+                -1
+            } else {
+                ((77 * i32::from(p[0]) + 150 * i32::from(p[1]) + 29 * i32::from(p[2])) >> 8) as i16
+            }
+        })
+        .collect();
+    let mut out = vec![[0; 2]; width * height];
+    for (index, out) in out.iter_mut().enumerate() {
+        let (x, y) = (index % width, index / width);
+        let middle = luma[index];
+        if middle < 0 {
+            continue;
+        }
+        let or_middle = |inside: bool, at: usize| if inside && luma[at] >= 0 { luma[at] } else { middle };
+        let left = or_middle(x > 0, index.wrapping_sub(1));
+        let right = or_middle(x + 1 < width, index + 1);
+        let above = or_middle(y > 0, index.wrapping_sub(width));
+        let below = or_middle(y + 1 < height, index + width);
+        *out = [right - left, below - above];
+    }
+    out
+}

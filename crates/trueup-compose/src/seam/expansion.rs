@@ -1,0 +1,169 @@
+//! The cheapest labelling of a scene, by expanding one photograph after the other.
+//!
+//! # Source
+//! Boykov, Veksler, Zabih, "Fast approximate energy minimization via graph cuts", IEEE TPAMI 23(11), 2001, section 5;
+//! the network of one expansion is that of Kolmogorov, Zabih, "What energy functions can be minimized via graph cuts?",
+//! IEEE TPAMI 26(2), 2004, section 4.
+
+use std::ops::Range;
+
+use super::energy::Scene;
+use super::max_flow::{DOWN, GridFlow, RIGHT};
+use super::{Label, NOBODY};
+
+/// Working memory of the expansions.
+#[derive(Default)]
+pub(super) struct Expansions {
+    flow: GridFlow,
+    /// For each pixel of the box the difference of the photograph shown and the one that expands; [`FIXED`] where the
+    /// pixel does not take part.
+    change: Vec<i32>,
+}
+
+/// See [`Expansions::change`].
+const FIXED: i32 = -1;
+
+/// The labelling that shows everywhere the photograph that lies deepest.
+pub(super) fn deepest(scene: &Scene<'_>) -> Vec<Label> {
+    let mut labels = vec![NOBODY; scene.width * scene.height];
+    let mut best = vec![-1_i16; labels.len()];
+    for (label, view) in scene.views.iter().enumerate() {
+        for y in view.rows.clone() {
+            for x in view.columns.clone() {
+                let at = y * scene.width + x;
+                if scene.allowed(label, x, y) && i16::from(scene.depth(label, x, y)) > best[at] {
+                    best[at] = i16::from(scene.depth(label, x, y));
+                    labels[at] = label as Label;
+                }
+            }
+        }
+    }
+    labels
+}
+
+impl Expansions {
+    /// Lets photograph `label` take the pixels of the box `columns` x `rows` where that lowers the cost most, all at once;
+    /// only pixels that are `free` change. Returns whether any did.
+    pub(super) fn expand(
+        &mut self,
+        scene: &Scene<'_>,
+        labels: &mut [Label],
+        label: usize,
+        (columns, rows): (&Range<usize>, &Range<usize>),
+        free: &dyn Fn(usize) -> bool,
+    ) -> bool {
+        let (width, height) = (columns.len(), rows.len());
+        self.change.clear();
+        self.change.resize(width * height, FIXED);
+        let mut nodes = 0;
+        for y in rows.clone() {
+            for x in columns.clone() {
+                let at = y * scene.width + x;
+                let old = labels[at];
+                if old != NOBODY && usize::from(old) != label && free(at) && scene.allowed(label, x, y) {
+                    let difference = scene.difference(usize::from(old), label, (x, y));
+                    self.change[(y - rows.start) * width + x - columns.start] = difference;
+                    nodes += 1;
+                }
+            }
+        }
+        if nodes == 0 {
+            return false;
+        }
+        self.flow.reset(width, height);
+        for (v, y) in rows.clone().enumerate() {
+            for (u, x) in columns.clone().enumerate() {
+                if self.change[v * width + u] != FIXED {
+                    let old = usize::from(labels[y * scene.width + x]);
+                    let change = scene.data_cost(label, x, y) - scene.data_cost(old, x, y);
+                    self.flow.add_sink_side_cost(self.flow.node(u, v), change);
+                }
+            }
+        }
+        for y in rows.clone() {
+            for x in columns.clone() {
+                for (direction, other) in [(RIGHT, (x + 1, y)), (DOWN, (x, y + 1))] {
+                    if other.0 < scene.width && other.1 < scene.height {
+                        self.join(scene, labels, label, (columns, rows), [(x, y), other], direction);
+                    }
+                }
+            }
+        }
+        // Neighbours left of and above the box.
+        for x in columns.clone() {
+            if rows.start > 0 {
+                self.join(scene, labels, label, (columns, rows), [(x, rows.start - 1), (x, rows.start)], DOWN);
+            }
+        }
+        for y in rows.clone() {
+            if columns.start > 0 {
+                self.join(scene, labels, label, (columns, rows), [(columns.start - 1, y), (columns.start, y)], RIGHT);
+            }
+        }
+        self.flow.solve();
+        let mut changed = false;
+        for (v, y) in rows.clone().enumerate() {
+            for (u, x) in columns.clone().enumerate() {
+                if self.change[v * width + u] != FIXED && self.flow.on_sink_side(self.flow.node(u, v)) {
+                    labels[y * scene.width + x] = label as Label;
+                    changed = true;
+                }
+            }
+        }
+        changed
+    }
+
+    /// Adds the cost of a seam between neighbouring pixels p and q. A node on the sink's side takes the new label.
+    fn join(
+        &mut self,
+        scene: &Scene<'_>,
+        labels: &[Label],
+        label: usize,
+        (columns, rows): (&Range<usize>, &Range<usize>),
+        [p, q]: [(usize, usize); 2],
+        direction: usize,
+    ) {
+        let node = |(x, y): (usize, usize)| {
+            if !(columns.contains(&x) && rows.contains(&y)) {
+                return None;
+            }
+            let (u, v) = (x - columns.start, y - rows.start);
+            let change = self.change[v * columns.len() + u];
+            (change != FIXED).then(|| (self.flow.node(u, v), change))
+        };
+        let (node_p, node_q) = (node(p), node(q));
+        if node_p.is_none() && node_q.is_none() {
+            return;
+        }
+        let old = |(x, y): (usize, usize)| labels[y * scene.width + x];
+        let (a, b) = (old(p), old(q));
+        if a == NOBODY || b == NOBODY {
+            return;
+        }
+        let (a, b) = (usize::from(a), usize::from(b));
+        match (node_p, node_q) {
+            (Some((at_p, change_p)), Some((_, change_q))) if a == b => {
+                let seam = scene.cost_of(p, q, change_p + change_q);
+                self.flow.add_arcs(at_p, direction, seam, seam);
+            }
+            (Some((at_p, _)), Some((at_q, _))) => {
+                let keep_both = scene.seam_cost(p, a, q, b);
+                let q_changes = scene.seam_cost(p, a, q, label);
+                let p_changes = scene.seam_cost(p, label, q, b);
+                self.flow.add_sink_side_cost(at_p, p_changes - keep_both);
+                self.flow.add_sink_side_cost(at_q, -p_changes);
+                // Rounding may miss the triangle inequality by one.
+                self.flow.add_arcs(at_p, direction, (q_changes + p_changes - keep_both).max(0), 0);
+            }
+            (Some((at_p, _)), None) => {
+                let change = scene.seam_cost(p, label, q, b) - scene.seam_cost(p, a, q, b);
+                self.flow.add_sink_side_cost(at_p, change);
+            }
+            (None, Some((at_q, _))) => {
+                let change = scene.seam_cost(p, a, q, label) - scene.seam_cost(p, a, q, b);
+                self.flow.add_sink_side_cost(at_q, change);
+            }
+            (None, None) => {}
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! The labelling of the canvas, at any pixel of it.
+
+use std::ops::Range;
+
+use super::view::{PARTLY, View, WHOLLY};
+use super::{Label, NOBODY};
+
+/// Which photograph the panorama shows where.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seams {
+    width: usize,
+    height: usize,
+    labels: Vec<Label>,
+    /// For each photograph the pixels that no photograph covers wholly and that this one covers in part.
+    partial: Vec<Vec<u32>>,
+}
+
+impl Seams {
+    pub(super) fn new(labels: Vec<Label>, views: Vec<View>, [width, height]: [usize; 2]) -> Self {
+        let mut whole = vec![false; labels.len()];
+        for view in &views {
+            for (index, pixel) in view.pixels.iter().enumerate() {
+                if pixel[3] & WHOLLY != 0 {
+                    whole[place(view, index, width)] = true;
+                }
+            }
+        }
+        let partial = views
+            .iter()
+            .map(|view| {
+                let touched = |(index, pixel): (usize, &[u8; 4])| {
+                    let at = place(view, index, width);
+                    (pixel[3] & PARTLY != 0 && !whole[at]).then_some(at as u32)
+                };
+                view.pixels.iter().enumerate().filter_map(touched).collect()
+            })
+            .collect();
+        let mut seams = Self { width, height, labels, partial };
+        seams.fill_rim();
+        seams
+    }
+
+    /// Everything shows photograph 0.
+    pub fn of_one(width: usize, height: usize) -> Self {
+        Self { width, height, labels: vec![0; width * height], partial: vec![Vec::new()] }
+    }
+
+    /// Width of the canvas the seams were found on.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height of the canvas the seams were found on.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Labels of the canvas the seams were found on, row by row; [`NOBODY`] where nothing is.
+    pub fn labels(&self) -> &[Label] {
+        &self.labels
+    }
+
+    /// Gives uncovered pixels beside covered ones a label, so that the finer canvas has one wherever it is covered.
+    fn fill_rim(&mut self) {
+        // Coverage of a pixel of this canvas is judged at its middle; a finer canvas may reach one pixel further.
+        const RINGS: usize = 2;
+        for _ in 0..RINGS {
+            let old = self.labels.clone();
+            for at in 0..old.len() {
+                if old[at] != NOBODY {
+                    continue;
+                }
+                let (x, y) = (at % self.width, at / self.width);
+                let near = (y.saturating_sub(1)..(y + 2).min(self.height))
+                    .flat_map(|v| (x.saturating_sub(1)..(x + 2).min(self.width)).map(move |u| (u, v)))
+                    .map(|(u, v)| old[v * self.width + u]);
+                // NOBODY is the largest label.
+                self.labels[at] = near.min().unwrap_or(NOBODY);
+            }
+        }
+    }
+
+    /// Label of the point (x, y), in pixels of this canvas: that of the four pixels around it with the most weight.
+    #[inline]
+    fn at(&self, x: f64, y: f64) -> Label {
+        let (x, y) = ((x - 0.5).max(0.0), (y - 0.5).max(0.0));
+        let (left, top) = ((x as usize).min(self.width - 1), (y as usize).min(self.height - 1));
+        let (right, bottom) = ((left + 1).min(self.width - 1), (top + 1).min(self.height - 1));
+        let label = |x: usize, y: usize| self.labels[y * self.width + x];
+        let corners = [label(left, top), label(right, top), label(left, bottom), label(right, bottom)];
+        if corners.iter().all(|&one| one == corners[0]) {
+            return corners[0];
+        }
+        let (u, v) = ((x - left as f64).min(1.0), (y - top as f64).min(1.0));
+        let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
+        let mut best = (NOBODY, -1.0);
+        for &candidate in corners.iter().filter(|&&one| one != NOBODY) {
+            let weight: f64 =
+                corners.iter().zip(weights).filter(|(one, _)| **one == candidate).map(|(_, weight)| weight).sum();
+            // Ties go to the lower label, whatever their order.
+            if weight > best.1 || weight == best.1 && candidate < best.0 {
+                best = (candidate, weight);
+            }
+        }
+        best.0
+    }
+
+    /// Labels of the pixels `columns` of row `y` of a canvas of `full` pixels (width, height).
+    pub(crate) fn row(&self, y: usize, columns: &Range<usize>, full: [usize; 2], out: &mut Vec<Label>) {
+        let (across, down) = (self.width as f64 / full[0] as f64, self.height as f64 / full[1] as f64);
+        out.clear();
+        let v = (y as f64 + 0.5) * down;
+        out.extend(columns.clone().map(|x| self.at((x as f64 + 0.5) * across, v)));
+    }
+
+    /// Labels of all pixels of a canvas of `full` pixels (width, height), row by row.
+    pub fn on_canvas(&self, full: [usize; 2]) -> Vec<Label> {
+        let mut row = Vec::new();
+        let mut labels = Vec::with_capacity(full[0] * full[1]);
+        for y in 0..full[1] {
+            self.row(y, &(0..full[0]), full, &mut row);
+            labels.extend_from_slice(&row);
+        }
+        labels
+    }
+
+    /// The photographs that a box of a canvas of `full` pixels may show, in order.
+    pub(crate) fn shown_in(&self, columns: &Range<usize>, rows: &Range<usize>, full: [usize; 2]) -> Vec<Label> {
+        let low = |at: usize, of: usize, full: usize| (at * of / full).saturating_sub(1);
+        let high = |at: usize, of: usize, full: usize| (at * of / full + 2).min(of);
+        let columns = low(columns.start, self.width, full[0])..high(columns.end, self.width, full[0]);
+        let rows = low(rows.start, self.height, full[1])..high(rows.end, self.height, full[1]);
+        let mut found: Vec<Label> = Vec::new();
+        for y in rows.clone() {
+            for same in self.labels[y * self.width..][columns.clone()].chunk_by(|a, b| a == b) {
+                if same[0] != NOBODY && !found.contains(&same[0]) {
+                    found.push(same[0]);
+                }
+            }
+        }
+        for (label, partial) in self.partial.iter().enumerate() {
+            let first = partial.partition_point(|&at| (at as usize) < rows.start * self.width);
+            let inside = partial[first..]
+                .iter()
+                .take_while(|&&at| (at as usize) < rows.end * self.width)
+                .any(|&at| columns.contains(&(at as usize % self.width)));
+            if inside && !found.contains(&(label as Label)) {
+                found.push(label as Label);
+            }
+        }
+        found.sort_unstable();
+        found
+    }
+}
+
+fn place(view: &View, index: usize, width: usize) -> usize {
+    let columns = view.columns.len();
+    (view.rows.start + index / columns) * width + view.columns.start + index % columns
+}

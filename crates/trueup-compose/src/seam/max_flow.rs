@@ -1,0 +1,392 @@
+//! Minimum cut of a grid whose nodes are joined to their four neighbours and to the two terminals.
+//!
+//! # Source
+//! Boykov, Kolmogorov, "An experimental comparison of min-cut/max-flow algorithms for energy minimization in vision",
+//! IEEE TPAMI 26(9), 2004, section 3; the origin checks with time stamps and distances are those of Kolmogorov's
+//! dissertation (Cornell, 2004), section 3.2.
+//!
+//! # Departures
+//! Arcs are not stored: they follow from the grid. Capacities are whole numbers, so that the cut is exact and the same
+//! everywhere.
+
+use std::collections::VecDeque;
+
+/// Directions to the four neighbours: right, down, left, up. `direction ^ 2` leads back.
+pub(super) const RIGHT: usize = 0;
+pub(super) const DOWN: usize = 1;
+
+const FREE: u8 = 0;
+const SOURCE: u8 = 1;
+const SINK: u8 = 2;
+
+/// What [`GridFlow::parent`] holds beside a direction.
+const TERMINAL: u8 = 4;
+const ORPHAN: u8 = 5;
+const NOBODY: u8 = 6;
+
+/// A flow network on a grid.
+#[derive(Debug, Default)]
+pub(super) struct GridFlow {
+    /// Nodes per row with the border; a ring of nodes without arcs surrounds the grid.
+    stride: usize,
+    /// Residual capacity from the source (above zero) or to the sink (below zero).
+    excess: Vec<i32>,
+    /// Residual capacities to the four neighbours.
+    residual: Vec<[i32; 4]>,
+    tree: Vec<u8>,
+    parent: Vec<u8>,
+    /// When `distance` was last known to be right.
+    stamp: Vec<u32>,
+    /// Arcs to the terminal.
+    distance: Vec<u32>,
+    clock: u32,
+    active: VecDeque<u32>,
+    is_active: Vec<bool>,
+    orphans: VecDeque<u32>,
+}
+
+impl GridFlow {
+    /// Empties the network for a grid of `width` x `height` nodes.
+    pub(super) fn reset(&mut self, width: usize, height: usize) {
+        let nodes = (width + 2) * (height + 2);
+        self.stride = width + 2;
+        self.clock = 0;
+        self.active.clear();
+        self.orphans.clear();
+        refill(&mut self.excess, nodes, 0);
+        refill(&mut self.residual, nodes, [0; 4]);
+        refill(&mut self.tree, nodes, FREE);
+        refill(&mut self.parent, nodes, NOBODY);
+        refill(&mut self.stamp, nodes, 0);
+        refill(&mut self.distance, nodes, 0);
+        refill(&mut self.is_active, nodes, false);
+    }
+
+    /// The node in column `x` and row `y`.
+    pub(super) fn node(&self, x: usize, y: usize) -> usize {
+        (y + 1) * self.stride + x + 1
+    }
+
+    /// Makes it cost `amount` (below zero: gain) to have `node` on the sink's side.
+    pub(super) fn add_sink_side_cost(&mut self, node: usize, amount: i32) {
+        self.excess[node] = self.excess[node].saturating_add(amount);
+    }
+
+    /// Makes it cost `there` to have `node` on the source's side and its neighbour in `direction` on the sink's, and `back`
+    /// for the reverse; both at least 0.
+    pub(super) fn add_arcs(&mut self, node: usize, direction: usize, there: i32, back: i32) {
+        let other = self.neighbour(node, direction);
+        self.residual[node][direction] += there;
+        self.residual[other][direction ^ 2] += back;
+    }
+
+    fn neighbour(&self, node: usize, direction: usize) -> usize {
+        match direction {
+            RIGHT => node + 1,
+            DOWN => node + self.stride,
+            2 => node - 1,
+            _ => node - self.stride,
+        }
+    }
+
+    /// Residual capacity of the arc along which the tree of `node` grows in `direction`: away from the source, towards
+    /// the sink.
+    fn growth_capacity(&self, node: usize, direction: usize) -> i32 {
+        match self.tree[node] {
+            SOURCE => self.residual[node][direction],
+            _ => self.residual[self.neighbour(node, direction)][direction ^ 2],
+        }
+    }
+
+    /// Finds the minimum cut. Afterwards [`Self::on_sink_side`] tells the sides.
+    pub(super) fn solve(&mut self) {
+        for node in 0..self.excess.len() {
+            if self.excess[node] != 0 {
+                self.tree[node] = if self.excess[node] > 0 { SOURCE } else { SINK };
+                self.parent[node] = TERMINAL;
+                self.distance[node] = 1;
+                self.activate(node);
+            }
+        }
+        while let Some(&front) = self.active.front() {
+            let node = front as usize;
+            let bridge = if self.tree[node] == FREE { None } else { self.grow(node) };
+            match bridge {
+                Some(direction) => {
+                    self.clock += 1;
+                    self.augment(node, direction);
+                    self.adopt();
+                }
+                None => {
+                    self.active.pop_front();
+                    self.is_active[node] = false;
+                }
+            }
+        }
+    }
+
+    /// Whether `node` is on the sink's side of the minimum cut that is nearest to the sink.
+    pub(super) fn on_sink_side(&self, node: usize) -> bool {
+        self.tree[node] == SINK
+    }
+
+    fn activate(&mut self, node: usize) {
+        if !self.is_active[node] {
+            self.is_active[node] = true;
+            self.active.push_back(node as u32);
+        }
+    }
+
+    /// Extends the tree of `node` to its free neighbours; returns the direction of an arc to the other tree.
+    fn grow(&mut self, node: usize) -> Option<usize> {
+        for direction in 0..4 {
+            if self.growth_capacity(node, direction) <= 0 {
+                continue;
+            }
+            let other = self.neighbour(node, direction);
+            if self.tree[other] == FREE {
+                self.tree[other] = self.tree[node];
+                self.join(other, direction ^ 2, node);
+                self.activate(other);
+            } else if self.tree[other] != self.tree[node] {
+                return Some(direction);
+            } else if self.stamp[other] <= self.stamp[node] && self.distance[other] > self.distance[node] + 1 {
+                // A shorter way to the terminal; trees stay flat.
+                self.join(other, direction ^ 2, node);
+            }
+        }
+        None
+    }
+
+    fn join(&mut self, child: usize, direction: usize, parent: usize) {
+        self.parent[child] = direction as u8;
+        self.stamp[child] = self.stamp[parent];
+        self.distance[child] = self.distance[parent] + 1;
+    }
+
+    /// Pushes what fits along the path that the arc from `node` in `direction` closes.
+    fn augment(&mut self, node: usize, direction: usize) {
+        let other = self.neighbour(node, direction);
+        // The arc runs from the source's tree to the sink's.
+        let (from, along, to) =
+            if self.tree[node] == SOURCE { (node, direction, other) } else { (other, direction ^ 2, node) };
+        let mut amount = self.residual[from][along];
+        let mut at = from;
+        while self.parent[at] < TERMINAL {
+            let up = usize::from(self.parent[at]);
+            at = self.neighbour(at, up);
+            amount = amount.min(self.residual[at][up ^ 2]);
+        }
+        amount = amount.min(self.excess[at]);
+        at = to;
+        while self.parent[at] < TERMINAL {
+            let up = usize::from(self.parent[at]);
+            amount = amount.min(self.residual[at][up]);
+            at = self.neighbour(at, up);
+        }
+        amount = amount.min(-self.excess[at]);
+
+        self.push(from, along, amount);
+        at = from;
+        while self.parent[at] < TERMINAL {
+            let up = usize::from(self.parent[at]);
+            let above = self.neighbour(at, up);
+            self.push(above, up ^ 2, amount);
+            if self.residual[above][up ^ 2] == 0 {
+                self.orphan(at);
+            }
+            at = above;
+        }
+        self.excess[at] -= amount;
+        if self.excess[at] == 0 {
+            self.orphan(at);
+        }
+        at = to;
+        while self.parent[at] < TERMINAL {
+            let up = usize::from(self.parent[at]);
+            self.push(at, up, amount);
+            let above = self.neighbour(at, up);
+            if self.residual[at][up] == 0 {
+                self.orphan(at);
+            }
+            at = above;
+        }
+        self.excess[at] += amount;
+        if self.excess[at] == 0 {
+            self.orphan(at);
+        }
+    }
+
+    fn push(&mut self, node: usize, direction: usize, amount: i32) {
+        let other = self.neighbour(node, direction);
+        self.residual[node][direction] -= amount;
+        self.residual[other][direction ^ 2] += amount;
+    }
+
+    fn orphan(&mut self, node: usize) {
+        self.parent[node] = ORPHAN;
+        self.orphans.push_back(node as u32);
+    }
+
+    /// Finds new parents for the orphans, or sets them free.
+    fn adopt(&mut self) {
+        while let Some(orphan) = self.orphans.pop_front() {
+            let node = orphan as usize;
+            let tree = self.tree[node];
+            let mut best: Option<(u32, usize)> = None;
+            for direction in 0..4 {
+                if self.capacity_from_parent(node, direction) > 0
+                    && let Some(distance) = self.distance_to_terminal(self.neighbour(node, direction), tree)
+                    && best.is_none_or(|(least, _)| distance < least)
+                {
+                    best = Some((distance, direction));
+                }
+            }
+            if let Some((distance, direction)) = best {
+                self.parent[node] = direction as u8;
+                self.stamp[node] = self.clock;
+                self.distance[node] = distance + 1;
+                continue;
+            }
+            for direction in 0..4 {
+                let other = self.neighbour(node, direction);
+                if self.tree[other] != tree {
+                    continue;
+                }
+                if self.capacity_from_parent(node, direction) > 0 {
+                    self.activate(other);
+                }
+                if usize::from(self.parent[other]) == direction ^ 2 {
+                    self.orphan(other);
+                }
+            }
+            self.tree[node] = FREE;
+            self.parent[node] = NOBODY;
+        }
+    }
+
+    /// Residual capacity of the tree arc between `node` and a possible parent in `direction`.
+    fn capacity_from_parent(&self, node: usize, direction: usize) -> i32 {
+        match self.tree[node] {
+            SOURCE => self.residual[self.neighbour(node, direction)][direction ^ 2],
+            _ => self.residual[node][direction],
+        }
+    }
+
+    /// Arcs from `start`, a node of `tree`, to its terminal; `None` if it is of another tree or hangs on an orphan.
+    fn distance_to_terminal(&mut self, start: usize, tree: u8) -> Option<u32> {
+        if self.tree[start] != tree {
+            return None;
+        }
+        let (mut at, mut steps) = (start, 0);
+        let distance = loop {
+            if self.stamp[at] == self.clock {
+                break self.distance[at];
+            }
+            match self.parent[at] {
+                TERMINAL => break 1,
+                ORPHAN | NOBODY => return None,
+                up => at = self.neighbour(at, usize::from(up)),
+            }
+            steps += 1;
+        };
+        // Remember along the way.
+        let mut left = distance + steps;
+        at = start;
+        while self.stamp[at] != self.clock {
+            self.stamp[at] = self.clock;
+            self.distance[at] = left;
+            if self.parent[at] >= TERMINAL {
+                break;
+            }
+            at = self.neighbour(at, usize::from(self.parent[at]));
+            left -= 1;
+        }
+        Some(distance + steps)
+    }
+}
+
+fn refill<T: Clone>(values: &mut Vec<T>, length: usize, value: T) {
+    values.clear();
+    values.resize(length, value);
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const WIDTH: usize = 4;
+    const HEIGHT: usize = 3;
+    const NODES: usize = WIDTH * HEIGHT;
+
+    /// Cost of the assignment whose bit i tells whether node i is on the sink's side.
+    fn cost(sides: u32, unary: &[i32], arcs: &[[i32; 4]]) -> i64 {
+        let side = |node: usize| sides >> node & 1 == 1;
+        let mut sum = 0;
+        for node in 0..NODES {
+            if side(node) {
+                sum += i64::from(unary[node]);
+            }
+            let (x, y) = (node % WIDTH, node / WIDTH);
+            let mut arc = |other: usize, there: i32, back: i32| {
+                if !side(node) && side(other) {
+                    sum += i64::from(there);
+                }
+                if side(node) && !side(other) {
+                    sum += i64::from(back);
+                }
+            };
+            if x + 1 < WIDTH {
+                arc(node + 1, arcs[node][0], arcs[node][1]);
+            }
+            if y + 1 < HEIGHT {
+                arc(node + WIDTH, arcs[node][2], arcs[node][3]);
+            }
+        }
+        sum
+    }
+
+    fn cut(flow: &mut GridFlow, unary: &[i32], arcs: &[[i32; 4]]) -> u32 {
+        flow.reset(WIDTH, HEIGHT);
+        for node in 0..NODES {
+            let (x, y) = (node % WIDTH, node / WIDTH);
+            let at = flow.node(x, y);
+            flow.add_sink_side_cost(at, unary[node]);
+            if x + 1 < WIDTH {
+                flow.add_arcs(at, RIGHT, arcs[node][0], arcs[node][1]);
+            }
+            if y + 1 < HEIGHT {
+                flow.add_arcs(at, DOWN, arcs[node][2], arcs[node][3]);
+            }
+        }
+        flow.solve();
+        let sink_side = |node: usize| flow.on_sink_side(flow.node(node % WIDTH, node / WIDTH));
+        (0..NODES).filter(|&node| sink_side(node)).map(|node| 1 << node).sum()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(200))]
+
+        #[test]
+        fn no_assignment_costs_less_than_the_cut(
+            unary in prop::collection::vec(-9..9_i32, NODES),
+            arcs in prop::collection::vec([0..7_i32, 0..7_i32, 0..7_i32, 0..7_i32], NODES),
+        ) {
+            let found = cost(cut(&mut GridFlow::default(), &unary, &arcs), &unary, &arcs);
+            let least = (0..1 << NODES).map(|sides| cost(sides, &unary, &arcs)).min();
+            prop_assert_eq!(Some(found), least);
+        }
+    }
+
+    #[test]
+    fn a_network_can_be_used_again() {
+        let arcs = vec![[2, 2, 2, 2]; NODES];
+        let mut flow = GridFlow::default();
+        let unary: Vec<i32> = (0..NODES as i32).map(|node| node - 6).collect();
+        let first = cut(&mut flow, &unary, &arcs);
+        assert_ne!(cut(&mut flow, &[5; NODES], &arcs), first);
+        assert_eq!(cut(&mut flow, &unary, &arcs), first);
+    }
+}

@@ -1,0 +1,111 @@
+//! Photographs as the search for seams sees them: small, corrected, on the canvas.
+
+use std::ops::Range;
+
+use crate::distance::border_distances;
+
+/// What is known of one pixel of a [`View`] beside its colour.
+///
+/// The photograph covers it in part.
+pub const PARTLY: u8 = 1;
+/// The photograph covers it wholly.
+pub const WHOLLY: u8 = 2;
+/// The camera's sensor was saturated there: brighter detail is lost.
+pub const CLIPPED: u8 = 4;
+/// The user does not want this photograph here, if another one can be had.
+pub const IGNORED: u8 = 8;
+/// The user wants this photograph here.
+pub const KEPT: u8 = 16;
+
+/// One pixel of a view: red, green and blue (square root of linear light, 255 is white) and flags.
+pub type ViewPixel = [u8; 4];
+
+/// A photograph on a small canvas: the box it lies in.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct View {
+    /// Columns of the small canvas.
+    pub columns: Range<usize>,
+    /// Rows of the small canvas.
+    pub rows: Range<usize>,
+    /// Row-major pixels of the box.
+    pub pixels: Vec<ViewPixel>,
+}
+
+impl View {
+    /// Index of the canvas pixel (x, y), if it is in the box.
+    #[inline]
+    pub(crate) fn index(&self, x: usize, y: usize) -> Option<usize> {
+        (self.columns.contains(&x) && self.rows.contains(&y))
+            .then(|| (y - self.rows.start) * self.columns.len() + x - self.columns.start)
+    }
+
+    /// Flags of the canvas pixel (x, y); 0 outside.
+    #[inline]
+    pub(crate) fn flags(&self, x: usize, y: usize) -> u8 {
+        self.index(x, y).map_or(0, |index| self.pixels[index][3])
+    }
+
+    /// The view on a canvas of half the size: means of 2 x 2 pixels over those that are covered.
+    pub(super) fn halved(&self) -> Self {
+        let half = |range: &Range<usize>| range.start / 2..range.end.div_ceil(2);
+        let (columns, rows) = (half(&self.columns), half(&self.rows));
+        let mut pixels = Vec::with_capacity(columns.len() * rows.len());
+        for y in rows.clone() {
+            for x in columns.clone() {
+                pixels.push(self.mean_of_four(2 * x, 2 * y));
+            }
+        }
+        Self { columns, rows, pixels }
+    }
+
+    fn mean_of_four(&self, x: usize, y: usize) -> ViewPixel {
+        let (mut sum, mut count, mut any, mut all) = ([0_u16; 3], 0, 0, u8::MAX);
+        for (x, y) in [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)] {
+            let pixel = self.index(x, y).map_or([0; 4], |index| self.pixels[index]);
+            if pixel[3] & PARTLY != 0 {
+                for (sum, level) in sum.iter_mut().zip(pixel) {
+                    *sum += u16::from(level);
+                }
+                count += 1;
+            }
+            any |= pixel[3];
+            all &= pixel[3];
+        }
+        let mean = |sum: u16| ((sum + count / 2) / count.max(1)) as u8;
+        let [r, g, b] = sum.map(mean);
+        [r, g, b, any & !WHOLLY | all & WHOLLY]
+    }
+
+    /// Distance of every pixel to the border of what is covered wholly, relative to the largest, 0 to 255.
+    pub(super) fn depths(&self) -> Vec<u8> {
+        let covered: Vec<bool> = self.pixels.iter().map(|pixel| pixel[3] & WHOLLY != 0).collect();
+        let distance = border_distances(&covered, self.columns.len());
+        let largest = distance.iter().copied().max().unwrap_or(0).max(1);
+        distance.iter().map(|&one| (u64::from(one) * 255 / u64::from(largest)) as u8).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halving_keeps_to_what_is_covered() {
+        let whole = PARTLY | WHOLLY;
+        let pixels = vec![[10, 0, 0, whole], [20, 0, 0, whole | CLIPPED], [30, 9, 9, PARTLY], [99, 99, 99, 0]];
+        let view = View { columns: 2..4, rows: 6..8, pixels };
+        let half = view.halved();
+        assert_eq!((half.columns, half.rows), (1..2, 3..4));
+        assert_eq!(half.pixels, [[20, 3, 3, PARTLY | CLIPPED]]);
+        // An odd start shares its pixel with what is outside.
+        let half = View { columns: 1..2, rows: 0..2, pixels: vec![[8, 8, 8, whole]; 2] }.halved();
+        assert_eq!(half.pixels, [[8, 8, 8, PARTLY]]);
+    }
+
+    #[test]
+    fn depth_grows_towards_the_middle() {
+        let view = View { columns: 0..5, rows: 0..5, pixels: vec![[0, 0, 0, PARTLY | WHOLLY]; 25] };
+        let depths = view.depths();
+        assert_eq!((depths[0], depths[6], depths[12]), (85, 170, 255));
+    }
+}
