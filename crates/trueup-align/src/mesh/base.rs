@@ -52,14 +52,14 @@ struct WantedSimilarity {
 ///
 /// `cameras` are those that the prior was made from; the bases follow them as the prior's lines correct them.
 ///
-/// Where the pictures together look more than 40 degrees up or down and reach the pole, the sphere is tilted so that
+/// Where the pictures together look more than 40 degrees up or down and one looks at a pole, the sphere is tilted so that
 /// their mean direction is level: verticals then converge as they do for the eye, and nothing is torn.
 pub fn bases(cameras: &[Camera], grids: &[GridMesh], prior: &SimilarityPrior, options: &MeshOptions) -> Vec<Base> {
     let cameras = &prior.corrected_cameras(cameras);
     let scaled_focal: f64 = cameras.iter().zip(&prior.scale).map(|(camera, scale)| camera.focal_px * scale).sum();
     let units_per_radian = scaled_focal / cameras.len().max(1) as f64;
     let level_from_world = prior.level_from_world();
-    let tilt = tilt_from_level(cameras, grids, &level_from_world);
+    let tilt = tilt_from_level(cameras, &level_from_world);
     let frame = tilt.unwrap_or_else(Matrix3::identity) * level_from_world;
     (0..grids.len())
         .map(|k| {
@@ -76,15 +76,16 @@ pub fn bases(cameras: &[Camera], grids: &[GridMesh], prior: &SimilarityPrior, op
 }
 
 /// The turn about the horizontal axis that brings a steep panorama's mean direction level; `None` if it is not steep.
-fn tilt_from_level(cameras: &[Camera], grids: &[GridMesh], level_from_world: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+fn tilt_from_level(cameras: &[Camera], level_from_world: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     /// Radians, 40 degrees.
     const STEEP: f64 = 0.7;
     /// Length of the mean direction below which the pictures look all round and have none.
     const ONE_WAY: f64 = 0.5;
-    let view = |k: usize| SphereView::new(MERCATOR, &cameras[k], level_from_world);
-    let forward: Vector3<f64> = (0..cameras.len()).map(|k| view(k).forward).sum();
+    let forwards: Vec<Vector3<f64>> =
+        cameras.iter().map(|camera| level_from_world * camera.rotation().row(2).transpose()).collect();
+    let forward: Vector3<f64> = forwards.iter().sum();
     let pitch = forward.y.atan2(forward.z);
-    let reaches_pole = (0..cameras.len()).any(|k| !view(k).is_moderate_all_over(&grids[k]));
+    let reaches_pole = forwards.iter().any(|&forward| !is_moderate(forward));
     let one_way = forward.norm() >= ONE_WAY * cameras.len() as f64;
     (reaches_pole && one_way && pitch.abs() > STEEP).then(|| rotation_about_x(pitch))
 }
@@ -110,11 +111,13 @@ struct SphereView {
     camera: Camera,
     level_from_camera: Matrix3<f64>,
     forward: Vector3<f64>,
+    /// Whether no vertex of the picture's grid comes near a pole.
+    moderate_all_over: bool,
 }
 
 impl Base {
     /// The base of a picture: on the level sphere, turned so that its rotation at the picture's centre is the wanted one.
-    /// A picture that reaches within 20 degrees of a pole cannot be unrolled; it gets the plain similarity.
+    /// A picture whose centre is within 20 degrees of a pole cannot be unrolled; it gets the plain similarity.
     fn new(
         options: &MeshOptions,
         camera: &Camera,
@@ -127,8 +130,8 @@ impl Base {
         if options.base == BaseShape::Similarity {
             return plain;
         }
-        let view = SphereView::new(options.conformality, camera, level_from_world);
-        if !view.is_moderate_all_over(grid) {
+        let view = SphereView::new(options.conformality, camera, grid, level_from_world);
+        if !is_moderate(view.forward) {
             return plain;
         }
         let at_centre = derivative_at_centre(options.conformality, &view.level_from_camera, camera.focal_px);
@@ -163,35 +166,71 @@ impl Base {
 }
 
 impl SphereView {
-    fn new(conformality: f64, camera: &Camera, level_from_world: &Matrix3<f64>) -> Self {
+    fn new(conformality: f64, camera: &Camera, grid: &GridMesh, level_from_world: &Matrix3<f64>) -> Self {
         let level_from_camera = level_from_world * camera.rotation().transpose();
-        Self { conformality, camera: *camera, level_from_camera, forward: level_from_camera.column(2).into_owned() }
-    }
-
-    fn is_moderate_all_over(&self, grid: &GridMesh) -> bool {
-        (0..grid.len()).all(|vertex| self.is_moderate(grid.source(vertex)))
+        let forward = level_from_camera.column(2).into_owned();
+        let mut view = Self { conformality, camera: *camera, level_from_camera, forward, moderate_all_over: false };
+        view.moderate_all_over = (0..grid.len()).all(|vertex| is_moderate(view.ray(grid.source(vertex))));
+        view
     }
 
     fn ray(&self, pixel: Vector2<f64>) -> Vector3<f64> {
         self.level_from_camera * self.camera.bearing(pixel)
     }
 
-    /// Whether a pixel, and the picture's centre, are far enough from the poles.
-    fn is_moderate(&self, pixel: Vector2<f64>) -> bool {
-        /// Sine of the largest latitude that is unrolled, 70 degrees.
-        const STEEPEST: f64 = 0.94;
-        let ray = self.ray(pixel);
-        (ray.y / ray.norm()).abs() <= STEEPEST && self.forward.y.abs() <= STEEPEST
+    /// Longitude relative to the viewing direction and unrolled latitude of a pixel. Beyond the largest latitude the
+    /// unrolled picture goes on straight, along rays from its centre.
+    fn unrolled(&self, pixel: Vector2<f64>) -> Vector2<f64> {
+        let Some(share) = self.moderate_share(pixel) else { return self.projected(self.ray(pixel)) };
+        let centre = Vector2::from(self.camera.principal_point);
+        let last = centre + (pixel - centre) * share;
+        self.projected(self.ray(last)) + self.derivative(self.ray(last), pixel - last)
     }
 
-    /// Longitude relative to the viewing direction and (projected) latitude of a pixel.
-    fn unrolled(&self, pixel: Vector2<f64>) -> Vector2<f64> {
-        let (ray, forward) = (self.ray(pixel), &self.forward);
+    /// The share of the way from the picture's centre to `pixel` after which it is too near a pole; `None` if it is
+    /// moderate to the end.
+    fn moderate_share(&self, pixel: Vector2<f64>) -> Option<f64> {
+        /// Steps in which the first steep place is sought: the way may pass a pole and come back.
+        const STEPS: usize = 16;
+        /// Halvings of that step: to a millionth of the way.
+        const HALVINGS: usize = 16;
+        if self.moderate_all_over {
+            return None;
+        }
+        let centre = Vector2::from(self.camera.principal_point);
+        let steep = |share: f64| !is_moderate(self.ray(centre + (pixel - centre) * share));
+        let first = (1..=STEPS).find(|&step| steep(step as f64 / STEPS as f64))?;
+        let (mut inside, mut outside) = ((first - 1) as f64 / STEPS as f64, first as f64 / STEPS as f64);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (inside + outside);
+            if steep(middle) { outside = middle } else { inside = middle }
+        }
+        Some(inside)
+    }
+
+    fn projected(&self, ray: Vector3<f64>) -> Vector2<f64> {
+        let forward = &self.forward;
         let horizontal = ray.x.hypot(ray.z);
         let longitude = (ray.x * forward.z - ray.z * forward.x).atan2(ray.x * forward.x + ray.z * forward.z);
-        let latitude = unrolled_latitude(ray.y.atan2(horizontal), self.conformality);
-        Vector2::new(longitude, latitude)
+        Vector2::new(longitude, unrolled_latitude(ray.y.atan2(horizontal), self.conformality))
     }
+
+    /// How far [`Self::projected`] moves, to first order, as the pixel of `ray` (of depth 1) moves by `step`.
+    fn derivative(&self, ray: Vector3<f64>, step: Vector2<f64>) -> Vector2<f64> {
+        let change = self.level_from_camera * (step / self.camera.focal_px).push(0.0);
+        let horizontal = ray.x.hypot(ray.z);
+        let longitude = (ray.z * change.x - ray.x * change.z) / horizontal.powi(2);
+        let outward = (ray.x * change.x + ray.z * change.z) / horizontal;
+        let latitude = (horizontal * change.y - ray.y * outward) / ray.norm_squared();
+        Vector2::new(longitude, latitude / (self.conformality * ray.y.atan2(horizontal)).cos())
+    }
+}
+
+/// Whether a direction in the level world is far enough from the poles to be unrolled.
+fn is_moderate(ray: Vector3<f64>) -> bool {
+    /// Sine of the largest latitude that is unrolled, 70 degrees.
+    const STEEPEST: f64 = 0.94;
+    (ray.y / ray.norm()).abs() <= STEEPEST
 }
 
 /// The similarity closest to the projection's derivative at the picture's centre, per pixel.
@@ -243,16 +282,31 @@ mod tests {
     /// A full turn that looks up a little has its mean direction near the pole without looking there.
     #[test]
     fn only_pictures_that_look_one_way_are_tilted_level() {
-        let tilt = |cameras: &[Camera]| {
-            let grids = vec![GridMesh::regular(800.0, 600.0, 40.0); cameras.len()];
-            tilt_from_level(cameras, &grids, &Matrix3::identity())
-        };
+        let tilt = |cameras: &[Camera]| tilt_from_level(cameras, &Matrix3::identity());
         let turn: Vec<Camera> =
-            (0..12).map(|k| camera(f64::from(k) * std::f64::consts::TAU / 12.0, 0.9, 0.0)).collect();
+            (0..12).map(|k| camera(f64::from(k) * std::f64::consts::TAU / 12.0, 1.25, 0.0)).collect();
         assert!(tilt(&turn[..1]).is_some());
         let lower: Vec<Camera> =
             (0..12).map(|k| camera(f64::from(k) * std::f64::consts::TAU / 12.0, -0.5, 0.0)).collect();
         assert!(tilt(&[turn, lower].concat()).is_none());
+    }
+
+    /// The corners of a picture that looks 57 degrees up are beyond the largest latitude: value and slope go on across it.
+    #[test]
+    fn steep_corners_go_on_straight() {
+        for conformality in [0.0, 0.8, MERCATOR] {
+            let grid = GridMesh::regular(800.0, 600.0, 40.0);
+            let view = SphereView::new(conformality, &camera(0.3, 1.0, 0.1), &grid, &Matrix3::identity());
+            let (centre, corner) = (Vector2::new(400.0, 300.0), Vector2::new(500.0, 0.0));
+            let share = view.moderate_share(corner).expect("a steep corner");
+            assert!(share > 0.1 && share < 0.99 && view.moderate_share(centre).is_none(), "{share}");
+            let at = |along: f64| view.unrolled(centre + (corner - centre) * along);
+            let step = 1e-4;
+            assert!((at(share + 1e-7) - at(share - 1e-7)).norm() < 1e-5);
+            let before = (at(share - step) - at(share - 2.0 * step)) / step;
+            let after = (at(1.0) - at(1.0 - step)) / step;
+            assert!((before - after).norm() < 2e-3 * before.norm(), "{conformality}: {before} and {after}");
+        }
     }
 
     /// Latitude 60 degrees: ln(2 + sqrt(3)) in Mercator's projection; in Miller's 5/4 ln(tan(45 + 24 degrees)).
