@@ -11,14 +11,12 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::source::WorkingFrame;
 
 use super::PriorInput;
-use super::weighted_solve::{DataTerm, TurnTerm, solve_unit_vectors};
+use super::weighted_solve::TurnTerm;
 use crate::match_points::OverlapWarp;
 
 /// Residual weight of an edge whose turn lies in its range, and of one that takes the lines' turn instead.
 const IN_RANGE_WEIGHT: f64 = 10.0;
 const OUT_OF_RANGE_WEIGHT: f64 = 1.0;
-/// Residual weight that ties every picture to its straightened roll.
-const ANCHOR_WEIGHT: f64 = 0.1;
 /// Shortest segment that takes part in the turn of least line distortion, working pixels.
 const MIN_LINE_PX: f64 = 10.0;
 /// Narrowest such segment, working pixels.
@@ -88,29 +86,6 @@ impl OverlapTurns {
     /// either.
     pub fn best(&self, input: &PriorInput<'_>, edge: &PairMatches) -> Option<f64> {
         least_line_distortion(input, edge).or_else(|| circular_median(&self.candidates))
-    }
-}
-
-/// Corrects `rolls` (of straightened cameras) where an overlap contradicts their difference: the fallback's form of
-/// [`allowed_turns`].
-///
-/// # Departures
-/// Every picture is tied weakly to its own roll instead of the reference alone strongly: the result does not depend on
-/// the reference, and the panorama keeps the level that straightening gave it.
-pub(super) fn correct_by_edges(input: &PriorInput<'_>, rolls: &[f64]) -> Vec<f64> {
-    let turns = allowed_turns(input, rolls);
-    if turns.iter().all(|term| term.weight > OUT_OF_RANGE_WEIGHT * OUT_OF_RANGE_WEIGHT) {
-        // Every difference stays, and so does every roll.
-        return rolls.to_vec();
-    }
-    let anchors: Vec<DataTerm> = rolls
-        .iter()
-        .enumerate()
-        .map(|(index, &angle)| DataTerm { index, angle, weight: ANCHOR_WEIGHT * ANCHOR_WEIGHT })
-        .collect();
-    match solve_unit_vectors(rolls.len(), &anchors, &turns) {
-        Some(vectors) => vectors.iter().map(|[u, v]| v.atan2(*u)).collect(),
-        None => rolls.to_vec(),
     }
 }
 

@@ -46,7 +46,7 @@ trueup_core::choice! {
     pub enum PriorMethod {
         /// Vanishing points, straightening where they are not believed.
         VanishingPoints = "vpg",
-        /// Straightening and the range of turns that each overlap allows.
+        /// Straightening.
         Straightening = "straightening",
         /// The global similarity prior in two dimensions, as published: the reference is upright, and so is every picture
         /// that its overlaps let be.
@@ -301,7 +301,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     if let Some(clause) = guidance.failed_clause.as_ref().filter(|_| !guidance.used) {
         context.report(Diagnostic::note("vanishing-guidance-refused", STAGE, clause, REFUSED_HINT));
     }
-    let upright = upright.unwrap_or_else(|| fallback(input, &rotations, &level));
+    let upright = upright.unwrap_or_else(|| fallback(&rotations, &level));
     let level_from_world = straighten::level_from_world(&upright.down, &rotations);
     let mut guidance = guidance;
     guidance.dominant = guidance.dominant.map(|world| rows_of(&(level_from_world * matrix_from_rows(&world))));
@@ -333,10 +333,14 @@ fn rolls(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> Vec<f64> {
     rotations.iter().map(|rotation| roll_from_down(&(rotation * down))).collect()
 }
 
-/// Straightened cameras, corrected where an overlap contradicts them.
-fn fallback(input: &PriorInput<'_>, rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> Upright {
-    let theta = edge_range::correct_by_edges(input, &rolls(down, rotations));
-    Upright { down: *down, theta, rotations: rotations.to_vec() }
+/// Straightened cameras.
+///
+/// # Departures
+/// The paper falls back to the global similarity prior, which corrects turns that an overlap contradicts. Level pictures
+/// that look up are twisted against each other although neither is rolled; that correction rolls them by the twist, which
+/// adds up along a row. Their place on the level sphere has the twist already.
+fn fallback(rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> Upright {
+    Upright { down: *down, theta: rolls(down, rotations), rotations: rotations.to_vec() }
 }
 
 fn check(input: &PriorInput<'_>) -> Result<()> {

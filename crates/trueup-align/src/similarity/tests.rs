@@ -328,9 +328,11 @@ pub(super) fn overlap(scene: &Scene, from: usize, to: usize) -> OverlapWarp {
     OverlapWarp { from, to, vertices: (0..grid.len()).map(carry).collect() }
 }
 
+/// Neighbours in a row that looks 40 degrees up are twisted against each other by 13 degrees, and none is rolled for it:
+/// the level sphere has the twist already.
 #[test]
-fn overlaps_keep_true_turns_and_correct_a_wrong_one() {
-    let sweep = Sweep { count: 2, yaw_step_deg: 20.0, ..Sweep::default() };
+fn the_fallback_does_not_roll_steep_rows() {
+    let sweep = Sweep { count: 2, yaw_step_deg: 20.0, pitch_base_deg: 40.0, roll_sd_deg: 2.0, ..Sweep::default() };
     let scene = Scene::new(sweep, CLEAN, 0.0, 21);
     let overlaps = [overlap(&scene, 0, 1), overlap(&scene, 1, 0)];
     let input = PriorInput {
@@ -345,16 +347,11 @@ fn overlaps_keep_true_turns_and_correct_a_wrong_one() {
         turn: 0.0,
         reference: 0,
     };
-    let kept = edge_range::correct_by_edges(&input, &scene.roll);
-    for (theta, roll) in kept.iter().zip(&scene.roll) {
+    let options = SimilarityOptions { prior: PriorMethod::Straightening, ..SimilarityOptions::default() };
+    let prior = run(&input, &options, &StageContext::default()).expect("a well-formed scene");
+    for (theta, roll) in prior.theta.iter().zip(&prior.roll) {
         assert!((theta - roll).abs() < 1e-12);
     }
-    let wrong = [scene.roll[0] - 0.5, scene.roll[1] + 0.5];
-    let corrected = edge_range::correct_by_edges(&input, &wrong);
-    let turn = wrap_angle(corrected[1] - corrected[0] - (scene.roll[1] - scene.roll[0]));
-    assert!(turn.abs() < 0.1, "{turn}");
-    // The mean, and with it the level of the panorama, stays.
-    assert!(((corrected[0] + corrected[1]) - (wrong[0] + wrong[1])).abs() < 1e-6);
 }
 
 #[test]
