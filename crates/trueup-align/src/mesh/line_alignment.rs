@@ -10,11 +10,13 @@
 //! straightness is the chord's deviation relative to the base's: where the base is a similarity both are the published
 //! terms, where it is a sphere unrolled, a straight line of the scene is rightly curved. Robust weights for lines.
 
-use nalgebra::Vector2;
+use nalgebra::{Matrix2, Vector2};
+use rayon::prelude::*;
 use trueup_core::lines::{LineSegment, PairLines};
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 
+use super::evidence::{self, Evidence};
 use super::normal_equations::{Metric, NormalEquations, Share};
 use super::structure::{Rod, RodTerm};
 
@@ -35,6 +37,9 @@ trueup_core::options! {
         max_points: usize = 1000, between(0.0, 1000000.0), "";
         /// Distances beyond this count linearly instead of squared.
         robust_px: f64 = 3.0, between(0.01, 1000.0), "panorama units";
+        /// Misalignment, common to neighbouring matches of a pair, from which on they weigh fully; with less their weight
+        /// falls with its square.
+        full_px: f64 = 1.0, between(0.001, 1000.0), "panorama units, per axis";
         /// Times the mesh is solved with lines and weights found on the solution before.
         rounds: usize = 3, between(1.0, 100.0), "";
     }
@@ -47,10 +52,29 @@ pub struct LineAlignmentInput<'a> {
     pub matched: &'a [PairLines],
     /// Matched points of overlapping pictures.
     pub points: &'a [PairMatches],
-    /// All segments of every picture.
+    /// How.
+    pub options: &'a LineAlignmentOptions,
+}
+
+/// Straight lines that are kept straight.
+#[derive(Debug, Clone, Copy)]
+pub struct StraightInput<'a> {
+    /// Segments of every picture.
     pub lines: &'a [Vec<LineSegment>],
     /// How.
     pub options: &'a LineAlignmentOptions,
+}
+
+impl StraightInput<'_> {
+    /// Adds the equations of straight lines around the present grids.
+    pub(super) fn add(&self, equations: &mut NormalEquations, present: &Present) {
+        for (picture, lines) in self.lines.iter().enumerate() {
+            for line in lines.iter().filter(|line| line.length() >= self.options.straight_length_px) {
+                let rod = Rod::along(picture, line, self.options.spacing_px, present.solved);
+                rod.add(RodTerm::Across, self.options.straightness, equations, present);
+            }
+        }
+    }
 }
 
 /// Grids around which equations are made.
@@ -64,26 +88,57 @@ pub(super) struct Present<'a> {
 }
 
 impl LineAlignmentInput<'_> {
-    /// Adds the equations of matched lines, straight lines and matched points around the present grids.
-    pub(super) fn add(&self, equations: &mut NormalEquations, present: &Present) {
-        for pair in self.matched {
+    /// For every pair of matched points, then of matched lines, the share of their weight that they have: how much of the
+    /// distances in the `present` grids is common to neighbours.
+    pub(super) fn shares(&self, present: &Present) -> Vec<f64> {
+        let points = self.points.par_iter().map(|pair| (pair.a, pair.b));
+        let pairs: Vec<(usize, usize)> = points.chain(self.matched.par_iter().map(|pair| (pair.a, pair.b))).collect();
+        pairs
+            .par_iter()
+            .map(|&pair| {
+                let common = evidence::common_square(&self.evidence(pair, present));
+                evidence::share(common, self.options.full_px)
+            })
+            .collect()
+    }
+
+    /// What the matched points and lines of a pair say; distances beyond the robust one count as that.
+    fn evidence(&self, pair: (usize, usize), present: &Present) -> Vec<Evidence> {
+        let (a, b) = pair;
+        let points = self.points.iter().filter(|points| (points.a, points.b) == pair);
+        let points = points.flat_map(|points| self.chosen(points)).map(|[p, q]| {
+            let gap = present.gap((a, p), (b, q));
+            Evidence { place: p, gap: gap * self.huber(gap.norm()), known: Matrix2::identity() }
+        });
+        let lines = self.matched.iter().filter(|lines| (lines.a, lines.b) == pair);
+        let lines = lines.flat_map(|lines| &lines.lines).filter_map(|[in_a, in_b]| {
+            let middle = Vector2::from(in_a.start).lerp(&Vector2::from(in_a.end), 0.5);
+            let (foot, normal) = meeting_place(present.fine[a].warp(middle), in_b, &present.fine[b])?;
+            let gap = present.gap((a, middle), (b, foot)).dot(&normal);
+            Some(Evidence { place: middle, gap: normal * (gap * self.huber(gap.abs())), known: normal * normal.transpose() })
+        });
+        points.chain(lines).collect()
+    }
+
+    /// The matched points of a pair that count, as places in both pictures.
+    fn chosen<'b>(&self, pair: &'b PairMatches) -> impl Iterator<Item = [Vector2<f64>; 2]> + use<'b> {
+        let most = self.options.max_points;
+        let step = pair.inliers.len().div_ceil(most.max(1)).max(1);
+        pair.inliers.iter().step_by(step).take(most).map(|one| [one.in_a, one.in_b].map(Vector2::from))
+    }
+
+    /// Adds the equations of matched lines and matched points around the present grids, with the `shares` of their weights.
+    pub(super) fn add(&self, equations: &mut NormalEquations, present: &Present, shares: &[f64]) {
+        let (of_points, of_lines) = shares.split_at(self.points.len().min(shares.len()));
+        for (pair, share) in self.matched.iter().zip(of_lines) {
             for [in_a, in_b] in &pair.lines {
-                self.add_matched((pair.a, in_a), (pair.b, in_b), equations, present);
+                self.add_matched((pair.a, in_a), (pair.b, in_b), share * self.options.weight, equations, present);
             }
         }
-        for (picture, lines) in self.lines.iter().enumerate() {
-            for line in lines.iter().filter(|line| line.length() >= self.options.straight_length_px) {
-                let rod = Rod::along(picture, line, self.options.spacing_px, present.solved);
-                rod.add(RodTerm::Across, self.options.straightness, equations, present);
-            }
-        }
-        for pair in self.points {
-            let step = pair.inliers.len().div_ceil(self.options.max_points.max(1)).max(1);
-            let most = self.options.max_points;
-            for one in pair.inliers.iter().step_by(step).take(most) {
-                let (p, q) = (Vector2::from(one.in_a), Vector2::from(one.in_b));
+        for (pair, share) in self.points.iter().zip(of_points) {
+            for [p, q] in self.chosen(pair) {
                 let meeting = Meeting::new((pair.a, p), (pair.b, q), present);
-                let weight = self.options.point_weight * self.huber(meeting.gap.norm());
+                let weight = share * self.options.point_weight * self.huber(meeting.gap.norm());
                 meeting.add(Metric::isotropic(weight), equations);
             }
         }
@@ -98,24 +153,38 @@ impl LineAlignmentInput<'_> {
         &self,
         (a, line_a): (usize, &LineSegment),
         (b, line_b): (usize, &LineSegment),
+        weight: f64,
         equations: &mut NormalEquations,
         present: &Present,
     ) {
-        let [start, end] = [line_b.start, line_b.end].map(Vector2::from);
-        let mesh_b = &present.fine[b];
         let steps = (line_a.length() / self.options.spacing_px).floor().max(1.0) as usize;
         for k in 0..=steps {
             let p = Vector2::from(line_a.start).lerp(&Vector2::from(line_a.end), k as f64 / steps as f64);
-            let place = present.fine[a].warp(p);
-            let Some(foot) = foot(place, [start, end], mesh_b) else { continue };
-            let along = mesh_b.derivative(foot) * (end - start);
-            let Some(along) = along.try_normalize(f64::EPSILON) else { continue };
-            let normal = Vector2::new(-along.y, along.x);
+            let Some((foot, normal)) = meeting_place(present.fine[a].warp(p), line_b, &present.fine[b]) else { continue };
             let meeting = Meeting::new((a, p), (b, foot), present);
-            let weight = self.options.weight * self.huber(normal.dot(&meeting.gap).abs());
-            meeting.add(Metric::along(normal, weight), equations);
+            let robust = self.huber(normal.dot(&meeting.gap).abs());
+            meeting.add(Metric::along(normal, weight * robust), equations);
         }
     }
+}
+
+impl Present<'_> {
+    /// Distance in the panorama of a pixel of one picture from one of another.
+    fn gap(&self, (a, p): (usize, Vector2<f64>), (b, q): (usize, Vector2<f64>)) -> Vector2<f64> {
+        self.fine[a].warp(p) - self.fine[b].warp(q)
+    }
+}
+
+/// The pixel of a line whose image is nearest to `place`, and the direction across the image there.
+fn meeting_place(
+    place: Vector2<f64>,
+    line: &LineSegment,
+    mesh: &GridMesh,
+) -> Option<(Vector2<f64>, Vector2<f64>)> {
+    let [start, end] = [line.start, line.end].map(Vector2::from);
+    let foot = foot(place, [start, end], mesh)?;
+    let along = (mesh.derivative(foot) * (end - start)).try_normalize(f64::EPSILON)?;
+    Some((foot, Vector2::new(-along.y, along.x)))
 }
 
 /// The pixel of a segment whose image is nearest to `place`; `None` beyond its ends.
@@ -150,7 +219,7 @@ impl Meeting {
             0..4 => Share { picture: a, vertex: corners_a[k], share: shares_a[k] },
             _ => Share { picture: b, vertex: corners_b[k - 4], share: -shares_b[k - 4] },
         });
-        let gap = present.fine[a].warp(p) - present.fine[b].warp(q);
+        let gap = present.gap((a, p), (b, q));
         let value = present.solved[a].warp(p) - present.solved[b].warp(q) - gap;
         Self { members, gap, value }
     }

@@ -133,8 +133,7 @@ fn matched_lines_are_drawn_onto_each_other() {
     let options = LineAlignmentOptions { robust_px: 10.0, ..LineAlignmentOptions::default() };
     let (in_a, in_b) = (segment([200.0, 30.0], [200.0, 210.0]), segment([103.0, 30.0], [103.0, 210.0]));
     let matched = [PairLines { a: 0, b: 1, lines: vec![[in_a, in_b]] }];
-    let lines = [vec![in_a], vec![in_b]];
-    let input = LineAlignmentInput { matched: &matched, points: &[], lines: &lines, options: &options };
+    let input = LineAlignmentInput { matched: &matched, points: &[], options: &options };
     let apart = |meshes: &[GridMesh]| {
         (meshes[0].warp(Vector2::new(200.0, 120.0)) - meshes[1].warp(Vector2::new(103.0, 120.0))).x.abs()
     };
@@ -167,11 +166,12 @@ fn a_bent_line_is_pulled_straight() {
     let structure = StructureOptions { weight: 100.0, ..StructureOptions::default() };
     let structure = Some(StructureInput { chains: &lines, options: &structure });
     let strict = LineAlignmentOptions { straightness: 100.0, ..LineAlignmentOptions::default() };
-    let strict =
-        Some(LineAlignmentInput { matched: &[], points: &[] as &[PairMatches], lines: &lines, options: &strict });
+    let straight = Some(StraightInput { lines: &lines, options: &strict });
+    let no_matches: &[PairMatches] = &[];
+    let strict = Some(LineAlignmentInput { matched: &[], points: no_matches, options: &strict });
     assert!(plain > 0.3, "{plain}");
     let kept = bend(&Refinements { structure, ..Refinements::default() });
-    let straightened = bend(&Refinements { lines: strict, ..Refinements::default() });
+    let straightened = bend(&Refinements { lines: strict, straight, ..Refinements::default() });
     assert!(kept < 0.25 * plain, "structure: {plain} px became {kept} px");
     assert!(straightened < 0.25 * plain, "straightness: {plain} px became {straightened} px");
 }
