@@ -18,33 +18,47 @@ pub(super) struct Evidence {
     pub known: Matrix2<f64>,
 }
 
-/// Square, per axis, of the misalignment that neighbours have in common; 0 if there is none or nothing to judge by.
-pub(super) fn common_square(evidence: &[Evidence]) -> f64 {
+/// Square, per axis, of the misalignment that neighbours have in common, around every piece of evidence; 0 if there is
+/// none or nothing to judge by.
+pub(super) fn common_squares(evidence: &[Evidence]) -> Vec<f64> {
     /// Closer matches share their pixels and so their noise.
     const NEAREST_PX: f64 = 8.0;
     /// Two cells of the usual grid: what is common over less, a grid cannot follow.
     const FARTHEST_PX: f64 = 80.0;
-    /// Neighbours that are compared.
-    const NEIGHBOURS: usize = 4;
-    let mut sum = [0.0; 2];
-    for one in evidence {
-        let mut near: Vec<(f64, &Evidence)> = evidence
-            .iter()
-            .map(|other| ((other.place - one.place).norm_squared(), other))
-            .filter(|(square, _)| (NEAREST_PX.powi(2)..=FARTHEST_PX.powi(2)).contains(square))
-            .collect();
-        if near.len() > NEIGHBOURS {
-            near.select_nth_unstable_by(NEIGHBOURS - 1, |one, other| one.0.total_cmp(&other.0));
-            near.truncate(NEIGHBOURS);
-        }
-        // The selection leaves no order, and sums depend on theirs.
-        near.sort_by(|one, other| one.0.total_cmp(&other.0));
-        for (_, other) in near {
-            sum[0] += one.gap.dot(&other.gap);
-            sum[1] += (one.known * other.known).trace();
-        }
-    }
-    quotient(sum)
+    /// Neighbours that are compared with one another.
+    const NEIGHBOURS: usize = 12;
+    /// Products with which a neighbourhood is drawn to the mean of all.
+    const DRAWN: f64 = 24.0;
+    let mut overall = [0.0; 2];
+    let around: Vec<[f64; 2]> = evidence
+        .iter()
+        .map(|one| {
+            let mut near: Vec<(f64, &Evidence)> = evidence
+                .iter()
+                .map(|other| ((other.place - one.place).norm_squared(), other))
+                .filter(|(square, _)| *square <= FARTHEST_PX.powi(2))
+                .collect();
+            if near.len() > NEIGHBOURS {
+                near.select_nth_unstable_by(NEIGHBOURS - 1, |one, other| one.0.total_cmp(&other.0));
+                near.truncate(NEIGHBOURS);
+            }
+            // The selection leaves no order, and sums depend on theirs.
+            near.sort_by(|one, other| one.0.total_cmp(&other.0));
+            let mut sum = [0.0; 2];
+            for (k, (_, one)) in near.iter().enumerate() {
+                for (_, other) in &near[..k] {
+                    if (other.place - one.place).norm_squared() >= NEAREST_PX.powi(2) {
+                        sum[0] += one.gap.dot(&other.gap);
+                        sum[1] += (one.known * other.known).trace();
+                    }
+                }
+            }
+            overall = [overall[0] + sum[0], overall[1] + sum[1]];
+            sum
+        })
+        .collect();
+    let mean = quotient(overall);
+    around.into_iter().map(|[products, units]| quotient([products + DRAWN * mean, units + DRAWN])).collect()
 }
 
 /// The mean square that sums of products and of what they would be for a misalignment of 1 px come to; not negative.
@@ -85,16 +99,18 @@ mod tests {
 
     #[test]
     fn noise_has_nothing_in_common_and_a_misalignment_its_square() {
-        assert!(common_square(&lattice(Vector2::zeros())) < 0.02);
+        let mean = |gap: Vector2<f64>| common_squares(&lattice(gap)).iter().sum::<f64>() / 900.0;
+        let none = mean(Vector2::zeros());
+        assert!(none < 0.03, "{none}");
         // Half of 0.6^2 + 0.8^2 per axis.
-        let found = common_square(&lattice(Vector2::new(0.6, -0.8)));
+        let found = mean(Vector2::new(0.6, -0.8));
         assert!((found - 0.5).abs() < 0.06, "{found}");
     }
 
     #[test]
     fn nothing_to_judge_by_is_no_misalignment() {
-        assert_eq!(common_square(&[]), 0.0);
-        assert_eq!(common_square(&lattice(Vector2::new(1.0, 0.0))[..1]), 0.0);
+        assert_eq!(common_squares(&[]), [0.0; 0]);
+        assert_eq!(common_squares(&lattice(Vector2::new(1.0, 0.0))[..1]), [0.0]);
         assert_eq!(share(0.0, 1.0), 0.0);
         assert_eq!(share(9.0, 1.0), 1.0);
     }

@@ -77,6 +77,19 @@ impl StraightInput<'_> {
     }
 }
 
+/// Shares of their weights that the matches of all lists have.
+pub(super) struct Shares {
+    points: Vec<Vec<f64>>,
+    lines: Vec<Vec<f64>>,
+}
+
+/// A match by its list and its index there.
+#[derive(Debug, Clone, Copy)]
+enum Match {
+    Point(usize, usize),
+    Line(usize, usize),
+}
+
 /// Grids around which equations are made.
 pub(super) struct Present<'a> {
     /// Those whose vertices are unknown.
@@ -88,57 +101,77 @@ pub(super) struct Present<'a> {
 }
 
 impl LineAlignmentInput<'_> {
-    /// For every pair of matched points, then of matched lines, the share of their weight that they have: how much of the
-    /// distances in the `present` grids is common to neighbours.
-    pub(super) fn shares(&self, present: &Present) -> Vec<f64> {
-        let points = self.points.par_iter().map(|pair| (pair.a, pair.b));
-        let pairs: Vec<(usize, usize)> = points.chain(self.matched.par_iter().map(|pair| (pair.a, pair.b))).collect();
-        pairs
+    /// The shares of their weights that all matches have: how much of the distances in the `present` grids is common to
+    /// neighbours.
+    pub(super) fn shares(&self, present: &Present) -> Shares {
+        let mut pairs: Vec<(usize, usize)> = self.points.iter().map(|pair| (pair.a, pair.b)).collect();
+        pairs.extend(self.matched.iter().map(|pair| (pair.a, pair.b)));
+        pairs.sort_unstable();
+        pairs.dedup();
+        let found: Vec<Vec<(Match, f64)>> = pairs
             .par_iter()
             .map(|&pair| {
-                let common = evidence::common_square(&self.evidence(pair, present));
-                evidence::share(common, self.options.full_px)
+                let (which, evidence): (Vec<Match>, Vec<Evidence>) = self.evidence(pair, present).into_iter().unzip();
+                let common = evidence::common_squares(&evidence);
+                let shares = common.into_iter().map(|common| evidence::share(common, self.options.full_px));
+                which.into_iter().zip(shares).collect()
             })
-            .collect()
+            .collect();
+        let mut shares = Shares {
+            points: self.points.iter().map(|pair| vec![0.0; pair.inliers.len()]).collect(),
+            lines: self.matched.iter().map(|pair| vec![0.0; pair.lines.len()]).collect(),
+        };
+        for (which, share) in found.into_iter().flatten() {
+            match which {
+                Match::Point(list, k) => shares.points[list][k] = share,
+                Match::Line(list, k) => shares.lines[list][k] = share,
+            }
+        }
+        shares
     }
 
-    /// What the matched points and lines of a pair say; distances beyond the robust one count as that.
-    fn evidence(&self, pair: (usize, usize), present: &Present) -> Vec<Evidence> {
+    /// What the matched points and lines of a pair say; distances beyond the robust one count as that. Lines whose middles
+    /// do not meet say nothing.
+    fn evidence(&self, pair: (usize, usize), present: &Present) -> Vec<(Match, Evidence)> {
         let (a, b) = pair;
-        let points = self.points.iter().filter(|points| (points.a, points.b) == pair);
-        let points = points.flat_map(|points| self.chosen(points)).map(|[p, q]| {
+        let points = self.points.iter().enumerate().filter(|(_, points)| (points.a, points.b) == pair);
+        let points = points.flat_map(|(list, points)| self.chosen(points).map(move |chosen| (list, chosen)));
+        let points = points.map(|(list, (k, [p, q]))| {
             let gap = present.gap((a, p), (b, q));
-            Evidence { place: p, gap: gap * self.huber(gap.norm()), known: Matrix2::identity() }
+            let evidence = Evidence { place: p, gap: gap * self.huber(gap.norm()), known: Matrix2::identity() };
+            (Match::Point(list, k), evidence)
         });
-        let lines = self.matched.iter().filter(|lines| (lines.a, lines.b) == pair);
-        let lines = lines.flat_map(|lines| &lines.lines).filter_map(|[in_a, in_b]| {
+        let lines = self.matched.iter().enumerate().filter(|(_, lines)| (lines.a, lines.b) == pair);
+        let lines = lines.flat_map(|(list, lines)| lines.lines.iter().enumerate().map(move |line| (list, line)));
+        let lines = lines.filter_map(|(list, (k, [in_a, in_b]))| {
             let middle = Vector2::from(in_a.start).lerp(&Vector2::from(in_a.end), 0.5);
             let (foot, normal) = meeting_place(present.fine[a].warp(middle), in_b, &present.fine[b])?;
             let gap = present.gap((a, middle), (b, foot)).dot(&normal);
-            Some(Evidence { place: middle, gap: normal * (gap * self.huber(gap.abs())), known: normal * normal.transpose() })
+            let gap = normal * (gap * self.huber(gap.abs()));
+            Some((Match::Line(list, k), Evidence { place: middle, gap, known: normal * normal.transpose() }))
         });
         points.chain(lines).collect()
     }
 
-    /// The matched points of a pair that count, as places in both pictures.
-    fn chosen<'b>(&self, pair: &'b PairMatches) -> impl Iterator<Item = [Vector2<f64>; 2]> + use<'b> {
+    /// The matched points of a pair that count, as indices with places in both pictures.
+    fn chosen<'b>(&self, pair: &'b PairMatches) -> impl Iterator<Item = (usize, [Vector2<f64>; 2])> + use<'b> {
         let most = self.options.max_points;
         let step = pair.inliers.len().div_ceil(most.max(1)).max(1);
-        pair.inliers.iter().step_by(step).take(most).map(|one| [one.in_a, one.in_b].map(Vector2::from))
+        let counted = pair.inliers.iter().enumerate().step_by(step).take(most);
+        counted.map(|(k, one)| (k, [one.in_a, one.in_b].map(Vector2::from)))
     }
 
     /// Adds the equations of matched lines and matched points around the present grids, with the `shares` of their weights.
-    pub(super) fn add(&self, equations: &mut NormalEquations, present: &Present, shares: &[f64]) {
-        let (of_points, of_lines) = shares.split_at(self.points.len().min(shares.len()));
-        for (pair, share) in self.matched.iter().zip(of_lines) {
-            for [in_a, in_b] in &pair.lines {
+    pub(super) fn add(&self, equations: &mut NormalEquations, present: &Present, shares: &Shares) {
+        for (pair, share) in self.matched.iter().zip(&shares.lines) {
+            for ([in_a, in_b], share) in pair.lines.iter().zip(share) {
                 self.add_matched((pair.a, in_a), (pair.b, in_b), share * self.options.weight, equations, present);
             }
         }
-        for (pair, share) in self.points.iter().zip(of_points) {
-            for [p, q] in self.chosen(pair) {
+        for (pair, share) in self.points.iter().zip(&shares.points) {
+            for (k, [p, q]) in self.chosen(pair) {
                 let meeting = Meeting::new((pair.a, p), (pair.b, q), present);
-                let weight = share * self.options.point_weight * self.huber(meeting.gap.norm());
+                let weight = share[k] * self.options.point_weight * self.huber(meeting.gap.norm());
                 meeting.add(Metric::isotropic(weight), equations);
             }
         }
