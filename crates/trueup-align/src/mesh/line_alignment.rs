@@ -8,7 +8,8 @@
 //! # Departures
 //! A sample of a line is drawn to the matched line's own image at its foot, not to the chord between that line's ends, and
 //! straightness is the chord's deviation relative to the base's: where the base is a similarity both are the published
-//! terms, where it is a sphere unrolled, a straight line of the scene is rightly curved. Robust weights for lines.
+//! terms, where it is a sphere unrolled, a straight line of the scene is rightly curved. Robust weights that narrow, and
+//! weights by what neighbouring matches have in common (`evidence`).
 
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
@@ -24,7 +25,7 @@ trueup_core::options! {
     /// How matched lines align the grids (`stitch.align = lines`).
     pub struct LineAlignmentOptions("line_alignment") {
         /// Weight of a squared distance of a line's sample from the matched line.
-        weight: f64 = 20.0, between(0.0, 10000.0), "per working px squared";
+        weight: f64 = 80.0, between(0.0, 10000.0), "per working px squared";
         /// Distance of the samples.
         spacing_px: f64 = 20.0, between(1.0, 1000.0), "working px";
         /// Weight of a squared deviation from straight of a sample of any long line.
@@ -32,16 +33,19 @@ trueup_core::options! {
         /// Lines from this length on are kept straight.
         straight_length_px: f64 = 50.0, between(1.0, 100000.0), "working px";
         /// Weight of the squared distance of matched points.
-        point_weight: f64 = 4.0, between(0.0, 10000.0), "per working px squared";
+        point_weight: f64 = 16.0, between(0.0, 10000.0), "per working px squared";
         /// Most matched points of a pair.
         max_points: usize = 1000, between(0.0, 1000000.0), "";
-        /// Distances beyond this count linearly instead of squared.
+        /// Distance at which a match has half its weight in the first round.
         robust_px: f64 = 3.0, between(0.01, 1000.0), "panorama units";
+        /// Factor on that distance from round to round: where depth differs within a cell, the surface that most matches
+        /// are on wins.
+        narrowing: f64 = 0.7, between(0.01, 1.0), "";
         /// Misalignment, common to neighbouring matches of a pair, from which on they weigh fully; with less their weight
         /// falls with its square.
-        full_px: f64 = 1.0, between(0.001, 1000.0), "panorama units, per axis";
+        full_px: f64 = 0.7, between(0.001, 1000.0), "panorama units, per axis";
         /// Times the mesh is solved with lines and weights found on the solution before.
-        rounds: usize = 3, between(1.0, 100.0), "";
+        rounds: usize = 4, between(1.0, 100.0), "";
     }
 }
 
@@ -138,7 +142,7 @@ impl LineAlignmentInput<'_> {
         let points = points.flat_map(|(list, points)| self.chosen(points).map(move |chosen| (list, chosen)));
         let points = points.map(|(list, (k, [p, q]))| {
             let gap = present.gap((a, p), (b, q));
-            let evidence = Evidence { place: p, gap: gap * self.huber(gap.norm()), known: Matrix2::identity() };
+            let evidence = Evidence { place: p, gap: gap * self.shortening(gap.norm()), known: Matrix2::identity() };
             (Match::Point(list, k), evidence)
         });
         let lines = self.matched.iter().enumerate().filter(|(_, lines)| (lines.a, lines.b) == pair);
@@ -147,7 +151,7 @@ impl LineAlignmentInput<'_> {
             let middle = Vector2::from(in_a.start).lerp(&Vector2::from(in_a.end), 0.5);
             let (foot, normal) = meeting_place(present.fine[a].warp(middle), in_b, &present.fine[b])?;
             let gap = present.gap((a, middle), (b, foot)).dot(&normal);
-            let gap = normal * (gap * self.huber(gap.abs()));
+            let gap = normal * (gap * self.shortening(gap.abs()));
             Some((Match::Line(list, k), Evidence { place: middle, gap, known: normal * normal.transpose() }))
         });
         points.chain(lines).collect()
@@ -161,23 +165,25 @@ impl LineAlignmentInput<'_> {
         counted.map(|(k, one)| (k, [one.in_a, one.in_b].map(Vector2::from)))
     }
 
-    /// Adds the equations of matched lines and matched points around the present grids, with the `shares` of their weights.
-    pub(super) fn add(&self, equations: &mut NormalEquations, present: &Present, shares: &Shares) {
+    /// Adds the equations of matched lines and matched points around the present grids, with the `shares` of their weights;
+    /// matches `robust_px` apart have half of that.
+    pub(super) fn add(&self, equations: &mut NormalEquations, present: &Present, shares: &Shares, robust_px: f64) {
         for (pair, share) in self.matched.iter().zip(&shares.lines) {
             for ([in_a, in_b], share) in pair.lines.iter().zip(share) {
-                self.add_matched((pair.a, in_a), (pair.b, in_b), share * self.options.weight, equations, present);
+                self.add_matched((pair.a, in_a), (pair.b, in_b), (share * self.options.weight, robust_px), equations, present);
             }
         }
         for (pair, share) in self.points.iter().zip(&shares.points) {
             for (k, [p, q]) in self.chosen(pair) {
                 let meeting = Meeting::new((pair.a, p), (pair.b, q), present);
-                let weight = share[k] * self.options.point_weight * self.huber(meeting.gap.norm());
+                let weight = share[k] * self.options.point_weight * robust(meeting.gap.norm(), robust_px);
                 meeting.add(Metric::isotropic(weight), equations);
             }
         }
     }
 
-    fn huber(&self, distance: f64) -> f64 {
+    /// Factor that shortens a distance to the robust one.
+    fn shortening(&self, distance: f64) -> f64 {
         if distance <= self.options.robust_px { 1.0 } else { self.options.robust_px / distance }
     }
 
@@ -186,7 +192,7 @@ impl LineAlignmentInput<'_> {
         &self,
         (a, line_a): (usize, &LineSegment),
         (b, line_b): (usize, &LineSegment),
-        weight: f64,
+        (weight, robust_px): (f64, f64),
         equations: &mut NormalEquations,
         present: &Present,
     ) {
@@ -195,7 +201,7 @@ impl LineAlignmentInput<'_> {
             let p = Vector2::from(line_a.start).lerp(&Vector2::from(line_a.end), k as f64 / steps as f64);
             let Some((foot, normal)) = meeting_place(present.fine[a].warp(p), line_b, &present.fine[b]) else { continue };
             let meeting = Meeting::new((a, p), (b, foot), present);
-            let robust = self.huber(normal.dot(&meeting.gap).abs());
+            let robust = robust(normal.dot(&meeting.gap).abs(), robust_px);
             meeting.add(Metric::along(normal, weight * robust), equations);
         }
     }
@@ -218,6 +224,11 @@ fn meeting_place(
     let foot = foot(place, [start, end], mesh)?;
     let along = (mesh.derivative(foot) * (end - start)).try_normalize(f64::EPSILON)?;
     Some((foot, Vector2::new(-along.y, along.x)))
+}
+
+/// Cauchy's weight of a distance.
+fn robust(distance: f64, width_px: f64) -> f64 {
+    1.0 / (1.0 + (distance / width_px).powi(2))
 }
 
 /// The pixel of a segment whose image is nearest to `place`; `None` beyond its ends.

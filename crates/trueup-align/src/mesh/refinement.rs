@@ -79,10 +79,12 @@ impl Problem<'_> {
         let folds = total_folds(&fine);
         let shares = input.shares(&Present { solved: &best.meshes, fine: &fine, places: self.places });
         let mut last = None;
+        let mut robust_px = input.options.robust_px;
         for _ in 0..input.options.rounds {
             let mut with_lines = equations.clone();
             let present = Present { solved: &best.meshes, fine: &fine, places: self.places };
-            input.add(&mut with_lines, &present, &shares);
+            input.add(&mut with_lines, &present, &shares, robust_px);
+            robust_px *= input.options.narrowing;
             let mut all = with_lines.clone();
             if let Some(straight) = straight {
                 straight.add(&mut all, &present);

@@ -32,7 +32,7 @@ trueup_core::options! {
         least_noise: f64 = 3.0, between(0.1, 255.0), "grey levels";
         /// Misalignment, common to neighbouring cells of an overlap, from which on its pixels weigh fully; with less their
         /// weight falls with its square.
-        full_px: f64 = 1.0, between(0.001, 1000.0), "panorama units, per axis";
+        full_px: f64 = 0.5, between(0.001, 1000.0), "panorama units, per axis";
         /// Distance of the samples in the finest pictures; twice as far in each coarser one.
         spacing_px: f64 = 4.0, between(1.0, 1000.0), "working px";
         /// Samples with a smaller change of grey in both pictures are passed over.
