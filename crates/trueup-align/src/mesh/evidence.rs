@@ -18,8 +18,17 @@ pub(super) struct Evidence {
     pub known: Matrix2<f64>,
 }
 
-/// Square, per axis, of the misalignment that neighbours have in common, around every piece of evidence; 0 if there is
-/// none or nothing to judge by.
+impl Evidence {
+    /// What a match says of the square, per axis, that has no neighbour to confirm it.
+    fn beyond_noise(&self) -> f64 {
+        /// Standard deviation of a match per axis that is not exceeded by much: matches are found to half of it.
+        const NOISE_PX: f64 = 1.0;
+        (self.gap.norm_squared() / self.known.trace().max(1.0) - NOISE_PX * NOISE_PX).max(0.0)
+    }
+}
+
+/// Square, per axis, of the misalignment that neighbours have in common, around every piece of evidence. Where
+/// none has a neighbour, what exceeds the usual noise.
 pub(super) fn common_squares(evidence: &[Evidence]) -> Vec<f64> {
     /// Closer matches share their pixels and so their noise.
     const NEAREST_PX: f64 = 8.0;
@@ -57,6 +66,9 @@ pub(super) fn common_squares(evidence: &[Evidence]) -> Vec<f64> {
             sum
         })
         .collect();
+    if overall[1] == 0.0 {
+        return evidence.iter().map(Evidence::beyond_noise).collect();
+    }
     let mean = quotient(overall);
     around.into_iter().map(|[products, units]| quotient([products + DRAWN * mean, units + DRAWN])).collect()
 }
@@ -108,9 +120,13 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_judge_by_is_no_misalignment() {
+    fn what_has_no_neighbour_must_exceed_the_usual_noise() {
         assert_eq!(common_squares(&[]), [0.0; 0]);
-        assert_eq!(common_squares(&lattice(Vector2::new(1.0, 0.0))[..1]), [0.0]);
+        let lonely = |gap: f64| {
+            let known = Matrix2::from_diagonal(&Vector2::new(1.0, 0.0));
+            common_squares(&[Evidence { place: Vector2::zeros(), gap: Vector2::new(gap, 0.0), known }])[0]
+        };
+        assert_eq!([lonely(0.9), lonely(-2.0)], [0.0, 3.0]);
         assert_eq!(share(0.0, 1.0), 0.0);
         assert_eq!(share(9.0, 1.0), 1.0);
     }

@@ -134,6 +134,15 @@ impl LineAlignmentInput<'_> {
         shares
     }
 
+    /// All matches with all of their weights.
+    #[cfg(test)]
+    pub(super) fn whole_shares(&self) -> Shares {
+        Shares {
+            points: self.points.iter().map(|pair| vec![1.0; pair.inliers.len()]).collect(),
+            lines: self.matched.iter().map(|pair| vec![1.0; pair.lines.len()]).collect(),
+        }
+    }
+
     /// What the matched points and lines of a pair say; distances beyond the robust one count as that. Lines whose middles
     /// do not meet say nothing.
     fn evidence(&self, pair: (usize, usize), present: &Present) -> Vec<(Match, Evidence)> {
@@ -170,7 +179,13 @@ impl LineAlignmentInput<'_> {
     pub(super) fn add(&self, equations: &mut NormalEquations, present: &Present, shares: &Shares, robust_px: f64) {
         for (pair, share) in self.matched.iter().zip(&shares.lines) {
             for ([in_a, in_b], share) in pair.lines.iter().zip(share) {
-                self.add_matched((pair.a, in_a), (pair.b, in_b), (share * self.options.weight, robust_px), equations, present);
+                self.add_matched(
+                    (pair.a, in_a),
+                    (pair.b, in_b),
+                    (share * self.options.weight, robust_px),
+                    equations,
+                    present,
+                );
             }
         }
         for (pair, share) in self.points.iter().zip(&shares.points) {
@@ -199,7 +214,9 @@ impl LineAlignmentInput<'_> {
         let steps = (line_a.length() / self.options.spacing_px).floor().max(1.0) as usize;
         for k in 0..=steps {
             let p = Vector2::from(line_a.start).lerp(&Vector2::from(line_a.end), k as f64 / steps as f64);
-            let Some((foot, normal)) = meeting_place(present.fine[a].warp(p), line_b, &present.fine[b]) else { continue };
+            let Some((foot, normal)) = meeting_place(present.fine[a].warp(p), line_b, &present.fine[b]) else {
+                continue;
+            };
             let meeting = Meeting::new((a, p), (b, foot), present);
             let robust = robust(normal.dot(&meeting.gap).abs(), robust_px);
             meeting.add(Metric::along(normal, weight * robust), equations);
@@ -215,11 +232,7 @@ impl Present<'_> {
 }
 
 /// The pixel of a line whose image is nearest to `place`, and the direction across the image there.
-fn meeting_place(
-    place: Vector2<f64>,
-    line: &LineSegment,
-    mesh: &GridMesh,
-) -> Option<(Vector2<f64>, Vector2<f64>)> {
+fn meeting_place(place: Vector2<f64>, line: &LineSegment, mesh: &GridMesh) -> Option<(Vector2<f64>, Vector2<f64>)> {
     let [start, end] = [line.start, line.end].map(Vector2::from);
     let foot = foot(place, [start, end], mesh)?;
     let along = (mesh.derivative(foot) * (end - start)).try_normalize(f64::EPSILON)?;

@@ -138,10 +138,7 @@ impl Problem<'_> {
                 }
                 before = misfit;
                 if let Some(straight) = straight {
-                    straight.add(
-                        &mut with_pixels,
-                        &Present { solved: &best.meshes, fine: &fine, places: self.places },
-                    );
+                    straight.add(&mut with_pixels, &Present { solved: &best.meshes, fine: &fine, places: self.places });
                 }
                 let next = self.solve(solver, &with_pixels)?;
                 let most_rms = self.alignment.rms(&best.meshes) + options.max_departure_px;

@@ -135,17 +135,19 @@ impl Overlap<'_> {
                 Some((inverse * pull, inverse * information))
             })
             .collect();
-        let mut sum = [0.0; 2];
+        let (mut sum, mut squares) = ([0.0; 2], 0.0);
         for vertex in 0..grid.len() {
             let right = Some(vertex + 1).filter(|next| next % grid.columns != 0);
             for neighbour in [right, Some(vertex + grid.columns)].into_iter().flatten() {
                 if let (Some((one, seen)), Some(Some((other, seen_there)))) = (own[vertex], own.get(neighbour)) {
                     sum[0] += one.dot(other);
+                    squares += one.dot(other).powi(2);
                     sum[1] += (seen * seen_there.transpose()).trace();
                 }
             }
         }
-        quotient(sum)
+        // Less the standard error that the sum has if cells have nothing in common.
+        quotient([sum[0] - squares.sqrt(), sum[1]])
     }
 
     fn samples(&self, level: usize, options: &PhotometricOptions) -> Vec<Sample> {
