@@ -79,7 +79,7 @@ fn true_distance(meshes: &[GridMesh]) -> f64 {
         sum += (meshes[0].warp(point) - meshes[1].warp(there)).norm_squared();
         count += 1.0;
     }
-    (sum / count as f64).sqrt()
+    (sum / count).sqrt()
 }
 
 fn pyramids() -> Vec<Pyramid> {
