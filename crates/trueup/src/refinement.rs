@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 use trueup_align::match_points::OverlapWarp;
-use trueup_align::mesh::{LineAlignmentInput, PhotometricInput, Pyramid, Refinements, StructureInput};
+use trueup_align::mesh::{LineAlignmentInput, PhotometricInput, Pyramid, Refinements, StraightInput, StructureInput};
 use trueup_core::lines::{LineSegment, PairLines};
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
@@ -107,9 +107,10 @@ impl Material {
             lines: align.uses_lines().then_some(LineAlignmentInput {
                 matched: &self.matched,
                 points: met,
-                lines: &component.lines,
                 options: &options.line_alignment,
             }),
+            straight: needs_pixels(options)
+                .then_some(StraightInput { lines: &component.lines, options: &options.line_alignment }),
             photometric: align
                 .uses_pixels()
                 .then_some(PhotometricInput { pyramids: &self.pyramids, options: &options.photometric }),

@@ -9,6 +9,7 @@
 mod alignment;
 mod base;
 mod complex;
+mod evidence;
 mod line_alignment;
 mod normal_equations;
 mod photometric;
@@ -25,7 +26,7 @@ use trueup_core::{Error, Result, StageContext};
 use crate::match_points::OverlapWarp;
 pub use alignment::{AlignmentEnergy, MatchPoint};
 pub use base::{Base, BaseShape, bases};
-pub use line_alignment::{LineAlignmentInput, LineAlignmentOptions};
+pub use line_alignment::{LineAlignmentInput, LineAlignmentOptions, StraightInput};
 pub use normal_equations::{MeshSolution, Metric, NormalEquations, Share};
 pub use photometric::{PhotometricInput, PhotometricOptions, Pyramid};
 pub use refinement::Refinements;

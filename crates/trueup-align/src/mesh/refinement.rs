@@ -6,7 +6,8 @@ use trueup_core::{Error, Result};
 
 use super::line_alignment::Present;
 use super::{
-    LineAlignmentInput, MeshSolver, NormalEquations, PhotometricInput, Problem, Solved, StructureInput, count_folds,
+    LineAlignmentInput, MeshSolver, NormalEquations, PhotometricInput, Problem, Solved, StraightInput, StructureInput,
+    count_folds,
 };
 
 /// Energies beyond those of the plain mesh; by default none.
@@ -16,6 +17,8 @@ pub struct Refinements<'a> {
     pub structure: Option<StructureInput<'a>>,
     /// Lines and points that align overlaps.
     pub lines: Option<LineAlignmentInput<'a>>,
+    /// Lines that keep straight while lines or pixels align overlaps.
+    pub straight: Option<StraightInput<'a>>,
     /// Pixels that align overlaps.
     pub photometric: Option<PhotometricInput<'a>>,
     /// Weight with which every picture's outline stays where the plain mesh has it while lines or pixels align overlaps
@@ -28,7 +31,7 @@ impl Refinements<'_> {
     pub(super) fn check(&self, pictures: usize) -> Result<()> {
         let given = [
             ("pyramids", self.photometric.map(|input| input.pyramids.len())),
-            ("lists of lines", self.lines.map(|input| input.lines.len())),
+            ("lists of lines", self.straight.map(|input| input.lines.len())),
             ("lists of chains", self.structure.map(|input| input.chains.len())),
         ];
         for (what, given) in given {
@@ -54,10 +57,10 @@ impl Problem<'_> {
             self.hold_outlines(&mut equations, &solved.meshes, refinements.outline_weight);
         }
         if let Some(input) = &refinements.lines {
-            (equations, solved) = self.align_lines(&mut solver, equations, input, solved)?;
+            (equations, solved) = self.align_lines(&mut solver, equations, (input, refinements.straight), solved)?;
         }
         if let Some(input) = &refinements.photometric {
-            solved = self.align_pixels(&mut solver, &equations, input, solved)?;
+            solved = self.align_pixels(&mut solver, &equations, (input, refinements.straight), solved)?;
         }
         Ok(solved)
     }
@@ -68,18 +71,25 @@ impl Problem<'_> {
         &self,
         solver: &mut MeshSolver,
         equations: NormalEquations,
-        input: &LineAlignmentInput,
+        (input, straight): (&LineAlignmentInput, Option<StraightInput>),
         start: Solved,
     ) -> Result<(NormalEquations, Solved)> {
         let mut best = start;
         let mut fine = self.delivered(&best.meshes);
         let folds = total_folds(&fine);
+        let shares = input.shares(&Present { solved: &best.meshes, fine: &fine, places: self.places });
         let mut last = None;
+        let mut robust_px = input.options.robust_px;
         for _ in 0..input.options.rounds {
             let mut with_lines = equations.clone();
             let present = Present { solved: &best.meshes, fine: &fine, places: self.places };
-            input.add(&mut with_lines, &present);
-            let next = self.solve(solver, &with_lines)?;
+            input.add(&mut with_lines, &present, &shares, robust_px);
+            robust_px *= input.options.narrowing;
+            let mut all = with_lines.clone();
+            if let Some(straight) = straight {
+                straight.add(&mut all, &present);
+            }
+            let next = self.solve(solver, &all)?;
             let Some(step) = self.longest_step(&best, next, |_, fine| total_folds(fine) <= folds) else { break };
             (best, fine) = step;
             last = Some(with_lines);
@@ -109,22 +119,27 @@ impl Problem<'_> {
         &self,
         solver: &mut MeshSolver,
         equations: &NormalEquations,
-        input: &PhotometricInput,
+        (input, straight): (&PhotometricInput, Option<StraightInput>),
         start: Solved,
     ) -> Result<Solved> {
         let options = input.options;
         let mut best = start;
         let mut fine = self.delivered(&best.meshes);
         let folds = total_folds(&fine);
+        let shares = input.shares(self.warps, [&best.meshes, &fine], self.context)?;
         for level in (0..options.levels).rev() {
             let mut before = f64::INFINITY;
             for _ in 0..options.rounds {
                 let mut with_pixels = equations.clone();
-                let misfit = input.add(&mut with_pixels, self.warps, [&best.meshes, &fine], level, self.context)?;
+                let misfit =
+                    input.add(&mut with_pixels, self.warps, [&best.meshes, &fine], (level, &shares), self.context)?;
                 if misfit >= before * (1.0 - options.settled) {
                     break;
                 }
                 before = misfit;
+                if let Some(straight) = straight {
+                    straight.add(&mut with_pixels, &Present { solved: &best.meshes, fine: &fine, places: self.places });
+                }
                 let next = self.solve(solver, &with_pixels)?;
                 let most_rms = self.alignment.rms(&best.meshes) + options.max_departure_px;
                 let is_sound = |meshes: &[GridMesh], fine: &[GridMesh]| {

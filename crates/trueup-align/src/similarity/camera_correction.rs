@@ -204,7 +204,7 @@ mod tests {
     #[test]
     fn regions_show_parallax_and_their_insides_show_noise() {
         let camera = still();
-        let sign = |number: usize| if number % 2 == 0 { 2.0 } else { -2.0 };
+        let sign = |number: usize| if number.is_multiple_of(2) { 2.0 } else { -2.0 };
         let of = |pair: &PairMatches| Deviations::of(&camera, &camera, pair).variance();
         let together = of(&pair(|region, _| sign(region)));
         assert!((together.parallax - 4.0).abs() < 1e-9 && together.noise.abs() < 1e-9, "{together:?}");

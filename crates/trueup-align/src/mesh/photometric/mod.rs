@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
-use super::NormalEquations;
+use super::{NormalEquations, evidence};
 use crate::match_points::OverlapWarp;
 use pair::{Overlap, OverlapEquations};
 pub use pyramid::Pyramid;
@@ -30,6 +30,9 @@ trueup_core::options! {
         noise_level: f64 = 10.0, between(0.1, 255.0), "grey levels";
         /// Smaller deviations are not believed: rounding and compression differ from place to place.
         least_noise: f64 = 3.0, between(0.1, 255.0), "grey levels";
+        /// Misalignment, common to neighbouring cells of an overlap, from which on its pixels weigh fully; with less their
+        /// weight falls with its square.
+        full_px: f64 = 0.5, between(0.001, 1000.0), "panorama units, per axis";
         /// Distance of the samples in the finest pictures; twice as far in each coarser one.
         spacing_px: f64 = 4.0, between(1.0, 1000.0), "working px";
         /// Samples with a smaller change of grey in both pictures are passed over.
@@ -68,17 +71,56 @@ pub struct PhotometricInput<'a> {
 
 impl PhotometricInput<'_> {
     /// Adds the equations of all overlaps, linearised around the present grids, at a level; gives the mean difference in
-    /// grey levels. `solved` are the grids whose vertices are unknown, `fine` the same subdivided along their bases.
+    /// grey levels. `solved` are the grids whose vertices are unknown, `fine` the same subdivided along their bases,
+    /// `shares` the share of its weight that every overlap has.
     pub(super) fn add(
         &self,
         equations: &mut NormalEquations,
         warps: &[OverlapWarp],
         [solved, fine]: [&[GridMesh]; 2],
-        level: usize,
+        (level, shares): (usize, &[f64]),
         context: &StageContext,
     ) -> Result<f64> {
-        // Each overlap once: its pixels say the same from either side.
-        let overlaps: Vec<Overlap> = warps
+        let overlaps = self.overlaps(warps, [solved, fine]);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (several, shares) in overlaps.chunks(OVERLAPS_AT_A_TIME).zip(shares.chunks(OVERLAPS_AT_A_TIME)) {
+            context.check_cancelled()?;
+            let found: Vec<OverlapEquations> = several
+                .par_iter()
+                .zip(shares)
+                .map(|(overlap, &share)| overlap.equations(level, share, self.options))
+                .collect();
+            for overlap in found {
+                for cells in &overlap.cells {
+                    equations.add_summed(&cells.members, &cells.metrics, &cells.right);
+                }
+                sum += overlap.misfit[0];
+                count += overlap.misfit[1];
+            }
+        }
+        Ok(if count > 0.0 { sum / count } else { 0.0 })
+    }
+
+    /// For every overlap the share of its weight that it has: how much of the misalignment that its pixels see, at the
+    /// size at which they see most, is common to neighbouring cells.
+    pub(super) fn shares(
+        &self,
+        warps: &[OverlapWarp],
+        grids: [&[GridMesh]; 2],
+        context: &StageContext,
+    ) -> Result<Vec<f64>> {
+        context.check_cancelled()?;
+        let levels = 0..self.options.levels;
+        let share = |overlap: &Overlap| {
+            let most = levels.clone().map(|level| overlap.common_square(level, self.options)).fold(0.0, f64::max);
+            evidence::share(most, self.options.full_px)
+        };
+        Ok(self.overlaps(warps, grids).par_iter().map(share).collect())
+    }
+
+    /// Each overlap once: its pixels say the same from either side.
+    fn overlaps<'a>(&'a self, warps: &'a [OverlapWarp], [solved, fine]: [&'a [GridMesh]; 2]) -> Vec<Overlap<'a>> {
+        warps
             .iter()
             .filter(|warp| warp.from < warp.to)
             .map(|warp| {
@@ -90,20 +132,6 @@ impl PhotometricInput<'_> {
                     pyramids: ends.map(|end| &self.pyramids[end]),
                 }
             })
-            .collect();
-        let (mut sum, mut count) = (0.0, 0.0);
-        for several in overlaps.chunks(OVERLAPS_AT_A_TIME) {
-            context.check_cancelled()?;
-            let found: Vec<OverlapEquations> =
-                several.par_iter().map(|overlap| overlap.equations(level, self.options)).collect();
-            for overlap in found {
-                for cells in &overlap.cells {
-                    equations.add_summed(&cells.members, &cells.metrics, &cells.right);
-                }
-                sum += overlap.misfit[0];
-                count += overlap.misfit[1];
-            }
-        }
-        Ok(if count > 0.0 { sum / count } else { 0.0 })
+            .collect()
     }
 }

@@ -4,6 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use trueup_core::mesh::GridMesh;
 
+use super::super::evidence::quotient;
 use super::super::normal_equations::{Metric, Share};
 use super::PhotometricOptions;
 use super::pyramid::{Grey, Pyramid};
@@ -38,6 +39,16 @@ struct Sample {
     gap: Vector2<f64>,
 }
 
+/// All samples of an overlap with what they differ by.
+struct Compared {
+    samples: Vec<Sample>,
+    colours: Colours,
+    residuals: Vec<f64>,
+    /// Their standard deviation, robustly, and the weights that follow.
+    sigma: f64,
+    weights: Vec<f64>,
+}
+
 /// The second picture's grey values as the first would show them: gain times value plus bias.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Colour {
@@ -61,17 +72,13 @@ pub(super) struct OverlapEquations {
 
 impl Overlap<'_> {
     /// The linearised photometric equations around the present grids, at a level of the pyramids.
-    pub fn equations(&self, level: usize, options: &PhotometricOptions) -> OverlapEquations {
-        let samples = self.samples(level, options);
-        if samples.len() < options.min_samples {
+    /// `share` of its weight is what the overlap has.
+    pub fn equations(&self, level: usize, share: f64, options: &PhotometricOptions) -> OverlapEquations {
+        let Some(Compared { samples, colours, residuals, sigma, weights }) = self.compared(level, options) else {
             return OverlapEquations { cells: Vec::new(), misfit: [0.0; 2] };
-        }
-        let colours = Colours::of(&samples, self.solved[0], options);
-        let residuals: Vec<f64> = samples.iter().map(|sample| colours.residual(sample)).collect();
-        let sigma = spread(&residuals);
-        let weights: Vec<f64> = residuals.iter().map(|residual| tukey_weight(residual / sigma)).collect();
+        };
         let noise = (options.noise_level / sigma.max(options.least_noise)).powi(2);
-        let share = options.weight * noise * (spacing_px(level, options) / super::PUBLISHED_SPACING_PX).powi(2);
+        let share = share * options.weight * noise * (spacing_px(level, options) / super::PUBLISHED_SPACING_PX).powi(2);
         let mut order: Vec<usize> = (0..samples.len()).filter(|&k| weights[k] > 0.0).collect();
         let cells_of = |k: usize| (samples[k].corners[0][0], samples[k].corners[1][0]);
         order.sort_by_key(|&k| cells_of(k));
@@ -93,6 +100,54 @@ impl Overlap<'_> {
             .zip(&weights)
             .fold([0.0; 2], |[sum, count], (residual, weight)| [sum + weight * residual.abs(), count + weight]);
         OverlapEquations { cells, misfit }
+    }
+
+    fn compared(&self, level: usize, options: &PhotometricOptions) -> Option<Compared> {
+        let samples = self.samples(level, options);
+        if samples.len() < options.min_samples {
+            return None;
+        }
+        let colours = Colours::of(&samples, self.solved[0], options);
+        let residuals: Vec<f64> = samples.iter().map(|sample| colours.residual(sample)).collect();
+        let sigma = spread(&residuals);
+        let weights = residuals.iter().map(|residual| tukey_weight(residual / sigma)).collect();
+        Some(Compared { samples, colours, residuals, sigma, weights })
+    }
+
+    /// Square, per axis, of the misalignment that the pixels of neighbouring cells have in common, at a level.
+    pub fn common_square(&self, level: usize, options: &PhotometricOptions) -> f64 {
+        let Some(compared) = self.compared(level, options) else { return 0.0 };
+        let grid = self.solved[0];
+        let per_sample = compared.sigma.max(options.least_noise).powi(-2);
+        let mut cells = vec![(Matrix2::zeros(), Vector2::zeros()); grid.len()];
+        for ((sample, residual), weight) in compared.samples.iter().zip(&compared.residuals).zip(&compared.weights) {
+            let slope = sample.mean_slope(compared.colours.of_sample(sample).gain);
+            let (information, pull) = &mut cells[sample.corners[0][0] as usize];
+            *information += slope * slope.transpose() * (weight * per_sample);
+            *pull -= slope * (residual * weight * per_sample);
+        }
+        // Each cell's own displacement, drawn to none with the weight of the mesh's match points, and what share of a true
+        // one it has.
+        let own: Vec<Option<(Vector2<f64>, Matrix2<f64>)>> = cells
+            .iter()
+            .map(|(information, pull)| {
+                let inverse = (information + Matrix2::identity()).try_inverse()?;
+                Some((inverse * pull, inverse * information))
+            })
+            .collect();
+        let (mut sum, mut squares) = ([0.0; 2], 0.0);
+        for vertex in 0..grid.len() {
+            let right = Some(vertex + 1).filter(|next| next % grid.columns != 0);
+            for neighbour in [right, Some(vertex + grid.columns)].into_iter().flatten() {
+                if let (Some((one, seen)), Some(Some((other, seen_there)))) = (own[vertex], own.get(neighbour)) {
+                    sum[0] += one.dot(other);
+                    squares += one.dot(other).powi(2);
+                    sum[1] += (seen * seen_there.transpose()).trace();
+                }
+            }
+        }
+        // Less the standard error that the sum has if cells have nothing in common.
+        quotient([sum[0] - squares.sqrt(), sum[1]])
     }
 
     fn samples(&self, level: usize, options: &PhotometricOptions) -> Vec<Sample> {
@@ -129,6 +184,13 @@ impl Overlap<'_> {
             grey,
             gap: self.solved[0].warp(point) - self.solved[1].warp(there),
         })
+    }
+}
+
+impl Sample {
+    /// Mean of both pictures' slopes, the second's as the first would show it with a gain.
+    fn mean_slope(&self, gain: f64) -> Vector2<f64> {
+        0.5 * (gain * self.grey[1].slope + self.grey[0].slope)
     }
 }
 
@@ -247,7 +309,7 @@ impl CellPair {
     /// The slope is the mean of both pictures': with it a step errs in the third order of the misalignment, with one
     /// picture's alone in the second.
     fn add(&mut self, sample: &Sample, gain: f64, residual: f64, weight: f64) {
-        let slope = 0.5 * (gain * sample.grey[1].slope + sample.grey[0].slope);
+        let slope = sample.mean_slope(gain);
         let metric = Metric::along(slope, weight);
         let value = slope.dot(&sample.gap) - residual;
         let shares: [f64; MEMBERS] = std::array::from_fn(|k| {

@@ -1,0 +1,133 @@
+//! How far overlaps are apart beyond the noise of what says so.
+//!
+//! The plain mesh meets overlaps to a tenth of a pixel where the photographs were taken from one point, better than any
+//! single match or cell of pixels says. Drawn to each of them it would follow their noise. Noise differs from neighbour to
+//! neighbour; a true misalignment is common to them. The product of neighbours' distances is therefore, on the mean, the
+//! square of the true one, and evidence weighs by it, as the prior variance of what is estimated says in a Wiener filter.
+
+use nalgebra::{Matrix2, Vector2};
+
+/// One match, seen in the first picture of a pair.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Evidence {
+    /// Where, in working pixels.
+    pub place: Vector2<f64>,
+    /// Distance in the panorama of what should meet.
+    pub gap: Vector2<f64>,
+    /// The directions in which the distance is known: the identity for points, across the line for lines.
+    pub known: Matrix2<f64>,
+}
+
+impl Evidence {
+    /// What a match says of the square, per axis, that has no neighbour to confirm it.
+    fn beyond_noise(&self) -> f64 {
+        /// Standard deviation of a match per axis that is not exceeded by much: matches are found to half of it.
+        const NOISE_PX: f64 = 1.0;
+        (self.gap.norm_squared() / self.known.trace().max(1.0) - NOISE_PX * NOISE_PX).max(0.0)
+    }
+}
+
+/// Square, per axis, of the misalignment that neighbours have in common, around every piece of evidence. Where
+/// none has a neighbour, what exceeds the usual noise.
+pub(super) fn common_squares(evidence: &[Evidence]) -> Vec<f64> {
+    /// Closer matches share their pixels and so their noise.
+    const NEAREST_PX: f64 = 8.0;
+    /// Two cells of the usual grid: what is common over less, a grid cannot follow.
+    const FARTHEST_PX: f64 = 80.0;
+    /// Neighbours that are compared with one another.
+    const NEIGHBOURS: usize = 12;
+    /// Products with which a neighbourhood is drawn to the mean of all.
+    const DRAWN: f64 = 24.0;
+    let mut overall = [0.0; 2];
+    let around: Vec<[f64; 2]> = evidence
+        .iter()
+        .map(|one| {
+            let mut near: Vec<(f64, &Evidence)> = evidence
+                .iter()
+                .map(|other| ((other.place - one.place).norm_squared(), other))
+                .filter(|(square, _)| *square <= FARTHEST_PX.powi(2))
+                .collect();
+            if near.len() > NEIGHBOURS {
+                near.select_nth_unstable_by(NEIGHBOURS - 1, |one, other| one.0.total_cmp(&other.0));
+                near.truncate(NEIGHBOURS);
+            }
+            // The selection leaves no order, and sums depend on theirs.
+            near.sort_by(|one, other| one.0.total_cmp(&other.0));
+            let mut sum = [0.0; 2];
+            for (k, (_, one)) in near.iter().enumerate() {
+                for (_, other) in &near[..k] {
+                    if (other.place - one.place).norm_squared() >= NEAREST_PX.powi(2) {
+                        sum[0] += one.gap.dot(&other.gap);
+                        sum[1] += (one.known * other.known).trace();
+                    }
+                }
+            }
+            overall = [overall[0] + sum[0], overall[1] + sum[1]];
+            sum
+        })
+        .collect();
+    if overall[1] == 0.0 {
+        return evidence.iter().map(Evidence::beyond_noise).collect();
+    }
+    let mean = quotient(overall);
+    around.into_iter().map(|[products, units]| quotient([products + DRAWN * mean, units + DRAWN])).collect()
+}
+
+/// The mean square that sums of products and of what they would be for a misalignment of 1 px come to; not negative.
+pub(super) fn quotient([products, units]: [f64; 2]) -> f64 {
+    if units > 0.0 { (products / units).max(0.0) } else { 0.0 }
+}
+
+/// The share of its weight that evidence has where the misalignment has a mean square of `common` per axis, and would have
+/// its whole weight from `full_px` on.
+pub(super) fn share(common: f64, full_px: f64) -> f64 {
+    (common / (full_px * full_px)).min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers that look independent, uniform in -0.5 to 0.5.
+    fn noise(k: u64) -> f64 {
+        let mixed = (k + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        ((mixed ^ (mixed >> 32)) % 10_000) as f64 / 10_000.0 - 0.5
+    }
+
+    /// Points and lines on a lattice of 10 px, misaligned by `true_gap` and noise of standard deviation 0.5.
+    fn lattice(true_gap: Vector2<f64>) -> Vec<Evidence> {
+        (0..900_u64)
+            .map(|k| {
+                let angle = std::f64::consts::TAU * noise(3 * k);
+                let normal = Vector2::new(angle.cos(), angle.sin());
+                let known = if k % 3 == 0 { normal * normal.transpose() } else { Matrix2::identity() };
+                let error = Vector2::new(noise(3 * k + 1), noise(3 * k + 2)) * (0.5 * 12.0_f64.sqrt());
+                let place = Vector2::new((k % 30) as f64, (k / 30) as f64) * 10.0;
+                Evidence { place, gap: known * (true_gap + error), known }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn noise_has_nothing_in_common_and_a_misalignment_its_square() {
+        let mean = |gap: Vector2<f64>| common_squares(&lattice(gap)).iter().sum::<f64>() / 900.0;
+        let none = mean(Vector2::zeros());
+        assert!(none < 0.03, "{none}");
+        // Half of 0.6^2 + 0.8^2 per axis.
+        let found = mean(Vector2::new(0.6, -0.8));
+        assert!((found - 0.5).abs() < 0.06, "{found}");
+    }
+
+    #[test]
+    fn what_has_no_neighbour_must_exceed_the_usual_noise() {
+        assert_eq!(common_squares(&[]), [0.0; 0]);
+        let lonely = |gap: f64| {
+            let known = Matrix2::from_diagonal(&Vector2::new(1.0, 0.0));
+            common_squares(&[Evidence { place: Vector2::zeros(), gap: Vector2::new(gap, 0.0), known }])[0]
+        };
+        assert_eq!([lonely(0.9), lonely(-2.0)], [0.0, 3.0]);
+        assert_eq!(share(0.0, 1.0), 0.0);
+        assert_eq!(share(9.0, 1.0), 1.0);
+    }
+}
