@@ -185,6 +185,7 @@ pub(crate) fn run(
                 frames: &component.frames,
                 grids: &fine,
                 pairs: &met,
+                match_grids: &grids,
                 overlaps: &kept,
                 names: &component.names(),
                 seeds: &component.seeds(),

@@ -63,11 +63,7 @@ pub fn vertical_lines(
     vanishing: &VanishingOptions,
     options: &MeasureOptions,
 ) -> Option<VerticalLines> {
-    let planes = InterpretationPlanes::new(picture.lines, picture.focal_px, picture.frame, vanishing);
-    let down = vertical_direction(&planes, &picture.expected_down, vanishing, options)?;
-    if down.x.hypot(down.y) < MIN_SINE {
-        return None;
-    }
+    let (planes, down) = planes_and_down(picture, vanishing, options)?;
     let leans: Vec<Lean> = pointing_down(&planes, &down, options)
         .filter_map(|k| {
             let share = planes.midpoints[k].x / picture.frame.width + 0.5;
@@ -86,16 +82,23 @@ pub fn vertical_lines(
 /// Which of a picture's segments are its vertical lines: those whose direction [`vertical_lines`] measures, by their
 /// positions in `picture.lines`, ascending. Empty where that finds none to measure.
 pub fn vertical_segments(picture: &LinedPicture, vanishing: &VanishingOptions, options: &MeasureOptions) -> Vec<usize> {
+    let Some((planes, down)) = planes_and_down(picture, vanishing, options) else { return Vec::new() };
+    let mut segments: Vec<usize> = pointing_down(&planes, &down, options).map(|plane| planes.indices[plane]).collect();
+    segments.sort_unstable();
+    segments
+}
+
+/// A picture's segments as planes and their vertical vanishing direction; `None` if they point to none, or if the picture
+/// looks within 15 degrees of straight up or down.
+fn planes_and_down(
+    picture: &LinedPicture,
+    vanishing: &VanishingOptions,
+    options: &MeasureOptions,
+) -> Option<(InterpretationPlanes, Vector3<f64>)> {
     let planes = InterpretationPlanes::new(picture.lines, picture.focal_px, picture.frame, vanishing);
-    match vertical_direction(&planes, &picture.expected_down, vanishing, options) {
-        Some(down) if down.x.hypot(down.y) >= MIN_SINE => {
-            let mut segments: Vec<usize> =
-                pointing_down(&planes, &down, options).map(|plane| planes.indices[plane]).collect();
-            segments.sort_unstable();
-            segments
-        }
-        _ => Vec::new(),
-    }
+    let down = vertical_direction(&planes, &picture.expected_down, vanishing, options)?;
+    // Not a number is no direction either.
+    (down.x.hypot(down.y) >= MIN_SINE).then_some((planes, down))
 }
 
 /// The planes whose segments point to the vertical vanishing direction `down`.

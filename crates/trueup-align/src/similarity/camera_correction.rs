@@ -119,8 +119,9 @@ impl Deviations {
 /// directions in it.
 ///
 /// Minimises sum over segments of weight (Geman-McClure) (residual / `line_error_px`)^2 plus sum over overlaps of
-/// (w_i - w_j)^T information (w_i - w_j) over turns w_i in the common frame that sum to zero, by reweighted Gauss-Newton steps from a coarse to a
-/// fine scale of the loss. A turn of all cameras together is not sought: `frame` is the segments' own choice for these.
+/// (w_i - w_j)^T information (w_i - w_j) over turns w_i in the common frame that sum to zero, by reweighted Gauss-Newton
+/// steps from a coarse to a fine scale of the loss. A turn of all cameras together is not sought: `frame` is the segments'
+/// own choice for these.
 pub(super) fn corrected_rotations(
     rotations: &[Matrix3<f64>],
     certainties: &[RelativeCertainty],

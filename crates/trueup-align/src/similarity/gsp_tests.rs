@@ -55,8 +55,8 @@ impl Graph {
         }
     }
 
-    fn prior(&self, prior: PriorMethod, reference: usize, turn_deg: f64) -> SimilarityPrior {
-        let input = PriorInput {
+    fn input<'a>(&'a self, vanishing: &'a VanishingOptions, reference: usize) -> PriorInput<'a> {
+        PriorInput {
             cameras: &self.cameras,
             triads: &self.triads,
             lines: &self.lines,
@@ -64,10 +64,15 @@ impl Graph {
             edges: &self.edges,
             overlaps: &self.overlaps,
             cell_px: CELL_PX,
-            vanishing: &VanishingOptions::default(),
-            turn: turn_deg.to_radians(),
+            vanishing,
+            turn: 0.0,
             reference,
-        };
+        }
+    }
+
+    fn prior(&self, prior: PriorMethod, reference: usize, turn_deg: f64) -> SimilarityPrior {
+        let vanishing = VanishingOptions::default();
+        let input = PriorInput { turn: turn_deg.to_radians(), ..self.input(&vanishing, reference) };
         let options = SimilarityOptions { prior, ..SimilarityOptions::default() };
         run(&input, &options, &StageContext::default()).expect("a well-formed graph")
     }
@@ -111,18 +116,8 @@ fn the_graphs_of_these_tests_have_the_turns_they_state() {
     let homography = Homography::from_rows(&graph.edges[0].b_from_a.expect("given"));
     let turned = homography.apply(Vector2::new(500.0, 300.0)) - Vector2::new(400.0, 300.0);
     assert!((turned.y.atan2(turned.x).to_degrees() + 4.0).abs() < 1e-9);
-    let input = PriorInput {
-        cameras: &graph.cameras,
-        triads: &graph.triads,
-        lines: &graph.lines,
-        frames: &graph.frames,
-        edges: &graph.edges,
-        overlaps: &graph.overlaps,
-        cell_px: CELL_PX,
-        vanishing: &VanishingOptions::default(),
-        turn: 0.0,
-        reference: 0,
-    };
+    let vanishing = VanishingOptions::default();
+    let input = graph.input(&vanishing, 0);
     let turns = edge_range::OverlapTurns::of(&input, &graph.edges[0]);
     let range = turns.range.expect("a warped overlap");
     assert!((range.start.to_degrees() + 3.0).abs() < 1e-9 && (range.extent.to_degrees() - 11.0).abs() < 1e-9);
@@ -160,18 +155,8 @@ fn gsp_3d_does_not_depend_on_the_reference_where_overlaps_agree_with_the_cameras
         .collect();
     let options = SimilarityOptions { prior: PriorMethod::Gsp3d, ..SimilarityOptions::default() };
     let prior = |reference| {
-        let input = PriorInput {
-            cameras: &scene.cameras,
-            triads: &scene.triads,
-            lines: &scene.lines,
-            frames: &scene.frames,
-            edges: &scene.edges,
-            overlaps: &overlaps,
-            cell_px: CELL_PX,
-            vanishing: &VanishingOptions::default(),
-            turn: 0.0,
-            reference,
-        };
+        let vanishing = VanishingOptions::default();
+        let input = PriorInput { overlaps: &overlaps, reference, ..scene.input(&vanishing) };
         run(&input, &options, &StageContext::default()).expect("a well-formed scene")
     };
     let rotations: Vec<Matrix3<f64>> = scene.cameras.iter().map(Camera::rotation).collect();
@@ -286,18 +271,8 @@ fn a_segment_counts_if_any_part_of_it_shows() {
 #[test]
 fn a_reference_that_does_not_exist_is_an_error() {
     let graph = Graph::new(2, &[edge(0, 1, (-1.0, 1.0), 0.0)]);
-    let input = PriorInput {
-        cameras: &graph.cameras,
-        triads: &graph.triads,
-        lines: &graph.lines,
-        frames: &graph.frames,
-        edges: &graph.edges,
-        overlaps: &graph.overlaps,
-        cell_px: CELL_PX,
-        vanishing: &VanishingOptions::default(),
-        turn: 0.0,
-        reference: 2,
-    };
+    let vanishing = VanishingOptions::default();
+    let input = graph.input(&vanishing, 2);
     let error = run(&input, &SimilarityOptions::default(), &StageContext::default()).expect_err("no such picture");
     assert!(error.to_string().contains("reference 2"));
 }

@@ -52,20 +52,14 @@ pub(super) fn straighten_with_pitch(rotations: &[Matrix3<f64>], pitch_prior: f64
     if pitch_prior <= 0.0 {
         return straighten(rotations).down;
     }
-    let eigen = level_moment(rotations, pitch_prior).symmetric_eigen();
-    let axis: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
-    let y_sum: Vector3<f64> = rotations.iter().map(|rotation| rotation.row(1).transpose()).sum();
-    if axis.dot(&y_sum) > 0.0 { axis } else { -axis }
-}
-
-/// sum x_i x_i^T + `pitch_prior` z_i z_i^T: for a vertical u in the common frame, u^T M u over the variance of the roll is
-/// how unlikely photographers are to hold the cameras so.
-pub(super) fn level_moment(rotations: &[Matrix3<f64>], pitch_prior: f64) -> Matrix3<f64> {
     let moments = rotations.iter().map(|rotation| {
         let (x, z) = (rotation.row(0).transpose(), rotation.row(2).transpose());
         x * x.transpose() + z * z.transpose() * pitch_prior
     });
-    moments.sum()
+    let eigen = moments.sum::<Matrix3<f64>>().symmetric_eigen();
+    let axis: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+    let y_sum: Vector3<f64> = rotations.iter().map(|rotation| rotation.row(1).transpose()).sum();
+    if axis.dot(&y_sum) > 0.0 { axis } else { -axis }
 }
 
 /// The rotation from the common frame to the level world: `down` becomes y, and the mean viewing direction lies in the

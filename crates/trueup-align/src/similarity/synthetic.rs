@@ -92,8 +92,9 @@ impl Scene {
         Self { roll, world_from_camera, cameras, triads, lines: vec![Vec::new(); sweep.count], frames, edges }
     }
 
-    pub fn prior(&self, options: &SimilarityOptions) -> SimilarityPrior {
-        let input = PriorInput {
+    /// What the prior is made from, without overlaps.
+    pub fn input<'a>(&'a self, vanishing: &'a VanishingOptions) -> PriorInput<'a> {
+        PriorInput {
             cameras: &self.cameras,
             triads: &self.triads,
             lines: &self.lines,
@@ -101,11 +102,14 @@ impl Scene {
             edges: &self.edges,
             overlaps: &[],
             cell_px: 40.0,
-            vanishing: &VanishingOptions::default(),
+            vanishing,
             turn: 0.0,
             reference: 0,
-        };
-        run(&input, options, &StageContext::default()).expect("a well-formed scene")
+        }
+    }
+
+    pub fn prior(&self, options: &SimilarityOptions) -> SimilarityPrior {
+        run(&self.input(&VanishingOptions::default()), options, &StageContext::default()).expect("a well-formed scene")
     }
 
     /// Per picture |theta - roll| in degrees.

@@ -248,18 +248,8 @@ fn malformed_input_is_an_error() {
     let scene = Scene::new(Sweep::default(), CLEAN, 0.0, 0);
     let mut broken = scene.cameras.clone();
     broken[2].focal_px = f64::NAN;
-    let input = PriorInput {
-        cameras: &broken,
-        triads: &scene.triads,
-        lines: &scene.lines,
-        frames: &scene.frames,
-        edges: &scene.edges,
-        overlaps: &[],
-        cell_px: 40.0,
-        vanishing: &VanishingOptions::default(),
-        turn: 0.0,
-        reference: 0,
-    };
+    let vanishing = VanishingOptions::default();
+    let input = PriorInput { cameras: &broken, ..scene.input(&vanishing) };
     let options = SimilarityOptions::default();
     assert!(run(&input, &options, &StageContext::default()).is_err());
     let nowhere = [OverlapWarp { from: 0, to: 1, vertices: Vec::new() }];
@@ -335,18 +325,8 @@ fn the_fallback_does_not_roll_steep_rows() {
     let sweep = Sweep { count: 2, yaw_step_deg: 20.0, pitch_base_deg: 40.0, roll_sd_deg: 2.0, ..Sweep::default() };
     let scene = Scene::new(sweep, CLEAN, 0.0, 21);
     let overlaps = [overlap(&scene, 0, 1), overlap(&scene, 1, 0)];
-    let input = PriorInput {
-        cameras: &scene.cameras,
-        triads: &scene.triads,
-        lines: &scene.lines,
-        frames: &scene.frames,
-        edges: &scene.edges,
-        overlaps: &overlaps,
-        cell_px: 40.0,
-        vanishing: &VanishingOptions::default(),
-        turn: 0.0,
-        reference: 0,
-    };
+    let vanishing = VanishingOptions::default();
+    let input = PriorInput { overlaps: &overlaps, ..scene.input(&vanishing) };
     let options = SimilarityOptions { prior: PriorMethod::Straightening, ..SimilarityOptions::default() };
     let prior = run(&input, &options, &StageContext::default()).expect("a well-formed scene");
     for (theta, roll) in prior.theta.iter().zip(&prior.roll) {

@@ -11,7 +11,8 @@ use trueup_core::{Result, StageContext};
 
 use super::apap::Kernel;
 use super::homography::undetermined;
-use super::placement::{Anchored, Step, anchored, order};
+use super::limits::corners;
+use super::placement::{Anchored, Step, one_after_another};
 use super::{STAGE, WarpInput, WarpOptions, deformed};
 use crate::match_points::MovingDlt;
 
@@ -26,21 +27,17 @@ use crate::match_points::MovingDlt;
 /// The published method is for two pictures. Here each further one is fitted to the places that its matches have in the
 /// panorama by then, and moves what is placed already in the same way; `warps.adapt_reference` turns that off.
 pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &StageContext<'_>) -> Result<Vec<GridMesh>> {
-    let mut placed: Vec<Option<GridMesh>> = vec![None; input.grids.len()];
-    placed[input.reference] = Some(input.grids[input.reference].clone());
-    for step in order(input)? {
-        context.check_cancelled()?;
-        let data = anchored(input, step.picture, &placed);
+    one_after_another(input, context, |step, data, placed| {
         let mut generator = context.generator(STAGE, input.seeds[step.picture]);
-        let grid = &input.grids[step.picture];
-        let join = Join::new(input, step, &data, &placed, options, &mut generator)
+        let join = Join::new(input, step, data, placed, options, &mut generator)
             .ok_or_else(|| undetermined(input, step.picture))?;
         if options.adapt_reference {
-            placed = placed.into_iter().map(|mesh| mesh.map(|mesh| join.adapted(mesh))).collect();
+            for mesh in placed.iter_mut() {
+                *mesh = mesh.take().map(|mesh| join.adapted(mesh));
+            }
         }
-        placed[step.picture] = Some(deformed(grid, |point| join.place(point)));
-    }
-    placed.into_iter().enumerate().map(|(picture, mesh)| mesh.ok_or_else(|| undetermined(input, picture))).collect()
+        Ok(deformed(&input.grids[step.picture], |point| join.place(point)))
+    })
 }
 
 /// How one picture joins those placed.
@@ -77,8 +74,7 @@ impl Join {
         let centre = |mesh: &GridMesh| mesh.warp(Vector2::new(mesh.width / 2.0, mesh.height / 2.0));
         let from = centre(parent);
         let axis = (centre(&local) - from).try_normalize(f64::MIN_POSITIVE)?;
-        let corners = [(0.0, 0.0), (grid.width, 0.0), (grid.width, grid.height), (0.0, grid.height)];
-        let along = corners.map(|(x, y)| axis.dot(&(local.warp(Vector2::new(x, y)) - from)));
+        let along = corners(grid.width, grid.height).map(|corner| axis.dot(&(local.warp(corner) - from)));
         let low = along.iter().copied().fold(f64::INFINITY, f64::min);
         let high = along.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let picture_from_global = global.inverse()?;
@@ -293,6 +289,7 @@ mod tests {
     use super::super::WarpModel;
     use super::super::tests::{Example, HEIGHT, WIDTH, matched, misalignment};
     use super::*;
+    use crate::warps::placement::anchored;
 
     fn joined(example: &Example, options: &WarpOptions) -> Join {
         let input = example.input();

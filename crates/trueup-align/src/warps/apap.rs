@@ -7,7 +7,7 @@ use trueup_core::{Result, StageContext};
 
 use super::homography::undetermined;
 use super::limits::{depth_at, refuse, with_depth};
-use super::placement::{anchored, order};
+use super::placement::one_after_another;
 use super::{WarpInput, WarpModel, WarpOptions};
 use crate::match_points::MovingDlt;
 
@@ -41,11 +41,7 @@ impl Kernel {
 /// The published method is for two pictures. Here each further one is fitted to the places that its matches have in the
 /// panorama by then, as deformed as these are.
 pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &StageContext<'_>) -> Result<Vec<GridMesh>> {
-    let mut placed: Vec<Option<GridMesh>> = vec![None; input.grids.len()];
-    placed[input.reference] = Some(input.grids[input.reference].clone());
-    for step in order(input)? {
-        context.check_cancelled()?;
-        let data = anchored(input, step.picture, &placed);
+    one_after_another(input, context, |step, data, _| {
         let dlt = MovingDlt::new(&data.points, &data.places).ok_or_else(|| undetermined(input, step.picture))?;
         let grid = &input.grids[step.picture];
         let target: Vec<Option<[f64; 2]>> = (0..grid.len())
@@ -56,9 +52,8 @@ pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &Stag
         let target = whole.ok_or_else(|| {
             refuse(WarpModel::Apap, input, step.picture, "does not lie in front of the panorama's plane")
         })?;
-        placed[step.picture] = Some(GridMesh { target, ..grid.clone() });
-    }
-    placed.into_iter().enumerate().map(|(picture, mesh)| mesh.ok_or_else(|| undetermined(input, picture))).collect()
+        Ok(GridMesh { target, ..grid.clone() })
+    })
 }
 
 /// Where a point goes; `None` behind the panorama's plane.

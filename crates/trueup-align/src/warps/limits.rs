@@ -30,11 +30,15 @@ pub(super) fn refuse(model: WarpModel, input: &WarpInput<'_>, picture: usize, re
 pub(super) fn farthest_angle(input: &WarpInput<'_>, picture: usize) -> f64 {
     let axis = input.cameras[input.reference].rotation().row(2).transpose();
     let frame = &input.frames[picture];
-    let corners = [(0.0, 0.0), (frame.width, 0.0), (frame.width, frame.height), (0.0, frame.height)];
-    corners
+    corners(frame.width, frame.height)
         .into_iter()
-        .map(|(x, y)| input.cameras[picture].world_direction(Vector2::new(x, y)).angle(&axis))
+        .map(|corner| input.cameras[picture].world_direction(corner).angle(&axis))
         .fold(0.0, f64::max)
+}
+
+/// The corners of a picture, clockwise from the top left.
+pub(super) fn corners(width: f64, height: f64) -> [Vector2<f64>; 4] {
+    [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)].map(|(x, y)| Vector2::new(x, y))
 }
 
 /// The homography scaled so that its denominator is the depth of a viewing direction of unit depth in the picture:
@@ -52,9 +56,8 @@ pub(super) fn with_depth(homography: &Homography, focal_from: f64, focal_to: f64
 /// `homography` as of [`with_depth`]. Where no corner is behind the plane, no point of the picture is.
 pub(super) fn least_depth(homography: &Homography, input: &WarpInput<'_>, picture: usize) -> f64 {
     let (frame, camera) = (&input.frames[picture], &input.cameras[picture]);
-    [(0.0, 0.0), (frame.width, 0.0), (frame.width, frame.height), (0.0, frame.height)]
+    corners(frame.width, frame.height)
         .into_iter()
-        .map(|(x, y)| Vector2::new(x, y))
         .map(|corner| depth_at(homography, camera, corner))
         .fold(f64::INFINITY, f64::min)
 }

@@ -54,8 +54,8 @@ trueup_core::choice! {
     }
 }
 
-/// What a warp model is made from. Pictures are counted 0..N; `cameras`, `frames`, `grids`, `names` and `seeds` have N
-/// entries.
+/// What a warp model is made from. Pictures are counted 0..N; `cameras`, `frames`, `grids`, `match_grids`, `names` and
+/// `seeds` have N entries.
 #[derive(Debug, Clone, Copy)]
 pub struct WarpInput<'a> {
     /// Cameras in working pixels, in any common world frame.
@@ -66,6 +66,8 @@ pub struct WarpInput<'a> {
     pub grids: &'a [GridMesh],
     /// The pairs whose overlaps are to meet, with their matches; they connect all pictures.
     pub pairs: &'a [PairMatches],
+    /// The grids whose vertices `overlaps` carry, of the same pictures.
+    pub match_grids: &'a [GridMesh],
     /// Match points, by which the alignment is measured.
     pub overlaps: &'a [OverlapWarp],
     /// Names of the pictures, for messages.
@@ -107,7 +109,7 @@ pub fn run(
     limits::check(model, input, &meshes, options)?;
     turn(&mut meshes, input.turn);
     Ok(WarpedMesh {
-        alignment_rms: alignment_rms(&meshes, input.overlaps),
+        alignment_rms: alignment_rms(&meshes, input),
         folds: meshes.iter().map(count_folds).sum(),
         relative_gradient: 0.0,
         meshes,
@@ -116,7 +118,8 @@ pub fn run(
 
 fn check(input: &WarpInput<'_>) -> Result<()> {
     let count = input.grids.len();
-    let lengths = [input.cameras.len(), input.frames.len(), input.names.len(), input.seeds.len()];
+    let lengths =
+        [input.cameras.len(), input.frames.len(), input.match_grids.len(), input.names.len(), input.seeds.len()];
     let known = |picture: usize| picture < count;
     let whole = lengths.iter().all(|&length| length == count)
         && known(input.reference)
@@ -152,29 +155,18 @@ fn turn(meshes: &mut [GridMesh], angle: f64) {
 }
 
 /// Root mean square distance between the two places of a match point; 0 without any.
-fn alignment_rms(meshes: &[GridMesh], overlaps: &[OverlapWarp]) -> f64 {
+fn alignment_rms(meshes: &[GridMesh], input: &WarpInput<'_>) -> f64 {
     let (mut sum, mut count) = (0.0, 0_usize);
-    for overlap in overlaps {
-        // The match points were carried from the undivided grid, which spans the same picture.
+    for overlap in input.overlaps {
         let (from, to) = (&meshes[overlap.from], &meshes[overlap.to]);
-        let Some(coarse) = coarse_grid(from, overlap.vertices.len()) else { continue };
         for (vertex, place) in overlap.vertices.iter().enumerate() {
             let Some(place) = place else { continue };
-            let apart = from.warp(coarse.source(vertex)) - to.warp(Vector2::from(*place));
+            let apart = from.warp(input.match_grids[overlap.from].source(vertex)) - to.warp(Vector2::from(*place));
             sum += apart.norm_squared();
             count += 1;
         }
     }
     if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
-}
-
-/// The grid with this many vertices that `fine` is a division of.
-fn coarse_grid(fine: &GridMesh, vertices: usize) -> Option<GridMesh> {
-    let (rows, columns) = (fine.rows - 1, fine.columns - 1);
-    (1..=rows.min(columns))
-        .filter(|factor| rows % factor == 0 && columns % factor == 0)
-        .map(|factor| GridMesh { rows: rows / factor + 1, columns: columns / factor + 1, target: Vec::new(), ..*fine })
-        .find(|grid| grid.len() == vertices)
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! The order in which pictures join a panorama, and where their matches lie in it by then.
 
 use nalgebra::Vector2;
-use trueup_core::Result;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
+use trueup_core::{Result, StageContext};
 
 use super::WarpInput;
 use super::homography::undetermined;
@@ -47,6 +47,26 @@ pub(super) fn order(input: &WarpInput<'_>) -> Result<Vec<Step>> {
         steps.push(Step { picture, parent });
     }
     Ok(steps)
+}
+
+/// Places the pictures in [`order`], the reference undeformed: `join` makes the grid of each further one from its matches
+/// with those placed, which it may move.
+///
+/// # Errors
+/// Those of [`order`] and of `join`; [`trueup_core::Error::Cancelled`].
+pub(super) fn one_after_another(
+    input: &WarpInput<'_>,
+    context: &StageContext<'_>,
+    mut join: impl FnMut(Step, &Anchored, &mut [Option<GridMesh>]) -> Result<GridMesh>,
+) -> Result<Vec<GridMesh>> {
+    let mut placed: Vec<Option<GridMesh>> = vec![None; input.grids.len()];
+    placed[input.reference] = Some(input.grids[input.reference].clone());
+    for step in order(input)? {
+        context.check_cancelled()?;
+        let data = anchored(input, step.picture, &placed);
+        placed[step.picture] = Some(join(step, &data, &mut placed)?);
+    }
+    placed.into_iter().enumerate().map(|(picture, mesh)| mesh.ok_or_else(|| undetermined(input, picture))).collect()
 }
 
 /// Matches of a picture with all placed ones, and the one among those that has most.

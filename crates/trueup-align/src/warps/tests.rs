@@ -71,6 +71,7 @@ impl Example {
             frames: &self.frames,
             grids: &self.grids,
             pairs: &self.pairs,
+            match_grids: &self.grids,
             overlaps: &[],
             names: &self.names,
             seeds: &self.seeds,

@@ -5,6 +5,11 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use trueup_core::{Error, Result};
 
+use super::pending::{PART, PREFIX, allow_umask, require_folder};
+
+/// Permissions that any new folder asks for.
+const NEW_FOLDER: u32 = 0o777;
+
 /// A folder under a temporary name beside its target; dropped uncommitted, it is removed with everything in it.
 #[derive(Debug)]
 pub struct PendingFolder {
@@ -30,13 +35,10 @@ impl PendingFolder {
             Some(parent) if target.file_name().is_some() => parent,
             _ => return Err(Error::input(shown, "it is no folder that can be made", "Give the name of a new folder.")),
         };
-        if !parent.is_dir() {
-            let reason = format!("the folder {} does not exist", parent.display());
-            return Err(Error::input(shown, reason, "Create it or choose another folder."));
-        }
+        require_folder(parent, shown)?;
         let mut builder = tempfile::Builder::new();
-        builder.prefix(".trueup-").suffix(".part");
-        allow_umask(&mut builder);
+        builder.prefix(PREFIX).suffix(PART);
+        allow_umask(&mut builder, NEW_FOLDER);
         let temporary = builder.tempdir_in(parent).map_err(|error| Error::io("writing into", parent, error))?;
         Ok(Self { temporary, target })
     }
@@ -61,7 +63,7 @@ impl PendingFolder {
         }
         // The temporary folder makes room for the old one: moved into a second temporary, it goes when that is dropped.
         let parent = temporary.path().parent().unwrap_or(Path::new("."));
-        let aside = tempfile::Builder::new().prefix(".trueup-").suffix(".old").tempdir_in(parent).map_err(failed)?;
+        let aside = tempfile::Builder::new().prefix(PREFIX).suffix(".old").tempdir_in(parent).map_err(failed)?;
         let old = aside.path().join("old");
         std::fs::rename(&target, &old).map_err(failed)?;
         if let Err(error) = std::fs::rename(temporary.path(), &target) {
@@ -75,15 +77,6 @@ impl PendingFolder {
         Ok(())
     }
 }
-
-#[cfg(unix)]
-fn allow_umask(builder: &mut tempfile::Builder) {
-    use std::os::unix::fs::PermissionsExt;
-    builder.permissions(std::fs::Permissions::from_mode(0o777));
-}
-
-#[cfg(not(unix))]
-fn allow_umask(_builder: &mut tempfile::Builder) {}
 
 #[cfg(test)]
 mod tests {

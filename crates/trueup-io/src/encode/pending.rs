@@ -1,10 +1,17 @@
 //! A file that appears complete or not at all.
 
+use std::fmt::Display;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 use trueup_core::{Error, Result};
+
+/// How temporary names begin, and how those of what is not yet complete end.
+pub(super) const PREFIX: &str = ".trueup-";
+pub(super) const PART: &str = ".part";
+/// Permissions that any new file asks for.
+const NEW_FILE: u32 = 0o666;
 
 /// A file under a temporary name beside its target; dropped uncommitted, it is removed.
 #[derive(Debug)]
@@ -26,10 +33,7 @@ impl PendingFile {
         if target.is_dir() {
             return Err(Error::input(path.display(), "it is a folder", "Give the name of a file in it."));
         }
-        if !folder.is_dir() {
-            let reason = format!("the folder {} does not exist", folder.display());
-            return Err(Error::input(path.display(), reason, "Create it or choose another folder."));
-        }
+        require_folder(folder, path.display())?;
         let existing = target.metadata().ok();
         if existing.as_ref().is_some_and(|metadata| metadata.permissions().readonly()) {
             return Err(Error::input(
@@ -39,11 +43,11 @@ impl PendingFile {
             ));
         }
         let mut builder = tempfile::Builder::new();
-        builder.prefix(".trueup-").suffix(".part");
+        builder.prefix(PREFIX).suffix(PART);
         // The permissions of the file it replaces, else those of any new file; temporary files are private otherwise.
         match existing {
             Some(metadata) => drop(builder.permissions(metadata.permissions())),
-            None => allow_umask(&mut builder),
+            None => allow_umask(&mut builder, NEW_FILE),
         }
         let temporary = builder.tempfile_in(folder).map_err(|error| Error::io("writing into", folder, error))?;
         Ok(Self { temporary, target })
@@ -63,11 +67,21 @@ impl PendingFile {
     }
 }
 
+/// Refuses `shown`, which is to lie in `folder`, if that folder does not exist.
+pub(super) fn require_folder(folder: &Path, shown: impl Display) -> Result<()> {
+    if folder.is_dir() {
+        return Ok(());
+    }
+    let reason = format!("the folder {} does not exist", folder.display());
+    Err(Error::input(shown, reason, "Create it or choose another folder."))
+}
+
+/// Gives what is built the permissions `mode` but for those that the user's umask withholds.
 #[cfg(unix)]
-fn allow_umask(builder: &mut tempfile::Builder) {
+pub(super) fn allow_umask(builder: &mut tempfile::Builder, mode: u32) {
     use std::os::unix::fs::PermissionsExt;
-    builder.permissions(std::fs::Permissions::from_mode(0o666));
+    builder.permissions(std::fs::Permissions::from_mode(mode));
 }
 
 #[cfg(not(unix))]
-fn allow_umask(_builder: &mut tempfile::Builder) {}
+pub(super) fn allow_umask(_builder: &mut tempfile::Builder, _mode: u32) {}

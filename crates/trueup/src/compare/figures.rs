@@ -190,27 +190,16 @@ pub(crate) fn fill(entries: &mut [Compared], figures: &[Figure]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::compare::Entry;
 
     fn figure(better: Better) -> Figure {
         Figure { better, decimals: 1, of: |c| c.seconds.get("it").copied(), ..FIGURES[0].clone() }
     }
 
     fn entry(value: Option<f64>) -> Compared {
-        Compared {
-            name: String::new(),
-            meaning: String::new(),
-            overrides: Vec::new(),
-            panorama: None,
-            refusal: None,
-            figures: BTreeMap::new(),
-            best: Vec::new(),
-            diagnostics: Vec::new(),
-            measures: None,
-            evaluation: None,
-            pixels: None,
-            pixels_skipped: None,
-            seconds: value.map(|value| ("it".to_owned(), value)).into_iter().collect(),
-        }
+        let entry = Entry { name: String::new(), meaning: String::new(), overrides: Vec::new() };
+        let seconds = value.map(|value| ("it".to_owned(), value)).into_iter().collect();
+        Compared { seconds, ..Compared::of(&entry) }
     }
 
     /// The positions of the entries that are marked.

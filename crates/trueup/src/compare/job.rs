@@ -1,6 +1,5 @@
 //! From photographs to a folder of panoramas side by side.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -189,26 +188,7 @@ impl Common<'_> {
     /// Makes one entry's panorama, or finds out why it cannot be made.
     fn make(&self, entry: &Entry, stem: &str, inputs: &Inputs) -> Result<Made> {
         let options = entry.options(self.options)?;
-        let mut made = Made {
-            compared: Compared {
-                name: entry.name.clone(),
-                meaning: entry.meaning.clone(),
-                overrides: entry.overrides.clone(),
-                panorama: None,
-                refusal: None,
-                figures: BTreeMap::new(),
-                best: Vec::new(),
-                diagnostics: Vec::new(),
-                measures: None,
-                evaluation: None,
-                pixels: None,
-                pixels_skipped: None,
-                seconds: BTreeMap::new(),
-            },
-            drawing: Drawing::default(),
-            project: None,
-            error: None,
-        };
+        let mut made = Made { compared: Compared::of(entry), drawing: Drawing::default(), project: None, error: None };
         let stitcher = Stitcher::new(&options, self.context);
         let aligned = stitcher.align_matched(self.set, inputs).and_then(|aligned| {
             let alignment = aligned.alignments.into_iter().next();

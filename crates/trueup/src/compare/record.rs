@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use trueup_core::diagnostics::Diagnostic;
 
+use super::Entry;
 use super::figures::Figure;
 use super::ranking::Ranking;
 use crate::evaluation::{Evaluation, PixelEvaluation};
@@ -87,6 +88,27 @@ pub struct Compared {
     pub pixels_skipped: Option<String>,
     /// Wall seconds per stage, as if the method had run alone.
     pub seconds: BTreeMap<String, f64>,
+}
+
+impl Compared {
+    /// Of `entry`, nothing of which is known yet.
+    pub(super) fn of(entry: &Entry) -> Self {
+        Self {
+            name: entry.name.clone(),
+            meaning: entry.meaning.clone(),
+            overrides: entry.overrides.clone(),
+            panorama: None,
+            refusal: None,
+            figures: BTreeMap::new(),
+            best: Vec::new(),
+            diagnostics: Vec::new(),
+            measures: None,
+            evaluation: None,
+            pixels: None,
+            pixels_skipped: None,
+            seconds: BTreeMap::new(),
+        }
+    }
 }
 
 /// A panorama in the folder of a comparison.
