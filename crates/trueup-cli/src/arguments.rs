@@ -11,6 +11,7 @@ const EXAMPLES: &str = "\
 Examples:
   trueup stitch holiday/ -o holiday.jpg
   trueup stitch IMG_01*.jpg -o pano.png --scale 0.5 --project pano.json
+  trueup compose pano.json -o large.tif
   trueup inspect pano.json --verbose
   trueup evaluate pano.json --truth truth.json
   trueup compare holiday/ -o holiday-compared
@@ -44,6 +45,10 @@ pub(crate) enum Command {
     ///
     /// Finds out by itself which photographs overlap. Those that belong elsewhere are left out, and the summary says why.
     Stitch(Box<StitchArgs>),
+    /// Compose a stitched panorama again from its project: at another size, in another format, of other photographs
+    ///
+    /// Nothing is measured or matched: the geometry is the one that `stitch --project` recorded.
+    Compose(Box<ComposeArgs>),
     /// Compare methods side by side: every method's panorama of the same photographs, with its measures, in one folder
     ///
     /// Photographs are measured and matched once. The folder holds a page to look at (index.html), a page on which people
@@ -135,6 +140,71 @@ pub(crate) struct StitchArgs {
     pub quiet: bool,
 
     /// Print also the pairs' verdicts, each picture's geometry, notes, and a line per stage's time
+    #[arg(short, long, help_heading = "Messages")]
+    pub verbose: bool,
+}
+
+const COMPOSE_EXAMPLES: &str = "\
+Examples:
+  trueup compose pano.json -o pano.tif                        the same panorama in another format
+  trueup compose pano.json -o small.jpg --scale 0.25
+  trueup compose pano.json -o pano.jpg --photos developed/    other photographs of the same names and sizes
+
+The options of the project are overruled by --config, that by --set, and that by the flags of their own. Options of what
+comes before composing are recorded with the geometry: to change them, stitch again.
+
+Exit status: 0 the panorama was written, 1 the input or the system failed, 2 wrong usage, 130 stopped by Ctrl-C.";
+
+#[derive(Debug, Args)]
+#[command(after_help = COMPOSE_EXAMPLES)]
+pub(crate) struct ComposeArgs {
+    /// A file that `trueup stitch --project` wrote
+    #[arg(value_name = "PROJECT.json")]
+    pub recorded: PathBuf,
+
+    /// The panorama; .jpg, .png, .tif or .webp chooses the format
+    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    pub output: PathBuf,
+
+    /// Write the new panorama's own record as JSON
+    #[arg(long, value_name = "FILE.json", help_heading = "Output")]
+    pub project: Option<PathBuf>,
+
+    /// Size of the panorama: 1 keeps the pixel scale of the reference photograph (canvas.scale)
+    #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Output")]
+    pub scale: Option<String>,
+
+    /// JPEG quality (output.jpeg_quality)
+    #[arg(long, value_name = "Q", allow_hyphen_values = true, help_heading = "Output")]
+    pub quality: Option<String>,
+
+    /// The folder of the photographs, if they moved, or of others of the same names and sizes
+    #[arg(long, value_name = "DIR", help_heading = "Photographs")]
+    pub photos: Option<PathBuf>,
+
+    /// Set any option of the stages from the canvas on; may be repeated
+    #[arg(long, value_name = "STAGE.OPTION=VALUE", allow_hyphen_values = true, help_heading = "Tuning")]
+    pub set: Vec<String>,
+
+    /// Read options from a TOML file with a table per stage
+    #[arg(long, value_name = "FILE.toml", help_heading = "Tuning")]
+    pub config: Option<PathBuf>,
+
+    /// Number of threads; 0 for one per core. The panorama is the same for any number
+    #[arg(
+        long,
+        value_name = "N",
+        allow_hyphen_values = true,
+        value_parser = clap::value_parser!(u16).range(0..=MAX_THREADS),
+        help_heading = "Tuning"
+    )]
+    pub threads: Option<u16>,
+
+    /// Print nothing but errors
+    #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]
+    pub quiet: bool,
+
+    /// Print also each picture's geometry, notes, which file is shown, and a line per stage's time
     #[arg(short, long, help_heading = "Messages")]
     pub verbose: bool,
 }

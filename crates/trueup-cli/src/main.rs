@@ -5,6 +5,7 @@
 
 mod arguments;
 mod compare;
+mod compose;
 mod evaluate;
 mod failure;
 mod inspect;
@@ -27,6 +28,7 @@ use arguments::{Command, LowArgs};
 fn main() -> ExitCode {
     let outcome = match LowArgs::parse().command {
         Command::Stitch(args) => stitch::run(*args),
+        Command::Compose(args) => compose::run(*args),
         Command::Compare(args) => compare::run(*args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),

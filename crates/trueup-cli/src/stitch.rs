@@ -26,7 +26,7 @@ pub(crate) fn run(args: StitchArgs) -> Result<(), Failure> {
 }
 
 /// A blank line between panoramas.
-fn summaries(written: &[Written], verbose: bool) -> String {
+pub(crate) fn summaries(written: &[Written], verbose: bool) -> String {
     let one = |written: &Written| {
         let file =
             PanoramaFile { panorama: &written.output, bytes: written.bytes, project: written.project_file.as_deref() };
@@ -51,11 +51,8 @@ impl CheckedStitch {
             ("--structure", "stitch.structure", &args.structure),
             ("--seed", "stitch.seed", &args.seed),
         ];
-        let options = chosen_options(args.config.as_deref(), &args.set, &flags)?;
-        if args.project.as_ref() == Some(&args.output) {
-            let message = format!("{} cannot be both the panorama and the project", args.output.display());
-            return Err(Failure::usage(message, "Give --output and --project different names."));
-        }
+        let options = chosen_options(StitchOptions::default(), args.config.as_deref(), &args.set, &flags)?;
+        require_two_names(&args.output, args.project.as_deref())?;
         let reference = chosen_reference(args.reference);
         let inputs = Inputs {
             photographs: args.photographs,
@@ -70,6 +67,15 @@ impl CheckedStitch {
     }
 }
 
+/// Refuses one name for the panorama and its record.
+pub(crate) fn require_two_names(output: &Path, project: Option<&Path>) -> Result<(), Failure> {
+    if project != Some(output) {
+        return Ok(());
+    }
+    let message = format!("{} cannot be both the panorama and the project", output.display());
+    Err(Failure::usage(message, "Give --output and --project different names."))
+}
+
 /// The reference that was typed, if any.
 pub(crate) fn chosen_reference(typed: Option<String>) -> Reference {
     match typed {
@@ -81,14 +87,14 @@ pub(crate) fn chosen_reference(typed: Option<String>) -> Reference {
 /// A flag of its own, the option it sets, and what was typed after it.
 pub(crate) type OptionFlag<'a> = (&'a str, &'a str, &'a Option<String>);
 
-/// Defaults, overruled by the configuration file, by `--set`, by the flags of their own, in this order. Every value that
+/// The options given first, overruled by the configuration file, by `--set`, by the flags of their own, in this order. Every value that
 /// cannot be is listed.
 pub(crate) fn chosen_options(
+    mut options: StitchOptions,
     config: Option<&Path>,
     set: &[String],
     flags: &[OptionFlag],
 ) -> Result<StitchOptions, Failure> {
-    let mut options = StitchOptions::default();
     if let Some(path) = config {
         read_config(&mut options, path)?;
     }

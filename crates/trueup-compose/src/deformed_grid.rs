@@ -10,7 +10,7 @@ use std::ops::Range;
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
-use crate::simd::InverseBilinear;
+use crate::simd::{InverseBilinear, Positions, invert_row};
 
 /// Marks a canvas pixel that no cell covers.
 pub(crate) const NO_CELL: u32 = u32::MAX;
@@ -172,6 +172,37 @@ impl DeformedGrid {
                 runs.push(Run { cell: same[0] as usize, columns });
             }
             column += same.len();
+        }
+    }
+}
+
+impl DeformedGrid {
+    /// Tells `found` of every canvas pixel in `columns` and `rows` that a cell covers: (x, y), the place in the photograph
+    /// that its centre shows, and the pixel's size there.
+    pub(crate) fn each_place(
+        &self,
+        columns: &Range<usize>,
+        rows: &Range<usize>,
+        mut found: impl FnMut([usize; 2], [f64; 2], [f64; 2]),
+    ) {
+        let within = |a: &Range<usize>, b: &Range<usize>| a.start.max(b.start)..a.end.min(b.end);
+        let (columns, rows) = (within(columns, &self.columns), within(rows, &self.rows));
+        if columns.is_empty() || rows.is_empty() {
+            return;
+        }
+        let (mut candidates, mut owner, mut runs) = (Vec::new(), Vec::new(), Vec::<Run>::new());
+        let mut positions = Positions::default();
+        self.cells_in_window(&columns, &rows, &mut candidates);
+        for y in rows {
+            self.runs_within(y, &columns, &candidates, &mut owner, &mut runs);
+            for run in &runs {
+                let cell = &self.cells[run.cell];
+                positions.resize(run.columns.len());
+                invert_row(&cell.inverse_along_row(y), run.columns.start, &mut positions);
+                for (index, x) in run.columns.clone().enumerate() {
+                    found([x, y], positions.place(index), cell.footprint);
+                }
+            }
         }
     }
 }

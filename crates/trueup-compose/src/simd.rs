@@ -57,6 +57,14 @@ pub(crate) struct Positions {
 }
 
 impl Positions {
+    /// Position `index` in the photograph's pixels.
+    pub(crate) fn place(&self, index: usize) -> [f64; 2] {
+        [
+            f64::from(self.column[index]) + 0.5 + f64::from(self.fraction_x[index]),
+            f64::from(self.row[index]) + 0.5 + f64::from(self.fraction_y[index]),
+        ]
+    }
+
     /// Makes room for `length` positions.
     pub(crate) fn resize(&mut self, length: usize) {
         self.column.resize(length, 0);

@@ -22,6 +22,7 @@ pub mod error;
 pub mod geometry;
 pub mod interpolation;
 pub mod lines;
+pub mod mask;
 pub mod matches;
 pub mod mesh;
 pub mod options;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
+use crate::mask::Masks;
 use crate::raster::Photograph;
 
 /// Where a focal length came from.
@@ -87,4 +88,9 @@ pub trait PhotographSource: Sync {
     /// # Errors
     /// If the file can no longer be read or decoded.
     fn photograph(&self, index: usize) -> Result<Photograph>;
+
+    /// What the photographer wants of the parts of photograph `index`; nothing unless a source says so.
+    fn masks(&self, _index: usize) -> Masks {
+        Masks::default()
+    }
 }

@@ -92,16 +92,9 @@ impl<'a> Component<'a> {
         self.images.iter().map(|image| name_seed(&image.path)).collect()
     }
 
-    /// Which photographs one camera took, as far as models and sizes tell: a number for each.
+    /// Which photographs one camera took: [`camera_groups`].
     pub(crate) fn camera_groups(&self) -> Vec<usize> {
-        let key = |image: &SourceImage| {
-            let (short, long) = (image.width.min(image.height), image.width.max(image.height));
-            (image.camera_model.clone(), short, long)
-        };
-        let mut keys: Vec<_> = self.images.iter().map(|image| key(image)).collect();
-        keys.sort();
-        keys.dedup();
-        self.images.iter().map(|image| keys.binary_search(&key(image)).unwrap_or(0)).collect()
+        camera_groups(&self.images)
     }
 
     /// What metadata say of the cameras, in working pixels.
@@ -117,6 +110,18 @@ impl<'a> Component<'a> {
             })
             .collect()
     }
+}
+
+/// Which photographs one camera took, as far as models and sizes tell: a number for each.
+pub(crate) fn camera_groups(images: &[&SourceImage]) -> Vec<usize> {
+    let key = |image: &SourceImage| {
+        let (short, long) = (image.width.min(image.height), image.width.max(image.height));
+        (image.camera_model.clone(), short, long)
+    };
+    let mut keys: Vec<_> = images.iter().map(|image| key(image)).collect();
+    keys.sort();
+    keys.dedup();
+    images.iter().map(|image| keys.binary_search(&key(image)).unwrap_or(0)).collect()
 }
 
 /// Runs the geometry stages in their order. With a `memory`, cameras and overlaps that it holds are not found again.

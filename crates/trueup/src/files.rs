@@ -9,7 +9,7 @@ use trueup_io::encode;
 use crate::inputs::Inputs;
 use crate::options::StitchOptions;
 use crate::project::{ImageRecord, Project};
-use crate::stitcher::Stitcher;
+use crate::stitcher::{Alignment, Stitcher};
 
 /// What to stitch and where to put it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -50,11 +50,7 @@ impl StitchJob {
         if let Some(project) = &self.project {
             encode::check_place(project)?;
         }
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(self.threads)
-            .build()
-            .map_err(|error| Error::input("threads", error, "Ask for fewer threads."))?;
-        pool.install(|| self.stitch(options, context))
+        thread_pool(self.threads)?.install(|| self.stitch(options, context))
     }
 
     fn stitch(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<Written>> {
@@ -62,27 +58,43 @@ impl StitchJob {
         let aligned = stitcher.align(&self.inputs)?;
         let several = aligned.alignments.len() > 1;
         let mut written = Vec::new();
-        for (index, mut alignment) in aligned.alignments.into_iter().enumerate() {
+        for (index, alignment) in aligned.alignments.into_iter().enumerate() {
             let number = several.then_some(index + 1);
-            let output = numbered(&self.output, number);
-            spare_photographs(&output, &alignment.project)?;
-            let start = Instant::now();
-            let panorama = stitcher.compose(&alignment)?;
-            alignment.record_seconds("render", start.elapsed());
-            let start = Instant::now();
-            let bytes = encode::write(&output, &panorama, &options.output, context)?;
-            alignment.record_seconds("output", start.elapsed());
-            drop(panorama);
-            alignment.record_findings(context.take_diagnostics());
-            let project = alignment.project;
             let project_file = self.project.as_deref().map(|path| numbered(path, number));
-            if let Some(path) = &project_file {
-                encode::write_atomically(path, project.to_json()?.as_bytes())?;
-            }
-            written.push(Written { output, bytes, project_file, project });
+            written.push(render_and_write(&stitcher, alignment, numbered(&self.output, number), project_file)?);
         }
         Ok(written)
     }
+}
+
+/// A pool of `threads` threads; 0 for one per core.
+pub(crate) fn thread_pool(threads: usize) -> Result<rayon::ThreadPool> {
+    let built = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    built.map_err(|error| Error::input("threads", error, "Ask for fewer threads."))
+}
+
+/// Composes an aligned panorama and writes it and its record.
+pub(crate) fn render_and_write(
+    stitcher: &Stitcher<'_>,
+    mut alignment: Alignment,
+    output: PathBuf,
+    project_file: Option<PathBuf>,
+) -> Result<Written> {
+    spare_photographs(&output, &alignment.project)?;
+    let (options, context) = (stitcher.options(), stitcher.context());
+    let start = Instant::now();
+    let panorama = stitcher.compose(&alignment)?;
+    alignment.record_seconds("render", start.elapsed());
+    let start = Instant::now();
+    let bytes = encode::write(&output, &panorama, &options.output, context)?;
+    alignment.record_seconds("output", start.elapsed());
+    drop(panorama);
+    alignment.record_findings(context.take_diagnostics());
+    let project = alignment.project;
+    if let Some(path) = &project_file {
+        encode::write_atomically(path, project.to_json()?.as_bytes())?;
+    }
+    Ok(Written { output, bytes, project_file, project })
 }
 
 /// `pano.jpg` becomes `pano-2.jpg`.

@@ -33,8 +33,11 @@ mod memory;
 mod names;
 mod options;
 mod project;
+mod recompose;
 mod record;
+mod recorded;
 mod refinement;
+mod replacements;
 mod stitcher;
 
 pub use evaluation::{Evaluation, PictureEvaluation, PixelEvaluation, evaluate, evaluate_pixels, read_truth};
@@ -46,6 +49,7 @@ pub use project::{
     Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
 };
 pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};
+pub use recompose::ComposeJob;
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;
 pub use trueup_compose::render::Panorama;

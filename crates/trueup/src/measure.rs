@@ -103,6 +103,25 @@ fn measure(
     })
 }
 
+/// The thumbnails of photographs that need not be measured, with their frames.
+///
+/// # Errors
+/// Those of decoding; [`Error::Cancelled`].
+pub(crate) fn thumbnails(
+    photographs: &FilePhotographs,
+    options: &StitchOptions,
+    context: &StageContext,
+) -> Result<Vec<(Raster<u8>, WorkingFrame)>> {
+    let thumbnail = |index: usize| {
+        context.check_cancelled()?;
+        let image = &photographs.images()[index];
+        let frame = WorkingFrame::new(image.width, image.height, options.stitch.working_pixels);
+        let picture = photographs.working(index, &frame, options.stitch.thumbnail_pixels)?;
+        Ok((picture.thumbnail, picture.thumbnail_frame))
+    };
+    (0..photographs.images().len()).into_par_iter().map(thumbnail).collect()
+}
+
 /// Whether an error is about one photograph, so that the others can still be stitched.
 pub(crate) fn concerns_one_photograph(error: &Error) -> bool {
     !matches!(error, Error::Cancelled | Error::Options(_))

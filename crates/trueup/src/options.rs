@@ -215,7 +215,28 @@ stage_options! {
     compare: CompareOptions,
 }
 
+/// The stages whose options a project's panorama may be composed with anew; those of the others are recorded with the
+/// geometry.
+const COMPOSING: [&str; 8] = [
+    SourceOptions::STAGE,
+    CanvasOptions::STAGE,
+    ExposureOptions::STAGE,
+    SeamOptions::STAGE,
+    RenderOptions::STAGE,
+    OutputOptions::STAGE,
+    MeasureOptions::STAGE,
+    CompareOptions::STAGE,
+];
+
+/// Options of other stages that change no result.
+const SPEED_ONLY: [&str; 1] = ["stitch.photograph_cache"];
+
 impl StitchOptions {
+    /// The stages that composing a recorded panorama takes options for, in words.
+    pub fn composing_stages() -> String {
+        COMPOSING.join(", ")
+    }
+
     /// Checks every option.
     ///
     /// # Errors
@@ -238,6 +259,24 @@ impl StitchOptions {
             && self.lines == other.lines
             && self.pairing == other.pairing
             && self.matching == other.matching
+    }
+
+    /// The options, `stage.option`, of what was finished before a panorama is composed, in which these options differ from
+    /// `recorded` ones: those of the geometry, which a project records once and for all.
+    pub fn differing_geometry(&self, recorded: &Self) -> Result<Vec<String>> {
+        let (own, recorded) = (self.to_table()?, recorded.to_table()?);
+        let mut differing = Vec::new();
+        for stage in Self::stages().into_iter().filter(|stage| !COMPOSING.contains(stage)) {
+            let table = |table: &toml::Table| table.get(stage).and_then(toml::Value::as_table).cloned().unwrap_or_default();
+            let recorded = table(&recorded);
+            for (option, value) in table(&own) {
+                let name = format!("{stage}.{option}");
+                if recorded.get(&option) != Some(&value) && !SPEED_ONLY.contains(&name.as_str()) {
+                    differing.push(name);
+                }
+            }
+        }
+        Ok(differing)
     }
 
     /// Reads a TOML text with a table per stage over the present values; what it does not name stays as it is.

@@ -2,8 +2,10 @@
 
 use trueup_compose::exposure::Correction;
 use trueup_compose::layout::{CanvasLayout, Placed};
+use trueup_core::diagnostics::Diagnostic;
 use trueup_core::geometry::rows_of;
 use trueup_core::mesh::GridMesh;
+use trueup_core::source::SourceImage;
 
 use crate::align::{Component, Geometry};
 use crate::matched::Matched;
@@ -110,6 +112,52 @@ pub(crate) fn place(component: &Component, geometry: Option<&Geometry>) -> Vec<P
         .collect()
 }
 
+/// What is found on the way from the geometry to the panorama, each time anew.
+const FOUND_IN_COMPOSING: [&str; 3] = ["canvas-reduced", "grid-folded", "photograph-replaced"];
+
+/// Brings the record up to what is composed of the photographs `images`, which stand at the positions `used`.
+pub(crate) fn record_composition(
+    project: &mut Project,
+    used: &[usize],
+    images: &[SourceImage],
+    layout: &CanvasLayout,
+    corrections: &[Correction],
+) {
+    project.canvas = Canvas { width: layout.width, height: layout.height };
+    project.diagnostics.retain(|one| !FOUND_IN_COMPOSING.contains(&one.code.as_str()));
+    for (k, &position) in used.iter().enumerate() {
+        let record = &mut project.images[position];
+        record_appearance(record, &layout.placed[k].mesh, &corrections[k]);
+        let path = images[k].path.display().to_string();
+        if path != record.path {
+            project.diagnostics.push(Diagnostic::note(
+                "photograph-replaced",
+                record.file_name(),
+                format!("{path} is shown"),
+                "",
+            ));
+        }
+        for known in std::iter::once(&mut project.reference).chain(&mut project.manhattan.inliers) {
+            if *known == record.path {
+                known.clone_from(&path);
+            }
+        }
+        record.path = path;
+    }
+}
+
+/// Where a photograph is shown and in which light.
+fn record_appearance(record: &mut ImageRecord, mesh: &GridMesh, correction: &Correction) {
+    record.gain = Some(correction.brightness());
+    record.correction = Some(*correction);
+    record.mesh = Some(MeshRecord {
+        rows: mesh.rows,
+        cols: mesh.columns,
+        source: (0..mesh.len()).map(|vertex| mesh.source(vertex).into()).collect(),
+        target: mesh.target.clone(),
+    });
+}
+
 pub(crate) fn fill_geometry(
     project: &mut Project,
     component: &Component,
@@ -125,14 +173,7 @@ pub(crate) fn fill_geometry(
         let record = &mut project.images[picture];
         let mesh = &layout.placed[k].mesh;
         record.status = ImageStatus::Used;
-        record.gain = Some(corrections[k].brightness());
-        record.correction = Some(corrections[k]);
-        record.mesh = Some(MeshRecord {
-            rows: mesh.rows,
-            cols: mesh.columns,
-            source: (0..mesh.len()).map(|vertex| mesh.source(vertex).into()).collect(),
-            target: mesh.target.clone(),
-        });
+        record_appearance(record, mesh, &corrections[k]);
         let Some(geometry) = geometry else { continue };
         let camera = &geometry.cameras.cameras[k];
         let camera_from_level = camera.rotation() * geometry.prior.level_from_world().transpose();

@@ -10,14 +10,14 @@ use trueup_compose::render::{self, Panorama};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
-use trueup_core::source::WorkingFrame;
+use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 use trueup_io::source::{self, RejectedSource, Sources};
 use trueup_vision::features::Features;
 use trueup_vision::{matching, pairing};
 
-use crate::align::{self, Component};
+use crate::align::{self, Component, camera_groups};
 use crate::clock::Clock;
 use crate::inputs::{Inputs, Reference};
 use crate::left_out::LeftOut;
@@ -28,7 +28,8 @@ use crate::memory::OverlapMemory;
 use crate::names;
 use crate::options::StitchOptions;
 use crate::project::Project;
-use crate::record::{fill_geometry, place};
+use crate::record::{fill_geometry, place, record_composition};
+use crate::recorded::Recorded;
 
 /// Runs the stages with one set of options.
 #[derive(Debug)]
@@ -104,6 +105,14 @@ impl<'a> Stitcher<'a> {
         Self { options, context }
     }
 
+    pub(crate) fn options(&self) -> &StitchOptions {
+        self.options
+    }
+
+    pub(crate) fn context(&self) -> &StageContext<'a> {
+        self.context
+    }
+
     /// Finds, measures and matches the photographs and estimates the panoramas' geometry:
     /// [`Stitcher::match_photographs`], then [`Stitcher::align_matched`].
     ///
@@ -124,8 +133,8 @@ impl<'a> Stitcher<'a> {
         let mut clock = Clock::default();
         let sources = clock.time("source", || source::scan(&inputs.photographs, &self.options.source, self.context))?;
         self.check_any(&sources, inputs)?;
-        let cache_bytes = (self.options.stitch.photograph_cache * 1e6) as usize;
-        let photographs = std::sync::Arc::new(FilePhotographs::new(sources.images.clone(), cache_bytes));
+        let photographs =
+            std::sync::Arc::new(FilePhotographs::new(sources.images.clone(), self.photograph_cache_bytes()));
         let matched = self.match_all(sources, &photographs, inputs, &mut clock)?;
         Ok(MatchedPhotographs { matched, photographs, clock, findings: self.context.take_diagnostics(), memory: None })
     }
@@ -181,6 +190,57 @@ impl<'a> Stitcher<'a> {
             &self.options.seam,
             self.context,
         )
+    }
+
+    /// The geometry that `project` records, over `images`: those used in it, in its order, or others of their sizes. The
+    /// canvas is laid out anew if the options ask for another one, and the corrections estimated anew if they ask for that.
+    ///
+    /// # Errors
+    /// [`Error::Options`]; [`Error::Input`] if the project was damaged; those of the layout; [`Error::Cancelled`].
+    pub(crate) fn recall(&self, project: &Project, images: Vec<SourceImage>) -> Result<Alignment> {
+        self.options.validate()?;
+        let mut clock = Clock::default();
+        let recorded = Recorded::new(project)?;
+        let photographs = std::sync::Arc::new(FilePhotographs::new(images, self.photograph_cache_bytes()));
+        let same_canvas = self.options.canvas == project.options.canvas;
+        let layout = match same_canvas {
+            true => recorded.layout,
+            false => layout::run(recorded.layout.placed, recorded.reference, &self.options.canvas, self.context)?,
+        };
+        let corrections = match self.options.exposure == project.options.exposure {
+            true => recorded.corrections,
+            false => clock.time("exposure", || self.correct_anew(&layout, recorded.reference, &photographs))?,
+        };
+        let mut project = Project { options: self.options.clone(), ..project.clone() };
+        record_composition(&mut project, &recorded.used, photographs.images(), &layout, &corrections);
+        if !same_canvas {
+            project.measures = None;
+        }
+        project.diagnostics.extend(self.context.take_diagnostics());
+        project.seconds.clone_from(clock.seconds());
+        Ok(Alignment { project, layout, corrections, photographs, clock })
+    }
+
+    /// What evens out the light of photographs that were only decoded, each placed once in `layout`.
+    fn correct_anew(
+        &self,
+        layout: &CanvasLayout,
+        reference: usize,
+        photographs: &FilePhotographs,
+    ) -> Result<Vec<Correction>> {
+        let images: Vec<&SourceImage> = photographs.images().iter().collect();
+        let thumbnails = measure::thumbnails(photographs, self.options, self.context)?;
+        let thumbnails: Vec<Thumbnail> = thumbnails
+            .iter()
+            .zip(camera_groups(&images))
+            .map(|((raster, frame), camera)| Thumbnail { raster, frame: *frame, camera })
+            .collect();
+        Ok(exposure::run(layout, &thumbnails, reference, &self.options.exposure, self.context)?.corrections)
+    }
+
+    fn photograph_cache_bytes(&self) -> usize {
+        // The cast saturates.
+        (self.options.stitch.photograph_cache * 1e6) as usize
     }
 
     /// Measures how true `panorama`, composed of `alignment`, is to its photographs: steps across its seams, and ghosts.

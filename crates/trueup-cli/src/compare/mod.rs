@@ -57,7 +57,7 @@ fn checked(args: CompareArgs) -> Result<(CompareJob, StitchOptions), Failure> {
         ("--quality", "output.jpeg_quality", &args.quality),
         ("--seed", "stitch.seed", &args.seed),
     ];
-    let options = chosen_options(args.config.as_deref(), &args.set, &flags)?;
+    let options = chosen_options(StitchOptions::default(), args.config.as_deref(), &args.set, &flags)?;
     let entries = entries(&args.methods, &args.entry, &options)?;
     let inputs = Inputs {
         photographs: args.photographs,

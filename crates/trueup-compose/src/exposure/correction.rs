@@ -49,7 +49,7 @@ impl Correction {
     ///
     /// # Errors
     /// [`Error::Input`].
-    pub(crate) fn check(&self) -> Result<()> {
+    pub fn check(&self) -> Result<()> {
         let usable = |factor: f64| factor.is_finite() && factor > 0.0;
         // Beyond the corner by a rim's width; exp overflows long after any lens.
         if self.gain.into_iter().all(usable) && usable(self.at_radius(1.0)) {

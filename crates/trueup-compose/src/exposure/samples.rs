@@ -62,8 +62,7 @@ impl Patch {
                 positions.resize(run.columns.len());
                 invert_row(&grid.cells[run.cell].inverse_along_row(y), run.columns.start, &mut positions);
                 for (index, column) in run.columns.clone().enumerate() {
-                    let x = f64::from(positions.column[index]) + 0.5 + f64::from(positions.fraction_x[index]);
-                    let y = f64::from(positions.row[index]) + 0.5 + f64::from(positions.fraction_y[index]);
+                    let [x, y] = positions.place(index);
                     let radius = ((x - half[0]).powi(2) + (y - half[1]).powi(2)) / corner;
                     let (x, y) = ((x * from_full).max(0.0) as usize, (y * from_full).max(0.0) as usize);
                     let light = light.pixel(x.min(light.width() - 1), y.min(light.height() - 1));

@@ -2,6 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use trueup_core::mask::Masks;
 use trueup_core::raster::Photograph;
 use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
 use trueup_core::{Error, Result};
@@ -15,6 +16,8 @@ use super::{WorkingPicture, photograph, reduce_photograph};
 #[derive(Debug)]
 pub struct FilePhotographs {
     images: Vec<SourceImage>,
+    /// By index; those beyond the end have none.
+    masks: Vec<Masks>,
     kept: Mutex<Kept>,
 }
 
@@ -29,7 +32,13 @@ impl FilePhotographs {
     /// Over `images`, keeping at most `cache_bytes` bytes of decoded pixels; 0 keeps none.
     pub fn new(images: Vec<SourceImage>, cache_bytes: usize) -> Self {
         let photographs = images.iter().map(|_| None).collect();
-        Self { images, kept: Mutex::new(Kept { photographs, free_bytes: cache_bytes }) }
+        Self { images, masks: Vec::new(), kept: Mutex::new(Kept { photographs, free_bytes: cache_bytes }) }
+    }
+
+    /// The same with what the photographer wants of the photographs' parts, in their order.
+    #[must_use]
+    pub fn with_masks(self, masks: Vec<Masks>) -> Self {
+        Self { masks, ..self }
     }
 
     /// The photographs this hands out, in order.
@@ -88,5 +97,9 @@ impl PhotographSource for FilePhotographs {
             Some(photograph) => Ok(photograph),
             None => photograph(image),
         }
+    }
+
+    fn masks(&self, index: usize) -> Masks {
+        self.masks.get(index).cloned().unwrap_or_default()
     }
 }

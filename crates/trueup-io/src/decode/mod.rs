@@ -3,6 +3,7 @@
 mod codecs;
 mod files;
 mod jpeg_scans;
+mod mask;
 mod orientation;
 mod reduce;
 #[cfg(test)]
@@ -14,6 +15,7 @@ use trueup_core::{Error, Result};
 
 pub(crate) use codecs::jpeg_options;
 pub use files::FilePhotographs;
+pub use mask::mask;
 
 /// A photograph reduced to the sizes that measurement works on.
 #[derive(Debug, Clone, PartialEq)]

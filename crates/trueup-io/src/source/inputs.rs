@@ -103,7 +103,7 @@ fn photographs_in_natural_order(paths: impl Iterator<Item = PathBuf>) -> Vec<Can
 }
 
 /// Natural order without regard to case. Ties fall back to the bytes, so that the order never depends on the file system.
-fn natural_order(a: &Path, b: &Path) -> Ordering {
+pub fn natural_order(a: &Path, b: &Path) -> Ordering {
     let (a_text, b_text) = (a.to_string_lossy(), b.to_string_lossy());
     natord::compare_ignore_case(&a_text, &b_text).then_with(|| a.cmp(b))
 }

@@ -22,6 +22,8 @@ use crate::metadata::{Header, HeaderError, TagVerdict, judge_orientation, read_h
 use duplicates::Accepted;
 use inputs::Candidate;
 
+pub use inputs::natural_order;
+
 /// The largest file that is opened. Files are read into memory to be decoded; no photograph is this large.
 const MAX_FILE_BYTES: u64 = 4 << 30;
 

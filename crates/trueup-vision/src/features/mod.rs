@@ -54,6 +54,28 @@ pub struct Features {
     pub descriptor_points: Vec<u32>,
 }
 
+impl Features {
+    /// Those whose points satisfy `wanted`, in their order.
+    #[must_use]
+    pub fn filtered(&self, wanted: impl Fn(&FeaturePoint) -> bool) -> Self {
+        let mut kept = Self::default();
+        let mut number = vec![None; self.points.len()];
+        for (point, number) in self.points.iter().zip(&mut number) {
+            if wanted(point) {
+                *number = Some(kept.points.len() as u32);
+                kept.points.push(*point);
+            }
+        }
+        for (descriptor, &point) in self.descriptors.iter().zip(&self.descriptor_points) {
+            if let Some(&Some(number)) = number.get(point as usize) {
+                kept.descriptors.push(*descriptor);
+                kept.descriptor_points.push(number);
+            }
+        }
+        kept
+    }
+}
+
 trueup_core::options! {
     /// How features are found and described.
     pub struct FeatureOptions("features") {

@@ -8,7 +8,7 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::source::WorkingFrame;
 
 use super::CompareOptions;
-use crate::evaluation::grid;
+use crate::recorded::grid;
 use crate::options::StitchOptions;
 use crate::project::{ImageRecord, Project};
 use crate::stitcher::MatchedPhotographs;

@@ -16,10 +16,11 @@ use super::record::{
     COMPARISON_FORMAT, COMPARISON_VERSION, Compared, ComparedPhotograph, Comparison, PanoramaRecord, Refusal,
 };
 use super::{Entry, figures, overlaps, ranking};
-use crate::evaluation::{evaluate, grid, read_truth};
+use crate::evaluation::{evaluate, read_truth};
 use crate::inputs::Inputs;
 use crate::options::StitchOptions;
 use crate::project::{ImageRecord, Project};
+use crate::recorded::grid;
 use crate::stitcher::{Alignment, MatchedPhotographs, Stitcher};
 
 /// Progress over the entries is reported as this.

@@ -1,6 +1,5 @@
 //! How good a panorama is, against the exactly known truth of its photographs.
 
-mod grids;
 mod pixels;
 #[cfg(test)]
 mod tests;
@@ -18,9 +17,7 @@ use trueup_core::truth::{ImageTruth, Truth};
 use trueup_core::{Error, Result};
 
 use crate::project::{ImageRecord, Project};
-use grids::used_grids;
-
-pub(crate) use grids::grid;
+use crate::recorded::used_grids;
 pub use pixels::{PixelEvaluation, evaluate_pixels};
 pub(crate) use pixels::{compare_overlaps, scale_up_to};
 

@@ -1,11 +1,10 @@
 //! How alike the photographs look where two of them lie on the panorama.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_align::metrics::{Overlap, OverlapMeasures, mean_over_overlaps};
-use trueup_compose::exposure::Correction;
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_compose::render::{self, Layer};
 use trueup_core::mesh::GridMesh;
@@ -13,10 +12,9 @@ use trueup_core::raster::Raster;
 use trueup_core::source::{PhotographSource, SourceImage};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::decode::FilePhotographs;
-use trueup_io::source;
 
-use super::grids::used_grids;
 use crate::project::{ImageRecord, Project};
+use crate::recorded::{find_photograph, recorded_corrections, used_grids};
 
 /// Progress is reported as this.
 const STAGE: &str = "comparing";
@@ -62,7 +60,7 @@ pub fn evaluate_pixels(project: &Project, project_folder: &Path, context: &Stage
     let records: Vec<&ImageRecord> = project.used_images().collect();
     let images = records
         .iter()
-        .map(|record| photograph(record, project_folder, project, context))
+        .map(|record| find_photograph(record, project_folder, &project.options.source, context))
         .collect::<Result<Vec<SourceImage>>>()?;
     let photographs = FilePhotographs::new(images, 0);
     let meshes = used_grids(&records)?;
@@ -94,9 +92,7 @@ pub(crate) fn compare_overlaps(
 ) -> Result<PixelEvaluation> {
     let records: Vec<&ImageRecord> = project.used_images().collect();
     let layout = layout(used_grids(&records)?, positions, scale);
-    let correction =
-        |record: &&ImageRecord| record.correction.unwrap_or(Correction::uniform(record.gain.unwrap_or(1.0)));
-    let corrections: Vec<Correction> = records.iter().map(correction).collect();
+    let corrections = recorded_corrections(&records)?;
 
     context.progress().begin(STAGE, records.len() as u64);
     let layers: Vec<Layer> = (0..records.len())
@@ -140,44 +136,6 @@ pub(crate) fn compare_overlaps(
         psnr_db: mean.psnr_db,
         ssim: mean.ssim,
     })
-}
-
-/// The file of a recorded photograph, checked to be of its size.
-fn photograph(
-    record: &ImageRecord,
-    project_folder: &Path,
-    project: &Project,
-    context: &StageContext,
-) -> Result<SourceImage> {
-    let recorded = Path::new(&record.path);
-    let places = [recorded.to_owned(), project_folder.join(recorded), project_folder.join(record.file_name())];
-    let Some(path): Option<PathBuf> = places.into_iter().find(|path| path.is_file()) else {
-        return Err(Error::input(
-            &record.path,
-            "photograph not found, neither here nor beside the project file",
-            "Run the command in the folder that the stitch was made in.",
-        ));
-    };
-    let path = path.display().to_string();
-    // The size was accepted when it was stitched; the file is decoded with the same limits.
-    let mut found = source::scan(std::slice::from_ref(&path), &project.options.source, context)?;
-    let Some(image) = found.images.pop() else {
-        return Err(found.rejected.first().map_or_else(
-            || Error::input(&path, "it cannot be read", "Check the file and its permissions."),
-            source::RejectedSource::to_error,
-        ));
-    };
-    if (image.width, image.height) == (record.width, record.height) {
-        return Ok(image);
-    }
-    Err(Error::input(
-        &path,
-        format!(
-            "it is {} x {} px, the project has it at {} x {} px",
-            image.width, image.height, record.width, record.height
-        ),
-        "Give back the photograph that was stitched.",
-    ))
 }
 
 /// The largest scale, at most 1, that keeps the canvas within `canvas_pixels` and the layers within their limit.

@@ -1,0 +1,109 @@
+//! Parts of a photograph that its photographer marked.
+
+use std::sync::Arc;
+
+/// Bits of a word.
+const WORD_BITS: usize = u64::BITS as usize;
+
+/// A mark for every pixel of a photograph in its upright orientation, a bit each.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mask {
+    width: usize,
+    height: usize,
+    words: Vec<u64>,
+}
+
+impl Mask {
+    /// A mask of `width` x `height` pixels; `marked` is asked for every pixel (x, y).
+    pub fn from_fn(width: usize, height: usize, marked: impl Fn(usize, usize) -> bool) -> Self {
+        let mut words = vec![0; (width * height).div_ceil(WORD_BITS)];
+        for y in 0..height {
+            for x in 0..width {
+                let bit = y * width + x;
+                words[bit / WORD_BITS] |= u64::from(marked(x, y)) << (bit % WORD_BITS);
+            }
+        }
+        Self { width, height, words }
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// All marks, row by row, the lowest bit of a word first: what tells two masks of one size apart.
+    pub fn words(&self) -> &[u64] {
+        &self.words
+    }
+
+    /// Whether the pixel (x, y) is marked; nothing outside is.
+    pub fn is_marked(&self, x: usize, y: usize) -> bool {
+        let bit = y * self.width + x;
+        x < self.width && y < self.height && self.words[bit / WORD_BITS] >> (bit % WORD_BITS) & 1 != 0
+    }
+
+    /// Whether the pixel at (x, y) is marked; nothing outside is.
+    pub fn contains(&self, [x, y]: [f64; 2]) -> bool {
+        // The casts saturate.
+        x >= 0.0 && y >= 0.0 && self.is_marked(x as usize, y as usize)
+    }
+
+    /// Whether any pixel is marked in a box of this size around (x, y).
+    pub fn any_within(&self, [x, y]: [f64; 2], size: [f64; 2]) -> bool {
+        let range = |middle: f64, size: f64, limit: usize| {
+            let (low, high) = (middle - 0.5 * size, middle + 0.5 * size);
+            (low.max(0.0) as usize).min(limit)..(high.max(0.0).ceil() as usize).min(limit)
+        };
+        let columns = range(x, size[0], self.width);
+        range(y, size[1], self.height).any(|y| columns.clone().any(|x| self.is_marked(x, y)))
+    }
+
+    /// This mask and another of the same size: what is marked in either. Sizes that differ leave this one as it is.
+    #[must_use]
+    pub fn or(mut self, other: &Self) -> Self {
+        if (self.width, self.height) == (other.width, other.height) {
+            self.words.iter_mut().zip(&other.words).for_each(|(word, other)| *word |= other);
+        }
+        self
+    }
+}
+
+/// What a photographer wants of the parts of one photograph.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Masks {
+    /// Marked parts are not looked at, and not shown where another photograph can be.
+    pub ignored: Option<Arc<Mask>>,
+    /// Marked parts are shown, whatever other photographs show there.
+    pub kept: Option<Arc<Mask>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_are_found_where_they_were_made_and_nowhere_else() {
+        let mask = Mask::from_fn(70, 3, |x, y| x == 65 && y == 1);
+        for y in 0..4 {
+            for x in 0..71 {
+                assert_eq!(mask.is_marked(x, y), (x, y) == (65, 1), "({x}, {y})");
+            }
+        }
+        assert!(mask.contains([65.0, 1.99]) && !mask.contains([66.0, 1.5]) && !mask.contains([-1.0, 1.0]));
+        assert!(mask.any_within([63.5, 1.5], [4.0, 1.0]) && !mask.any_within([62.5, 1.5], [4.0, 1.0]));
+        assert!(!mask.any_within([f64::NAN, 1.0], [4.0, 4.0]) && !mask.any_within([1e300, 1.0], [4.0, 1e300]));
+    }
+
+    #[test]
+    fn either_of_two_masks_of_one_size_counts() {
+        let left = Mask::from_fn(4, 2, |x, _| x == 0);
+        let right = Mask::from_fn(4, 2, |x, _| x == 3);
+        assert_eq!(left.clone().or(&right), Mask::from_fn(4, 2, |x, _| x == 0 || x == 3));
+        assert_eq!(left.clone().or(&Mask::from_fn(5, 2, |_, _| true)), left);
+    }
+}

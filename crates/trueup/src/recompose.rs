@@ -1,0 +1,73 @@
+//! From a project to a file: a recorded panorama is composed again.
+
+use std::path::PathBuf;
+
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result, StageContext};
+use trueup_io::encode;
+
+use crate::files::{Written, render_and_write, thread_pool};
+use crate::options::StitchOptions;
+use crate::project::{ImageRecord, Project};
+use crate::recorded::Recorded;
+use crate::replacements::{other_photographs, recorded_photographs};
+use crate::stitcher::Stitcher;
+
+/// Which recorded panorama to compose, of which photographs, and where to put it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ComposeJob {
+    /// The record of a stitch.
+    pub project: Project,
+    /// The folder that the project's file lies in: recorded paths are looked up there first, then from the current folder.
+    pub project_folder: PathBuf,
+    /// A folder with other photographs of the same names (whatever their extensions) and sizes, to be shown instead.
+    pub photographs: Option<PathBuf>,
+    /// The panorama's file; its extension chooses the format.
+    pub output: PathBuf,
+    /// The file of the new panorama's own record, if wanted.
+    pub new_project: Option<PathBuf>,
+    /// Number of threads; 0 for one per core.
+    pub threads: usize,
+}
+
+impl ComposeJob {
+    /// Runs the job: nothing is measured or matched, the geometry is the recorded one. With the recorded options and
+    /// photographs, the panorama is the very one that was stitched.
+    ///
+    /// # Errors
+    /// [`Error::Options`]; [`Error::Unsupported`] if an option of the geometry differs from the recorded one;
+    /// [`Error::Input`] if the project was damaged, or photographs are missing or have other sizes; those of composing and
+    /// writing; [`Error::Cancelled`].
+    pub fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<Written> {
+        options.validate()?;
+        let differing = options.differing_geometry(&self.project.options)?;
+        if !differing.is_empty() {
+            return Err(Error::Unsupported {
+                what: format!("composing a recorded panorama with another {}", differing.join(", ")),
+                hint: format!(
+                    "Its geometry was found with the recorded value: stitch the photographs again. Composing heeds {}.",
+                    StitchOptions::composing_stages()
+                ),
+            });
+        }
+        // Before files are looked for: a project that was edited to nonsense names itself.
+        Recorded::new(&self.project)?;
+        encode::check_writable(&self.output)?;
+        if let Some(project) = &self.new_project {
+            encode::check_place(project)?;
+        }
+        thread_pool(self.threads)?.install(|| {
+            let stitcher = Stitcher::new(options, context);
+            let alignment = stitcher.recall(&self.project, self.find_photographs(options, context)?)?;
+            render_and_write(&stitcher, alignment, self.output.clone(), self.new_project.clone())
+        })
+    }
+
+    fn find_photographs(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<SourceImage>> {
+        let records: Vec<&ImageRecord> = self.project.used_images().collect();
+        match &self.photographs {
+            Some(folder) => other_photographs(&records, folder, &options.source, context),
+            None => recorded_photographs(&records, &self.project_folder, &options.source, context),
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! A panorama's geometry and photographs, found again from its project.
+
+use std::path::{Path, PathBuf};
+
+use trueup_compose::exposure::Correction;
+use trueup_compose::layout::{CanvasLayout, Placed};
+use trueup_core::mesh::GridMesh;
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result, StageContext};
+use trueup_io::source::{self, RejectedSource, SourceOptions};
+
+use crate::project::{ImageRecord, ImageStatus, MeshRecord, Project};
+
+/// What a project must be to be read again.
+const AS_WRITTEN: &str = "Give a project file as `trueup stitch --project` wrote it.";
+/// Vertices farther away than this, in panorama pixels, are no places any more: no file format is as wide.
+const FARTHEST_PX: f64 = 4_294_967_296.0;
+/// Vertices may lie this far beyond the canvas that is recorded with them, which is rounded to whole pixels.
+const ROUNDED_PX: f64 = 1.0;
+/// Largest distance of a grid's recorded sources from an even grid, relative to the photograph's longer side: what
+/// rounding leaves.
+const EVEN: f64 = 1e-6;
+
+/// What a project says of its panorama's geometry, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Recorded {
+    /// Positions in [`Project::images`] of the photographs in the panorama.
+    pub used: Vec<usize>,
+    /// The canvas; photographs are numbered by their place in `used`.
+    pub layout: CanvasLayout,
+    /// What evens out their light.
+    pub corrections: Vec<Correction>,
+    /// The reference's place in `used`.
+    pub reference: usize,
+}
+
+impl Recorded {
+    /// Reads the geometry of `project`, which may have been edited to anything.
+    ///
+    /// # Errors
+    /// [`Error::Options`]; [`Error::Input`] if grids, corrections, canvas or reference are missing or cannot be.
+    pub fn new(project: &Project) -> Result<Self> {
+        project.options.validate()?;
+        let used: Vec<usize> =
+            (0..project.images.len()).filter(|&at| project.images[at].status == ImageStatus::Used).collect();
+        let records: Vec<&ImageRecord> = project.used_images().collect();
+        if used.is_empty() {
+            return Err(Error::input("the project", "it uses no photographs", AS_WRITTEN));
+        }
+        let reference = records.iter().position(|record| record.path == project.reference).ok_or_else(|| {
+            Error::input(&project.reference, "it is the reference, but none of the photographs used", AS_WRITTEN)
+        })?;
+        let meshes = used_grids(&records)?;
+        let corrections = recorded_corrections(&records)?;
+        let (width, height) = (project.canvas.width, project.canvas.height);
+        let outside = |mesh: &GridMesh| {
+            let (low, high) = mesh.bounds();
+            low.min() < -ROUNDED_PX || high.x > width as f64 + ROUNDED_PX || high.y > height as f64 + ROUNDED_PX
+        };
+        let pixels = width as f64 * height as f64;
+        if pixels < 1.0 || pixels > project.options.canvas.max_pixels || meshes.iter().any(outside) {
+            let reason = format!("the canvas of {width} x {height} px does not belong to the grids");
+            return Err(Error::input("the project", reason, AS_WRITTEN));
+        }
+        let placed = meshes.into_iter().enumerate().map(|(photograph, mesh)| Placed { photograph, mesh }).collect();
+        let layout = CanvasLayout { width, height, canvas_from_target: 1.0, placed };
+        Ok(Self { used, layout, corrections, reference })
+    }
+}
+
+/// The grids of used pictures over the original photographs.
+///
+/// # Errors
+/// [`Error::Input`] if one is missing or damaged.
+pub(crate) fn used_grids(records: &[&ImageRecord]) -> Result<Vec<GridMesh>> {
+    records.iter().map(|record| grid(record)).collect()
+}
+
+/// The grid of one used picture over the original photograph.
+///
+/// # Errors
+/// [`Error::Input`] if it is missing or damaged.
+pub(crate) fn grid(record: &ImageRecord) -> Result<GridMesh> {
+    let damaged = |reason: String| Error::input(&record.path, reason, AS_WRITTEN);
+    let mesh = record.mesh.as_ref().ok_or_else(|| damaged("the project holds no grid of it".to_owned()))?;
+    if !is_whole(mesh, record.width, record.height) {
+        return Err(damaged(format!(
+            "its grid of {} x {} with {} vertices over {} x {} px is damaged",
+            mesh.rows,
+            mesh.cols,
+            mesh.target.len(),
+            record.width,
+            record.height
+        )));
+    }
+    let (width, height) = (record.width as f64, record.height as f64);
+    Ok(GridMesh { rows: mesh.rows, columns: mesh.cols, width, height, target: mesh.target.clone() })
+}
+
+fn is_whole(mesh: &MeshRecord, width: usize, height: usize) -> bool {
+    let counted = mesh.rows >= 2
+        && mesh.cols >= 2
+        && mesh.rows.checked_mul(mesh.cols) == Some(mesh.target.len())
+        && mesh.source.len() == mesh.target.len()
+        && width.min(height) > 0;
+    if !counted || !mesh.target.iter().flatten().all(|coordinate| coordinate.abs() <= FARTHEST_PX) {
+        return false;
+    }
+    let (width, height) = (width as f64, height as f64);
+    let even = GridMesh { rows: mesh.rows, columns: mesh.cols, width, height, target: Vec::new() };
+    let tolerance = EVEN * width.max(height);
+    let is_even = |(vertex, source): (usize, &[f64; 2])| {
+        let expected = even.source(vertex);
+        (0..2).all(|axis| (source[axis] - expected[axis]).abs() <= tolerance)
+    };
+    mesh.source.iter().enumerate().all(is_even)
+}
+
+/// What evens out the light of used pictures; gains alone in files of programs that knew no more.
+///
+/// # Errors
+/// [`Error::Input`] if one is no positive factor on light.
+pub(crate) fn recorded_corrections(records: &[&ImageRecord]) -> Result<Vec<Correction>> {
+    let correction = |record: &&ImageRecord| {
+        let correction = record.correction.unwrap_or(Correction::uniform(record.gain.unwrap_or(1.0)));
+        let damaged = |_| Error::input(&record.path, "its recorded gains are no positive factors on light", AS_WRITTEN);
+        correction.check().map_err(damaged).map(|()| correction)
+    };
+    records.iter().map(correction).collect()
+}
+
+/// The file of a recorded photograph, checked to be of its size: beside the project file as recorded, as recorded from
+/// the current folder, or beside the project file by its name alone.
+///
+/// # Errors
+/// [`Error::Input`] if there is none, it cannot be read or has another size; [`Error::Options`]; [`Error::Cancelled`].
+pub(crate) fn find_photograph(
+    record: &ImageRecord,
+    project_folder: &Path,
+    options: &SourceOptions,
+    context: &StageContext,
+) -> Result<SourceImage> {
+    let recorded = Path::new(&record.path);
+    let places = [project_folder.join(recorded), recorded.to_owned(), project_folder.join(record.file_name())];
+    let Some(path): Option<PathBuf> = places.into_iter().find(|path| path.is_file()) else {
+        return Err(Error::input(
+            &record.path,
+            "photograph not found, neither here nor beside the project file",
+            "Run the command in the folder that the stitch was made in.",
+        ));
+    };
+    let path = path.display().to_string();
+    let mut found = source::scan(std::slice::from_ref(&path), options, context)?;
+    let Some(image) = found.images.pop() else {
+        return Err(found.rejected.first().map_or_else(
+            || Error::input(&path, "it cannot be read", "Check the file and its permissions."),
+            RejectedSource::to_error,
+        ));
+    };
+    check_size(&image, record)?;
+    Ok(image)
+}
+
+/// Refuses a photograph of another size than the recorded one's.
+///
+/// # Errors
+/// [`Error::Input`].
+pub(crate) fn check_size(image: &SourceImage, record: &ImageRecord) -> Result<()> {
+    if (image.width, image.height) == (record.width, record.height) {
+        return Ok(());
+    }
+    Err(Error::input(
+        image.path.display(),
+        format!(
+            "it is {} x {} px, the project has it at {} x {} px",
+            image.width, image.height, record.width, record.height
+        ),
+        "Give back the photograph that was stitched.",
+    ))
+}
