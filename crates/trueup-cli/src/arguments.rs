@@ -101,6 +101,15 @@ pub(crate) struct StitchArgs {
     #[arg(long, value_name = "FILE", help_heading = "Photographs")]
     pub graph: Option<PathBuf>,
 
+    /// A picture of the photograph NAME's size: what is black or transparent in it is ignored, and not shown where another
+    /// photograph can be; may be repeated
+    #[arg(long, value_name = "NAME=FILE", help_heading = "Photographs")]
+    pub mask: Vec<String>,
+
+    /// A picture of the photograph NAME's size: what is white in it is shown; may be repeated
+    #[arg(long, value_name = "NAME=FILE", help_heading = "Photographs")]
+    pub keep: Vec<String>,
+
     /// How the panorama's shape is found (stitch.method; `trueup options stitch` names the methods)
     #[arg(long, value_name = "METHOD", help_heading = "Tuning")]
     pub method: Option<String>,
@@ -181,6 +190,15 @@ pub(crate) struct ComposeArgs {
     /// The folder of the photographs, if they moved, or of others of the same names and sizes
     #[arg(long, value_name = "DIR", help_heading = "Photographs")]
     pub photos: Option<PathBuf>,
+
+    /// A picture of the photograph NAME's size: what is black or transparent in it is ignored, and not shown where another
+    /// photograph can be; may be repeated
+    #[arg(long, value_name = "NAME=FILE", help_heading = "Photographs")]
+    pub mask: Vec<String>,
+
+    /// A picture of the photograph NAME's size: what is white in it is shown; may be repeated
+    #[arg(long, value_name = "NAME=FILE", help_heading = "Photographs")]
+    pub keep: Vec<String>,
 
     /// Set any option of the stages from the canvas on; may be repeated
     #[arg(long, value_name = "STAGE.OPTION=VALUE", allow_hyphen_values = true, help_heading = "Tuning")]

@@ -9,7 +9,7 @@ use crate::failure::Failure;
 use crate::inspect;
 use crate::output;
 use crate::progress::Bars;
-use crate::stitch::{chosen_options, require_two_names, summaries};
+use crate::stitch::{chosen_masks, chosen_options, require_two_names, summaries};
 
 pub(crate) fn run(args: ComposeArgs) -> Result<(), Failure> {
     let (quiet, verbose) = (args.quiet, args.verbose);
@@ -35,6 +35,7 @@ fn checked(args: ComposeArgs) -> Result<(ComposeJob, StitchOptions), Failure> {
         project,
         project_folder,
         photographs: args.photos,
+        masks: chosen_masks(&args.mask, &args.keep)?,
         output: args.output,
         new_project: args.project,
         threads: args.threads.map_or(0, usize::from),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use trueup::{Error, Inputs, Reference, StageContext, StitchJob, StitchOptions, Written};
+use trueup::{Error, Inputs, MaskFile, MaskKind, Reference, StageContext, StitchJob, StitchOptions, Written};
 
 use crate::arguments::StitchArgs;
 use crate::failure::Failure;
@@ -59,6 +59,7 @@ impl CheckedStitch {
             reference,
             graph: args.graph,
             all: args.all,
+            masks: chosen_masks(&args.mask, &args.keep)?,
             require_all: args.require_all,
         };
         // The library reads 0 as one thread per core.
@@ -74,6 +75,21 @@ pub(crate) fn require_two_names(output: &Path, project: Option<&Path>) -> Result
     }
     let message = format!("{} cannot be both the panorama and the project", output.display());
     Err(Failure::usage(message, "Give --output and --project different names."))
+}
+
+/// The masks that were typed.
+pub(crate) fn chosen_masks(ignoring: &[String], keeping: &[String]) -> Result<Vec<MaskFile>, Failure> {
+    let typed = ignoring.iter().map(|typed| ("--mask", typed, MaskKind::Use));
+    let mask = |(flag, typed, kind): (&str, &String, MaskKind)| match typed.split_once('=') {
+        Some((photograph, file)) if !photograph.is_empty() && !file.is_empty() => {
+            Ok(MaskFile { photograph: photograph.to_owned(), file: file.into(), kind })
+        }
+        _ => {
+            let message = format!("{flag} {typed}: it is not of the form NAME=FILE");
+            Err(Failure::usage(message, "Write the photograph's name, \"=\", and the file of its mask."))
+        }
+    };
+    typed.chain(keeping.iter().map(|typed| ("--keep", typed, MaskKind::Keep))).map(mask).collect()
 }
 
 /// The reference that was typed, if any.

@@ -23,4 +23,5 @@ mod sampling;
 #[allow(unsafe_code)] // Vector instructions chosen at run time; every other module is safe code.
 mod simd;
 mod transfer_curve;
+mod unwanted;
 mod weights;

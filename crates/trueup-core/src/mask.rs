@@ -63,6 +63,12 @@ impl Mask {
         range(y, size[1], self.height).any(|y| columns.clone().any(|x| self.is_marked(x, y)))
     }
 
+    /// The mask that marks what this one does not.
+    #[must_use]
+    pub fn inverted(&self) -> Self {
+        Self::from_fn(self.width, self.height, |x, y| !self.is_marked(x, y))
+    }
+
     /// This mask and another of the same size: what is marked in either. Sizes that differ leave this one as it is.
     #[must_use]
     pub fn or(mut self, other: &Self) -> Self {
@@ -97,6 +103,13 @@ mod tests {
         assert!(mask.contains([65.0, 1.99]) && !mask.contains([66.0, 1.5]) && !mask.contains([-1.0, 1.0]));
         assert!(mask.any_within([63.5, 1.5], [4.0, 1.0]) && !mask.any_within([62.5, 1.5], [4.0, 1.0]));
         assert!(!mask.any_within([f64::NAN, 1.0], [4.0, 4.0]) && !mask.any_within([1e300, 1.0], [4.0, 1e300]));
+    }
+
+    #[test]
+    fn what_is_inverted_twice_is_the_same() {
+        let mask = Mask::from_fn(13, 7, |x, y| x * y % 3 == 0);
+        assert!((0..13).all(|x| (0..7).all(|y| mask.inverted().is_marked(x, y) != mask.is_marked(x, y))));
+        assert_eq!(mask.inverted().inverted(), mask);
     }
 
     #[test]

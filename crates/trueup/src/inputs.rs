@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::masks::MaskFile;
+
 /// Which photograph sets the panorama's pixel scale and stays in place.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Reference {
@@ -23,6 +25,8 @@ pub struct Inputs {
     pub graph: Option<PathBuf>,
     /// Stitch every group of overlapping photographs, not only the largest.
     pub all: bool,
+    /// Pictures that mark what is to be ignored or kept of the photographs.
+    pub masks: Vec<MaskFile>,
     /// Fail unless every photograph given is used.
     pub require_all: bool,
 }

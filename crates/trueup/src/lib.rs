@@ -26,6 +26,7 @@ mod evaluation;
 mod files;
 mod inputs;
 mod left_out;
+mod masks;
 mod matched;
 mod measure;
 mod measures;
@@ -43,6 +44,7 @@ mod stitcher;
 pub use evaluation::{Evaluation, PictureEvaluation, PixelEvaluation, evaluate, evaluate_pixels, read_truth};
 pub use files::{StitchJob, Written};
 pub use inputs::{Inputs, Reference};
+pub use masks::{MaskFile, MaskKind, MaskRecord};
 pub use measures::{BentLine, LongLines, Measures, PictureMeasures, ReprojectionMeasures, UprightMeasures};
 pub use options::{Method, StitchOptions, WorkingOptions};
 pub use project::{

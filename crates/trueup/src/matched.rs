@@ -2,12 +2,12 @@
 
 use trueup_align::stitch_graph::{GraphFile, StitchGraph};
 use trueup_core::matches::PairMatches;
-use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
 use trueup_io::source::{RejectedSource, Sources};
 
 use crate::inputs::{Inputs, Reference};
 use crate::left_out::{self, LeftOut};
+use crate::masks::{MaskRecord, photograph_named};
 use crate::measure::Measured;
 
 /// Everything known after matching.
@@ -20,6 +20,8 @@ pub(crate) struct Matched {
     pub pairs: Vec<PairMatches>,
     pub graph: StitchGraph,
     pub graph_file: GraphFile,
+    /// The masks of each photograph.
+    pub masks: Vec<Vec<MaskRecord>>,
 }
 
 impl Matched {
@@ -29,19 +31,7 @@ impl Matched {
 
     /// The photograph the user calls `name`: by name, by path, or by the end of its path.
     pub fn picture_named(&self, name: &str) -> Result<usize> {
-        let called = |image: &SourceImage| image.name == name || image.path.as_os_str() == name;
-        let images = &self.sources.images;
-        images
-            .iter()
-            .position(called)
-            .or_else(|| images.iter().position(|image| image.path.ends_with(name)))
-            .ok_or_else(|| {
-                Error::input(
-                    name,
-                    "no photograph of this name was given, so it cannot be the reference",
-                    "Write the name of one of the photographs, with its extension.",
-                )
-            })
+        photograph_named(&self.sources.images, name, "so it cannot be the reference")
     }
 
     pub fn reference_of(&self, members: &[usize], inputs: &Inputs) -> Result<usize> {

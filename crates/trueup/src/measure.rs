@@ -5,13 +5,14 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 use trueup_core::lines::LineSegment;
 use trueup_core::raster::Raster;
-use trueup_core::source::WorkingFrame;
+use trueup_core::source::{PhotographSource, WorkingFrame};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 use trueup_vision::features::{self, Features};
 use trueup_vision::lines;
 
 use crate::clock::Clock;
+use crate::masks;
 use crate::options::StitchOptions;
 use crate::refinement;
 
@@ -88,9 +89,16 @@ fn measure(
     let mut next_lap = || std::mem::replace(&mut lap, Instant::now()).elapsed();
     let picture = photographs.working(index, &frame, options.stitch.thumbnail_pixels)?;
     busy.decode = next_lap();
-    let features = features::detect(&picture.gray, &options.features, context)?;
+    let ignored = photographs.masks(index).ignored;
+    let mut features = features::detect(&picture.gray, &options.features, context)?;
     busy.features = next_lap();
-    let lines = lines::detect(&picture.gray, &options.lines, context)?;
+    let mut lines = lines::detect(&picture.gray, &options.lines, context)?;
+    let mut thumbnail = picture.thumbnail;
+    if let Some(ignored) = ignored {
+        features = masks::outside(&features, &ignored, &frame);
+        lines = masks::lines_outside(lines, &ignored, &frame);
+        masks::blacken(&mut thumbnail, &ignored, &picture.thumbnail_frame);
+    }
     busy.lines = next_lap();
     let gray = refinement::needs_pixels(options).then(|| refinement::eight_bit(&picture.gray));
     Ok(Measured {
@@ -98,7 +106,7 @@ fn measure(
         features,
         lines,
         gray,
-        thumbnail: picture.thumbnail,
+        thumbnail,
         thumbnail_frame: picture.thumbnail_frame,
     })
 }
@@ -117,7 +125,11 @@ pub(crate) fn thumbnails(
         let image = &photographs.images()[index];
         let frame = WorkingFrame::new(image.width, image.height, options.stitch.working_pixels);
         let picture = photographs.working(index, &frame, options.stitch.thumbnail_pixels)?;
-        Ok((picture.thumbnail, picture.thumbnail_frame))
+        let mut thumbnail = picture.thumbnail;
+        if let Some(ignored) = photographs.masks(index).ignored {
+            masks::blacken(&mut thumbnail, &ignored, &picture.thumbnail_frame);
+        }
+        Ok((thumbnail, picture.thumbnail_frame))
     };
     (0..photographs.images().len()).into_par_iter().map(thumbnail).collect()
 }

@@ -7,6 +7,7 @@ use trueup_compose::exposure::Correction;
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::matches::PairVerdict;
 
+use crate::masks::MaskRecord;
 use crate::measures::Measures;
 use crate::options::StitchOptions;
 
@@ -68,6 +69,9 @@ pub struct ImageRecord {
     /// All that was done to its light; `None` in files of programs that knew gains only.
     #[serde(default)]
     pub correction: Option<Correction>,
+    /// The masks it was given.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub masks: Vec<MaskRecord>,
     /// Three orthogonal vanishing directions in the camera frame, if found.
     pub vanishing_points: Option<[[f64; 3]; 3]>,
     /// The deformed grid.

@@ -7,6 +7,7 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::encode;
 
 use crate::files::{Written, render_and_write, thread_pool};
+use crate::masks::{AllMasks, MaskFile, MaskRecord};
 use crate::options::StitchOptions;
 use crate::project::{ImageRecord, Project};
 use crate::recorded::Recorded;
@@ -22,6 +23,8 @@ pub struct ComposeJob {
     pub project_folder: PathBuf,
     /// A folder with other photographs of the same names (whatever their extensions) and sizes, to be shown instead.
     pub photographs: Option<PathBuf>,
+    /// Pictures that mark what is to be ignored or kept, in place of the recorded ones of the photographs they name.
+    pub masks: Vec<MaskFile>,
     /// The panorama's file; its extension chooses the format.
     pub output: PathBuf,
     /// The file of the new panorama's own record, if wanted.
@@ -58,7 +61,11 @@ impl ComposeJob {
         }
         thread_pool(self.threads)?.install(|| {
             let stitcher = Stitcher::new(options, context);
-            let alignment = stitcher.recall(&self.project, self.find_photographs(options, context)?)?;
+            let images = self.find_photographs(options, context)?;
+            let mut masks = AllMasks::read(&self.masks, &images, &options.source, context)?;
+            let recorded: Vec<&[MaskRecord]> = self.project.used_images().map(|one| one.masks.as_slice()).collect();
+            masks.recall(&recorded, &images, &self.project_folder, &options.source, context)?;
+            let alignment = stitcher.recall(&self.project, images, masks)?;
             render_and_write(&stitcher, alignment, self.output.clone(), self.new_project.clone())
         })
     }

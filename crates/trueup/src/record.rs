@@ -8,6 +8,7 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::source::SourceImage;
 
 use crate::align::{Component, Geometry};
+use crate::masks::MaskRecord;
 use crate::matched::Matched;
 use crate::options::{Shape, StitchOptions};
 use crate::project::{
@@ -36,6 +37,7 @@ impl Matched {
                     width: image.width,
                     height: image.height,
                     component: component.filter(|_| self.measured[index].is_some()),
+                    masks: self.masks[index].clone(),
                     ..left_out_record(image.path.display().to_string(), reason, hint)
                 }
             })
@@ -93,6 +95,7 @@ fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
         scale: None,
         gain: None,
         correction: None,
+        masks: Vec::new(),
         vanishing_points: None,
         mesh: None,
     }
@@ -120,11 +123,13 @@ pub(crate) fn record_composition(
     project: &mut Project,
     used: &[usize],
     images: &[SourceImage],
+    masks: &[Vec<MaskRecord>],
     layout: &CanvasLayout,
     corrections: &[Correction],
 ) {
     project.canvas = Canvas { width: layout.width, height: layout.height };
     project.diagnostics.retain(|one| !FOUND_IN_COMPOSING.contains(&one.code.as_str()));
+    let mut renamed = Vec::new();
     for (k, &position) in used.iter().enumerate() {
         let record = &mut project.images[position];
         record_appearance(record, &layout.placed[k].mesh, &corrections[k]);
@@ -137,13 +142,23 @@ pub(crate) fn record_composition(
                 "",
             ));
         }
-        for known in std::iter::once(&mut project.reference).chain(&mut project.manhattan.inliers) {
-            if *known == record.path {
-                known.clone_from(&path);
-            }
-        }
-        record.path = path;
+        record.masks.clone_from(&masks[k]);
+        renamed.push((std::mem::replace(&mut record.path, path.clone()), path));
     }
+    for known in paths(project) {
+        if let Some((_, path)) = renamed.iter().find(|(old, _)| old == known) {
+            known.clone_from(path);
+        }
+    }
+}
+
+/// Everywhere that a project names photographs in use by their paths, but for their own records.
+fn paths(project: &mut Project) -> impl Iterator<Item = &mut String> {
+    let measures = project.measures.iter_mut().flat_map(|measures| {
+        let bent = measures.long_lines.iter_mut().filter_map(|lines| lines.longest_bent.as_mut());
+        measures.pictures.iter_mut().map(|one| &mut one.path).chain(bent.map(|bent| &mut bent.path))
+    });
+    std::iter::once(&mut project.reference).chain(&mut project.manhattan.inliers).chain(measures)
 }
 
 /// Where a photograph is shown and in which light.

@@ -21,6 +21,7 @@ use crate::align::{self, Component, camera_groups};
 use crate::clock::Clock;
 use crate::inputs::{Inputs, Reference};
 use crate::left_out::LeftOut;
+use crate::masks::{AllMasks, MaskRecord};
 use crate::matched::{Matched, no_overlap, none_usable, reason_of_rejected, require_all};
 use crate::measure;
 use crate::measures;
@@ -134,8 +135,10 @@ impl<'a> Stitcher<'a> {
         let sources = clock.time("source", || source::scan(&inputs.photographs, &self.options.source, self.context))?;
         self.check_any(&sources, inputs)?;
         let photographs =
-            std::sync::Arc::new(FilePhotographs::new(sources.images.clone(), self.photograph_cache_bytes()));
-        let matched = self.match_all(sources, &photographs, inputs, &mut clock)?;
+            FilePhotographs::new(sources.images.clone(), self.photograph_cache_bytes());
+        let masks = AllMasks::read(&inputs.masks, &sources.images, &self.options.source, self.context)?;
+        let photographs = std::sync::Arc::new(photographs.with_masks(masks.masks));
+        let matched = self.match_all(sources, masks.records, &photographs, inputs, &mut clock)?;
         Ok(MatchedPhotographs { matched, photographs, clock, findings: self.context.take_diagnostics(), memory: None })
     }
 
@@ -192,16 +195,17 @@ impl<'a> Stitcher<'a> {
         )
     }
 
-    /// The geometry that `project` records, over `images`: those used in it, in its order, or others of their sizes. The
-    /// canvas is laid out anew if the options ask for another one, and the corrections estimated anew if they ask for that.
+    /// The geometry that `project` records, over `images` with their `masks`: those used in it, in its order, or others of
+    /// their sizes. The canvas is laid out anew if the options ask for another one, and the corrections estimated anew if they ask for that.
     ///
     /// # Errors
     /// [`Error::Options`]; [`Error::Input`] if the project was damaged; those of the layout; [`Error::Cancelled`].
-    pub(crate) fn recall(&self, project: &Project, images: Vec<SourceImage>) -> Result<Alignment> {
+    pub(crate) fn recall(&self, project: &Project, images: Vec<SourceImage>, masks: AllMasks) -> Result<Alignment> {
         self.options.validate()?;
         let mut clock = Clock::default();
         let recorded = Recorded::new(project)?;
-        let photographs = std::sync::Arc::new(FilePhotographs::new(images, self.photograph_cache_bytes()));
+        let photographs = FilePhotographs::new(images, self.photograph_cache_bytes()).with_masks(masks.masks);
+        let photographs = std::sync::Arc::new(photographs);
         let same_canvas = self.options.canvas == project.options.canvas;
         let layout = match same_canvas {
             true => recorded.layout,
@@ -212,7 +216,8 @@ impl<'a> Stitcher<'a> {
             false => clock.time("exposure", || self.correct_anew(&layout, recorded.reference, &photographs))?,
         };
         let mut project = Project { options: self.options.clone(), ..project.clone() };
-        record_composition(&mut project, &recorded.used, photographs.images(), &layout, &corrections);
+        let images = photographs.images();
+        record_composition(&mut project, &recorded.used, images, &masks.records, &layout, &corrections);
         if !same_canvas {
             project.measures = None;
         }
@@ -282,6 +287,7 @@ impl<'a> Stitcher<'a> {
     fn match_all(
         &self,
         sources: Sources,
+        masks: Vec<Vec<MaskRecord>>,
         photographs: &FilePhotographs,
         inputs: &Inputs,
         clock: &mut Clock,
@@ -328,7 +334,7 @@ impl<'a> Stitcher<'a> {
             matching::run(&features, &frames, &candidates, &forced, &self.options.matching, self.context)
         })?;
         let graph = StitchGraph::new(names.len(), &pairs);
-        Ok(Matched { sources, measured, undecodable, pairs, graph, graph_file })
+        Ok(Matched { sources, measured, undecodable, pairs, graph, graph_file, masks })
     }
 
     /// The groups to be stitched: the largest, or all with at least two members; a single photograph is a group.

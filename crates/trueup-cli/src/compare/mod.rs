@@ -64,6 +64,7 @@ fn checked(args: CompareArgs) -> Result<(CompareJob, StitchOptions), Failure> {
         reference: chosen_reference(args.reference),
         graph: args.graph,
         all: false,
+        masks: Vec::new(),
         require_all: args.require_all,
     };
     // The library reads 0 as one thread per core.

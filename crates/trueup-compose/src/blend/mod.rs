@@ -16,8 +16,10 @@ mod views;
 
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
+use trueup_core::mask::Mask;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::Photograph;
 use trueup_core::source::PhotographSource;
@@ -71,6 +73,8 @@ struct Work<'a> {
     canvas: [usize; 2],
     /// `None` to cut without blending.
     levels: Option<Levels>,
+    /// What is ignored of each photograph.
+    ignored: Vec<Option<Arc<Mask>>>,
 }
 
 /// The finished canvas, and the seams that were used.
@@ -99,7 +103,8 @@ pub(crate) fn run(
     let seams =
         if count == 1 { Seams::of_one(size[0], size[1]) } else { seam::run(views, size, seam_options, context)? };
     let levels = levels.map(|levels| Levels::new(bases, &seams, canvas, levels));
-    let work = Work { options, seams: &seams, canvas, levels };
+    let ignored = layout.placed.iter().map(|placed| photographs.masks(placed.photograph).ignored).collect();
+    let work = Work { options, seams: &seams, canvas, levels, ignored };
 
     let strips = strips(&work, count);
     let last_strip: Vec<Option<usize>> =

@@ -121,7 +121,8 @@ fn with_work<T>(lefts: &[usize], test: impl FnOnce(&Work<'_>, &[Option<Prepared<
     let seams = seam::run(small.views, small.size, &seam_options, &context).expect("seams");
     let canvas = [layout.width, layout.height];
     let levels = Some(Levels::new(small.bases, &seams, canvas, 2));
-    let work = Work { options: &options, seams: &seams, canvas, levels };
+    let ignored = vec![None; layout.placed.len()];
+    let work = Work { options: &options, seams: &seams, canvas, levels, ignored };
     let prepared: Vec<Option<Prepared<'_>>> = pictures
         .into_iter()
         .zip(&layout.placed)

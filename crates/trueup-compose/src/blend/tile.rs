@@ -2,11 +2,14 @@
 
 use std::ops::Range;
 
+use trueup_core::mask::Mask;
+
 use super::coarse::FIRST_LEVEL;
 use super::pyramid::{Plane, add_detail, collapse, colour, level_shares};
 use super::{Base, Finished, Work};
 use crate::render::prepared::{Prepared, Scratch, Window};
 use crate::seam::{Label, NOBODY};
+use crate::unwanted::in_mask;
 
 /// Canvas pixels beside a tile that its fine levels are made of: a sample of the coarsest of them is 4 pixels wide, its
 /// own support 6 pixels, and interpolation reaches two samples further. A multiple of 2^[`FIRST_LEVEL`].
@@ -158,6 +161,7 @@ impl Tile {
             }
             self.add_opacity(&plane, &mut opacity);
             let mut mask = mask;
+            hide_ignored(&mut plane, &mask, picture, work.ignored[usize::from(*label)].as_deref());
             for level in 0..FIRST_LEVEL {
                 if sums.len() <= level as usize {
                     sums.push(Plane::new(plane.columns.clone(), plane.rows.clone()));
@@ -218,6 +222,19 @@ impl Tile {
             }
         }
     }
+}
+
+/// Takes from a photograph's `plane` what its photographer ignores and another photograph is shown for, so that nothing
+/// of it reaches over the seam.
+fn hide_ignored(plane: &mut Plane<[f32; 4]>, shown: &Plane<f32>, picture: &Prepared<'_>, ignored: Option<&Mask>) {
+    let Some(ignored) = ignored else { return };
+    let (columns, rows) = (plane.columns.clone(), plane.rows.clone());
+    picture.grid().each_place(&columns, &rows, |[x, y], place, _| {
+        let at = (y - rows.start) * columns.len() + x - columns.start;
+        if shown.texels[at] == 0.0 && ignored.contains(in_mask(ignored, place, picture.grid().size)) {
+            plane.texels[at] = [0.0; 4];
+        }
+    });
 }
 
 /// A change of the square root of linear light too small for 16 bits.

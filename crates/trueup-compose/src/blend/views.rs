@@ -2,8 +2,10 @@
 
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
+use trueup_core::mask::{Mask, Masks};
 use trueup_core::mesh::GridMesh;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::Photograph;
@@ -17,7 +19,8 @@ use crate::exposure::Correction;
 use crate::layout::{CanvasLayout, Placed};
 use crate::render::prepared::{Prepared, Scratch, Window, check_photograph};
 use crate::render::{Interpolation, RenderOptions};
-use crate::seam::{CLIPPED, PARTLY, SeamOptions, View, WHOLLY};
+use crate::seam::{CLIPPED, IGNORED, KEPT, PARTLY, SeamOptions, View, WHOLLY, small_size};
+use crate::unwanted::{Covered, Unwanted, in_mask};
 use crate::weights::WHOLE;
 
 /// What the first pass makes.
@@ -51,6 +54,7 @@ pub(super) fn make(
     let halving =
         RenderOptions { interpolation: Interpolation::Bilinear, minification_threshold: 1.0, ..options.clone() };
     let sampling = RenderOptions { minification_threshold: 4.0, ..halving.clone() };
+    let covered = Covered::find(layout, photographs, size).map(Arc::new);
     let mut room = options.kept_photographs * 1e6;
     let at_a_time = rayon::current_num_threads().max(1);
     for (placed, corrections) in layout.placed.chunks(at_a_time).zip(corrections.chunks(at_a_time)) {
@@ -64,9 +68,15 @@ pub(super) fn make(
                 // The larger picture first: the smaller is made from what is left of the photograph then.
                 let mesh = scaled(&placed.mesh, [0, 1].map(|axis| size[axis] as f64 / canvas[axis] as f64), 0.0);
                 let prepared = Prepared::new(Cow::Borrowed(&photograph), &mesh, size, correction, &halving);
-                let view = if layout.placed.len() == 1 { View::default() } else { view(&prepared, &sampling) };
+                let masks = photographs.masks(placed.photograph);
+                let view = match layout.placed.len() {
+                    1 => View::default(),
+                    _ => marked(view(&prepared, &sampling), &prepared, &masks),
+                };
                 let base = match with_bases {
-                    true => base(&prepared, placed, correction, canvas, [&halving, &sampling]),
+                    true => {
+                        base(&prepared, placed, correction, canvas, (&masks, covered.as_ref()), [&halving, &sampling])
+                    }
                     false => Base::default(),
                 };
                 context.progress().advance(RenderOptions::STAGE, 1);
@@ -83,12 +93,6 @@ pub(super) fn make(
         }
     }
     Ok(small)
-}
-
-/// The size of a canvas of at most `pixels` pixels, and at most half of the canvas along each side.
-fn small_size(canvas: [usize; 2], pixels: f64) -> [usize; 2] {
-    let scale = (pixels / (canvas[0] as f64 * canvas[1] as f64)).sqrt().min(0.5);
-    canvas.map(|length| ((length as f64 * scale) as usize).max(1))
 }
 
 /// The grid with its targets scaled by `scale` and then moved by `shift`.
@@ -125,12 +129,33 @@ fn view(prepared: &Prepared<'_>, options: &RenderOptions) -> View {
     View { columns, rows, pixels }
 }
 
+/// The view with what the photographer marked.
+fn marked(mut view: View, prepared: &Prepared<'_>, masks: &Masks) -> View {
+    if masks.ignored.is_none() && masks.kept.is_none() {
+        return view;
+    }
+    let size = prepared.grid().size;
+    let View { columns, rows, pixels } = &mut view;
+    prepared.grid().each_place(columns, rows, |[x, y], place, footprint| {
+        let flags = &mut pixels[(y - rows.start) * columns.len() + x - columns.start][3];
+        if *flags & PARTLY == 0 {
+            return;
+        }
+        let ignored = |mask: &Arc<Mask>| mask.any_within(in_mask(mask, place, size), in_mask(mask, footprint, size));
+        let kept = |mask: &Arc<Mask>| mask.contains(in_mask(mask, place, size));
+        *flags |= u8::from(masks.ignored.as_ref().is_some_and(ignored)) * IGNORED;
+        *flags |= u8::from(masks.kept.as_ref().is_some_and(kept)) * KEPT;
+    });
+    view
+}
+
 /// The coarse level of a photograph.
 fn base(
     larger: &Prepared<'_>,
     placed: &Placed,
     correction: &Correction,
     canvas: [usize; 2],
+    (masks, covered): (&Masks, Option<&Arc<Covered>>),
     [halving, sampling]: [&RenderOptions; 2],
 ) -> Base {
     let step = f64::from(1_u32 << SAMPLED_LEVEL);
@@ -139,7 +164,8 @@ fn base(
     let (photograph, [width, height]) = larger.photograph();
     let mesh = GridMesh { width, height, ..mesh };
     let size = canvas.map(|length| length.div_ceil(1 << SAMPLED_LEVEL));
-    let prepared = Prepared::new(Cow::Borrowed(photograph), &mesh, size, correction, halving);
+    let prepared = Prepared::new(Cow::Borrowed(photograph), &mesh, size, correction, halving)
+        .without(Unwanted::new(masks, covered, size));
     // Room for the interpolated rim, from a sample that every coarser level has.
     let grown = |range: Range<usize>, length: usize| {
         (range.start / RIM * RIM).saturating_sub(RIM)..(range.end + RIM).min(length)

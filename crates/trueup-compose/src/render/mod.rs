@@ -12,6 +12,7 @@ pub use layer::{Layer, layer};
 pub use panorama::Panorama;
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use trueup_core::diagnostics::Diagnostic;
@@ -23,7 +24,8 @@ use crate::blend;
 use crate::deformed_grid::count_folded_triangles;
 use crate::exposure::Correction;
 use crate::layout::{CanvasLayout, check_mesh};
-use crate::seam::SeamOptions;
+use crate::seam::{SeamOptions, small_size};
+use crate::unwanted::{Covered, Unwanted};
 use prepared::{Prepared, Scratch, check_photograph};
 
 const STAGE: &str = RenderOptions::STAGE;
@@ -108,7 +110,7 @@ pub fn run(
             let blended = blend::run(layout, corrections, photographs, (options, seams), cut, context)?;
             Ok(Panorama::from_roots(layout.width, layout.height, blended.pixels, blended.seams))
         }
-        _ => mean(layout, corrections, photographs, options, context),
+        _ => mean(layout, corrections, photographs, (options, seams), context),
     }
 }
 
@@ -117,10 +119,11 @@ fn mean(
     layout: &CanvasLayout,
     corrections: &[Correction],
     photographs: &dyn PhotographSource,
-    options: &RenderOptions,
+    (options, seams): (&RenderOptions, &SeamOptions),
     context: &StageContext,
 ) -> Result<Panorama> {
     let (width, height) = (layout.width, layout.height);
+    let covered = Covered::find(layout, photographs, small_size([width, height], seams.fine_pixels)).map(Arc::new);
     let mut sums = vec![[0.0; 4]; width * height];
     context.progress().begin(STAGE, layout.placed.len() as u64);
     let at_a_time = rayon::current_num_threads().max(1);
@@ -132,7 +135,10 @@ fn mean(
             .map(|(placed, correction)| {
                 let photograph = photographs.photograph(placed.photograph)?;
                 check_photograph(placed, &photograph)?;
-                Ok(Prepared::new(Cow::Owned(photograph), &placed.mesh, [width, height], correction, options))
+                let masks = photographs.masks(placed.photograph);
+                let prepared =
+                    Prepared::new(Cow::Owned(photograph), &placed.mesh, [width, height], correction, options);
+                Ok(prepared.without(Unwanted::new(&masks, covered.as_ref(), [width, height])))
             })
             .collect::<Result<_>>()?;
         sums.par_chunks_mut(width * BAND_ROWS).enumerate().try_for_each(|(band, sums)| {

@@ -13,6 +13,7 @@ use crate::exposure::{Correction, LightTable};
 use crate::layout::Placed;
 use crate::sampling::{Bicubic, Bilinear, MAX_STRETCH, interpolate, reduce_by_two};
 use crate::simd::{Combine, Contribution, Development, Positions, accumulate, develop, invert_row};
+use crate::unwanted::Unwanted;
 use crate::weights::Feather;
 
 /// A decoded photograph with its grid, feather and correction.
@@ -23,6 +24,7 @@ pub(crate) struct Prepared<'a> {
     grid: DeformedGrid,
     feather: Feather,
     light: LightTable,
+    unwanted: Option<Unwanted>,
 }
 
 /// Working memory of one task.
@@ -67,7 +69,17 @@ impl<'a> Prepared<'a> {
         }
         let feather = Feather::new(grid.size, options.feather_exponent);
         let light = LightTable::new(correction, grid.size);
-        Self { photograph, grid, feather, light }
+        Self { photograph, grid, feather, light, unwanted: None }
+    }
+
+    /// The same without what is not to be seen of it.
+    pub(crate) fn without(self, unwanted: Option<Unwanted>) -> Self {
+        Self { unwanted, ..self }
+    }
+
+    /// The grid, in the pixels of [`Self::photograph`].
+    pub(crate) fn grid(&self) -> &DeformedGrid {
+        &self.grid
     }
 
     /// The photograph as it is sampled, maybe reduced, and its exact size.
@@ -193,6 +205,13 @@ impl<'a> Prepared<'a> {
                 interpolate::<Bilinear>(&self.photograph, positions, stretch, samples, at_border)
             }
             Interpolation::Bicubic => interpolate::<Bicubic>(&self.photograph, positions, stretch, samples, at_border),
+        }
+        if let Some(unwanted) = &self.unwanted {
+            for (index, (x, sample)) in run.columns.clone().zip(samples).enumerate() {
+                if unwanted.hides(positions.place(index), self.grid.size, [x, y]) {
+                    sample[3] = 0.0;
+                }
+            }
         }
     }
 }

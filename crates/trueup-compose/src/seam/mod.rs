@@ -59,6 +59,12 @@ trueup_core::options! {
     }
 }
 
+/// The size of a canvas of at most `pixels` pixels, and at most half of the canvas along each side.
+pub(crate) fn small_size(canvas: [usize; 2], pixels: f64) -> [usize; 2] {
+    let scale = (pixels / (canvas[0] as f64 * canvas[1] as f64)).sqrt().min(0.5);
+    canvas.map(|length| ((length as f64 * scale) as usize).max(1))
+}
+
 /// Finds the seams between `views`, photographs on a canvas of `size` pixels (width, height).
 ///
 /// # Errors
