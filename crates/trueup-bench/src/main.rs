@@ -45,5 +45,5 @@ fn main() -> ExitCode {
 
 /// A token that the first Ctrl-C cancels; the second ends the program.
 fn cancel_token() -> Arc<CancelToken> {
-    trueup_terminal::cancel_token("trueup-bench", "stopping; what is done is kept")
+    trueup_terminal::cancel_token("trueup-bench", "stopping; what is done is kept", None)
 }

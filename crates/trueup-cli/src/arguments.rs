@@ -110,6 +110,10 @@ pub(crate) struct StitchArgs {
     #[arg(long, value_name = "NAME=FILE", help_heading = "Photographs")]
     pub keep: Vec<String>,
 
+    /// Keep what is found in the photographs in this folder, so that later runs need not find it again
+    #[arg(long, value_name = "DIR", help_heading = "Photographs")]
+    pub cache: Option<PathBuf>,
+
     /// How the panorama's shape is found (stitch.method; `trueup options stitch` names the methods)
     #[arg(long, value_name = "METHOD", help_heading = "Tuning")]
     pub method: Option<String>,
@@ -288,6 +292,10 @@ pub(crate) struct CompareArgs {
     /// Match only the pairs in this file, one `NAME -- NAME` a line
     #[arg(long, value_name = "FILE", help_heading = "Photographs")]
     pub graph: Option<PathBuf>,
+
+    /// Keep what is found in the photographs in this folder, so that later runs need not find it again
+    #[arg(long, value_name = "DIR", help_heading = "Photographs")]
+    pub cache: Option<PathBuf>,
 
     /// Every random choice derives from this number (stitch.seed)
     #[arg(long, value_name = "N", allow_hyphen_values = true, help_heading = "Tuning")]

@@ -21,9 +21,10 @@ use std::sync::Arc;
 
 use clap::Parser;
 
-use trueup::CancelToken;
+use trueup::{CancelToken, Error};
 
 use arguments::{Command, LowArgs};
+use failure::Failure;
 
 fn main() -> ExitCode {
     let outcome = match LowArgs::parse().command {
@@ -43,7 +44,12 @@ fn main() -> ExitCode {
     }
 }
 
-/// A token that the first Ctrl-C cancels; the second ends the program.
+/// A token that the first Ctrl-C cancels; work that does not stop within a second is left, with nothing half written.
+/// The second Ctrl-C ends the program.
 fn cancel_token() -> Arc<CancelToken> {
-    trueup_terminal::cancel_token("trueup", "")
+    let last_resort = || {
+        trueup::abandon_unfinished();
+        eprint!("{}", Failure::from(Error::Cancelled));
+    };
+    trueup_terminal::cancel_token("trueup", "", Some(last_resort))
 }

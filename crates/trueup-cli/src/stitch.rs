@@ -64,7 +64,8 @@ impl CheckedStitch {
         };
         // The library reads 0 as one thread per core.
         let threads = args.threads.map_or(0, usize::from);
-        Ok(Self { job: StitchJob { inputs, output: args.output, project: args.project, threads }, options })
+        let job = StitchJob { inputs, output: args.output, project: args.project, cache: args.cache, threads };
+        Ok(Self { job, options })
     }
 }
 

@@ -1,11 +1,14 @@
 //! The `trueup` command as users run it: its messages, its exit status, and what it leaves on the disk.
 
+mod cache;
 mod cli;
 mod compare;
+mod compose;
 mod determinism;
 mod documented;
 mod evaluate;
 mod failures;
+mod masks;
 mod options;
 mod pictures;
 mod run;

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use trueup_align::cameras::{self, CameraPrior, Cameras};
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points::{self, OverlapWarp};
@@ -23,6 +24,7 @@ use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 
+use crate::cache::Known;
 use crate::clock::Clock;
 use crate::measure::Measured;
 use crate::memory::{OverlapMemory, Overlaps};
@@ -45,6 +47,7 @@ pub(crate) struct Component<'a> {
 }
 
 /// The geometry of one group.
+#[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Geometry {
     pub cameras: Cameras,
     pub triads: Vec<TriadOutcome>,
@@ -122,6 +125,30 @@ pub(crate) fn camera_groups(images: &[&SourceImage]) -> Vec<usize> {
     keys.sort();
     keys.dedup();
     images.iter().map(|image| keys.binary_search(&key(image)).unwrap_or(0)).collect()
+}
+
+/// [`run`], unless an earlier run found this geometry.
+pub(crate) fn run_or_recall(
+    component: &Component,
+    options: &StitchOptions,
+    context: &StageContext,
+    clock: &mut Clock,
+    known: &Known<'_>,
+    photographs: &FilePhotographs,
+) -> Result<Geometry> {
+    let Some(key) = known.geometry_key(component, options) else {
+        return run(component, options, context, clock, None, photographs);
+    };
+    if let Some((geometry, findings)) = known.geometry(&key) {
+        findings.into_iter().for_each(|one| context.report(one));
+        return Ok(geometry);
+    }
+    let before = context.take_diagnostics();
+    let geometry = run(component, options, context, clock, None, photographs)?;
+    let findings = context.take_diagnostics();
+    known.keep_geometry(&key, &geometry, &findings);
+    before.into_iter().chain(findings).for_each(|one| context.report(one));
+    Ok(geometry)
 }
 
 /// Runs the geometry stages in their order. With a `memory`, cameras and overlaps that it holds are not found again.

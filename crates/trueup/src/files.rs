@@ -6,6 +6,7 @@ use std::time::Instant;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::encode;
 
+use crate::cache::Cache;
 use crate::inputs::Inputs;
 use crate::options::StitchOptions;
 use crate::project::{ImageRecord, Project};
@@ -21,6 +22,8 @@ pub struct StitchJob {
     pub output: PathBuf,
     /// The project's file, if wanted; numbered like the panoramas.
     pub project: Option<PathBuf>,
+    /// A folder for results that later runs can use, see [`Cache`]; made if it is not there.
+    pub cache: Option<PathBuf>,
     /// Number of threads; 0 for one per core.
     pub threads: usize,
 }
@@ -50,11 +53,12 @@ impl StitchJob {
         if let Some(project) = &self.project {
             encode::check_place(project)?;
         }
-        thread_pool(self.threads)?.install(|| self.stitch(options, context))
+        let cache = self.cache.as_ref().map(|folder| Cache::open(folder, &options.cache)).transpose()?;
+        thread_pool(self.threads)?.install(|| self.stitch(options, cache.as_ref(), context))
     }
 
-    fn stitch(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<Written>> {
-        let stitcher = Stitcher::new(options, context);
+    fn stitch(&self, options: &StitchOptions, cache: Option<&Cache>, context: &StageContext) -> Result<Vec<Written>> {
+        let stitcher = Stitcher::new(options, context).with_cache(cache);
         let aligned = stitcher.align(&self.inputs)?;
         let several = aligned.alignments.len() > 1;
         let mut written = Vec::new();

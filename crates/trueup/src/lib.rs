@@ -20,6 +20,7 @@
 #![forbid(unsafe_code)]
 
 mod align;
+mod cache;
 mod clock;
 pub mod compare;
 mod evaluation;
@@ -33,6 +34,7 @@ mod measures;
 mod memory;
 mod names;
 mod options;
+mod pairs;
 mod project;
 mod recompose;
 mod record;
@@ -41,6 +43,7 @@ mod refinement;
 mod replacements;
 mod stitcher;
 
+pub use cache::{Cache, CacheOptions, CacheUse};
 pub use evaluation::{Evaluation, PictureEvaluation, PixelEvaluation, evaluate, evaluate_pixels, read_truth};
 pub use files::{StitchJob, Written};
 pub use inputs::{Inputs, Reference};
@@ -50,8 +53,8 @@ pub use options::{Method, StitchOptions, WorkingOptions};
 pub use project::{
     Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
 };
-pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use recompose::ComposeJob;
+pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;
 pub use trueup_compose::render::Panorama;
@@ -61,4 +64,4 @@ pub use trueup_core::options::{InvalidOption, OptionDescription};
 pub use trueup_core::raster::RowSource;
 pub use trueup_core::truth::{ImageTruth, Truth};
 pub use trueup_core::{Error, Result, StageContext};
-pub use trueup_io::encode::{OutputOptions, write as write_picture};
+pub use trueup_io::encode::{OutputOptions, abandon_unfinished, write as write_picture};

@@ -79,8 +79,7 @@ impl AllMasks {
         options: &SourceOptions,
         context: &StageContext,
     ) -> Result<Self> {
-        let mut all =
-            Self { masks: vec![Masks::default(); images.len()], records: vec![Vec::new(); images.len()] };
+        let mut all = Self { masks: vec![Masks::default(); images.len()], records: vec![Vec::new(); images.len()] };
         for one in files {
             let position = photograph_named(images, &one.photograph, "so nothing of it can be masked")?;
             let record = MaskRecord { path: one.file.display().to_string(), kind: one.kind };

@@ -11,6 +11,7 @@ use trueup_io::decode::FilePhotographs;
 use trueup_vision::features::{self, Features};
 use trueup_vision::lines;
 
+use crate::cache::Known;
 use crate::clock::Clock;
 use crate::masks;
 use crate::options::StitchOptions;
@@ -39,12 +40,13 @@ struct Busy {
     lines: Duration,
 }
 
-/// Measures every photograph in parallel. A photograph that cannot be decoded yields its error; the others go on.
+/// Measures every photograph in parallel but for those that earlier runs measured. A photograph that cannot be decoded yields its error; the others go on.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
 pub(crate) fn run(
     photographs: &FilePhotographs,
+    known: Option<&Known<'_>>,
     options: &StitchOptions,
     context: &StageContext,
     clock: &mut Clock,
@@ -56,7 +58,16 @@ pub(crate) fn run(
         .into_par_iter()
         .map(|index| {
             let mut busy = Busy::default();
-            let result = measure(photographs, index, options, context, &mut busy);
+            let result = match known.and_then(|known| known.measured(index)) {
+                Some(measured) => Ok(measured),
+                None => {
+                    let result = measure(photographs, index, options, context, &mut busy);
+                    if let (Some(known), Ok(measured)) = (known, &result) {
+                        known.keep_measured(index, measured);
+                    }
+                    result
+                }
+            };
             context.progress().advance(STAGE, 1);
             (result, busy)
         })
@@ -101,14 +112,7 @@ fn measure(
     }
     busy.lines = next_lap();
     let gray = refinement::needs_pixels(options).then(|| refinement::eight_bit(&picture.gray));
-    Ok(Measured {
-        frame,
-        features,
-        lines,
-        gray,
-        thumbnail,
-        thumbnail_frame: picture.thumbnail_frame,
-    })
+    Ok(Measured { frame, features, lines, gray, thumbnail, thumbnail_frame: picture.thumbnail_frame })
 }
 
 /// The thumbnails of photographs that need not be measured, with their frames.

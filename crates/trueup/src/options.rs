@@ -22,6 +22,7 @@ use trueup_vision::lines::LineOptions;
 use trueup_vision::matching::MatchingOptions;
 use trueup_vision::pairing::PairingOptions;
 
+use crate::cache::CacheOptions;
 use crate::compare::CompareOptions;
 
 trueup_core::choice! {
@@ -213,11 +214,13 @@ stage_options! {
     measures: MeasureOptions,
     /// How methods are compared side by side.
     compare: CompareOptions,
+    /// How much is kept between runs.
+    cache: CacheOptions,
 }
 
 /// The stages whose options a project's panorama may be composed with anew; those of the others are recorded with the
 /// geometry.
-const COMPOSING: [&str; 8] = [
+const COMPOSING: [&str; 9] = [
     SourceOptions::STAGE,
     CanvasOptions::STAGE,
     ExposureOptions::STAGE,
@@ -226,6 +229,7 @@ const COMPOSING: [&str; 8] = [
     OutputOptions::STAGE,
     MeasureOptions::STAGE,
     CompareOptions::STAGE,
+    CacheOptions::STAGE,
 ];
 
 /// Options of other stages that change no result.
@@ -267,7 +271,8 @@ impl StitchOptions {
         let (own, recorded) = (self.to_table()?, recorded.to_table()?);
         let mut differing = Vec::new();
         for stage in Self::stages().into_iter().filter(|stage| !COMPOSING.contains(stage)) {
-            let table = |table: &toml::Table| table.get(stage).and_then(toml::Value::as_table).cloned().unwrap_or_default();
+            let table =
+                |table: &toml::Table| table.get(stage).and_then(toml::Value::as_table).cloned().unwrap_or_default();
             let recorded = table(&recorded);
             for (option, value) in table(&own) {
                 let name = format!("{stage}.{option}");

@@ -178,3 +178,115 @@ pub(crate) fn check_size(image: &SourceImage, record: &ImageRecord) -> Result<()
         "Give back the photograph that was stitched.",
     ))
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use serde_json::{Value, json};
+    use trueup_compose::{layout, render};
+    use trueup_core::raster::{Photograph, Raster};
+    use trueup_core::source::PhotographSource;
+
+    use super::*;
+
+    /// Two photographs of 8 x 6 pixels side by side, as a project.
+    fn project() -> Value {
+        let image = |path: &str, left: f64| {
+            let even: Vec<[f64; 2]> = GridMesh::regular(8.0, 6.0, 4.0).target;
+            let target: Vec<[f64; 2]> = even.iter().map(|vertex| [vertex[0] + left, vertex[1]]).collect();
+            json!({
+                "path": path, "width": 8, "height": 6, "status": "used", "reason": "", "hint": "",
+                "gain": 1.1, "correction": {"gain": [1.1, 1.0, 0.9], "vignetting": [0.1, 0.0, 0.0]},
+                "mesh": {"rows": 3, "cols": 3, "source": even, "target": target}
+            })
+        };
+        json!({
+            "format": "trueup-project", "version": 1, "method": "vpg", "options": {}, "reference": "b.jpg",
+            "images": [image("a.jpg", 0.0), image("b.jpg", 5.5)], "pairs": [],
+            "manhattan": {"threshold": 0.1, "accepted": false, "inliers": []},
+            "canvas": {"width": 14, "height": 6}, "seconds": {}, "diagnostics": []
+        })
+    }
+
+    fn read(project: &Value) -> Result<(Project, Recorded)> {
+        let project = Project::from_json(&project.to_string(), "p.json")?;
+        let recorded = Recorded::new(&project)?;
+        Ok((project, recorded))
+    }
+
+    /// Gray photographs of the size that is asked for.
+    struct Plain(Vec<[usize; 2]>);
+
+    impl PhotographSource for Plain {
+        fn photograph(&self, index: usize) -> Result<Photograph> {
+            let [width, height] = self.0[index];
+            Ok(Photograph::Eight(Raster::new(width, height, 1)))
+        }
+    }
+
+    #[test]
+    fn a_project_is_read_as_it_was_written() {
+        let (_, recorded) = read(&project()).expect("whole");
+        assert_eq!((recorded.used, recorded.reference), (vec![0, 1], 1));
+        assert_eq!((recorded.layout.width, recorded.layout.height), (14, 6));
+        assert_eq!(recorded.layout.placed[1].mesh.target[4], [9.5, 3.0]);
+        assert_eq!(recorded.corrections[0].gain, [1.1, 1.0, 0.9]);
+    }
+
+    /// Every place in a value, as a JSON pointer.
+    fn pointers(value: &Value, here: &str, all: &mut Vec<String>) {
+        all.push(here.to_owned());
+        match value {
+            Value::Object(fields) => {
+                fields.iter().for_each(|(name, value)| pointers(value, &format!("{here}/{name}"), all));
+            }
+            Value::Array(values) => {
+                values.iter().enumerate().for_each(|(at, value)| pointers(value, &format!("{here}/{at}"), all));
+            }
+            _ => {}
+        }
+    }
+
+    fn anything() -> impl Strategy<Value = Value> {
+        prop_oneof![
+            Just(Value::Null),
+            Just(json!([])),
+            Just(json!({})),
+            any::<bool>().prop_map(Value::from),
+            any::<i64>().prop_map(Value::from),
+            (0..20_i64).prop_map(Value::from),
+            any::<f64>().prop_map(Value::from),
+            (-20.0..20.0_f64).prop_map(Value::from),
+            prop_oneof!["used", "left_out", "a.jpg", ""].prop_map(Value::from),
+            Just(json!(u64::MAX)),
+        ]
+    }
+
+    proptest! {
+        /// Whatever is changed in a project, it is refused or composed, and nothing panics.
+        #[test]
+        fn no_change_of_a_project_panics(changes in prop::collection::vec((any::<prop::sample::Index>(), anything()), 1..3)) {
+            let mut changed = project();
+            for (place, value) in changes {
+                let mut all = Vec::new();
+                pointers(&changed, "", &mut all);
+                if let Some(old) = changed.pointer_mut(place.get(&all)) {
+                    *old = value;
+                }
+            }
+            let Ok((project, recorded)) = read(&changed) else { return Ok(()) };
+            let sizes: Vec<[usize; 2]> =
+                recorded.used.iter().map(|&at| [project.images[at].width, project.images[at].height]).collect();
+            let canvas = recorded.layout.width.saturating_mul(recorded.layout.height);
+            if canvas > 10_000 || sizes.iter().any(|size| size[0].saturating_mul(size[1]) > 10_000) {
+                return Ok(());
+            }
+            let context = StageContext::default();
+            let options = &project.options;
+            let photographs = Plain(sizes);
+            let (layout, corrections) = (&recorded.layout, &recorded.corrections);
+            drop(render::run(layout, corrections, &photographs, &options.render, &options.seam, &context));
+            drop(layout::run(recorded.layout.placed, recorded.reference, &options.canvas, &context));
+        }
+    }
+}

@@ -1,7 +1,5 @@
 //! The order of the stages: the one place that knows it.
 
-use std::collections::BTreeSet;
-
 use trueup_align::stitch_graph::{GraphFile, StitchGraph, parse_graph_file};
 use trueup_compose::exposure::{self, Correction, Thumbnail};
 use trueup_compose::fidelity::{self, Fidelity};
@@ -9,15 +7,14 @@ use trueup_compose::layout::{self, CanvasLayout};
 use trueup_compose::render::{self, Panorama};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::lines::LineSegment;
-use trueup_core::matches::PairMatches;
 use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 use trueup_io::source::{self, RejectedSource, Sources};
 use trueup_vision::features::Features;
-use trueup_vision::{matching, pairing};
 
 use crate::align::{self, Component, camera_groups};
+use crate::cache::{Cache, Key, Known, photograph_keys};
 use crate::clock::Clock;
 use crate::inputs::{Inputs, Reference};
 use crate::left_out::LeftOut;
@@ -28,6 +25,7 @@ use crate::measures;
 use crate::memory::OverlapMemory;
 use crate::names;
 use crate::options::StitchOptions;
+use crate::pairs;
 use crate::project::Project;
 use crate::record::{fill_geometry, place, record_composition};
 use crate::recorded::Recorded;
@@ -37,6 +35,7 @@ use crate::recorded::Recorded;
 pub struct Stitcher<'a> {
     options: &'a StitchOptions,
     context: &'a StageContext<'a>,
+    cache: Option<&'a Cache>,
 }
 
 /// What [`Stitcher::align`] found: one alignment per group of photographs to be stitched, the largest first.
@@ -54,6 +53,8 @@ pub struct MatchedPhotographs {
     clock: Clock,
     findings: Vec<Diagnostic>,
     memory: Option<OverlapMemory>,
+    /// What decides each photograph's measurements; empty without a cache.
+    keys: Vec<Option<Key>>,
 }
 
 impl MatchedPhotographs {
@@ -103,7 +104,14 @@ impl Alignment {
 impl<'a> Stitcher<'a> {
     /// A stitcher with these options. Parallel work runs on the current thread pool.
     pub fn new(options: &'a StitchOptions, context: &'a StageContext<'a>) -> Self {
-        Self { options, context }
+        Self { options, context, cache: None }
+    }
+
+    /// The same stitcher, which finds results of earlier runs in `cache` and keeps its own there. They decide how long the
+    /// work takes, never what comes of it.
+    #[must_use]
+    pub fn with_cache(self, cache: Option<&'a Cache>) -> Self {
+        Self { cache, ..self }
     }
 
     pub(crate) fn options(&self) -> &StitchOptions {
@@ -134,12 +142,20 @@ impl<'a> Stitcher<'a> {
         let mut clock = Clock::default();
         let sources = clock.time("source", || source::scan(&inputs.photographs, &self.options.source, self.context))?;
         self.check_any(&sources, inputs)?;
-        let photographs =
-            FilePhotographs::new(sources.images.clone(), self.photograph_cache_bytes());
+        let photographs = FilePhotographs::new(sources.images.clone(), self.photograph_cache_bytes());
         let masks = AllMasks::read(&inputs.masks, &sources.images, &self.options.source, self.context)?;
         let photographs = std::sync::Arc::new(photographs.with_masks(masks.masks));
-        let matched = self.match_all(sources, masks.records, &photographs, inputs, &mut clock)?;
-        Ok(MatchedPhotographs { matched, photographs, clock, findings: self.context.take_diagnostics(), memory: None })
+        let keys = match self.cache {
+            Some(_) => clock.time("source", || photograph_keys(&photographs, self.options, self.context))?,
+            None => Vec::new(),
+        };
+        let known = self.known(&keys);
+        let matched = self.match_all(sources, masks.records, &photographs, known.as_ref(), inputs, &mut clock)?;
+        if let Some(cache) = self.cache {
+            cache.report(self.context);
+        }
+        let findings = self.context.take_diagnostics();
+        Ok(MatchedPhotographs { matched, photographs, clock, findings, memory: None, keys })
     }
 
     /// Estimates the geometry of the panoramas that matched photographs make.
@@ -284,11 +300,16 @@ impl<'a> Stitcher<'a> {
         Err(none_usable(sources.rejected.iter().cloned().map(reason_of_rejected).collect()))
     }
 
+    fn known<'k>(&'k self, keys: &'k [Option<Key>]) -> Option<Known<'k>> {
+        self.cache.filter(|_| !keys.is_empty()).map(|cache| Known { cache, keys })
+    }
+
     fn match_all(
         &self,
         sources: Sources,
         masks: Vec<Vec<MaskRecord>>,
         photographs: &FilePhotographs,
+        known: Option<&Known<'_>>,
         inputs: &Inputs,
         clock: &mut Clock,
     ) -> Result<Matched> {
@@ -301,7 +322,7 @@ impl<'a> Stitcher<'a> {
             }
         };
         let (mut measured, mut undecodable) = (Vec::new(), Vec::new());
-        for outcome in measure::run(photographs, self.options, self.context, clock)? {
+        for outcome in measure::run(photographs, known, self.options, self.context, clock)? {
             match outcome {
                 Ok(one) => {
                     measured.push(Some(one));
@@ -322,16 +343,9 @@ impl<'a> Stitcher<'a> {
             .iter_mut()
             .map(|one| one.as_mut().map_or(unmeasured.clone(), |one| std::mem::take(&mut one.features)))
             .collect();
-        let pairs = clock.time("matching", || -> Result<Vec<PairMatches>> {
-            let candidates = if graph_file.edges.is_empty() {
-                pairing::propose(&features, &self.options.pairing, self.context)?.pairs
-            } else {
-                graph_file.edges.clone()
-            };
+        let pairs = clock.time("matching", || {
             let usable = |index: usize| measured[index].is_some();
-            let candidates: Vec<_> = candidates.into_iter().filter(|&(a, b)| usable(a) && usable(b)).collect();
-            let forced: BTreeSet<(usize, usize)> = graph_file.edges.iter().copied().collect();
-            matching::run(&features, &frames, &candidates, &forced, &self.options.matching, self.context)
+            pairs::run(&features, &frames, &graph_file.edges, &usable, known, self.options, self.context)
         })?;
         let graph = StitchGraph::new(names.len(), &pairs);
         Ok(Matched { sources, measured, undecodable, pairs, graph, graph_file, masks })
@@ -398,7 +412,14 @@ impl<'a> Stitcher<'a> {
             Component::new(members, reference, rotation, &matched.sources.images, &matched.measured, &matched.pairs);
         let geometry = match members.len() {
             1 => None,
-            _ => Some(align::run(&component, self.options, self.context, &mut clock, memory.as_ref(), photographs)?),
+            _ => Some(match (memory, self.known(&set.keys)) {
+                (None, Some(known)) => {
+                    align::run_or_recall(&component, self.options, self.context, &mut clock, &known, photographs)?
+                }
+                (memory, _) => {
+                    align::run(&component, self.options, self.context, &mut clock, memory.as_ref(), photographs)?
+                }
+            }),
         };
         let placed = place(&component, geometry.as_ref());
         let layout = layout::run(placed, component.reference, &self.options.canvas, self.context)?;

@@ -71,7 +71,8 @@ fn checked(args: CompareArgs) -> Result<(CompareJob, StitchOptions), Failure> {
     let threads = args.threads.map_or(0, usize::from);
     // The command demands an output wherever this is called.
     let output = args.output.unwrap_or_default();
-    Ok((CompareJob { inputs, entries, truth: args.truth, ranked: args.rank, output, threads }, options))
+    let cache = args.cache;
+    Ok((CompareJob { inputs, entries, truth: args.truth, ranked: args.rank, output, cache, threads }, options))
 }
 
 /// The methods that were named, or all, then the entries that were typed. Every one that cannot be is listed.

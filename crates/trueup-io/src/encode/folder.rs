@@ -6,6 +6,7 @@ use tempfile::TempDir;
 use trueup_core::{Error, Result};
 
 use super::pending::{PART, PREFIX, allow_umask, require_folder};
+use super::unfinished::{Entry, UNFINISHED};
 
 /// Permissions that any new folder asks for.
 const NEW_FOLDER: u32 = 0o777;
@@ -15,6 +16,8 @@ const NEW_FOLDER: u32 = 0o777;
 pub struct PendingFolder {
     temporary: TempDir,
     target: PathBuf,
+    /// After the folder, which is gone before it leaves the list.
+    entry: Entry<'static>,
 }
 
 impl PendingFolder {
@@ -39,8 +42,9 @@ impl PendingFolder {
         let mut builder = tempfile::Builder::new();
         builder.prefix(PREFIX).suffix(PART);
         allow_umask(&mut builder, NEW_FOLDER);
-        let temporary = builder.tempdir_in(parent).map_err(|error| Error::io("writing into", parent, error))?;
-        Ok(Self { temporary, target })
+        let make = || builder.tempdir_in(parent).map_err(|error| Error::io("writing into", parent, error));
+        let (temporary, entry) = UNFINISHED.begin(make, TempDir::path)?;
+        Ok(Self { temporary, target, entry })
     }
 
     /// Where files are to be written until the folder has its name.
@@ -54,10 +58,16 @@ impl PendingFolder {
     /// # Errors
     /// [`Error::Io`] if the operating system refuses.
     pub fn commit(self) -> Result<()> {
-        let Self { temporary, target } = self;
-        let failed = |error: std::io::Error| Error::io("writing", &target, error);
+        let Self { temporary, target, entry } = self;
+        let committed = UNFINISHED.complete(|| Self::replace(temporary, &target));
+        drop(entry);
+        committed
+    }
+
+    fn replace(temporary: TempDir, target: &Path) -> Result<()> {
+        let failed = |error: std::io::Error| Error::io("writing", target, error);
         if !target.exists() {
-            std::fs::rename(temporary.path(), &target).map_err(failed)?;
+            std::fs::rename(temporary.path(), target).map_err(failed)?;
             let _ = temporary.keep();
             return Ok(());
         }
@@ -65,10 +75,10 @@ impl PendingFolder {
         let parent = temporary.path().parent().unwrap_or(Path::new("."));
         let aside = tempfile::Builder::new().prefix(PREFIX).suffix(".old").tempdir_in(parent).map_err(failed)?;
         let old = aside.path().join("old");
-        std::fs::rename(&target, &old).map_err(failed)?;
-        if let Err(error) = std::fs::rename(temporary.path(), &target) {
+        std::fs::rename(target, &old).map_err(failed)?;
+        if let Err(error) = std::fs::rename(temporary.path(), target) {
             // The first failure is the one to tell of; should this fail, too, the old folder must not be dropped.
-            if std::fs::rename(&old, &target).is_err() {
+            if std::fs::rename(&old, target).is_err() {
                 let _ = aside.keep();
             }
             return Err(failed(error));

@@ -6,6 +6,7 @@ mod jpeg;
 mod pending;
 #[cfg(test)]
 mod tests;
+mod unfinished;
 
 use std::path::Path;
 
@@ -19,6 +20,7 @@ use crate::format::PictureFormat;
 use pending::PendingFile;
 
 pub use folder::PendingFolder;
+pub use unfinished::abandon_unfinished;
 
 trueup_core::choice! {
     /// How finely JPEG stores colour, relative to brightness.

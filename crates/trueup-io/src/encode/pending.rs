@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 use trueup_core::{Error, Result};
 
+use super::unfinished::{Entry, UNFINISHED};
+
 /// How temporary names begin, and how those of what is not yet complete end.
 pub(super) const PREFIX: &str = ".trueup-";
 pub(super) const PART: &str = ".part";
@@ -18,6 +20,8 @@ const NEW_FILE: u32 = 0o666;
 pub(crate) struct PendingFile {
     temporary: NamedTempFile,
     target: PathBuf,
+    /// After the file, which is gone before it leaves the list.
+    _entry: Entry<'static>,
 }
 
 impl PendingFile {
@@ -49,8 +53,9 @@ impl PendingFile {
             Some(metadata) => drop(builder.permissions(metadata.permissions())),
             None => allow_umask(&mut builder, NEW_FILE),
         }
-        let temporary = builder.tempfile_in(folder).map_err(|error| Error::io("writing into", folder, error))?;
-        Ok(Self { temporary, target })
+        let make = || builder.tempfile_in(folder).map_err(|error| Error::io("writing into", folder, error));
+        let (temporary, entry) = UNFINISHED.begin(make, NamedTempFile::path)?;
+        Ok(Self { temporary, target, _entry: entry })
     }
 
     /// The file to write to.
@@ -60,9 +65,10 @@ impl PendingFile {
 
     /// Gives the file its name; returns its length in bytes.
     pub(crate) fn commit(self) -> Result<u64> {
-        let length =
-            self.temporary.as_file().metadata().map_err(|error| Error::io("writing", &self.target, error))?.len();
-        self.temporary.persist(&self.target).map_err(|failed| Error::io("writing", &self.target, failed.error))?;
+        let Self { temporary, target, _entry } = self;
+        let length = temporary.as_file().metadata().map_err(|error| Error::io("writing", &target, error))?.len();
+        UNFINISHED
+            .complete(|| temporary.persist(&target).map_err(|failed| Error::io("writing", &target, failed.error)))?;
         Ok(length)
     }
 }

@@ -15,6 +15,7 @@ mod simd;
 mod tests;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use trueup_core::options::StageOptions;
 use trueup_core::raster::Raster;
 use trueup_core::{Error, Result, StageContext};
@@ -30,7 +31,7 @@ pub const DESCRIPTOR_LENGTH: usize = 128;
 pub type Descriptor = [u8; DESCRIPTOR_LENGTH];
 
 /// A place that looks distinctive at one scale.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FeaturePoint {
     /// Position (x, y) in the picture's pixels.
     pub position: [f64; 2],

@@ -55,8 +55,7 @@ pub struct Picture<'a> {
 
 /// Matches the pictures of every pair, in parallel; the results are in the order of `pairs`.
 ///
-/// `forced` holds the pairs (smaller index first) that the user's graph joins. Pairs that show the same view are
-/// reported as diagnostics with the code `near-duplicate`.
+/// `forced` holds the pairs (smaller index first) that the user's graph joins.
 ///
 /// # Errors
 /// [`Error::Options`]; [`Error::Input`] if a pair names a picture that is not there or twice the same, or if features
@@ -88,11 +87,14 @@ pub fn run(
         })
         .collect();
     context.progress().finish(STAGE);
-    let matched = matched?;
-    for pair in matched.iter().filter(|pair| is_near_duplicate(pair)) {
+    matched
+}
+
+/// Reports the pairs that show the same view, as diagnostics with the code `near-duplicate`.
+pub fn report_near_duplicates(pairs: &[PairMatches], context: &StageContext<'_>) {
+    for pair in pairs.iter().filter(|pair| is_near_duplicate(pair)) {
         context.report(near_duplicate(pair));
     }
-    Ok(matched)
 }
 
 /// Matches two pictures and judges whether they overlap.
@@ -133,7 +135,8 @@ pub fn match_pair(
         return Ok(pair);
     }
     context.check_cancelled()?;
-    let mut generator = context.generator(STAGE, (a.index as u64) << 32 | b.index as u64);
+    // Seeded by what is matched, so that the result does not depend on which other pictures there are.
+    let mut generator = context.generator(STAGE, fingerprint(a.features).rotate_left(1) ^ fingerprint(b.features));
     let points = matched_points(&putative);
     let search = Search {
         inlier_px: options.inlier_px,
@@ -205,6 +208,15 @@ fn all_inliers(
         inliers.extend(more.iter().map(|found| found.at));
     }
     inliers
+}
+
+/// A number that tells the features of one picture from those of another.
+fn fingerprint(features: &Features) -> u64 {
+    // FNV-1a over whole words, turned so that high bits count.
+    const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+    const PRIME: u64 = 0x0000_0100_0000_01b3;
+    let words = features.points.iter().flat_map(|point| point.position.map(f64::to_bits));
+    words.fold(OFFSET, |hash, word| (hash ^ word).wrapping_mul(PRIME).rotate_left(29))
 }
 
 /// How many matches must agree when `in_overlap` lie in the predicted overlap.

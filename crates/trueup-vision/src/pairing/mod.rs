@@ -49,26 +49,41 @@ pub fn propose(features: &[Features], options: &PairingOptions, context: &StageC
     if count <= options.exhaustive_up_to {
         return Ok(CandidatePairs { pairs: all_pairs(count), exhaustive: true });
     }
-    for (index, features) in features.iter().enumerate() {
-        check_features(index, features)?;
-    }
-    let looks = quick_looks(features, options, context)?;
-    let mut pairs: Vec<(usize, usize)> = (0..count).flat_map(|picture| nearest(picture, &looks, options)).collect();
+    Ok(propose_by(&quick_looks(features, &|_, _| None, options, context)?, options))
+}
+
+/// The proposal of [`propose`] for many pictures, from the [`quick_looks`] at their pairs.
+pub fn propose_by(looks: &[Vec<usize>], options: &PairingOptions) -> CandidatePairs {
+    let count = looks.len();
+    let mut pairs: Vec<(usize, usize)> = (0..count).flat_map(|picture| nearest(picture, looks, options)).collect();
     if options.consecutive {
         pairs.extend((1..count).map(|next| (next - 1, next)));
     }
     pairs.sort_unstable();
     pairs.dedup();
-    let exhaustive = pairs.len() == count * (count - 1) / 2;
-    Ok(CandidatePairs { pairs, exhaustive })
+    let exhaustive = pairs.len() == count * count.saturating_sub(1) / 2;
+    CandidatePairs { pairs, exhaustive }
 }
 
 fn all_pairs(count: usize) -> Vec<(usize, usize)> {
     (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))).collect()
 }
 
-/// Numbers of putative matches of all pairs: `looks[b][a]` for a < b.
-fn quick_looks(features: &[Features], options: &PairingOptions, context: &StageContext<'_>) -> Result<Vec<Vec<usize>>> {
+/// Numbers of putative matches of the strongest features of all pairs: `looks[b][a]` for a < b. Pairs whose number
+/// `known(a, b)` tells are not looked at.
+///
+/// # Errors
+/// As [`propose`].
+pub fn quick_looks(
+    features: &[Features],
+    known: &(dyn Fn(usize, usize) -> Option<usize> + Sync),
+    options: &PairingOptions,
+    context: &StageContext<'_>,
+) -> Result<Vec<Vec<usize>>> {
+    options.check()?;
+    for (index, features) in features.iter().enumerate() {
+        check_features(index, features)?;
+    }
     let subsets: Vec<Features> = features.iter().map(|features| strongest(features, options.subset)).collect();
     let matching = MatchingOptions::default();
     context.progress().begin(PairingOptions::STAGE, features.len() as u64);
@@ -77,6 +92,9 @@ fn quick_looks(features: &[Features], options: &PairingOptions, context: &StageC
         .map(|b| {
             let look = |a: usize| {
                 context.check_cancelled()?;
+                if let Some(known) = known(a, b) {
+                    return Ok(known);
+                }
                 Ok(putative_matches(&subsets[a], &subsets[b], &matching).len())
             };
             let looks: Result<Vec<usize>> = (0..b).map(look).collect();

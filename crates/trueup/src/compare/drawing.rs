@@ -8,9 +8,9 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::source::WorkingFrame;
 
 use super::CompareOptions;
-use crate::recorded::grid;
 use crate::options::StitchOptions;
 use crate::project::{ImageRecord, Project};
+use crate::recorded::grid;
 use crate::stitcher::MatchedPhotographs;
 
 /// Points in panorama pixels, to be joined.

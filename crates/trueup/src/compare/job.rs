@@ -16,6 +16,7 @@ use super::record::{
     COMPARISON_FORMAT, COMPARISON_VERSION, Compared, ComparedPhotograph, Comparison, PanoramaRecord, Refusal,
 };
 use super::{Entry, figures, overlaps, ranking};
+use crate::cache::Cache;
 use crate::evaluation::{evaluate, read_truth};
 use crate::inputs::Inputs;
 use crate::options::StitchOptions;
@@ -39,6 +40,8 @@ pub struct CompareJob {
     pub ranked: Option<Vec<String>>,
     /// The folder to write.
     pub output: PathBuf,
+    /// A folder for results that later runs can use, see [`Cache`]; made if it is not there.
+    pub cache: Option<PathBuf>,
     /// Number of threads; 0 for one per core.
     pub threads: usize,
 }
@@ -123,7 +126,9 @@ impl CompareJob {
     ) -> Result<Comparison> {
         let start = Instant::now();
         let inputs = Inputs { all: false, ..self.inputs.clone() };
-        let set = Stitcher::new(options, context).match_photographs(&inputs)?.remembering();
+        let cache = self.cache.as_ref().map(|folder| Cache::open(folder, &options.cache)).transpose()?;
+        let stitcher = Stitcher::new(options, context).with_cache(cache.as_ref());
+        let set = stitcher.match_photographs(&inputs)?.remembering();
         spare_photographs(&self.output, set.photographs().images().iter().map(|image| image.path.as_path()))?;
         let pixels: f64 = set.photographs().images().iter().map(|image| (image.width * image.height) as f64).sum();
         let options = &at_page_size(options, pixels);

@@ -1,0 +1,132 @@
+//! Panoramas composed again from their projects.
+
+use serde_json::{Value, json};
+
+use crate::pictures::{STREET_NAMES, plain, street_desk};
+use crate::run::{Desk, Run, finish, trueup};
+
+/// A folder with the street's photographs, their panorama `pano.jpg` and its project `pano.json`.
+fn stitched() -> Desk {
+    let desk = street_desk();
+    desk.stitch(&[&STREET_NAMES[..], &["--project", "pano.json"]].concat()).expect_success();
+    desk
+}
+
+fn compose(desk: &Desk, arguments: &[&str]) -> Run {
+    finish(trueup(desk.path(), &[&["compose", "pano.json", "-o", "again.jpg"], arguments].concat()))
+}
+
+#[test]
+fn the_same_options_give_the_same_bytes() {
+    let desk = stitched();
+    let stdout = compose(&desk, &["--project", "again.json"]).expect_success().to_owned();
+    assert!(stdout.contains("pictures  4 of 4 used"), "{stdout}");
+    assert!(desk.read("pano.jpg") == desk.read("again.jpg"), "the panoramas differ");
+    let without_seconds = |name: &str| {
+        let mut project = desk.json(name);
+        project.as_object_mut().expect("an object").remove("seconds");
+        project
+    };
+    assert_eq!(without_seconds("pano.json"), without_seconds("again.json"));
+}
+
+#[test]
+fn other_options_of_composing_are_heeded_and_others_refused() {
+    let desk = stitched();
+    let canvas = desk.json("pano.json")["canvas"]["width"].as_u64().expect("a width");
+    compose(&desk, &["--scale", "0.25", "--set", "render.blend=feather", "--project", "small.json"]).expect_success();
+    let small = desk.json("small.json");
+    let width = small["canvas"]["width"].as_u64().expect("a width");
+    assert!(width.abs_diff(canvas / 2) <= 1, "{width} is not half of {canvas}");
+    assert_eq!((&small["measures"], &small["options"]["canvas"]["scale"]), (&Value::Null, &json!(0.25)));
+    // What was written can be composed, too.
+    let again = finish(trueup(desk.path(), &["compose", "small.json", "-o", "third.jpg"]));
+    again.expect_success();
+    assert!(desk.read("again.jpg") == desk.read("third.jpg"));
+    compose(&desk, &["--set", "mesh.cell_px=30", "--set", "stitch.seed=5"]).expect_failure(
+        2,
+        &[
+            "composing a recorded panorama with another stitch.seed, mesh.cell_px is not supported",
+            "stitch the photographs",
+        ],
+    );
+    compose(&desk, &["--set", "exposure.enabled=false"]).expect_success();
+    assert!(desk.read("again.jpg") != desk.read("pano.jpg"));
+}
+
+#[test]
+fn photographs_are_found_where_they_moved_and_others_shown_in_their_place() {
+    let desk = stitched();
+    let folder = desk.join("moved");
+    std::fs::create_dir(&folder).expect("a folder");
+    for name in STREET_NAMES {
+        std::fs::rename(desk.join(name), folder.join(name)).expect("moved");
+    }
+    compose(&desk, &[]).expect_failure(1, &["4 of 4 photographs: a.jpg: photograph not found", "d.jpg: ", "--photos"]);
+    compose(&desk, &["--photos", "moved"]).expect_success();
+    assert!(desk.read("pano.jpg") == desk.read("again.jpg"), "the panoramas differ");
+    // Beside the project, wherever the command is run.
+    std::fs::copy(desk.join("pano.json"), folder.join("pano.json")).expect("copied");
+    finish(trueup(desk.path(), &["compose", "moved/pano.json", "-o", "third.jpg"])).expect_success();
+    assert!(desk.read("pano.jpg") == desk.read("third.jpg"), "the panoramas differ");
+    // Plain pictures of the same names and size.
+    std::fs::create_dir(desk.join("gray")).expect("a folder");
+    for (name, level) in [("a.jpg", 90), ("b.jpeg", 91), ("c.jpg", 92), ("d.jpg", 93)] {
+        desk.put(&format!("gray/{name}"), plain(480, 360, level));
+    }
+    let verbose = compose(&desk, &["--photos", "gray", "--verbose"]);
+    assert!(verbose.expect_success().contains("b.jpg: gray/b.jpeg is shown"), "{}", verbose.stdout);
+    desk.put("gray/d.jpg", plain(481, 360, 93));
+    std::fs::remove_file(desk.join("gray/a.jpg")).expect("removed");
+    compose(&desk, &["--photos", "gray"]).expect_failure(
+        1,
+        &["2 of 4 photographs: a.jpg: no file in gray has its name; gray/d.jpg: it is 481 x 360 px, the project has it at 480 x 360 px"],
+    );
+    // Other names: the order counts.
+    std::fs::create_dir(desk.join("order")).expect("a folder");
+    for (position, name) in STREET_NAMES.iter().enumerate() {
+        std::fs::copy(folder.join(name), desk.join(&format!("order/{}.jpg", position + 8))).expect("copied");
+    }
+    compose(&desk, &["--photos", "order"]).expect_success();
+    assert!(desk.read("pano.jpg") == desk.read("again.jpg"), "the panoramas differ");
+}
+
+/// Changes of a project that no stitch could have written, with a part of what is said of each.
+#[test]
+fn projects_edited_to_nonsense_are_refused() {
+    let desk = stitched();
+    let project = desk.json("pano.json");
+    let target = "/images/0/mesh/target";
+    let mistakes = [
+        ("/images/0/width", json!(0), "is damaged"),
+        ("/images/1/mesh", Value::Null, "the project holds no grid of it"),
+        ("/images/0/mesh/rows", json!(1), "is damaged"),
+        ("/images/0/mesh/cols", json!(u64::MAX), "is damaged"),
+        (target, json!([]), "is damaged"),
+        ("/images/0/mesh/target/0", json!([1e300, 0.0]), "is damaged"),
+        ("/images/0/mesh/target/0/0", Value::Null, "the project is damaged"),
+        ("/images/0/mesh/source/1", json!([3.0, 3.0]), "is damaged"),
+        ("/images/0/correction/gain/1", json!(-0.5), "no positive factors on light"),
+        ("/images/0/correction/vignetting/2", json!(1e5), "no positive factors on light"),
+        ("/images/0/status", json!("lost"), "the project is damaged"),
+        ("/canvas/width", json!(0), "does not belong to the grids"),
+        ("/canvas/height", json!(1_000_000_000_u64), "does not belong to the grids"),
+        ("/canvas/width", json!(20), "does not belong to the grids"),
+        ("/reference", json!("nobody.jpg"), "none of the photographs used"),
+        ("/options/mesh", json!({"cell": 3}), "the project is damaged"),
+        ("/options/canvas/scale", json!(-2.0), "invalid canvas.scale = -2"),
+        ("/images", json!([]), "uses no photographs"),
+        ("/images/2/path", json!(""), "photograph"),
+        ("/images/2/height", json!(361), "is damaged"),
+    ];
+    let files = desk.files();
+    for (pointer, value, part) in mistakes {
+        let mut edited = project.clone();
+        *edited.pointer_mut(pointer).expect("a field") = value;
+        desk.put("edited.json", edited.to_string());
+        let run = finish(trueup(desk.path(), &["compose", "edited.json", "-o", "again.jpg"]));
+        assert!(matches!(run.status, 1 | 2) && run.stderr.contains(part), "{pointer}: {}", run.stderr);
+        std::fs::remove_file(desk.join("edited.json")).expect("removed");
+        assert_eq!(desk.files(), files, "{pointer}: nothing is left behind");
+    }
+}

@@ -1,0 +1,81 @@
+//! Masks: what is ignored is not seen, what is kept is.
+
+use image::{GrayImage, Luma, Rgba, RgbaImage};
+
+use crate::pictures::{HEIGHT, STREET_NAMES, WIDTH, jpeg, street_desk, street_pixels};
+use crate::run::{Desk, finish, trueup};
+
+/// Columns of `b.jpg` that are spoilt.
+const SPOILT: usize = WIDTH / 2;
+
+/// The street, with the left half of `b.jpg` red: `a.jpg` shows most of that place, too.
+fn spoilt() -> Desk {
+    let desk = street_desk();
+    let mut rgb = street_pixels()[1].clone();
+    for pixel in rgb.chunks_exact_mut(3).enumerate().filter(|(at, _)| at % WIDTH < SPOILT).map(|(_, pixel)| pixel) {
+        pixel.copy_from_slice(&[255, 0, 0]);
+    }
+    desk.put("b.jpg", jpeg(&rgb, WIDTH, HEIGHT));
+    let mask = GrayImage::from_fn(WIDTH as u32, HEIGHT as u32, |x, _| Luma([u8::from(x as usize >= SPOILT) * 255]));
+    mask.save(desk.join("mask.png")).expect("written");
+    desk
+}
+
+/// Share of the pixels of a panorama that are red.
+fn redness(desk: &Desk, name: &str) -> f64 {
+    let picture = image::open(desk.join(name)).expect("a panorama").to_rgb8();
+    let red = picture.pixels().filter(|pixel| pixel[0] > 150 && pixel[1] < 60 && pixel[2] < 60).count();
+    red as f64 / picture.pixels().len() as f64
+}
+
+#[test]
+fn what_is_ignored_is_not_seen_by_any_blend() {
+    let desk = spoilt();
+    let mask = ["--mask", "b.jpg=mask.png", "--project", "pano.json"];
+    desk.stitch(&[&STREET_NAMES[..], &mask].concat()).expect_success();
+    let masked = redness(&desk, "pano.jpg");
+    let record = &desk.json("pano.json")["images"][1]["masks"];
+    assert_eq!(*record, serde_json::json!([{"path": "mask.png", "kind": "use"}]));
+    for blend in ["multiband", "feather", "average", "none"] {
+        let set = format!("render.blend={blend}");
+        let compose = ["compose", "pano.json", "-o", "again.png", "--set", &set];
+        finish(trueup(desk.path(), &compose)).expect_success();
+        assert!(redness(&desk, "again.png") <= masked + 0.02, "{blend}: {}", redness(&desk, "again.png"));
+    }
+    // The whole photograph is used again: another mask stands in place of the recorded one.
+    GrayImage::from_pixel(WIDTH as u32, HEIGHT as u32, Luma([255])).save(desk.join("all.png")).expect("written");
+    let shown = ["compose", "pano.json", "-o", "red.png", "--set", "render.blend=average", "--mask", "b.jpg=all.png"];
+    finish(trueup(desk.path(), &shown)).expect_success();
+    std::fs::remove_file(desk.join("mask.png")).expect("removed");
+    finish(trueup(desk.path(), &["compose", "pano.json", "-o", "again.png"]))
+        .expect_failure(1, &["mask.png: this mask of b.jpg is not there"]);
+}
+
+#[test]
+fn what_is_kept_is_shown() {
+    let desk = spoilt();
+    // Transparent but for the spoilt part.
+    let keep = RgbaImage::from_fn(WIDTH as u32, HEIGHT as u32, |x, _| {
+        Rgba([255, 255, 255, u8::from((x as usize) < SPOILT) * 255])
+    });
+    keep.save(desk.join("keep.png")).expect("written");
+    desk.stitch(&[&STREET_NAMES[..], &["--mask", "b.jpg=mask.png"]].concat()).expect_success();
+    let ignored = redness(&desk, "pano.jpg");
+    desk.stitch(&[&STREET_NAMES[..], &["--keep", "b.jpg=keep.png"]].concat()).expect_success();
+    let kept = redness(&desk, "pano.jpg");
+    assert!(kept > 0.08 && kept > ignored + 0.05, "{kept} against {ignored}");
+}
+
+#[test]
+fn masks_that_fit_no_photograph_are_refused() {
+    let desk = street_desk();
+    GrayImage::new(48, 36).save(desk.join("small.png")).expect("written");
+    let refused = |mask: &str, status: i32, part: &str| {
+        desk.stitch(&["a.jpg", "b.jpg", "--mask", mask]).expect_failure(status, &[part]);
+    };
+    refused("b.jpg=small.png", 1, "small.png: the mask has 48 x 36 px, the photograph b.jpg has 480 x 360 px");
+    refused("q.jpg=small.png", 1, "q.jpg: no photograph of this name was given, so nothing of it can be masked");
+    refused("b.jpg=none.png", 1, "none.png: there is no such file");
+    refused("b.jpg", 2, "--mask b.jpg: it is not of the form NAME=FILE");
+    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "small.png"]);
+}
