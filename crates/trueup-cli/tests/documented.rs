@@ -78,6 +78,13 @@ const MISTAKES: &[Mistake] = &[
     mistake("comparison over other files", &["compare", "a.jpg", "b.jpg", "-o", "notes"]),
     mistake("comparison over a file", &["compare", "b.jpg", "c.jpg", "-o", "a.jpg"]),
     mistake("tally of other files", &["compare", "--tally", "other.json"]),
+    mistake("mask of another size", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--mask", "b.jpg=dot.jpg"]),
+    mistake("mask of no photograph", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--mask", "q.jpg=dot.jpg"]),
+    mistake("mask without a name", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--mask", "dot.jpg"]),
+    mistake("cache over a file", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--cache", "dot.jpg"]),
+    mistake("another geometry to compose", &["compose", "pano.json", "-o", "pano.jpg", "--set", "mesh.cell_px=30"]),
+    mistake("project edited to nonsense", &["compose", "nonsense.json", "-o", "pano.jpg"]),
+    mistake("photograph that is gone", &["compose", "gone.json", "-o", "pano.jpg"]),
     mistake("no project file", &["inspect", "none.json"]),
     mistake("not a project file", &["inspect", "other.json"]),
     mistake("project of a later version", &["inspect", "later.json"]),
@@ -113,6 +120,9 @@ fn desk() -> Desk {
     desk.put("other.json", "{}");
     desk.stitch(&["a.jpg", "b.jpg", "--project", "pano.json"]).expect_success();
     std::fs::remove_file(desk.join("pano.jpg")).expect("removed");
+    let project = String::from_utf8(desk.read("pano.json")).expect("UTF-8");
+    desk.put("nonsense.json", project.replacen("\"gain\":[", "\"gain\":[-", 1));
+    desk.put("gone.json", project.replace("a.jpg", "gone.jpg"));
     let truth = street_truth();
     desk.put("bent.json", truth.replacen("\"R\":[[", "\"R\":[[7", 1));
     desk.put("strange.json", truth.replace(".jpg", ".png"));

@@ -189,6 +189,9 @@ impl<'a> Stitcher<'a> {
         let mut alignments = Vec::new();
         for component in &components {
             let mut alignment = self.align_component(component, &components, set, inputs)?;
+            if let Some(cache) = self.cache {
+                cache.report(self.context);
+            }
             alignment.project.diagnostics =
                 shared_diagnostics.iter().cloned().chain(self.context.take_diagnostics()).collect();
             alignments.push(alignment);
