@@ -270,7 +270,7 @@ mod tests {
             for (place, value) in changes {
                 let mut all = Vec::new();
                 pointers(&changed, "", &mut all);
-                if let Some(old) = changed.pointer_mut(place.get(&all)) {
+                if let Some(old) = changed.pointer_mut(&all[place.index(all.len())]) {
                     *old = value;
                 }
             }
