@@ -69,7 +69,8 @@ fn all_pairs(count: usize) -> Vec<(usize, usize)> {
 
 /// Numbers of putative matches of all pairs: `looks[b][a]` for a < b.
 fn quick_looks(features: &[Features], options: &PairingOptions, context: &StageContext<'_>) -> Result<Vec<Vec<usize>>> {
-    let subsets: Vec<Features> = features.iter().map(|features| strongest(features, options.subset)).collect();
+    let subsets: Vec<Features> =
+        features.iter().map(|features| features.strongest(options.subset).into_owned()).collect();
     let matching = MatchingOptions::default();
     context.progress().begin(PairingOptions::STAGE, features.len() as u64);
     let looks = (0..features.len())
@@ -86,17 +87,6 @@ fn quick_looks(features: &[Features], options: &PairingOptions, context: &StageC
         .collect();
     context.progress().finish(PairingOptions::STAGE);
     looks
-}
-
-/// The first `count` points, which are the strongest.
-fn strongest(features: &Features, count: usize) -> Features {
-    let points = features.points.len().min(count);
-    let descriptors = features.descriptor_points.partition_point(|&point| (point as usize) < points);
-    Features {
-        points: features.points[..points].to_vec(),
-        descriptors: features.descriptors[..descriptors].to_vec(),
-        descriptor_points: features.descriptor_points[..descriptors].to_vec(),
-    }
 }
 
 /// A picture's pairs with its proposed neighbours.
