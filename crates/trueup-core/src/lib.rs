@@ -23,9 +23,11 @@ pub mod geometry;
 pub mod interpolation;
 pub mod lines;
 pub mod matches;
+pub mod memory;
 pub mod mesh;
 pub mod options;
 pub mod raster;
+pub mod scratch;
 pub mod source;
 pub mod truth;
 

@@ -146,8 +146,11 @@ pub trait RowSource: Sync {
     fn width(&self) -> usize;
     /// Height in pixels.
     fn height(&self) -> usize;
-    /// Writes row `y` as 8-bit RGBA with straight (not premultiplied) alpha, `4 * width` bytes.
-    fn rgba8_row(&self, y: usize, row: &mut [u8]);
+    /// Writes row `y` as 8-bit RGBA, encoded, with straight (not premultiplied) alpha: `4 * width` samples.
+    ///
+    /// # Errors
+    /// If the pixels cannot be had, e.g. from a file that holds them.
+    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()>;
 }
 
 #[cfg(test)]

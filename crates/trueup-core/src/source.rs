@@ -87,4 +87,9 @@ pub trait PhotographSource: Sync {
     /// # Errors
     /// If the file can no longer be read or decoded.
     fn photograph(&self, index: usize) -> Result<Photograph>;
+
+    /// Bytes that the samples of photograph `index` take once decoded, where that is known before.
+    fn bytes(&self, _index: usize) -> Option<usize> {
+        None
+    }
 }

@@ -3,6 +3,7 @@
 //! * [`source`] turns paths, folders and glob patterns into [`trueup_core::source::SourceImage`]s, reading headers only.
 //! * [`decode`] reads their pixels: whole photographs, and the reduced pictures that measurement works on.
 //! * [`encode`] writes a panorama row by row; a file appears complete or not at all.
+//! * [`scratch`] keeps on disk what does not fit in memory, and knows how much room there is.
 //!
 //! Sizes are checked from the header before pixels are allocated, and no input makes these functions panic.
 #![forbid(unsafe_code)]
@@ -11,4 +12,5 @@ pub mod decode;
 pub mod encode;
 mod format;
 mod metadata;
+pub mod scratch;
 pub mod source;
