@@ -256,6 +256,12 @@ mod tests {
             }
             Ok(())
         }
+        fn rgba16_row(&self, _: usize, _: &mut [u16]) -> Result<()> {
+            unreachable!("measured at 8 bits")
+        }
+        fn linear_row(&self, _: usize, _: &mut [f32]) -> Result<()> {
+            unreachable!("measured at 8 bits")
+        }
     }
 
     fn layer(level: impl Fn(usize, usize) -> f32) -> Layer {

@@ -127,13 +127,81 @@ impl EncodeRoots {
     }
 }
 
+/// Linear light (0 to 1) to encoded value (0 to 1), by the formula.
+fn encoded_from_linear(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Steps of [`Encode16`]. Against the square root of linear light the curve bends by at most 25.8 (twice its slope near
+/// black, 12.92), so that the chord between entries is off by 25.8 / 8 / 4095^2 = 2e-7: an 80th of a 16-bit step. Where the curve's two pieces meet its slope changes by 0.025, and
+/// the chord across is off by up to 0.025 / 4 / 4095: a tenth of a step.
+const ROOT_STEPS: usize = 4095;
+
+/// 16-bit sRGB from linear light, off by hardly more than the rounding.
+#[derive(Debug)]
+pub(crate) struct Encode16 {
+    /// Value, 0 to 65535, where the square root is entry `i` / 4095, and the difference to the next entry.
+    entries: [[f32; 2]; ROOT_STEPS + 1],
+}
+
+impl Encode16 {
+    /// The table of the process.
+    pub(crate) fn table() -> &'static Self {
+        static TABLE: LazyLock<Encode16> = LazyLock::new(|| {
+            let value = |index: usize| {
+                let root = index.min(ROOT_STEPS) as f64 / ROOT_STEPS as f64;
+                65535.0 * encoded_from_linear(root * root)
+            };
+            let entry = |index| [value(index) as f32, (value(index + 1) - value(index)) as f32];
+            Encode16 { entries: std::array::from_fn(entry) }
+        });
+        &TABLE
+    }
+
+    /// The nearest 16-bit level; values outside 0 to 1 are clamped, NaN gives 0.
+    #[inline(always)]
+    pub(crate) fn level(&self, linear: f32) -> u16 {
+        // `max` first: unlike `clamp`, it turns NaN into a number.
+        #[allow(clippy::manual_clamp)]
+        let position = linear.max(0.0).min(1.0).sqrt() * ROOT_STEPS as f32;
+        let index = position as usize;
+        let [value, step] = self.entries[index.min(ROOT_STEPS)];
+        // The addition rounds; the conversion truncates.
+        ((position - index as f32) * step + value + 0.5) as u16
+    }
+}
+
+/// 16-bit sRGB from the square root of linear light in 16 bits.
+///
+/// The roots are as fine as the levels but for the darkest hundredth, where a root spans up to 1.45 of them.
+#[derive(Debug)]
+pub(crate) struct EncodeRoots16 {
+    levels: Vec<u16>,
+}
+
+impl EncodeRoots16 {
+    /// The table of the process.
+    pub(crate) fn table() -> &'static Self {
+        static TABLE: LazyLock<EncodeRoots16> = LazyLock::new(|| {
+            let level = |root: u16| {
+                let root = f64::from(root) / 65535.0;
+                (65535.0 * encoded_from_linear(root * root)).round() as u16
+            };
+            EncodeRoots16 { levels: (0..=u16::MAX).map(level).collect() }
+        });
+        &TABLE
+    }
+
+    /// The nearest 16-bit level; 65535 is white.
+    #[inline(always)]
+    pub(crate) fn level(&self, root: u16) -> u16 {
+        self.levels[usize::from(root)]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn encoded_from_linear(linear: f64) -> f64 {
-        if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
-    }
 
     #[test]
     fn every_level_survives_the_round_trip() {
@@ -156,6 +224,36 @@ mod tests {
         for (value, level) in [(-1.0, 0), (0.0, 0), (1.0, 255), (7.0, 255), (f32::NAN, 0), (f32::INFINITY, 255)] {
             assert_eq!(Encode::table().level(value), level);
         }
+    }
+
+    #[test]
+    fn sixteen_bits_are_off_by_hardly_more_than_half_a_level() {
+        let steps = 3_000_000;
+        let mut last = 0;
+        for step in 0..=steps {
+            // Finer near black, where the curve is steep.
+            let linear = (step as f32 / steps as f32).powi(2);
+            let exact = 65535.0 * encoded_from_linear(f64::from(linear));
+            let level = Encode16::table().level(linear);
+            assert!((f64::from(level) - exact).abs() <= 0.6, "{linear}: {level} for {exact}");
+            assert!(level >= last, "{linear}");
+            last = level;
+        }
+        for (value, level) in [(-1.0, 0), (0.0, 0), (1.0, 65535), (7.0, 65535), (f32::NAN, 0), (f32::INFINITY, 65535)] {
+            assert_eq!(Encode16::table().level(value), level);
+        }
+    }
+
+    /// The roots of neighbouring levels differ; a level that passes through them comes back to within the root's own step.
+    #[test]
+    fn sixteen_bits_pass_through_roots() {
+        for level in 0..=u16::MAX {
+            let linear = linear_from_encoded(f64::from(level) / 65535.0);
+            let back = EncodeRoots16::table().level((linear.sqrt() * 65535.0).round() as u16);
+            assert!(back.abs_diff(level) <= 1, "{level}: {back}");
+        }
+        assert_eq!(EncodeRoots16::table().level(0), 0);
+        assert_eq!(EncodeRoots16::table().level(65535), 65535);
     }
 
     #[test]

@@ -151,6 +151,17 @@ pub trait RowSource: Sync {
     /// # Errors
     /// If the pixels cannot be had, e.g. from a file that holds them.
     fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()>;
+    /// Writes row `y` as 16-bit RGBA, encoded by the same curve, with straight alpha: `4 * width` samples, 65535 is full.
+    ///
+    /// # Errors
+    /// Those of [`Self::rgba8_row`].
+    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()>;
+    /// Writes row `y` as RGBA in linear light (1 is white, more is possible) with straight alpha (0 to 1): `4 * width`
+    /// samples.
+    ///
+    /// # Errors
+    /// Those of [`Self::rgba8_row`].
+    fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()>;
 }
 
 #[cfg(test)]

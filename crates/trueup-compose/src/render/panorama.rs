@@ -5,7 +5,7 @@ use trueup_core::raster::RowSource;
 
 use super::store::Store;
 use crate::seam::Seams;
-use crate::transfer_curve::{Encode, EncodeRoots};
+use crate::transfer_curve::{Encode, Encode16, EncodeRoots, EncodeRoots16};
 use crate::weights::alpha;
 
 /// The finished panorama: 8 or 16 bytes a pixel in memory or in a scratch file, encoded as its rows are asked for.
@@ -90,6 +90,41 @@ impl RowSource for Panorama {
                     let level = |root: u16| if shown { encode.level(root) } else { 0 };
                     pixel.copy_from_slice(&[level(r), level(g), level(b), opacity]);
                 }
+            }
+        }
+        Ok(())
+    }
+
+    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
+        match &self.pixels {
+            Pixels::Sums(sums) => {
+                let encode = Encode16::table();
+                for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(sums.row(y)?.iter()) {
+                    let opacity = (alpha(sum) * 65535.0 + 0.5) as u16;
+                    let scale = if opacity > 0 { 1.0 / sum } else { 0.0 };
+                    let levels = [encode.level(r * scale), encode.level(g * scale), encode.level(b * scale), opacity];
+                    pixel.copy_from_slice(&levels);
+                }
+            }
+            Pixels::Roots(roots) => {
+                let encode = EncodeRoots16::table();
+                for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(roots.row(y)?.iter()) {
+                    let level = |root: u16| if opacity > 0 { encode.level(root) } else { 0 };
+                    pixel.copy_from_slice(&[level(r), level(g), level(b), opacity]);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()> {
+        let out = row.chunks_exact_mut(4);
+        match &self.pixels {
+            Pixels::Sums(sums) => {
+                out.zip(sums.row(y)?.iter()).for_each(|(out, &sum)| out.copy_from_slice(&linear_of_sum(sum)));
+            }
+            Pixels::Roots(roots) => {
+                out.zip(roots.row(y)?.iter()).for_each(|(out, &root)| out.copy_from_slice(&linear_of_root(root)));
             }
         }
         Ok(())
