@@ -130,6 +130,14 @@ pub(crate) struct StitchArgs {
     )]
     pub threads: Option<u16>,
 
+    /// Memory that the work may take, such as 2GB or 512MB; auto is a quarter of the machine's (stitch.memory)
+    #[arg(long, value_name = "AMOUNT", help_heading = "Tuning")]
+    pub memory: Option<String>,
+
+    /// Folder for the scratch file of a panorama that does not fit in memory, instead of the output's (stitch.scratch)
+    #[arg(long, value_name = "DIR", help_heading = "Tuning")]
+    pub scratch: Option<String>,
+
     /// Print nothing but errors
     #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]
     pub quiet: bool,

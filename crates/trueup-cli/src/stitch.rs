@@ -50,6 +50,8 @@ impl CheckedStitch {
             ("--align", "stitch.align", &args.align),
             ("--structure", "stitch.structure", &args.structure),
             ("--seed", "stitch.seed", &args.seed),
+            ("--memory", "stitch.memory", &args.memory),
+            ("--scratch", "stitch.scratch", &args.scratch),
         ];
         let options = chosen_options(args.config.as_deref(), &args.set, &flags)?;
         if args.project.as_ref() == Some(&args.output) {

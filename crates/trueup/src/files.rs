@@ -67,7 +67,7 @@ impl StitchJob {
             let output = numbered(&self.output, number);
             spare_photographs(&output, &alignment.project)?;
             let start = Instant::now();
-            let panorama = stitcher.compose(&alignment)?;
+            let panorama = Stitcher::new(options, context).writing_to(&output).compose(&alignment)?;
             alignment.record_seconds("render", start.elapsed());
             let start = Instant::now();
             let bytes = encode::write(&output, &panorama, &options.output, context)?;

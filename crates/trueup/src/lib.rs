@@ -20,6 +20,7 @@
 #![forbid(unsafe_code)]
 
 mod align;
+mod budget;
 mod clock;
 pub mod compare;
 mod evaluation;

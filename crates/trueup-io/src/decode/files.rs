@@ -1,5 +1,6 @@
 //! Photographs in files, each decoded once where memory allows.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use trueup_core::raster::Photograph;
@@ -16,6 +17,8 @@ use super::{WorkingPicture, photograph, reduce_photograph};
 pub struct FilePhotographs {
     images: Vec<SourceImage>,
     kept: Mutex<Kept>,
+    /// Bytes that the samples of each took when it was decoded; 0 before.
+    bytes: Vec<AtomicUsize>,
 }
 
 /// Decoded photographs by index, and the bytes that may still be kept.
@@ -29,7 +32,8 @@ impl FilePhotographs {
     /// Over `images`, keeping at most `cache_bytes` bytes of decoded pixels; 0 keeps none.
     pub fn new(images: Vec<SourceImage>, cache_bytes: usize) -> Self {
         let photographs = images.iter().map(|_| None).collect();
-        Self { images, kept: Mutex::new(Kept { photographs, free_bytes: cache_bytes }) }
+        let bytes = images.iter().map(|_| AtomicUsize::new(0)).collect();
+        Self { images, bytes, kept: Mutex::new(Kept { photographs, free_bytes: cache_bytes }) }
     }
 
     /// The photographs this hands out, in order.
@@ -43,7 +47,7 @@ impl FilePhotographs {
     /// As [`working`](super::working); [`Error::Input`] if there is no photograph `index`.
     pub fn working(&self, index: usize, frame: &WorkingFrame, thumbnail_max_area: f64) -> Result<WorkingPicture> {
         let image = self.image(index)?;
-        let photograph = photograph(image)?;
+        let photograph = self.decode(index, image)?;
         let working = reduce_photograph(&photograph, &image.name, frame, thumbnail_max_area)?;
         self.keep(index, photograph);
         Ok(working)
@@ -52,6 +56,20 @@ impl FilePhotographs {
     /// Forgets photograph `index` if it is kept: for those that will not be asked for again.
     pub fn forget(&self, index: usize) {
         drop(self.take(index));
+    }
+
+    /// Bytes of the photographs that are kept now.
+    pub fn kept_bytes(&self) -> usize {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.photographs.iter().flatten().map(Photograph::bytes).sum()
+    }
+
+    fn decode(&self, index: usize, image: &SourceImage) -> Result<Photograph> {
+        let photograph = photograph(image)?;
+        if let Some(bytes) = self.bytes.get(index) {
+            bytes.store(photograph.bytes(), Ordering::Relaxed);
+        }
+        Ok(photograph)
     }
 
     fn image(&self, index: usize) -> Result<&SourceImage> {
@@ -86,7 +104,11 @@ impl PhotographSource for FilePhotographs {
         let image = self.image(index)?;
         match self.take(index) {
             Some(photograph) => Ok(photograph),
-            None => photograph(image),
+            None => self.decode(index, image),
         }
+    }
+
+    fn bytes(&self, index: usize) -> Option<usize> {
+        self.bytes.get(index).map(|bytes| bytes.load(Ordering::Relaxed)).filter(|&bytes| bytes > 0)
     }
 }

@@ -1,6 +1,7 @@
 //! Panoramas to files, row by row. A file appears complete or not at all.
 
 mod codecs;
+mod expected;
 mod folder;
 mod jpeg;
 mod pending;
@@ -18,6 +19,7 @@ use crate::format::PictureFormat;
 
 use pending::PendingFile;
 
+pub use expected::expected_bytes;
 pub use folder::PendingFolder;
 
 trueup_core::choice! {
