@@ -48,7 +48,9 @@ pub fn layer(
     let photograph = photographs.photograph(placed.photograph)?;
     check_photograph(placed, &photograph)?;
     let size = [layout.width, layout.height];
-    let prepared = Prepared::new(Cow::Owned(photograph), &placed.mesh, size, &corrections[position], options);
+    let curve = photographs.transfer_curve();
+    let light = (&curve, &corrections[position]);
+    let prepared = Prepared::new(Cow::Owned(photograph), &placed.mesh, size, light, options);
     let (columns, rows) = (prepared.columns(), prepared.rows());
     let (width, height) = (columns.len(), rows.len());
     let mut layer = Layer {
@@ -57,7 +59,7 @@ pub fn layer(
         gray: Raster::new(width, height, 1),
         covered: Raster::new(width, height, 1),
     };
-    let encode = Encode::table();
+    let encode = Encode::of(&curve);
     let mut scratch = Scratch::default();
     let mut samples = Vec::new();
     for first in rows.clone().step_by(BAND_ROWS) {

@@ -80,10 +80,12 @@ impl TransferCurve {
         }
     }
 
-    /// The encoded value (0 to 1) that stands for linear light; where several do, the middle one. NaN gives 0.
+    /// The encoded value (0 to 1) that stands for linear light; where several do, the middle one, but 0 for no light and 1
+    /// for all. NaN gives 0.
     pub fn encoded(&self, linear: f64) -> f64 {
         let y = unit(linear);
         match &self.0 {
+            _ if y == 0.0 || y == 1.0 => y,
             Kind::Srgb if y <= 0.003_130_8 => 12.92 * y,
             Kind::Srgb => 1.055 * y.powf(1.0 / 2.4) - 0.055,
             Kind::Gamma(gamma) => y.powf(1.0 / gamma),
@@ -190,6 +192,8 @@ mod tests {
         let table = TransferCurve::table(vec![0.0, 0.5, 0.5, 0.5, 1.0]).expect("a curve");
         assert_eq!(table.encoded(0.5), 0.5);
         assert_eq!(table.encoded(0.75), 0.875);
+        let dark = TransferCurve::table(vec![0.0, 0.0, 1.0, 1.0]).expect("a curve");
+        assert_eq!((dark.encoded(0.0), dark.encoded(0.5), dark.encoded(1.0)), (0.0, 0.5, 1.0));
         assert_eq!((table.encoded(-3.0), table.encoded(7.0), table.encoded(f64::NAN)), (0.0, 1.0, 0.0));
     }
 
