@@ -1,5 +1,6 @@
 //! The finished panorama.
 
+use trueup_core::Result;
 use trueup_core::colour::TransferCurve;
 use trueup_core::raster::RowSource;
 
@@ -77,7 +78,7 @@ impl RowSource for Panorama {
         self.height
     }
 
-    fn rgba8_row(&self, y: usize, row: &mut [u8]) {
+    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
         let range = y * self.width..(y + 1) * self.width;
         match &self.pixels {
             Pixels::Sums(sums) => {
@@ -99,5 +100,36 @@ impl RowSource for Panorama {
                 }
             }
         }
+        Ok(())
+    }
+
+    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
+        let range = y * self.width..(y + 1) * self.width;
+        match &self.pixels {
+            Pixels::Sums(sums) => {
+                let encode = self.encoding.linear16();
+                for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(&sums[range]) {
+                    let opacity = (alpha(sum) * 65535.0 + 0.5) as u16;
+                    let scale = if opacity > 0 { 1.0 / sum } else { 0.0 };
+                    let levels = [encode.level(r * scale), encode.level(g * scale), encode.level(b * scale), opacity];
+                    pixel.copy_from_slice(&levels);
+                }
+            }
+            Pixels::Roots(roots) => {
+                let encode = self.encoding.roots16();
+                for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(&roots[range]) {
+                    let level = |root: u16| if opacity > 0 { encode.level(root) } else { 0 };
+                    pixel.copy_from_slice(&[level(r), level(g), level(b), opacity]);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()> {
+        for (x, pixel) in row.chunks_exact_mut(4).take(self.width).enumerate() {
+            pixel.copy_from_slice(&self.linear_pixel(x, y));
+        }
+        Ok(())
     }
 }

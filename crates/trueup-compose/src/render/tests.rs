@@ -60,7 +60,7 @@ fn compose(
 fn rows(panorama: &Panorama) -> Vec<u8> {
     let mut bytes = vec![0; panorama.width() * panorama.height() * 4];
     for (y, row) in bytes.chunks_exact_mut(panorama.width() * 4).enumerate() {
-        panorama.rgba8_row(y, row);
+        panorama.rgba8_row(y, row).expect("rows in memory");
     }
     bytes
 }
@@ -343,4 +343,38 @@ fn a_layer_is_one_photograph_where_it_lies() {
         }
     }
     assert!(layer(&layout, &[Correction::default(); 2], 2, &photographs, &RenderOptions::default()).is_err());
+}
+
+/// The rows of one panorama at every depth say the same, from sums and from roots.
+#[test]
+fn rows_of_every_depth_agree() {
+    let layout = canvas(90, 50, vec![moved(0, 80.0, 40.0, |p| [p.x + 4.3, p.y + 5.6])]);
+    for blend in [Blend::Feather, Blend::MultiBand] {
+        let options = RenderOptions { blend, ..RenderOptions::default() };
+        let panorama = render(&layout, vec![Photograph::Eight(noise(80, 40, 3))], &options);
+        let (mut eight, mut sixteen, mut linear) = (vec![0; 360], vec![0; 360], vec![0.0; 360]);
+        for y in 0..50 {
+            panorama.rgba8_row(y, &mut eight).expect("rows in memory");
+            panorama.rgba16_row(y, &mut sixteen).expect("rows in memory");
+            panorama.linear_row(y, &mut linear).expect("rows in memory");
+            for x in 0..90 {
+                let at = 4 * x..4 * x + 4;
+                let linear = &linear[at.clone()];
+                // A part of a pixel too small for 8 bits of alpha is left out there.
+                if eight[at.end - 1] == 0 {
+                    continue;
+                }
+                for ((&eight, &sixteen), channel) in eight[at.clone()].iter().zip(&sixteen[at]).zip(0..) {
+                    assert!((f32::from(sixteen) / 257.0 - f32::from(eight)).abs() <= 0.505, "{eight} {sixteen}");
+                    let light = f64::from(linear[channel]).min(1.0);
+                    let encoded = match channel {
+                        3 => light,
+                        _ if light <= 0.0031308 => 12.92 * light,
+                        _ => 1.055 * light.powf(1.0 / 2.4) - 0.055,
+                    };
+                    assert!((encoded * 65535.0 - f64::from(sixteen)).abs() < 0.6, "{encoded} {sixteen}");
+                }
+            }
+        }
+    }
 }

@@ -4,9 +4,9 @@ use std::io::Write;
 
 use jpeg_encoder::{ChromaSubsamplingMethod, ColorType, Encoder, SamplingFactor};
 use rayon::prelude::*;
+use trueup_core::StageContext;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::RowSource;
-use trueup_core::{Result as CoreResult, StageContext};
 
 use super::{ChromaSubsampling, Failure, OutputOptions, RGBA};
 
@@ -35,15 +35,14 @@ pub(super) fn write(
     let firsts: Vec<usize> = (0..height).step_by(STRIP_ROWS).collect();
     let mut strip_number = 0_usize;
     for batch in firsts.chunks(STRIPS_PER_THREAD * rayon::current_num_threads()) {
-        let strips: CoreResult<Vec<Result<Vec<u8>, Failure>>> = batch
+        let strips: Vec<Vec<u8>> = batch
             .par_iter()
             .map(|&first| {
                 context.check_cancelled()?;
-                Ok(encode_strip(picture, first, STRIP_ROWS.min(height - first), options))
+                encode_strip(picture, first, STRIP_ROWS.min(height - first), options)
             })
-            .collect();
-        for strip in strips.map_err(|_| Failure::Cancelled)? {
-            let strip = strip?;
+            .collect::<Result<_, Failure>>()?;
+        for strip in strips {
             let (header, coded) = split_scan(&strip).ok_or_else(malformed)?;
             if strip_number == 0 {
                 file.write_all(&with_height(header, height).ok_or_else(malformed)?)?;
@@ -77,7 +76,7 @@ fn encode_strip(
     let mut row = vec![0; width * RGBA];
     let mut rgb = vec![0; width * rows * 3];
     for (y, target) in rgb.chunks_exact_mut(width * 3).enumerate() {
-        picture.rgba8_row(first + y, &mut row);
+        picture.rgba8_row(first + y, &mut row)?;
         composite(&row, options.background.value(), target);
     }
     let (sampling, unit_width, unit_height) = match options.jpeg_subsampling {

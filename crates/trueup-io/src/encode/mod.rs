@@ -193,16 +193,23 @@ const RGBA: usize = 4;
 /// Why a codec stopped, before it is tied to the file.
 #[derive(Debug)]
 enum Failure {
-    Cancelled,
+    /// The picture could not hand out its rows, or the work is cancelled.
+    Picture(Error),
     Io(std::io::Error),
 }
 
 impl Failure {
     fn at(self, path: &Path) -> Error {
         match self {
-            Self::Cancelled => Error::Cancelled,
+            Self::Picture(error) => error,
             Self::Io(error) => Error::io("writing", path, error),
         }
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self::Picture(error)
     }
 }
 
@@ -223,15 +230,13 @@ fn for_each_strip(
     let row_bytes = picture.width() * RGBA;
     let mut strip = vec![0; row_bytes * rows.min(picture.height())];
     for first in (0..picture.height()).step_by(rows.max(1)) {
-        if context.check_cancelled().is_err() {
-            return Err(Failure::Cancelled);
-        }
+        context.check_cancelled()?;
         let count = rows.min(picture.height() - first);
         let strip = &mut strip[..count * row_bytes];
         strip
             .par_chunks_exact_mut(row_bytes)
             .enumerate()
-            .for_each(|(row, pixels)| picture.rgba8_row(first + row, pixels));
+            .try_for_each(|(row, pixels)| picture.rgba8_row(first + row, pixels))?;
         consume(strip)?;
         context.progress().advance(OutputOptions::STAGE, count as u64);
     }

@@ -27,10 +27,23 @@ impl RowSource for Gradient {
     fn height(&self) -> usize {
         self.height
     }
-    fn rgba8_row(&self, y: usize, row: &mut [u8]) {
+    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
         for (x, pixel) in row.as_chunks_mut::<4>().0.iter_mut().enumerate() {
             *pixel = self.pixel(x, y);
         }
+        Ok(())
+    }
+    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
+        for (x, pixel) in row.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+            *pixel = self.pixel(x, y).map(|level| 257 * u16::from(level));
+        }
+        Ok(())
+    }
+    fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()> {
+        for (x, pixel) in row.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+            *pixel = self.pixel(x, y).map(|level| f32::from(level) / 255.0);
+        }
+        Ok(())
     }
 }
 
@@ -181,11 +194,23 @@ impl RowSource for CancelAtEnd<'_> {
     fn height(&self) -> usize {
         self.0.height
     }
-    fn rgba8_row(&self, y: usize, row: &mut [u8]) {
+    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
         if y + 1 == self.0.height {
             self.1.cancel();
         }
-        self.0.rgba8_row(y, row);
+        self.0.rgba8_row(y, row)
+    }
+    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
+        if y + 1 == self.0.height {
+            self.1.cancel();
+        }
+        self.0.rgba16_row(y, row)
+    }
+    fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()> {
+        if y + 1 == self.0.height {
+            self.1.cancel();
+        }
+        self.0.linear_row(y, row)
     }
 }
 
