@@ -16,7 +16,7 @@ pub enum SphericalProjection {
 ///
 /// The whole turn is `full_width` pixels wide. An equirectangular sphere is half as high, from the zenith (row 0) to the
 /// nadir. A cylinder has no end: `full_height` is then any height that holds the part and has the horizon in its middle.
-/// Column `full_width / 2` looks to [`Self::middle_heading_deg`], if that is known.
+/// Column `full_width / 2` looks to [`Self::middle_yaw`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SphericalFrame {
     /// How directions become pixels.
@@ -29,9 +29,10 @@ pub struct SphericalFrame {
     pub left: usize,
     /// Rows of the whole above the panorama's first row. `top` + the panorama's height is at most `full_height`.
     pub top: usize,
-    /// Compass heading of the middle column of the whole, degrees clockwise from north, 0 to 360; `None` if unknown.
+    /// Direction of the middle column of the whole in the levelled world, in which the cameras' rotations are recorded:
+    /// radians to the right of its z axis.
     #[serde(default)]
-    pub middle_heading_deg: Option<f64>,
+    pub middle_yaw: f64,
 }
 
 impl SphericalFrame {
@@ -42,7 +43,7 @@ impl SphericalFrame {
             && height > 0
             && fits(self.left, width, self.full_width)
             && fits(self.top, height, self.full_height)
-            && self.middle_heading_deg.is_none_or(|heading| (0.0..=360.0).contains(&heading))
+            && self.middle_yaw.is_finite()
     }
 }
 
@@ -58,11 +59,11 @@ mod tests {
             full_height: 2000,
             left: 1000,
             top: 500,
-            middle_heading_deg: None,
+            middle_yaw: 0.0,
         };
         assert!(frame.holds(3000, 1500));
         assert!(!frame.holds(3001, 1500) && !frame.holds(3000, 1501) && !frame.holds(0, 10));
         assert!(!SphericalFrame { left: usize::MAX, ..frame }.holds(2, 2));
-        assert!(!SphericalFrame { middle_heading_deg: Some(f64::NAN), ..frame }.holds(2, 2));
+        assert!(!SphericalFrame { middle_yaw: f64::NAN, ..frame }.holds(2, 2));
     }
 }
