@@ -121,7 +121,8 @@ pub(crate) fn run(
                     None => photographs.photograph(placed.photograph)?,
                 };
                 check_photograph(placed, &photograph)?;
-                let prepared = Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, (&curve, &corrections[at]), options);
+                let prepared =
+                    Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, (&curve, &corrections[at]), options);
                 context.progress().advance(stage, 1);
                 Ok((at, prepared))
             })

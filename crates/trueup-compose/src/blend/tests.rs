@@ -127,7 +127,13 @@ fn with_work<T>(lefts: &[usize], test: impl FnOnce(&Work<'_>, &[Option<Prepared<
         .into_iter()
         .zip(&layout.placed)
         .map(|(photograph, placed)| {
-            Some(Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, (&TransferCurve::SRGB, &Correction::default()), &options))
+            Some(Prepared::new(
+                Cow::Owned(photograph),
+                &placed.mesh,
+                canvas,
+                (&TransferCurve::SRGB, &Correction::default()),
+                &options,
+            ))
         })
         .collect();
     test(&work, &prepared)

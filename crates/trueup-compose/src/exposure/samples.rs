@@ -99,12 +99,7 @@ fn intersect(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
 
 /// Natural logarithm of the mean linear light of blocks of `block` x `block` pixels, by channel; NaN where a sample lies
 /// outside `telling`.
-fn block_means(
-    raster: &Raster<u8>,
-    linearise: &Linearise,
-    block: usize,
-    telling: RangeInclusive<u8>,
-) -> Raster<f32> {
+fn block_means(raster: &Raster<u8>, linearise: &Linearise, block: usize, telling: RangeInclusive<u8>) -> Raster<f32> {
     let (width, height) = (raster.width().div_ceil(block), raster.height().div_ceil(block));
     let mut means = Raster::new(width, height, 3);
     for y in 0..height {

@@ -106,7 +106,12 @@ pub fn run(
     match options.blend {
         Blend::MultiBand | Blend::None if !layout.placed.is_empty() => {
             let blended = blend::run(layout, corrections, photographs, (options, seams), cut, context)?;
-            Ok(Panorama::from_roots([layout.width, layout.height], blended.pixels, blended.seams, photographs.transfer_curve()))
+            Ok(Panorama::from_roots(
+                [layout.width, layout.height],
+                blended.pixels,
+                blended.seams,
+                photographs.transfer_curve(),
+            ))
         }
         _ => mean(layout, corrections, photographs, options, context),
     }

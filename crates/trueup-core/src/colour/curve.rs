@@ -69,7 +69,9 @@ impl TransferCurve {
             Kind::Srgb if x <= 0.040_45 => x / 12.92,
             Kind::Srgb => ((x + 0.055) / 1.055).powf(2.4),
             Kind::Gamma(gamma) => x.powf(*gamma),
-            Kind::Parametric([g, a, b, c, d, e, f]) if x >= *d => unit((a * x + b).max(0.0).powf(*g) + e).max(c * d + f),
+            Kind::Parametric([g, a, b, c, d, e, f]) if x >= *d => {
+                unit((a * x + b).max(0.0).powf(*g) + e).max(c * d + f)
+            }
             Kind::Parametric([_, _, _, c, _, _, f]) => unit(c * x + f),
             Kind::Table(samples) => {
                 let position = x * (samples.len() - 1) as f64;
@@ -150,7 +152,9 @@ mod tests {
     #[test]
     fn srgb_has_the_values_of_the_standard() {
         // Linear light of a few 8-bit levels, computed by hand from equation 6 and 7 of the standard.
-        for (level, linear) in [(0.0, 0.0), (10.0, 0.003_035_27), (55.0, 0.038_204_4), (188.0, 0.502_886_5), (255.0, 1.0)] {
+        for (level, linear) in
+            [(0.0, 0.0), (10.0, 0.003_035_27), (55.0, 0.038_204_4), (188.0, 0.502_886_5), (255.0, 1.0)]
+        {
             assert!((TransferCurve::SRGB.linear(level / 255.0) - linear).abs() < 1e-7, "{level}");
         }
         assert_eq!(TransferCurve::default(), TransferCurve::SRGB);

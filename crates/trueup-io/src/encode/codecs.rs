@@ -14,7 +14,7 @@ use tiff::tags::{CompressionMethod, ExtraSamples, PhotometricInterpretation, Pla
 use trueup_core::StageContext;
 use trueup_core::raster::RowSource;
 
-use super::{Failure, OutputOptions, PngCompression, RGBA, TiffCompression, for_each_strip};
+use super::{Failure, Metadata, OutputOptions, PngCompression, RGBA, TiffCompression, for_each_strip, tiff_metadata};
 
 /// Rows made at a time.
 const STRIP_ROWS: usize = 64;
@@ -30,14 +30,18 @@ const BIG_TIFF_BYTES: usize = 4_000_000_000;
 pub(super) fn write_png(
     file: &mut impl Write,
     picture: &dyn RowSource,
+    metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext,
 ) -> Result<(), Failure> {
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
-    let mut encoder = PngEncoder::new(&mut output, picture.width() as u32, picture.height() as u32);
+    let info = metadata.png_info(picture.width() as u32, picture.height() as u32);
+    let mut encoder = PngEncoder::with_info(&mut output, info).map_err(from_png)?;
+    if metadata.icc.is_none() {
+        encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+    }
     encoder.set_color(PngColorType::Rgba);
     encoder.set_depth(BitDepth::Eight);
-    encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
     encoder.set_compression(match options.png_compression {
         PngCompression::Fast => Compression::Fast,
         PngCompression::Balanced => Compression::Balanced,
@@ -58,27 +62,31 @@ pub(super) fn write_png(
 pub(super) fn write_tiff(
     file: &mut (impl Write + Seek),
     picture: &dyn RowSource,
+    metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext,
 ) -> Result<(), Failure> {
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
     if picture.width() * picture.height() * RGBA > BIG_TIFF_BYTES {
-        let mut encoder = TiffEncoder::new_big(&mut output).map_err(from_tiff)?;
-        write_tiff_directory(encoder.image_directory().map_err(from_tiff)?, picture, options, context)?;
+        let encoder = TiffEncoder::new_big(&mut output).map_err(from_tiff)?;
+        write_tiff_directory(encoder, picture, metadata, options, context)?;
     } else {
-        let mut encoder = TiffEncoder::new(&mut output).map_err(from_tiff)?;
-        write_tiff_directory(encoder.image_directory().map_err(from_tiff)?, picture, options, context)?;
+        let encoder = TiffEncoder::new(&mut output).map_err(from_tiff)?;
+        write_tiff_directory(encoder, picture, metadata, options, context)?;
     }
     output.flush()?;
     Ok(())
 }
 
 fn write_tiff_directory<W: Write + Seek, K: TiffKind>(
-    mut directory: DirectoryEncoder<'_, W, K>,
+    mut encoder: TiffEncoder<W, K>,
     picture: &dyn RowSource,
+    metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext,
 ) -> Result<(), Failure> {
+    let hanging = tiff_metadata::write_directories(&mut encoder, metadata).map_err(from_tiff)?;
+    let mut directory = encoder.image_directory().map_err(from_tiff)?;
     let deflate = options.tiff_compression == TiffCompression::Deflate;
     let row_bytes = picture.width() * RGBA;
     let (mut offsets, mut lengths) = (Vec::new(), Vec::new());
@@ -120,6 +128,7 @@ fn write_tiff_directory<W: Write + Seek, K: TiffKind>(
     directory.write_tag(Tag::BitsPerSample, &[8_u16; RGBA][..]).map_err(from_tiff)?;
     write_tiff_offsets(&mut directory, Tag::StripOffsets, &offsets)?;
     write_tiff_offsets(&mut directory, Tag::StripByteCounts, &lengths)?;
+    tiff_metadata::write_tags(&mut directory, metadata, &hanging).map_err(from_tiff)?;
     directory.finish().map_err(from_tiff)
 }
 
@@ -159,6 +168,7 @@ fn deflated(strip: &[u8], row_bytes: usize) -> std::io::Result<Vec<u8>> {
 pub(super) fn write_webp(
     file: &mut impl Write,
     picture: &dyn RowSource,
+    metadata: &Metadata,
     context: &StageContext,
 ) -> Result<(), Failure> {
     let mut pixels = Vec::with_capacity(picture.width() * picture.height() * RGBA);
@@ -167,7 +177,8 @@ pub(super) fn write_webp(
         Ok(())
     })?;
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
-    let encoder = image_webp::WebPEncoder::new(&mut output);
+    let mut encoder = image_webp::WebPEncoder::new(&mut output);
+    metadata.tell_webp(&mut encoder);
     encoder
         .encode(&pixels, picture.width() as u32, picture.height() as u32, image_webp::ColorType::Rgba8)
         .map_err(std::io::Error::other)?;

@@ -3,9 +3,11 @@
 mod codecs;
 mod folder;
 mod jpeg;
+mod metadata;
 mod pending;
 #[cfg(test)]
 mod tests;
+mod tiff_metadata;
 
 use std::path::Path;
 
@@ -14,11 +16,13 @@ use trueup_core::options::StageOptions;
 use trueup_core::raster::RowSource;
 use trueup_core::{Error, Result, StageContext};
 
+use crate::colour::{InSrgb, is_srgb};
 use crate::format::PictureFormat;
 
 use pending::PendingFile;
 
 pub use folder::PendingFolder;
+pub use metadata::Metadata;
 
 trueup_core::choice! {
     /// How finely JPEG stores colour, relative to brightness.
@@ -66,6 +70,28 @@ trueup_core::choice! {
     }
 }
 
+trueup_core::choice! {
+    /// Which colour space panoramas are written in.
+    pub enum OutputProfile {
+        /// That of the photographs, whose profile is embedded.
+        Keep = "keep",
+        /// sRGB, for places that ignore profiles; colours it does not have are clipped.
+        Srgb = "srgb",
+    }
+}
+
+trueup_core::choice! {
+    /// What panoramas tell of the photographs they are made of.
+    pub enum MetadataKept {
+        /// Camera, lens, exposure, time and place.
+        Keep = "keep",
+        /// All but the place.
+        NoLocation = "no-location",
+        /// Nothing. The colour profile and the crop of a spherical panorama, which viewers need, are written all the same.
+        None = "none",
+    }
+}
+
 impl Background {
     /// The value of all three channels.
     fn value(self) -> u8 {
@@ -90,10 +116,17 @@ trueup_core::options! {
         tiff_compression: TiffCompression = TiffCompression::Deflate, Allowed::Any, "";
         /// What shows through transparent parts in JPEG, which has no transparency.
         background: Background = Background::Black, Allowed::Any, "";
+        /// Which colour space panoramas are written in.
+        profile: OutputProfile = OutputProfile::Keep, Allowed::Any, "";
+        /// What panoramas tell of their photographs, in EXIF and XMP.
+        metadata: MetadataKept = MetadataKept::Keep, Allowed::Any, "";
     }
 }
 
 /// Writes a panorama to `path`, in the format its extension names; returns the file's length in bytes.
+///
+/// `metadata` describes the picture: its colour profile, which [`OutputOptions::profile`] may have it converted from, and
+/// the EXIF and XMP to embed.
 ///
 /// Rows are asked for in strips, in parallel on the current thread pool; only WebP needs a copy of the whole. JPEG is
 /// laid over the background, the other formats keep transparency. The bytes written depend on the picture and the
@@ -104,17 +137,29 @@ trueup_core::options! {
 /// [`Error::Options`] for options out of range; [`Error::Unsupported`] for other extensions; [`Error::Limits`] for
 /// pictures larger than the format can hold; [`Error::Input`] for an empty picture or a folder that does not exist;
 /// [`Error::Io`] if the operating system refuses; [`Error::Cancelled`].
-pub fn write(path: &Path, picture: &dyn RowSource, options: &OutputOptions, context: &StageContext) -> Result<u64> {
+pub fn write(
+    path: &Path,
+    picture: &dyn RowSource,
+    metadata: &Metadata,
+    options: &OutputOptions,
+    context: &StageContext,
+) -> Result<u64> {
     options.check()?;
+    if let (OutputProfile::Srgb, Some(icc)) = (options.profile, &metadata.icc)
+        && !is_srgb(icc)
+    {
+        let options = OutputOptions { profile: OutputProfile::Keep, ..options.clone() };
+        return write(path, &InSrgb::new(picture, icc)?, &metadata.in_srgb(), &options, context);
+    }
     let format = output_format(path)?;
     check_size(path, format, picture.width(), picture.height())?;
     let mut pending = PendingFile::create(path)?;
     context.progress().begin(OutputOptions::STAGE, picture.height() as u64);
     let written = match format {
-        PictureFormat::Jpeg => jpeg::write(pending.file(), picture, options, context),
-        PictureFormat::Png => codecs::write_png(pending.file(), picture, options, context),
-        PictureFormat::Tiff => codecs::write_tiff(pending.file(), picture, options, context),
-        PictureFormat::WebP => codecs::write_webp(pending.file(), picture, context),
+        PictureFormat::Jpeg => jpeg::write(pending.file(), picture, metadata, options, context),
+        PictureFormat::Png => codecs::write_png(pending.file(), picture, metadata, options, context),
+        PictureFormat::Tiff => codecs::write_tiff(pending.file(), picture, metadata, options, context),
+        PictureFormat::WebP => codecs::write_webp(pending.file(), picture, metadata, context),
     };
     context.progress().finish(OutputOptions::STAGE);
     written.map_err(|failure| failure.at(path))?;

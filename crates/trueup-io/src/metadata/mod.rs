@@ -1,5 +1,6 @@
 //! What a file's header and EXIF say about a photograph, without decoding its pixels.
 
+mod all_fields;
 mod exif_fields;
 mod focal;
 mod orientation;
@@ -15,6 +16,7 @@ use zune_jpeg::JpegDecoder;
 use crate::decode::jpeg_options;
 use crate::format::PictureFormat;
 
+pub(crate) use all_fields::read_fields;
 pub(crate) use exif_fields::ExifFields;
 pub(crate) use focal::focal_prior;
 pub(crate) use orientation::{TagVerdict, judge_orientation};
@@ -81,13 +83,19 @@ fn stored_size<R: BufRead + Seek>(reader: &mut R, format: PictureFormat) -> Resu
     Ok((width as usize, height as usize))
 }
 
-fn read_exif<R: BufRead + Seek>(reader: &mut R, format: PictureFormat) -> Option<ExifFields> {
+/// The EXIF fields of a file. Damaged EXIF counts as absent.
+pub(crate) fn read_exif<R: BufRead + Seek>(reader: &mut R, format: PictureFormat) -> Option<ExifFields> {
     if format == PictureFormat::Tiff {
         // The EXIF library would read the whole file, pixels and all.
         return ExifFields::from_tiff(&mut TiffDecoder::new(reader).ok()?);
     }
+    read_exif_block(reader).map(|exif| ExifFields::from_exif(&exif))
+}
+
+/// The EXIF block of a JPEG, PNG or WebP, as much of it as can be read.
+fn read_exif_block<R: BufRead + Seek>(reader: &mut R) -> Option<exif::Exif> {
     let mut exif_reader = exif::Reader::new();
     exif_reader.continue_on_error(true);
     let exif = exif_reader.read_from_container(reader);
-    exif.or_else(|error| error.distill_partial_result(|_| {})).ok().map(|exif| ExifFields::from_exif(&exif))
+    exif.or_else(|error| error.distill_partial_result(|_| {})).ok()
 }
