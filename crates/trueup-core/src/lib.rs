@@ -16,6 +16,7 @@
 #![forbid(unsafe_code)]
 
 pub mod camera;
+pub mod colour;
 pub mod context;
 pub mod diagnostics;
 pub mod error;
@@ -27,6 +28,7 @@ pub mod mesh;
 pub mod options;
 pub mod raster;
 pub mod source;
+pub mod spherical;
 pub mod truth;
 
 pub use context::StageContext;

@@ -91,6 +91,7 @@ pub(crate) fn run(
     let stage = RenderOptions::STAGE;
     let count = layout.placed.len();
     let canvas = [layout.width, layout.height];
+    let curve = photographs.transfer_curve();
     // Small pictures, seams, and the photographs themselves.
     context.progress().begin(stage, 2 * count as u64);
     let levels = if cut || count == 1 { None } else { Some(levels_above(layout, options)) };
@@ -120,7 +121,8 @@ pub(crate) fn run(
                     None => photographs.photograph(placed.photograph)?,
                 };
                 check_photograph(placed, &photograph)?;
-                let prepared = Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, &corrections[at], options);
+                let prepared =
+                    Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, (&curve, &corrections[at]), options);
                 context.progress().advance(stage, 1);
                 Ok((at, prepared))
             })

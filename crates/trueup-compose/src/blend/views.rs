@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use rayon::prelude::*;
+use trueup_core::colour::TransferCurve;
 use trueup_core::mesh::GridMesh;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::Photograph;
@@ -45,6 +46,7 @@ pub(super) fn make(
     context: &StageContext,
 ) -> Result<Small> {
     let canvas = [layout.width, layout.height];
+    let curve = photographs.transfer_curve();
     let size = small_size(canvas, seam_options.fine_pixels);
     let mut small = Small { views: Vec::new(), size, bases: Vec::new(), kept: Vec::new() };
     // Halved as often as can be, then read between samples: nothing here is ever looked at.
@@ -63,10 +65,10 @@ pub(super) fn make(
                 check_photograph(placed, &photograph)?;
                 // The larger picture first: the smaller is made from what is left of the photograph then.
                 let mesh = scaled(&placed.mesh, [0, 1].map(|axis| size[axis] as f64 / canvas[axis] as f64), 0.0);
-                let prepared = Prepared::new(Cow::Borrowed(&photograph), &mesh, size, correction, &halving);
+                let prepared = Prepared::new(Cow::Borrowed(&photograph), &mesh, size, (&curve, correction), &halving);
                 let view = if layout.placed.len() == 1 { View::default() } else { view(&prepared, &sampling) };
                 let base = match with_bases {
-                    true => base(&prepared, placed, correction, canvas, [&halving, &sampling]),
+                    true => base(&prepared, placed, (&curve, correction), canvas, [&halving, &sampling]),
                     false => Base::default(),
                 };
                 context.progress().advance(RenderOptions::STAGE, 1);
@@ -129,7 +131,7 @@ fn view(prepared: &Prepared<'_>, options: &RenderOptions) -> View {
 fn base(
     larger: &Prepared<'_>,
     placed: &Placed,
-    correction: &Correction,
+    light: (&TransferCurve, &Correction),
     canvas: [usize; 2],
     [halving, sampling]: [&RenderOptions; 2],
 ) -> Base {
@@ -139,7 +141,7 @@ fn base(
     let (photograph, [width, height]) = larger.photograph();
     let mesh = GridMesh { width, height, ..mesh };
     let size = canvas.map(|length| length.div_ceil(1 << SAMPLED_LEVEL));
-    let prepared = Prepared::new(Cow::Borrowed(photograph), &mesh, size, correction, halving);
+    let prepared = Prepared::new(Cow::Borrowed(photograph), &mesh, size, light, halving);
     // Room for the interpolated rim, from a sample that every coarser level has.
     let grown = |range: Range<usize>, length: usize| {
         (range.start / RIM * RIM).saturating_sub(RIM)..(range.end + RIM).min(length)

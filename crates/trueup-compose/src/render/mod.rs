@@ -8,7 +8,7 @@ mod layer;
 mod panorama;
 pub(crate) mod prepared;
 
-pub use layer::{Layer, layer};
+pub use layer::{Layer, LayerRows, layer, layer_rows, layer_size};
 pub use panorama::Panorama;
 
 use std::borrow::Cow;
@@ -106,7 +106,12 @@ pub fn run(
     match options.blend {
         Blend::MultiBand | Blend::None if !layout.placed.is_empty() => {
             let blended = blend::run(layout, corrections, photographs, (options, seams), cut, context)?;
-            Ok(Panorama::from_roots(layout.width, layout.height, blended.pixels, blended.seams))
+            Ok(Panorama::from_roots(
+                [layout.width, layout.height],
+                blended.pixels,
+                blended.seams,
+                photographs.transfer_curve(),
+            ))
         }
         _ => mean(layout, corrections, photographs, options, context),
     }
@@ -121,6 +126,7 @@ fn mean(
     context: &StageContext,
 ) -> Result<Panorama> {
     let (width, height) = (layout.width, layout.height);
+    let curve = photographs.transfer_curve();
     let mut sums = vec![[0.0; 4]; width * height];
     context.progress().begin(STAGE, layout.placed.len() as u64);
     let at_a_time = rayon::current_num_threads().max(1);
@@ -132,7 +138,7 @@ fn mean(
             .map(|(placed, correction)| {
                 let photograph = photographs.photograph(placed.photograph)?;
                 check_photograph(placed, &photograph)?;
-                Ok(Prepared::new(Cow::Owned(photograph), &placed.mesh, [width, height], correction, options))
+                Ok(Prepared::new(Cow::Owned(photograph), &placed.mesh, [width, height], (&curve, correction), options))
             })
             .collect::<Result<_>>()?;
         sums.par_chunks_mut(width * BAND_ROWS).enumerate().try_for_each(|(band, sums)| {
@@ -147,7 +153,7 @@ fn mean(
         context.progress().advance(STAGE, placed.len() as u64);
     }
     context.progress().finish(STAGE);
-    Ok(Panorama::from_sums(width, height, sums))
+    Ok(Panorama::from_sums([width, height], sums, curve))
 }
 
 fn check(layout: &CanvasLayout, corrections: &[Correction], options: &RenderOptions) -> Result<()> {

@@ -1,10 +1,12 @@
 //! The finished panorama.
 
+use rayon::prelude::*;
 use trueup_core::Result;
+use trueup_core::colour::TransferCurve;
 use trueup_core::raster::RowSource;
 
 use crate::seam::Seams;
-use crate::transfer_curve::{Encode, Encode16, EncodeRoots, EncodeRoots16};
+use crate::transfer_curve::Encoding;
 use crate::weights::alpha;
 
 /// The finished panorama: 8 or 16 bytes a pixel, encoded as its rows are asked for.
@@ -14,6 +16,7 @@ pub struct Panorama {
     height: usize,
     pub(super) pixels: Pixels,
     seams: Option<Seams>,
+    encoding: Encoding,
 }
 
 /// What a panorama holds, row-major.
@@ -21,17 +24,22 @@ pub struct Panorama {
 pub(super) enum Pixels {
     /// Sums over the photographs of weight * (red, green, blue) in linear light, and of the weights.
     Sums(Vec<[f32; 4]>),
-    /// Square roots of linear light and alpha; 65535 is 1. Fine enough for 16 bits of sRGB.
+    /// Square roots of linear light and alpha; 65535 is 1. Fine enough for 16 bits of the usual curves.
     Roots(Vec<[u16; 4]>),
 }
 
 impl Panorama {
-    pub(super) fn from_sums(width: usize, height: usize, sums: Vec<[f32; 4]>) -> Self {
-        Self { width, height, pixels: Pixels::Sums(sums), seams: None }
+    pub(super) fn from_sums([width, height]: [usize; 2], sums: Vec<[f32; 4]>, curve: TransferCurve) -> Self {
+        Self { width, height, pixels: Pixels::Sums(sums), seams: None, encoding: Encoding::new(curve) }
     }
 
-    pub(super) fn from_roots(width: usize, height: usize, roots: Vec<[u16; 4]>, seams: Seams) -> Self {
-        Self { width, height, pixels: Pixels::Roots(roots), seams: Some(seams) }
+    pub(super) fn from_roots(
+        [width, height]: [usize; 2],
+        roots: Vec<[u16; 4]>,
+        seams: Seams,
+        curve: TransferCurve,
+    ) -> Self {
+        Self { width, height, pixels: Pixels::Roots(roots), seams: Some(seams), encoding: Encoding::new(curve) }
     }
 
     /// Bytes that rendering a canvas of `width` x `height` pixels takes beside the decoded photographs and what is made
@@ -71,11 +79,18 @@ impl RowSource for Panorama {
         self.height
     }
 
+    fn is_opaque(&self) -> bool {
+        match &self.pixels {
+            Pixels::Sums(sums) => sums.par_iter().all(|&[.., sum]| alpha(sum) >= 1.0),
+            Pixels::Roots(roots) => roots.par_iter().all(|&[.., opacity]| opacity == u16::MAX),
+        }
+    }
+
     fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
         let range = y * self.width..(y + 1) * self.width;
         match &self.pixels {
             Pixels::Sums(sums) => {
-                let encode = Encode::table();
+                let encode = &self.encoding.linear;
                 for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(&sums[range]) {
                     let opacity = (alpha(sum) * 255.0 + 0.5) as u8;
                     let scale = if opacity > 0 { 1.0 / sum } else { 0.0 };
@@ -84,7 +99,7 @@ impl RowSource for Panorama {
                 }
             }
             Pixels::Roots(roots) => {
-                let encode = EncodeRoots::table();
+                let encode = &self.encoding.roots;
                 for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(&roots[range]) {
                     let opacity = ((u32::from(opacity) * 255 + 32767) / 65535) as u8;
                     let shown = opacity > 0;
@@ -100,7 +115,7 @@ impl RowSource for Panorama {
         let range = y * self.width..(y + 1) * self.width;
         match &self.pixels {
             Pixels::Sums(sums) => {
-                let encode = Encode16::table();
+                let encode = self.encoding.linear16();
                 for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(&sums[range]) {
                     let opacity = (alpha(sum) * 65535.0 + 0.5) as u16;
                     let scale = if opacity > 0 { 1.0 / sum } else { 0.0 };
@@ -109,7 +124,7 @@ impl RowSource for Panorama {
                 }
             }
             Pixels::Roots(roots) => {
-                let encode = EncodeRoots16::table();
+                let encode = self.encoding.roots16();
                 for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(&roots[range]) {
                     let level = |root: u16| if opacity > 0 { encode.level(root) } else { 0 };
                     pixel.copy_from_slice(&[level(r), level(g), level(b), opacity]);

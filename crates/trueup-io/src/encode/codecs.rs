@@ -10,7 +10,7 @@ use trueup_core::StageContext;
 use trueup_core::raster::RowSource;
 
 use super::samples::{Sample, flattened};
-use super::{Depth, Failure, OutputOptions, PngCompression, RGBA, channels_of, for_each_strip};
+use super::{Depth, Failure, Metadata, OutputOptions, PngCompression, RGBA, channels_of, for_each_strip};
 
 /// Rows made at a time.
 const STRIP_ROWS: usize = 64;
@@ -22,16 +22,20 @@ const BUFFER_BYTES: usize = 1 << 20;
 pub(super) fn write_png(
     file: &mut impl Write,
     picture: &dyn RowSource,
+    metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext,
 ) -> Result<(), Failure> {
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
     let channels = channels_of(picture, options);
-    let mut encoder = PngEncoder::new(&mut output, picture.width() as u32, picture.height() as u32);
+    let info = metadata.png_info(picture.width() as u32, picture.height() as u32);
+    let mut encoder = PngEncoder::with_info(&mut output, info).map_err(from_png)?;
     encoder.set_color(if channels == RGBA { PngColorType::Rgba } else { PngColorType::Rgb });
     let sixteen = options.depth == Depth::Sixteen;
     encoder.set_depth(if sixteen { BitDepth::Sixteen } else { BitDepth::Eight });
-    encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+    if metadata.icc.is_none() {
+        encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+    }
     encoder.set_compression(png_compression(options));
     let mut writer = encoder.write_header().map_err(from_png)?;
     let mut stream = writer.stream_writer_with_size(BUFFER_BYTES).map_err(from_png)?;
@@ -68,6 +72,7 @@ pub(super) fn png_compression(options: &OutputOptions) -> Compression {
 pub(super) fn write_webp(
     file: &mut impl Write,
     picture: &dyn RowSource,
+    metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext,
 ) -> Result<(), Failure> {
@@ -80,7 +85,8 @@ pub(super) fn write_webp(
         Ok(())
     })?;
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
-    let encoder = image_webp::WebPEncoder::new(&mut output);
+    let mut encoder = image_webp::WebPEncoder::new(&mut output);
+    metadata.tell_webp(&mut encoder);
     let color = if channels == RGBA { image_webp::ColorType::Rgba8 } else { image_webp::ColorType::Rgb8 };
     encoder.encode(&pixels, picture.width() as u32, picture.height() as u32, color).map_err(std::io::Error::other)?;
     output.flush()?;

@@ -60,7 +60,7 @@ impl RowSource for Fine {
 fn written(name: &str, picture: &dyn RowSource, options: &OutputOptions) -> (TempDir, std::path::PathBuf) {
     let folder = TempDir::new().expect("a temporary folder");
     let path = folder.path().join(name);
-    let bytes = write(&path, picture, options, &StageContext::default()).expect("written");
+    let bytes = write(&path, picture, &Metadata::default(), options, &StageContext::default()).expect("written");
     if !name.ends_with(".dzi") {
         assert_eq!(bytes, path.metadata().expect("a file").len());
     }
@@ -250,20 +250,22 @@ fn deep_zoom_replaces_its_own_tiles_only() {
     let (folder, path) = written("pano.dzi", &Gradient { width: 300, height: 300 }, &options);
     let tiles = folder.path().join("pano_files");
     assert!(tiles.join("9/1_1.jpg").is_file());
-    write(&path, &Gradient { width: 200, height: 100 }, &options, &StageContext::default()).expect("written again");
+    write(&path, &Gradient { width: 200, height: 100 }, &Metadata::default(), &options, &StageContext::default())
+        .expect("written again");
     assert!(!tiles.join("9").exists() && tiles.join("8/0_0.jpg").is_file());
 
     let cancel = CancelToken::default();
     let picture = CancelAtEnd(Gradient { width: 300, height: 300 }, &cancel);
-    let stopped = write(&path, &picture, &options, &StageContext::new(&Silent, &cancel, 0));
+    let stopped = write(&path, &picture, &Metadata::default(), &options, &StageContext::new(&Silent, &cancel, 0));
     assert!(matches!(stopped, Err(Error::Cancelled)), "{stopped:?}");
     assert!(!tiles.join("9").exists() && tiles.join("8/0_0.jpg").is_file());
     assert_eq!(files_in(&folder).len(), 2);
 
     std::fs::write(tiles.join("8/notes.txt"), "mine").expect("written");
-    for refused in
-        [check_writable(&path, &options), write(&path, &picture.0, &options, &StageContext::default()).map(drop)]
-    {
+    for refused in [
+        check_writable(&path, &options),
+        write(&path, &picture.0, &Metadata::default(), &options, &StageContext::default()).map(drop),
+    ] {
         let message = refused.expect_err("notes are kept").to_string();
         assert!(message.contains("notes.txt"), "{message}");
     }
@@ -307,7 +309,8 @@ fn layers_are_pages_with_a_place() {
     let path = folder.path().join("layers.tif");
     for layer_extent in [LayerExtent::Canvas, LayerExtent::Cropped] {
         let options = OutputOptions { layer_extent, depth: Depth::Sixteen, ..OutputOptions::default() };
-        let bytes = write_layers(&path, &TwoLayers, &options, &StageContext::default()).expect("written");
+        let bytes =
+            write_layers(&path, &TwoLayers, &Metadata::default(), &options, &StageContext::default()).expect("written");
         assert_eq!(bytes, path.metadata().expect("a file").len());
         let mut file = pages(&path);
         for (index, [left, top]) in [[10, 20], [150, 200]].into_iter().enumerate() {
@@ -348,8 +351,13 @@ fn layers_are_pages_with_a_place() {
     assert!(check_layers_place(&folder.path().join("a.png")).is_err());
     let options = OutputOptions::default();
     for room in [0, 100, 5_000] {
-        let failed =
-            tiff::write_pages(&mut FullDisk { position: 0, room }, &TwoLayers, &options, &StageContext::default());
+        let failed = tiff::write_pages(
+            &mut FullDisk { position: 0, room },
+            &TwoLayers,
+            &Metadata::default(),
+            &options,
+            &StageContext::default(),
+        );
         assert!(matches!(failed, Err(Failure::Io(_))), "{failed:?}");
     }
 }

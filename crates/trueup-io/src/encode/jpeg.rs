@@ -9,7 +9,7 @@ use trueup_core::options::StageOptions;
 use trueup_core::raster::RowSource;
 
 use super::samples::{Sample, flattened};
-use super::{ChromaSubsampling, Failure, OutputOptions, RGBA};
+use super::{ChromaSubsampling, Failure, Metadata, OutputOptions, RGBA};
 
 /// Rows of a strip: a multiple of 8 and of 16, the heights of a minimum coded unit, and few enough that the units of a
 /// strip of the largest width fit the 16-bit restart interval.
@@ -29,6 +29,7 @@ const STRIPS_PER_THREAD: usize = 4;
 pub(super) fn write(
     file: &mut impl Write,
     picture: &dyn RowSource,
+    metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext,
 ) -> Result<(), Failure> {
@@ -46,7 +47,7 @@ pub(super) fn write(
         for strip in strips {
             let (header, coded) = split_scan(&strip).ok_or_else(malformed)?;
             if strip_number == 0 {
-                file.write_all(&with_height(header, height).ok_or_else(malformed)?)?;
+                file.write_all(&metadata.jpeg_headers(&with_height(header, height).ok_or_else(malformed)?))?;
             } else {
                 file.write_all(&[0xff, RESTART_0 + ((strip_number - 1) % 8) as u8])?;
             }

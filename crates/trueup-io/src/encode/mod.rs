@@ -7,12 +7,14 @@ mod folder;
 mod format_tests;
 mod jpeg;
 mod labels;
+mod metadata;
 mod pending;
 mod pyramid;
 mod samples;
 #[cfg(test)]
 mod tests;
 mod tiff;
+mod tiff_metadata;
 
 use std::path::Path;
 
@@ -21,6 +23,7 @@ use trueup_core::options::StageOptions;
 use trueup_core::raster::RowSource;
 use trueup_core::{Error, Result, StageContext};
 
+use crate::colour::{InSrgb, is_srgb};
 use crate::format::{OutputFormat, PictureFormat};
 
 use codecs::from_tiff;
@@ -29,6 +32,7 @@ use samples::Sample;
 
 pub use folder::PendingFolder;
 pub use labels::{LabelMap, NOTHING, check_labels_place, write_labels};
+pub use metadata::Metadata;
 pub use tiff::{LayerPage, LayerSet, check_layers_place, write_layers};
 
 trueup_core::choice! {
@@ -147,6 +151,28 @@ trueup_core::choice! {
     }
 }
 
+trueup_core::choice! {
+    /// Which colour space panoramas are written in.
+    pub enum OutputProfile {
+        /// That of the photographs, whose profile is embedded.
+        Keep = "keep",
+        /// sRGB, for places that ignore profiles; colours it does not have are clipped.
+        Srgb = "srgb",
+    }
+}
+
+trueup_core::choice! {
+    /// What panoramas tell of the photographs they are made of.
+    pub enum MetadataKept {
+        /// Camera, lens, exposure, time and place.
+        Keep = "keep",
+        /// All but the place.
+        NoLocation = "no-location",
+        /// Nothing. The colour profile and the crop of a spherical panorama, which viewers need, are written all the same.
+        None = "none",
+    }
+}
+
 impl Background {
     /// The value of all three channels.
     fn value(self) -> u8 {
@@ -189,6 +215,10 @@ trueup_core::options! {
         layer_extent: LayerExtent = LayerExtent::Canvas, Allowed::Any, "";
         /// What shows through transparent parts where there is no transparency, as in JPEG.
         background: Background = Background::Black, Allowed::Any, "";
+        /// Which colour space panoramas are written in. Deep Zoom tiles and floating point samples are in sRGB's.
+        profile: OutputProfile = OutputProfile::Keep, Allowed::Any, "";
+        /// What panoramas tell of their photographs, in EXIF and XMP.
+        metadata: MetadataKept = MetadataKept::Keep, Allowed::Any, "";
     }
 }
 
@@ -213,6 +243,9 @@ impl OutputOptions {
 /// Writes a panorama to `path`, in the format its extension names; returns the file's length in bytes, for Deep Zoom that
 /// of all files.
 ///
+/// `metadata` describes the picture: its colour profile, which [`OutputOptions::profile`] may have it converted from, and
+/// the EXIF and XMP to embed; Deep Zoom has none.
+///
 /// Rows are asked for in strips, in parallel on the current thread pool; only WebP needs a copy of the whole. JPEG is
 /// laid over the background, the other formats keep transparency unless [`OutputOptions::alpha`] says otherwise. A depth
 /// of [`Depth::Auto`] is taken for 8 bits, see [`OutputOptions::with_depth_for`]. The bytes written depend on the picture
@@ -224,9 +257,21 @@ impl OutputOptions {
 /// has not; [`Error::Limits`] for pictures larger than the format can hold; [`Error::Input`] for an empty picture or a
 /// folder that does not exist; [`Error::Io`] if the operating system refuses; [`Error::Cancelled`]; and what the picture
 /// returns.
-pub fn write(path: &Path, picture: &dyn RowSource, options: &OutputOptions, context: &StageContext) -> Result<u64> {
+pub fn write(
+    path: &Path,
+    picture: &dyn RowSource,
+    metadata: &Metadata,
+    options: &OutputOptions,
+    context: &StageContext,
+) -> Result<u64> {
     options.check()?;
     let format = output_format(path, options)?;
+    // Viewers of tiles know no profiles, and a profile describes encoded samples, not linear light.
+    let without_profile = format == OutputFormat::DeepZoom || options.depth == Depth::Float;
+    if let Some(icc) = profile_to_leave(metadata, options, without_profile) {
+        let options = OutputOptions { profile: OutputProfile::Keep, ..options.clone() };
+        return write(path, &InSrgb::new(picture, icc)?, &metadata.in_srgb(), &options, context);
+    }
     check_sides(path, largest_side(format), picture.width(), picture.height())?;
     context.progress().begin(OutputOptions::STAGE, picture.height() as u64);
     let length = match format {
@@ -234,10 +279,10 @@ pub fn write(path: &Path, picture: &dyn RowSource, options: &OutputOptions, cont
         OutputFormat::Picture(format) => {
             let mut pending = PendingFile::create(path)?;
             let written = match format {
-                PictureFormat::Jpeg => jpeg::write(pending.file(), picture, options, context),
-                PictureFormat::Png => codecs::write_png(pending.file(), picture, options, context),
-                PictureFormat::Tiff => tiff::write(pending.file(), picture, options, context),
-                PictureFormat::WebP => codecs::write_webp(pending.file(), picture, options, context),
+                PictureFormat::Jpeg => jpeg::write(pending.file(), picture, metadata, options, context),
+                PictureFormat::Png => codecs::write_png(pending.file(), picture, metadata, options, context),
+                PictureFormat::Tiff => tiff::write(pending.file(), picture, metadata, options, context),
+                PictureFormat::WebP => codecs::write_webp(pending.file(), picture, metadata, options, context),
             };
             written.map_err(|failure| failure.at(path))?;
             context.check_cancelled()?;
@@ -246,6 +291,12 @@ pub fn write(path: &Path, picture: &dyn RowSource, options: &OutputOptions, cont
     };
     context.progress().finish(OutputOptions::STAGE);
     Ok(length)
+}
+
+/// The profile of a picture that is to be converted to sRGB.
+fn profile_to_leave<'a>(metadata: &'a Metadata, options: &OutputOptions, always: bool) -> Option<&'a [u8]> {
+    let leaves = always || options.profile == OutputProfile::Srgb;
+    metadata.icc.as_deref().filter(|icc| leaves && !is_srgb(icc))
 }
 
 /// Checks that a panorama could be written to `path`, before the long work that makes one: the extension names a format

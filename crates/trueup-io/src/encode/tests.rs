@@ -58,7 +58,7 @@ pub(super) fn read(path: &Path) -> Raster<u8> {
 }
 
 fn write_default(path: &Path, picture: &Gradient) -> Result<u64> {
-    write(path, picture, &OutputOptions::default(), &StageContext::default())
+    write(path, picture, &Metadata::default(), &OutputOptions::default(), &StageContext::default())
 }
 
 /// The files in a folder, temporary ones included.
@@ -99,7 +99,7 @@ fn compression_changes_no_pixel() {
     ];
     for (name, options) in options {
         let path = folder.path().join(name);
-        write(&path, &picture, &options, &StageContext::default()).expect("written");
+        write(&path, &picture, &Metadata::default(), &options, &StageContext::default()).expect("written");
         let raster = read(&path);
         assert_eq!(raster.pixel(33, 66), picture.pixel(33, 66));
     }
@@ -115,7 +115,7 @@ fn jpeg_strips_join_without_a_trace() {
         for jpeg_subsampling in subsamplings {
             let options = OutputOptions { jpeg_subsampling, background: Background::White, ..OutputOptions::default() };
             let path = folder.path().join("a.jpg");
-            write(&path, &picture, &options, &StageContext::default()).expect("written");
+            write(&path, &picture, &Metadata::default(), &options, &StageContext::default()).expect("written");
             let raster = read(&path);
             assert_eq!((raster.width(), raster.height(), raster.channels()), (width, height, 3));
             for y in 0..height {
@@ -143,7 +143,8 @@ fn bytes_do_not_depend_on_the_threads() {
         let path = folder.path().join(name);
         let bytes_with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            pool.install(|| write(&path, &picture, options, &StageContext::default())).expect("written");
+            pool.install(|| write(&path, &picture, &Metadata::default(), options, &StageContext::default()))
+                .expect("written");
             std::fs::read(&path).expect("a file")
         };
         assert_eq!(bytes_with(1), bytes_with(2), "{name}");
@@ -226,7 +227,13 @@ fn a_stop_leaves_the_old_file_and_nothing_else() {
         std::fs::write(&path, b"old").expect("a file");
         let cancel = CancelToken::default();
         let picture = CancelAtEnd(Gradient { width: 30, height: 300 }, &cancel);
-        let stopped = write(&path, &picture, &OutputOptions::default(), &StageContext::new(&Silent, &cancel, 0));
+        let stopped = write(
+            &path,
+            &picture,
+            &Metadata::default(),
+            &OutputOptions::default(),
+            &StageContext::new(&Silent, &cancel, 0),
+        );
         assert!(matches!(stopped, Err(Error::Cancelled)), "{name}: {stopped:?}");
         assert_eq!(std::fs::read(&path).expect("the old file"), b"old");
         std::fs::remove_file(&path).expect("our own file");
@@ -266,14 +273,16 @@ fn a_full_disk_is_an_error_in_every_format() {
     let picture = Gradient { width: 60, height: 300 };
     let (options, context) = (OutputOptions::default(), StageContext::default());
     let tiled = OutputOptions { tiff_layout: TiffLayout::Tiles256, ..OutputOptions::default() };
+    let metadata = Metadata::default();
     for room in [0, 10, 300, 700] {
         let disk = || FullDisk { position: 0, room };
+        let large = Gradient { width: 600, height: 600 };
         let results = [
-            jpeg::write(&mut disk(), &picture, &options, &context),
-            codecs::write_png(&mut disk(), &picture, &options, &context),
-            tiff::write(&mut disk(), &picture, &options, &context),
-            tiff::write(&mut disk(), &picture, &tiled, &context),
-            codecs::write_webp(&mut disk(), &Gradient { width: 600, height: 600 }, &options, &context),
+            jpeg::write(&mut disk(), &picture, &metadata, &options, &context),
+            codecs::write_png(&mut disk(), &picture, &metadata, &options, &context),
+            tiff::write(&mut disk(), &picture, &metadata, &options, &context),
+            tiff::write(&mut disk(), &picture, &metadata, &tiled, &context),
+            codecs::write_webp(&mut disk(), &large, &metadata, &options, &context),
         ];
         for (index, result) in results.into_iter().enumerate() {
             let Err(Failure::Io(error)) = result else { panic!("format {index}, room {room}: {result:?}") };

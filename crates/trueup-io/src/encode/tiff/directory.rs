@@ -5,12 +5,13 @@ use std::io::{Seek, Write};
 use tiff::encoder::{DirectoryEncoder, Rational, TiffKind};
 use tiff::tags::{
     CompressionMethod, ExtraSamples, PhotometricInterpretation, PlanarConfiguration, Predictor, ResolutionUnit,
-    SampleFormat, Tag, Type, ValueBuffer,
+    SampleFormat, Tag,
 };
 
 use super::blocks::{BlockForm, Stored};
 use crate::encode::samples::Sample;
-use crate::encode::{Failure, RGBA, from_tiff};
+use crate::encode::tiff_metadata::{Ascii, Hanging, write_tags};
+use crate::encode::{Failure, Metadata, RGBA, from_tiff};
 
 /// How a page is cut into blocks.
 #[derive(Debug, Clone, Copy)]
@@ -22,7 +23,7 @@ pub(super) enum Blocks {
 }
 
 /// What a page is, beside its pixels.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub(super) struct Page<'a> {
     pub(super) width: u32,
     pub(super) height: u32,
@@ -31,6 +32,8 @@ pub(super) struct Page<'a> {
     pub(super) blocks: Blocks,
     pub(super) form: BlockForm,
     pub(super) place: Option<&'a Place<'a>>,
+    /// What it tells beside its pixels.
+    pub(super) metadata: Option<(&'a Metadata, &'a Hanging)>,
 }
 
 /// Where a page lies among others.
@@ -103,6 +106,10 @@ pub(super) fn write_directory<S: Sample, W: Write + Seek, K: TiffKind>(
     if let Some(place) = page.place {
         write_place(&mut directory, place)?;
     }
+    if let Some((metadata, hanging)) = page.metadata {
+        // A profile describes encoded samples; floating point numbers are linear light.
+        write_tags(&mut directory, metadata, hanging, !S::IS_FLOAT).map_err(from_tiff)?;
+    }
     directory.finish().map_err(from_tiff)
 }
 
@@ -161,15 +168,5 @@ fn write_place<W: Write + Seek, K: TiffKind>(
     directory.write_tag(FULL_HEIGHT, place.whole[1]).map_err(from_tiff)?;
     // Names beyond ASCII are written in UTF-8, as programs do although the standard has no word for it.
     let bytes: Vec<u8> = place.name.bytes().filter(|&byte| byte != 0).chain([0]).collect();
-    let name = text(&bytes)?;
-    directory.write_tag_buf(PAGE_NAME, &name).map_err(from_tiff)
-}
-
-/// Bytes that end in 0 as a value of the type ASCII, which the crate makes of ASCII alone.
-fn text(bytes: &[u8]) -> Result<ValueBuffer, Failure> {
-    let placeholder = "x".repeat(bytes.len().saturating_sub(1));
-    let mut value = ValueBuffer::from_value(&placeholder.as_str());
-    debug_assert_eq!(value.data_type(), Type::ASCII);
-    value.as_bytes_mut().copy_from_slice(bytes);
-    Ok(value)
+    directory.write_tag(PAGE_NAME, Ascii(bytes)).map_err(from_tiff)
 }

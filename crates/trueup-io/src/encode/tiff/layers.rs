@@ -10,8 +10,12 @@ use trueup_core::{Error, Result, StageContext};
 
 use super::directory::Place;
 use super::{BUFFER_BYTES, DEFAULT_TILE_PX, Form, MAX_SIDE, write_picture};
+use crate::colour::InSrgb;
 use crate::encode::pending::PendingFile;
-use crate::encode::{Failure, LayerExtent, OutputOptions, RGBA, TiffLayout, check_place, check_sides, from_tiff};
+use crate::encode::{
+    Depth, Failure, LayerExtent, Metadata, OutputOptions, RGBA, TiffLayout, check_place, check_sides, from_tiff,
+    profile_to_leave,
+};
 use crate::format::PictureFormat;
 
 /// One page of a file of layers.
@@ -63,17 +67,23 @@ pub fn check_layers_place(path: &Path) -> Result<()> {
 ///
 /// Every page has alpha, the name of its layer, its number, and its place in the panorama (XPosition, YPosition at 72
 /// pixels an inch; ImageFullWidth, ImageFullLength). [`OutputOptions::layer_extent`] decides whether it is as large as the
-/// panorama. The file appears complete or not at all.
+/// panorama. Of `metadata`, the pages have the colour profile. The file appears complete or not at all.
 ///
 /// # Errors
 /// Those of [`write()`](crate::encode::write()), and of [`LayerSet::open`].
-pub fn write_layers(path: &Path, set: &dyn LayerSet, options: &OutputOptions, context: &StageContext) -> Result<u64> {
+pub fn write_layers(
+    path: &Path,
+    set: &dyn LayerSet,
+    metadata: &Metadata,
+    options: &OutputOptions,
+    context: &StageContext,
+) -> Result<u64> {
     options.check()?;
     check_layers_place(path)?;
     let [width, height] = set.whole();
     check_sides(path, (MAX_SIDE, "Lower canvas.scale."), width, height)?;
     let mut pending = PendingFile::create(path)?;
-    write_pages(pending.file(), set, options, context).map_err(|failure| failure.at(path))?;
+    write_pages(pending.file(), set, metadata, options, context).map_err(|failure| failure.at(path))?;
     context.check_cancelled()?;
     pending.commit()
 }
@@ -82,6 +92,7 @@ pub fn write_layers(path: &Path, set: &dyn LayerSet, options: &OutputOptions, co
 pub(crate) fn write_pages(
     file: &mut (impl Write + Seek),
     set: &dyn LayerSet,
+    metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext,
 ) -> std::result::Result<(), Failure> {
@@ -91,10 +102,10 @@ pub(crate) fn write_pages(
     // Pages as large as the panorama take room for the layers alone: empty tiles are stored once.
     if form.is_big(set.pixels(), options) {
         let mut encoder = TiffEncoder::new_big(&mut output).map_err(from_tiff)?;
-        write_each(&mut encoder, set, options, form, context)?;
+        write_each(&mut encoder, set, metadata, options, form, context)?;
     } else {
         let mut encoder = TiffEncoder::new(&mut output).map_err(from_tiff)?;
-        write_each(&mut encoder, set, options, form, context)?;
+        write_each(&mut encoder, set, metadata, options, form, context)?;
     }
     output.flush()?;
     context.progress().finish(OutputOptions::STAGE);
@@ -116,14 +127,20 @@ impl Form {
 fn write_each<W: Write + Seek, K: TiffKind>(
     encoder: &mut TiffEncoder<W, K>,
     set: &dyn LayerSet,
+    metadata: &Metadata,
     options: &OutputOptions,
     form: Form,
     context: &StageContext,
 ) -> std::result::Result<(), Failure> {
     let whole = set.whole();
+    let converted = profile_to_leave(metadata, options, options.depth == Depth::Float);
+    let icc = metadata.icc.clone().filter(|_| converted.is_none());
+    let metadata = Metadata { icc, ..Metadata::default() };
     for index in 0..set.count() {
         context.check_cancelled()?;
         let page = set.open(index)?;
+        let in_srgb = converted.map(|icc| InSrgb::new(page.rows.as_ref(), icc)).transpose()?;
+        let rows: &dyn RowSource = in_srgb.as_ref().map_or(page.rows.as_ref(), |rows| rows);
         let number = [index, set.count()].map(|number| u16::try_from(number).unwrap_or(u16::MAX));
         let corner = match options.layer_extent {
             LayerExtent::Cropped => page.corner,
@@ -134,10 +151,10 @@ fn write_each<W: Write + Seek, K: TiffKind>(
         // The progress of the whole file is that of its pages.
         let quiet = context.without_progress();
         match options.layer_extent {
-            LayerExtent::Cropped => write_picture(encoder, page.rows.as_ref(), form, Some(&place), &quiet)?,
+            LayerExtent::Cropped => write_picture(encoder, rows, &metadata, form, Some(&place), &quiet)?,
             LayerExtent::Canvas => {
-                let rows = OnCanvas { layer: page.rows.as_ref(), corner: page.corner, whole };
-                write_picture(encoder, &rows, form, Some(&place), &quiet)?;
+                let rows = OnCanvas { layer: rows, corner: page.corner, whole };
+                write_picture(encoder, &rows, &metadata, form, Some(&place), &quiet)?;
             }
         }
         context.progress().advance(OutputOptions::STAGE, 1);

@@ -12,7 +12,8 @@ use trueup_core::raster::RowSource;
 
 use super::pyramid::level_sizes;
 use super::samples::Sample;
-use super::{BigTiff, Depth, Failure, OutputOptions, TiffCompression, TiffLayout, channels_of, from_tiff};
+use super::tiff_metadata::write_directories;
+use super::{BigTiff, Depth, Failure, Metadata, OutputOptions, TiffCompression, TiffLayout, channels_of, from_tiff};
 use blocks::{BlockForm, write_strips, write_tiles};
 use directory::{Blocks, Page, Place, write_directory};
 
@@ -41,6 +42,7 @@ const STRIP_ROWS: usize = 64;
 pub(super) fn write(
     file: &mut (impl Write + Seek),
     picture: &dyn RowSource,
+    metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext,
 ) -> Result<(), Failure> {
@@ -48,10 +50,10 @@ pub(super) fn write(
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
     if form.is_big(picture.width() as u64 * picture.height() as u64, options) {
         let mut encoder = TiffEncoder::new_big(&mut output).map_err(from_tiff)?;
-        write_picture(&mut encoder, picture, form, None, context)?;
+        write_picture(&mut encoder, picture, metadata, form, None, context)?;
     } else {
         let mut encoder = TiffEncoder::new(&mut output).map_err(from_tiff)?;
-        write_picture(&mut encoder, picture, form, None, context)?;
+        write_picture(&mut encoder, picture, metadata, form, None, context)?;
     }
     output.flush()?;
     Ok(())
@@ -106,24 +108,27 @@ const DEFAULT_TILE_PX: usize = 256;
 fn write_picture<W: Write + Seek, K: TiffKind>(
     encoder: &mut TiffEncoder<W, K>,
     picture: &dyn RowSource,
+    metadata: &Metadata,
     form: Form,
     place: Option<&Place<'_>>,
     context: &StageContext,
 ) -> Result<(), Failure> {
     match form.depth {
-        Depth::Auto | Depth::Eight => write_samples::<u8, W, K>(encoder, picture, form, place, context),
-        Depth::Sixteen => write_samples::<u16, W, K>(encoder, picture, form, place, context),
-        Depth::Float => write_samples::<f32, W, K>(encoder, picture, form, place, context),
+        Depth::Auto | Depth::Eight => write_samples::<u8, W, K>(encoder, picture, metadata, form, place, context),
+        Depth::Sixteen => write_samples::<u16, W, K>(encoder, picture, metadata, form, place, context),
+        Depth::Float => write_samples::<f32, W, K>(encoder, picture, metadata, form, place, context),
     }
 }
 
 fn write_samples<S: Sample, W: Write + Seek, K: TiffKind>(
     encoder: &mut TiffEncoder<W, K>,
     picture: &dyn RowSource,
+    metadata: &Metadata,
     form: Form,
     place: Option<&Place<'_>>,
     context: &StageContext,
 ) -> Result<(), Failure> {
+    let hanging = write_directories(encoder, metadata).map_err(from_tiff)?;
     let page = |[width, height]: [usize; 2], level, blocks| Page {
         width: width as u32,
         height: height as u32,
@@ -131,6 +136,7 @@ fn write_samples<S: Sample, W: Write + Seek, K: TiffKind>(
         blocks,
         form: form.blocks,
         place: place.filter(|_| level == 0),
+        metadata: (level == 0).then_some((metadata, &hanging)),
     };
     // Blocks are written as they are ready, the directories that tell where they are behind them.
     let mut directory = encoder.image_directory().map_err(from_tiff)?;
