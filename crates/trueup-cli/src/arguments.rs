@@ -72,6 +72,10 @@ pub(crate) struct StitchArgs {
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     pub project: Option<PathBuf>,
 
+    /// Write the cameras as a project of the Hugin stitcher
+    #[arg(long, value_name = "FILE.pto", help_heading = "Output")]
+    pub pto: Option<PathBuf>,
+
     /// Size of the panorama: 1 keeps the pixel scale of the reference photograph (canvas.scale)
     #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Output")]
     pub scale: Option<String>,

@@ -58,6 +58,12 @@ impl CheckedStitch {
             let message = format!("{} cannot be both the panorama and the project", args.output.display());
             return Err(Failure::usage(message, "Give --output and --project different names."));
         }
+        if let Some(pto) = &args.pto
+            && (*pto == args.output || args.project.as_ref() == Some(pto))
+        {
+            let message = format!("{} cannot be two files at once", pto.display());
+            return Err(Failure::usage(message, "Give --output, --project and --pto different names."));
+        }
         let reference = chosen_reference(args.reference);
         let inputs = Inputs {
             photographs: args.photographs,
@@ -68,7 +74,10 @@ impl CheckedStitch {
         };
         // The library reads 0 as one thread per core.
         let threads = args.threads.map_or(0, usize::from);
-        Ok(Self { job: StitchJob { inputs, output: args.output, project: args.project, threads }, options })
+        Ok(Self {
+            job: StitchJob { inputs, output: args.output, project: args.project, hugin_project: args.pto, threads },
+            options,
+        })
     }
 }
 

@@ -16,6 +16,7 @@
 #![forbid(unsafe_code)]
 
 pub mod camera;
+pub mod colour;
 pub mod context;
 pub mod diagnostics;
 pub mod error;
@@ -29,6 +30,7 @@ pub mod options;
 pub mod raster;
 pub mod scratch;
 pub mod source;
+pub mod spherical;
 pub mod truth;
 
 pub use context::StageContext;

@@ -146,6 +146,10 @@ pub trait RowSource: Sync {
     fn width(&self) -> usize;
     /// Height in pixels.
     fn height(&self) -> usize;
+    /// Whether every pixel is known to be wholly opaque; `false` where that is not known.
+    fn is_opaque(&self) -> bool {
+        false
+    }
     /// Writes row `y` as 8-bit RGBA, encoded, with straight (not premultiplied) alpha: `4 * width` samples.
     ///
     /// # Errors

@@ -11,10 +11,11 @@ use trueup_compose::render::{self, Panorama};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
-use trueup_core::source::WorkingFrame;
+use trueup_core::source::{PhotographSource, WorkingFrame};
 use trueup_core::{Error, Result, StageContext};
+use trueup_io::colour::PhotographColours;
 use trueup_io::decode::FilePhotographs;
-use trueup_io::encode;
+use trueup_io::encode::{self, Metadata};
 use trueup_io::scratch::{ScratchFolder, check_room};
 use trueup_io::source::{self, RejectedSource, Sources};
 use trueup_vision::features::Features;
@@ -32,6 +33,7 @@ use crate::memory::OverlapMemory;
 use crate::names;
 use crate::options::StitchOptions;
 use crate::project::Project;
+use crate::provenance;
 use crate::record::{fill_geometry, place};
 
 /// Runs the stages with one set of options.
@@ -130,7 +132,9 @@ impl<'a> Stitcher<'a> {
         let sources = clock.time("source", || source::scan(&inputs.photographs, &self.options.source, self.context))?;
         self.check_any(&sources, inputs)?;
         let measuring = Budget::new(self.options).measuring(&sources.images, self.options)?;
-        let photographs = std::sync::Arc::new(FilePhotographs::new(sources.images.clone(), measuring.kept_bytes));
+        let colours = PhotographColours::survey(&sources.images, self.context);
+        let photographs = FilePhotographs::new(sources.images.clone(), measuring.kept_bytes).in_colours(colours);
+        let photographs = std::sync::Arc::new(photographs);
         let matched = self.match_all(sources, (&photographs, measuring.at_once), inputs, &mut clock)?;
         Ok(MatchedPhotographs { matched, photographs, clock, findings: self.context.take_diagnostics(), memory: None })
     }
@@ -208,6 +212,11 @@ impl<'a> Stitcher<'a> {
         let bytes = encode::expected_bytes(output, layout.width, layout.height, &self.options.output);
         check_room(folder, bytes, "the panorama")?;
         Ok(ScratchFolder::new(named.unwrap_or_else(|| folder.to_owned())).beside(folder, bytes))
+    }
+
+    /// What the panorama's file is to tell: its colour profile, and of its photographs what the options let pass.
+    pub fn metadata(&self, alignment: &Alignment) -> Metadata {
+        provenance::metadata(&alignment.project, alignment.photographs.colours(), &self.options.output)
     }
 
     /// Measures how true `panorama`, composed of `alignment`, is to its photographs: steps across its seams, and ghosts.
@@ -363,11 +372,17 @@ impl<'a> Stitcher<'a> {
         };
         let placed = place(&component, geometry.as_ref());
         let layout = layout::run(placed, component.reference, &self.options.canvas, self.context)?;
+        let curve = photographs.transfer_curve();
         let thumbnails: Vec<Thumbnail> = members
             .iter()
             .zip(component.camera_groups())
             .filter_map(|(&picture, camera)| Some((camera, matched.measured[picture].as_ref()?)))
-            .map(|(camera, one)| Thumbnail { raster: &one.thumbnail, frame: one.thumbnail_frame, camera })
+            .map(|(camera, one)| Thumbnail {
+                raster: &one.thumbnail,
+                curve: &curve,
+                frame: one.thumbnail_frame,
+                camera,
+            })
             .collect();
         let corrections = clock
             .time("exposure", || {
@@ -376,6 +391,7 @@ impl<'a> Stitcher<'a> {
             .corrections;
         let mut project = matched.project(self.options, members, stitched);
         fill_geometry(&mut project, &component, geometry.as_ref(), &layout, &corrections);
+        project.colour_space = photographs.colours().map(PhotographColours::name).unwrap_or_default();
         project.measures = geometry
             .as_ref()
             .map(|geometry| clock.time("measures", || measures::run(&component, geometry, &layout, self.options)));

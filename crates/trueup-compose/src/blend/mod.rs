@@ -107,7 +107,8 @@ pub(crate) fn run(
     let mut work = Work { options, seams: &seams, canvas, first_level, levels };
 
     let batches = order::batches(&work, &bytes, plan.photographs)?;
-    let supply = Supply { layout, corrections, photographs, options, context };
+    let curve = photographs.transfer_curve();
+    let supply = Supply { layout, curve: &curve, corrections, photographs, options, context };
     let mut shelf = Shelf::new(supply, kept, &batches, plan.photographs, plan.at_a_time);
     let mut pixels = plan.store(canvas, [tile_side(first_level); 2]);
     for (index, batch) in batches.iter().enumerate() {

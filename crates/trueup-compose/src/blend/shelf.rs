@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use rayon::prelude::*;
+use trueup_core::colour::TransferCurve;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::Photograph;
 use trueup_core::source::PhotographSource;
@@ -19,6 +20,7 @@ use crate::seam::Label;
 #[derive(Clone, Copy)]
 pub(super) struct Supply<'a> {
     pub(super) layout: &'a CanvasLayout,
+    pub(super) curve: &'a TransferCurve,
     pub(super) corrections: &'a [Correction],
     pub(super) photographs: &'a dyn PhotographSource,
     pub(super) options: &'a RenderOptions,
@@ -129,6 +131,6 @@ impl<'a> Supply<'a> {
         };
         check_photograph(placed, &photograph)?;
         let canvas = [self.layout.width, self.layout.height];
-        Ok(Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, &self.corrections[at], self.options))
+        Ok(Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, (self.curve, &self.corrections[at]), self.options))
     }
 }

@@ -1,4 +1,5 @@
 use proptest::prelude::*;
+use trueup_core::colour::TransferCurve;
 use trueup_core::mesh::GridMesh;
 use std::borrow::Cow;
 
@@ -56,7 +57,7 @@ fn composed(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOp
 }
 
 fn root_of(level: u8) -> u16 {
-    (crate::transfer_curve::Linearise::table().linear(f32::from(level)).sqrt() * 65535.0 + 0.5) as u16
+    (crate::transfer_curve::Linearise::of(&TransferCurve::SRGB).linear(f32::from(level)).sqrt() * 65535.0 + 0.5) as u16
 }
 
 #[test]
@@ -136,7 +137,13 @@ fn with_work<T>(lefts: &[usize], first_level: u32, test: impl FnOnce(&Work<'_>, 
         .into_iter()
         .zip(&layout.placed)
         .map(|(photograph, placed)| {
-            Some(Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, &Correction::default(), &options))
+            Some(Prepared::new(
+                Cow::Owned(photograph),
+                &placed.mesh,
+                canvas,
+                (&TransferCurve::SRGB, &Correction::default()),
+                &options,
+            ))
         })
         .collect();
     test(&work, &prepared)
@@ -220,7 +227,7 @@ proptest! {
         let panorama = render(&layout, &corrections, &Memory(pictures), &options, &SeamOptions::default(), &context);
         let panorama = panorama.expect("renders");
         let used = &levels[..lefts.len()];
-        let linear = |level: u8| crate::transfer_curve::Linearise::table().linear(f32::from(level));
+        let linear = |level: u8| crate::transfer_curve::Linearise::of(&TransferCurve::SRGB).linear(f32::from(level));
         let low = used.iter().map(|&level| linear(level)).fold(f32::INFINITY, f32::min) - 1e-4;
         let high = used.iter().map(|&level| linear(level)).fold(0.0, f32::max) + 1e-4;
         for y in 0..layout.height {

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use rayon::prelude::*;
+use trueup_core::colour::TransferCurve;
 use trueup_core::mesh::GridMesh;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::Photograph;
@@ -49,6 +50,7 @@ pub(super) fn make(
     context: &StageContext,
 ) -> Result<Small> {
     let canvas = [layout.width, layout.height];
+    let curve = photographs.transfer_curve();
     let size = small_size(canvas, seam_options.fine_pixels);
     let bases = Bases::new(plan.bases.clone());
     let mut small = Small { views: Vec::new(), size, bases, kept: Vec::new(), bytes: Vec::new() };
@@ -68,10 +70,10 @@ pub(super) fn make(
                 check_photograph(placed, &photograph)?;
                 // The larger picture first: the smaller is made from what is left of the photograph then.
                 let mesh = scaled(&placed.mesh, [0, 1].map(|axis| size[axis] as f64 / canvas[axis] as f64), 0.0);
-                let prepared = Prepared::new(Cow::Borrowed(&photograph), &mesh, size, correction, &halving);
+                let prepared = Prepared::new(Cow::Borrowed(&photograph), &mesh, size, (&curve, correction), &halving);
                 let view = if layout.placed.len() == 1 { View::default() } else { view(&prepared, &sampling) };
                 let base = match first_level {
-                    Some(level) => base(&prepared, placed, correction, (canvas, level), [&halving, &sampling]),
+                    Some(level) => base(&prepared, placed, (&curve, correction), (canvas, level), [&halving, &sampling]),
                     None => Base::default(),
                 };
                 context.progress().advance(RenderOptions::STAGE, 1);
@@ -135,7 +137,7 @@ fn view(prepared: &Prepared<'_>, options: &RenderOptions) -> View {
 fn base(
     larger: &Prepared<'_>,
     placed: &Placed,
-    correction: &Correction,
+    light: (&TransferCurve, &Correction),
     (canvas, first_level): ([usize; 2], u32),
     [halving, sampling]: [&RenderOptions; 2],
 ) -> Base {
@@ -146,7 +148,7 @@ fn base(
     let (photograph, [width, height]) = larger.photograph();
     let mesh = GridMesh { width, height, ..mesh };
     let size = canvas.map(|length| length.div_ceil(1 << level));
-    let prepared = Prepared::new(Cow::Borrowed(photograph), &mesh, size, correction, halving);
+    let prepared = Prepared::new(Cow::Borrowed(photograph), &mesh, size, light, halving);
     // Room for the interpolated rim, from a sample that every coarser level has.
     let grown = |range: Range<usize>, length: usize| {
         (range.start / RIM * RIM).saturating_sub(RIM)..(range.end + RIM).min(length)

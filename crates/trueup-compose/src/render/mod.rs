@@ -10,7 +10,7 @@ pub(crate) mod plan;
 pub(crate) mod prepared;
 pub(crate) mod store;
 
-pub use layer::{Layer, layer};
+pub use layer::{Layer, LayerRows, layer, layer_rows, layer_size};
 pub use panorama::Panorama;
 pub use plan::Resources;
 
@@ -127,9 +127,12 @@ pub fn run_within(
     match options.blend {
         Blend::MultiBand | Blend::None if !layout.placed.is_empty() => {
             let blended = blend::run(layout, corrections, photographs, (options, seams), (cut, &plan), context)?;
-            Ok(Panorama::from_roots(size, blended.pixels, blended.seams))
+            Ok(Panorama::from_roots(size, blended.pixels, blended.seams, photographs.transfer_curve()))
         }
-        _ => Ok(Panorama::from_sums(size, mean(layout, corrections, photographs, options, &plan, context)?)),
+        _ => {
+            let sums = mean(layout, corrections, photographs, options, &plan, context)?;
+            Ok(Panorama::from_sums(size, sums, photographs.transfer_curve()))
+        }
     }
 }
 
@@ -143,6 +146,7 @@ fn mean(
     context: &StageContext,
 ) -> Result<Store<[f32; 4]>> {
     let (width, height) = (layout.width, layout.height);
+    let curve = photographs.transfer_curve();
     let part_rows = plan.sum_rows(width, BAND_ROWS);
     let parts: Vec<Range<usize>> =
         (0..height).step_by(part_rows).map(|first| first..first.saturating_add(part_rows).min(height)).collect();
@@ -165,7 +169,7 @@ fn mean(
                     let photograph = photographs.photograph(placed.photograph)?;
                     check_photograph(placed, &photograph)?;
                     let photograph = Cow::Owned(photograph);
-                    Ok(Prepared::new(photograph, &placed.mesh, [width, height], &corrections[at], options))
+                    Ok(Prepared::new(photograph, &placed.mesh, [width, height], (&curve, &corrections[at]), options))
                 })
                 .collect::<Result<_>>()?;
             sums.par_chunks_mut(width * BAND_ROWS).enumerate().try_for_each(|(band, sums)| {

@@ -1,11 +1,12 @@
 //! The finished panorama.
 
 use trueup_core::Result;
+use trueup_core::colour::TransferCurve;
 use trueup_core::raster::RowSource;
 
 use super::store::Store;
 use crate::seam::Seams;
-use crate::transfer_curve::{Encode, Encode16, EncodeRoots, EncodeRoots16};
+use crate::transfer_curve::Encoding;
 use crate::weights::alpha;
 
 /// The finished panorama: 8 or 16 bytes a pixel in memory or in a scratch file, encoded as its rows are asked for.
@@ -15,6 +16,7 @@ pub struct Panorama {
     height: usize,
     pub(super) pixels: Pixels,
     seams: Option<Seams>,
+    encoding: Encoding,
 }
 
 /// What a panorama holds.
@@ -22,17 +24,22 @@ pub struct Panorama {
 pub(super) enum Pixels {
     /// Sums over the photographs of weight * (red, green, blue) in linear light, and of the weights.
     Sums(Store<[f32; 4]>),
-    /// Square roots of linear light and alpha; 65535 is 1. Fine enough for 16 bits of sRGB.
+    /// Square roots of linear light and alpha; 65535 is 1. Fine enough for 16 bits of the usual curves.
     Roots(Store<[u16; 4]>),
 }
 
 impl Panorama {
-    pub(super) fn from_sums([width, height]: [usize; 2], sums: Store<[f32; 4]>) -> Self {
-        Self { width, height, pixels: Pixels::Sums(sums), seams: None }
+    pub(super) fn from_sums([width, height]: [usize; 2], sums: Store<[f32; 4]>, curve: TransferCurve) -> Self {
+        Self { width, height, pixels: Pixels::Sums(sums), seams: None, encoding: Encoding::new(curve) }
     }
 
-    pub(super) fn from_roots([width, height]: [usize; 2], roots: Store<[u16; 4]>, seams: Seams) -> Self {
-        Self { width, height, pixels: Pixels::Roots(roots), seams: Some(seams) }
+    pub(super) fn from_roots(
+        [width, height]: [usize; 2],
+        roots: Store<[u16; 4]>,
+        seams: Seams,
+        curve: TransferCurve,
+    ) -> Self {
+        Self { width, height, pixels: Pixels::Roots(roots), seams: Some(seams), encoding: Encoding::new(curve) }
     }
 
     /// The seams it was made with; `None` where photographs were averaged.
@@ -71,10 +78,17 @@ impl RowSource for Panorama {
         self.height
     }
 
+    fn is_opaque(&self) -> bool {
+        match &self.pixels {
+            Pixels::Sums(sums) => sums.is_opaque(),
+            Pixels::Roots(roots) => roots.is_opaque(),
+        }
+    }
+
     fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
         match &self.pixels {
             Pixels::Sums(sums) => {
-                let encode = Encode::table();
+                let encode = &self.encoding.linear;
                 for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(sums.row(y)?.iter()) {
                     let opacity = (alpha(sum) * 255.0 + 0.5) as u8;
                     let scale = if opacity > 0 { 1.0 / sum } else { 0.0 };
@@ -83,7 +97,7 @@ impl RowSource for Panorama {
                 }
             }
             Pixels::Roots(roots) => {
-                let encode = EncodeRoots::table();
+                let encode = &self.encoding.roots;
                 for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(roots.row(y)?.iter()) {
                     let opacity = ((u32::from(opacity) * 255 + 32767) / 65535) as u8;
                     let shown = opacity > 0;
@@ -98,7 +112,7 @@ impl RowSource for Panorama {
     fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
         match &self.pixels {
             Pixels::Sums(sums) => {
-                let encode = Encode16::table();
+                let encode = self.encoding.linear16();
                 for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(sums.row(y)?.iter()) {
                     let opacity = (alpha(sum) * 65535.0 + 0.5) as u16;
                     let scale = if opacity > 0 { 1.0 / sum } else { 0.0 };
@@ -107,7 +121,7 @@ impl RowSource for Panorama {
                 }
             }
             Pixels::Roots(roots) => {
-                let encode = EncodeRoots16::table();
+                let encode = self.encoding.roots16();
                 for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(roots.row(y)?.iter()) {
                     let level = |root: u16| if opacity > 0 { encode.level(root) } else { 0 };
                     pixel.copy_from_slice(&[level(r), level(g), level(b), opacity]);

@@ -3,10 +3,14 @@
 use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use rayon::prelude::*;
 use trueup_core::Result;
 use trueup_core::scratch::ScratchFile;
+
+use crate::weights::alpha;
 
 /// What a canvas consists of.
 pub(crate) trait Pixel: Copy + Default + Send + Sync {
@@ -16,10 +20,12 @@ pub(crate) trait Pixel: Copy + Default + Send + Sync {
     fn write(self, bytes: &mut [u8]);
     /// Reads what [`Self::write`] wrote.
     fn read(bytes: &[u8]) -> Self;
+    /// Whether nothing shows through.
+    fn is_opaque(&self) -> bool;
 }
 
 macro_rules! pixels {
-    ($($sample:ty),*) => {$(
+    ($($sample:ty, $opaque:expr);*) => {$(
         impl Pixel for [$sample; 4] {
             const BYTES: usize = size_of::<Self>();
 
@@ -39,10 +45,14 @@ macro_rules! pixels {
                 });
                 std::array::from_fn(|_| samples.next().unwrap_or_default())
             }
+
+            fn is_opaque(&self) -> bool {
+                $opaque(self[3])
+            }
         }
     )*};
 }
-pixels!(u16, f32);
+pixels!(u16, |opacity| opacity == u16::MAX; f32, |sum| alpha(sum) >= 1.0);
 
 /// Pixels as bytes.
 pub(crate) fn to_bytes<P: Pixel>(pixels: &[P]) -> Vec<u8> {
@@ -99,6 +109,14 @@ impl<P: Pixel> Store<P> {
         }
     }
 
+    /// Whether no pixel lets anything show through.
+    pub(crate) fn is_opaque(&self) -> bool {
+        match self {
+            Self::Memory { pixels, .. } => pixels.par_iter().all(P::is_opaque),
+            Self::Scratch(blocks) => blocks.opaque.load(Ordering::Relaxed),
+        }
+    }
+
     /// Pixel (x, y).
     pub(crate) fn pixel(&self, x: usize, y: usize) -> Result<P> {
         match self {
@@ -122,6 +140,8 @@ pub(crate) struct Blocks<P> {
     offset: u64,
     size: [usize; 2],
     side: [usize; 2],
+    /// Whether what was written so far is.
+    opaque: AtomicBool,
     band_rows: usize,
     most_bands: usize,
     bands: Mutex<VecDeque<(usize, Band<P>)>>,
@@ -138,7 +158,7 @@ impl<P: Pixel> Blocks<P> {
         let row_bytes = (size[0] * P::BYTES).max(1);
         let band_rows = (BANDS_BYTES / wanted / row_bytes).clamp(1, BAND_ROWS);
         let most_bands = (BANDS_BYTES / (row_bytes * band_rows)).clamp(2, wanted);
-        Self { file, offset, size, side, band_rows, most_bands, bands: Mutex::default() }
+        Self { file, offset, size, side, opaque: AtomicBool::new(true), band_rows, most_bands, bands: Mutex::default() }
     }
 
     /// Where pixel (x, y) is in the file, and how many columns its block has.
@@ -155,6 +175,9 @@ impl<P: Pixel> Blocks<P> {
         debug_assert!(columns.start % self.side[0] == 0 && rows.start % self.side[1] == 0);
         debug_assert_eq!(columns.len(), self.side[0].min(self.size[0] - columns.start));
         debug_assert_eq!(rows.len(), self.side[1].min(self.size[1] - rows.start));
+        if !block.iter().all(P::is_opaque) {
+            self.opaque.store(false, Ordering::Relaxed);
+        }
         let (at, _) = self.place(columns.start, rows.start);
         self.file.write_at(&to_bytes(block), at)
     }
@@ -209,8 +232,6 @@ impl<P: Pixel> Blocks<P> {
 
 #[cfg(test)]
 mod tests {
-    use rayon::prelude::*;
-
     use super::*;
     use crate::render::tests::RamDisk;
 

@@ -401,6 +401,24 @@ fn a_layer_is_one_photograph_where_it_lies() {
             }
         }
     }
+    let corrections = [Correction::default(); 2];
+    let rows = layer_rows(&layout, &corrections, 1, &photographs, &RenderOptions::default())
+        .expect("a layer")
+        .expect("on the canvas");
+    assert_eq!([rows.left, rows.top], [found.left, found.top]);
+    assert_eq!([rows.width(), rows.height()], [found.gray.width(), found.gray.height()]);
+    assert_eq!(layer_size(&layout, 1), [rows.width(), rows.height()]);
+    let (mut eight, mut sixteen) = (vec![0; 4 * rows.width()], vec![0; 4 * rows.width()]);
+    for y in 0..rows.height() {
+        rows.rgba8_row(y, &mut eight).expect("a row");
+        rows.rgba16_row(y, &mut sixteen).expect("a row");
+        for x in 0..rows.width() {
+            let covered = found.covered.pixel(x, y)[0];
+            assert_eq!(eight[4 * x + 3] == 255, covered, "{x} {y}");
+            assert!(!covered || (f32::from(eight[4 * x]) - found.gray.pixel(x, y)[0]).abs() < 0.01);
+            assert!(!covered || (f32::from(sixteen[4 * x]) / 257.0 - f32::from(eight[4 * x])).abs() <= 0.505);
+        }
+    }
     assert!(layer(&layout, &[Correction::default(); 2], 2, &photographs, &RenderOptions::default()).is_err());
 }
 

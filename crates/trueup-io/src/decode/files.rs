@@ -3,11 +3,13 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use trueup_core::colour::TransferCurve;
 use trueup_core::raster::Photograph;
 use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
 use trueup_core::{Error, Result};
 
 use super::{WorkingPicture, photograph, reduce_photograph};
+use crate::colour::PhotographColours;
 
 /// Photographs in files. What [`working`](Self::working) decodes is kept, within a budget of bytes, until
 /// [`photograph`](PhotographSource::photograph) asks for it, so that a small set is decoded once.
@@ -16,6 +18,7 @@ use super::{WorkingPicture, photograph, reduce_photograph};
 #[derive(Debug)]
 pub struct FilePhotographs {
     images: Vec<SourceImage>,
+    colours: Option<PhotographColours>,
     kept: Mutex<Kept>,
     /// Bytes that the samples of each took when it was decoded; 0 before.
     bytes: Vec<AtomicUsize>,
@@ -33,7 +36,17 @@ impl FilePhotographs {
     pub fn new(images: Vec<SourceImage>, cache_bytes: usize) -> Self {
         let photographs = images.iter().map(|_| None).collect();
         let bytes = images.iter().map(|_| AtomicUsize::new(0)).collect();
-        Self { images, bytes, kept: Mutex::new(Kept { photographs, free_bytes: cache_bytes }) }
+        Self { images, colours: None, bytes, kept: Mutex::new(Kept { photographs, free_bytes: cache_bytes }) }
+    }
+
+    /// In one colour space: `colours` are those of the same photographs. Without, samples are handed out as they are.
+    pub fn in_colours(self, colours: PhotographColours) -> Self {
+        Self { colours: Some(colours), ..self }
+    }
+
+    /// The colour space that photographs are handed out in, if it was asked for.
+    pub fn colours(&self) -> Option<&PhotographColours> {
+        self.colours.as_ref()
     }
 
     /// The photographs this hands out, in order.
@@ -65,7 +78,10 @@ impl FilePhotographs {
     }
 
     fn decode(&self, index: usize, image: &SourceImage) -> Result<Photograph> {
-        let photograph = photograph(image)?;
+        let mut photograph = photograph(image)?;
+        if let Some(conversion) = self.colours.as_ref().and_then(|colours| colours.conversion(index)) {
+            photograph = conversion.apply(photograph, &image.name)?;
+        }
         if let Some(bytes) = self.bytes.get(index) {
             bytes.store(photograph.bytes(), Ordering::Relaxed);
         }
@@ -110,5 +126,9 @@ impl PhotographSource for FilePhotographs {
 
     fn bytes(&self, index: usize) -> Option<usize> {
         self.bytes.get(index).map(|bytes| bytes.load(Ordering::Relaxed)).filter(|&bytes| bytes > 0)
+    }
+
+    fn transfer_curve(&self) -> TransferCurve {
+        self.colours.as_ref().map_or(TransferCurve::SRGB, |colours| colours.transfer_curve().clone())
     }
 }
