@@ -183,7 +183,10 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let space = ScratchFolder::new(folder.path());
         let refused = space.create(u64::MAX).expect_err("no disk is so large").to_string();
-        assert!(refused.contains("18446744073.7 GB for the scratch file needed") && refused.contains(" free "), "{refused}");
+        assert!(
+            refused.contains("18446744073.7 GB for the scratch file needed") && refused.contains(" free "),
+            "{refused}"
+        );
         let both = space.beside(folder.path(), u64::MAX).create(8).expect_err("no disk is so large").to_string();
         assert!(both.contains("the scratch file and the panorama"), "{both}");
         let missing = ScratchFolder::new(folder.path().join("absent")).create(8);

@@ -156,7 +156,10 @@ mod tests {
             Budget::new(&options).measuring(&images(3, 6000, 4000), &options).err().map(|error| error.to_string())
         };
         let message = refused("100MB").expect("too little");
-        assert!(message.contains("0.jpg (6000 x 4000 px): at least 403 MB of memory needed, 100 MB allowed"), "{message}");
+        assert!(
+            message.contains("0.jpg (6000 x 4000 px): at least 403 MB of memory needed, 100 MB allowed"),
+            "{message}"
+        );
         assert_eq!(refused("404MB"), None);
     }
 

@@ -54,7 +54,10 @@ fn strips(along: usize, across: usize, side: usize, index: impl Fn(usize, usize)
         .step_by(thick)
         .map(|start| {
             let end = (start + thick).min(along);
-            (0..across).flat_map(|across| (start..end).map(move |along| (along, across))).map(|(a, b)| index(a, b)).collect()
+            (0..across)
+                .flat_map(|across| (start..end).map(move |along| (along, across)))
+                .map(|(a, b)| index(a, b))
+                .collect()
         })
         .collect()
 }

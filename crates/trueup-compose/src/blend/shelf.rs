@@ -131,6 +131,12 @@ impl<'a> Supply<'a> {
         };
         check_photograph(placed, &photograph)?;
         let canvas = [self.layout.width, self.layout.height];
-        Ok(Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, (self.curve, &self.corrections[at]), self.options))
+        Ok(Prepared::new(
+            Cow::Owned(photograph),
+            &placed.mesh,
+            canvas,
+            (self.curve, &self.corrections[at]),
+            self.options,
+        ))
     }
 }

@@ -1,7 +1,7 @@
 use proptest::prelude::*;
+use std::borrow::Cow;
 use trueup_core::colour::TransferCurve;
 use trueup_core::mesh::GridMesh;
-use std::borrow::Cow;
 
 use trueup_core::raster::{Photograph, Raster};
 
@@ -127,7 +127,8 @@ fn with_work<T>(lefts: &[usize], first_level: u32, test: impl FnOnce(&Work<'_>, 
     let context = StageContext::default();
     let memory = Memory(pictures.clone());
     let plan = Plan::new(&layout, &memory, Blend::MultiBand, &seam_options, &Resources::unlimited()).expect("no limit");
-    let small = views::make(&layout, &corrections, &memory, &options, &seam_options, (Some(first_level), &plan), &context);
+    let small =
+        views::make(&layout, &corrections, &memory, &options, &seam_options, (Some(first_level), &plan), &context);
     let small = small.expect("small");
     let seams = seam::run(small.views, small.size, &seam_options, &context).expect("seams");
     let canvas = [layout.width, layout.height];
@@ -168,19 +169,19 @@ fn tiles_of_any_size_give_the_same_bits_as_the_whole() {
 }
 
 fn assert_that_tiles_give_the_whole(work: &Work<'_>, pictures: &[Option<Prepared<'_>>]) {
-        let [width, height] = work.canvas;
-        let whole = blended(work, pictures, 0..width, 0..height);
-        for side in [2, 5, 8, 16].map(|samples| samples << work.first_level) {
-            for top in (0..height).step_by(side) {
-                for left in (0..width).step_by(side) {
-                    let (columns, rows) = (left..(left + side).min(width), top..(top + side).min(height));
-                    let tile = blended(work, pictures, columns.clone(), rows.clone());
-                    for (y, row) in rows.zip(tile.chunks_exact(columns.len())) {
-                        assert_eq!(row, &whole[y * width..][columns.clone()], "tile of {side} at ({left}, {top})");
-                    }
+    let [width, height] = work.canvas;
+    let whole = blended(work, pictures, 0..width, 0..height);
+    for side in [2, 5, 8, 16].map(|samples| samples << work.first_level) {
+        for top in (0..height).step_by(side) {
+            for left in (0..width).step_by(side) {
+                let (columns, rows) = (left..(left + side).min(width), top..(top + side).min(height));
+                let tile = blended(work, pictures, columns.clone(), rows.clone());
+                for (y, row) in rows.zip(tile.chunks_exact(columns.len())) {
+                    assert_eq!(row, &whole[y * width..][columns.clone()], "tile of {side} at ({left}, {top})");
                 }
             }
         }
+    }
 }
 
 #[test]

@@ -73,7 +73,9 @@ pub(super) fn make(
                 let prepared = Prepared::new(Cow::Borrowed(&photograph), &mesh, size, (&curve, correction), &halving);
                 let view = if layout.placed.len() == 1 { View::default() } else { view(&prepared, &sampling) };
                 let base = match first_level {
-                    Some(level) => base(&prepared, placed, (&curve, correction), (canvas, level), [&halving, &sampling]),
+                    Some(level) => {
+                        base(&prepared, placed, (&curve, correction), (canvas, level), [&halving, &sampling])
+                    }
                     None => Base::default(),
                 };
                 context.progress().advance(RenderOptions::STAGE, 1);

@@ -152,9 +152,8 @@ fn mean(
         (0..height).step_by(part_rows).map(|first| first..first.saturating_add(part_rows).min(height)).collect();
     let covered = covered_rows(layout);
     let meet = |a: &Range<usize>, b: &Range<usize>| a.start < b.end && b.start < a.end;
-    let covering = |part: &Range<usize>| -> Vec<usize> {
-        (0..covered.len()).filter(|&at| meet(&covered[at], part)).collect()
-    };
+    let covering =
+        |part: &Range<usize>| -> Vec<usize> { (0..covered.len()).filter(|&at| meet(&covered[at], part)).collect() };
     let covering: Vec<Vec<usize>> = parts.iter().map(covering).collect();
     context.progress().begin(STAGE, covering.iter().map(Vec::len).sum::<usize>() as u64);
     let mut store = plan.on_disk().then(|| plan.store([width, height], [width, BAND_ROWS]));

@@ -167,8 +167,7 @@ impl Needs {
         sorted.sort_unstable_by(|a, b| b.cmp(a));
         let largest = sorted.first().copied().unwrap_or(0);
         let seamed = matches!(blend, Blend::MultiBand | Blend::None) && !layout.placed.is_empty();
-        let (working, bases) =
-            if seamed { blend::needed_bytes(layout, blend == Blend::None, seams) } else { (0, 0) };
+        let (working, bases) = if seamed { blend::needed_bytes(layout, blend == Blend::None, seams) } else { (0, 0) };
         let pixel_bytes = if seamed { ROOT_BYTES } else { SUM_BYTES };
         let band = if seamed { 0 } else { canvas[0] * super::BAND_ROWS * SUM_BYTES };
         let meeting = sorted.iter().take(MEETING).sum();
@@ -177,7 +176,9 @@ impl Needs {
 
     /// With the canvas and the photographs' own levels on disk, and one photograph decoded at a time.
     fn least(&self) -> usize {
-        [self.working, self.band, self.meeting, DECODING * self.largest].iter().fold(0, |sum, &one| sum.saturating_add(one))
+        [self.working, self.band, self.meeting, DECODING * self.largest]
+            .iter()
+            .fold(0, |sum, &one| sum.saturating_add(one))
     }
 
     fn refusal(&self, layout: &CanvasLayout, allowed: usize) -> Error {

@@ -172,7 +172,7 @@ impl<P: Pixel> Blocks<P> {
 
     /// Writes one block; different ones may be written at once.
     pub(crate) fn put(&self, columns: &Range<usize>, rows: &Range<usize>, block: &[P]) -> Result<()> {
-        debug_assert!(columns.start % self.side[0] == 0 && rows.start % self.side[1] == 0);
+        debug_assert!(columns.start.is_multiple_of(self.side[0]) && rows.start.is_multiple_of(self.side[1]));
         debug_assert_eq!(columns.len(), self.side[0].min(self.size[0] - columns.start));
         debug_assert_eq!(rows.len(), self.side[1].min(self.size[1] - rows.start));
         if !block.iter().all(P::is_opaque) {
@@ -265,7 +265,9 @@ mod tests {
     fn floating_point_keeps_its_bits() {
         let pixels = [[0.1_f32, -0.0, f32::MIN_POSITIVE, 3e38], [f32::INFINITY, 1.0, 1e-45, 7.0]];
         let back: Vec<[f32; 4]> = to_bytes(&pixels).chunks_exact(16).map(Pixel::read).collect();
-        assert_eq!(back.as_flattened().iter().map(|one| one.to_bits()).collect::<Vec<_>>(),
-            pixels.as_flattened().iter().map(|one| one.to_bits()).collect::<Vec<_>>());
+        assert_eq!(
+            back.as_flattened().iter().map(|one| one.to_bits()).collect::<Vec<_>>(),
+            pixels.as_flattened().iter().map(|one| one.to_bits()).collect::<Vec<_>>()
+        );
     }
 }

@@ -112,7 +112,9 @@ fn linear(panorama: &Panorama, x: usize, y: usize) -> [f32; 4] {
 pub(super) fn bits(panorama: &Panorama) -> Vec<[u32; 4]> {
     (0..panorama.height())
         .flat_map(|y| match &panorama.pixels {
-            Pixels::Sums(sums) => sums.row(y).expect("a row").iter().map(|sum| sum.map(f32::to_bits)).collect::<Vec<_>>(),
+            Pixels::Sums(sums) => {
+                sums.row(y).expect("a row").iter().map(|sum| sum.map(f32::to_bits)).collect::<Vec<_>>()
+            }
             Pixels::Roots(roots) => roots.row(y).expect("a row").iter().map(|root| root.map(u32::from)).collect(),
         })
         .collect()

@@ -42,8 +42,8 @@ fn composed(blend: Blend, memory: usize, disk: &RamDisk, threads: usize) -> Resu
     let seams = SeamOptions::default();
     let context = StageContext::default();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-    let panorama = pool
-        .install(|| run_within(&resources, &layout, &corrections, &photographs, (&options, &seams), &context))?;
+    let panorama =
+        pool.install(|| run_within(&resources, &layout, &corrections, &photographs, (&options, &seams), &context))?;
     Ok((panorama, photographs.1.load(Ordering::Relaxed)))
 }
 

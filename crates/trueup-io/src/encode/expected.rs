@@ -46,7 +46,8 @@ mod tests {
         };
         assert_eq!(bytes("a.tif", TiffCompression::None), 1_500_000);
         assert_eq!(bytes("a.tif", TiffCompression::Deflate), 400_000);
-        let deep = OutputOptions { depth: Depth::Float, tiff_compression: TiffCompression::None, ..OutputOptions::default() };
+        let deep =
+            OutputOptions { depth: Depth::Float, tiff_compression: TiffCompression::None, ..OutputOptions::default() };
         assert_eq!(expected_bytes(Path::new("a.tiff"), 1000, 500, &deep), 6_000_000);
         assert_eq!(bytes("a.dzi", TiffCompression::None), 50_000);
         assert_eq!(bytes("a.JPG", TiffCompression::None), 50_000);
