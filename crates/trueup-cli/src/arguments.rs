@@ -72,6 +72,10 @@ pub(crate) struct StitchArgs {
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     pub project: Option<PathBuf>,
 
+    /// Write the cameras as a project of the Hugin stitcher
+    #[arg(long, value_name = "FILE.pto", help_heading = "Output")]
+    pub pto: Option<PathBuf>,
+
     /// Size of the panorama: 1 keeps the pixel scale of the reference photograph (canvas.scale)
     #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Output")]
     pub scale: Option<String>,
@@ -129,6 +133,14 @@ pub(crate) struct StitchArgs {
         help_heading = "Tuning"
     )]
     pub threads: Option<u16>,
+
+    /// Memory that the work may take, such as 2GB or 512MB; auto is a quarter of the machine's (stitch.memory)
+    #[arg(long, value_name = "AMOUNT", help_heading = "Tuning")]
+    pub memory: Option<String>,
+
+    /// Folder for the scratch file of a panorama that does not fit in memory, instead of the output's (stitch.scratch)
+    #[arg(long, value_name = "DIR", help_heading = "Tuning")]
+    pub scratch: Option<String>,
 
     /// Print nothing but errors
     #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]

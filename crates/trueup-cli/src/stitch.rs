@@ -50,11 +50,19 @@ impl CheckedStitch {
             ("--align", "stitch.align", &args.align),
             ("--structure", "stitch.structure", &args.structure),
             ("--seed", "stitch.seed", &args.seed),
+            ("--memory", "stitch.memory", &args.memory),
+            ("--scratch", "stitch.scratch", &args.scratch),
         ];
         let options = chosen_options(args.config.as_deref(), &args.set, &flags)?;
         if args.project.as_ref() == Some(&args.output) {
             let message = format!("{} cannot be both the panorama and the project", args.output.display());
             return Err(Failure::usage(message, "Give --output and --project different names."));
+        }
+        if let Some(pto) = &args.pto
+            && (*pto == args.output || args.project.as_ref() == Some(pto))
+        {
+            let message = format!("{} cannot be two files at once", pto.display());
+            return Err(Failure::usage(message, "Give --output, --project and --pto different names."));
         }
         let reference = chosen_reference(args.reference);
         let inputs = Inputs {
@@ -66,7 +74,10 @@ impl CheckedStitch {
         };
         // The library reads 0 as one thread per core.
         let threads = args.threads.map_or(0, usize::from);
-        Ok(Self { job: StitchJob { inputs, output: args.output, project: args.project, threads }, options })
+        Ok(Self {
+            job: StitchJob { inputs, output: args.output, project: args.project, hugin_project: args.pto, threads },
+            options,
+        })
     }
 }
 

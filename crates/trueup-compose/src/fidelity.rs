@@ -56,7 +56,7 @@ pub fn measure(panorama: &dyn RowSource, layers: &[Layer], shown: &[u16]) -> Res
             "Measure them together.",
         ));
     }
-    let gray = luma(panorama);
+    let gray = luma(panorama)?;
     let mut sums = Sums::default();
     let measured = Measured { gray: &gray, layers, shown };
     measured.lines(&mut sums);
@@ -106,16 +106,16 @@ pub fn deepest(layers: &[Layer], [width, height]: [usize; 2]) -> Result<Vec<u16>
     Ok(shown)
 }
 
-fn luma(panorama: &dyn RowSource) -> Raster<f32> {
+fn luma(panorama: &dyn RowSource) -> Result<Raster<f32>> {
     let mut gray = Raster::new(panorama.width(), panorama.height(), 1);
     let mut row = vec![0; 4 * panorama.width()];
     for y in 0..panorama.height() {
-        panorama.rgba8_row(y, &mut row);
+        panorama.rgba8_row(y, &mut row)?;
         for (gray, pixel) in gray.row_mut(y).iter_mut().zip(row.chunks_exact(4)) {
             *gray = LUMA.iter().zip(pixel).map(|(share, &level)| share * f32::from(level)).sum();
         }
     }
-    gray
+    Ok(gray)
 }
 
 /// Where a stretch of a line lies, whether it runs down, and between whom.
@@ -250,10 +250,17 @@ mod tests {
         fn height(&self) -> usize {
             self.0.height()
         }
-        fn rgba8_row(&self, y: usize, row: &mut [u8]) {
+        fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
             for (pixel, &gray) in row.chunks_exact_mut(4).zip(self.0.row(y)) {
                 pixel.copy_from_slice(&[gray as u8, gray as u8, gray as u8, 255]);
             }
+            Ok(())
+        }
+        fn rgba16_row(&self, _: usize, _: &mut [u16]) -> Result<()> {
+            unreachable!("measured at 8 bits")
+        }
+        fn linear_row(&self, _: usize, _: &mut [f32]) -> Result<()> {
+            unreachable!("measured at 8 bits")
         }
     }
 

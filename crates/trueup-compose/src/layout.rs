@@ -15,8 +15,12 @@ trueup_core::options! {
         /// Size of the panorama relative to the reference photograph's own pixels: 1 keeps every detail the reference
         /// has, 0.25 makes a quick preview.
         scale: f64 = 1.0, between(1e-4, 16.0), "";
-        /// Largest number of canvas pixels. A larger canvas is reduced evenly to fit, and a diagnostic says so.
-        max_pixels: f64 = 400e6, between(1.0, 1e12), "px";
+        /// Largest number of canvas pixels. A larger canvas is reduced evenly to fit, and a diagnostic says so. What memory
+        /// and disk hold is checked besides.
+        max_pixels: f64 = 1e12, between(1.0, 1e12), "px";
+        /// Canvas pixels for each pixel of the photographs (as large as the scale makes them) above which a canvas of more
+        /// than 400 million pixels is reduced evenly: a shape that runs away is not worth its time.
+        max_growth: f64 = 8.0, between(1.0, 1e6), "";
     }
 }
 
@@ -46,7 +50,8 @@ pub struct CanvasLayout {
 /// keeps its pixel scale times [`CanvasOptions::scale`].
 ///
 /// Targets may be in any unit common to all grids. The canvas is `ceil(max - min)` of the scaled vertices; above
-/// [`CanvasOptions::max_pixels`] all vertices are reduced evenly and `canvas-reduced` is reported.
+/// [`CanvasOptions::max_pixels`] and [`CanvasOptions::max_growth`] all vertices are reduced evenly and `canvas-reduced` is
+/// reported.
 ///
 /// # Errors
 /// [`Error::Options`]; [`Error::Input`] if there is no grid, `reference` is not one of them, or a grid's size and
@@ -91,7 +96,8 @@ pub fn run(
         ));
     }
     let wanted = options.scale / pixel_scale;
-    let canvas_from_target = scale_within(extent, wanted, options.max_pixels);
+    let max_pixels = most_pixels(&placed, options);
+    let canvas_from_target = scale_within(extent, wanted, max_pixels);
     let [width, height] = canvas_size(extent, canvas_from_target);
     if canvas_from_target < wanted {
         let [wanted_width, wanted_height] = canvas_size(extent, wanted);
@@ -99,17 +105,25 @@ pub fn run(
             "canvas-reduced",
             STAGE,
             format!(
-                "a canvas of {wanted_width:.0} x {wanted_height:.0} px is above the limit of {:.0} px; it was reduced \
-                 to {width:.0} x {height:.0}",
-                options.max_pixels
+                "a canvas of {wanted_width:.0} x {wanted_height:.0} px is above the limit of {max_pixels:.0} px; it was \
+                 reduced to {width:.0} x {height:.0}"
             ),
-            "Raise canvas.max_pixels, or choose a projection that stretches the borders less.",
+            "Raise canvas.max_pixels or canvas.max_growth, or choose a projection that stretches the borders less.",
         ));
     }
     for vertex in placed.iter_mut().flat_map(|item| &mut item.mesh.target) {
         *vertex = ((Vector2::from(*vertex) - low) * canvas_from_target).into();
     }
     Ok(CanvasLayout { width: width as usize, height: height as usize, canvas_from_target, placed })
+}
+
+/// The largest canvas that is not reduced.
+fn most_pixels(placed: &[Placed], options: &CanvasOptions) -> f64 {
+    /// Canvases of up to so many pixels are made in minutes; their growth is not looked at.
+    const ANY_GROWTH_PIXELS: f64 = 400e6;
+    let photographs: f64 = placed.iter().map(|item| item.mesh.width * item.mesh.height).sum();
+    let grown = options.max_growth * photographs * options.scale.powi(2);
+    options.max_pixels.min(grown.max(ANY_GROWTH_PIXELS))
 }
 
 /// Refuses grids no later step could walk.
@@ -229,6 +243,25 @@ mod tests {
         assert!(layout.width * layout.height <= 1000);
         assert!(layout.width * layout.height > 900, "{} x {}", layout.width, layout.height);
         assert_eq!(context.take_diagnostics()[0].code, "canvas-reduced");
+    }
+
+    #[test]
+    fn a_canvas_that_runs_away_is_reduced() {
+        let context = StageContext::default();
+        let options = CanvasOptions::default();
+        // Two photographs of 0.12 million pixels, 100,000 of their widths apart.
+        let far = vec![placed(1.0, [0.0, 0.0]), placed(1.0, [4e7, 0.0])];
+        let layout = run(far, 0, &options, &context).expect("two grids");
+        assert!(layout.width * layout.height <= 400_000_000);
+        assert_eq!(context.take_diagnostics()[0].code, "canvas-reduced");
+        // One of them enlarged to 1.2 billion pixels is what was asked for.
+        let large = CanvasOptions { scale: 16.0, ..options };
+        let mut photograph = placed(1.0, [0.0, 0.0]);
+        (photograph.mesh.width, photograph.mesh.height) = (4000.0, 3000.0);
+        photograph.mesh.target.iter_mut().flatten().for_each(|coordinate| *coordinate *= 10.0);
+        let layout = run(vec![photograph], 0, &large, &context).expect("one grid");
+        assert_eq!((layout.width, layout.height), (64_000, 48_000));
+        assert!(context.take_diagnostics().is_empty());
     }
 
     #[test]

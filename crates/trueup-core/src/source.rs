@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use crate::colour::TransferCurve;
 use crate::error::Result;
 use crate::raster::Photograph;
 
@@ -87,4 +88,15 @@ pub trait PhotographSource: Sync {
     /// # Errors
     /// If the file can no longer be read or decoded.
     fn photograph(&self, index: usize) -> Result<Photograph>;
+
+    /// Bytes that the samples of photograph `index` take once decoded, where that is known before.
+    fn bytes(&self, _index: usize) -> Option<usize> {
+        None
+    }
+
+    /// How the samples of all photographs stand for light; sRGB's curve unless told otherwise. What wraps another source
+    /// hands its curve on.
+    fn transfer_curve(&self) -> TransferCurve {
+        TransferCurve::SRGB
+    }
 }

@@ -20,7 +20,13 @@ fn sets() -> Vec<String> {
 #[divan::bench(args = sets(), sample_count = 5, sample_size = 1)]
 fn stitch(bencher: Bencher, set: &str) {
     let output = std::env::temp_dir().join("trueup-bench.jpg");
-    let job = StitchJob { inputs: Inputs::new([set]), output: PathBuf::from(&output), project: None, threads: 0 };
+    let job = StitchJob {
+        inputs: Inputs::new([set]),
+        output: PathBuf::from(&output),
+        project: None,
+        hugin_project: None,
+        threads: 0,
+    };
     let options = StitchOptions::default();
     bencher.bench_local(|| job.run(&options, &StageContext::default()).expect("a set that stitches"));
     // Nothing depends on the file; it may already be gone.

@@ -9,6 +9,7 @@ use trueup_io::encode;
 use crate::inputs::Inputs;
 use crate::options::StitchOptions;
 use crate::project::{ImageRecord, Project};
+use crate::pto::hugin_project;
 use crate::stitcher::Stitcher;
 
 /// What to stitch and where to put it.
@@ -21,6 +22,8 @@ pub struct StitchJob {
     pub output: PathBuf,
     /// The project's file, if wanted; numbered like the panoramas.
     pub project: Option<PathBuf>,
+    /// A file for the cameras as a Hugin project, if wanted; numbered like the panoramas.
+    pub hugin_project: Option<PathBuf>,
     /// Number of threads; 0 for one per core.
     pub threads: usize,
 }
@@ -46,9 +49,9 @@ impl StitchJob {
     /// of the photographs. Panoramas already written stay.
     pub fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<Written>> {
         options.validate()?;
-        encode::check_writable(&self.output)?;
-        if let Some(project) = &self.project {
-            encode::check_place(project)?;
+        encode::check_writable(&self.output, &options.output)?;
+        for side in [&self.project, &self.hugin_project].into_iter().flatten() {
+            encode::check_place(side)?;
         }
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads)
@@ -67,10 +70,10 @@ impl StitchJob {
             let output = numbered(&self.output, number);
             spare_photographs(&output, &alignment.project)?;
             let start = Instant::now();
-            let panorama = stitcher.compose(&alignment)?;
+            let panorama = Stitcher::new(options, context).writing_to(&output).compose(&alignment)?;
             alignment.record_seconds("render", start.elapsed());
             let start = Instant::now();
-            let bytes = encode::write(&output, &panorama, &options.output, context)?;
+            let bytes = encode::write(&output, &panorama, &stitcher.metadata(&alignment), &options.output, context)?;
             alignment.record_seconds("output", start.elapsed());
             drop(panorama);
             alignment.record_findings(context.take_diagnostics());
@@ -78,6 +81,9 @@ impl StitchJob {
             let project_file = self.project.as_deref().map(|path| numbered(path, number));
             if let Some(path) = &project_file {
                 encode::write_atomically(path, project.to_json()?.as_bytes())?;
+            }
+            if let Some(path) = &self.hugin_project {
+                encode::write_atomically(&numbered(path, number), hugin_project(&project)?.as_bytes())?;
             }
             written.push(Written { output, bytes, project_file, project });
         }

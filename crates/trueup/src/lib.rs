@@ -13,13 +13,15 @@
 //! let inputs = Inputs::new(["holiday/"]);
 //! for alignment in stitcher.align(&inputs)?.alignments {
 //!     let panorama = stitcher.compose(&alignment)?;
-//!     trueup::write_picture("pano.jpg".as_ref(), &panorama, &options.output, &context)?;
+//!     let metadata = stitcher.metadata(&alignment);
+//!     trueup::write_picture("pano.jpg".as_ref(), &panorama, &metadata, &options.output, &context)?;
 //! }
 //! # Ok::<(), trueup::Error>(())
 //! ```
 #![forbid(unsafe_code)]
 
 mod align;
+mod budget;
 mod clock;
 pub mod compare;
 mod evaluation;
@@ -33,6 +35,8 @@ mod memory;
 mod names;
 mod options;
 mod project;
+mod provenance;
+mod pto;
 mod record;
 mod refinement;
 mod stitcher;
@@ -45,6 +49,7 @@ pub use options::{Method, StitchOptions, WorkingOptions};
 pub use project::{
     Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
 };
+pub use pto::hugin_project;
 pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;
@@ -53,6 +58,7 @@ pub use trueup_core::context::{CancelToken, Progress, Silent};
 pub use trueup_core::diagnostics::{Diagnostic, Severity};
 pub use trueup_core::options::{InvalidOption, OptionDescription};
 pub use trueup_core::raster::RowSource;
+pub use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 pub use trueup_core::truth::{ImageTruth, Truth};
 pub use trueup_core::{Error, Result, StageContext};
-pub use trueup_io::encode::{OutputOptions, write as write_picture};
+pub use trueup_io::encode::{Metadata, OutputOptions, write as write_picture};

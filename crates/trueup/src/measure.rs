@@ -17,6 +17,9 @@ use crate::refinement;
 
 const STAGE: &str = "measuring";
 
+/// With room for so many photographs per thread, no group of them is waited for.
+const MANY_PER_THREAD: usize = 4;
+
 /// What is known of a photograph after its pixels were looked at.
 #[derive(Debug)]
 pub(crate) struct Measured {
@@ -38,12 +41,13 @@ struct Busy {
     lines: Duration,
 }
 
-/// Measures every photograph in parallel. A photograph that cannot be decoded yields its error; the others go on.
+/// Measures every photograph, at most `at_once` in parallel. A photograph that cannot be decoded yields its error; the others go on.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
 pub(crate) fn run(
     photographs: &FilePhotographs,
+    at_once: usize,
     options: &StitchOptions,
     context: &StageContext,
     clock: &mut Clock,
@@ -51,15 +55,18 @@ pub(crate) fn run(
     let count = photographs.images().len();
     context.progress().begin(STAGE, count as u64);
     let start = Instant::now();
-    let measured: Vec<(Result<Measured>, Busy)> = (0..count)
-        .into_par_iter()
-        .map(|index| {
-            let mut busy = Busy::default();
-            let result = measure(photographs, index, options, context, &mut busy);
-            context.progress().advance(STAGE, 1);
-            (result, busy)
-        })
-        .collect();
+    let measured_one = |index: usize| {
+        let mut busy = Busy::default();
+        let result = measure(photographs, index, options, context, &mut busy);
+        context.progress().advance(STAGE, 1);
+        (result, busy)
+    };
+    // Threads that share a photograph's work may begin another one meanwhile: where memory counts, only groups limit them.
+    let group = if at_once >= MANY_PER_THREAD * rayon::current_num_threads() { count } else { at_once };
+    let mut measured: Vec<(Result<Measured>, Busy)> = Vec::with_capacity(count);
+    for first in (0..count).step_by(group.max(1)) {
+        measured.par_extend((first..first.saturating_add(group).min(count)).into_par_iter().map(measured_one));
+    }
     context.progress().finish(STAGE);
     context.check_cancelled()?;
     let total = |part: fn(&Busy) -> Duration| measured.iter().map(|(_, busy)| part(busy)).sum::<Duration>();

@@ -12,6 +12,7 @@ use trueup_compose::exposure::ExposureOptions;
 use trueup_compose::layout::CanvasOptions;
 use trueup_compose::render::RenderOptions;
 use trueup_compose::seam::SeamOptions;
+use trueup_core::memory::MemoryBudget;
 use trueup_core::options::{InvalidOption, OptionDescription, StageOptions};
 use trueup_core::{Error, Result};
 use trueup_io::encode::OutputOptions;
@@ -127,8 +128,11 @@ trueup_core::options! {
         working_pixels: f64 = 480000.0, between(10000.0, 100000000.0), "px";
         /// Size of the small pictures that exposure is compared on.
         thumbnail_pixels: f64 = 30000.0, between(100.0, 1000000.0), "px";
-        /// Decoded photographs are kept up to this much memory so that they need not be decoded twice.
-        photograph_cache: f64 = 96.0, between(0.0, 1000000.0), "MB";
+        /// Memory that the work may take; auto is a quarter of the machine's, or more where less is too little. The panorama
+        /// is the same with any amount: with less, its canvas goes to a scratch file and photographs are decoded again.
+        memory: MemoryBudget = MemoryBudget::Auto, Allowed::Any, "";
+        /// Folder for the scratch file; empty for the folder of the panorama.
+        scratch: String = String::new(), Allowed::Any, "";
         /// Every random choice derives from this number.
         seed: u64 = 0, between(0.0, 9007199254740992.0), "";
     }
@@ -229,8 +233,8 @@ impl StitchOptions {
     /// one can be aligned by the other.
     pub fn matches_alike(&self, other: &Self) -> bool {
         let working = |options: &Self| {
-            let WorkingOptions { working_pixels, thumbnail_pixels, photograph_cache, seed, .. } = options.stitch;
-            (working_pixels, thumbnail_pixels, photograph_cache, seed)
+            let WorkingOptions { working_pixels, thumbnail_pixels, seed, .. } = options.stitch;
+            (working_pixels, thumbnail_pixels, seed)
         };
         working(self) == working(other)
             && self.source == other.source

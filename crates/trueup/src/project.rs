@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use trueup_compose::exposure::Correction;
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::matches::PairVerdict;
+use trueup_core::spherical::SphericalFrame;
 
 use crate::measures::Measures;
 use crate::options::StitchOptions;
@@ -47,6 +48,9 @@ pub struct ImageRecord {
     pub width: usize,
     /// Height after orientation; 0 if the file could not be read.
     pub height: usize,
+    /// EXIF orientation (1 to 8) that was applied to the stored pixels; 0 in files of programs that did not record it.
+    #[serde(default)]
+    pub orientation: u8,
     /// Whether it is used.
     pub status: ImageStatus,
     /// Why it is left out; empty when used.
@@ -152,6 +156,12 @@ pub struct Project {
     pub measures: Option<Measures>,
     /// Size of the panorama.
     pub canvas: Canvas,
+    /// Name of the colour space it was composed in; empty in files of programs that knew one only.
+    #[serde(default)]
+    pub colour_space: String,
+    /// Where it lies on the sphere; `None` unless its projection is one that viewers of spherical panoramas know.
+    #[serde(default)]
+    pub spherical: Option<SphericalFrame>,
     /// Wall seconds per stage.
     pub seconds: BTreeMap<String, f64>,
     /// What was found on the way.

@@ -33,6 +33,7 @@ impl Matched {
                 ImageRecord {
                     width: image.width,
                     height: image.height,
+                    orientation: image.orientation,
                     component: component.filter(|_| self.measured[index].is_some()),
                     ..left_out_record(image.path.display().to_string(), reason, hint)
                 }
@@ -70,6 +71,8 @@ impl Matched {
             },
             measures: None,
             canvas: Canvas { width: 0, height: 0 },
+            colour_space: String::new(),
+            spherical: None,
             seconds: std::collections::BTreeMap::new(),
             diagnostics: Vec::new(),
         }
@@ -81,6 +84,7 @@ fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
         path,
         width: 0,
         height: 0,
+        orientation: 0,
         status: ImageStatus::LeftOut,
         reason,
         hint,

@@ -1,6 +1,7 @@
 //! The order of the stages: the one place that knows it.
 
 use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 use trueup_align::stitch_graph::{GraphFile, StitchGraph, parse_graph_file};
 use trueup_compose::exposure::{self, Correction, Thumbnail};
@@ -10,14 +11,18 @@ use trueup_compose::render::{self, Panorama};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
-use trueup_core::source::WorkingFrame;
+use trueup_core::source::{PhotographSource, WorkingFrame};
 use trueup_core::{Error, Result, StageContext};
+use trueup_io::colour::PhotographColours;
 use trueup_io::decode::FilePhotographs;
+use trueup_io::encode::{self, Metadata};
+use trueup_io::scratch::{ScratchFolder, check_room};
 use trueup_io::source::{self, RejectedSource, Sources};
 use trueup_vision::features::Features;
 use trueup_vision::{matching, pairing};
 
 use crate::align::{self, Component};
+use crate::budget::Budget;
 use crate::clock::Clock;
 use crate::inputs::{Inputs, Reference};
 use crate::left_out::LeftOut;
@@ -28,6 +33,7 @@ use crate::memory::OverlapMemory;
 use crate::names;
 use crate::options::StitchOptions;
 use crate::project::Project;
+use crate::provenance;
 use crate::record::{fill_geometry, place};
 
 /// Runs the stages with one set of options.
@@ -35,6 +41,7 @@ use crate::record::{fill_geometry, place};
 pub struct Stitcher<'a> {
     options: &'a StitchOptions,
     context: &'a StageContext<'a>,
+    output: Option<&'a Path>,
 }
 
 /// What [`Stitcher::align`] found: one alignment per group of photographs to be stitched, the largest first.
@@ -101,7 +108,7 @@ impl Alignment {
 impl<'a> Stitcher<'a> {
     /// A stitcher with these options. Parallel work runs on the current thread pool.
     pub fn new(options: &'a StitchOptions, context: &'a StageContext<'a>) -> Self {
-        Self { options, context }
+        Self { options, context, output: None }
     }
 
     /// Finds, measures and matches the photographs and estimates the panoramas' geometry:
@@ -124,9 +131,11 @@ impl<'a> Stitcher<'a> {
         let mut clock = Clock::default();
         let sources = clock.time("source", || source::scan(&inputs.photographs, &self.options.source, self.context))?;
         self.check_any(&sources, inputs)?;
-        let cache_bytes = (self.options.stitch.photograph_cache * 1e6) as usize;
-        let photographs = std::sync::Arc::new(FilePhotographs::new(sources.images.clone(), cache_bytes));
-        let matched = self.match_all(sources, &photographs, inputs, &mut clock)?;
+        let measuring = Budget::new(self.options).measuring(&sources.images, self.options)?;
+        let colours = PhotographColours::survey(&sources.images, self.context);
+        let photographs = FilePhotographs::new(sources.images.clone(), measuring.kept_bytes).in_colours(colours);
+        let photographs = std::sync::Arc::new(photographs);
+        let matched = self.match_all(sources, (&photographs, measuring.at_once), inputs, &mut clock)?;
         Ok(MatchedPhotographs { matched, photographs, clock, findings: self.context.take_diagnostics(), memory: None })
     }
 
@@ -168,19 +177,46 @@ impl<'a> Stitcher<'a> {
         Ok(Aligned { alignments })
     }
 
-    /// Renders an aligned panorama from the full-resolution photographs.
+    /// Says where composed panoramas will be written: scratch files go into the same folder, unless `stitch.scratch` names
+    /// one, and leave room for them. Without, scratch files go where the system wants temporary files.
+    #[must_use]
+    pub fn writing_to(self, output: &'a Path) -> Self {
+        Self { output: Some(output), ..self }
+    }
+
+    /// Renders an aligned panorama from the full-resolution photographs, within `stitch.memory`.
     ///
     /// # Errors
-    /// Those of reading the photographs; [`Error::Limits`] if the canvas is too large; [`Error::Cancelled`].
+    /// Those of reading the photographs and of a scratch file; [`Error::Limits`] with the numbers, before any photograph is
+    /// read, if the canvas is too large for the memory or the disk; [`Error::Cancelled`].
     pub fn compose(&self, alignment: &Alignment) -> Result<Panorama> {
-        render::run(
-            &alignment.layout,
+        let layout = &alignment.layout;
+        let scratch = self.scratch(layout)?;
+        render::run_within(
+            &Budget::new(self.options).composing(alignment.photographs.kept_bytes(), &scratch),
+            layout,
             &alignment.corrections,
             alignment.photographs.as_ref(),
-            &self.options.render,
-            &self.options.seam,
+            (&self.options.render, &self.options.seam),
             self.context,
         )
+    }
+
+    /// Where a scratch file would go. Refuses a panorama for which there is no room.
+    fn scratch(&self, layout: &CanvasLayout) -> Result<ScratchFolder> {
+        let named = Some(&self.options.stitch.scratch).filter(|named| !named.is_empty()).map(PathBuf::from);
+        let Some(output) = self.output else {
+            return Ok(ScratchFolder::new(named.unwrap_or_else(std::env::temp_dir)));
+        };
+        let folder = output.parent().unwrap_or(Path::new(""));
+        let bytes = encode::expected_bytes(output, layout.width, layout.height, &self.options.output);
+        check_room(folder, bytes, "the panorama")?;
+        Ok(ScratchFolder::new(named.unwrap_or_else(|| folder.to_owned())).beside(folder, bytes))
+    }
+
+    /// What the panorama's file is to tell: its colour profile, and of its photographs what the options let pass.
+    pub fn metadata(&self, alignment: &Alignment) -> Metadata {
+        provenance::metadata(&alignment.project, alignment.photographs.colours(), &self.options.output)
     }
 
     /// Measures how true `panorama`, composed of `alignment`, is to its photographs: steps across its seams, and ghosts.
@@ -222,7 +258,7 @@ impl<'a> Stitcher<'a> {
     fn match_all(
         &self,
         sources: Sources,
-        photographs: &FilePhotographs,
+        (photographs, at_once): (&FilePhotographs, usize),
         inputs: &Inputs,
         clock: &mut Clock,
     ) -> Result<Matched> {
@@ -235,7 +271,7 @@ impl<'a> Stitcher<'a> {
             }
         };
         let (mut measured, mut undecodable) = (Vec::new(), Vec::new());
-        for outcome in measure::run(photographs, self.options, self.context, clock)? {
+        for outcome in measure::run(photographs, at_once, self.options, self.context, clock)? {
             match outcome {
                 Ok(one) => {
                     measured.push(Some(one));
@@ -336,11 +372,17 @@ impl<'a> Stitcher<'a> {
         };
         let placed = place(&component, geometry.as_ref());
         let layout = layout::run(placed, component.reference, &self.options.canvas, self.context)?;
+        let curve = photographs.transfer_curve();
         let thumbnails: Vec<Thumbnail> = members
             .iter()
             .zip(component.camera_groups())
             .filter_map(|(&picture, camera)| Some((camera, matched.measured[picture].as_ref()?)))
-            .map(|(camera, one)| Thumbnail { raster: &one.thumbnail, frame: one.thumbnail_frame, camera })
+            .map(|(camera, one)| Thumbnail {
+                raster: &one.thumbnail,
+                curve: &curve,
+                frame: one.thumbnail_frame,
+                camera,
+            })
             .collect();
         let corrections = clock
             .time("exposure", || {
@@ -349,6 +391,7 @@ impl<'a> Stitcher<'a> {
             .corrections;
         let mut project = matched.project(self.options, members, stitched);
         fill_geometry(&mut project, &component, geometry.as_ref(), &layout, &corrections);
+        project.colour_space = photographs.colours().map(PhotographColours::name).unwrap_or_default();
         project.measures = geometry
             .as_ref()
             .map(|geometry| clock.time("measures", || measures::run(&component, geometry, &layout, self.options)));

@@ -1,11 +1,16 @@
 use proptest::prelude::*;
+use std::borrow::Cow;
+use trueup_core::colour::TransferCurve;
 use trueup_core::mesh::GridMesh;
-use trueup_core::raster::Raster;
+
+use trueup_core::raster::{Photograph, Raster};
 
 use super::*;
 use crate::layout::Placed;
+use crate::render::prepared::Prepared;
 use crate::render::tests::Memory;
-use crate::render::{Blend, run as render};
+use crate::render::{Blend, Resources, run as render};
+use crate::seam::Label;
 
 const WIDTH: usize = 150;
 const HEIGHT: usize = 110;
@@ -44,11 +49,15 @@ fn composed(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOp
     let seam_options = SeamOptions::default();
     let context = StageContext::default();
     let cut = options.blend == Blend::None;
-    run(layout, &corrections, &Memory(pictures), (options, &seam_options), cut, &context).expect("renders").pixels
+    let memory = Memory(pictures);
+    let plan = Plan::new(layout, &memory, options.blend, &seam_options, &Resources::unlimited()).expect("no limit");
+    let blended = run(layout, &corrections, &memory, (options, &seam_options), (cut, &plan), &context);
+    let Store::Memory { pixels, .. } = blended.expect("renders").pixels else { panic!("there is no limit") };
+    pixels
 }
 
 fn root_of(level: u8) -> u16 {
-    (crate::transfer_curve::Linearise::table().linear(f32::from(level)).sqrt() * 65535.0 + 0.5) as u16
+    (crate::transfer_curve::Linearise::of(&TransferCurve::SRGB).linear(f32::from(level)).sqrt() * 65535.0 + 0.5) as u16
 }
 
 #[test]
@@ -108,7 +117,7 @@ fn no_border_of_the_panorama_is_darker_than_its_photographs() {
 }
 
 /// Everything that tiles need, of photographs that differ in brightness.
-fn with_work<T>(lefts: &[usize], test: impl FnOnce(&Work<'_>, &[Option<Prepared<'_>>]) -> T) -> T {
+fn with_work<T>(lefts: &[usize], first_level: u32, test: impl FnOnce(&Work<'_>, &[Option<Prepared<'_>>]) -> T) -> T {
     let layout = layout(lefts);
     let pictures: Vec<Photograph> = (0..lefts.len())
         .map(|index| picture(lefts[index], |level| (usize::from(level) * (10 + index) / 12) as u8))
@@ -117,16 +126,25 @@ fn with_work<T>(lefts: &[usize], test: impl FnOnce(&Work<'_>, &[Option<Prepared<
     let (options, seam_options) = (RenderOptions::default(), SeamOptions::default());
     let context = StageContext::default();
     let memory = Memory(pictures.clone());
-    let small = views::make(&layout, &corrections, &memory, &options, &seam_options, true, &context).expect("small");
+    let plan = Plan::new(&layout, &memory, Blend::MultiBand, &seam_options, &Resources::unlimited()).expect("no limit");
+    let small =
+        views::make(&layout, &corrections, &memory, &options, &seam_options, (Some(first_level), &plan), &context);
+    let small = small.expect("small");
     let seams = seam::run(small.views, small.size, &seam_options, &context).expect("seams");
     let canvas = [layout.width, layout.height];
-    let levels = Some(Levels::new(small.bases, &seams, canvas, 2));
-    let work = Work { options: &options, seams: &seams, canvas, levels };
+    let levels = Some(Levels::new(small.bases, &seams, canvas, (first_level, 2)).expect("in memory"));
+    let work = Work { options: &options, seams: &seams, canvas, first_level, levels };
     let prepared: Vec<Option<Prepared<'_>>> = pictures
         .into_iter()
         .zip(&layout.placed)
         .map(|(photograph, placed)| {
-            Some(Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, &Correction::default(), &options))
+            Some(Prepared::new(
+                Cow::Owned(photograph),
+                &placed.mesh,
+                canvas,
+                (&TransferCurve::SRGB, &Correction::default()),
+                &options,
+            ))
         })
         .collect();
     test(&work, &prepared)
@@ -145,26 +163,39 @@ fn blended(
 
 #[test]
 fn tiles_of_any_size_give_the_same_bits_as_the_whole() {
-    with_work(&[0, 60, 130], |work, pictures| {
-        let [width, height] = work.canvas;
-        let whole = blended(work, pictures, 0..width, 0..height);
-        for side in [16, 40, 64, 128] {
-            for top in (0..height).step_by(side) {
-                for left in (0..width).step_by(side) {
-                    let (columns, rows) = (left..(left + side).min(width), top..(top + side).min(height));
-                    let tile = blended(work, pictures, columns.clone(), rows.clone());
-                    for (y, row) in rows.zip(tile.chunks_exact(columns.len())) {
-                        assert_eq!(row, &whole[y * width..][columns.clone()], "tile of {side} at ({left}, {top})");
-                    }
+    for first_level in [3, 4] {
+        with_work(&[0, 60, 130], first_level, assert_that_tiles_give_the_whole);
+    }
+}
+
+fn assert_that_tiles_give_the_whole(work: &Work<'_>, pictures: &[Option<Prepared<'_>>]) {
+    let [width, height] = work.canvas;
+    let whole = blended(work, pictures, 0..width, 0..height);
+    for side in [2, 5, 8, 16].map(|samples| samples << work.first_level) {
+        for top in (0..height).step_by(side) {
+            for left in (0..width).step_by(side) {
+                let (columns, rows) = (left..(left + side).min(width), top..(top + side).min(height));
+                let tile = blended(work, pictures, columns.clone(), rows.clone());
+                for (y, row) in rows.zip(tile.chunks_exact(columns.len())) {
+                    assert_eq!(row, &whole[y * width..][columns.clone()], "tile of {side} at ({left}, {top})");
                 }
             }
         }
-    });
+    }
+}
+
+#[test]
+fn the_level_that_is_blended_as_a_whole_follows_from_the_canvas() {
+    assert_eq!(first_level([1, 1]), 3);
+    // 400 million pixels, the largest canvas there was before it depended on the size.
+    assert_eq!(first_level([20_000, 20_000]), 3);
+    assert_eq!(first_level([40_000, 25_000]), 4);
+    assert_eq!(first_level([400_000, 200_000]), 7);
 }
 
 #[test]
 fn a_tile_of_one_photograph_is_what_blending_would_give() {
-    with_work(&[0, 60, 130], |work, pictures| {
+    with_work(&[0, 60, 130], 3, |work, pictures| {
         let mut compared = 0;
         for left in (0..work.canvas[0] - 24).step_by(8) {
             let tile = tile(work, left..left + 24, 40..64);
@@ -197,13 +228,13 @@ proptest! {
         let panorama = render(&layout, &corrections, &Memory(pictures), &options, &SeamOptions::default(), &context);
         let panorama = panorama.expect("renders");
         let used = &levels[..lefts.len()];
-        let linear = |level: u8| crate::transfer_curve::Linearise::table().linear(f32::from(level));
+        let linear = |level: u8| crate::transfer_curve::Linearise::of(&TransferCurve::SRGB).linear(f32::from(level));
         let low = used.iter().map(|&level| linear(level)).fold(f32::INFINITY, f32::min) - 1e-4;
         let high = used.iter().map(|&level| linear(level)).fold(0.0, f32::max) + 1e-4;
         for y in 0..layout.height {
             for x in 0..layout.width {
                 let covered = lefts.iter().any(|&left| (left..left + WIDTH).contains(&x));
-                let [r, _, _, alpha] = panorama.linear_pixel(x, y);
+                let [r, _, _, alpha] = panorama.linear_pixel(x, y).expect("in memory");
                 prop_assert_eq!(alpha > 0.0, covered);
                 prop_assert!(!covered || (low..=high).contains(&r), "{} at ({}, {})", r, x, y);
             }

@@ -4,17 +4,19 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use rayon::prelude::*;
+use trueup_core::colour::TransferCurve;
 use trueup_core::mesh::GridMesh;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::Photograph;
 use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 
-use super::Base;
-use super::coarse::{self, SAMPLED_LEVEL};
+use super::bases::{Base, Bases};
+use super::coarse::{self, SAMPLED_BELOW};
 use super::pyramid::Plane;
 use crate::exposure::Correction;
 use crate::layout::{CanvasLayout, Placed};
+use crate::render::plan::Plan;
 use crate::render::prepared::{Prepared, Scratch, Window, check_photograph};
 use crate::render::{Interpolation, RenderOptions};
 use crate::seam::{CLIPPED, PARTLY, SeamOptions, View, WHOLLY};
@@ -26,33 +28,38 @@ pub(super) struct Small {
     pub(super) views: Vec<View>,
     /// Size of their canvas.
     pub(super) size: [usize; 2],
-    /// For the coarse levels; empty without.
-    pub(super) bases: Vec<Base>,
+    /// For the coarse levels; empty boxes without.
+    pub(super) bases: Bases,
     /// Decoded photographs, as far as there is room for them.
     pub(super) kept: Vec<Option<Photograph>>,
+    /// Bytes of each photograph.
+    pub(super) bytes: Vec<usize>,
 }
 
 /// Level of the camera's own values (0 to 255) from which on a channel counts as saturated.
 const SATURATED: f32 = 252.0;
 
+/// Reads every photograph once; `first_level` is that of the coarse levels, if there are to be any.
 pub(super) fn make(
     layout: &CanvasLayout,
     corrections: &[Correction],
     photographs: &dyn PhotographSource,
     options: &RenderOptions,
     seam_options: &SeamOptions,
-    with_bases: bool,
+    (first_level, plan): (Option<u32>, &Plan),
     context: &StageContext,
 ) -> Result<Small> {
     let canvas = [layout.width, layout.height];
+    let curve = photographs.transfer_curve();
     let size = small_size(canvas, seam_options.fine_pixels);
-    let mut small = Small { views: Vec::new(), size, bases: Vec::new(), kept: Vec::new() };
+    let bases = Bases::new(plan.bases.clone());
+    let mut small = Small { views: Vec::new(), size, bases, kept: Vec::new(), bytes: Vec::new() };
     // Halved as often as can be, then read between samples: nothing here is ever looked at.
     let halving =
         RenderOptions { interpolation: Interpolation::Bilinear, minification_threshold: 1.0, ..options.clone() };
     let sampling = RenderOptions { minification_threshold: 4.0, ..halving.clone() };
-    let mut room = options.kept_photographs * 1e6;
-    let at_a_time = rayon::current_num_threads().max(1);
+    let mut room = plan.photographs;
+    let at_a_time = plan.at_a_time;
     for (placed, corrections) in layout.placed.chunks(at_a_time).zip(corrections.chunks(at_a_time)) {
         context.check_cancelled()?;
         let made: Vec<(View, Base, Photograph)> = placed
@@ -63,11 +70,13 @@ pub(super) fn make(
                 check_photograph(placed, &photograph)?;
                 // The larger picture first: the smaller is made from what is left of the photograph then.
                 let mesh = scaled(&placed.mesh, [0, 1].map(|axis| size[axis] as f64 / canvas[axis] as f64), 0.0);
-                let prepared = Prepared::new(Cow::Borrowed(&photograph), &mesh, size, correction, &halving);
+                let prepared = Prepared::new(Cow::Borrowed(&photograph), &mesh, size, (&curve, correction), &halving);
                 let view = if layout.placed.len() == 1 { View::default() } else { view(&prepared, &sampling) };
-                let base = match with_bases {
-                    true => base(&prepared, placed, correction, canvas, [&halving, &sampling]),
-                    false => Base::default(),
+                let base = match first_level {
+                    Some(level) => {
+                        base(&prepared, placed, (&curve, correction), (canvas, level), [&halving, &sampling])
+                    }
+                    None => Base::default(),
                 };
                 context.progress().advance(RenderOptions::STAGE, 1);
                 Ok((view, base, photograph))
@@ -75,10 +84,11 @@ pub(super) fn make(
             .collect::<Result<_>>()?;
         for (view, base, photograph) in made {
             small.views.push(view);
-            small.bases.push(base);
-            let bytes = photograph.bytes() as f64;
+            small.bases.push(base)?;
+            let bytes = photograph.bytes();
             let fits = bytes <= room;
-            room -= if fits { bytes } else { 0.0 };
+            room -= if fits { bytes } else { 0 };
+            small.bytes.push(bytes);
             small.kept.push(fits.then_some(photograph));
         }
     }
@@ -86,7 +96,7 @@ pub(super) fn make(
 }
 
 /// The size of a canvas of at most `pixels` pixels, and at most half of the canvas along each side.
-fn small_size(canvas: [usize; 2], pixels: f64) -> [usize; 2] {
+pub(super) fn small_size(canvas: [usize; 2], pixels: f64) -> [usize; 2] {
     let scale = (pixels / (canvas[0] as f64 * canvas[1] as f64)).sqrt().min(0.5);
     canvas.map(|length| ((length as f64 * scale) as usize).max(1))
 }
@@ -129,17 +139,18 @@ fn view(prepared: &Prepared<'_>, options: &RenderOptions) -> View {
 fn base(
     larger: &Prepared<'_>,
     placed: &Placed,
-    correction: &Correction,
-    canvas: [usize; 2],
+    light: (&TransferCurve, &Correction),
+    (canvas, first_level): ([usize; 2], u32),
     [halving, sampling]: [&RenderOptions; 2],
 ) -> Base {
-    let step = f64::from(1_u32 << SAMPLED_LEVEL);
+    let level = first_level - SAMPLED_BELOW;
+    let step = f64::from(1_u32 << level);
     // Sample i lies on the middle of pixel i * step.
     let mesh = scaled(&placed.mesh, [step.recip(); 2], 0.5 - 0.5 / step);
     let (photograph, [width, height]) = larger.photograph();
     let mesh = GridMesh { width, height, ..mesh };
-    let size = canvas.map(|length| length.div_ceil(1 << SAMPLED_LEVEL));
-    let prepared = Prepared::new(Cow::Borrowed(photograph), &mesh, size, correction, halving);
+    let size = canvas.map(|length| length.div_ceil(1 << level));
+    let prepared = Prepared::new(Cow::Borrowed(photograph), &mesh, size, light, halving);
     // Room for the interpolated rim, from a sample that every coarser level has.
     let grown = |range: Range<usize>, length: usize| {
         (range.start / RIM * RIM).saturating_sub(RIM)..(range.end + RIM).min(length)
@@ -155,5 +166,5 @@ fn base(
     Base { plane: coarse::base(plane) }
 }
 
-/// Samples at [`SAMPLED_LEVEL`] around a photograph that its coarser levels reach.
-const RIM: usize = 8;
+/// Samples around a photograph that its coarser levels reach.
+pub(super) const RIM: usize = 8;

@@ -14,6 +14,7 @@ pub(crate) use correction::{LightTable, exposed};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use trueup_core::colour::TransferCurve;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::Raster;
 use trueup_core::source::WorkingFrame;
@@ -82,8 +83,10 @@ trueup_core::options! {
 /// A photograph reduced to its working size, as the comparison of light reads it.
 #[derive(Debug, Clone, Copy)]
 pub struct Thumbnail<'a> {
-    /// 8-bit sRGB, three channels.
+    /// 8 bits, three channels.
     pub raster: &'a Raster<u8>,
+    /// How its levels stand for light.
+    pub curve: &'a TransferCurve,
     /// How its pixels relate to the full-resolution photograph.
     pub frame: WorkingFrame,
     /// Which camera took it: photographs with the same number share their vignetting.
@@ -128,7 +131,7 @@ pub struct Exposure {
 ///
 /// # Departures
 /// All errors are on logarithms, where the whole model is linear; the published error of the gains on intensities draws
-/// them towards zero and is led by bright outliers. The response is taken to be sRGB's.
+/// them towards zero and is led by bright outliers. The response is taken to be the transfer curve of the photographs' colour space.
 pub fn run(
     layout: &CanvasLayout,
     thumbnails: &[Thumbnail<'_>],

@@ -47,7 +47,8 @@ impl Patch {
         footprints.sort_by(f64::total_cmp);
         let footprint = footprints.get(footprints.len() / 2).copied().unwrap_or(1.0);
         let block = (footprint * thumbnail.frame.working_from_full).round().max(1.0) as usize;
-        let light = block_means(thumbnail.raster, block, options.darkest..=options.brightest);
+        let linearise = Linearise::of(thumbnail.curve);
+        let light = block_means(thumbnail.raster, &linearise, block, options.darkest..=options.brightest);
         let from_full = thumbnail.frame.working_from_full / block as f64;
         let half = grid.size.map(|length| 0.5 * length);
         let corner = half[0] * half[0] + half[1] * half[1];
@@ -98,8 +99,7 @@ fn intersect(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
 
 /// Natural logarithm of the mean linear light of blocks of `block` x `block` pixels, by channel; NaN where a sample lies
 /// outside `telling`.
-fn block_means(raster: &Raster<u8>, block: usize, telling: RangeInclusive<u8>) -> Raster<f32> {
-    let linearise = Linearise::table();
+fn block_means(raster: &Raster<u8>, linearise: &Linearise, block: usize, telling: RangeInclusive<u8>) -> Raster<f32> {
     let (width, height) = (raster.width().div_ceil(block), raster.height().div_ceil(block));
     let mut means = Raster::new(width, height, 3);
     for y in 0..height {

@@ -43,7 +43,8 @@ fn layout(shifts: &[f64]) -> CanvasLayout {
 
 fn estimate(shifts: &[f64], rasters: &[Raster<u8>], options: &ExposureOptions) -> Exposure {
     let frame = WorkingFrame::new(WIDTH, HEIGHT, 480_000.0);
-    let thumbnails: Vec<Thumbnail> = rasters.iter().map(|raster| Thumbnail { raster, frame, camera: 0 }).collect();
+    let thumbnails: Vec<Thumbnail> =
+        rasters.iter().map(|raster| Thumbnail { raster, curve: &TransferCurve::SRGB, frame, camera: 0 }).collect();
     run(&layout(shifts), &thumbnails, 0, options, &StageContext::default()).expect("estimates")
 }
 

@@ -1,16 +1,18 @@
-//! One photograph alone on the canvas, for measuring.
+//! One photograph alone on the canvas: for measuring, and row by row for files.
 
 use std::borrow::Cow;
 
 use trueup_core::Result;
-use trueup_core::raster::{LUMA, Raster};
+use trueup_core::colour::TransferCurve;
+use trueup_core::raster::{LUMA, Raster, RowSource};
 use trueup_core::source::PhotographSource;
 
 use super::prepared::{Prepared, Scratch, Window, check_photograph};
 use super::{BAND_ROWS, RenderOptions, check};
+use crate::deformed_grid::DeformedGrid;
 use crate::exposure::Correction;
 use crate::layout::CanvasLayout;
-use crate::transfer_curve::Encode;
+use crate::transfer_curve::{Encode, Encoding};
 use crate::weights::WHOLE;
 
 /// What one photograph shows of the canvas: its bounding box there.
@@ -37,18 +39,7 @@ pub fn layer(
     photographs: &dyn PhotographSource,
     options: &RenderOptions,
 ) -> Result<Layer> {
-    check(layout, corrections, options)?;
-    let Some(placed) = layout.placed.get(position) else {
-        return Err(trueup_core::Error::input(
-            "canvas",
-            format!("there is no photograph {position} on it"),
-            "Ask for one of the photographs placed.",
-        ));
-    };
-    let photograph = photographs.photograph(placed.photograph)?;
-    check_photograph(placed, &photograph)?;
-    let size = [layout.width, layout.height];
-    let prepared = Prepared::new(Cow::Owned(photograph), &placed.mesh, size, &corrections[position], options);
+    let (prepared, curve) = alone(layout, corrections, position, photographs, options)?;
     let (columns, rows) = (prepared.columns(), prepared.rows());
     let (width, height) = (columns.len(), rows.len());
     let mut layer = Layer {
@@ -57,7 +48,7 @@ pub fn layer(
         gray: Raster::new(width, height, 1),
         covered: Raster::new(width, height, 1),
     };
-    let encode = Encode::table();
+    let encode = Encode::of(&curve);
     let mut scratch = Scratch::default();
     let mut samples = Vec::new();
     for first in rows.clone().step_by(BAND_ROWS) {
@@ -78,4 +69,126 @@ pub fn layer(
         }
     }
     Ok(layer)
+}
+
+/// Photograph `layout.placed[position]` alone, with the curve of its samples.
+fn alone(
+    layout: &CanvasLayout,
+    corrections: &[Correction],
+    position: usize,
+    photographs: &dyn PhotographSource,
+    options: &RenderOptions,
+) -> Result<(Prepared<'static>, TransferCurve)> {
+    check(layout, corrections, options)?;
+    let Some(placed) = layout.placed.get(position) else {
+        return Err(trueup_core::Error::input(
+            "canvas",
+            format!("there is no photograph {position} on it"),
+            "Ask for one of the photographs placed.",
+        ));
+    };
+    let photograph = photographs.photograph(placed.photograph)?;
+    check_photograph(placed, &photograph)?;
+    let curve = photographs.transfer_curve();
+    let light = (&curve, &corrections[position]);
+    let size = [layout.width, layout.height];
+    Ok((Prepared::new(Cow::Owned(photograph), &placed.mesh, size, light, options), curve))
+}
+
+/// One photograph alone on the canvas, corrected, with alpha: its bounding box, row by row. Holds the photograph and no
+/// pixel of the canvas.
+pub struct LayerRows {
+    /// First column of the canvas.
+    pub left: usize,
+    /// First row of the canvas.
+    pub top: usize,
+    prepared: Prepared<'static>,
+    encoding: Encoding,
+    options: RenderOptions,
+}
+
+impl std::fmt::Debug for LayerRows {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_struct("LayerRows").field("left", &self.left).field("top", &self.top).finish_non_exhaustive()
+    }
+}
+
+/// Prepares photograph `layout.placed[position]` to be rendered alone, as [`super::run`] would; `None` if none of it lies on
+/// the canvas.
+///
+/// # Errors
+/// Those of [`layer`].
+pub fn layer_rows(
+    layout: &CanvasLayout,
+    corrections: &[Correction],
+    position: usize,
+    photographs: &dyn PhotographSource,
+    options: &RenderOptions,
+) -> Result<Option<LayerRows>> {
+    let (prepared, curve) = alone(layout, corrections, position, photographs, options)?;
+    let (columns, rows) = (prepared.columns(), prepared.rows());
+    if columns.is_empty() || rows.is_empty() {
+        return Ok(None);
+    }
+    let (left, top) = (columns.start, rows.start);
+    Ok(Some(LayerRows { left, top, prepared, encoding: Encoding::new(curve), options: options.clone() }))
+}
+
+/// Width and height of the box of photograph `layout.placed[position]` on the canvas, in pixels; 0 if there is no such
+/// position.
+pub fn layer_size(layout: &CanvasLayout, position: usize) -> [usize; 2] {
+    let Some(placed) = layout.placed.get(position) else { return [0, 0] };
+    let grid = DeformedGrid::new(&placed.mesh, 1.0, true, layout.width, layout.height);
+    [grid.columns.len(), grid.rows.len()]
+}
+
+impl LayerRows {
+    /// Row `y` of the box: roots of linear light, and the share that is covered.
+    fn samples(&self, y: usize) -> Vec<[f32; 4]> {
+        let columns = self.prepared.columns();
+        let rows = self.top + y..self.top + y + 1;
+        let mut samples = vec![[0.0; 4]; columns.len()];
+        let window = Window { columns: &columns, rows: &rows };
+        self.prepared.sample(window, &mut samples, &self.options, &mut Scratch::default());
+        samples
+    }
+
+    fn row<T: Copy + Default>(
+        &self,
+        y: usize,
+        row: &mut [T],
+        color: impl Fn(f32) -> T,
+        alpha: impl Fn(f32) -> T,
+    ) -> Result<()> {
+        for (pixel, [r, g, b, share]) in row.chunks_exact_mut(4).zip(self.samples(y)) {
+            match share > 0.0 {
+                true => pixel.copy_from_slice(&[color(r * r), color(g * g), color(b * b), alpha(share.min(1.0))]),
+                false => pixel.fill(T::default()),
+            }
+        }
+        Ok(())
+    }
+}
+
+impl RowSource for LayerRows {
+    fn width(&self) -> usize {
+        self.prepared.columns().len()
+    }
+
+    fn height(&self) -> usize {
+        self.prepared.rows().len()
+    }
+
+    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
+        self.row(y, row, |light| self.encoding.linear.level(light), |share| (share * 255.0 + 0.5) as u8)
+    }
+
+    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
+        let encode = self.encoding.linear16();
+        self.row(y, row, |light| encode.level(light), |share| (share * 65535.0 + 0.5) as u16)
+    }
+
+    fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()> {
+        self.row(y, row, |light| light, |share| share)
+    }
 }

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use trueup_core::colour::TransferCurve;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Photograph;
 use trueup_core::{Error, Result};
@@ -45,12 +46,12 @@ pub(crate) struct Window<'a> {
 
 impl<'a> Prepared<'a> {
     /// A photograph on a canvas of `size` pixels (width, height), where `mesh` puts it; the two fit together, see
-    /// [`check_photograph`].
+    /// [`check_photograph`]. Its samples become light by the transfer curve and the correction `light`.
     pub(crate) fn new(
         mut photograph: Cow<'a, Photograph>,
         mesh: &GridMesh,
         size: [usize; 2],
-        correction: &Correction,
+        light: (&TransferCurve, &Correction),
         options: &RenderOptions,
     ) -> Self {
         let grid_of = |mesh: &GridMesh| DeformedGrid::new(mesh, 1.0, true, size[0], size[1]);
@@ -66,7 +67,7 @@ impl<'a> Prepared<'a> {
             grid = grid_of(&mesh);
         }
         let feather = Feather::new(grid.size, options.feather_exponent);
-        let light = LightTable::new(correction, grid.size);
+        let light = LightTable::new(light.0, light.1, grid.size);
         Self { photograph, grid, feather, light }
     }
 

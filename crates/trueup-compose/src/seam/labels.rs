@@ -113,6 +113,11 @@ impl Seams {
         out.extend(columns.clone().map(|x| self.at((x as f64 + 0.5) * across, v)));
     }
 
+    /// Labels of row `y` of a canvas of `full` pixels (width, height), replacing `out`; [`NOBODY`] where nothing is.
+    pub fn row_on_canvas(&self, y: usize, full: [usize; 2], out: &mut Vec<Label>) {
+        self.row(y, &(0..full[0]), full, out);
+    }
+
     /// Labels of all pixels of a canvas of `full` pixels (width, height), row by row.
     pub fn on_canvas(&self, full: [usize; 2]) -> Vec<Label> {
         let mut row = Vec::new();

@@ -12,6 +12,7 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
 use trueup_core::source::{PhotographSource, SourceImage};
 use trueup_core::{Error, Result, StageContext};
+use trueup_io::colour::PhotographColours;
 use trueup_io::decode::FilePhotographs;
 use trueup_io::source;
 
@@ -64,7 +65,8 @@ pub fn evaluate_pixels(project: &Project, project_folder: &Path, context: &Stage
         .iter()
         .map(|record| photograph(record, project_folder, project, context))
         .collect::<Result<Vec<SourceImage>>>()?;
-    let photographs = FilePhotographs::new(images, 0);
+    let colours = PhotographColours::survey(&images, context);
+    let photographs = FilePhotographs::new(images, 0).in_colours(colours);
     let meshes = used_grids(&records)?;
     let scale = scale(&meshes, project.options.measures.canvas_pixels);
     let positions: Vec<usize> = (0..records.len()).collect();
