@@ -21,6 +21,7 @@
 #![forbid(unsafe_code)]
 
 mod align;
+mod by_hand;
 mod clock;
 pub mod compare;
 mod evaluation;
