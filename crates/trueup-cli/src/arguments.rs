@@ -64,7 +64,7 @@ pub(crate) struct StitchArgs {
     #[arg(value_name = "PHOTOS", required = true)]
     pub photographs: Vec<String>,
 
-    /// The panorama; .jpg, .png, .tif or .webp chooses the format
+    /// The panorama; .jpg, .png, .tif, .webp or .dzi (Deep Zoom) chooses the format
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     pub output: PathBuf,
 
@@ -76,6 +76,14 @@ pub(crate) struct StitchArgs {
     #[arg(long, value_name = "FILE.pto", help_heading = "Output")]
     pub pto: Option<PathBuf>,
 
+    /// Write the photographs as layers, aligned and corrected, one to a page (output.layer_extent)
+    #[arg(long, value_name = "FILE.tif", help_heading = "Output")]
+    pub layers: Option<PathBuf>,
+
+    /// Write which photograph is shown where
+    #[arg(long, value_name = "FILE.png", help_heading = "Output")]
+    pub seams: Option<PathBuf>,
+
     /// Size of the panorama: 1 keeps the pixel scale of the reference photograph (canvas.scale)
     #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Output")]
     pub scale: Option<String>,
@@ -83,6 +91,10 @@ pub(crate) struct StitchArgs {
     /// JPEG quality (output.jpeg_quality)
     #[arg(long, value_name = "Q", allow_hyphen_values = true, help_heading = "Output")]
     pub quality: Option<String>,
+
+    /// Bits of a sample: auto, 8, 16 or float (output.depth)
+    #[arg(long, value_name = "DEPTH", help_heading = "Output")]
+    pub depth: Option<String>,
 
     /// Stitch every group of overlapping photographs, not only the largest; several panoramas are numbered
     #[arg(long, help_heading = "Photographs")]

@@ -1,6 +1,6 @@
 //! `trueup stitch`: from arguments to a checked job, from the job's result to the summary.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use trueup::{Error, Inputs, Reference, StageContext, StitchJob, StitchOptions, Written};
 
@@ -47,6 +47,7 @@ impl CheckedStitch {
             ("--method", "stitch.method", &args.method),
             ("--scale", "canvas.scale", &args.scale),
             ("--quality", "output.jpeg_quality", &args.quality),
+            ("--depth", "output.depth", &args.depth),
             ("--align", "stitch.align", &args.align),
             ("--structure", "stitch.structure", &args.structure),
             ("--seed", "stitch.seed", &args.seed),
@@ -54,16 +55,13 @@ impl CheckedStitch {
             ("--scratch", "stitch.scratch", &args.scratch),
         ];
         let options = chosen_options(args.config.as_deref(), &args.set, &flags)?;
-        if args.project.as_ref() == Some(&args.output) {
-            let message = format!("{} cannot be both the panorama and the project", args.output.display());
-            return Err(Failure::usage(message, "Give --output and --project different names."));
-        }
-        if let Some(pto) = &args.pto
-            && (*pto == args.output || args.project.as_ref() == Some(pto))
-        {
-            let message = format!("{} cannot be two files at once", pto.display());
-            return Err(Failure::usage(message, "Give --output, --project and --pto different names."));
-        }
+        check_different(&[
+            ("--output", Some(&args.output)),
+            ("--project", args.project.as_ref()),
+            ("--pto", args.pto.as_ref()),
+            ("--layers", args.layers.as_ref()),
+            ("--seams", args.seams.as_ref()),
+        ])?;
         let reference = chosen_reference(args.reference);
         let inputs = Inputs {
             photographs: args.photographs,
@@ -75,10 +73,30 @@ impl CheckedStitch {
         // The library reads 0 as one thread per core.
         let threads = args.threads.map_or(0, usize::from);
         Ok(Self {
-            job: StitchJob { inputs, output: args.output, project: args.project, hugin_project: args.pto, threads },
+            job: StitchJob {
+                inputs,
+                output: args.output,
+                project: args.project,
+                hugin_project: args.pto,
+                layers: args.layers,
+                seams: args.seams,
+                threads,
+            },
             options,
         })
     }
+}
+
+/// Refuses one name for two files.
+fn check_different(files: &[(&str, Option<&PathBuf>)]) -> Result<(), Failure> {
+    let given: Vec<(&str, &PathBuf)> = files.iter().filter_map(|(flag, path)| Some((*flag, (*path)?))).collect();
+    for (index, (flag, path)) in given.iter().enumerate() {
+        if let Some((other, _)) = given[..index].iter().find(|(_, other)| other == path) {
+            let message = format!("{} cannot be the file of both {other} and {flag}", path.display());
+            return Err(Failure::usage(message, format!("Give {other} and {flag} different names.")));
+        }
+    }
+    Ok(())
 }
 
 /// The reference that was typed, if any.

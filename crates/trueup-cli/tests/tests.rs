@@ -6,6 +6,7 @@ mod determinism;
 mod documented;
 mod evaluate;
 mod failures;
+mod formats;
 mod options;
 mod pictures;
 mod run;

@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use trueup_compose::render::Blend;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::encode;
 
+use crate::by_hand::no_seams;
 use crate::inputs::Inputs;
 use crate::options::StitchOptions;
 use crate::project::{ImageRecord, Project};
@@ -24,6 +26,10 @@ pub struct StitchJob {
     pub project: Option<PathBuf>,
     /// A file for the cameras as a Hugin project, if wanted; numbered like the panoramas.
     pub hugin_project: Option<PathBuf>,
+    /// A TIFF for the photographs as layers, if wanted; numbered like the panoramas.
+    pub layers: Option<PathBuf>,
+    /// A PNG for what photograph is shown where, if wanted; numbered like the panoramas.
+    pub seams: Option<PathBuf>,
     /// Number of threads; 0 for one per core.
     pub threads: usize,
 }
@@ -50,6 +56,15 @@ impl StitchJob {
     pub fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<Written>> {
         options.validate()?;
         encode::check_writable(&self.output, &options.output)?;
+        if let Some(layers) = &self.layers {
+            encode::check_layers_place(layers)?;
+        }
+        if let Some(seams) = &self.seams {
+            encode::check_labels_place(seams)?;
+            if !matches!(options.render.blend, Blend::MultiBand | Blend::None) {
+                return Err(no_seams());
+            }
+        }
         for side in [&self.project, &self.hugin_project].into_iter().flatten() {
             encode::check_place(side)?;
         }
@@ -68,14 +83,25 @@ impl StitchJob {
         for (index, mut alignment) in aligned.alignments.into_iter().enumerate() {
             let number = several.then_some(index + 1);
             let output = numbered(&self.output, number);
-            spare_photographs(&output, &alignment.project)?;
+            let layers = self.layers.as_deref().map(|path| numbered(path, number));
+            let seams = self.seams.as_deref().map(|path| numbered(path, number));
+            for path in [Some(&output), layers.as_ref(), seams.as_ref()].into_iter().flatten() {
+                spare_photographs(path, &alignment.project)?;
+            }
             let start = Instant::now();
             let panorama = Stitcher::new(options, context).writing_to(&output).compose(&alignment)?;
             alignment.record_seconds("render", start.elapsed());
             let start = Instant::now();
-            let bytes = encode::write(&output, &panorama, &stitcher.metadata(&alignment), &options.output, context)?;
-            alignment.record_seconds("output", start.elapsed());
+            let output_options = stitcher.output_options(&alignment, &output)?;
+            let bytes = encode::write(&output, &panorama, &stitcher.metadata(&alignment), &output_options, context)?;
+            if let Some(path) = &seams {
+                stitcher.write_seams(&alignment, &panorama, path)?;
+            }
             drop(panorama);
+            if let Some(path) = &layers {
+                stitcher.write_layers(&alignment, path)?;
+            }
+            alignment.record_seconds("output", start.elapsed());
             alignment.record_findings(context.take_diagnostics());
             let project = alignment.project;
             let project_file = self.project.as_deref().map(|path| numbered(path, number));

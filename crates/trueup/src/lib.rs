@@ -22,6 +22,7 @@
 
 mod align;
 mod budget;
+mod by_hand;
 mod clock;
 pub mod compare;
 mod evaluation;

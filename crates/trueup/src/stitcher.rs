@@ -92,6 +92,21 @@ pub struct Alignment {
 }
 
 impl Alignment {
+    /// Where the photographs lie on the canvas.
+    pub(crate) fn layout(&self) -> &CanvasLayout {
+        &self.layout
+    }
+
+    /// Gain, colour and vignetting of every photograph placed.
+    pub(crate) fn corrections(&self) -> &[Correction] {
+        &self.corrections
+    }
+
+    /// The photographs, in the order of [`Project::images`].
+    pub(crate) fn photographs(&self) -> &FilePhotographs {
+        &self.photographs
+    }
+
     /// Adds what composing found to the record.
     pub(crate) fn record_findings(&mut self, findings: Vec<Diagnostic>) {
         let names: Vec<String> = self.photographs.images().iter().map(|image| image.name.clone()).collect();
@@ -109,6 +124,16 @@ impl<'a> Stitcher<'a> {
     /// A stitcher with these options. Parallel work runs on the current thread pool.
     pub fn new(options: &'a StitchOptions, context: &'a StageContext<'a>) -> Self {
         Self { options, context, output: None }
+    }
+
+    /// The options of all stages.
+    pub(crate) fn options(&self) -> &StitchOptions {
+        self.options
+    }
+
+    /// What the stages are given beside their input.
+    pub(crate) fn context(&self) -> &StageContext<'a> {
+        self.context
     }
 
     /// Finds, measures and matches the photographs and estimates the panoramas' geometry:

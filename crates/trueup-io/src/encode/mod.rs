@@ -70,7 +70,7 @@ trueup_core::choice! {
         Eight = "8",
         /// 16 bits: PNG and TIFF.
         Sixteen = "16",
-        /// Linear light as 32-bit floating point numbers, 1 for white and more above: TIFF.
+        /// Linear light as 32-bit floating point numbers, 1 for white: TIFF.
         Float = "float",
     }
 }
