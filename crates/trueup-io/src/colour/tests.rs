@@ -154,7 +154,7 @@ fn exif_names_adobe_rgb_where_there_is_no_profile() {
     writer.write(&mut block, false).expect("a block");
     let mut bytes = Vec::new();
     let mut encoder = jpeg_encoder::Encoder::new(&mut bytes, 95);
-    encoder.add_app_segment(1, &[b"Exif\0\0", block.into_inner().as_slice()].concat()).expect("a segment");
+    encoder.add_app_segment(1, [b"Exif\0\0", block.into_inner().as_slice()].concat()).expect("a segment");
     let pixels = COLOUR.repeat((SIDE * SIDE) as usize);
     encoder.encode(&pixels, SIDE as u16, SIDE as u16, jpeg_encoder::ColorType::Rgb).expect("encoded");
     std::fs::write(&path, bytes).expect("written");

@@ -23,6 +23,8 @@ use pending::PendingFile;
 
 pub use folder::PendingFolder;
 pub use metadata::Metadata;
+#[cfg(test)]
+pub(crate) use tiff_metadata::OF_JPEG;
 
 trueup_core::choice! {
     /// How finely JPEG stores colour, relative to brightness.
