@@ -27,6 +27,7 @@ pub mod mesh;
 pub mod options;
 pub mod raster;
 pub mod source;
+pub mod spherical;
 pub mod truth;
 
 pub use context::StageContext;

@@ -20,6 +20,7 @@
 #![forbid(unsafe_code)]
 
 mod align;
+mod arrangement;
 mod clock;
 pub mod compare;
 mod evaluation;
@@ -37,6 +38,7 @@ mod record;
 mod refinement;
 mod stitcher;
 
+pub use arrangement::ProjectionRecord;
 pub use evaluation::{Evaluation, PictureEvaluation, PixelEvaluation, evaluate, evaluate_pixels, read_truth};
 pub use files::{StitchJob, Written};
 pub use inputs::{Inputs, Reference};
@@ -46,6 +48,7 @@ pub use project::{
     Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
 };
 pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};
+pub use trueup_align::projection::{FlatKind, Projection};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;
 pub use trueup_compose::render::Panorama;
@@ -53,6 +56,7 @@ pub use trueup_core::context::{CancelToken, Progress, Silent};
 pub use trueup_core::diagnostics::{Diagnostic, Severity};
 pub use trueup_core::options::{InvalidOption, OptionDescription};
 pub use trueup_core::raster::RowSource;
+pub use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 pub use trueup_core::truth::{ImageTruth, Truth};
 pub use trueup_core::{Error, Result, StageContext};
 pub use trueup_io::encode::{OutputOptions, write as write_picture};

@@ -7,6 +7,7 @@ use trueup_compose::exposure::Correction;
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::matches::PairVerdict;
 
+use crate::arrangement::ProjectionRecord;
 use crate::measures::Measures;
 use crate::options::StitchOptions;
 
@@ -34,7 +35,8 @@ pub struct MeshRecord {
     pub cols: usize,
     /// Vertices in pixels of the original photograph after orientation; the corner is (0, 0).
     pub source: Vec<[f64; 2]>,
-    /// Vertices in pixels of the written panorama; the corner is (0, 0).
+    /// Vertices in pixels of the written panorama; the corner is (0, 0), and where the panorama was cropped they may lie
+    /// outside. With [`Project::projection`], in a plane of their own in which the mesh was solved.
     pub target: Vec<[f64; 2]>,
 }
 
@@ -59,6 +61,10 @@ pub struct ImageRecord {
     pub focal_px: Option<f64>,
     /// Rows of the rotation from the levelled world (y down) to the camera.
     pub rotation: Option<[[f64; 3]; 3]>,
+    /// The same as the photograph's own lines correct it, which projections are drawn by; `None` in files of programs that
+    /// knew no projections.
+    #[serde(default)]
+    pub upright_rotation: Option<[[f64; 3]; 3]>,
     /// Clockwise rotation that the similarity prior wants, in degrees.
     pub theta_deg: Option<f64>,
     /// Scale that the similarity prior wants, relative to the others.
@@ -152,6 +158,10 @@ pub struct Project {
     pub measures: Option<Measures>,
     /// Size of the panorama.
     pub canvas: Canvas,
+    /// How directions were drawn; `None` where the panorama is the mesh itself, and in files of programs that knew no
+    /// projections.
+    #[serde(default)]
+    pub projection: Option<ProjectionRecord>,
     /// Wall seconds per stage.
     pub seconds: BTreeMap<String, f64>,
     /// What was found on the way.

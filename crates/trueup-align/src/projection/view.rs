@@ -1,6 +1,6 @@
 //! Where the viewer looks, what is shown, and on which projection.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z, wrap_angle};
 use trueup_core::options::{InvalidOption, OptionValue};
@@ -147,6 +147,8 @@ impl ProjectionOptions {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::super::coverage::tests::shot;
     use super::*;
 
