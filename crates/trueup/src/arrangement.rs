@@ -193,7 +193,7 @@ fn report_cut(
             if outside > NOTABLE {
                 let [across, _] = view.half.map(|half| 2.0 * half.to_degrees());
                 let message = format!(
-                    "{:.0} % of it lies outside of the {across:.0} degrees that the {} view shows",
+                    "{:.0} % of it lies outside of the {} view, which is {across:.0} degrees wide and as high as carries well",
                     100.0 * outside,
                     view.flat.kind.name()
                 );

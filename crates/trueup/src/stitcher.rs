@@ -162,8 +162,8 @@ impl<'a> Stitcher<'a> {
         let mut alignments = Vec::new();
         for component in &components {
             let mut alignment = self.align_component(component, &components, set, inputs)?;
-            alignment.project.diagnostics =
-                shared_diagnostics.iter().cloned().chain(self.context.take_diagnostics()).collect();
+            let own = self.context.take_diagnostics().into_iter().map(|one| names::by_name(one, &file_names));
+            alignment.project.diagnostics = shared_diagnostics.iter().cloned().chain(own).collect();
             alignments.push(alignment);
         }
         Ok(Aligned { alignments })
