@@ -83,6 +83,14 @@ fn samples(shot: &Shot) -> impl Iterator<Item = Vector2<f64>> {
         .map(move |index| size.component_mul(&Vector2::new(share(index % SAMPLES), share(index / SAMPLES))))
 }
 
+/// The largest angle from the horizon that a photograph reaches, radians.
+pub(super) fn steepest(shot: &Shot) -> f64 {
+    if [-1.0, 1.0].iter().any(|&down| shows(shot, Vector3::new(0.0, down, 0.0))) {
+        return PI / 2.0;
+    }
+    samples(shot).map(|pixel| shot.camera.world_direction(pixel).y.asin().abs()).fold(0.0, f64::max)
+}
+
 /// Whether a photograph shows a direction of the level world.
 pub(super) fn shows(shot: &Shot, direction: Vector3<f64>) -> bool {
     let pixel = shot.camera.project(shot.camera.rotation() * direction);

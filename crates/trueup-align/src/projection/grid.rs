@@ -65,14 +65,10 @@ struct Drawing<'a> {
 
 impl<'a> Drawing<'a> {
     fn new(shot: &'a Shot, meeting: &'a Meeting, placement: &'a Placement<'a>) -> Self {
-        /// Planes end a little before a right angle.
-        const LARGEST: f64 = 1.55;
         let view = placement.view;
         let cell = shot.mesh.cell_width().max(shot.mesh.cell_height()) / shot.camera.focal_px;
         let margin = MARGIN.max(3.0 * cell);
-        let [across, along] = view.half;
-        let along = if view.flat.kind.turns() { along + margin } else { (along + margin).min(LARGEST.max(along)) };
-        let reach = view.flat.reach([across + margin, along]);
+        let reach = view.flat.reach(view.half.map(|half| half + margin));
         Self {
             shot,
             meeting,

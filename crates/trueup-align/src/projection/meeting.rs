@@ -7,6 +7,9 @@
 //! and directions that need no correction get none. The mesh's own shape, its plane and its drift over long rows are
 //! forgotten by this; only what it knows of overlaps remains, so that any mesh will do, of whatever method.
 //!
+//! Near the poles the mesh knows nothing: photographs that look there cannot be unrolled, and pull at their neighbours. They
+//! are drawn as their cameras see.
+//!
 //! # Source
 //! H.-Y. Shum and R. Szeliski, "Construction and refinement of panoramic mosaics with global and local alignment" (2000),
 //! section 5: local alignment ("deghosting") towards the mean ray; here the correspondences are the mesh's, and the
@@ -16,6 +19,7 @@ use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 
 use super::Shot;
+use super::coverage::steepest;
 
 /// By how many of its own pixels each vertex of a photograph's grid looks aside, row-major.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -30,6 +34,7 @@ pub struct Meeting {
 /// * `max_parallax`: the largest angle in radians between where a camera sees a place and where it is drawn; from half of it
 ///   on, corrections fade, since a mesh that has to contradict its cameras more than that is torn itself.
 pub fn meeting(shots: &[Shot], period: Option<f64>, max_parallax: f64) -> Vec<Meeting> {
+    let trusts: Vec<f64> = shots.iter().map(|shot| trust(steepest(shot))).collect();
     let bounds: Vec<_> = shots.iter().map(|shot| shot.mesh.bounds()).collect();
     (0..shots.len())
         .into_par_iter()
@@ -37,10 +42,12 @@ pub fn meeting(shots: &[Shot], period: Option<f64>, max_parallax: f64) -> Vec<Me
             let shot = &shots[k];
             let aside = (0..shot.mesh.len()).map(|vertex| {
                 let pixel = shot.mesh.source(vertex);
-                let own = Sight { direction: shot.camera.world_direction(pixel), weight: depth(shot, pixel) };
+                let direction = shot.camera.world_direction(pixel);
+                let own = Sight { direction, weight: depth(shot, pixel), trust: trusts[k] };
                 let place = Vector2::from(shot.mesh.target[vertex]);
                 let others = (0..shots.len()).filter(|&other| other != k).filter_map(|other| {
-                    sight(&shots[other], &bounds[other], place, &own.direction, period)
+                    let seen = sight(&shots[other], &bounds[other], place, &own.direction, period)?;
+                    Some(Sight { trust: trusts[other], ..seen })
                 });
                 let drawn = common_direction(own, others, max_parallax);
                 let back = shot.camera.project(shot.camera.rotation() * drawn);
@@ -56,6 +63,16 @@ pub fn meeting(shots: &[Shot], period: Option<f64>, max_parallax: f64) -> Vec<Me
 struct Sight {
     direction: Vector3<f64>,
     weight: f64,
+    /// How far its mesh is believed, 0 to 1.
+    trust: f64,
+}
+
+/// How far the mesh of a photograph is believed that reaches this far from the horizon (radians): the mesh's sphere is unrolled up
+/// to 70 degrees.
+fn trust(steepest: f64) -> f64 {
+    const WHOLE_DEG: f64 = 65.0;
+    const NONE_DEG: f64 = 75.0;
+    ((NONE_DEG - steepest.to_degrees()) / (NONE_DEG - WHOLE_DEG)).clamp(0.0, 1.0)
 }
 
 /// How another photograph sees the `place` that is expected in `direction`; `None` if it does not show it.
@@ -84,7 +101,7 @@ fn sight(
     }
     let pixel = other.mesh.source_of(place, expected)?;
     let inside = (0..2).all(|axis| (0.0..=size[axis]).contains(&pixel[axis]));
-    inside.then(|| Sight { direction: other.camera.world_direction(pixel), weight: depth(other, pixel) })
+    inside.then(|| Sight { direction: other.camera.world_direction(pixel), weight: depth(other, pixel), trust: 1.0 })
 }
 
 /// 1 in the middle of a photograph, 0 on its border.
@@ -103,7 +120,9 @@ fn common_direction(own: Sight, others: impl Iterator<Item = Sight>, max_paralla
     let farthest = counted.map(|sight| sight.direction.angle(&mean)).fold(own.direction.angle(&mean), f64::max);
     let kept = (2.0 - 2.0 * farthest / max_parallax.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
     let smooth = kept * kept * (3.0 - 2.0 * kept);
-    own.direction.lerp(&mean, smooth).normalize()
+    let weights: f64 = sights.iter().map(|sight| sight.weight).sum();
+    let trust = sights.iter().map(|sight| sight.weight * sight.trust).sum::<f64>() / weights;
+    own.direction.lerp(&mean, smooth * trust).normalize()
 }
 
 #[cfg(test)]
