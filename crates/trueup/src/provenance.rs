@@ -22,6 +22,7 @@ pub(crate) fn metadata(project: &Project, colours: Option<&PhotographColours>, o
         height: project.canvas.height,
         is_srgb: options.profile == OutputProfile::Srgb || colours.is_none_or(PhotographColours::is_srgb),
         spherical: project.projection.and_then(|projection| projection.sphere),
+        pose_deg: project.projection.map_or([0.0; 2], |projection| [projection.pitch_deg, projection.roll_deg]),
     };
     let icc = colours.and_then(PhotographColours::icc).map(<[u8]>::to_vec);
     Metadata { icc, ..provenance::describe(&subject, options.metadata) }

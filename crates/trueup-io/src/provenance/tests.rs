@@ -101,7 +101,16 @@ const FRAME: SphericalFrame = SphericalFrame {
 };
 
 fn subject<'a>(photographs: &'a [&'a Path], yaws: &'a [Option<f64>]) -> Subject<'a> {
-    Subject { photographs, reference: 1, yaws, width: 4000, height: 1200, is_srgb: false, spherical: Some(FRAME) }
+    Subject {
+        photographs,
+        reference: 1,
+        yaws,
+        width: 4000,
+        height: 1200,
+        is_srgb: false,
+        spherical: Some(FRAME),
+        pose_deg: [0.0; 2],
+    }
 }
 
 fn parse(block: Vec<u8>) -> Exif {
@@ -192,6 +201,11 @@ fn the_crop_adds_up() {
     assert_eq!((number("CroppedAreaImageWidthPixels"), number("CroppedAreaImageHeightPixels")), (4000, 1200));
     assert_eq!((number("CroppedAreaLeftPixels"), number("CroppedAreaTopPixels")), (1000, 1500));
     assert_eq!(element(&xmp, "UsePanoramaViewer"), Some("True"));
+    let pose = |xmp: &str| ["PosePitchDegrees", "PoseRollDegrees"].map(|name| element(xmp, name).map(str::to_owned));
+    assert_eq!(pose(&xmp), [Some("0.0".to_owned()), Some("0.0".to_owned())]);
+    let tilted = Subject { pose_deg: [12.34, -5.0], ..subject(&[], &[]) };
+    let xmp = gpano::packet(&tilted, Some(&FRAME), &gpano::Facts::default()).expect("XMP");
+    assert_eq!(pose(&xmp), [Some("12.3".to_owned()), Some("-5.0".to_owned())]);
     let outside = SphericalFrame { left: 5000, ..FRAME };
     assert_eq!(gpano::packet(&subject(&[], &[]), Some(&outside), &gpano::Facts::default()), None);
 }
