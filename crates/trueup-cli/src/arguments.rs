@@ -96,6 +96,35 @@ pub(crate) struct StitchArgs {
     #[arg(long, value_name = "DEPTH", help_heading = "Output")]
     pub depth: Option<String>,
 
+    /// What the panorama is drawn on: mesh, auto, equirectangular, cylindrical, perspective, mercator, panini or
+    /// stereographic (projection.kind)
+    #[arg(long, value_name = "PROJECTION", help_heading = "View")]
+    pub projection: Option<String>,
+
+    /// Turn the viewer right, degrees; with a projection other than mesh, as the next three (projection.yaw)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
+    pub yaw: Option<String>,
+
+    /// Turn the viewer up, degrees (projection.pitch)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
+    pub pitch: Option<String>,
+
+    /// Turn the viewer clockwise, degrees (projection.roll)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
+    pub roll: Option<String>,
+
+    /// Horizontal field of view, degrees; without it, what is there as far as the projection carries (projection.fov)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
+    pub fov: Option<String>,
+
+    /// What is kept: none (all), rectangle (the largest without holes) or auto (that, if it keeps most) (canvas.crop)
+    #[arg(long, value_name = "CROP", help_heading = "View")]
+    pub crop: Option<String>,
+
+    /// What shows where no photograph is: black, gray, white, #rrggbb or transparent (output.background)
+    #[arg(long, value_name = "COLOUR", help_heading = "View")]
+    pub background: Option<String>,
+
     /// Stitch every group of overlapping photographs, not only the largest; several panoramas are numbered
     #[arg(long, help_heading = "Photographs")]
     pub all: bool,

@@ -45,6 +45,13 @@ impl CheckedStitch {
     fn new(args: StitchArgs) -> Result<Self, Failure> {
         let flags = [
             ("--method", "stitch.method", &args.method),
+            ("--projection", "projection.kind", &args.projection),
+            ("--yaw", "projection.yaw", &args.yaw),
+            ("--pitch", "projection.pitch", &args.pitch),
+            ("--roll", "projection.roll", &args.roll),
+            ("--fov", "projection.fov", &args.fov),
+            ("--crop", "canvas.crop", &args.crop),
+            ("--background", "output.background", &args.background),
             ("--scale", "canvas.scale", &args.scale),
             ("--quality", "output.jpeg_quality", &args.quality),
             ("--depth", "output.depth", &args.depth),
@@ -132,7 +139,7 @@ pub(crate) fn chosen_options(
             wrong.push(format!("{typed}: {}", reason(error)));
         }
     }
-    wrong.extend(options.invalid().iter().map(ToString::to_string));
+    wrong.extend(options.all_invalid().iter().map(ToString::to_string));
     if wrong.is_empty() { Ok(options) } else { Err(Failure::options(wrong)) }
 }
 

@@ -1,6 +1,7 @@
 //! The `trueup` command as users run it: its messages, its exit status, and what it leaves on the disk.
 
 mod cli;
+mod colour;
 mod compare;
 mod determinism;
 mod documented;

@@ -3,9 +3,11 @@
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use trueup_core::diagnostics::Diagnostic;
-use trueup_core::mesh::GridMesh;
+use trueup_core::mesh::{GridLines, GridMesh};
 use trueup_core::options::StageOptions;
 use trueup_core::{Error, Result, StageContext};
+
+use crate::crop::Crop;
 
 const STAGE: &str = CanvasOptions::STAGE;
 
@@ -21,6 +23,10 @@ trueup_core::options! {
         /// Canvas pixels for each pixel of the photographs (as large as the scale makes them) above which a canvas of more
         /// than 400 million pixels is reduced evenly: a shape that runs away is not worth its time.
         max_growth: f64 = 8.0, between(1.0, 1e6), "";
+        /// What of the canvas is kept.
+        crop: Crop = Crop::None, Allowed::Any, "";
+        /// Share of the covered pixels that the largest rectangle must keep for `crop = auto` to crop to it.
+        min_kept: f64 = 0.75, between(0.0, 1.0), "";
     }
 }
 
@@ -42,7 +48,10 @@ pub struct CanvasLayout {
     pub height: usize,
     /// Canvas pixels per unit of the targets that were given.
     pub canvas_from_target: f64,
-    /// The photographs used, in the order given; targets are canvas pixels, the smallest coordinate 0 on both axes.
+    /// What lies at the canvas's corner (0, 0), in the unit of the targets that were given.
+    #[serde(default)]
+    pub origin: [f64; 2],
+    /// The photographs used, in the order given; targets are canvas pixels and may lie outside the canvas.
     pub placed: Vec<Placed>,
 }
 
@@ -60,7 +69,7 @@ pub struct CanvasLayout {
 /// # Departures
 /// The scale of the reference is the median over its cells, so that a few stretched cells at its border do not count.
 pub fn run(
-    mut placed: Vec<Placed>,
+    placed: Vec<Placed>,
     reference: usize,
     options: &CanvasOptions,
     context: &StageContext,
@@ -85,18 +94,58 @@ pub fn run(
             "Choose another reference or another method.",
         ));
     }
-    let (low, high) = bounds(&placed);
-    let extent = high - low;
-    if !extent.max().is_finite() {
-        return Err(Error::unsolvable(
-            STAGE,
-            "the canvas",
-            "the photographs lie too far apart to be measured",
-            "Leave out the photographs that are not part of the scene.",
-        ));
+    let frame = Frame { canvas_from_target: options.scale / pixel_scale, window: None };
+    framed(placed, &frame, options, context)
+}
+
+/// What part of the common unit's plane becomes the canvas, and how large.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Canvas pixels wanted per unit of the targets; [`CanvasOptions::scale`] is in it.
+    pub canvas_from_target: f64,
+    /// Smallest and largest target that may be shown; `None`: all that the grids cover.
+    pub window: Option<[Vector2<f64>; 2]>,
+}
+
+/// Lays the grids on one canvas as `frame` wants it: of the window the part that the grids cover. Grids that show nothing in
+/// it are left out.
+///
+/// # Errors
+/// Those of [`run`]; [`Error::Unsolvable`] if no grid shows anything in the window.
+pub fn framed(
+    mut placed: Vec<Placed>,
+    frame: &Frame,
+    options: &CanvasOptions,
+    context: &StageContext,
+) -> Result<CanvasLayout> {
+    options.check()?;
+    for item in &placed {
+        check_mesh(item)?;
     }
-    let wanted = options.scale / pixel_scale;
+    let (mut low, mut high) = bounds(&placed);
+    if let Some([window_low, window_high]) = frame.window {
+        (low, high) = (low.sup(&window_low), high.inf(&window_high));
+        placed.retain(|item| shows(&item.mesh, low, high));
+    }
+    let extent = high - low;
+    if placed.is_empty() || !extent.max().is_finite() || extent.min() < 0.0 {
+        return Err(match placed.is_empty() || extent.max().is_finite() {
+            true => Error::unsolvable(
+                STAGE,
+                "the canvas",
+                "no photograph lies in the frame",
+                "Widen projection.fov, turn the view towards the photographs, or choose another projection.",
+            ),
+            false => Error::unsolvable(
+                STAGE,
+                "the canvas",
+                "the photographs lie too far apart to be measured",
+                "Leave out the photographs that are not part of the scene.",
+            ),
+        });
+    }
     let max_pixels = most_pixels(&placed, options);
+    let wanted = frame.canvas_from_target;
     let canvas_from_target = scale_within(extent, wanted, max_pixels);
     let [width, height] = canvas_size(extent, canvas_from_target);
     if canvas_from_target < wanted {
@@ -114,7 +163,19 @@ pub fn run(
     for vertex in placed.iter_mut().flat_map(|item| &mut item.mesh.target) {
         *vertex = ((Vector2::from(*vertex) - low) * canvas_from_target).into();
     }
-    Ok(CanvasLayout { width: width as usize, height: height as usize, canvas_from_target, placed })
+    let origin = low.into();
+    Ok(CanvasLayout { width: width as usize, height: height as usize, canvas_from_target, origin, placed })
+}
+
+/// Whether a whole cell of the grid reaches into the box.
+fn shows(mesh: &GridMesh, low: Vector2<f64>, high: Vector2<f64>) -> bool {
+    mesh.whole_cells().any(|corners| {
+        let corners = corners.map(|vertex| mesh.target[vertex]);
+        (0..2).all(|axis| {
+            corners.iter().any(|corner| corner[axis] > low[axis])
+                && corners.iter().any(|corner| corner[axis] < high[axis])
+        })
+    })
 }
 
 /// The largest canvas that is not reduced.
@@ -150,12 +211,31 @@ pub(crate) fn check_mesh(placed: &Placed) -> Result<()> {
             "Give rows * columns vertices, at least 2 x 2, over a picture of at least one pixel.",
         ));
     }
-    if mesh.target.iter().flatten().any(|coordinate| !coordinate.is_finite()) {
+    let lined = |lines: &GridLines| {
+        let ascending = |lines: &[f64], count: usize| {
+            lines.len() == count
+                && lines[0] == 0.0
+                && lines[count - 1] == 1.0
+                && lines.windows(2).all(|pair| pair[0] < pair[1])
+        };
+        ascending(&lines.columns, mesh.columns) && ascending(&lines.rows, mesh.rows)
+    };
+    if !mesh.lines.as_ref().is_none_or(lined) {
+        return Err(Error::input(
+            subject(),
+            "the lines of its grid do not ascend from 0 to 1",
+            "Give one share for every column and row of vertices.",
+        ));
+    }
+    let infinite = mesh.target.iter().any(|vertex| {
+        vertex.iter().any(|coordinate| coordinate.is_infinite()) || vertex[0].is_nan() != vertex[1].is_nan()
+    });
+    if infinite || mesh.whole_cells().next().is_none() {
         return Err(Error::unsolvable(
             STAGE,
             subject(),
-            "its grid has vertices that are not finite",
-            "Leave this photograph out, or choose another method.",
+            if infinite { "its grid has vertices that are not finite" } else { "its grid has no cell that is whole" },
+            "Leave this photograph out, or choose another method or projection.",
         ));
     }
     Ok(())
@@ -163,15 +243,15 @@ pub(crate) fn check_mesh(placed: &Placed) -> Result<()> {
 
 /// Target pixels per source pixel: median over the cells of the square root of target area per source area.
 pub fn median_cell_scale(mesh: &GridMesh) -> f64 {
-    let cell_area = mesh.cell_width() * mesh.cell_height();
-    let mut scales: Vec<f64> = (0..(mesh.rows - 1) * (mesh.columns - 1))
-        .map(|cell| {
-            let first = cell / (mesh.columns - 1) * mesh.columns + cell % (mesh.columns - 1);
-            let vertex = |index: usize| Vector2::from(mesh.target[index]);
+    let mut scales: Vec<f64> = mesh
+        .whole_cells()
+        .map(|corners| {
+            let step = mesh.source(corners[2]) - mesh.source(corners[0]);
+            let [top_left, top_right, bottom_right, bottom_left] =
+                corners.map(|vertex| Vector2::from(mesh.target[vertex]));
             // Area of a quadrilateral from its diagonals.
-            let falling = vertex(first + mesh.columns + 1) - vertex(first);
-            let rising = vertex(first + 1) - vertex(first + mesh.columns);
-            (0.5 * falling.perp(&rising).abs() / cell_area).sqrt()
+            let (falling, rising) = (bottom_right - top_left, top_right - bottom_left);
+            (0.5 * falling.perp(&rising).abs() / (step.x * step.y)).sqrt()
         })
         .collect();
     scales.sort_by(f64::total_cmp);
@@ -281,7 +361,7 @@ mod tests {
         let context = StageContext::default();
         let options = CanvasOptions::default();
         let mut infinite = placed(1.0, [0.0, 0.0]);
-        infinite.mesh.target[5][1] = f64::NAN;
+        infinite.mesh.target[5][1] = f64::INFINITY;
         assert!(matches!(run(vec![infinite], 0, &options, &context), Err(Error::Unsolvable { .. })));
         let mut short = placed(1.0, [0.0, 0.0]);
         short.mesh.target.pop();

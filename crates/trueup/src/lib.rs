@@ -21,6 +21,7 @@
 #![forbid(unsafe_code)]
 
 mod align;
+mod arrangement;
 mod budget;
 mod by_hand;
 mod clock;
@@ -42,6 +43,7 @@ mod record;
 mod refinement;
 mod stitcher;
 
+pub use arrangement::ProjectionRecord;
 pub use evaluation::{Evaluation, PictureEvaluation, PixelEvaluation, evaluate, evaluate_pixels, read_truth};
 pub use files::{StitchJob, Written};
 pub use inputs::{Inputs, Reference};
@@ -52,6 +54,7 @@ pub use project::{
 };
 pub use pto::hugin_project;
 pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};
+pub use trueup_align::projection::{FlatKind, Projection};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;
 pub use trueup_compose::render::Panorama;

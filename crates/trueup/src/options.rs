@@ -5,6 +5,7 @@ use trueup_align::cameras::CameraOptions;
 use trueup_align::match_points::MatchPointOptions;
 use trueup_align::mesh::{LineAlignmentOptions, MeshOptions, PhotometricOptions, StructureOptions};
 use trueup_align::metrics::MeasureOptions;
+use trueup_align::projection::ProjectionOptions;
 use trueup_align::similarity::{PriorMethod, SimilarityOptions};
 use trueup_align::vanishing::VanishingOptions;
 use trueup_align::warps::{WarpModel, WarpOptions};
@@ -203,6 +204,8 @@ stage_options! {
     photometric: PhotometricOptions,
     /// How the methods that are warp models place the photographs.
     warps: WarpOptions,
+    /// What the panorama is drawn on, and where the viewer looks.
+    projection: ProjectionOptions,
     /// How large the panorama is.
     canvas: CanvasOptions,
     /// How exposures are evened out.
@@ -220,12 +223,19 @@ stage_options! {
 }
 
 impl StitchOptions {
+    /// Every option outside its allowed range, and every one that does not go with another; empty when all is well.
+    pub fn all_invalid(&self) -> Vec<InvalidOption> {
+        let mut invalid = self.invalid();
+        invalid.extend(self.projection.beyond_the_projection());
+        invalid
+    }
+
     /// Checks every option.
     ///
     /// # Errors
     /// [`Error::Options`] with the complete list of options outside their range.
     pub fn validate(&self) -> Result<()> {
-        let invalid = self.invalid();
+        let invalid = self.all_invalid();
         if invalid.is_empty() { Ok(()) } else { Err(Error::Options(invalid)) }
     }
 

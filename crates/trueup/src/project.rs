@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use trueup_compose::exposure::Correction;
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::matches::PairVerdict;
-use trueup_core::spherical::SphericalFrame;
 
+use crate::arrangement::ProjectionRecord;
 use crate::measures::Measures;
 use crate::options::StitchOptions;
 
@@ -35,7 +35,8 @@ pub struct MeshRecord {
     pub cols: usize,
     /// Vertices in pixels of the original photograph after orientation; the corner is (0, 0).
     pub source: Vec<[f64; 2]>,
-    /// Vertices in pixels of the written panorama; the corner is (0, 0).
+    /// Vertices in pixels of the written panorama; the corner is (0, 0), and where the panorama was cropped they may lie
+    /// outside. With [`Project::projection`], in a plane of their own in which the mesh was solved.
     pub target: Vec<[f64; 2]>,
 }
 
@@ -63,6 +64,10 @@ pub struct ImageRecord {
     pub focal_px: Option<f64>,
     /// Rows of the rotation from the levelled world (y down) to the camera.
     pub rotation: Option<[[f64; 3]; 3]>,
+    /// The same as the photograph's own lines correct it, which projections are drawn by; `None` in files of programs that
+    /// knew no projections.
+    #[serde(default)]
+    pub upright_rotation: Option<[[f64; 3]; 3]>,
     /// Clockwise rotation that the similarity prior wants, in degrees.
     pub theta_deg: Option<f64>,
     /// Scale that the similarity prior wants, relative to the others.
@@ -159,9 +164,10 @@ pub struct Project {
     /// Name of the colour space it was composed in; empty in files of programs that knew one only.
     #[serde(default)]
     pub colour_space: String,
-    /// Where it lies on the sphere; `None` unless its projection is one that viewers of spherical panoramas know.
+    /// How directions were drawn; `None` where the panorama is the mesh itself, and in files of programs that knew no
+    /// projections.
     #[serde(default)]
-    pub spherical: Option<SphericalFrame>,
+    pub projection: Option<ProjectionRecord>,
     /// Wall seconds per stage.
     pub seconds: BTreeMap<String, f64>,
     /// What was found on the way.
@@ -169,6 +175,12 @@ pub struct Project {
 }
 
 impl ImageRecord {
+    /// Rows of the rotation from the levelled world to the camera, as the photograph's own lines correct it where that is
+    /// recorded.
+    pub(crate) fn level_rotation(&self) -> Option<&[[f64; 3]; 3]> {
+        self.upright_rotation.as_ref().or(self.rotation.as_ref())
+    }
+
     /// The file's name without folders; paths written on another system are understood.
     pub fn file_name(&self) -> &str {
         self.path.rsplit(['/', '\\']).next().unwrap_or(&self.path)

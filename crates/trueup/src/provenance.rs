@@ -21,7 +21,8 @@ pub(crate) fn metadata(project: &Project, colours: Option<&PhotographColours>, o
         width: project.canvas.width,
         height: project.canvas.height,
         is_srgb: options.profile == OutputProfile::Srgb || colours.is_none_or(PhotographColours::is_srgb),
-        spherical: project.spherical,
+        spherical: project.projection.and_then(|projection| projection.sphere),
+        pose_deg: project.projection.map_or([0.0; 2], |projection| [projection.pitch_deg, projection.roll_deg]),
     };
     let icc = colours.and_then(PhotographColours::icc).map(<[u8]>::to_vec);
     Metadata { icc, ..provenance::describe(&subject, options.metadata) }
@@ -29,6 +30,6 @@ pub(crate) fn metadata(project: &Project, colours: Option<&PhotographColours>, o
 
 /// Where a photograph looks in the levelled world, radians to the right of its z axis.
 fn yaw(image: &ImageRecord) -> Option<f64> {
-    let forward = matrix_from_rows(image.rotation.as_ref()?).row(2).transpose();
+    let forward = matrix_from_rows(image.level_rotation()?).row(2).transpose();
     Some(forward.x.atan2(forward.z))
 }

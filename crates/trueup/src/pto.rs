@@ -56,7 +56,7 @@ pub fn hugin_project(project: &Project) -> Result<String> {
     let mut lines = String::new();
     let mut focal_sum = 0.0;
     for image in project.used_images() {
-        let (Some(rotation), Some(focal_px)) = (&image.rotation, image.focal_px) else { return Err(missing()) };
+        let (Some(rotation), Some(focal_px)) = (image.level_rotation(), image.focal_px) else { return Err(missing()) };
         focal_sum += focal_px;
         // Writing to a string cannot fail.
         let _ = writeln!(lines, "{}", image_line(image, &matrix_from_rows(rotation), focal_px)?);

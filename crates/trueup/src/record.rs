@@ -1,11 +1,12 @@
 //! Fills the project: what is recorded of photographs, pairs and geometry.
 
 use trueup_compose::exposure::Correction;
-use trueup_compose::layout::{CanvasLayout, Placed};
-use trueup_core::geometry::rows_of;
+use trueup_compose::layout::Placed;
+use trueup_core::geometry::{matrix_from_rows, rows_of};
 use trueup_core::mesh::GridMesh;
 
 use crate::align::{Component, Geometry};
+use crate::arrangement::Arrangement;
 use crate::matched::Matched;
 use crate::options::{Shape, StitchOptions};
 use crate::project::{
@@ -72,7 +73,7 @@ impl Matched {
             measures: None,
             canvas: Canvas { width: 0, height: 0 },
             colour_space: String::new(),
-            spherical: None,
+            projection: None,
             seconds: std::collections::BTreeMap::new(),
             diagnostics: Vec::new(),
         }
@@ -91,6 +92,7 @@ fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
         component: None,
         focal_px: None,
         rotation: None,
+        upright_rotation: None,
         theta_deg: None,
         scale: None,
         gain: None,
@@ -118,16 +120,18 @@ pub(crate) fn fill_geometry(
     project: &mut Project,
     component: &Component,
     geometry: Option<&Geometry>,
-    layout: &CanvasLayout,
+    arrangement: &Arrangement,
     corrections: &[Correction],
 ) {
-    project.canvas = Canvas { width: layout.width, height: layout.height };
+    project.canvas = Canvas { width: arrangement.written.width, height: arrangement.written.height };
+    project.projection = arrangement.projection;
     project.reference = component.images[component.reference].path.display().to_string();
     let method = project.options.stitch.method;
     let is_warp = matches!(method.shape(), Shape::Warp(_));
     for (k, &picture) in component.members.iter().enumerate() {
         let record = &mut project.images[picture];
-        let mesh = &layout.placed[k].mesh;
+        let mesh = &arrangement.plane.placed[k].mesh;
+        let shift = arrangement.plane_shift;
         record.status = ImageStatus::Used;
         record.gain = Some(corrections[k].brightness());
         record.correction = Some(corrections[k]);
@@ -135,13 +139,15 @@ pub(crate) fn fill_geometry(
             rows: mesh.rows,
             cols: mesh.columns,
             source: (0..mesh.len()).map(|vertex| mesh.source(vertex).into()).collect(),
-            target: mesh.target.clone(),
+            target: mesh.target.iter().map(|vertex| [vertex[0] - shift[0], vertex[1] - shift[1]]).collect(),
         });
         let Some(geometry) = geometry else { continue };
         let camera = &geometry.cameras.cameras[k];
         let camera_from_level = camera.rotation() * geometry.prior.level_from_world().transpose();
         record.focal_px = Some(camera.focal_px / component.frames[k].working_from_full);
         record.rotation = Some(rows_of(&camera_from_level));
+        let upright = matrix_from_rows(&geometry.prior.camera_from_world[k]);
+        record.upright_rotation = Some(rows_of(&(upright * geometry.prior.level_from_world().transpose())));
         // A warp model asks no prior; what straightening would want is not what was done.
         if !is_warp {
             record.theta_deg = Some(geometry.prior.theta[k].to_degrees());

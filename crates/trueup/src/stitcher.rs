@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use trueup_align::stitch_graph::{GraphFile, StitchGraph, parse_graph_file};
 use trueup_compose::exposure::{self, Correction, Thumbnail};
 use trueup_compose::fidelity::{self, Fidelity};
-use trueup_compose::layout::{self, CanvasLayout};
+use trueup_compose::layout::CanvasLayout;
 use trueup_compose::render::{self, Panorama};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::lines::LineSegment;
@@ -22,6 +22,7 @@ use trueup_vision::features::Features;
 use trueup_vision::{matching, pairing};
 
 use crate::align::{self, Component};
+use crate::arrangement;
 use crate::budget::Budget;
 use crate::clock::Clock;
 use crate::inputs::{Inputs, Reference};
@@ -195,8 +196,8 @@ impl<'a> Stitcher<'a> {
         let mut alignments = Vec::new();
         for component in &components {
             let mut alignment = self.align_component(component, &components, set, inputs)?;
-            alignment.project.diagnostics =
-                shared_diagnostics.iter().cloned().chain(self.context.take_diagnostics()).collect();
+            let own = self.context.take_diagnostics().into_iter().map(|one| names::by_name(one, &file_names));
+            alignment.project.diagnostics = shared_diagnostics.iter().cloned().chain(own).collect();
             alignments.push(alignment);
         }
         Ok(Aligned { alignments })
@@ -396,7 +397,8 @@ impl<'a> Stitcher<'a> {
             _ => Some(align::run(&component, self.options, self.context, &mut clock, memory.as_ref(), photographs)?),
         };
         let placed = place(&component, geometry.as_ref());
-        let layout = layout::run(placed, component.reference, &self.options.canvas, self.context)?;
+        let sources = arrangement::Sources::of_geometry(placed, &component, geometry.as_ref());
+        let arrangement = clock.time("canvas", || arrangement::run(sources, self.options, self.context))?;
         let curve = photographs.transfer_curve();
         let thumbnails: Vec<Thumbnail> = members
             .iter()
@@ -411,16 +413,29 @@ impl<'a> Stitcher<'a> {
             .collect();
         let corrections = clock
             .time("exposure", || {
-                exposure::run(&layout, &thumbnails, component.reference, &self.options.exposure, self.context)
+                exposure::run(
+                    &arrangement.plane,
+                    &thumbnails,
+                    component.reference,
+                    &self.options.exposure,
+                    self.context,
+                )
             })?
             .corrections;
         let mut project = matched.project(self.options, members, stitched);
-        fill_geometry(&mut project, &component, geometry.as_ref(), &layout, &corrections);
+        fill_geometry(&mut project, &component, geometry.as_ref(), &arrangement, &corrections);
         project.colour_space = photographs.colours().map(PhotographColours::name).unwrap_or_default();
-        project.measures = geometry
-            .as_ref()
-            .map(|geometry| clock.time("measures", || measures::run(&component, geometry, &layout, self.options)));
+        project.measures = geometry.as_ref().map(|geometry| {
+            clock.time("measures", || measures::run(&component, geometry, &arrangement.plane, self.options))
+        });
         project.seconds.clone_from(clock.seconds());
+        let layout = arrangement.written;
+        // A photograph may be placed several times, or not at all; its light is the same everywhere.
+        let corrections = layout
+            .placed
+            .iter()
+            .filter_map(|placed| Some(corrections[members.binary_search(&placed.photograph).ok()?]))
+            .collect();
         Ok(Alignment { project, layout, corrections, photographs: photographs.clone(), clock })
     }
 

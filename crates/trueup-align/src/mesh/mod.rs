@@ -137,7 +137,7 @@ pub fn run_refined(
 /// The undeformed grid with `factor` cells per cell of `grid` along each axis.
 pub fn divided(grid: &GridMesh, factor: usize) -> GridMesh {
     let (rows, columns) = ((grid.rows - 1) * factor + 1, (grid.columns - 1) * factor + 1);
-    let mut fine = GridMesh { rows, columns, target: Vec::new(), ..*grid };
+    let mut fine = GridMesh { rows, columns, target: Vec::new(), lines: None, ..*grid };
     fine.target = (0..fine.len()).map(|vertex| fine.source(vertex).into()).collect();
     fine
 }

@@ -41,7 +41,7 @@ fn layout(lefts: &[usize]) -> CanvasLayout {
         })
         .collect();
     let width = WIDTH + lefts.iter().copied().max().unwrap_or(0);
-    CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, placed }
+    CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, origin: [0.0; 2], placed }
 }
 
 fn composed(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Vec<Finished> {

@@ -5,6 +5,8 @@ use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 use image::{ImageDecoder, ImageFormat, ImageReader};
+use tiff::decoder::Decoder as TiffDecoder;
+use tiff::tags::Tag as TiffTag;
 use zune_jpeg::JpegDecoder;
 
 use crate::decode::jpeg_options;
@@ -60,7 +62,11 @@ fn read_icc(reader: &mut BufReader<File>, format: PictureFormat) -> Option<Vec<u
             return decoder.icc_profile();
         }
         PictureFormat::Png => ImageFormat::Png,
-        PictureFormat::Tiff => ImageFormat::Tiff,
+        PictureFormat::Tiff => {
+            // The picture decoder would measure the profile by the memory that the pixels take.
+            let profile = TiffDecoder::new(reader).ok()?.find_tag(TiffTag::IccProfile).ok().flatten()?;
+            return profile.into_u8_vec().ok();
+        }
         PictureFormat::WebP => ImageFormat::WebP,
     };
     let mut picture = ImageReader::with_format(reader, format);

@@ -36,6 +36,8 @@ pub use folder::PendingFolder;
 pub use labels::{LabelMap, NOTHING, check_labels_place, write_labels};
 pub use metadata::Metadata;
 pub use tiff::{LayerPage, LayerSet, check_layers_place, write_layers};
+#[cfg(test)]
+pub(crate) use tiff_metadata::OF_JPEG;
 
 trueup_core::choice! {
     /// How finely JPEG stores colour, relative to brightness.

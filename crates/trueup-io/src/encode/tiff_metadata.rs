@@ -18,6 +18,14 @@ const XMP: u16 = 700;
 const EXIF_DIRECTORY: u16 = 34_665;
 const GPS_DIRECTORY: u16 = 34_853;
 
+/// Fields that describe how a JPEG is stored (EXIF 3.0, section 4.6.8); a TIFF has tags of its own for it.
+pub(crate) const OF_JPEG: [exif::Tag; 4] = [
+    exif::Tag::YCbCrPositioning,
+    exif::Tag::ComponentsConfiguration,
+    exif::Tag::PixelXDimension,
+    exif::Tag::PixelYDimension,
+];
+
 /// Where the directories that hang on the picture's were written.
 #[derive(Debug, Default)]
 pub(super) struct Hanging {
@@ -35,7 +43,9 @@ pub(super) fn write_directories<W: Write + Seek, K: TiffKind>(
     let exif = metadata.exif.clone().and_then(|bytes| exif::Reader::new().read_raw(bytes).ok());
     let Some(exif) = exif else { return Ok(Hanging::default()) };
     let of = |context: Context| -> Vec<Field> {
-        let wanted = exif.fields().filter(|field| field.ifd_num == In::PRIMARY && field.tag.context() == context);
+        let wanted = exif.fields().filter(|field| {
+            field.ifd_num == In::PRIMARY && field.tag.context() == context && !OF_JPEG.contains(&field.tag)
+        });
         wanted.cloned().collect()
     };
     Ok(Hanging {

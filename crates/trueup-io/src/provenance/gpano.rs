@@ -76,9 +76,8 @@ fn geometry(
         ("CroppedAreaImageHeightPixels", subject.height.to_string()),
         ("CroppedAreaLeftPixels", frame.left.to_string()),
         ("CroppedAreaTopPixels", frame.top.to_string()),
-        // The panorama stands upright.
-        ("PosePitchDegrees", "0".to_owned()),
-        ("PoseRollDegrees", "0".to_owned()),
+        ("PosePitchDegrees", format!("{:.1}", subject.pose_deg[0] + 0.0)),
+        ("PoseRollDegrees", format!("{:.1}", subject.pose_deg[1] + 0.0)),
     ];
     if let Some(heading) = world_heading_deg {
         let middle = heading + frame.middle_yaw.to_degrees();

@@ -71,6 +71,13 @@ const LONGEST: usize = 1024;
 /// EXIF 2.32, whose fields are used.
 const VERSION: &[u8] = b"0232";
 
+/// The version that every block states.
+const FLASHPIX: &[u8] = b"0100";
+/// Colour samples lie in the middle of the pixels they belong to, as means of them do.
+const CENTRED: u16 = 1;
+/// The order of components: Y, Cb, Cr, none.
+const YCBCR: [u8; 4] = [1, 2, 3, 0];
+
 /// ColorSpace of sRGB and of all others.
 const SRGB: u16 = 1;
 const UNCALIBRATED: u16 = 0xffff;
@@ -104,6 +111,10 @@ pub(super) fn fields(
         add(tag, Value::Rational(vec![DOTS_PER_INCH]));
     }
     add(Tag::ResolutionUnit, Value::Short(vec![INCH]));
+    add(Tag::FlashpixVersion, Value::Undefined(FLASHPIX.to_vec(), 0));
+    // How a JPEG stores colours; the other formats have no such thing, and readers pass over it.
+    add(Tag::YCbCrPositioning, Value::Short(vec![CENTRED]));
+    add(Tag::ComponentsConfiguration, Value::Undefined(YCBCR.to_vec(), 0));
     if let Some(moment) = earliest {
         add(Tag::DateTimeOriginal, ascii(&moment.local));
         if let Some(digits) = &moment.subseconds {

@@ -33,7 +33,7 @@ pub(crate) fn grid(record: &ImageRecord) -> Result<GridMesh> {
             record.height
         )));
     }
-    Ok(GridMesh { rows: mesh.rows, columns: mesh.cols, width, height, target: mesh.target.clone() })
+    Ok(GridMesh { rows: mesh.rows, columns: mesh.cols, width, height, target: mesh.target.clone(), lines: None })
 }
 
 fn is_whole(mesh: &MeshRecord) -> bool {

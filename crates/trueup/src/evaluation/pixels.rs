@@ -218,6 +218,7 @@ fn layout(meshes: Vec<GridMesh>, positions: &[usize], scale: f64) -> CanvasLayou
         width: side(high.x - low.x),
         height: side(high.y - low.y),
         canvas_from_target: scale,
+        origin: [0.0; 2],
         placed: placed.collect(),
     }
 }

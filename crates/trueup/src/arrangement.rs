@@ -1,0 +1,263 @@
+//! From the solved mesh to the canvas that is composed: projection, frame, crop.
+//!
+//! Works from what a stitch has at hand as from what its project records: grids in any plane and levelled cameras.
+
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
+use trueup_align::projection::{self, FlatKind, Placement, Projection, Shot, View};
+use trueup_compose::crop;
+use trueup_compose::layout::{self, CanvasLayout, Frame, Placed};
+use trueup_core::camera::Camera;
+use trueup_core::diagnostics::Diagnostic;
+use trueup_core::geometry::matrix_from_rows;
+use trueup_core::mesh::GridMesh;
+use trueup_core::spherical::{SphericalFrame, SphericalProjection};
+use trueup_core::{Error, Result, StageContext};
+
+use crate::align::{Component, Geometry};
+use crate::options::StitchOptions;
+use crate::project::Project;
+
+/// How the panorama is drawn from directions. A direction of the level world (x right, y down, z forward) that the rotations
+/// `yaw`, `pitch` and `roll` turn into the viewer's lies at `(plane - origin) * px_per_radian` on the canvas, where `plane` is
+/// its place in the projection.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ProjectionRecord {
+    /// The projection's name.
+    pub kind: FlatKind,
+    /// Where the viewer looks: to the right of straight ahead in the level world.
+    pub yaw_deg: f64,
+    /// Where the viewer looks: up.
+    pub pitch_deg: f64,
+    /// How the viewer's head is turned, clockwise.
+    pub roll_deg: f64,
+    /// Distance of Panini's viewpoint behind the axis; the others do not ask.
+    pub panini_distance: f64,
+    /// Canvas pixels per radian at the projection's middle.
+    pub px_per_radian: f64,
+    /// The plane's coordinates (radians at the middle) at the canvas's corner.
+    pub origin: [f64; 2],
+    /// Where the panorama lies on the whole sphere, for viewers of spherical panoramas; `None` for other projections.
+    pub sphere: Option<SphericalFrame>,
+}
+
+/// What an arrangement is made from.
+#[derive(Debug, Clone)]
+pub(crate) struct Sources {
+    /// Every photograph once, in the plane of the solved mesh, in any unit.
+    pub placed: Vec<Placed>,
+    /// Which of them sets the pixel scale.
+    pub reference: usize,
+    /// Their cameras in the photographs' own pixels, in the level world; `None` where none are known.
+    pub cameras: Option<Vec<Camera>>,
+    /// The scene's dominant directions in the level world (columns), if they are known.
+    pub dominant: Option<Matrix3<f64>>,
+}
+
+/// A canvas, and how it came about.
+#[derive(Debug, Clone)]
+pub(crate) struct Arrangement {
+    /// Every photograph once in the plane of the mesh, in pixels of the canvas if that is the mesh's; for measures, exposure
+    /// and the record.
+    pub plane: CanvasLayout,
+    /// The canvas's pixel (0, 0) in `plane`'s pixels; zero but for a cropped mesh.
+    pub plane_shift: [f64; 2],
+    /// What is composed.
+    pub written: CanvasLayout,
+    /// How directions were drawn; `None` for the mesh.
+    pub projection: Option<ProjectionRecord>,
+}
+
+impl Sources {
+    /// What a stitch knows of a group of photographs.
+    pub fn of_geometry(placed: Vec<Placed>, component: &Component, geometry: Option<&Geometry>) -> Self {
+        let cameras = geometry.map(|geometry| {
+            let level_from_world = geometry.prior.level_from_world();
+            let corrected = geometry.prior.corrected_cameras(&geometry.cameras.cameras);
+            let full = corrected.iter().zip(&component.frames).zip(&placed).map(|((camera, frame), placed)| {
+                let camera_from_level = camera.rotation() * level_from_world.transpose();
+                let focal_px = camera.focal_px / frame.working_from_full;
+                Camera::new(focal_px, placed.mesh.width, placed.mesh.height, &camera_from_level)
+            });
+            full.collect()
+        });
+        let dominant = geometry.and_then(|geometry| geometry.prior.guidance.dominant);
+        let dominant = dominant.as_ref().map(matrix_from_rows);
+        Self { placed, reference: component.reference, cameras, dominant }
+    }
+
+    /// What a project knows of the photographs used, whose grids are `placed` in its order.
+    pub fn of_project(placed: Vec<Placed>, reference: usize, project: &Project) -> Self {
+        let camera = |(record, placed): (&crate::project::ImageRecord, &Placed)| {
+            let camera_from_level = record.upright_rotation.or(record.rotation)?;
+            let mesh = &placed.mesh;
+            Some(Camera::new(record.focal_px?, mesh.width, mesh.height, &matrix_from_rows(&camera_from_level)))
+        };
+        let cameras = project.used_images().zip(&placed).map(camera).collect();
+        let dominant = project.manhattan.dominant.as_ref().filter(|_| project.manhattan.accepted);
+        Self { placed, reference, cameras, dominant: dominant.map(matrix_from_rows) }
+    }
+}
+
+/// Arranges the photographs as the options ask: projected, laid on a canvas, cropped.
+///
+/// # Errors
+/// Those of the layout; [`Error::NotApplicable`] if a projection is asked for and no cameras are known;
+/// [`Error::Unsolvable`] if nothing lies in the view.
+pub(crate) fn run(sources: Sources, options: &StitchOptions, context: &StageContext) -> Result<Arrangement> {
+    let Sources { placed, reference, cameras, dominant } = sources;
+    let wanted = options.projection.kind;
+    let Some(cameras) = cameras.filter(|_| wanted != Projection::Mesh) else {
+        if !matches!(wanted, Projection::Mesh | Projection::Auto) {
+            return Err(Error::not_applicable(
+                format!("projection.kind = {}", trueup_core::options::OptionValue::display(&wanted)),
+                "no cameras are known: there is one photograph alone, or its record lacks them",
+                "Stitch at least two overlapping photographs, or leave the projection to mesh.",
+            ));
+        }
+        let plane = layout::run(placed, reference, &options.canvas, context)?;
+        let (written, plane_shift) = framed(plane.clone(), options);
+        return Ok(Arrangement { plane, plane_shift, written, projection: None });
+    };
+    // This canvas is never drawn, so that its size is nobody's concern.
+    let plane = layout::run(placed, reference, &options.canvas, &StageContext::default())?;
+    let shots: Vec<Shot> = cameras
+        .iter()
+        .zip(&plane.placed)
+        .map(|(camera, placed)| Shot { camera: *camera, mesh: placed.mesh.clone() })
+        .collect();
+    let view = View::choose(&shots, dominant.as_ref(), &options.projection);
+    let drawn = draw(&shots, &plane, &view, reference, options, context)?;
+    let (written, _) = framed(drawn, options);
+    report_cut(&plane, &written, &view, options, context);
+    let projection = Some(record(&view, &written));
+    Ok(Arrangement { plane, plane_shift: [0.0; 2], written, projection })
+}
+
+/// The photographs on the view's canvas.
+fn draw(
+    shots: &[Shot],
+    plane: &CanvasLayout,
+    view: &View,
+    reference: usize,
+    options: &StitchOptions,
+    context: &StageContext,
+) -> Result<CanvasLayout> {
+    let max_parallax = options.projection.max_parallax_deg.to_radians();
+    let meetings = projection::meeting(shots, None, max_parallax);
+    context.check_cancelled()?;
+    // The reference keeps its own pixels in the middle of the projection.
+    let canvas_from_plane = options.canvas.scale * shots[reference].camera.focal_px;
+    let placement = Placement { view, canvas_from_plane, closed: false };
+    let placed = projection::place(shots, &meetings, &placement)
+        .into_iter()
+        .map(|grid| Placed { photograph: plane.placed[grid.shot].photograph, mesh: grid.mesh })
+        .collect();
+    context.check_cancelled()?;
+    let reach = view.flat.reach(view.half);
+    let frame = Frame { canvas_from_target: canvas_from_plane, window: Some([-reach, reach]) };
+    layout::framed(placed, &frame, &options.canvas, context)
+}
+
+/// The layout as it is cropped, and by how much it moved.
+fn framed(layout: CanvasLayout, options: &StitchOptions) -> (CanvasLayout, [f64; 2]) {
+    match crop::choose(&layout, options.canvas.crop, options.canvas.min_kept) {
+        None => (layout, [0.0; 2]),
+        Some(kept) => {
+            let shift = [kept.columns.start, kept.rows.start].map(|start| start as f64);
+            (crop::cropped(layout, &kept), shift)
+        }
+    }
+}
+
+/// Says which photographs are not shown, or not wholly though nobody asked for that.
+fn report_cut(
+    plane: &CanvasLayout,
+    written: &CanvasLayout,
+    view: &View,
+    options: &StitchOptions,
+    context: &StageContext,
+) {
+    let size = [written.width, written.height].map(|length| length as f64);
+    for placed in &plane.placed {
+        let shown = || written.placed.iter().filter(|other| other.photograph == placed.photograph);
+        let subject = format!("photograph {}", placed.photograph);
+        let hint = "Choose an equirectangular projection, widen projection.fov, or turn the view (yaw, pitch).";
+        if shown().next().is_none() {
+            let message = format!("it lies outside of the {} view and is not shown", view.flat.kind.name());
+            context.report(Diagnostic::warning("projection-left-out", subject, message, hint));
+        } else if !view.flat.kind.turns() && options.projection.fov == 0.0 {
+            let outside = shown().map(|other| share_outside(&other.mesh, size)).fold(1.0, f64::min);
+            /// Less than this is a corner.
+            const NOTABLE: f64 = 0.02;
+            if outside > NOTABLE {
+                let [across, _] = view.half.map(|half| 2.0 * half.to_degrees());
+                let message = format!(
+                    "{:.0} % of it lies outside of the {} view, which is {across:.0} degrees wide and as high as carries well",
+                    100.0 * outside,
+                    view.flat.kind.name()
+                );
+                context.report(Diagnostic::note("projection-cut", subject, message, hint));
+            }
+        }
+    }
+}
+
+/// Share of the grid's vertices that lie outside of a canvas.
+fn share_outside(mesh: &GridMesh, size: [f64; 2]) -> f64 {
+    // Vertices lie closer where the projection bends more; each counts for the photograph around it.
+    let weight = |vertex: usize| {
+        let (row, column) = (vertex / mesh.columns, vertex % mesh.columns);
+        let at = |row: usize, column: usize| mesh.source(row * mesh.columns + column);
+        let low = at(row.saturating_sub(1), column.saturating_sub(1));
+        let high = at((row + 1).min(mesh.rows - 1), (column + 1).min(mesh.columns - 1));
+        (high - low).product()
+    };
+    let (mut outside, mut all) = (0.0, 0.0);
+    for vertex in 0..mesh.len() {
+        let shown = (0..2).all(|axis| (0.0..=size[axis]).contains(&mesh.target[vertex][axis]));
+        all += weight(vertex);
+        outside += if shown { 0.0 } else { weight(vertex) };
+    }
+    outside / all
+}
+
+fn record(view: &View, written: &CanvasLayout) -> ProjectionRecord {
+    let px_per_radian = written.canvas_from_target;
+    ProjectionRecord {
+        kind: view.flat.kind,
+        yaw_deg: view.yaw.to_degrees(),
+        pitch_deg: view.pitch.to_degrees(),
+        roll_deg: view.roll.to_degrees(),
+        panini_distance: view.flat.panini_distance,
+        px_per_radian,
+        origin: written.origin,
+        sphere: sphere(view, written),
+    }
+}
+
+/// Where a canvas lies on the whole sphere, in whole pixels.
+fn sphere(view: &View, written: &CanvasLayout) -> Option<SphericalFrame> {
+    use std::f64::consts::{PI, TAU};
+    let scale = written.canvas_from_target;
+    let [x, y] = written.origin;
+    // Rounding may put the last column a pixel beyond the whole.
+    let whole = |length: f64, start: usize, own: usize| (length.round() as usize).max(start + own);
+    let start = |at: f64| (at * scale).round().max(0.0) as usize;
+    let left = start(x + PI);
+    let full_width = whole(TAU * scale, left, written.width);
+    let (projection, top, full_height) = match view.flat.kind {
+        FlatKind::Equirectangular => {
+            let top = start(y + PI / 2.0);
+            (SphericalProjection::Equirectangular, top, whole(PI * scale, top, written.height))
+        }
+        FlatKind::Cylindrical => {
+            // As high above the horizon as below it.
+            let half = (-y).max(y + written.height as f64 / scale).max(0.0);
+            let top = start(y + half);
+            (SphericalProjection::Cylindrical, top, whole(2.0 * half * scale, top, written.height))
+        }
+        _ => return None,
+    };
+    Some(SphericalFrame { projection, full_width, full_height, left, top, middle_yaw: view.yaw })
+}
