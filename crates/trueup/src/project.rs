@@ -125,6 +125,17 @@ pub struct Canvas {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
+    /// Whether it goes all the way round and its ends meet: columns are then meant modulo the width, and vertices may lie
+    /// beyond either end.
+    #[serde(default)]
+    pub full_turn: bool,
+}
+
+impl Canvas {
+    /// Columns after which the panorama repeats; `None` if it does not.
+    pub fn period(&self) -> Option<f64> {
+        self.full_turn.then_some(self.width as f64)
+    }
 }
 
 /// The record of one panorama.

@@ -69,7 +69,7 @@ impl Matched {
                 inliers: Vec::new(),
             },
             measures: None,
-            canvas: Canvas { width: 0, height: 0 },
+            canvas: Canvas { width: 0, height: 0, full_turn: false },
             seconds: std::collections::BTreeMap::new(),
             diagnostics: Vec::new(),
         }
@@ -117,7 +117,7 @@ pub(crate) fn fill_geometry(
     layout: &CanvasLayout,
     corrections: &[Correction],
 ) {
-    project.canvas = Canvas { width: layout.width, height: layout.height };
+    project.canvas = Canvas { width: layout.width, height: layout.height, full_turn: layout.period.is_some() };
     project.reference = component.images[component.reference].path.display().to_string();
     let method = project.options.stitch.method;
     let is_warp = matches!(method.shape(), Shape::Warp(_));

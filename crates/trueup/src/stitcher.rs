@@ -197,12 +197,12 @@ impl<'a> Stitcher<'a> {
                 render::layer(layout, &alignment.corrections, position, photographs, &self.options.render)
             })
             .collect::<Result<Vec<_>>>()?;
-        let size = [layout.width, layout.height];
+        let (size, around) = ([layout.width, layout.height], layout.period.is_some());
         let shown = match panorama.seams() {
             Some(seams) => seams.on_canvas(size),
-            None => fidelity::deepest(&layers, size)?,
+            None => fidelity::deepest(&layers, size, around)?,
         };
-        fidelity::measure(panorama, &layers, &shown)
+        fidelity::measure(panorama, &layers, &shown, around)
     }
 
     fn check_any(&self, sources: &Sources, inputs: &Inputs) -> Result<()> {
@@ -335,7 +335,8 @@ impl<'a> Stitcher<'a> {
             _ => Some(align::run(&component, self.options, self.context, &mut clock, memory.as_ref(), photographs)?),
         };
         let placed = place(&component, geometry.as_ref());
-        let layout = layout::run(placed, component.reference, &self.options.canvas, self.context)?;
+        let period = geometry.as_ref().and_then(|geometry| geometry.mesh.period);
+        let layout = layout::run_around(placed, component.reference, period, &self.options.canvas, self.context)?;
         let thumbnails: Vec<Thumbnail> = members
             .iter()
             .zip(component.camera_groups())
