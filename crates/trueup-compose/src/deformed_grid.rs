@@ -116,9 +116,10 @@ impl DeformedGrid {
             }
         }
         let cells_within = |axis: fn(&Cell) -> [f64; 2]| {
-            cells.iter().map(axis).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], range| {
-                [low.min(range[0]), high.max(range[1])]
-            })
+            cells
+                .iter()
+                .map(axis)
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], range| [low.min(range[0]), high.max(range[1])])
         };
         let ([left, right], [top, bottom]) = (cells_within(|cell| cell.x_range), cells_within(|cell| cell.y_range));
         Self {

@@ -174,10 +174,13 @@ impl GridMesh {
     /// Smallest and largest target coordinates of the vertices that are defined; infinite and reversed where none is.
     pub fn bounds(&self) -> (Vector2<f64>, Vector2<f64>) {
         let start = (Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY));
-        self.target.iter().filter(|vertex| vertex.iter().all(|coordinate| !coordinate.is_nan())).fold(start, |(low, high), &vertex| {
-            let vertex = Vector2::from(vertex);
-            (low.inf(&vertex), high.sup(&vertex))
-        })
+        self.target.iter().filter(|vertex| vertex.iter().all(|coordinate| !coordinate.is_nan())).fold(
+            start,
+            |(low, high), &vertex| {
+                let vertex = Vector2::from(vertex);
+                (low.inf(&vertex), high.sup(&vertex))
+            },
+        )
     }
 }
 

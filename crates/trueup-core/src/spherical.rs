@@ -38,7 +38,8 @@ pub struct SphericalFrame {
 impl SphericalFrame {
     /// Whether a panorama of `width` x `height` pixels lies inside the whole.
     pub fn holds(&self, width: usize, height: usize) -> bool {
-        let fits = |start: usize, length: usize, whole: usize| start.checked_add(length).is_some_and(|end| end <= whole);
+        let fits =
+            |start: usize, length: usize, whole: usize| start.checked_add(length).is_some_and(|end| end <= whole);
         width > 0
             && height > 0
             && fits(self.left, width, self.full_width)

@@ -198,12 +198,12 @@ impl<'a> Stitcher<'a> {
                 render::layer(layout, &alignment.corrections, position, photographs, &self.options.render)
             })
             .collect::<Result<Vec<_>>>()?;
-        let size = [layout.width, layout.height];
+        let (size, around) = ([layout.width, layout.height], layout.period.is_some());
         let shown = match panorama.seams() {
             Some(seams) => seams.on_canvas(size),
-            None => fidelity::deepest(&layers, size)?,
+            None => fidelity::deepest(&layers, size, around)?,
         };
-        fidelity::measure(panorama, &layers, &shown)
+        fidelity::measure(panorama, &layers, &shown, around)
     }
 
     fn check_any(&self, sources: &Sources, inputs: &Inputs) -> Result<()> {
@@ -346,14 +346,20 @@ impl<'a> Stitcher<'a> {
             .collect();
         let corrections = clock
             .time("exposure", || {
-                exposure::run(&arrangement.plane, &thumbnails, component.reference, &self.options.exposure, self.context)
+                exposure::run(
+                    &arrangement.plane,
+                    &thumbnails,
+                    component.reference,
+                    &self.options.exposure,
+                    self.context,
+                )
             })?
             .corrections;
         let mut project = matched.project(self.options, members, stitched);
         fill_geometry(&mut project, &component, geometry.as_ref(), &arrangement, &corrections);
-        project.measures = geometry
-            .as_ref()
-            .map(|geometry| clock.time("measures", || measures::run(&component, geometry, &arrangement.plane, self.options)));
+        project.measures = geometry.as_ref().map(|geometry| {
+            clock.time("measures", || measures::run(&component, geometry, &arrangement.plane, self.options))
+        });
         project.seconds.clone_from(clock.seconds());
         let layout = arrangement.written;
         // A photograph may be placed several times, or not at all; its light is the same everywhere.

@@ -50,7 +50,8 @@ impl Coverage {
             }
             let centre = ahead.x.atan2(ahead.z);
             let from_centre = directions.iter().map(|direction| wrap_angle(direction.x.atan2(direction.z) - centre));
-            let (left, right) = from_centre.fold((0.0_f64, 0.0_f64), |(left, right), one| (left.min(one), right.max(one)));
+            let (left, right) =
+                from_centre.fold((0.0_f64, 0.0_f64), |(left, right), one| (left.min(one), right.max(one)));
             let step = |longitude: f64| (longitude / TAU * STEPS as f64).round() as i64;
             for index in step(centre + left)..=step(centre + right) {
                 covered[index.rem_euclid(STEPS as i64) as usize] = true;
@@ -94,9 +95,7 @@ pub(super) fn steepest(shot: &Shot) -> f64 {
 /// Whether a photograph shows a direction of the level world.
 pub(super) fn shows(shot: &Shot, direction: Vector3<f64>) -> bool {
     let pixel = shot.camera.project(shot.camera.rotation() * direction);
-    pixel.is_some_and(|pixel| {
-        (0.0..=shot.mesh.width).contains(&pixel.x) && (0.0..=shot.mesh.height).contains(&pixel.y)
-    })
+    pixel.is_some_and(|pixel| (0.0..=shot.mesh.width).contains(&pixel.x) && (0.0..=shot.mesh.height).contains(&pixel.y))
 }
 
 /// First step and length of the widest run of uncovered steps around the turn.

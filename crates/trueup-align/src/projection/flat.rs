@@ -116,8 +116,9 @@ impl Flat {
         let [[x, y]] = place.data.0;
         let turned = |longitude: f64, slope: f64| Vector3::new(longitude.sin(), slope, longitude.cos()).normalize();
         match self.kind {
-            FlatKind::Equirectangular => (y.abs() <= PI / 2.0)
-                .then(|| Vector3::new(y.cos() * x.sin(), y.sin(), y.cos() * x.cos())),
+            FlatKind::Equirectangular => {
+                (y.abs() <= PI / 2.0).then(|| Vector3::new(y.cos() * x.sin(), y.sin(), y.cos() * x.cos()))
+            }
             FlatKind::Cylindrical => Some(turned(x, y)),
             FlatKind::Mercator => Some(turned(x, y.sinh())),
             FlatKind::Perspective => Some(Vector3::new(x, y, 1.0).normalize()),
@@ -145,9 +146,9 @@ impl Flat {
     pub fn reach(&self, angle: [f64; 2]) -> Vector2<f64> {
         let right = match self.kind.turns() {
             true => angle[0],
-            false => self
-                .place(Vector3::new(angle[0].sin(), 0.0, angle[0].cos()))
-                .map_or(f64::INFINITY, |place| place.x),
+            false => {
+                self.place(Vector3::new(angle[0].sin(), 0.0, angle[0].cos())).map_or(f64::INFINITY, |place| place.x)
+            }
         };
         let below = Vector3::new(0.0, angle[1].sin(), angle[1].cos());
         // At a pole itself, the cylinders have no end, and the equirectangular projection has no longitude.
@@ -210,9 +211,8 @@ mod tests {
     #[test]
     fn paninis_distance_leads_from_the_plane_to_the_cylinder() {
         let direction = toward(50.0, -20.0);
-        let at = |panini_distance: f64| {
-            Flat { kind: FlatKind::Panini, panini_distance }.place(direction).expect("shown")
-        };
+        let at =
+            |panini_distance: f64| Flat { kind: FlatKind::Panini, panini_distance }.place(direction).expect("shown");
         assert!((at(0.0) - flat(FlatKind::Perspective).place(direction).expect("shown")).norm() < 1e-12);
         assert!((at(1e9).x - 50_f64.to_radians().sin()).abs() < 1e-8);
     }

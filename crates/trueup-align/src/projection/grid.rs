@@ -41,11 +41,8 @@ const MARGIN: f64 = 0.09;
 ///
 /// `meetings` holds for every photograph what [`super::meeting`] found.
 pub fn place(shots: &[Shot], meetings: &[Meeting], placement: &Placement<'_>) -> Vec<PlacedGrid> {
-    let drawings: Vec<Vec<GridMesh>> = shots
-        .par_iter()
-        .zip(meetings)
-        .map(|(shot, meeting)| Drawing::new(shot, meeting, placement).grids())
-        .collect();
+    let drawings: Vec<Vec<GridMesh>> =
+        shots.par_iter().zip(meetings).map(|(shot, meeting)| Drawing::new(shot, meeting, placement).grids()).collect();
     drawings
         .into_iter()
         .enumerate()
@@ -119,9 +116,9 @@ impl<'a> Drawing<'a> {
         }
         let middle = (start + end) / 2.0;
         let on_canvas = (middle - true_place).norm() * self.placement.canvas_from_plane;
-        let in_photograph = flat.direction(middle).map_or(f64::INFINITY, |direction| {
-            direction.angle(&self.direction(pixel)) * self.shot.camera.focal_px
-        });
+        let in_photograph = flat
+            .direction(middle)
+            .map_or(f64::INFINITY, |direction| direction.angle(&self.direction(pixel)) * self.shot.camera.focal_px);
         Some(on_canvas.min(in_photograph))
     }
 
@@ -129,9 +126,12 @@ impl<'a> Drawing<'a> {
     fn lines(&self) -> GridLines {
         /// Rounds of division, each by up to [`PIECES`]: four of them take a cell of 100 pixels below one.
         const ROUNDS: usize = 10;
-        let mut lines = self.shot.mesh.lines.clone().unwrap_or_else(|| {
-            GridLines::even(self.shot.mesh.columns, self.shot.mesh.rows)
-        });
+        let mut lines = self
+            .shot
+            .mesh
+            .lines
+            .clone()
+            .unwrap_or_else(|| GridLines::even(self.shot.mesh.columns, self.shot.mesh.rows));
         // What is smaller than this share of a pixel is not seen, not even at a pole, half a pixel from the first row's centres.
         let smallest = 0.125 * (self.shot.camera.focal_px / self.placement.canvas_from_plane).max(1.0);
         for _ in 0..ROUNDS {
@@ -140,12 +140,12 @@ impl<'a> Drawing<'a> {
             let vertex = |row: usize, column: usize| (self.pixel(&lines, row, column), places[row * columns + column]);
             let worst = |sags: &mut dyn Iterator<Item = Option<f64>>| sags.flatten().fold(0.0, f64::max);
             let across: Vec<f64> = (0..columns - 1)
-                .map(|column| {
-                    worst(&mut (0..rows).map(|row| self.sag(vertex(row, column), vertex(row, column + 1))))
-                })
+                .map(|column| worst(&mut (0..rows).map(|row| self.sag(vertex(row, column), vertex(row, column + 1)))))
                 .collect();
             let down: Vec<f64> = (0..rows - 1)
-                .map(|row| worst(&mut (0..columns).map(|column| self.sag(vertex(row, column), vertex(row + 1, column)))))
+                .map(|row| {
+                    worst(&mut (0..columns).map(|column| self.sag(vertex(row, column), vertex(row + 1, column))))
+                })
                 .collect();
             let finer = GridLines {
                 columns: divided(&lines.columns, &across, smallest / self.shot.mesh.width),

@@ -45,7 +45,9 @@ impl View {
         let facade = dominant.filter(|_| options.facing).and_then(|dominant| nearest_facade(dominant, coverage.middle));
         let far = |yaw: f64| 0.5 * coverage.span + wrap_angle(yaw - coverage.middle).abs();
         let straight = match facade {
-            Some(facade) if coverage.is_full_turn() || (!kind.turns() && far(facade) <= kind.comfortable()[0]) => facade,
+            Some(facade) if coverage.is_full_turn() || (!kind.turns() && far(facade) <= kind.comfortable()[0]) => {
+                facade
+            }
             _ => coverage.middle,
         };
         let one_way = coverage.forward.norm() >= ONE_WAY;
@@ -58,22 +60,13 @@ impl View {
         };
         let [width, height] = kind.comfortable();
         let width = if options.fov > 0.0 { 0.5 * options.fov.to_radians() } else { width };
-        let upright = options.pitch == 0.0 && options.roll == 0.0;
-        let closed = kind.turns() && coverage.is_full_turn() && upright && width >= std::f64::consts::PI;
-        Self {
-            flat,
-            yaw: wrap_angle(straight + yaw),
-            pitch: level + pitch,
-            roll,
-            half: [width, height],
-            closed,
-        }
+        let closed = kind.turns() && coverage.is_full_turn() && width >= std::f64::consts::PI;
+        Self { flat, yaw: wrap_angle(straight + yaw), pitch: level + pitch, roll, half: [width, height], closed }
     }
 
     /// The rotation from the level world to the viewer.
     pub fn view_from_level(&self) -> Matrix3<f64> {
-        let level_from_view =
-            rotation_about_y(self.yaw) * rotation_about_x(self.pitch) * rotation_about_z(self.roll);
+        let level_from_view = rotation_about_y(self.yaw) * rotation_about_x(self.pitch) * rotation_about_z(self.roll);
         level_from_view.transpose()
     }
 }
@@ -86,9 +79,7 @@ fn nearest_facade(dominant: &Matrix3<f64>, middle: f64) -> Option<f64> {
         .column_iter()
         .filter(|direction| direction.y.abs() < HORIZONTAL)
         .flat_map(|direction| [direction.x.atan2(direction.z), (-direction.x).atan2(-direction.z)]);
-    longitudes.min_by(|one, other| {
-        wrap_angle(one - middle).abs().total_cmp(&wrap_angle(other - middle).abs())
-    })
+    longitudes.min_by(|one, other| wrap_angle(one - middle).abs().total_cmp(&wrap_angle(other - middle).abs()))
 }
 
 /// The projection asked for, or the one that suits.

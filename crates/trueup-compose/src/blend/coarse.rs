@@ -4,7 +4,8 @@ use rayon::prelude::*;
 
 use super::Base;
 use super::pyramid::{LEAST_SHARE, Plane, add_base, add_detail, collapse};
-use crate::seam::{NOBODY, Seams};
+use super::unrolled::Unrolled;
+use crate::seam::{Label, NOBODY, Seams};
 
 /// Log2 of the canvas pixels per sample of the finest level that is blended as a whole.
 pub(super) const FIRST_LEVEL: u32 = 3;
@@ -13,8 +14,8 @@ pub(super) const FIRST_LEVEL: u32 = 3;
 const LABELS_PER_SAMPLE: usize = 4;
 
 /// The blended level [`FIRST_LEVEL`] of a canvas, from the photographs' own. `levels` more are blended above it.
-pub(super) fn blend(bases: &[Base], seams: &Seams, canvas: [usize; 2], levels: u32) -> Plane<[f32; 4]> {
-    let size = |level: u32| canvas.map(|length| length.div_ceil(1 << (FIRST_LEVEL + level)));
+pub(super) fn blend(bases: &[Base], seams: &Seams, unrolled: &Unrolled<'_>, levels: u32) -> Plane<[f32; 4]> {
+    let size = |level: u32| unrolled.canvas().map(|length| length.div_ceil(1 << (FIRST_LEVEL + level)));
     let mut sums: Vec<Plane<[f32; 4]>> = (0..=levels)
         .map(|level| {
             let [width, height] = size(level);
@@ -27,7 +28,7 @@ pub(super) fn blend(bases: &[Base], seams: &Seams, canvas: [usize; 2], levels: u
         let pyramids: Vec<_> = bases
             .par_iter()
             .enumerate()
-            .map(|(index, base)| pyramid(base, mask(base, first + index, seams, canvas), levels))
+            .map(|(index, base)| pyramid(base, mask(base, first + index, seams, unrolled), levels))
             .collect();
         for pyramid in pyramids {
             sums.par_iter_mut().enumerate().for_each(|(level, sum)| {
@@ -59,11 +60,12 @@ fn pyramid(base: &Base, mask: Plane<f32>, levels: u32) -> Levels {
     pyramid
 }
 
-/// The share of every sample's surroundings that shows photograph `label`.
-fn mask(base: &Base, label: usize, seams: &Seams, canvas: [usize; 2]) -> Plane<f32> {
+/// The share of every sample's surroundings that shows the photograph of a placement.
+fn mask(base: &Base, placement: usize, seams: &Seams, unrolled: &Unrolled<'_>) -> Plane<f32> {
+    let label = unrolled.label(placement as Label);
     let mut mask: Plane<f32> = Plane::new(base.plane.columns.clone(), base.plane.rows.clone());
     let step = (1 << FIRST_LEVEL) / LABELS_PER_SAMPLE;
-    let points = canvas.map(|length| length.div_ceil(step));
+    let down = unrolled.canvas()[1].div_ceil(step);
     let share = 1.0 / (LABELS_PER_SAMPLE * LABELS_PER_SAMPLE) as f32;
     let mut labels = Vec::new();
     // The sample's own place is its middle: half of the points lie before it.
@@ -72,16 +74,16 @@ fn mask(base: &Base, label: usize, seams: &Seams, canvas: [usize; 2]) -> Plane<f
         let columns = mask.columns.clone();
         let row = mask.row_mut(y);
         for v in y * LABELS_PER_SAMPLE..(y + 1) * LABELS_PER_SAMPLE {
-            let v = v.saturating_sub(before).min(points[1] - 1);
+            let v = v.saturating_sub(before).min(down - 1);
             let across = columns.start * LABELS_PER_SAMPLE..columns.end * LABELS_PER_SAMPLE;
             let shifted = across.start.saturating_sub(before)..across.end;
             let lead = shifted.start + before - across.start;
-            seams.row(v, &shifted, points, &mut labels);
+            unrolled.labels(seams, (v, &shifted), step, &mut labels);
             for (x, weight) in row.iter_mut().enumerate() {
                 for point in 0..LABELS_PER_SAMPLE {
                     let at = (x * LABELS_PER_SAMPLE + point).saturating_sub(lead);
                     let shown = labels[at.min(labels.len() - 1)];
-                    if shown != NOBODY && usize::from(shown) == label {
+                    if shown != NOBODY && shown == label {
                         *weight += share;
                     }
                 }

@@ -12,6 +12,7 @@
 mod coarse;
 mod pyramid;
 mod tile;
+mod unrolled;
 mod views;
 
 use std::borrow::Cow;
@@ -31,6 +32,7 @@ use crate::seam::{self, Label, SeamOptions, Seams};
 use coarse::FIRST_LEVEL;
 use pyramid::Plane;
 use tile::Tile;
+use unrolled::Unrolled;
 
 /// A finished pixel: square roots of linear light and alpha, 65535 is 1.
 pub(crate) type Finished = [u16; 4];
@@ -57,8 +59,8 @@ struct Levels {
 }
 
 impl Levels {
-    fn new(mut bases: Vec<Base>, seams: &Seams, canvas: [usize; 2], levels: u32) -> Self {
-        let blended = coarse::blend(&bases, seams, canvas, levels);
+    fn new(mut bases: Vec<Base>, seams: &Seams, unrolled: &Unrolled<'_>, levels: u32) -> Self {
+        let blended = coarse::blend(&bases, seams, unrolled, levels);
         bases.par_iter_mut().for_each(|base| pyramid::level_shares(&mut base.plane));
         Self { blended, bases }
     }
@@ -68,7 +70,7 @@ impl Levels {
 struct Work<'a> {
     options: &'a RenderOptions,
     seams: &'a Seams,
-    canvas: [usize; 2],
+    unrolled: &'a Unrolled<'a>,
     /// `None` to cut without blending.
     levels: Option<Levels>,
 }
@@ -90,37 +92,43 @@ pub(crate) fn run(
 ) -> Result<Blended> {
     let stage = RenderOptions::STAGE;
     let count = layout.placed.len();
-    let canvas = [layout.width, layout.height];
-    // Small pictures, seams, and the photographs themselves.
-    context.progress().begin(stage, 2 * count as u64);
     let levels = if cut || count == 1 { None } else { Some(levels_above(layout, options)) };
+    let unrolled = Unrolled::new(layout, levels)?;
+    let (canvas, placed) = (unrolled.canvas(), unrolled.placed());
+    // Small pictures, and the photographs themselves wherever they are placed.
+    context.progress().begin(stage, (count + placed.len()) as u64);
     let views::Small { views, size, bases, mut kept } =
-        views::make(layout, corrections, photographs, options, seam_options, levels.is_some(), context)?;
-    let seams =
-        if count == 1 { Seams::of_one(size[0], size[1]) } else { seam::run(views, size, seam_options, context)? };
-    let levels = levels.map(|levels| Levels::new(bases, &seams, canvas, levels));
-    let work = Work { options, seams: &seams, canvas, levels };
+        views::make(&unrolled, corrections, photographs, (options, seam_options), levels.is_some(), context)?;
+    let around = layout.period.is_some();
+    let seams = match count {
+        1 => Seams::of_one(size[0], size[1]),
+        _ => seam::run(views, size, around, seam_options, context)?,
+    };
+    let levels = levels.map(|levels| Levels::new(bases, &seams, &unrolled, levels));
+    let work = Work { options, seams: &seams, unrolled: &unrolled, levels };
 
-    let strips = strips(&work, count);
-    let last_strip: Vec<Option<usize>> =
-        (0..count).map(|picture| strips.iter().rposition(|strip| strip.shown.contains(&(picture as Label)))).collect();
-    let mut pictures: Vec<Option<Prepared<'_>>> = (0..count).map(|_| None).collect();
+    let strips = strips(&work);
+    let last_strip: Vec<Option<usize>> = (0..placed.len())
+        .map(|picture| strips.iter().rposition(|strip| strip.shown.contains(&(picture as Label))))
+        .collect();
+    let mut pictures: Vec<Option<Prepared<'_>>> = placed.iter().map(|_| None).collect();
     let mut pixels = vec![[0; 4]; layout.width * layout.height];
     for (index, strip) in strips.iter().enumerate() {
         context.check_cancelled()?;
         let wanted: Vec<usize> =
             strip.shown.iter().map(|&label| usize::from(label)).filter(|&at| pictures[at].is_none()).collect();
-        let ready: Vec<(usize, Option<Photograph>)> = wanted.iter().map(|&at| (at, kept[at].take())).collect();
+        let ready: Vec<(usize, Option<Photograph>)> =
+            wanted.iter().map(|&at| (at, kept[unrolled.original(at)].take())).collect();
         let loaded: Vec<(usize, Prepared<'_>)> = ready
             .into_par_iter()
             .map(|(at, photograph)| {
-                let placed = &layout.placed[at];
+                let (placed, correction) = (&placed[at], &corrections[unrolled.original(at)]);
                 let photograph = match photograph {
                     Some(photograph) => photograph,
                     None => photographs.photograph(placed.photograph)?,
                 };
                 check_photograph(placed, &photograph)?;
-                let prepared = Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, &corrections[at], options);
+                let prepared = Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, correction, options);
                 context.progress().advance(stage, 1);
                 Ok((at, prepared))
             })
@@ -139,7 +147,8 @@ pub(crate) fn run(
         for (tile, finished) in strip.tiles.iter().zip(finished) {
             let rows = finished.chunks_exact(tile.columns.len().max(1));
             for (y, row) in tile.rows.clone().zip(rows) {
-                pixels[y * layout.width..][tile.columns.clone()].copy_from_slice(row);
+                let first = y * layout.width + tile.columns.start - unrolled.lead();
+                pixels[first..first + row.len()].copy_from_slice(row);
             }
         }
         for (at, picture) in pictures.iter_mut().enumerate() {
@@ -179,8 +188,9 @@ struct Strip {
 }
 
 /// The canvas in strips across its shorter side.
-fn strips(work: &Work<'_>, count: usize) -> Vec<Strip> {
-    let [width, height] = work.canvas;
+fn strips(work: &Work<'_>) -> Vec<Strip> {
+    let [width, height] = work.unrolled.finished();
+    let lead = work.unrolled.lead();
     let wide = width >= height;
     let (along, across) = if wide { (width, height) } else { (height, width) };
     (0..along)
@@ -192,21 +202,21 @@ fn strips(work: &Work<'_>, count: usize) -> Vec<Strip> {
                 for b in (0..across).step_by(TILE) {
                     let (a, b) = (a..(a + TILE).min(along), b..(b + TILE).min(across));
                     let (columns, rows) = if wide { (a, b) } else { (b, a) };
-                    tiles.push(tile(work, columns, rows));
+                    tiles.push(tile(work, columns.start + lead..columns.end + lead, rows));
                 }
             }
             let mut shown: Vec<Label> = tiles.iter().flat_map(|tile| tile.shown.clone()).collect();
             shown.sort_unstable();
             shown.dedup();
-            shown.retain(|&label| usize::from(label) < count);
+            shown.retain(|&label| usize::from(label) < work.unrolled.placed().len());
             Strip { tiles, shown }
         })
         .collect()
 }
 
 fn tile(work: &Work<'_>, columns: Range<usize>, rows: Range<usize>) -> Tile {
-    let (wide, high) = Tile::with_margin(&columns, &rows, work.canvas);
-    Tile { shown: work.seams.shown_in(&wide, &high, work.canvas), columns, rows }
+    let (wide, high) = Tile::with_margin(&columns, &rows, work.unrolled.canvas());
+    Tile { shown: work.unrolled.shown_in(work.seams, &wide, &high), columns, rows }
 }
 
 #[cfg(test)]

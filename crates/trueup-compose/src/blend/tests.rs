@@ -36,7 +36,7 @@ fn layout(lefts: &[usize]) -> CanvasLayout {
         })
         .collect();
     let width = WIDTH + lefts.iter().copied().max().unwrap_or(0);
-    CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, origin: [0.0; 2], placed }
+    CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, origin: [0.0; 2], placed, period: None }
 }
 
 fn composed(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Vec<Finished> {
@@ -117,11 +117,13 @@ fn with_work<T>(lefts: &[usize], test: impl FnOnce(&Work<'_>, &[Option<Prepared<
     let (options, seam_options) = (RenderOptions::default(), SeamOptions::default());
     let context = StageContext::default();
     let memory = Memory(pictures.clone());
-    let small = views::make(&layout, &corrections, &memory, &options, &seam_options, true, &context).expect("small");
-    let seams = seam::run(small.views, small.size, &seam_options, &context).expect("seams");
+    let unrolled = Unrolled::new(&layout, Some(2)).expect("few");
+    let small =
+        views::make(&unrolled, &corrections, &memory, (&options, &seam_options), true, &context).expect("small");
+    let seams = seam::run(small.views, small.size, false, &seam_options, &context).expect("seams");
     let canvas = [layout.width, layout.height];
-    let levels = Some(Levels::new(small.bases, &seams, canvas, 2));
-    let work = Work { options: &options, seams: &seams, canvas, levels };
+    let levels = Some(Levels::new(small.bases, &seams, &unrolled, 2));
+    let work = Work { options: &options, seams: &seams, unrolled: &unrolled, levels };
     let prepared: Vec<Option<Prepared<'_>>> = pictures
         .into_iter()
         .zip(&layout.placed)
@@ -146,7 +148,7 @@ fn blended(
 #[test]
 fn tiles_of_any_size_give_the_same_bits_as_the_whole() {
     with_work(&[0, 60, 130], |work, pictures| {
-        let [width, height] = work.canvas;
+        let [width, height] = work.unrolled.canvas();
         let whole = blended(work, pictures, 0..width, 0..height);
         for side in [16, 40, 64, 128] {
             for top in (0..height).step_by(side) {
@@ -166,7 +168,7 @@ fn tiles_of_any_size_give_the_same_bits_as_the_whole() {
 fn a_tile_of_one_photograph_is_what_blending_would_give() {
     with_work(&[0, 60, 130], |work, pictures| {
         let mut compared = 0;
-        for left in (0..work.canvas[0] - 24).step_by(8) {
+        for left in (0..work.unrolled.canvas()[0] - 24).step_by(8) {
             let tile = tile(work, left..left + 24, 40..64);
             if tile.shown.len() == 1 {
                 let fast = tile.finish(work, pictures, &mut Scratch::default());

@@ -9,11 +9,12 @@ use trueup_core::source::PhotographSource;
 use super::prepared::{Prepared, Scratch, Window, check_photograph};
 use super::{BAND_ROWS, RenderOptions, check};
 use crate::exposure::Correction;
-use crate::layout::CanvasLayout;
+use crate::layout::{CanvasLayout, TURNS, columns_around};
 use crate::transfer_curve::Encode;
 use crate::weights::WHOLE;
 
-/// What one photograph shows of the canvas: its bounding box there.
+/// What one photograph shows of the canvas: its bounding box there. On a cylinder it may run past the width into the next
+/// turn, but does not meet itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layer {
     /// First column of the canvas.
@@ -47,12 +48,15 @@ pub fn layer(
     };
     let photograph = photographs.photograph(placed.photograph)?;
     check_photograph(placed, &photograph)?;
-    let size = [layout.width, layout.height];
-    let prepared = Prepared::new(Cow::Owned(photograph), &placed.mesh, size, &corrections[position], options);
-    let (columns, rows) = (prepared.columns(), prepared.rows());
+    let size = [layout.width * if layout.period.is_some() { TURNS } else { 1 }, layout.height];
+    let mesh = &placed.in_first_turn(layout.period).mesh;
+    let prepared = Prepared::new(Cow::Owned(photograph), mesh, size, &corrections[position], options);
+    let (all, rows) = (prepared.columns(), prepared.rows());
+    let columns = all.start..all.end.min(all.start + layout.period.unwrap_or(all.len()));
+    let (on_canvas, turned) = columns_around(columns.clone(), layout.period);
     let (width, height) = (columns.len(), rows.len());
     let mut layer = Layer {
-        left: columns.start,
+        left: on_canvas.start,
         top: rows.start,
         gray: Raster::new(width, height, 1),
         covered: Raster::new(width, height, 1),
@@ -75,6 +79,8 @@ pub fn layer(
                     *covered = share >= WHOLE;
                 }
             }
+            layer.gray.row_mut(y - rows.start).rotate_right(turned);
+            layer.covered.row_mut(y - rows.start).rotate_right(turned);
         }
     }
     Ok(layer)

@@ -120,16 +120,18 @@ fn mean(
     options: &RenderOptions,
     context: &StageContext,
 ) -> Result<Panorama> {
+    let (layout, originals) = layout.unrolled(0);
     let (width, height) = (layout.width, layout.height);
     let mut sums = vec![[0.0; 4]; width * height];
     context.progress().begin(STAGE, layout.placed.len() as u64);
     let at_a_time = rayon::current_num_threads().max(1);
-    for (placed, corrections) in layout.placed.chunks(at_a_time).zip(corrections.chunks(at_a_time)) {
+    for (placed, originals) in layout.placed.chunks(at_a_time).zip(originals.chunks(at_a_time)) {
         context.check_cancelled()?;
         let prepared: Vec<Prepared<'_>> = placed
             .par_iter()
-            .zip(corrections)
-            .map(|(placed, correction)| {
+            .zip(originals)
+            .map(|(placed, &original)| {
+                let correction = &corrections[original];
                 let photograph = photographs.photograph(placed.photograph)?;
                 check_photograph(placed, &photograph)?;
                 Ok(Prepared::new(Cow::Owned(photograph), &placed.mesh, [width, height], correction, options))

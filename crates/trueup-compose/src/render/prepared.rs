@@ -222,7 +222,8 @@ fn halvings_before_sampling(grid: &DeformedGrid, minification_threshold: f64) ->
     /// A cell that is stretched more unevenly lies at a pole of the projection; it asks for detail along one axis that it
     /// cannot show along the other.
     const UNEVEN: f64 = 4.0;
-    let even = |cell: &&Cell| cell.footprint[0].max(cell.footprint[1]) <= UNEVEN * cell.footprint[0].min(cell.footprint[1]);
+    let even =
+        |cell: &&Cell| cell.footprint[0].max(cell.footprint[1]) <= UNEVEN * cell.footprint[0].min(cell.footprint[1]);
     let least = grid.cells.iter().filter(even).flat_map(|cell| cell.footprint).fold(f64::INFINITY, f64::min);
     let shorter = grid.size[0].min(grid.size[1]);
     let wanted = (least / minification_threshold).min(shorter);

@@ -39,7 +39,7 @@ fn moved(photograph: usize, width: f64, height: f64, move_to: impl Fn(Vector2<f6
 }
 
 fn canvas(width: usize, height: usize, placed: Vec<Placed>) -> CanvasLayout {
-    CanvasLayout { width, height, canvas_from_target: 1.0, origin: [0.0; 2], placed }
+    CanvasLayout { width, height, canvas_from_target: 1.0, origin: [0.0; 2], placed, period: None }
 }
 
 fn render(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Panorama {
