@@ -121,7 +121,7 @@ pub(crate) struct StitchArgs {
     #[arg(long, value_name = "CROP", help_heading = "View")]
     pub crop: Option<String>,
 
-    /// What shows where no photograph is: black, gray, white, #rrggbb or transparent (output.background)
+    /// What shows where no photograph is, in formats without transparency: black, gray or white (output.background)
     #[arg(long, value_name = "COLOUR", help_heading = "View")]
     pub background: Option<String>,
 

@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
+use nalgebra::Vector2;
 use rayon::prelude::*;
 
 use crate::deformed_grid::DeformedGrid;
-use crate::layout::{CanvasLayout, Placed};
+use crate::layout::{self, CanvasLayout, Placed};
 
 trueup_core::choice! {
     /// What of the canvas is kept.
@@ -53,6 +54,7 @@ impl Coverage {
     /// A grid's outline is followed along the pixel row's upper and lower edge and through its middle; between these, it is taken
     /// as straight. Time grows with rows and cells, not with pixels.
     pub fn of(layout: &CanvasLayout) -> Self {
+        let (layout, _) = layout.unrolled(0);
         let (width, height) = (layout.width, layout.height);
         let grids: Vec<DeformedGrid> =
             layout.placed.par_iter().map(|placed| DeformedGrid::new(&placed.mesh, 1.0, false, width, height)).collect();
@@ -204,13 +206,16 @@ fn united(mut stretches: Vec<Range<usize>>) -> Vec<Range<usize>> {
     united
 }
 
-/// The rectangle of the canvas that is to be kept; `None` for all of it.
+/// The rectangle of the canvas that is to be kept; `None` for all of it. Of a full turn, rows alone are cut.
 pub fn choose(layout: &CanvasLayout, crop: Crop, min_kept: f64) -> Option<Rectangle> {
     if crop == Crop::None {
         return None;
     }
     let coverage = Coverage::of(layout);
-    let rectangle = coverage.largest_rectangle();
+    let rectangle = match layout.period {
+        None => coverage.largest_rectangle(),
+        Some(_) => coverage.longest_whole_rows(),
+    };
     let enough = match crop {
         Crop::None => false,
         Crop::Rectangle => rectangle.area() > 0,
@@ -230,20 +235,16 @@ pub fn cropped(layout: CanvasLayout, rectangle: &Rectangle) -> CanvasLayout {
         }
         placed
     };
-    let placed = layout.placed.into_iter().map(moved).filter(|placed| shows(placed, size)).collect();
+    let around = layout.period.is_some();
+    let placed = layout.placed.into_iter().map(moved).filter(|placed| shows(placed, around, size)).collect();
     let origin = [0, 1].map(|axis| layout.origin[axis] + shift[axis] / layout.canvas_from_target);
     CanvasLayout { width: size[0], height: size[1], origin, placed, ..layout }
 }
 
 /// Whether a photograph reaches into a canvas of `size` pixels.
-pub(crate) fn shows(placed: &Placed, size: [usize; 2]) -> bool {
-    let mesh = &placed.mesh;
-    mesh.whole_cells().any(|corners| {
-        (0..2).all(|axis| {
-            let reach = corners.map(|vertex| mesh.target[vertex][axis]);
-            reach.iter().any(|&at| at > 0.0) && reach.iter().any(|&at| at < size[axis] as f64)
-        })
-    })
+fn shows(placed: &Placed, around: bool, size: [usize; 2]) -> bool {
+    let end = Vector2::new(size[0] as f64, size[1] as f64);
+    layout::shows(&placed.mesh, around, Vector2::zeros(), end)
 }
 
 #[cfg(test)]
@@ -270,7 +271,7 @@ mod tests {
                 Placed { photograph, mesh }
             })
             .collect();
-        CanvasLayout { width, height, canvas_from_target: 2.0, origin: [5.0, 7.0], placed }
+        CanvasLayout { width, height, canvas_from_target: 2.0, origin: [5.0, 7.0], placed, period: None }
     }
 
     fn upright(left: f64, top: f64, right: f64, bottom: f64) -> [[f64; 2]; 4] {
@@ -300,6 +301,17 @@ mod tests {
         let slanted = layout(80, 80, &[[[40.0, 0.0], [80.0, 40.0], [40.0, 80.0], [0.0, 40.0]]]);
         let largest = Coverage::of(&slanted).largest_rectangle();
         assert_eq!(largest, Rectangle { columns: 20..60, rows: 20..60 });
+    }
+
+    /// Two photographs around a cylinder of 160 columns: rows are cut where either ends.
+    #[test]
+    fn of_a_full_turn_rows_alone_are_cut() {
+        let mut turn = layout(160, 70, &[upright(-20.0, 0.0, 80.0, 60.0), upright(70.0, 9.5, 170.0, 70.0)]);
+        turn.period = Some(160);
+        let kept = choose(&turn, Crop::Auto, 0.5).expect("whole rows");
+        assert_eq!(kept, Rectangle { columns: 0..160, rows: 10..60 });
+        let kept = cropped(turn, &kept);
+        assert_eq!((kept.width, kept.height, kept.period, kept.placed.len()), (160, 50, Some(160), 2));
     }
 
     #[test]

@@ -1,5 +1,8 @@
 //! The canvas: deformed grids in any common unit become grids in canvas pixels.
 
+use std::borrow::Cow;
+use std::ops::Range;
+
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use trueup_core::diagnostics::Diagnostic;
@@ -53,6 +56,9 @@ pub struct CanvasLayout {
     pub origin: [f64; 2],
     /// The photographs used, in the order given; targets are canvas pixels and may lie outside the canvas.
     pub placed: Vec<Placed>,
+    /// The canvas is a cylinder of that many columns, its width: what lies beyond one end is seen at the other.
+    #[serde(default)]
+    pub period: Option<usize>,
 }
 
 /// Lays the grids on one canvas: shifted by the smallest vertex, scaled so that the photograph `placed[reference]`
@@ -71,6 +77,22 @@ pub struct CanvasLayout {
 pub fn run(
     placed: Vec<Placed>,
     reference: usize,
+    options: &CanvasOptions,
+    context: &StageContext,
+) -> Result<CanvasLayout> {
+    run_around(placed, reference, None, options, context)
+}
+
+/// As [`run`]; with a `period`, on a cylinder: places that far apart in x, in the unit of the targets, are the same. The
+/// canvas then is the one period around the middle of the grids, and its width that period in whole pixels; x is scaled by
+/// up to half a pixel over the whole width to make it so.
+///
+/// # Errors
+/// As [`run`]; [`Error::Unsolvable`] if the period is not a positive length.
+pub fn run_around(
+    placed: Vec<Placed>,
+    reference: usize,
+    period: Option<f64>,
     options: &CanvasOptions,
     context: &StageContext,
 ) -> Result<CanvasLayout> {
@@ -94,7 +116,7 @@ pub fn run(
             "Choose another reference or another method.",
         ));
     }
-    let frame = Frame { canvas_from_target: options.scale / pixel_scale, window: None };
+    let frame = Frame { canvas_from_target: options.scale / pixel_scale, window: None, period };
     framed(placed, &frame, options, context)
 }
 
@@ -105,13 +127,15 @@ pub struct Frame {
     pub canvas_from_target: f64,
     /// Smallest and largest target that may be shown; `None`: all that the grids cover.
     pub window: Option<[Vector2<f64>; 2]>,
+    /// Places that far apart in x are the same: the canvas is a cylinder of that many units, from the window's left end.
+    pub period: Option<f64>,
 }
 
 /// Lays the grids on one canvas as `frame` wants it: of the window the part that the grids cover. Grids that show nothing in
 /// it are left out.
 ///
 /// # Errors
-/// Those of [`run`]; [`Error::Unsolvable`] if no grid shows anything in the window.
+/// Those of [`run_around`]; [`Error::Unsolvable`] if no grid shows anything in the window.
 pub fn framed(
     mut placed: Vec<Placed>,
     frame: &Frame,
@@ -123,9 +147,16 @@ pub fn framed(
         check_mesh(item)?;
     }
     let (mut low, mut high) = bounds(&placed);
+    if frame.period.is_some_and(|period| !(period > 0.0)) {
+        return Err(Error::unsolvable(STAGE, "the canvas", "its period is not a length", "Choose another method."));
+    }
+    if let Some(period) = frame.period {
+        low.x = frame.window.map_or(0.5 * (low.x + high.x - period), |[window_low, _]| window_low.x);
+        high.x = low.x + period;
+    }
     if let Some([window_low, window_high]) = frame.window {
         (low, high) = (low.sup(&window_low), high.inf(&window_high));
-        placed.retain(|item| shows(&item.mesh, low, high));
+        placed.retain(|item| shows(&item.mesh, frame.period.is_some(), low, high));
     }
     let extent = high - low;
     if placed.is_empty() || !extent.max().is_finite() || extent.min() < 0.0 {
@@ -146,10 +177,11 @@ pub fn framed(
     }
     let max_pixels = most_pixels(&placed, options);
     let wanted = frame.canvas_from_target;
-    let canvas_from_target = scale_within(extent, wanted, max_pixels);
-    let [width, height] = canvas_size(extent, canvas_from_target);
+    let size = |scale: f64| canvas_size(extent, scale, frame.period.is_some());
+    let canvas_from_target = scale_within(size, extent, wanted, max_pixels);
+    let [width, height] = size(canvas_from_target);
     if canvas_from_target < wanted {
-        let [wanted_width, wanted_height] = canvas_size(extent, wanted);
+        let [wanted_width, wanted_height] = size(wanted);
         context.report(Diagnostic::warning(
             "canvas-reduced",
             STAGE,
@@ -163,19 +195,84 @@ pub fn framed(
     for vertex in placed.iter_mut().flat_map(|item| &mut item.mesh.target) {
         *vertex = ((Vector2::from(*vertex) - low) * canvas_from_target).into();
     }
-    let origin = low.into();
-    Ok(CanvasLayout { width: width as usize, height: height as usize, canvas_from_target, origin, placed })
+    if let Some(period) = frame.period {
+        let to_whole_pixels = width / (period * canvas_from_target);
+        for vertex in placed.iter_mut().flat_map(|item| &mut item.mesh.target) {
+            vertex[0] *= to_whole_pixels;
+        }
+    }
+    let (width, height) = (width as usize, height as usize);
+    let (origin, period) = (low.into(), frame.period.map(|_| width));
+    Ok(CanvasLayout { width, height, canvas_from_target, origin, placed, period })
 }
 
-/// Whether a whole cell of the grid reaches into the box.
-fn shows(mesh: &GridMesh, low: Vector2<f64>, high: Vector2<f64>) -> bool {
+/// Whether a whole cell of the grid reaches into the box; on a cylinder, into its rows.
+pub(crate) fn shows(mesh: &GridMesh, around: bool, low: Vector2<f64>, high: Vector2<f64>) -> bool {
     mesh.whole_cells().any(|corners| {
         let corners = corners.map(|vertex| mesh.target[vertex]);
-        (0..2).all(|axis| {
+        (usize::from(around)..2).all(|axis| {
             corners.iter().any(|corner| corner[axis] > low[axis])
                 && corners.iter().any(|corner| corner[axis] < high[axis])
         })
     })
+}
+
+impl CanvasLayout {
+    /// The layout without its period: every photograph at every place at which it meets the columns from `-reach` to
+    /// `width + reach`. With `reach`, the canvas is wider by it on both sides and begins that much farther left.
+    ///
+    /// Gives for each of the photographs placed the position of its original. Without a period nothing changes.
+    pub(crate) fn unrolled(&self, reach: usize) -> (Cow<'_, Self>, Vec<usize>) {
+        let Some(period) = self.period else { return (Cow::Borrowed(self), (0..self.placed.len()).collect()) };
+        let (mut placed, mut originals) = (Vec::new(), Vec::new());
+        let (reach_px, width) = (reach as f64, self.width as f64);
+        for (position, item) in self.placed.iter().enumerate() {
+            let (low, high) = item.mesh.bounds();
+            // One pixel more for what the border's pixels take from beyond it.
+            let first = ((-reach_px - high.x - 1.0) / period as f64).ceil();
+            let last = ((width + reach_px - low.x + 1.0) / period as f64).floor();
+            let mut turn = first;
+            while turn <= last {
+                placed.push(item.moved(turn * period as f64 + reach_px));
+                originals.push(position);
+                turn += 1.0;
+            }
+        }
+        (Cow::Owned(Self { width: self.width + 2 * reach, placed, period: None, ..*self }), originals)
+    }
+}
+
+/// Turns that a photograph of [`Placed::in_first_turn`] may reach into: its own, those that a very wide one takes up.
+pub(crate) const TURNS: usize = 4;
+
+/// The columns of a photograph of [`Placed::in_first_turn`], beginning in the first turn and not longer than one. One that
+/// goes all the way round is to be turned to the right by the second number of columns, after which it begins at 0.
+pub(crate) fn columns_around(columns: Range<usize>, period: Option<usize>) -> (Range<usize>, usize) {
+    let Some(period) = period else { return (columns, 0) };
+    let start = columns.start % period;
+    if columns.len() >= period { (0..period, start) } else { (start..start + columns.len(), 0) }
+}
+
+impl Placed {
+    /// The photograph moved to the right.
+    fn moved(&self, by: f64) -> Self {
+        let mut moved = self.clone();
+        for vertex in &mut moved.mesh.target {
+            vertex[0] += by;
+        }
+        moved
+    }
+
+    /// The photograph moved by whole turns, so that it begins in the first turn or soon after and no column before it is
+    /// wanted for its border; without a period where it is.
+    pub(crate) fn in_first_turn(&self, period: Option<usize>) -> Cow<'_, Self> {
+        let Some(period) = period else { return Cow::Borrowed(self) };
+        // As a share of the period: pixels of any smaller canvas that the border cuts.
+        const RIM: f64 = 1.0 / 16.0;
+        let turns = RIM - self.mesh.bounds().0.x / period as f64;
+        let moved = turns.ceil() * period as f64;
+        if moved == 0.0 { Cow::Borrowed(self) } else { Cow::Owned(self.moved(moved)) }
+    }
 }
 
 /// The largest canvas that is not reduced.
@@ -266,21 +363,22 @@ fn bounds(placed: &[Placed]) -> (Vector2<f64>, Vector2<f64>) {
     })
 }
 
-/// Width and height of the canvas in whole pixels, at least 1 each.
-fn canvas_size(extent: Vector2<f64>, scale: f64) -> [f64; 2] {
+/// Width and height of the canvas in whole pixels, at least 1 each; `around` a cylinder the width nearest to its girth.
+fn canvas_size(extent: Vector2<f64>, scale: f64, around: bool) -> [f64; 2] {
     // A photograph of 100 px placed at a fractional offset spans 100 px plus rounding; that is no 101st column.
     const ROUNDING_PX: f64 = 1e-6;
-    [(extent.x * scale - ROUNDING_PX).ceil().max(1.0), (extent.y * scale - ROUNDING_PX).ceil().max(1.0)]
+    let width = if around { (extent.x * scale).round() } else { (extent.x * scale - ROUNDING_PX).ceil() };
+    [width.max(1.0), (extent.y * scale - ROUNDING_PX).ceil().max(1.0)]
 }
 
 /// The largest scale, at most `wanted`, whose canvas holds at most `max_pixels`.
-fn scale_within(extent: Vector2<f64>, wanted: f64, max_pixels: f64) -> f64 {
+fn scale_within(size: impl Fn(f64) -> [f64; 2], extent: Vector2<f64>, wanted: f64, max_pixels: f64) -> f64 {
     // Just below the exact ratio, so that rounding up to whole pixels fits after a step or two.
     const SAFETY: f64 = 1.0 - 1e-6;
     // Neither side alone may exceed the limit; this keeps the product below finite.
     let mut scale = wanted.min(max_pixels / extent.max());
     loop {
-        let [width, height] = canvas_size(extent, scale);
+        let [width, height] = size(scale);
         let pixels = width * height;
         if pixels <= max_pixels {
             return scale;
@@ -323,6 +421,37 @@ mod tests {
         assert!(layout.width * layout.height <= 1000);
         assert!(layout.width * layout.height > 900, "{} x {}", layout.width, layout.height);
         assert_eq!(context.take_diagnostics()[0].code, "canvas-reduced");
+    }
+
+    #[test]
+    fn a_cylinder_is_its_period_in_whole_pixels_around_the_middle() {
+        let context = StageContext::default();
+        // From -10 to 490, with a period of 380.3: 59.85 beyond each end.
+        let pictures = vec![placed(1.0, [-10.0, 3.0]), placed(1.0, [90.0, 3.0])];
+        let options = CanvasOptions::default();
+        let layout = run_around(pictures.clone(), 0, Some(380.3), &options, &context).expect("two grids");
+        assert_eq!((layout.width, layout.height, layout.period), (380, 300, Some(380)));
+        let share = 380.0 / 380.3;
+        let (low, _) = layout.placed[0].mesh.bounds();
+        let (_, high) = layout.placed[1].mesh.bounds();
+        assert!((low.x + 59.85 * share).abs() < 1e-9 && (high.x - 380.0 - 59.85 * share).abs() < 1e-9);
+        assert!(run_around(pictures.clone(), 0, Some(f64::NAN), &options, &context).is_err());
+        // Each lies across one end, and so is placed there again; 100 px further out, both are seen once more.
+        let (wide, originals) = layout.unrolled(0);
+        assert_eq!((originals.as_slice(), wide.width, wide.period), ([0, 0, 1, 1].as_slice(), 380, None));
+        let (wide, originals) = layout.unrolled(100);
+        assert_eq!((originals.as_slice(), wide.width), ([0, 0, 0, 1, 1, 1].as_slice(), 580));
+        assert!((wide.placed[1].mesh.target[0][0] - wide.placed[0].mesh.target[0][0] - 380.0).abs() < 1e-9);
+        let first = layout.placed[0].in_first_turn(layout.period);
+        assert!((first.mesh.bounds().0.x - (380.0 - 59.85 * share)).abs() < 1e-9);
+        let second = layout.placed[1].in_first_turn(layout.period);
+        assert_eq!(second, Cow::Borrowed(&layout.placed[1]));
+        assert_eq!(columns_around(350..420, Some(380)), (350..420, 0));
+        assert_eq!(columns_around(390..420, Some(380)), (10..40, 0));
+        assert_eq!(columns_around(390..800, Some(380)), (0..380, 10));
+        assert_eq!(columns_around(390..800, None), (390..800, 0));
+        let flat = run(pictures, 0, &options, &context).expect("two grids");
+        assert_eq!(flat.unrolled(100), (Cow::Borrowed(&flat), vec![0, 1]));
     }
 
     #[test]

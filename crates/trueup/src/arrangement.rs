@@ -52,6 +52,8 @@ pub(crate) struct Sources {
     pub cameras: Option<Vec<Camera>>,
     /// The scene's dominant directions in the level world (columns), if they are known.
     pub dominant: Option<Matrix3<f64>>,
+    /// The turn of the plane of `placed` in its unit, if it closes on itself.
+    pub period: Option<f64>,
 }
 
 /// A canvas, and how it came about.
@@ -83,10 +85,13 @@ impl Sources {
         });
         let dominant = geometry.and_then(|geometry| geometry.prior.guidance.dominant);
         let dominant = dominant.as_ref().map(matrix_from_rows);
-        Self { placed, reference: component.reference, cameras, dominant }
+        let period = geometry.and_then(|geometry| geometry.mesh.period);
+        Self { placed, reference: component.reference, cameras, dominant, period }
     }
 
-    /// What a project knows of the photographs used, whose grids are `placed` in its order.
+    /// What a project knows of the photographs used, whose grids are `placed` in its order: composing from the record starts
+    /// here.
+    #[allow(dead_code)]
     pub fn of_project(placed: Vec<Placed>, reference: usize, project: &Project) -> Self {
         let camera = |(record, placed): (&crate::project::ImageRecord, &Placed)| {
             let camera_from_level = record.upright_rotation.or(record.rotation)?;
@@ -95,7 +100,8 @@ impl Sources {
         };
         let cameras = project.used_images().zip(&placed).map(camera).collect();
         let dominant = project.manhattan.dominant.as_ref().filter(|_| project.manhattan.accepted);
-        Self { placed, reference, cameras, dominant: dominant.map(matrix_from_rows) }
+        let period = project.grid_canvas().period();
+        Self { placed, reference, cameras, dominant: dominant.map(matrix_from_rows), period }
     }
 }
 
@@ -105,7 +111,7 @@ impl Sources {
 /// Those of the layout; [`Error::NotApplicable`] if a projection is asked for and no cameras are known;
 /// [`Error::Unsolvable`] if nothing lies in the view.
 pub(crate) fn run(sources: Sources, options: &StitchOptions, context: &StageContext) -> Result<Arrangement> {
-    let Sources { placed, reference, cameras, dominant } = sources;
+    let Sources { placed, reference, cameras, dominant, period } = sources;
     let wanted = options.projection.kind;
     let Some(cameras) = cameras.filter(|_| wanted != Projection::Mesh) else {
         if !matches!(wanted, Projection::Mesh | Projection::Auto) {
@@ -115,12 +121,12 @@ pub(crate) fn run(sources: Sources, options: &StitchOptions, context: &StageCont
                 "Stitch at least two overlapping photographs, or leave the projection to mesh.",
             ));
         }
-        let plane = layout::run(placed, reference, &options.canvas, context)?;
+        let plane = layout::run_around(placed, reference, period, &options.canvas, context)?;
         let (written, plane_shift) = framed(plane.clone(), options);
         return Ok(Arrangement { plane, plane_shift, written, projection: None });
     };
     // This canvas is never drawn, so that its size is nobody's concern.
-    let plane = layout::run(placed, reference, &options.canvas, &StageContext::default())?;
+    let plane = layout::run_around(placed, reference, period, &options.canvas, &StageContext::default())?;
     let shots: Vec<Shot> = cameras
         .iter()
         .zip(&plane.placed)
@@ -144,18 +150,22 @@ fn draw(
     context: &StageContext,
 ) -> Result<CanvasLayout> {
     let max_parallax = options.projection.max_parallax_deg.to_radians();
-    let meetings = projection::meeting(shots, None, max_parallax);
+    let meetings = projection::meeting(shots, plane.period.map(|period| period as f64), max_parallax);
     context.check_cancelled()?;
     // The reference keeps its own pixels in the middle of the projection.
     let canvas_from_plane = options.canvas.scale * shots[reference].camera.focal_px;
-    let placement = Placement { view, canvas_from_plane, closed: false };
+    let placement = Placement { view, canvas_from_plane, closed: view.closed };
     let placed = projection::place(shots, &meetings, &placement)
         .into_iter()
         .map(|grid| Placed { photograph: plane.placed[grid.shot].photograph, mesh: grid.mesh })
         .collect();
     context.check_cancelled()?;
     let reach = view.flat.reach(view.half);
-    let frame = Frame { canvas_from_target: canvas_from_plane, window: Some([-reach, reach]) };
+    let frame = Frame {
+        canvas_from_target: canvas_from_plane,
+        window: Some([-reach, reach]),
+        period: view.flat.period().filter(|_| view.closed),
+    };
     layout::framed(placed, &frame, &options.canvas, context)
 }
 
@@ -245,7 +255,10 @@ fn sphere(view: &View, written: &CanvasLayout) -> Option<SphericalFrame> {
     let whole = |length: f64, start: usize, own: usize| (length.round() as usize).max(start + own);
     let start = |at: f64| (at * scale).round().max(0.0) as usize;
     let left = start(x + PI);
-    let full_width = whole(TAU * scale, left, written.width);
+    let full_width = match written.period {
+        Some(period) => period,
+        None => whole(TAU * scale, left, written.width),
+    };
     let (projection, top, full_height) = match view.flat.kind {
         FlatKind::Equirectangular => {
             let top = start(y + PI / 2.0);
@@ -260,4 +273,55 @@ fn sphere(view: &View, written: &CanvasLayout) -> Option<SphericalFrame> {
         _ => return None,
     };
     Some(SphericalFrame { projection, full_width, full_height, left, top, middle_yaw: view.yaw })
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_align::projection::Flat;
+
+    use super::*;
+
+    fn view(kind: FlatKind) -> View {
+        let flat = Flat { kind, panini_distance: 1.0 };
+        View { flat, yaw: 0.25, pitch: 0.0, roll: 0.0, half: kind.comfortable(), closed: false }
+    }
+
+    fn canvas(width: usize, height: usize, origin: [f64; 2]) -> CanvasLayout {
+        CanvasLayout { width, height, canvas_from_target: 1000.0, origin, placed: Vec::new(), period: None }
+    }
+
+    /// 1000 pixels a radian: the whole is 6283 x 3142 pixels, its middle at (3141.6, 1570.8); the canvas begins half a radian
+    /// left of it and 0.2 radians above the horizon.
+    #[test]
+    fn a_cropped_panorama_knows_its_place_on_the_sphere() {
+        let frame = sphere(&view(FlatKind::Equirectangular), &canvas(1200, 700, [-0.5, -0.2])).expect("a sphere");
+        assert_eq!((frame.full_width, frame.full_height, frame.left, frame.top), (6283, 3142, 2642, 1371));
+        assert!(frame.holds(1200, 700) && frame.middle_yaw == 0.25);
+        // The cylinder reaches 0.5 below the horizon, and as much above it in the whole.
+        let frame = sphere(&view(FlatKind::Cylindrical), &canvas(1200, 700, [-0.5, -0.2])).expect("a cylinder");
+        assert_eq!((frame.full_height, frame.top), (1000, 300));
+        assert!(sphere(&view(FlatKind::Panini), &canvas(10, 10, [0.0; 2])).is_none());
+        // What rounding adds at the end is part of the whole.
+        let ending = sphere(&view(FlatKind::Equirectangular), &canvas(6284, 3143, [-std::f64::consts::PI, -1.5708]));
+        assert!(ending.expect("a sphere").holds(6284, 3143));
+    }
+
+    #[test]
+    fn a_single_photograph_has_no_projection() {
+        let mesh = GridMesh::regular(40.0, 30.0, 40.0);
+        let sources = |period| Sources {
+            placed: vec![Placed { photograph: 0, mesh: mesh.clone() }],
+            reference: 0,
+            cameras: None,
+            dominant: None,
+            period,
+        };
+        let mut options = StitchOptions::default();
+        options.projection.kind = Projection::Perspective;
+        let refused = run(sources(None), &options, &StageContext::default()).expect_err("no camera");
+        assert!(matches!(refused, Error::NotApplicable { .. }), "{refused}");
+        options.projection.kind = Projection::Auto;
+        let kept = run(sources(None), &options, &StageContext::default()).expect("as it is");
+        assert_eq!((kept.written.width, kept.written.height, kept.projection), (40, 30, None));
+    }
 }

@@ -134,6 +134,17 @@ pub struct Canvas {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
+    /// Whether it goes all the way round and its ends meet: columns are then meant modulo the width, and vertices may lie
+    /// beyond either end.
+    #[serde(default)]
+    pub full_turn: bool,
+}
+
+impl Canvas {
+    /// Columns after which the panorama repeats; `None` if it does not.
+    pub fn period(&self) -> Option<f64> {
+        self.full_turn.then_some(self.width as f64)
+    }
 }
 
 /// The record of one panorama.
@@ -168,6 +179,9 @@ pub struct Project {
     /// projections.
     #[serde(default)]
     pub projection: Option<ProjectionRecord>,
+    /// The canvas of the plane in which the grids lie, where that is not the panorama's: with a projection.
+    #[serde(default)]
+    pub mesh_canvas: Option<Canvas>,
     /// Wall seconds per stage.
     pub seconds: BTreeMap<String, f64>,
     /// What was found on the way.
@@ -188,6 +202,11 @@ impl ImageRecord {
 }
 
 impl Project {
+    /// The canvas that the grids of the photographs lie on.
+    pub fn grid_canvas(&self) -> Canvas {
+        self.mesh_canvas.unwrap_or(self.canvas)
+    }
+
     /// The photographs in the panorama, in the order given.
     pub fn used_images(&self) -> impl Iterator<Item = &ImageRecord> {
         self.images.iter().filter(|image| image.status == ImageStatus::Used)

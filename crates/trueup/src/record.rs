@@ -1,7 +1,7 @@
 //! Fills the project: what is recorded of photographs, pairs and geometry.
 
 use trueup_compose::exposure::Correction;
-use trueup_compose::layout::Placed;
+use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_core::geometry::{matrix_from_rows, rows_of};
 use trueup_core::mesh::GridMesh;
 
@@ -71,9 +71,10 @@ impl Matched {
                 inliers: Vec::new(),
             },
             measures: None,
-            canvas: Canvas { width: 0, height: 0 },
+            canvas: Canvas { width: 0, height: 0, full_turn: false },
             colour_space: String::new(),
             projection: None,
+            mesh_canvas: None,
             seconds: std::collections::BTreeMap::new(),
             diagnostics: Vec::new(),
         }
@@ -123,7 +124,13 @@ pub(crate) fn fill_geometry(
     arrangement: &Arrangement,
     corrections: &[Correction],
 ) {
-    project.canvas = Canvas { width: arrangement.written.width, height: arrangement.written.height };
+    let canvas = |layout: &CanvasLayout| Canvas {
+        width: layout.width,
+        height: layout.height,
+        full_turn: layout.period.is_some(),
+    };
+    project.canvas = canvas(&arrangement.written);
+    project.mesh_canvas = arrangement.projection.map(|_| canvas(&arrangement.plane));
     project.projection = arrangement.projection;
     project.reference = component.images[component.reference].path.display().to_string();
     let method = project.options.stitch.method;

@@ -259,12 +259,12 @@ impl<'a> Stitcher<'a> {
                 render::layer(layout, &alignment.corrections, position, photographs, &self.options.render)
             })
             .collect::<Result<Vec<_>>>()?;
-        let size = [layout.width, layout.height];
+        let (size, around) = ([layout.width, layout.height], layout.period.is_some());
         let shown = match panorama.seams() {
             Some(seams) => seams.on_canvas(size),
-            None => fidelity::deepest(&layers, size)?,
+            None => fidelity::deepest(&layers, size, around)?,
         };
-        fidelity::measure(panorama, &layers, &shown)
+        fidelity::measure(panorama, &layers, &shown, around)
     }
 
     fn check_any(&self, sources: &Sources, inputs: &Inputs) -> Result<()> {

@@ -67,11 +67,11 @@ struct Sight {
     trust: f64,
 }
 
-/// How far the mesh of a photograph is believed that reaches this far from the horizon (radians): the mesh's sphere is unrolled up
-/// to 70 degrees.
+/// How far the mesh of a photograph is believed that reaches this far from the horizon (radians). The mesh's sphere is unrolled up
+/// to 70 degrees, and what lies beyond pulls at its neighbours.
 fn trust(steepest: f64) -> f64 {
-    const WHOLE_DEG: f64 = 65.0;
-    const NONE_DEG: f64 = 75.0;
+    const WHOLE_DEG: f64 = 55.0;
+    const NONE_DEG: f64 = 65.0;
     ((NONE_DEG - steepest.to_degrees()) / (NONE_DEG - WHOLE_DEG)).clamp(0.0, 1.0)
 }
 

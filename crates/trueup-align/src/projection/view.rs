@@ -60,8 +60,7 @@ impl View {
         };
         let [width, height] = kind.comfortable();
         let width = if options.fov > 0.0 { 0.5 * options.fov.to_radians() } else { width };
-        let upright = options.pitch == 0.0 && options.roll == 0.0;
-        let closed = kind.turns() && coverage.is_full_turn() && upright && width >= std::f64::consts::PI;
+        let closed = kind.turns() && coverage.is_full_turn() && width >= std::f64::consts::PI;
         Self { flat, yaw: wrap_angle(straight + yaw), pitch: level + pitch, roll, half: [width, height], closed }
     }
 

@@ -5,7 +5,8 @@ use trueup_core::Result;
 
 use super::bases::{Base, Bases};
 use super::pyramid::{LEAST_SHARE, Plane, add_base, add_detail, collapse};
-use crate::seam::{NOBODY, Seams};
+use super::unrolled::Unrolled;
+use crate::seam::{Label, NOBODY, Seams};
 
 /// Log2 of the canvas pixels per sample of the finest level that is blended as a whole, on a canvas of this size; at least
 /// [`LEAST_FIRST_LEVEL`]. It follows from the canvas alone, so that the memory there is does not show in the panorama.
@@ -27,10 +28,10 @@ const LABELS_PER_SAMPLE: usize = 4;
 pub(super) fn blend(
     bases: &Bases,
     seams: &Seams,
-    canvas: [usize; 2],
+    unrolled: &Unrolled<'_>,
     (first_level, levels): (u32, u32),
 ) -> Result<Plane<[f32; 4]>> {
-    let size = |level: u32| canvas.map(|length| length.div_ceil(1 << (first_level + level)));
+    let size = |level: u32| unrolled.canvas().map(|length| length.div_ceil(1 << (first_level + level)));
     let mut sums: Vec<Plane<[f32; 4]>> = (0..=levels)
         .map(|level| {
             let [width, height] = size(level);
@@ -44,7 +45,7 @@ pub(super) fn blend(
             .into_par_iter()
             .map(|label| {
                 let base = bases.read(label)?;
-                let mask = mask(&base, label, seams, (canvas, first_level));
+                let mask = mask(&base, label, seams, (unrolled, first_level));
                 Ok(pyramid(base.into_owned(), mask, levels))
             })
             .collect::<Result<_>>()?;
@@ -78,11 +79,12 @@ fn pyramid(base: Base, mask: Plane<f32>, levels: u32) -> Levels {
     pyramid
 }
 
-/// The share of every sample's surroundings that shows photograph `label`.
-fn mask(base: &Base, label: usize, seams: &Seams, (canvas, first_level): ([usize; 2], u32)) -> Plane<f32> {
+/// The share of every sample's surroundings that shows the photograph of a placement.
+fn mask(base: &Base, placement: usize, seams: &Seams, (unrolled, first_level): (&Unrolled<'_>, u32)) -> Plane<f32> {
+    let label = unrolled.label(placement as Label);
     let mut mask: Plane<f32> = Plane::new(base.plane.columns.clone(), base.plane.rows.clone());
     let step = (1 << first_level) / LABELS_PER_SAMPLE;
-    let points = canvas.map(|length| length.div_ceil(step));
+    let down = unrolled.canvas()[1].div_ceil(step);
     let share = 1.0 / (LABELS_PER_SAMPLE * LABELS_PER_SAMPLE) as f32;
     let mut labels = Vec::new();
     // The sample's own place is its middle: half of the points lie before it.
@@ -91,16 +93,16 @@ fn mask(base: &Base, label: usize, seams: &Seams, (canvas, first_level): ([usize
         let columns = mask.columns.clone();
         let row = mask.row_mut(y);
         for v in y * LABELS_PER_SAMPLE..(y + 1) * LABELS_PER_SAMPLE {
-            let v = v.saturating_sub(before).min(points[1] - 1);
+            let v = v.saturating_sub(before).min(down - 1);
             let across = columns.start * LABELS_PER_SAMPLE..columns.end * LABELS_PER_SAMPLE;
             let shifted = across.start.saturating_sub(before)..across.end;
             let lead = shifted.start + before - across.start;
-            seams.row(v, &shifted, points, &mut labels);
+            unrolled.labels(seams, (v, &shifted), step, &mut labels);
             for (x, weight) in row.iter_mut().enumerate() {
                 for point in 0..LABELS_PER_SAMPLE {
                     let at = (x * LABELS_PER_SAMPLE + point).saturating_sub(lead);
                     let shown = labels[at.min(labels.len() - 1)];
-                    if shown != NOBODY && usize::from(shown) == label {
+                    if shown != NOBODY && shown == label {
                         *weight += share;
                     }
                 }

@@ -16,6 +16,7 @@ mod order;
 mod pyramid;
 mod shelf;
 mod tile;
+mod unrolled;
 mod views;
 
 use std::ops::Range;
@@ -38,6 +39,7 @@ pub(crate) use needs::needed_bytes;
 use pyramid::Plane;
 use shelf::{Shelf, Supply};
 use tile::Tile;
+use unrolled::Unrolled;
 
 /// A finished pixel: square roots of linear light and alpha, 65535 is 1.
 pub(crate) type Finished = [u16; 4];
@@ -61,8 +63,13 @@ struct Levels {
 
 impl Levels {
     /// Blends from `first_level` on and at so many `levels` above it.
-    fn new(mut bases: Bases, seams: &Seams, canvas: [usize; 2], (first_level, levels): (u32, u32)) -> Result<Self> {
-        let blended = coarse::blend(&bases, seams, canvas, (first_level, levels))?;
+    fn new(
+        mut bases: Bases,
+        seams: &Seams,
+        unrolled: &Unrolled<'_>,
+        (first_level, levels): (u32, u32),
+    ) -> Result<Self> {
+        let blended = coarse::blend(&bases, seams, unrolled, (first_level, levels))?;
         bases.level_all();
         Ok(Self { blended, bases })
     }
@@ -72,7 +79,7 @@ impl Levels {
 struct Work<'a> {
     options: &'a RenderOptions,
     seams: &'a Seams,
-    canvas: [usize; 2],
+    unrolled: &'a Unrolled<'a>,
     /// Log2 of the pixels per sample of the first level that is blended as a whole.
     first_level: u32,
     /// `None` to cut without blending.
@@ -96,30 +103,36 @@ pub(crate) fn run(
 ) -> Result<Blended> {
     let stage = RenderOptions::STAGE;
     let count = layout.placed.len();
-    let canvas = [layout.width, layout.height];
-    let first_level = first_level(canvas);
-    // Small pictures, seams, and the photographs themselves.
-    context.progress().begin(stage, 2 * count as u64);
+    let first_level = first_level([layout.width, layout.height]);
     let levels = if cut || count == 1 { None } else { Some(levels_above(layout, options)) };
-    let views::Small { views, size, bases, kept, bytes } = views::make(
-        layout,
+    let unrolled = Unrolled::new(layout, first_level, levels)?;
+    let placements = unrolled.placed().len();
+    // Small pictures, and the photographs themselves wherever they are placed.
+    context.progress().begin(stage, (count + placements) as u64);
+    let views::Small { views, size, bases, mut kept, bytes } = views::make(
+        &unrolled,
         corrections,
         photographs,
-        options,
-        seam_options,
+        (options, seam_options),
         (levels.map(|_| first_level), plan),
         context,
     )?;
-    let seams =
-        if count == 1 { Seams::of_one(size[0], size[1]) } else { seam::run(views, size, seam_options, context)? };
-    let levels = levels.map(|levels| Levels::new(bases, &seams, canvas, (first_level, levels))).transpose()?;
-    let mut work = Work { options, seams: &seams, canvas, first_level, levels };
+    let around = layout.period.is_some();
+    let seams = match count {
+        1 => Seams::of_one(size[0], size[1]),
+        _ => seam::run(views, size, around, seam_options, context)?,
+    };
+    let levels = levels.map(|levels| Levels::new(bases, &seams, &unrolled, (first_level, levels))).transpose()?;
+    let mut work = Work { options, seams: &seams, unrolled: &unrolled, first_level, levels };
 
+    let bytes: Vec<usize> = (0..placements).map(|at| bytes[unrolled.original(at)]).collect();
+    // Of several placements, the first takes what was kept.
+    let kept = (0..placements).map(|at| kept[unrolled.original(at)].take()).collect();
     let batches = order::batches(&work, &bytes, plan.photographs)?;
     let curve = photographs.transfer_curve();
-    let supply = Supply { layout, curve: &curve, corrections, photographs, options, context };
+    let supply = Supply { unrolled: &unrolled, curve: &curve, corrections, photographs, options, context };
     let mut shelf = Shelf::new(supply, kept, &batches, plan.photographs, plan.at_a_time);
-    let mut pixels = plan.store(canvas, [tile_side(first_level); 2]);
+    let mut pixels = plan.store([layout.width, layout.height], [tile_side(first_level); 2]);
     for (index, batch) in batches.iter().enumerate() {
         shelf.prepare(index, batch, &bytes)?;
         if let Some(levels) = &mut work.levels {
@@ -133,7 +146,8 @@ pub(crate) fn run(
             let finished: Vec<Vec<Finished>> =
                 tiles.par_iter().map_init(Scratch::default, finish).collect::<Result<_>>()?;
             for (tile, finished) in tiles.iter().zip(finished) {
-                pixels.put(&tile.columns, &tile.rows, &finished)?;
+                let columns = tile.columns.start - unrolled.lead()..tile.columns.end - unrolled.lead();
+                pixels.put(&columns, &tile.rows, &finished)?;
             }
         }
     }
@@ -164,7 +178,7 @@ const MOST_LEVELS: u32 = 12;
 /// The tile of these columns and rows.
 fn tile(work: &Work<'_>, columns: Range<usize>, rows: Range<usize>) -> Tile {
     let (wide, high) = Tile::with_margin(&columns, &rows, work);
-    Tile { shown: work.seams.shown_in(&wide, &high, work.canvas), columns, rows }
+    Tile { shown: work.unrolled.shown_in(work.seams, &wide, &high), columns, rows }
 }
 
 #[cfg(test)]

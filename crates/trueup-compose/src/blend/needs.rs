@@ -1,8 +1,12 @@
 //! How much memory blending takes, before there is anything to blend.
 
+use trueup_core::Result;
+
 use super::coarse::first_level;
-use super::{Finished, TILES_AT_ONCE, bases, tile, tile_side, views};
+use super::unrolled::Unrolled;
+use super::{Finished, TILES_AT_ONCE, bases, levels_above, tile, tile_side, views};
 use crate::layout::CanvasLayout;
+use crate::render::{Blend, RenderOptions};
 use crate::seam::SeamOptions;
 
 /// Bytes of the search for seams per pixel of all small pictures: pixels at all levels, gradients, depths.
@@ -18,14 +22,22 @@ const COARSE_COPIES: f64 = 8.0;
 const TILE_COPIES: f64 = 8.0;
 
 /// Bytes that blending takes beside canvas and photographs; bytes of the photographs' own coarse levels.
-pub(crate) fn needed_bytes(layout: &CanvasLayout, cut: bool, seam_options: &SeamOptions) -> (usize, usize) {
-    let canvas = [layout.width, layout.height];
-    let first_level = first_level(canvas);
+pub(crate) fn needed_bytes(
+    layout: &CanvasLayout,
+    options: &RenderOptions,
+    seam_options: &SeamOptions,
+) -> Result<(usize, usize)> {
+    let cut = options.blend == Blend::None;
+    let several = layout.placed.len() > 1;
+    let first_level = first_level([layout.width, layout.height]);
+    let levels = if cut || !several { None } else { Some(levels_above(layout, options)) };
+    let unrolled = Unrolled::new(layout, first_level, levels)?;
+    let canvas = unrolled.canvas();
     let threads = rayon::current_num_threads().max(1) as f64;
     let sample = bases::SAMPLE_BYTES as f64;
     // Every photograph's box on the canvas, at a scale and with so many pixels on all sides.
     let boxes = |scale: f64, rim: f64| {
-        layout.placed.iter().map(move |placed| {
+        unrolled.placed().iter().map(move |placed| {
             let (low, high) = placed.mesh.bounds();
             let side = |axis: usize| {
                 let whole = canvas[axis] as f64;
@@ -35,9 +47,9 @@ pub(crate) fn needed_bytes(layout: &CanvasLayout, cut: bool, seam_options: &Seam
         })
     };
     let largest = |areas: &[f64]| areas.iter().copied().fold(0.0, f64::max);
-    let small = views::small_size(canvas, seam_options.fine_pixels).map(|length| length as f64);
-    let views: Vec<f64> = boxes(small[0] / canvas[0] as f64, 1.0).collect();
-    let several = layout.placed.len() > 1;
+    let small = views::small_size([layout.width, layout.height], layout.period.is_some(), seam_options)
+        .map(|length| length as f64);
+    let views: Vec<f64> = boxes(small[0] / layout.width as f64, 1.0).collect();
     let searching =
         SEARCH_VIEW * views.iter().sum::<f64>() + SEARCH_CANVAS * small[0] * small[1] + SEARCH_CUT * largest(&views);
     // The grown box at the sampled level has two of its samples for each of the first.
@@ -52,5 +64,5 @@ pub(crate) fn needed_bytes(layout: &CanvasLayout, cut: bool, seam_options: &Seam
     let working = if several { searching.max(coarse).max(tiles) } else { tiles - sample * whole };
     let bases = if cut || !several { 0.0 } else { sample * bases.iter().sum::<f64>() };
     // The casts saturate.
-    (working as usize, bases as usize)
+    Ok((working as usize, bases as usize))
 }

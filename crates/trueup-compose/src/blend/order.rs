@@ -26,12 +26,13 @@ pub(super) struct Batch {
 /// # Errors
 /// [`Error::Limits`] if a single tile is made of more.
 pub(super) fn batches(work: &Work<'_>, bytes: &[usize], room: usize) -> Result<Vec<Batch>> {
-    let [width, height] = work.canvas;
+    let [width, height] = work.unrolled.finished();
     let side = tile_side(work.first_level);
-    let cut = |length: usize| -> Vec<Range<usize>> {
-        (0..length).step_by(side).map(|start| start..(start + side).min(length)).collect()
+    let cut = |first: usize, length: usize| -> Vec<Range<usize>> {
+        let end = first + length;
+        (first..end).step_by(side).map(|start| start..(start + side).min(end)).collect()
     };
-    let (columns, rows) = (cut(width), cut(height));
+    let (columns, rows) = (cut(work.unrolled.lead(), width), cut(0, height));
     let tiles: Vec<Tile> = (0..rows.len() * columns.len())
         .into_par_iter()
         .map(|at| tile(work, columns[at % columns.len()].clone(), rows[at / columns.len()].clone()))

@@ -10,8 +10,8 @@ use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 
 use super::order::Batch;
+use super::unrolled::Unrolled;
 use crate::exposure::Correction;
-use crate::layout::CanvasLayout;
 use crate::render::RenderOptions;
 use crate::render::prepared::{Prepared, check_photograph};
 use crate::seam::Label;
@@ -19,7 +19,7 @@ use crate::seam::Label;
 /// What photographs are made ready from.
 #[derive(Clone, Copy)]
 pub(super) struct Supply<'a> {
-    pub(super) layout: &'a CanvasLayout,
+    pub(super) unrolled: &'a Unrolled<'a>,
     pub(super) curve: &'a TransferCurve,
     pub(super) corrections: &'a [Correction],
     pub(super) photographs: &'a dyn PhotographSource,
@@ -124,18 +124,18 @@ impl<'a> Supply<'a> {
     /// Photograph `at`, decoded unless it was kept.
     fn ready(&self, at: usize, kept: Option<Photograph>) -> Result<Prepared<'a>> {
         self.context.check_cancelled()?;
-        let placed = &self.layout.placed[at];
+        let placed = &self.unrolled.placed()[at];
         let photograph = match kept {
             Some(photograph) => photograph,
             None => self.photographs.photograph(placed.photograph)?,
         };
         check_photograph(placed, &photograph)?;
-        let canvas = [self.layout.width, self.layout.height];
+        let correction = &self.corrections[self.unrolled.original(at)];
         Ok(Prepared::new(
             Cow::Owned(photograph),
             &placed.mesh,
-            canvas,
-            (self.curve, &self.corrections[at]),
+            self.unrolled.canvas(),
+            (self.curve, correction),
             self.options,
         ))
     }

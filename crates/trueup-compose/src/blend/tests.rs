@@ -41,7 +41,7 @@ fn layout(lefts: &[usize]) -> CanvasLayout {
         })
         .collect();
     let width = WIDTH + lefts.iter().copied().max().unwrap_or(0);
-    CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, origin: [0.0; 2], placed }
+    CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, origin: [0.0; 2], placed, period: None }
 }
 
 fn composed(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Vec<Finished> {
@@ -50,7 +50,7 @@ fn composed(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOp
     let context = StageContext::default();
     let cut = options.blend == Blend::None;
     let memory = Memory(pictures);
-    let plan = Plan::new(layout, &memory, options.blend, &seam_options, &Resources::unlimited()).expect("no limit");
+    let plan = Plan::new(layout, &memory, options, &seam_options, &Resources::unlimited()).expect("no limit");
     let blended = run(layout, &corrections, &memory, (options, &seam_options), (cut, &plan), &context);
     let Store::Memory { pixels, .. } = blended.expect("renders").pixels else { panic!("there is no limit") };
     pixels
@@ -126,14 +126,15 @@ fn with_work<T>(lefts: &[usize], first_level: u32, test: impl FnOnce(&Work<'_>, 
     let (options, seam_options) = (RenderOptions::default(), SeamOptions::default());
     let context = StageContext::default();
     let memory = Memory(pictures.clone());
-    let plan = Plan::new(&layout, &memory, Blend::MultiBand, &seam_options, &Resources::unlimited()).expect("no limit");
+    let plan = Plan::new(&layout, &memory, &options, &seam_options, &Resources::unlimited()).expect("no limit");
+    let unrolled = Unrolled::new(&layout, first_level, Some(2)).expect("few");
     let small =
-        views::make(&layout, &corrections, &memory, &options, &seam_options, (Some(first_level), &plan), &context);
+        views::make(&unrolled, &corrections, &memory, (&options, &seam_options), (Some(first_level), &plan), &context);
     let small = small.expect("small");
-    let seams = seam::run(small.views, small.size, &seam_options, &context).expect("seams");
+    let seams = seam::run(small.views, small.size, false, &seam_options, &context).expect("seams");
     let canvas = [layout.width, layout.height];
-    let levels = Some(Levels::new(small.bases, &seams, canvas, (first_level, 2)).expect("in memory"));
-    let work = Work { options: &options, seams: &seams, canvas, first_level, levels };
+    let levels = Some(Levels::new(small.bases, &seams, &unrolled, (first_level, 2)).expect("in memory"));
+    let work = Work { options: &options, seams: &seams, unrolled: &unrolled, first_level, levels };
     let prepared: Vec<Option<Prepared<'_>>> = pictures
         .into_iter()
         .zip(&layout.placed)
@@ -169,7 +170,7 @@ fn tiles_of_any_size_give_the_same_bits_as_the_whole() {
 }
 
 fn assert_that_tiles_give_the_whole(work: &Work<'_>, pictures: &[Option<Prepared<'_>>]) {
-    let [width, height] = work.canvas;
+    let [width, height] = work.unrolled.canvas();
     let whole = blended(work, pictures, 0..width, 0..height);
     for side in [2, 5, 8, 16].map(|samples| samples << work.first_level) {
         for top in (0..height).step_by(side) {
@@ -197,7 +198,7 @@ fn the_level_that_is_blended_as_a_whole_follows_from_the_canvas() {
 fn a_tile_of_one_photograph_is_what_blending_would_give() {
     with_work(&[0, 60, 130], 3, |work, pictures| {
         let mut compared = 0;
-        for left in (0..work.canvas[0] - 24).step_by(8) {
+        for left in (0..work.unrolled.canvas()[0] - 24).step_by(8) {
             let tile = tile(work, left..left + 24, 40..64);
             if tile.shown.len() == 1 {
                 let fast = tile.finish(work, pictures, &mut Scratch::default());

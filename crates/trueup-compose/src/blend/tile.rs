@@ -20,7 +20,7 @@ pub(super) const fn margin(first_level: u32) -> usize {
 pub(super) struct Tile {
     pub(super) columns: Range<usize>,
     pub(super) rows: Range<usize>,
-    /// The photographs it is made of.
+    /// The placements of photographs it is made of.
     pub(super) shown: Vec<Label>,
 }
 
@@ -34,7 +34,8 @@ impl Tile {
         let margin = margin(work.first_level);
         let grown =
             |range: &Range<usize>, length: usize| range.start.saturating_sub(margin)..(range.end + margin).min(length);
-        (grown(columns, work.canvas[0]), grown(rows, work.canvas[1]))
+        let [width, height] = work.unrolled.canvas();
+        (grown(columns, width), grown(rows, height))
     }
 
     /// The finished pixels, row by row.
@@ -129,11 +130,11 @@ impl Tile {
             let mut pixels = vec![[0.0; 4]; out.len()];
             picture.sample(self.window(&self.columns, &self.rows), &mut pixels, work.options, scratch);
             for (row, y) in self.rows.clone().enumerate() {
-                work.seams.row(y, &self.columns, work.canvas, &mut labels);
+                work.unrolled.labels(work.seams, (y, &self.columns), 1, &mut labels);
                 for (x, own) in labels.iter().enumerate() {
                     let at = row * width + x;
                     // Where the owner covers nothing, whoever covers most.
-                    let claim = pixels[at][3] * if own == label { 2.0 } else { 1.0 };
+                    let claim = pixels[at][3] * if *own == work.unrolled.label(*label) { 2.0 } else { 1.0 };
                     if claim > taken[at] {
                         taken[at] = claim;
                         out[at] = finished(pixels[at], [0.0; 3]);
@@ -207,10 +208,11 @@ impl Tile {
         let mut masks: Vec<Plane<f32>> = shown.iter().map(|_| Plane::new(columns.clone(), rows.clone())).collect();
         let mut labels = Vec::new();
         for y in rows.clone() {
-            work.seams.row(y, columns, work.canvas, &mut labels);
-            for (mask, (label, _)) in masks.iter_mut().zip(shown) {
+            work.unrolled.labels(work.seams, (y, columns), 1, &mut labels);
+            for (mask, (placement, _)) in masks.iter_mut().zip(shown) {
+                let label = work.unrolled.label(*placement);
                 for (weight, own) in mask.row_mut(y).iter_mut().zip(&labels) {
-                    *weight = if own == label && own != &NOBODY { 1.0 } else { 0.0 };
+                    *weight = if *own == label && *own != NOBODY { 1.0 } else { 0.0 };
                 }
             }
         }

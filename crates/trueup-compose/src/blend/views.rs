@@ -14,12 +14,13 @@ use trueup_core::{Result, StageContext};
 use super::bases::{Base, Bases};
 use super::coarse::{self, SAMPLED_BELOW};
 use super::pyramid::Plane;
+use super::unrolled::Unrolled;
 use crate::exposure::Correction;
-use crate::layout::{CanvasLayout, Placed};
+use crate::layout::{Placed, TURNS, columns_around};
 use crate::render::plan::Plan;
 use crate::render::prepared::{Prepared, Scratch, Window, check_photograph};
 use crate::render::{Interpolation, RenderOptions};
-use crate::seam::{CLIPPED, PARTLY, SeamOptions, View, WHOLLY};
+use crate::seam::{CLIPPED, PARTLY, SeamOptions, View, ViewPixel, WHOLLY};
 use crate::weights::WHOLE;
 
 /// What the first pass makes.
@@ -41,17 +42,19 @@ const SATURATED: f32 = 252.0;
 
 /// Reads every photograph once; `first_level` is that of the coarse levels, if there are to be any.
 pub(super) fn make(
-    layout: &CanvasLayout,
+    unrolled: &Unrolled<'_>,
     corrections: &[Correction],
     photographs: &dyn PhotographSource,
-    options: &RenderOptions,
-    seam_options: &SeamOptions,
+    (options, seam_options): (&RenderOptions, &SeamOptions),
     (first_level, plan): (Option<u32>, &Plan),
     context: &StageContext,
 ) -> Result<Small> {
+    let layout = unrolled.original_layout();
     let canvas = [layout.width, layout.height];
     let curve = photographs.transfer_curve();
-    let size = small_size(canvas, seam_options.fine_pixels);
+    let size = small_size(canvas, layout.period.is_some(), seam_options);
+    let period = layout.period.map(|_| size[0]);
+    let clip = [size[0] * if period.is_some() { TURNS } else { 1 }, size[1]];
     let bases = Bases::new(plan.bases.clone());
     let mut small = Small { views: Vec::new(), size, bases, kept: Vec::new(), bytes: Vec::new() };
     // Halved as often as can be, then read between samples: nothing here is ever looked at.
@@ -60,31 +63,40 @@ pub(super) fn make(
     let sampling = RenderOptions { minification_threshold: 4.0, ..halving.clone() };
     let mut room = plan.photographs;
     let at_a_time = plan.at_a_time;
-    for (placed, corrections) in layout.placed.chunks(at_a_time).zip(corrections.chunks(at_a_time)) {
+    for (chunk, (placed, corrections)) in layout.placed.chunks(at_a_time).zip(corrections.chunks(at_a_time)).enumerate()
+    {
         context.check_cancelled()?;
-        let made: Vec<(View, Base, Photograph)> = placed
+        let made: Vec<(View, Vec<Base>, Photograph)> = placed
             .par_iter()
             .zip(corrections)
-            .map(|(placed, correction)| {
+            .enumerate()
+            .map(|(index, (placed, correction))| {
                 let photograph = photographs.photograph(placed.photograph)?;
                 check_photograph(placed, &photograph)?;
                 // The larger picture first: the smaller is made from what is left of the photograph then.
-                let mesh = scaled(&placed.mesh, [0, 1].map(|axis| size[axis] as f64 / canvas[axis] as f64), 0.0);
-                let prepared = Prepared::new(Cow::Borrowed(&photograph), &mesh, size, (&curve, correction), &halving);
-                let view = if layout.placed.len() == 1 { View::default() } else { view(&prepared, &sampling) };
-                let base = match first_level {
+                let first = placed.in_first_turn(layout.period);
+                let mesh = scaled(&first.mesh, [0, 1].map(|axis| size[axis] as f64 / canvas[axis] as f64), 0.0);
+                let prepared = Prepared::new(Cow::Borrowed(&photograph), &mesh, clip, (&curve, correction), &halving);
+                let view = match layout.placed.len() {
+                    1 => View::default(),
+                    _ => view(&prepared, period, &sampling),
+                };
+                let placements = unrolled.placements(chunk * at_a_time + index);
+                let base = |placement: usize| match first_level {
                     Some(level) => {
+                        let (placed, canvas) = (&unrolled.placed()[placement], unrolled.canvas());
                         base(&prepared, placed, (&curve, correction), (canvas, level), [&halving, &sampling])
                     }
                     None => Base::default(),
                 };
+                let bases = placements.map(base).collect();
                 context.progress().advance(RenderOptions::STAGE, 1);
-                Ok((view, base, photograph))
+                Ok((view, bases, photograph))
             })
             .collect::<Result<_>>()?;
-        for (view, base, photograph) in made {
+        for (view, bases, photograph) in made {
             small.views.push(view);
-            small.bases.push(base)?;
+            bases.into_iter().try_for_each(|base| small.bases.push(base))?;
             let bytes = photograph.bytes();
             let fits = bytes <= room;
             room -= if fits { bytes } else { 0 };
@@ -95,10 +107,16 @@ pub(super) fn make(
     Ok(small)
 }
 
-/// The size of a canvas of at most `pixels` pixels, and at most half of the canvas along each side.
-pub(super) fn small_size(canvas: [usize; 2], pixels: f64) -> [usize; 2] {
+/// The size of a canvas of at most `fine_pixels` pixels, and at most half of the canvas along each side. `around` a
+/// cylinder it can be halved as often as the search for seams wants to.
+pub(super) fn small_size(canvas: [usize; 2], around: bool, options: &SeamOptions) -> [usize; 2] {
+    let pixels = options.fine_pixels;
     let scale = (pixels / (canvas[0] as f64 * canvas[1] as f64)).sqrt().min(0.5);
-    canvas.map(|length| ((length as f64 * scale) as usize).max(1))
+    let size = canvas.map(|length| ((length as f64 * scale) as usize).max(1));
+    let halvings = (pixels / options.coarse_pixels).max(1.0).log2() / 2.0;
+    // The cast saturates.
+    let unit = 1_usize << (halvings.ceil() as u32).min(size[0].ilog2());
+    if around { [size[0] / unit * unit, size[1]] } else { size }
 }
 
 /// The grid with its targets scaled by `scale` and then moved by `shift`.
@@ -110,8 +128,10 @@ fn scaled(mesh: &GridMesh, scale: [f64; 2], shift: f64) -> GridMesh {
     mesh
 }
 
-fn view(prepared: &Prepared<'_>, options: &RenderOptions) -> View {
-    let (columns, rows) = (prepared.columns(), prepared.rows());
+/// `period` is the width of the small canvas if it is a cylinder.
+fn view(prepared: &Prepared<'_>, period: Option<usize>, options: &RenderOptions) -> View {
+    let (all, rows) = (prepared.columns(), prepared.rows());
+    let columns = all.start..all.end.min(all.start + period.unwrap_or(all.len()));
     let mut samples = vec![[0.0; 4]; columns.len() * rows.len()];
     let mut clipped = vec![false; samples.len()];
     let window = Window { columns: &columns, rows: &rows };
@@ -120,7 +140,7 @@ fn view(prepared: &Prepared<'_>, options: &RenderOptions) -> View {
             *clipped = sample[..3].iter().any(|&level| level >= SATURATED);
         }
     });
-    let pixels = samples
+    let mut pixels: Vec<ViewPixel> = samples
         .iter()
         .zip(clipped)
         .map(|(&[r, g, b, share], clipped)| {
@@ -132,6 +152,10 @@ fn view(prepared: &Prepared<'_>, options: &RenderOptions) -> View {
             [level(r), level(g), level(b), flags]
         })
         .collect();
+    let (columns, turned) = columns_around(columns, period);
+    if turned > 0 {
+        pixels.chunks_exact_mut(columns.len()).for_each(|row| row.rotate_right(turned));
+    }
     View { columns, rows, pixels }
 }
 

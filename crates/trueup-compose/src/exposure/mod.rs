@@ -145,14 +145,16 @@ pub fn run(
         return Ok(Exposure { corrections: vec![Correction::default(); count], pairs: Vec::new() });
     }
     let scale = sampling_scale(layout, options.samples);
-    let size = [layout.width, layout.height].map(|length| (length as f64 * scale).ceil() as usize);
+    let turn = layout.period.map(|period| (period as f64 * scale).round() as usize);
+    let [width, height] = [layout.width, layout.height].map(|length| (length as f64 * scale).ceil() as usize);
+    let size = [turn.unwrap_or(width), height];
     let patches: Vec<Patch> = layout
         .placed
         .par_iter()
         .zip(thumbnails)
         .map(|(placed, thumbnail)| {
             context.check_cancelled()?;
-            Ok(Patch::new(placed, thumbnail, scale, size, options))
+            Ok(Patch::new(placed, thumbnail, scale, size, layout.period, options))
         })
         .collect::<Result<_>>()?;
     let observed: Vec<Observed> = (0..count)
@@ -160,7 +162,7 @@ pub fn run(
         .map(|first| {
             context.check_cancelled()?;
             Ok((first + 1..count)
-                .filter_map(|second| compare(shared(&patches[first], &patches[second]), first, second, options))
+                .filter_map(|second| compare(shared(&patches[first], &patches[second], turn), first, second, options))
                 .collect::<Vec<_>>())
         })
         .collect::<Result<Vec<_>>>()?
@@ -217,7 +219,10 @@ fn sampling_scale(layout: &CanvasLayout, samples: f64) -> f64 {
     let median = areas.get(areas.len() / 2).copied().unwrap_or(1.0).max(1.0);
     // Coordinates beyond this are no sampling grid any more.
     const MAX_SIDE: f64 = 16_384.0;
-    (samples / median).sqrt().min(1.0).min(MAX_SIDE / layout.width.max(layout.height) as f64)
+    let scale = (samples / median).sqrt().min(1.0).min(MAX_SIDE / layout.width.max(layout.height) as f64);
+    // A turn is a whole number of samples.
+    let whole = |period: usize| (period as f64 * scale).ceil() / period as f64;
+    layout.period.map_or(scale, whole)
 }
 
 /// Compares two photographs by what they share; `None` if that is too little.

@@ -6,7 +6,7 @@ use trueup_core::raster::Raster;
 
 use super::{ExposureOptions, Thumbnail};
 use crate::deformed_grid::{DeformedGrid, Run};
-use crate::layout::Placed;
+use crate::layout::{Placed, TURNS};
 use crate::simd::{Positions, invert_row};
 use crate::transfer_curve::Linearise;
 
@@ -28,6 +28,11 @@ pub(super) struct Shared {
 }
 
 impl Shared {
+    /// The same with the photographs' parts exchanged.
+    fn swapped(self) -> Self {
+        Self { log_ratio: self.log_ratio.map(|ratio| -ratio), radius: [self.radius[1], self.radius[0]] }
+    }
+
     /// The mean over the channels: the ratio of brightness.
     pub(super) fn brightness(&self) -> f32 {
         (self.log_ratio[0] + self.log_ratio[1] + self.log_ratio[2]) / 3.0
@@ -40,8 +45,11 @@ impl Patch {
         thumbnail: &Thumbnail<'_>,
         scale: f64,
         [width, height]: [usize; 2],
+        period: Option<usize>,
         options: &ExposureOptions,
     ) -> Self {
+        let placed = placed.in_first_turn(period);
+        let width = width * if period.is_some() { TURNS } else { 1 };
         let grid = DeformedGrid::new(&placed.mesh, scale, false, width, height);
         let mut footprints: Vec<f64> = grid.cells.iter().map(|cell| cell.footprint[0].min(cell.footprint[1])).collect();
         footprints.sort_by(f64::total_cmp);
@@ -81,13 +89,25 @@ impl Patch {
     }
 }
 
-/// The places where both photographs tell their light.
-pub(super) fn shared(first: &Patch, second: &Patch) -> Vec<Shared> {
-    let (rows, columns) = (intersect(&first.rows, &second.rows), intersect(&first.columns, &second.columns));
+/// The places where both photographs tell their light; on a cylinder of `turn` columns, turns apart, too.
+pub(super) fn shared(first: &Patch, second: &Patch, turn: Option<usize>) -> Vec<Shared> {
+    let Some(turn) = turn else { return shared_ahead(first, second, 0) };
+    // Each begins in the first turn or soon after and may reach some turns on.
+    let ahead = (0..=TURNS).flat_map(|turns| shared_ahead(first, second, turns * turn));
+    let behind =
+        (1..=TURNS).flat_map(|turns| shared_ahead(second, first, turns * turn).into_iter().map(Shared::swapped));
+    ahead.chain(behind).collect()
+}
+
+/// The places where both photographs tell their light if the second is moved to the right by some columns.
+fn shared_ahead(first: &Patch, second: &Patch, by: usize) -> Vec<Shared> {
+    let rows = intersect(&first.rows, &second.rows);
+    let columns = intersect(&first.columns, &(second.columns.start + by..second.columns.end + by));
     if rows.is_empty() || columns.is_empty() {
         return Vec::new();
     }
-    rows.flat_map(|y| first.row(y, &columns).iter().zip(second.row(y, &columns)))
+    let own = columns.start - by..columns.end - by;
+    rows.flat_map(|y| first.row(y, &columns).iter().zip(second.row(y, &own)))
         .map(|(a, b)| Shared { log_ratio: [a[0] - b[0], a[1] - b[1], a[2] - b[2]], radius: [a[3], b[3]] })
         .filter(|shared| shared.log_ratio.iter().all(|ratio| ratio.is_finite()))
         .collect()

@@ -38,7 +38,7 @@ fn layout(shifts: &[f64]) -> CanvasLayout {
         })
         .collect();
     let width = WIDTH + shifts.iter().copied().fold(0.0, f64::max) as usize;
-    CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, origin: [0.0; 2], placed }
+    CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, origin: [0.0; 2], placed, period: None }
 }
 
 fn estimate(shifts: &[f64], rasters: &[Raster<u8>], options: &ExposureOptions) -> Exposure {

@@ -1,6 +1,7 @@
 //! One photograph alone on the canvas: for measuring, and row by row for files.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use trueup_core::Result;
 use trueup_core::colour::TransferCurve;
@@ -11,11 +12,12 @@ use super::prepared::{Prepared, Scratch, Window, check_photograph};
 use super::{BAND_ROWS, RenderOptions, check};
 use crate::deformed_grid::DeformedGrid;
 use crate::exposure::Correction;
-use crate::layout::CanvasLayout;
+use crate::layout::{CanvasLayout, TURNS, columns_around};
 use crate::transfer_curve::{Encode, Encoding};
 use crate::weights::WHOLE;
 
-/// What one photograph shows of the canvas: its bounding box there.
+/// What one photograph shows of the canvas: its bounding box there. On a cylinder it may run past the width into the next
+/// turn, but does not meet itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layer {
     /// First column of the canvas.
@@ -40,10 +42,12 @@ pub fn layer(
     options: &RenderOptions,
 ) -> Result<Layer> {
     let (prepared, curve) = alone(layout, corrections, position, photographs, options)?;
-    let (columns, rows) = (prepared.columns(), prepared.rows());
+    let (all, rows) = (prepared.columns(), prepared.rows());
+    let columns = all.start..all.end.min(all.start + layout.period.unwrap_or(all.len()));
+    let (on_canvas, turned) = columns_around(columns.clone(), layout.period);
     let (width, height) = (columns.len(), rows.len());
     let mut layer = Layer {
-        left: columns.start,
+        left: on_canvas.start,
         top: rows.start,
         gray: Raster::new(width, height, 1),
         covered: Raster::new(width, height, 1),
@@ -66,6 +70,8 @@ pub fn layer(
                     *covered = share >= WHOLE;
                 }
             }
+            layer.gray.row_mut(y - rows.start).rotate_right(turned);
+            layer.covered.row_mut(y - rows.start).rotate_right(turned);
         }
     }
     Ok(layer)
@@ -91,8 +97,19 @@ fn alone(
     check_photograph(placed, &photograph)?;
     let curve = photographs.transfer_curve();
     let light = (&curve, &corrections[position]);
-    let size = [layout.width, layout.height];
-    Ok((Prepared::new(Cow::Owned(photograph), &placed.mesh, size, light, options), curve))
+    let mesh = &placed.in_first_turn(layout.period).mesh;
+    Ok((Prepared::new(Cow::Owned(photograph), mesh, unrolled_size(layout), light, options), curve))
+}
+
+/// The canvas, on a cylinder with the turns that a photograph may reach into.
+fn unrolled_size(layout: &CanvasLayout) -> [usize; 2] {
+    [layout.width * if layout.period.is_some() { TURNS } else { 1 }, layout.height]
+}
+
+/// Columns of the canvas that a box of `columns` takes: all of them if it lies across the ends of a cylinder.
+fn columns_of_box(columns: &Range<usize>, layout: &CanvasLayout) -> Range<usize> {
+    let (around, _) = columns_around(columns.clone(), layout.period);
+    if around.end > layout.width { 0..layout.width } else { around }
 }
 
 /// One photograph alone on the canvas, corrected, with alpha: its bounding box, row by row. Holds the photograph and no
@@ -102,6 +119,9 @@ pub struct LayerRows {
     pub left: usize,
     /// First row of the canvas.
     pub top: usize,
+    width: usize,
+    /// Width of the canvas.
+    turn: usize,
     prepared: Prepared<'static>,
     encoding: Encoding,
     options: RenderOptions,
@@ -130,16 +150,25 @@ pub fn layer_rows(
     if columns.is_empty() || rows.is_empty() {
         return Ok(None);
     }
-    let (left, top) = (columns.start, rows.start);
-    Ok(Some(LayerRows { left, top, prepared, encoding: Encoding::new(curve), options: options.clone() }))
+    let on_canvas = columns_of_box(&columns, layout);
+    Ok(Some(LayerRows {
+        left: on_canvas.start,
+        top: rows.start,
+        width: on_canvas.len(),
+        turn: layout.width,
+        prepared,
+        encoding: Encoding::new(curve),
+        options: options.clone(),
+    }))
 }
 
 /// Width and height of the box of photograph `layout.placed[position]` on the canvas, in pixels; 0 if there is no such
 /// position.
 pub fn layer_size(layout: &CanvasLayout, position: usize) -> [usize; 2] {
     let Some(placed) = layout.placed.get(position) else { return [0, 0] };
-    let grid = DeformedGrid::new(&placed.mesh, 1.0, true, layout.width, layout.height);
-    [grid.columns.len(), grid.rows.len()]
+    let [width, height] = unrolled_size(layout);
+    let grid = DeformedGrid::new(&placed.in_first_turn(layout.period).mesh, 1.0, true, width, height);
+    [columns_of_box(&grid.columns, layout).len(), grid.rows.len()]
 }
 
 impl LayerRows {
@@ -150,7 +179,15 @@ impl LayerRows {
         let mut samples = vec![[0.0; 4]; columns.len()];
         let window = Window { columns: &columns, rows: &rows };
         self.prepared.sample(window, &mut samples, &self.options, &mut Scratch::default());
-        samples
+        // Across the ends of a cylinder, what runs past the last column goes on in the first.
+        let mut row = vec![[0.0; 4]; self.width];
+        for (x, sample) in columns.zip(samples) {
+            let at = x % self.turn - self.left;
+            if sample[3] > row[at][3] {
+                row[at] = sample;
+            }
+        }
+        row
     }
 
     fn row<T: Copy + Default>(
@@ -172,7 +209,7 @@ impl LayerRows {
 
 impl RowSource for LayerRows {
     fn width(&self) -> usize {
-        self.prepared.columns().len()
+        self.width
     }
 
     fn height(&self) -> usize {

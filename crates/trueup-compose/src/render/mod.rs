@@ -121,7 +121,7 @@ pub fn run_within(
     check(layout, corrections, options)?;
     seams.check()?;
     let size = [layout.width, layout.height];
-    let plan = Plan::new(layout, photographs, options.blend, seams, resources)?;
+    let plan = Plan::new(layout, photographs, options, seams, resources)?;
     report_folds(layout, context);
     let cut = options.blend == Blend::None;
     match options.blend {
@@ -145,12 +145,13 @@ fn mean(
     plan: &Plan,
     context: &StageContext,
 ) -> Result<Store<[f32; 4]>> {
+    let (layout, originals) = layout.unrolled(0);
     let (width, height) = (layout.width, layout.height);
     let curve = photographs.transfer_curve();
     let part_rows = plan.sum_rows(width, BAND_ROWS);
     let parts: Vec<Range<usize>> =
         (0..height).step_by(part_rows).map(|first| first..first.saturating_add(part_rows).min(height)).collect();
-    let covered = covered_rows(layout);
+    let covered = covered_rows(&layout);
     let meet = |a: &Range<usize>, b: &Range<usize>| a.start < b.end && b.start < a.end;
     let covering =
         |part: &Range<usize>| -> Vec<usize> { (0..covered.len()).filter(|&at| meet(&covered[at], part)).collect() };
@@ -168,7 +169,13 @@ fn mean(
                     let photograph = photographs.photograph(placed.photograph)?;
                     check_photograph(placed, &photograph)?;
                     let photograph = Cow::Owned(photograph);
-                    Ok(Prepared::new(photograph, &placed.mesh, [width, height], (&curve, &corrections[at]), options))
+                    Ok(Prepared::new(
+                        photograph,
+                        &placed.mesh,
+                        [width, height],
+                        (&curve, &corrections[originals[at]]),
+                        options,
+                    ))
                 })
                 .collect::<Result<_>>()?;
             sums.par_chunks_mut(width * BAND_ROWS).enumerate().try_for_each(|(band, sums)| {

@@ -8,8 +8,8 @@ use trueup_core::scratch::{NoScratch, ScratchFile, ScratchSpace};
 use trueup_core::source::PhotographSource;
 use trueup_core::{Error, Result};
 
-use super::Blend;
 use super::store::{Blocks, Pixel, Store};
+use super::{Blend, RenderOptions};
 use crate::blend;
 use crate::layout::{CanvasLayout, Placed};
 use crate::seam::SeamOptions;
@@ -78,12 +78,12 @@ impl Plan {
     pub(crate) fn new(
         layout: &CanvasLayout,
         source: &dyn PhotographSource,
-        blend: Blend,
+        options: &RenderOptions,
         seams: &SeamOptions,
         resources: &Resources<'_>,
     ) -> Result<Self> {
         let bytes: Vec<usize> = layout.placed.iter().map(|placed| photograph_bytes(placed, source)).collect();
-        let needs = Needs::new(layout, &bytes, blend, seams);
+        let needs = Needs::new(layout, &bytes, options, seams)?;
         let least = needs.least();
         if least > resources.ceiling {
             return Err(needs.refusal(layout, resources.ceiling));
@@ -160,18 +160,18 @@ struct Needs {
 }
 
 impl Needs {
-    fn new(layout: &CanvasLayout, bytes: &[usize], blend: Blend, seams: &SeamOptions) -> Self {
+    fn new(layout: &CanvasLayout, bytes: &[usize], options: &RenderOptions, seams: &SeamOptions) -> Result<Self> {
         let canvas = [layout.width, layout.height];
         let pixels = layout.width.saturating_mul(layout.height);
         let mut sorted = bytes.to_vec();
         sorted.sort_unstable_by(|a, b| b.cmp(a));
         let largest = sorted.first().copied().unwrap_or(0);
-        let seamed = matches!(blend, Blend::MultiBand | Blend::None) && !layout.placed.is_empty();
-        let (working, bases) = if seamed { blend::needed_bytes(layout, blend == Blend::None, seams) } else { (0, 0) };
+        let seamed = matches!(options.blend, Blend::MultiBand | Blend::None) && !layout.placed.is_empty();
+        let (working, bases) = if seamed { blend::needed_bytes(layout, options, seams)? } else { (0, 0) };
         let pixel_bytes = if seamed { ROOT_BYTES } else { SUM_BYTES };
         let band = if seamed { 0 } else { canvas[0] * super::BAND_ROWS * SUM_BYTES };
         let meeting = sorted.iter().take(MEETING).sum();
-        Self { canvas: pixels.saturating_mul(pixel_bytes), pixel_bytes, working, bases, largest, meeting, band }
+        Ok(Self { canvas: pixels.saturating_mul(pixel_bytes), pixel_bytes, working, bases, largest, meeting, band })
     }
 
     /// With the canvas and the photographs' own levels on disk, and one photograph decoded at a time.
@@ -214,13 +214,15 @@ mod tests {
                 Placed { photograph, mesh }
             })
             .collect();
-        CanvasLayout { width: 2000 * (count + 1), height: 3000, canvas_from_target: 1.0, placed }
+        let width = 2000 * (count + 1);
+        CanvasLayout { width, height: 3000, canvas_from_target: 1.0, origin: [0.0; 2], placed, period: None }
     }
 
     fn plan(memory: usize, ceiling: usize, blend: Blend) -> Result<Plan> {
         let disk = RamDisk::default();
         let resources = Resources { memory, ceiling, scratch: &disk };
-        Plan::new(&layout(20), &Memory(Vec::new()), blend, &SeamOptions::default(), &resources)
+        let options = RenderOptions { blend, ..RenderOptions::default() };
+        Plan::new(&layout(20), &Memory(Vec::new()), &options, &SeamOptions::default(), &resources)
     }
 
     #[test]
@@ -243,7 +245,9 @@ mod tests {
             assert!(refused.contains("composing 42000 x 3000 px: at least "), "{refused}");
             let layout = layout(20);
             let bytes = vec![48_000_000; 20];
-            let least = Needs::new(&layout, &bytes, blend, &SeamOptions::default()).least();
+            let options = RenderOptions { blend, ..RenderOptions::default() };
+            let needs = Needs::new(&layout, &bytes, &options, &SeamOptions::default());
+            let least = needs.expect("few photographs").least();
             assert!(refused.contains(&bytes_in_words(least as u64)), "{refused}");
             assert!(plan(least, least, blend).is_ok() && plan(least, least - 1, blend).is_err());
         }

@@ -86,7 +86,7 @@ pub(super) fn moved(photograph: usize, width: f64, height: f64, move_to: impl Fn
 }
 
 pub(super) fn canvas(width: usize, height: usize, placed: Vec<Placed>) -> CanvasLayout {
-    CanvasLayout { width, height, canvas_from_target: 1.0, origin: [0.0; 2], placed }
+    CanvasLayout { width, height, canvas_from_target: 1.0, origin: [0.0; 2], placed, period: None }
 }
 
 fn render(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Panorama {

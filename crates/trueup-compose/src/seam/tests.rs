@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use proptest::prelude::*;
 
 use super::*;
@@ -18,7 +20,7 @@ fn view(columns: Range<usize>, rows: Range<usize>, level: impl Fn(usize, usize) 
 }
 
 fn find(views: Vec<View>, size: [usize; 2], options: &SeamOptions) -> Seams {
-    run(views, size, options, &StageContext::default()).expect("views on a canvas")
+    run(views, size, false, options, &StageContext::default()).expect("views on a canvas")
 }
 
 fn texture(x: usize, y: usize) -> u8 {
@@ -95,10 +97,12 @@ fn finer_canvases_ask_the_same_labels() {
 fn views_outside_the_canvas_are_refused() {
     let context = StageContext::default();
     let options = SeamOptions::default();
-    assert!(run(vec![view(0..9, 0..9, texture)], [8, 9], &options, &context).is_err());
-    assert!(run(vec![View { pixels: vec![], ..view(0..9, 0..9, texture) }], [9, 9], &options, &context).is_err());
-    assert!(run(vec![], [0, 9], &options, &context).is_err());
-    let empty = run(vec![], [3, 2], &options, &context).expect("an empty canvas");
+    assert!(run(vec![view(0..9, 0..9, texture)], [8, 9], false, &options, &context).is_err());
+    assert!(
+        run(vec![View { pixels: vec![], ..view(0..9, 0..9, texture) }], [9, 9], false, &options, &context).is_err()
+    );
+    assert!(run(vec![], [0, 9], false, &options, &context).is_err());
+    let empty = run(vec![], [3, 2], false, &options, &context).expect("an empty canvas");
     assert!(empty.labels().iter().all(|&label| label == NOBODY));
 }
 
@@ -119,10 +123,10 @@ proptest! {
         let seams = find(views.clone(), [64, 48], &options);
         for y in 0..48 {
             for x in 0..64 {
-                let covering = views.iter().filter(|view| view.flags(x, y) != 0).count();
+                let covering = views.iter().filter(|view| view.flags(x, y, 0) != 0).count();
                 let label = seams.labels()[y * 64 + x];
                 if covering > 0 {
-                    prop_assert!(views[usize::from(label)].flags(x, y) != 0, "({}, {}): {}", x, y, label);
+                    prop_assert!(views[usize::from(label)].flags(x, y, 0) != 0, "({}, {}): {}", x, y, label);
                 }
             }
         }
