@@ -60,7 +60,8 @@ struct Levels {
 
 impl Levels {
     fn new(mut bases: Vec<Base>, seams: &Seams, unrolled: &Unrolled<'_>, levels: u32) -> Self {
-        let blended = coarse::blend(&bases, seams, unrolled, levels);
+        let mut blended = coarse::blend(&bases, seams, unrolled, levels);
+        unrolled.join_ends(&mut blended, levels);
         bases.par_iter_mut().for_each(|base| pyramid::level_shares(&mut base.plane));
         Self { blended, bases }
     }
