@@ -80,6 +80,12 @@ pub fn find_cut(cameras: &[Camera], edges: &[GraphEdge], level_from_world: &Matr
     })
 }
 
+/// Whether the overlaps lead all the way round: the pictures cannot be laid flat without cutting some.
+pub(crate) fn goes_round(cameras: &[Camera], edges: &[GraphEdge], level_from_world: &Matrix3<f64>) -> bool {
+    let yaws: Vec<f64> = cameras.iter().map(|camera| viewing_yaw(camera, level_from_world)).collect();
+    !lies_flat(&yaws, edges)
+}
+
 /// The direction a camera looks in, in the level world.
 fn viewing_direction(camera: &Camera, level_from_world: &Matrix3<f64>) -> Vector3<f64> {
     level_from_world * camera.rotation().row(2).transpose()

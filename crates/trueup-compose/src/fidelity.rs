@@ -315,6 +315,36 @@ mod tests {
         assert!(found.step < 1e-5 && found.ghost < 1e-5, "{found:?}");
     }
 
+    /// A ramp that goes on across the ends of a cylinder: whoever shows it, there is no step, and one that is there is found.
+    #[test]
+    fn the_ends_of_a_full_turn_are_a_line_too() {
+        let whole = layer(|x, _| 50.0 + x as f32);
+        // Two of them, of half the width, the second from column 45 over the end to column 15.
+        let half = |left: usize, first: usize| {
+            let mut gray = Raster::new(30, 30, 1);
+            for y in 0..30 {
+                for x in 0..30 {
+                    gray.pixel_mut(x, y)[0] = 50.0 + (first + x) as f32;
+                }
+            }
+            Layer { left, top: 0, gray, covered: Raster::from_data(30, 30, 1, vec![true; 900]).expect("as many") }
+        };
+        let layers = [half(15, 15), half(45, 45)];
+        let shown: Vec<u16> = (0..1800).map(|at| u16::from(!(15..45).contains(&(at % 60)))).collect();
+        assert_eq!(deepest(&layers, [60, 30], true).expect("on the cylinder"), shown);
+        assert!(deepest(&layers, [60, 30], false).is_err());
+        let true_levels = |x: usize| if x < 15 { 110.0 + x as f32 } else { 50.0 + x as f32 };
+        let good = Picture(layer(|x, _| true_levels(x)).gray);
+        let found = measure(&good, &layers, &shown, true).expect("one cylinder");
+        assert_eq!(found.wrap_px, 30);
+        assert!(found.wrap_step < 1e-5, "{found:?}");
+        let bad = Picture(layer(|x, _| true_levels(x) + if x < 15 { 12.0 } else { 0.0 }).gray);
+        let found = measure(&bad, &layers, &shown, true).expect("one cylinder");
+        assert!((found.wrap_step - 12.0).abs() < 1e-5, "{found:?}");
+        let flat = measure(&good, &[whole], &vec![0; 1800], false).expect("one canvas");
+        assert_eq!((flat.wrap_px, flat.wrap_step), (0, 0.0));
+    }
+
     #[test]
     fn a_mean_of_two_that_do_not_fit_is_a_ghost() {
         let bar = |at: usize| layer(move |x, _| if (at..at + 4).contains(&x) { 200.0 } else { 40.0 });

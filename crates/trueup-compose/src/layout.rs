@@ -56,7 +56,8 @@ pub struct CanvasLayout {
     pub origin: [f64; 2],
     /// The photographs used, in the order given; targets are canvas pixels and may lie outside the canvas.
     pub placed: Vec<Placed>,
-    /// The canvas is a cylinder of that many columns, its width: what lies beyond one end is seen at the other.
+    /// The canvas is a cylinder of that many columns, its width: what lies beyond one end is seen at the other. A multiple
+    /// of 8, so that the finer levels of a blend repeat exactly; with others its ends may show a faint step.
     #[serde(default)]
     pub period: Option<usize>,
 }
@@ -84,8 +85,8 @@ pub fn run(
 }
 
 /// As [`run`]; with a `period`, on a cylinder: places that far apart in x, in the unit of the targets, are the same. The
-/// canvas then is the one period around the middle of the grids, and its width that period in whole pixels; x is scaled by
-/// up to half a pixel over the whole width to make it so.
+/// canvas then is the one period around the middle of the grids; its scale is the nearest to that asked for at which the
+/// period is a multiple of 8 pixels.
 ///
 /// # Errors
 /// As [`run`]; [`Error::Unsolvable`] if the period is not a positive length.
@@ -178,9 +179,10 @@ pub fn framed(
     let max_pixels = most_pixels(&placed, options);
     let wanted = frame.canvas_from_target;
     let size = |scale: f64| canvas_size(extent, scale, frame.period.is_some());
-    let canvas_from_target = scale_within(size, extent, wanted, max_pixels);
-    let [width, height] = size(canvas_from_target);
-    if canvas_from_target < wanted {
+    let found = scale_within(size, extent, wanted, max_pixels);
+    let [width, height] = size(found);
+    let canvas_from_target = frame.period.map_or(found, |period| width / period);
+    if found < wanted {
         let [wanted_width, wanted_height] = size(wanted);
         context.report(Diagnostic::warning(
             "canvas-reduced",
@@ -194,12 +196,6 @@ pub fn framed(
     }
     for vertex in placed.iter_mut().flat_map(|item| &mut item.mesh.target) {
         *vertex = ((Vector2::from(*vertex) - low) * canvas_from_target).into();
-    }
-    if let Some(period) = frame.period {
-        let to_whole_pixels = width / (period * canvas_from_target);
-        for vertex in placed.iter_mut().flat_map(|item| &mut item.mesh.target) {
-            vertex[0] *= to_whole_pixels;
-        }
     }
     let (width, height) = (width as usize, height as usize);
     let (origin, period) = (low.into(), frame.period.map(|_| width));
@@ -363,12 +359,20 @@ fn bounds(placed: &[Placed]) -> (Vector2<f64>, Vector2<f64>) {
     })
 }
 
-/// Width and height of the canvas in whole pixels, at least 1 each; `around` a cylinder the width nearest to its girth.
+/// Columns of which a cylinder has a whole number of times: those of a sample of the level from which on blending is done
+/// as a whole.
+pub(crate) const CYLINDER_UNIT: usize = 8;
+
+/// Width and height of the canvas in whole pixels, at least 1 each; `around` a cylinder the width is the nearest multiple of
+/// its unit, and the height follows.
 fn canvas_size(extent: Vector2<f64>, scale: f64, around: bool) -> [f64; 2] {
     // A photograph of 100 px placed at a fractional offset spans 100 px plus rounding; that is no 101st column.
     const ROUNDING_PX: f64 = 1e-6;
-    let width = if around { (extent.x * scale).round() } else { (extent.x * scale - ROUNDING_PX).ceil() };
-    [width.max(1.0), (extent.y * scale - ROUNDING_PX).ceil().max(1.0)]
+    let units = (extent.x * scale / CYLINDER_UNIT as f64).round().max(1.0);
+    let around = around.then_some(units * CYLINDER_UNIT as f64);
+    let scale_y = around.map_or(scale, |width| width / extent.x);
+    let width = around.unwrap_or((extent.x * scale - ROUNDING_PX).ceil());
+    [width.max(1.0), (extent.y * scale_y - ROUNDING_PX).ceil().max(1.0)]
 }
 
 /// The largest scale, at most `wanted`, whose canvas holds at most `max_pixels`.
@@ -426,24 +430,25 @@ mod tests {
     #[test]
     fn a_cylinder_is_its_period_in_whole_pixels_around_the_middle() {
         let context = StageContext::default();
-        // From -10 to 490, with a period of 380.3: 59.85 beyond each end.
+        // From -10 to 490, with a period of 380.3: 59.85 beyond each end. 384 is the nearest multiple of 8.
         let pictures = vec![placed(1.0, [-10.0, 3.0]), placed(1.0, [90.0, 3.0])];
         let options = CanvasOptions::default();
         let layout = run_around(pictures.clone(), 0, Some(380.3), &options, &context).expect("two grids");
-        assert_eq!((layout.width, layout.height, layout.period), (380, 300, Some(380)));
-        let share = 380.0 / 380.3;
+        assert_eq!((layout.width, layout.height, layout.period), (384, 303, Some(384)));
+        let share = 384.0 / 380.3;
+        assert!((layout.canvas_from_target - share).abs() < 1e-12);
         let (low, _) = layout.placed[0].mesh.bounds();
         let (_, high) = layout.placed[1].mesh.bounds();
-        assert!((low.x + 59.85 * share).abs() < 1e-9 && (high.x - 380.0 - 59.85 * share).abs() < 1e-9);
+        assert!((low.x + 59.85 * share).abs() < 1e-9 && (high.x - 384.0 - 59.85 * share).abs() < 1e-9);
         assert!(run_around(pictures.clone(), 0, Some(f64::NAN), &options, &context).is_err());
         // Each lies across one end, and so is placed there again; 100 px further out, both are seen once more.
         let (wide, originals) = layout.unrolled(0);
-        assert_eq!((originals.as_slice(), wide.width, wide.period), ([0, 0, 1, 1].as_slice(), 380, None));
+        assert_eq!((originals.as_slice(), wide.width, wide.period), ([0, 0, 1, 1].as_slice(), 384, None));
         let (wide, originals) = layout.unrolled(100);
-        assert_eq!((originals.as_slice(), wide.width), ([0, 0, 0, 1, 1, 1].as_slice(), 580));
-        assert!((wide.placed[1].mesh.target[0][0] - wide.placed[0].mesh.target[0][0] - 380.0).abs() < 1e-9);
+        assert_eq!((originals.as_slice(), wide.width), ([0, 0, 0, 1, 1, 1].as_slice(), 584));
+        assert!((wide.placed[1].mesh.target[0][0] - wide.placed[0].mesh.target[0][0] - 384.0).abs() < 1e-9);
         let first = layout.placed[0].in_first_turn(layout.period);
-        assert!((first.mesh.bounds().0.x - (380.0 - 59.85 * share)).abs() < 1e-9);
+        assert!((first.mesh.bounds().0.x - (384.0 - 59.85 * share)).abs() < 1e-9);
         let second = layout.placed[1].in_first_turn(layout.period);
         assert_eq!(second, Cow::Borrowed(&layout.placed[1]));
         assert_eq!(columns_around(350..420, Some(380)), (350..420, 0));

@@ -304,11 +304,9 @@ mod tests {
     #[test]
     fn only_pictures_that_look_one_way_are_tilted_level() {
         let tilt = |cameras: &[Camera]| tilt_from_level(cameras, &Matrix3::identity());
-        let turn: Vec<Camera> =
-            (0..12).map(|k| camera(f64::from(k) * std::f64::consts::TAU / 12.0, 1.25, 0.0)).collect();
+        let turn: Vec<Camera> = (0..12).map(|k| camera(f64::from(k) * TAU / 12.0, 1.25, 0.0)).collect();
         assert!(tilt(&turn[..1]).is_some());
-        let lower: Vec<Camera> =
-            (0..12).map(|k| camera(f64::from(k) * std::f64::consts::TAU / 12.0, -0.5, 0.0)).collect();
+        let lower: Vec<Camera> = (0..12).map(|k| camera(f64::from(k) * TAU / 12.0, -0.5, 0.0)).collect();
         assert!(tilt(&[turn, lower].concat()).is_none());
     }
 

@@ -28,8 +28,9 @@ impl Closure<'_> {
         /// Largest difference in height of the ends, and largest spread of what the match points say, as shares of the
         /// period: a slope of 1.7 degrees.
         const MOST_OFF: f64 = 0.03;
-        /// Largest difference of the period from that by the cameras, as its share.
-        const MOST_STRETCH: f64 = 0.1;
+        /// Largest difference of the period from that by the cameras, as its share. Focal lengths may be off by a tenth and
+        /// more although all matches agree on the period.
+        const MOST_STRETCH: f64 = 0.25;
         let Some(x) = median(apart.iter().map(|one| one.x)) else {
             return Some("no point of their overlap was carried across".to_owned());
         };
@@ -164,11 +165,11 @@ mod tests {
     fn ends_that_contradict_leave_the_turn_open_and_say_so() {
         let context = StageContext::default();
         let ring = Ring::new();
-        let open = ring.deformed(1.0, 1.3 * TAU * FOCAL_PX, &context);
+        let open = ring.deformed(1.0, 1.5 * TAU * FOCAL_PX, &context);
         assert_eq!(open.period, None);
         let found = context.take_diagnostics();
         assert_eq!((found[0].code.as_str(), found[0].severity), ("full-turn-open", Severity::Warning));
-        assert!(found[0].message.contains("77 %"), "{}", found[0].message);
+        assert!(found[0].message.contains("67 %"), "{}", found[0].message);
         // As without any closure.
         let options = MeshOptions::default();
         let bases: Vec<Base> = ring

@@ -69,7 +69,8 @@ impl Levels {
         unrolled: &Unrolled<'_>,
         (first_level, levels): (u32, u32),
     ) -> Result<Self> {
-        let blended = coarse::blend(&bases, seams, unrolled, (first_level, levels))?;
+        let mut blended = coarse::blend(&bases, seams, unrolled, (first_level, levels))?;
+        unrolled.join_ends(&mut blended, (first_level, levels));
         bases.level_all();
         Ok(Self { blended, bases })
     }

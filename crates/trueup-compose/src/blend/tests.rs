@@ -213,6 +213,92 @@ fn a_tile_of_one_photograph_is_what_blending_would_give() {
     });
 }
 
+/// Photographs around a cylinder of `AROUND` columns, the first at column `by`; the last lies across the ends for `by` = 0.
+fn ring(by: usize) -> CanvasLayout {
+    let mut layout = layout(&RING.map(|left| left + by));
+    // As layouts have it: the middle of each photograph within the canvas.
+    for placed in &mut layout.placed {
+        let middle = placed.mesh.bounds().0.x + WIDTH as f64 / 2.0;
+        let turns = (middle / AROUND as f64).floor();
+        placed.mesh.target.iter_mut().for_each(|vertex| vertex[0] -= turns * AROUND as f64);
+    }
+    CanvasLayout { width: AROUND, period: Some(AROUND), ..layout }
+}
+
+const AROUND: usize = 384;
+const RING: [usize; 4] = [0, 100, 190, 290];
+
+/// Photographs of a scene that repeats, each darker than the one before.
+fn ring_pictures() -> Vec<Photograph> {
+    let of = |(index, left): (usize, usize)| {
+        let level = |level: u8| (usize::from(level) * (20 - index) / 20) as u8;
+        let pixel = |at: usize| scene((left + at % WIDTH) % AROUND, at / WIDTH).map(level);
+        let data = (0..WIDTH * HEIGHT).flat_map(pixel).collect();
+        Photograph::Eight(Raster::from_data(WIDTH, HEIGHT, 3, data).expect("as many samples"))
+    };
+    RING.into_iter().enumerate().map(of).collect()
+}
+
+fn composed_in_any_way(layout: &CanvasLayout, blend: Blend) -> Vec<[f32; 4]> {
+    let options = RenderOptions { blend, ..RenderOptions::default() };
+    let corrections = vec![Correction::default(); RING.len()];
+    let (seams, context) = (SeamOptions::default(), StageContext::default());
+    let panorama = render(layout, &corrections, &Memory(ring_pictures()), &options, &seams, &context).expect("renders");
+    // Square roots of light, as the eye sees steps.
+    let root = |at: usize| panorama.linear_pixel(at % AROUND, at / AROUND).expect("in memory").map(f32::sqrt);
+    (0..AROUND * HEIGHT).map(root).collect()
+}
+
+/// Wherever a cylinder is cut open, the panorama is the same: to rounding if the samples of all levels fall on the same
+/// places, and else as far as a pyramid's samples between two pixels differ.
+#[test]
+fn a_cylinder_may_be_cut_open_anywhere() {
+    for blend in [Blend::MultiBand, Blend::None, Blend::Feather, Blend::Average] {
+        let still = composed_in_any_way(&ring(0), blend);
+        for (by, tolerance) in [(64, 1e-4), (320, 1e-4), (150, 0.012)] {
+            // The search for seams sees pixels of twice the size on canvases of half, a quarter and an eighth.
+            let tolerance = if by == 150 && blend != Blend::MultiBand { 1e-4 } else { tolerance };
+            let moved = composed_in_any_way(&ring(by), blend);
+            for (at, still) in still.iter().enumerate() {
+                let place = at / AROUND * AROUND + (at + by) % AROUND;
+                for (moved, still) in moved[place].iter().zip(still) {
+                    assert!((moved - still).abs() <= tolerance, "{blend:?} by {by} at {at}: {moved} {still}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_ends_of_a_cylinder_meet_as_smoothly_as_any_two_columns() {
+    let pixels = composed_in_any_way(&ring(0), Blend::MultiBand);
+    // What the panorama changes of the scene, by columns: smooth, whatever the scene.
+    let column = |x: usize| -> f32 {
+        let change = |y: usize| {
+            let expected = f32::from(root_of(scene(x, y)[0])) / 65535.0;
+            pixels[y * AROUND + x][0] / expected
+        };
+        (0..HEIGHT).map(change).sum::<f32>() / HEIGHT as f32
+    };
+    let columns: Vec<f32> = (0..AROUND).map(column).collect();
+    let step = |x: usize| columns[(x + 1) % AROUND] - columns[x % AROUND];
+    let bend = |x: usize| (step(x + 1) - 0.5 * (step(x) + step(x + 2))).abs();
+    let elsewhere = (0..AROUND - 3).map(bend).fold(0.0, f32::max);
+    // The photographs beside the ends differ by 15 of 100 in light.
+    let ends = (AROUND - 3..AROUND).map(bend).fold(0.0, f32::max);
+    assert!(ends <= elsewhere && ends < 3e-4, "{ends} {elsewhere}");
+    assert!(pixels.iter().all(|pixel| pixel[3] == 1.0));
+}
+
+#[test]
+fn threads_change_no_bit_of_a_cylinder() {
+    let of_threads = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
+        pool.install(|| [Blend::MultiBand, Blend::Feather].map(|blend| composed_in_any_way(&ring(0), blend)))
+    };
+    assert_eq!(of_threads(1), of_threads(3));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
