@@ -1,12 +1,13 @@
-//! A full turn laid out flat must be cut somewhere: which overlaps the mesh leaves out.
+//! A full turn laid out flat must be cut somewhere: which overlaps lie across the cut, and how many turns apart.
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
 use trueup_core::geometry::wrap_angle;
 
+use crate::mesh::is_moderate;
 use crate::stitch_graph::{GraphEdge, StitchGraph};
 
 /// Where a full turn is cut.
@@ -14,8 +15,30 @@ use crate::stitch_graph::{GraphEdge, StitchGraph};
 pub struct FullTurnCut {
     /// Direction of the cut in the levelled world, radians from its forward axis towards the right.
     pub yaw: f64,
-    /// Overlapping pairs (a < b) across the cut, sorted; they take no part in the mesh.
+    /// Overlapping pairs (a < b) across the cut, sorted: laid flat, their pictures lie a whole turn apart.
     pub severed: Vec<(usize, usize)>,
+    /// Those of them that can close the turn; empty if the pictures do not hold together without them.
+    pub closing: Vec<ClosingPair>,
+}
+
+/// An overlap across the cut.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ClosingPair {
+    /// First picture.
+    pub a: usize,
+    /// Second picture, greater than the first.
+    pub b: usize,
+    /// Turns by which the first picture's part of the overlap lies to the right of the second's: 1 or -1.
+    pub turns: f64,
+}
+
+impl FullTurnCut {
+    /// Turns by which the part of an overlap in picture `from` lies to the right of that in picture `to`; `None` if the
+    /// two do not close the turn.
+    pub fn turns(&self, from: usize, to: usize) -> Option<f64> {
+        let pair = self.closing.iter().find(|pair| (pair.a, pair.b) == (from.min(to), from.max(to)))?;
+        Some(if from < to { pair.turns } else { -pair.turns })
+    }
 }
 
 /// Decides whether the pictures go all the way round, and if so where to cut: through the direction that the weakest
@@ -44,16 +67,39 @@ pub fn find_cut(cameras: &[Camera], edges: &[GraphEdge], level_from_world: &Matr
             best = Some((torn, weight, yaw));
         }
     }
-    best.map(|(_, _, yaw)| {
-        let severed = severed_by(yaw, &yaws, edges).iter().map(|edge| (edge.a, edge.b)).collect();
-        FullTurnCut { yaw, severed }
+    best.map(|(torn, _, yaw)| {
+        let severed: Vec<(usize, usize)> = severed_by(yaw, &yaws, edges).iter().map(|edge| (edge.a, edge.b)).collect();
+        // A picture that looks at a pole lies beside every direction; its overlaps say nothing of the turn.
+        let turns_round = |&(a, b): &(usize, usize)| {
+            [a, b].iter().all(|&picture| is_moderate(viewing_direction(&cameras[picture], level_from_world)))
+        };
+        let turns = |(a, b): (usize, usize)| (from_cut(yaw, yaws[a]) - from_cut(yaw, yaws[b])).signum();
+        let closing = severed.iter().filter(|pair| !torn && turns_round(pair));
+        let closing = closing.map(|&(a, b)| ClosingPair { a, b, turns: turns((a, b)) }).collect();
+        FullTurnCut { yaw, severed, closing }
     })
+}
+
+/// Whether the overlaps lead all the way round: the pictures cannot be laid flat without cutting some.
+pub(crate) fn goes_round(cameras: &[Camera], edges: &[GraphEdge], level_from_world: &Matrix3<f64>) -> bool {
+    let yaws: Vec<f64> = cameras.iter().map(|camera| viewing_yaw(camera, level_from_world)).collect();
+    !lies_flat(&yaws, edges)
+}
+
+/// The direction a camera looks in, in the level world.
+fn viewing_direction(camera: &Camera, level_from_world: &Matrix3<f64>) -> Vector3<f64> {
+    level_from_world * camera.rotation().row(2).transpose()
 }
 
 /// The direction a camera looks in, radians from the levelled forward axis towards the right.
 fn viewing_yaw(camera: &Camera, level_from_world: &Matrix3<f64>) -> f64 {
-    let forward = level_from_world * camera.rotation().row(2).transpose();
+    let forward = viewing_direction(camera, level_from_world);
     forward.x.atan2(forward.z)
+}
+
+/// Where a direction lies right of the cut, 0 to a whole turn.
+fn from_cut(cut: f64, yaw: f64) -> f64 {
+    (yaw - cut).rem_euclid(TAU)
 }
 
 /// Whether going the short way along every edge gives each picture one consistent direction.
@@ -86,13 +132,7 @@ fn lies_flat(yaws: &[f64], edges: &[GraphEdge]) -> bool {
 
 /// The edges whose short way crosses the direction `cut`.
 fn severed_by<'a>(cut: f64, yaws: &[f64], edges: &'a [GraphEdge]) -> Vec<&'a GraphEdge> {
-    edges
-        .iter()
-        .filter(|edge| {
-            let from_cut = |picture: usize| (yaws[picture] - cut).rem_euclid(TAU);
-            (from_cut(edge.a) - from_cut(edge.b)).abs() > PI
-        })
-        .collect()
+    edges.iter().filter(|edge| (from_cut(cut, yaws[edge.a]) - from_cut(cut, yaws[edge.b])).abs() > PI).collect()
 }
 
 fn stays_connected(pictures: usize, edges: &[GraphEdge], severed: &[&GraphEdge]) -> bool {
@@ -103,7 +143,7 @@ fn stays_connected(pictures: usize, edges: &[GraphEdge], severed: &[&GraphEdge])
 
 #[cfg(test)]
 mod tests {
-    use trueup_core::geometry::rotation_about_y;
+    use trueup_core::geometry::{rotation_about_x, rotation_about_y};
 
     use super::*;
 
@@ -132,6 +172,29 @@ mod tests {
         let cameras = row((0..15).map(|k| f64::from(k) * 24.0));
         let cut = find_cut(&cameras, &chain(15, true, 3), &Matrix3::identity()).expect("a full turn");
         assert_eq!(cut.severed, [(3, 4)]);
+        // Picture 3 lies at the right end, picture 4 at the left.
+        assert_eq!(cut.closing, [ClosingPair { a: 3, b: 4, turns: 1.0 }]);
+        assert_eq!((cut.turns(3, 4), cut.turns(4, 3), cut.turns(0, 1)), (Some(1.0), Some(-1.0), None));
         assert!((cut.yaw.to_degrees() - 3.5 * 24.0).abs() < 1e-9);
+    }
+    #[test]
+    fn what_tears_the_turn_and_what_looks_at_a_pole_does_not_close_it() {
+        let cameras = row((0..15).map(|k| f64::from(k) * 24.0));
+        let mut edges = chain(15, true, 3);
+        // Picture 2 hangs on by its overlap with 15, which looks straight up from the same direction.
+        let mut with_zenith = cameras;
+        let up = rotation_about_y(60_f64.to_radians()) * rotation_about_x(90_f64.to_radians());
+        with_zenith.push(Camera::new(600.0, 800.0, 600.0, &up.transpose()));
+        for a in 0..15 {
+            edges.push(GraphEdge { a, b: 15, weight: 1 });
+        }
+        let cut = find_cut(&with_zenith, &edges, &Matrix3::identity()).expect("a full turn");
+        assert!(cut.severed.len() > 1, "{:?}", cut.severed);
+        assert!(cut.closing.iter().all(|pair| pair.b < 15) && cut.closing.len() == 1, "{:?}", cut.closing);
+        // Two pictures that overlap on both sides: the turn hangs on one of the overlaps wherever it is cut.
+        let three = row([0.0, 120.0, 240.0].into_iter());
+        let edges = [(0, 1), (1, 2), (0, 2)].map(|(a, b)| GraphEdge { a, b, weight: 50 });
+        let cut = find_cut(&three, &edges, &Matrix3::identity()).expect("a full turn");
+        assert_eq!((cut.severed.len(), cut.closing.len()), (1, 1));
     }
 }

@@ -6,6 +6,7 @@ pub mod full_turn;
 pub mod match_points;
 pub mod mesh;
 pub mod metrics;
+pub mod projection;
 pub mod similarity;
 pub mod stitch_graph;
 pub mod vanishing;

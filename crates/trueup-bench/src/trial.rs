@@ -45,13 +45,12 @@ impl Trial {
         }
     }
 
-    /// The options of the run. Photographs are decoded once here, so none are kept.
+    /// The options of the run.
     ///
     /// # Errors
     /// Those of an override that does not exist or is out of range.
     pub(crate) fn options(&self) -> Result<StitchOptions> {
         let mut options = StitchOptions::default();
-        options.set("stitch.photograph_cache=0")?;
         options.stitch.seed = self.seed;
         for assignment in &self.overrides {
             options.set(assignment)?;

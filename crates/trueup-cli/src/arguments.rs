@@ -69,7 +69,7 @@ pub(crate) struct StitchArgs {
     #[arg(value_name = "PHOTOS", required = true)]
     pub photographs: Vec<String>,
 
-    /// The panorama; .jpg, .png, .tif or .webp chooses the format
+    /// The panorama; .jpg, .png, .tif, .webp or .dzi (Deep Zoom) chooses the format
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     pub output: PathBuf,
 
@@ -77,13 +77,8 @@ pub(crate) struct StitchArgs {
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     pub project: Option<PathBuf>,
 
-    /// Size of the panorama: 1 keeps the pixel scale of the reference photograph (canvas.scale)
-    #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Output")]
-    pub scale: Option<String>,
-
-    /// JPEG quality (output.jpeg_quality)
-    #[arg(long, value_name = "Q", allow_hyphen_values = true, help_heading = "Output")]
-    pub quality: Option<String>,
+    #[command(flatten)]
+    pub picture: PictureArgs,
 
     /// Stitch every group of overlapping photographs, not only the largest; several panoramas are numbered
     #[arg(long, help_heading = "Photographs")]
@@ -148,6 +143,9 @@ pub(crate) struct StitchArgs {
     )]
     pub threads: Option<u16>,
 
+    #[command(flatten)]
+    pub budget: BudgetArgs,
+
     /// Print nothing but errors
     #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]
     pub quiet: bool,
@@ -157,10 +155,80 @@ pub(crate) struct StitchArgs {
     pub verbose: bool,
 }
 
+/// What the panorama looks like, and what is written beside it.
+#[derive(Debug, Args)]
+pub(crate) struct PictureArgs {
+    /// Write the cameras as a project of the Hugin stitcher
+    #[arg(long, value_name = "FILE.pto", help_heading = "Output")]
+    pub pto: Option<PathBuf>,
+
+    /// Write the photographs as layers, aligned and corrected, one to a page (output.layer_extent)
+    #[arg(long, value_name = "FILE.tif", help_heading = "Output")]
+    pub layers: Option<PathBuf>,
+
+    /// Write which photograph is shown where
+    #[arg(long, value_name = "FILE.png", help_heading = "Output")]
+    pub seams: Option<PathBuf>,
+
+    /// Size of the panorama: 1 keeps the pixel scale of the reference photograph (canvas.scale)
+    #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Output")]
+    pub scale: Option<String>,
+
+    /// JPEG quality (output.jpeg_quality)
+    #[arg(long, value_name = "Q", allow_hyphen_values = true, help_heading = "Output")]
+    pub quality: Option<String>,
+
+    /// Bits of a sample: auto, 8, 16 or float (output.depth)
+    #[arg(long, value_name = "DEPTH", help_heading = "Output")]
+    pub depth: Option<String>,
+
+    /// What the panorama is drawn on: mesh, auto, equirectangular, cylindrical, perspective, mercator, panini or
+    /// stereographic (projection.kind)
+    #[arg(long, value_name = "PROJECTION", help_heading = "View")]
+    pub projection: Option<String>,
+
+    /// Turn the viewer right, degrees; with a projection other than mesh, as the next three (projection.yaw)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
+    pub yaw: Option<String>,
+
+    /// Turn the viewer up, degrees (projection.pitch)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
+    pub pitch: Option<String>,
+
+    /// Turn the viewer clockwise, degrees (projection.roll)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
+    pub roll: Option<String>,
+
+    /// Horizontal field of view, degrees; without it, what is there as far as the projection carries (projection.fov)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
+    pub fov: Option<String>,
+
+    /// What is kept: none (all), rectangle (the largest without holes) or auto (that, if it keeps most) (canvas.crop)
+    #[arg(long, value_name = "CROP", help_heading = "View")]
+    pub crop: Option<String>,
+
+    /// What shows where no photograph is, in formats without transparency: black, gray or white (output.background)
+    #[arg(long, value_name = "COLOUR", help_heading = "View")]
+    pub background: Option<String>,
+}
+
+/// What the work may take.
+#[derive(Debug, Args)]
+pub(crate) struct BudgetArgs {
+    /// Memory that the work may take, such as 2GB or 512MB; auto is a quarter of the machine's (stitch.memory)
+    #[arg(long, value_name = "AMOUNT", help_heading = "Tuning")]
+    pub memory: Option<String>,
+
+    /// Folder for the scratch file of a panorama that does not fit in memory, instead of the output's (stitch.scratch)
+    #[arg(long, value_name = "DIR", help_heading = "Tuning")]
+    pub scratch: Option<String>,
+}
+
 const COMPOSE_EXAMPLES: &str = "\
 Examples:
   trueup compose pano.json -o pano.tif                        the same panorama in another format
   trueup compose pano.json -o small.jpg --scale 0.25
+  trueup compose pano.json -o round.jpg --projection equirectangular --crop auto
   trueup compose pano.json -o pano.jpg --photos developed/    other photographs of the same names and sizes
 
 The options of the project are overruled by --config, that by --set, and that by the flags of their own. Options of what
@@ -175,7 +243,7 @@ pub(crate) struct ComposeArgs {
     #[arg(value_name = "PROJECT.json")]
     pub recorded: PathBuf,
 
-    /// The panorama; .jpg, .png, .tif or .webp chooses the format
+    /// The panorama; .jpg, .png, .tif, .webp or .dzi (Deep Zoom) chooses the format
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     pub output: PathBuf,
 
@@ -183,13 +251,8 @@ pub(crate) struct ComposeArgs {
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     pub project: Option<PathBuf>,
 
-    /// Size of the panorama: 1 keeps the pixel scale of the reference photograph (canvas.scale)
-    #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Output")]
-    pub scale: Option<String>,
-
-    /// JPEG quality (output.jpeg_quality)
-    #[arg(long, value_name = "Q", allow_hyphen_values = true, help_heading = "Output")]
-    pub quality: Option<String>,
+    #[command(flatten)]
+    pub picture: PictureArgs,
 
     /// The folder of the photographs, if they moved, or of others of the same names and sizes
     #[arg(long, value_name = "DIR", help_heading = "Photographs")]
@@ -221,6 +284,9 @@ pub(crate) struct ComposeArgs {
         help_heading = "Tuning"
     )]
     pub threads: Option<u16>,
+
+    #[command(flatten)]
+    pub budget: BudgetArgs,
 
     /// Print nothing but errors
     #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]

@@ -9,7 +9,7 @@ use crate::failure::Failure;
 use crate::inspect;
 use crate::output;
 use crate::progress::Bars;
-use crate::stitch::{chosen_masks, chosen_options, require_two_names, summaries};
+use crate::stitch::{check_files, chosen_masks, chosen_options, picture_flags, summaries};
 
 pub(crate) fn run(args: ComposeArgs) -> Result<(), Failure> {
     let (quiet, verbose) = (args.quiet, args.verbose);
@@ -25,10 +25,10 @@ pub(crate) fn run(args: ComposeArgs) -> Result<(), Failure> {
 
 /// Arguments that make sense: what the library needs.
 fn checked(args: ComposeArgs) -> Result<(ComposeJob, StitchOptions), Failure> {
-    require_two_names(&args.output, args.project.as_deref())?;
+    check_files(&args.output, args.project.as_ref(), &args.picture)?;
     let project = inspect::read(&args.recorded)?;
     project.options.validate()?;
-    let flags = [("--scale", "canvas.scale", &args.scale), ("--quality", "output.jpeg_quality", &args.quality)];
+    let flags = picture_flags(&args.picture, &args.budget);
     let options = chosen_options(project.options.clone(), args.config.as_deref(), &args.set, &flags)?;
     let project_folder = args.recorded.parent().unwrap_or(Path::new("")).to_owned();
     let job = ComposeJob {
@@ -38,6 +38,9 @@ fn checked(args: ComposeArgs) -> Result<(ComposeJob, StitchOptions), Failure> {
         masks: chosen_masks(&args.mask, &args.keep)?,
         output: args.output,
         new_project: args.project,
+        hugin_project: args.picture.pto,
+        layers: args.picture.layers,
+        seams: args.picture.seams,
         threads: args.threads.map_or(0, usize::from),
     };
     Ok((job, options))

@@ -1,10 +1,10 @@
 //! `trueup stitch`: from arguments to a checked job, from the job's result to the summary.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use trueup::{Error, Inputs, MaskFile, MaskKind, Reference, StageContext, StitchJob, StitchOptions, Written};
 
-use crate::arguments::StitchArgs;
+use crate::arguments::{BudgetArgs, PictureArgs, StitchArgs};
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Bars;
@@ -43,16 +43,15 @@ struct CheckedStitch {
 
 impl CheckedStitch {
     fn new(args: StitchArgs) -> Result<Self, Failure> {
-        let flags = [
+        let mut flags = picture_flags(&args.picture, &args.budget);
+        flags.extend([
             ("--method", "stitch.method", &args.method),
-            ("--scale", "canvas.scale", &args.scale),
-            ("--quality", "output.jpeg_quality", &args.quality),
             ("--align", "stitch.align", &args.align),
             ("--structure", "stitch.structure", &args.structure),
             ("--seed", "stitch.seed", &args.seed),
-        ];
+        ]);
         let options = chosen_options(StitchOptions::default(), args.config.as_deref(), &args.set, &flags)?;
-        require_two_names(&args.output, args.project.as_deref())?;
+        check_files(&args.output, args.project.as_ref(), &args.picture)?;
         let reference = chosen_reference(args.reference);
         let inputs = Inputs {
             photographs: args.photographs,
@@ -64,18 +63,55 @@ impl CheckedStitch {
         };
         // The library reads 0 as one thread per core.
         let threads = args.threads.map_or(0, usize::from);
-        let job = StitchJob { inputs, output: args.output, project: args.project, cache: args.cache, threads };
+        let job = StitchJob {
+            inputs,
+            output: args.output,
+            project: args.project,
+            hugin_project: args.picture.pto,
+            layers: args.picture.layers,
+            seams: args.picture.seams,
+            cache: args.cache,
+            threads,
+        };
         Ok(Self { job, options })
     }
 }
 
-/// Refuses one name for the panorama and its record.
-pub(crate) fn require_two_names(output: &Path, project: Option<&Path>) -> Result<(), Failure> {
-    if project != Some(output) {
-        return Ok(());
+/// The options that flags of `trueup stitch` and `trueup compose` set.
+pub(crate) fn picture_flags<'a>(picture: &'a PictureArgs, budget: &'a BudgetArgs) -> Vec<OptionFlag<'a>> {
+    vec![
+        ("--projection", "projection.kind", &picture.projection),
+        ("--yaw", "projection.yaw", &picture.yaw),
+        ("--pitch", "projection.pitch", &picture.pitch),
+        ("--roll", "projection.roll", &picture.roll),
+        ("--fov", "projection.fov", &picture.fov),
+        ("--crop", "canvas.crop", &picture.crop),
+        ("--background", "output.background", &picture.background),
+        ("--scale", "canvas.scale", &picture.scale),
+        ("--quality", "output.jpeg_quality", &picture.quality),
+        ("--depth", "output.depth", &picture.depth),
+        ("--memory", "stitch.memory", &budget.memory),
+        ("--scratch", "stitch.scratch", &budget.scratch),
+    ]
+}
+
+/// Refuses one name for two files.
+pub(crate) fn check_files(output: &PathBuf, project: Option<&PathBuf>, picture: &PictureArgs) -> Result<(), Failure> {
+    let files = [
+        ("--output", Some(output)),
+        ("--project", project),
+        ("--pto", picture.pto.as_ref()),
+        ("--layers", picture.layers.as_ref()),
+        ("--seams", picture.seams.as_ref()),
+    ];
+    let given: Vec<(&str, &PathBuf)> = files.iter().filter_map(|(flag, path)| Some((*flag, (*path)?))).collect();
+    for (index, (flag, path)) in given.iter().enumerate() {
+        if let Some((other, _)) = given[..index].iter().find(|(_, other)| other == path) {
+            let message = format!("{} cannot be the file of both {other} and {flag}", path.display());
+            return Err(Failure::usage(message, format!("Give {other} and {flag} different names.")));
+        }
     }
-    let message = format!("{} cannot be both the panorama and the project", output.display());
-    Err(Failure::usage(message, "Give --output and --project different names."))
+    Ok(())
 }
 
 /// The masks that were typed.
@@ -126,7 +162,7 @@ pub(crate) fn chosen_options(
             wrong.push(format!("{typed}: {}", reason(error)));
         }
     }
-    wrong.extend(options.invalid().iter().map(ToString::to_string));
+    wrong.extend(options.all_invalid().iter().map(ToString::to_string));
     if wrong.is_empty() { Ok(options) } else { Err(Failure::options(wrong)) }
 }
 

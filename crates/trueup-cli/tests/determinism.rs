@@ -27,6 +27,18 @@ fn threads_and_runs_change_no_byte() {
     }
 }
 
+/// Enlarged so far that the canvas is put into a scratch file, as `failures` proves.
+#[test]
+fn memory_changes_no_byte() {
+    let desk = street_desk();
+    let photographs = ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "--scale", "6"];
+    let plenty = stitch(&desk, &[&photographs[..], &["--memory", "8GB"]].concat());
+    let little = stitch(&desk, &[&photographs[..], &["--memory", "230MB"]].concat());
+    assert!(plenty.0 == little.0, "the panoramas differ");
+    assert_eq!(plenty.1["images"], little.1["images"]);
+    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "pano.jpg", "pano.json"]);
+}
+
 #[test]
 fn the_order_of_the_photographs_hardly_matters() {
     let desk = street_desk();

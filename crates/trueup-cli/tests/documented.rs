@@ -27,6 +27,7 @@ const MISTAKES: &[Mistake] = &[
     mistake("header that claims 60000 x 60000", &["stitch", "giant.jpg", "-o", "pano.jpg"]),
     mistake("8 x 8 pixels", &["stitch", "dot.jpg", "-o", "pano.jpg"]),
     mistake("several files, none usable", &["stitch", "text.jpg", "empty.jpg", "-o", "pano.jpg"]),
+    mistake("too little memory", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--memory", "100MB"]),
     mistake("black pictures", &["stitch", "black.jpg", "white.jpg", "-o", "pano.jpg"]),
     Mistake {
         what: "unrelated pictures",

@@ -197,6 +197,31 @@ fn a_full_disk_leaves_the_old_panorama_as_it_was() {
     assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "pano.jpg"]);
 }
 
+/// The same for the scratch file of a canvas that does not fit in memory.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_disk_without_room_for_the_scratch_file_leaves_nothing_behind() {
+    let desk = street_desk();
+    desk.put("pano.jpg", "the old panorama");
+    let mut command = std::process::Command::new("sh");
+    let script =
+        "trap '' XFSZ; ulimit -f 8; exec \"$0\" stitch a.jpg b.jpg c.jpg d.jpg -o pano.jpg --scale 6 --memory 230MB";
+    command.current_dir(desk.path()).args(["-c", script, env!("CARGO_BIN_EXE_trueup")]);
+    finish(command).expect_failure(1, &["writing the scratch file in .: File too large"]);
+    assert_eq!(desk.read("pano.jpg"), b"the old panorama");
+    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "pano.jpg"]);
+}
+
+#[test]
+fn too_little_memory_is_refused_before_the_work() {
+    let desk = street_desk();
+    desk.put("pano.jpg", "the old panorama");
+    desk.stitch(&["a.jpg", "b.jpg", "--memory", "200MB"])
+        .expect_failure(1, &["measuring ", "at least ", " MB of memory needed, 200 MB allowed", "Raise --memory"]);
+    assert_eq!(desk.read("pano.jpg"), b"the old panorama");
+    desk.stitch(&["a.jpg", "b.jpg", "--memory", "2"]).expect_failure(2, &["--memory 2: ", "auto | 2GB | 512MB"]);
+}
+
 #[test]
 fn a_failure_leaves_the_old_panorama_as_it_was() {
     let desk = Desk::new();

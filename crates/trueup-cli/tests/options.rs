@@ -126,7 +126,7 @@ fn wrong_usage_ends_with_two() {
         (&[], "Usage: trueup"),
         (
             &["stitch", "a.jpg", "-o", "p.jpg", "--project", "p.jpg"],
-            "p.jpg cannot be both the panorama and the project",
+            "p.jpg cannot be the file of both --output and --project",
         ),
     ] {
         run(arguments).expect_failure(2, &[message]);

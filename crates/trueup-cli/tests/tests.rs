@@ -2,12 +2,14 @@
 
 mod cache;
 mod cli;
+mod colour;
 mod compare;
 mod compose;
 mod determinism;
 mod documented;
 mod evaluate;
 mod failures;
+mod formats;
 mod masks;
 mod options;
 mod pictures;

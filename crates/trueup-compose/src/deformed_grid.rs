@@ -90,11 +90,18 @@ impl DeformedGrid {
             rows.insert(0, -margin_y);
             rows.push(mesh.height + margin_y);
         }
-        let target: Vec<Vector2<f64>> = rows
-            .iter()
-            .flat_map(|&y| columns.iter().map(move |&x| Vector2::new(x, y)))
-            .map(|source| mesh.warp(source) * canvas_from_mesh)
-            .collect();
+        // A vertex of the mesh is taken as it is: beside one that is not defined, interpolation would lose it.
+        let ring = usize::from(rim);
+        let place = |row: usize, column: usize| {
+            let own = (row.wrapping_sub(ring), column.wrapping_sub(ring));
+            let place = match own.0 < mesh.rows && own.1 < mesh.columns {
+                true => Vector2::from(mesh.target[own.0 * mesh.columns + own.1]),
+                false => mesh.warp(Vector2::new(columns[column], rows[row])),
+            };
+            place * canvas_from_mesh
+        };
+        let target: Vec<Vector2<f64>> =
+            (0..rows.len() * columns.len()).map(|index| place(index / columns.len(), index % columns.len())).collect();
         let size = [mesh.width, mesh.height];
         let mut cells = Vec::with_capacity((rows.len() - 1) * (columns.len() - 1));
         for (row, y) in rows.windows(2).enumerate() {
@@ -102,16 +109,24 @@ impl DeformedGrid {
                 let first = row * columns.len() + column;
                 let corners =
                     [first, first + 1, first + columns.len() + 1, first + columns.len()].map(|index| target[index]);
+                if corners.iter().any(|corner| corner.x.is_nan()) {
+                    continue;
+                }
                 cells.push(Cell::new(corners, [x[0], y[0]], [x[1] - x[0], y[1] - y[0]], size));
             }
         }
-        let low = target.iter().fold(Vector2::repeat(f64::INFINITY), |low, vertex| low.inf(vertex));
-        let high = target.iter().fold(Vector2::repeat(f64::NEG_INFINITY), |high, vertex| high.sup(vertex));
+        let cells_within = |axis: fn(&Cell) -> [f64; 2]| {
+            cells
+                .iter()
+                .map(axis)
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], range| [low.min(range[0]), high.max(range[1])])
+        };
+        let ([left, right], [top, bottom]) = (cells_within(|cell| cell.x_range), cells_within(|cell| cell.y_range));
         Self {
             cells,
             size,
-            rows: first_centre_from(low.y, height)..first_centre_from(high.y, height),
-            columns: first_centre_from(low.x, width)..first_centre_from(high.x, width),
+            rows: first_centre_from(top, height)..first_centre_from(bottom, height),
+            columns: first_centre_from(left, width)..first_centre_from(right, width),
         }
     }
 
@@ -173,6 +188,30 @@ impl DeformedGrid {
             }
             column += same.len();
         }
+    }
+
+    /// Where the line y = `line` lies within the grid: disjoint ascending stretches that do not touch, from `candidates` (see
+    /// [`Self::cells_in_rows`]).
+    pub(crate) fn covered_along(&self, line: f64, candidates: &[u32]) -> Vec<[f64; 2]> {
+        /// Cells that share an edge meet at the same crossing; this allows for edges that only nearly coincide.
+        const TOUCHING_PX: f64 = 1e-6;
+        let mut stretches = Vec::new();
+        for &index in candidates {
+            let cell = &self.cells[index as usize];
+            if cell.y_range[0] <= line && line < cell.y_range[1] {
+                let (crossings, count) = cell.crossings(line);
+                stretches.extend(crossings[..count].chunks_exact(2).map(|pair| [pair[0], pair[1]]));
+            }
+        }
+        stretches.sort_unstable_by(|one: &[f64; 2], other| one[0].total_cmp(&other[0]));
+        let mut joined: Vec<[f64; 2]> = Vec::new();
+        for stretch in stretches {
+            match joined.last_mut() {
+                Some(last) if stretch[0] <= last[1] + TOUCHING_PX => last[1] = last[1].max(stretch[1]),
+                _ => joined.push(stretch),
+            }
+        }
+        joined
     }
 }
 
@@ -262,15 +301,18 @@ fn first_centre_from(position: f64, limit: usize) -> usize {
 /// Width of the extrapolated ring in photograph pixels along x and y: a little more than one canvas pixel.
 fn rim_width(mesh: &GridMesh, canvas_from_mesh: f64) -> [f64; 2] {
     const CANVAS_PX: f64 = 1.25;
-    let step = Vector2::new(mesh.cell_width(), mesh.cell_height());
     let mut widest = [0.0_f64; 2];
     for row in 0..mesh.rows - 1 {
         for column in 0..mesh.columns - 1 {
             let outer = row == 0 || column == 0 || row + 2 == mesh.rows || column + 2 == mesh.columns;
             if outer {
                 let first = row * mesh.columns + column;
-                let corners = [first, first + 1, first + mesh.columns + 1, first + mesh.columns]
-                    .map(|index| Vector2::from(mesh.target[index]) * canvas_from_mesh);
+                let vertices = [first, first + 1, first + mesh.columns + 1, first + mesh.columns];
+                if !vertices.iter().all(|&vertex| mesh.is_defined(vertex)) {
+                    continue;
+                }
+                let corners = vertices.map(|vertex| Vector2::from(mesh.target[vertex]) * canvas_from_mesh);
+                let step = mesh.source(vertices[2]) - mesh.source(first);
                 let cell = Cell::new(corners, [0.0; 2], step.into(), step.into());
                 for (widest, footprint) in widest.iter_mut().zip(cell.footprint) {
                     *widest = widest.max(footprint);

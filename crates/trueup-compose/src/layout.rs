@@ -1,11 +1,16 @@
 //! The canvas: deformed grids in any common unit become grids in canvas pixels.
 
+use std::borrow::Cow;
+use std::ops::Range;
+
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use trueup_core::diagnostics::Diagnostic;
-use trueup_core::mesh::GridMesh;
+use trueup_core::mesh::{GridLines, GridMesh};
 use trueup_core::options::StageOptions;
 use trueup_core::{Error, Result, StageContext};
+
+use crate::crop::Crop;
 
 const STAGE: &str = CanvasOptions::STAGE;
 
@@ -15,8 +20,16 @@ trueup_core::options! {
         /// Size of the panorama relative to the reference photograph's own pixels: 1 keeps every detail the reference
         /// has, 0.25 makes a quick preview.
         scale: f64 = 1.0, between(1e-4, 16.0), "";
-        /// Largest number of canvas pixels. A larger canvas is reduced evenly to fit, and a diagnostic says so.
-        max_pixels: f64 = 400e6, between(1.0, 1e12), "px";
+        /// Largest number of canvas pixels. A larger canvas is reduced evenly to fit, and a diagnostic says so. What memory
+        /// and disk hold is checked besides.
+        max_pixels: f64 = 1e12, between(1.0, 1e12), "px";
+        /// Canvas pixels for each pixel of the photographs (as large as the scale makes them) above which a canvas of more
+        /// than 400 million pixels is reduced evenly: a shape that runs away is not worth its time.
+        max_growth: f64 = 8.0, between(1.0, 1e6), "";
+        /// What of the canvas is kept.
+        crop: Crop = Crop::None, Allowed::Any, "";
+        /// Share of the covered pixels that the largest rectangle must keep for `crop = auto` to crop to it.
+        min_kept: f64 = 0.75, between(0.0, 1.0), "";
     }
 }
 
@@ -38,15 +51,23 @@ pub struct CanvasLayout {
     pub height: usize,
     /// Canvas pixels per unit of the targets that were given.
     pub canvas_from_target: f64,
-    /// The photographs used, in the order given; targets are canvas pixels, the smallest coordinate 0 on both axes.
+    /// What lies at the canvas's corner (0, 0), in the unit of the targets that were given.
+    #[serde(default)]
+    pub origin: [f64; 2],
+    /// The photographs used, in the order given; targets are canvas pixels and may lie outside the canvas.
     pub placed: Vec<Placed>,
+    /// The canvas is a cylinder of that many columns, its width: what lies beyond one end is seen at the other. A multiple
+    /// of 8, so that the finer levels of a blend repeat exactly; with others its ends may show a faint step.
+    #[serde(default)]
+    pub period: Option<usize>,
 }
 
 /// Lays the grids on one canvas: shifted by the smallest vertex, scaled so that the photograph `placed[reference]`
 /// keeps its pixel scale times [`CanvasOptions::scale`].
 ///
 /// Targets may be in any unit common to all grids. The canvas is `ceil(max - min)` of the scaled vertices; above
-/// [`CanvasOptions::max_pixels`] all vertices are reduced evenly and `canvas-reduced` is reported.
+/// [`CanvasOptions::max_pixels`] and [`CanvasOptions::max_growth`] all vertices are reduced evenly and `canvas-reduced` is
+/// reported.
 ///
 /// # Errors
 /// [`Error::Options`]; [`Error::Input`] if there is no grid, `reference` is not one of them, or a grid's size and
@@ -55,8 +76,24 @@ pub struct CanvasLayout {
 /// # Departures
 /// The scale of the reference is the median over its cells, so that a few stretched cells at its border do not count.
 pub fn run(
-    mut placed: Vec<Placed>,
+    placed: Vec<Placed>,
     reference: usize,
+    options: &CanvasOptions,
+    context: &StageContext,
+) -> Result<CanvasLayout> {
+    run_around(placed, reference, None, options, context)
+}
+
+/// As [`run`]; with a `period`, on a cylinder: places that far apart in x, in the unit of the targets, are the same. The
+/// canvas then is the one period around the middle of the grids; its scale is the nearest to that asked for at which the
+/// period is a multiple of 8 pixels.
+///
+/// # Errors
+/// As [`run`]; [`Error::Unsolvable`] if the period is not a positive length.
+pub fn run_around(
+    placed: Vec<Placed>,
+    reference: usize,
+    period: Option<f64>,
     options: &CanvasOptions,
     context: &StageContext,
 ) -> Result<CanvasLayout> {
@@ -80,36 +117,167 @@ pub fn run(
             "Choose another reference or another method.",
         ));
     }
-    let (low, high) = bounds(&placed);
-    let extent = high - low;
-    if !extent.max().is_finite() {
-        return Err(Error::unsolvable(
-            STAGE,
-            "the canvas",
-            "the photographs lie too far apart to be measured",
-            "Leave out the photographs that are not part of the scene.",
-        ));
+    let frame = Frame { canvas_from_target: options.scale / pixel_scale, window: None, period };
+    framed(placed, &frame, options, context)
+}
+
+/// What part of the common unit's plane becomes the canvas, and how large.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Canvas pixels wanted per unit of the targets; [`CanvasOptions::scale`] is in it.
+    pub canvas_from_target: f64,
+    /// Smallest and largest target that may be shown; `None`: all that the grids cover.
+    pub window: Option<[Vector2<f64>; 2]>,
+    /// Places that far apart in x are the same: the canvas is a cylinder of that many units, from the window's left end.
+    pub period: Option<f64>,
+}
+
+/// Lays the grids on one canvas as `frame` wants it: of the window the part that the grids cover. Grids that show nothing in
+/// it are left out.
+///
+/// # Errors
+/// Those of [`run_around`]; [`Error::Unsolvable`] if no grid shows anything in the window.
+pub fn framed(
+    mut placed: Vec<Placed>,
+    frame: &Frame,
+    options: &CanvasOptions,
+    context: &StageContext,
+) -> Result<CanvasLayout> {
+    options.check()?;
+    for item in &placed {
+        check_mesh(item)?;
     }
-    let wanted = options.scale / pixel_scale;
-    let canvas_from_target = scale_within(extent, wanted, options.max_pixels);
-    let [width, height] = canvas_size(extent, canvas_from_target);
-    if canvas_from_target < wanted {
-        let [wanted_width, wanted_height] = canvas_size(extent, wanted);
+    let (mut low, mut high) = bounds(&placed);
+    if frame.period.is_some_and(|period| !(period > 0.0)) {
+        return Err(Error::unsolvable(STAGE, "the canvas", "its period is not a length", "Choose another method."));
+    }
+    if let Some(period) = frame.period {
+        low.x = frame.window.map_or(0.5 * (low.x + high.x - period), |[window_low, _]| window_low.x);
+        high.x = low.x + period;
+    }
+    if let Some([window_low, window_high]) = frame.window {
+        (low, high) = (low.sup(&window_low), high.inf(&window_high));
+        placed.retain(|item| shows(&item.mesh, frame.period.is_some(), low, high));
+    }
+    let extent = high - low;
+    if placed.is_empty() || !extent.max().is_finite() || extent.min() < 0.0 {
+        return Err(match placed.is_empty() || extent.max().is_finite() {
+            true => Error::unsolvable(
+                STAGE,
+                "the canvas",
+                "no photograph lies in the frame",
+                "Widen projection.fov, turn the view towards the photographs, or choose another projection.",
+            ),
+            false => Error::unsolvable(
+                STAGE,
+                "the canvas",
+                "the photographs lie too far apart to be measured",
+                "Leave out the photographs that are not part of the scene.",
+            ),
+        });
+    }
+    let max_pixels = most_pixels(&placed, options);
+    let wanted = frame.canvas_from_target;
+    let size = |scale: f64| canvas_size(extent, scale, frame.period.is_some());
+    let found = scale_within(size, extent, wanted, max_pixels);
+    let [width, height] = size(found);
+    let canvas_from_target = frame.period.map_or(found, |period| width / period);
+    if found < wanted {
+        let [wanted_width, wanted_height] = size(wanted);
         context.report(Diagnostic::warning(
             "canvas-reduced",
             STAGE,
             format!(
-                "a canvas of {wanted_width:.0} x {wanted_height:.0} px is above the limit of {:.0} px; it was reduced \
-                 to {width:.0} x {height:.0}",
-                options.max_pixels
+                "a canvas of {wanted_width:.0} x {wanted_height:.0} px is above the limit of {max_pixels:.0} px; it was \
+                 reduced to {width:.0} x {height:.0}"
             ),
-            "Raise canvas.max_pixels, or choose a projection that stretches the borders less.",
+            "Raise canvas.max_pixels or canvas.max_growth, or choose a projection that stretches the borders less.",
         ));
     }
     for vertex in placed.iter_mut().flat_map(|item| &mut item.mesh.target) {
         *vertex = ((Vector2::from(*vertex) - low) * canvas_from_target).into();
     }
-    Ok(CanvasLayout { width: width as usize, height: height as usize, canvas_from_target, placed })
+    let (width, height) = (width as usize, height as usize);
+    let (origin, period) = (low.into(), frame.period.map(|_| width));
+    Ok(CanvasLayout { width, height, canvas_from_target, origin, placed, period })
+}
+
+/// Whether a whole cell of the grid reaches into the box; on a cylinder, into its rows.
+pub(crate) fn shows(mesh: &GridMesh, around: bool, low: Vector2<f64>, high: Vector2<f64>) -> bool {
+    mesh.whole_cells().any(|corners| {
+        let corners = corners.map(|vertex| mesh.target[vertex]);
+        (usize::from(around)..2).all(|axis| {
+            corners.iter().any(|corner| corner[axis] > low[axis])
+                && corners.iter().any(|corner| corner[axis] < high[axis])
+        })
+    })
+}
+
+impl CanvasLayout {
+    /// The layout without its period: every photograph at every place at which it meets the columns from `-reach` to
+    /// `width + reach`. With `reach`, the canvas is wider by it on both sides and begins that much farther left.
+    ///
+    /// Gives for each of the photographs placed the position of its original. Without a period nothing changes.
+    pub(crate) fn unrolled(&self, reach: usize) -> (Cow<'_, Self>, Vec<usize>) {
+        let Some(period) = self.period else { return (Cow::Borrowed(self), (0..self.placed.len()).collect()) };
+        let (mut placed, mut originals) = (Vec::new(), Vec::new());
+        let (reach_px, width) = (reach as f64, self.width as f64);
+        for (position, item) in self.placed.iter().enumerate() {
+            let (low, high) = item.mesh.bounds();
+            // One pixel more for what the border's pixels take from beyond it.
+            let first = ((-reach_px - high.x - 1.0) / period as f64).ceil();
+            let last = ((width + reach_px - low.x + 1.0) / period as f64).floor();
+            let mut turn = first;
+            while turn <= last {
+                placed.push(item.moved(turn * period as f64 + reach_px));
+                originals.push(position);
+                turn += 1.0;
+            }
+        }
+        (Cow::Owned(Self { width: self.width + 2 * reach, placed, period: None, ..*self }), originals)
+    }
+}
+
+/// Turns that a photograph of [`Placed::in_first_turn`] may reach into: its own, those that a very wide one takes up.
+pub(crate) const TURNS: usize = 4;
+
+/// The columns of a photograph of [`Placed::in_first_turn`], beginning in the first turn and not longer than one. One that
+/// goes all the way round is to be turned to the right by the second number of columns, after which it begins at 0.
+pub(crate) fn columns_around(columns: Range<usize>, period: Option<usize>) -> (Range<usize>, usize) {
+    let Some(period) = period else { return (columns, 0) };
+    let start = columns.start % period;
+    if columns.len() >= period { (0..period, start) } else { (start..start + columns.len(), 0) }
+}
+
+impl Placed {
+    /// The photograph moved to the right.
+    fn moved(&self, by: f64) -> Self {
+        let mut moved = self.clone();
+        for vertex in &mut moved.mesh.target {
+            vertex[0] += by;
+        }
+        moved
+    }
+
+    /// The photograph moved by whole turns, so that it begins in the first turn or soon after and no column before it is
+    /// wanted for its border; without a period where it is.
+    pub(crate) fn in_first_turn(&self, period: Option<usize>) -> Cow<'_, Self> {
+        let Some(period) = period else { return Cow::Borrowed(self) };
+        // As a share of the period: pixels of any smaller canvas that the border cuts.
+        const RIM: f64 = 1.0 / 16.0;
+        let turns = RIM - self.mesh.bounds().0.x / period as f64;
+        let moved = turns.ceil() * period as f64;
+        if moved == 0.0 { Cow::Borrowed(self) } else { Cow::Owned(self.moved(moved)) }
+    }
+}
+
+/// The largest canvas that is not reduced.
+fn most_pixels(placed: &[Placed], options: &CanvasOptions) -> f64 {
+    /// Canvases of up to so many pixels are made in minutes; their growth is not looked at.
+    const ANY_GROWTH_PIXELS: f64 = 400e6;
+    let photographs: f64 = placed.iter().map(|item| item.mesh.width * item.mesh.height).sum();
+    let grown = options.max_growth * photographs * options.scale.powi(2);
+    options.max_pixels.min(grown.max(ANY_GROWTH_PIXELS))
 }
 
 /// Refuses grids no later step could walk.
@@ -136,12 +304,31 @@ pub(crate) fn check_mesh(placed: &Placed) -> Result<()> {
             "Give rows * columns vertices, at least 2 x 2, over a picture of at least one pixel.",
         ));
     }
-    if mesh.target.iter().flatten().any(|coordinate| !coordinate.is_finite()) {
+    let lined = |lines: &GridLines| {
+        let ascending = |lines: &[f64], count: usize| {
+            lines.len() == count
+                && lines[0] == 0.0
+                && lines[count - 1] == 1.0
+                && lines.windows(2).all(|pair| pair[0] < pair[1])
+        };
+        ascending(&lines.columns, mesh.columns) && ascending(&lines.rows, mesh.rows)
+    };
+    if !mesh.lines.as_ref().is_none_or(lined) {
+        return Err(Error::input(
+            subject(),
+            "the lines of its grid do not ascend from 0 to 1",
+            "Give one share for every column and row of vertices.",
+        ));
+    }
+    let infinite = mesh.target.iter().any(|vertex| {
+        vertex.iter().any(|coordinate| coordinate.is_infinite()) || vertex[0].is_nan() != vertex[1].is_nan()
+    });
+    if infinite || mesh.whole_cells().next().is_none() {
         return Err(Error::unsolvable(
             STAGE,
             subject(),
-            "its grid has vertices that are not finite",
-            "Leave this photograph out, or choose another method.",
+            if infinite { "its grid has vertices that are not finite" } else { "its grid has no cell that is whole" },
+            "Leave this photograph out, or choose another method or projection.",
         ));
     }
     Ok(())
@@ -149,15 +336,15 @@ pub(crate) fn check_mesh(placed: &Placed) -> Result<()> {
 
 /// Target pixels per source pixel: median over the cells of the square root of target area per source area.
 pub fn median_cell_scale(mesh: &GridMesh) -> f64 {
-    let cell_area = mesh.cell_width() * mesh.cell_height();
-    let mut scales: Vec<f64> = (0..(mesh.rows - 1) * (mesh.columns - 1))
-        .map(|cell| {
-            let first = cell / (mesh.columns - 1) * mesh.columns + cell % (mesh.columns - 1);
-            let vertex = |index: usize| Vector2::from(mesh.target[index]);
+    let mut scales: Vec<f64> = mesh
+        .whole_cells()
+        .map(|corners| {
+            let step = mesh.source(corners[2]) - mesh.source(corners[0]);
+            let [top_left, top_right, bottom_right, bottom_left] =
+                corners.map(|vertex| Vector2::from(mesh.target[vertex]));
             // Area of a quadrilateral from its diagonals.
-            let falling = vertex(first + mesh.columns + 1) - vertex(first);
-            let rising = vertex(first + 1) - vertex(first + mesh.columns);
-            (0.5 * falling.perp(&rising).abs() / cell_area).sqrt()
+            let (falling, rising) = (bottom_right - top_left, top_right - bottom_left);
+            (0.5 * falling.perp(&rising).abs() / (step.x * step.y)).sqrt()
         })
         .collect();
     scales.sort_by(f64::total_cmp);
@@ -172,21 +359,30 @@ fn bounds(placed: &[Placed]) -> (Vector2<f64>, Vector2<f64>) {
     })
 }
 
-/// Width and height of the canvas in whole pixels, at least 1 each.
-fn canvas_size(extent: Vector2<f64>, scale: f64) -> [f64; 2] {
+/// Columns of which a cylinder has a whole number of times: those of a sample of the level from which on blending is done
+/// as a whole.
+pub(crate) const CYLINDER_UNIT: usize = 8;
+
+/// Width and height of the canvas in whole pixels, at least 1 each; `around` a cylinder the width is the nearest multiple of
+/// its unit, and the height follows.
+fn canvas_size(extent: Vector2<f64>, scale: f64, around: bool) -> [f64; 2] {
     // A photograph of 100 px placed at a fractional offset spans 100 px plus rounding; that is no 101st column.
     const ROUNDING_PX: f64 = 1e-6;
-    [(extent.x * scale - ROUNDING_PX).ceil().max(1.0), (extent.y * scale - ROUNDING_PX).ceil().max(1.0)]
+    let units = (extent.x * scale / CYLINDER_UNIT as f64).round().max(1.0);
+    let around = around.then_some(units * CYLINDER_UNIT as f64);
+    let scale_y = around.map_or(scale, |width| width / extent.x);
+    let width = around.unwrap_or((extent.x * scale - ROUNDING_PX).ceil());
+    [width.max(1.0), (extent.y * scale_y - ROUNDING_PX).ceil().max(1.0)]
 }
 
 /// The largest scale, at most `wanted`, whose canvas holds at most `max_pixels`.
-fn scale_within(extent: Vector2<f64>, wanted: f64, max_pixels: f64) -> f64 {
+fn scale_within(size: impl Fn(f64) -> [f64; 2], extent: Vector2<f64>, wanted: f64, max_pixels: f64) -> f64 {
     // Just below the exact ratio, so that rounding up to whole pixels fits after a step or two.
     const SAFETY: f64 = 1.0 - 1e-6;
     // Neither side alone may exceed the limit; this keeps the product below finite.
     let mut scale = wanted.min(max_pixels / extent.max());
     loop {
-        let [width, height] = canvas_size(extent, scale);
+        let [width, height] = size(scale);
         let pixels = width * height;
         if pixels <= max_pixels {
             return scale;
@@ -232,6 +428,57 @@ mod tests {
     }
 
     #[test]
+    fn a_cylinder_is_its_period_in_whole_pixels_around_the_middle() {
+        let context = StageContext::default();
+        // From -10 to 490, with a period of 380.3: 59.85 beyond each end. 384 is the nearest multiple of 8.
+        let pictures = vec![placed(1.0, [-10.0, 3.0]), placed(1.0, [90.0, 3.0])];
+        let options = CanvasOptions::default();
+        let layout = run_around(pictures.clone(), 0, Some(380.3), &options, &context).expect("two grids");
+        assert_eq!((layout.width, layout.height, layout.period), (384, 303, Some(384)));
+        let share = 384.0 / 380.3;
+        assert!((layout.canvas_from_target - share).abs() < 1e-12);
+        let (low, _) = layout.placed[0].mesh.bounds();
+        let (_, high) = layout.placed[1].mesh.bounds();
+        assert!((low.x + 59.85 * share).abs() < 1e-9 && (high.x - 384.0 - 59.85 * share).abs() < 1e-9);
+        assert!(run_around(pictures.clone(), 0, Some(f64::NAN), &options, &context).is_err());
+        // Each lies across one end, and so is placed there again; 100 px further out, both are seen once more.
+        let (wide, originals) = layout.unrolled(0);
+        assert_eq!((originals.as_slice(), wide.width, wide.period), ([0, 0, 1, 1].as_slice(), 384, None));
+        let (wide, originals) = layout.unrolled(100);
+        assert_eq!((originals.as_slice(), wide.width), ([0, 0, 0, 1, 1, 1].as_slice(), 584));
+        assert!((wide.placed[1].mesh.target[0][0] - wide.placed[0].mesh.target[0][0] - 384.0).abs() < 1e-9);
+        let first = layout.placed[0].in_first_turn(layout.period);
+        assert!((first.mesh.bounds().0.x - (384.0 - 59.85 * share)).abs() < 1e-9);
+        let second = layout.placed[1].in_first_turn(layout.period);
+        assert_eq!(second, Cow::Borrowed(&layout.placed[1]));
+        assert_eq!(columns_around(350..420, Some(380)), (350..420, 0));
+        assert_eq!(columns_around(390..420, Some(380)), (10..40, 0));
+        assert_eq!(columns_around(390..800, Some(380)), (0..380, 10));
+        assert_eq!(columns_around(390..800, None), (390..800, 0));
+        let flat = run(pictures, 0, &options, &context).expect("two grids");
+        assert_eq!(flat.unrolled(100), (Cow::Borrowed(&flat), vec![0, 1]));
+    }
+
+    #[test]
+    fn a_canvas_that_runs_away_is_reduced() {
+        let context = StageContext::default();
+        let options = CanvasOptions::default();
+        // Two photographs of 0.12 million pixels, 100,000 of their widths apart.
+        let far = vec![placed(1.0, [0.0, 0.0]), placed(1.0, [4e7, 0.0])];
+        let layout = run(far, 0, &options, &context).expect("two grids");
+        assert!(layout.width * layout.height <= 400_000_000);
+        assert_eq!(context.take_diagnostics()[0].code, "canvas-reduced");
+        // One of them enlarged to 1.2 billion pixels is what was asked for.
+        let large = CanvasOptions { scale: 16.0, ..options };
+        let mut photograph = placed(1.0, [0.0, 0.0]);
+        (photograph.mesh.width, photograph.mesh.height) = (4000.0, 3000.0);
+        photograph.mesh.target.iter_mut().flatten().for_each(|coordinate| *coordinate *= 10.0);
+        let layout = run(vec![photograph], 0, &large, &context).expect("one grid");
+        assert_eq!((layout.width, layout.height), (64_000, 48_000));
+        assert!(context.take_diagnostics().is_empty());
+    }
+
+    #[test]
     fn a_very_long_strip_is_reduced_too() {
         let mut strip = placed(1.0, [0.0, 0.0]);
         for vertex in &mut strip.mesh.target {
@@ -248,7 +495,7 @@ mod tests {
         let context = StageContext::default();
         let options = CanvasOptions::default();
         let mut infinite = placed(1.0, [0.0, 0.0]);
-        infinite.mesh.target[5][1] = f64::NAN;
+        infinite.mesh.target[5][1] = f64::INFINITY;
         assert!(matches!(run(vec![infinite], 0, &options, &context), Err(Error::Unsolvable { .. })));
         let mut short = placed(1.0, [0.0, 0.0]);
         short.mesh.target.pop();

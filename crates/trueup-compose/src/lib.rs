@@ -10,6 +10,7 @@
 //!
 //! Every photograph is resampled exactly once, from its own samples straight to the canvas.
 
+pub mod crop;
 pub mod exposure;
 pub mod fidelity;
 pub mod layout;

@@ -5,7 +5,6 @@
 
 use crate::exposure::{LightTable, exposed};
 use crate::sampling::Kernel;
-use crate::transfer_curve::Linearise;
 use crate::weights::{Feather, weight};
 
 /// The inverse of one cell's bilinear map along one canvas row.
@@ -191,7 +190,7 @@ fn accumulate_portable(
     const PER_LEVEL: f32 = 1.0 / 255.0;
     let Contribution { feather, light, border_footprint, combine } = contribution;
     let (gain, varies) = (light.gain, light.varies());
-    let linearise = Linearise::table();
+    let linearise = light.linearise.as_ref();
     let length = sums.len();
     let (columns, rows) = (&positions.column[..length], &positions.row[..length]);
     let (fractions_x, fractions_y) = (&positions.fraction_x[..length], &positions.fraction_y[..length]);
@@ -241,7 +240,7 @@ fn develop_portable(development: Development<'_>, positions: &Positions, samples
     const PER_LEVEL: f32 = 1.0 / 255.0;
     let Development { feather, light, border_footprint } = development;
     let (gain, varies) = (light.gain, light.varies());
-    let linearise = Linearise::table();
+    let linearise = light.linearise.as_ref();
     let length = samples.len();
     let (columns, rows) = (&positions.column[..length], &positions.row[..length]);
     let (fractions_x, fractions_y) = (&positions.fraction_x[..length], &positions.fraction_y[..length]);

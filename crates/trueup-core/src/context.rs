@@ -78,6 +78,11 @@ impl<'a> StageContext<'a> {
         Self { progress, cancel, seed, diagnostics: Mutex::new(Vec::new()) }
     }
 
+    /// The same cancellation and seed, for a part of the work whose progress is told by the whole. Diagnostics are its own.
+    pub fn without_progress(&self) -> StageContext<'a> {
+        Self::new(&SILENT, self.cancel, self.seed)
+    }
+
     /// Where progress goes.
     pub fn progress(&self) -> &dyn Progress {
         self.progress

@@ -16,6 +16,7 @@
 #![forbid(unsafe_code)]
 
 pub mod camera;
+pub mod colour;
 pub mod context;
 pub mod diagnostics;
 pub mod error;
@@ -24,10 +25,13 @@ pub mod interpolation;
 pub mod lines;
 pub mod mask;
 pub mod matches;
+pub mod memory;
 pub mod mesh;
 pub mod options;
 pub mod raster;
+pub mod scratch;
 pub mod source;
+pub mod spherical;
 pub mod truth;
 
 pub use context::StageContext;

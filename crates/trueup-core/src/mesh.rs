@@ -16,8 +16,30 @@ pub struct GridMesh {
     pub width: f64,
     /// Height of the picture in the pixels of `source`.
     pub height: f64,
-    /// Vertices in the panorama, row-major.
+    /// Vertices in the panorama, row-major. A vertex outside what a projection can show is NaN on both axes; cells that
+    /// touch one are not there.
     pub target: Vec<[f64; 2]>,
+    /// Where the columns and rows of vertices lie; `None`: evenly over the picture.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lines: Option<GridLines>,
+}
+
+/// Where the columns and rows of a grid's vertices lie in the picture, as shares of its width and height: each ascending
+/// from 0 to 1.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GridLines {
+    /// A share of the width for every column of vertices.
+    pub columns: Vec<f64>,
+    /// A share of the height for every row of vertices.
+    pub rows: Vec<f64>,
+}
+
+impl GridLines {
+    /// `columns` and `rows` lines of vertices, evenly spread.
+    pub fn even(columns: usize, rows: usize) -> Self {
+        let even = |count: usize| (0..count).map(|line| line as f64 / (count - 1) as f64).collect();
+        Self { columns: even(columns), rows: even(rows) }
+    }
 }
 
 impl GridMesh {
@@ -25,7 +47,7 @@ impl GridMesh {
     pub fn regular(width: f64, height: f64, cell_px: f64) -> Self {
         let columns = (width / cell_px).ceil().max(1.0) as usize + 1;
         let rows = (height / cell_px).ceil().max(1.0) as usize + 1;
-        let mut mesh = Self { rows, columns, width, height, target: Vec::new() };
+        let mut mesh = Self { rows, columns, width, height, target: Vec::new(), lines: None };
         mesh.target = (0..rows * columns).map(|index| mesh.source(index).into()).collect();
         mesh
     }
@@ -40,12 +62,12 @@ impl GridMesh {
         self.len() == 0
     }
 
-    /// Width of a cell in source pixels.
+    /// Width of a cell in source pixels; the mean where the columns are not even.
     pub fn cell_width(&self) -> f64 {
         self.width / (self.columns - 1) as f64
     }
 
-    /// Height of a cell in source pixels.
+    /// Height of a cell in source pixels; the mean where the rows are not even.
     pub fn cell_height(&self) -> f64 {
         self.height / (self.rows - 1) as f64
     }
@@ -53,20 +75,52 @@ impl GridMesh {
     /// Position of a vertex in the picture.
     pub fn source(&self, index: usize) -> Vector2<f64> {
         let (row, column) = (index / self.columns, index % self.columns);
-        Vector2::new(
-            self.width * column as f64 / (self.columns - 1) as f64,
-            self.height * row as f64 / (self.rows - 1) as f64,
-        )
+        match &self.lines {
+            None => Vector2::new(
+                self.width * column as f64 / (self.columns - 1) as f64,
+                self.height * row as f64 / (self.rows - 1) as f64,
+            ),
+            Some(lines) => Vector2::new(self.width * lines.columns[column], self.height * lines.rows[row]),
+        }
+    }
+
+    /// Whether a vertex is defined.
+    pub fn is_defined(&self, vertex: usize) -> bool {
+        self.target[vertex].iter().all(|coordinate| coordinate.is_finite())
+    }
+
+    /// The corners (top left, top right, bottom right, bottom left) of every cell whose corners are all defined, row-major.
+    pub fn whole_cells(&self) -> impl Iterator<Item = [usize; 4]> + '_ {
+        let cells = (self.rows.max(1) - 1) * (self.columns.max(1) - 1);
+        (0..cells)
+            .map(|cell| {
+                let first = cell / (self.columns - 1) * self.columns + cell % (self.columns - 1);
+                [first, first + 1, first + self.columns + 1, first + self.columns]
+            })
+            .filter(|corners| corners.iter().all(|&corner| self.is_defined(corner)))
+    }
+
+    /// The cell along one axis that holds the share `at` of the picture, and the share of the cell that lies before it.
+    fn within(lines: &[f64], at: f64) -> (usize, f64) {
+        let cell = lines.partition_point(|&line| line <= at).clamp(1, lines.len() - 1) - 1;
+        (cell, (at - lines[cell]) / (lines[cell + 1] - lines[cell]))
     }
 
     /// The four vertices around a point of the picture (top left, top right, bottom right, bottom left) and their
     /// bilinear weights. Points outside the picture use the nearest cell and extrapolate.
     pub fn bilinear(&self, point: Vector2<f64>) -> ([usize; 4], [f64; 4]) {
-        let gx = point.x / self.cell_width();
-        let gy = point.y / self.cell_height();
-        let column = (gx.max(0.0) as usize).min(self.columns - 2);
-        let row = (gy.max(0.0) as usize).min(self.rows - 2);
-        let (u, v) = (gx - column as f64, gy - row as f64);
+        let ((column, u), (row, v)) = match &self.lines {
+            None => {
+                let gx = point.x / self.cell_width();
+                let gy = point.y / self.cell_height();
+                let column = (gx.max(0.0) as usize).min(self.columns - 2);
+                let row = (gy.max(0.0) as usize).min(self.rows - 2);
+                ((column, gx - column as f64), (row, gy - row as f64))
+            }
+            Some(lines) => {
+                (Self::within(&lines.columns, point.x / self.width), Self::within(&lines.rows, point.y / self.height))
+            }
+        };
         let first = row * self.columns + column;
         (
             [first, first + 1, first + self.columns + 1, first + self.columns],
@@ -88,8 +142,8 @@ impl GridMesh {
     pub fn derivative(&self, point: Vector2<f64>) -> Matrix2<f64> {
         let ([a, b, c, d], _) = self.bilinear(point);
         let origin = self.source(a);
+        let cell = self.source(c) - origin;
         let [a, b, c, d] = [a, b, c, d].map(|vertex| Vector2::from(self.target[vertex]));
-        let cell = Vector2::new(self.cell_width(), self.cell_height());
         let (u, v) = ((point.x - origin.x) / cell.x, (point.y - origin.y) / cell.y);
         let along_x = ((b - a) * (1.0 - v) + (c - d) * v) / cell.x;
         let along_y = ((d - a) * (1.0 - u) + (c - b) * u) / cell.y;
@@ -117,13 +171,16 @@ impl GridMesh {
         None
     }
 
-    /// Smallest and largest target coordinates.
+    /// Smallest and largest target coordinates of the vertices that are defined; infinite and reversed where none is.
     pub fn bounds(&self) -> (Vector2<f64>, Vector2<f64>) {
         let start = (Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY));
-        self.target.iter().fold(start, |(low, high), &vertex| {
-            let vertex = Vector2::from(vertex);
-            (low.inf(&vertex), high.sup(&vertex))
-        })
+        self.target.iter().filter(|vertex| vertex.iter().all(|coordinate| !coordinate.is_nan())).fold(
+            start,
+            |(low, high), &vertex| {
+                let vertex = Vector2::from(vertex);
+                (low.inf(&vertex), high.sup(&vertex))
+            },
+        )
     }
 }
 
@@ -159,6 +216,25 @@ mod tests {
             assert!((found - point).norm() < 2e-3, "{found} instead of {point}");
         }
         assert_eq!(mesh.source_of(Vector2::repeat(f64::NAN), Vector2::zeros()), None);
+    }
+
+    /// Lines at thirds of the unit square over 30 x 12 pixels: (14, 3) lies two tenths into the middle column, and 3 of 4
+    /// rows' pixels into the first row. A vertex that is not defined takes its four cells away.
+    #[test]
+    fn uneven_lines_and_undefined_vertices() {
+        let lines = GridLines { columns: vec![0.0, 0.4, 0.9, 1.0], rows: vec![0.0, 1.0 / 3.0, 1.0] };
+        let mut mesh = GridMesh { rows: 3, columns: 4, width: 30.0, height: 12.0, target: vec![], lines: Some(lines) };
+        mesh.target = (0..mesh.len()).map(|vertex| mesh.source(vertex).into()).collect();
+        let (corners, shares) = mesh.bilinear(Vector2::new(15.0, 3.0));
+        assert_eq!(corners, [1, 2, 6, 5]);
+        for (share, expected) in shares.iter().zip([0.8 * 0.25, 0.2 * 0.25, 0.2 * 0.75, 0.8 * 0.75]) {
+            assert!((share - expected).abs() < 1e-12);
+        }
+        assert!((mesh.derivative(Vector2::new(29.0, 11.0)) - Matrix2::identity()).norm() < 1e-12);
+        assert_eq!(mesh.whole_cells().count(), 6);
+        mesh.target[5] = [f64::NAN; 2];
+        assert_eq!(mesh.whole_cells().collect::<Vec<_>>(), [[2, 3, 7, 6], [6, 7, 11, 10]]);
+        assert_eq!(mesh.bounds(), (Vector2::zeros(), Vector2::new(30.0, 12.0)));
     }
 
     proptest! {

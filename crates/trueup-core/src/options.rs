@@ -98,6 +98,12 @@ impl OptionValue for bool {
     }
 }
 
+impl OptionValue for String {
+    fn display(&self) -> String {
+        self.clone()
+    }
+}
+
 /// One row of the option reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OptionDescription {

@@ -146,8 +146,26 @@ pub trait RowSource: Sync {
     fn width(&self) -> usize;
     /// Height in pixels.
     fn height(&self) -> usize;
-    /// Writes row `y` as 8-bit RGBA with straight (not premultiplied) alpha, `4 * width` bytes.
-    fn rgba8_row(&self, y: usize, row: &mut [u8]);
+    /// Whether every pixel is known to be wholly opaque; `false` where that is not known.
+    fn is_opaque(&self) -> bool {
+        false
+    }
+    /// Writes row `y` as 8-bit RGBA, encoded, with straight (not premultiplied) alpha: `4 * width` samples.
+    ///
+    /// # Errors
+    /// If the pixels cannot be had, e.g. from a file that holds them.
+    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()>;
+    /// Writes row `y` as 16-bit RGBA, encoded by the same curve, with straight alpha: `4 * width` samples, 65535 is full.
+    ///
+    /// # Errors
+    /// Those of [`Self::rgba8_row`].
+    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()>;
+    /// Writes row `y` as RGBA in linear light (1 is white, more is possible) with straight alpha (0 to 1): `4 * width`
+    /// samples.
+    ///
+    /// # Errors
+    /// Those of [`Self::rgba8_row`].
+    fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()>;
 }
 
 #[cfg(test)]

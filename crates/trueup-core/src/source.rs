@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use crate::colour::TransferCurve;
 use crate::error::Result;
 use crate::mask::Masks;
 use crate::raster::Photograph;
@@ -92,5 +93,16 @@ pub trait PhotographSource: Sync {
     /// What the photographer wants of the parts of photograph `index`; nothing unless a source says so.
     fn masks(&self, _index: usize) -> Masks {
         Masks::default()
+    }
+
+    /// Bytes that the samples of photograph `index` take once decoded, where that is known before.
+    fn bytes(&self, _index: usize) -> Option<usize> {
+        None
+    }
+
+    /// How the samples of all photographs stand for light; sRGB's curve unless told otherwise. What wraps another source
+    /// hands its curve on.
+    fn transfer_curve(&self) -> TransferCurve {
+        TransferCurve::SRGB
     }
 }

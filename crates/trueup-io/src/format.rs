@@ -11,6 +11,25 @@ pub(crate) enum PictureFormat {
     WebP,
 }
 
+/// What a panorama is written as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum OutputFormat {
+    /// One file in a format that is read, too.
+    Picture(PictureFormat),
+    /// A folder of tiles and a file that describes it.
+    DeepZoom,
+}
+
+impl OutputFormat {
+    /// The format that the extension of `path` names, in any case.
+    pub(crate) fn of_extension(path: &Path) -> Option<Self> {
+        match lower_extension(path)?.as_str() {
+            "dzi" => Some(Self::DeepZoom),
+            _ => PictureFormat::of_extension(path).map(Self::Picture),
+        }
+    }
+}
+
 /// How many bytes [`PictureFormat::of_content`] needs to see.
 pub(crate) const SIGNATURE_BYTES: usize = 16;
 

@@ -25,6 +25,9 @@ fn stitch(bencher: Bencher, set: &str) {
         output: PathBuf::from(&output),
         project: None,
         cache: None,
+        hugin_project: None,
+        layers: None,
+        seams: None,
         threads: 0,
     };
     let options = StitchOptions::default();

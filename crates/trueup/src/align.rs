@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use trueup_align::cameras::{self, CameraPrior, Cameras};
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points::{self, OverlapWarp};
-use trueup_align::mesh::{self, WarpedMesh};
+use trueup_align::mesh::{self, Closure, Refinements, WarpedMesh};
 use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityOptions, SimilarityPrior};
 use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::{self, TriadOutcome};
@@ -192,22 +192,21 @@ pub(crate) fn run(
     let edges: Vec<GraphEdge> =
         pairs.iter().map(|pair| GraphEdge { a: pair.a, b: pair.b, weight: pair.agreeing }).collect();
     let cut = full_turn::find_cut(&cameras.cameras, &edges, &prior.level_from_world());
-    let (kept, met): (Cow<'_, [OverlapWarp]>, Vec<PairMatches>) = match &cut {
-        None => (warps.into(), pairs.clone()),
-        Some(cut) => {
-            report_cut(cut, component, context);
-            let met = |from: usize, to: usize| cut.severed.binary_search(&(from.min(to), from.max(to))).is_err();
-            (
-                warps.iter().filter(|warp| met(warp.from, warp.to)).cloned().collect(),
-                pairs.iter().filter(|pair| met(pair.a, pair.b)).cloned().collect(),
-            )
-        }
+    let turn = cut.as_ref().map(|cut| Turn::new(cut, warps));
+    let kept: Cow<'_, [OverlapWarp]> = turn.as_ref().map_or(warps.into(), |turn| turn.within.as_slice().into());
+    let unsevered = |pair: &PairMatches| {
+        let severed = |cut: &FullTurnCut| cut.severed.binary_search(&(pair.a, pair.b)).is_ok();
+        !cut.as_ref().is_some_and(severed)
     };
+    let met: Vec<PairMatches> = pairs.iter().filter(|pair| unsevered(pair)).cloned().collect();
     let mesh = in_one_step("mesh", context, clock, || match shape {
         Shape::Mesh(_) => {
             let bases = mesh::bases(&cameras.cameras, &grids, &prior, &options.mesh);
             let material = Material::new(component, (&grids, &kept), photographs, options, context)?;
-            let refinements = material.refinements(component, &met, options);
+            let closure = turn.as_ref().and_then(|turn| turn.closure(mesh::turn_length(&cameras.cameras, &prior)));
+            // What is turned as a whole does not go round along the panorama's rows.
+            let closure = closure.filter(|_| component.reference_rotation == 0.0);
+            let refinements = Refinements { closure, ..material.refinements(component, &met, options) };
             mesh::run_refined(&grids, &kept, &bases, component.reference, &options.mesh, &refinements, context)
         }
         Shape::Warp(model) => {
@@ -229,7 +228,34 @@ pub(crate) fn run(
             warps::run(model, &input, &options.warps, context)
         }
     })?;
+    if let Some(cut) = &cut {
+        report_cut(cut, mesh.period.is_some(), component, context);
+    }
+    let met = if mesh.period.is_some() { pairs.clone() } else { met };
     Ok(Geometry { cameras: cameras.clone(), triads, prior, mesh, met })
+}
+
+/// The overlaps of a full turn, by whether they lie across its cut.
+struct Turn {
+    within: Vec<OverlapWarp>,
+    across: Vec<OverlapWarp>,
+    /// For each of those across, see [`Closure::turns`].
+    turns: Vec<f64>,
+}
+
+impl Turn {
+    fn new(cut: &FullTurnCut, warps: &[OverlapWarp]) -> Self {
+        let is_within =
+            |warp: &&OverlapWarp| cut.severed.binary_search(&(warp.from.min(warp.to), warp.from.max(warp.to))).is_err();
+        let across = warps.iter().filter_map(|warp| Some((warp.clone(), cut.turns(warp.from, warp.to)?)));
+        let (across, turns) = across.unzip();
+        Self { within: warps.iter().filter(is_within).cloned().collect(), across, turns }
+    }
+
+    /// What closes the turn, whose length is `expected` by the cameras.
+    fn closure(&self, expected: f64) -> Option<Closure<'_>> {
+        (!self.across.is_empty()).then(|| Closure { warps: &self.across, turns: &self.turns, expected })
+    }
 }
 
 /// The options of the prior that a method means.
@@ -341,13 +367,13 @@ fn name_seed(path: &Path) -> u64 {
     name.bytes().fold(0, |hash: u64, byte| hash.wrapping_mul(31).wrapping_add(u64::from(byte)))
 }
 
-fn report_cut(cut: &FullTurnCut, component: &Component, context: &StageContext) {
+fn report_cut(cut: &FullTurnCut, closed: bool, component: &Component, context: &StageContext) {
     let name = |k: usize| &component.images[k].name;
     let pairs: Vec<String> = cut.severed.iter().map(|&(a, b)| format!("{} - {}", name(a), name(b))).collect();
-    context.report(Diagnostic::note(
-        "full-turn",
-        "mesh",
-        format!("the photographs go all the way round; the panorama is cut between {}", pairs.join(", ")),
-        "",
-    ));
+    let pairs = pairs.join(", ");
+    let message = match closed {
+        true => format!("a full turn: the ends meet, between {pairs}"),
+        false => format!("the photographs go all the way round; the panorama is cut between {pairs}"),
+    };
+    context.report(Diagnostic::note("full-turn", "mesh", message, ""));
 }

@@ -3,13 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use trueup_compose::render::Blend;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::encode;
 
+use crate::by_hand::no_seams;
 use crate::cache::Cache;
 use crate::inputs::Inputs;
 use crate::options::StitchOptions;
 use crate::project::{ImageRecord, Project};
+use crate::pto::hugin_project;
 use crate::stitcher::{Alignment, Stitcher};
 
 /// What to stitch and where to put it.
@@ -24,6 +27,12 @@ pub struct StitchJob {
     pub project: Option<PathBuf>,
     /// A folder for results that later runs can use, see [`Cache`]; made if it is not there.
     pub cache: Option<PathBuf>,
+    /// A file for the cameras as a Hugin project, if wanted; numbered like the panoramas.
+    pub hugin_project: Option<PathBuf>,
+    /// A TIFF for the photographs as layers, if wanted; numbered like the panoramas.
+    pub layers: Option<PathBuf>,
+    /// A PNG for what photograph is shown where, if wanted; numbered like the panoramas.
+    pub seams: Option<PathBuf>,
     /// Number of threads; 0 for one per core.
     pub threads: usize,
 }
@@ -49,10 +58,7 @@ impl StitchJob {
     /// of the photographs. Panoramas already written stay.
     pub fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<Written>> {
         options.validate()?;
-        encode::check_writable(&self.output)?;
-        if let Some(project) = &self.project {
-            encode::check_place(project)?;
-        }
+        self.outputs().check(options)?;
         let cache = self.cache.as_ref().map(|folder| Cache::open(folder, &options.cache)).transpose()?;
         thread_pool(self.threads)?.install(|| self.stitch(options, cache.as_ref(), context))
     }
@@ -64,10 +70,57 @@ impl StitchJob {
         let mut written = Vec::new();
         for (index, alignment) in aligned.alignments.into_iter().enumerate() {
             let number = several.then_some(index + 1);
-            let project_file = self.project.as_deref().map(|path| numbered(path, number));
-            written.push(render_and_write(&stitcher, alignment, numbered(&self.output, number), project_file)?);
+            written.push(render_and_write(&stitcher, alignment, self.outputs().numbered(number))?);
         }
         Ok(written)
+    }
+
+    fn outputs(&self) -> Outputs {
+        Outputs {
+            panorama: self.output.clone(),
+            project: self.project.clone(),
+            hugin_project: self.hugin_project.clone(),
+            layers: self.layers.clone(),
+            seams: self.seams.clone(),
+        }
+    }
+}
+
+/// The files that one panorama is written to; all but the first if wanted.
+#[derive(Debug, Clone)]
+pub(crate) struct Outputs {
+    pub panorama: PathBuf,
+    pub project: Option<PathBuf>,
+    pub hugin_project: Option<PathBuf>,
+    pub layers: Option<PathBuf>,
+    pub seams: Option<PathBuf>,
+}
+
+impl Outputs {
+    /// Refuses before work starts what could not be written when it is done.
+    pub fn check(&self, options: &StitchOptions) -> Result<()> {
+        encode::check_writable(&self.panorama, &options.output)?;
+        if let Some(layers) = &self.layers {
+            encode::check_layers_place(layers)?;
+        }
+        if let Some(seams) = &self.seams {
+            encode::check_labels_place(seams)?;
+            if !matches!(options.render.blend, Blend::MultiBand | Blend::None) {
+                return Err(no_seams());
+            }
+        }
+        [&self.project, &self.hugin_project].into_iter().flatten().try_for_each(|side| encode::check_place(side))
+    }
+
+    fn numbered(self, number: Option<usize>) -> Self {
+        let side = |path: Option<PathBuf>| path.map(|path| numbered(&path, number));
+        Self {
+            panorama: numbered(&self.panorama, number),
+            project: side(self.project),
+            hugin_project: side(self.hugin_project),
+            layers: side(self.layers),
+            seams: side(self.seams),
+        }
     }
 }
 
@@ -77,26 +130,34 @@ pub(crate) fn thread_pool(threads: usize) -> Result<rayon::ThreadPool> {
     built.map_err(|error| Error::input("threads", error, "Ask for fewer threads."))
 }
 
-/// Composes an aligned panorama and writes it and its record.
-pub(crate) fn render_and_write(
-    stitcher: &Stitcher<'_>,
-    mut alignment: Alignment,
-    output: PathBuf,
-    project_file: Option<PathBuf>,
-) -> Result<Written> {
-    spare_photographs(&output, &alignment.project)?;
+/// Composes an aligned panorama and writes it and what is wanted beside it.
+pub(crate) fn render_and_write(stitcher: &Stitcher<'_>, mut alignment: Alignment, outputs: Outputs) -> Result<Written> {
+    let Outputs { panorama: output, project: project_file, hugin_project: pto, layers, seams } = outputs;
+    for path in [Some(&output), layers.as_ref(), seams.as_ref()].into_iter().flatten() {
+        spare_photographs(path, &alignment.project)?;
+    }
     let (options, context) = (stitcher.options(), stitcher.context());
     let start = Instant::now();
-    let panorama = stitcher.compose(&alignment)?;
+    let panorama = Stitcher::new(options, context).writing_to(&output).compose(&alignment)?;
     alignment.record_seconds("render", start.elapsed());
     let start = Instant::now();
-    let bytes = encode::write(&output, &panorama, &options.output, context)?;
-    alignment.record_seconds("output", start.elapsed());
+    let output_options = stitcher.output_options(&alignment, &output)?;
+    let bytes = encode::write(&output, &panorama, &stitcher.metadata(&alignment), &output_options, context)?;
+    if let Some(path) = &seams {
+        stitcher.write_seams(&alignment, &panorama, path)?;
+    }
     drop(panorama);
+    if let Some(path) = &layers {
+        stitcher.write_layers(&alignment, path)?;
+    }
+    alignment.record_seconds("output", start.elapsed());
     alignment.record_findings(context.take_diagnostics());
     let project = alignment.project;
     if let Some(path) = &project_file {
         encode::write_atomically(path, project.to_json()?.as_bytes())?;
+    }
+    if let Some(path) = &pto {
+        encode::write_atomically(path, hugin_project(&project)?.as_bytes())?;
     }
     Ok(Written { output, bytes, project_file, project })
 }

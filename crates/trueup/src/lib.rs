@@ -13,13 +13,17 @@
 //! let inputs = Inputs::new(["holiday/"]);
 //! for alignment in stitcher.align(&inputs)?.alignments {
 //!     let panorama = stitcher.compose(&alignment)?;
-//!     trueup::write_picture("pano.jpg".as_ref(), &panorama, &options.output, &context)?;
+//!     let metadata = stitcher.metadata(&alignment);
+//!     trueup::write_picture("pano.jpg".as_ref(), &panorama, &metadata, &options.output, &context)?;
 //! }
 //! # Ok::<(), trueup::Error>(())
 //! ```
 #![forbid(unsafe_code)]
 
 mod align;
+mod arrangement;
+mod budget;
+mod by_hand;
 mod cache;
 mod clock;
 pub mod compare;
@@ -36,6 +40,8 @@ mod names;
 mod options;
 mod pairs;
 mod project;
+mod provenance;
+mod pto;
 mod recompose;
 mod record;
 mod recorded;
@@ -43,6 +49,7 @@ mod refinement;
 mod replacements;
 mod stitcher;
 
+pub use arrangement::ProjectionRecord;
 pub use cache::{Cache, CacheOptions, CacheUse};
 pub use evaluation::{Evaluation, PictureEvaluation, PixelEvaluation, evaluate, evaluate_pixels, read_truth};
 pub use files::{StitchJob, Written};
@@ -53,8 +60,10 @@ pub use options::{Method, StitchOptions, WorkingOptions};
 pub use project::{
     Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
 };
+pub use pto::hugin_project;
 pub use recompose::ComposeJob;
 pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};
+pub use trueup_align::projection::{FlatKind, Projection};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;
 pub use trueup_compose::render::Panorama;
@@ -62,6 +71,7 @@ pub use trueup_core::context::{CancelToken, Progress, Silent};
 pub use trueup_core::diagnostics::{Diagnostic, Severity};
 pub use trueup_core::options::{InvalidOption, OptionDescription};
 pub use trueup_core::raster::RowSource;
+pub use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 pub use trueup_core::truth::{ImageTruth, Truth};
 pub use trueup_core::{Error, Result, StageContext};
-pub use trueup_io::encode::{OutputOptions, abandon_unfinished, write as write_picture};
+pub use trueup_io::encode::{Metadata, OutputOptions, abandon_unfinished, write as write_picture};

@@ -1,5 +1,6 @@
 //! The first pass over the pixels: every photograph is decoded once, reduced, and measured.
 
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
@@ -18,6 +19,9 @@ use crate::options::StitchOptions;
 use crate::refinement;
 
 const STAGE: &str = "measuring";
+
+/// With room for so many photographs per thread, no group of them is waited for.
+const MANY_PER_THREAD: usize = 4;
 
 /// What is known of a photograph after its pixels were looked at.
 #[derive(Debug)]
@@ -40,13 +44,14 @@ struct Busy {
     lines: Duration,
 }
 
-/// Measures every photograph in parallel but for those that earlier runs measured. A photograph that cannot be decoded yields its error; the others go on.
+/// Measures every photograph, at most `at_once` in parallel, but for those that earlier runs measured. A photograph that
+/// cannot be decoded yields its error; the others go on.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
 pub(crate) fn run(
     photographs: &FilePhotographs,
-    known: Option<&Known<'_>>,
+    (known, at_once): (Option<&Known<'_>>, usize),
     options: &StitchOptions,
     context: &StageContext,
     clock: &mut Clock,
@@ -54,24 +59,26 @@ pub(crate) fn run(
     let count = photographs.images().len();
     context.progress().begin(STAGE, count as u64);
     let start = Instant::now();
-    let measured: Vec<(Result<Measured>, Busy)> = (0..count)
-        .into_par_iter()
-        .map(|index| {
-            let mut busy = Busy::default();
-            let result = match known.and_then(|known| known.measured(index)) {
-                Some(measured) => Ok(measured),
-                None => {
-                    let result = measure(photographs, index, options, context, &mut busy);
-                    if let (Some(known), Ok(measured)) = (known, &result) {
-                        known.keep_measured(index, measured);
-                    }
-                    result
+    let measured_one = |index: usize| {
+        let mut busy = Busy::default();
+        let result = match known.and_then(|known| known.measured(index)) {
+            Some(measured) => Ok(measured),
+            None => {
+                let result = measure(photographs, index, options, context, &mut busy);
+                if let (Some(known), Ok(measured)) = (known, &result) {
+                    known.keep_measured(index, measured);
                 }
-            };
-            context.progress().advance(STAGE, 1);
-            (result, busy)
-        })
-        .collect();
+                result
+            }
+        };
+        context.progress().advance(STAGE, 1);
+        (result, busy)
+    };
+    // Threads that share a photograph's work may begin another one meanwhile: where memory counts, only groups limit them.
+    let mut measured: Vec<(Result<Measured>, Busy)> = Vec::with_capacity(count);
+    for group in groups(count, at_once) {
+        measured.par_extend(group.into_par_iter().map(measured_one));
+    }
     context.progress().finish(STAGE);
     context.check_cancelled()?;
     let total = |part: fn(&Busy) -> Duration| measured.iter().map(|(_, busy)| part(busy)).sum::<Duration>();
@@ -115,12 +122,13 @@ fn measure(
     Ok(Measured { frame, features, lines, gray, thumbnail, thumbnail_frame: picture.thumbnail_frame })
 }
 
-/// The thumbnails of photographs that need not be measured, with their frames.
+/// The thumbnails of photographs that need not be measured, with their frames; at most `at_once` are made in parallel.
 ///
 /// # Errors
 /// Those of decoding; [`Error::Cancelled`].
 pub(crate) fn thumbnails(
     photographs: &FilePhotographs,
+    at_once: usize,
     options: &StitchOptions,
     context: &StageContext,
 ) -> Result<Vec<(Raster<u8>, WorkingFrame)>> {
@@ -135,7 +143,19 @@ pub(crate) fn thumbnails(
         }
         Ok((thumbnail, picture.thumbnail_frame))
     };
-    (0..photographs.images().len()).into_par_iter().map(thumbnail).collect()
+    let count = photographs.images().len();
+    let mut thumbnails = Vec::with_capacity(count);
+    for group in groups(count, at_once) {
+        thumbnails.extend(group.into_par_iter().map(thumbnail).collect::<Result<Vec<_>>>()?);
+    }
+    Ok(thumbnails)
+}
+
+/// Photographs to be looked at together: all, if `at_once` leaves room for many per thread.
+fn groups(count: usize, at_once: usize) -> impl Iterator<Item = Range<usize>> {
+    let group = if at_once >= MANY_PER_THREAD * rayon::current_num_threads() { count } else { at_once };
+    let group = group.max(1);
+    (0..count).step_by(group).map(move |first| first..first.saturating_add(group).min(count))
 }
 
 /// Whether an error is about one photograph, so that the others can still be stitched.

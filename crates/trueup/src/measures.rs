@@ -109,6 +109,7 @@ pub(crate) fn run(
     options: &StitchOptions,
 ) -> Measures {
     let meshes: Vec<&GridMesh> = layout.placed.iter().map(|placed| &placed.mesh).collect();
+    let period = layout.period.map(|columns| columns as f64);
     // The same grids over the working pictures, in whose pixels lines are.
     let working: Vec<GridMesh> = meshes
         .iter()
@@ -118,11 +119,11 @@ pub(crate) fn run(
     let verticals = vertical_lines(component, geometry, &working, options);
     let certain: Vec<Option<VerticalLines>> =
         verticals.iter().map(|found| found.filter(|found| found.is_certain(&options.measures))).collect();
-    let distortion = metrics::local_distortion(&working, Outside::Centre);
+    let distortion = metrics::local_distortion(&working, Outside::Centre, period);
     Measures {
         upright: upright(&certain),
         estimated_gdic_deg: estimated_inconsistency(&certain, &working, component.reference),
-        reprojection: reprojection(component, geometry, &meshes),
+        reprojection: reprojection(component, geometry, &meshes, period),
         long_lines: long_lines(component, &working, &options.measures),
         ld: HUNDREDTHS * distortion.worst,
         ld_mean: HUNDREDTHS * distortion.mean,
@@ -179,7 +180,12 @@ fn estimated_inconsistency(certain: &[Option<VerticalLines>], meshes: &[GridMesh
     mean_relative_turn(&rotations, &gammas, reference).map(f64::to_degrees)
 }
 
-fn reprojection(component: &Component, geometry: &Geometry, meshes: &[&GridMesh]) -> Option<ReprojectionMeasures> {
+fn reprojection(
+    component: &Component,
+    geometry: &Geometry,
+    meshes: &[&GridMesh],
+    period: Option<f64>,
+) -> Option<ReprojectionMeasures> {
     let pairs: Vec<MatchedPair> = geometry
         .met
         .iter()
@@ -195,7 +201,7 @@ fn reprojection(component: &Component, geometry: &Geometry, meshes: &[&GridMesh]
             MatchedPair { a: meshes[pair.a], b: meshes[pair.b], matches }
         })
         .collect();
-    let found = metrics::reprojection(&pairs)?;
+    let found = metrics::reprojection(&pairs, period)?;
     Some(ReprojectionMeasures {
         matches: found.matches,
         mean_px: found.mean_px,

@@ -16,7 +16,9 @@ pub(crate) fn by_name(finding: Diagnostic, names: &[String]) -> Diagnostic {
     };
     let subject = match finding.code.as_str() {
         "near-duplicate" => pair(),
-        "grid-folded" => finding.subject.strip_prefix(NUMBERED).and_then(name),
+        "grid-folded" | "projection-cut" | "projection-left-out" => {
+            finding.subject.strip_prefix(NUMBERED).and_then(name)
+        }
         _ => None,
     };
     Diagnostic { subject: subject.unwrap_or_else(|| finding.subject.clone()), ..finding }

@@ -5,6 +5,7 @@ use trueup_align::cameras::CameraOptions;
 use trueup_align::match_points::MatchPointOptions;
 use trueup_align::mesh::{LineAlignmentOptions, MeshOptions, PhotometricOptions, StructureOptions};
 use trueup_align::metrics::MeasureOptions;
+use trueup_align::projection::ProjectionOptions;
 use trueup_align::similarity::{PriorMethod, SimilarityOptions};
 use trueup_align::vanishing::VanishingOptions;
 use trueup_align::warps::{WarpModel, WarpOptions};
@@ -12,6 +13,7 @@ use trueup_compose::exposure::ExposureOptions;
 use trueup_compose::layout::CanvasOptions;
 use trueup_compose::render::RenderOptions;
 use trueup_compose::seam::SeamOptions;
+use trueup_core::memory::MemoryBudget;
 use trueup_core::options::{InvalidOption, OptionDescription, StageOptions};
 use trueup_core::{Error, Result};
 use trueup_io::encode::OutputOptions;
@@ -128,8 +130,11 @@ trueup_core::options! {
         working_pixels: f64 = 480000.0, between(10000.0, 100000000.0), "px";
         /// Size of the small pictures that exposure is compared on.
         thumbnail_pixels: f64 = 30000.0, between(100.0, 1000000.0), "px";
-        /// Decoded photographs are kept up to this much memory so that they need not be decoded twice.
-        photograph_cache: f64 = 96.0, between(0.0, 1000000.0), "MB";
+        /// Memory that the work may take; auto is a quarter of the machine's, or more where less is too little. The panorama
+        /// is the same with any amount: with less, its canvas goes to a scratch file and photographs are decoded again.
+        memory: MemoryBudget = MemoryBudget::Auto, Allowed::Any, "";
+        /// Folder for the scratch file; empty for the folder of the panorama.
+        scratch: String = String::new(), Allowed::Any, "";
         /// Every random choice derives from this number.
         seed: u64 = 0, between(0.0, 9007199254740992.0), "";
     }
@@ -200,6 +205,8 @@ stage_options! {
     photometric: PhotometricOptions,
     /// How the methods that are warp models place the photographs.
     warps: WarpOptions,
+    /// What the panorama is drawn on, and where the viewer looks.
+    projection: ProjectionOptions,
     /// How large the panorama is.
     canvas: CanvasOptions,
     /// How exposures are evened out.
@@ -220,8 +227,9 @@ stage_options! {
 
 /// The stages whose options a project's panorama may be composed with anew; those of the others are recorded with the
 /// geometry.
-const COMPOSING: [&str; 9] = [
+const COMPOSING: [&str; 10] = [
     SourceOptions::STAGE,
+    ProjectionOptions::STAGE,
     CanvasOptions::STAGE,
     ExposureOptions::STAGE,
     SeamOptions::STAGE,
@@ -233,7 +241,7 @@ const COMPOSING: [&str; 9] = [
 ];
 
 /// Options of other stages that change no result.
-const SPEED_ONLY: [&str; 1] = ["stitch.photograph_cache"];
+const SPEED_ONLY: [&str; 2] = ["stitch.memory", "stitch.scratch"];
 
 impl StitchOptions {
     /// The stages that composing a recorded panorama takes options for, in words.
@@ -241,12 +249,19 @@ impl StitchOptions {
         COMPOSING.join(", ")
     }
 
+    /// Every option outside its allowed range, and every one that does not go with another; empty when all is well.
+    pub fn all_invalid(&self) -> Vec<InvalidOption> {
+        let mut invalid = self.invalid();
+        invalid.extend(self.projection.beyond_the_projection());
+        invalid
+    }
+
     /// Checks every option.
     ///
     /// # Errors
     /// [`Error::Options`] with the complete list of options outside their range.
     pub fn validate(&self) -> Result<()> {
-        let invalid = self.invalid();
+        let invalid = self.all_invalid();
         if invalid.is_empty() { Ok(()) } else { Err(Error::Options(invalid)) }
     }
 
@@ -254,8 +269,8 @@ impl StitchOptions {
     /// one can be aligned by the other.
     pub fn matches_alike(&self, other: &Self) -> bool {
         let working = |options: &Self| {
-            let WorkingOptions { working_pixels, thumbnail_pixels, photograph_cache, seed, .. } = options.stitch;
-            (working_pixels, thumbnail_pixels, photograph_cache, seed)
+            let WorkingOptions { working_pixels, thumbnail_pixels, seed, .. } = options.stitch;
+            (working_pixels, thumbnail_pixels, seed)
         };
         working(self) == working(other)
             && self.source == other.source

@@ -7,6 +7,7 @@ use trueup_compose::exposure::Correction;
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::matches::PairVerdict;
 
+use crate::arrangement::ProjectionRecord;
 use crate::masks::MaskRecord;
 use crate::measures::Measures;
 use crate::options::StitchOptions;
@@ -35,7 +36,8 @@ pub struct MeshRecord {
     pub cols: usize,
     /// Vertices in pixels of the original photograph after orientation; the corner is (0, 0).
     pub source: Vec<[f64; 2]>,
-    /// Vertices in pixels of the written panorama; the corner is (0, 0).
+    /// Vertices in pixels of the written panorama; the corner is (0, 0), and where the panorama was cropped they may lie
+    /// outside. With [`Project::projection`], in a plane of their own in which the mesh was solved.
     pub target: Vec<[f64; 2]>,
 }
 
@@ -48,6 +50,9 @@ pub struct ImageRecord {
     pub width: usize,
     /// Height after orientation; 0 if the file could not be read.
     pub height: usize,
+    /// EXIF orientation (1 to 8) that was applied to the stored pixels; 0 in files of programs that did not record it.
+    #[serde(default)]
+    pub orientation: u8,
     /// Whether it is used.
     pub status: ImageStatus,
     /// Why it is left out; empty when used.
@@ -60,6 +65,10 @@ pub struct ImageRecord {
     pub focal_px: Option<f64>,
     /// Rows of the rotation from the levelled world (y down) to the camera.
     pub rotation: Option<[[f64; 3]; 3]>,
+    /// The same as the photograph's own lines correct it, which projections are drawn by; `None` in files of programs that
+    /// knew no projections.
+    #[serde(default)]
+    pub upright_rotation: Option<[[f64; 3]; 3]>,
     /// Clockwise rotation that the similarity prior wants, in degrees.
     pub theta_deg: Option<f64>,
     /// Scale that the similarity prior wants, relative to the others.
@@ -129,6 +138,17 @@ pub struct Canvas {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
+    /// Whether it goes all the way round and its ends meet: columns are then meant modulo the width, and vertices may lie
+    /// beyond either end.
+    #[serde(default)]
+    pub full_turn: bool,
+}
+
+impl Canvas {
+    /// Columns after which the panorama repeats; `None` if it does not.
+    pub fn period(&self) -> Option<f64> {
+        self.full_turn.then_some(self.width as f64)
+    }
 }
 
 /// The record of one panorama.
@@ -156,6 +176,16 @@ pub struct Project {
     pub measures: Option<Measures>,
     /// Size of the panorama.
     pub canvas: Canvas,
+    /// Name of the colour space it was composed in; empty in files of programs that knew one only.
+    #[serde(default)]
+    pub colour_space: String,
+    /// How directions were drawn; `None` where the panorama is the mesh itself, and in files of programs that knew no
+    /// projections.
+    #[serde(default)]
+    pub projection: Option<ProjectionRecord>,
+    /// The canvas of the plane in which the grids lie, where that is not the panorama's: with a projection.
+    #[serde(default)]
+    pub mesh_canvas: Option<Canvas>,
     /// Wall seconds per stage.
     pub seconds: BTreeMap<String, f64>,
     /// What was found on the way.
@@ -163,6 +193,12 @@ pub struct Project {
 }
 
 impl ImageRecord {
+    /// Rows of the rotation from the levelled world to the camera, as the photograph's own lines correct it where that is
+    /// recorded.
+    pub(crate) fn level_rotation(&self) -> Option<&[[f64; 3]; 3]> {
+        self.upright_rotation.as_ref().or(self.rotation.as_ref())
+    }
+
     /// The file's name without folders; paths written on another system are understood.
     pub fn file_name(&self) -> &str {
         self.path.rsplit(['/', '\\']).next().unwrap_or(&self.path)
@@ -170,6 +206,11 @@ impl ImageRecord {
 }
 
 impl Project {
+    /// The canvas that the grids of the photographs lie on.
+    pub fn grid_canvas(&self) -> Canvas {
+        self.mesh_canvas.unwrap_or(self.canvas)
+    }
+
     /// The photographs in the panorama, in the order given.
     pub fn used_images(&self) -> impl Iterator<Item = &ImageRecord> {
         self.images.iter().filter(|image| image.status == ImageStatus::Used)

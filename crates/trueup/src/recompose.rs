@@ -4,9 +4,8 @@ use std::path::PathBuf;
 
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
-use trueup_io::encode;
 
-use crate::files::{Written, render_and_write, thread_pool};
+use crate::files::{Outputs, Written, render_and_write, thread_pool};
 use crate::masks::{AllMasks, MaskFile, MaskRecord};
 use crate::options::StitchOptions;
 use crate::project::{ImageRecord, Project};
@@ -29,6 +28,12 @@ pub struct ComposeJob {
     pub output: PathBuf,
     /// The file of the new panorama's own record, if wanted.
     pub new_project: Option<PathBuf>,
+    /// A file for the cameras as a Hugin project, if wanted.
+    pub hugin_project: Option<PathBuf>,
+    /// A TIFF for the photographs as layers, if wanted.
+    pub layers: Option<PathBuf>,
+    /// A PNG for what photograph is shown where, if wanted.
+    pub seams: Option<PathBuf>,
     /// Number of threads; 0 for one per core.
     pub threads: usize,
 }
@@ -55,10 +60,14 @@ impl ComposeJob {
         }
         // Before files are looked for: a project that was edited to nonsense names itself.
         Recorded::new(&self.project)?;
-        encode::check_writable(&self.output)?;
-        if let Some(project) = &self.new_project {
-            encode::check_place(project)?;
-        }
+        let outputs = Outputs {
+            panorama: self.output.clone(),
+            project: self.new_project.clone(),
+            hugin_project: self.hugin_project.clone(),
+            layers: self.layers.clone(),
+            seams: self.seams.clone(),
+        };
+        outputs.check(options)?;
         thread_pool(self.threads)?.install(|| {
             let stitcher = Stitcher::new(options, context);
             let images = self.find_photographs(options, context)?;
@@ -66,7 +75,7 @@ impl ComposeJob {
             let recorded: Vec<&[MaskRecord]> = self.project.used_images().map(|one| one.masks.as_slice()).collect();
             masks.recall(&recorded, &images, &self.project_folder, &options.source, context)?;
             let alignment = stitcher.recall(&self.project, images, masks)?;
-            render_and_write(&stitcher, alignment, self.output.clone(), self.new_project.clone())
+            render_and_write(&stitcher, alignment, outputs)
         })
     }
 

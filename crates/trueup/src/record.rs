@@ -3,11 +3,12 @@
 use trueup_compose::exposure::Correction;
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_core::diagnostics::Diagnostic;
-use trueup_core::geometry::rows_of;
+use trueup_core::geometry::{matrix_from_rows, rows_of};
 use trueup_core::mesh::GridMesh;
 use trueup_core::source::SourceImage;
 
 use crate::align::{Component, Geometry};
+use crate::arrangement::Arrangement;
 use crate::masks::MaskRecord;
 use crate::matched::Matched;
 use crate::options::{Shape, StitchOptions};
@@ -36,6 +37,7 @@ impl Matched {
                 ImageRecord {
                     width: image.width,
                     height: image.height,
+                    orientation: image.orientation,
                     component: component.filter(|_| self.measured[index].is_some()),
                     masks: self.masks[index].clone(),
                     ..left_out_record(image.path.display().to_string(), reason, hint)
@@ -73,7 +75,10 @@ impl Matched {
                 inliers: Vec::new(),
             },
             measures: None,
-            canvas: Canvas { width: 0, height: 0 },
+            canvas: Canvas { width: 0, height: 0, full_turn: false },
+            colour_space: String::new(),
+            projection: None,
+            mesh_canvas: None,
             seconds: std::collections::BTreeMap::new(),
             diagnostics: Vec::new(),
         }
@@ -85,12 +90,14 @@ fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
         path,
         width: 0,
         height: 0,
+        orientation: 0,
         status: ImageStatus::LeftOut,
         reason,
         hint,
         component: None,
         focal_px: None,
         rotation: None,
+        upright_rotation: None,
         theta_deg: None,
         scale: None,
         gain: None,
@@ -116,7 +123,16 @@ pub(crate) fn place(component: &Component, geometry: Option<&Geometry>) -> Vec<P
 }
 
 /// What is found on the way from the geometry to the panorama, each time anew.
-const FOUND_IN_COMPOSING: [&str; 3] = ["canvas-reduced", "grid-folded", "photograph-replaced"];
+const FOUND_IN_COMPOSING: [&str; 8] = [
+    "canvas-reduced",
+    "colour-converted",
+    "colour-profile-damaged",
+    "colour-profile-ignored",
+    "grid-folded",
+    "photograph-replaced",
+    "projection-cut",
+    "projection-left-out",
+];
 
 /// Brings the record up to what is composed of the photographs `images`, which stand at the positions `used`.
 pub(crate) fn record_composition(
@@ -124,15 +140,16 @@ pub(crate) fn record_composition(
     used: &[usize],
     images: &[SourceImage],
     masks: &[Vec<MaskRecord>],
-    layout: &CanvasLayout,
+    arrangement: &Arrangement,
     corrections: &[Correction],
 ) {
-    project.canvas = Canvas { width: layout.width, height: layout.height };
+    record_canvas(project, arrangement);
     project.diagnostics.retain(|one| !FOUND_IN_COMPOSING.contains(&one.code.as_str()));
     let mut renamed = Vec::new();
     for (k, &position) in used.iter().enumerate() {
         let record = &mut project.images[position];
-        record_appearance(record, &layout.placed[k].mesh, &corrections[k]);
+        let mesh = &arrangement.plane.placed[k].mesh;
+        record_appearance(record, (mesh, arrangement.plane_shift), &corrections[k]);
         let path = images[k].path.display().to_string();
         if path != record.path {
             project.diagnostics.push(Diagnostic::note(
@@ -162,38 +179,53 @@ fn paths(project: &mut Project) -> impl Iterator<Item = &mut String> {
 }
 
 /// Where a photograph is shown and in which light.
-fn record_appearance(record: &mut ImageRecord, mesh: &GridMesh, correction: &Correction) {
+fn record_appearance(record: &mut ImageRecord, (mesh, shift): (&GridMesh, [f64; 2]), correction: &Correction) {
     record.gain = Some(correction.brightness());
     record.correction = Some(*correction);
     record.mesh = Some(MeshRecord {
         rows: mesh.rows,
         cols: mesh.columns,
         source: (0..mesh.len()).map(|vertex| mesh.source(vertex).into()).collect(),
-        target: mesh.target.clone(),
+        target: mesh.target.iter().map(|vertex| [vertex[0] - shift[0], vertex[1] - shift[1]]).collect(),
     });
+}
+
+/// What the panorama is drawn on.
+fn record_canvas(project: &mut Project, arrangement: &Arrangement) {
+    let canvas = |layout: &CanvasLayout| Canvas {
+        width: layout.width,
+        height: layout.height,
+        full_turn: layout.period.is_some(),
+    };
+    project.canvas = canvas(&arrangement.written);
+    project.mesh_canvas = arrangement.projection.map(|_| canvas(&arrangement.plane));
+    project.projection = arrangement.projection;
 }
 
 pub(crate) fn fill_geometry(
     project: &mut Project,
     component: &Component,
     geometry: Option<&Geometry>,
-    layout: &CanvasLayout,
+    arrangement: &Arrangement,
     corrections: &[Correction],
 ) {
-    project.canvas = Canvas { width: layout.width, height: layout.height };
+    record_canvas(project, arrangement);
     project.reference = component.images[component.reference].path.display().to_string();
     let method = project.options.stitch.method;
     let is_warp = matches!(method.shape(), Shape::Warp(_));
     for (k, &picture) in component.members.iter().enumerate() {
         let record = &mut project.images[picture];
-        let mesh = &layout.placed[k].mesh;
+        let mesh = &arrangement.plane.placed[k].mesh;
+        let shift = arrangement.plane_shift;
         record.status = ImageStatus::Used;
-        record_appearance(record, mesh, &corrections[k]);
+        record_appearance(record, (mesh, shift), &corrections[k]);
         let Some(geometry) = geometry else { continue };
         let camera = &geometry.cameras.cameras[k];
         let camera_from_level = camera.rotation() * geometry.prior.level_from_world().transpose();
         record.focal_px = Some(camera.focal_px / component.frames[k].working_from_full);
         record.rotation = Some(rows_of(&camera_from_level));
+        let upright = matrix_from_rows(&geometry.prior.camera_from_world[k]);
+        record.upright_rotation = Some(rows_of(&(upright * geometry.prior.level_from_world().transpose())));
         // A warp model asks no prior; what straightening would want is not what was done.
         if !is_warp {
             record.theta_deg = Some(geometry.prior.theta[k].to_degrees());

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use trueup_compose::crop::Crop;
 use trueup_compose::exposure::Correction;
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_core::mesh::GridMesh;
@@ -52,18 +53,29 @@ impl Recorded {
         })?;
         let meshes = used_grids(&records)?;
         let corrections = recorded_corrections(&records)?;
-        let (width, height) = (project.canvas.width, project.canvas.height);
+        let canvas = project.grid_canvas();
+        let (width, height) = (canvas.width, canvas.height);
+        // Grids may lie beyond the ends of a full turn by less than a turn, and anywhere around what was cropped.
+        let turn = if canvas.full_turn { width as f64 } else { 0.0 };
+        let may_be_cropped = project.projection.is_none() && project.options.canvas.crop != Crop::None;
         let outside = |mesh: &GridMesh| {
             let (low, high) = mesh.bounds();
-            low.min() < -ROUNDED_PX || high.x > width as f64 + ROUNDED_PX || high.y > height as f64 + ROUNDED_PX
+            let is_across = low.x < -ROUNDED_PX - turn || high.x > width as f64 + ROUNDED_PX + turn;
+            is_across || low.y < -ROUNDED_PX || high.y > height as f64 + ROUNDED_PX
+        };
+        let far = |mesh: &GridMesh| {
+            let (low, high) = mesh.bounds();
+            turn > 0.0 && (low.x < -ROUNDED_PX - turn || high.x > width as f64 + ROUNDED_PX + turn)
         };
         let pixels = width as f64 * height as f64;
-        if pixels < 1.0 || pixels > project.options.canvas.max_pixels || meshes.iter().any(outside) {
+        let strays = meshes.iter().any(|mesh| if may_be_cropped { far(mesh) } else { outside(mesh) });
+        if pixels < 1.0 || pixels > project.options.canvas.max_pixels || strays {
             let reason = format!("the canvas of {width} x {height} px does not belong to the grids");
             return Err(Error::input("the project", reason, AS_WRITTEN));
         }
         let placed = meshes.into_iter().enumerate().map(|(photograph, mesh)| Placed { photograph, mesh }).collect();
-        let layout = CanvasLayout { width, height, canvas_from_target: 1.0, placed };
+        let period = canvas.full_turn.then_some(width);
+        let layout = CanvasLayout { width, height, canvas_from_target: 1.0, origin: [0.0; 2], placed, period };
         Ok(Self { used, layout, corrections, reference })
     }
 }
@@ -94,7 +106,7 @@ pub(crate) fn grid(record: &ImageRecord) -> Result<GridMesh> {
         )));
     }
     let (width, height) = (record.width as f64, record.height as f64);
-    Ok(GridMesh { rows: mesh.rows, columns: mesh.cols, width, height, target: mesh.target.clone() })
+    Ok(GridMesh { rows: mesh.rows, columns: mesh.cols, width, height, target: mesh.target.clone(), lines: None })
 }
 
 fn is_whole(mesh: &MeshRecord, width: usize, height: usize) -> bool {
@@ -107,7 +119,7 @@ fn is_whole(mesh: &MeshRecord, width: usize, height: usize) -> bool {
         return false;
     }
     let (width, height) = (width as f64, height as f64);
-    let even = GridMesh { rows: mesh.rows, columns: mesh.cols, width, height, target: Vec::new() };
+    let even = GridMesh { rows: mesh.rows, columns: mesh.cols, width, height, target: Vec::new(), lines: None };
     let tolerance = EVEN * width.max(height);
     let is_even = |(vertex, source): (usize, &[f64; 2])| {
         let expected = even.source(vertex);

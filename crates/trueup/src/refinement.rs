@@ -102,6 +102,7 @@ impl Material {
     ) -> Refinements<'a> {
         let align = options.stitch.align;
         Refinements {
+            closure: None,
             structure: (options.stitch.structure == Structure::Lines)
                 .then_some(StructureInput { chains: &self.chains, options: &options.structure }),
             lines: align.uses_lines().then_some(LineAlignmentInput {

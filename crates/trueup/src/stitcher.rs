@@ -1,19 +1,26 @@
 //! The order of the stages: the one place that knows it.
 
+use std::path::{Path, PathBuf};
+
 use trueup_align::stitch_graph::{GraphFile, StitchGraph, parse_graph_file};
 use trueup_compose::exposure::{self, Correction, Thumbnail};
 use trueup_compose::fidelity::{self, Fidelity};
-use trueup_compose::layout::{self, CanvasLayout};
+use trueup_compose::layout::CanvasLayout;
 use trueup_compose::render::{self, Panorama};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::lines::LineSegment;
-use trueup_core::source::{SourceImage, WorkingFrame};
+use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
 use trueup_core::{Error, Result, StageContext};
+use trueup_io::colour::PhotographColours;
 use trueup_io::decode::FilePhotographs;
+use trueup_io::encode::{self, Metadata};
+use trueup_io::scratch::{ScratchFolder, check_room};
 use trueup_io::source::{self, RejectedSource, Sources};
 use trueup_vision::features::Features;
 
 use crate::align::{self, Component, camera_groups};
+use crate::arrangement;
+use crate::budget::Budget;
 use crate::cache::{Cache, Key, Known, photograph_keys};
 use crate::clock::Clock;
 use crate::inputs::{Inputs, Reference};
@@ -27,6 +34,7 @@ use crate::names;
 use crate::options::StitchOptions;
 use crate::pairs;
 use crate::project::Project;
+use crate::provenance;
 use crate::record::{fill_geometry, place, record_composition};
 use crate::recorded::Recorded;
 
@@ -36,6 +44,7 @@ pub struct Stitcher<'a> {
     options: &'a StitchOptions,
     context: &'a StageContext<'a>,
     cache: Option<&'a Cache>,
+    output: Option<&'a Path>,
 }
 
 /// What [`Stitcher::align`] found: one alignment per group of photographs to be stitched, the largest first.
@@ -88,6 +97,21 @@ pub struct Alignment {
 }
 
 impl Alignment {
+    /// Where the photographs lie on the canvas.
+    pub(crate) fn layout(&self) -> &CanvasLayout {
+        &self.layout
+    }
+
+    /// Gain, colour and vignetting of every photograph placed.
+    pub(crate) fn corrections(&self) -> &[Correction] {
+        &self.corrections
+    }
+
+    /// The photographs, in the order of [`Project::images`].
+    pub(crate) fn photographs(&self) -> &FilePhotographs {
+        &self.photographs
+    }
+
     /// Adds what composing found to the record.
     pub(crate) fn record_findings(&mut self, findings: Vec<Diagnostic>) {
         let names: Vec<String> = self.photographs.images().iter().map(|image| image.name.clone()).collect();
@@ -104,7 +128,7 @@ impl Alignment {
 impl<'a> Stitcher<'a> {
     /// A stitcher with these options. Parallel work runs on the current thread pool.
     pub fn new(options: &'a StitchOptions, context: &'a StageContext<'a>) -> Self {
-        Self { options, context, cache: None }
+        Self { options, context, cache: None, output: None }
     }
 
     /// The same stitcher, which finds results of earlier runs in `cache` and keeps its own there. They decide how long the
@@ -114,10 +138,12 @@ impl<'a> Stitcher<'a> {
         Self { cache, ..self }
     }
 
+    /// The options of all stages.
     pub(crate) fn options(&self) -> &StitchOptions {
         self.options
     }
 
+    /// What the stages are given beside their input.
     pub(crate) fn context(&self) -> &StageContext<'a> {
         self.context
     }
@@ -142,15 +168,17 @@ impl<'a> Stitcher<'a> {
         let mut clock = Clock::default();
         let sources = clock.time("source", || source::scan(&inputs.photographs, &self.options.source, self.context))?;
         self.check_any(&sources, inputs)?;
-        let photographs = FilePhotographs::new(sources.images.clone(), self.photograph_cache_bytes());
+        let measuring = Budget::new(self.options).measuring(&sources.images, self.options)?;
         let masks = AllMasks::read(&inputs.masks, &sources.images, &self.options.source, self.context)?;
+        let colours = PhotographColours::survey(&sources.images, self.context);
+        let photographs = FilePhotographs::new(sources.images.clone(), measuring.kept_bytes).in_colours(colours);
         let photographs = std::sync::Arc::new(photographs.with_masks(masks.masks));
         let keys = match self.cache {
             Some(_) => clock.time("source", || photograph_keys(&photographs, self.options, self.context))?,
             None => Vec::new(),
         };
-        let known = self.known(&keys);
-        let matched = self.match_all(sources, masks.records, &photographs, known.as_ref(), inputs, &mut clock)?;
+        let known = (self.known(&keys), measuring.at_once);
+        let matched = self.match_all((sources, masks.records), &photographs, known, inputs, &mut clock)?;
         if let Some(cache) = self.cache {
             cache.report(self.context);
         }
@@ -192,57 +220,77 @@ impl<'a> Stitcher<'a> {
             if let Some(cache) = self.cache {
                 cache.report(self.context);
             }
-            alignment.project.diagnostics =
-                shared_diagnostics.iter().cloned().chain(self.context.take_diagnostics()).collect();
+            let own = self.context.take_diagnostics().into_iter().map(|one| names::by_name(one, &file_names));
+            alignment.project.diagnostics = shared_diagnostics.iter().cloned().chain(own).collect();
             alignments.push(alignment);
         }
         Ok(Aligned { alignments })
     }
 
-    /// Renders an aligned panorama from the full-resolution photographs.
+    /// Says where composed panoramas will be written: scratch files go into the same folder, unless `stitch.scratch` names
+    /// one, and leave room for them. Without, scratch files go where the system wants temporary files.
+    #[must_use]
+    pub fn writing_to(self, output: &'a Path) -> Self {
+        Self { output: Some(output), ..self }
+    }
+
+    /// Renders an aligned panorama from the full-resolution photographs, within `stitch.memory`.
     ///
     /// # Errors
-    /// Those of reading the photographs; [`Error::Limits`] if the canvas is too large; [`Error::Cancelled`].
+    /// Those of reading the photographs and of a scratch file; [`Error::Limits`] with the numbers, before any photograph is
+    /// read, if the canvas is too large for the memory or the disk; [`Error::Cancelled`].
     pub fn compose(&self, alignment: &Alignment) -> Result<Panorama> {
-        render::run(
-            &alignment.layout,
+        let layout = &alignment.layout;
+        let scratch = self.scratch(layout)?;
+        render::run_within(
+            &Budget::new(self.options).composing(alignment.photographs.kept_bytes(), &scratch),
+            layout,
             &alignment.corrections,
             alignment.photographs.as_ref(),
-            &self.options.render,
-            &self.options.seam,
+            (&self.options.render, &self.options.seam),
             self.context,
         )
     }
 
     /// The geometry that `project` records, over `images` with their `masks`: those used in it, in its order, or others of
-    /// their sizes. The canvas is laid out anew if the options ask for another one, and the corrections estimated anew if they ask for that.
+    /// their sizes. The canvas is laid out anew if the options ask for another one, and the corrections estimated anew if
+    /// they ask for that.
     ///
     /// # Errors
-    /// [`Error::Options`]; [`Error::Input`] if the project was damaged; those of the layout; [`Error::Cancelled`].
+    /// [`Error::Options`]; [`Error::Input`] if the project was damaged; [`Error::NotApplicable`] if a projection is asked
+    /// for and the project has no cameras; those of the layout; [`Error::Limits`]; [`Error::Cancelled`].
     pub(crate) fn recall(&self, project: &Project, images: Vec<SourceImage>, masks: AllMasks) -> Result<Alignment> {
         self.options.validate()?;
         let mut clock = Clock::default();
-        let recorded = Recorded::new(project)?;
-        let photographs = FilePhotographs::new(images, self.photograph_cache_bytes()).with_masks(masks.masks);
-        let photographs = std::sync::Arc::new(photographs);
-        let same_canvas = self.options.canvas == project.options.canvas;
-        let layout = match same_canvas {
-            true => recorded.layout,
-            false => layout::run(recorded.layout.placed, recorded.reference, &self.options.canvas, self.context)?,
-        };
+        let Recorded { used, layout, corrections, reference } = Recorded::new(project)?;
+        let measuring = Budget::new(self.options).measuring(&images, self.options)?;
+        let colours = PhotographColours::survey(&images, self.context);
+        let photographs = FilePhotographs::new(images, measuring.kept_bytes).in_colours(colours);
+        let photographs = std::sync::Arc::new(photographs.with_masks(masks.masks));
+        let arrangement =
+            clock.time("canvas", || arrangement::recall(layout, reference, project, self.options, self.context))?;
         let corrections = match self.options.exposure == project.options.exposure {
-            true => recorded.corrections,
-            false => clock.time("exposure", || self.correct_anew(&layout, recorded.reference, &photographs))?,
+            true => corrections,
+            false => clock.time("exposure", || {
+                self.correct_anew(&arrangement.plane, reference, (&photographs, measuring.at_once))
+            })?,
         };
+        let same_canvas = self.options.canvas == project.options.canvas;
         let mut project = Project { options: self.options.clone(), ..project.clone() };
         let images = photographs.images();
-        record_composition(&mut project, &recorded.used, images, &masks.records, &layout, &corrections);
+        record_composition(&mut project, &used, images, &masks.records, &arrangement, &corrections);
+        project.colour_space = photographs.colours().map(PhotographColours::name).unwrap_or_default();
         if !same_canvas {
             project.measures = None;
         }
-        project.diagnostics.extend(self.context.take_diagnostics());
-        project.seconds.clone_from(clock.seconds());
-        Ok(Alignment { project, layout, corrections, photographs, clock })
+        let layout = arrangement.written;
+        // Photographs are numbered by their place among those used.
+        let corrections =
+            layout.placed.iter().filter_map(|placed| corrections.get(placed.photograph).copied()).collect();
+        let mut alignment = Alignment { project, layout, corrections, photographs, clock };
+        alignment.record_findings(self.context.take_diagnostics());
+        alignment.project.seconds.clone_from(alignment.clock.seconds());
+        Ok(alignment)
     }
 
     /// What evens out the light of photographs that were only decoded, each placed once in `layout`.
@@ -250,21 +298,34 @@ impl<'a> Stitcher<'a> {
         &self,
         layout: &CanvasLayout,
         reference: usize,
-        photographs: &FilePhotographs,
+        (photographs, at_once): (&FilePhotographs, usize),
     ) -> Result<Vec<Correction>> {
         let images: Vec<&SourceImage> = photographs.images().iter().collect();
-        let thumbnails = measure::thumbnails(photographs, self.options, self.context)?;
+        let thumbnails = measure::thumbnails(photographs, at_once, self.options, self.context)?;
+        let curve = photographs.transfer_curve();
         let thumbnails: Vec<Thumbnail> = thumbnails
             .iter()
             .zip(camera_groups(&images))
-            .map(|((raster, frame), camera)| Thumbnail { raster, frame: *frame, camera })
+            .map(|((raster, frame), camera)| Thumbnail { raster, curve: &curve, frame: *frame, camera })
             .collect();
         Ok(exposure::run(layout, &thumbnails, reference, &self.options.exposure, self.context)?.corrections)
     }
 
-    fn photograph_cache_bytes(&self) -> usize {
-        // The cast saturates.
-        (self.options.stitch.photograph_cache * 1e6) as usize
+    /// Where a scratch file would go. Refuses a panorama for which there is no room.
+    fn scratch(&self, layout: &CanvasLayout) -> Result<ScratchFolder> {
+        let named = Some(&self.options.stitch.scratch).filter(|named| !named.is_empty()).map(PathBuf::from);
+        let Some(output) = self.output else {
+            return Ok(ScratchFolder::new(named.unwrap_or_else(std::env::temp_dir)));
+        };
+        let folder = output.parent().unwrap_or(Path::new(""));
+        let bytes = encode::expected_bytes(output, layout.width, layout.height, &self.options.output);
+        check_room(folder, bytes, "the panorama")?;
+        Ok(ScratchFolder::new(named.unwrap_or_else(|| folder.to_owned())).beside(folder, bytes))
+    }
+
+    /// What the panorama's file is to tell: its colour profile, and of its photographs what the options let pass.
+    pub fn metadata(&self, alignment: &Alignment) -> Metadata {
+        provenance::metadata(&alignment.project, alignment.photographs.colours(), &self.options.output)
     }
 
     /// Measures how true `panorama`, composed of `alignment`, is to its photographs: steps across its seams, and ghosts.
@@ -281,12 +342,12 @@ impl<'a> Stitcher<'a> {
                 render::layer(layout, &alignment.corrections, position, photographs, &self.options.render)
             })
             .collect::<Result<Vec<_>>>()?;
-        let size = [layout.width, layout.height];
+        let (size, around) = ([layout.width, layout.height], layout.period.is_some());
         let shown = match panorama.seams() {
             Some(seams) => seams.on_canvas(size),
-            None => fidelity::deepest(&layers, size)?,
+            None => fidelity::deepest(&layers, size, around)?,
         };
-        fidelity::measure(panorama, &layers, &shown)
+        fidelity::measure(panorama, &layers, &shown, around)
     }
 
     fn check_any(&self, sources: &Sources, inputs: &Inputs) -> Result<()> {
@@ -309,10 +370,9 @@ impl<'a> Stitcher<'a> {
 
     fn match_all(
         &self,
-        sources: Sources,
-        masks: Vec<Vec<MaskRecord>>,
+        (sources, masks): (Sources, Vec<Vec<MaskRecord>>),
         photographs: &FilePhotographs,
-        known: Option<&Known<'_>>,
+        (known, at_once): (Option<Known<'_>>, usize),
         inputs: &Inputs,
         clock: &mut Clock,
     ) -> Result<Matched> {
@@ -325,7 +385,8 @@ impl<'a> Stitcher<'a> {
             }
         };
         let (mut measured, mut undecodable) = (Vec::new(), Vec::new());
-        for outcome in measure::run(photographs, known, self.options, self.context, clock)? {
+        let known = known.as_ref();
+        for outcome in measure::run(photographs, (known, at_once), self.options, self.context, clock)? {
             match outcome {
                 Ok(one) => {
                     measured.push(Some(one));
@@ -425,24 +486,45 @@ impl<'a> Stitcher<'a> {
             }),
         };
         let placed = place(&component, geometry.as_ref());
-        let layout = layout::run(placed, component.reference, &self.options.canvas, self.context)?;
+        let sources = arrangement::Sources::of_geometry(placed, &component, geometry.as_ref());
+        let arrangement = clock.time("canvas", || arrangement::run(sources, self.options, self.context))?;
+        let curve = photographs.transfer_curve();
         let thumbnails: Vec<Thumbnail> = members
             .iter()
             .zip(component.camera_groups())
             .filter_map(|(&picture, camera)| Some((camera, matched.measured[picture].as_ref()?)))
-            .map(|(camera, one)| Thumbnail { raster: &one.thumbnail, frame: one.thumbnail_frame, camera })
+            .map(|(camera, one)| Thumbnail {
+                raster: &one.thumbnail,
+                curve: &curve,
+                frame: one.thumbnail_frame,
+                camera,
+            })
             .collect();
         let corrections = clock
             .time("exposure", || {
-                exposure::run(&layout, &thumbnails, component.reference, &self.options.exposure, self.context)
+                exposure::run(
+                    &arrangement.plane,
+                    &thumbnails,
+                    component.reference,
+                    &self.options.exposure,
+                    self.context,
+                )
             })?
             .corrections;
         let mut project = matched.project(self.options, members, stitched);
-        fill_geometry(&mut project, &component, geometry.as_ref(), &layout, &corrections);
-        project.measures = geometry
-            .as_ref()
-            .map(|geometry| clock.time("measures", || measures::run(&component, geometry, &layout, self.options)));
+        fill_geometry(&mut project, &component, geometry.as_ref(), &arrangement, &corrections);
+        project.colour_space = photographs.colours().map(PhotographColours::name).unwrap_or_default();
+        project.measures = geometry.as_ref().map(|geometry| {
+            clock.time("measures", || measures::run(&component, geometry, &arrangement.plane, self.options))
+        });
         project.seconds.clone_from(clock.seconds());
+        let layout = arrangement.written;
+        // A photograph may be placed several times, or not at all; its light is the same everywhere.
+        let corrections = layout
+            .placed
+            .iter()
+            .filter_map(|placed| Some(corrections[members.binary_search(&placed.photograph).ok()?]))
+            .collect();
         Ok(Alignment { project, layout, corrections, photographs: photographs.clone(), clock })
     }
 

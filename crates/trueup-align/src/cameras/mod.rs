@@ -18,6 +18,7 @@ use trueup_core::source::WorkingFrame;
 use trueup_core::{Result, StageContext};
 
 use crate::stitch_graph::{GraphEdge, StitchGraph};
+use crate::{full_turn, similarity};
 use bundle::{FocalModel, Parameters};
 use observations::Observations;
 
@@ -119,7 +120,7 @@ pub fn run(
         StitchGraph::from_edges(priors.len(), pairs.iter().map(edge_of).collect()).central_picture(&everything);
     let mut active: Vec<usize> = (0..pairs.len()).collect();
     let mut solution = solve(priors, pairs, &active, anchor, options, context)?;
-    let contradicting = contradicting_pairs(priors.len(), pairs, &solution.pair_rms_px, options);
+    let contradicting = contradicting_pairs(&solution.cameras, pairs, &solution.pair_rms_px, options);
     if !contradicting.is_empty() {
         active.retain(|position| contradicting.binary_search(position).is_err());
         for &position in &contradicting {
@@ -253,12 +254,18 @@ fn focal_spread(shared: &FocalModel, shared_focal: &[f64], free_focal: &[f64]) -
 }
 
 /// Pairs whose residual is too large, worst first as long as the rest stays connected; ascending positions.
+///
+/// Where that would open a full turn, pairs that close it are spared unless they are far too bad: what they contradict by is
+/// then mostly what the turn tells of the focal length, which no other pair tells as well.
 fn contradicting_pairs(
-    pictures: usize,
+    cameras: &[Camera],
     pairs: &[PairMatches],
     pair_rms_px: &[f64],
     options: &CameraOptions,
 ) -> Vec<usize> {
+    /// Residual up to which a pair that closes a full turn is spared, in units of that of other pairs.
+    const SPARED: f64 = 2.0;
+    let pictures = cameras.len();
     let mut suspects: Vec<usize> =
         (0..pairs.len()).filter(|&position| pair_rms_px[position] > options.max_pair_rms_px).collect();
     suspects.sort_by(|&first, &second| pair_rms_px[second].total_cmp(&pair_rms_px[first]).then(first.cmp(&second)));
@@ -271,6 +278,19 @@ fn contradicting_pairs(
         if StitchGraph::from_edges(pictures, rest).components.len() == 1 {
             dropped.push(suspect);
         }
+    }
+    let level = similarity::level_by_cameras(cameras);
+    let goes_round = |left_out: &dyn Fn(usize) -> bool| {
+        let edges: Vec<GraphEdge> = (0..pairs.len())
+            .filter(|&position| !left_out(position))
+            .map(|position| edge_of(&pairs[position]))
+            .collect();
+        full_turn::goes_round(cameras, &edges, &level)
+    };
+    if goes_round(&|_| false) && !goes_round(&|position| dropped.contains(&position)) {
+        let all = dropped.clone();
+        let closes = |pair: usize| goes_round(&|position| position != pair && all.contains(&position));
+        dropped.retain(|&pair| pair_rms_px[pair] > SPARED * options.max_pair_rms_px || !closes(pair));
     }
     dropped.sort_unstable();
     dropped

@@ -161,3 +161,29 @@ fn a_pair_that_contradicts_the_rest_is_set_aside() {
     assert!(worst_rotation_error(&truth, &cameras.cameras) < 0.1);
     assert!(wrap_angle(cameras.pair_rms_px[wrong]) != 0.0);
 }
+
+#[test]
+fn a_pair_that_closes_a_full_turn_is_spared_unless_it_is_far_too_bad() {
+    let truth: Vec<Camera> = (0..12).map(|k| camera(700.0, 30.0 * f64::from(k), 0.0, 0.0)).collect();
+    let pairs = matched(&truth, 0.3, 0.0);
+    let position = |a, b| pairs.iter().position(|pair| (pair.a, pair.b) == (a, b)).expect("overlap");
+    let (closing, inner) = (position(0, 11), position(3, 4));
+    assert_eq!(pairs.len(), 12);
+    let options = CameraOptions::default();
+    let found = |closing_px: f64, inner_px: f64| {
+        let mut rms = vec![1.0; pairs.len()];
+        (rms[closing], rms[inner]) = (closing_px, inner_px);
+        contradicting_pairs(&truth, &pairs, &rms, &options)
+    };
+    assert!(found(11.0, 1.0).is_empty());
+    assert_eq!(found(21.0, 1.0), [closing]);
+    // Only one can go at all; it is the worse one, and spared as well.
+    assert!(found(11.0, 12.0).is_empty());
+    // In an open row nothing is spared: the chain hangs on every pair but those of a short cut.
+    let row: Vec<Camera> = (0..4).map(|k| camera(700.0, 15.0 * f64::from(k), 0.0, 0.0)).collect();
+    let pairs = matched(&row, 0.3, 0.0);
+    let short_cut = pairs.iter().position(|pair| (pair.a, pair.b) == (0, 2)).expect("overlap");
+    let mut rms = vec![1.0; pairs.len()];
+    rms[short_cut] = 11.0;
+    assert_eq!(contradicting_pairs(&row, &pairs, &rms, &options), [short_cut]);
+}

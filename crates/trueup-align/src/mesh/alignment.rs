@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
-use super::{Base, NormalEquations};
+use super::{Base, Closure, NormalEquations};
 use crate::match_points::OverlapWarp;
 
 /// A grid vertex of one picture and its place in another.
@@ -19,14 +19,26 @@ pub struct MatchPoint {
     pub place: [f64; 2],
     /// How far the other picture's base is, at that place, from its bilinear interpolation.
     pub sag: [f64; 2],
+    /// Turns by which the vertex lies to the right of the place: 0 but across the cut of a full turn.
+    pub turns: f64,
+}
+
+impl MatchPoint {
+    /// From where the other picture has it to where its own has it, in the deformed `meshes`.
+    fn distance(&self, meshes: &[GridMesh]) -> Vector2<f64> {
+        let vertex = Vector2::from(meshes[self.from].target[self.vertex]);
+        vertex - meshes[self.to].warp(Vector2::from(self.place)) - Vector2::from(self.sag)
+    }
 }
 
 /// Sum over match points of |phi_from(vertex) - phi_to(place)|^2; paper equation for E_a.
 ///
 /// # Departures
+/// Across the cut of a full turn the two places are to lie one period, an unknown length, apart in x.
+///
 /// phi is bilinear in the deviation from the base, not in the vertices themselves; with a base that is a similarity the
 /// two are the same. Otherwise the bilinear chords of two curved grids would pull on each other.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct AlignmentEnergy {
     points: Vec<MatchPoint>,
 }
@@ -34,19 +46,31 @@ pub struct AlignmentEnergy {
 impl AlignmentEnergy {
     /// The match points of all warps. `places` are the bases' places of the grids' vertices.
     pub fn new(grids: &[GridMesh], warps: &[OverlapWarp], bases: &[Base], places: &[Vec<Vector2<f64>>]) -> Self {
-        let points = warps
-            .iter()
-            .flat_map(|warp| {
-                warp.vertices.iter().take(grids[warp.from].len()).enumerate().filter_map(|(vertex, place)| {
-                    let to = warp.to;
-                    place.map(|place| {
-                        let sag = bases[to].sag(&grids[to], &places[to], Vector2::from(place)).into();
-                        MatchPoint { from: warp.from, vertex, to, place, sag }
-                    })
+        let within = Closure { warps, turns: &[], expected: 0.0 };
+        let mut energy = Self { points: Vec::new() };
+        energy.join(&within, grids, bases, places);
+        energy
+    }
+
+    /// Takes in the match points of `closure`.
+    pub fn join(&mut self, closure: &Closure, grids: &[GridMesh], bases: &[Base], places: &[Vec<Vector2<f64>>]) {
+        let turns = closure.turns.iter().copied().chain(std::iter::repeat(0.0));
+        let points = closure.warps.iter().zip(turns).flat_map(|(warp, turns)| {
+            warp.vertices.iter().take(grids[warp.from].len()).enumerate().filter_map(move |(vertex, place)| {
+                let to = warp.to;
+                place.map(|place| {
+                    let sag = bases[to].sag(&grids[to], &places[to], Vector2::from(place)).into();
+                    MatchPoint { from: warp.from, vertex, to, place, sag, turns }
                 })
             })
-            .collect();
-        Self { points }
+        });
+        self.points.extend(points);
+    }
+
+    /// For every match point across the cut of a full turn, the way from its place at the left end to that at the right.
+    pub(super) fn apart(&self, meshes: &[GridMesh]) -> Vec<Vector2<f64>> {
+        let across = self.points.iter().filter(|point| point.turns != 0.0);
+        across.map(|point| point.distance(meshes) * point.turns).collect()
     }
 
     /// Adds the energy, each match point weighted by `weight` squared.
@@ -55,7 +79,11 @@ impl AlignmentEnergy {
             let (corners, shares) = grids[point.to].bilinear(Vector2::from(point.place));
             let to: [(usize, f64); 4] = std::array::from_fn(|k| (corners[k], -shares[k]));
             let value = Vector2::from(point.sag);
-            equations.add_between((point.from, &[(point.vertex, 1.0)]), (point.to, &to), value, weight * weight);
+            let from = [(point.vertex, 1.0)];
+            equations.add_between((point.from, &from), (point.to, &to), value, weight * weight);
+            if point.turns != 0.0 {
+                equations.add_period([(point.from, &from), (point.to, &to)], point.turns, value.x, weight * weight);
+            }
         }
     }
 
@@ -73,16 +101,11 @@ impl AlignmentEnergy {
         cells
     }
 
-    /// Root mean square distance of the two places of a match point in the deformed `meshes`; 0 without match points.
-    pub fn rms(&self, meshes: &[GridMesh]) -> f64 {
-        let sum: f64 = self
-            .points
-            .iter()
-            .map(|point| {
-                let vertex = Vector2::from(meshes[point.from].target[point.vertex]);
-                (vertex - meshes[point.to].warp(Vector2::from(point.place)) - Vector2::from(point.sag)).norm_squared()
-            })
-            .sum();
-        (sum / self.points.len().max(1) as f64).sqrt()
+    /// Root mean square distance of the two places of a match point in the deformed `meshes`, across a full turn's cut
+    /// modulo `period`; 0 without match points.
+    pub fn rms(&self, meshes: &[GridMesh], period: Option<f64>) -> f64 {
+        let turn = Vector2::new(period.unwrap_or(0.0), 0.0);
+        let squares = self.points.iter().map(|point| (point.distance(meshes) - turn * point.turns).norm_squared());
+        (squares.sum::<f64>() / self.points.len().max(1) as f64).sqrt()
     }
 }

@@ -2,6 +2,8 @@
 //!
 //! The similarity energies compare every grid edge with the base, so the base decides which shape is free of cost.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Matrix3, Vector2, Vector3};
 use trueup_core::camera::Camera;
 use trueup_core::geometry::{roll_from_down, rotation_about_x};
@@ -53,8 +55,7 @@ struct WantedSimilarity {
 /// their mean direction is level: verticals then converge as they do for the eye, and nothing is torn.
 pub fn bases(cameras: &[Camera], grids: &[GridMesh], prior: &SimilarityPrior, options: &MeshOptions) -> Vec<Base> {
     let cameras = &prior.corrected_cameras(cameras);
-    let scaled_focal: f64 = cameras.iter().zip(&prior.scale).map(|(camera, scale)| camera.focal_px * scale).sum();
-    let units_per_radian = scaled_focal / cameras.len().max(1) as f64;
+    let units_per_radian = units_per_radian(cameras, prior);
     let level_from_world = prior.level_from_world();
     let tilt = tilt_from_level(cameras, &level_from_world);
     let frame = tilt.unwrap_or_else(Matrix3::identity) * level_from_world;
@@ -70,6 +71,17 @@ pub fn bases(cameras: &[Camera], grids: &[GridMesh], prior: &SimilarityPrior, op
             Base::new(options, &cameras[k], &grids[k], &frame, wanted)
         })
         .collect()
+}
+
+/// Panorama units per radian of the sphere that the prior means.
+fn units_per_radian(cameras: &[Camera], prior: &SimilarityPrior) -> f64 {
+    let scaled_focal: f64 = cameras.iter().zip(&prior.scale).map(|(camera, scale)| camera.focal_px * scale).sum();
+    scaled_focal / cameras.len().max(1) as f64
+}
+
+/// Length of a full turn on the unrolled sphere of [`bases`], in panorama units.
+pub fn turn_length(cameras: &[Camera], prior: &SimilarityPrior) -> f64 {
+    TAU * units_per_radian(&prior.corrected_cameras(cameras), prior)
 }
 
 /// The turn about the horizontal axis that brings a steep panorama's mean direction level; `None` if it is not steep.
@@ -134,6 +146,18 @@ impl Base {
         let at_centre = derivative_at_centre(options.conformality, &view.level_from_camera, camera.focal_px);
         let turn = conjugate_product(at_centre, similarity).normalize();
         Self { factor: turn * wanted.units_per_radian, sphere: Some(view) }
+    }
+
+    /// The picture of a camera on the level sphere, upright.
+    #[cfg(test)]
+    pub(super) fn on_level_sphere(
+        camera: &Camera,
+        grid: &GridMesh,
+        units_per_radian: f64,
+        options: &MeshOptions,
+    ) -> Self {
+        let wanted = WantedSimilarity { scale: 1.0, theta: 0.0, units_per_radian };
+        Self::new(options, camera, grid, &Matrix3::identity(), wanted)
     }
 
     /// The plain similarity of a picture.
@@ -224,7 +248,7 @@ impl SphereView {
 }
 
 /// Whether a direction in the level world is far enough from the poles to be unrolled.
-fn is_moderate(ray: Vector3<f64>) -> bool {
+pub(crate) fn is_moderate(ray: Vector3<f64>) -> bool {
     /// Sine of the largest latitude that is unrolled, 70 degrees.
     const STEEPEST: f64 = 0.94;
     (ray.y / ray.norm()).abs() <= STEEPEST
@@ -280,11 +304,9 @@ mod tests {
     #[test]
     fn only_pictures_that_look_one_way_are_tilted_level() {
         let tilt = |cameras: &[Camera]| tilt_from_level(cameras, &Matrix3::identity());
-        let turn: Vec<Camera> =
-            (0..12).map(|k| camera(f64::from(k) * std::f64::consts::TAU / 12.0, 1.25, 0.0)).collect();
+        let turn: Vec<Camera> = (0..12).map(|k| camera(f64::from(k) * TAU / 12.0, 1.25, 0.0)).collect();
         assert!(tilt(&turn[..1]).is_some());
-        let lower: Vec<Camera> =
-            (0..12).map(|k| camera(f64::from(k) * std::f64::consts::TAU / 12.0, -0.5, 0.0)).collect();
+        let lower: Vec<Camera> = (0..12).map(|k| camera(f64::from(k) * TAU / 12.0, -0.5, 0.0)).collect();
         assert!(tilt(&[turn, lower].concat()).is_none());
     }
 

@@ -8,6 +8,7 @@
 
 mod alignment;
 mod base;
+mod closure;
 mod complex;
 mod evidence;
 mod line_alignment;
@@ -20,12 +21,15 @@ mod structure;
 
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
+use trueup_core::diagnostics::Diagnostic;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Error, Result, StageContext};
 
 use crate::match_points::OverlapWarp;
 pub use alignment::{AlignmentEnergy, MatchPoint};
-pub use base::{Base, BaseShape, bases};
+pub(crate) use base::is_moderate;
+pub use base::{Base, BaseShape, bases, turn_length};
+pub use closure::Closure;
 pub use line_alignment::{LineAlignmentInput, LineAlignmentOptions, StraightInput};
 pub use normal_equations::{MeshSolution, Metric, NormalEquations, Share};
 pub use photometric::{PhotometricInput, PhotometricOptions, Pyramid};
@@ -75,11 +79,16 @@ pub struct WarpedMesh {
     pub folds: usize,
     /// Relative gradient |A^T (A x - b)| / |A^T b| of the energy at the solution.
     pub relative_gradient: f64,
+    /// Length of a full turn in panorama units: places this far apart in x are the same. `None` if the pictures do not go
+    /// all the way round, or their ends do not meet.
+    #[serde(default)]
+    pub period: Option<f64>,
 }
 
 /// Deforms the undeformed `grids` so that overlaps align and every edge keeps to its picture's base.
 ///
-/// * `warps`: match points, two directions a pair; pairs across the cut of a full turn are left out by the caller.
+/// * `warps`: match points, two directions a pair; pairs across the cut of a full turn are not among them (see
+///   [`Closure`]).
 /// * `bases`: for every picture the shape that the prior asks for.
 /// * `reference`: the picture whose first vertex stays in place (translation is otherwise free).
 ///
@@ -99,6 +108,8 @@ pub fn run(
 
 /// As [`run`], and with the energies of `refinements`; none of them leave the grids exactly as [`run`] makes them.
 ///
+/// A full turn is closed if its ends can meet; otherwise the warning `full-turn-open` says why not, and it is left open.
+///
 /// # Errors
 /// As [`run`]; [`Error::Input`] if a refinement's lists do not have an entry per picture.
 pub fn run_refined(
@@ -110,39 +121,55 @@ pub fn run_refined(
     refinements: &Refinements,
     context: &StageContext,
 ) -> Result<WarpedMesh> {
-    /// Any positive weight anchors the one free translation exactly; 1 keeps the system well conditioned.
-    const ANCHOR_WEIGHT: f64 = 1.0;
     context.check_cancelled()?;
     refinements.check(grids.len())?;
-    let mut equations = NormalEquations::new(grids);
     let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(grids).map(|(base, grid)| base.places(grid)).collect();
     let alignment = AlignmentEnergy::new(grids, warps, bases, &places);
-    alignment.add(options.alignment_weight, &mut equations, grids);
-    let overlap = alignment.overlap_cells(grids);
-    for (picture, grid) in grids.iter().enumerate() {
-        SimilarityEnergy::new(grid, &places[picture], &overlap[picture], options).add(picture, &mut equations);
-    }
-    let anchored = anchors(grids.len(), warps, reference);
-    for picture in anchored {
-        equations.anchor(picture, ANCHOR_WEIGHT);
-    }
-    let problem = Problem { grids, warps, bases, places: &places, alignment: &alignment, options, context };
-    let Solved { meshes: solved, relative_gradient } = problem.solve_refined(equations, refinements)?;
-    let alignment_rms = alignment.rms(&solved);
-    let meshes = problem.delivered(&solved);
-    let folds = meshes.iter().map(count_folds).sum();
-    Ok(WarpedMesh { meshes, alignment_rms, folds, relative_gradient })
+    let open = Problem {
+        grids,
+        warps,
+        bases,
+        places: &places,
+        alignment: &alignment,
+        reference,
+        closing: &[],
+        options,
+        context,
+    };
+    let Some(closure) = &refinements.closure else { return open.deform(refinements) };
+    let mut alignment = alignment.clone();
+    alignment.join(closure, grids, bases, &places);
+    let closed = Problem { alignment: &alignment, closing: closure.warps, ..open };
+    let plain = open.solve_refined(open.equations(), &Refinements::default())?;
+    let contradiction = match closure.contradiction(&alignment.apart(&plain.meshes)) {
+        Some(contradiction) => contradiction,
+        None => {
+            let warped = closed.deform(refinements)?;
+            if warped.folds <= refinement::total_folds(&open.delivered(&plain.meshes)) {
+                return Ok(warped);
+            }
+            "closing the turn would fold the photographs".to_owned()
+        }
+    };
+    context.report(Diagnostic::warning(
+        "full-turn-open",
+        "mesh",
+        format!("the photographs go all the way round, but the panorama's ends do not meet: {contradiction}"),
+        "Look whether the photographs beside the cut show the same; --graph names the pairs to be matched.",
+    ));
+    open.deform(refinements)
 }
 
 /// The undeformed grid with `factor` cells per cell of `grid` along each axis.
 pub fn divided(grid: &GridMesh, factor: usize) -> GridMesh {
     let (rows, columns) = ((grid.rows - 1) * factor + 1, (grid.columns - 1) * factor + 1);
-    let mut fine = GridMesh { rows, columns, target: Vec::new(), ..*grid };
+    let mut fine = GridMesh { rows, columns, target: Vec::new(), lines: None, ..*grid };
     fine.target = (0..fine.len()).map(|vertex| fine.source(vertex).into()).collect();
     fine
 }
 
 /// What all rounds of solving have in common.
+#[derive(Clone, Copy)]
 struct Problem<'a> {
     grids: &'a [GridMesh],
     warps: &'a [OverlapWarp],
@@ -150,6 +177,10 @@ struct Problem<'a> {
     /// The bases' places of the grids' vertices.
     places: &'a [Vec<Vector2<f64>>],
     alignment: &'a AlignmentEnergy,
+    /// The picture that stays in place.
+    reference: usize,
+    /// Match points across the cut of a full turn that is to be closed.
+    closing: &'a [OverlapWarp],
     options: &'a MeshOptions,
     context: &'a StageContext<'a>,
 }
@@ -157,10 +188,37 @@ struct Problem<'a> {
 /// Grids whose vertices are a solution.
 struct Solved {
     meshes: Vec<GridMesh>,
+    /// Length of a full turn that is closed.
+    period: Option<f64>,
     relative_gradient: f64,
 }
 
 impl Problem<'_> {
+    /// The energies of the plain mesh.
+    fn equations(&self) -> NormalEquations {
+        /// Any positive weight anchors the one free translation exactly; 1 keeps the system well conditioned.
+        const ANCHOR_WEIGHT: f64 = 1.0;
+        let mut equations = NormalEquations::new(self.grids);
+        self.alignment.add(self.options.alignment_weight, &mut equations, self.grids);
+        let overlap = self.alignment.overlap_cells(self.grids);
+        for (picture, grid) in self.grids.iter().enumerate() {
+            SimilarityEnergy::new(grid, &self.places[picture], &overlap[picture], self.options)
+                .add(picture, &mut equations);
+        }
+        for picture in anchors(self.grids.len(), &[self.warps, self.closing], self.reference) {
+            equations.anchor(picture, ANCHOR_WEIGHT);
+        }
+        equations
+    }
+
+    fn deform(&self, refinements: &Refinements) -> Result<WarpedMesh> {
+        let Solved { meshes, period, relative_gradient } = self.solve_refined(self.equations(), refinements)?;
+        let alignment_rms = self.alignment.rms(&meshes, period);
+        let meshes = self.delivered(&meshes);
+        let folds = refinement::total_folds(&meshes);
+        Ok(WarpedMesh { meshes, alignment_rms, folds, relative_gradient, period })
+    }
+
     fn solve(&self, solver: &mut MeshSolver, equations: &NormalEquations) -> Result<Solved> {
         self.context.check_cancelled()?;
         let unsolvable = |why: &str| {
@@ -176,7 +234,11 @@ impl Problem<'_> {
             return Err(unsolvable("the solution is not finite"));
         }
         let meshes = equations.meshes(self.grids, &solution.coordinates);
-        Ok(Solved { meshes, relative_gradient: solution.relative_gradient })
+        let period = solution.period;
+        if period.is_some_and(|period| !(period.is_finite() && period > 0.0)) {
+            return Err(unsolvable("the length of a full turn is not positive"));
+        }
+        Ok(Solved { meshes, period, relative_gradient: solution.relative_gradient })
     }
 
     /// Solved grids with the subdivision that they are delivered with.
@@ -196,9 +258,9 @@ fn subdivided(solved: &GridMesh, base: &Base, places: &[Vector2<f64>], factor: u
 }
 
 /// One picture of every part that the warps connect: the reference where it is a member, else the first.
-fn anchors(pictures: usize, warps: &[OverlapWarp], reference: usize) -> Vec<usize> {
+fn anchors(pictures: usize, warps: &[&[OverlapWarp]], reference: usize) -> Vec<usize> {
     let mut union = petgraph::unionfind::UnionFind::<usize>::new(pictures);
-    for warp in warps.iter().filter(|warp| warp.vertices.iter().any(Option::is_some)) {
+    for warp in warps.iter().copied().flatten().filter(|warp| warp.vertices.iter().any(Option::is_some)) {
         union.union(warp.from, warp.to);
     }
     let labels = union.into_labeling();

@@ -25,6 +25,8 @@ type Block = [f64; 4];
 pub struct MeshSolution {
     /// x and y of every vertex in turn.
     pub coordinates: Vec<f64>,
+    /// The length of a full turn, where equations ask for it.
+    pub period: Option<f64>,
     /// |A^T A x - A^T b| / |A^T b|.
     pub relative_gradient: f64,
 }
@@ -44,6 +46,19 @@ pub struct NormalEquations {
     /// Whether `between` holds couplings inside a grid, so that its order is not that of the columns.
     far_inside: bool,
     pub(super) right: Vec<f64>,
+    pub(super) border: Option<Border>,
+}
+
+/// The last row and column of the normal equations: those of one more unknown, the length of a full turn, that couples
+/// with vertices anywhere.
+#[derive(Debug, Clone)]
+pub(super) struct Border {
+    /// The couplings with all other unknowns.
+    pub couplings: Vec<f64>,
+    /// The coupling with itself.
+    pub own: f64,
+    /// The right side.
+    pub right: f64,
 }
 
 /// A symmetric 2 x 2 matrix [[xx, xy], [xy, yy]] that weighs a residual of the plane.
@@ -108,10 +123,11 @@ impl NormalEquations {
             between: Vec::new(),
             far_inside: false,
             right: vec![0.0; 2 * vertices],
+            border: None,
         }
     }
 
-    /// Number of scalar unknowns.
+    /// Number of scalar unknowns, without the length of a full turn.
     pub fn unknowns(&self) -> usize {
         self.right.len()
     }
@@ -162,6 +178,21 @@ impl NormalEquations {
                 self.between.push((one.max(other) as u32, one.min(other) as u32, block));
             }
         }
+    }
+
+    /// Makes the length of a full turn, P, an unknown and adds what it contributes to
+    /// squared_weight |sum_m weight_m v_m - (turns P, 0) - value|^2 beyond the same without P (see
+    /// [`Self::add_between`]): each of `parts` is a picture with its vertices and their weights.
+    pub fn add_period(&mut self, parts: [(usize, &[(usize, f64)]); 2], turns: f64, value: f64, squared_weight: f64) {
+        let unknowns = self.unknowns();
+        let border = self.border.get_or_insert_with(|| Border { couplings: vec![0.0; unknowns], own: 0.0, right: 0.0 });
+        for (picture, members) in parts {
+            for &(m, weight) in members {
+                border.couplings[2 * (self.first[picture] + m)] -= squared_weight * turns * weight;
+            }
+        }
+        border.own += squared_weight * turns * turns;
+        border.right -= squared_weight * turns * value;
     }
 
     /// Adds weight |v - source place|^2 for the first vertex of grid `picture`, whose source is (0, 0).

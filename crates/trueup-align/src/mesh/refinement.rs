@@ -6,13 +6,15 @@ use trueup_core::{Error, Result};
 
 use super::line_alignment::Present;
 use super::{
-    LineAlignmentInput, MeshSolver, NormalEquations, PhotometricInput, Problem, Solved, StraightInput, StructureInput,
-    count_folds,
+    Closure, LineAlignmentInput, MeshSolver, NormalEquations, PhotometricInput, Problem, Solved, StraightInput,
+    StructureInput, count_folds,
 };
 
 /// Energies beyond those of the plain mesh; by default none.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Refinements<'a> {
+    /// What closes a full turn.
+    pub closure: Option<Closure<'a>>,
     /// Long lines that keep their shape.
     pub structure: Option<StructureInput<'a>>,
     /// Lines and points that align overlaps.
@@ -141,9 +143,9 @@ impl Problem<'_> {
                     straight.add(&mut with_pixels, &Present { solved: &best.meshes, fine: &fine, places: self.places });
                 }
                 let next = self.solve(solver, &with_pixels)?;
-                let most_rms = self.alignment.rms(&best.meshes) + options.max_departure_px;
-                let is_sound = |meshes: &[GridMesh], fine: &[GridMesh]| {
-                    total_folds(fine) <= folds && self.alignment.rms(meshes) <= most_rms
+                let most_rms = self.alignment.rms(&best.meshes, best.period) + options.max_departure_px;
+                let is_sound = |step: &Solved, fine: &[GridMesh]| {
+                    total_folds(fine) <= folds && self.alignment.rms(&step.meshes, step.period) <= most_rms
                 };
                 let Some(step) = self.longest_step(&best, next, is_sound) else { break };
                 (best, fine) = step;
@@ -158,15 +160,16 @@ impl Problem<'_> {
         &self,
         from: &Solved,
         to: Solved,
-        is_sound: impl Fn(&[GridMesh], &[GridMesh]) -> bool,
+        is_sound: impl Fn(&Solved, &[GridMesh]) -> bool,
     ) -> Option<(Solved, Vec<GridMesh>)> {
         const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
         SHARES.iter().find_map(|&share| {
             let meshes: Vec<GridMesh> =
                 from.meshes.iter().zip(&to.meshes).map(|(from, to)| between(from, to, share)).collect();
             let fine = self.delivered(&meshes);
-            let solved = Solved { meshes, relative_gradient: to.relative_gradient };
-            is_sound(&solved.meshes, &fine).then_some((solved, fine))
+            let period = from.period.zip(to.period).map(|(from, to)| from + share * (to - from));
+            let solved = Solved { meshes, period, relative_gradient: to.relative_gradient };
+            is_sound(&solved, &fine).then_some((solved, fine))
         })
     }
 }
@@ -182,6 +185,6 @@ fn between(from: &GridMesh, to: &GridMesh, share: f64) -> GridMesh {
     GridMesh { target, ..to.clone() }
 }
 
-fn total_folds(meshes: &[GridMesh]) -> usize {
+pub(super) fn total_folds(meshes: &[GridMesh]) -> usize {
     meshes.iter().map(count_folds).sum()
 }

@@ -26,15 +26,46 @@ impl MeshSolver {
         let matrix = self.in_known_pattern(equations.matrix()?)?;
         let known = self.known.as_ref()?;
         let factor = Llt::try_new_with_symbolic(known.symbolic.clone(), matrix.as_ref(), faer::Side::Lower).ok()?;
-        let right = faer::Mat::from_fn(equations.unknowns(), 1, |row, _| equations.right[row]);
-        let mut solution = factor.solve(&right);
-        // One step of refinement recovers the digits that the normal equations lose.
-        let residual = &right - multiply(&matrix, &solution);
-        solution += factor.solve(&residual);
-        let gradient = &right - multiply(&matrix, &solution);
+        let column = |values: &[f64]| faer::Mat::from_fn(values.len(), 1, |row, _| values[row]);
+        let right = column(&equations.right);
+        let Some(border) = &equations.border else {
+            let mut solution = factor.solve(&right);
+            // One step of refinement recovers the digits that the normal equations lose.
+            let residual = &right - multiply(&matrix, &solution);
+            solution += factor.solve(&residual);
+            let gradient = &right - multiply(&matrix, &solution);
+            return Some(MeshSolution {
+                relative_gradient: gradient.norm_l2() / right.norm_l2().max(f64::MIN_POSITIVE),
+                coordinates: (0..equations.unknowns()).map(|row| solution[(row, 0)]).collect(),
+                period: None,
+            });
+        };
+        // Block elimination: the matrix without its last row and column keeps its order and its factor.
+        let couplings = column(&border.couplings);
+        let along = factor.solve(&couplings);
+        let stiffness = border.own - dot(&couplings, &along);
+        if !(stiffness.is_finite() && stiffness > 0.0) {
+            return None;
+        }
+        let solve = |right: &faer::Mat<f64>, last: f64| {
+            let plain = factor.solve(right);
+            let period = (last - dot(&couplings, &plain)) / stiffness;
+            (plain - faer::Scale(period) * &along, period)
+        };
+        let residual = |solution: &faer::Mat<f64>, period: f64| {
+            let rest = &right - multiply(&matrix, solution) - faer::Scale(period) * &couplings;
+            (rest, border.right - dot(&couplings, solution) - border.own * period)
+        };
+        let (mut solution, mut period) = solve(&right, border.right);
+        let (rest, last) = residual(&solution, period);
+        let (correction, correction_of_period) = solve(&rest, last);
+        solution += correction;
+        period += correction_of_period;
+        let (rest, last) = residual(&solution, period);
         Some(MeshSolution {
-            relative_gradient: gradient.norm_l2() / right.norm_l2().max(f64::MIN_POSITIVE),
+            relative_gradient: rest.norm_l2().hypot(last) / right.norm_l2().hypot(border.right).max(f64::MIN_POSITIVE),
             coordinates: (0..equations.unknowns()).map(|row| solution[(row, 0)]).collect(),
+            period: Some(period),
         })
     }
 
@@ -79,6 +110,10 @@ fn widened(matrix: &SparseColMat<usize, f64>, pattern: &SymbolicSparseColMat<usi
         starts.push(rows.len());
     }
     SparseColMat::new(SymbolicSparseColMat::new_checked(columns, columns, starts, None, rows), values)
+}
+
+fn dot(one: &faer::Mat<f64>, other: &faer::Mat<f64>) -> f64 {
+    (0..one.nrows()).map(|row| one[(row, 0)] * other[(row, 0)]).sum()
 }
 
 /// The product of the symmetric matrix, given by its lower triangle, with a column.

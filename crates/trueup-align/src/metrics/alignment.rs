@@ -2,6 +2,7 @@
 
 use nalgebra::Vector2;
 use trueup_core::camera::Camera;
+use trueup_core::geometry::wrap_length;
 use trueup_core::mesh::GridMesh;
 
 use super::outline::Outline;
@@ -17,16 +18,18 @@ const MARGIN_PX: f64 = 2.0;
 const SEEN_PX: [f64; 2] = [1.0, 2.0];
 /// Overlaps with fewer sampled points are passed over.
 const MIN_POINTS: usize = 20;
-/// A full turn opens somewhere: points this share of the panorama's width apart lie at the cut and are no error.
+/// An open full turn is cut somewhere: points this share of the panorama's width apart lie at the cut and are no error.
 const CUT_SHARE: f64 = 0.25;
 
 /// Root mean square distance in the panorama between the two places of what two pictures both show, over all overlapping
 /// pairs, divided by the pictures' mean scale: in their own pixels. `None` if no two pictures overlap or the lists differ
 /// in length.
 ///
+/// On a full turn whose ends meet, distances are taken modulo its `period`.
+///
 /// `cameras` are the true ones, of one common centre, in the pixels of the grids' pictures. 40 x 30 points are carried
 /// from each picture to all later ones.
-pub fn true_alignment(meshes: &[GridMesh], cameras: &[Camera]) -> Option<f64> {
+pub fn true_alignment(meshes: &[GridMesh], cameras: &[Camera], period: Option<f64>) -> Option<f64> {
     if meshes.len() != cameras.len() {
         return None;
     }
@@ -38,7 +41,8 @@ pub fn true_alignment(meshes: &[GridMesh], cameras: &[Camera]) -> Option<f64> {
             let seen: Vec<f64> = samples(mesh)
                 .filter_map(|point| {
                     let there = cameras[i].transfer(&cameras[j], point)?;
-                    is_seen(&meshes[j], there).then(|| (mesh.warp(point) - meshes[j].warp(there)).norm())
+                    let way = mesh.warp(point) - meshes[j].warp(there);
+                    is_seen(&meshes[j], there).then(|| wrap_length(way.x, period).hypot(way.y))
                 })
                 .collect();
             if seen.len() >= MIN_POINTS {
@@ -95,23 +99,28 @@ mod tests {
     #[test]
     fn pictures_that_meet_have_no_error_and_a_shift_counts_in_their_own_pixels() {
         let (mut meshes, cameras) = panned();
-        let exact = true_alignment(&meshes, &cameras).expect("an overlap");
+        let exact = true_alignment(&meshes, &cameras, None).expect("an overlap");
         assert!(exact < 0.01, "{exact}");
         for vertex in &mut meshes[1].target {
             vertex[1] += 3.0;
         }
         // The cylinder doubles the pixel scale at the middle of a picture and less elsewhere.
         let scale = (Outline::new(&meshes[0]).area() / (400.0 * 300.0)).sqrt();
-        let shifted = true_alignment(&meshes, &cameras).expect("an overlap");
+        let shifted = true_alignment(&meshes, &cameras, None).expect("an overlap");
         assert!((shifted - 3.0 / scale).abs() < 0.01, "{shifted}");
+        for vertex in &mut meshes[1].target {
+            vertex[0] += 5000.0;
+        }
+        let round = true_alignment(&meshes, &cameras, Some(5000.0)).expect("an overlap");
+        assert!((round - shifted).abs() < 1e-9, "{round}");
     }
 
     #[test]
     fn without_overlap_there_is_no_figure() {
         let (meshes, _) = panned();
         let away = [0.0, 3.0].map(|yaw: f64| Camera::new(500.0, 400.0, 300.0, &rotation_about_y(yaw).transpose()));
-        assert_eq!(true_alignment(&meshes, &away), None);
-        assert_eq!(true_alignment(&[], &[]), None);
-        assert_eq!(true_alignment(&meshes[..1], &[Camera::new(500.0, 400.0, 300.0, &Matrix3::identity())]), None);
+        assert_eq!(true_alignment(&meshes, &away, None), None);
+        assert_eq!(true_alignment(&[], &[], None), None);
+        assert_eq!(true_alignment(&meshes[..1], &[Camera::new(500.0, 400.0, 300.0, &Matrix3::identity())], None), None);
     }
 }

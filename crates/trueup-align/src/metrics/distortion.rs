@@ -41,17 +41,26 @@ pub struct LocalDistortion {
 /// distortion. Similarities and affine maps have none. The figure grows with the size of the cells: compare grids of equal
 /// cells only.
 ///
+/// On a full turn whose ends meet, places that differ by its `period` are the same.
+///
 /// # Source
 /// VPG equations 12 and 13.
 ///
 /// # Departures
 /// The paper does not say when a cell is outside; `outside` does.
-pub fn local_distortion(meshes: &[GridMesh], outside: Outside) -> LocalDistortion {
+pub fn local_distortion(meshes: &[GridMesh], outside: Outside, period: Option<f64>) -> LocalDistortion {
     let outlines: Vec<Outline> = meshes.iter().map(Outline::new).collect();
     let mut folds = 0;
     let mut pictures = Vec::with_capacity(meshes.len());
     for (k, mesh) in meshes.iter().enumerate() {
-        let alone = |point: Vector2<f64>| (0..meshes.len()).all(|other| other == k || !outlines[other].contains(point));
+        let is_in = |other: usize, point: Vector2<f64>| match period {
+            None => outlines[other].contains(point),
+            // Pictures begin in one turn and end in the next at the latest.
+            Some(period) => {
+                [-1.0, 0.0, 1.0].iter().any(|turns| outlines[other].contains(point + Vector2::new(turns * period, 0.0)))
+            }
+        };
+        let alone = |point: Vector2<f64>| (0..meshes.len()).all(|other| other == k || !is_in(other, point));
         let vertices_alone: Vec<bool> = match outside {
             Outside::CentreAndCorners => (0..mesh.len()).map(|vertex| alone(target(mesh, vertex))).collect(),
             Outside::Centre => vec![true; mesh.len()],
@@ -138,17 +147,19 @@ mod tests {
         let mut mesh = GridMesh::regular(16.0, 16.0, 16.0);
         let map = |p: Vector2<f64>| p / (1.0 - p.x / 100.0);
         mesh.target = (0..4).map(|vertex| map(mesh.source(vertex)).into()).collect();
-        assert!((local_distortion(&[mesh], Outside::CentreAndCorners).worst - 0.196748261 / 1.303776091).abs() < 1e-8);
+        assert!(
+            (local_distortion(&[mesh], Outside::CentreAndCorners, None).worst - 0.196748261 / 1.303776091).abs() < 1e-8
+        );
     }
 
     #[test]
     fn covered_cells_are_not_judged_and_turned_ones_are_counted() {
         let whole = mapped(|p| p);
         let hidden = mapped(|p| p * 0.5 + Vector2::new(50.0, 50.0));
-        assert_eq!(local_distortion(&[hidden, whole.clone()], Outside::Centre).pictures[0], None);
+        assert_eq!(local_distortion(&[hidden, whole.clone()], Outside::Centre, None).pictures[0], None);
         let mut folded = whole;
         folded.target[12] = [390.0, 290.0];
-        assert!(local_distortion(&[folded], Outside::Centre).folds > 0);
+        assert!(local_distortion(&[folded], Outside::Centre, None).folds > 0);
     }
 
     /// Two pictures of 100 x 100 px overlap by 14 px: of ten columns of cells, the ninth has its centre outside the other
@@ -163,8 +174,8 @@ mod tests {
             vertex[0] += bent(Vector2::new(86.0, 0.0)).x;
         }
         let meshes = [left, right];
-        let strict = local_distortion(&meshes, Outside::CentreAndCorners).pictures[0].expect("cells");
-        let loose = local_distortion(&meshes, Outside::Centre).pictures[0].expect("cells");
+        let strict = local_distortion(&meshes, Outside::CentreAndCorners, None).pictures[0].expect("cells");
+        let loose = local_distortion(&meshes, Outside::Centre, None).pictures[0].expect("cells");
         assert!(loose > strict, "the distortion grows to the right: {loose} {strict}");
     }
 
@@ -173,7 +184,7 @@ mod tests {
         #[test]
         fn affine_maps_have_none(a in 0.5..2.0_f64, b in -0.4..0.4_f64, c in -0.4..0.4_f64, d in 0.5..2.0_f64) {
             let mesh = mapped(|p| Vector2::new(a * p.x + b * p.y + 17.0, c * p.x + d * p.y - 3.0));
-            let distortion = local_distortion(&[mesh], Outside::CentreAndCorners);
+            let distortion = local_distortion(&[mesh], Outside::CentreAndCorners, None);
             prop_assert!(distortion.worst < 1e-9 && distortion.folds == 0);
         }
     }

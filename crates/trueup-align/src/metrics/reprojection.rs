@@ -1,6 +1,7 @@
 //! How well matched points meet in the panorama.
 
 use nalgebra::Vector2;
+use trueup_core::geometry::wrap_length;
 use trueup_core::matches::PointMatch;
 use trueup_core::mesh::GridMesh;
 
@@ -29,15 +30,17 @@ pub struct MatchedPair<'a> {
 }
 
 /// Measures how far apart matched points land, each distance divided by the local scale there, the root mean square of the
-/// two pictures' own. `None` without a match that lies in unfolded places of both.
-pub fn reprojection(pairs: &[MatchedPair]) -> Option<Reprojection> {
+/// two pictures' own. `None` without a match that lies in unfolded places of both. On a full turn whose ends meet, distances
+/// are taken modulo its `period`.
+pub fn reprojection(pairs: &[MatchedPair], period: Option<f64>) -> Option<Reprojection> {
     let mut distances: Vec<f64> = pairs
         .iter()
         .flat_map(|pair| {
             pair.matches.iter().filter_map(|one| {
                 let (p, q) = (Vector2::from(one.in_a), Vector2::from(one.in_b));
                 let scale = ((squared_scale(pair.a, p) + squared_scale(pair.b, q)) / 2.0).sqrt();
-                let distance = (pair.a.warp(p) - pair.b.warp(q)).norm() / scale;
+                let way = pair.a.warp(p) - pair.b.warp(q);
+                let distance = wrap_length(way.x, period).hypot(way.y) / scale;
                 distance.is_finite().then_some(distance)
             })
         })
@@ -79,7 +82,7 @@ mod tests {
         let b = a.clone();
         // 20 matches, off by 1 .. 20 px: mean 10.5, mean square 143.5, the 19th of 20 is 19.
         let matches = (1..=20).map(|k| PointMatch { in_a: [50.0, 37.0], in_b: [50.0, 37.0 + f64::from(k)] }).collect();
-        let found = reprojection(&[MatchedPair { a: &a, b: &b, matches }]).expect("twenty matches");
+        let found = reprojection(&[MatchedPair { a: &a, b: &b, matches }], None).expect("twenty matches");
         assert_eq!(found.matches, 20);
         assert!((found.mean_px - 10.5).abs() < 1e-9);
         assert!((found.rms_px - 143.5_f64.sqrt()).abs() < 1e-9);
@@ -99,6 +102,6 @@ mod tests {
 
     #[test]
     fn no_matches_have_no_figure() {
-        assert_eq!(reprojection(&[]), None);
+        assert_eq!(reprojection(&[], None), None);
     }
 }

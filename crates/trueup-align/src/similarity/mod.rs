@@ -253,6 +253,12 @@ pub struct SimilarityPrior {
     pub roll: Vec<f64>,
 }
 
+/// The rotation that levels the common frame by the cameras alone; for the frame see [`SimilarityPrior::level_from_world`].
+pub(crate) fn level_by_cameras(cameras: &[Camera]) -> Matrix3<f64> {
+    let rotations: Vec<Matrix3<f64>> = cameras.iter().map(|camera| camera.rotation()).collect();
+    straighten::level_from_world(&straighten::straighten(&rotations).down, &rotations)
+}
+
 impl SimilarityPrior {
     /// The rotation that levels the cameras' world.
     pub fn level_from_world(&self) -> Matrix3<f64> {

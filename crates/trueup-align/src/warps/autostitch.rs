@@ -1,6 +1,6 @@
 //! The pictures on a sphere, a cylinder or a plane around straightened cameras, as AutoStitch has them.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 use trueup_core::geometry::wrap_angle;
@@ -35,6 +35,12 @@ pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions) -> Result<Vec<
     let origin = input.cut_yaw.map_or(0.0, |cut| cut + PI);
     let radius = input.cameras[input.reference].focal_px;
     (0..input.grids.len()).map(|picture| View { input, options, picture, origin, radius }.place()).collect()
+}
+
+/// Length of a full turn in panorama units, where the pictures go all the way round a sphere or a cylinder and stay level.
+pub(super) fn period(model: WarpModel, input: &WarpInput<'_>, options: &WarpOptions) -> Option<f64> {
+    let unrolled = model == WarpModel::Autostitch && options.projection != Projection::Plane;
+    (unrolled && input.cut_yaw.is_some() && input.turn == 0.0).then(|| TAU * input.cameras[input.reference].focal_px)
 }
 
 struct View<'a> {

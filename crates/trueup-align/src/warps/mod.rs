@@ -112,6 +112,7 @@ pub fn run(
         alignment_rms: alignment_rms(&meshes, input),
         folds: meshes.iter().map(count_folds).sum(),
         relative_gradient: 0.0,
+        period: autostitch::period(model, input, options),
         meshes,
     })
 }

@@ -96,7 +96,10 @@ fn name_of<'a>(path: &'a str, project: &Project, names: &'a [String]) -> &'a str
 }
 
 fn panorama(page: &mut Page, project: &Project, file: Option<&PanoramaFile>) {
-    let size = format!("{} x {} px", project.canvas.width, project.canvas.height);
+    let mut size = format!("{} x {} px", project.canvas.width, project.canvas.height);
+    if project.canvas.full_turn {
+        size.push_str(", a full turn: the ends meet");
+    }
     let Some(file) = file else {
         page.entry("panorama", &size);
         return;

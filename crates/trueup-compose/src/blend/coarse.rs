@@ -1,20 +1,37 @@
-//! The coarse levels: every photograph at an eighth of the canvas, blended as a whole.
+//! The coarse levels: every photograph at an eighth of the canvas (less, if it is huge), blended as a whole.
 
 use rayon::prelude::*;
+use trueup_core::Result;
 
-use super::Base;
+use super::bases::{Base, Bases};
 use super::pyramid::{LEAST_SHARE, Plane, add_base, add_detail, collapse};
-use crate::seam::{NOBODY, Seams};
+use super::unrolled::Unrolled;
+use crate::seam::{Label, NOBODY, Seams};
 
-/// Log2 of the canvas pixels per sample of the finest level that is blended as a whole.
-pub(super) const FIRST_LEVEL: u32 = 3;
+/// Log2 of the canvas pixels per sample of the finest level that is blended as a whole, on a canvas of this size; at least
+/// [`LEAST_FIRST_LEVEL`]. It follows from the canvas alone, so that the memory there is does not show in the panorama.
+pub(super) fn first_level([width, height]: [usize; 2]) -> u32 {
+    let samples = |level: u32| width.div_ceil(1 << level).saturating_mul(height.div_ceil(1 << level));
+    (LEAST_FIRST_LEVEL..).find(|&level| samples(level) <= MOST_SAMPLES).unwrap_or(LEAST_FIRST_LEVEL)
+}
+
+/// Log2 of 8 pixels.
+pub(super) const LEAST_FIRST_LEVEL: u32 = 3;
+
+/// A level of more samples is not blended as a whole: 100 MB, of a canvas of 400 million pixels at an eighth.
+const MOST_SAMPLES: usize = 6_250_000;
 
 /// Points along each axis of a sample at which labels are asked for.
 const LABELS_PER_SAMPLE: usize = 4;
 
-/// The blended level [`FIRST_LEVEL`] of a canvas, from the photographs' own. `levels` more are blended above it.
-pub(super) fn blend(bases: &[Base], seams: &Seams, canvas: [usize; 2], levels: u32) -> Plane<[f32; 4]> {
-    let size = |level: u32| canvas.map(|length| length.div_ceil(1 << (FIRST_LEVEL + level)));
+/// The blended level `first_level` of a canvas, from the photographs' own. `levels` more are blended above it.
+pub(super) fn blend(
+    bases: &Bases,
+    seams: &Seams,
+    unrolled: &Unrolled<'_>,
+    (first_level, levels): (u32, u32),
+) -> Result<Plane<[f32; 4]>> {
+    let size = |level: u32| unrolled.canvas().map(|length| length.div_ceil(1 << (first_level + level)));
     let mut sums: Vec<Plane<[f32; 4]>> = (0..=levels)
         .map(|level| {
             let [width, height] = size(level);
@@ -22,13 +39,16 @@ pub(super) fn blend(bases: &[Base], seams: &Seams, canvas: [usize; 2], levels: u
         })
         .collect();
     // As many pyramids at a time as there are threads, added up in order.
-    for (group, bases) in bases.chunks(rayon::current_num_threads().max(1)).enumerate() {
-        let first = group * rayon::current_num_threads().max(1);
-        let pyramids: Vec<_> = bases
-            .par_iter()
-            .enumerate()
-            .map(|(index, base)| pyramid(base, mask(base, first + index, seams, canvas), levels))
-            .collect();
+    let at_a_time = rayon::current_num_threads().max(1);
+    for first in (0..bases.len()).step_by(at_a_time) {
+        let pyramids: Vec<_> = (first..(first + at_a_time).min(bases.len()))
+            .into_par_iter()
+            .map(|label| {
+                let base = bases.read(label)?;
+                let mask = mask(&base, label, seams, (unrolled, first_level));
+                Ok(pyramid(base.into_owned(), mask, levels))
+            })
+            .collect::<Result<_>>()?;
         for pyramid in pyramids {
             sums.par_iter_mut().enumerate().for_each(|(level, sum)| {
                 let (own, mask) = &pyramid[level];
@@ -44,13 +64,13 @@ pub(super) fn blend(bases: &[Base], seams: &Seams, canvas: [usize; 2], levels: u
         collapse(&mut sum, blended.as_ref());
         blended = Some(sum);
     }
-    blended.unwrap_or_default()
+    Ok(blended.unwrap_or_default())
 }
 
 type Levels = Vec<(Plane<[f32; 4]>, Plane<f32>)>;
 
-fn pyramid(base: &Base, mask: Plane<f32>, levels: u32) -> Levels {
-    let mut pyramid = vec![(base.plane.clone(), mask)];
+fn pyramid(base: Base, mask: Plane<f32>, levels: u32) -> Levels {
+    let mut pyramid = vec![(base.plane, mask)];
     for _ in 0..levels {
         if let Some((plane, mask)) = pyramid.last() {
             pyramid.push((plane.reduced(), mask.reduced()));
@@ -59,11 +79,12 @@ fn pyramid(base: &Base, mask: Plane<f32>, levels: u32) -> Levels {
     pyramid
 }
 
-/// The share of every sample's surroundings that shows photograph `label`.
-fn mask(base: &Base, label: usize, seams: &Seams, canvas: [usize; 2]) -> Plane<f32> {
+/// The share of every sample's surroundings that shows the photograph of a placement.
+fn mask(base: &Base, placement: usize, seams: &Seams, (unrolled, first_level): (&Unrolled<'_>, u32)) -> Plane<f32> {
+    let label = unrolled.label(placement as Label);
     let mut mask: Plane<f32> = Plane::new(base.plane.columns.clone(), base.plane.rows.clone());
-    let step = (1 << FIRST_LEVEL) / LABELS_PER_SAMPLE;
-    let points = canvas.map(|length| length.div_ceil(step));
+    let step = (1 << first_level) / LABELS_PER_SAMPLE;
+    let down = unrolled.canvas()[1].div_ceil(step);
     let share = 1.0 / (LABELS_PER_SAMPLE * LABELS_PER_SAMPLE) as f32;
     let mut labels = Vec::new();
     // The sample's own place is its middle: half of the points lie before it.
@@ -72,16 +93,16 @@ fn mask(base: &Base, label: usize, seams: &Seams, canvas: [usize; 2]) -> Plane<f
         let columns = mask.columns.clone();
         let row = mask.row_mut(y);
         for v in y * LABELS_PER_SAMPLE..(y + 1) * LABELS_PER_SAMPLE {
-            let v = v.saturating_sub(before).min(points[1] - 1);
+            let v = v.saturating_sub(before).min(down - 1);
             let across = columns.start * LABELS_PER_SAMPLE..columns.end * LABELS_PER_SAMPLE;
             let shifted = across.start.saturating_sub(before)..across.end;
             let lead = shifted.start + before - across.start;
-            seams.row(v, &shifted, points, &mut labels);
+            unrolled.labels(seams, (v, &shifted), step, &mut labels);
             for (x, weight) in row.iter_mut().enumerate() {
                 for point in 0..LABELS_PER_SAMPLE {
                     let at = (x * LABELS_PER_SAMPLE + point).saturating_sub(lead);
                     let shown = labels[at.min(labels.len() - 1)];
-                    if shown != NOBODY && usize::from(shown) == label {
+                    if shown != NOBODY && shown == label {
                         *weight += share;
                     }
                 }
@@ -91,16 +112,16 @@ fn mask(base: &Base, label: usize, seams: &Seams, canvas: [usize; 2]) -> Plane<f
     mask
 }
 
-/// Log2 of the canvas pixels per sample at which photographs are sampled for the coarse levels.
-pub(super) const SAMPLED_LEVEL: u32 = 2;
+/// Photographs are sampled for the coarse levels at the level so far below [`first_level`].
+pub(super) const SAMPLED_BELOW: u32 = 1;
 
-/// The level [`FIRST_LEVEL`] of a photograph from its samples at [`SAMPLED_LEVEL`]: what of it is coarser than two samples.
+/// The level [`first_level`] of a photograph from its samples [`SAMPLED_BELOW`] it: what of it is coarser than two samples.
 ///
 /// Photographs are read at different places between their own samples; what they say of the finest contours there differs
 /// although they agree. The band that is left out here is blended with the fine levels.
 pub(super) fn base(sampled: Plane<[f32; 4]>) -> Plane<[f32; 4]> {
     let mut level = sampled;
-    for _ in SAMPLED_LEVEL..FIRST_LEVEL {
+    for _ in 0..SAMPLED_BELOW {
         level = level.reduced();
     }
     let mut base = level.reduced().expanded(&level.columns, &level.rows);

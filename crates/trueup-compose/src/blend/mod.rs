@@ -2,67 +2,79 @@
 //!
 //! Two passes over the photographs. The first makes small pictures of all of them: for the search of the seams, and for the
 //! coarse levels of the blend, which reach far and are blended as a whole. The second finishes the canvas in tiles, from
-//! one end of its longer side to the other; a photograph is in memory only from the first strip of tiles that shows it to
-//! the last. Where a tile shows one photograph alone, only what the coarse levels changed is added to it.
+//! strip by strip; a photograph is in memory from the first strip of tiles that shows it to the last, or less, if there is
+//! little memory. Where a tile shows one photograph alone, only what the coarse levels changed is added to it.
 //!
 //! Values are square roots of linear light. Differences between photographs that corrections have left are proportional to
 //! the light; added to linear light, what is smoothed over the bright side of a contour would push the dark side below
 //! black and show as a halo, while the root, near to what the eye sees, keeps both sides' errors equally small.
 
+mod bases;
 mod coarse;
+mod needs;
+mod order;
 mod pyramid;
+mod shelf;
 mod tile;
+mod unrolled;
 mod views;
 
-use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
 use trueup_core::mask::Mask;
 use trueup_core::options::StageOptions;
-use trueup_core::raster::Photograph;
 use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 
 use crate::exposure::Correction;
 use crate::layout::CanvasLayout;
 use crate::render::RenderOptions;
-use crate::render::prepared::{Prepared, Scratch, check_photograph};
-use crate::seam::{self, Label, SeamOptions, Seams};
-use coarse::FIRST_LEVEL;
+use crate::render::plan::Plan;
+use crate::render::prepared::Scratch;
+use crate::render::store::Store;
+use crate::seam::{self, SeamOptions, Seams};
+use bases::Bases;
+use coarse::first_level;
+pub(crate) use needs::needed_bytes;
 use pyramid::Plane;
+use shelf::{Shelf, Supply};
 use tile::Tile;
+use unrolled::Unrolled;
 
 /// A finished pixel: square roots of linear light and alpha, 65535 is 1.
 pub(crate) type Finished = [u16; 4];
 
-/// Side of a tile in canvas pixels, a multiple of 2^[`FIRST_LEVEL`]. Larger tiles waste less on margins, smaller ones
-/// less on pixels that only one photograph shows.
-const TILE: usize = 128;
-
-/// Tiles across a strip: enough for all threads, few enough to let photographs go.
-const TILES_ACROSS: usize = 4;
-
-/// A photograph at an eighth of the canvas.
-#[derive(Debug, Clone, Default)]
-struct Base {
-    plane: Plane<[f32; 4]>,
+/// Side of a tile in canvas pixels, a multiple of 2^first_level: 128 for the canvases of most panoramas. Larger tiles waste
+/// less on margins, smaller ones less on pixels that only one photograph shows.
+const fn tile_side(first_level: u32) -> usize {
+    16 << first_level
 }
+
+/// Tiles for each thread that are finished before they are put on the canvas.
+const TILES_AT_ONCE: usize = 16;
 
 /// The coarse levels.
 struct Levels {
-    /// The blended level [`FIRST_LEVEL`].
+    /// The blended level `first_level`.
     blended: Plane<[f32; 4]>,
     /// The same level of every photograph.
-    bases: Vec<Base>,
+    bases: Bases,
 }
 
 impl Levels {
-    fn new(mut bases: Vec<Base>, seams: &Seams, canvas: [usize; 2], levels: u32) -> Self {
-        let blended = coarse::blend(&bases, seams, canvas, levels);
-        bases.par_iter_mut().for_each(|base| pyramid::level_shares(&mut base.plane));
-        Self { blended, bases }
+    /// Blends from `first_level` on and at so many `levels` above it.
+    fn new(
+        mut bases: Bases,
+        seams: &Seams,
+        unrolled: &Unrolled<'_>,
+        (first_level, levels): (u32, u32),
+    ) -> Result<Self> {
+        let mut blended = coarse::blend(&bases, seams, unrolled, (first_level, levels))?;
+        unrolled.join_ends(&mut blended, (first_level, levels));
+        bases.level_all();
+        Ok(Self { blended, bases })
     }
 }
 
@@ -70,16 +82,18 @@ impl Levels {
 struct Work<'a> {
     options: &'a RenderOptions,
     seams: &'a Seams,
-    canvas: [usize; 2],
+    unrolled: &'a Unrolled<'a>,
+    /// Log2 of the pixels per sample of the first level that is blended as a whole.
+    first_level: u32,
     /// `None` to cut without blending.
     levels: Option<Levels>,
-    /// What is ignored of each photograph.
+    /// What is ignored of the photograph of each placement.
     ignored: Vec<Option<Arc<Mask>>>,
 }
 
 /// The finished canvas, and the seams that were used.
 pub(crate) struct Blended {
-    pub(crate) pixels: Vec<Finished>,
+    pub(crate) pixels: Store<Finished>,
     pub(crate) seams: Seams,
 }
 
@@ -89,67 +103,57 @@ pub(crate) fn run(
     corrections: &[Correction],
     photographs: &dyn PhotographSource,
     (options, seam_options): (&RenderOptions, &SeamOptions),
-    cut: bool,
+    (cut, plan): (bool, &Plan),
     context: &StageContext,
 ) -> Result<Blended> {
     let stage = RenderOptions::STAGE;
     let count = layout.placed.len();
-    let canvas = [layout.width, layout.height];
-    // Small pictures, seams, and the photographs themselves.
-    context.progress().begin(stage, 2 * count as u64);
+    let first_level = first_level([layout.width, layout.height]);
     let levels = if cut || count == 1 { None } else { Some(levels_above(layout, options)) };
-    let views::Small { views, size, bases, mut kept } =
-        views::make(layout, corrections, photographs, options, seam_options, levels.is_some(), context)?;
-    let seams =
-        if count == 1 { Seams::of_one(size[0], size[1]) } else { seam::run(views, size, seam_options, context)? };
-    let levels = levels.map(|levels| Levels::new(bases, &seams, canvas, levels));
-    let ignored = layout.placed.iter().map(|placed| photographs.masks(placed.photograph).ignored).collect();
-    let work = Work { options, seams: &seams, canvas, levels, ignored };
+    let unrolled = Unrolled::new(layout, first_level, levels)?;
+    let placements = unrolled.placed().len();
+    // Small pictures, and the photographs themselves wherever they are placed.
+    context.progress().begin(stage, (count + placements) as u64);
+    let views::Small { views, size, bases, mut kept, bytes } = views::make(
+        &unrolled,
+        corrections,
+        photographs,
+        (options, seam_options),
+        (levels.map(|_| first_level), plan),
+        context,
+    )?;
+    let around = layout.period.is_some();
+    let seams = match count {
+        1 => Seams::of_one(size[0], size[1]),
+        _ => seam::run(views, size, around, seam_options, context)?,
+    };
+    let levels = levels.map(|levels| Levels::new(bases, &seams, &unrolled, (first_level, levels))).transpose()?;
+    let ignored = unrolled.placed().iter().map(|placed| photographs.masks(placed.photograph).ignored).collect();
+    let mut work = Work { options, seams: &seams, unrolled: &unrolled, first_level, levels, ignored };
 
-    let strips = strips(&work, count);
-    let last_strip: Vec<Option<usize>> =
-        (0..count).map(|picture| strips.iter().rposition(|strip| strip.shown.contains(&(picture as Label)))).collect();
-    let mut pictures: Vec<Option<Prepared<'_>>> = (0..count).map(|_| None).collect();
-    let mut pixels = vec![[0; 4]; layout.width * layout.height];
-    for (index, strip) in strips.iter().enumerate() {
-        context.check_cancelled()?;
-        let wanted: Vec<usize> =
-            strip.shown.iter().map(|&label| usize::from(label)).filter(|&at| pictures[at].is_none()).collect();
-        let ready: Vec<(usize, Option<Photograph>)> = wanted.iter().map(|&at| (at, kept[at].take())).collect();
-        let loaded: Vec<(usize, Prepared<'_>)> = ready
-            .into_par_iter()
-            .map(|(at, photograph)| {
-                let placed = &layout.placed[at];
-                let photograph = match photograph {
-                    Some(photograph) => photograph,
-                    None => photographs.photograph(placed.photograph)?,
-                };
-                check_photograph(placed, &photograph)?;
-                let prepared = Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, &corrections[at], options);
-                context.progress().advance(stage, 1);
-                Ok((at, prepared))
-            })
-            .collect::<Result<_>>()?;
-        for (at, prepared) in loaded {
-            pictures[at] = Some(prepared);
+    let bytes: Vec<usize> = (0..placements).map(|at| bytes[unrolled.original(at)]).collect();
+    // Of several placements, the first takes what was kept.
+    let kept = (0..placements).map(|at| kept[unrolled.original(at)].take()).collect();
+    let batches = order::batches(&work, &bytes, plan.photographs)?;
+    let curve = photographs.transfer_curve();
+    let supply = Supply { unrolled: &unrolled, curve: &curve, corrections, photographs, options, context };
+    let mut shelf = Shelf::new(supply, kept, &batches, plan.photographs, plan.at_a_time);
+    let mut pixels = plan.store([layout.width, layout.height], [tile_side(first_level); 2]);
+    for (index, batch) in batches.iter().enumerate() {
+        shelf.prepare(index, batch, &bytes)?;
+        if let Some(levels) = &mut work.levels {
+            levels.bases.hold(|at| shelf.pictures()[at].is_some())?;
         }
-        let finished: Vec<Vec<Finished>> = strip
-            .tiles
-            .par_iter()
-            .map_init(Scratch::default, |scratch, tile| {
+        for tiles in batch.tiles.chunks(TILES_AT_ONCE * rayon::current_num_threads().max(1)) {
+            let finish = |scratch: &mut Scratch, tile: &Tile| {
                 context.check_cancelled()?;
-                Ok(tile.finish(&work, &pictures, scratch))
-            })
-            .collect::<Result<_>>()?;
-        for (tile, finished) in strip.tiles.iter().zip(finished) {
-            let rows = finished.chunks_exact(tile.columns.len().max(1));
-            for (y, row) in tile.rows.clone().zip(rows) {
-                pixels[y * layout.width..][tile.columns.clone()].copy_from_slice(row);
-            }
-        }
-        for (at, picture) in pictures.iter_mut().enumerate() {
-            if last_strip[at].is_none_or(|last| last <= index) {
-                *picture = None;
+                Ok(tile.finish(&work, shelf.pictures(), scratch))
+            };
+            let finished: Vec<Vec<Finished>> =
+                tiles.par_iter().map_init(Scratch::default, finish).collect::<Result<_>>()?;
+            for (tile, finished) in tiles.iter().zip(finished) {
+                let columns = tile.columns.start - unrolled.lead()..tile.columns.end - unrolled.lead();
+                pixels.put(&columns, &tile.rows, &finished)?;
             }
         }
     }
@@ -158,7 +162,7 @@ pub(crate) fn run(
     Ok(Blended { pixels, seams })
 }
 
-/// Levels above [`FIRST_LEVEL`], so that the coarsest samples are as wide as the widest transition wanted.
+/// Levels above the first that is blended as a whole, so that the coarsest samples are as wide as the widest transition wanted.
 fn levels_above(layout: &CanvasLayout, options: &RenderOptions) -> u32 {
     let mut sides: Vec<f64> = layout
         .placed
@@ -171,47 +175,16 @@ fn levels_above(layout: &CanvasLayout, options: &RenderOptions) -> u32 {
     sides.sort_by(f64::total_cmp);
     let side = sides.get(sides.len() / 2).copied().unwrap_or(1.0);
     let wanted = (options.transition * side).max(1.0).log2().round();
-    (wanted as u32).saturating_sub(FIRST_LEVEL).min(MOST_LEVELS)
+    (wanted as u32).saturating_sub(first_level([layout.width, layout.height])).min(MOST_LEVELS)
 }
 
 /// 2^(3 + 12) pixels are wider than any photograph.
 const MOST_LEVELS: u32 = 12;
 
-/// A row of tiles across the canvas, or several, and what they show.
-struct Strip {
-    tiles: Vec<Tile>,
-    shown: Vec<Label>,
-}
-
-/// The canvas in strips across its shorter side.
-fn strips(work: &Work<'_>, count: usize) -> Vec<Strip> {
-    let [width, height] = work.canvas;
-    let wide = width >= height;
-    let (along, across) = if wide { (width, height) } else { (height, width) };
-    (0..along)
-        .step_by(TILE * TILES_ACROSS)
-        .map(|start| {
-            let end = (start + TILE * TILES_ACROSS).min(along);
-            let mut tiles = Vec::new();
-            for a in (start..end).step_by(TILE) {
-                for b in (0..across).step_by(TILE) {
-                    let (a, b) = (a..(a + TILE).min(along), b..(b + TILE).min(across));
-                    let (columns, rows) = if wide { (a, b) } else { (b, a) };
-                    tiles.push(tile(work, columns, rows));
-                }
-            }
-            let mut shown: Vec<Label> = tiles.iter().flat_map(|tile| tile.shown.clone()).collect();
-            shown.sort_unstable();
-            shown.dedup();
-            shown.retain(|&label| usize::from(label) < count);
-            Strip { tiles, shown }
-        })
-        .collect()
-}
-
+/// The tile of these columns and rows.
 fn tile(work: &Work<'_>, columns: Range<usize>, rows: Range<usize>) -> Tile {
-    let (wide, high) = Tile::with_margin(&columns, &rows, work.canvas);
-    Tile { shown: work.seams.shown_in(&wide, &high, work.canvas), columns, rows }
+    let (wide, high) = Tile::with_margin(&columns, &rows, work);
+    Tile { shown: work.unrolled.shown_in(work.seams, &wide, &high), columns, rows }
 }
 
 #[cfg(test)]

@@ -1,11 +1,16 @@
 use proptest::prelude::*;
+use std::borrow::Cow;
+use trueup_core::colour::TransferCurve;
 use trueup_core::mesh::GridMesh;
-use trueup_core::raster::Raster;
+
+use trueup_core::raster::{Photograph, Raster};
 
 use super::*;
 use crate::layout::Placed;
+use crate::render::prepared::Prepared;
 use crate::render::tests::Memory;
-use crate::render::{Blend, run as render};
+use crate::render::{Blend, Resources, run as render};
+use crate::seam::Label;
 
 const WIDTH: usize = 150;
 const HEIGHT: usize = 110;
@@ -36,7 +41,7 @@ fn layout(lefts: &[usize]) -> CanvasLayout {
         })
         .collect();
     let width = WIDTH + lefts.iter().copied().max().unwrap_or(0);
-    CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, placed }
+    CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, origin: [0.0; 2], placed, period: None }
 }
 
 fn composed(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Vec<Finished> {
@@ -44,11 +49,15 @@ fn composed(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOp
     let seam_options = SeamOptions::default();
     let context = StageContext::default();
     let cut = options.blend == Blend::None;
-    run(layout, &corrections, &Memory(pictures), (options, &seam_options), cut, &context).expect("renders").pixels
+    let memory = Memory(pictures);
+    let plan = Plan::new(layout, &memory, options, &seam_options, &Resources::unlimited()).expect("no limit");
+    let blended = run(layout, &corrections, &memory, (options, &seam_options), (cut, &plan), &context);
+    let Store::Memory { pixels, .. } = blended.expect("renders").pixels else { panic!("there is no limit") };
+    pixels
 }
 
 fn root_of(level: u8) -> u16 {
-    (crate::transfer_curve::Linearise::table().linear(f32::from(level)).sqrt() * 65535.0 + 0.5) as u16
+    (crate::transfer_curve::Linearise::of(&TransferCurve::SRGB).linear(f32::from(level)).sqrt() * 65535.0 + 0.5) as u16
 }
 
 #[test]
@@ -108,7 +117,7 @@ fn no_border_of_the_panorama_is_darker_than_its_photographs() {
 }
 
 /// Everything that tiles need, of photographs that differ in brightness.
-fn with_work<T>(lefts: &[usize], test: impl FnOnce(&Work<'_>, &[Option<Prepared<'_>>]) -> T) -> T {
+fn with_work<T>(lefts: &[usize], first_level: u32, test: impl FnOnce(&Work<'_>, &[Option<Prepared<'_>>]) -> T) -> T {
     let layout = layout(lefts);
     let pictures: Vec<Photograph> = (0..lefts.len())
         .map(|index| picture(lefts[index], |level| (usize::from(level) * (10 + index) / 12) as u8))
@@ -117,17 +126,27 @@ fn with_work<T>(lefts: &[usize], test: impl FnOnce(&Work<'_>, &[Option<Prepared<
     let (options, seam_options) = (RenderOptions::default(), SeamOptions::default());
     let context = StageContext::default();
     let memory = Memory(pictures.clone());
-    let small = views::make(&layout, &corrections, &memory, &options, &seam_options, true, &context).expect("small");
-    let seams = seam::run(small.views, small.size, &seam_options, &context).expect("seams");
+    let plan = Plan::new(&layout, &memory, &options, &seam_options, &Resources::unlimited()).expect("no limit");
+    let unrolled = Unrolled::new(&layout, first_level, Some(2)).expect("few");
+    let small =
+        views::make(&unrolled, &corrections, &memory, (&options, &seam_options), (Some(first_level), &plan), &context);
+    let small = small.expect("small");
+    let seams = seam::run(small.views, small.size, false, &seam_options, &context).expect("seams");
     let canvas = [layout.width, layout.height];
-    let levels = Some(Levels::new(small.bases, &seams, canvas, 2));
-    let ignored = vec![None; layout.placed.len()];
-    let work = Work { options: &options, seams: &seams, canvas, levels, ignored };
+    let levels = Some(Levels::new(small.bases, &seams, &unrolled, (first_level, 2)).expect("in memory"));
+    let ignored = vec![None; unrolled.placed().len()];
+    let work = Work { options: &options, seams: &seams, unrolled: &unrolled, first_level, levels, ignored };
     let prepared: Vec<Option<Prepared<'_>>> = pictures
         .into_iter()
         .zip(&layout.placed)
         .map(|(photograph, placed)| {
-            Some(Prepared::new(Cow::Owned(photograph), &placed.mesh, canvas, &Correction::default(), &options))
+            Some(Prepared::new(
+                Cow::Owned(photograph),
+                &placed.mesh,
+                canvas,
+                (&TransferCurve::SRGB, &Correction::default()),
+                &options,
+            ))
         })
         .collect();
     test(&work, &prepared)
@@ -146,28 +165,41 @@ fn blended(
 
 #[test]
 fn tiles_of_any_size_give_the_same_bits_as_the_whole() {
-    with_work(&[0, 60, 130], |work, pictures| {
-        let [width, height] = work.canvas;
-        let whole = blended(work, pictures, 0..width, 0..height);
-        for side in [16, 40, 64, 128] {
-            for top in (0..height).step_by(side) {
-                for left in (0..width).step_by(side) {
-                    let (columns, rows) = (left..(left + side).min(width), top..(top + side).min(height));
-                    let tile = blended(work, pictures, columns.clone(), rows.clone());
-                    for (y, row) in rows.zip(tile.chunks_exact(columns.len())) {
-                        assert_eq!(row, &whole[y * width..][columns.clone()], "tile of {side} at ({left}, {top})");
-                    }
+    for first_level in [3, 4] {
+        with_work(&[0, 60, 130], first_level, assert_that_tiles_give_the_whole);
+    }
+}
+
+fn assert_that_tiles_give_the_whole(work: &Work<'_>, pictures: &[Option<Prepared<'_>>]) {
+    let [width, height] = work.unrolled.canvas();
+    let whole = blended(work, pictures, 0..width, 0..height);
+    for side in [2, 5, 8, 16].map(|samples| samples << work.first_level) {
+        for top in (0..height).step_by(side) {
+            for left in (0..width).step_by(side) {
+                let (columns, rows) = (left..(left + side).min(width), top..(top + side).min(height));
+                let tile = blended(work, pictures, columns.clone(), rows.clone());
+                for (y, row) in rows.zip(tile.chunks_exact(columns.len())) {
+                    assert_eq!(row, &whole[y * width..][columns.clone()], "tile of {side} at ({left}, {top})");
                 }
             }
         }
-    });
+    }
+}
+
+#[test]
+fn the_level_that_is_blended_as_a_whole_follows_from_the_canvas() {
+    assert_eq!(first_level([1, 1]), 3);
+    // 400 million pixels, the largest canvas there was before it depended on the size.
+    assert_eq!(first_level([20_000, 20_000]), 3);
+    assert_eq!(first_level([40_000, 25_000]), 4);
+    assert_eq!(first_level([400_000, 200_000]), 7);
 }
 
 #[test]
 fn a_tile_of_one_photograph_is_what_blending_would_give() {
-    with_work(&[0, 60, 130], |work, pictures| {
+    with_work(&[0, 60, 130], 3, |work, pictures| {
         let mut compared = 0;
-        for left in (0..work.canvas[0] - 24).step_by(8) {
+        for left in (0..work.unrolled.canvas()[0] - 24).step_by(8) {
             let tile = tile(work, left..left + 24, 40..64);
             if tile.shown.len() == 1 {
                 let fast = tile.finish(work, pictures, &mut Scratch::default());
@@ -180,6 +212,92 @@ fn a_tile_of_one_photograph_is_what_blending_would_give() {
         }
         assert!(compared >= 5, "{compared}");
     });
+}
+
+/// Photographs around a cylinder of `AROUND` columns, the first at column `by`; the last lies across the ends for `by` = 0.
+fn ring(by: usize) -> CanvasLayout {
+    let mut layout = layout(&RING.map(|left| left + by));
+    // As layouts have it: the middle of each photograph within the canvas.
+    for placed in &mut layout.placed {
+        let middle = placed.mesh.bounds().0.x + WIDTH as f64 / 2.0;
+        let turns = (middle / AROUND as f64).floor();
+        placed.mesh.target.iter_mut().for_each(|vertex| vertex[0] -= turns * AROUND as f64);
+    }
+    CanvasLayout { width: AROUND, period: Some(AROUND), ..layout }
+}
+
+const AROUND: usize = 384;
+const RING: [usize; 4] = [0, 100, 190, 290];
+
+/// Photographs of a scene that repeats, each darker than the one before.
+fn ring_pictures() -> Vec<Photograph> {
+    let of = |(index, left): (usize, usize)| {
+        let level = |level: u8| (usize::from(level) * (20 - index) / 20) as u8;
+        let pixel = |at: usize| scene((left + at % WIDTH) % AROUND, at / WIDTH).map(level);
+        let data = (0..WIDTH * HEIGHT).flat_map(pixel).collect();
+        Photograph::Eight(Raster::from_data(WIDTH, HEIGHT, 3, data).expect("as many samples"))
+    };
+    RING.into_iter().enumerate().map(of).collect()
+}
+
+fn composed_in_any_way(layout: &CanvasLayout, blend: Blend) -> Vec<[f32; 4]> {
+    let options = RenderOptions { blend, ..RenderOptions::default() };
+    let corrections = vec![Correction::default(); RING.len()];
+    let (seams, context) = (SeamOptions::default(), StageContext::default());
+    let panorama = render(layout, &corrections, &Memory(ring_pictures()), &options, &seams, &context).expect("renders");
+    // Square roots of light, as the eye sees steps.
+    let root = |at: usize| panorama.linear_pixel(at % AROUND, at / AROUND).expect("in memory").map(f32::sqrt);
+    (0..AROUND * HEIGHT).map(root).collect()
+}
+
+/// Wherever a cylinder is cut open, the panorama is the same: to rounding if the samples of all levels fall on the same
+/// places, and else as far as a pyramid's samples between two pixels differ.
+#[test]
+fn a_cylinder_may_be_cut_open_anywhere() {
+    for blend in [Blend::MultiBand, Blend::None, Blend::Feather, Blend::Average] {
+        let still = composed_in_any_way(&ring(0), blend);
+        for (by, tolerance) in [(64, 1e-4), (320, 1e-4), (150, 0.012)] {
+            // The search for seams sees pixels of twice the size on canvases of half, a quarter and an eighth.
+            let tolerance = if by == 150 && blend != Blend::MultiBand { 1e-4 } else { tolerance };
+            let moved = composed_in_any_way(&ring(by), blend);
+            for (at, still) in still.iter().enumerate() {
+                let place = at / AROUND * AROUND + (at + by) % AROUND;
+                for (moved, still) in moved[place].iter().zip(still) {
+                    assert!((moved - still).abs() <= tolerance, "{blend:?} by {by} at {at}: {moved} {still}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_ends_of_a_cylinder_meet_as_smoothly_as_any_two_columns() {
+    let pixels = composed_in_any_way(&ring(0), Blend::MultiBand);
+    // What the panorama changes of the scene, by columns: smooth, whatever the scene.
+    let column = |x: usize| -> f32 {
+        let change = |y: usize| {
+            let expected = f32::from(root_of(scene(x, y)[0])) / 65535.0;
+            pixels[y * AROUND + x][0] / expected
+        };
+        (0..HEIGHT).map(change).sum::<f32>() / HEIGHT as f32
+    };
+    let columns: Vec<f32> = (0..AROUND).map(column).collect();
+    let step = |x: usize| columns[(x + 1) % AROUND] - columns[x % AROUND];
+    let bend = |x: usize| (step(x + 1) - 0.5 * (step(x) + step(x + 2))).abs();
+    let elsewhere = (0..AROUND - 3).map(bend).fold(0.0, f32::max);
+    // The photographs beside the ends differ by 15 of 100 in light.
+    let ends = (AROUND - 3..AROUND).map(bend).fold(0.0, f32::max);
+    assert!(ends <= elsewhere && ends < 3e-4, "{ends} {elsewhere}");
+    assert!(pixels.iter().all(|pixel| pixel[3] == 1.0));
+}
+
+#[test]
+fn threads_change_no_bit_of_a_cylinder() {
+    let of_threads = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
+        pool.install(|| [Blend::MultiBand, Blend::Feather].map(|blend| composed_in_any_way(&ring(0), blend)))
+    };
+    assert_eq!(of_threads(1), of_threads(3));
 }
 
 proptest! {
@@ -198,13 +316,13 @@ proptest! {
         let panorama = render(&layout, &corrections, &Memory(pictures), &options, &SeamOptions::default(), &context);
         let panorama = panorama.expect("renders");
         let used = &levels[..lefts.len()];
-        let linear = |level: u8| crate::transfer_curve::Linearise::table().linear(f32::from(level));
+        let linear = |level: u8| crate::transfer_curve::Linearise::of(&TransferCurve::SRGB).linear(f32::from(level));
         let low = used.iter().map(|&level| linear(level)).fold(f32::INFINITY, f32::min) - 1e-4;
         let high = used.iter().map(|&level| linear(level)).fold(0.0, f32::max) + 1e-4;
         for y in 0..layout.height {
             for x in 0..layout.width {
                 let covered = lefts.iter().any(|&left| (left..left + WIDTH).contains(&x));
-                let [r, _, _, alpha] = panorama.linear_pixel(x, y);
+                let [r, _, _, alpha] = panorama.linear_pixel(x, y).expect("in memory");
                 prop_assert_eq!(alpha > 0.0, covered);
                 prop_assert!(!covered || (low..=high).contains(&r), "{} at ({}, {})", r, x, y);
             }

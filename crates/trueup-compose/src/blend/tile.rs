@@ -4,23 +4,26 @@ use std::ops::Range;
 
 use trueup_core::mask::Mask;
 
-use super::coarse::FIRST_LEVEL;
+use super::bases::Base;
 use super::pyramid::{Plane, add_detail, collapse, colour, level_shares};
-use super::{Base, Finished, Work};
+use super::{Finished, Work};
 use crate::render::prepared::{Prepared, Scratch, Window};
 use crate::seam::{Label, NOBODY};
 use crate::unwanted::in_mask;
 
-/// Canvas pixels beside a tile that its fine levels are made of: a sample of the coarsest of them is 4 pixels wide, its
-/// own support 6 pixels, and interpolation reaches two samples further. A multiple of 2^[`FIRST_LEVEL`].
-pub(super) const MARGIN: usize = 16;
+/// Canvas pixels beside a tile that its fine levels are made of. With 8 pixels a sample at the first whole level, a sample of
+/// the coarsest of the fine ones is 4 pixels wide, its own support 6 pixels, and interpolation reaches two samples further:
+/// 14. A multiple of 2^first_level.
+pub(super) const fn margin(first_level: u32) -> usize {
+    2 << first_level
+}
 
-/// A part of the canvas; `columns` and `rows` start at multiples of 2^[`FIRST_LEVEL`].
+/// A part of the canvas; `columns` and `rows` start at multiples of 2^first_level.
 #[derive(Debug, Clone)]
 pub(super) struct Tile {
     pub(super) columns: Range<usize>,
     pub(super) rows: Range<usize>,
-    /// The photographs it is made of.
+    /// The placements of photographs it is made of.
     pub(super) shown: Vec<Label>,
 }
 
@@ -29,11 +32,13 @@ impl Tile {
     pub(super) fn with_margin(
         columns: &Range<usize>,
         rows: &Range<usize>,
-        canvas: [usize; 2],
+        work: &Work<'_>,
     ) -> (Range<usize>, Range<usize>) {
+        let margin = margin(work.first_level);
         let grown =
-            |range: &Range<usize>, length: usize| range.start.saturating_sub(MARGIN)..(range.end + MARGIN).min(length);
-        (grown(columns, canvas[0]), grown(rows, canvas[1]))
+            |range: &Range<usize>, length: usize| range.start.saturating_sub(margin)..(range.end + margin).min(length);
+        let [width, height] = work.unrolled.canvas();
+        (grown(columns, width), grown(rows, height))
     }
 
     /// The finished pixels, row by row.
@@ -69,16 +74,19 @@ impl Tile {
     fn of_one(&self, work: &Work<'_>, picture: &Prepared<'_>, label: usize, scratch: &mut Scratch) -> Vec<Finished> {
         let mut pixels = vec![[0.0; 4]; self.columns.len() * self.rows.len()];
         picture.sample(self.window(&self.columns, &self.rows), &mut pixels, work.options, scratch);
-        let offset = work.levels.as_ref().and_then(|levels| self.offset(&levels.blended, &levels.bases[label]));
+        let offset = work
+            .levels
+            .as_ref()
+            .and_then(|levels| self.offset(&levels.blended, levels.bases.at(label), work.first_level));
         let offsets = offset.iter().flat_map(|plane| &plane.texels).map(|texel| colour(*texel).unwrap_or_default());
         let offsets = offsets.chain(std::iter::repeat([0.0; 3]));
         pixels.iter().zip(offsets).map(|(pixel, offset)| finished(*pixel, offset)).collect()
     }
 
     /// What the coarse levels change of a photograph, on the pixels of the tile; `None` if nothing.
-    fn offset(&self, blended: &Plane<[f32; 4]>, base: &Base) -> Option<Plane<[f32; 4]>> {
+    fn offset(&self, blended: &Plane<[f32; 4]>, base: &Base, first_level: u32) -> Option<Plane<[f32; 4]>> {
         let reach = |range: &Range<usize>, length: usize| {
-            (range.start >> FIRST_LEVEL).saturating_sub(2)..(((range.end - 1) >> FIRST_LEVEL) + 3).min(length)
+            (range.start >> first_level).saturating_sub(2)..(((range.end - 1) >> first_level) + 3).min(length)
         };
         let columns = reach(&self.columns, blended.columns.end);
         let rows = reach(&self.rows, blended.rows.end);
@@ -100,15 +108,15 @@ impl Tile {
         if !any {
             return None;
         }
-        for level in (0..FIRST_LEVEL).rev() {
+        for level in (0..first_level).rev() {
             let within = |range: &Range<usize>, length: usize| {
                 // One sample more than the next finer level asks for, two in the end none.
                 let more = if level == 0 { 0 } else { 2 };
                 (range.start >> level).saturating_sub(more)..(((range.end - 1) >> level) + 1 + more).min(length)
             };
-            let finest = [work_length(blended.columns.end, level), work_length(blended.rows.end, level)];
-            let columns = within(&self.columns, finest[0]);
-            let rows = within(&self.rows, finest[1]);
+            // At least as many samples as the canvas has.
+            let columns = within(&self.columns, blended.columns.end << (first_level - level));
+            let rows = within(&self.rows, blended.rows.end << (first_level - level));
             plane = plane.expanded(&columns, &rows);
             level_shares(&mut plane);
         }
@@ -125,11 +133,11 @@ impl Tile {
             let mut pixels = vec![[0.0; 4]; out.len()];
             picture.sample(self.window(&self.columns, &self.rows), &mut pixels, work.options, scratch);
             for (row, y) in self.rows.clone().enumerate() {
-                work.seams.row(y, &self.columns, work.canvas, &mut labels);
+                work.unrolled.labels(work.seams, (y, &self.columns), 1, &mut labels);
                 for (x, own) in labels.iter().enumerate() {
                     let at = row * width + x;
                     // Where the owner covers nothing, whoever covers most.
-                    let claim = pixels[at][3] * if own == label { 2.0 } else { 1.0 };
+                    let claim = pixels[at][3] * if *own == work.unrolled.label(*label) { 2.0 } else { 1.0 };
                     if claim > taken[at] {
                         taken[at] = claim;
                         out[at] = finished(pixels[at], [0.0; 3]);
@@ -148,7 +156,7 @@ impl Tile {
         scratch: &mut Scratch,
     ) -> Vec<Finished> {
         let Some(levels) = &work.levels else { return Vec::new() };
-        let (columns, rows) = Self::with_margin(&self.columns, &self.rows, work.canvas);
+        let (columns, rows) = Self::with_margin(&self.columns, &self.rows, work);
         let mut opacity = vec![0.0_f32; self.columns.len() * self.rows.len()];
         let mut sums: Vec<Plane<[f32; 4]>> = Vec::new();
         let masks = self.masks(work, shown, &columns, &rows);
@@ -162,13 +170,13 @@ impl Tile {
             self.add_opacity(&plane, &mut opacity);
             let mut mask = mask;
             hide_ignored(&mut plane, &mask, picture, work.ignored[usize::from(*label)].as_deref());
-            for level in 0..FIRST_LEVEL {
+            for level in 0..work.first_level {
                 if sums.len() <= level as usize {
                     sums.push(Plane::new(plane.columns.clone(), plane.rows.clone()));
                 }
-                let last = level + 1 == FIRST_LEVEL;
+                let last = level + 1 == work.first_level;
                 let reduced = if last { Plane::default() } else { plane.reduced() };
-                let coarser = if last { &levels.bases[usize::from(*label)].plane } else { &reduced };
+                let coarser = if last { &levels.bases.at(usize::from(*label)).plane } else { &reduced };
                 add_detail(&mut sums[level as usize], &plane, coarser, &mask);
                 if !last {
                     mask = mask.reduced();
@@ -204,10 +212,11 @@ impl Tile {
         let mut masks: Vec<Plane<f32>> = shown.iter().map(|_| Plane::new(columns.clone(), rows.clone())).collect();
         let mut labels = Vec::new();
         for y in rows.clone() {
-            work.seams.row(y, columns, work.canvas, &mut labels);
-            for (mask, (label, _)) in masks.iter_mut().zip(shown) {
+            work.unrolled.labels(work.seams, (y, columns), 1, &mut labels);
+            for (mask, (placement, _)) in masks.iter_mut().zip(shown) {
+                let label = work.unrolled.label(*placement);
                 for (weight, own) in mask.row_mut(y).iter_mut().zip(&labels) {
-                    *weight = if own == label && own != &NOBODY { 1.0 } else { 0.0 };
+                    *weight = if *own == label && *own != NOBODY { 1.0 } else { 0.0 };
                 }
             }
         }
@@ -239,11 +248,6 @@ fn hide_ignored(plane: &mut Plane<[f32; 4]>, shown: &Plane<f32>, picture: &Prepa
 
 /// A change of the square root of linear light too small for 16 bits.
 const NO_CHANGE: f32 = 1e-6;
-
-/// Samples of a level along a side of `length` samples at [`FIRST_LEVEL`], at least as many as the canvas has.
-fn work_length(length: usize, level: u32) -> usize {
-    length << (FIRST_LEVEL - level)
-}
 
 /// A pixel of the panorama from the square root of linear light and the share covered.
 fn finished([r, g, b, share]: [f32; 4], offset: [f32; 3]) -> Finished {

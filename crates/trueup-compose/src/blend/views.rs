@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
+use trueup_core::colour::TransferCurve;
 use trueup_core::mask::{Mask, Masks};
 use trueup_core::mesh::GridMesh;
 use trueup_core::options::StageOptions;
@@ -12,14 +13,16 @@ use trueup_core::raster::Photograph;
 use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 
-use super::Base;
-use super::coarse::{self, SAMPLED_LEVEL};
+use super::bases::{Base, Bases};
+use super::coarse::{self, SAMPLED_BELOW};
 use super::pyramid::Plane;
+use super::unrolled::Unrolled;
 use crate::exposure::Correction;
-use crate::layout::{CanvasLayout, Placed};
+use crate::layout::{Placed, TURNS, columns_around};
+use crate::render::plan::Plan;
 use crate::render::prepared::{Prepared, Scratch, Window, check_photograph};
 use crate::render::{Interpolation, RenderOptions};
-use crate::seam::{CLIPPED, IGNORED, KEPT, PARTLY, SeamOptions, View, WHOLLY, small_size};
+use crate::seam::{CLIPPED, IGNORED, KEPT, PARTLY, SeamOptions, View, ViewPixel, WHOLLY, small_size};
 use crate::unwanted::{Covered, Unwanted, in_mask};
 use crate::weights::WHOLE;
 
@@ -29,66 +32,82 @@ pub(super) struct Small {
     pub(super) views: Vec<View>,
     /// Size of their canvas.
     pub(super) size: [usize; 2],
-    /// For the coarse levels; empty without.
-    pub(super) bases: Vec<Base>,
+    /// For the coarse levels; empty boxes without.
+    pub(super) bases: Bases,
     /// Decoded photographs, as far as there is room for them.
     pub(super) kept: Vec<Option<Photograph>>,
+    /// Bytes of each photograph.
+    pub(super) bytes: Vec<usize>,
 }
 
 /// Level of the camera's own values (0 to 255) from which on a channel counts as saturated.
 const SATURATED: f32 = 252.0;
 
+/// Reads every photograph once; `first_level` is that of the coarse levels, if there are to be any.
 pub(super) fn make(
-    layout: &CanvasLayout,
+    unrolled: &Unrolled<'_>,
     corrections: &[Correction],
     photographs: &dyn PhotographSource,
-    options: &RenderOptions,
-    seam_options: &SeamOptions,
-    with_bases: bool,
+    (options, seam_options): (&RenderOptions, &SeamOptions),
+    (first_level, plan): (Option<u32>, &Plan),
     context: &StageContext,
 ) -> Result<Small> {
+    let layout = unrolled.original_layout();
     let canvas = [layout.width, layout.height];
-    let size = small_size(canvas, seam_options.fine_pixels);
-    let mut small = Small { views: Vec::new(), size, bases: Vec::new(), kept: Vec::new() };
+    let curve = photographs.transfer_curve();
+    let size = small_size(canvas, layout.period.is_some(), seam_options);
+    let period = layout.period.map(|_| size[0]);
+    let clip = [size[0] * if period.is_some() { TURNS } else { 1 }, size[1]];
+    let bases = Bases::new(plan.bases.clone());
+    let mut small = Small { views: Vec::new(), size, bases, kept: Vec::new(), bytes: Vec::new() };
     // Halved as often as can be, then read between samples: nothing here is ever looked at.
     let halving =
         RenderOptions { interpolation: Interpolation::Bilinear, minification_threshold: 1.0, ..options.clone() };
     let sampling = RenderOptions { minification_threshold: 4.0, ..halving.clone() };
-    let covered = Covered::find(layout, photographs, size).map(Arc::new);
-    let mut room = options.kept_photographs * 1e6;
-    let at_a_time = rayon::current_num_threads().max(1);
-    for (placed, corrections) in layout.placed.chunks(at_a_time).zip(corrections.chunks(at_a_time)) {
+    let covered = Covered::find(unrolled.layout(), photographs, small_size(unrolled.canvas(), false, seam_options));
+    let covered = covered.map(Arc::new);
+    let mut room = plan.photographs;
+    let at_a_time = plan.at_a_time;
+    for (chunk, (placed, corrections)) in layout.placed.chunks(at_a_time).zip(corrections.chunks(at_a_time)).enumerate()
+    {
         context.check_cancelled()?;
-        let made: Vec<(View, Base, Photograph)> = placed
+        let made: Vec<(View, Vec<Base>, Photograph)> = placed
             .par_iter()
             .zip(corrections)
-            .map(|(placed, correction)| {
+            .enumerate()
+            .map(|(index, (placed, correction))| {
                 let photograph = photographs.photograph(placed.photograph)?;
                 check_photograph(placed, &photograph)?;
                 // The larger picture first: the smaller is made from what is left of the photograph then.
-                let mesh = scaled(&placed.mesh, [0, 1].map(|axis| size[axis] as f64 / canvas[axis] as f64), 0.0);
-                let prepared = Prepared::new(Cow::Borrowed(&photograph), &mesh, size, correction, &halving);
+                let first = placed.in_first_turn(layout.period);
+                let mesh = scaled(&first.mesh, [0, 1].map(|axis| size[axis] as f64 / canvas[axis] as f64), 0.0);
+                let prepared = Prepared::new(Cow::Borrowed(&photograph), &mesh, clip, (&curve, correction), &halving);
                 let masks = photographs.masks(placed.photograph);
                 let view = match layout.placed.len() {
                     1 => View::default(),
-                    _ => marked(view(&prepared, &sampling), &prepared, &masks),
+                    _ => view(&prepared, &masks, period, &sampling),
                 };
-                let base = match with_bases {
-                    true => {
-                        base(&prepared, placed, correction, canvas, (&masks, covered.as_ref()), [&halving, &sampling])
+                let placements = unrolled.placements(chunk * at_a_time + index);
+                let base = |placement: usize| match first_level {
+                    Some(level) => {
+                        let (placed, canvas) = (&unrolled.placed()[placement], unrolled.canvas());
+                        let (light, unwanted) = ((&curve, correction), (&masks, covered.as_ref()));
+                        base(&prepared, placed, light, (canvas, level), unwanted, [&halving, &sampling])
                     }
-                    false => Base::default(),
+                    None => Base::default(),
                 };
+                let bases = placements.map(base).collect();
                 context.progress().advance(RenderOptions::STAGE, 1);
-                Ok((view, base, photograph))
+                Ok((view, bases, photograph))
             })
             .collect::<Result<_>>()?;
-        for (view, base, photograph) in made {
+        for (view, bases, photograph) in made {
             small.views.push(view);
-            small.bases.push(base);
-            let bytes = photograph.bytes() as f64;
+            bases.into_iter().try_for_each(|base| small.bases.push(base))?;
+            let bytes = photograph.bytes();
             let fits = bytes <= room;
-            room -= if fits { bytes } else { 0.0 };
+            room -= if fits { bytes } else { 0 };
+            small.bytes.push(bytes);
             small.kept.push(fits.then_some(photograph));
         }
     }
@@ -104,8 +123,10 @@ fn scaled(mesh: &GridMesh, scale: [f64; 2], shift: f64) -> GridMesh {
     mesh
 }
 
-fn view(prepared: &Prepared<'_>, options: &RenderOptions) -> View {
-    let (columns, rows) = (prepared.columns(), prepared.rows());
+/// `period` is the width of the small canvas if it is a cylinder.
+fn view(prepared: &Prepared<'_>, masks: &Masks, period: Option<usize>, options: &RenderOptions) -> View {
+    let (all, rows) = (prepared.columns(), prepared.rows());
+    let columns = all.start..all.end.min(all.start + period.unwrap_or(all.len()));
     let mut samples = vec![[0.0; 4]; columns.len() * rows.len()];
     let mut clipped = vec![false; samples.len()];
     let window = Window { columns: &columns, rows: &rows };
@@ -114,7 +135,7 @@ fn view(prepared: &Prepared<'_>, options: &RenderOptions) -> View {
             *clipped = sample[..3].iter().any(|&level| level >= SATURATED);
         }
     });
-    let pixels = samples
+    let mut pixels: Vec<ViewPixel> = samples
         .iter()
         .zip(clipped)
         .map(|(&[r, g, b, share], clipped)| {
@@ -126,16 +147,25 @@ fn view(prepared: &Prepared<'_>, options: &RenderOptions) -> View {
             [level(r), level(g), level(b), flags]
         })
         .collect();
+    mark(&mut pixels, (&columns, &rows), prepared, masks);
+    let (columns, turned) = columns_around(columns, period);
+    if turned > 0 {
+        pixels.chunks_exact_mut(columns.len()).for_each(|row| row.rotate_right(turned));
+    }
     View { columns, rows, pixels }
 }
 
-/// The view with what the photographer marked.
-fn marked(mut view: View, prepared: &Prepared<'_>, masks: &Masks) -> View {
+/// Adds what the photographer marked to the pixels of so many columns and rows.
+fn mark(
+    pixels: &mut [ViewPixel],
+    (columns, rows): (&Range<usize>, &Range<usize>),
+    prepared: &Prepared<'_>,
+    masks: &Masks,
+) {
     if masks.ignored.is_none() && masks.kept.is_none() {
-        return view;
+        return;
     }
     let size = prepared.grid().size;
-    let View { columns, rows, pixels } = &mut view;
     prepared.grid().each_place(columns, rows, |[x, y], place, footprint| {
         let flags = &mut pixels[(y - rows.start) * columns.len() + x - columns.start][3];
         if *flags & PARTLY == 0 {
@@ -146,25 +176,25 @@ fn marked(mut view: View, prepared: &Prepared<'_>, masks: &Masks) -> View {
         *flags |= u8::from(masks.ignored.as_ref().is_some_and(ignored)) * IGNORED;
         *flags |= u8::from(masks.kept.as_ref().is_some_and(kept)) * KEPT;
     });
-    view
 }
 
 /// The coarse level of a photograph.
 fn base(
     larger: &Prepared<'_>,
     placed: &Placed,
-    correction: &Correction,
-    canvas: [usize; 2],
+    light: (&TransferCurve, &Correction),
+    (canvas, first_level): ([usize; 2], u32),
     (masks, covered): (&Masks, Option<&Arc<Covered>>),
     [halving, sampling]: [&RenderOptions; 2],
 ) -> Base {
-    let step = f64::from(1_u32 << SAMPLED_LEVEL);
+    let level = first_level - SAMPLED_BELOW;
+    let step = f64::from(1_u32 << level);
     // Sample i lies on the middle of pixel i * step.
     let mesh = scaled(&placed.mesh, [step.recip(); 2], 0.5 - 0.5 / step);
     let (photograph, [width, height]) = larger.photograph();
     let mesh = GridMesh { width, height, ..mesh };
-    let size = canvas.map(|length| length.div_ceil(1 << SAMPLED_LEVEL));
-    let prepared = Prepared::new(Cow::Borrowed(photograph), &mesh, size, correction, halving)
+    let size = canvas.map(|length| length.div_ceil(1 << level));
+    let prepared = Prepared::new(Cow::Borrowed(photograph), &mesh, size, light, halving)
         .without(Unwanted::new(masks, covered, size));
     // Room for the interpolated rim, from a sample that every coarser level has.
     let grown = |range: Range<usize>, length: usize| {
@@ -181,5 +211,5 @@ fn base(
     Base { plane: coarse::base(plane) }
 }
 
-/// Samples at [`SAMPLED_LEVEL`] around a photograph that its coarser levels reach.
-const RIM: usize = 8;
+/// Samples around a photograph that its coarser levels reach.
+pub(super) const RIM: usize = 8;

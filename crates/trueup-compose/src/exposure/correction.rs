@@ -1,7 +1,12 @@
 //! What is done to the light of one photograph before it is laid beside others.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
+use trueup_core::colour::TransferCurve;
 use trueup_core::{Error, Result};
+
+use crate::transfer_curve::Linearise;
 
 /// Even powers of the radius in the model of vignetting: r^2, r^4, r^6.
 pub const VIGNETTING_TERMS: usize = 3;
@@ -75,9 +80,10 @@ pub(crate) fn exposed(linear: f32, factor: f32) -> f32 {
     factor * linear / levelled.sqrt().sqrt()
 }
 
-/// A [`Correction`] as the inner loops read it.
+/// From a photograph's samples to corrected light, as the inner loops read it: its transfer curve and its [`Correction`].
 #[derive(Debug, Clone)]
 pub(crate) struct LightTable {
+    pub(crate) linearise: Arc<Linearise>,
     pub(crate) gain: [f32; 3],
     /// Factor at r^2 = index / (length - 2), one entry beyond the corner; empty without vignetting.
     falloff: Vec<f32>,
@@ -91,13 +97,14 @@ pub(crate) struct LightTable {
 const STEPS: usize = 256;
 
 impl LightTable {
-    /// For a photograph of `size` pixels.
-    pub(crate) fn new(correction: &Correction, size: [f64; 2]) -> Self {
+    /// For a photograph of `size` pixels, encoded by `curve`.
+    pub(crate) fn new(curve: &TransferCurve, correction: &Correction, size: [f64; 2]) -> Self {
         let plain = correction.vignetting.iter().all(|&coefficient| coefficient == 0.0);
         let last = if plain { 0 } else { STEPS + 2 };
         let factor = |index: usize| correction.at_radius((index as f64 / STEPS as f64).min(1.0)) as f32;
         let corner = 0.25 * (size[0] * size[0] + size[1] * size[1]);
         Self {
+            linearise: Linearise::of(curve),
             gain: correction.gain.map(|gain| gain as f32),
             falloff: (0..last).map(factor).collect(),
             centre: size.map(|length| 0.5 * length as f32),
@@ -130,14 +137,14 @@ mod tests {
     #[test]
     fn the_table_follows_the_formula() {
         let correction = Correction { gain: [1.0, 2.0, 0.5], vignetting: [0.3, -0.2, 0.4] };
-        let table = LightTable::new(&correction, [400.0, 300.0]);
+        let table = LightTable::new(&TransferCurve::SRGB, &correction, [400.0, 300.0]);
         assert!(table.varies());
         for (x, y) in [(200.0, 150.0), (0.0, 0.0), (37.5, 281.0), (400.0, 300.0), (390.0, 12.0)] {
             let r2 = ((x - 200.0) * (x - 200.0) + (y - 150.0) * (y - 150.0)) / (200.0 * 200.0 + 150.0 * 150.0);
             let expected = f64::exp(0.3 * r2 - 0.2 * r2 * r2 + 0.4 * r2 * r2 * r2);
             assert!((f64::from(table.at(x as f32, y as f32)) - expected).abs() < 1e-4, "({x}, {y})");
         }
-        assert!(!LightTable::new(&Correction::uniform(3.0), [400.0, 300.0]).varies());
+        assert!(!LightTable::new(&TransferCurve::SRGB, &Correction::uniform(3.0), [400.0, 300.0]).varies());
         assert!((correction.brightness() - 1.0).abs() < 1e-12);
     }
 

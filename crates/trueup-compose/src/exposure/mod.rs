@@ -14,6 +14,7 @@ pub(crate) use correction::{LightTable, exposed};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use trueup_core::colour::TransferCurve;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::Raster;
 use trueup_core::source::WorkingFrame;
@@ -82,8 +83,10 @@ trueup_core::options! {
 /// A photograph reduced to its working size, as the comparison of light reads it.
 #[derive(Debug, Clone, Copy)]
 pub struct Thumbnail<'a> {
-    /// 8-bit sRGB, three channels.
+    /// 8 bits, three channels.
     pub raster: &'a Raster<u8>,
+    /// How its levels stand for light.
+    pub curve: &'a TransferCurve,
     /// How its pixels relate to the full-resolution photograph.
     pub frame: WorkingFrame,
     /// Which camera took it: photographs with the same number share their vignetting.
@@ -128,7 +131,7 @@ pub struct Exposure {
 ///
 /// # Departures
 /// All errors are on logarithms, where the whole model is linear; the published error of the gains on intensities draws
-/// them towards zero and is led by bright outliers. The response is taken to be sRGB's.
+/// them towards zero and is led by bright outliers. The response is taken to be the transfer curve of the photographs' colour space.
 pub fn run(
     layout: &CanvasLayout,
     thumbnails: &[Thumbnail<'_>],
@@ -142,14 +145,16 @@ pub fn run(
         return Ok(Exposure { corrections: vec![Correction::default(); count], pairs: Vec::new() });
     }
     let scale = sampling_scale(layout, options.samples);
-    let size = [layout.width, layout.height].map(|length| (length as f64 * scale).ceil() as usize);
+    let turn = layout.period.map(|period| (period as f64 * scale).round() as usize);
+    let [width, height] = [layout.width, layout.height].map(|length| (length as f64 * scale).ceil() as usize);
+    let size = [turn.unwrap_or(width), height];
     let patches: Vec<Patch> = layout
         .placed
         .par_iter()
         .zip(thumbnails)
         .map(|(placed, thumbnail)| {
             context.check_cancelled()?;
-            Ok(Patch::new(placed, thumbnail, scale, size, options))
+            Ok(Patch::new(placed, thumbnail, scale, size, layout.period, options))
         })
         .collect::<Result<_>>()?;
     let observed: Vec<Observed> = (0..count)
@@ -157,7 +162,7 @@ pub fn run(
         .map(|first| {
             context.check_cancelled()?;
             Ok((first + 1..count)
-                .filter_map(|second| compare(shared(&patches[first], &patches[second]), first, second, options))
+                .filter_map(|second| compare(shared(&patches[first], &patches[second], turn), first, second, options))
                 .collect::<Vec<_>>())
         })
         .collect::<Result<Vec<_>>>()?
@@ -214,7 +219,10 @@ fn sampling_scale(layout: &CanvasLayout, samples: f64) -> f64 {
     let median = areas.get(areas.len() / 2).copied().unwrap_or(1.0).max(1.0);
     // Coordinates beyond this are no sampling grid any more.
     const MAX_SIDE: f64 = 16_384.0;
-    (samples / median).sqrt().min(1.0).min(MAX_SIDE / layout.width.max(layout.height) as f64)
+    let scale = (samples / median).sqrt().min(1.0).min(MAX_SIDE / layout.width.max(layout.height) as f64);
+    // A turn is a whole number of samples.
+    let whole = |period: usize| (period as f64 * scale).ceil() / period as f64;
+    layout.period.map_or(scale, whole)
 }
 
 /// Compares two photographs by what they share; `None` if that is too little.

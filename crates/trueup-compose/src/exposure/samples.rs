@@ -6,7 +6,7 @@ use trueup_core::raster::Raster;
 
 use super::{ExposureOptions, Thumbnail};
 use crate::deformed_grid::{DeformedGrid, Run};
-use crate::layout::Placed;
+use crate::layout::{Placed, TURNS};
 use crate::simd::{Positions, invert_row};
 use crate::transfer_curve::Linearise;
 
@@ -28,6 +28,11 @@ pub(super) struct Shared {
 }
 
 impl Shared {
+    /// The same with the photographs' parts exchanged.
+    fn swapped(self) -> Self {
+        Self { log_ratio: self.log_ratio.map(|ratio| -ratio), radius: [self.radius[1], self.radius[0]] }
+    }
+
     /// The mean over the channels: the ratio of brightness.
     pub(super) fn brightness(&self) -> f32 {
         (self.log_ratio[0] + self.log_ratio[1] + self.log_ratio[2]) / 3.0
@@ -40,14 +45,18 @@ impl Patch {
         thumbnail: &Thumbnail<'_>,
         scale: f64,
         [width, height]: [usize; 2],
+        period: Option<usize>,
         options: &ExposureOptions,
     ) -> Self {
+        let placed = placed.in_first_turn(period);
+        let width = width * if period.is_some() { TURNS } else { 1 };
         let grid = DeformedGrid::new(&placed.mesh, scale, false, width, height);
         let mut footprints: Vec<f64> = grid.cells.iter().map(|cell| cell.footprint[0].min(cell.footprint[1])).collect();
         footprints.sort_by(f64::total_cmp);
         let footprint = footprints.get(footprints.len() / 2).copied().unwrap_or(1.0);
         let block = (footprint * thumbnail.frame.working_from_full).round().max(1.0) as usize;
-        let light = block_means(thumbnail.raster, block, options.darkest..=options.brightest);
+        let linearise = Linearise::of(thumbnail.curve);
+        let light = block_means(thumbnail.raster, &linearise, block, options.darkest..=options.brightest);
         let from_full = thumbnail.frame.working_from_full / block as f64;
         let half = grid.size.map(|length| 0.5 * length);
         let corner = half[0] * half[0] + half[1] * half[1];
@@ -79,13 +88,25 @@ impl Patch {
     }
 }
 
-/// The places where both photographs tell their light.
-pub(super) fn shared(first: &Patch, second: &Patch) -> Vec<Shared> {
-    let (rows, columns) = (intersect(&first.rows, &second.rows), intersect(&first.columns, &second.columns));
+/// The places where both photographs tell their light; on a cylinder of `turn` columns, turns apart, too.
+pub(super) fn shared(first: &Patch, second: &Patch, turn: Option<usize>) -> Vec<Shared> {
+    let Some(turn) = turn else { return shared_ahead(first, second, 0) };
+    // Each begins in the first turn or soon after and may reach some turns on.
+    let ahead = (0..=TURNS).flat_map(|turns| shared_ahead(first, second, turns * turn));
+    let behind =
+        (1..=TURNS).flat_map(|turns| shared_ahead(second, first, turns * turn).into_iter().map(Shared::swapped));
+    ahead.chain(behind).collect()
+}
+
+/// The places where both photographs tell their light if the second is moved to the right by some columns.
+fn shared_ahead(first: &Patch, second: &Patch, by: usize) -> Vec<Shared> {
+    let rows = intersect(&first.rows, &second.rows);
+    let columns = intersect(&first.columns, &(second.columns.start + by..second.columns.end + by));
     if rows.is_empty() || columns.is_empty() {
         return Vec::new();
     }
-    rows.flat_map(|y| first.row(y, &columns).iter().zip(second.row(y, &columns)))
+    let own = columns.start - by..columns.end - by;
+    rows.flat_map(|y| first.row(y, &columns).iter().zip(second.row(y, &own)))
         .map(|(a, b)| Shared { log_ratio: [a[0] - b[0], a[1] - b[1], a[2] - b[2]], radius: [a[3], b[3]] })
         .filter(|shared| shared.log_ratio.iter().all(|ratio| ratio.is_finite()))
         .collect()
@@ -97,8 +118,7 @@ fn intersect(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
 
 /// Natural logarithm of the mean linear light of blocks of `block` x `block` pixels, by channel; NaN where a sample lies
 /// outside `telling`.
-fn block_means(raster: &Raster<u8>, block: usize, telling: RangeInclusive<u8>) -> Raster<f32> {
-    let linearise = Linearise::table();
+fn block_means(raster: &Raster<u8>, linearise: &Linearise, block: usize, telling: RangeInclusive<u8>) -> Raster<f32> {
     let (width, height) = (raster.width().div_ceil(block), raster.height().div_ceil(block));
     let mut means = Raster::new(width, height, 3);
     for y in 0..height {

@@ -38,12 +38,13 @@ fn layout(shifts: &[f64]) -> CanvasLayout {
         })
         .collect();
     let width = WIDTH + shifts.iter().copied().fold(0.0, f64::max) as usize;
-    CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, placed }
+    CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, origin: [0.0; 2], placed, period: None }
 }
 
 fn estimate(shifts: &[f64], rasters: &[Raster<u8>], options: &ExposureOptions) -> Exposure {
     let frame = WorkingFrame::new(WIDTH, HEIGHT, 480_000.0);
-    let thumbnails: Vec<Thumbnail> = rasters.iter().map(|raster| Thumbnail { raster, frame, camera: 0 }).collect();
+    let thumbnails: Vec<Thumbnail> =
+        rasters.iter().map(|raster| Thumbnail { raster, curve: &TransferCurve::SRGB, frame, camera: 0 }).collect();
     run(&layout(shifts), &thumbnails, 0, options, &StageContext::default()).expect("estimates")
 }
 
@@ -54,6 +55,37 @@ fn gains(exposure: &Exposure) -> Vec<f64> {
 /// ln of the light that reaches the sensor at the squared radius `r2`, relative to the middle.
 fn falloff(r2: f64) -> f64 {
     -0.5 * r2 - 0.2 * r2 * r2
+}
+
+/// Two photographs on a cylinder of 480 columns, the second 300 to the right of the first: they meet only across the ends.
+#[test]
+fn overlaps_across_the_ends_of_a_full_turn_count() {
+    const AROUND: usize = 480;
+    let picture = |shift: usize, gain: f64| {
+        let level = |i: usize| encoded(gain * scene(((i % WIDTH + shift) % AROUND) as f64, (i / WIDTH) as f64));
+        let data = (0..WIDTH * HEIGHT).flat_map(|i| [level(i); 3]).collect();
+        Raster::from_data(WIDTH, HEIGHT, 3, data).expect("as many samples")
+    };
+    let rasters = [picture(0, 1.0), picture(300, 0.7)];
+    let frame = WorkingFrame::new(WIDTH, HEIGHT, 480_000.0);
+    let thumbnails: Vec<Thumbnail> =
+        rasters.iter().map(|raster| Thumbnail { raster, curve: &TransferCurve::SRGB, frame, camera: 0 }).collect();
+    let options = ExposureOptions { model: ExposureModel::Gain, ..ExposureOptions::default() };
+    let flat = layout(&[0.0, 300.0]);
+    for (shifts, swapped) in
+        [([0.0, 300.0], false), ([-90.0, 210.0], false), ([100.0, -80.0], false), ([300.0, 0.0], true)]
+    {
+        let order = if swapped { [1, 0] } else { [0, 1] };
+        let layout = CanvasLayout { width: AROUND, period: Some(AROUND), ..layout(&shifts) };
+        let thumbnails = order.map(|k| thumbnails[k]);
+        let found = run(&layout, &thumbnails, 0, &options, &StageContext::default()).expect("estimates");
+        assert_eq!(found.pairs.len(), 1, "{shifts:?}");
+        let gains = gains(&found);
+        let expected = if swapped { 0.7 } else { 1.0 / 0.7 };
+        assert!((gains[1] / gains[0] - expected).abs() < 0.03, "{shifts:?}: {gains:?}");
+    }
+    let alone = run(&flat, &thumbnails, 0, &options, &StageContext::default()).expect("estimates");
+    assert!(alone.pairs.is_empty());
 }
 
 #[test]

@@ -1,19 +1,23 @@
-//! One photograph alone on the canvas, for measuring.
+//! One photograph alone on the canvas: for measuring, and row by row for files.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use trueup_core::Result;
-use trueup_core::raster::{LUMA, Raster};
+use trueup_core::colour::TransferCurve;
+use trueup_core::raster::{LUMA, Raster, RowSource};
 use trueup_core::source::PhotographSource;
 
 use super::prepared::{Prepared, Scratch, Window, check_photograph};
 use super::{BAND_ROWS, RenderOptions, check};
+use crate::deformed_grid::DeformedGrid;
 use crate::exposure::Correction;
-use crate::layout::CanvasLayout;
-use crate::transfer_curve::Encode;
+use crate::layout::{CanvasLayout, TURNS, columns_around};
+use crate::transfer_curve::{Encode, Encoding};
 use crate::weights::WHOLE;
 
-/// What one photograph shows of the canvas: its bounding box there.
+/// What one photograph shows of the canvas: its bounding box there. On a cylinder it may run past the width into the next
+/// turn, but does not meet itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layer {
     /// First column of the canvas.
@@ -37,27 +41,18 @@ pub fn layer(
     photographs: &dyn PhotographSource,
     options: &RenderOptions,
 ) -> Result<Layer> {
-    check(layout, corrections, options)?;
-    let Some(placed) = layout.placed.get(position) else {
-        return Err(trueup_core::Error::input(
-            "canvas",
-            format!("there is no photograph {position} on it"),
-            "Ask for one of the photographs placed.",
-        ));
-    };
-    let photograph = photographs.photograph(placed.photograph)?;
-    check_photograph(placed, &photograph)?;
-    let size = [layout.width, layout.height];
-    let prepared = Prepared::new(Cow::Owned(photograph), &placed.mesh, size, &corrections[position], options);
-    let (columns, rows) = (prepared.columns(), prepared.rows());
+    let (prepared, curve) = alone(layout, corrections, position, photographs, options)?;
+    let (all, rows) = (prepared.columns(), prepared.rows());
+    let columns = all.start..all.end.min(all.start + layout.period.unwrap_or(all.len()));
+    let (on_canvas, turned) = columns_around(columns.clone(), layout.period);
     let (width, height) = (columns.len(), rows.len());
     let mut layer = Layer {
-        left: columns.start,
+        left: on_canvas.start,
         top: rows.start,
         gray: Raster::new(width, height, 1),
         covered: Raster::new(width, height, 1),
     };
-    let encode = Encode::table();
+    let encode = Encode::of(&curve);
     let mut scratch = Scratch::default();
     let mut samples = Vec::new();
     for first in rows.clone().step_by(BAND_ROWS) {
@@ -75,7 +70,162 @@ pub fn layer(
                     *covered = share >= WHOLE;
                 }
             }
+            layer.gray.row_mut(y - rows.start).rotate_right(turned);
+            layer.covered.row_mut(y - rows.start).rotate_right(turned);
         }
     }
     Ok(layer)
+}
+
+/// Photograph `layout.placed[position]` alone, with the curve of its samples.
+fn alone(
+    layout: &CanvasLayout,
+    corrections: &[Correction],
+    position: usize,
+    photographs: &dyn PhotographSource,
+    options: &RenderOptions,
+) -> Result<(Prepared<'static>, TransferCurve)> {
+    check(layout, corrections, options)?;
+    let Some(placed) = layout.placed.get(position) else {
+        return Err(trueup_core::Error::input(
+            "canvas",
+            format!("there is no photograph {position} on it"),
+            "Ask for one of the photographs placed.",
+        ));
+    };
+    let photograph = photographs.photograph(placed.photograph)?;
+    check_photograph(placed, &photograph)?;
+    let curve = photographs.transfer_curve();
+    let light = (&curve, &corrections[position]);
+    let mesh = &placed.in_first_turn(layout.period).mesh;
+    Ok((Prepared::new(Cow::Owned(photograph), mesh, unrolled_size(layout), light, options), curve))
+}
+
+/// The canvas, on a cylinder with the turns that a photograph may reach into.
+fn unrolled_size(layout: &CanvasLayout) -> [usize; 2] {
+    [layout.width * if layout.period.is_some() { TURNS } else { 1 }, layout.height]
+}
+
+/// Columns of the canvas that a box of `columns` takes: all of them if it lies across the ends of a cylinder.
+fn columns_of_box(columns: &Range<usize>, layout: &CanvasLayout) -> Range<usize> {
+    let (around, _) = columns_around(columns.clone(), layout.period);
+    if around.end > layout.width { 0..layout.width } else { around }
+}
+
+/// One photograph alone on the canvas, corrected, with alpha: its bounding box, row by row. Holds the photograph and no
+/// pixel of the canvas.
+pub struct LayerRows {
+    /// First column of the canvas.
+    pub left: usize,
+    /// First row of the canvas.
+    pub top: usize,
+    width: usize,
+    /// Width of the canvas.
+    turn: usize,
+    prepared: Prepared<'static>,
+    encoding: Encoding,
+    options: RenderOptions,
+}
+
+impl std::fmt::Debug for LayerRows {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_struct("LayerRows").field("left", &self.left).field("top", &self.top).finish_non_exhaustive()
+    }
+}
+
+/// Prepares photograph `layout.placed[position]` to be rendered alone, as [`super::run`] would; `None` if none of it lies on
+/// the canvas.
+///
+/// # Errors
+/// Those of [`layer`].
+pub fn layer_rows(
+    layout: &CanvasLayout,
+    corrections: &[Correction],
+    position: usize,
+    photographs: &dyn PhotographSource,
+    options: &RenderOptions,
+) -> Result<Option<LayerRows>> {
+    let (prepared, curve) = alone(layout, corrections, position, photographs, options)?;
+    let (columns, rows) = (prepared.columns(), prepared.rows());
+    if columns.is_empty() || rows.is_empty() {
+        return Ok(None);
+    }
+    let on_canvas = columns_of_box(&columns, layout);
+    Ok(Some(LayerRows {
+        left: on_canvas.start,
+        top: rows.start,
+        width: on_canvas.len(),
+        turn: layout.width,
+        prepared,
+        encoding: Encoding::new(curve),
+        options: options.clone(),
+    }))
+}
+
+/// Width and height of the box of photograph `layout.placed[position]` on the canvas, in pixels; 0 if there is no such
+/// position.
+pub fn layer_size(layout: &CanvasLayout, position: usize) -> [usize; 2] {
+    let Some(placed) = layout.placed.get(position) else { return [0, 0] };
+    let [width, height] = unrolled_size(layout);
+    let grid = DeformedGrid::new(&placed.in_first_turn(layout.period).mesh, 1.0, true, width, height);
+    [columns_of_box(&grid.columns, layout).len(), grid.rows.len()]
+}
+
+impl LayerRows {
+    /// Row `y` of the box: roots of linear light, and the share that is covered.
+    fn samples(&self, y: usize) -> Vec<[f32; 4]> {
+        let columns = self.prepared.columns();
+        let rows = self.top + y..self.top + y + 1;
+        let mut samples = vec![[0.0; 4]; columns.len()];
+        let window = Window { columns: &columns, rows: &rows };
+        self.prepared.sample(window, &mut samples, &self.options, &mut Scratch::default());
+        // Across the ends of a cylinder, what runs past the last column goes on in the first.
+        let mut row = vec![[0.0; 4]; self.width];
+        for (x, sample) in columns.zip(samples) {
+            let at = x % self.turn - self.left;
+            if sample[3] > row[at][3] {
+                row[at] = sample;
+            }
+        }
+        row
+    }
+
+    fn row<T: Copy + Default>(
+        &self,
+        y: usize,
+        row: &mut [T],
+        color: impl Fn(f32) -> T,
+        alpha: impl Fn(f32) -> T,
+    ) -> Result<()> {
+        for (pixel, [r, g, b, share]) in row.chunks_exact_mut(4).zip(self.samples(y)) {
+            match share > 0.0 {
+                true => pixel.copy_from_slice(&[color(r * r), color(g * g), color(b * b), alpha(share.min(1.0))]),
+                false => pixel.fill(T::default()),
+            }
+        }
+        Ok(())
+    }
+}
+
+impl RowSource for LayerRows {
+    fn width(&self) -> usize {
+        self.width
+    }
+
+    fn height(&self) -> usize {
+        self.prepared.rows().len()
+    }
+
+    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
+        self.row(y, row, |light| self.encoding.linear.level(light), |share| (share * 255.0 + 0.5) as u8)
+    }
+
+    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
+        let encode = self.encoding.linear16();
+        self.row(y, row, |light| encode.level(light), |share| (share * 65535.0 + 0.5) as u16)
+    }
+
+    fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()> {
+        self.row(y, row, |light| light, |share| share)
+    }
 }

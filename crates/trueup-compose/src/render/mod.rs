@@ -6,12 +6,16 @@
 
 mod layer;
 mod panorama;
+pub(crate) mod plan;
 pub(crate) mod prepared;
+pub(crate) mod store;
 
-pub use layer::{Layer, layer};
+pub use layer::{Layer, LayerRows, layer, layer_rows, layer_size};
 pub use panorama::Panorama;
+pub use plan::Resources;
 
 use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -21,12 +25,14 @@ use trueup_core::source::PhotographSource;
 use trueup_core::{Error, Result, StageContext};
 
 use crate::blend;
-use crate::deformed_grid::count_folded_triangles;
+use crate::deformed_grid::{DeformedGrid, count_folded_triangles};
 use crate::exposure::Correction;
-use crate::layout::{CanvasLayout, check_mesh};
+use crate::layout::{CanvasLayout, Placed, check_mesh};
 use crate::seam::{SeamOptions, small_size};
 use crate::unwanted::{Covered, Unwanted};
+use plan::Plan;
 use prepared::{Prepared, Scratch, check_photograph};
+use store::Store;
 
 const STAGE: &str = RenderOptions::STAGE;
 
@@ -68,9 +74,6 @@ trueup_core::options! {
         /// Widest transition of multi-band blending, as a share of the photographs' shorter side on the canvas. Higher
         /// evens out more of what differs in brightness and colour.
         transition: f64 = 0.25, between(0.0, 1.0), "";
-        /// Decoded photographs are kept up to this much memory between the search of the seams and the blending, so that
-        /// they need not be decoded again.
-        kept_photographs: f64 = 512.0, between(0.0, 1000000.0), "MB";
         /// Power of the feather weight. Higher values let the photograph that lies deepest prevail, which shortens the
         /// transition and with it ghosts; 1 blends over the whole overlap.
         feather_exponent: f64 = 3.0, between(0.1, 16.0), "";
@@ -101,59 +104,118 @@ pub fn run(
     seams: &SeamOptions,
     context: &StageContext,
 ) -> Result<Panorama> {
-    check(layout, corrections, options)?;
-    seams.check()?;
-    report_folds(layout, context);
-    let cut = options.blend == Blend::None;
-    match options.blend {
-        Blend::MultiBand | Blend::None if !layout.placed.is_empty() => {
-            let blended = blend::run(layout, corrections, photographs, (options, seams), cut, context)?;
-            Ok(Panorama::from_roots(layout.width, layout.height, blended.pixels, blended.seams))
-        }
-        _ => mean(layout, corrections, photographs, (options, seams), context),
-    }
+    run_within(&Resources::unlimited(), layout, corrections, photographs, (options, seams), context)
 }
 
-/// The weighted mean of all photographs at every pixel.
-fn mean(
+/// [`run`] within so much memory. A canvas that does not fit into its share goes to a scratch file, and photographs are
+/// decoded again where they cannot be kept; the panorama is the same to the last bit.
+///
+/// # Errors
+/// As [`run`]; [`Error::Limits`] with the numbers, before any photograph is decoded, if memory or disk do not suffice.
+pub fn run_within(
+    resources: &Resources<'_>,
     layout: &CanvasLayout,
     corrections: &[Correction],
     photographs: &dyn PhotographSource,
     (options, seams): (&RenderOptions, &SeamOptions),
     context: &StageContext,
 ) -> Result<Panorama> {
+    check(layout, corrections, options)?;
+    seams.check()?;
+    let size = [layout.width, layout.height];
+    let plan = Plan::new(layout, photographs, options, seams, resources)?;
+    report_folds(layout, context);
+    let cut = options.blend == Blend::None;
+    match options.blend {
+        Blend::MultiBand | Blend::None if !layout.placed.is_empty() => {
+            let blended = blend::run(layout, corrections, photographs, (options, seams), (cut, &plan), context)?;
+            Ok(Panorama::from_roots(size, blended.pixels, blended.seams, photographs.transfer_curve()))
+        }
+        _ => {
+            let sums = mean(layout, corrections, photographs, (options, seams), &plan, context)?;
+            Ok(Panorama::from_sums(size, sums, photographs.transfer_curve()))
+        }
+    }
+}
+
+/// The weighted mean of all photographs at every pixel: sums over as many rows at once as there is memory for.
+fn mean(
+    layout: &CanvasLayout,
+    corrections: &[Correction],
+    photographs: &dyn PhotographSource,
+    (options, seams): (&RenderOptions, &SeamOptions),
+    plan: &Plan,
+    context: &StageContext,
+) -> Result<Store<[f32; 4]>> {
+    let (layout, originals) = layout.unrolled(0);
     let (width, height) = (layout.width, layout.height);
-    let covered = Covered::find(layout, photographs, small_size([width, height], seams.fine_pixels)).map(Arc::new);
-    let mut sums = vec![[0.0; 4]; width * height];
-    context.progress().begin(STAGE, layout.placed.len() as u64);
-    let at_a_time = rayon::current_num_threads().max(1);
-    for (placed, corrections) in layout.placed.chunks(at_a_time).zip(corrections.chunks(at_a_time)) {
-        context.check_cancelled()?;
-        let prepared: Vec<Prepared<'_>> = placed
-            .par_iter()
-            .zip(corrections)
-            .map(|(placed, correction)| {
-                let photograph = photographs.photograph(placed.photograph)?;
-                check_photograph(placed, &photograph)?;
-                let masks = photographs.masks(placed.photograph);
-                let prepared =
-                    Prepared::new(Cow::Owned(photograph), &placed.mesh, [width, height], correction, options);
-                Ok(prepared.without(Unwanted::new(&masks, covered.as_ref(), [width, height])))
-            })
-            .collect::<Result<_>>()?;
-        sums.par_chunks_mut(width * BAND_ROWS).enumerate().try_for_each(|(band, sums)| {
+    let curve = photographs.transfer_curve();
+    let shown_elsewhere = Covered::find(&layout, photographs, small_size([width, height], false, seams)).map(Arc::new);
+    let part_rows = plan.sum_rows(width, BAND_ROWS);
+    let parts: Vec<Range<usize>> =
+        (0..height).step_by(part_rows).map(|first| first..first.saturating_add(part_rows).min(height)).collect();
+    let covered = covered_rows(&layout);
+    let meet = |a: &Range<usize>, b: &Range<usize>| a.start < b.end && b.start < a.end;
+    let covering =
+        |part: &Range<usize>| -> Vec<usize> { (0..covered.len()).filter(|&at| meet(&covered[at], part)).collect() };
+    let covering: Vec<Vec<usize>> = parts.iter().map(covering).collect();
+    context.progress().begin(STAGE, covering.iter().map(Vec::len).sum::<usize>() as u64);
+    let mut store = plan.on_disk().then(|| plan.store([width, height], [width, BAND_ROWS]));
+    for (part, covering) in parts.into_iter().zip(covering) {
+        let mut sums = vec![[0.0; 4]; width * part.len()];
+        for group in covering.chunks(plan.at_a_time) {
             context.check_cancelled()?;
-            let rows = band * BAND_ROWS..(band * BAND_ROWS + sums.len() / width);
-            let mut scratch = Scratch::default();
-            for picture in &prepared {
-                picture.add_to_band(&rows, sums, width, options, &mut scratch);
+            let prepared: Vec<Prepared<'_>> = group
+                .par_iter()
+                .map(|&at| {
+                    let placed = &layout.placed[at];
+                    let photograph = photographs.photograph(placed.photograph)?;
+                    check_photograph(placed, &photograph)?;
+                    let photograph = Cow::Owned(photograph);
+                    let (size, light) = ([width, height], (&curve, &corrections[originals[at]]));
+                    let masks = photographs.masks(placed.photograph);
+                    Ok(Prepared::new(photograph, &placed.mesh, size, light, options).without(Unwanted::new(
+                        &masks,
+                        shown_elsewhere.as_ref(),
+                        size,
+                    )))
+                })
+                .collect::<Result<_>>()?;
+            sums.par_chunks_mut(width * BAND_ROWS).enumerate().try_for_each(|(band, sums)| {
+                context.check_cancelled()?;
+                let first = part.start + band * BAND_ROWS;
+                let rows = first..first + sums.len() / width;
+                let mut scratch = Scratch::default();
+                for picture in &prepared {
+                    picture.add_to_band(&rows, sums, width, options, &mut scratch);
+                }
+                Ok(())
+            })?;
+            context.progress().advance(STAGE, group.len() as u64);
+        }
+        match &mut store {
+            // All rows at once.
+            None => store = Some(Store::of_pixels(width, sums)),
+            Some(store) => {
+                for (band, sums) in sums.chunks(width * BAND_ROWS).enumerate() {
+                    let first = part.start + band * BAND_ROWS;
+                    store.put(&(0..width), &(first..first + sums.len() / width), sums)?;
+                }
             }
-            Ok(())
-        })?;
-        context.progress().advance(STAGE, placed.len() as u64);
+        }
     }
     context.progress().finish(STAGE);
-    Ok(Panorama::from_sums(width, height, sums))
+    Ok(store.unwrap_or_else(|| Store::in_memory([width, height])))
+}
+
+/// The rows of the canvas that each photograph may cover.
+fn covered_rows(layout: &CanvasLayout) -> Vec<Range<usize>> {
+    let rows = |placed: &Placed| {
+        let rows = DeformedGrid::new(&placed.mesh, 1.0, true, layout.width, layout.height).rows;
+        // Reduced photographs have the same grid but for rounding.
+        rows.start.saturating_sub(1)..(rows.end + 1).min(layout.height)
+    };
+    layout.placed.par_iter().map(rows).collect()
 }
 
 fn check(layout: &CanvasLayout, corrections: &[Correction], options: &RenderOptions) -> Result<()> {
@@ -171,7 +233,7 @@ fn check(layout: &CanvasLayout, corrections: &[Correction], options: &RenderOpti
     if pixels.is_none_or(|pixels| pixels > isize::MAX as usize / size_of::<[f32; 4]>()) {
         return Err(Error::input(
             "canvas",
-            format!("{} x {} px cannot be held in memory", layout.width, layout.height),
+            format!("{} x {} px are not a canvas", layout.width, layout.height),
             "Lower canvas.scale or canvas.max_pixels.",
         ));
     }
@@ -195,3 +257,5 @@ fn report_folds(layout: &CanvasLayout, context: &StageContext) {
 
 #[cfg(test)]
 pub(crate) mod tests;
+#[cfg(test)]
+mod within_tests;

@@ -1,42 +1,45 @@
 //! The finished panorama.
 
+use trueup_core::Result;
+use trueup_core::colour::TransferCurve;
 use trueup_core::raster::RowSource;
 
+use super::store::Store;
 use crate::seam::Seams;
-use crate::transfer_curve::{Encode, EncodeRoots};
+use crate::transfer_curve::Encoding;
 use crate::weights::alpha;
 
-/// The finished panorama: 8 or 16 bytes a pixel, encoded as its rows are asked for.
-#[derive(Debug, Clone, PartialEq)]
+/// The finished panorama: 8 or 16 bytes a pixel in memory or in a scratch file, encoded as its rows are asked for.
+#[derive(Debug)]
 pub struct Panorama {
     width: usize,
     height: usize,
     pub(super) pixels: Pixels,
     seams: Option<Seams>,
+    encoding: Encoding,
 }
 
-/// What a panorama holds, row-major.
-#[derive(Debug, Clone, PartialEq)]
+/// What a panorama holds.
+#[derive(Debug)]
 pub(super) enum Pixels {
     /// Sums over the photographs of weight * (red, green, blue) in linear light, and of the weights.
-    Sums(Vec<[f32; 4]>),
-    /// Square roots of linear light and alpha; 65535 is 1. Fine enough for 16 bits of sRGB.
-    Roots(Vec<[u16; 4]>),
+    Sums(Store<[f32; 4]>),
+    /// Square roots of linear light and alpha; 65535 is 1. Fine enough for 16 bits of the usual curves.
+    Roots(Store<[u16; 4]>),
 }
 
 impl Panorama {
-    pub(super) fn from_sums(width: usize, height: usize, sums: Vec<[f32; 4]>) -> Self {
-        Self { width, height, pixels: Pixels::Sums(sums), seams: None }
+    pub(super) fn from_sums([width, height]: [usize; 2], sums: Store<[f32; 4]>, curve: TransferCurve) -> Self {
+        Self { width, height, pixels: Pixels::Sums(sums), seams: None, encoding: Encoding::new(curve) }
     }
 
-    pub(super) fn from_roots(width: usize, height: usize, roots: Vec<[u16; 4]>, seams: Seams) -> Self {
-        Self { width, height, pixels: Pixels::Roots(roots), seams: Some(seams) }
-    }
-
-    /// Bytes that rendering a canvas of `width` x `height` pixels takes beside the decoded photographs and what is made
-    /// from them at a reduced size; blending without seams takes the most.
-    pub fn required_bytes(width: usize, height: usize) -> usize {
-        width.saturating_mul(height).saturating_mul(size_of::<[f32; 4]>())
+    pub(super) fn from_roots(
+        [width, height]: [usize; 2],
+        roots: Store<[u16; 4]>,
+        seams: Seams,
+        curve: TransferCurve,
+    ) -> Self {
+        Self { width, height, pixels: Pixels::Roots(roots), seams: Some(seams), encoding: Encoding::new(curve) }
     }
 
     /// The seams it was made with; `None` where photographs were averaged.
@@ -46,19 +49,24 @@ impl Panorama {
 
     /// Linear light (red, green, blue; 1 is white, more is possible) and alpha (0 to 1) of pixel (x, y); all 0 where no
     /// photograph is.
-    pub fn linear_pixel(&self, x: usize, y: usize) -> [f32; 4] {
-        let at = y * self.width + x;
-        match &self.pixels {
-            Pixels::Sums(sums) => {
-                let [r, g, b, sum] = sums[at];
-                if sum > 0.0 { [r / sum, g / sum, b / sum, alpha(sum)] } else { [0.0; 4] }
-            }
-            Pixels::Roots(roots) => {
-                let [r, g, b, opacity] = roots[at].map(|value| f32::from(value) / 65535.0);
-                [r * r, g * g, b * b, opacity]
-            }
-        }
+    ///
+    /// # Errors
+    /// [`trueup_core::Error::Io`] if a scratch file cannot be read.
+    pub fn linear_pixel(&self, x: usize, y: usize) -> Result<[f32; 4]> {
+        Ok(match &self.pixels {
+            Pixels::Sums(sums) => linear_of_sum(sums.pixel(x, y)?),
+            Pixels::Roots(roots) => linear_of_root(roots.pixel(x, y)?),
+        })
     }
+}
+
+fn linear_of_sum([r, g, b, sum]: [f32; 4]) -> [f32; 4] {
+    if sum > 0.0 { [r / sum, g / sum, b / sum, alpha(sum)] } else { [0.0; 4] }
+}
+
+fn linear_of_root(root: [u16; 4]) -> [f32; 4] {
+    let [r, g, b, opacity] = root.map(|value| f32::from(value) / 65535.0);
+    [r * r, g * g, b * b, opacity]
 }
 
 impl RowSource for Panorama {
@@ -70,12 +78,18 @@ impl RowSource for Panorama {
         self.height
     }
 
-    fn rgba8_row(&self, y: usize, row: &mut [u8]) {
-        let range = y * self.width..(y + 1) * self.width;
+    fn is_opaque(&self) -> bool {
+        match &self.pixels {
+            Pixels::Sums(sums) => sums.is_opaque(),
+            Pixels::Roots(roots) => roots.is_opaque(),
+        }
+    }
+
+    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
         match &self.pixels {
             Pixels::Sums(sums) => {
-                let encode = Encode::table();
-                for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(&sums[range]) {
+                let encode = &self.encoding.linear;
+                for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(sums.row(y)?.iter()) {
                     let opacity = (alpha(sum) * 255.0 + 0.5) as u8;
                     let scale = if opacity > 0 { 1.0 / sum } else { 0.0 };
                     let levels = [encode.level(r * scale), encode.level(g * scale), encode.level(b * scale), opacity];
@@ -83,8 +97,8 @@ impl RowSource for Panorama {
                 }
             }
             Pixels::Roots(roots) => {
-                let encode = EncodeRoots::table();
-                for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(&roots[range]) {
+                let encode = &self.encoding.roots;
+                for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(roots.row(y)?.iter()) {
                     let opacity = ((u32::from(opacity) * 255 + 32767) / 65535) as u8;
                     let shown = opacity > 0;
                     let level = |root: u16| if shown { encode.level(root) } else { 0 };
@@ -92,5 +106,41 @@ impl RowSource for Panorama {
                 }
             }
         }
+        Ok(())
+    }
+
+    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
+        match &self.pixels {
+            Pixels::Sums(sums) => {
+                let encode = self.encoding.linear16();
+                for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(sums.row(y)?.iter()) {
+                    let opacity = (alpha(sum) * 65535.0 + 0.5) as u16;
+                    let scale = if opacity > 0 { 1.0 / sum } else { 0.0 };
+                    let levels = [encode.level(r * scale), encode.level(g * scale), encode.level(b * scale), opacity];
+                    pixel.copy_from_slice(&levels);
+                }
+            }
+            Pixels::Roots(roots) => {
+                let encode = self.encoding.roots16();
+                for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(roots.row(y)?.iter()) {
+                    let level = |root: u16| if opacity > 0 { encode.level(root) } else { 0 };
+                    pixel.copy_from_slice(&[level(r), level(g), level(b), opacity]);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()> {
+        let out = row.chunks_exact_mut(4);
+        match &self.pixels {
+            Pixels::Sums(sums) => {
+                out.zip(sums.row(y)?.iter()).for_each(|(out, &sum)| out.copy_from_slice(&linear_of_sum(sum)));
+            }
+            Pixels::Roots(roots) => {
+                out.zip(roots.row(y)?.iter()).for_each(|(out, &root)| out.copy_from_slice(&linear_of_root(root)));
+            }
+        }
+        Ok(())
     }
 }

@@ -3,12 +3,13 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use trueup_core::colour::TransferCurve;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Photograph;
 use trueup_core::{Error, Result};
 
 use super::{Blend, Interpolation, RenderOptions};
-use crate::deformed_grid::{DeformedGrid, Run};
+use crate::deformed_grid::{Cell, DeformedGrid, Run};
 use crate::exposure::{Correction, LightTable};
 use crate::layout::Placed;
 use crate::sampling::{Bicubic, Bilinear, MAX_STRETCH, interpolate, reduce_by_two};
@@ -47,12 +48,12 @@ pub(crate) struct Window<'a> {
 
 impl<'a> Prepared<'a> {
     /// A photograph on a canvas of `size` pixels (width, height), where `mesh` puts it; the two fit together, see
-    /// [`check_photograph`].
+    /// [`check_photograph`]. Its samples become light by the transfer curve and the correction `light`.
     pub(crate) fn new(
         mut photograph: Cow<'a, Photograph>,
         mesh: &GridMesh,
         size: [usize; 2],
-        correction: &Correction,
+        light: (&TransferCurve, &Correction),
         options: &RenderOptions,
     ) -> Self {
         let grid_of = |mesh: &GridMesh| DeformedGrid::new(mesh, 1.0, true, size[0], size[1]);
@@ -68,7 +69,7 @@ impl<'a> Prepared<'a> {
             grid = grid_of(&mesh);
         }
         let feather = Feather::new(grid.size, options.feather_exponent);
-        let light = LightTable::new(correction, grid.size);
+        let light = LightTable::new(light.0, light.1, grid.size);
         Self { photograph, grid, feather, light, unwanted: None }
     }
 
@@ -238,7 +239,12 @@ pub(crate) fn check_photograph(placed: &Placed, photograph: &Photograph) -> Resu
 /// How often the photograph can be halved and still have, in every cell, at least the samples that the widened kernel
 /// of the least reduced cell wants.
 fn halvings_before_sampling(grid: &DeformedGrid, minification_threshold: f64) -> u32 {
-    let least = grid.cells.iter().flat_map(|cell| cell.footprint).fold(f64::INFINITY, f64::min);
+    /// A cell that is stretched more unevenly lies at a pole of the projection; it asks for detail along one axis that it
+    /// cannot show along the other.
+    const UNEVEN: f64 = 4.0;
+    let even =
+        |cell: &&Cell| cell.footprint[0].max(cell.footprint[1]) <= UNEVEN * cell.footprint[0].min(cell.footprint[1]);
+    let least = grid.cells.iter().filter(even).flat_map(|cell| cell.footprint).fold(f64::INFINITY, f64::min);
     let shorter = grid.size[0].min(grid.size[1]);
     let wanted = (least / minification_threshold).min(shorter);
     if wanted >= 2.0 { wanted.log2().floor().min(16.0) as u32 } else { 0 }

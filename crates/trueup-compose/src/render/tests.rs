@@ -2,6 +2,7 @@ use nalgebra::Vector2;
 use proptest::prelude::*;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::{Photograph, Raster, RowSource};
+use trueup_core::scratch::{ScratchFile, ScratchSpace};
 
 use super::panorama::Pixels;
 use super::*;
@@ -18,7 +19,53 @@ impl PhotographSource for Memory {
     }
 }
 
-fn noise(width: usize, height: usize, channels: usize) -> Raster<u8> {
+/// A scratch file in memory that takes at most so many bytes.
+#[derive(Debug)]
+pub(crate) struct RamDisk {
+    pub(crate) room: u64,
+    pub(super) bytes: Arc<std::sync::Mutex<Vec<u8>>>,
+}
+
+impl Default for RamDisk {
+    fn default() -> Self {
+        Self { room: u64::MAX, bytes: Default::default() }
+    }
+}
+
+impl RamDisk {
+    /// The most that was written.
+    pub(crate) fn length(&self) -> usize {
+        self.bytes.lock().expect("no writer failed").len()
+    }
+}
+
+impl ScratchSpace for RamDisk {
+    fn create(&self, _: u64) -> Result<Box<dyn ScratchFile>> {
+        Ok(Box::new(Self { room: self.room, bytes: self.bytes.clone() }))
+    }
+}
+
+impl ScratchFile for RamDisk {
+    fn write_at(&self, bytes: &[u8], offset: u64) -> Result<()> {
+        let end = offset as usize + bytes.len();
+        if end as u64 > self.room {
+            return Err(Error::io("writing", std::path::Path::new("disk"), std::io::ErrorKind::StorageFull.into()));
+        }
+        let mut all = self.bytes.lock().expect("no writer failed");
+        let length = all.len().max(end);
+        all.resize(length, 0);
+        all[offset as usize..end].copy_from_slice(bytes);
+        Ok(())
+    }
+
+    fn read_at(&self, bytes: &mut [u8], offset: u64) -> Result<()> {
+        let all = self.bytes.lock().expect("no writer failed");
+        bytes.copy_from_slice(&all[offset as usize..][..bytes.len()]);
+        Ok(())
+    }
+}
+
+pub(super) fn noise(width: usize, height: usize, channels: usize) -> Raster<u8> {
     let data = (0..width * height * channels).map(|i| ((i * 2_654_435_761) >> 13) as u8).collect();
     Raster::from_data(width, height, channels, data).expect("as many samples")
 }
@@ -30,7 +77,7 @@ fn gradient(width: usize, height: usize, level: impl Fn(f64, f64) -> f64) -> Pho
     Photograph::Eight(Raster::from_data(width, height, 3, data).expect("as many samples"))
 }
 
-fn moved(photograph: usize, width: f64, height: f64, move_to: impl Fn(Vector2<f64>) -> [f64; 2]) -> Placed {
+pub(super) fn moved(photograph: usize, width: f64, height: f64, move_to: impl Fn(Vector2<f64>) -> [f64; 2]) -> Placed {
     let mut mesh = GridMesh::regular(width, height, 20.0);
     for vertex in &mut mesh.target {
         *vertex = move_to(Vector2::from(*vertex));
@@ -38,8 +85,8 @@ fn moved(photograph: usize, width: f64, height: f64, move_to: impl Fn(Vector2<f6
     Placed { photograph, mesh }
 }
 
-fn canvas(width: usize, height: usize, placed: Vec<Placed>) -> CanvasLayout {
-    CanvasLayout { width, height, canvas_from_target: 1.0, placed }
+pub(super) fn canvas(width: usize, height: usize, placed: Vec<Placed>) -> CanvasLayout {
+    CanvasLayout { width, height, canvas_from_target: 1.0, origin: [0.0; 2], placed, period: None }
 }
 
 fn render(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Panorama {
@@ -57,10 +104,26 @@ fn compose(
     run(layout, corrections, photographs, options, &SeamOptions::default(), context)
 }
 
-fn rows(panorama: &Panorama) -> Vec<u8> {
+fn linear(panorama: &Panorama, x: usize, y: usize) -> [f32; 4] {
+    panorama.linear_pixel(x, y).expect("pixels in memory")
+}
+
+/// Everything a panorama holds, exactly.
+pub(super) fn bits(panorama: &Panorama) -> Vec<[u32; 4]> {
+    (0..panorama.height())
+        .flat_map(|y| match &panorama.pixels {
+            Pixels::Sums(sums) => {
+                sums.row(y).expect("a row").iter().map(|sum| sum.map(f32::to_bits)).collect::<Vec<_>>()
+            }
+            Pixels::Roots(roots) => roots.row(y).expect("a row").iter().map(|root| root.map(u32::from)).collect(),
+        })
+        .collect()
+}
+
+pub(super) fn rows(panorama: &Panorama) -> Vec<u8> {
     let mut bytes = vec![0; panorama.width() * panorama.height() * 4];
     for (y, row) in bytes.chunks_exact_mut(panorama.width() * 4).enumerate() {
-        panorama.rgba8_row(y, row);
+        panorama.rgba8_row(y, row).expect("rows in memory");
     }
     bytes
 }
@@ -160,7 +223,7 @@ fn gains_act_on_linear_light() {
     let context = StageContext::default();
     let panorama = compose(&layout, &[Correction::uniform(2.0)], &photographs, &options, &context).expect("renders");
     // sRGB 100 is 0.127438 in linear light; twice that, levelled off by 0.1 %, is level 137.6.
-    assert!((panorama.linear_pixel(15, 15)[0] - 0.254_876 / 1.000_987).abs() < 2e-5);
+    assert!((linear(&panorama, 15, 15)[0] - 0.254_876 / 1.000_987).abs() < 2e-5);
     assert_eq!(&rows(&panorama)[..4], [138, 138, 138, 255]);
     assert!(matches!(compose(&layout, &[], &photographs, &options, &context), Err(Error::Input { .. })));
     let bad = [Correction::uniform(f64::NAN)];
@@ -194,7 +257,7 @@ fn folds_are_counted_and_every_pixel_is_hit_once() {
     let photographs = Memory(vec![gradient(60, 60, |_, _| 90.0)]);
     let panorama = compose(&layout, &[Correction::default()], &photographs, &options, &context).expect("renders");
     let Pixels::Sums(sums) = &panorama.pixels else { panic!("a mean") };
-    assert!(sums.iter().all(|sum| sum[3] <= 1.0));
+    assert!((0..60).all(|y| sums.row(y).expect("in memory").iter().all(|sum| sum[3] <= 1.0)));
     let diagnostics = context.take_diagnostics();
     assert_eq!(diagnostics[0].code, "grid-folded");
     assert!(diagnostics[0].message.starts_with("2 of 18"), "{}", diagnostics[0].message);
@@ -216,7 +279,7 @@ fn pictures_outside_or_far_too_small_are_harmless() {
     for blend in [Blend::Feather, Blend::MultiBand, Blend::None] {
         let options = RenderOptions { blend, ..RenderOptions::default() };
         let panorama = render(&layout, vec![picture.clone()], &options);
-        assert!((0..400).all(|at| panorama.linear_pixel(at % 20, at / 20).iter().all(|value| value.is_finite())));
+        assert!((0..400).all(|at| linear(&panorama, at % 20, at / 20).iter().all(|value| value.is_finite())));
     }
 }
 
@@ -232,12 +295,10 @@ fn photographs_of_another_size_are_refused() {
 }
 
 #[test]
-fn sums_take_sixteen_bytes_a_pixel() {
-    assert_eq!(Panorama::required_bytes(1000, 500), 8_000_000);
+fn an_empty_layout_is_transparent() {
     let layout = canvas(70, 30, vec![]);
     let panorama = render(&layout, vec![], &RenderOptions::default());
-    let Pixels::Sums(sums) = &panorama.pixels else { panic!("nothing to seek seams between") };
-    assert_eq!(size_of_val(sums.as_slice()), Panorama::required_bytes(70, 30));
+    assert!(matches!(panorama.pixels, Pixels::Sums(_)), "nothing to seek seams between");
     assert!(rows(&panorama).iter().all(|&byte| byte == 0));
 }
 
@@ -250,7 +311,7 @@ fn any_number_of_threads_gives_the_same_bits() {
     let of_threads = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
         let of = |blend| render(&layout, pictures.clone(), &RenderOptions { blend, ..RenderOptions::default() });
-        pool.install(|| [of(Blend::MultiBand), of(Blend::Feather), of(Blend::None)])
+        pool.install(|| [Blend::MultiBand, Blend::Feather, Blend::None].map(|blend| bits(&of(blend))))
     };
     let single = of_threads(1);
     for threads in [2, 3] {
@@ -342,5 +403,57 @@ fn a_layer_is_one_photograph_where_it_lies() {
             }
         }
     }
+    let corrections = [Correction::default(); 2];
+    let rows = layer_rows(&layout, &corrections, 1, &photographs, &RenderOptions::default())
+        .expect("a layer")
+        .expect("on the canvas");
+    assert_eq!([rows.left, rows.top], [found.left, found.top]);
+    assert_eq!([rows.width(), rows.height()], [found.gray.width(), found.gray.height()]);
+    assert_eq!(layer_size(&layout, 1), [rows.width(), rows.height()]);
+    let (mut eight, mut sixteen) = (vec![0; 4 * rows.width()], vec![0; 4 * rows.width()]);
+    for y in 0..rows.height() {
+        rows.rgba8_row(y, &mut eight).expect("a row");
+        rows.rgba16_row(y, &mut sixteen).expect("a row");
+        for x in 0..rows.width() {
+            let covered = found.covered.pixel(x, y)[0];
+            assert_eq!(eight[4 * x + 3] == 255, covered, "{x} {y}");
+            assert!(!covered || (f32::from(eight[4 * x]) - found.gray.pixel(x, y)[0]).abs() < 0.01);
+            assert!(!covered || (f32::from(sixteen[4 * x]) / 257.0 - f32::from(eight[4 * x])).abs() <= 0.505);
+        }
+    }
     assert!(layer(&layout, &[Correction::default(); 2], 2, &photographs, &RenderOptions::default()).is_err());
+}
+
+/// The rows of one panorama at every depth say the same, from sums and from roots.
+#[test]
+fn rows_of_every_depth_agree() {
+    let layout = canvas(90, 50, vec![moved(0, 80.0, 40.0, |p| [p.x + 4.3, p.y + 5.6])]);
+    for blend in [Blend::Feather, Blend::MultiBand] {
+        let options = RenderOptions { blend, ..RenderOptions::default() };
+        let panorama = render(&layout, vec![Photograph::Eight(noise(80, 40, 3))], &options);
+        let (mut eight, mut sixteen, mut linear) = (vec![0; 360], vec![0; 360], vec![0.0; 360]);
+        for y in 0..50 {
+            panorama.rgba8_row(y, &mut eight).expect("rows in memory");
+            panorama.rgba16_row(y, &mut sixteen).expect("rows in memory");
+            panorama.linear_row(y, &mut linear).expect("rows in memory");
+            for x in 0..90 {
+                let at = 4 * x..4 * x + 4;
+                let linear = &linear[at.clone()];
+                // A part of a pixel too small for 8 bits of alpha is left out there.
+                if eight[at.end - 1] == 0 {
+                    continue;
+                }
+                for ((&eight, &sixteen), channel) in eight[at.clone()].iter().zip(&sixteen[at]).zip(0..) {
+                    assert!((f32::from(sixteen) / 257.0 - f32::from(eight)).abs() <= 0.505, "{eight} {sixteen}");
+                    let light = f64::from(linear[channel]).min(1.0);
+                    let encoded = match channel {
+                        3 => light,
+                        _ if light <= 0.0031308 => 12.92 * light,
+                        _ => 1.055 * light.powf(1.0 / 2.4) - 0.055,
+                    };
+                    assert!((encoded * 65535.0 - f64::from(sixteen)).abs() < 0.6, "{encoded} {sixteen}");
+                }
+            }
+        }
+    }
 }

@@ -20,6 +20,8 @@ const MAX_DIFFERENCE: i32 = 128 * UNIT;
 pub(super) struct Scene<'a> {
     pub(super) width: usize,
     pub(super) height: usize,
+    /// Columns of a turn on a cylinder, its width; 0 on a plane.
+    pub(super) turn: usize,
     pub(super) views: &'a [View],
     /// Horizontal and vertical differences of the luma, for every pixel of every view.
     gradients: Vec<Vec<[i16; 2]>>,
@@ -46,13 +48,15 @@ impl<'a> Scene<'a> {
     pub(super) fn new(
         views: &'a [View],
         [width, height]: [usize; 2],
+        turn: usize,
         moving: &'a [u32],
         options: &SeamOptions,
     ) -> Self {
         let mut anyone = vec![0_u8; width * height];
         for view in views {
             for (y, row) in view.rows.clone().zip(view.pixels.chunks_exact(view.columns.len().max(1))) {
-                for (anyone, pixel) in anyone[y * width..][view.columns.clone()].iter_mut().zip(row) {
+                for (x, pixel) in view.columns.clone().zip(row) {
+                    let anyone = &mut anyone[y * width + if x < width { x } else { x - width }];
                     let flags = pixel[3];
                     let whole = flags & WHOLLY != 0;
                     let shown = whole && flags & (CLIPPED | IGNORED) == 0;
@@ -65,6 +69,7 @@ impl<'a> Scene<'a> {
         Self {
             width,
             height,
+            turn,
             views,
             gradients: views.iter().map(gradients).collect(),
             depths: views.iter().map(View::depths).collect(),
@@ -78,21 +83,27 @@ impl<'a> Scene<'a> {
         }
     }
 
+    /// The canvas column of a column that may lie in the next turn.
+    #[inline]
+    pub(super) fn column(&self, x: usize) -> usize {
+        if x < self.width { x } else { x - self.turn }
+    }
+
     /// Whether photograph `label` may be shown at a canvas pixel: where no one covers it wholly, those that cover it in
     /// part may.
     pub(super) fn allowed(&self, label: usize, x: usize, y: usize) -> bool {
         let wanted = if self.anyone[y * self.width + x] & ANY_WHOLE != 0 { WHOLLY } else { PARTLY };
-        self.views[label].flags(x, y) & wanted != 0
+        self.views[label].flags(x, y, self.turn) & wanted != 0
     }
 
     /// How deep inside photograph `label` a canvas pixel lies, 0 to 255.
     pub(super) fn depth(&self, label: usize, x: usize, y: usize) -> u8 {
-        self.views[label].index(x, y).map_or(0, |index| self.depths[label][index])
+        self.views[label].index_around(x, y, self.turn).map_or(0, |index| self.depths[label][index])
     }
 
     /// Cost of showing photograph `label`, which is allowed there, at a canvas pixel.
     pub(super) fn data_cost(&self, label: usize, x: usize, y: usize) -> i32 {
-        let flags = self.views[label].flags(x, y);
+        let flags = self.views[label].flags(x, y, self.turn);
         let anyone = self.anyone[y * self.width + x];
         let mut cost = self.depth_weight * (255 - i32::from(self.depth(label, x, y))) / 255;
         if flags & CLIPPED != 0 && anyone & ANY_UNCLIPPED != 0 {
@@ -124,7 +135,8 @@ impl<'a> Scene<'a> {
 
     /// How differently two photographs show a canvas pixel.
     pub(super) fn difference(&self, a: usize, b: usize, (x, y): (usize, usize)) -> i32 {
-        let (Some(i), Some(j)) = (self.views[a].index(x, y), self.views[b].index(x, y)) else { return UNSEEN };
+        let index = |label: usize| self.views[label].index_around(x, y, self.turn);
+        let (Some(i), Some(j)) = (index(a), index(b)) else { return UNSEEN };
         let (first, second) = (self.views[a].pixels[i], self.views[b].pixels[j]);
         if first[3] & second[3] & PARTLY == 0 {
             return UNSEEN;

@@ -30,6 +30,7 @@ pub(super) fn deepest(scene: &Scene<'_>) -> Vec<Label> {
     for (label, view) in scene.views.iter().enumerate() {
         for y in view.rows.clone() {
             for x in view.columns.clone() {
+                let x = scene.column(x);
                 let at = y * scene.width + x;
                 if scene.allowed(label, x, y) && i16::from(scene.depth(label, x, y)) > best[at] {
                     best[at] = i16::from(scene.depth(label, x, y));
@@ -43,7 +44,8 @@ pub(super) fn deepest(scene: &Scene<'_>) -> Vec<Label> {
 
 impl Expansions {
     /// Lets photograph `label` take the pixels of the box `columns` x `rows` where that lowers the cost most, all at once;
-    /// only pixels that are `free` change. Returns whether any did.
+    /// only pixels that are `free` change. Returns whether any did. Columns may run into the next turn of a cylinder; of a
+    /// box that goes all the way round, the first column stays as it is.
     pub(super) fn expand(
         &mut self,
         scene: &Scene<'_>,
@@ -53,16 +55,18 @@ impl Expansions {
         free: &dyn Fn(usize) -> bool,
     ) -> bool {
         let (width, height) = (columns.len(), rows.len());
+        let all_round = scene.turn > 0 && width == scene.turn;
         self.change.clear();
         self.change.resize(width * height, FIXED);
         let mut nodes = 0;
         for y in rows.clone() {
-            for x in columns.clone() {
+            for x in columns.clone().skip(usize::from(all_round)) {
+                let place = (y - rows.start) * width + x - columns.start;
+                let x = scene.column(x);
                 let at = y * scene.width + x;
                 let old = labels[at];
                 if old != NOBODY && usize::from(old) != label && free(at) && scene.allowed(label, x, y) {
-                    let difference = scene.difference(usize::from(old), label, (x, y));
-                    self.change[(y - rows.start) * width + x - columns.start] = difference;
+                    self.change[place] = scene.difference(usize::from(old), label, (x, y));
                     nodes += 1;
                 }
             }
@@ -74,6 +78,7 @@ impl Expansions {
         for (v, y) in rows.clone().enumerate() {
             for (u, x) in columns.clone().enumerate() {
                 if self.change[v * width + u] != FIXED {
+                    let x = scene.column(x);
                     let old = usize::from(labels[y * scene.width + x]);
                     let change = scene.data_cost(label, x, y) - scene.data_cost(old, x, y);
                     self.flow.add_sink_side_cost(self.flow.node(u, v), change);
@@ -83,7 +88,7 @@ impl Expansions {
         for y in rows.clone() {
             for x in columns.clone() {
                 for (direction, other) in [(RIGHT, (x + 1, y)), (DOWN, (x, y + 1))] {
-                    if other.0 < scene.width && other.1 < scene.height {
+                    if (other.0 < scene.width || scene.turn > 0) && other.1 < scene.height {
                         self.join(scene, labels, label, (columns, rows), [(x, y), other], direction);
                     }
                 }
@@ -96,8 +101,10 @@ impl Expansions {
             }
         }
         for y in rows.clone() {
-            if columns.start > 0 {
+            if columns.start > 0 && !all_round {
                 self.join(scene, labels, label, (columns, rows), [(columns.start - 1, y), (columns.start, y)], RIGHT);
+            } else if scene.turn > 0 && !all_round {
+                self.join(scene, labels, label, (columns, rows), [(scene.turn - 1, y), (0, y)], RIGHT);
             }
         }
         self.flow.solve();
@@ -105,7 +112,7 @@ impl Expansions {
         for (v, y) in rows.clone().enumerate() {
             for (u, x) in columns.clone().enumerate() {
                 if self.change[v * width + u] != FIXED && self.flow.on_sink_side(self.flow.node(u, v)) {
-                    labels[y * scene.width + x] = label as Label;
+                    labels[y * scene.width + scene.column(x)] = label as Label;
                     changed = true;
                 }
             }
@@ -135,6 +142,7 @@ impl Expansions {
         if node_p.is_none() && node_q.is_none() {
             return;
         }
+        let [p, q] = [p, q].map(|(x, y)| (scene.column(x), y));
         let old = |(x, y): (usize, usize)| labels[y * scene.width + x];
         let (a, b) = (old(p), old(q));
         if a == NOBODY || b == NOBODY {

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::moving::neighbours;
 use super::view::{PARTLY, View, WHOLLY};
 use super::{Label, NOBODY};
 
@@ -10,13 +11,15 @@ use super::{Label, NOBODY};
 pub struct Seams {
     width: usize,
     height: usize,
+    /// Columns of a turn on a cylinder, its width; 0 on a plane.
+    turn: usize,
     labels: Vec<Label>,
     /// For each photograph the pixels that no photograph covers wholly and that this one covers in part.
     partial: Vec<Vec<u32>>,
 }
 
 impl Seams {
-    pub(super) fn new(labels: Vec<Label>, views: Vec<View>, [width, height]: [usize; 2]) -> Self {
+    pub(super) fn new(labels: Vec<Label>, views: Vec<View>, [width, height]: [usize; 2], turn: usize) -> Self {
         let mut whole = vec![false; labels.len()];
         for view in &views {
             for (index, pixel) in view.pixels.iter().enumerate() {
@@ -32,17 +35,19 @@ impl Seams {
                     let at = place(view, index, width);
                     (pixel[3] & PARTLY != 0 && !whole[at]).then_some(at as u32)
                 };
-                view.pixels.iter().enumerate().filter_map(touched).collect()
+                let mut partial: Vec<u32> = view.pixels.iter().enumerate().filter_map(touched).collect();
+                partial.sort_unstable();
+                partial
             })
             .collect();
-        let mut seams = Self { width, height, labels, partial };
+        let mut seams = Self { width, height, turn, labels, partial };
         seams.fill_rim();
         seams
     }
 
     /// Everything shows photograph 0.
     pub fn of_one(width: usize, height: usize) -> Self {
-        Self { width, height, labels: vec![0; width * height], partial: vec![Vec::new()] }
+        Self { width, height, turn: 0, labels: vec![0; width * height], partial: vec![Vec::new()] }
     }
 
     /// Width of the canvas the seams were found on.
@@ -72,7 +77,7 @@ impl Seams {
                 }
                 let (x, y) = (at % self.width, at / self.width);
                 let near = (y.saturating_sub(1)..(y + 2).min(self.height))
-                    .flat_map(|v| (x.saturating_sub(1)..(x + 2).min(self.width)).map(move |u| (u, v)))
+                    .flat_map(|v| neighbours(x, self.width, self.turn).map(move |u| (u, v)))
                     .map(|(u, v)| old[v * self.width + u]);
                 // NOBODY is the largest label.
                 self.labels[at] = near.min().unwrap_or(NOBODY);
@@ -81,11 +86,16 @@ impl Seams {
     }
 
     /// Label of the point (x, y), in pixels of this canvas: that of the four pixels around it with the most weight.
+    /// On a cylinder x lies in the first turn.
     #[inline]
     fn at(&self, x: f64, y: f64) -> Label {
+        let before_first = self.turn > 0 && x < 0.5;
+        let x = if before_first { x + self.width as f64 } else { x };
         let (x, y) = ((x - 0.5).max(0.0), (y - 0.5).max(0.0));
         let (left, top) = ((x as usize).min(self.width - 1), (y as usize).min(self.height - 1));
-        let (right, bottom) = ((left + 1).min(self.width - 1), (top + 1).min(self.height - 1));
+        let beyond_last = self.turn > 0 && left + 1 == self.width;
+        let right = if beyond_last { 0 } else { (left + 1).min(self.width - 1) };
+        let bottom = (top + 1).min(self.height - 1);
         let label = |x: usize, y: usize| self.labels[y * self.width + x];
         let corners = [label(left, top), label(right, top), label(left, bottom), label(right, bottom)];
         if corners.iter().all(|&one| one == corners[0]) {
@@ -113,6 +123,27 @@ impl Seams {
         out.extend(columns.clone().map(|x| self.at((x as f64 + 0.5) * across, v)));
     }
 
+    /// Labels of the points `columns` of row `y` of a cylinder of `full` points (around, down), of which the first lies
+    /// `lead` points left of the first turn.
+    pub(crate) fn row_around(
+        &self,
+        y: usize,
+        columns: &Range<usize>,
+        (lead, full): (f64, [f64; 2]),
+        out: &mut Vec<Label>,
+    ) {
+        let (across, down) = (self.width as f64 / full[0], self.height as f64 / full[1]);
+        out.clear();
+        let v = (y as f64 + 0.5) * down;
+        // The remainder is exact, so that every turn gives the same.
+        out.extend(columns.clone().map(|x| self.at((x as f64 + 0.5 - lead).rem_euclid(full[0]) * across, v)));
+    }
+
+    /// Labels of row `y` of a canvas of `full` pixels (width, height), replacing `out`; [`NOBODY`] where nothing is.
+    pub fn row_on_canvas(&self, y: usize, full: [usize; 2], out: &mut Vec<Label>) {
+        self.row(y, &(0..full[0]), full, out);
+    }
+
     /// Labels of all pixels of a canvas of `full` pixels (width, height), row by row.
     pub fn on_canvas(&self, full: [usize; 2]) -> Vec<Label> {
         let mut row = Vec::new();
@@ -124,13 +155,40 @@ impl Seams {
         labels
     }
 
-    /// The photographs that a box of a canvas of `full` pixels may show, in order.
+    /// The photographs that a box of a canvas of `full` pixels (width, height) may show, in order; on a
+    /// cylinder columns may run into any further turn.
     pub(crate) fn shown_in(&self, columns: &Range<usize>, rows: &Range<usize>, full: [usize; 2]) -> Vec<Label> {
         let low = |at: usize, of: usize, full: usize| (at * of / full).saturating_sub(1);
         let high = |at: usize, of: usize, full: usize| (at * of / full + 2).min(of);
-        let columns = low(columns.start, self.width, full[0])..high(columns.end, self.width, full[0]);
         let rows = low(rows.start, self.height, full[1])..high(rows.end, self.height, full[1]);
         let mut found: Vec<Label> = Vec::new();
+        for columns in self.in_first_turn(columns, full[0]) {
+            let columns = low(columns.start, self.width, full[0])..high(columns.end, self.width, full[0]);
+            self.add_shown_in(&columns, &rows, &mut found);
+        }
+        found.sort_unstable();
+        found
+    }
+
+    /// The columns of the first turn that are meant by `columns`, in at most two parts. Where they meet an end, a pixel of
+    /// the other end is among them.
+    fn in_first_turn(&self, columns: &Range<usize>, full: usize) -> Vec<Range<usize>> {
+        if self.turn == 0 {
+            return vec![columns.clone()];
+        }
+        // A pixel of the small canvas more on both sides: labels are read between pixels.
+        let reach = full.div_ceil(self.width) + 1;
+        let (start, length) = (columns.start + full - reach % full, columns.len() + 2 * reach);
+        if length >= full {
+            return vec![0..full];
+        }
+        let start = start % full;
+        let end = start + length;
+        if end <= full { vec![start..end] } else { vec![start..full, 0..end - full] }
+    }
+
+    /// Adds the photographs that a box of this canvas may show to those `found`.
+    fn add_shown_in(&self, columns: &Range<usize>, rows: &Range<usize>, found: &mut Vec<Label>) {
         for y in rows.clone() {
             for same in self.labels[y * self.width..][columns.clone()].chunk_by(|a, b| a == b) {
                 if same[0] != NOBODY && !found.contains(&same[0]) {
@@ -148,12 +206,11 @@ impl Seams {
                 found.push(label as Label);
             }
         }
-        found.sort_unstable();
-        found
     }
 }
 
 fn place(view: &View, index: usize, width: usize) -> usize {
     let columns = view.columns.len();
-    (view.rows.start + index / columns) * width + view.columns.start + index % columns
+    let x = view.columns.start + index % columns;
+    (view.rows.start + index / columns) * width + if x < width { x } else { x - width }
 }

@@ -11,8 +11,6 @@ mod max_flow;
 mod moving;
 mod view;
 
-use std::ops::Range;
-
 use trueup_core::options::StageOptions;
 use trueup_core::{Error, Result, StageContext};
 
@@ -59,13 +57,20 @@ trueup_core::options! {
     }
 }
 
-/// The size of a canvas of at most `pixels` pixels, and at most half of the canvas along each side.
-pub(crate) fn small_size(canvas: [usize; 2], pixels: f64) -> [usize; 2] {
+/// The size of a canvas of at most `fine_pixels` pixels, and at most half of the canvas along each side. `around` a
+/// cylinder it can be halved as often as the search for seams wants to.
+pub(crate) fn small_size(canvas: [usize; 2], around: bool, options: &SeamOptions) -> [usize; 2] {
+    let pixels = options.fine_pixels;
     let scale = (pixels / (canvas[0] as f64 * canvas[1] as f64)).sqrt().min(0.5);
-    canvas.map(|length| ((length as f64 * scale) as usize).max(1))
+    let size = canvas.map(|length| ((length as f64 * scale) as usize).max(1));
+    let halvings = (pixels / options.coarse_pixels).max(1.0).log2() / 2.0;
+    // The cast saturates.
+    let unit = 1_usize << (halvings.ceil() as u32).min(size[0].ilog2());
+    if around { [size[0] / unit * unit, size[1]] } else { size }
 }
 
-/// Finds the seams between `views`, photographs on a canvas of `size` pixels (width, height).
+/// Finds the seams between `views`, photographs on a canvas of `size` pixels (width, height). `around` says that the canvas
+/// is a cylinder, whose first column lies beside its last.
 ///
 /// # Errors
 /// [`Error::Options`]; [`Error::Input`] if there are too many views or one does not fit the canvas; [`Error::Cancelled`].
@@ -77,12 +82,21 @@ pub(crate) fn small_size(canvas: [usize; 2], pixels: f64) -> [usize; 2] {
 /// # Departures
 /// Coarse to fine as Lombaert, Sun, Grady, Xu, "A multilevel banded graph cuts method for fast image segmentation", ICCV
 /// 2005; things that moved are found first, and their parts kept together.
-pub fn run(views: Vec<View>, size: [usize; 2], options: &SeamOptions, context: &StageContext) -> Result<Seams> {
+pub fn run(
+    views: Vec<View>,
+    size: [usize; 2],
+    around: bool,
+    options: &SeamOptions,
+    context: &StageContext,
+) -> Result<Seams> {
     options.check()?;
-    check(&views, size)?;
+    check(&views, size, around)?;
+    let turn = |[width, _]: [usize; 2]| if around { width } else { 0 };
     let mut levels = vec![(views, size)];
     while let Some((finest, [width, height])) = levels.last() {
-        if (width * height) as f64 <= options.coarse_pixels || finest.len() < 2 {
+        // A cylinder stays one only if all its pixels are halved.
+        let halves = !around || width.is_multiple_of(2);
+        if (width * height) as f64 <= options.coarse_pixels || finest.len() < 2 || !halves {
             break;
         }
         let half = (finest.iter().map(View::halved).collect(), [width.div_ceil(2), height.div_ceil(2)]);
@@ -93,10 +107,10 @@ pub fn run(views: Vec<View>, size: [usize; 2], options: &SeamOptions, context: &
     while let Some((views, size)) = levels.pop() {
         context.check_cancelled()?;
         let moving = match &coarser {
-            None => moving_things(&views, size, options),
+            None => moving_things(&views, size, turn(size), options),
             Some((_, moving, coarse)) => doubled(moving, *coarse, size),
         };
-        let scene = Scene::new(&views, size, &moving, options);
+        let scene = Scene::new(&views, size, turn(size), &moving, options);
         let labels = match &coarser {
             None => search(&scene, &mut expansions, options, context)?,
             Some((labels, _, coarse)) => {
@@ -105,16 +119,17 @@ pub fn run(views: Vec<View>, size: [usize; 2], options: &SeamOptions, context: &
         };
         drop(scene);
         if levels.is_empty() {
-            return Ok(Seams::new(labels, views, size));
+            return Ok(Seams::new(labels, views, size, turn(size)));
         }
         coarser = Some((labels, moving, size));
     }
     Err(Error::input("seams", "there is no canvas to find them on", "Give a canvas of at least one pixel."))
 }
 
-fn check(views: &[View], [width, height]: [usize; 2]) -> Result<()> {
+fn check(views: &[View], [width, height]: [usize; 2], around: bool) -> Result<()> {
     let fits = |view: &View| {
-        view.columns.end <= width
+        let in_one_turn = view.columns.start <= width && view.columns.len() <= width;
+        (view.columns.end <= width || around && in_one_turn)
             && view.rows.end <= height
             && view.columns.len().checked_mul(view.rows.len()) == Some(view.pixels.len())
     };
@@ -153,7 +168,7 @@ fn search(
             last_try[label] = clock;
             if expansions.expand(scene, &mut labels, label, (&view.columns, &view.rows), &|_| true) {
                 for (other, neighbour) in scene.views.iter().enumerate() {
-                    if other != label && meet(&view.columns, &neighbour.columns) && meet(&view.rows, &neighbour.rows) {
+                    if other != label && view.meets(neighbour, scene.turn) {
                         last_change[other] = clock;
                     }
                 }
@@ -161,10 +176,6 @@ fn search(
         }
     }
     Ok(labels)
-}
-
-fn meet(a: &Range<usize>, b: &Range<usize>) -> bool {
-    a.start <= b.end && b.start <= a.end
 }
 
 /// The labelling of a finer canvas from that of a coarser one: seams move within a band.
@@ -182,11 +193,12 @@ fn follow(
             *label = best[at];
         }
     }
-    let band = band(&labels, width, height, options.band_px);
+    let band = band(&labels, [width, height], scene.turn, options.band_px);
     let mut boxes = vec![[usize::MAX, usize::MAX, 0, 0]; scene.views.len()];
     for (at, &label) in labels.iter().enumerate() {
         if band[at] && label != NOBODY {
             let (x, y) = (at % width, at / width);
+            let x = if scene.views[usize::from(label)].columns.contains(&x) { x } else { x + scene.turn };
             let [left, top, right, bottom] = boxes[usize::from(label)];
             boxes[usize::from(label)] = [left.min(x), top.min(y), right.max(x + 1), bottom.max(y + 1)];
         }
@@ -204,8 +216,8 @@ fn follow(
     Ok(labels)
 }
 
-/// Pixels within `reach` of a change of labels.
-fn band(labels: &[Label], width: usize, height: usize, reach: usize) -> Vec<bool> {
+/// Pixels within `reach` of a change of labels, on a cylinder of `turn` columns or with 0 on a plane.
+fn band(labels: &[Label], [width, height]: [usize; 2], turn: usize, reach: usize) -> Vec<bool> {
     let mut edge = vec![false; labels.len()];
     for at in 0..labels.len() {
         if at % width + 1 < width && labels[at] != labels[at + 1] {
@@ -216,12 +228,20 @@ fn band(labels: &[Label], width: usize, height: usize, reach: usize) -> Vec<bool
             edge[at] = true;
             edge[at + width] = true;
         }
+        let next_turn = at + 1 - turn.min(at + 1);
+        if turn > 0 && at % width + 1 == width && labels[at] != labels[next_turn] {
+            edge[at] = true;
+            edge[next_turn] = true;
+        }
     }
     // A square dilation: along rows, then along columns.
     let mut wide = vec![false; labels.len()];
     for (row, wide) in edge.chunks_exact(width).zip(wide.chunks_exact_mut(width)) {
         for x in (0..width).filter(|&x| row[x]) {
             wide[x.saturating_sub(reach)..(x + reach + 1).min(width)].fill(true);
+            if turn > 0 && (x < reach || x + reach >= width) {
+                (x + turn - reach.min(turn)..=x + turn + reach).for_each(|x| wide[x % turn] = true);
+            }
         }
     }
     let mut band = vec![false; labels.len()];

@@ -9,7 +9,14 @@ use super::view::{View, WHOLLY};
 ///
 /// A pixel differs if no pixel of the other photograph within one step looks like it, both ways, so that misalignment by
 /// a pixel or two says nothing. Parts grow from strong differences into weak ones that touch them (hysteresis).
-pub(super) fn moving_things(views: &[View], [width, height]: [usize; 2], options: &SeamOptions) -> Vec<u32> {
+///
+/// `turn` is the width of a canvas that is a cylinder, 0 on a plane.
+pub(super) fn moving_things(
+    views: &[View],
+    [width, height]: [usize; 2],
+    turn: usize,
+    options: &SeamOptions,
+) -> Vec<u32> {
     let mut difference = vec![0_u8; width * height];
     for y in 0..height {
         // Photographs whose box meets the row; neighbours in their order are compared.
@@ -17,11 +24,11 @@ pub(super) fn moving_things(views: &[View], [width, height]: [usize; 2], options
         for x in 0..width {
             let mut last: Option<&View> = None;
             for &view in &met {
-                if view.flags(x, y) & WHOLLY == 0 {
+                if view.flags(x, y, turn) & WHOLLY == 0 {
                     continue;
                 }
                 if let Some(last) = last {
-                    let level = unlike(last, view, x, y).min(unlike(view, last, x, y));
+                    let level = unlike(last, view, (x, y), turn).min(unlike(view, last, (x, y), turn));
                     let place = &mut difference[y * width + x];
                     *place = level.max(*place);
                 }
@@ -29,17 +36,17 @@ pub(super) fn moving_things(views: &[View], [width, height]: [usize; 2], options
             }
         }
     }
-    label_parts(&difference, [width, height], options.moving_low, options.moving_high)
+    label_parts(&difference, [width, height], turn, options.moving_low, options.moving_high)
 }
 
 /// Smallest difference of `a` at (x, y) from `b` at that pixel and its eight neighbours, mean of the channels.
-fn unlike(a: &View, b: &View, x: usize, y: usize) -> u8 {
-    let Some(at) = a.index(x, y) else { return 0 };
+fn unlike(a: &View, b: &View, (x, y): (usize, usize), turn: usize) -> u8 {
+    let Some(at) = a.index_around(x, y, turn) else { return 0 };
     let colour = a.pixels[at];
     let mut least = u16::MAX;
     for v in y.saturating_sub(1)..=y + 1 {
-        for u in x.saturating_sub(1)..=x + 1 {
-            if let Some(index) = b.index(u, v) {
+        for u in neighbours(x, usize::MAX, turn) {
+            if let Some(index) = b.index_around(u, v, turn) {
                 let other = b.pixels[index];
                 if other[3] & WHOLLY != 0 {
                     least = least.min((0..3).map(|c| u16::from(colour[c].abs_diff(other[c]))).sum());
@@ -50,7 +57,15 @@ fn unlike(a: &View, b: &View, x: usize, y: usize) -> u8 {
     if least == u16::MAX { 0 } else { (least / 3) as u8 }
 }
 
-fn label_parts(difference: &[u8], [width, height]: [usize; 2], low: f64, high: f64) -> Vec<u32> {
+/// A column and those beside it, of `width` columns; on a cylinder of `turn` columns both are there.
+pub(super) fn neighbours(x: usize, width: usize, turn: usize) -> impl Iterator<Item = usize> {
+    let around = move |x: usize| if turn > 0 { x % turn } else { x };
+    let first = if turn > 0 { x + turn - 1 } else { x.saturating_sub(1) };
+    let end = if turn > 0 { x + turn + 2 } else { (x + 2).min(width) };
+    (first..end).map(around)
+}
+
+fn label_parts(difference: &[u8], [width, height]: [usize; 2], turn: usize, low: f64, high: f64) -> Vec<u32> {
     let mut number = vec![0_u32; width * height];
     let mut parts = 0;
     let mut open = VecDeque::new();
@@ -64,7 +79,7 @@ fn label_parts(difference: &[u8], [width, height]: [usize; 2], low: f64, high: f
         while let Some(at) = open.pop_front() {
             let (x, y) = (at % width, at / width);
             for v in y.saturating_sub(1)..(y + 2).min(height) {
-                for u in x.saturating_sub(1)..(x + 2).min(width) {
+                for u in neighbours(x, width, turn) {
                     let next = v * width + u;
                     if number[next] == 0 && f64::from(difference[next]) >= low {
                         number[next] = parts;
@@ -96,7 +111,7 @@ mod tests {
             View { columns: 0..30, rows: 0..20, pixels }
         };
         let options = SeamOptions::default();
-        let found = moving_things(&[view(0, false), view(1, true)], [30, 20], &options);
+        let found = moving_things(&[view(0, false), view(1, true)], [30, 20], 0, &options);
         for (index, &number) in found.iter().enumerate() {
             let (x, y) = (index % 30, index / 30);
             let inside = (10..16).contains(&x) && (5..12).contains(&y);
@@ -104,6 +119,8 @@ mod tests {
             assert!(inside || number == 0, "({x}, {y})");
             assert!(!core || number == 1, "({x}, {y})");
         }
-        assert!(moving_things(&[view(0, false), view(1, false)], [30, 20], &options).iter().all(|&number| number == 0));
+        assert!(
+            moving_things(&[view(0, false), view(1, false)], [30, 20], 0, &options).iter().all(|&number| number == 0)
+        );
     }
 }

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use proptest::prelude::*;
 
 use super::*;
@@ -18,7 +20,7 @@ fn view(columns: Range<usize>, rows: Range<usize>, level: impl Fn(usize, usize) 
 }
 
 fn find(views: Vec<View>, size: [usize; 2], options: &SeamOptions) -> Seams {
-    run(views, size, options, &StageContext::default()).expect("views on a canvas")
+    run(views, size, false, options, &StageContext::default()).expect("views on a canvas")
 }
 
 fn texture(x: usize, y: usize) -> u8 {
@@ -95,11 +97,80 @@ fn finer_canvases_ask_the_same_labels() {
 fn views_outside_the_canvas_are_refused() {
     let context = StageContext::default();
     let options = SeamOptions::default();
-    assert!(run(vec![view(0..9, 0..9, texture)], [8, 9], &options, &context).is_err());
-    assert!(run(vec![View { pixels: vec![], ..view(0..9, 0..9, texture) }], [9, 9], &options, &context).is_err());
-    assert!(run(vec![], [0, 9], &options, &context).is_err());
-    let empty = run(vec![], [3, 2], &options, &context).expect("an empty canvas");
+    assert!(run(vec![view(0..9, 0..9, texture)], [8, 9], false, &options, &context).is_err());
+    assert!(
+        run(vec![View { pixels: vec![], ..view(0..9, 0..9, texture) }], [9, 9], false, &options, &context).is_err()
+    );
+    assert!(run(vec![], [0, 9], false, &options, &context).is_err());
+    let empty = run(vec![], [3, 2], false, &options, &context).expect("an empty canvas");
     assert!(empty.labels().iter().all(|&label| label == NOBODY));
+}
+
+/// Views of a scene that repeats after `around` columns, on that cylinder; each begins at a column and has a width. All
+/// columns are moved to the right by `by`.
+fn ring(around: usize, boxes: &[(usize, usize)], by: usize) -> Vec<View> {
+    let level = move |x: usize, y: usize, index: usize| {
+        let thing = index == 0 && (4..14).contains(&x) && (10..24).contains(&y);
+        if thing { 230 } else { 60 + (x * 7 + y * 13 + index * 3) % 41 }
+    };
+    let of = |(index, &(start, length)): (usize, &(usize, usize))| {
+        let start = (start + by) % around;
+        let there = move |x: usize| (x + around - by % around) % around;
+        view(start..start + length, 0..40, move |x, y| level(there(x), y, index) as u8)
+    };
+    boxes.iter().enumerate().map(of).collect()
+}
+
+/// Wherever the cylinder is cut open, the seams are the same.
+#[test]
+fn the_seams_of_a_cylinder_have_no_end() {
+    let boxes = [(100, 50), (20, 60), (60, 60), (8, 20)];
+    // On the coarse canvas alone at any column; over two halvings at multiples of four.
+    for (coarse_pixels, steps) in [(1e6, vec![1, 7, 20, 64, 119]), (1_000.0, vec![4, 20, 64, 116])] {
+        let options = SeamOptions { coarse_pixels, ..SeamOptions::default() };
+        let find = |by| {
+            let context = StageContext::default();
+            run(ring(120, &boxes, by), [120, 40], true, &options, &context).expect("views on a cylinder")
+        };
+        let still = find(0);
+        assert!(still.labels().iter().all(|&label| label != NOBODY));
+        for by in steps {
+            let moved = find(by);
+            for at in 0..120 * 40 {
+                let (x, y) = (at % 120, at / 120);
+                assert_eq!(moved.labels()[y * 120 + (x + by) % 120], still.labels()[at], "({x}, {y}) by {by}");
+            }
+            // Between pixels, too: at four times the size, half a pixel from the ends.
+            let (mut here, mut there) = (Vec::new(), Vec::new());
+            for y in 0..160 {
+                still.row_around(y, &(0..480), (0.0, [480.0, 160.0]), &mut here);
+                moved.row_around(y, &(4 * by..480 + 4 * by), (0.0, [480.0, 160.0]), &mut there);
+                assert_eq!(here, there, "{y} by {by}");
+            }
+            let shown = |seams: &Seams, from: usize| seams.shown_in(&(from..from + 60), &(0..160), [480, 160]);
+            assert_eq!(shown(&moved, 4 * by), shown(&still, 0));
+        }
+        // The thing at the cut is shown whole or not at all.
+        let shown = (4..14).filter(|&x| still.labels()[17 * 120 + x] == 0).count();
+        assert!(shown == 0 || shown == 10, "{shown}");
+    }
+}
+
+/// A view that goes all the way round gives way where another one is wanted, across the ends, and is shown elsewhere.
+#[test]
+fn a_view_may_go_all_the_way_round() {
+    let mut views = vec![view(0..64, 0..40, texture), view(50..90, 0..20, |x, y| texture(x % 64, y))];
+    for (at, pixel) in views[1].pixels.iter_mut().enumerate() {
+        // From column 54 to column 21, of which the last 22 lie in the next turn.
+        let inside = (4..36).contains(&(at % 40)) && (4..16).contains(&(at / 40));
+        pixel[3] |= if inside { KEPT } else { 0 };
+    }
+    let seams = run(views, [64, 40], true, &SeamOptions::default(), &StageContext::default()).expect("a cylinder");
+    assert!((0..64).all(|x| seams.labels()[35 * 64 + x] == 0));
+    let kept = |x: usize| !(22..54).contains(&x);
+    // The first column of a view that goes all round is the one that it cannot take back.
+    assert!((0..64).filter(|&x| kept(x)).all(|x| seams.labels()[8 * 64 + x] == 1));
+    assert!((30..46).all(|x| seams.labels()[8 * 64 + x] == 0));
 }
 
 proptest! {
@@ -119,10 +190,10 @@ proptest! {
         let seams = find(views.clone(), [64, 48], &options);
         for y in 0..48 {
             for x in 0..64 {
-                let covering = views.iter().filter(|view| view.flags(x, y) != 0).count();
+                let covering = views.iter().filter(|view| view.flags(x, y, 0) != 0).count();
                 let label = seams.labels()[y * 64 + x];
                 if covering > 0 {
-                    prop_assert!(views[usize::from(label)].flags(x, y) != 0, "({}, {}): {}", x, y, label);
+                    prop_assert!(views[usize::from(label)].flags(x, y, 0) != 0, "({}, {}): {}", x, y, label);
                 }
             }
         }

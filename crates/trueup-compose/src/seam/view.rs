@@ -23,7 +23,8 @@ pub type ViewPixel = [u8; 4];
 /// A photograph on a small canvas: the box it lies in.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct View {
-    /// Columns of the small canvas.
+    /// Columns of the small canvas; on a cylinder they may run past its width into the next turn, but not meet
+    /// themselves.
     pub columns: Range<usize>,
     /// Rows of the small canvas.
     pub rows: Range<usize>,
@@ -39,10 +40,24 @@ impl View {
             .then(|| (y - self.rows.start) * self.columns.len() + x - self.columns.start)
     }
 
-    /// Flags of the canvas pixel (x, y); 0 outside.
+    /// The same on a cylinder of `turn` columns, or with 0 on a plane.
     #[inline]
-    pub(crate) fn flags(&self, x: usize, y: usize) -> u8 {
-        self.index(x, y).map_or(0, |index| self.pixels[index][3])
+    pub(super) fn index_around(&self, x: usize, y: usize, turn: usize) -> Option<usize> {
+        self.index(if self.columns.contains(&x) { x } else { x + turn }, y)
+    }
+
+    /// Flags of the canvas pixel (x, y); 0 outside. `turn` as for [`Self::index_around`].
+    #[inline]
+    pub(super) fn flags(&self, x: usize, y: usize, turn: usize) -> u8 {
+        self.index_around(x, y, turn).map_or(0, |index| self.pixels[index][3])
+    }
+
+    /// Whether the boxes of two views meet or touch on a cylinder of `turn` columns, or with 0 on a plane.
+    pub(super) fn meets(&self, other: &Self, turn: usize) -> bool {
+        let meet = |a: &Range<usize>, b: &Range<usize>, by: usize| a.start <= b.end + by && b.start + by <= a.end;
+        let (mine, others) = (&self.columns, &other.columns);
+        meet(&self.rows, &other.rows, 0)
+            && (meet(mine, others, 0) || meet(mine, others, turn) || meet(others, mine, turn))
     }
 
     /// The view on a canvas of half the size: means of 2 x 2 pixels over those that are covered.

@@ -7,6 +7,11 @@ pub fn wrap_angle(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
 }
 
+/// The shortest of the lengths that differ from `length` by whole periods; itself without a period.
+pub fn wrap_length(length: f64, period: Option<f64>) -> f64 {
+    period.map_or(length, |period| length - (length / period).round() * period)
+}
+
 /// The mean direction of weighted angles, in (-pi, pi]; `None` if they cancel out.
 pub fn circular_mean(weighted_angles: impl IntoIterator<Item = (f64, f64)>) -> Option<f64> {
     const CANCELLED: f64 = 1e-12;
@@ -26,6 +31,13 @@ mod tests {
         assert_eq!(wrap_angle(PI), -PI);
         assert_eq!(wrap_angle(-PI), -PI);
         assert!((wrap_angle(3.0 * PI + 0.1) - (0.1 - PI)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn lengths_are_shortened_by_whole_periods() {
+        assert_eq!(wrap_length(95.0, Some(100.0)), -5.0);
+        assert_eq!(wrap_length(-212.0, Some(100.0)), -12.0);
+        assert_eq!(wrap_length(95.0, None), 95.0);
     }
 
     #[test]

@@ -4,7 +4,7 @@ mod angle;
 mod homography;
 mod rotation;
 
-pub use angle::{circular_mean, wrap_angle};
+pub use angle::{circular_mean, wrap_angle, wrap_length};
 pub use homography::{Homography, Normalisation};
 pub use rotation::{
     cross_matrix, exp_rotation, log_rotation, matrix_from_rows, nearest_rotation, random_rotation, roll_from_down,

@@ -13,6 +13,7 @@ use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
 
 use super::jpeg_scans::has_separate_subsampled_scans;
+use super::tiff_kinds;
 use crate::format::{PictureFormat, SIGNATURE_BYTES, SUPPORTED};
 
 /// Largest width and height a JPEG can state (ITU-T T.81 table B.2).
@@ -46,7 +47,10 @@ pub(crate) fn decode_stored(image: &SourceImage) -> Result<Photograph> {
             decode_jpeg(image, &bytes)
         }
         PictureFormat::Png => decode_other(image, file, ImageFormat::Png),
-        PictureFormat::Tiff => decode_other(image, file, ImageFormat::Tiff),
+        PictureFormat::Tiff => match tiff_kinds::decode(image, &mut file)? {
+            Some(photograph) => Ok(photograph),
+            None => decode_other(image, file, ImageFormat::Tiff),
+        },
         PictureFormat::WebP => decode_other(image, file, ImageFormat::WebP),
     }
 }
@@ -117,15 +121,20 @@ fn has_end_of_image(bytes: &[u8]) -> bool {
 
 fn decode_other(image: &SourceImage, file: File, format: ImageFormat) -> Result<Photograph> {
     let mut reader = ImageReader::with_format(BufReader::new(file), format);
-    let pixels = (image.width as u64).saturating_mul(image.height as u64);
     let mut limits = image::Limits::default();
-    limits.max_alloc = Some(pixels.saturating_mul(MAX_PIXEL_BYTES).saturating_add(DECODER_SLACK_BYTES));
+    limits.max_alloc = Some(decoding_limit(image));
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(|error| damaged(image, error))?;
     let (width, height) = decoder.dimensions();
     check_unchanged(image, width as usize, height as usize)?;
     let picture = DynamicImage::from_decoder(decoder).map_err(|error| damaged(image, error))?;
     to_photograph(image, picture)
+}
+
+/// Most bytes a decoder may take for this picture.
+pub(super) fn decoding_limit(image: &SourceImage) -> u64 {
+    let pixels = (image.width as u64).saturating_mul(image.height as u64);
+    pixels.saturating_mul(MAX_PIXEL_BYTES).saturating_add(DECODER_SLACK_BYTES)
 }
 
 /// Sorts the kinds of pixels the `image` crate knows into ours.
@@ -142,23 +151,16 @@ fn to_photograph(image: &SourceImage, picture: DynamicImage) -> Result<Photograp
         DynamicImage::ImageRgb16(buffer) => sixteen(3, buffer.into_raw()),
         DynamicImage::ImageRgba16(buffer) => sixteen(4, buffer.into_raw()),
         DynamicImage::ImageLumaA16(buffer) => sixteen(4, spread_gray_alpha(&buffer.into_raw())),
-        DynamicImage::ImageRgb32F(buffer) => sixteen(3, unit_to_sixteen(&buffer.into_raw())),
-        DynamicImage::ImageRgba32F(buffer) => sixteen(4, unit_to_sixteen(&buffer.into_raw())),
         _ => Err(Error::input(&image.name, "its kind of pixels is not read", "Export it with 8 or 16 bits a sample.")),
     }
 }
 
-fn spread_gray_alpha<T: Copy>(samples: &[T]) -> Vec<T> {
+pub(super) fn spread_gray_alpha<T: Copy>(samples: &[T]) -> Vec<T> {
     samples.as_chunks::<2>().0.iter().flat_map(|&[gray, alpha]| [gray, gray, gray, alpha]).collect()
 }
 
-/// Floating point samples, 1 for white, to 16 bits; NaN becomes black.
-fn unit_to_sixteen(samples: &[f32]) -> Vec<u16> {
-    samples.iter().map(|&sample| (sample.clamp(0.0, 1.0) * 65_535.0 + 0.5) as u16).collect()
-}
-
 /// The memory limit was judged by the size found when the file was examined, so it must still have that size.
-fn check_unchanged(image: &SourceImage, stored_width: usize, stored_height: usize) -> Result<()> {
+pub(super) fn check_unchanged(image: &SourceImage, stored_width: usize, stored_height: usize) -> Result<()> {
     let expected = match image.orientation {
         5..=8 => (image.height, image.width),
         _ => (image.width, image.height),
@@ -176,7 +178,7 @@ fn check_unchanged(image: &SourceImage, stored_width: usize, stored_height: usiz
     ))
 }
 
-fn damaged(image: &SourceImage, words: impl ToString) -> Error {
+pub(super) fn damaged(image: &SourceImage, words: impl ToString) -> Error {
     let words = words.to_string();
     let reason = format!("its pixels cannot be decoded ({})", words.trim().trim_end_matches('.'));
     Error::input(

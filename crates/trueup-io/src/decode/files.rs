@@ -1,13 +1,16 @@
 //! Photographs in files, each decoded once where memory allows.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use trueup_core::colour::TransferCurve;
 use trueup_core::mask::Masks;
 use trueup_core::raster::Photograph;
 use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
 use trueup_core::{Error, Result};
 
 use super::{WorkingPicture, photograph, reduce_photograph};
+use crate::colour::PhotographColours;
 
 /// Photographs in files. What [`working`](Self::working) decodes is kept, within a budget of bytes, until
 /// [`photograph`](PhotographSource::photograph) asks for it, so that a small set is decoded once.
@@ -18,7 +21,10 @@ pub struct FilePhotographs {
     images: Vec<SourceImage>,
     /// By index; those beyond the end have none.
     masks: Vec<Masks>,
+    colours: Option<PhotographColours>,
     kept: Mutex<Kept>,
+    /// Bytes that the samples of each took when it was decoded; 0 before.
+    bytes: Vec<AtomicUsize>,
 }
 
 /// Decoded photographs by index, and the bytes that may still be kept.
@@ -32,13 +38,25 @@ impl FilePhotographs {
     /// Over `images`, keeping at most `cache_bytes` bytes of decoded pixels; 0 keeps none.
     pub fn new(images: Vec<SourceImage>, cache_bytes: usize) -> Self {
         let photographs = images.iter().map(|_| None).collect();
-        Self { images, masks: Vec::new(), kept: Mutex::new(Kept { photographs, free_bytes: cache_bytes }) }
+        let bytes = images.iter().map(|_| AtomicUsize::new(0)).collect();
+        let kept = Mutex::new(Kept { photographs, free_bytes: cache_bytes });
+        Self { images, masks: Vec::new(), colours: None, bytes, kept }
     }
 
     /// The same with what the photographer wants of the photographs' parts, in their order.
     #[must_use]
     pub fn with_masks(self, masks: Vec<Masks>) -> Self {
         Self { masks, ..self }
+    }
+
+    /// In one colour space: `colours` are those of the same photographs. Without, samples are handed out as they are.
+    pub fn in_colours(self, colours: PhotographColours) -> Self {
+        Self { colours: Some(colours), ..self }
+    }
+
+    /// The colour space that photographs are handed out in, if it was asked for.
+    pub fn colours(&self) -> Option<&PhotographColours> {
+        self.colours.as_ref()
     }
 
     /// The photographs this hands out, in order.
@@ -52,7 +70,7 @@ impl FilePhotographs {
     /// As [`working`](super::working); [`Error::Input`] if there is no photograph `index`.
     pub fn working(&self, index: usize, frame: &WorkingFrame, thumbnail_max_area: f64) -> Result<WorkingPicture> {
         let image = self.image(index)?;
-        let photograph = photograph(image)?;
+        let photograph = self.decode(index, image)?;
         let working = reduce_photograph(&photograph, &image.name, frame, thumbnail_max_area)?;
         self.keep(index, photograph);
         Ok(working)
@@ -61,6 +79,23 @@ impl FilePhotographs {
     /// Forgets photograph `index` if it is kept: for those that will not be asked for again.
     pub fn forget(&self, index: usize) {
         drop(self.take(index));
+    }
+
+    /// Bytes of the photographs that are kept now.
+    pub fn kept_bytes(&self) -> usize {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.photographs.iter().flatten().map(Photograph::bytes).sum()
+    }
+
+    fn decode(&self, index: usize, image: &SourceImage) -> Result<Photograph> {
+        let mut photograph = photograph(image)?;
+        if let Some(conversion) = self.colours.as_ref().and_then(|colours| colours.conversion(index)) {
+            photograph = conversion.apply(photograph, &image.name)?;
+        }
+        if let Some(bytes) = self.bytes.get(index) {
+            bytes.store(photograph.bytes(), Ordering::Relaxed);
+        }
+        Ok(photograph)
     }
 
     fn image(&self, index: usize) -> Result<&SourceImage> {
@@ -95,11 +130,19 @@ impl PhotographSource for FilePhotographs {
         let image = self.image(index)?;
         match self.take(index) {
             Some(photograph) => Ok(photograph),
-            None => photograph(image),
+            None => self.decode(index, image),
         }
     }
 
     fn masks(&self, index: usize) -> Masks {
         self.masks.get(index).cloned().unwrap_or_default()
+    }
+
+    fn bytes(&self, index: usize) -> Option<usize> {
+        self.bytes.get(index).map(|bytes| bytes.load(Ordering::Relaxed)).filter(|&bytes| bytes > 0)
+    }
+
+    fn transfer_curve(&self) -> TransferCurve {
+        self.colours.as_ref().map_or(TransferCurve::SRGB, |colours| colours.transfer_curve().clone())
     }
 }

@@ -8,6 +8,7 @@ mod orientation;
 mod reduce;
 #[cfg(test)]
 mod tests;
+mod tiff_kinds;
 
 use trueup_core::raster::{LUMA, Photograph, Raster};
 use trueup_core::source::{SourceImage, WorkingFrame};
@@ -16,6 +17,7 @@ use trueup_core::{Error, Result};
 pub(crate) use codecs::jpeg_options;
 pub use files::FilePhotographs;
 pub use mask::mask;
+pub(crate) use tiff_kinds::{Kind as TiffKind, inspect as inspect_tiff};
 
 /// A photograph reduced to the sizes that measurement works on.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,7 +33,8 @@ pub struct WorkingPicture {
 /// Decodes a photograph in full size, upright.
 ///
 /// Gray stays one channel; gray with alpha becomes RGBA; palettes, CMYK and one-bit pictures become RGB or gray;
-/// 16 bits a sample stay 16; floating point is clamped to [0, 1] and becomes 16 bits.
+/// 16 bits a sample stay 16; floating point is taken for linear light, 1 for white, and becomes 16 bits of sRGB, what is
+/// brighter than white becoming white.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read, [`Error::Input`] if its pixels are damaged or incomplete (no missing part
@@ -40,6 +43,21 @@ pub fn photograph(image: &SourceImage) -> Result<Photograph> {
     Ok(match codecs::decode_stored(image)? {
         Photograph::Eight(raster) => Photograph::Eight(orientation::upright(raster, image.orientation)),
         Photograph::Sixteen(raster) => Photograph::Sixteen(orientation::upright(raster, image.orientation)),
+    })
+}
+
+/// Bits of a sample in a photograph's file: 8 or 16, for floating point 16, 32 or 64.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read, [`Error::Input`] if its header no longer can.
+pub fn sample_bits(image: &SourceImage) -> Result<u16> {
+    let file = std::fs::File::open(&image.path).map_err(|error| Error::io("reading", &image.path, error))?;
+    crate::metadata::sample_bits(&file).ok_or_else(|| {
+        Error::input(
+            &image.name,
+            "its header can no longer be read",
+            "Do not change photographs while they are stitched; start again.",
+        )
     })
 }
 

@@ -81,12 +81,14 @@ fn every_kind_of_pixel_keeps_its_depth() {
 }
 
 #[test]
-fn floating_point_is_clamped_to_sixteen_bits() {
+fn floating_point_is_linear_light() {
     let folder = TempDir::new().expect("a temporary folder");
     let picture: DynamicImage = Rgb32FImage::from_fn(WIDTH, HEIGHT, |_, _| Rgb([0.5, -1.0, 7.0])).into();
     let image = examine(write(&folder, "float.tif", &encode(&picture, ImageFormat::Tiff)));
     let Photograph::Sixteen(raster) = photograph(&image).expect("a photograph") else { panic!("8 bit") };
-    assert_eq!(raster.pixel(0, 0), [32_768, 0, 65_535]);
+    // IEC 61966-2-1: 1.055 * 0.5^(1 / 2.4) - 0.055 = 0.735357, of 65535.
+    assert_eq!(raster.pixel(0, 0), [48_192, 0, 65_535]);
+    assert_eq!(sample_bits(&image).expect("a header"), 32);
 }
 
 #[test]

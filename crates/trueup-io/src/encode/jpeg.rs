@@ -2,13 +2,14 @@
 
 use std::io::Write;
 
-use jpeg_encoder::{ChromaSubsamplingMethod, ColorType, Encoder, SamplingFactor};
+use jpeg_encoder::{ChromaSubsamplingMethod, ColorType, Encoder, JfifWrite, SamplingFactor};
 use rayon::prelude::*;
+use trueup_core::StageContext;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::RowSource;
-use trueup_core::{Result as CoreResult, StageContext};
 
-use super::{ChromaSubsampling, Failure, OutputOptions, RGBA};
+use super::samples::{Sample, flattened};
+use super::{ChromaSubsampling, Failure, Metadata, OutputOptions, RGBA};
 
 /// Rows of a strip: a multiple of 8 and of 16, the heights of a minimum coded unit, and few enough that the units of a
 /// strip of the largest width fit the 16-bit restart interval.
@@ -28,6 +29,7 @@ const STRIPS_PER_THREAD: usize = 4;
 pub(super) fn write(
     file: &mut impl Write,
     picture: &dyn RowSource,
+    metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext,
 ) -> Result<(), Failure> {
@@ -35,18 +37,17 @@ pub(super) fn write(
     let firsts: Vec<usize> = (0..height).step_by(STRIP_ROWS).collect();
     let mut strip_number = 0_usize;
     for batch in firsts.chunks(STRIPS_PER_THREAD * rayon::current_num_threads()) {
-        let strips: CoreResult<Vec<Result<Vec<u8>, Failure>>> = batch
+        let strips: Vec<Vec<u8>> = batch
             .par_iter()
             .map(|&first| {
                 context.check_cancelled()?;
-                Ok(encode_strip(picture, first, STRIP_ROWS.min(height - first), options))
+                encode_strip(picture, first, STRIP_ROWS.min(height - first), options)
             })
-            .collect();
-        for strip in strips.map_err(|_| Failure::Cancelled)? {
-            let strip = strip?;
+            .collect::<Result<_, Failure>>()?;
+        for strip in strips {
             let (header, coded) = split_scan(&strip).ok_or_else(malformed)?;
             if strip_number == 0 {
-                file.write_all(&with_height(header, height).ok_or_else(malformed)?)?;
+                file.write_all(&metadata.jpeg_headers(&with_height(header, height).ok_or_else(malformed)?))?;
             } else {
                 file.write_all(&[0xff, RESTART_0 + ((strip_number - 1) % 8) as u8])?;
             }
@@ -75,21 +76,21 @@ fn encode_strip(
 ) -> Result<Vec<u8>, Failure> {
     let width = picture.width();
     let mut row = vec![0; width * RGBA];
-    let mut rgb = vec![0; width * rows * 3];
-    for (y, target) in rgb.chunks_exact_mut(width * 3).enumerate() {
-        picture.rgba8_row(first + y, &mut row);
-        composite(&row, options.background.value(), target);
+    let (mut rgb, mut flat) = (Vec::with_capacity(width * rows * 3), Vec::new());
+    for y in 0..rows {
+        picture.rgba8_row(first + y, &mut row)?;
+        flattened(&row, 3, u8::of(options.background), &mut flat);
+        rgb.extend_from_slice(&flat);
     }
-    let (sampling, unit_width, unit_height) = match options.jpeg_subsampling {
-        ChromaSubsampling::Full => (SamplingFactor::F_1_1, 8, 8),
-        ChromaSubsampling::HalfWidth => (SamplingFactor::F_2_1, 16, 8),
-        ChromaSubsampling::Quarter => (SamplingFactor::F_2_2, 16, 16),
+    let (unit_width, unit_height) = match options.jpeg_subsampling {
+        ChromaSubsampling::Full => (8, 8),
+        ChromaSubsampling::HalfWidth => (16, 8),
+        ChromaSubsampling::Quarter => (16, 16),
     };
     let units = width.div_ceil(unit_width) * (STRIP_ROWS / unit_height);
     let mut coded = Vec::with_capacity(rgb.len() / 6);
     let mut encoder = Encoder::new(&mut coded, options.jpeg_quality);
-    encoder.set_sampling_factor(sampling);
-    encoder.set_chroma_subsampling_method(ChromaSubsamplingMethod::Average);
+    set_sampling(&mut encoder, options);
     encoder.set_restart_interval(u16::try_from(units).map_err(|_| malformed())?);
     let (width, rows) = (u16::try_from(width), u16::try_from(rows));
     let (Ok(width), Ok(rows)) = (width, rows) else { return Err(malformed()) };
@@ -97,14 +98,14 @@ fn encode_strip(
     Ok(coded)
 }
 
-/// Lays a row of straight-alpha RGBA over a background of one value.
-fn composite(rgba: &[u8], background: u8, rgb: &mut [u8]) {
-    for (target, &[r, g, b, alpha]) in rgb.as_chunks_mut::<3>().0.iter_mut().zip(rgba.as_chunks::<4>().0) {
-        let alpha = u32::from(alpha);
-        // Rounded division by 255.
-        let over = |value: u8| ((u32::from(value) * alpha + u32::from(background) * (255 - alpha) + 127) / 255) as u8;
-        *target = [over(r), over(g), over(b)];
-    }
+/// Sets how finely colour is stored.
+pub(super) fn set_sampling<W: JfifWrite>(encoder: &mut Encoder<W>, options: &OutputOptions) {
+    encoder.set_sampling_factor(match options.jpeg_subsampling {
+        ChromaSubsampling::Full => SamplingFactor::F_1_1,
+        ChromaSubsampling::HalfWidth => SamplingFactor::F_2_1,
+        ChromaSubsampling::Quarter => SamplingFactor::F_2_2,
+    });
+    encoder.set_chroma_subsampling_method(ChromaSubsamplingMethod::Average);
 }
 
 /// Splits a JPEG of one scan into its headers, the scan header included, and the coded data before the end marker.

@@ -8,13 +8,13 @@ use super::*;
 use crate::source::{SourceOptions, scan};
 
 /// A smooth picture with a transparent left half.
-struct Gradient {
-    width: usize,
-    height: usize,
+pub(super) struct Gradient {
+    pub(super) width: usize,
+    pub(super) height: usize,
 }
 
 impl Gradient {
-    fn pixel(&self, x: usize, y: usize) -> [u8; 4] {
+    pub(super) fn pixel(&self, x: usize, y: usize) -> [u8; 4] {
         let alpha = if x < self.width / 2 { 0 } else { 255 };
         [(x * 255 / self.width) as u8, (y * 255 / self.height) as u8, 128, alpha]
     }
@@ -27,14 +27,27 @@ impl RowSource for Gradient {
     fn height(&self) -> usize {
         self.height
     }
-    fn rgba8_row(&self, y: usize, row: &mut [u8]) {
+    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
         for (x, pixel) in row.as_chunks_mut::<4>().0.iter_mut().enumerate() {
             *pixel = self.pixel(x, y);
         }
+        Ok(())
+    }
+    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
+        for (x, pixel) in row.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+            *pixel = self.pixel(x, y).map(|level| 257 * u16::from(level));
+        }
+        Ok(())
+    }
+    fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()> {
+        for (x, pixel) in row.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+            *pixel = self.pixel(x, y).map(|level| f32::from(level) / 255.0);
+        }
+        Ok(())
     }
 }
 
-fn read(path: &Path) -> Raster<u8> {
+pub(super) fn read(path: &Path) -> Raster<u8> {
     let sources =
         scan(&[path.display().to_string()], &SourceOptions::default(), &StageContext::default()).expect("a scan");
     let image = sources.images.first().unwrap_or_else(|| panic!("{:?}", sources.rejected));
@@ -45,11 +58,11 @@ fn read(path: &Path) -> Raster<u8> {
 }
 
 fn write_default(path: &Path, picture: &Gradient) -> Result<u64> {
-    write(path, picture, &OutputOptions::default(), &StageContext::default())
+    write(path, picture, &Metadata::default(), &OutputOptions::default(), &StageContext::default())
 }
 
 /// The files in a folder, temporary ones included.
-fn files_in(folder: &TempDir) -> Vec<String> {
+pub(super) fn files_in(folder: &TempDir) -> Vec<String> {
     let entries = std::fs::read_dir(folder.path()).expect("our own folder");
     entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect()
 }
@@ -86,7 +99,7 @@ fn compression_changes_no_pixel() {
     ];
     for (name, options) in options {
         let path = folder.path().join(name);
-        write(&path, &picture, &options, &StageContext::default()).expect("written");
+        write(&path, &picture, &Metadata::default(), &options, &StageContext::default()).expect("written");
         let raster = read(&path);
         assert_eq!(raster.pixel(33, 66), picture.pixel(33, 66));
     }
@@ -102,7 +115,7 @@ fn jpeg_strips_join_without_a_trace() {
         for jpeg_subsampling in subsamplings {
             let options = OutputOptions { jpeg_subsampling, background: Background::White, ..OutputOptions::default() };
             let path = folder.path().join("a.jpg");
-            write(&path, &picture, &options, &StageContext::default()).expect("written");
+            write(&path, &picture, &Metadata::default(), &options, &StageContext::default()).expect("written");
             let raster = read(&path);
             assert_eq!((raster.width(), raster.height(), raster.channels()), (width, height, 3));
             for y in 0..height {
@@ -123,11 +136,15 @@ fn jpeg_strips_join_without_a_trace() {
 fn bytes_do_not_depend_on_the_threads() {
     let folder = TempDir::new().expect("a temporary folder");
     let picture = Gradient { width: 60, height: 700 };
-    for name in ["a.jpg", "a.png", "a.tif", "a.webp"] {
+    let tiled = OutputOptions { tiff_layout: TiffLayout::Tiles256, depth: Depth::Sixteen, ..OutputOptions::default() };
+    let plain = OutputOptions::default();
+    let cases = [("a.jpg", &plain), ("a.png", &plain), ("a.tif", &plain), ("a.webp", &plain), ("b.tif", &tiled)];
+    for (name, options) in cases {
         let path = folder.path().join(name);
         let bytes_with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            pool.install(|| write_default(&path, &picture)).expect("written");
+            pool.install(|| write(&path, &picture, &Metadata::default(), options, &StageContext::default()))
+                .expect("written");
             std::fs::read(&path).expect("a file")
         };
         assert_eq!(bytes_with(1), bytes_with(2), "{name}");
@@ -159,6 +176,7 @@ fn sizes_beyond_the_format_are_refused_with_advice() {
 #[test]
 fn what_cannot_be_written_is_said_early_and_leaves_nothing() {
     let folder = TempDir::new().expect("a temporary folder");
+    let check_writable = |path: &Path| check_writable(path, &OutputOptions::default());
     let at = |name: &str| folder.path().join(name);
     assert!(matches!(check_writable(&at("a.gif")), Err(Error::Unsupported { .. })));
     assert!(matches!(check_writable(&at("a")), Err(Error::Unsupported { .. })));
@@ -172,7 +190,7 @@ fn what_cannot_be_written_is_said_early_and_leaves_nothing() {
 }
 
 /// Cancels the work when its last row is asked for.
-struct CancelAtEnd<'a>(Gradient, &'a CancelToken);
+pub(super) struct CancelAtEnd<'a>(pub(super) Gradient, pub(super) &'a CancelToken);
 
 impl RowSource for CancelAtEnd<'_> {
     fn width(&self) -> usize {
@@ -181,11 +199,23 @@ impl RowSource for CancelAtEnd<'_> {
     fn height(&self) -> usize {
         self.0.height
     }
-    fn rgba8_row(&self, y: usize, row: &mut [u8]) {
+    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
         if y + 1 == self.0.height {
             self.1.cancel();
         }
-        self.0.rgba8_row(y, row);
+        self.0.rgba8_row(y, row)
+    }
+    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
+        if y + 1 == self.0.height {
+            self.1.cancel();
+        }
+        self.0.rgba16_row(y, row)
+    }
+    fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()> {
+        if y + 1 == self.0.height {
+            self.1.cancel();
+        }
+        self.0.linear_row(y, row)
     }
 }
 
@@ -197,7 +227,13 @@ fn a_stop_leaves_the_old_file_and_nothing_else() {
         std::fs::write(&path, b"old").expect("a file");
         let cancel = CancelToken::default();
         let picture = CancelAtEnd(Gradient { width: 30, height: 300 }, &cancel);
-        let stopped = write(&path, &picture, &OutputOptions::default(), &StageContext::new(&Silent, &cancel, 0));
+        let stopped = write(
+            &path,
+            &picture,
+            &Metadata::default(),
+            &OutputOptions::default(),
+            &StageContext::new(&Silent, &cancel, 0),
+        );
         assert!(matches!(stopped, Err(Error::Cancelled)), "{name}: {stopped:?}");
         assert_eq!(std::fs::read(&path).expect("the old file"), b"old");
         std::fs::remove_file(&path).expect("our own file");
@@ -206,9 +242,9 @@ fn a_stop_leaves_the_old_file_and_nothing_else() {
 }
 
 /// A disk that fills up after so many bytes.
-struct FullDisk {
-    position: u64,
-    room: u64,
+pub(super) struct FullDisk {
+    pub(super) position: u64,
+    pub(super) room: u64,
 }
 
 impl std::io::Write for FullDisk {
@@ -236,13 +272,17 @@ impl std::io::Seek for FullDisk {
 fn a_full_disk_is_an_error_in_every_format() {
     let picture = Gradient { width: 60, height: 300 };
     let (options, context) = (OutputOptions::default(), StageContext::default());
+    let tiled = OutputOptions { tiff_layout: TiffLayout::Tiles256, ..OutputOptions::default() };
+    let metadata = Metadata::default();
     for room in [0, 10, 300, 700] {
         let disk = || FullDisk { position: 0, room };
+        let large = Gradient { width: 600, height: 600 };
         let results = [
-            jpeg::write(&mut disk(), &picture, &options, &context),
-            codecs::write_png(&mut disk(), &picture, &options, &context),
-            codecs::write_tiff(&mut disk(), &picture, &options, &context),
-            codecs::write_webp(&mut disk(), &Gradient { width: 600, height: 600 }, &context),
+            jpeg::write(&mut disk(), &picture, &metadata, &options, &context),
+            codecs::write_png(&mut disk(), &picture, &metadata, &options, &context),
+            tiff::write(&mut disk(), &picture, &metadata, &options, &context),
+            tiff::write(&mut disk(), &picture, &metadata, &tiled, &context),
+            codecs::write_webp(&mut disk(), &large, &metadata, &options, &context),
         ];
         for (index, result) in results.into_iter().enumerate() {
             let Err(Failure::Io(error)) = result else { panic!("format {index}, room {room}: {result:?}") };

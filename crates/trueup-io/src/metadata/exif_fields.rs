@@ -9,6 +9,7 @@ use tiff::tags::Tag as TiffTag;
 
 /// EXIF 3.0 tag numbers read from a TIFF's EXIF directory (section 4.6).
 const FOCAL_LENGTH: u16 = 0x920a;
+const COLOR_SPACE: u16 = 0xa001;
 const PIXEL_X_DIMENSION: u16 = 0xa002;
 const PIXEL_Y_DIMENSION: u16 = 0xa003;
 const FOCAL_PLANE_X_RESOLUTION: u16 = 0xa20e;
@@ -36,6 +37,10 @@ pub(crate) struct ExifFields {
     pub(crate) make: Option<String>,
     /// Model, trimmed.
     pub(crate) model: Option<String>,
+    /// ColorSpace: 1 sRGB, 65535 uncalibrated, by some cameras 2 for Adobe RGB.
+    pub(crate) colour_space: Option<u32>,
+    /// InteroperabilityIndex, trimmed; not read from a TIFF's own directories.
+    pub(crate) interoperability: Option<String>,
 }
 
 impl ExifFields {
@@ -57,6 +62,8 @@ impl ExifFields {
             focal_plane_unit: value(Tag::FocalPlaneResolutionUnit).and_then(|value| value.get_uint(0)),
             make: text(Tag::Make),
             model: text(Tag::Model),
+            colour_space: value(Tag::ColorSpace).and_then(|value| value.get_uint(0)),
+            interoperability: text(Tag::InteroperabilityIndex),
         }
     }
 
@@ -82,6 +89,7 @@ impl ExifFields {
         fields.focal_mm = number(FOCAL_LENGTH);
         fields.focal_35mm = number(FOCAL_LENGTH_IN_35MM_FILM);
         fields.focal_plane_resolution = number(FOCAL_PLANE_X_RESOLUTION);
+        fields.colour_space = number(COLOR_SPACE).map(|space| space as u32);
         fields.focal_plane_unit = number(FOCAL_PLANE_RESOLUTION_UNIT).map(|unit| unit as u32);
         Some(fields)
     }

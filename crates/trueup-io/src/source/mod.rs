@@ -161,6 +161,14 @@ fn examine(
         ),
     })?;
     check_size(&header, options)?;
+    if header.is_float {
+        context.report(Diagnostic::note(
+            "floating-point",
+            name,
+            "its samples are floating point numbers, taken for linear light with 1 for white; what is brighter is white",
+            "If it looks wrong, export it with 16 bits a sample.",
+        ));
+    }
     accepted.admit(&path, name, length)?;
 
     let tag = header.exif.orientation;

@@ -14,6 +14,8 @@ mod simd;
 #[cfg(test)]
 mod tests;
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_core::options::StageOptions;
@@ -74,6 +76,19 @@ impl Features {
             }
         }
         kept
+    }
+
+    /// The features of the `count` strongest points, all if there are no more; points keep their indices.
+    pub fn strongest(&self, count: usize) -> Cow<'_, Self> {
+        if self.points.len() <= count {
+            return Cow::Borrowed(self);
+        }
+        let descriptors = self.descriptor_points.partition_point(|&point| (point as usize) < count);
+        Cow::Owned(Self {
+            points: self.points[..count].to_vec(),
+            descriptors: self.descriptors[..descriptors].to_vec(),
+            descriptor_points: self.descriptor_points[..descriptors].to_vec(),
+        })
     }
 }
 

@@ -1,6 +1,6 @@
 //! Matches between pairs of pictures, and which pairs overlap.
 //!
-//! Descriptors are compared exhaustively (`putative`), a homography is sought that many matches agree on
+//! Descriptors of the strongest features are compared exhaustively (`putative`), a homography is sought that many matches agree on
 //! (`ransac`), the pair is judged by how many do, and the matches of a joined pair are completed by further planes
 //! (`planes`) and by a second look near the predicted places (`guided`).
 
@@ -119,7 +119,8 @@ pub fn match_pair(
     let (a, b) = if a.index <= b.index { (a, b) } else { (b, a) };
     check(a, b, options)?;
     context.check_cancelled()?;
-    let putative = by_distinctiveness(putative_matches(a.features, b.features, options));
+    let [compared_a, compared_b] = [a, b].map(|one| one.features.strongest(options.compared_features));
+    let putative = by_distinctiveness(putative_matches(&compared_a, &compared_b, options));
     let mut pair = PairMatches {
         a: a.index,
         b: b.index,

@@ -3,6 +3,9 @@
 trueup_core::options! {
     /// How pictures are matched in pairs and which pairs are joined.
     pub struct MatchingOptions("matching") {
+        /// Strongest features of each picture that are compared with all such of the other. Those beyond are matched near
+        /// the places that these predict (`guided`). More finds smaller overlaps; the time grows with the square.
+        compared_features: usize = 4000, between(16.0, 1000000.0), "features";
         /// Largest ratio of the distances to the nearest and the second-nearest point. Lower is stricter.
         max_distance_ratio: f64 = 0.8, between(0.1, 1.0), "";
         /// How far from the nearest point the second-nearest must lie in the picture; nearer ones are the same place.

@@ -284,6 +284,18 @@ fn ambiguous_points_are_matched_near_their_predicted_places() {
 }
 
 #[test]
+fn weak_features_are_matched_near_the_places_that_the_strong_ones_predict() {
+    let mut generator = generator(9);
+    let mut scene = Scene::default();
+    scene.add_plane(&example_map(), 120, 0.0, &mut generator);
+    let few = MatchingOptions { compared_features: 50, ..MatchingOptions::default() };
+    let pair = scene.matched(false, &few);
+    assert_eq!((pair.putative, pair.inliers.len()), (50, 120));
+    let unguided = MatchingOptions { guided: false, ..few };
+    assert_eq!(scene.matched(false, &unguided).inliers.len(), 50);
+}
+
+#[test]
 fn results_do_not_depend_on_threads_and_follow_the_order_of_pairs() {
     let mut generator = generator(7);
     let mut scene = Scene::default();

@@ -84,7 +84,8 @@ pub fn quick_looks(
     for (index, features) in features.iter().enumerate() {
         check_features(index, features)?;
     }
-    let subsets: Vec<Features> = features.iter().map(|features| strongest(features, options.subset)).collect();
+    let subsets: Vec<Features> =
+        features.iter().map(|features| features.strongest(options.subset).into_owned()).collect();
     let matching = MatchingOptions::default();
     context.progress().begin(PairingOptions::STAGE, features.len() as u64);
     let looks = (0..features.len())
@@ -104,17 +105,6 @@ pub fn quick_looks(
         .collect();
     context.progress().finish(PairingOptions::STAGE);
     looks
-}
-
-/// The first `count` points, which are the strongest.
-fn strongest(features: &Features, count: usize) -> Features {
-    let points = features.points.len().min(count);
-    let descriptors = features.descriptor_points.partition_point(|&point| (point as usize) < points);
-    Features {
-        points: features.points[..points].to_vec(),
-        descriptors: features.descriptors[..descriptors].to_vec(),
-        descriptor_points: features.descriptor_points[..descriptors].to_vec(),
-    }
 }
 
 /// A picture's pairs with its proposed neighbours.

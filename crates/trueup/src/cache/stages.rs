@@ -26,7 +26,8 @@ const GEOMETRY: &str = "geometry";
 /// The kinds of entries.
 pub(super) const KINDS: [&str; 4] = [MEASURED, PAIR, LOOKS, GEOMETRY];
 
-/// The keys of photographs, by what decides their measurements: their bytes, how they are turned and masked, options.
+/// The keys of photographs, by what decides their measurements: their bytes, how they are turned and masked, the colour
+/// space that they are brought to, options.
 /// `None` for files that cannot be read.
 ///
 /// # Errors
@@ -40,6 +41,7 @@ pub(crate) fn photograph_keys(
         .part(&options.features)?
         .part(&options.lines)?
         .part(&(options.stitch.working_pixels, options.stitch.thumbnail_pixels))?
+        .part(&photographs.colours().map(|colours| (colours.name(), colours.icc())))?
         .finish();
     let key = |index: usize| -> Result<Option<Key>> {
         context.check_cancelled()?;

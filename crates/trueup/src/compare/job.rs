@@ -234,7 +234,8 @@ impl Common<'_> {
         alignment.record_seconds("render", start.elapsed());
         let start = Instant::now();
         let options = &alignment.project.options.output;
-        let bytes = encode::write(&self.folder.join(&file), &panorama, options, self.context)?;
+        let bytes =
+            encode::write(&self.folder.join(&file), &panorama, &stitcher.metadata(&alignment), options, self.context)?;
         drop(panorama);
         alignment.record_seconds("output", start.elapsed());
         alignment.record_findings(self.context.take_diagnostics());

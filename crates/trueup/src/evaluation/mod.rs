@@ -110,6 +110,7 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     let known = match_pictures(project, truth)?;
     let records: Vec<&ImageRecord> = known.iter().map(|one| one.record).collect();
     let meshes = used_grids(&records)?;
+    let period = project.grid_canvas().period();
     let gammas: Vec<f64> = known.iter().map(|one| one.truth.gamma_deg.to_radians()).collect();
     let reference = known.iter().position(|one| one.record.path == project.reference);
 
@@ -119,7 +120,7 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     let turn = |rotations: &[f64], reference| mean_relative_turn(rotations, &gammas, reference).map(f64::to_degrees);
     let thetas: Option<Vec<f64>> = records.iter().map(|record| Some(record.theta_deg?.to_radians())).collect();
     let theta_errors = thetas.as_ref().and_then(|thetas| relative_turns(thetas, &gammas, 0));
-    let distortion = metrics::local_distortion(&meshes, Outside::Centre);
+    let distortion = metrics::local_distortion(&meshes, Outside::Centre, period);
     let pictures = (0..known.len()).map(|k| PictureEvaluation {
         file: known[k].truth.file.clone(),
         upright_deg: upright.pictures[k].to_degrees(),
@@ -138,9 +139,9 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
         theta_error_max_deg: theta_errors.as_ref().map(|errors| largest(errors).to_degrees()),
         ld: HUNDREDTHS * distortion.worst,
         ld_mean: HUNDREDTHS * distortion.mean,
-        ld_corners: HUNDREDTHS * metrics::local_distortion(&meshes, Outside::CentreAndCorners).worst,
+        ld_corners: HUNDREDTHS * metrics::local_distortion(&meshes, Outside::CentreAndCorners, period).worst,
         folds: meshes.iter().map(folded_cells).sum(),
-        align_px: alignment(&known, &meshes),
+        align_px: alignment(&known, &meshes, period),
         pictures: pictures.collect(),
     })
 }
@@ -196,7 +197,7 @@ fn too_few(count: usize) -> Error {
 }
 
 /// [`metrics::true_alignment`] where all pictures share one centre of projection.
-fn alignment(known: &[Known], meshes: &[GridMesh]) -> Option<f64> {
+fn alignment(known: &[Known], meshes: &[GridMesh], period: Option<f64>) -> Option<f64> {
     if known.iter().any(|one| one.truth.centre != known[0].truth.centre) {
         return None;
     }
@@ -205,5 +206,5 @@ fn alignment(known: &[Known], meshes: &[GridMesh]) -> Option<f64> {
         Camera::new(truth.focal_px, truth.width as f64, truth.height as f64, &truth.camera_from_world())
     };
     let cameras: Vec<Camera> = known.iter().map(camera).collect();
-    metrics::true_alignment(meshes, &cameras)
+    metrics::true_alignment(meshes, &cameras, period)
 }

@@ -11,9 +11,10 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
 use trueup_core::source::{PhotographSource, SourceImage};
 use trueup_core::{Error, Result, StageContext};
+use trueup_io::colour::PhotographColours;
 use trueup_io::decode::FilePhotographs;
 
-use crate::project::{ImageRecord, Project};
+use crate::project::{Canvas, ImageRecord, Project};
 use crate::recorded::{find_photograph, recorded_corrections, used_grids};
 
 /// Progress is reported as this.
@@ -62,7 +63,8 @@ pub fn evaluate_pixels(project: &Project, project_folder: &Path, context: &Stage
         .iter()
         .map(|record| find_photograph(record, project_folder, &project.options.source, context))
         .collect::<Result<Vec<SourceImage>>>()?;
-    let photographs = FilePhotographs::new(images, 0);
+    let colours = PhotographColours::survey(&images, context);
+    let photographs = FilePhotographs::new(images, 0).in_colours(colours);
     let meshes = used_grids(&records)?;
     let scale = scale(&meshes, project.options.measures.canvas_pixels);
     let positions: Vec<usize> = (0..records.len()).collect();
@@ -91,7 +93,7 @@ pub(crate) fn compare_overlaps(
     context: &StageContext,
 ) -> Result<PixelEvaluation> {
     let records: Vec<&ImageRecord> = project.used_images().collect();
-    let layout = layout(used_grids(&records)?, positions, scale);
+    let layout = layout(used_grids(&records)?, positions, (scale, project.grid_canvas()));
     let corrections = recorded_corrections(&records)?;
 
     context.progress().begin(STAGE, records.len() as u64);
@@ -112,7 +114,7 @@ pub(crate) fn compare_overlaps(
         .par_iter()
         .map(|&(a, b)| {
             context.check_cancelled()?;
-            Ok(compare(&layers[a], &layers[b]).filter(|one| one.pixels >= MIN_OVERLAP_PX))
+            Ok(compare(&layers[a], &layers[b], layout.period).filter(|one| one.pixels >= MIN_OVERLAP_PX))
         })
         .collect::<Result<Vec<_>>>()?
         .into_iter()
@@ -160,43 +162,56 @@ fn bounds(meshes: &[GridMesh]) -> (nalgebra::Vector2<f64>, nalgebra::Vector2<f64
 }
 
 /// The grids of the photographs at `positions` on a canvas of this scale.
-fn layout(meshes: Vec<GridMesh>, positions: &[usize], scale: f64) -> CanvasLayout {
+fn layout(meshes: Vec<GridMesh>, positions: &[usize], (scale, panorama): (f64, Canvas)) -> CanvasLayout {
     let (low, high) = bounds(&meshes);
+    let period = panorama.full_turn.then(|| (panorama.width as f64 * scale).round().max(1.0));
+    // A turn is a whole number of pixels.
+    let scale_x = period.map_or(scale, |period| period / panorama.width as f64);
     let placed = positions.iter().zip(meshes).map(|(&photograph, mut mesh)| {
         for vertex in &mut mesh.target {
-            *vertex = [(vertex[0] - low.x) * scale, (vertex[1] - low.y) * scale];
+            *vertex = [(vertex[0] - low.x) * scale_x, (vertex[1] - low.y) * scale];
         }
         Placed { photograph, mesh }
     });
     // The casts saturate.
     let side = |length: f64| (length * scale).ceil().max(1.0) as usize;
     CanvasLayout {
-        width: side(high.x - low.x),
+        width: period.map_or(side(high.x - low.x), |period| period as usize),
         height: side(high.y - low.y),
         canvas_from_target: scale,
+        origin: [0.0; 2],
         placed: placed.collect(),
+        period: period.map(|period| period as usize),
     }
 }
 
-/// Two layers where their boxes overlap.
-fn compare(a: &Layer, b: &Layer) -> Option<OverlapMeasures> {
-    let (left, top) = (a.left.max(b.left), a.top.max(b.top));
-    let end = |layer: &Layer| [layer.left + layer.gray.width(), layer.top + layer.gray.height()];
-    let (end_a, end_b) = (end(a), end(b));
+/// Two layers where their boxes overlap; on a cylinder where they overlap most, turns apart or not.
+fn compare(a: &Layer, b: &Layer, period: Option<usize>) -> Option<OverlapMeasures> {
+    let turn = period.unwrap_or(0);
+    let places = [[0, 0], [turn, 0], [0, turn]];
+    let overlap = |[a_by, b_by]: &[usize; 2]| {
+        let end = |layer: &Layer, by: usize| layer.left + by + layer.gray.width();
+        end(a, *a_by).min(end(b, *b_by)).saturating_sub((a.left + a_by).max(b.left + b_by))
+    };
+    let [a_by, b_by] = *places.iter().rev().max_by_key(|place| overlap(place))?;
+    let (left, top) = ((a.left + a_by).max(b.left + b_by), a.top.max(b.top));
+    let end = |layer: &Layer, by: usize| [layer.left + by + layer.gray.width(), layer.top + layer.gray.height()];
+    let (end_a, end_b) = (end(a, a_by), end(b, b_by));
     let width = end_a[0].min(end_b[0]).checked_sub(left).filter(|&width| width > 0)?;
     let height = end_a[1].min(end_b[1]).checked_sub(top).filter(|&height| height > 0)?;
-    let mut covered = cut(&a.covered, left - a.left, top - a.top, width, height);
-    let other = cut(&b.covered, left - b.left, top - b.top, width, height);
+    let of_a = [left - a.left - a_by, top - a.top];
+    let of_b = [left - b.left - b_by, top - b.top];
+    let mut covered = cut(&a.covered, of_a, width, height);
+    let other = cut(&b.covered, of_b, width, height);
     for (covered, other) in covered.data_mut().iter_mut().zip(other.data()) {
         *covered &= other;
     }
-    let gray_a = cut(&a.gray, left - a.left, top - a.top, width, height);
-    let gray_b = cut(&b.gray, left - b.left, top - b.top, width, height);
+    let (gray_a, gray_b) = (cut(&a.gray, of_a, width, height), cut(&b.gray, of_b, width, height));
     Overlap { a: &gray_a, b: &gray_b, covered: &covered }.measure()
 }
 
 /// A box of a raster of one channel.
-fn cut<T: Copy + Default>(raster: &Raster<T>, left: usize, top: usize, width: usize, height: usize) -> Raster<T> {
+fn cut<T: Copy + Default>(raster: &Raster<T>, [left, top]: [usize; 2], width: usize, height: usize) -> Raster<T> {
     let mut cut = Raster::new(width, height, 1);
     for y in 0..height {
         cut.row_mut(y).copy_from_slice(&raster.row(top + y)[left..left + width]);

@@ -1,0 +1,188 @@
+//! What closes a full turn: overlaps whose pictures, laid flat, lie a whole turn apart.
+
+use nalgebra::Vector2;
+
+use crate::match_points::OverlapWarp;
+
+/// Overlaps across the cut of a full turn.
+///
+/// Their match points are to lie one period apart in x, and at one height. The period, the length of a turn in the
+/// panorama, is one more unknown beside the vertices, so that it takes up what focal lengths are off.
+#[derive(Debug, Clone, Copy)]
+pub struct Closure<'a> {
+    /// Match points, two directions a pair.
+    pub warps: &'a [OverlapWarp],
+    /// For each of them the turns by which its `from` lies to the right of its `to`: 1 or -1.
+    pub turns: &'a [f64],
+    /// The period by the cameras, in panorama units.
+    pub expected: f64,
+}
+
+impl Closure<'_> {
+    /// Why the ends of a panorama that was laid out without the closure cannot be the same place; `None` if they can.
+    ///
+    /// `apart` holds, for every match point, the way from where the left end has it to where the right end has it. What
+    /// the ends are off is spread over the whole turn when it is closed; more than that takes up comes of wrong matches or
+    /// cameras.
+    pub(super) fn contradiction(&self, apart: &[Vector2<f64>]) -> Option<String> {
+        /// Largest difference in height of the ends, and largest spread of what the match points say, as shares of the
+        /// period: a slope of 1.7 degrees.
+        const MOST_OFF: f64 = 0.03;
+        /// Largest difference of the period from that by the cameras, as its share. Focal lengths may be off by a tenth and
+        /// more although all matches agree on the period.
+        const MOST_STRETCH: f64 = 0.25;
+        let Some(x) = median(apart.iter().map(|one| one.x)) else {
+            return Some("no point of their overlap was carried across".to_owned());
+        };
+        let middle = Vector2::new(x, median(apart.iter().map(|one| one.y))?);
+        let spread = median(apart.iter().map(|one| (one - middle).norm()))?;
+        let share = |length: f64| length / self.expected;
+        let percent = |length: f64| 100.0 * share(length);
+        // Written so that a number that is none is refused, too.
+        let within = |length: f64, most: f64| share(length).abs() <= most;
+        if !within(middle.x - self.expected, MOST_STRETCH) {
+            return Some(format!("by their matches they are {:.0} % of a turn apart", percent(middle.x)));
+        }
+        if !within(middle.y, MOST_OFF) {
+            return Some(format!("they differ in height by {:.1} % of a turn", percent(middle.y).abs()));
+        }
+        (!within(spread, MOST_OFF)).then(|| format!("their matches contradict each other by {:.1} %", percent(spread)))
+    }
+}
+
+/// The middle value, the upper one of an even count.
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use trueup_core::StageContext;
+    use trueup_core::camera::Camera;
+    use trueup_core::diagnostics::Severity;
+    use trueup_core::geometry::rotation_about_y;
+    use trueup_core::mesh::GridMesh;
+
+    use super::super::*;
+    use super::*;
+
+    const PICTURES: usize = 10;
+    const FOCAL_PX: f64 = 400.0;
+
+    /// A ring of level pictures 36 degrees apart, with all match points; those across the cut, between the last and the
+    /// first, apart, with their turns.
+    struct Ring {
+        cameras: Vec<Camera>,
+        grids: Vec<GridMesh>,
+        within: Vec<OverlapWarp>,
+        across: Vec<OverlapWarp>,
+        turns: Vec<f64>,
+    }
+
+    impl Ring {
+        fn new() -> Self {
+            let step = TAU / PICTURES as f64;
+            let camera =
+                |k: usize| Camera::new(FOCAL_PX, 400.0, 300.0, &rotation_about_y((k as f64 - 4.5) * step).transpose());
+            let cameras: Vec<Camera> = (0..PICTURES).map(camera).collect();
+            let grids = vec![GridMesh::regular(400.0, 300.0, 50.0); PICTURES];
+            let carried = |from: usize, to: usize| OverlapWarp {
+                from,
+                to,
+                vertices: (0..grids[from].len())
+                    .map(|vertex| {
+                        let place = cameras[from].transfer(&cameras[to], grids[from].source(vertex))?;
+                        ((0.0..=400.0).contains(&place.x) && (0.0..=300.0).contains(&place.y)).then_some(place.into())
+                    })
+                    .collect(),
+            };
+            let neighbours = |k: usize| [carried(k, k + 1), carried(k + 1, k)];
+            let within = (0..PICTURES - 1).flat_map(neighbours).collect();
+            let across = vec![carried(PICTURES - 1, 0), carried(0, PICTURES - 1)];
+            Self { cameras, grids, within, across, turns: vec![1.0, -1.0] }
+        }
+
+        /// The mesh on the sphere of cameras whose focal length is `share` of the true one.
+        fn deformed(&self, share: f64, expected: f64, context: &StageContext) -> WarpedMesh {
+            let options = MeshOptions::default();
+            let bases: Vec<Base> = self
+                .cameras
+                .iter()
+                .zip(&self.grids)
+                .map(|(camera, grid)| {
+                    let wrong = Camera { focal_px: share * camera.focal_px, ..*camera };
+                    Base::on_level_sphere(&wrong, grid, FOCAL_PX * share, &options)
+                })
+                .collect();
+            let closure = Closure { warps: &self.across, turns: &self.turns, expected };
+            let refinements = Refinements { closure: Some(closure), ..Refinements::default() };
+            run_refined(&self.grids, &self.within, &bases, 0, &options, &refinements, context).expect("solvable")
+        }
+    }
+
+    #[test]
+    fn a_ring_of_exact_matches_closes_exactly() {
+        let context = StageContext::default();
+        let warped = Ring::new().deformed(1.0, TAU * FOCAL_PX, &context);
+        let period = warped.period.expect("a full turn");
+        assert!((period - TAU * FOCAL_PX).abs() < 1e-6, "{period}");
+        assert!(warped.alignment_rms < 1e-6 && warped.relative_gradient < 1e-9, "{warped:?}");
+        assert!(context.take_diagnostics().is_empty());
+    }
+
+    /// The matches lie a ring's circumference apart whatever the focal length: the period follows them, not the base.
+    #[test]
+    fn the_period_takes_up_a_wrong_focal_length() {
+        let ring = Ring::new();
+        for share in [0.97, 1.04] {
+            let warped = ring.deformed(share, TAU * FOCAL_PX * share, &StageContext::default());
+            let period = warped.period.expect("a full turn");
+            let apart = |warp: &OverlapWarp| -> Vec<f64> {
+                let ends = warp.vertices.iter().enumerate().filter_map(|(vertex, place)| {
+                    let place = Vector2::from((*place)?);
+                    let from = warped.meshes[warp.from].warp(ring.grids[0].source(vertex));
+                    let way = from - warped.meshes[warp.to].warp(place) - Vector2::new(period, 0.0);
+                    Some(way.norm())
+                });
+                ends.collect()
+            };
+            let across = apart(&ring.across[0]);
+            let mean = across.iter().sum::<f64>() / across.len() as f64;
+            assert!(across.len() > 4 && mean < 1.5 * warped.alignment_rms + 0.1, "{mean} {}", warped.alignment_rms);
+            // All pictures alike: none bears more of the misfit than the others.
+            let width = |mesh: &GridMesh| mesh.bounds().1.x - mesh.bounds().0.x;
+            let widths: Vec<f64> = warped.meshes.iter().map(width).collect();
+            let (low, high) = widths.iter().fold((f64::MAX, 0.0_f64), |(low, high), &w| (low.min(w), high.max(w)));
+            assert!(high - low < 0.01 * high, "{widths:?}");
+        }
+    }
+
+    #[test]
+    fn ends_that_contradict_leave_the_turn_open_and_say_so() {
+        let context = StageContext::default();
+        let ring = Ring::new();
+        let open = ring.deformed(1.0, 1.5 * TAU * FOCAL_PX, &context);
+        assert_eq!(open.period, None);
+        let found = context.take_diagnostics();
+        assert_eq!((found[0].code.as_str(), found[0].severity), ("full-turn-open", Severity::Warning));
+        assert!(found[0].message.contains("67 %"), "{}", found[0].message);
+        // As without any closure.
+        let options = MeshOptions::default();
+        let bases: Vec<Base> = ring
+            .cameras
+            .iter()
+            .zip(&ring.grids)
+            .map(|(camera, grid)| Base::on_level_sphere(camera, grid, FOCAL_PX, &options))
+            .collect();
+        assert_eq!(open, run(&ring.grids, &ring.within, &bases, 0, &options, &context).expect("solvable"));
+        let closure = Closure { warps: &[], turns: &[], expected: 100.0 };
+        let lifted = vec![Vector2::new(100.0, 5.0); 9];
+        assert!(closure.contradiction(&lifted).expect("too high").contains("5.0 %"));
+        assert!(closure.contradiction(&[]).is_some());
+        assert!(closure.contradiction(&[Vector2::new(f64::NAN, 0.0)]).is_some());
+    }
+}

@@ -1,0 +1,68 @@
+//! How much memory blending takes, before there is anything to blend.
+
+use trueup_core::Result;
+
+use super::coarse::first_level;
+use super::unrolled::Unrolled;
+use super::{Finished, TILES_AT_ONCE, bases, levels_above, tile, tile_side, views};
+use crate::layout::CanvasLayout;
+use crate::render::{Blend, RenderOptions};
+use crate::seam::SeamOptions;
+
+/// Bytes of the search for seams per pixel of all small pictures: pixels at all levels, gradients, depths.
+const SEARCH_VIEW: f64 = 4.0 * 4.0 / 3.0 + 4.0 + 1.0;
+/// The same per pixel of their canvas: labels, parts that moved, flags, each at two levels.
+const SEARCH_CANVAS: f64 = 16.0;
+/// The same per pixel of the largest small picture: the flow network.
+const SEARCH_CUT: f64 = 36.0;
+/// A photograph's pyramid, its masks and interpolated levels, and its samples before they are reduced, in pictures of its
+/// finest level.
+const COARSE_COPIES: f64 = 8.0;
+/// A tile's photograph, sums, masks and interpolated levels, in pictures of the tile with its margin.
+const TILE_COPIES: f64 = 8.0;
+
+/// Bytes that blending takes beside canvas and photographs; bytes of the photographs' own coarse levels.
+pub(crate) fn needed_bytes(
+    layout: &CanvasLayout,
+    options: &RenderOptions,
+    seam_options: &SeamOptions,
+) -> Result<(usize, usize)> {
+    let cut = options.blend == Blend::None;
+    let several = layout.placed.len() > 1;
+    let first_level = first_level([layout.width, layout.height]);
+    let levels = if cut || !several { None } else { Some(levels_above(layout, options)) };
+    let unrolled = Unrolled::new(layout, first_level, levels)?;
+    let canvas = unrolled.canvas();
+    let threads = rayon::current_num_threads().max(1) as f64;
+    let sample = bases::SAMPLE_BYTES as f64;
+    // Every photograph's box on the canvas, at a scale and with so many pixels on all sides.
+    let boxes = |scale: f64, rim: f64| {
+        unrolled.placed().iter().map(move |placed| {
+            let (low, high) = placed.mesh.bounds();
+            let side = |axis: usize| {
+                let whole = canvas[axis] as f64;
+                (high[axis].clamp(0.0, whole) - low[axis].clamp(0.0, whole)) * scale + 2.0 * rim
+            };
+            side(0) * side(1)
+        })
+    };
+    let largest = |areas: &[f64]| areas.iter().copied().fold(0.0, f64::max);
+    let small = crate::seam::small_size([layout.width, layout.height], layout.period.is_some(), seam_options)
+        .map(|length| length as f64);
+    let views: Vec<f64> = boxes(small[0] / layout.width as f64, 1.0).collect();
+    let searching =
+        SEARCH_VIEW * views.iter().sum::<f64>() + SEARCH_CANVAS * small[0] * small[1] + SEARCH_CUT * largest(&views);
+    // The grown box at the sampled level has two of its samples for each of the first.
+    let bases: Vec<f64> = boxes(f64::from(1 << first_level).recip(), views::RIM as f64).collect();
+    let whole: f64 = canvas.iter().map(|&length| length.div_ceil(1 << first_level) as f64).product();
+    // Sums at all levels and what one of them is interpolated to, beside some photographs' own levels.
+    let coarse = sample * (whole * (4.0 / 3.0 + 1.0) + threads * COARSE_COPIES * largest(&bases));
+    let side = (tile_side(first_level) + 2 * tile::margin(first_level)) as f64;
+    let finished = (TILES_AT_ONCE * size_of::<Finished>()) as f64 * (tile_side(first_level) as f64).powi(2);
+    let tiles = sample * whole + threads * (sample * TILE_COPIES * side * side + finished);
+    let coarse = if cut || !several { 0.0 } else { coarse };
+    let working = if several { searching.max(coarse).max(tiles) } else { tiles - sample * whole };
+    let bases = if cut || !several { 0.0 } else { sample * bases.iter().sum::<f64>() };
+    // The casts saturate.
+    Ok((working as usize, bases as usize))
+}

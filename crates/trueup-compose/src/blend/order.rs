@@ -1,0 +1,118 @@
+//! In which order tiles are finished: strip by strip, in batches whose photographs fit into memory.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+use trueup_core::memory::bytes_in_words;
+use trueup_core::{Error, Result};
+
+use super::tile::Tile;
+use super::{Work, tile, tile_side};
+use crate::seam::Label;
+
+/// Canvas pixels across a strip: enough tiles for all threads, few enough photographs.
+const STRIP: usize = 512;
+
+/// Tiles that are finished one after the other, and the photographs they are made of.
+#[derive(Debug)]
+pub(super) struct Batch {
+    pub(super) tiles: Vec<Tile>,
+    pub(super) shown: Vec<Label>,
+}
+
+/// The canvas in batches whose photographs, of these sizes in `bytes`, take no more than `room` bytes. Strips run across
+/// that side of the canvas which leaves fewer photographs in memory from one strip to the next.
+///
+/// # Errors
+/// [`Error::Limits`] if a single tile is made of more.
+pub(super) fn batches(work: &Work<'_>, bytes: &[usize], room: usize) -> Result<Vec<Batch>> {
+    let [width, height] = work.unrolled.finished();
+    let side = tile_side(work.first_level);
+    let cut = |first: usize, length: usize| -> Vec<Range<usize>> {
+        let end = first + length;
+        (first..end).step_by(side).map(|start| start..(start + side).min(end)).collect()
+    };
+    let (columns, rows) = (cut(work.unrolled.lead(), width), cut(0, height));
+    let tiles: Vec<Tile> = (0..rows.len() * columns.len())
+        .into_par_iter()
+        .map(|at| tile(work, columns[at % columns.len()].clone(), rows[at / columns.len()].clone()))
+        .collect();
+    let along_x = strips(columns.len(), rows.len(), side, |along, across| across * columns.len() + along);
+    let along_y = strips(rows.len(), columns.len(), side, |along, across| along * columns.len() + across);
+    let (x, y) = (most_alive(&along_x, &tiles, bytes), most_alive(&along_y, &tiles, bytes));
+    let strips = if x < y || x == y && width >= height { along_x } else { along_y };
+    let mut batches = Vec::new();
+    for strip in strips {
+        split(&strip, &tiles, bytes, room, &mut batches)?;
+    }
+    Ok(batches)
+}
+
+/// Indices of the tiles of every strip; within a strip, those that lie side by side across it follow each other.
+fn strips(along: usize, across: usize, side: usize, index: impl Fn(usize, usize) -> usize) -> Vec<Vec<usize>> {
+    let thick = (STRIP / side).max(1);
+    (0..along)
+        .step_by(thick)
+        .map(|start| {
+            let end = (start + thick).min(along);
+            (0..across)
+                .flat_map(|across| (start..end).map(move |along| (along, across)))
+                .map(|(a, b)| index(a, b))
+                .collect()
+        })
+        .collect()
+}
+
+/// The most bytes of photographs that are in memory at once if each stays from the first strip that shows it to the last.
+fn most_alive(strips: &[Vec<usize>], tiles: &[Tile], bytes: &[usize]) -> usize {
+    let mut spans: Vec<Option<[usize; 2]>> = vec![None; bytes.len()];
+    for (index, strip) in strips.iter().enumerate() {
+        for &label in strip.iter().flat_map(|&at| &tiles[at].shown) {
+            if let Some(span) = spans.get_mut(usize::from(label)) {
+                *span = Some([span.map_or(index, |[first, _]| first), index]);
+            }
+        }
+    }
+    (0..strips.len())
+        .map(|strip| {
+            let alive = |span: &Option<[usize; 2]>| span.is_some_and(|[first, last]| (first..=last).contains(&strip));
+            spans.iter().zip(bytes).filter(|(span, _)| alive(span)).map(|(_, bytes)| bytes).sum()
+        })
+        .max()
+        .unwrap_or(0)
+}
+
+/// Adds the tiles of a strip in as few batches as the room allows.
+fn split(strip: &[usize], tiles: &[Tile], bytes: &[usize], room: usize, batches: &mut Vec<Batch>) -> Result<()> {
+    let mut batch = Batch { tiles: Vec::new(), shown: Vec::new() };
+    for tile in strip.iter().map(|&at| &tiles[at]) {
+        let own: Vec<Label> = tile.shown.iter().copied().filter(|&label| usize::from(label) < bytes.len()).collect();
+        let size = |labels: &[Label]| labels.iter().map(|&label| bytes[usize::from(label)]).sum::<usize>();
+        if size(&own) > room {
+            return Err(too_many(own.len(), size(&own), room));
+        }
+        let mut joined = batch.shown.clone();
+        joined.extend(own.iter().filter(|label| !batch.shown.contains(label)));
+        if size(&joined) > room {
+            batches.push(std::mem::replace(&mut batch, Batch { tiles: Vec::new(), shown: own }));
+        } else {
+            batch.shown = joined;
+        }
+        batch.tiles.push(tile.clone());
+    }
+    batches.push(batch);
+    for batch in batches {
+        batch.shown.sort_unstable();
+    }
+    Ok(())
+}
+
+fn too_many(count: usize, needed: usize, room: usize) -> Error {
+    let words = |bytes: usize| bytes_in_words(bytes as u64);
+    Error::Limits {
+        subject: format!("{count} photographs that meet at one place"),
+        needed: format!("{} of memory for them", words(needed)),
+        allowed: words(room),
+        hint: format!("Raise --memory (stitch.memory) by {}.", words(needed - room)),
+    }
+}

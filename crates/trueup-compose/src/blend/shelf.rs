@@ -1,0 +1,142 @@
+//! The photographs that are in memory while tiles are finished.
+
+use std::borrow::Cow;
+
+use rayon::prelude::*;
+use trueup_core::colour::TransferCurve;
+use trueup_core::options::StageOptions;
+use trueup_core::raster::Photograph;
+use trueup_core::source::PhotographSource;
+use trueup_core::{Result, StageContext};
+
+use super::order::Batch;
+use super::unrolled::Unrolled;
+use crate::exposure::Correction;
+use crate::render::RenderOptions;
+use crate::render::prepared::{Prepared, check_photograph};
+use crate::seam::Label;
+
+/// What photographs are made ready from.
+#[derive(Clone, Copy)]
+pub(super) struct Supply<'a> {
+    pub(super) unrolled: &'a Unrolled<'a>,
+    pub(super) curve: &'a TransferCurve,
+    pub(super) corrections: &'a [Correction],
+    pub(super) photographs: &'a dyn PhotographSource,
+    pub(super) options: &'a RenderOptions,
+    pub(super) context: &'a StageContext<'a>,
+}
+
+/// Photographs in memory, within a number of bytes. Since the order of the work is known, the one that is wanted last makes
+/// room for others (Belady, IBM Systems Journal 5(2), 1966): no other choice decodes fewer files.
+pub(super) struct Shelf<'a> {
+    supply: Supply<'a>,
+    room: usize,
+    at_a_time: usize,
+    /// Decoded, as the first pass left them.
+    kept: Vec<Option<Photograph>>,
+    pictures: Vec<Option<Prepared<'a>>>,
+    /// For every photograph, the batches that show it.
+    uses: Vec<Vec<usize>>,
+    /// Whether progress was reported for a photograph.
+    counted: Vec<bool>,
+}
+
+impl<'a> Shelf<'a> {
+    pub(super) fn new(
+        supply: Supply<'a>,
+        kept: Vec<Option<Photograph>>,
+        batches: &[Batch],
+        room: usize,
+        at_a_time: usize,
+    ) -> Self {
+        let count = kept.len();
+        let mut uses = vec![Vec::new(); count];
+        for (index, batch) in batches.iter().enumerate() {
+            for &label in &batch.shown {
+                uses[usize::from(label)].push(index);
+            }
+        }
+        Self {
+            supply,
+            room,
+            at_a_time,
+            kept,
+            pictures: (0..count).map(|_| None).collect(),
+            uses,
+            counted: vec![false; count],
+        }
+    }
+
+    /// The photographs that are ready, by label.
+    pub(super) fn pictures(&self) -> &[Option<Prepared<'a>>] {
+        &self.pictures
+    }
+
+    /// Makes ready what batch number `index` shows; `bytes` are the photographs' sizes. Others may go.
+    pub(super) fn prepare(&mut self, index: usize, batch: &Batch, bytes: &[usize]) -> Result<()> {
+        let wanted: Vec<usize> = batch.shown.iter().map(|&label: &Label| usize::from(label)).collect();
+        let missing: Vec<usize> = wanted.iter().copied().filter(|&at| self.pictures[at].is_none()).collect();
+        let coming: usize = missing.iter().filter(|&&at| self.kept[at].is_none()).map(|&at| bytes[at]).sum();
+        self.make_room(index, &wanted, coming);
+        for group in missing.chunks(self.at_a_time.max(1)) {
+            let ready: Vec<(usize, Option<Photograph>)> = group.iter().map(|&at| (at, self.kept[at].take())).collect();
+            let supply = self.supply;
+            let loaded: Vec<(usize, Prepared<'a>)> =
+                ready.into_par_iter().map(|(at, kept)| Ok((at, supply.ready(at, kept)?))).collect::<Result<_>>()?;
+            for (at, prepared) in loaded {
+                self.pictures[at] = Some(prepared);
+                if !std::mem::replace(&mut self.counted[at], true) {
+                    supply.context.progress().advance(RenderOptions::STAGE, 1);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets go of photographs that are not `wanted` in batch `index` until `coming` more bytes fit: at first those that are
+    /// never wanted again, then those that are wanted last.
+    fn make_room(&mut self, index: usize, wanted: &[usize], coming: usize) {
+        let next_use = |at: usize| {
+            let uses = &self.uses[at];
+            uses.get(uses.partition_point(|&batch| batch < index)).copied()
+        };
+        let mut others: Vec<(Option<usize>, usize)> =
+            (0..self.kept.len()).filter(|at| !wanted.contains(at)).map(|at| (next_use(at), at)).collect();
+        // None, never, sorts first: it is to go first; then the latest, ties by the higher index.
+        others.sort_unstable_by(|(a, i), (b, j)| (a.is_some(), b, j).cmp(&(b.is_some(), a, i)));
+        for (next, at) in others {
+            if next.is_some() && self.held_bytes().saturating_add(coming) <= self.room {
+                break;
+            }
+            self.kept[at] = None;
+            self.pictures[at] = None;
+        }
+    }
+
+    fn held_bytes(&self) -> usize {
+        let kept: usize = self.kept.iter().flatten().map(Photograph::bytes).sum();
+        kept + self.pictures.iter().flatten().map(|picture| picture.photograph().0.bytes()).sum::<usize>()
+    }
+}
+
+impl<'a> Supply<'a> {
+    /// Photograph `at`, decoded unless it was kept.
+    fn ready(&self, at: usize, kept: Option<Photograph>) -> Result<Prepared<'a>> {
+        self.context.check_cancelled()?;
+        let placed = &self.unrolled.placed()[at];
+        let photograph = match kept {
+            Some(photograph) => photograph,
+            None => self.photographs.photograph(placed.photograph)?,
+        };
+        check_photograph(placed, &photograph)?;
+        let correction = &self.corrections[self.unrolled.original(at)];
+        Ok(Prepared::new(
+            Cow::Owned(photograph),
+            &placed.mesh,
+            self.unrolled.canvas(),
+            (self.curve, correction),
+            self.options,
+        ))
+    }
+}

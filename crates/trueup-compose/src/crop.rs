@@ -1,0 +1,367 @@
+//! Cropping: the part of the canvas that becomes the panorama.
+
+use std::ops::Range;
+
+use nalgebra::Vector2;
+use rayon::prelude::*;
+
+use crate::deformed_grid::DeformedGrid;
+use crate::layout::{self, CanvasLayout, Placed};
+
+trueup_core::choice! {
+    /// What of the canvas is kept.
+    pub enum Crop {
+        /// All that any photograph covers; what none covers is transparent or background.
+        None = "none",
+        /// The largest rectangle without holes if it keeps most of the picture (canvas.min_kept), otherwise all: no head is lost
+        /// for a straight border.
+        Auto = "auto",
+        /// The largest rectangle without holes, however much it costs.
+        Rectangle = "rectangle",
+    }
+}
+
+/// A rectangle of canvas pixels.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rectangle {
+    /// Columns.
+    pub columns: Range<usize>,
+    /// Rows.
+    pub rows: Range<usize>,
+}
+
+impl Rectangle {
+    /// Number of pixels.
+    pub fn area(&self) -> usize {
+        self.columns.len() * self.rows.len()
+    }
+}
+
+/// Which pixels of a canvas some photograph covers wholly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coverage {
+    width: usize,
+    /// For every row disjoint ascending stretches of columns that do not touch.
+    rows: Vec<Vec<Range<usize>>>,
+}
+
+/// Rows of the canvas whose cells are found together.
+const BAND_ROWS: usize = 32;
+
+impl Coverage {
+    /// The pixels that lie wholly inside of at least one photograph's grid.
+    ///
+    /// A grid's outline is followed along the pixel row's upper and lower edge and through its middle; between these, it is taken
+    /// as straight. Time grows with rows and cells, not with pixels.
+    pub fn of(layout: &CanvasLayout) -> Self {
+        let (layout, _) = layout.unrolled(0);
+        let (width, height) = (layout.width, layout.height);
+        let grids: Vec<DeformedGrid> =
+            layout.placed.par_iter().map(|placed| DeformedGrid::new(&placed.mesh, 1.0, false, width, height)).collect();
+        let bands: Vec<Vec<Vec<Range<usize>>>> = (0..height.div_ceil(BAND_ROWS))
+            .into_par_iter()
+            .map(|band| {
+                let rows = band * BAND_ROWS..((band + 1) * BAND_ROWS).min(height);
+                let mut covered = vec![Vec::new(); rows.len()];
+                let mut candidates = Vec::new();
+                for grid in &grids {
+                    grid.cells_in_rows(&(rows.start.saturating_sub(1)..rows.end + 1), &mut candidates);
+                    for (y, covered) in rows.clone().zip(&mut covered) {
+                        covered.extend(whole_pixels(grid, y, &candidates, width));
+                    }
+                }
+                covered.into_iter().map(united).collect()
+            })
+            .collect();
+        Self { width, rows: bands.into_iter().flatten().collect() }
+    }
+
+    /// Number of pixels covered.
+    pub fn area(&self) -> usize {
+        self.rows.iter().flatten().map(Range::len).sum()
+    }
+
+    /// The largest rectangle of covered pixels, the topmost and leftmost of equal ones; empty if nothing is covered.
+    ///
+    /// Heights of covered columns above each row, and the largest rectangle under their outline by a stack: a few
+    /// operations a pixel. Rows whose columns all go on below cannot be a largest rectangle's last, and are only counted.
+    pub fn largest_rectangle(&self) -> Rectangle {
+        let mut best = Rectangle { columns: 0..0, rows: 0..0 };
+        let mut heights = vec![0_usize; self.width];
+        let mut stack: Vec<(usize, usize)> = Vec::new();
+        for (y, stretches) in self.rows.iter().enumerate() {
+            let mut end = 0;
+            for stretch in stretches {
+                heights[end..stretch.start].fill(0);
+                heights[stretch.clone()].iter_mut().for_each(|height| *height += 1);
+                end = stretch.end;
+            }
+            heights[end..].fill(0);
+            if self.rows.get(y + 1).is_some_and(|below| stretches.iter().all(|stretch| lies_within(stretch, below))) {
+                continue;
+            }
+            for stretch in stretches {
+                let tallest = heights[stretch.clone()].iter().copied().max().unwrap_or(0);
+                if tallest * stretch.len() > best.area() {
+                    under_outline(&heights, stretch, y + 1, &mut stack, &mut best);
+                }
+            }
+        }
+        best
+    }
+
+    /// The longest run of rows that are covered over the whole width; empty if there is none.
+    pub fn longest_whole_rows(&self) -> Rectangle {
+        let (mut best, mut start) = (0..0, 0);
+        for (y, stretches) in self.rows.iter().enumerate() {
+            if stretches.len() != 1 || stretches[0] != (0..self.width) {
+                start = y + 1;
+            } else if y + 1 - start > best.len() {
+                best = start..y + 1;
+            }
+        }
+        Rectangle { columns: 0..self.width, rows: best }
+    }
+}
+
+/// Enlarges `best` to the largest rectangle that ends at row `bottom` under the outline of `heights` in `stretch`.
+fn under_outline(
+    heights: &[usize],
+    stretch: &Range<usize>,
+    bottom: usize,
+    stack: &mut Vec<(usize, usize)>,
+    best: &mut Rectangle,
+) {
+    // First column and height of the rectangles that are still open, both ascending.
+    stack.clear();
+    let mut area = best.area();
+    for x in stretch.start..=stretch.end {
+        let height = if x < stretch.end { heights[x] } else { 0 };
+        let mut first = x;
+        while let Some(&(start, open)) = stack.last().filter(|&&(_, open)| open >= height) {
+            stack.pop();
+            first = start;
+            if open * (x - start) > area {
+                area = open * (x - start);
+                *best = Rectangle { columns: start..x, rows: bottom - open..bottom };
+            }
+        }
+        stack.push((first, height));
+    }
+}
+
+fn lies_within(stretch: &Range<usize>, others: &[Range<usize>]) -> bool {
+    let next = others.partition_point(|other| other.end < stretch.end);
+    others.get(next).is_some_and(|other| other.start <= stretch.start && stretch.end <= other.end)
+}
+
+/// The pixels of row `y` that lie wholly within the grid.
+fn whole_pixels(grid: &DeformedGrid, y: usize, candidates: &[u32], width: usize) -> Vec<Range<usize>> {
+    /// Just inside of the row's edges, so that a border along the edge belongs to it.
+    const INSIDE: f64 = 1e-6;
+    let mut common: Option<Vec<Range<usize>>> = None;
+    for line in [y as f64 + INSIDE, y as f64 + 0.5, (y + 1) as f64 - INSIDE] {
+        let stretches = grid.covered_along(line, candidates);
+        let pixels: Vec<Range<usize>> = stretches
+            .into_iter()
+            .map(|[left, right]| {
+                // The casts saturate.
+                let first = (left - INSIDE).ceil().max(0.0) as usize;
+                first..((right + INSIDE).floor().max(0.0) as usize).min(width)
+            })
+            .filter(|pixels| !pixels.is_empty())
+            .collect();
+        common = Some(match common {
+            None => pixels,
+            Some(common) => intersection(&common, &pixels),
+        });
+    }
+    common.unwrap_or_default()
+}
+
+/// Of two ascending lists of stretches what they have in common.
+fn intersection(one: &[Range<usize>], other: &[Range<usize>]) -> Vec<Range<usize>> {
+    let (mut i, mut j) = (0, 0);
+    let mut common = Vec::new();
+    while let (Some(a), Some(b)) = (one.get(i), other.get(j)) {
+        let both = a.start.max(b.start)..a.end.min(b.end);
+        if !both.is_empty() {
+            common.push(both);
+        }
+        if a.end < b.end { i += 1 } else { j += 1 }
+    }
+    common
+}
+
+/// Stretches in any order as disjoint ascending ones that do not touch.
+fn united(mut stretches: Vec<Range<usize>>) -> Vec<Range<usize>> {
+    stretches.sort_unstable_by_key(|stretch| stretch.start);
+    let mut united: Vec<Range<usize>> = Vec::new();
+    for stretch in stretches {
+        match united.last_mut() {
+            Some(last) if stretch.start <= last.end => last.end = last.end.max(stretch.end),
+            _ => united.push(stretch),
+        }
+    }
+    united
+}
+
+/// The rectangle of the canvas that is to be kept; `None` for all of it. Of a full turn, rows alone are cut.
+pub fn choose(layout: &CanvasLayout, crop: Crop, min_kept: f64) -> Option<Rectangle> {
+    if crop == Crop::None {
+        return None;
+    }
+    let coverage = Coverage::of(layout);
+    let rectangle = match layout.period {
+        None => coverage.largest_rectangle(),
+        Some(_) => coverage.longest_whole_rows(),
+    };
+    let enough = match crop {
+        Crop::None => false,
+        Crop::Rectangle => rectangle.area() > 0,
+        Crop::Auto => rectangle.area() > 0 && rectangle.area() as f64 >= min_kept * coverage.area() as f64,
+    };
+    let all = rectangle.columns == (0..layout.width) && rectangle.rows == (0..layout.height);
+    (enough && !all).then_some(rectangle)
+}
+
+/// The layout of a part of its canvas; photographs that show nothing of it are left out.
+pub fn cropped(layout: CanvasLayout, rectangle: &Rectangle) -> CanvasLayout {
+    let shift = [rectangle.columns.start, rectangle.rows.start].map(|start| start as f64);
+    let size = [rectangle.columns.len(), rectangle.rows.len()];
+    let moved = |mut placed: Placed| {
+        for vertex in &mut placed.mesh.target {
+            *vertex = [vertex[0] - shift[0], vertex[1] - shift[1]];
+        }
+        placed
+    };
+    let around = layout.period.is_some();
+    let placed = layout.placed.into_iter().map(moved).filter(|placed| shows(placed, around, size)).collect();
+    let origin = [0, 1].map(|axis| layout.origin[axis] + shift[axis] / layout.canvas_from_target);
+    CanvasLayout { width: size[0], height: size[1], origin, placed, ..layout }
+}
+
+/// Whether a photograph reaches into a canvas of `size` pixels.
+fn shows(placed: &Placed, around: bool, size: [usize; 2]) -> bool {
+    let end = Vector2::new(size[0] as f64, size[1] as f64);
+    layout::shows(&placed.mesh, around, Vector2::zeros(), end)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use trueup_core::mesh::GridMesh;
+
+    use super::*;
+
+    /// Grids of 100 x 60 pixels with their corners (top left, top right, bottom right, bottom left) at the given places.
+    fn layout(width: usize, height: usize, outlines: &[[[f64; 2]; 4]]) -> CanvasLayout {
+        let placed = outlines
+            .iter()
+            .enumerate()
+            .map(|(photograph, corners)| {
+                let mut mesh = GridMesh::regular(100.0, 60.0, 10.0);
+                for vertex in 0..mesh.len() {
+                    let source = mesh.source(vertex);
+                    let (u, v) = (source.x / 100.0, source.y / 60.0);
+                    let shares = [(1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v];
+                    mesh.target[vertex] =
+                        [0, 1].map(|axis| (0..4).map(|corner| corners[corner][axis] * shares[corner]).sum());
+                }
+                Placed { photograph, mesh }
+            })
+            .collect();
+        CanvasLayout { width, height, canvas_from_target: 2.0, origin: [5.0, 7.0], placed, period: None }
+    }
+
+    fn upright(left: f64, top: f64, right: f64, bottom: f64) -> [[f64; 2]; 4] {
+        [[left, top], [right, top], [right, bottom], [left, bottom]]
+    }
+
+    #[test]
+    fn two_steps_leave_the_common_rows() {
+        let steps = layout(190, 70, &[upright(0.0, 0.0, 100.0, 60.0), upright(90.0, 9.5, 190.0, 70.0)]);
+        let coverage = Coverage::of(&steps);
+        assert_eq!(coverage.area(), 100 * 60 + 100 * 60 - 10 * 50);
+        let largest = coverage.largest_rectangle();
+        assert_eq!(largest, Rectangle { columns: 0..190, rows: 10..60 });
+        let kept = cropped(steps.clone(), &largest);
+        assert_eq!((kept.width, kept.height, kept.origin), (190, 50, [5.0, 12.0]));
+        assert_eq!(kept.placed[0].mesh.target[0], [0.0, -10.0]);
+        // 9500 of 11500 pixels.
+        assert_eq!(choose(&steps, Crop::Auto, 0.8), Some(largest.clone()));
+        assert_eq!(choose(&steps, Crop::Auto, 0.9), None);
+        assert_eq!(choose(&steps, Crop::Rectangle, 0.9), Some(largest));
+        assert_eq!(choose(&steps, Crop::None, 0.0), None);
+    }
+
+    /// A square on its corner, 40 in half width: of rectangles inside the largest is a square of side 40.
+    #[test]
+    fn a_slanted_outline_keeps_whole_pixels_only() {
+        let slanted = layout(80, 80, &[[[40.0, 0.0], [80.0, 40.0], [40.0, 80.0], [0.0, 40.0]]]);
+        let largest = Coverage::of(&slanted).largest_rectangle();
+        assert_eq!(largest, Rectangle { columns: 20..60, rows: 20..60 });
+    }
+
+    /// Two photographs around a cylinder of 160 columns: rows are cut where either ends.
+    #[test]
+    fn of_a_full_turn_rows_alone_are_cut() {
+        let mut turn = layout(160, 70, &[upright(-20.0, 0.0, 80.0, 60.0), upright(70.0, 9.5, 170.0, 70.0)]);
+        turn.period = Some(160);
+        let kept = choose(&turn, Crop::Auto, 0.5).expect("whole rows");
+        assert_eq!(kept, Rectangle { columns: 0..160, rows: 10..60 });
+        let kept = cropped(turn, &kept);
+        assert_eq!((kept.width, kept.height, kept.period, kept.placed.len()), (160, 50, Some(160), 2));
+    }
+
+    #[test]
+    fn holes_and_photographs_outside_are_seen() {
+        let hole = layout(
+            120,
+            60,
+            &[
+                upright(0.0, 0.0, 50.0, 60.0),
+                upright(50.0, 0.0, 120.0, 20.0),
+                upright(50.0, 40.0, 120.0, 60.0),
+                upright(70.0, 10.0, 120.0, 50.0),
+            ],
+        );
+        let coverage = Coverage::of(&hole);
+        assert_eq!(coverage.largest_rectangle(), Rectangle { columns: 0..50, rows: 0..60 });
+        assert_eq!(coverage.longest_whole_rows(), Rectangle { columns: 0..120, rows: 0..20 });
+        let kept = cropped(hole, &coverage.largest_rectangle());
+        assert_eq!(kept.placed.len(), 1);
+    }
+
+    fn brute_force(rows: &[Vec<bool>]) -> usize {
+        let (height, width) = (rows.len(), rows[0].len());
+        let mut best = 0;
+        for top in 0..height {
+            for left in 0..width {
+                for bottom in top + 1..=height {
+                    for right in left + 1..=width {
+                        let area = (bottom - top) * (right - left);
+                        if area > best && rows[top..bottom].iter().all(|row| row[left..right].iter().all(|&one| one)) {
+                            best = area;
+                        }
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    proptest! {
+        #[test]
+        fn the_largest_rectangle_is_the_largest(seed in prop::collection::vec(prop::collection::vec(0..5_u8, 9), 8)) {
+            let cells: Vec<Vec<bool>> = seed.iter().map(|row| row.iter().map(|&one| one > 0).collect()).collect();
+            let rows = cells
+                .iter()
+                .map(|row| united((0..9).filter(|&x| row[x]).map(|x| x..x + 1).collect()))
+                .collect();
+            let found = Coverage { width: 9, rows }.largest_rectangle();
+            prop_assert_eq!(found.area(), brute_force(&cells));
+            prop_assert!(cells[found.rows.clone()].iter().all(|row| row[found.columns.clone()].iter().all(|&one| one)));
+        }
+    }
+}

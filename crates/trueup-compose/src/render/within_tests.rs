@@ -1,0 +1,78 @@
+//! Composing within a memory budget.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::tests::{Memory, RamDisk, bits, canvas, moved, noise, rows};
+use super::*;
+
+/// Counts how often photographs are decoded.
+struct Counting(Memory, AtomicUsize);
+
+impl PhotographSource for Counting {
+    fn photograph(&self, index: usize) -> Result<trueup_core::raster::Photograph> {
+        self.1.fetch_add(1, Ordering::Relaxed);
+        self.0.photograph(index)
+    }
+}
+
+const COUNT: usize = 10;
+
+/// Two rows of photographs, over many tiles.
+fn scene() -> (CanvasLayout, Vec<Correction>, Counting) {
+    let placed = (0..COUNT)
+        .map(|i| {
+            let (left, top) = ((i / 2) as f64 * 310.0, (i % 2) as f64 * 190.0);
+            moved(i, 420.0, 260.0, move |p| [p.x + left + 0.02 * p.y, 1.01 * p.y + top + 2e-5 * p.x * p.y])
+        })
+        .collect();
+    let pictures = (0..COUNT).map(|i| {
+        let noise = noise(420, 260, 3);
+        let data = noise.into_data().into_iter().map(|level| level / 4 + 40 + 7 * i as u8).collect();
+        let raster = trueup_core::raster::Raster::from_data(420, 260, 3, data).expect("as many samples");
+        trueup_core::raster::Photograph::Eight(raster)
+    });
+    let corrections = (0..COUNT).map(|i| Correction::uniform(1.0 + 0.01 * i as f64)).collect();
+    (canvas(1670, 460, placed), corrections, Counting(Memory(pictures.collect()), AtomicUsize::new(0)))
+}
+
+fn composed(blend: Blend, memory: usize, disk: &RamDisk, threads: usize) -> Result<(Panorama, usize)> {
+    let (layout, corrections, photographs) = scene();
+    let resources = Resources { memory, ceiling: usize::MAX, scratch: disk };
+    let options = RenderOptions { blend, ..RenderOptions::default() };
+    let seams = SeamOptions::default();
+    let context = StageContext::default();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+    let panorama =
+        pool.install(|| run_within(&resources, &layout, &corrections, &photographs, (&options, &seams), &context))?;
+    Ok((panorama, photographs.1.load(Ordering::Relaxed)))
+}
+
+#[test]
+fn the_budget_does_not_show_in_the_panorama() {
+    for blend in [Blend::MultiBand, Blend::None, Blend::Feather, Blend::Average] {
+        let disk = RamDisk::default();
+        let (free, decoded) = composed(blend, usize::MAX, &disk, 3).expect("no limit");
+        assert_eq!((disk.length(), decoded), (0, COUNT));
+        let (free_bits, free_rows) = (bits(&free), rows(&free));
+        for threads in [1, 3] {
+            let disk = RamDisk::default();
+            let (tight, decoded) = composed(blend, 1, &disk, threads).expect("the least");
+            assert!(disk.length() >= 1670 * 460 * 8, "{blend:?}: the canvas is in the file");
+            assert!(decoded > COUNT, "{blend:?}: photographs are decoded again");
+            assert!(bits(&tight) == free_bits, "{blend:?}, {threads} threads");
+            assert!(rows(&tight) == free_rows, "{blend:?}, {threads} threads");
+            assert_eq!(tight.seams(), free.seams());
+        }
+    }
+}
+
+#[test]
+fn a_full_disk_stops_the_work_with_a_reason() {
+    for blend in [Blend::MultiBand, Blend::None, Blend::Feather] {
+        for room in [0, 1_000_000, 5_000_000] {
+            let disk = RamDisk { room, ..RamDisk::default() };
+            let Err(error) = composed(blend, 1, &disk, 2) else { panic!("{blend:?} in {room} bytes") };
+            assert!(matches!(error, Error::Io { .. }), "{error}");
+        }
+    }
+}

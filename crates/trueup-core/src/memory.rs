@@ -1,0 +1,134 @@
+//! Amounts of memory: how users write them, and the option that limits it.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::options::OptionValue;
+
+/// Units, the largest first: name in lower case and bytes. The first three are those that amounts are shown in.
+const UNITS: [(&str, f64); 9] = [
+    ("gb", 1e9),
+    ("mb", 1e6),
+    ("kb", 1e3),
+    ("gib", 1_073_741_824.0),
+    ("mib", 1_048_576.0),
+    ("kib", 1024.0),
+    ("tb", 1e12),
+    ("g", 1e9),
+    ("m", 1e6),
+];
+
+/// A number of bytes for people: `750 MB`, `8.1 GB`.
+pub fn bytes_in_words(bytes: u64) -> String {
+    let bytes = bytes as f64;
+    // What would round to a thousand of a unit is one of the next.
+    const NEXT_UNIT: f64 = 999.5;
+    if bytes >= NEXT_UNIT * 1e6 {
+        format!("{:.1} GB", bytes / 1e9)
+    } else if bytes >= NEXT_UNIT * 1e3 {
+        format!("{:.0} MB", bytes / 1e6)
+    } else {
+        format!("{:.0} kB", (bytes / 1e3).ceil())
+    }
+}
+
+/// How much memory the work may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MemoryBudget {
+    /// A share of the machine's.
+    #[default]
+    Auto,
+    /// So many bytes.
+    Bytes(u64),
+}
+
+impl FromStr for MemoryBudget {
+    type Err = String;
+
+    /// `auto`, or a number with a unit: `2GB`, `512 MB`, `1.5GiB`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let text = text.trim().to_ascii_lowercase();
+        if text == "auto" {
+            return Ok(Self::Auto);
+        }
+        let digits = text.find(|one: char| one.is_ascii_alphabetic()).unwrap_or(text.len());
+        let (number, unit) = (text[..digits].trim(), &text[digits..]);
+        let number: Option<f64> = number.parse().ok().filter(|number: &f64| number.is_finite() && *number > 0.0);
+        let unit = UNITS.iter().find(|(name, _)| *name == unit);
+        match (number, unit) {
+            // The cast saturates.
+            (Some(number), Some((_, bytes))) => Ok(Self::Bytes((number * bytes) as u64)),
+            _ => Err(format!("\"{text}\" is no amount of memory; write auto, or one such as 2GB or 512MB")),
+        }
+    }
+}
+
+impl fmt::Display for MemoryBudget {
+    /// As it can be read again.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => formatter.write_str("auto"),
+            Self::Bytes(bytes) => write!(formatter, "{}MB", *bytes as f64 / 1e6),
+        }
+    }
+}
+
+impl Serialize for MemoryBudget {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for MemoryBudget {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+impl OptionValue for MemoryBudget {
+    fn display(&self) -> String {
+        self.to_string()
+    }
+
+    fn choices() -> &'static [&'static str] {
+        &["auto", "2GB", "512MB", "..."]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn amounts_are_read_as_people_write_them() {
+        for (text, bytes) in [
+            ("2GB", 2_000_000_000),
+            ("512 mb", 512_000_000),
+            ("1.5GiB", 1_610_612_736),
+            ("2g", 2_000_000_000),
+            ("64KiB", 65_536),
+            ("0.001TB", 1_000_000_000),
+        ] {
+            assert_eq!(text.parse(), Ok(MemoryBudget::Bytes(bytes)), "{text}");
+        }
+        assert_eq!("Auto".parse(), Ok(MemoryBudget::Auto));
+        for text in ["", "2", "GB", "-1GB", "0MB", "2 bytes", "infGB", "nanMB", "1e400GB"] {
+            assert!(text.parse::<MemoryBudget>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_shown_can_be_read_again() {
+        for budget in [MemoryBudget::Auto, MemoryBudget::Bytes(1_234_567_000), MemoryBudget::Bytes(7)] {
+            assert_eq!(budget.to_string().parse(), Ok(budget));
+        }
+    }
+
+    #[test]
+    fn amounts_are_shown_with_the_unit_that_fits() {
+        let shown = [0, 1, 999_499, 999_500, 8_400_000, 999_600_000, 8_123_000_000].map(bytes_in_words);
+        assert_eq!(shown, ["0 kB", "1 kB", "1000 kB", "1 MB", "8 MB", "1.0 GB", "8.1 GB"]);
+    }
+}

@@ -1,0 +1,176 @@
+//! Samples on their way from a picture into a file, at any depth.
+
+use trueup_core::Result;
+use trueup_core::raster::RowSource;
+
+use super::Background;
+
+/// A sample of a picture that is written. Pixels are RGBA with straight alpha.
+pub(super) trait Sample: Copy + Default + PartialEq + Send + Sync + 'static {
+    /// Bits in the file.
+    const BITS: u16;
+    /// Whether samples are floating point numbers.
+    const IS_FLOAT: bool;
+
+    /// Row `y` of a picture, `4 * width` samples.
+    fn row(picture: &dyn RowSource, y: usize, row: &mut [Self]) -> Result<()>;
+
+    /// The mean of four pixels, each weighted by its alpha.
+    fn mean(pixels: [[Self; 4]; 4]) -> [Self; 4];
+
+    /// A pixel laid over a background of one value.
+    fn over(pixel: [Self; 4], background: Self) -> [Self; 3];
+
+    /// The value of a background.
+    fn of(background: Background) -> Self;
+
+    /// Appends a row of samples as they are, in the machine's order of bytes.
+    fn append(row: &[Self], bytes: &mut Vec<u8>);
+
+    /// Appends a row of samples as differences from the pixel to the left, `channels` samples away.
+    fn append_differences(row: &[Self], channels: usize, bytes: &mut Vec<u8>);
+}
+
+macro_rules! whole_sample {
+    ($type:ty, $wide:ty, $row:ident) => {
+        impl Sample for $type {
+            const BITS: u16 = <$type>::BITS as u16;
+            const IS_FLOAT: bool = false;
+
+            fn row(picture: &dyn RowSource, y: usize, row: &mut [Self]) -> Result<()> {
+                picture.$row(y, row)
+            }
+
+            #[inline]
+            fn mean(pixels: [[Self; 4]; 4]) -> [Self; 4] {
+                let sum = |channel: usize| pixels.iter().map(|pixel| <$wide>::from(pixel[channel])).sum::<$wide>();
+                let alphas = sum(3);
+                let alpha = ((alphas + 2) / 4) as $type;
+                let color = |channel: usize| -> $type {
+                    if alphas == 4 * <$wide>::from(<$type>::MAX) {
+                        return ((sum(channel) + 2) / 4) as $type;
+                    }
+                    let weighted = |pixel: &[Self; 4]| <$wide>::from(pixel[channel]) * <$wide>::from(pixel[3]);
+                    ((pixels.iter().map(weighted).sum::<$wide>() + alphas / 2) / alphas) as $type
+                };
+                if alpha == 0 { [0; 4] } else { [color(0), color(1), color(2), alpha] }
+            }
+
+            #[inline]
+            fn over([r, g, b, alpha]: [Self; 4], background: Self) -> [Self; 3] {
+                const FULL: $wide = <$type>::MAX as $wide;
+                let (alpha, background) = (<$wide>::from(alpha), <$wide>::from(background));
+                // Rounded division.
+                [r, g, b].map(|value| {
+                    ((<$wide>::from(value) * alpha + background * (FULL - alpha) + FULL / 2) / FULL) as $type
+                })
+            }
+
+            fn of(background: Background) -> Self {
+                // From 8 bits to as many as there are: 255 becomes the largest value.
+                <$type>::from(background.value()) * (<$type>::MAX / <$type>::from(u8::MAX))
+            }
+
+            fn append(row: &[Self], bytes: &mut Vec<u8>) {
+                bytes.extend(row.iter().flat_map(|sample| sample.to_ne_bytes()));
+            }
+
+            fn append_differences(row: &[Self], channels: usize, bytes: &mut Vec<u8>) {
+                let (first, rest) = row.split_at(channels.min(row.len()));
+                Self::append(first, bytes);
+                bytes.extend(rest.iter().zip(row).flat_map(|(value, left)| value.wrapping_sub(*left).to_ne_bytes()));
+            }
+        }
+    };
+}
+whole_sample!(u8, u32, rgba8_row);
+whole_sample!(u16, u64, rgba16_row);
+
+/// Linear light.
+impl Sample for f32 {
+    const BITS: u16 = 32;
+    const IS_FLOAT: bool = true;
+
+    fn row(picture: &dyn RowSource, y: usize, row: &mut [Self]) -> Result<()> {
+        picture.linear_row(y, row)
+    }
+
+    #[inline]
+    fn mean(pixels: [[Self; 4]; 4]) -> [Self; 4] {
+        let alphas: f32 = pixels.iter().map(|pixel| pixel[3]).sum();
+        if alphas <= 0.0 {
+            return [0.0; 4];
+        }
+        let color = |channel: usize| pixels.iter().map(|pixel| pixel[channel] * pixel[3]).sum::<f32>() / alphas;
+        [color(0), color(1), color(2), alphas / 4.0]
+    }
+
+    #[inline]
+    fn over([r, g, b, alpha]: [Self; 4], background: Self) -> [Self; 3] {
+        [r, g, b].map(|value| value * alpha + background * (1.0 - alpha))
+    }
+
+    fn of(background: Background) -> Self {
+        /// Linear light of the 8-bit level 128 (IEC 61966-2-1:1999, equation 6).
+        const MIDDLE_GRAY: f32 = 0.215_861;
+        match background {
+            Background::Black => 0.0,
+            Background::Gray => MIDDLE_GRAY,
+            Background::White => 1.0,
+        }
+    }
+
+    fn append(row: &[Self], bytes: &mut Vec<u8>) {
+        bytes.extend(row.iter().flat_map(|sample| sample.to_ne_bytes()));
+    }
+
+    /// The most significant bytes of all samples, then the next, and so on; of these bytes the differences.
+    ///
+    /// # Source
+    /// Adobe Photoshop TIFF Technical Note 3 (2005).
+    fn append_differences(row: &[Self], channels: usize, bytes: &mut Vec<u8>) {
+        let plane = |index: usize| row.iter().map(move |sample| sample.to_be_bytes()[index]);
+        let planes: Vec<u8> = (0..size_of::<Self>()).flat_map(plane).collect();
+        u8::append_differences(&planes, channels, bytes);
+    }
+}
+
+/// A row of RGBA as it is written: with `channels` 4 as it is, with 3 laid over the background. Replaces `out`.
+pub(super) fn flattened<S: Sample>(rgba: &[S], channels: usize, background: S, out: &mut Vec<S>) {
+    out.clear();
+    match channels {
+        4 => out.extend_from_slice(rgba),
+        _ => out.extend(rgba.as_chunks::<4>().0.iter().flat_map(|&pixel| S::over(pixel, background))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_weigh_by_alpha() {
+        let opaque = [[10_u8, 20, 30, 255], [20, 20, 30, 255], [30, 20, 30, 255], [42, 20, 31, 255]];
+        assert_eq!(u8::mean(opaque), [26, 20, 30, 255]);
+        let half = [[200_u16, 100, 0, 65535], [9999, 9999, 9999, 0], [100, 300, 0, 65535], [7, 7, 7, 0]];
+        assert_eq!(u16::mean(half), [150, 200, 0, 32768]);
+        assert_eq!(u8::mean([[9, 9, 9, 0]; 4]), [0; 4]);
+        assert_eq!(f32::mean([[2.0, 0.5, 0.0, 1.0], [0.0; 4], [4.0, 0.5, 0.0, 1.0], [0.0; 4]]), [3.0, 0.5, 0.0, 0.5]);
+    }
+
+    #[test]
+    fn transparent_parts_show_the_background() {
+        assert_eq!(u8::over([200, 100, 0, 255], 128), [200, 100, 0]);
+        assert_eq!(u16::over([9, 9, 9, 0], u16::of(Background::White)), [65535; 3]);
+        assert_eq!(u16::of(Background::Gray), 128 * 257);
+        assert_eq!(f32::over([1.0, 0.5, 0.0, 0.5], 1.0), [1.0, 0.75, 0.5]);
+    }
+
+    /// The bytes of two pixels of one channel: 1.0 is 3f800000, -2.0 is c0000000.
+    #[test]
+    fn floats_are_differenced_plane_by_plane() {
+        let mut bytes = Vec::new();
+        f32::append_differences(&[1.0, -2.0], 1, &mut bytes);
+        assert_eq!(bytes, [0x3f, 0x81, 0xc0, 0x80, 0, 0, 0, 0]);
+    }
+}

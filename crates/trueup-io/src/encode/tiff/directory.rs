@@ -1,0 +1,172 @@
+//! The directory of a page of a TIFF.
+
+use std::io::{Seek, Write};
+
+use tiff::encoder::{DirectoryEncoder, Rational, TiffKind};
+use tiff::tags::{
+    CompressionMethod, ExtraSamples, PhotometricInterpretation, PlanarConfiguration, Predictor, ResolutionUnit,
+    SampleFormat, Tag,
+};
+
+use super::blocks::{BlockForm, Stored};
+use crate::encode::samples::Sample;
+use crate::encode::tiff_metadata::{Ascii, Hanging, write_tags};
+use crate::encode::{Failure, Metadata, RGBA, from_tiff};
+
+/// How a page is cut into blocks.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Blocks {
+    /// Strips of so many rows.
+    Strips(usize),
+    /// Square tiles of this side.
+    Tiles(usize),
+}
+
+/// What a page is, beside its pixels.
+#[derive(Clone, Copy)]
+pub(super) struct Page<'a> {
+    pub(super) width: u32,
+    pub(super) height: u32,
+    /// Whether it is a smaller copy of the page before.
+    pub(super) is_reduced: bool,
+    pub(super) blocks: Blocks,
+    pub(super) form: BlockForm,
+    pub(super) place: Option<&'a Place<'a>>,
+    /// What it tells beside its pixels.
+    pub(super) metadata: Option<(&'a Metadata, &'a Hanging)>,
+}
+
+/// Where a page lies among others.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place<'a> {
+    pub(super) name: &'a str,
+    /// Number of the page, from 0, and of all.
+    pub(super) number: [u16; 2],
+    /// Its corner in the whole picture, in pixels.
+    pub(super) corner: [u32; 2],
+    /// Size of the whole picture.
+    pub(super) whole: [u32; 2],
+}
+
+/// Pixels per inch that pages with a place state: the place is told in inches, as a fraction with this denominator, which
+/// gives back whole pixels.
+const PIXELS_PER_INCH: u32 = 72;
+
+/// Tags of TIFF 6.0 section 12 that the `tiff` crate has no names for.
+const PAGE_NAME: Tag = Tag::Unknown(285);
+const X_POSITION: Tag = Tag::Unknown(286);
+const Y_POSITION: Tag = Tag::Unknown(287);
+const PAGE_NUMBER: Tag = Tag::Unknown(297);
+/// Size of the picture that a page was cropped from: tags that Pixar registered and stitchers use.
+const FULL_WIDTH: Tag = Tag::Unknown(33300);
+const FULL_HEIGHT: Tag = Tag::Unknown(33301);
+
+/// NewSubfileType of a smaller copy of another page, and of one of several pages (TIFF 6.0 section 8).
+const REDUCED: u32 = 1;
+const ONE_OF_SEVERAL: u32 = 2;
+
+/// Writes the directory of a page whose pixels are in the file.
+pub(super) fn write_directory<S: Sample, W: Write + Seek, K: TiffKind>(
+    mut directory: DirectoryEncoder<'_, W, K>,
+    page: Page<'_>,
+    stored: &Stored,
+) -> Result<(), Failure> {
+    let channels = page.form.channels;
+    let (method, predictor) = match page.form.deflate {
+        true if S::IS_FLOAT => (CompressionMethod::Deflate, Predictor::FloatingPoint),
+        true => (CompressionMethod::Deflate, Predictor::Horizontal),
+        false => (CompressionMethod::None, Predictor::None),
+    };
+    let codes = [
+        (Tag::Compression, method.to_u16()),
+        (Tag::Predictor, predictor.to_u16()),
+        (Tag::PhotometricInterpretation, PhotometricInterpretation::RGB.to_u16()),
+        (Tag::SamplesPerPixel, channels as u16),
+        (Tag::PlanarConfiguration, PlanarConfiguration::Chunky.to_u16()),
+    ];
+    for (tag, code) in codes {
+        directory.write_tag(tag, code).map_err(from_tiff)?;
+    }
+    if channels == RGBA {
+        directory.write_tag(Tag::ExtraSamples, ExtraSamples::UnassociatedAlpha.to_u16()).map_err(from_tiff)?;
+    }
+    let subfile = match (page.is_reduced, page.place) {
+        (true, _) => REDUCED,
+        (false, Some(_)) => ONE_OF_SEVERAL,
+        (false, None) => 0,
+    };
+    let sizes = [(Tag::NewSubfileType, subfile), (Tag::ImageWidth, page.width), (Tag::ImageLength, page.height)];
+    for (tag, size) in sizes {
+        directory.write_tag(tag, size).map_err(from_tiff)?;
+    }
+    directory.write_tag(Tag::BitsPerSample, &vec![S::BITS; channels][..]).map_err(from_tiff)?;
+    let sample_format = if S::IS_FLOAT { SampleFormat::IEEEFP } else { SampleFormat::Uint };
+    directory.write_tag(Tag::SampleFormat, &vec![sample_format; channels][..]).map_err(from_tiff)?;
+    write_blocks(&mut directory, page.blocks, stored)?;
+    if let Some(place) = page.place {
+        write_place(&mut directory, place)?;
+    }
+    if let Some((metadata, hanging)) = page.metadata {
+        // A profile describes encoded samples; floating point numbers are linear light.
+        write_tags(&mut directory, metadata, hanging, !S::IS_FLOAT).map_err(from_tiff)?;
+    }
+    directory.finish().map_err(from_tiff)
+}
+
+fn write_blocks<W: Write + Seek, K: TiffKind>(
+    directory: &mut DirectoryEncoder<'_, W, K>,
+    blocks: Blocks,
+    stored: &Stored,
+) -> Result<(), Failure> {
+    let (offsets, lengths) = match blocks {
+        Blocks::Strips(rows) => {
+            directory.write_tag(Tag::RowsPerStrip, rows as u32).map_err(from_tiff)?;
+            (Tag::StripOffsets, Tag::StripByteCounts)
+        }
+        Blocks::Tiles(side) => {
+            directory.write_tag(Tag::TileWidth, side as u32).map_err(from_tiff)?;
+            directory.write_tag(Tag::TileLength, side as u32).map_err(from_tiff)?;
+            (Tag::TileOffsets, Tag::TileByteCounts)
+        }
+    };
+    write_numbers(directory, offsets, &stored.offsets)?;
+    write_numbers(directory, lengths, &stored.lengths)
+}
+
+/// Writes offsets or lengths in 32 bits where they fit, as classic TIFF demands, else in 64.
+fn write_numbers<W: Write + Seek, K: TiffKind>(
+    directory: &mut DirectoryEncoder<'_, W, K>,
+    tag: Tag,
+    values: &[u64],
+) -> Result<(), Failure> {
+    let short: Result<Vec<u32>, _> = values.iter().map(|&value| u32::try_from(value)).collect();
+    match short {
+        Ok(values) => directory.write_tag(tag, &values[..]),
+        Err(_) => directory.write_tag(tag, values),
+    }
+    .map_err(from_tiff)
+}
+
+fn write_place<W: Write + Seek, K: TiffKind>(
+    directory: &mut DirectoryEncoder<'_, W, K>,
+    place: &Place<'_>,
+) -> Result<(), Failure> {
+    let resolution = Rational { n: PIXELS_PER_INCH, d: 1 };
+    let inches = |pixels: u32| Rational { n: pixels, d: PIXELS_PER_INCH };
+    let rationals = [
+        (Tag::XResolution, resolution.clone()),
+        (Tag::YResolution, resolution),
+        (X_POSITION, inches(place.corner[0])),
+        (Y_POSITION, inches(place.corner[1])),
+    ];
+    for (tag, value) in rationals {
+        directory.write_tag(tag, value).map_err(from_tiff)?;
+    }
+    directory.write_tag(Tag::ResolutionUnit, ResolutionUnit::Inch).map_err(from_tiff)?;
+    directory.write_tag(PAGE_NUMBER, &place.number[..]).map_err(from_tiff)?;
+    directory.write_tag(FULL_WIDTH, place.whole[0]).map_err(from_tiff)?;
+    directory.write_tag(FULL_HEIGHT, place.whole[1]).map_err(from_tiff)?;
+    // Names beyond ASCII are written in UTF-8, as programs do although the standard has no word for it.
+    let bytes: Vec<u8> = place.name.bytes().filter(|&byte| byte != 0).chain([0]).collect();
+    directory.write_tag(PAGE_NAME, Ascii(bytes)).map_err(from_tiff)
+}
