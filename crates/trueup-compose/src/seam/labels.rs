@@ -180,11 +180,11 @@ impl Seams {
         let reach = full.div_ceil(self.width) + 1;
         let (start, length) = (columns.start + full - reach % full, columns.len() + 2 * reach);
         if length >= full {
-            return vec![0..full];
+            return Vec::from([0..full]);
         }
         let start = start % full;
         let end = start + length;
-        if end <= full { vec![start..end] } else { vec![start..full, 0..end - full] }
+        if end <= full { Vec::from([start..end]) } else { Vec::from([start..full, 0..end - full]) }
     }
 
     /// Adds the photographs that a box of this canvas may show to those `found`.
