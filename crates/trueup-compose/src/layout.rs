@@ -112,7 +112,7 @@ pub fn run_around(
             (Vector2::new(left, low.y), Vector2::new(period, high.y - low.y))
         }
     };
-    if period.is_some_and(|period| !(period > 0.0)) {
+    if period.is_some_and(|period| period.is_nan() || period <= 0.0) {
         return Err(Error::unsolvable(STAGE, "the canvas", "its period is not a length", "Choose another method."));
     }
     if !extent.max().is_finite() {
