@@ -117,7 +117,6 @@ pub fn run_around(
             "Choose another reference or another method.",
         ));
     }
-<<<<<<< HEAD
     let frame = Frame { canvas_from_target: options.scale / pixel_scale, window: None, period };
     framed(placed, &frame, options, context)
 }
@@ -150,17 +149,6 @@ pub fn framed(
     }
     let (mut low, mut high) = bounds(&placed);
     if frame.period.is_some_and(|period| period.is_nan() || period <= 0.0) {
-=======
-    let (low, high) = bounds(&placed);
-    let (low, extent) = match period {
-        None => (low, high - low),
-        Some(period) => {
-            let left = 0.5 * (low.x + high.x - period);
-            (Vector2::new(left, low.y), Vector2::new(period, high.y - low.y))
-        }
-    };
-    if period.is_some_and(|period| period.is_nan() || period <= 0.0) {
->>>>>>> turn
         return Err(Error::unsolvable(STAGE, "the canvas", "its period is not a length", "Choose another method."));
     }
     if let Some(period) = frame.period {

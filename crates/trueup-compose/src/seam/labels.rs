@@ -162,11 +162,7 @@ impl Seams {
         let high = |at: usize, of: usize, full: usize| (at * of / full + 2).min(of);
         let rows = low(rows.start, self.height, full[1])..high(rows.end, self.height, full[1]);
         let mut found: Vec<Label> = Vec::new();
-<<<<<<< HEAD
         for columns in self.in_first_turn(columns, full[0]).iter().filter(|columns| !columns.is_empty()) {
-=======
-        for columns in self.in_first_turn(columns, full[0]).into_iter().filter(|part| !part.is_empty()) {
->>>>>>> turn
             let columns = low(columns.start, self.width, full[0])..high(columns.end, self.width, full[0]);
             self.add_shown_in(&columns, &rows, &mut found);
         }
@@ -174,11 +170,7 @@ impl Seams {
         found
     }
 
-<<<<<<< HEAD
     /// The columns of the first turn that are meant by `columns`, in one part or two, the second empty if there is none. Where they meet an end, a pixel of
-=======
-    /// The columns of the first turn that are meant by `columns`, in two parts, of which the second may be empty. Where they meet an end, a pixel of
->>>>>>> turn
     /// the other end is among them.
     fn in_first_turn(&self, columns: &Range<usize>, full: usize) -> [Range<usize>; 2] {
         if self.turn == 0 {
@@ -192,11 +184,7 @@ impl Seams {
         }
         let start = start % full;
         let end = start + length;
-<<<<<<< HEAD
         if end <= full { [start..end, 0..0] } else { [start..full, 0..end - full] }
-=======
-        [start..end.min(full), 0..end.saturating_sub(full)]
->>>>>>> turn
     }
 
     /// Adds the photographs that a box of this canvas may show to those `found`.
