@@ -68,7 +68,8 @@ fn overlaps_across_the_ends_of_a_full_turn_count() {
     };
     let rasters = [picture(0, 1.0), picture(300, 0.7)];
     let frame = WorkingFrame::new(WIDTH, HEIGHT, 480_000.0);
-    let thumbnails: Vec<Thumbnail> = rasters.iter().map(|raster| Thumbnail { raster, frame, camera: 0 }).collect();
+    let thumbnails: Vec<Thumbnail> =
+        rasters.iter().map(|raster| Thumbnail { raster, curve: &TransferCurve::SRGB, frame, camera: 0 }).collect();
     let options = ExposureOptions { model: ExposureModel::Gain, ..ExposureOptions::default() };
     let flat = layout(&[0.0, 300.0]);
     for (shifts, swapped) in
