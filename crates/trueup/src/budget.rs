@@ -157,7 +157,7 @@ mod tests {
         };
         let message = refused("100MB").expect("too little");
         assert!(
-            message.contains("0.jpg (6000 x 4000 px): at least 403 MB of memory needed, 100 MB allowed"),
+            message.contains("2.jpg (6000 x 4000 px): at least 403 MB of memory needed, 100 MB allowed"),
             "{message}"
         );
         assert_eq!(refused("404MB"), None);
