@@ -30,6 +30,27 @@ fn the_same_options_give_the_same_bytes() {
     assert_eq!(without_seconds("pano.json"), without_seconds("again.json"));
 }
 
+/// Composing with a view gives what stitching with it does, from projects of the same view, of none, and cropped.
+#[test]
+fn views_and_what_lies_beside_a_panorama_come_out_as_stitched() {
+    let desk = stitched();
+    let view = ["--projection", "equirectangular", "--yaw", "5", "--crop", "rectangle", "--depth", "8"];
+    let stitched =
+        [&["stitch", "-o", "view.jpg", "--scale", "0.5", "--project", "view.json"], &STREET_NAMES[..], &view];
+    finish(trueup(desk.path(), &stitched.concat())).expect_success();
+    let beside = ["--layers", "layers.tif", "--seams", "seams.png", "--pto", "again.pto"];
+    compose(&desk, &[&view[..], &beside].concat()).expect_success();
+    assert!(desk.read("view.jpg") == desk.read("again.jpg"), "from the mesh's project");
+    assert!(beside.chunks(2).all(|flag| desk.join(flag[1]).is_file()));
+    finish(trueup(desk.path(), &["compose", "view.json", "-o", "again.jpg"])).expect_success();
+    assert!(desk.read("view.jpg") == desk.read("again.jpg"), "from its own project");
+
+    compose(&desk, &["--crop", "rectangle", "--project", "cropped.json"]).expect_success();
+    assert!(desk.read("pano.jpg") != desk.read("again.jpg"));
+    finish(trueup(desk.path(), &["compose", "cropped.json", "-o", "third.jpg"])).expect_success();
+    assert!(desk.read("again.jpg") == desk.read("third.jpg"), "from the cropped project");
+}
+
 #[test]
 fn other_options_of_composing_are_heeded_and_others_refused() {
     let desk = stitched();

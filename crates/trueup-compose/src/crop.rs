@@ -135,8 +135,9 @@ fn under_outline(
     // First column and height of the rectangles that are still open, both ascending.
     stack.clear();
     let mut area = best.area();
-    for x in stretch.start..=stretch.end {
-        let height = if x < stretch.end { heights[x] } else { 0 };
+    // Behind the last column everything closes.
+    let outline = heights[stretch.clone()].iter().copied().chain([0]);
+    for (x, height) in (stretch.start..).zip(outline) {
         let mut first = x;
         while let Some(&(start, open)) = stack.last().filter(|&&(_, open)| open >= height) {
             stack.pop();

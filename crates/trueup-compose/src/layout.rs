@@ -148,7 +148,7 @@ pub fn framed(
         check_mesh(item)?;
     }
     let (mut low, mut high) = bounds(&placed);
-    if frame.period.is_some_and(|period| !(period > 0.0)) {
+    if frame.period.is_some_and(|period| period.is_nan() || period <= 0.0) {
         return Err(Error::unsolvable(STAGE, "the canvas", "its period is not a length", "Choose another method."));
     }
     if let Some(period) = frame.period {

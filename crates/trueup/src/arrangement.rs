@@ -342,7 +342,8 @@ mod tests {
         assert_eq!((frame.full_height, frame.top), (1000, 300));
         assert!(sphere(&view(FlatKind::Panini), &canvas(10, 10, [0.0; 2])).is_none());
         // What rounding adds at the end is part of the whole.
-        let ending = sphere(&view(FlatKind::Equirectangular), &canvas(6284, 3143, [-std::f64::consts::PI, -1.5708]));
+        let corner = [-std::f64::consts::PI, -std::f64::consts::FRAC_PI_2];
+        let ending = sphere(&view(FlatKind::Equirectangular), &canvas(6284, 3143, corner));
         assert!(ending.expect("a sphere").holds(6284, 3143));
     }
 

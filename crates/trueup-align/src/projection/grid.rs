@@ -190,8 +190,9 @@ impl<'a> Drawing<'a> {
             let (low, high) = mesh.bounds();
             for turns in [0.0, -1.0, 1.0] {
                 let shift = turns * TAU;
-                let seen = low.x + shift < view.half[0] && high.x + shift > -view.half[0];
-                if if self.placement.closed { turns == 0.0 } else { seen } {
+                let in_view = low.x + shift < view.half[0] && high.x + shift > -view.half[0];
+                let wanted = if self.placement.closed { turns == 0.0 } else { in_view };
+                if wanted {
                     let mut mesh = mesh.clone();
                     mesh.target.iter_mut().for_each(|vertex| vertex[0] += shift);
                     grids.push(mesh);

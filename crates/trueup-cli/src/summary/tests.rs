@@ -44,6 +44,15 @@ time      2.5 s: render 2.0, features 0.5
 }
 
 #[test]
+fn a_full_turn_is_said_beside_the_size() {
+    let mut project = project();
+    // Files that do not say so are of panoramas with two ends.
+    assert!(!project.canvas.full_turn);
+    project.canvas.full_turn = true;
+    assert!(text(&project, None, false).starts_with("panorama  70 x 31 px, a full turn: the ends meet\n"));
+}
+
+#[test]
 fn the_long_summary_adds_pictures_pairs_notes_and_stages() {
     let long = text(&project(), None, true);
     for part in [

@@ -32,7 +32,7 @@ impl<'a> Unrolled<'a> {
         // than two more, and rims of photographs are at most a few finer ones wide.
         const REACH: usize = 5;
         let lead = match (layout.period, levels) {
-            (Some(_), Some(levels)) => ((REACH + JOINED) << (first_level + levels)) + (2 * AS_ONE << first_level),
+            (Some(_), Some(levels)) => ((REACH + JOINED) << (first_level + levels)) + ((2 * AS_ONE) << first_level),
             _ => 0,
         };
         let (unrolled, originals) = layout.unrolled(lead);

@@ -73,7 +73,7 @@ trueup_core::options! {
         blend: Blend = Blend::MultiBand, Allowed::Any, "";
         /// Widest transition of multi-band blending, as a share of the photographs' shorter side on the canvas. Higher
         /// evens out more of what differs in brightness and colour.
-        transition: f64 = 0.25, between(0.0, 1.0), "";
+        transition: f64 = 0.1, between(0.0, 1.0), "";
         /// Power of the feather weight. Higher values let the photograph that lies deepest prevail, which shortens the
         /// transition and with it ghosts; 1 blends over the whole overlap.
         feather_exponent: f64 = 3.0, between(0.1, 16.0), "";

@@ -162,7 +162,7 @@ impl Seams {
         let high = |at: usize, of: usize, full: usize| (at * of / full + 2).min(of);
         let rows = low(rows.start, self.height, full[1])..high(rows.end, self.height, full[1]);
         let mut found: Vec<Label> = Vec::new();
-        for columns in self.in_first_turn(columns, full[0]) {
+        for columns in self.in_first_turn(columns, full[0]).iter().filter(|columns| !columns.is_empty()) {
             let columns = low(columns.start, self.width, full[0])..high(columns.end, self.width, full[0]);
             self.add_shown_in(&columns, &rows, &mut found);
         }
@@ -170,21 +170,21 @@ impl Seams {
         found
     }
 
-    /// The columns of the first turn that are meant by `columns`, in at most two parts. Where they meet an end, a pixel of
+    /// The columns of the first turn that are meant by `columns`, in one part or two, the second empty if there is none. Where they meet an end, a pixel of
     /// the other end is among them.
-    fn in_first_turn(&self, columns: &Range<usize>, full: usize) -> Vec<Range<usize>> {
+    fn in_first_turn(&self, columns: &Range<usize>, full: usize) -> [Range<usize>; 2] {
         if self.turn == 0 {
-            return vec![columns.clone()];
+            return [columns.clone(), 0..0];
         }
         // A pixel of the small canvas more on both sides: labels are read between pixels.
         let reach = full.div_ceil(self.width) + 1;
         let (start, length) = (columns.start + full - reach % full, columns.len() + 2 * reach);
         if length >= full {
-            return vec![0..full];
+            return [0..full, 0..0];
         }
         let start = start % full;
         let end = start + length;
-        if end <= full { vec![start..end] } else { vec![start..full, 0..end - full] }
+        if end <= full { [start..end, 0..0] } else { [start..full, 0..end - full] }
     }
 
     /// Adds the photographs that a box of this canvas may show to those `found`.

@@ -59,8 +59,12 @@ impl RowSource for InSrgb<'_> {
     fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
         let mut sixteen = vec![0; row.len()];
         self.rgba16_row(y, &mut sixteen)?;
-        for (target, sample) in row.iter_mut().zip(sixteen) {
-            *target = ((u32::from(sample) + 128) / 257) as u8;
+        for (target, samples) in row.as_chunks_mut::<4>().0.iter_mut().zip(sixteen.as_chunks::<4>().0) {
+            *target = samples.map(|sample| ((u32::from(sample) + 128) / 257) as u8);
+            // What is too little for 8 bits of alpha has no colour, as in the picture itself.
+            if target[3] == 0 {
+                *target = [0; 4];
+            }
         }
         Ok(())
     }
