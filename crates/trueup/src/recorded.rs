@@ -69,7 +69,11 @@ impl Recorded {
         };
         let pixels = width as f64 * height as f64;
         let strays = meshes.iter().any(|mesh| if may_be_cropped { far(mesh) } else { outside(mesh) });
-        if pixels < 1.0 || pixels > project.options.canvas.max_pixels || strays {
+        // No canvas reaches beyond all grids by more than a part of a pixel.
+        let reach =
+            |axis: usize| meshes.iter().map(|mesh| mesh.bounds().1[axis]).fold(0.0, f64::max).ceil() + ROUNDED_PX;
+        let empty = (!canvas.full_turn && width as f64 > reach(0)) || height as f64 > reach(1);
+        if pixels < 1.0 || pixels > project.options.canvas.max_pixels || strays || empty {
             let reason = format!("the canvas of {width} x {height} px does not belong to the grids");
             return Err(Error::input("the project", reason, AS_WRITTEN));
         }
