@@ -308,7 +308,9 @@ fn results_do_not_depend_on_threads_and_follow_the_order_of_pairs() {
         let context = StageContext::default();
         let options = MatchingOptions::default();
         let matched = pool.install(|| run(&features, &frames, &pairs, &BTreeSet::new(), &options, &context));
-        (matched.expect("valid pictures"), context.take_diagnostics())
+        let matched = matched.expect("valid pictures");
+        report_near_duplicates(&matched, &context);
+        (matched, context.take_diagnostics())
     };
     let (matched, diagnostics) = run_on(1);
     assert_eq!((matched.clone(), diagnostics.clone()), run_on(2));
