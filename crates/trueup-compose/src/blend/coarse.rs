@@ -25,57 +25,98 @@ const MOST_SAMPLES: usize = 6_250_000;
 const LABELS_PER_SAMPLE: usize = 4;
 
 /// The blended level `first_level` of a canvas, from the photographs' own. `levels` more are blended above it.
+///
+/// What is blended is how each photograph differs from the level cut along the seams, which is added back: with masks that
+/// add up to 1 that is the same. But beside its border a photograph's coarser samples are means of one side only. Those of
+/// the photograph itself say that a bright sky beyond the border is as dark as the building before it, and the sky becomes
+/// gray; those of a difference say that it goes on as it is.
 pub(super) fn blend(
     bases: &Bases,
     seams: &Seams,
     unrolled: &Unrolled<'_>,
     (first_level, levels): (u32, u32),
 ) -> Result<Plane<[f32; 4]>> {
-    let size = |level: u32| unrolled.canvas().map(|length| length.div_ceil(1 << (first_level + level)));
-    let mut sums: Vec<Plane<[f32; 4]>> = (0..=levels)
-        .map(|level| {
-            let [width, height] = size(level);
-            Plane::new(0..width, 0..height)
-        })
-        .collect();
-    // As many pyramids at a time as there are threads, added up in order.
-    let at_a_time = rayon::current_num_threads().max(1);
-    for first in (0..bases.len()).step_by(at_a_time) {
-        let pyramids: Vec<_> = (first..(first + at_a_time).min(bases.len()))
-            .into_par_iter()
-            .map(|label| {
-                let base = bases.read(label)?;
-                let mask = mask(&base, label, seams, (unrolled, first_level));
-                Ok(pyramid(base.into_owned(), mask, levels))
-            })
-            .collect::<Result<_>>()?;
-        for pyramid in pyramids {
-            sums.par_iter_mut().enumerate().for_each(|(level, sum)| {
-                let (own, mask) = &pyramid[level];
-                match pyramid.get(level + 1) {
-                    Some((coarser, _)) => add_detail(sum, own, coarser, mask),
-                    None => add_base(sum, own, mask),
-                }
-            });
-        }
+    let sums = |level: u32| {
+        let [width, height] = unrolled.canvas().map(|length| length.div_ceil(1 << (first_level + level)));
+        Plane::new(0..width, 0..height)
+    };
+    let mask = |base: &Base, label: usize| mask(base, label, seams, (unrolled, first_level));
+    let mut cut = sums(0);
+    let masked = |label: usize| {
+        let base = bases.read(label)?;
+        let mask = mask(&base, label);
+        Ok((base, mask))
+    };
+    in_order(bases.len(), masked, |(base, mask)| add_base(&mut cut, &base.plane, &mask))?;
+    collapse(&mut cut, None);
+
+    let mut blended: Vec<Plane<[f32; 4]>> = (0..=levels).map(sums).collect();
+    let differences = |label: usize| {
+        let mut base = bases.read(label)?.into_owned();
+        let mask = mask(&base, label);
+        subtract(&mut base.plane, &cut);
+        Ok(pyramid(base, mask, levels))
+    };
+    in_order(bases.len(), differences, |pyramid: Levels| {
+        blended.par_iter_mut().enumerate().for_each(|(level, sum)| {
+            let (own, weights) = &pyramid[level];
+            match pyramid.get(level + 1) {
+                Some((coarser, _)) => add_detail(sum, own, coarser, weights),
+                None => add_base(sum, own, weights),
+            }
+        });
+    })?;
+    let mut coarser: Option<Plane<[f32; 4]>> = None;
+    while let Some(mut sum) = blended.pop() {
+        collapse(&mut sum, coarser.as_ref());
+        coarser = Some(sum);
     }
-    let mut blended: Option<Plane<[f32; 4]>> = None;
-    while let Some(mut sum) = sums.pop() {
-        collapse(&mut sum, blended.as_ref());
-        blended = Some(sum);
+    for (cut, change) in cut.texels.iter_mut().zip(coarser.iter().flat_map(|plane| &plane.texels)) {
+        let [r, g, b, _] = *change;
+        *cut = [cut[0] + r, cut[1] + g, cut[2] + b, cut[3]];
     }
-    Ok(blended.unwrap_or_default())
+    Ok(cut)
 }
 
-type Levels = Vec<(Plane<[f32; 4]>, Plane<f32>)>;
+/// Makes something of each of `count` photographs, as many at a time as there are threads, and uses them in order.
+fn in_order<T: Send>(count: usize, make: impl Fn(usize) -> Result<T> + Sync, mut take: impl FnMut(T)) -> Result<()> {
+    let at_a_time = rayon::current_num_threads().max(1);
+    for first in (0..count).step_by(at_a_time) {
+        let made: Vec<T> = (first..(first + at_a_time).min(count)).into_par_iter().map(&make).collect::<Result<_>>()?;
+        made.into_iter().for_each(&mut take);
+    }
+    Ok(())
+}
 
-fn pyramid(base: Base, mask: Plane<f32>, levels: u32) -> Levels {
-    let mut pyramid = vec![(base.plane, mask)];
-    for _ in 0..levels {
-        if let Some((plane, mask)) = pyramid.last() {
-            pyramid.push((plane.reduced(), mask.reduced()));
+/// Takes the blended level from a photograph's, wherever that covers anything. Beside its border the difference soon counts
+/// next to nothing, by the fourth power of the share: there the photograph's own samples are means of one side already.
+fn subtract(plane: &mut Plane<[f32; 4]>, blended: &Plane<[f32; 4]>) {
+    let columns = plane.columns.clone();
+    for y in plane.rows.clone() {
+        for (texel, blended) in plane.row_mut(y).iter_mut().zip(&blended.row(y)[columns.clone()]) {
+            let [r, g, b, share] = *texel;
+            let trusted = (share * share * (share * share)).max(share.min(NEXT_TO_NOTHING));
+            let trust = trusted / share.max(LEAST_SHARE);
+            let difference = [r - blended[0] * share, g - blended[1] * share, b - blended[2] * share, share];
+            *texel = difference.map(|value| value * trust);
         }
     }
+}
+
+/// A photograph's samples and their weights, from fine to coarse.
+type Levels = Vec<(Plane<[f32; 4]>, Plane<f32>)>;
+
+/// Weights are the masks of the next coarser level, but for the widest band: how wide that changes is what was asked for.
+fn pyramid(base: Base, mask: Plane<f32>, levels: u32) -> Levels {
+    let mut pyramid = Vec::new();
+    let (mut plane, mut mask) = (base.plane, mask);
+    for _ in 0..levels {
+        let (coarser_plane, coarser_mask) = (plane.reduced(), mask.reduced());
+        let weights = coarser_mask.expanded(&plane.columns, &plane.rows);
+        pyramid.push((plane, weights));
+        (plane, mask) = (coarser_plane, coarser_mask);
+    }
+    pyramid.push((plane, mask));
     pyramid
 }
 
@@ -129,10 +170,12 @@ pub(super) fn base(sampled: Plane<[f32; 4]>) -> Plane<[f32; 4]> {
     base
 }
 
+/// Share of samples that are there only so that others have something to be compared with.
+const NEXT_TO_NOTHING: f32 = 1e-3;
+
 /// Gives samples beside covered ones their neighbours' colour with next to no share, so that finer samples between the two
 /// always have something to be compared with.
 fn spread(plane: &mut Plane<[f32; 4]>) {
-    const NEXT_TO_NOTHING: f32 = 1e-3;
     let (width, height) = (plane.columns.len(), plane.rows.len());
     let old = plane.texels.clone();
     for (at, texel) in plane.texels.iter_mut().enumerate() {

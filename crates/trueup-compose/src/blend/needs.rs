@@ -55,9 +55,10 @@ pub(crate) fn needed_bytes(
     // The grown box at the sampled level has two of its samples for each of the first.
     let bases: Vec<f64> = boxes(f64::from(1 << first_level).recip(), views::RIM as f64).collect();
     let whole: f64 = canvas.iter().map(|&length| length.div_ceil(1 << first_level) as f64).product();
-    // Sums at all levels and what one of them is interpolated to, beside some photographs' own levels.
-    let coarse = sample * (whole * (4.0 / 3.0 + 1.0) + threads * COARSE_COPIES * largest(&bases));
-    let side = (tile_side(first_level) + 2 * tile::margin(first_level)) as f64;
+    // The level cut along the seams, sums at all levels and what one of them is interpolated to, beside some photographs'
+    // own levels.
+    let coarse = sample * (whole * (1.0 + 4.0 / 3.0 + 1.0) + threads * COARSE_COPIES * largest(&bases));
+    let side = (tile_side(first_level) + 2 * tile::mask_margin(first_level)) as f64;
     let finished = (TILES_AT_ONCE * size_of::<Finished>()) as f64 * (tile_side(first_level) as f64).powi(2);
     let tiles = sample * whole + threads * (sample * TILE_COPIES * side * side + finished);
     let coarse = if cut || !several { 0.0 } else { coarse };

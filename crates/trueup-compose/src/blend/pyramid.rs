@@ -7,6 +7,9 @@
 //! Burt, Adelson, "A multiresolution spline with application to image mosaics", ACM TOG 2(4), 1983; kernel 1 4 6 4 1.
 //!
 //! # Departures
+//! But for the finest and the widest, bands are weighted by masks of the next coarser level: what differs between two
+//! photographs goes over within the width of its own contours instead of half of it, and shows less of a step.
+//!
 //! Samples carry the share that is covered, colours are multiplied by it, and sums are divided by the sum of the shares
 //! (normalised convolution: Knutsson, Westin, CVPR 1993), so that what lies beside a picture never bleeds into it.
 
@@ -78,6 +81,16 @@ impl<T: Texel> Plane<T> {
                 &row[(from - self.columns.start as isize) as usize..(to - self.columns.start as isize) as usize];
             out[(from - first) as usize..(to - first) as usize].copy_from_slice(source);
         }
+    }
+
+    /// The part `columns` x `rows`, all of which the plane holds.
+    pub(super) fn part(&self, columns: &Range<usize>, rows: &Range<usize>) -> Self {
+        let mut part = Self::new(columns.clone(), rows.clone());
+        let first = columns.start - self.columns.start;
+        for y in rows.clone() {
+            part.row_mut(y).copy_from_slice(&self.row(y)[first..first + columns.len()]);
+        }
+        part
     }
 
     /// The next coarser level: every sample whose middle this plane holds.

@@ -101,6 +101,33 @@ fn a_difference_in_brightness_fades_over_the_seam() {
     assert!((0..layout.width).all(|x| [low, high].contains(&cut[55 * layout.width + x][0])));
 }
 
+/// A photograph that ends at a contour knows of one side only. Where it agrees with another that knows both, the panorama is
+/// that other one, on both sides.
+#[test]
+fn a_sky_beside_the_border_of_a_dark_photograph_stays_bright() {
+    const ROOF: usize = 50;
+    let of = |top: usize| {
+        let level = |at: usize| if top + at / WIDTH < ROOF { 240 } else { 30 };
+        let data = (0..WIDTH * HEIGHT).flat_map(|at| [level(at); 3]).collect();
+        Photograph::Eight(Raster::from_data(WIDTH, HEIGHT, 3, data).expect("as many samples"))
+    };
+    let mut layout = layout(&[0, 70]);
+    layout.placed[1].mesh.target.iter_mut().for_each(|vertex| vertex[1] += ROOF as f64);
+    layout.height += ROOF;
+    // Wide transitions, whose samples are as large as what lies above the roof.
+    let options = RenderOptions { transition: 0.5, ..RenderOptions::default() };
+    let pixels = composed(&layout, vec![of(0), of(ROOF)], &options);
+    for (at, pixel) in pixels.iter().enumerate().filter(|(_, pixel)| pixel[3] == 65535) {
+        let (x, y) = (at % layout.width, at / layout.width);
+        // Within two samples of the first level that is blended as a whole, both photographs' own contours count.
+        if y.abs_diff(ROOF) > 16 {
+            let expected = root_of(if y < ROOF { 240 } else { 30 });
+            // A 25th of white; means of one side made it a quarter.
+            assert!(pixel[0].abs_diff(expected) <= 65535 / 25, "{} {expected} at ({x}, {y})", pixel[0]);
+        }
+    }
+}
+
 #[test]
 fn no_border_of_the_panorama_is_darker_than_its_photographs() {
     let mut layout = layout(&[0, 80]);

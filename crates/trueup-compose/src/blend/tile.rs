@@ -11,11 +11,26 @@ use crate::render::prepared::{Prepared, Scratch, Window};
 use crate::seam::{Label, NOBODY};
 use crate::unwanted::in_mask;
 
-/// Canvas pixels beside a tile that its fine levels are made of. With 8 pixels a sample at the first whole level, a sample of
-/// the coarsest of the fine ones is 4 pixels wide, its own support 6 pixels, and interpolation reaches two samples further:
-/// 14. A multiple of 2^first_level.
-pub(super) const fn margin(first_level: u32) -> usize {
+/// Canvas pixels beside a tile that its fine levels are made of, a multiple of 2^first_level.
+///
+/// Interpolating wants one sample beside the tile at every level, and reducing two of the finer level beside the middles of
+/// those that it makes: m samples of a level take 2 m + 2 of the one below. One at the coarsest of the fine levels, the
+/// last below `first_level`, becomes 3 2^(first_level - 1) - 2 pixels.
+const fn margin(first_level: u32) -> usize {
     2 << first_level
+}
+
+/// The same for the masks, which are reduced once more: 3 2^first_level - 2 pixels.
+pub(super) const fn mask_margin(first_level: u32) -> usize {
+    3 << first_level
+}
+
+/// A box with so many pixels more on all sides, cut at the canvas.
+fn grown([columns, rows]: [&Range<usize>; 2], margin: usize, work: &Work<'_>) -> (Range<usize>, Range<usize>) {
+    let grown =
+        |range: &Range<usize>, length: usize| range.start.saturating_sub(margin)..(range.end + margin).min(length);
+    let [width, height] = work.unrolled.canvas();
+    (grown(columns, width), grown(rows, height))
 }
 
 /// A part of the canvas; `columns` and `rows` start at multiples of 2^first_level.
@@ -28,17 +43,13 @@ pub(super) struct Tile {
 }
 
 impl Tile {
-    /// The tile with its margin, cut at the canvas.
+    /// What of the canvas decides which photographs a tile is made of: the tile and as much as its masks reach.
     pub(super) fn with_margin(
         columns: &Range<usize>,
         rows: &Range<usize>,
         work: &Work<'_>,
     ) -> (Range<usize>, Range<usize>) {
-        let margin = margin(work.first_level);
-        let grown =
-            |range: &Range<usize>, length: usize| range.start.saturating_sub(margin)..(range.end + margin).min(length);
-        let [width, height] = work.unrolled.canvas();
-        (grown(columns, width), grown(rows, height))
+        grown([columns, rows], mask_margin(work.first_level), work)
     }
 
     /// The finished pixels, row by row.
@@ -156,10 +167,11 @@ impl Tile {
         scratch: &mut Scratch,
     ) -> Vec<Finished> {
         let Some(levels) = &work.levels else { return Vec::new() };
-        let (columns, rows) = Self::with_margin(&self.columns, &self.rows, work);
+        let (columns, rows) = grown([&self.columns, &self.rows], margin(work.first_level), work);
         let mut opacity = vec![0.0_f32; self.columns.len() * self.rows.len()];
         let mut sums: Vec<Plane<[f32; 4]>> = Vec::new();
-        let masks = self.masks(work, shown, &columns, &rows);
+        let (mask_columns, mask_rows) = Self::with_margin(&self.columns, &self.rows, work);
+        let masks = self.masks(work, shown, &mask_columns, &mask_rows);
         for ((label, picture), mask) in shown.iter().zip(masks) {
             let mut plane = Plane::new(columns.clone(), rows.clone());
             picture.sample(self.window(&columns, &rows), &mut plane.texels, work.options, scratch);
@@ -169,7 +181,9 @@ impl Tile {
             }
             self.add_opacity(&plane, &mut opacity);
             let mut mask = mask;
-            hide_ignored(&mut plane, &mask, picture, work.ignored[usize::from(*label)].as_deref());
+            // Contours at the finest level change at the seam itself.
+            let mut weights = mask.part(&columns, &rows);
+            hide_ignored(&mut plane, &weights, picture, work.ignored[usize::from(*label)].as_deref());
             for level in 0..work.first_level {
                 if sums.len() <= level as usize {
                     sums.push(Plane::new(plane.columns.clone(), plane.rows.clone()));
@@ -177,9 +191,12 @@ impl Tile {
                 let last = level + 1 == work.first_level;
                 let reduced = if last { Plane::default() } else { plane.reduced() };
                 let coarser = if last { &levels.bases.at(usize::from(*label)).plane } else { &reduced };
-                add_detail(&mut sums[level as usize], &plane, coarser, &mask);
+                mask = mask.reduced();
+                if level > 0 {
+                    weights = mask.expanded(&plane.columns, &plane.rows);
+                }
+                add_detail(&mut sums[level as usize], &plane, coarser, &weights);
                 if !last {
-                    mask = mask.reduced();
                     plane = reduced;
                 }
             }
