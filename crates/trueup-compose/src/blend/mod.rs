@@ -29,7 +29,7 @@ use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 
 use crate::exposure::Correction;
-use crate::layout::CanvasLayout;
+use crate::layout::{CanvasLayout, unit_of_turn};
 use crate::render::RenderOptions;
 use crate::render::plan::Plan;
 use crate::render::prepared::Scratch;
@@ -71,8 +71,7 @@ impl Levels {
         unrolled: &Unrolled<'_>,
         (first_level, levels): (u32, u32),
     ) -> Result<Self> {
-        let mut blended = coarse::blend(&bases, seams, unrolled, (first_level, levels))?;
-        unrolled.join_ends(&mut blended, (first_level, levels));
+        let blended = coarse::blend(&bases, seams, unrolled, (first_level, levels))?;
         bases.level_all();
         Ok(Self { blended, bases })
     }
@@ -162,7 +161,8 @@ pub(crate) fn run(
     Ok(Blended { pixels, seams })
 }
 
-/// Levels above the first that is blended as a whole, so that the coarsest samples are as wide as the widest transition wanted.
+/// Levels above the first that is blended as a whole, so that the coarsest samples are as wide as the widest transition
+/// wanted, but on a cylinder no wider than those of which a turn has a whole number.
 fn levels_above(layout: &CanvasLayout, options: &RenderOptions) -> u32 {
     let mut sides: Vec<f64> = layout
         .placed
@@ -175,7 +175,10 @@ fn levels_above(layout: &CanvasLayout, options: &RenderOptions) -> u32 {
     sides.sort_by(f64::total_cmp);
     let side = sides.get(sides.len() / 2).copied().unwrap_or(1.0);
     let wanted = (options.transition * side).max(1.0).log2().round();
-    (wanted as u32).saturating_sub(first_level([layout.width, layout.height])).min(MOST_LEVELS)
+    // A turn that no layout makes has samples of its own at every turn, rather than hardly any transitions.
+    let repeats = layout.period.filter(|&period| period > 0 && period.is_multiple_of(unit_of_turn(period)));
+    let widest = repeats.map_or(u32::MAX, usize::trailing_zeros);
+    (wanted as u32).min(widest).saturating_sub(first_level([layout.width, layout.height])).min(MOST_LEVELS)
 }
 
 /// 2^(3 + 12) pixels are wider than any photograph.

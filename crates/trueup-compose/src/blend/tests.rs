@@ -268,10 +268,13 @@ fn ring_pictures() -> Vec<Photograph> {
 }
 
 fn composed_in_any_way(layout: &CanvasLayout, blend: Blend) -> Vec<[f32; 4]> {
-    let options = RenderOptions { blend, ..RenderOptions::default() };
+    composed_around(layout, &RenderOptions { blend, ..RenderOptions::default() })
+}
+
+fn composed_around(layout: &CanvasLayout, options: &RenderOptions) -> Vec<[f32; 4]> {
     let corrections = vec![Correction::default(); RING.len()];
     let (seams, context) = (SeamOptions::default(), StageContext::default());
-    let panorama = render(layout, &corrections, &Memory(ring_pictures()), &options, &seams, &context).expect("renders");
+    let panorama = render(layout, &corrections, &Memory(ring_pictures()), options, &seams, &context).expect("renders");
     // Square roots of light, as the eye sees steps.
     let root = |at: usize| panorama.linear_pixel(at % AROUND, at / AROUND).expect("in memory").map(f32::sqrt);
     (0..AROUND * HEIGHT).map(root).collect()
@@ -295,6 +298,32 @@ fn a_cylinder_may_be_cut_open_anywhere() {
             }
         }
     }
+}
+
+/// The ends of a turn are places like any other at all levels, up to samples of a third of the turn: moved by whole ones of
+/// them, the panorama is moved and nothing else.
+#[test]
+fn all_levels_of_a_turn_repeat() {
+    let period = ring(0).period.expect("a turn");
+    for (transition, levels) in [(0.1, 0), (0.25, 2), (0.5, 3), (1.0, 4)] {
+        let options = RenderOptions { transition, ..RenderOptions::default() };
+        assert_eq!(levels_above(&ring(0), &options), levels);
+        let coarsest = 8 << levels;
+        assert!(period.is_multiple_of(coarsest));
+        let still = composed_around(&ring(0), &options);
+        for by in [128, 256] {
+            let moved = composed_around(&ring(by), &options);
+            for (at, still) in still.iter().enumerate() {
+                let place = at / AROUND * AROUND + (at + by) % AROUND;
+                for (moved, still) in moved[place].iter().zip(still) {
+                    assert!((moved - still).abs() <= 1e-4, "{transition} by {by} at {at}: {moved} {still}");
+                }
+            }
+        }
+    }
+    // Of 376 columns a turn has a whole number of samples of 8; none that are wider are blended.
+    let odd = CanvasLayout { width: 376, period: Some(376), ..ring(0) };
+    assert_eq!(levels_above(&odd, &RenderOptions { transition: 1.0, ..RenderOptions::default() }), 0);
 }
 
 #[test]

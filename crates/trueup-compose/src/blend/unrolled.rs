@@ -5,15 +5,8 @@ use std::ops::Range;
 
 use trueup_core::{Error, Result};
 
-use super::pyramid::Plane;
 use crate::layout::{CanvasLayout, Placed};
 use crate::seam::{Label, NOBODY, Seams};
-
-/// Widest samples over which what one turn has goes over into what the next has.
-const JOINED: usize = 4;
-
-/// Samples of the first level on both sides of an end in which it is the next turn's alone: more than tiles read beyond it.
-const AS_ONE: usize = 8;
 
 /// A layout without a period, on which the photographs of one with a period lie wherever they are seen. The turn between
 /// [`Self::lead`] and `lead + width` is the panorama. Without a period the layout is as it was.
@@ -32,7 +25,7 @@ impl<'a> Unrolled<'a> {
         // than two more, and rims of photographs are at most a few finer ones wide.
         const REACH: usize = 5;
         let lead = match (layout.period, levels) {
-            (Some(_), Some(levels)) => ((REACH + JOINED) << (first_level + levels)) + ((2 * AS_ONE) << first_level),
+            (Some(_), Some(levels)) => REACH << (first_level + levels),
             _ => 0,
         };
         let (unrolled, originals) = layout.unrolled(lead);
@@ -44,32 +37,6 @@ impl<'a> Unrolled<'a> {
             ));
         }
         Ok(Self { original: layout, layout: unrolled, originals, lead })
-    }
-
-    /// Makes the ends of the blended `first_level` the same, if a turn has a whole number of its samples.
-    ///
-    /// The samples of coarser levels lie on other places of one turn than of the next, and so differ a little where
-    /// photographs do. What one turn has goes over into what the next has within some of the widest samples.
-    pub(super) fn join_ends(&self, blended: &mut Plane<[f32; 4]>, (first_level, levels): (u32, u32)) {
-        let whole = |period: &usize| period.is_multiple_of(1 << first_level);
-        let Some(period) = self.original.period.filter(whole) else { return };
-        let turn = period >> first_level;
-        let end = (self.lead >> first_level) + turn;
-        let joined = (JOINED << levels).min(turn / 2);
-        let first = end.saturating_sub(AS_ONE + joined).max(turn);
-        for y in blended.rows.clone() {
-            let row = blended.row_mut(y);
-            for x in first..(end + AS_ONE).min(row.len()) {
-                let along = ((x - first) as f32 / joined.max(1) as f32).min(1.0);
-                let share = along * along * (3.0 - 2.0 * along);
-                let (here, before) = (row[x], row[x - turn]);
-                row[x] = match (here[3] > 0.0, before[3] > 0.0) {
-                    (true, true) => std::array::from_fn(|k| here[k] + share * (before[k] - here[k])),
-                    (true, false) => here,
-                    (false, _) => before,
-                };
-            }
-        }
     }
 
     /// The layout that was unrolled.

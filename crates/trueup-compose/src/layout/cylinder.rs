@@ -5,9 +5,19 @@ use std::ops::Range;
 
 use super::{CanvasLayout, Placed};
 
-/// A cylinder's width is a multiple of so many columns: those of a sample of the level from which on blending is done as a
-/// whole.
-pub(super) const CYLINDER_UNIT: usize = 8;
+/// Samples that a turn has at least at the coarsest level that repeats exactly. Twice as many would change the scale by half
+/// as much, at most a 128th instead of a 64th, and leave too narrow transitions where few photographs make up a turn.
+const LEAST_SAMPLES: usize = 32;
+
+/// Columns of the finest samples that are blended as a whole: a turn has a whole number at least of these.
+const LEAST_UNIT: usize = 8;
+
+/// A cylinder about so wide has a whole number of times so many columns, a power of two. All levels of a blend whose samples
+/// are no wider repeat exactly from turn to turn. On one of a few pixels it is a single column: nothing is blended there.
+pub(crate) fn unit_of_turn(width: usize) -> usize {
+    let unit = 1 << (width / LEAST_SAMPLES).max(1).ilog2();
+    if width < LEAST_SAMPLES { 1 } else { unit.max(LEAST_UNIT) }
+}
 
 /// Turns that a photograph of [`Placed::in_first_turn`] may reach into: its own, those that a very wide one takes up.
 pub(crate) const TURNS: usize = 4;

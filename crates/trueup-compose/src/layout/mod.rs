@@ -14,7 +14,7 @@ mod cylinder;
 mod size;
 
 pub(crate) use checked::check_mesh;
-pub(crate) use cylinder::{TURNS, columns_around};
+pub(crate) use cylinder::{TURNS, columns_around, unit_of_turn};
 pub use size::median_cell_scale;
 use size::{canvas_size, most_pixels, scale_within};
 
@@ -63,7 +63,8 @@ pub struct CanvasLayout {
     /// The photographs used, in the order given; targets are canvas pixels and may lie outside the canvas.
     pub placed: Vec<Placed>,
     /// The canvas is a cylinder of that many columns, its width: what lies beyond one end is seen at the other. A multiple
-    /// of 8, so that the finer levels of a blend repeat exactly; with others its ends may show a faint step.
+    /// of the largest power of two (at least 8) that it holds 32 times, so that all levels of a blend repeat exactly; with
+    /// others its ends may show a faint step.
     #[serde(default)]
     pub period: Option<usize>,
 }
@@ -91,8 +92,8 @@ pub fn run(
 }
 
 /// As [`run`]; with a `period`, on a cylinder: places that far apart in x, in the unit of the targets, are the same. The
-/// canvas then is the one period around the middle of the grids; its scale is the nearest to that asked for at which the
-/// period is a multiple of 8 pixels.
+/// canvas then is the one period around the middle of the grids; its scale is the nearest to that asked for, by at most
+/// a 64th, at which the period is a whole number of the samples that blending takes, see [`CanvasLayout::period`].
 ///
 /// # Errors
 /// As [`run`]; [`Error::Unsolvable`] if the period is not a positive length.
@@ -172,6 +173,10 @@ fn fitted(
     }
     if let Some([window_low, window_high]) = frame.window {
         (low, high) = (low.sup(&window_low), high.inf(&window_high));
+        if let Some(period) = frame.period {
+            // All of a turn is shown.
+            high.x = low.x + period;
+        }
         placed.retain(|item| shows(&item.mesh, frame.period.is_some(), low, high));
     }
     let extent = high - low;
@@ -190,7 +195,7 @@ fn fitted(
     }
     let max_pixels = most_pixels(&placed, options);
     let wanted = frame.canvas_from_target;
-    let size = |scale: f64| canvas_size(extent, scale, frame.period.is_some());
+    let size = |scale: f64| canvas_size(extent, scale, frame.period);
     let found = scale_within(size, extent, wanted, max_pixels);
     let [width, height] = size(found);
     let canvas_from_target = frame.period.map_or(found, |period| width / period);

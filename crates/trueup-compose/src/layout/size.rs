@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
-use super::cylinder::CYLINDER_UNIT;
+use super::cylinder::unit_of_turn;
 use super::{CanvasOptions, Placed};
 
 /// Target pixels per source pixel: median over the cells of the square root of target area per source area.
@@ -32,16 +32,21 @@ pub(super) fn most_pixels(placed: &[Placed], options: &CanvasOptions) -> f64 {
     options.max_pixels.min(grown.max(ANY_GROWTH_PIXELS))
 }
 
-/// Width and height of the canvas in whole pixels, at least 1 each; `around` a cylinder the width is the nearest multiple of
-/// its unit, and the height follows.
-pub(super) fn canvas_size(extent: Vector2<f64>, scale: f64, around: bool) -> [f64; 2] {
+/// Width and height of the canvas in whole pixels, at least 1 each. Around a cylinder the width is the nearest multiple of its
+/// unit to its `period`, and the height follows from the scale which that makes.
+pub(super) fn canvas_size(extent: Vector2<f64>, scale: f64, period: Option<f64>) -> [f64; 2] {
     // A photograph of 100 px placed at a fractional offset spans 100 px plus rounding; that is no 101st column.
     const ROUNDING_PX: f64 = 1e-6;
-    let units = (extent.x * scale / CYLINDER_UNIT as f64).round().max(1.0);
-    let around = around.then_some(units * CYLINDER_UNIT as f64);
-    let scale_y = around.map_or(scale, |width| width / extent.x);
-    let width = around.unwrap_or((extent.x * scale - ROUNDING_PX).ceil());
-    [width.max(1.0), (extent.y * scale_y - ROUNDING_PX).ceil().max(1.0)]
+    let whole = |length: f64| (length - ROUNDING_PX).ceil().max(1.0);
+    match period {
+        None => [whole(extent.x * scale), whole(extent.y * scale)],
+        Some(period) => {
+            // The cast saturates.
+            let unit = unit_of_turn((period * scale) as usize) as f64;
+            let width = ((period * scale / unit).round() * unit).max(1.0);
+            [width, whole(extent.y * (width / period))]
+        }
+    }
 }
 
 /// The largest scale, at most `wanted`, whose canvas holds at most `max_pixels`.

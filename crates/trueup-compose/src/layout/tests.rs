@@ -66,6 +66,42 @@ fn a_cylinder_is_its_period_in_whole_pixels_around_the_middle() {
     assert_eq!(flat.unrolled(100), (Cow::Borrowed(&flat), vec![0, 1]));
 }
 
+/// Whatever the scale: the width is a whole number of times a power of two that it holds 32 times, no more than a 64th from
+/// what was asked for; the height is that of the scale which was used.
+#[test]
+fn a_turn_is_a_whole_number_of_the_samples_of_a_blend() {
+    let context = StageContext::default();
+    for scale in [0.01, 0.1, 0.33, 1.0, 1.37, 2.9, 7.7, 16.0] {
+        let options = CanvasOptions { scale, ..CanvasOptions::default() };
+        let around = |placed| run_around(placed, 0, Some(4380.3), &options, &context).expect("two grids");
+        let layout = around(vec![placed(1.0, [-10.0, 3.0]), placed(1.0, [4000.0, 90.2])]);
+        let wanted = 4380.3 * scale;
+        // 32 times 8 pixels; below, units of 8 change the scale by more.
+        let most = if wanted < 256.0 { 4.0 / wanted } else { 1.0 / 64.0 };
+        assert!((layout.width as f64 / wanted - 1.0).abs() <= most, "{} {wanted}", layout.width);
+        let unit = 1 << layout.width.trailing_zeros();
+        assert!(unit >= 8 && unit * 64 > layout.width, "{}", layout.width);
+        assert_eq!(layout.height as f64, (387.2 * layout.width as f64 / 4380.3 - 1e-6).ceil(), "at {scale}");
+        assert!((layout.canvas_from_target * 4380.3 - layout.width as f64).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_framed_turn_is_shown_whole_within_the_pixels_allowed() {
+    let context = StageContext::default();
+    let pictures = || vec![placed(1.0, [-10.0, 3.0]), placed(1.0, [4000.0, 90.2])];
+    let window = Some([Vector2::new(-100.0, 10.0), Vector2::new(900.0, 200.0)]);
+    let frame = Frame { canvas_from_target: 1.0, window, period: Some(4380.3) };
+    let layout = framed(pictures(), &frame, &CanvasOptions::default(), &context).expect("two grids");
+    assert_eq!((layout.width, layout.height, layout.period), (4352, 189, Some(4352)));
+    for max_pixels in [1.0, 5.0, 100.0, 3000.0, 700_000.0] {
+        let options = CanvasOptions { max_pixels, ..CanvasOptions::default() };
+        let layout = framed(pictures(), &frame, &options, &context).expect("two grids");
+        assert!((layout.width * layout.height) as f64 <= max_pixels, "{} x {}", layout.width, layout.height);
+        assert_eq!(layout.period, Some(layout.width));
+    }
+}
+
 #[test]
 fn a_canvas_that_runs_away_is_reduced() {
     let context = StageContext::default();
