@@ -23,6 +23,8 @@ pub struct Fidelity {
     pub wrap_px: usize,
     /// Mean absolute step across it that no photograph shows.
     pub wrap_step: f64,
+    /// The same across columns within a full turn, 32 pixels apart: what `wrap_step` is to be compared with.
+    pub column_step: f64,
     /// Pixels that two photographs cover.
     pub overlap_px: usize,
     /// Mean distance of the panorama's gradient from that of the nearest photograph: ghosts and blur.
@@ -49,7 +51,8 @@ const STRETCH_PX: usize = 32;
 /// theirs. The panorama's is then compared with that of both photographs, and the nearer one counts.
 ///
 /// With `around` the canvas is a cylinder, whose first column lies beside its last. The step between these two is measured
-/// all along them, whoever is shown there.
+/// all along them, whoever is shown there. Most of such a line lies within one photograph, which a seam never does; the same is
+/// therefore measured across other columns, one in 32, for comparison.
 ///
 /// # Errors
 /// [`Error::Input`] if the sizes do not fit.
@@ -74,12 +77,14 @@ pub fn measure(panorama: &dyn RowSource, layers: &[Layer], shown: &[u16], around
     };
     let (line_px, step) = total(&sums.stretches);
     let (wrap_px, wrap_step) = total(&sums.wrap);
+    let (column_px, column_step) = total(&sums.columns);
     let mean = |sum: f64, count: usize| if count > 0 { sum / count as f64 } else { 0.0 };
     Ok(Fidelity {
         line_px,
         step: mean(step, line_px),
         wrap_px,
         wrap_step: mean(wrap_step, wrap_px),
+        column_step: mean(column_step, column_px),
         overlap_px: sums.overlap_px,
         ghost: mean(sums.ghost, sums.overlap_px),
         ghost_share: mean(sums.ghosts as f64, sums.overlap_px),
@@ -140,6 +145,8 @@ struct Sums {
     stretches: BTreeMap<Stretch, [f64; 4]>,
     /// The same where the ends of a full turn meet.
     wrap: BTreeMap<Stretch, [f64; 4]>,
+    /// The same across some of a full turn's other columns.
+    columns: BTreeMap<Stretch, [f64; 4]>,
     overlap_px: usize,
     ghost: f64,
     ghosts: usize,
@@ -186,6 +193,9 @@ impl Measured<'_> {
                     };
                     if x + 1 == width {
                         self.line([here, right], column, |_| Some(y), &mut sums.wrap);
+                    }
+                    if self.turn > 0 && x + 1 < width && (x + 1).is_multiple_of(STRETCH_PX) {
+                        self.line([here, right], column, |_| Some(y), &mut sums.columns);
                     }
                     if right != here {
                         self.line([here, right], column, |_| Some(y), &mut sums.stretches);
@@ -337,12 +347,16 @@ mod tests {
         let good = Picture(layer(|x, _| true_levels(x)).gray);
         let found = measure(&good, &layers, &shown, true).expect("one cylinder");
         assert_eq!(found.wrap_px, 30);
-        assert!(found.wrap_step < 1e-5, "{found:?}");
+        assert!(found.wrap_step < 1e-5 && found.column_step < 1e-5, "{found:?}");
         let bad = Picture(layer(|x, _| true_levels(x) + if x < 15 { 12.0 } else { 0.0 }).gray);
         let found = measure(&bad, &layers, &shown, true).expect("one cylinder");
         assert!((found.wrap_step - 12.0).abs() < 1e-5, "{found:?}");
+        // The same step at column 32, the only one of 60 columns that is compared.
+        let inner = Picture(layer(|x, _| true_levels(x) + if (20..32).contains(&x) { 12.0 } else { 0.0 }).gray);
+        let found = measure(&inner, &layers, &shown, true).expect("one cylinder");
+        assert!((found.column_step - 12.0).abs() < 1e-5 && found.wrap_step < 1e-5, "{found:?}");
         let flat = measure(&good, &[whole], &vec![0; 1800], false).expect("one canvas");
-        assert_eq!((flat.wrap_px, flat.wrap_step), (0, 0.0));
+        assert_eq!((flat.wrap_px, flat.wrap_step, flat.column_step), (0, 0.0, 0.0));
     }
 
     #[test]

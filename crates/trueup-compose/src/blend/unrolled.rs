@@ -22,7 +22,8 @@ impl<'a> Unrolled<'a> {
     /// With room for `levels` above `first_level`, or for cutting without blending.
     pub(super) fn new(layout: &'a CanvasLayout, first_level: u32, levels: Option<u32>) -> Result<Self> {
         // Widest samples beside a pixel that it is made of: reducing reaches less than two of them, interpolating less
-        // than two more, and rims of photographs are at most a few finer ones wide.
+        // than two more, and rims of photographs are at most a few finer ones wide. Masks that are interpolated to the
+        // second widest level reach no farther.
         const REACH: usize = 5;
         let lead = match (layout.period, levels) {
             (Some(_), Some(levels)) => REACH << (first_level + levels),
