@@ -207,6 +207,10 @@ pub(crate) struct PictureArgs {
     #[arg(long, value_name = "CROP", help_heading = "View")]
     pub crop: Option<String>,
 
+    /// Fill gaps up to so wide, in shares of a photograph's side, with a smooth surface: 0.1 for ragged borders (canvas.fill)
+    #[arg(long, value_name = "SHARE", allow_hyphen_values = true, help_heading = "View")]
+    pub fill: Option<String>,
+
     /// What shows where no photograph is, in formats without transparency: black, gray or white (output.background)
     #[arg(long, value_name = "COLOUR", help_heading = "View")]
     pub background: Option<String>,

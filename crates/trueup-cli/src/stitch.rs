@@ -86,6 +86,7 @@ pub(crate) fn picture_flags<'a>(picture: &'a PictureArgs, budget: &'a BudgetArgs
         ("--roll", "projection.roll", &picture.roll),
         ("--fov", "projection.fov", &picture.fov),
         ("--crop", "canvas.crop", &picture.crop),
+        ("--fill", "canvas.fill", &picture.fill),
         ("--background", "output.background", &picture.background),
         ("--scale", "canvas.scale", &picture.scale),
         ("--quality", "output.jpeg_quality", &picture.quality),

@@ -30,6 +30,9 @@ trueup_core::options! {
         crop: Crop = Crop::None, Allowed::Any, "";
         /// Share of the covered pixels that the largest rectangle must keep for `crop = auto` to crop to it.
         min_kept: f64 = 0.75, between(0.0, 1.0), "";
+        /// Gaps between and beside the photographs of up to twice this width, as a share of a photograph's side, are filled with
+        /// a smooth surface over their borders' colours: small ones in an even sky or wall are not noticed. 0 fills nothing.
+        fill: f64 = 0.0, between(0.0, 1.0), "";
     }
 }
 
@@ -214,6 +217,17 @@ pub(crate) fn shows(mesh: &GridMesh, around: bool, low: Vector2<f64>, high: Vect
 }
 
 impl CanvasLayout {
+    /// The smaller side of a photograph on the canvas, pixels: the median over those placed; 1 if there is none.
+    pub(crate) fn photograph_side(&self) -> f64 {
+        let side = |placed: &Placed| {
+            let (low, high) = placed.mesh.bounds();
+            (high - low).min()
+        };
+        let mut sides: Vec<f64> = self.placed.iter().map(side).collect();
+        sides.sort_by(f64::total_cmp);
+        sides.get(sides.len() / 2).copied().unwrap_or(1.0)
+    }
+
     /// The layout without its period: every photograph at every place at which it meets the columns from `-reach` to
     /// `width + reach`. With `reach`, the canvas is wider by it on both sides and begins that much farther left.
     ///

@@ -13,6 +13,7 @@
 pub mod crop;
 pub mod exposure;
 pub mod fidelity;
+pub mod gaps;
 pub mod layout;
 pub mod render;
 pub mod seam;

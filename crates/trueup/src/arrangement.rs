@@ -138,8 +138,8 @@ pub(crate) fn recall(
         let written = crop::cropped(plane.clone(), &whole);
         return Ok(Arrangement { plane, plane_shift: [0.0; 2], written, projection: None });
     }
-    let CanvasOptions { crop, min_kept, .. } = recorded.canvas;
-    let same_plane = CanvasOptions { crop, min_kept, ..options.canvas.clone() } == recorded.canvas;
+    let CanvasOptions { crop, min_kept, fill, .. } = recorded.canvas;
+    let same_plane = CanvasOptions { crop, min_kept, fill, ..options.canvas.clone() } == recorded.canvas;
     let sources = Sources::of_project(plane.placed.clone(), reference, project);
     match same_plane && !may_be_cropped {
         true => on_plane(plane, reference, (sources.cameras, sources.dominant), options, context),
@@ -211,7 +211,7 @@ fn draw(
 
 /// The layout as it is cropped, and by how much it moved.
 fn framed(layout: CanvasLayout, options: &StitchOptions) -> (CanvasLayout, [f64; 2]) {
-    match crop::choose(&layout, options.canvas.crop, options.canvas.min_kept) {
+    match crop::choose(&layout, &options.canvas) {
         None => (layout, [0.0; 2]),
         Some(kept) => {
             let shift = [kept.columns.start, kept.rows.start].map(|start| start as f64);

@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use trueup_align::stitch_graph::{GraphFile, StitchGraph, parse_graph_file};
+use trueup_compose::crop::Coverage;
 use trueup_compose::exposure::{self, Correction, Thumbnail};
 use trueup_compose::fidelity::{self, Fidelity};
+use trueup_compose::gaps::Gaps;
 use trueup_compose::layout::CanvasLayout;
 use trueup_compose::render::{self, Panorama};
 use trueup_core::diagnostics::Diagnostic;
@@ -242,14 +244,29 @@ impl<'a> Stitcher<'a> {
     pub fn compose(&self, alignment: &Alignment) -> Result<Panorama> {
         let layout = &alignment.layout;
         let scratch = self.scratch(layout)?;
-        render::run_within(
+        let mut panorama = render::run_within(
             &Budget::new(self.options).composing(alignment.photographs.kept_bytes(), &scratch),
             layout,
             &alignment.corrections,
             alignment.photographs.as_ref(),
             (&self.options.render, &self.options.seam),
             self.context,
-        )
+        )?;
+        if self.options.canvas.fill > 0.0 {
+            let gaps = Gaps::find(layout, Coverage::of(layout), self.options.canvas.fill);
+            let filled = panorama.fill(&gaps, self.context)?;
+            self.report_filled(filled, layout);
+        }
+        Ok(panorama)
+    }
+
+    /// Says how much of a panorama no photograph shows.
+    fn report_filled(&self, filled: usize, layout: &CanvasLayout) {
+        if filled > 0 {
+            let percent = 100.0 * filled as f64 / (layout.width as f64 * layout.height as f64);
+            let message = format!("{percent:.2} % of it is shown by no photograph and was filled with a smooth surface");
+            self.context.report(Diagnostic::note("gaps-filled", "panorama", message, "Leave --fill out to leave it empty."));
+        }
     }
 
     /// The geometry that `project` records, over `images` with their `masks`: those used in it, in its order, or others of
