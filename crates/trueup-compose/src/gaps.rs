@@ -6,8 +6,8 @@ use crate::layout::CanvasLayout;
 
 /// What no photograph covers of a canvas, told apart into small gaps, which may be filled, and voids.
 ///
-/// A void is all that a disc of the given radius reaches which lies wholly in what is not covered, and all that lies farther
-/// than twice the radius from every photograph; a gap is the rest. So notches, slits and ragged or wavy borders up to
+/// A void is all that a disc of the given radius reaches which lies wholly in what is not covered, with the corners beside it,
+/// and all that lies farther than twice the radius from every photograph; a gap is the rest. So notches, slits and ragged or wavy borders up to
 /// twice as wide as the radius are gaps, whatever they are joined to. Discs do not reach out of the canvas: a strip along
 /// its border is as wide as it is.
 #[derive(Debug, Clone)]
@@ -26,6 +26,10 @@ pub struct Gaps {
 
 /// Cells of the small canvas on which voids are sought, at most: their outline is smooth between them.
 const MOST_CELLS: usize = 1 << 20;
+
+/// Radii around the middle of a disc that are void: with sqrt(2), corners that a disc does not fill are no gaps either; the
+/// rest is what chamfer distances are off.
+const CORNER: f32 = 1.5;
 
 /// [`border_distances`] counts in thirds of a pixel.
 const THIRDS: f32 = 3.0;
@@ -58,7 +62,8 @@ impl Gaps {
                 elsewhere[(at / columns + reach) * grown + at % columns + reach] = !from(at);
             }
             let distances = border_distances(&elsewhere, grown);
-            let own = (0..rows).flat_map(move |row| (row + reach) * grown + reach..(row + reach) * grown + reach + columns);
+            let own =
+                (0..rows).flat_map(move |row| (row + reach) * grown + reach..(row + reach) * grown + reach + columns);
             own.map(|at| distances[at] as f32 * (cell as f32 / THIRDS)).collect::<Vec<f32>>()
         };
         let depths = border_distances(&uncovered, columns);
@@ -66,7 +71,8 @@ impl Gaps {
         let (from_void, from_photographs) = (padded(&is_middle), padded(&|at| !uncovered[at]));
         let radius_px = radius as f32;
         let margin = from_void.iter().zip(&from_photographs);
-        let margin = margin.map(|(void, photographs)| (void - radius_px).min(2.0 * radius_px - photographs)).collect();
+        let margin =
+            margin.map(|(void, photographs)| (void - CORNER * radius_px).min(2.0 * radius_px - photographs)).collect();
         Self { coverage, margin, columns, cell, lead, around: layout.period.is_some(), radius }
     }
 
@@ -151,7 +157,9 @@ mod tests {
         let slit = layout(206, 160, &[[0.0, 0.0], [106.0, 0.0]], None);
         let gaps = gaps(&slit, 5.0);
         assert!((0..55).all(|y| gaps.is_small(103, y)));
-        assert!(!gaps.is_small(30, 120) && !gaps.is_small(103, 100) && !gaps.is_small(0, 159) && !gaps.is_small(205, 159));
+        assert!(
+            !gaps.is_small(30, 120) && !gaps.is_small(103, 100) && !gaps.is_small(0, 159) && !gaps.is_small(205, 159)
+        );
         let filled = gaps.filled_coverage();
         assert!(filled.holds(103, 20) && !filled.holds(30, 120));
     }

@@ -264,8 +264,14 @@ impl<'a> Stitcher<'a> {
     fn report_filled(&self, filled: usize, layout: &CanvasLayout) {
         if filled > 0 {
             let percent = 100.0 * filled as f64 / (layout.width as f64 * layout.height as f64);
-            let message = format!("{percent:.2} % of it is shown by no photograph and was filled with a smooth surface");
-            self.context.report(Diagnostic::note("gaps-filled", "panorama", message, "Leave --fill out to leave it empty."));
+            let message =
+                format!("{percent:.2} % of it is shown by no photograph and was filled with a smooth surface");
+            self.context.report(Diagnostic::note(
+                "gaps-filled",
+                "panorama",
+                message,
+                "Leave --fill out to leave it empty.",
+            ));
         }
     }
 

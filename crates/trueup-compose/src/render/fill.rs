@@ -117,7 +117,7 @@ impl<'a> Canvas<'a> {
         (x + self.lead.div_ceil(self.width) * self.width - self.lead) % self.width
     }
 
-    /// The tiles of the panorama that have gaps, and all whose colours these may need.
+    /// The tiles of the panorama at and beside gaps, and all whose colours these may need.
     fn tiles(&self) -> (Vec<Tile>, Vec<Tile>) {
         let side = tile_side(self.first_level);
         let end = self.lead + self.width;
@@ -140,10 +140,11 @@ impl<'a> Canvas<'a> {
             (row.saturating_sub(reach)..(row + reach + 1).min(down))
                 .any(|row| gap[row * across..][columns.clone()].contains(&true))
         };
-        let sources = (0..across * down).filter(|&at| near(at)).map(tile).collect();
-        let inside = |tile: &Tile| (self.lead..end).contains(&tile.columns.start);
+        let sources: Vec<Tile> = (0..across * down).filter(|&at| near(at)).map(tile).collect();
+        // Borders that a photograph covers by less than a pixel's rounding lie beside gaps, too.
+        let inside = sources.iter().filter(|tile| (self.lead..end).contains(&tile.columns.start)).cloned();
         let cut = |tile: Tile| Tile { columns: tile.columns.start..tile.columns.end.min(end), rows: tile.rows };
-        let wanted = (0..across * down).filter(|&at| gap[at]).map(tile).filter(inside).map(cut).collect();
+        let wanted = inside.map(cut).collect();
         (wanted, sources)
     }
 
@@ -151,7 +152,8 @@ impl<'a> Canvas<'a> {
     fn known<P: Shade>(&self, store: &Store<P>, tile: &Tile) -> Result<Plane<[f32; 4]>> {
         // As far as the finest level's support and interpolation reach, see the blend's tiles.
         let margin = 2 << self.first_level;
-        let columns = tile.columns.start.saturating_sub(margin)..(tile.columns.end + margin).min(self.width + 2 * self.lead);
+        let columns =
+            tile.columns.start.saturating_sub(margin)..(tile.columns.end + margin).min(self.width + 2 * self.lead);
         let rows = tile.rows.start.saturating_sub(margin)..(tile.rows.end + margin).min(self.height);
         let mut plane = Plane::new(columns.clone(), rows.clone());
         let mut first = columns.start;
@@ -192,7 +194,8 @@ impl<'a> Canvas<'a> {
                 })
                 .collect::<Result<_>>()?;
             for (tile, plane) in tiles.iter().zip(reduced) {
-                let own = |range: &Range<usize>| range.start >> self.first_level..range.end.div_ceil(1 << self.first_level);
+                let own =
+                    |range: &Range<usize>| range.start >> self.first_level..range.end.div_ceil(1 << self.first_level);
                 let columns = own(&tile.columns);
                 for y in own(&tile.rows) {
                     let texels = &plane.row(y)[columns.start - plane.columns.start..][..columns.len()];
@@ -222,7 +225,8 @@ impl<'a> Canvas<'a> {
             for (x, (pixel, &texel)) in columns.clone().zip(pixels.iter_mut().zip(texels)) {
                 let own = pixel.root();
                 let share = own[3];
-                if share < 1.0 && self.gaps.is_small(x, y)
+                if share < 1.0
+                    && self.gaps.is_small(x, y)
                     && let Some(smooth) = colour(texel)
                 {
                     *pixel = P::of_root([0, 1, 2].map(|k| share * own[k] + (1.0 - share) * smooth[k]));

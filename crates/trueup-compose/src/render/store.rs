@@ -186,7 +186,16 @@ impl<P: Pixel> Blocks<P> {
         let row_bytes = (size[0] * P::BYTES).max(1);
         let band_rows = (BANDS_BYTES / wanted / row_bytes).clamp(1, BAND_ROWS);
         let most_bands = (BANDS_BYTES / (row_bytes * band_rows)).clamp(2, wanted);
-        Self { file, offset, size, side, translucent: AtomicUsize::new(0), band_rows, most_bands, bands: Mutex::default() }
+        Self {
+            file,
+            offset,
+            size,
+            side,
+            translucent: AtomicUsize::new(0),
+            band_rows,
+            most_bands,
+            bands: Mutex::default(),
+        }
     }
 
     /// Where pixel (x, y) is in the file, and how many columns its block has.

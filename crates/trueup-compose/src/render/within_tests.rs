@@ -2,6 +2,8 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use trueup_core::raster::RowSource;
+
 use super::tests::{Memory, RamDisk, bits, canvas, moved, noise, rows};
 use super::*;
 use crate::crop::Coverage;
@@ -64,7 +66,8 @@ fn the_budget_does_not_show_in_the_panorama() {
             assert!(bits(&tight) == free_bits, "{blend:?}, {threads} threads");
             assert!(rows(&tight) == free_rows, "{blend:?}, {threads} threads");
             assert_eq!(tight.seams(), free.seams());
-            let (mut tight, mut free) = (tight, composed(blend, usize::MAX, &RamDisk::default(), 3).expect("no limit").0);
+            let (mut tight, mut free) =
+                (tight, composed(blend, usize::MAX, &RamDisk::default(), 3).expect("no limit").0);
             assert!(!tight.is_opaque() && !free.is_opaque());
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
             let filled = pool.install(|| fill(&mut tight));
@@ -97,7 +100,10 @@ fn gaps_take_up_the_colours_beside_them() {
     let mut row = vec![0; 4 * 300];
     for y in [0, 10, 19] {
         panorama.rgba8_row(y, &mut row).expect("in memory");
-        assert_eq!((row[4 * 30..][..4].to_vec(), row[4 * 270..][..4].to_vec()), (vec![40, 40, 40, 255], vec![200, 200, 200, 255]));
+        assert_eq!(
+            (row[4 * 30..][..4].to_vec(), row[4 * 270..][..4].to_vec()),
+            (vec![40, 40, 40, 255], vec![200, 200, 200, 255])
+        );
         let levels: Vec<u8> = row.chunks_exact(4).map(|pixel| pixel[0]).collect();
         assert!(levels.windows(2).all(|pair| pair[0] <= pair[1]), "row {y}: {levels:?}");
     }
