@@ -29,6 +29,9 @@ impl<'a> Stitcher<'a> {
     /// # Errors
     /// Those of reading the photographs and of a scratch file; [`Error::Limits`] with the numbers, before any photograph is
     /// read, if the canvas is too large for the memory or the disk; [`Error::Cancelled`].
+    ///
+    /// [`Error::Cancelled`]: trueup_core::Error::Cancelled
+    /// [`Error::Limits`]: trueup_core::Error::Limits
     pub fn compose(&self, alignment: &Alignment) -> Result<Panorama> {
         let layout = &alignment.layout;
         let scratch = self.scratch(layout)?;
@@ -81,6 +84,9 @@ impl<'a> Stitcher<'a> {
     ///
     /// # Errors
     /// Those of reading the photographs; [`Error::Input`] if the two do not belong together; [`Error::Cancelled`].
+    ///
+    /// [`Error::Cancelled`]: trueup_core::Error::Cancelled
+    /// [`Error::Input`]: trueup_core::Error::Input
     pub fn fidelity(&self, alignment: &Alignment, panorama: &Panorama) -> Result<Fidelity> {
         let layout = &alignment.layout;
         let layers = (0..layout.placed.len())

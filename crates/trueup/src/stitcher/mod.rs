@@ -80,6 +80,10 @@ impl<'a> Stitcher<'a> {
     /// # Errors
     /// [`Error::Options`]; [`Error::Input`] when no photograph can be read or the graph does not fit the photographs;
     /// [`Error::Cancelled`].
+    ///
+    /// [`Error::Cancelled`]: trueup_core::Error::Cancelled
+    /// [`Error::Input`]: trueup_core::Error::Input
+    /// [`Error::Options`]: trueup_core::Error::Options
     pub fn match_photographs(&self, inputs: &Inputs) -> Result<MatchedPhotographs> {
         self.options.validate()?;
         let mut clock = Clock::default();
@@ -111,6 +115,11 @@ impl<'a> Stitcher<'a> {
     /// # Errors
     /// [`Error::Options`]; [`Error::Input`] when the reference does not fit the photographs, or `require_all` is not met;
     /// [`Error::Unsolvable`] when no two photographs overlap; [`Error::Cancelled`].
+    ///
+    /// [`Error::Cancelled`]: trueup_core::Error::Cancelled
+    /// [`Error::Input`]: trueup_core::Error::Input
+    /// [`Error::Options`]: trueup_core::Error::Options
+    /// [`Error::Unsolvable`]: trueup_core::Error::Unsolvable
     pub fn align_matched(&self, set: &MatchedPhotographs, inputs: &Inputs) -> Result<Aligned> {
         self.options.validate()?;
         let MatchedPhotographs { matched, photographs, findings, .. } = set;

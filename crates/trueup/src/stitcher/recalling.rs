@@ -26,6 +26,12 @@ impl Stitcher<'_> {
     /// # Errors
     /// [`Error::Options`]; [`Error::Input`] if the project was damaged; [`Error::NotApplicable`] if a projection is asked
     /// for and the project has no cameras; those of the layout; [`Error::Limits`]; [`Error::Cancelled`].
+    ///
+    /// [`Error::Cancelled`]: trueup_core::Error::Cancelled
+    /// [`Error::Input`]: trueup_core::Error::Input
+    /// [`Error::Limits`]: trueup_core::Error::Limits
+    /// [`Error::NotApplicable`]: trueup_core::Error::NotApplicable
+    /// [`Error::Options`]: trueup_core::Error::Options
     pub(crate) fn recall(&self, project: &Project, images: Vec<SourceImage>, masks: AllMasks) -> Result<Alignment> {
         self.options.validate()?;
         let mut clock = Clock::default();

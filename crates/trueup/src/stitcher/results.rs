@@ -16,7 +16,8 @@ use crate::memory::OverlapMemory;
 use crate::names;
 use crate::project::Project;
 
-/// What [`Stitcher::align`] found: one alignment per group of photographs to be stitched, the largest first.
+/// What [`Stitcher::align`](super::Stitcher::align) found: one alignment per group of
+/// photographs to be stitched, the largest first.
 #[derive(Debug)]
 pub struct Aligned {
     /// At least one.
