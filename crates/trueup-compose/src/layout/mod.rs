@@ -1,5 +1,11 @@
 //! The canvas: deformed grids in any common unit become grids in canvas pixels.
 
+mod checked;
+mod cylinder;
+mod size;
+#[cfg(test)]
+mod tests;
+
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use trueup_core::diagnostics::Diagnostic;
@@ -8,15 +14,11 @@ use trueup_core::options::StageOptions;
 use trueup_core::{Error, Result, StageContext};
 
 use crate::crop::Crop;
-
-mod checked;
-mod cylinder;
-mod size;
+use size::{canvas_size, most_pixels, scale_within};
 
 pub(crate) use checked::check_mesh;
 pub(crate) use cylinder::{TURNS, columns_around};
 pub use size::median_cell_scale;
-use size::{canvas_size, most_pixels, scale_within};
 
 const STAGE: &str = CanvasOptions::STAGE;
 
@@ -232,6 +234,3 @@ fn bounds(placed: &[Placed]) -> (Vector2<f64>, Vector2<f64>) {
         (low.inf(&item_low), high.sup(&item_high))
     })
 }
-
-#[cfg(test)]
-mod tests;
