@@ -1,0 +1,236 @@
+//! The canvas: deformed grids in any common unit become grids in canvas pixels.
+
+mod checked;
+mod cylinder;
+mod size;
+#[cfg(test)]
+mod tests;
+
+use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
+use trueup_core::diagnostics::Diagnostic;
+use trueup_core::mesh::GridMesh;
+use trueup_core::options::StageOptions;
+use trueup_core::{Error, Result, StageContext};
+
+use crate::crop::Crop;
+use size::{canvas_size, most_pixels, scale_within};
+
+pub(crate) use checked::check_mesh;
+pub(crate) use cylinder::{TURNS, columns_around};
+pub use size::median_cell_scale;
+
+const STAGE: &str = CanvasOptions::STAGE;
+
+trueup_core::options! {
+    /// How large the panorama becomes.
+    pub struct CanvasOptions("canvas") {
+        /// Size of the panorama relative to the reference photograph's own pixels: 1 keeps every detail the reference
+        /// has, 0.25 makes a quick preview.
+        scale: f64 = 1.0, between(1e-4, 16.0), "";
+        /// Largest number of canvas pixels. A larger canvas is reduced evenly to fit, and a diagnostic says so. What memory
+        /// and disk hold is checked besides.
+        max_pixels: f64 = 1e12, between(1.0, 1e12), "px";
+        /// Canvas pixels for each pixel of the photographs (as large as the scale makes them) above which a canvas of more
+        /// than 400 million pixels is reduced evenly: a shape that runs away is not worth its time.
+        max_growth: f64 = 8.0, between(1.0, 1e6), "";
+        /// What of the canvas is kept.
+        crop: Crop = Crop::None, Allowed::Any, "";
+        /// Share of the covered pixels that the largest rectangle must keep for `crop = auto` to crop to it.
+        min_kept: f64 = 0.75, between(0.0, 1.0), "";
+    }
+}
+
+/// A photograph and the deformed grid that carries it to the panorama.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Placed {
+    /// Index of the photograph in the [`trueup_core::source::PhotographSource`].
+    pub photograph: usize,
+    /// Grid over the full-resolution photograph: width and height are its pixels.
+    pub mesh: GridMesh,
+}
+
+/// The canvas and where every photograph lies on it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CanvasLayout {
+    /// Width of the canvas in pixels, at least 1.
+    pub width: usize,
+    /// Height of the canvas in pixels, at least 1.
+    pub height: usize,
+    /// Canvas pixels per unit of the targets that were given.
+    pub canvas_from_target: f64,
+    /// What lies at the canvas's corner (0, 0), in the unit of the targets that were given.
+    #[serde(default)]
+    pub origin: [f64; 2],
+    /// The photographs used, in the order given; targets are canvas pixels and may lie outside the canvas.
+    pub placed: Vec<Placed>,
+    /// The canvas is a cylinder of that many columns, its width: what lies beyond one end is seen at the other. A multiple
+    /// of 8, so that the finer levels of a blend repeat exactly; with others its ends may show a faint step.
+    #[serde(default)]
+    pub period: Option<usize>,
+}
+
+/// Lays the grids on one canvas: shifted by the smallest vertex, scaled so that the photograph `placed[reference]`
+/// keeps its pixel scale times [`CanvasOptions::scale`].
+///
+/// Targets may be in any unit common to all grids. The canvas is `ceil(max - min)` of the scaled vertices; above
+/// [`CanvasOptions::max_pixels`] and [`CanvasOptions::max_growth`] all vertices are reduced evenly and `canvas-reduced` is
+/// reported.
+///
+/// # Errors
+/// [`Error::Options`]; [`Error::Input`] if there is no grid, `reference` is not one of them, or a grid's size and
+/// number of vertices disagree; [`Error::Unsolvable`] if a vertex is not finite or the reference has no area.
+///
+/// # Departures
+/// The scale of the reference is the median over its cells, so that a few stretched cells at its border do not count.
+pub fn run(
+    placed: Vec<Placed>,
+    reference: usize,
+    options: &CanvasOptions,
+    context: &StageContext,
+) -> Result<CanvasLayout> {
+    run_around(placed, reference, None, options, context)
+}
+
+/// As [`run`]; with a `period`, on a cylinder: places that far apart in x, in the unit of the targets, are the same. The
+/// canvas then is the one period around the middle of the grids; its scale is the nearest to that asked for at which the
+/// period is a multiple of 8 pixels.
+///
+/// # Errors
+/// As [`run`]; [`Error::Unsolvable`] if the period is not a positive length.
+pub fn run_around(
+    placed: Vec<Placed>,
+    reference: usize,
+    period: Option<f64>,
+    options: &CanvasOptions,
+    context: &StageContext,
+) -> Result<CanvasLayout> {
+    check(&placed, options)?;
+    let Some(anchor) = placed.get(reference) else {
+        return Err(Error::input(
+            "canvas",
+            format!("photograph {reference} of {} cannot be the reference", placed.len()),
+            "Choose one of the photographs in use.",
+        ));
+    };
+    let pixel_scale = median_cell_scale(&anchor.mesh);
+    if !(pixel_scale.is_finite() && pixel_scale > 0.0) {
+        return Err(Error::unsolvable(
+            STAGE,
+            format!("photograph {}", anchor.photograph),
+            "the reference has no area in the panorama",
+            "Choose another reference or another method.",
+        ));
+    }
+    let frame = Frame { canvas_from_target: options.scale / pixel_scale, window: None, period };
+    fitted(placed, &frame, options, context)
+}
+
+/// What part of the common unit's plane becomes the canvas, and how large.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Canvas pixels wanted per unit of the targets; [`CanvasOptions::scale`] is in it.
+    pub canvas_from_target: f64,
+    /// Smallest and largest target that may be shown; `None`: all that the grids cover.
+    pub window: Option<[Vector2<f64>; 2]>,
+    /// Places that far apart in x are the same: the canvas is a cylinder of that many units, from the window's left end.
+    pub period: Option<f64>,
+}
+
+/// Lays the grids on one canvas as `frame` wants it: of the window the part that the grids cover. Grids that show nothing in
+/// it are left out.
+///
+/// # Errors
+/// Those of [`run_around`]; [`Error::Unsolvable`] if no grid shows anything in the window.
+pub fn framed(
+    placed: Vec<Placed>,
+    frame: &Frame,
+    options: &CanvasOptions,
+    context: &StageContext,
+) -> Result<CanvasLayout> {
+    check(&placed, options)?;
+    fitted(placed, frame, options, context)
+}
+
+fn check(placed: &[Placed], options: &CanvasOptions) -> Result<()> {
+    options.check()?;
+    placed.iter().try_for_each(check_mesh)
+}
+
+/// [`framed`] of what has been checked.
+fn fitted(
+    mut placed: Vec<Placed>,
+    frame: &Frame,
+    options: &CanvasOptions,
+    context: &StageContext,
+) -> Result<CanvasLayout> {
+    let (mut low, mut high) = bounds(&placed);
+    if frame.period.is_some_and(|period| period.is_nan() || period <= 0.0) {
+        return Err(Error::unsolvable(STAGE, "the canvas", "its period is not a length", "Choose another method."));
+    }
+    if let Some(period) = frame.period {
+        low.x = frame.window.map_or(0.5 * (low.x + high.x - period), |[window_low, _]| window_low.x);
+        high.x = low.x + period;
+    }
+    if let Some([window_low, window_high]) = frame.window {
+        (low, high) = (low.sup(&window_low), high.inf(&window_high));
+        placed.retain(|item| shows(&item.mesh, frame.period.is_some(), low, high));
+    }
+    let extent = high - low;
+    if placed.is_empty() || !extent.max().is_finite() || extent.min() < 0.0 {
+        let (reason, hint) = match placed.is_empty() || extent.max().is_finite() {
+            true => (
+                "no photograph lies in the frame",
+                "Widen projection.fov, turn the view towards the photographs, or choose another projection.",
+            ),
+            false => (
+                "the photographs lie too far apart to be measured",
+                "Leave out the photographs that are not part of the scene.",
+            ),
+        };
+        return Err(Error::unsolvable(STAGE, "the canvas", reason, hint));
+    }
+    let max_pixels = most_pixels(&placed, options);
+    let wanted = frame.canvas_from_target;
+    let size = |scale: f64| canvas_size(extent, scale, frame.period.is_some());
+    let found = scale_within(size, extent, wanted, max_pixels);
+    let [width, height] = size(found);
+    let canvas_from_target = frame.period.map_or(found, |period| width / period);
+    if found < wanted {
+        let [wanted_width, wanted_height] = size(wanted);
+        context.report(Diagnostic::warning(
+            "canvas-reduced",
+            STAGE,
+            format!(
+                "a canvas of {wanted_width:.0} x {wanted_height:.0} px is above the limit of {max_pixels:.0} px; it was \
+                 reduced to {width:.0} x {height:.0}"
+            ),
+            "Raise canvas.max_pixels or canvas.max_growth, or choose a projection that stretches the borders less.",
+        ));
+    }
+    for vertex in placed.iter_mut().flat_map(|item| &mut item.mesh.target) {
+        *vertex = ((Vector2::from(*vertex) - low) * canvas_from_target).into();
+    }
+    let (width, height) = (width as usize, height as usize);
+    let (origin, period) = (low.into(), frame.period.map(|_| width));
+    Ok(CanvasLayout { width, height, canvas_from_target, origin, placed, period })
+}
+
+/// Whether a whole cell of the grid reaches into the box; on a cylinder, into its rows.
+pub(crate) fn shows(mesh: &GridMesh, around: bool, low: Vector2<f64>, high: Vector2<f64>) -> bool {
+    mesh.whole_cells().any(|corners| {
+        let corners = corners.map(|vertex| mesh.target[vertex]);
+        (usize::from(around)..2).all(|axis| {
+            corners.iter().any(|corner| corner[axis] > low[axis])
+                && corners.iter().any(|corner| corner[axis] < high[axis])
+        })
+    })
+}
+
+fn bounds(placed: &[Placed]) -> (Vector2<f64>, Vector2<f64>) {
+    let start = (Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY));
+    placed.iter().fold(start, |(low, high), item| {
+        let (item_low, item_high) = item.mesh.bounds();
+        (low.inf(&item_low), high.sup(&item_high))
+    })
+}
