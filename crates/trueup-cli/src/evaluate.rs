@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use serde_json::json;
-use trueup::{Error, Evaluation, PixelEvaluation, Project, StageContext};
+use trueup::{Error, Evaluation, PixelEvaluation, Project};
 
 use crate::arguments::EvaluateArgs;
 use crate::failure::Failure;
 use crate::inspect;
 use crate::output;
-use crate::progress::Bars;
+use crate::progress;
 use crate::summary::{self, Page};
 
 /// The pixel measures, or why there are none.
@@ -49,13 +49,9 @@ fn against(project: &Project, project_file: &Path, truth_file: &Path) -> Result<
 
 /// Photographs that are gone or cannot be compared leave the other measures as they are.
 fn pixels(project: &Project, project_file: &Path) -> Result<Pixels, Error> {
-    let cancel = crate::cancel_token();
-    let bars = Bars::new(false);
-    let context = StageContext::new(&bars, &cancel, project.options.stitch.seed);
     let folder = project_file.parent().unwrap_or(Path::new(""));
-    let compared = trueup::evaluate_pixels(project, folder, &context);
-    bars.clear();
-    match compared {
+    let seed = project.options.stitch.seed;
+    match progress::shown(false, seed, |context| trueup::evaluate_pixels(project, folder, context)) {
         Ok(pixels) => Ok(Ok(pixels)),
         Err(Error::Input { subject, reason, .. }) => Ok(Err(format!("{reason}: {subject}"))),
         Err(Error::Unsolvable { why, .. }) => Ok(Err(why)),

@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod chosen;
 mod compare;
 mod compose;
 mod evaluate;

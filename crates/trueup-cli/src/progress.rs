@@ -3,12 +3,22 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use trueup::Progress;
+use trueup::{Progress, StageContext};
 
 const TEMPLATE: &str = "{prefix:16} {bar:32} {pos:>6} of {len:<6} {elapsed}";
 
+/// What `work` comes to, with its progress on standard error, or with none of it if `quiet`, until the first Ctrl-C. The
+/// bars are gone when it returns.
+pub(crate) fn shown<T>(quiet: bool, seed: u64, work: impl FnOnce(&StageContext) -> T) -> T {
+    let cancel = crate::cancel_token();
+    let bars = Bars::new(quiet);
+    let outcome = work(&StageContext::new(&bars, &cancel, seed));
+    bars.clear();
+    outcome
+}
+
 /// A bar per stage with its counts. Draws nothing unless standard error is a terminal.
-pub(crate) struct Bars {
+struct Bars {
     drawn: MultiProgress,
     /// The stages begun, in that order.
     stages: Mutex<Vec<(String, ProgressBar)>>,
@@ -16,13 +26,13 @@ pub(crate) struct Bars {
 
 impl Bars {
     /// Bars on standard error; `quiet` ones draw nothing at all.
-    pub(crate) fn new(quiet: bool) -> Self {
+    fn new(quiet: bool) -> Self {
         let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         Self { drawn: MultiProgress::with_draw_target(target), stages: Mutex::default() }
     }
 
     /// Takes every bar from the screen, to make room for the summary.
-    pub(crate) fn clear(&self) {
+    fn clear(&self) {
         for (_, bar) in self.stages().drain(..) {
             bar.finish_and_clear();
         }

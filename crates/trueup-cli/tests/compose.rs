@@ -34,7 +34,8 @@ fn the_same_options_give_the_same_bytes() {
 #[test]
 fn views_and_what_lies_beside_a_panorama_come_out_as_stitched() {
     let desk = stitched();
-    let view = ["--projection", "equirectangular", "--yaw", "5", "--crop", "rectangle", "--depth", "8"];
+    let view =
+        ["--projection", "equirectangular", "--yaw", "5", "--crop", "rectangle", "--fill", "0.1", "--depth", "8"];
     let stitched =
         [&["stitch", "-o", "view.jpg", "--scale", "0.5", "--project", "view.json"], &STREET_NAMES[..], &view];
     finish(trueup(desk.path(), &stitched.concat())).expect_success();

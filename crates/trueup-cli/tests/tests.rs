@@ -10,6 +10,7 @@ mod documented;
 mod evaluate;
 mod failures;
 mod formats;
+mod full_turn;
 mod masks;
 mod options;
 mod pictures;

@@ -6,7 +6,8 @@ use nalgebra::Vector2;
 use rayon::prelude::*;
 
 use crate::deformed_grid::DeformedGrid;
-use crate::layout::{self, CanvasLayout, Placed};
+use crate::gaps::Gaps;
+use crate::layout::{self, CanvasLayout, CanvasOptions, Placed};
 
 trueup_core::choice! {
     /// What of the canvas is kept.
@@ -74,6 +75,25 @@ impl Coverage {
             })
             .collect();
         Self { width, rows: bands.into_iter().flatten().collect() }
+    }
+
+    /// Whether the pixel is covered.
+    pub(crate) fn holds(&self, x: usize, y: usize) -> bool {
+        let stretches = self.rows.get(y).map_or(&[][..], Vec::as_slice);
+        let next = stretches.partition_point(|stretch| stretch.end <= x);
+        stretches.get(next).is_some_and(|stretch| stretch.start <= x)
+    }
+
+    /// The coverage with those of the other pixels that `as_well` names.
+    pub(crate) fn with(&self, as_well: impl Fn(usize, usize) -> bool + Sync) -> Self {
+        let filled = |(y, stretches): (usize, &Vec<Range<usize>>)| {
+            let starts = std::iter::once(0).chain(stretches.iter().map(|stretch| stretch.end));
+            let ends = stretches.iter().map(|stretch| stretch.start).chain([self.width]);
+            let others = starts.zip(ends).flat_map(|(start, end)| start..end);
+            let more = others.filter(|&x| as_well(x, y)).map(|x| x..x + 1);
+            united(stretches.iter().cloned().chain(more).collect())
+        };
+        Self { width: self.width, rows: self.rows.par_iter().enumerate().map(filled).collect() }
     }
 
     /// Number of pixels covered.
@@ -208,11 +228,17 @@ fn united(mut stretches: Vec<Range<usize>>) -> Vec<Range<usize>> {
 }
 
 /// The rectangle of the canvas that is to be kept; `None` for all of it. Of a full turn, rows alone are cut.
-pub fn choose(layout: &CanvasLayout, crop: Crop, min_kept: f64) -> Option<Rectangle> {
+///
+/// Gaps that will be filled are no holes.
+pub fn choose(layout: &CanvasLayout, options: &CanvasOptions) -> Option<Rectangle> {
+    let &CanvasOptions { crop, min_kept, fill, .. } = options;
     if crop == Crop::None {
         return None;
     }
-    let coverage = Coverage::of(layout);
+    let mut coverage = Coverage::of(layout);
+    if fill > 0.0 {
+        coverage = Gaps::find(layout, coverage, fill).filled_coverage();
+    }
     let rectangle = match layout.period {
         None => coverage.largest_rectangle(),
         Some(_) => coverage.longest_whole_rows(),
@@ -275,6 +301,10 @@ mod tests {
         CanvasLayout { width, height, canvas_from_target: 2.0, origin: [5.0, 7.0], placed, period: None }
     }
 
+    fn options(crop: Crop, min_kept: f64) -> CanvasOptions {
+        CanvasOptions { crop, min_kept, ..CanvasOptions::default() }
+    }
+
     fn upright(left: f64, top: f64, right: f64, bottom: f64) -> [[f64; 2]; 4] {
         [[left, top], [right, top], [right, bottom], [left, bottom]]
     }
@@ -290,10 +320,10 @@ mod tests {
         assert_eq!((kept.width, kept.height, kept.origin), (190, 50, [5.0, 12.0]));
         assert_eq!(kept.placed[0].mesh.target[0], [0.0, -10.0]);
         // 9500 of 11500 pixels.
-        assert_eq!(choose(&steps, Crop::Auto, 0.8), Some(largest.clone()));
-        assert_eq!(choose(&steps, Crop::Auto, 0.9), None);
-        assert_eq!(choose(&steps, Crop::Rectangle, 0.9), Some(largest));
-        assert_eq!(choose(&steps, Crop::None, 0.0), None);
+        assert_eq!(choose(&steps, &options(Crop::Auto, 0.8)), Some(largest.clone()));
+        assert_eq!(choose(&steps, &options(Crop::Auto, 0.9)), None);
+        assert_eq!(choose(&steps, &options(Crop::Rectangle, 0.9)), Some(largest));
+        assert_eq!(choose(&steps, &options(Crop::None, 0.0)), None);
     }
 
     /// A square on its corner, 40 in half width: of rectangles inside the largest is a square of side 40.
@@ -309,7 +339,7 @@ mod tests {
     fn of_a_full_turn_rows_alone_are_cut() {
         let mut turn = layout(160, 70, &[upright(-20.0, 0.0, 80.0, 60.0), upright(70.0, 9.5, 170.0, 70.0)]);
         turn.period = Some(160);
-        let kept = choose(&turn, Crop::Auto, 0.5).expect("whole rows");
+        let kept = choose(&turn, &options(Crop::Auto, 0.5)).expect("whole rows");
         assert_eq!(kept, Rectangle { columns: 0..160, rows: 10..60 });
         let kept = cropped(turn, &kept);
         assert_eq!((kept.width, kept.height, kept.period, kept.placed.len()), (160, 50, Some(160), 2));

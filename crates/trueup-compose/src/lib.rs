@@ -6,6 +6,7 @@
 //! * [`exposure`]: reduced photographs to gain, colour cast and vignetting of each;
 //! * [`render`]: full-resolution photographs, layout and corrections to a [`render::Panorama`], along the seams that
 //!   [`seam`] finds;
+//! * [`gaps`]: what no photograph covers, and what of that is small enough to be filled;
 //! * [`fidelity`]: how true a panorama is to its photographs.
 //!
 //! Every photograph is resampled exactly once, from its own samples straight to the canvas.
@@ -13,6 +14,7 @@
 pub mod crop;
 pub mod exposure;
 pub mod fidelity;
+pub mod gaps;
 pub mod layout;
 pub mod render;
 pub mod seam;

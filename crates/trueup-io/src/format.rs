@@ -1,5 +1,6 @@
 //! Which picture format a file holds, told by its first bytes, never by its name.
 
+use std::io::Read;
 use std::path::Path;
 
 /// The formats that are read and written.
@@ -31,7 +32,14 @@ impl OutputFormat {
 }
 
 /// How many bytes [`PictureFormat::of_content`] needs to see.
-pub(crate) const SIGNATURE_BYTES: usize = 16;
+const SIGNATURE_BYTES: usize = 16;
+
+/// What [`PictureFormat::of_content`] needs to see of a file, or all of a shorter one.
+pub(crate) fn read_start(file: &mut impl Read) -> std::io::Result<Vec<u8>> {
+    let mut start = Vec::with_capacity(SIGNATURE_BYTES);
+    file.take(SIGNATURE_BYTES as u64).read_to_end(&mut start)?;
+    Ok(start)
+}
 
 /// The supported formats, for messages.
 pub(crate) const SUPPORTED: &str = "JPEG, PNG, TIFF or WebP";
@@ -44,7 +52,7 @@ const FOREIGN_EXTENSIONS: [&str; 21] = [
 ];
 
 impl PictureFormat {
-    /// The format whose signature `start`, the first [`SIGNATURE_BYTES`] of a file, carries.
+    /// The format whose signature `start`, the file's [`read_start`], carries.
     ///
     /// # Source
     /// JPEG: ITU-T T.81 B.1.1.3 (SOI and the next marker). PNG: W3C PNG 5.2. TIFF 6.0 section 2 and BigTIFF.

@@ -28,7 +28,8 @@ use crate::cache::Known;
 use crate::clock::Clock;
 use crate::measure::Measured;
 use crate::memory::{OverlapMemory, Overlaps};
-use crate::options::{Shape, StitchOptions};
+use crate::method::Shape;
+use crate::options::StitchOptions;
 use crate::refinement::Material;
 
 /// One group of overlapping photographs with everything the geometry stages need; indices are local, 0..N.

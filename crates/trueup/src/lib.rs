@@ -36,10 +36,12 @@ mod matched;
 mod measure;
 mod measures;
 mod memory;
+mod method;
 mod names;
 mod options;
 mod pairs;
 mod project;
+mod projection_record;
 mod provenance;
 mod pto;
 mod recompose;
@@ -49,17 +51,18 @@ mod refinement;
 mod replacements;
 mod stitcher;
 
-pub use arrangement::ProjectionRecord;
 pub use cache::{Cache, CacheOptions, CacheUse};
 pub use evaluation::{Evaluation, PictureEvaluation, PixelEvaluation, evaluate, evaluate_pixels, read_truth};
 pub use files::{StitchJob, Written};
 pub use inputs::{Inputs, Reference};
 pub use masks::{MaskFile, MaskKind, MaskRecord};
 pub use measures::{BentLine, LongLines, Measures, PictureMeasures, ReprojectionMeasures, UprightMeasures};
-pub use options::{Method, StitchOptions, WorkingOptions};
+pub use method::Method;
+pub use options::{StitchOptions, WorkingOptions};
 pub use project::{
     Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
 };
+pub use projection_record::ProjectionRecord;
 pub use pto::hugin_project;
 pub use recompose::ComposeJob;
 pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};

@@ -7,10 +7,10 @@ use trueup_compose::exposure::Correction;
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::matches::PairVerdict;
 
-use crate::arrangement::ProjectionRecord;
 use crate::masks::MaskRecord;
 use crate::measures::Measures;
 use crate::options::StitchOptions;
+use crate::projection_record::ProjectionRecord;
 
 /// The `format` field of every project file.
 pub const PROJECT_FORMAT: &str = "trueup-project";

@@ -11,7 +11,8 @@ use crate::align::{Component, Geometry};
 use crate::arrangement::Arrangement;
 use crate::masks::MaskRecord;
 use crate::matched::Matched;
-use crate::options::{Shape, StitchOptions};
+use crate::method::Shape;
+use crate::options::StitchOptions;
 use crate::project::{
     Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
 };

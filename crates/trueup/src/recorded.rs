@@ -58,17 +58,16 @@ impl Recorded {
         // Grids may lie beyond the ends of a full turn by less than a turn, and anywhere around what was cropped.
         let turn = if canvas.full_turn { width as f64 } else { 0.0 };
         let may_be_cropped = project.projection.is_none() && project.options.canvas.crop != Crop::None;
-        let outside = |mesh: &GridMesh| {
+        let is_stray = |mesh: &GridMesh| {
             let (low, high) = mesh.bounds();
-            let is_across = low.x < -ROUNDED_PX - turn || high.x > width as f64 + ROUNDED_PX + turn;
-            is_across || low.y < -ROUNDED_PX || high.y > height as f64 + ROUNDED_PX
-        };
-        let far = |mesh: &GridMesh| {
-            let (low, high) = mesh.bounds();
-            turn > 0.0 && (low.x < -ROUNDED_PX - turn || high.x > width as f64 + ROUNDED_PX + turn)
+            let is_aside = low.x < -ROUNDED_PX - turn || high.x > width as f64 + ROUNDED_PX + turn;
+            match may_be_cropped {
+                true => turn > 0.0 && is_aside,
+                false => is_aside || low.y < -ROUNDED_PX || high.y > height as f64 + ROUNDED_PX,
+            }
         };
         let pixels = width as f64 * height as f64;
-        let strays = meshes.iter().any(|mesh| if may_be_cropped { far(mesh) } else { outside(mesh) });
+        let strays = meshes.iter().any(is_stray);
         // No canvas reaches beyond all grids by more than a part of a pixel.
         let reach =
             |axis: usize| meshes.iter().map(|mesh| mesh.bounds().1[axis]).fold(0.0, f64::max).ceil() + ROUNDED_PX;

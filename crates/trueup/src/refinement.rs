@@ -15,7 +15,8 @@ use trueup_vision::line_matching::{self, LinedPicture};
 use trueup_vision::lines;
 
 use crate::align::Component;
-use crate::options::{StitchOptions, Structure};
+use crate::method::Structure;
+use crate::options::StitchOptions;
 
 /// Whether the mesh is refined by the photographs' pixels, so that they are worth keeping.
 pub(crate) fn needs_pixels(options: &StitchOptions) -> bool {

@@ -166,14 +166,16 @@ mod tests {
 
     use super::*;
 
-    const KINDS: [FlatKind; 6] = [
-        FlatKind::Equirectangular,
-        FlatKind::Cylindrical,
-        FlatKind::Mercator,
-        FlatKind::Perspective,
-        FlatKind::Panini,
-        FlatKind::Stereographic,
-    ];
+    impl FlatKind {
+        pub(in crate::projection) const ALL: [Self; 6] = [
+            Self::Equirectangular,
+            Self::Cylindrical,
+            Self::Mercator,
+            Self::Perspective,
+            Self::Panini,
+            Self::Stereographic,
+        ];
+    }
 
     fn flat(kind: FlatKind) -> Flat {
         Flat { kind, panini_distance: 1.0 }
@@ -224,7 +226,7 @@ mod tests {
         assert!(flat(FlatKind::Panini).place(toward(180.0, 0.0)).is_none());
         assert!(flat(FlatKind::Cylindrical).place(toward(0.0, 90.0)).is_none());
         assert!(flat(FlatKind::Equirectangular).direction(Vector2::new(0.0, 1.6)).is_none());
-        assert!(KINDS.iter().all(|&kind| flat(kind).place(Vector3::zeros()).is_none()));
+        assert!(FlatKind::ALL.iter().all(|&kind| flat(kind).place(Vector3::zeros()).is_none()));
     }
 
     #[test]
@@ -239,7 +241,7 @@ mod tests {
         /// Forth and back, and near the middle a radian is a unit along both axes.
         #[test]
         fn places_and_directions_are_inverse(longitude in -100.0..100.0_f64, latitude in -75.0..75.0_f64, d in 0.0..3.0_f64) {
-            for kind in KINDS {
+            for kind in FlatKind::ALL {
                 let flat = Flat { kind, panini_distance: d };
                 let direction = toward(longitude, latitude);
                 if let Some(place) = flat.place(direction) {

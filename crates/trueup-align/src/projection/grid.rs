@@ -260,14 +260,7 @@ mod tests {
     /// plane is stretched.
     #[test]
     fn cells_follow_the_projection() {
-        for kind in [
-            FlatKind::Equirectangular,
-            FlatKind::Cylindrical,
-            FlatKind::Mercator,
-            FlatKind::Perspective,
-            FlatKind::Panini,
-            FlatKind::Stereographic,
-        ] {
+        for kind in FlatKind::ALL {
             let (view, shot) = (view(kind), shot(35.0, 20.0));
             let mesh = placed(std::slice::from_ref(&shot), &view, false).remove(0).mesh;
             let mut checked = 0;

@@ -4,13 +4,13 @@ mod pages;
 mod summary;
 
 use trueup::compare::{CompareJob, Comparison, Drawing, Entry, Page, read_rankings, tally};
-use trueup::{Error, Inputs, StageContext, StitchOptions};
+use trueup::{Error, Inputs, StitchOptions};
 
 use crate::arguments::CompareArgs;
+use crate::chosen;
 use crate::failure::Failure;
 use crate::output;
-use crate::progress::Bars;
-use crate::stitch::{chosen_options, chosen_reference, reason};
+use crate::progress;
 
 pub(crate) fn run(args: CompareArgs) -> Result<(), Failure> {
     if !args.tally.is_empty() {
@@ -18,12 +18,7 @@ pub(crate) fn run(args: CompareArgs) -> Result<(), Failure> {
     }
     let quiet = args.quiet;
     let (job, options) = checked(args)?;
-    let cancel = crate::cancel_token();
-    let bars = Bars::new(quiet);
-    let context = StageContext::new(&bars, &cancel, options.stitch.seed);
-    let compared = job.run(&options, &context, &pages);
-    bars.clear();
-    let compared = compared?;
+    let compared = progress::shown(quiet, options.stitch.seed, |context| job.run(&options, context, &pages))?;
     if quiet { Ok(()) } else { output::print(&summary::text(&compared, &job.output)) }
 }
 
@@ -55,23 +50,22 @@ fn checked(args: CompareArgs) -> Result<(CompareJob, StitchOptions), Failure> {
         ("--scale", "compare.scale", &args.scale),
         ("--format", "compare.format", &args.format),
         ("--quality", "output.jpeg_quality", &args.quality),
-        ("--seed", "stitch.seed", &args.seed),
+        ("--seed", "stitch.seed", &args.geometry.seed),
     ];
-    let options = chosen_options(StitchOptions::default(), args.config.as_deref(), &args.set, &flags)?;
+    let options = chosen::options(StitchOptions::default(), &args.tuning, &flags)?;
     let entries = entries(&args.methods, &args.entry, &options)?;
     let inputs = Inputs {
         photographs: args.photographs,
-        reference: chosen_reference(args.reference),
-        graph: args.graph,
+        reference: chosen::reference(args.geometry.reference),
+        graph: args.geometry.graph,
         all: false,
         masks: Vec::new(),
-        require_all: args.require_all,
+        require_all: args.geometry.require_all,
     };
-    // The library reads 0 as one thread per core.
-    let threads = args.threads.map_or(0, usize::from);
+    let threads = chosen::threads(&args.tuning);
     // The command demands an output wherever this is called.
     let output = args.output.unwrap_or_default();
-    let cache = args.cache;
+    let cache = args.geometry.cache;
     Ok((CompareJob { inputs, entries, truth: args.truth, ranked: args.rank, output, cache, threads }, options))
 }
 
@@ -85,7 +79,7 @@ fn entries(methods: &[String], typed: &[String], options: &StitchOptions) -> Res
         match entry.and_then(|entry| entry.options(options).map(|_| entry)) {
             Ok(entry) => entries.push(entry),
             Err(Error::Options(invalid)) => wrong.extend(invalid.iter().map(|one| format!("{argument}: {one}"))),
-            Err(error) => wrong.push(format!("{argument}: {}", reason(error))),
+            Err(error) => wrong.push(format!("{argument}: {}", chosen::reason(error))),
         }
     }
     if wrong.is_empty() { Ok(entries) } else { Err(Failure::options(wrong)) }

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
 
-use trueup::{Diagnostic, ImageRecord, ImageStatus, Project, Severity};
+use trueup::{Diagnostic, ImageRecord, ImageStatus, Project, Severity, Written};
 
 use crate::words::file_size;
 
@@ -46,6 +46,16 @@ pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool
         false => page.entry("time", &seconds_in_short(&project.seconds)),
     }
     page.into_text()
+}
+
+/// The summaries of panoramas that were written, with a blank line between them.
+pub(crate) fn of_written(written: &[Written], verbose: bool) -> String {
+    let one = |written: &Written| {
+        let file =
+            PanoramaFile { panorama: &written.output, bytes: written.bytes, project: written.project_file.as_deref() };
+        text(&written.project, Some(&file), verbose)
+    };
+    written.iter().map(one).collect::<Vec<_>>().join("\n")
 }
 
 /// The measures that the project file holds, all of them.

@@ -10,7 +10,7 @@ use crate::seam::{Label, NOBODY, Seams};
 
 /// Log2 of the canvas pixels per sample of the finest level that is blended as a whole, on a canvas of this size; at least
 /// [`LEAST_FIRST_LEVEL`]. It follows from the canvas alone, so that the memory there is does not show in the panorama.
-pub(super) fn first_level([width, height]: [usize; 2]) -> u32 {
+pub(crate) fn first_level([width, height]: [usize; 2]) -> u32 {
     let samples = |level: u32| width.div_ceil(1 << level).saturating_mul(height.div_ceil(1 << level));
     (LEAST_FIRST_LEVEL..).find(|&level| samples(level) <= MOST_SAMPLES).unwrap_or(LEAST_FIRST_LEVEL)
 }

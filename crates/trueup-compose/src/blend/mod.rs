@@ -13,7 +13,7 @@ mod bases;
 mod coarse;
 mod needs;
 mod order;
-mod pyramid;
+pub(crate) mod pyramid;
 mod shelf;
 mod tile;
 mod unrolled;
@@ -36,7 +36,7 @@ use crate::render::prepared::Scratch;
 use crate::render::store::Store;
 use crate::seam::{self, SeamOptions, Seams};
 use bases::Bases;
-use coarse::first_level;
+pub(crate) use coarse::first_level;
 pub(crate) use needs::needed_bytes;
 use pyramid::Plane;
 use shelf::{Shelf, Supply};
@@ -48,7 +48,7 @@ pub(crate) type Finished = [u16; 4];
 
 /// Side of a tile in canvas pixels, a multiple of 2^first_level: 128 for the canvases of most panoramas. Larger tiles waste
 /// less on margins, smaller ones less on pixels that only one photograph shows.
-const fn tile_side(first_level: u32) -> usize {
+pub(crate) const fn tile_side(first_level: u32) -> usize {
     16 << first_level
 }
 
@@ -164,17 +164,7 @@ pub(crate) fn run(
 /// Levels above the first that is blended as a whole, so that the coarsest samples are as wide as the widest transition
 /// wanted, but on a cylinder no wider than those of which a turn has a whole number.
 fn levels_above(layout: &CanvasLayout, options: &RenderOptions) -> u32 {
-    let mut sides: Vec<f64> = layout
-        .placed
-        .iter()
-        .map(|placed| {
-            let (low, high) = placed.mesh.bounds();
-            (high - low).min()
-        })
-        .collect();
-    sides.sort_by(f64::total_cmp);
-    let side = sides.get(sides.len() / 2).copied().unwrap_or(1.0);
-    let wanted = (options.transition * side).max(1.0).log2().round();
+    let wanted = (options.transition * layout.photograph_side()).max(1.0).log2().round();
     // A turn that no layout makes has samples of its own at every turn, rather than hardly any transitions.
     let repeats = layout.period.filter(|&period| period > 0 && period.is_multiple_of(unit_of_turn(period)));
     let widest = repeats.map_or(u32::MAX, usize::trailing_zeros);

@@ -16,7 +16,7 @@
 use std::ops::Range;
 
 /// Something that can be summed with weights.
-pub(super) trait Texel: Copy + Default {
+pub(crate) trait Texel: Copy + Default {
     /// `self + weight * other`.
     fn plus(self, other: Self, weight: f32) -> Self;
 }
@@ -42,26 +42,26 @@ impl Texel for [f32; 4] {
 
 /// A part of one level; all outside is zero. Four channels are three of colour times the share, and the share.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Plane<T> {
-    pub(super) columns: Range<usize>,
-    pub(super) rows: Range<usize>,
-    pub(super) texels: Vec<T>,
+pub(crate) struct Plane<T> {
+    pub(crate) columns: Range<usize>,
+    pub(crate) rows: Range<usize>,
+    pub(crate) texels: Vec<T>,
 }
 
 impl<T: Texel> Plane<T> {
     /// Zeros.
-    pub(super) fn new(columns: Range<usize>, rows: Range<usize>) -> Self {
+    pub(crate) fn new(columns: Range<usize>, rows: Range<usize>) -> Self {
         let texels = vec![T::default(); columns.len() * rows.len()];
         Self { columns, rows, texels }
     }
 
     /// The samples of row `y`, which the plane holds.
-    pub(super) fn row(&self, y: usize) -> &[T] {
+    pub(crate) fn row(&self, y: usize) -> &[T] {
         let width = self.columns.len();
         &self.texels[(y - self.rows.start) * width..][..width]
     }
 
-    pub(super) fn row_mut(&mut self, y: usize) -> &mut [T] {
+    pub(crate) fn row_mut(&mut self, y: usize) -> &mut [T] {
         let width = self.columns.len();
         &mut self.texels[(y - self.rows.start) * width..][..width]
     }
@@ -94,7 +94,7 @@ impl<T: Texel> Plane<T> {
     }
 
     /// The next coarser level: every sample whose middle this plane holds.
-    pub(super) fn reduced(&self) -> Self {
+    pub(crate) fn reduced(&self) -> Self {
         let half = |range: &Range<usize>| range.start.div_ceil(2)..range.end.div_ceil(2);
         let mut reduced = Self::new(half(&self.columns), half(&self.rows));
         let width = reduced.columns.len();
@@ -125,7 +125,7 @@ impl<T: Texel> Plane<T> {
     }
 
     /// The part `columns` x `rows` of the next finer level, interpolated; sums not divided by their shares.
-    pub(super) fn expanded(&self, columns: &Range<usize>, rows: &Range<usize>) -> Self {
+    pub(crate) fn expanded(&self, columns: &Range<usize>, rows: &Range<usize>) -> Self {
         let mut expanded = Self::new(columns.clone(), rows.clone());
         let width = columns.len();
         if width == 0 {
@@ -184,11 +184,11 @@ fn two<T: Texel>(a: T, b: T) -> T {
 }
 
 /// A smaller share of a sample, a 64th of a step of 16 bits, is none: its colour would be made of rounding.
-pub(super) const LEAST_SHARE: f32 = 1.0 / (1 << 22) as f32;
+pub(crate) const LEAST_SHARE: f32 = 1.0 / (1 << 22) as f32;
 
 /// Colour divided by the share; `None` where nothing is covered.
 #[inline(always)]
-pub(super) fn colour(texel: [f32; 4]) -> Option<[f32; 3]> {
+pub(crate) fn colour(texel: [f32; 4]) -> Option<[f32; 3]> {
     (texel[3] > LEAST_SHARE).then(|| {
         let scale = 1.0 / texel[3];
         [texel[0] * scale, texel[1] * scale, texel[2] * scale]
@@ -202,7 +202,7 @@ fn mean([r, g, b, weight]: [f32; 4]) -> Option<[f32; 3]> {
 }
 
 /// Makes every sample that is covered at all count the same when it is interpolated.
-pub(super) fn level_shares(plane: &mut Plane<[f32; 4]>) {
+pub(crate) fn level_shares(plane: &mut Plane<[f32; 4]>) {
     for texel in &mut plane.texels {
         *texel = match colour(*texel) {
             Some([r, g, b]) => [r, g, b, 1.0],
@@ -213,7 +213,7 @@ pub(super) fn level_shares(plane: &mut Plane<[f32; 4]>) {
 
 /// Adds to `sum` the level's detail of one picture, `level` minus its interpolated coarser level, weighted by `mask` and by
 /// the share covered (its fourth power).
-pub(super) fn add_detail(
+pub(crate) fn add_detail(
     sum: &mut Plane<[f32; 4]>,
     level: &Plane<[f32; 4]>,
     coarser: &Plane<[f32; 4]>,
@@ -230,7 +230,7 @@ pub(super) fn add_detail(
 }
 
 /// Adds to `sum` one picture at the coarsest level.
-pub(super) fn add_base(sum: &mut Plane<[f32; 4]>, level: &Plane<[f32; 4]>, mask: &Plane<f32>) {
+pub(crate) fn add_base(sum: &mut Plane<[f32; 4]>, level: &Plane<[f32; 4]>, mask: &Plane<f32>) {
     for_each_weighted(sum, level, mask, |_, own| own);
 }
 
@@ -268,7 +268,7 @@ fn for_each_weighted(
 
 /// Turns weighted sums into the blended level: their mean, on top of what the coarser blended level interpolates to. The
 /// fourth channel becomes 1 where there is something.
-pub(super) fn collapse(sum: &mut Plane<[f32; 4]>, coarser: Option<&Plane<[f32; 4]>>) {
+pub(crate) fn collapse(sum: &mut Plane<[f32; 4]>, coarser: Option<&Plane<[f32; 4]>>) {
     let smooth = coarser.map(|coarser| coarser.expanded(&sum.columns, &sum.rows));
     for (index, texel) in sum.texels.iter_mut().enumerate() {
         let base = smooth.as_ref().map_or(Some([0.0; 3]), |smooth| colour(smooth.texels[index]));

@@ -1,5 +1,11 @@
 //! The canvas: deformed grids in any common unit become grids in canvas pixels.
 
+mod checked;
+mod cylinder;
+mod size;
+#[cfg(test)]
+mod tests;
+
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use trueup_core::diagnostics::Diagnostic;
@@ -8,15 +14,11 @@ use trueup_core::options::StageOptions;
 use trueup_core::{Error, Result, StageContext};
 
 use crate::crop::Crop;
-
-mod checked;
-mod cylinder;
-mod size;
+use size::{canvas_size, most_pixels, scale_within};
 
 pub(crate) use checked::check_mesh;
 pub(crate) use cylinder::{TURNS, columns_around, unit_of_turn};
 pub use size::median_cell_scale;
-use size::{canvas_size, most_pixels, scale_within};
 
 const STAGE: &str = CanvasOptions::STAGE;
 
@@ -36,6 +38,9 @@ trueup_core::options! {
         crop: Crop = Crop::None, Allowed::Any, "";
         /// Share of the covered pixels that the largest rectangle must keep for `crop = auto` to crop to it.
         min_kept: f64 = 0.75, between(0.0, 1.0), "";
+        /// Gaps between and beside the photographs of up to twice this width, as a share of a photograph's side, are filled with
+        /// a smooth surface over their borders' colours: small ones in an even sky or wall are not noticed. 0 fills nothing.
+        fill: f64 = 0.0, between(0.0, 1.0), "";
     }
 }
 
@@ -93,7 +98,8 @@ pub fn run(
 
 /// As [`run`]; with a `period`, on a cylinder: places that far apart in x, in the unit of the targets, are the same. The
 /// canvas then is the one period around the middle of the grids; its scale is the nearest to that asked for, by at most
-/// a 64th, at which the period is a whole number of the samples that blending takes, see [`CanvasLayout::period`].
+/// a 64th or 4 pixels, at which the period is a whole number of the samples that blending takes, see
+/// [`CanvasLayout::period`].
 ///
 /// # Errors
 /// As [`run`]; [`Error::Unsolvable`] if the period is not a positive length.
@@ -219,6 +225,19 @@ fn fitted(
     Ok(CanvasLayout { width, height, canvas_from_target, origin, placed, period })
 }
 
+impl CanvasLayout {
+    /// The smaller side of a photograph on the canvas, pixels: the median over those placed; 1 if there is none.
+    pub(crate) fn photograph_side(&self) -> f64 {
+        let side = |placed: &Placed| {
+            let (low, high) = placed.mesh.bounds();
+            (high - low).min()
+        };
+        let mut sides: Vec<f64> = self.placed.iter().map(side).collect();
+        sides.sort_by(f64::total_cmp);
+        sides.get(sides.len() / 2).copied().unwrap_or(1.0)
+    }
+}
+
 /// Whether a whole cell of the grid reaches into the box; on a cylinder, into its rows.
 pub(crate) fn shows(mesh: &GridMesh, around: bool, low: Vector2<f64>, high: Vector2<f64>) -> bool {
     mesh.whole_cells().any(|corners| {
@@ -237,6 +256,3 @@ fn bounds(placed: &[Placed]) -> (Vector2<f64>, Vector2<f64>) {
         (low.inf(&item_low), high.sup(&item_high))
     })
 }
-
-#[cfg(test)]
-mod tests;

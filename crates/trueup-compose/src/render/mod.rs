@@ -4,6 +4,7 @@
 //! time as the current thread pool has threads, then added to the canvas one after the other, each in parallel over bands
 //! of rows. Both give the same bits for any number of threads.
 
+mod fill;
 mod layer;
 mod panorama;
 pub(crate) mod plan;

@@ -60,7 +60,7 @@ impl Panorama {
     }
 }
 
-fn linear_of_sum([r, g, b, sum]: [f32; 4]) -> [f32; 4] {
+pub(super) fn linear_of_sum([r, g, b, sum]: [f32; 4]) -> [f32; 4] {
     if sum > 0.0 { [r / sum, g / sum, b / sum, alpha(sum)] } else { [0.0; 4] }
 }
 

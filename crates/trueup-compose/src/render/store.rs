@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
@@ -70,6 +70,11 @@ pub(crate) fn read_pixels<P: Pixel>(file: &dyn ScratchFile, offset: u64, count: 
     Ok(bytes.chunks_exact(P::BYTES).map(P::read).collect())
 }
 
+/// How many pixels let something show through.
+fn translucent<P: Pixel>(pixels: &[P]) -> usize {
+    pixels.iter().filter(|pixel| !pixel.is_opaque()).count()
+}
+
 /// A canvas, row-major in memory.
 #[derive(Debug)]
 pub(crate) enum Store<P> {
@@ -101,6 +106,29 @@ impl<P: Pixel> Store<P> {
         }
     }
 
+    /// The block `columns` x `rows`, row by row.
+    pub(crate) fn window(&self, columns: &Range<usize>, rows: &Range<usize>) -> Result<Vec<P>> {
+        let mut window = Vec::with_capacity(columns.len() * rows.len());
+        for y in rows.clone() {
+            match self {
+                Self::Memory { width, pixels } => window.extend_from_slice(&pixels[y * width..][columns.clone()]),
+                Self::Scratch(blocks) => blocks.stretch(columns, y, &mut window)?,
+            }
+        }
+        Ok(window)
+    }
+
+    /// Sets pixels of row `y` that were put before.
+    pub(crate) fn set(&mut self, columns: &Range<usize>, y: usize, row: &[P]) -> Result<()> {
+        match self {
+            Self::Memory { width, pixels } => {
+                pixels[y * *width..][columns.clone()].copy_from_slice(row);
+                Ok(())
+            }
+            Self::Scratch(blocks) => blocks.set(columns, y, row),
+        }
+    }
+
     /// Row `y`.
     pub(crate) fn row(&self, y: usize) -> Result<Cow<'_, [P]>> {
         match self {
@@ -113,7 +141,7 @@ impl<P: Pixel> Store<P> {
     pub(crate) fn is_opaque(&self) -> bool {
         match self {
             Self::Memory { pixels, .. } => pixels.par_iter().all(P::is_opaque),
-            Self::Scratch(blocks) => blocks.opaque.load(Ordering::Relaxed),
+            Self::Scratch(blocks) => blocks.translucent.load(Ordering::Relaxed) == 0,
         }
     }
 
@@ -140,8 +168,8 @@ pub(crate) struct Blocks<P> {
     offset: u64,
     size: [usize; 2],
     side: [usize; 2],
-    /// Whether what was written so far is.
-    opaque: AtomicBool,
+    /// Pixels put so far that let something show through.
+    translucent: AtomicUsize,
     band_rows: usize,
     most_bands: usize,
     bands: Mutex<VecDeque<(usize, Band<P>)>>,
@@ -158,7 +186,16 @@ impl<P: Pixel> Blocks<P> {
         let row_bytes = (size[0] * P::BYTES).max(1);
         let band_rows = (BANDS_BYTES / wanted / row_bytes).clamp(1, BAND_ROWS);
         let most_bands = (BANDS_BYTES / (row_bytes * band_rows)).clamp(2, wanted);
-        Self { file, offset, size, side, opaque: AtomicBool::new(true), band_rows, most_bands, bands: Mutex::default() }
+        Self {
+            file,
+            offset,
+            size,
+            side,
+            translucent: AtomicUsize::new(0),
+            band_rows,
+            most_bands,
+            bands: Mutex::default(),
+        }
     }
 
     /// Where pixel (x, y) is in the file, and how many columns its block has.
@@ -175,11 +212,38 @@ impl<P: Pixel> Blocks<P> {
         debug_assert!(columns.start.is_multiple_of(self.side[0]) && rows.start.is_multiple_of(self.side[1]));
         debug_assert_eq!(columns.len(), self.side[0].min(self.size[0] - columns.start));
         debug_assert_eq!(rows.len(), self.side[1].min(self.size[1] - rows.start));
-        if !block.iter().all(P::is_opaque) {
-            self.opaque.store(false, Ordering::Relaxed);
-        }
+        self.translucent.fetch_add(translucent(block), Ordering::Relaxed);
         let (at, _) = self.place(columns.start, rows.start);
         self.file.write_at(&to_bytes(block), at)
+    }
+
+    /// The stretches of row `y` that lie in one block each: first column, length, and place in the file.
+    fn stretches(&self, columns: &Range<usize>, y: usize) -> impl Iterator<Item = (usize, usize, u64)> {
+        let (mut next, end) = (columns.start, columns.end);
+        std::iter::from_fn(move || {
+            let first = next;
+            next = ((first / self.side[0] + 1) * self.side[0]).min(end);
+            (first < end).then(|| (first, next - first, self.place(first, y).0))
+        })
+    }
+
+    fn stretch(&self, columns: &Range<usize>, y: usize, out: &mut Vec<P>) -> Result<()> {
+        for (_, count, at) in self.stretches(columns, y) {
+            out.extend(read_pixels::<P>(self.file.as_ref(), at, count)?);
+        }
+        Ok(())
+    }
+
+    fn set(&mut self, columns: &Range<usize>, y: usize, row: &[P]) -> Result<()> {
+        let mut old = Vec::with_capacity(columns.len());
+        self.stretch(columns, y, &mut old)?;
+        let others = self.translucent.load(Ordering::Relaxed) - translucent(&old);
+        self.translucent.store(others + translucent(row), Ordering::Relaxed);
+        self.bands.lock().unwrap_or_else(PoisonError::into_inner).clear();
+        for (first, count, at) in self.stretches(columns, y) {
+            self.file.write_at(&to_bytes(&row[first - columns.start..][..count]), at)?;
+        }
+        Ok(())
     }
 
     fn pixel(&self, x: usize, y: usize) -> Result<P> {

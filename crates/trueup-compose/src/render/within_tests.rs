@@ -2,8 +2,12 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use trueup_core::raster::RowSource;
+
 use super::tests::{Memory, RamDisk, bits, canvas, moved, noise, rows};
 use super::*;
+use crate::crop::Coverage;
+use crate::gaps::Gaps;
 
 /// Counts how often photographs are decoded.
 struct Counting(Memory, AtomicUsize);
@@ -62,8 +66,50 @@ fn the_budget_does_not_show_in_the_panorama() {
             assert!(bits(&tight) == free_bits, "{blend:?}, {threads} threads");
             assert!(rows(&tight) == free_rows, "{blend:?}, {threads} threads");
             assert_eq!(tight.seams(), free.seams());
+            let (mut tight, mut free) =
+                (tight, composed(blend, usize::MAX, &RamDisk::default(), 3).expect("no limit").0);
+            assert!(!tight.is_opaque() && !free.is_opaque());
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            let filled = pool.install(|| fill(&mut tight));
+            assert!(filled > 1000 && fill(&mut free) == filled);
+            assert!(bits(&tight) == bits(&free), "{blend:?}, {threads} threads, filled");
+            assert!(tight.is_opaque() && free.is_opaque() && rows(&tight) == rows(&free));
         }
     }
+}
+
+fn fill(panorama: &mut Panorama) -> usize {
+    let (layout, ..) = scene();
+    let gaps = Gaps::find(&layout, Coverage::of(&layout), 0.3);
+    panorama.fill(&gaps, &StageContext::default()).expect("room")
+}
+
+#[test]
+fn gaps_take_up_the_colours_beside_them() {
+    // A photograph that is dark on the left and bright on the right, below a strip of 20 rows.
+    let halves = (0..300 * 200).flat_map(|at| [if at % 300 < 150 { 40_u8 } else { 200 }; 3]).collect();
+    let raster = trueup_core::raster::Raster::from_data(300, 200, 3, halves).expect("as many samples");
+    let source = Memory(vec![trueup_core::raster::Photograph::Eight(raster)]);
+    let layout = canvas(300, 320, vec![moved(0, 300.0, 200.0, |p| [p.x, p.y + 20.0])]);
+    let (options, seams, context) = (RenderOptions::default(), SeamOptions::default(), StageContext::default());
+    let mut panorama =
+        run(&layout, &[Correction::default()], &source, &options, &seams, &context).expect("one photograph");
+    let before = rows(&panorama);
+    let gaps = Gaps::find(&layout, Coverage::of(&layout), 0.1);
+    assert_eq!(panorama.fill(&gaps, &context).expect("in memory"), 300 * 20);
+    let mut row = vec![0; 4 * 300];
+    for y in [0, 10, 19] {
+        panorama.rgba8_row(y, &mut row).expect("in memory");
+        assert_eq!(
+            (row[4 * 30..][..4].to_vec(), row[4 * 270..][..4].to_vec()),
+            (vec![40, 40, 40, 255], vec![200, 200, 200, 255])
+        );
+        let levels: Vec<u8> = row.chunks_exact(4).map(|pixel| pixel[0]).collect();
+        assert!(levels.windows(2).all(|pair| pair[0] <= pair[1]), "row {y}: {levels:?}");
+    }
+    // The rest, the 100 empty rows below as well, is what it was.
+    let first = 4 * 300 * 20;
+    assert!(rows(&panorama)[first..] == before[first..]);
 }
 
 #[test]

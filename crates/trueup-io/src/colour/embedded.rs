@@ -1,7 +1,7 @@
 //! What a file says of its colours, without decoding its pixels.
 
 use std::fs::File;
-use std::io::{BufReader, Read, Seek};
+use std::io::{BufReader, Seek};
 use std::path::Path;
 
 use image::{ImageDecoder, ImageFormat, ImageReader};
@@ -10,7 +10,7 @@ use tiff::tags::Tag as TiffTag;
 use zune_jpeg::JpegDecoder;
 
 use crate::decode::jpeg_options;
-use crate::format::{PictureFormat, SIGNATURE_BYTES};
+use crate::format::{PictureFormat, read_start};
 use crate::metadata::{ExifFields, read_exif};
 
 /// Memory that reading a header may take, in bytes: profiles may be compressed.
@@ -40,9 +40,7 @@ pub(crate) fn read(path: &Path) -> Embedded {
 
 fn try_read(path: &Path) -> Option<Embedded> {
     let mut file = File::open(path).ok()?;
-    let mut start = Vec::with_capacity(SIGNATURE_BYTES);
-    Read::take(&mut file, SIGNATURE_BYTES as u64).read_to_end(&mut start).ok()?;
-    let format = PictureFormat::of_content(&start)?;
+    let format = PictureFormat::of_content(&read_start(&mut file).ok()?)?;
     let mut reader = BufReader::new(file);
     reader.rewind().ok()?;
     let icc = read_icc(&mut reader, format).filter(|icc| !icc.is_empty());

@@ -14,7 +14,7 @@ use zune_jpeg::JpegDecoder;
 
 use super::jpeg_scans::has_separate_subsampled_scans;
 use super::tiff_kinds;
-use crate::format::{PictureFormat, SIGNATURE_BYTES, SUPPORTED};
+use crate::format::{PictureFormat, SUPPORTED, read_start};
 
 /// Largest width and height a JPEG can state (ITU-T T.81 table B.2).
 const JPEG_MAX_SIDE: usize = 65_535;
@@ -34,8 +34,7 @@ pub(crate) fn jpeg_options() -> DecoderOptions {
 pub(crate) fn decode_stored(image: &SourceImage) -> Result<Photograph> {
     let reading = |error| Error::io("reading", &image.path, error);
     let mut file = File::open(&image.path).map_err(reading)?;
-    let mut start = Vec::with_capacity(SIGNATURE_BYTES);
-    Read::take(&mut file, SIGNATURE_BYTES as u64).read_to_end(&mut start).map_err(reading)?;
+    let start = read_start(&mut file).map_err(reading)?;
     file.rewind().map_err(reading)?;
     let format = PictureFormat::of_content(&start).ok_or_else(|| {
         Error::input(&image.name, format!("it is not a {SUPPORTED} picture"), "Give the photograph again.")

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{DeepZoomFormat, Depth, OutputOptions, TiffCompression};
+use super::{DeepZoomFormat, OutputOptions, TiffCompression};
 use crate::format::{OutputFormat, PictureFormat};
 
 /// Bytes a pixel of compressed panoramas of photographs, at the low end: what is refused would not have fitted.
@@ -16,11 +16,7 @@ const COLOURS: f64 = 3.0;
 /// where nothing is compressed and nothing transparent, else at the low end of what photographs take. 0 for formats that are
 /// not written.
 pub fn expected_bytes(path: &Path, width: usize, height: usize, options: &OutputOptions) -> u64 {
-    let sample_bytes = match options.depth {
-        Depth::Auto | Depth::Eight => 1.0,
-        Depth::Sixteen => 2.0,
-        Depth::Float => 4.0,
-    };
+    let sample_bytes = f64::from(options.depth.sample_bytes());
     let bytes_per_pixel = match OutputFormat::of_extension(path) {
         None => 0.0,
         Some(OutputFormat::DeepZoom) if options.dzi_format == DeepZoomFormat::Png => LOSSLESS,
@@ -37,6 +33,7 @@ pub fn expected_bytes(path: &Path, width: usize, height: usize, options: &Output
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::encode::Depth;
 
     #[test]
     fn what_is_not_compressed_is_exact_and_the_rest_smaller() {

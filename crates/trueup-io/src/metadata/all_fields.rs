@@ -10,7 +10,7 @@ use tiff::decoder::ifd::Value as TiffValue;
 use tiff::tags::{IfdPointer, Tag as TiffTag};
 
 use super::read_exif_block;
-use crate::format::{PictureFormat, SIGNATURE_BYTES};
+use crate::format::{PictureFormat, read_start};
 
 /// The fields of these tags that a file has, of the picture itself. A file that cannot be read has none; damaged fields are
 /// left out.
@@ -20,9 +20,7 @@ pub(crate) fn read_fields(path: &Path, wanted: &[Tag]) -> Vec<Field> {
 
 fn try_read(path: &Path, wanted: &[Tag]) -> Option<Vec<Field>> {
     let mut file = File::open(path).ok()?;
-    let mut start = Vec::with_capacity(SIGNATURE_BYTES);
-    Read::take(&mut file, SIGNATURE_BYTES as u64).read_to_end(&mut start).ok()?;
-    let format = PictureFormat::of_content(&start)?;
+    let format = PictureFormat::of_content(&read_start(&mut file).ok()?)?;
     let mut reader = BufReader::new(file);
     reader.rewind().ok()?;
     if format == PictureFormat::Tiff {

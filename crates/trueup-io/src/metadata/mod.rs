@@ -6,7 +6,7 @@ mod focal;
 mod orientation;
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Seek};
+use std::io::{BufRead, BufReader, Seek};
 
 use image::{ImageDecoder, ImageError, ImageFormat, ImageReader};
 use tiff::TiffError;
@@ -15,7 +15,7 @@ use trueup_core::source::FocalPrior;
 use zune_jpeg::JpegDecoder;
 
 use crate::decode::{TiffKind, inspect_tiff, jpeg_options};
-use crate::format::{PictureFormat, SIGNATURE_BYTES};
+use crate::format::{PictureFormat, read_start};
 
 pub(crate) use all_fields::read_fields;
 pub(crate) use exif_fields::ExifFields;
@@ -66,9 +66,7 @@ pub(crate) fn read_header(file: &File, format: PictureFormat) -> Result<Header, 
 /// Bits of a sample of a picture file; `None` where the header cannot be read.
 pub(crate) fn sample_bits(file: &File) -> Option<u16> {
     let mut reader = BufReader::new(file);
-    let mut start = [0; SIGNATURE_BYTES];
-    let length = reader.read(&mut start).ok()?;
-    let format = PictureFormat::of_content(&start[..length])?;
+    let format = PictureFormat::of_content(&read_start(&mut reader).ok()?)?;
     reader.rewind().ok()?;
     stored(&mut reader, format).ok().map(|stored| stored.bits)
 }

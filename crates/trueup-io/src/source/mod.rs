@@ -7,7 +7,6 @@ mod names;
 mod tests;
 
 use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -16,7 +15,7 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 
-use crate::format::{self, PictureFormat, SIGNATURE_BYTES, SUPPORTED};
+use crate::format::{self, PictureFormat, SUPPORTED};
 use crate::metadata::{Header, HeaderError, TagVerdict, judge_orientation, read_header};
 
 use duplicates::Accepted;
@@ -246,8 +245,7 @@ fn recognise(file: &mut File, length: u64) -> std::result::Result<PictureFormat,
             "Copy it again from the camera or leave it out.",
         ));
     }
-    let mut start = Vec::with_capacity(SIGNATURE_BYTES);
-    file.take(SIGNATURE_BYTES as u64).read_to_end(&mut start).map_err(|error| {
+    let start = format::read_start(file).map_err(|error| {
         Rejection::new("file-unreadable", format!("it cannot be read ({error})"), "Check the file and its permissions.")
     })?;
     if let Some(format) = PictureFormat::of_content(&start) {

@@ -3,7 +3,8 @@
 use trueup_core::options::{OptionValue, StageOptions};
 use trueup_core::{Error, Result};
 
-use crate::options::{Method, StitchOptions, WorkingOptions};
+use crate::method::Method;
+use crate::options::{StitchOptions, WorkingOptions};
 
 /// One panorama to be made: a name, and departures from the options that all have in common.
 #[derive(Debug, Clone, PartialEq, Eq)]

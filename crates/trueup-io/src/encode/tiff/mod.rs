@@ -89,12 +89,8 @@ impl Form {
 
     /// Whether the offsets of a file with so many pixels need 64 bits.
     fn is_big(&self, pixels: u64, options: &OutputOptions) -> bool {
-        let sample_bytes: u64 = match self.depth {
-            Depth::Auto | Depth::Eight => 1,
-            Depth::Sixteen => 2,
-            Depth::Float => 4,
-        };
-        let bytes = pixels.saturating_mul(self.blocks.channels as u64 * sample_bytes);
+        let pixel_bytes = self.blocks.channels as u64 * u64::from(self.depth.sample_bytes());
+        let bytes = pixels.saturating_mul(pixel_bytes);
         // All smaller copies together take a third more.
         let bytes = if self.overviews { bytes.saturating_add(bytes / 3) } else { bytes };
         options.tiff_big == BigTiff::Always || bytes > BIG_TIFF_BYTES

@@ -1,0 +1,109 @@
+//! What may be typed, before any of it is checked against the options' ranges or the disk.
+
+mod compare;
+mod compose;
+mod shared;
+mod stitch;
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+pub(crate) use compare::CompareArgs;
+pub(crate) use compose::ComposeArgs;
+pub(crate) use shared::{BudgetArgs, FileArgs, MaskArgs, PictureArgs, TuningArgs};
+pub(crate) use stitch::StitchArgs;
+
+const EXAMPLES: &str = "\
+Examples:
+  trueup stitch holiday/ -o holiday.jpg
+  trueup stitch IMG_01*.jpg -o pano.png --scale 0.5 --project pano.json
+  trueup compose pano.json -o large.tif
+  trueup inspect pano.json --verbose
+  trueup evaluate pano.json --truth truth.json
+  trueup compare holiday/ -o holiday-compared
+  trueup options mesh";
+
+/// Panoramas that stand upright: photographs in, a natural panorama out, and the reasons why it looks as it does.
+#[derive(Debug, Parser)]
+#[command(name = "trueup", version, after_help = EXAMPLES, max_term_width = 110)]
+pub(crate) struct LowArgs {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Stitch photographs into a panorama
+    ///
+    /// Finds out by itself which photographs overlap. Those that belong elsewhere are left out, and the summary says why.
+    Stitch(Box<StitchArgs>),
+    /// Compose a stitched panorama again from its project: at another size, in another format, of other photographs
+    ///
+    /// Nothing is measured or matched: the geometry is the one that `stitch --project` recorded.
+    Compose(Box<ComposeArgs>),
+    /// Compare methods side by side: every method's panorama of the same photographs, with its measures, in one folder
+    ///
+    /// Photographs are measured and matched once. The folder holds a page to look at (index.html), a page on which people
+    /// rank unnamed panoramas (ranking.html), every figure as JSON, the panoramas and their project files.
+    Compare(Box<CompareArgs>),
+    /// Print what a project file says of its panorama: the summary that `stitch` printed, with each picture's measures
+    Inspect(InspectArgs),
+    /// Print every measure of a panorama: its own, against the truth, and of the pixels where photographs overlap
+    Evaluate(EvaluateArgs),
+    /// List every option of every stage: default, range, unit, meaning
+    Options(OptionsArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct InspectArgs {
+    /// A file that `trueup stitch --project` wrote
+    #[arg(value_name = "PROJECT.json")]
+    pub project: PathBuf,
+
+    /// Print also the pairs' verdicts, each picture's geometry, notes, and a line per stage's time
+    #[arg(short, long)]
+    pub verbose: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateArgs {
+    /// A file that `trueup stitch --project` wrote
+    #[arg(value_name = "PROJECT.json")]
+    pub project: PathBuf,
+
+    /// What is exactly known of the photographs: cameras and directions, as `trueup-scenes` writes them
+    #[arg(long, value_name = "TRUTH.json")]
+    pub truth: Option<PathBuf>,
+
+    /// As a JSON object
+    #[arg(long)]
+    pub json: bool,
+
+    /// Do not read the photographs again to compare their pixels
+    #[arg(long)]
+    pub no_pixels: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct OptionsArgs {
+    /// Only the options of this stage
+    #[arg(value_name = "STAGE")]
+    pub stage: Option<String>,
+
+    /// As a JSON array of {name, default, allowed, unit, meaning}
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_is_well_formed() {
+        LowArgs::command().debug_assert();
+    }
+}

@@ -1,0 +1,164 @@
+//! Arguments that several commands have.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+/// More threads than this are a typing mistake, and starting them would hang the machine.
+const MAX_THREADS: i64 = 1024;
+
+/// What is written.
+#[derive(Debug, Args)]
+pub(crate) struct FileArgs {
+    /// The panorama; .jpg, .png, .tif, .webp or .dzi (Deep Zoom) chooses the format
+    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    pub output: PathBuf,
+
+    /// Write the panorama's record (geometry, pairs, reasons, timings) as JSON
+    #[arg(long, value_name = "FILE.json", help_heading = "Output")]
+    pub project: Option<PathBuf>,
+
+    /// Write the cameras as a project of the Hugin stitcher
+    #[arg(long, value_name = "FILE.pto", help_heading = "Output")]
+    pub pto: Option<PathBuf>,
+
+    /// Write the photographs as layers, aligned and corrected, one to a page (output.layer_extent)
+    #[arg(long, value_name = "FILE.tif", help_heading = "Output")]
+    pub layers: Option<PathBuf>,
+
+    /// Write which photograph is shown where
+    #[arg(long, value_name = "FILE.png", help_heading = "Output")]
+    pub seams: Option<PathBuf>,
+}
+
+/// What the panorama looks like.
+#[derive(Debug, Args)]
+pub(crate) struct PictureArgs {
+    /// Size of the panorama: 1 keeps the pixel scale of the reference photograph (canvas.scale)
+    #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Output")]
+    pub scale: Option<String>,
+
+    /// JPEG quality (output.jpeg_quality)
+    #[arg(long, value_name = "Q", allow_hyphen_values = true, help_heading = "Output")]
+    pub quality: Option<String>,
+
+    /// Bits of a sample: auto, 8, 16 or float (output.depth)
+    #[arg(long, value_name = "DEPTH", help_heading = "Output")]
+    pub depth: Option<String>,
+
+    /// What the panorama is drawn on: mesh, auto, equirectangular, cylindrical, perspective, mercator, panini or
+    /// stereographic (projection.kind)
+    #[arg(long, value_name = "PROJECTION", help_heading = "View")]
+    pub projection: Option<String>,
+
+    /// Turn the viewer right, degrees; with a projection other than mesh, as the next three (projection.yaw)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
+    pub yaw: Option<String>,
+
+    /// Turn the viewer up, degrees (projection.pitch)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
+    pub pitch: Option<String>,
+
+    /// Turn the viewer clockwise, degrees (projection.roll)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
+    pub roll: Option<String>,
+
+    /// Horizontal field of view, degrees; without it, what is there as far as the projection carries (projection.fov)
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
+    pub fov: Option<String>,
+
+    /// What is kept: none (all), rectangle (the largest without holes) or auto (that, if it keeps most) (canvas.crop)
+    #[arg(long, value_name = "CROP", help_heading = "View")]
+    pub crop: Option<String>,
+
+    /// Fill gaps up to so wide, in shares of a photograph's side, with a smooth surface: 0.1 for ragged borders (canvas.fill)
+    #[arg(long, value_name = "SHARE", allow_hyphen_values = true, help_heading = "View")]
+    pub fill: Option<String>,
+
+    /// What shows where no photograph is, in formats without transparency: black, gray or white (output.background)
+    #[arg(long, value_name = "COLOUR", help_heading = "View")]
+    pub background: Option<String>,
+}
+
+/// How the geometry is found where none is recorded.
+#[derive(Debug, Args)]
+pub(crate) struct GeometryArgs {
+    /// Fail unless every photograph given is used
+    #[arg(long, help_heading = "Photographs")]
+    pub require_all: bool,
+
+    /// The photograph that sets the pixel scale and stays in place: auto, or its name
+    #[arg(long, value_name = "auto|NAME", help_heading = "Photographs")]
+    pub reference: Option<String>,
+
+    /// Match only the pairs in this file, one `NAME -- NAME` a line
+    #[arg(long, value_name = "FILE", help_heading = "Photographs")]
+    pub graph: Option<PathBuf>,
+
+    /// Keep what is found in the photographs in this folder, so that later runs need not find it again
+    #[arg(long, value_name = "DIR", help_heading = "Photographs")]
+    pub cache: Option<PathBuf>,
+
+    /// Every random choice derives from this number (stitch.seed)
+    #[arg(long, value_name = "N", allow_hyphen_values = true, help_heading = "Tuning")]
+    pub seed: Option<String>,
+}
+
+/// Pictures that say what of a photograph is to be seen.
+#[derive(Debug, Args)]
+pub(crate) struct MaskArgs {
+    /// A picture of the photograph NAME's size: what is black or transparent in it is ignored, and not shown where another
+    /// photograph can be; may be repeated
+    #[arg(long, value_name = "NAME=FILE", help_heading = "Photographs")]
+    pub mask: Vec<String>,
+
+    /// A picture of the photograph NAME's size: what is white in it is shown; may be repeated
+    #[arg(long, value_name = "NAME=FILE", help_heading = "Photographs")]
+    pub keep: Vec<String>,
+}
+
+/// Options of every stage, and how the work is done.
+#[derive(Debug, Args)]
+pub(crate) struct TuningArgs {
+    /// Set any option of any stage that runs; may be repeated
+    #[arg(long, value_name = "STAGE.OPTION=VALUE", allow_hyphen_values = true, help_heading = "Tuning")]
+    pub set: Vec<String>,
+
+    /// Read options from a TOML file with a table per stage
+    #[arg(long, value_name = "FILE.toml", help_heading = "Tuning")]
+    pub config: Option<PathBuf>,
+
+    /// Number of threads; 0 for one per core. The panorama is the same for any number
+    #[arg(
+        long,
+        value_name = "N",
+        allow_hyphen_values = true,
+        value_parser = clap::value_parser!(u16).range(0..=MAX_THREADS),
+        help_heading = "Tuning"
+    )]
+    pub threads: Option<u16>,
+}
+
+/// What the work may take.
+#[derive(Debug, Args)]
+pub(crate) struct BudgetArgs {
+    /// Memory that the work may take, such as 2GB or 512MB; auto is a quarter of the machine's (stitch.memory)
+    #[arg(long, value_name = "AMOUNT", help_heading = "Tuning")]
+    pub memory: Option<String>,
+
+    /// Folder for the scratch file of a panorama that does not fit in memory, instead of the output's (stitch.scratch)
+    #[arg(long, value_name = "DIR", help_heading = "Tuning")]
+    pub scratch: Option<String>,
+}
+
+/// What is printed.
+#[derive(Debug, Args)]
+pub(crate) struct MessageArgs {
+    /// Print nothing but errors
+    #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]
+    pub quiet: bool,
+
+    /// Print also the pairs' verdicts, each picture's geometry, notes, and a line per stage's time
+    #[arg(short, long, help_heading = "Messages")]
+    pub verbose: bool,
+}

@@ -1,0 +1,64 @@
+//! What may be typed after `trueup stitch`.
+
+use clap::Args;
+
+use super::shared::{BudgetArgs, FileArgs, GeometryArgs, MaskArgs, MessageArgs, PictureArgs, TuningArgs};
+
+const EXAMPLES: &str = "\
+Examples:
+  trueup stitch a.jpg b.jpg c.jpg -o pano.jpg
+  trueup stitch holiday/ -o pano.tif                     every picture of a folder
+  trueup stitch 'holiday/IMG_*.jpg' -o pano.jpg --all    pano-1.jpg, pano-2.jpg, ...
+  trueup stitch holiday/ -o small.webp --scale 0.25      a quick preview
+  trueup stitch holiday/ -o pano.jpg --set mesh.cell_px=30 --set exposure.enabled=false
+  trueup stitch holiday/ -o pano.jpg --config mine.toml  [mesh] cell_px = 30.0
+
+Defaults are overruled by --config, that by --set, and that by the flags of their own (--scale, --quality, ...).
+
+Exit status: 0 a panorama was written, 1 the input or the system failed, 2 wrong usage, 130 stopped by Ctrl-C.
+The first Ctrl-C stops at the next safe place and leaves nothing half written; the second kills at once.";
+
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct StitchArgs {
+    /// Files, folders (their pictures, not those of folders inside) or glob patterns; JPEG, PNG, TIFF, WebP
+    #[arg(value_name = "PHOTOS", required = true)]
+    pub photographs: Vec<String>,
+
+    #[command(flatten)]
+    pub files: FileArgs,
+
+    #[command(flatten)]
+    pub picture: PictureArgs,
+
+    /// Stitch every group of overlapping photographs, not only the largest; several panoramas are numbered
+    #[arg(long, help_heading = "Photographs")]
+    pub all: bool,
+
+    #[command(flatten)]
+    pub geometry: GeometryArgs,
+
+    #[command(flatten)]
+    pub masks: MaskArgs,
+
+    /// How the panorama's shape is found (stitch.method; `trueup options stitch` names the methods)
+    #[arg(long, value_name = "METHOD", help_heading = "Tuning")]
+    pub method: Option<String>,
+
+    /// What draws overlapping photographs together: points, lines, photometric or lines+photometric (stitch.align)
+    #[arg(long, value_name = "ALIGN", help_heading = "Tuning")]
+    pub align: Option<String>,
+
+    /// What is kept of the photographs' structure: none or lines (stitch.structure)
+    #[arg(long, value_name = "STRUCTURE", help_heading = "Tuning")]
+    pub structure: Option<String>,
+
+    #[command(flatten)]
+    pub tuning: TuningArgs,
+
+    #[command(flatten)]
+    pub budget: BudgetArgs,
+
+    #[command(flatten)]
+    pub messages: MessageArgs,
+}

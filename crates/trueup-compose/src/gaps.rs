@@ -1,0 +1,182 @@
+//! The parts of a canvas that no photograph covers: which of them are small.
+
+use crate::crop::Coverage;
+use crate::distance::border_distances;
+use crate::layout::CanvasLayout;
+
+/// What no photograph covers of a canvas, told apart into small gaps, which may be filled, and voids.
+///
+/// A void is all that a disc of the given radius reaches which lies wholly in what is not covered, with the corners beside it,
+/// and all that lies farther than twice the radius from every photograph; a gap is the rest. So notches, slits and ragged or wavy borders up to
+/// twice as wide as the radius are gaps, whatever they are joined to. Discs do not reach out of the canvas: a strip along
+/// its border is as wide as it is.
+#[derive(Debug, Clone)]
+pub struct Gaps {
+    coverage: Coverage,
+    /// Canvas pixels to the nearest void, at the middles of cells; not above 0 in one.
+    margin: Vec<f32>,
+    columns: usize,
+    /// Canvas pixels per cell.
+    cell: usize,
+    /// Columns of cells that repeat the other end of a full turn, on either side.
+    lead: usize,
+    around: bool,
+    radius: f64,
+}
+
+/// Cells of the small canvas on which voids are sought, at most: their outline is smooth between them.
+const MOST_CELLS: usize = 1 << 20;
+
+/// Radii around the middle of a disc that are void: with sqrt(2), corners that a disc does not fill are no gaps either; the
+/// rest is what chamfer distances are off.
+const CORNER: f32 = 1.5;
+
+/// [`border_distances`] counts in thirds of a pixel.
+const THIRDS: f32 = 3.0;
+
+impl Gaps {
+    /// The gaps of a canvas; `fill` is the radius in photographs' sides, see
+    /// [`CanvasOptions::fill`](crate::layout::CanvasOptions).
+    pub fn find(layout: &CanvasLayout, coverage: Coverage, fill: f64) -> Self {
+        let (width, height) = (layout.width, layout.height);
+        let radius = fill * layout.photograph_side();
+        let cell = (1..).find(|cell| width.div_ceil(*cell) * height.div_ceil(*cell) <= MOST_CELLS).unwrap_or(1);
+        // The casts saturate; no gap is wider than the canvas.
+        let reach = ((2.0 * radius / cell as f64).ceil() as usize + 1).min(width.max(height));
+        // Discs whose middles lie beyond an end of a full turn reach back over it.
+        let lead = if layout.period.is_some() { reach.min(width / cell) } else { 0 };
+        let (columns, rows) = (width.div_ceil(cell) + 2 * lead, height.div_ceil(cell));
+        let turn = width.div_ceil(cell);
+        let middle = |index: usize, length: usize| (index * cell + cell / 2).min(length - 1);
+        let uncovered: Vec<bool> = (0..columns * rows)
+            .map(|at| {
+                let column = (at % columns + turn - lead) % turn;
+                !coverage.holds(middle(column, width), middle(at / columns, height))
+            })
+            .collect();
+        // What lies beyond the canvas is no border of anything: it is neither a void nor covered.
+        let padded = |from: &dyn Fn(usize) -> bool| {
+            let grown = columns + 2 * reach;
+            let mut elsewhere = vec![true; grown * (rows + 2 * reach)];
+            for at in 0..columns * rows {
+                elsewhere[(at / columns + reach) * grown + at % columns + reach] = !from(at);
+            }
+            let distances = border_distances(&elsewhere, grown);
+            let own =
+                (0..rows).flat_map(move |row| (row + reach) * grown + reach..(row + reach) * grown + reach + columns);
+            own.map(|at| distances[at] as f32 * (cell as f32 / THIRDS)).collect::<Vec<f32>>()
+        };
+        let depths = border_distances(&uncovered, columns);
+        let is_middle = |at: usize| f64::from(depths[at] as f32 * (cell as f32 / THIRDS)) > radius;
+        let (from_void, from_photographs) = (padded(&is_middle), padded(&|at| !uncovered[at]));
+        let radius_px = radius as f32;
+        let margin = from_void.iter().zip(&from_photographs);
+        let margin =
+            margin.map(|(void, photographs)| (void - CORNER * radius_px).min(2.0 * radius_px - photographs)).collect();
+        Self { coverage, margin, columns, cell, lead, around: layout.period.is_some(), radius }
+    }
+
+    /// Whether some photograph covers the pixel wholly.
+    pub(crate) fn is_covered(&self, x: usize, y: usize) -> bool {
+        self.coverage.holds(x, y)
+    }
+
+    /// Whether a pixel, if no photograph covers it, is part of a gap.
+    pub(crate) fn is_small(&self, x: usize, y: usize) -> bool {
+        let rows = self.margin.len() / self.columns.max(1);
+        let place = |pixel: usize, lead: usize, cells: usize| {
+            let at = ((pixel as f64 + 0.5) / self.cell as f64 + lead as f64 - 0.5).clamp(0.0, (cells - 1) as f64);
+            (at as usize, (at as usize + 1).min(cells - 1), at.fract() as f32)
+        };
+        if rows == 0 {
+            return false;
+        }
+        let (left, right, along) = place(x, self.lead, self.columns);
+        let (top, bottom, down) = place(y, 0, rows);
+        let at = |column: usize, row: usize| self.margin[row * self.columns + column];
+        let upper = at(left, top) + along * (at(right, top) - at(left, top));
+        let lower = at(left, bottom) + along * (at(right, bottom) - at(left, bottom));
+        upper + down * (lower - upper) > 0.0
+    }
+
+    /// The coverage as it is when the gaps are filled.
+    pub(crate) fn filled_coverage(&self) -> Coverage {
+        self.coverage.with(|x, y| self.is_small(x, y))
+    }
+
+    /// Whether the canvas goes all the way round.
+    pub(crate) fn is_around(&self) -> bool {
+        self.around
+    }
+
+    /// Half of the width of the widest gap, pixels.
+    pub(crate) fn radius(&self) -> f64 {
+        self.radius
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::mesh::GridMesh;
+
+    use super::*;
+    use crate::layout::Placed;
+
+    /// Photographs of 100 x 60 pixels with their top left corners at `places`.
+    fn layout(width: usize, height: usize, places: &[[f64; 2]], period: Option<usize>) -> CanvasLayout {
+        let placed = places.iter().enumerate().map(|(photograph, [left, top])| {
+            let mut mesh = GridMesh::regular(100.0, 60.0, 10.0);
+            mesh.target.iter_mut().for_each(|vertex| *vertex = [vertex[0] + left, vertex[1] + top]);
+            Placed { photograph, mesh }
+        });
+        CanvasLayout { width, height, canvas_from_target: 1.0, origin: [0.0; 2], placed: placed.collect(), period }
+    }
+
+    fn gaps(layout: &CanvasLayout, radius: f64) -> Gaps {
+        let gaps = Gaps::find(layout, Coverage::of(layout), radius / 60.0);
+        assert!((gaps.radius() - radius).abs() < 1e-12);
+        gaps
+    }
+
+    #[test]
+    fn strips_along_the_border_are_gaps_up_to_twice_the_radius() {
+        // Two steps: strips of 10 rows above the second photograph and below the first.
+        let steps = layout(190, 70, &[[0.0, 0.0], [90.0, 10.0]], None);
+        let all = gaps(&steps, 6.0);
+        assert!(all.is_small(0, 69) && all.is_small(150, 0));
+        assert_eq!(all.filled_coverage().area(), 190 * 70);
+        // A disc of radius 4 has room in them; what is left are the ends of the strips.
+        let few = gaps(&steps, 4.0);
+        assert!(!few.is_small(50, 65) && !few.is_small(150, 5));
+        assert!(few.filled_coverage().area() < 190 * 70 - 1500);
+    }
+
+    #[test]
+    fn slits_are_gaps_and_what_is_far_from_photographs_is_none() {
+        // A slit of 6 columns between two photographs, and an empty half below.
+        let slit = layout(206, 160, &[[0.0, 0.0], [106.0, 0.0]], None);
+        let gaps = gaps(&slit, 5.0);
+        assert!((0..55).all(|y| gaps.is_small(103, y)));
+        assert!(
+            !gaps.is_small(30, 120) && !gaps.is_small(103, 100) && !gaps.is_small(0, 159) && !gaps.is_small(205, 159)
+        );
+        let filled = gaps.filled_coverage();
+        assert!(filled.holds(103, 20) && !filled.holds(30, 120));
+    }
+
+    /// On a full turn the strip above the photographs goes on across the ends, and so do discs.
+    #[test]
+    fn a_full_turn_has_no_ends() {
+        let places = [[-50.0, 30.0], [40.0, 30.0], [110.0, 30.0]];
+        let around = gaps(&layout(200, 90, &places, Some(200)), 12.0);
+        let within = (0..200).all(|x| around.is_small(x, 5) == around.is_small((x + 77) % 200, 5));
+        assert!(within && !around.is_small(0, 5));
+        assert!(gaps(&layout(200, 90, &places, Some(200)), 16.0).is_small(199, 5));
+    }
+
+    #[test]
+    fn a_canvas_without_gaps_has_none_to_fill() {
+        let whole = layout(100, 60, &[[0.0, 0.0]], None);
+        assert_eq!(gaps(&whole, 30.0).filled_coverage().area(), 6000);
+    }
+}

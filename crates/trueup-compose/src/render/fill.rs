@@ -1,0 +1,262 @@
+//! Filling gaps: a smooth surface over the colours along their borders.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+use trueup_core::raster::RowSource;
+use trueup_core::{Result, StageContext};
+
+use super::panorama::{Panorama, Pixels, linear_of_sum};
+use super::store::{Pixel, Store};
+use crate::blend::pyramid::{Plane, colour};
+use crate::blend::{first_level, tile_side};
+use crate::gaps::Gaps;
+
+/// A pixel whose colour can be looked at and set.
+trait Shade: Pixel {
+    /// Square roots of linear light, and the share that is covered.
+    fn root(self) -> [f32; 4];
+    /// A pixel of that colour, covered wholly.
+    fn of_root(root: [f32; 3]) -> Self;
+}
+
+impl Shade for [u16; 4] {
+    fn root(self) -> [f32; 4] {
+        self.map(|value| f32::from(value) / f32::from(u16::MAX))
+    }
+
+    fn of_root([r, g, b]: [f32; 3]) -> Self {
+        // The casts saturate.
+        [r, g, b, 1.0].map(|value| (value * f32::from(u16::MAX) + 0.5) as u16)
+    }
+}
+
+impl Shade for [f32; 4] {
+    fn root(self) -> [f32; 4] {
+        let [r, g, b, share] = linear_of_sum(self);
+        [r.max(0.0).sqrt(), g.max(0.0).sqrt(), b.max(0.0).sqrt(), share]
+    }
+
+    fn of_root([r, g, b]: [f32; 3]) -> Self {
+        [r * r, g * g, b * b, 1.0]
+    }
+}
+
+impl Panorama {
+    /// Fills the gaps with a smooth surface, and returns how many pixels that were; `gaps` are those of the layout it was
+    /// made of. The same pixels come out however the panorama is held.
+    ///
+    /// # Errors
+    /// [`trueup_core::Error::Io`] if a scratch file cannot be read or written; [`trueup_core::Error::Cancelled`].
+    ///
+    /// # Source
+    /// Push-pull: Gortler, Grzeszczuk, Szeliski, Cohen, "The lumigraph", SIGGRAPH 1996, section 3.4.
+    pub fn fill(&mut self, gaps: &Gaps, context: &StageContext) -> Result<usize> {
+        let size = [self.width(), self.height()];
+        match &mut self.pixels {
+            Pixels::Sums(sums) => fill(sums, size, gaps, context),
+            Pixels::Roots(roots) => fill(roots, size, gaps, context),
+        }
+    }
+}
+/// Tiles that are finished before they are put on the canvas; a number of threads must not show in the panorama.
+const TILES_AT_ONCE: usize = 64;
+
+fn fill<P: Shade>(store: &mut Store<P>, size: [usize; 2], gaps: &Gaps, context: &StageContext) -> Result<usize> {
+    let canvas = Canvas::new(size, gaps);
+    let (wanted, sources) = canvas.tiles();
+    if wanted.is_empty() {
+        return Ok(0);
+    }
+    let surface = canvas.coarse_surface(store, &sources, context)?;
+    let mut filled = 0;
+    for tiles in wanted.chunks(TILES_AT_ONCE) {
+        context.check_cancelled()?;
+        let finished: Vec<(usize, Vec<P>)> =
+            tiles.par_iter().map(|tile| canvas.finished(store, tile, &surface)).collect::<Result<_>>()?;
+        for (tile, (count, pixels)) in tiles.iter().zip(finished) {
+            filled += count;
+            let columns = tile.columns.start - canvas.lead..tile.columns.end - canvas.lead;
+            for (y, row) in tile.rows.clone().zip(pixels.chunks_exact(columns.len())) {
+                store.set(&columns, y, row)?;
+            }
+        }
+    }
+    Ok(filled)
+}
+
+/// A part of the canvas, which begins `lead` columns before the panorama does.
+#[derive(Debug, Clone)]
+struct Tile {
+    columns: Range<usize>,
+    rows: Range<usize>,
+}
+
+/// The canvas, with as much beyond both ends of a full turn as is felt across them.
+struct Canvas<'a> {
+    gaps: &'a Gaps,
+    width: usize,
+    height: usize,
+    lead: usize,
+    /// Log2 of the pixels per sample of the level from which on the surface is found as a whole.
+    first_level: u32,
+}
+
+impl<'a> Canvas<'a> {
+    fn new([width, height]: [usize; 2], gaps: &'a Gaps) -> Self {
+        let first_level = first_level([width, height]);
+        let side = tile_side(first_level);
+        // A gap is two radii wide at most; its borders' colours come from a little farther away.
+        let reach = (4.0 * gaps.radius()).ceil() as usize;
+        let lead = if gaps.is_around() { reach.clamp(1, width).next_multiple_of(side) } else { 0 };
+        Self { gaps, width, height, lead, first_level }
+    }
+
+    /// The column of the panorama that is seen at a column of this canvas.
+    fn column(&self, x: usize) -> usize {
+        (x + self.lead.div_ceil(self.width) * self.width - self.lead) % self.width
+    }
+
+    /// The tiles of the panorama at and beside gaps, and all whose colours these may need.
+    fn tiles(&self) -> (Vec<Tile>, Vec<Tile>) {
+        let side = tile_side(self.first_level);
+        let end = self.lead + self.width;
+        let across = (end + self.lead).div_ceil(side);
+        let down = self.height.div_ceil(side);
+        let tile = |at: usize| {
+            let (left, top) = (at % across * side, at / across * side);
+            let right = (left + side).min(end + self.lead);
+            Tile { columns: left..right, rows: top..(top + side).min(self.height) }
+        };
+        let has_gap = |tile: &Tile| {
+            let mut pixels = tile.rows.clone().flat_map(|y| tile.columns.clone().map(move |x| (self.column(x), y)));
+            pixels.any(|(x, y)| !self.gaps.is_covered(x, y) && self.gaps.is_small(x, y))
+        };
+        let gap: Vec<bool> = (0..across * down).into_par_iter().map(|at| has_gap(&tile(at))).collect();
+        let reach = (2.0 * self.gaps.radius() / side as f64).ceil() as usize + 1;
+        let near = |at: usize| {
+            let (column, row) = (at % across, at / across);
+            let columns = column.saturating_sub(reach)..(column + reach + 1).min(across);
+            (row.saturating_sub(reach)..(row + reach + 1).min(down))
+                .any(|row| gap[row * across..][columns.clone()].contains(&true))
+        };
+        let sources: Vec<Tile> = (0..across * down).filter(|&at| near(at)).map(tile).collect();
+        // Borders that a photograph covers by less than a pixel's rounding lie beside gaps, too.
+        let inside = sources.iter().filter(|tile| (self.lead..end).contains(&tile.columns.start)).cloned();
+        let cut = |tile: Tile| Tile { columns: tile.columns.start..tile.columns.end.min(end), rows: tile.rows };
+        let wanted = inside.map(cut).collect();
+        (wanted, sources)
+    }
+
+    /// Colours times the share covered of a tile with its margin; nothing where the gaps are.
+    fn known<P: Shade>(&self, store: &Store<P>, tile: &Tile) -> Result<Plane<[f32; 4]>> {
+        // As far as the finest level's support and interpolation reach, see the blend's tiles.
+        let margin = 2 << self.first_level;
+        let columns =
+            tile.columns.start.saturating_sub(margin)..(tile.columns.end + margin).min(self.width + 2 * self.lead);
+        let rows = tile.rows.start.saturating_sub(margin)..(tile.rows.end + margin).min(self.height);
+        let mut plane = Plane::new(columns.clone(), rows.clone());
+        let mut first = columns.start;
+        while first < columns.end {
+            let start = self.column(first);
+            let count = (columns.end - first).min(self.width - start);
+            let pixels = store.window(&(start..start + count), &rows)?;
+            for (y, pixels) in rows.clone().zip(pixels.chunks_exact(count)) {
+                let texels = &mut plane.row_mut(y)[first - columns.start..][..count];
+                for (x, (texel, &pixel)) in (start..).zip(texels.iter_mut().zip(pixels)) {
+                    let [r, g, b, share] = pixel.root();
+                    if self.gaps.is_covered(x, y) {
+                        *texel = [r * share, g * share, b * share, share];
+                    }
+                }
+            }
+            first += count;
+        }
+        Ok(plane)
+    }
+
+    /// The surface at the first level and so much of the panorama as gaps need.
+    fn coarse_surface<P: Shade>(
+        &self,
+        store: &Store<P>,
+        sources: &[Tile],
+        context: &StageContext,
+    ) -> Result<Plane<[f32; 4]>> {
+        let samples = |length: usize| 0..length.div_ceil(1 << self.first_level);
+        let mut known = Plane::new(samples(self.width + 2 * self.lead), samples(self.height));
+        for tiles in sources.chunks(TILES_AT_ONCE) {
+            context.check_cancelled()?;
+            let reduced: Vec<Plane<[f32; 4]>> = tiles
+                .par_iter()
+                .map(|tile| {
+                    let plane = self.known(store, tile)?;
+                    Ok((0..self.first_level).fold(plane, |plane, _| plane.reduced()))
+                })
+                .collect::<Result<_>>()?;
+            for (tile, plane) in tiles.iter().zip(reduced) {
+                let own =
+                    |range: &Range<usize>| range.start >> self.first_level..range.end.div_ceil(1 << self.first_level);
+                let columns = own(&tile.columns);
+                for y in own(&tile.rows) {
+                    let texels = &plane.row(y)[columns.start - plane.columns.start..][..columns.len()];
+                    known.row_mut(y)[columns.clone()].copy_from_slice(texels);
+                }
+            }
+        }
+        let mut levels = vec![known];
+        while let Some(last) = levels.last().filter(|last| last.texels.len() > 1) {
+            levels.push(last.reduced());
+        }
+        Ok(pulled(levels, None))
+    }
+
+    /// A tile's pixels with its gaps filled, and how many that were.
+    fn finished<P: Shade>(&self, store: &Store<P>, tile: &Tile, surface: &Plane<[f32; 4]>) -> Result<(usize, Vec<P>)> {
+        let mut levels = vec![self.known(store, tile)?];
+        for _ in 1..self.first_level {
+            levels.extend(levels.last().map(Plane::reduced));
+        }
+        let surface = pulled(levels, Some(surface));
+        let columns = tile.columns.start - self.lead..tile.columns.end - self.lead;
+        let mut pixels = store.window(&columns, &tile.rows)?;
+        let mut filled = 0;
+        for (y, pixels) in tile.rows.clone().zip(pixels.chunks_exact_mut(columns.len())) {
+            let texels = &surface.row(y)[tile.columns.start - surface.columns.start..];
+            for (x, (pixel, &texel)) in columns.clone().zip(pixels.iter_mut().zip(texels)) {
+                let own = pixel.root();
+                let share = own[3];
+                if share < 1.0
+                    && self.gaps.is_small(x, y)
+                    && let Some(smooth) = colour(texel)
+                {
+                    *pixel = P::of_root([0, 1, 2].map(|k| share * own[k] + (1.0 - share) * smooth[k]));
+                    filled += 1;
+                }
+            }
+        }
+        Ok((filled, pixels))
+    }
+}
+
+/// A sample counts as wholly known if this share of its surroundings is, its inverse: colours reach into a gap as far as the
+/// finest level that knows any, so that each place of a gap takes up what is next to it.
+const SATURATION: f32 = 16.0;
+
+/// The finest of `levels` with what it lacks from the coarser ones, the coarsest from `coarser`.
+fn pulled(mut levels: Vec<Plane<[f32; 4]>>, coarser: Option<&Plane<[f32; 4]>>) -> Plane<[f32; 4]> {
+    let mut whole: Option<Plane<[f32; 4]>> = None;
+    while let Some(mut level) = levels.pop() {
+        if let Some(coarser) = whole.as_ref().or(coarser) {
+            let smooth = coarser.expanded(&level.columns, &level.rows);
+            for (texel, smooth) in level.texels.iter_mut().zip(&smooth.texels) {
+                if let Some([r, g, b]) = colour(*smooth) {
+                    let known = (SATURATION * texel[3]).min(1.0);
+                    let [own_r, own_g, own_b] = colour(*texel).unwrap_or_default();
+                    *texel = [r + known * (own_r - r), g + known * (own_g - g), b + known * (own_b - b), 1.0];
+                }
+            }
+        }
+        whole = Some(level);
+    }
+    whole.unwrap_or_default()
+}

@@ -1,0 +1,109 @@
+//! How a panorama is drawn from directions, as its project records it.
+
+use std::f64::consts::{PI, TAU};
+
+use serde::{Deserialize, Serialize};
+use trueup_align::projection::{FlatKind, View};
+use trueup_compose::layout::CanvasLayout;
+use trueup_core::spherical::{SphericalFrame, SphericalProjection};
+
+/// How the panorama is drawn from directions. A direction of the level world (x right, y down, z forward) that the rotations
+/// `yaw`, `pitch` and `roll` turn into the viewer's lies at `(plane - origin) * px_per_radian` on the canvas, where `plane` is
+/// its place in the projection.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ProjectionRecord {
+    /// The projection's name.
+    pub kind: FlatKind,
+    /// Where the viewer looks: to the right of straight ahead in the level world.
+    pub yaw_deg: f64,
+    /// Where the viewer looks: up.
+    pub pitch_deg: f64,
+    /// How the viewer's head is turned, clockwise.
+    pub roll_deg: f64,
+    /// Distance of Panini's viewpoint behind the axis; the others do not ask.
+    pub panini_distance: f64,
+    /// Canvas pixels per radian at the projection's middle.
+    pub px_per_radian: f64,
+    /// The plane's coordinates (radians at the middle) at the canvas's corner.
+    pub origin: [f64; 2],
+    /// Where the panorama lies on the whole sphere, for viewers of spherical panoramas; `None` for other projections.
+    pub sphere: Option<SphericalFrame>,
+}
+
+impl ProjectionRecord {
+    /// How `view` is drawn on the canvas `written`.
+    pub(crate) fn new(view: &View, written: &CanvasLayout) -> Self {
+        let px_per_radian = written.canvas_from_target;
+        Self {
+            kind: view.flat.kind,
+            yaw_deg: view.yaw.to_degrees(),
+            pitch_deg: view.pitch.to_degrees(),
+            roll_deg: view.roll.to_degrees(),
+            panini_distance: view.flat.panini_distance,
+            px_per_radian,
+            origin: written.origin,
+            sphere: sphere(view, written),
+        }
+    }
+}
+
+/// Where a canvas lies on the whole sphere, in whole pixels.
+fn sphere(view: &View, written: &CanvasLayout) -> Option<SphericalFrame> {
+    let scale = written.canvas_from_target;
+    let [x, y] = written.origin;
+    // Rounding may put the last column a pixel beyond the whole.
+    let whole = |length: f64, start: usize, own: usize| (length.round() as usize).max(start + own);
+    let start = |at: f64| (at * scale).round().max(0.0) as usize;
+    let left = start(x + PI);
+    let full_width = match written.period {
+        Some(period) => period,
+        None => whole(TAU * scale, left, written.width),
+    };
+    let (projection, top, full_height) = match view.flat.kind {
+        FlatKind::Equirectangular => {
+            let top = start(y + PI / 2.0);
+            (SphericalProjection::Equirectangular, top, whole(PI * scale, top, written.height))
+        }
+        FlatKind::Cylindrical => {
+            // As high above the horizon as below it.
+            let half = (-y).max(y + written.height as f64 / scale).max(0.0);
+            let top = start(y + half);
+            (SphericalProjection::Cylindrical, top, whole(2.0 * half * scale, top, written.height))
+        }
+        _ => return None,
+    };
+    Some(SphericalFrame { projection, full_width, full_height, left, top, middle_yaw: view.yaw })
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_align::projection::Flat;
+
+    use super::*;
+
+    fn view(kind: FlatKind) -> View {
+        let flat = Flat { kind, panini_distance: 1.0 };
+        View { flat, yaw: 0.25, pitch: 0.0, roll: 0.0, half: kind.comfortable(), closed: false }
+    }
+
+    fn canvas(width: usize, height: usize, origin: [f64; 2]) -> CanvasLayout {
+        CanvasLayout { width, height, canvas_from_target: 1000.0, origin, placed: Vec::new(), period: None }
+    }
+
+    /// 1000 pixels a radian: the whole is 6283 x 3142 pixels, its middle at (3141.6, 1570.8); the canvas begins half a radian
+    /// left of it and 0.2 radians above the horizon.
+    #[test]
+    fn a_cropped_panorama_knows_its_place_on_the_sphere() {
+        let frame = sphere(&view(FlatKind::Equirectangular), &canvas(1200, 700, [-0.5, -0.2])).expect("a sphere");
+        assert_eq!((frame.full_width, frame.full_height, frame.left, frame.top), (6283, 3142, 2642, 1371));
+        assert!(frame.holds(1200, 700) && frame.middle_yaw == 0.25);
+        // The cylinder reaches 0.5 below the horizon, and as much above it in the whole.
+        let frame = sphere(&view(FlatKind::Cylindrical), &canvas(1200, 700, [-0.5, -0.2])).expect("a cylinder");
+        assert_eq!((frame.full_height, frame.top), (1000, 300));
+        assert!(sphere(&view(FlatKind::Panini), &canvas(10, 10, [0.0; 2])).is_none());
+        // What rounding adds at the end is part of the whole.
+        let corner = [-PI, -PI / 2.0];
+        let ending = sphere(&view(FlatKind::Equirectangular), &canvas(6284, 3143, corner));
+        assert!(ending.expect("a sphere").holds(6284, 3143));
+    }
+}

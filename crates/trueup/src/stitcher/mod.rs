@@ -1,0 +1,242 @@
+//! The order of the stages: the one place that knows it.
+
+mod composing;
+mod matching;
+mod recalling;
+mod results;
+
+use std::path::Path;
+
+use trueup_compose::exposure::{self, Correction, Thumbnail};
+use trueup_compose::layout::{CanvasLayout, Placed};
+use trueup_core::diagnostics::Diagnostic;
+use trueup_core::raster::Raster;
+use trueup_core::source::{PhotographSource, WorkingFrame};
+use trueup_core::{Result, StageContext};
+use trueup_io::colour::PhotographColours;
+use trueup_io::decode::FilePhotographs;
+use trueup_io::source::{self, RejectedSource};
+
+use crate::align::{self, Component};
+use crate::arrangement;
+use crate::budget::Budget;
+use crate::cache::{Cache, Key, Known, photograph_keys};
+use crate::clock::Clock;
+use crate::inputs::Inputs;
+use crate::left_out::LeftOut;
+use crate::masks::AllMasks;
+use crate::matched::require_all;
+use crate::measures;
+use crate::names;
+use crate::options::StitchOptions;
+use crate::record::{fill_geometry, place};
+
+pub use results::{Aligned, Alignment, MatchedPhotographs};
+
+/// Runs the stages with one set of options.
+#[derive(Debug)]
+pub struct Stitcher<'a> {
+    options: &'a StitchOptions,
+    context: &'a StageContext<'a>,
+    cache: Option<&'a Cache>,
+    output: Option<&'a Path>,
+}
+
+impl<'a> Stitcher<'a> {
+    /// A stitcher with these options. Parallel work runs on the current thread pool.
+    pub fn new(options: &'a StitchOptions, context: &'a StageContext<'a>) -> Self {
+        Self { options, context, cache: None, output: None }
+    }
+
+    /// The same stitcher, which finds results of earlier runs in `cache` and keeps its own there. They decide how long the
+    /// work takes, never what comes of it.
+    #[must_use]
+    pub fn with_cache(self, cache: Option<&'a Cache>) -> Self {
+        Self { cache, ..self }
+    }
+
+    /// The options of all stages.
+    pub(crate) fn options(&self) -> &StitchOptions {
+        self.options
+    }
+
+    /// What the stages are given beside their input.
+    pub(crate) fn context(&self) -> &StageContext<'a> {
+        self.context
+    }
+
+    /// Finds, measures and matches the photographs and estimates the panoramas' geometry:
+    /// [`Stitcher::match_photographs`], then [`Stitcher::align_matched`].
+    ///
+    /// # Errors
+    /// Those of the two.
+    pub fn align(&self, inputs: &Inputs) -> Result<Aligned> {
+        self.align_matched(&self.match_photographs(inputs)?, inputs)
+    }
+
+    /// Finds, measures and matches the photographs. What comes of it can be aligned several times, with other references
+    /// or other options of the later stages.
+    ///
+    /// # Errors
+    /// [`Error::Options`]; [`Error::Input`] when no photograph can be read or the graph does not fit the photographs;
+    /// [`Error::Cancelled`].
+    ///
+    /// [`Error::Cancelled`]: trueup_core::Error::Cancelled
+    /// [`Error::Input`]: trueup_core::Error::Input
+    /// [`Error::Options`]: trueup_core::Error::Options
+    pub fn match_photographs(&self, inputs: &Inputs) -> Result<MatchedPhotographs> {
+        self.options.validate()?;
+        let mut clock = Clock::default();
+        let sources = clock.time("source", || source::scan(&inputs.photographs, &self.options.source, self.context))?;
+        self.check_any(&sources, inputs)?;
+        let measuring = Budget::new(self.options).measuring(&sources.images, self.options)?;
+        let masks = AllMasks::read(&inputs.masks, &sources.images, &self.options.source, self.context)?;
+        let colours = PhotographColours::survey(&sources.images, self.context);
+        let photographs = FilePhotographs::new(sources.images.clone(), measuring.kept_bytes).in_colours(colours);
+        let photographs = std::sync::Arc::new(photographs.with_masks(masks.masks));
+        let keys = match self.cache {
+            Some(_) => clock.time("source", || photograph_keys(&photographs, self.options, self.context))?,
+            None => Vec::new(),
+        };
+        let known = (self.known(&keys), measuring.at_once);
+        let matched = self.match_all((sources, masks.records), &photographs, known, inputs, &mut clock)?;
+        if let Some(cache) = self.cache {
+            cache.report(self.context);
+        }
+        let findings = self.context.take_diagnostics();
+        Ok(MatchedPhotographs { matched, photographs, clock, findings, memory: None, keys })
+    }
+
+    /// Estimates the geometry of the panoramas that matched photographs make.
+    ///
+    /// Of `inputs`, the photographs and the graph are those that were matched; the reference, `all` and `require_all` are
+    /// heeded.
+    ///
+    /// # Errors
+    /// [`Error::Options`]; [`Error::Input`] when the reference does not fit the photographs, or `require_all` is not met;
+    /// [`Error::Unsolvable`] when no two photographs overlap; [`Error::Cancelled`].
+    ///
+    /// [`Error::Cancelled`]: trueup_core::Error::Cancelled
+    /// [`Error::Input`]: trueup_core::Error::Input
+    /// [`Error::Options`]: trueup_core::Error::Options
+    /// [`Error::Unsolvable`]: trueup_core::Error::Unsolvable
+    pub fn align_matched(&self, set: &MatchedPhotographs, inputs: &Inputs) -> Result<Aligned> {
+        self.options.validate()?;
+        let MatchedPhotographs { matched, photographs, findings, .. } = set;
+        let components = self.components_to_stitch(matched, inputs)?;
+        if inputs.require_all {
+            require_all(matched, &components)?;
+        }
+        for (index, image) in matched.sources.images.iter().enumerate() {
+            if !components.iter().any(|component| component.contains(&index)) {
+                photographs.forget(index);
+                self.report_left_out(&image.name, &matched.why_left_out(index, &components));
+            }
+        }
+        for rejected in &matched.sources.rejected {
+            self.report_rejected(rejected);
+        }
+        let file_names = matched.names();
+        let found = findings.iter().cloned().chain(self.context.take_diagnostics());
+        let shared_diagnostics: Vec<_> = found.map(|one| names::by_name(one, &file_names)).collect();
+
+        let mut alignments = Vec::new();
+        for component in &components {
+            let mut alignment = self.align_component(component, &components, set, inputs)?;
+            if let Some(cache) = self.cache {
+                cache.report(self.context);
+            }
+            let own = self.context.take_diagnostics().into_iter().map(|one| names::by_name(one, &file_names));
+            alignment.project.diagnostics = shared_diagnostics.iter().cloned().chain(own).collect();
+            alignments.push(alignment);
+        }
+        Ok(Aligned { alignments })
+    }
+
+    fn known<'k>(&'k self, keys: &'k [Option<Key>]) -> Option<Known<'k>> {
+        self.cache.filter(|_| !keys.is_empty()).map(|cache| Known { cache, keys })
+    }
+
+    fn align_component(
+        &self,
+        members: &[usize],
+        stitched: &[Vec<usize>],
+        set: &MatchedPhotographs,
+        inputs: &Inputs,
+    ) -> Result<Alignment> {
+        let MatchedPhotographs { matched, photographs, clock, memory, .. } = set;
+        let mut clock = clock.clone();
+        let reference = matched.reference_of(members, inputs)?;
+        let rotation = match matched.graph_file.reference == Some(reference) {
+            true => matched.graph_file.reference_rotation_deg.unwrap_or(0.0).to_radians(),
+            false => 0.0,
+        };
+        let component =
+            Component::new(members, reference, rotation, &matched.sources.images, &matched.measured, &matched.pairs);
+        let geometry = match members.len() {
+            1 => None,
+            _ => Some(match (memory, self.known(&set.keys)) {
+                (None, Some(known)) => {
+                    align::run_or_recall(&component, self.options, self.context, &mut clock, &known, photographs)?
+                }
+                (memory, _) => {
+                    align::run(&component, self.options, self.context, &mut clock, memory.as_ref(), photographs)?
+                }
+            }),
+        };
+        let placed = place(&component, geometry.as_ref());
+        let sources = arrangement::Sources::of_geometry(placed, &component, geometry.as_ref());
+        let arrangement = clock.time("canvas", || arrangement::run(sources, self.options, self.context))?;
+        let corrections = clock.time("exposure", || {
+            let thumbnails = members.iter().zip(component.camera_groups()).filter_map(|(&picture, camera)| {
+                let measured = matched.measured[picture].as_ref()?;
+                Some((&measured.thumbnail, measured.thumbnail_frame, camera))
+            });
+            self.correct(&arrangement.plane, component.reference, photographs, thumbnails)
+        })?;
+        let mut project = matched.project(self.options, members, stitched);
+        fill_geometry(&mut project, &component, geometry.as_ref(), &arrangement, &corrections);
+        project.colour_space = photographs.colours().map(PhotographColours::name).unwrap_or_default();
+        project.measures = geometry.as_ref().map(|geometry| {
+            clock.time("measures", || measures::run(&component, geometry, &arrangement.plane, self.options))
+        });
+        project.seconds.clone_from(clock.seconds());
+        let layout = arrangement.written;
+        let corrections = as_placed(&layout, &corrections, |photograph| members.binary_search(&photograph).ok());
+        Ok(Alignment { project, layout, corrections, photographs: photographs.clone(), clock })
+    }
+
+    /// What evens out the light of the photographs placed in `layout`, from their thumbnails, each with its frame and the
+    /// camera that took it.
+    fn correct<'t>(
+        &self,
+        layout: &CanvasLayout,
+        reference: usize,
+        photographs: &FilePhotographs,
+        thumbnails: impl Iterator<Item = (&'t Raster<u8>, WorkingFrame, usize)>,
+    ) -> Result<Vec<Correction>> {
+        let curve = photographs.transfer_curve();
+        let thumbnails: Vec<Thumbnail> =
+            thumbnails.map(|(raster, frame, camera)| Thumbnail { raster, curve: &curve, frame, camera }).collect();
+        Ok(exposure::run(layout, &thumbnails, reference, &self.options.exposure, self.context)?.corrections)
+    }
+
+    fn report_left_out(&self, name: &str, left_out: &LeftOut) {
+        self.context.report(Diagnostic::warning(left_out.code, name, &left_out.reason, &left_out.hint));
+    }
+
+    fn report_rejected(&self, rejected: &RejectedSource) {
+        self.context.report(Diagnostic::warning(&rejected.code, &rejected.name, &rejected.reason, &rejected.hint));
+    }
+}
+
+/// The corrections of the photographs as `layout` places them, of which `position` tells which is a photograph's: one may be
+/// placed several times, or not at all, and its light is the same everywhere.
+fn as_placed(
+    layout: &CanvasLayout,
+    corrections: &[Correction],
+    position: impl Fn(usize) -> Option<usize>,
+) -> Vec<Correction> {
+    let correction = |placed: &Placed| corrections.get(position(placed.photograph)?).copied();
+    layout.placed.iter().filter_map(correction).collect()
+}
