@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use trueup_align::stitch_graph::{GraphFile, StitchGraph, parse_graph_file};
-use trueup_compose::exposure::{self, Correction, Thumbnail};
+use trueup_compose::exposure::{self, Corrections, Thumbnail};
 use trueup_compose::fidelity::{self, Fidelity};
 use trueup_compose::layout::CanvasLayout;
 use trueup_compose::render::{self, Panorama};
@@ -91,7 +91,7 @@ pub struct Alignment {
     /// The record so far; complete but for the seconds that composing and writing take.
     pub project: Project,
     layout: CanvasLayout,
-    corrections: Vec<Correction>,
+    corrections: Corrections,
     photographs: std::sync::Arc<FilePhotographs>,
     clock: Clock,
 }
@@ -102,8 +102,8 @@ impl Alignment {
         &self.layout
     }
 
-    /// Gain, colour and vignetting of every photograph placed.
-    pub(crate) fn corrections(&self) -> &[Correction] {
+    /// Gain, colour and vignetting of every photograph placed, and the response of all.
+    pub(crate) fn corrections(&self) -> &Corrections {
         &self.corrections
     }
 
@@ -285,8 +285,7 @@ impl<'a> Stitcher<'a> {
         }
         let layout = arrangement.written;
         // Photographs are numbered by their place among those used.
-        let corrections =
-            layout.placed.iter().filter_map(|placed| corrections.get(placed.photograph).copied()).collect();
+        let corrections = corrections.of_placed(&layout, |photograph| Some(photograph));
         let mut alignment = Alignment { project, layout, corrections, photographs, clock };
         alignment.record_findings(self.context.take_diagnostics());
         alignment.project.seconds.clone_from(alignment.clock.seconds());
@@ -299,7 +298,7 @@ impl<'a> Stitcher<'a> {
         layout: &CanvasLayout,
         reference: usize,
         (photographs, at_once): (&FilePhotographs, usize),
-    ) -> Result<Vec<Correction>> {
+    ) -> Result<Corrections> {
         let images: Vec<&SourceImage> = photographs.images().iter().collect();
         let thumbnails = measure::thumbnails(photographs, at_once, self.options, self.context)?;
         let curve = photographs.transfer_curve();
@@ -520,11 +519,7 @@ impl<'a> Stitcher<'a> {
         project.seconds.clone_from(clock.seconds());
         let layout = arrangement.written;
         // A photograph may be placed several times, or not at all; its light is the same everywhere.
-        let corrections = layout
-            .placed
-            .iter()
-            .filter_map(|placed| Some(corrections[members.binary_search(&placed.photograph).ok()?]))
-            .collect();
+        let corrections = corrections.of_placed(&layout, |photograph| members.binary_search(&photograph).ok());
         Ok(Alignment { project, layout, corrections, photographs: photographs.clone(), clock })
     }
 

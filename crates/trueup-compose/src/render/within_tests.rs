@@ -18,7 +18,7 @@ impl PhotographSource for Counting {
 const COUNT: usize = 10;
 
 /// Two rows of photographs, over many tiles.
-fn scene() -> (CanvasLayout, Vec<Correction>, Counting) {
+fn scene() -> (CanvasLayout, Corrections, Counting) {
     let placed = (0..COUNT)
         .map(|i| {
             let (left, top) = ((i / 2) as f64 * 310.0, (i % 2) as f64 * 190.0);
@@ -31,8 +31,8 @@ fn scene() -> (CanvasLayout, Vec<Correction>, Counting) {
         let raster = trueup_core::raster::Raster::from_data(420, 260, 3, data).expect("as many samples");
         trueup_core::raster::Photograph::Eight(raster)
     });
-    let corrections = (0..COUNT).map(|i| Correction::uniform(1.0 + 0.01 * i as f64)).collect();
-    (canvas(1670, 460, placed), corrections, Counting(Memory(pictures.collect()), AtomicUsize::new(0)))
+    let corrections: Vec<_> = (0..COUNT).map(|i| Correction::uniform(1.0 + 0.01 * i as f64)).collect();
+    (canvas(1670, 460, placed), corrections.into(), Counting(Memory(pictures.collect()), AtomicUsize::new(0)))
 }
 
 fn composed(blend: Blend, memory: usize, disk: &RamDisk, threads: usize) -> Result<(Panorama, usize)> {
