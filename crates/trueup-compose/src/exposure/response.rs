@@ -34,11 +34,12 @@ const CHECKED: usize = 1020;
 const STEPS: usize = 65_535;
 
 impl Response {
-    /// The functions f at the encoded value `e`, all 0 at white: ln((e + d) / (1 + d)) with d = 0.03, near to a power of the
-    /// light, and 4 e (1 - e) times the Chebyshev polynomials T_0 to T_2 of 1 - 2 e.
+    /// The functions f at the encoded value `e`: ln((e + d) / (1 + d)) / ln((1 + d) / d) with d = 0.03, near to a power of the
+    /// light, and 4 e (1 - e) times the Chebyshev polynomials T_0 to T_2 of 1 - 2 e. All are 0 at white and from -1 to 1.
     pub fn terms(e: f64) -> [f64; RESPONSE_TERMS] {
         let (bump, u) = (4.0 * e * (1.0 - e), 1.0 - 2.0 * e);
-        [((e + FOOT) / (1.0 + FOOT)).ln(), bump, bump * u, bump * (2.0 * u * u - 1.0)]
+        let power = ((e + FOOT) / (1.0 + FOOT)).ln() / ((1.0 + FOOT) / FOOT).ln();
+        [power, bump, bump * u, bump * (2.0 * u * u - 1.0)]
     }
 
     /// Whether it leaves the profile's curve as it is.
@@ -101,10 +102,10 @@ mod tests {
 
     #[test]
     fn the_factor_follows_the_formula() {
-        // At e = 1/4: 4 e (1 - e) = 3/4, u = 1/2, 2 u^2 - 1 = -1/2; ln(0.28 / 1.03) = -1.302525.
+        // At e = 1/4: 4 e (1 - e) = 3/4, u = 1/2, 2 u^2 - 1 = -1/2; ln(0.28 / 1.03) / ln(1.03 / 0.03) = -1.302525 / 3.536117.
         let [power, others @ ..] = Response::terms(0.25);
         assert_eq!(others, [0.75, 0.375, -0.375]);
-        assert!((power + 1.302_525).abs() < 1e-6, "{power}");
+        assert!((power + 0.368_349).abs() < 1e-6, "{power}");
         assert_eq!(Response::terms(1.0), [0.0; RESPONSE_TERMS]);
         // At e = 1/2 the last three functions are 1, 0, -1; exp(0.5 - 0.3) = 1.221403, sRGB's light there is 0.214041.
         let response = Response { coefficients: [0.0, 0.5, 0.7, 0.3] };
