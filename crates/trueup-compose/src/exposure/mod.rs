@@ -7,8 +7,10 @@
 //! for its vignetting.
 
 mod correction;
+mod evidence;
 mod predicted;
 mod response;
+mod robust;
 mod samples;
 mod solve;
 

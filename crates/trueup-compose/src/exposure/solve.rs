@@ -10,10 +10,10 @@ use trueup_core::colour::TransferCurve;
 use trueup_core::{Result, StageContext};
 
 use super::correction::{Correction, Corrections, VIGNETTING_TERMS};
-use super::predicted::Predicted;
 use super::response::{RESPONSE_TERMS, Response};
+use super::robust::{LEAST_DEVIATION, magnitude, mean, weights_of};
 use super::samples::Shared;
-use super::{ExposureModel, ExposureOptions, GainAnchor, NORMAL, PairExposure};
+use super::{ExposureModel, ExposureOptions, GainAnchor, PairExposure};
 
 /// An overlap and its samples.
 pub(super) struct Observed {
@@ -39,13 +39,6 @@ impl Observed {
 
 /// Repetitions of the weighted solution; the weights of real overlaps stand still after six.
 const REPETITIONS: usize = 8;
-
-/// Residual, in standard deviations of the overlap, at which a sample counts half. Tuning constant of the Cauchy
-/// estimator for 95 % efficiency (Holland, Welsch, "Robust regression using iteratively reweighted least-squares", 1977).
-const CAUCHY: f64 = 2.385;
-
-/// Smallest standard deviation of a sample's logarithm: half a level of 8 bits at middle gray.
-const LEAST_DEVIATION: f64 = 0.01;
 
 /// Neighbouring samples see the same things; an overlap is worth about this share of its samples.
 const INDEPENDENT: f64 = 0.01;
@@ -112,9 +105,9 @@ pub(super) struct Solution {
     pub(super) casts: [DVector<f64>; 3],
     pub(super) response: Response,
     /// For each overlap and sample, by how much the functions of the response differ; none are 0.
-    answers: Vec<Vec<Differences>>,
+    pub(super) answers: Vec<Vec<Differences>>,
     /// Slopes of the response's functions against the logarithm of light, over all samples.
-    slopes: [f64; RESPONSE_TERMS],
+    pub(super) slopes: [f64; RESPONSE_TERMS],
 }
 
 /// f(first) - f(second) of the response's functions f, by channel.
@@ -133,7 +126,11 @@ impl Solution {
     }
 
     /// The samples of an overlap with what the response adds to ln(first / second) of each channel.
-    fn ratios<'a>(&'a self, index: usize, one: &'a Observed) -> impl Iterator<Item = (&'a Shared, [f64; 3])> {
+    pub(super) fn ratios<'a>(
+        &'a self,
+        index: usize,
+        one: &'a Observed,
+    ) -> impl Iterator<Item = (&'a Shared, [f64; 3])> {
         one.samples.iter().zip(&self.answers[index]).map(|(sample, answers)| {
             let ratio = sample.log_ratio();
             let added = |channel: usize| -> f64 {
@@ -141,37 +138,6 @@ impl Solution {
                 terms.map(|(coefficient, differs)| coefficient * f64::from(differs)).sum()
             };
             (sample, std::array::from_fn(|channel| f64::from(ratio[channel]) + added(channel)))
-        })
-    }
-}
-
-/// Straight lines through the response's functions against the logarithm of light.
-#[derive(Default)]
-struct Line {
-    count: f64,
-    light: f64,
-    squares: f64,
-    terms: [f64; RESPONSE_TERMS],
-    products: [f64; RESPONSE_TERMS],
-}
-
-impl Line {
-    fn add(&mut self, light: f64, terms: [f64; RESPONSE_TERMS]) {
-        self.count += 1.0;
-        self.light += light;
-        self.squares += light * light;
-        for (term, value) in terms.into_iter().enumerate() {
-            self.terms[term] += value;
-            self.products[term] += light * value;
-        }
-    }
-
-    /// The slopes of the lines; 0 where all light is the same.
-    fn slopes(&self) -> [f64; RESPONSE_TERMS] {
-        let spread = self.squares - self.light * self.light / self.count;
-        std::array::from_fn(|term| {
-            let common = self.products[term] - self.light * self.terms[term] / self.count;
-            if spread > 0.0 { common / spread } else { 0.0 }
         })
     }
 }
@@ -213,38 +179,15 @@ impl Problem<'_> {
     }
 
     /// ln of the factor on a channel of `photograph` at the squared radius `r2`.
-    fn log_factor(&self, solution: &Solution, photograph: usize, channel: usize, r2: f32) -> f64 {
+    pub(super) fn log_factor(&self, solution: &Solution, photograph: usize, channel: usize, r2: f32) -> f64 {
         let lens = self.count + self.lens_of[photograph] * self.terms;
         let vignetting = powers(r2).into_iter().take(self.terms).zip(lens..);
         let lift: f64 = vignetting.map(|(power, at)| power * solution.brightness[at]).sum();
         solution.brightness[photograph] + solution.casts[channel][photograph] + lift
     }
 
-    /// By how much the functions of the response differ in every sample, by what the solution says the photographs show.
-    fn predict(&self, solution: &mut Solution, profile: &TransferCurve) -> Result<()> {
-        let predicted = Predicted::new(profile, &solution.response)?;
-        let mut line = Line::default();
-        let mut of = |one: &Observed| -> Vec<Differences> {
-            let samples = one.samples.iter().map(|sample| {
-                std::array::from_fn(|channel| {
-                    let factor = |photograph, r2| self.log_factor(solution, photograph, channel, r2);
-                    let factors = [factor(one.pair.first, sample.radius[0]), factor(one.pair.second, sample.radius[1])];
-                    let light = sample.log_light.map(|light| f64::from(light[channel]));
-                    let terms = predicted.terms(light, factors, sample.variances);
-                    light.into_iter().zip(terms).for_each(|(light, terms)| line.add(light, terms));
-                    std::array::from_fn(|term| (terms[0][term] - terms[1][term]) as f32)
-                })
-            });
-            samples.collect()
-        };
-        let answers = self.observed.iter().map(&mut of).collect();
-        solution.answers = answers;
-        solution.slopes = line.slopes();
-        Ok(())
-    }
-
     /// Weight of one sample of an overlap before residuals are known.
-    fn share(&self, one: &Observed) -> f64 {
+    pub(super) fn share(&self, one: &Observed) -> f64 {
         let from_samples = one.pair.deviation.powi(2) / (INDEPENDENT * one.pair.samples as f64);
         1.0 / (self.options.pair_deviation.powi(2) + from_samples) / one.samples.len() as f64
     }
@@ -311,10 +254,8 @@ impl Problem<'_> {
             let answers = &solution.answers[index];
             for (((sample, ratio), weight), answers) in solution.ratios(index, one).zip(weights).zip(answers) {
                 self.row(&one.pair, sample, &mut row);
-                for term in 0..response_terms {
-                    let differs = mean(std::array::from_fn(|channel| f64::from(answers[channel][term])));
-                    row.push((self.unknowns + term, differs));
-                }
+                let differs = |term: usize| mean(std::array::from_fn(|channel| f64::from(answers[channel][term])));
+                row.extend((0..response_terms).map(|term| (self.unknowns + term, differs(term))));
                 let weight = weight * share;
                 for &(i, a) in &row {
                     right[i] -= weight * a * mean(ratio);
@@ -339,22 +280,6 @@ impl Problem<'_> {
             }
         }
         Some(normal.cholesky()?.solve(&right))
-    }
-
-    /// What the response does to the ratios of photographs: the root of the mean square of what it adds to their logarithms,
-    /// but for what is the same all over an overlap, which gains do as well.
-    fn effect(&self, weights: &[Vec<f64>], solution: &Solution) -> f64 {
-        let (mut squares, mut total) = (0.0, 0.0);
-        for (index, (one, weights)) in self.observed.iter().zip(weights).enumerate() {
-            let share = self.share(one);
-            let added = |(sample, ratio): (&Shared, [f64; 3])| mean(ratio) - f64::from(sample.brightness());
-            let weighed = || solution.ratios(index, one).map(added).zip(weights);
-            let sum: f64 = weights.iter().sum();
-            let common = weighed().map(|(added, weight)| weight * added).sum::<f64>() / sum.max(f64::MIN_POSITIVE);
-            squares += share * weighed().map(|(added, weight)| weight * (added - common).powi(2)).sum::<f64>();
-            total += share * sum;
-        }
-        if total > 0.0 { (squares / total).sqrt() } else { 0.0 }
     }
 
     /// What red, green and blue differ from the brightness, as logarithms of gains.
@@ -416,32 +341,5 @@ impl Problem<'_> {
             correction
         };
         Corrections { response: solution.response, photographs: (0..self.count).map(correction).collect() }
-    }
-}
-
-/// The mean of the three channels.
-fn mean(channels: [f64; 3]) -> f64 {
-    channels.iter().sum::<f64>() / 3.0
-}
-
-/// Root mean square of the residuals of the three channels.
-fn magnitude(residuals: [f64; 3]) -> f64 {
-    mean(residuals.map(|residual| residual * residual)).sqrt()
-}
-
-/// Turns the residuals of an overlap's samples into weights, at most their certainties, by their own spread.
-fn weights_of(residuals: &mut [f64], certainties: &[f64]) {
-    for (residual, certainty) in residuals.iter_mut().zip(certainties) {
-        *residual *= certainty.sqrt();
-    }
-    let mut sorted = residuals.to_vec();
-    let middle = sorted.len() / 2;
-    if sorted.is_empty() {
-        return;
-    }
-    let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let scale = CAUCHY * (NORMAL * median).max(LEAST_DEVIATION);
-    for (residual, certainty) in residuals.iter_mut().zip(certainties) {
-        *residual = certainty / (1.0 + (*residual / scale).powi(2));
     }
 }
