@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::pictures::{STREET_NAMES, plain, street_desk};
+use crate::pictures::{HEIGHT, STREET_NAMES, WIDTH, jpeg, plain, street_desk, street_pixels};
 use crate::run::{Desk, Run, finish, trueup};
 
 /// A folder with the street's photographs, their panorama `pano.jpg` and its project `pano.json`.
@@ -28,6 +28,32 @@ fn the_same_options_give_the_same_bytes() {
         project
     };
     assert_eq!(without_seconds("pano.json"), without_seconds("again.json"));
+}
+
+/// Photographs of several exposures by a camera that presses highlights together: the response that was found is
+/// recorded, and gives the same panorama again.
+#[test]
+fn a_response_is_recorded() {
+    let desk = Desk::new();
+    for ((name, pixels), exposure) in STREET_NAMES.iter().zip(street_pixels()).zip([1.0, 0.45, 1.5, 0.6]) {
+        let pressed = |level: u8| {
+            let light = exposure * (f64::from(level) / 255.0).powf(2.2);
+            let shown = (1.0 - (-2.0 * light).exp()) / (1.0 - f64::exp(-2.0));
+            (255.0 * shown.min(1.0).powf(1.0 / 2.2)).round() as u8
+        };
+        let pixels: Vec<u8> = pixels.iter().copied().map(pressed).collect();
+        desk.put(name, &jpeg(&pixels, WIDTH, HEIGHT));
+    }
+    desk.stitch(&[&STREET_NAMES[..], &["--project", "pano.json"]].concat()).expect_success();
+    let response = desk.json("pano.json")["response"].clone();
+    let response: Vec<f64> = serde_json::from_value(response).expect("numbers");
+    assert!(response.len() == 4 && response.iter().any(|&one| one.abs() > 0.1), "{response:?}");
+    compose(&desk, &["--project", "again.json"]).expect_success();
+    assert!(desk.read("pano.jpg") == desk.read("again.jpg"), "the panoramas differ");
+    assert_eq!(desk.json("again.json")["response"], json!(response));
+    compose(&desk, &["--set", "exposure.response=false", "--project", "again.json"]).expect_success();
+    assert!(desk.read("pano.jpg") != desk.read("again.jpg"));
+    assert_eq!(desk.json("again.json")["response"], json!([0.0, 0.0, 0.0, 0.0]));
 }
 
 /// Composing with a view gives what stitching with it does, from projects of the same view, of none, and cropped.

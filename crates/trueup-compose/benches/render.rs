@@ -50,7 +50,7 @@ fn layout(scale: f64) -> CanvasLayout {
 }
 
 fn compose(layout: &CanvasLayout, photographs: &Memory, options: &RenderOptions) -> Result<Panorama> {
-    let corrections = [Correction::uniform(0.9), Correction::uniform(1.1)];
+    let corrections = vec![Correction::uniform(0.9), Correction::uniform(1.1)].into();
     render(layout, &corrections, photographs, options, &SeamOptions::default(), &StageContext::default())
 }
 

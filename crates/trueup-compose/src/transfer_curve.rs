@@ -234,6 +234,8 @@ impl EncodeRoots16 {
 #[derive(Debug, Clone)]
 pub(crate) struct Encoding {
     curve: TransferCurve,
+    /// The colour profile's own curve, where pixels are light by another one.
+    profile: Option<TransferCurve>,
     pub(crate) linear: Arc<Encode>,
     pub(crate) roots: Arc<EncodeRoots>,
     linear16: OnceLock<Arc<Encode16>>,
@@ -244,7 +246,20 @@ impl Encoding {
     /// By a curve.
     pub(crate) fn new(curve: TransferCurve) -> Self {
         let (linear, roots) = (Encode::of(&curve), EncodeRoots::of(&curve));
-        Self { linear, roots, linear16: OnceLock::new(), roots16: OnceLock::new(), curve }
+        Self { linear, roots, linear16: OnceLock::new(), roots16: OnceLock::new(), curve, profile: None }
+    }
+
+    /// The same for a picture with the colour profile of `profile`, whatever light its pixels hold.
+    pub(crate) fn of_profile(self, profile: &TransferCurve) -> Self {
+        Self { profile: (self.curve != *profile).then(|| profile.clone()), ..self }
+    }
+
+    /// The colour profile's linear light of what the curve takes for `light`.
+    pub(crate) fn profile_light(&self, light: f32) -> f32 {
+        match &self.profile {
+            Some(profile) => profile.linear(self.curve.encoded(f64::from(light))) as f32,
+            None => light,
+        }
     }
 
     /// To 16 bits from linear light.
@@ -261,7 +276,7 @@ impl Encoding {
 impl PartialEq for Encoding {
     /// The tables follow from the curve.
     fn eq(&self, other: &Self) -> bool {
-        self.curve == other.curve
+        self.curve == other.curve && self.profile == other.profile
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use trueup_compose::exposure::Correction;
+use trueup_compose::exposure::{Correction, Response};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::matches::PairVerdict;
 
@@ -179,6 +179,10 @@ pub struct Project {
     /// Name of the colour space it was composed in; empty in files of programs that knew one only.
     #[serde(default)]
     pub colour_space: String,
+    /// What the cameras' response adds to that space's transfer curve: all factors act on the light by it. Nothing in files
+    /// of programs that estimated none.
+    #[serde(default)]
+    pub response: Response,
     /// How directions were drawn; `None` where the panorama is the mesh itself, and in files of programs that knew no
     /// projections.
     #[serde(default)]

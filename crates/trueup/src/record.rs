@@ -1,6 +1,6 @@
 //! Fills the project: what is recorded of photographs, pairs and geometry.
 
-use trueup_compose::exposure::Correction;
+use trueup_compose::exposure::{Correction, Corrections, Response};
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::geometry::{matrix_from_rows, rows_of};
@@ -78,6 +78,7 @@ impl Matched {
             measures: None,
             canvas: Canvas { width: 0, height: 0, full_turn: false },
             colour_space: String::new(),
+            response: Response::default(),
             projection: None,
             mesh_canvas: None,
             seconds: std::collections::BTreeMap::new(),
@@ -142,15 +143,16 @@ pub(crate) fn record_composition(
     images: &[SourceImage],
     masks: &[Vec<MaskRecord>],
     arrangement: &Arrangement,
-    corrections: &[Correction],
+    corrections: &Corrections,
 ) {
     record_canvas(project, arrangement);
+    project.response = corrections.response;
     project.diagnostics.retain(|one| !FOUND_IN_COMPOSING.contains(&one.code.as_str()));
     let mut renamed = Vec::new();
     for (k, &position) in used.iter().enumerate() {
         let record = &mut project.images[position];
         let mesh = &arrangement.plane.placed[k].mesh;
-        record_appearance(record, (mesh, arrangement.plane_shift), &corrections[k]);
+        record_appearance(record, (mesh, arrangement.plane_shift), &corrections.photographs[k]);
         let path = images[k].path.display().to_string();
         if path != record.path {
             project.diagnostics.push(Diagnostic::note(
@@ -208,9 +210,10 @@ pub(crate) fn fill_geometry(
     component: &Component,
     geometry: Option<&Geometry>,
     arrangement: &Arrangement,
-    corrections: &[Correction],
+    corrections: &Corrections,
 ) {
     record_canvas(project, arrangement);
+    project.response = corrections.response;
     project.reference = component.images[component.reference].path.display().to_string();
     let method = project.options.stitch.method;
     let is_warp = matches!(method.shape(), Shape::Warp(_));
@@ -219,7 +222,7 @@ pub(crate) fn fill_geometry(
         let mesh = &arrangement.plane.placed[k].mesh;
         let shift = arrangement.plane_shift;
         record.status = ImageStatus::Used;
-        record_appearance(record, (mesh, shift), &corrections[k]);
+        record_appearance(record, (mesh, shift), &corrections.photographs[k]);
         let Some(geometry) = geometry else { continue };
         let camera = &geometry.cameras.cameras[k];
         let camera_from_level = camera.rotation() * geometry.prior.level_from_world().transpose();

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use trueup_compose::crop::Crop;
-use trueup_compose::exposure::Correction;
+use trueup_compose::exposure::{Correction, Corrections};
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_core::mesh::GridMesh;
 use trueup_core::source::SourceImage;
@@ -30,7 +30,7 @@ pub(crate) struct Recorded {
     /// The canvas; photographs are numbered by their place in `used`.
     pub layout: CanvasLayout,
     /// What evens out their light.
-    pub corrections: Vec<Correction>,
+    pub corrections: Corrections,
     /// The reference's place in `used`.
     pub reference: usize,
 }
@@ -52,7 +52,7 @@ impl Recorded {
             Error::input(&project.reference, "it is the reference, but none of the photographs used", AS_WRITTEN)
         })?;
         let meshes = used_grids(&records)?;
-        let corrections = recorded_corrections(&records)?;
+        let corrections = recorded_corrections(project, &records)?;
         let canvas = project.grid_canvas();
         let (width, height) = (canvas.width, canvas.height);
         // Grids may lie beyond the ends of a full turn by less than a turn, and anywhere around what was cropped.
@@ -131,17 +131,19 @@ fn is_whole(mesh: &MeshRecord, width: usize, height: usize) -> bool {
     mesh.source.iter().enumerate().all(is_even)
 }
 
-/// What evens out the light of used pictures; gains alone in files of programs that knew no more.
+/// What evens out the light of used pictures, the `records` of `project`; gains alone in files of programs that knew no
+/// more.
 ///
 /// # Errors
 /// [`Error::Input`] if one is no positive factor on light.
-pub(crate) fn recorded_corrections(records: &[&ImageRecord]) -> Result<Vec<Correction>> {
+pub(crate) fn recorded_corrections(project: &Project, records: &[&ImageRecord]) -> Result<Corrections> {
     let correction = |record: &&ImageRecord| {
         let correction = record.correction.unwrap_or(Correction::uniform(record.gain.unwrap_or(1.0)));
         let damaged = |_| Error::input(&record.path, "its recorded gains are no positive factors on light", AS_WRITTEN);
         correction.check().map_err(damaged).map(|()| correction)
     };
-    records.iter().map(correction).collect()
+    let photographs = records.iter().map(correction).collect::<Result<_>>()?;
+    Ok(Corrections { response: project.response, photographs })
 }
 
 /// The file of a recorded photograph, checked to be of its size: beside the project file as recorded, as recorded from
@@ -219,7 +221,7 @@ mod tests {
             "format": "trueup-project", "version": 1, "method": "vpg", "options": {}, "reference": "b.jpg",
             "images": [image("a.jpg", 0.0), image("b.jpg", 5.5)], "pairs": [],
             "manhattan": {"threshold": 0.1, "accepted": false, "inliers": []},
-            "canvas": {"width": 14, "height": 6}, "seconds": {}, "diagnostics": []
+            "canvas": {"width": 14, "height": 6}, "response": [0.1, 0.2, -0.1, 0.05], "seconds": {}, "diagnostics": []
         })
     }
 
@@ -245,7 +247,12 @@ mod tests {
         assert_eq!((recorded.used, recorded.reference), (vec![0, 1], 1));
         assert_eq!((recorded.layout.width, recorded.layout.height), (14, 6));
         assert_eq!(recorded.layout.placed[1].mesh.target[4], [9.5, 3.0]);
-        assert_eq!(recorded.corrections[0].gain, [1.1, 1.0, 0.9]);
+        assert_eq!(recorded.corrections.photographs[0].gain, [1.1, 1.0, 0.9]);
+        assert_eq!(recorded.corrections.response.coefficients, [0.1, 0.2, -0.1, 0.05]);
+        let mut older = project();
+        older.as_object_mut().expect("an object").remove("response");
+        let (_, recorded) = read(&older).expect("whole");
+        assert!(recorded.corrections.response.is_plain());
     }
 
     /// Every place in a value, as a JSON pointer.

@@ -6,6 +6,7 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::raster::{Photograph, Raster};
 
 use super::*;
+use crate::exposure::Corrections;
 use crate::layout::Placed;
 use crate::render::prepared::Prepared;
 use crate::render::tests::Memory;
@@ -272,7 +273,7 @@ fn composed_in_any_way(layout: &CanvasLayout, blend: Blend) -> Vec<[f32; 4]> {
 }
 
 fn composed_around(layout: &CanvasLayout, options: &RenderOptions) -> Vec<[f32; 4]> {
-    let corrections = vec![Correction::default(); RING.len()];
+    let corrections = Corrections::plain(RING.len());
     let (seams, context) = (SeamOptions::default(), StageContext::default());
     let panorama = render(layout, &corrections, &Memory(ring_pictures()), options, &seams, &context).expect("renders");
     // Square roots of light, as the eye sees steps.
@@ -366,7 +367,7 @@ proptest! {
     ) {
         let layout = layout(&lefts);
         let pictures: Vec<Photograph> = (0..lefts.len()).map(|index| { let level = levels[index]; picture(0, move |_| level) }).collect();
-        let corrections = vec![Correction::default(); lefts.len()];
+        let corrections = Corrections::plain(lefts.len());
         let context = StageContext::default();
         let options = RenderOptions::default();
         let panorama = render(&layout, &corrections, &Memory(pictures), &options, &SeamOptions::default(), &context);

@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 use trueup_core::colour::TransferCurve;
 use trueup_core::{Error, Result};
 
+use super::response::Response;
+use crate::layout::{CanvasLayout, Placed};
 use crate::transfer_curve::Linearise;
 
 /// Even powers of the radius in the model of vignetting: r^2, r^4, r^6.
@@ -65,6 +67,37 @@ impl Correction {
             format!("{self:?} is not a positive factor on light"),
             "Give finite gains above zero for each photograph.",
         ))
+    }
+}
+
+/// What evens out the light of all photographs of a panorama.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Corrections {
+    /// The cameras' response, by which samples are read and the panorama is written: what is shown as it was taken keeps
+    /// its samples. All factors act on the light by this response.
+    pub response: Response,
+    /// One for each photograph.
+    pub photographs: Vec<Correction>,
+}
+
+impl Corrections {
+    /// Leaves `count` photographs as they are.
+    pub fn plain(count: usize) -> Self {
+        vec![Correction::default(); count].into()
+    }
+
+    /// Those of what is placed in `layout`, if `index_of` tells a photograph's place in these. A photograph may be placed
+    /// several times, or not at all; its light is the same everywhere.
+    pub fn of_placed(&self, layout: &CanvasLayout, index_of: impl Fn(usize) -> Option<usize>) -> Self {
+        let of = |placed: &Placed| self.photographs.get(index_of(placed.photograph)?).copied();
+        Self { response: self.response, photographs: layout.placed.iter().filter_map(of).collect() }
+    }
+}
+
+impl From<Vec<Correction>> for Corrections {
+    /// Factors on the light by the colour profile's own curve.
+    fn from(photographs: Vec<Correction>) -> Self {
+        Self { response: Response::default(), photographs }
     }
 }
 

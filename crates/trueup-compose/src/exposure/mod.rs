@@ -2,15 +2,21 @@
 //!
 //! All factors act on linear light, so that they add up as logarithms: what photograph i shows of a place, times its gain,
 //! times its lens's correction there, equals the same of photograph j. The overlaps give one such equation per sample and
-//! channel; moving things and ghosts are weighed down by their residuals, saturated samples do not take part. What the
-//! reference shows stays as it is, but for its vignetting.
+//! channel; moving things and ghosts are weighed down by their residuals, saturated samples do not take part. What is linear
+//! light is estimated, too, as a [`Response`] beside the colour profile's curve. What the reference shows stays as it is, but
+//! for its vignetting.
 
 mod correction;
+mod evidence;
+mod predicted;
+mod response;
+mod robust;
 mod samples;
 mod solve;
 
-pub use correction::{Correction, VIGNETTING_TERMS};
+pub use correction::{Correction, Corrections, VIGNETTING_TERMS};
 pub(crate) use correction::{LightTable, exposed};
+pub use response::{RESPONSE_TERMS, Response};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -75,6 +81,12 @@ trueup_core::options! {
         /// How strong vignetting is expected to be, as a standard deviation of every coefficient of its natural logarithm.
         /// Lower trusts that the lenses are good, higher follows the overlaps.
         vignetting_deviation: f64 = 0.6, between(1e-4, 100.0), "";
+        /// Whether the cameras' response is estimated beside the full model, one for all photographs; without, their samples
+        /// are taken for light by the colour profile's curve.
+        response: bool = true, Allowed::Any, "";
+        /// How far the response is expected to lie from the colour profile's curve, as a standard deviation of every
+        /// coefficient of its natural logarithm.
+        response_deviation: f64 = 0.5, between(1e-4, 100.0), "";
         /// Largest gain; the smallest is its inverse.
         max_gain: f64 = 8.0, between(1.0, 1000.0), "";
     }
@@ -112,7 +124,7 @@ pub struct PairExposure {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Exposure {
     /// For each photograph of [`CanvasLayout::placed`]; gains of 1 where it overlaps no other.
-    pub corrections: Vec<Correction>,
+    pub corrections: Corrections,
     /// The pairs that were compared, by (first, second).
     pub pairs: Vec<PairExposure>,
 }
@@ -127,11 +139,15 @@ pub struct Exposure {
 /// # Source
 /// Gains: Brown, Lowe, "Automatic panoramic image stitching using invariant features", IJCV 74(1), 2007, section 6.
 /// Vignetting from overlaps: Goldman, Chen, "Vignette and exposure calibration and compensation", ICCV 2005 (even
-/// polynomial of the sixth degree, exposures and lens together).
+/// polynomial of the sixth degree, exposures and lens together). Response from unknown exposures: Mitsunaga, Nayar,
+/// "Radiometric self calibration", CVPR 1999; that a power of it cannot be known: Grossberg, Nayar, "Determining the camera
+/// response from images: what is knowable?", TPAMI 25(11), 2003.
 ///
 /// # Departures
 /// All errors are on logarithms, where the whole model is linear; the published error of the gains on intensities draws
-/// them towards zero and is led by bright outliers. The response is taken to be the transfer curve of the photographs' colour space.
+/// them towards zero and is led by bright outliers. The response is a correction of the transfer curve of the photographs' colour
+/// space, one for all channels, whose mean slope stays that of the curve; its functions are read off the light that both
+/// photographs together say, not off each one's own noisy sample.
 pub fn run(
     layout: &CanvasLayout,
     thumbnails: &[Thumbnail<'_>],
@@ -142,7 +158,7 @@ pub fn run(
     check(layout, thumbnails, reference, options)?;
     let count = layout.placed.len();
     if !options.enabled || count < 2 {
-        return Ok(Exposure { corrections: vec![Correction::default(); count], pairs: Vec::new() });
+        return Ok(Exposure { corrections: Corrections::plain(count), pairs: Vec::new() });
     }
     let scale = sampling_scale(layout, options.samples);
     let turn = layout.period.map(|period| (period as f64 * scale).round() as usize);
@@ -162,7 +178,14 @@ pub fn run(
         .map(|first| {
             context.check_cancelled()?;
             Ok((first + 1..count)
-                .filter_map(|second| compare(shared(&patches[first], &patches[second], turn), first, second, options))
+                .filter_map(|second| {
+                    compare(
+                        shared(&patches[first], &patches[second], turn),
+                        [first, second],
+                        thumbnails[first].curve,
+                        options,
+                    )
+                })
                 .collect::<Vec<_>>())
         })
         .collect::<Result<Vec<_>>>()?
@@ -170,7 +193,13 @@ pub fn run(
         .flatten()
         .collect();
     let cameras: Vec<usize> = thumbnails.iter().map(|thumbnail| thumbnail.camera).collect();
-    let corrections = solve(&cameras, &observed, reference, options, context)?;
+    let response_asked = options.response && options.model == ExposureModel::Full;
+    // One response is fitted for one colour profile.
+    let profile = thumbnails
+        .first()
+        .map(|thumbnail| thumbnail.curve)
+        .filter(|&profile| response_asked && thumbnails.iter().all(|thumbnail| thumbnail.curve == profile));
+    let corrections = solve(&cameras, &observed, (reference, profile), options, context)?;
     Ok(Exposure { corrections, pairs: observed.into_iter().map(|observed| observed.pair).collect() })
 }
 
@@ -226,12 +255,17 @@ fn sampling_scale(layout: &CanvasLayout, samples: f64) -> f64 {
 }
 
 /// Compares two photographs by what they share; `None` if that is too little.
-fn compare(mut samples: Vec<Shared>, first: usize, second: usize, options: &ExposureOptions) -> Option<Observed> {
+fn compare(
+    mut samples: Vec<Shared>,
+    [first, second]: [usize; 2],
+    curve: &TransferCurve,
+    options: &ExposureOptions,
+) -> Option<Observed> {
     if samples.len() < options.min_shared.max(1) {
         return None;
     }
     let channel_medians = std::array::from_fn(|channel| {
-        let mut ratios: Vec<f32> = samples.iter().map(|sample| sample.log_ratio[channel]).collect();
+        let mut ratios: Vec<f32> = samples.iter().map(|sample| sample.log_ratio()[channel]).collect();
         median(&mut ratios)
     });
     let mut ratios: Vec<f32> = samples.iter().map(Shared::brightness).collect();
@@ -249,7 +283,8 @@ fn compare(mut samples: Vec<Shared>, first: usize, second: usize, options: &Expo
         index += 1;
         (index - 1).is_multiple_of(step)
     });
-    Some(Observed { pair, channel_medians, samples })
+    let samples: Vec<Shared> = samples.into_iter().map(|sample| sample.with_variances(curve)).collect();
+    Some(Observed::new(pair, channel_medians, samples, options.pair_deviation))
 }
 
 /// Ratio of the standard deviation to the median absolute deviation of a normal distribution.
@@ -261,5 +296,7 @@ fn median(values: &mut [f32]) -> f32 {
     *values.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
+#[cfg(test)]
+mod recovery_tests;
 #[cfg(test)]
 mod tests;

@@ -2,6 +2,7 @@
 
 use std::ops::{Range, RangeInclusive};
 
+use trueup_core::colour::TransferCurve;
 use trueup_core::raster::Raster;
 
 use super::{ExposureOptions, Thumbnail};
@@ -21,21 +22,46 @@ pub(super) struct Patch {
 /// What two photographs show of the same place.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shared {
-    /// ln(first / second) of red, green and blue.
-    pub(super) log_ratio: [f32; 3],
+    /// Logarithms of the light of red, green and blue in the first and in the second photograph.
+    pub(super) log_light: [[f32; 3]; 2],
     /// Squared radius in the first and in the second photograph.
     pub(super) radius: [f32; 2],
+    /// Variances of the logarithms by the noise of either photograph; above 0 once they are known.
+    pub(super) variances: [f32; 2],
 }
+
+/// Standard deviation of a sample's encoded value by noise, rounding and compression: 1.5 of 255 levels.
+const NOISE: f64 = 1.5 / 255.0;
+
+/// Least variance, where a curve stands still: noise of a hundredth of a percent.
+const LEAST_VARIANCE: f32 = 1e-8;
 
 impl Shared {
     /// The same with the photographs' parts exchanged.
     fn swapped(self) -> Self {
-        Self { log_ratio: self.log_ratio.map(|ratio| -ratio), radius: [self.radius[1], self.radius[0]] }
+        let Self { log_light: [first, second], radius: [here, there], variances: [own, others] } = self;
+        Self { log_light: [second, first], radius: [there, here], variances: [others, own] }
+    }
+
+    /// With the variances of samples encoded by `curve`: the same noise hides more of the light the darker it is.
+    pub(super) fn with_variances(self, curve: &TransferCurve) -> Self {
+        let variance = |channels: [f32; 3]| {
+            let light = f64::from(channels.iter().sum::<f32>() / 3.0).exp();
+            let encoded = curve.encoded(light);
+            let [low, high] = [encoded - 0.5 * NOISE, encoded + 0.5 * NOISE].map(|e| curve.linear(e));
+            ((high - low) / light).powi(2) as f32
+        };
+        Self { variances: self.log_light.map(variance).map(|one| one.max(LEAST_VARIANCE)), ..self }
+    }
+
+    /// ln(first / second) of red, green and blue.
+    pub(super) fn log_ratio(&self) -> [f32; 3] {
+        std::array::from_fn(|channel| self.log_light[0][channel] - self.log_light[1][channel])
     }
 
     /// The mean over the channels: the ratio of brightness.
     pub(super) fn brightness(&self) -> f32 {
-        (self.log_ratio[0] + self.log_ratio[1] + self.log_ratio[2]) / 3.0
+        self.log_ratio().iter().sum::<f32>() / 3.0
     }
 }
 
@@ -107,8 +133,12 @@ fn shared_ahead(first: &Patch, second: &Patch, by: usize) -> Vec<Shared> {
     }
     let own = columns.start - by..columns.end - by;
     rows.flat_map(|y| first.row(y, &columns).iter().zip(second.row(y, &own)))
-        .map(|(a, b)| Shared { log_ratio: [a[0] - b[0], a[1] - b[1], a[2] - b[2]], radius: [a[3], b[3]] })
-        .filter(|shared| shared.log_ratio.iter().all(|ratio| ratio.is_finite()))
+        .map(|(a, b)| Shared {
+            log_light: [[a[0], a[1], a[2]], [b[0], b[1], b[2]]],
+            radius: [a[3], b[3]],
+            variances: [0.0; 2],
+        })
+        .filter(|shared| shared.log_ratio().iter().all(|ratio| ratio.is_finite()))
         .collect()
 }
 

@@ -49,7 +49,7 @@ fn estimate(shifts: &[f64], rasters: &[Raster<u8>], options: &ExposureOptions) -
 }
 
 fn gains(exposure: &Exposure) -> Vec<f64> {
-    exposure.corrections.iter().map(Correction::brightness).collect()
+    exposure.corrections.photographs.iter().map(Correction::brightness).collect()
 }
 
 /// ln of the light that reaches the sensor at the squared radius `r2`, relative to the middle.
@@ -116,7 +116,7 @@ fn gain_colour_and_vignetting_are_recovered_together() {
     }
     let exposure = estimate(&shifts, &rasters, &ExposureOptions::default());
     let truth = |k: usize, c: usize| lights[0] * casts[0][c] / (lights[k] * casts[k][c]);
-    for (k, correction) in exposure.corrections.iter().enumerate() {
+    for (k, correction) in exposure.corrections.photographs.iter().enumerate() {
         for c in 0..3 {
             assert!((correction.gain[c] / truth(k, c) - 1.0).abs() < 0.02, "{k}: {correction:?}");
         }
@@ -126,7 +126,7 @@ fn gain_colour_and_vignetting_are_recovered_together() {
         }
     }
     let plain = ExposureOptions { model: ExposureModel::Gain, ..ExposureOptions::default() };
-    for correction in estimate(&shifts, &rasters, &plain).corrections {
+    for correction in estimate(&shifts, &rasters, &plain).corrections.photographs {
         assert_eq!(correction, Correction::uniform(correction.gain[0]));
     }
 }
@@ -139,14 +139,14 @@ fn gains_from_a_quarter_to_four_are_recovered() {
     for anchor in [GainAnchor::Mean, GainAnchor::Reference] {
         let exposure = estimate(&shifts, &rasters, &ExposureOptions { anchor, ..ExposureOptions::default() });
         assert_eq!(exposure.pairs.len(), 3);
-        let corrections = exposure.corrections.iter();
+        let corrections = exposure.corrections.photographs.iter();
         let products: Vec<f64> =
             corrections.clone().zip(lights).flat_map(|(one, light)| one.gain.map(|gain| gain * light)).collect();
         for product in &products {
             assert!((product / products[0] - 1.0).abs() < 0.02, "{products:?}");
         }
         match anchor {
-            GainAnchor::Reference => assert_eq!(exposure.corrections[0].gain, [1.0; 3]),
+            GainAnchor::Reference => assert_eq!(exposure.corrections.photographs[0].gain, [1.0; 3]),
             GainAnchor::Mean => assert!(corrections.map(|one| one.brightness().ln()).sum::<f64>().abs() < 1e-9),
         }
     }
@@ -180,7 +180,7 @@ fn photographs_without_overlap_keep_their_brightness() {
     let alone = estimate(&[0.0], &rasters[..1], &ExposureOptions::default());
     assert_eq!(gains(&alone), [1.0]);
     let off = ExposureOptions { enabled: false, ..ExposureOptions::default() };
-    assert_eq!(estimate(&[0.0, 150.0, 900.0], &rasters, &off).corrections, [Correction::default(); 3]);
+    assert_eq!(estimate(&[0.0, 150.0, 900.0], &rasters, &off).corrections, Corrections::plain(3));
 }
 
 #[test]

@@ -4,16 +4,16 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use trueup_core::Result;
-use trueup_core::colour::TransferCurve;
 use trueup_core::raster::{LUMA, Raster, RowSource};
 use trueup_core::source::PhotographSource;
 
+use super::answering::Answering;
 use super::prepared::{Prepared, Scratch, Window, check_photograph};
 use super::{BAND_ROWS, RenderOptions, check};
 use crate::deformed_grid::DeformedGrid;
-use crate::exposure::Correction;
+use crate::exposure::Corrections;
 use crate::layout::{CanvasLayout, TURNS, columns_around};
-use crate::transfer_curve::{Encode, Encoding};
+use crate::transfer_curve::Encoding;
 use crate::weights::WHOLE;
 
 /// What one photograph shows of the canvas: its bounding box there. On a cylinder it may run past the width into the next
@@ -36,12 +36,12 @@ pub struct Layer {
 /// Those of [`super::run`], and [`trueup_core::Error::Input`] if there is no such position.
 pub fn layer(
     layout: &CanvasLayout,
-    corrections: &[Correction],
+    corrections: &Corrections,
     position: usize,
     photographs: &dyn PhotographSource,
     options: &RenderOptions,
 ) -> Result<Layer> {
-    let (prepared, curve) = alone(layout, corrections, position, photographs, options)?;
+    let (prepared, encoding) = alone(layout, corrections, position, photographs, options)?;
     let (all, rows) = (prepared.columns(), prepared.rows());
     let columns = all.start..all.end.min(all.start + layout.period.unwrap_or(all.len()));
     let (on_canvas, turned) = columns_around(columns.clone(), layout.period);
@@ -52,7 +52,7 @@ pub fn layer(
         gray: Raster::new(width, height, 1),
         covered: Raster::new(width, height, 1),
     };
-    let encode = Encode::of(&curve);
+    let encode = encoding.linear;
     let mut scratch = Scratch::default();
     let mut samples = Vec::new();
     for first in rows.clone().step_by(BAND_ROWS) {
@@ -77,14 +77,14 @@ pub fn layer(
     Ok(layer)
 }
 
-/// Photograph `layout.placed[position]` alone, with the curve of its samples.
+/// Photograph `layout.placed[position]` alone, and how it is written.
 fn alone(
     layout: &CanvasLayout,
-    corrections: &[Correction],
+    corrections: &Corrections,
     position: usize,
     photographs: &dyn PhotographSource,
     options: &RenderOptions,
-) -> Result<(Prepared<'static>, TransferCurve)> {
+) -> Result<(Prepared<'static>, Encoding)> {
     check(layout, corrections, options)?;
     let Some(placed) = layout.placed.get(position) else {
         return Err(trueup_core::Error::input(
@@ -95,10 +95,11 @@ fn alone(
     };
     let photograph = photographs.photograph(placed.photograph)?;
     check_photograph(placed, &photograph)?;
+    let photographs = Answering::new(photographs, &corrections.response)?;
     let curve = photographs.transfer_curve();
-    let light = (&curve, &corrections[position]);
+    let light = (&curve, &corrections.photographs[position]);
     let mesh = &placed.in_first_turn(layout.period).mesh;
-    Ok((Prepared::new(Cow::Owned(photograph), mesh, unrolled_size(layout), light, options), curve))
+    Ok((Prepared::new(Cow::Owned(photograph), mesh, unrolled_size(layout), light, options), photographs.encoding()))
 }
 
 /// The canvas, on a cylinder with the turns that a photograph may reach into.
@@ -140,12 +141,12 @@ impl std::fmt::Debug for LayerRows {
 /// Those of [`layer`].
 pub fn layer_rows(
     layout: &CanvasLayout,
-    corrections: &[Correction],
+    corrections: &Corrections,
     position: usize,
     photographs: &dyn PhotographSource,
     options: &RenderOptions,
 ) -> Result<Option<LayerRows>> {
-    let (prepared, curve) = alone(layout, corrections, position, photographs, options)?;
+    let (prepared, encoding) = alone(layout, corrections, position, photographs, options)?;
     let (columns, rows) = (prepared.columns(), prepared.rows());
     if columns.is_empty() || rows.is_empty() {
         return Ok(None);
@@ -157,7 +158,7 @@ pub fn layer_rows(
         width: on_canvas.len(),
         turn: layout.width,
         prepared,
-        encoding: Encoding::new(curve),
+        encoding,
         options: options.clone(),
     }))
 }
@@ -226,6 +227,6 @@ impl RowSource for LayerRows {
     }
 
     fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()> {
-        self.row(y, row, |light| light, |share| share)
+        self.row(y, row, |light| self.encoding.profile_light(light), |share| share)
     }
 }

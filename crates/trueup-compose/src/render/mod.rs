@@ -4,6 +4,7 @@
 //! time as the current thread pool has threads, then added to the canvas one after the other, each in parallel over bands
 //! of rows. Both give the same bits for any number of threads.
 
+mod answering;
 mod fill;
 mod layer;
 mod panorama;
@@ -27,10 +28,11 @@ use trueup_core::{Error, Result, StageContext};
 
 use crate::blend;
 use crate::deformed_grid::{DeformedGrid, count_folded_triangles};
-use crate::exposure::Correction;
+use crate::exposure::{Correction, Corrections};
 use crate::layout::{CanvasLayout, Placed, check_mesh};
 use crate::seam::{SeamOptions, small_size};
 use crate::unwanted::{Covered, Unwanted};
+use answering::Answering;
 use plan::Plan;
 use prepared::{Prepared, Scratch, check_photograph};
 use store::Store;
@@ -86,7 +88,8 @@ trueup_core::options! {
 
 /// Renders the panorama: every photograph warped by its grid, corrected and blended.
 ///
-/// `corrections` holds one for each placed photograph. A canvas pixel sees the photograph at exactly one position, found by
+/// `corrections` holds one for each placed photograph, and the response by which they are read and the panorama is written.
+/// A canvas pixel sees the photograph at exactly one position, found by
 /// inverting the bilinear map of the cell that covers it; where a grid folds over itself, the later cell (row-major)
 /// covers. Progress counts photographs, twice where seams are sought.
 ///
@@ -99,7 +102,7 @@ trueup_core::options! {
 /// cells' diagonals; here the inverse is bilinear like the warp itself.
 pub fn run(
     layout: &CanvasLayout,
-    corrections: &[Correction],
+    corrections: &Corrections,
     photographs: &dyn PhotographSource,
     options: &RenderOptions,
     seams: &SeamOptions,
@@ -116,13 +119,15 @@ pub fn run(
 pub fn run_within(
     resources: &Resources<'_>,
     layout: &CanvasLayout,
-    corrections: &[Correction],
+    corrections: &Corrections,
     photographs: &dyn PhotographSource,
     (options, seams): (&RenderOptions, &SeamOptions),
     context: &StageContext,
 ) -> Result<Panorama> {
     check(layout, corrections, options)?;
     seams.check()?;
+    let photographs = &Answering::new(photographs, &corrections.response)?;
+    let corrections = &corrections.photographs;
     let size = [layout.width, layout.height];
     let plan = Plan::new(layout, photographs, options, seams, resources)?;
     report_folds(layout, context);
@@ -130,11 +135,11 @@ pub fn run_within(
     match options.blend {
         Blend::MultiBand | Blend::None if !layout.placed.is_empty() => {
             let blended = blend::run(layout, corrections, photographs, (options, seams), (cut, &plan), context)?;
-            Ok(Panorama::from_roots(size, blended.pixels, blended.seams, photographs.transfer_curve()))
+            Ok(Panorama::from_roots(size, blended.pixels, blended.seams, photographs.encoding()))
         }
         _ => {
             let sums = mean(layout, corrections, photographs, (options, seams), &plan, context)?;
-            Ok(Panorama::from_sums(size, sums, photographs.transfer_curve()))
+            Ok(Panorama::from_sums(size, sums, photographs.encoding()))
         }
     }
 }
@@ -219,8 +224,9 @@ fn covered_rows(layout: &CanvasLayout) -> Vec<Range<usize>> {
     layout.placed.par_iter().map(rows).collect()
 }
 
-fn check(layout: &CanvasLayout, corrections: &[Correction], options: &RenderOptions) -> Result<()> {
+fn check(layout: &CanvasLayout, corrections: &Corrections, options: &RenderOptions) -> Result<()> {
     options.check()?;
+    let corrections = &corrections.photographs;
     layout.placed.iter().try_for_each(check_mesh)?;
     if corrections.len() != layout.placed.len() {
         return Err(Error::input(

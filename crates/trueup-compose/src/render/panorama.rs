@@ -1,7 +1,6 @@
 //! The finished panorama.
 
 use trueup_core::Result;
-use trueup_core::colour::TransferCurve;
 use trueup_core::raster::RowSource;
 
 use super::store::Store;
@@ -29,17 +28,17 @@ pub(super) enum Pixels {
 }
 
 impl Panorama {
-    pub(super) fn from_sums([width, height]: [usize; 2], sums: Store<[f32; 4]>, curve: TransferCurve) -> Self {
-        Self { width, height, pixels: Pixels::Sums(sums), seams: None, encoding: Encoding::new(curve) }
+    pub(super) fn from_sums([width, height]: [usize; 2], sums: Store<[f32; 4]>, encoding: Encoding) -> Self {
+        Self { width, height, pixels: Pixels::Sums(sums), seams: None, encoding }
     }
 
     pub(super) fn from_roots(
         [width, height]: [usize; 2],
         roots: Store<[u16; 4]>,
         seams: Seams,
-        curve: TransferCurve,
+        encoding: Encoding,
     ) -> Self {
-        Self { width, height, pixels: Pixels::Roots(roots), seams: Some(seams), encoding: Encoding::new(curve) }
+        Self { width, height, pixels: Pixels::Roots(roots), seams: Some(seams), encoding }
     }
 
     /// The seams it was made with; `None` where photographs were averaged.
@@ -53,10 +52,16 @@ impl Panorama {
     /// # Errors
     /// [`trueup_core::Error::Io`] if a scratch file cannot be read.
     pub fn linear_pixel(&self, x: usize, y: usize) -> Result<[f32; 4]> {
-        Ok(match &self.pixels {
+        Ok(self.profile_light(match &self.pixels {
             Pixels::Sums(sums) => linear_of_sum(sums.pixel(x, y)?),
             Pixels::Roots(roots) => linear_of_root(roots.pixel(x, y)?),
-        })
+        }))
+    }
+
+    /// Linear light by the colour profile.
+    fn profile_light(&self, [r, g, b, opacity]: [f32; 4]) -> [f32; 4] {
+        let [r, g, b] = [r, g, b].map(|light| self.encoding.profile_light(light));
+        [r, g, b, opacity]
     }
 }
 
@@ -135,10 +140,12 @@ impl RowSource for Panorama {
         let out = row.chunks_exact_mut(4);
         match &self.pixels {
             Pixels::Sums(sums) => {
-                out.zip(sums.row(y)?.iter()).for_each(|(out, &sum)| out.copy_from_slice(&linear_of_sum(sum)));
+                out.zip(sums.row(y)?.iter())
+                    .for_each(|(out, &sum)| out.copy_from_slice(&self.profile_light(linear_of_sum(sum))));
             }
             Pixels::Roots(roots) => {
-                out.zip(roots.row(y)?.iter()).for_each(|(out, &root)| out.copy_from_slice(&linear_of_root(root)));
+                out.zip(roots.row(y)?.iter())
+                    .for_each(|(out, &root)| out.copy_from_slice(&self.profile_light(linear_of_root(root))));
             }
         }
         Ok(())

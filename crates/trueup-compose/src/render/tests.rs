@@ -4,9 +4,12 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::raster::{Photograph, Raster, RowSource};
 use trueup_core::scratch::{ScratchFile, ScratchSpace};
 
+use trueup_core::colour::TransferCurve;
+
 use super::panorama::Pixels;
 use super::*;
 use crate::deformed_grid::DeformedGrid;
+use crate::exposure::Response;
 use crate::layout::{self, CanvasOptions, Placed};
 use crate::simd::{Positions, invert_row};
 
@@ -90,13 +93,13 @@ pub(super) fn canvas(width: usize, height: usize, placed: Vec<Placed>) -> Canvas
 }
 
 fn render(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Panorama {
-    let corrections = vec![Correction::default(); layout.placed.len()];
+    let corrections = Corrections::plain(layout.placed.len());
     compose(layout, &corrections, &Memory(pictures), options, &StageContext::default()).expect("renders")
 }
 
 fn compose(
     layout: &CanvasLayout,
-    corrections: &[Correction],
+    corrections: &Corrections,
     photographs: &Memory,
     options: &RenderOptions,
     context: &StageContext,
@@ -221,12 +224,16 @@ fn gains_act_on_linear_light() {
     let photographs = Memory(vec![gradient(30, 30, |_, _| 100.0)]);
     let options = RenderOptions::default();
     let context = StageContext::default();
-    let panorama = compose(&layout, &[Correction::uniform(2.0)], &photographs, &options, &context).expect("renders");
+    let panorama =
+        compose(&layout, &vec![Correction::uniform(2.0)].into(), &photographs, &options, &context).expect("renders");
     // sRGB 100 is 0.127438 in linear light; twice that, levelled off by 0.1 %, is level 137.6.
     assert!((linear(&panorama, 15, 15)[0] - 0.254_876 / 1.000_987).abs() < 2e-5);
     assert_eq!(&rows(&panorama)[..4], [138, 138, 138, 255]);
-    assert!(matches!(compose(&layout, &[], &photographs, &options, &context), Err(Error::Input { .. })));
-    let bad = [Correction::uniform(f64::NAN)];
+    assert!(matches!(
+        compose(&layout, &Corrections::plain(0), &photographs, &options, &context),
+        Err(Error::Input { .. })
+    ));
+    let bad = vec![Correction::uniform(f64::NAN)].into();
     assert!(matches!(compose(&layout, &bad, &photographs, &options, &context), Err(Error::Input { .. })));
 }
 
@@ -255,7 +262,7 @@ fn folds_are_counted_and_every_pixel_is_hit_once() {
     let context = StageContext::default();
     let options = RenderOptions { blend: Blend::Average, ..RenderOptions::default() };
     let photographs = Memory(vec![gradient(60, 60, |_, _| 90.0)]);
-    let panorama = compose(&layout, &[Correction::default()], &photographs, &options, &context).expect("renders");
+    let panorama = compose(&layout, &Corrections::plain(1), &photographs, &options, &context).expect("renders");
     let Pixels::Sums(sums) = &panorama.pixels else { panic!("a mean") };
     assert!((0..60).all(|y| sums.row(y).expect("in memory").iter().all(|sum| sum[3] <= 1.0)));
     let diagnostics = context.take_diagnostics();
@@ -289,7 +296,7 @@ fn photographs_of_another_size_are_refused() {
     let options = RenderOptions::default();
     for picture in [noise(30, 29, 3), noise(30, 30, 2)] {
         let photographs = Memory(vec![Photograph::Eight(picture)]);
-        let result = compose(&layout, &[Correction::default()], &photographs, &options, &StageContext::default());
+        let result = compose(&layout, &Corrections::plain(1), &photographs, &options, &StageContext::default());
         assert!(matches!(result, Err(Error::Input { .. })));
     }
 }
@@ -384,8 +391,7 @@ fn a_layer_is_one_photograph_where_it_lies() {
     let placed = vec![moved(0, 100.0, 80.0, |p| p.into()), moved(1, 60.0, 40.0, |p| [p.x + 30.0, p.y + 20.0])];
     let context = StageContext::default();
     let layout = layout::run(placed, 0, &CanvasOptions::default(), &context).expect("two grids");
-    let found =
-        layer(&layout, &[Correction::default(); 2], 1, &photographs, &RenderOptions::default()).expect("a layer");
+    let found = layer(&layout, &Corrections::plain(2), 1, &photographs, &RenderOptions::default()).expect("a layer");
     // The extrapolated rim may reach a pixel beyond the photograph; it is not covered.
     for y in 0..layout.height {
         for x in 0..layout.width {
@@ -403,7 +409,7 @@ fn a_layer_is_one_photograph_where_it_lies() {
             }
         }
     }
-    let corrections = [Correction::default(); 2];
+    let corrections = Corrections::plain(2);
     let rows = layer_rows(&layout, &corrections, 1, &photographs, &RenderOptions::default())
         .expect("a layer")
         .expect("on the canvas");
@@ -421,7 +427,7 @@ fn a_layer_is_one_photograph_where_it_lies() {
             assert!(!covered || (f32::from(sixteen[4 * x]) / 257.0 - f32::from(eight[4 * x])).abs() <= 0.505);
         }
     }
-    assert!(layer(&layout, &[Correction::default(); 2], 2, &photographs, &RenderOptions::default()).is_err());
+    assert!(layer(&layout, &Corrections::plain(2), 2, &photographs, &RenderOptions::default()).is_err());
 }
 
 /// The rows of one panorama at every depth say the same, from sums and from roots.
@@ -453,6 +459,41 @@ fn rows_of_every_depth_agree() {
                     };
                     assert!((encoded * 65535.0 - f64::from(sixteen)).abs() < 0.6, "{encoded} {sixteen}");
                 }
+            }
+        }
+    }
+}
+
+/// What is shown as it was taken keeps its samples, whatever the response; floating point stays the profile's light.
+#[test]
+fn a_response_leaves_the_look_of_a_photograph() {
+    let response = Response { coefficients: [0.1, -0.6, 0.5, 0.2] };
+    let ramp = |levels: usize, level: &dyn Fn(usize) -> u16| -> Vec<u16> {
+        (0..levels).flat_map(|at| [level(at), level(levels - 1 - at), level(at)]).collect()
+    };
+    let eight: Vec<u8> = ramp(256, &|at| at as u16).iter().map(|&level| level as u8).collect();
+    let sixteen = ramp(256, &|at| at as u16 * 257);
+    let eight = Photograph::Eight(Raster::from_data(256, 1, 3, eight).expect("as many samples"));
+    let sixteen = Photograph::Sixteen(Raster::from_data(256, 1, 3, sixteen).expect("as many samples"));
+    let layout = canvas(256, 1, vec![moved(0, 256.0, 1.0, |p| [p.x, p.y])]);
+    let corrections = Corrections { response, photographs: vec![Correction::default()] };
+    for blend in [Blend::MultiBand, Blend::None, Blend::Feather, Blend::Average] {
+        let options = RenderOptions { blend, ..RenderOptions::default() };
+        for photograph in [eight.clone(), sixteen.clone()] {
+            let context = StageContext::default();
+            let panorama =
+                compose(&layout, &corrections, &Memory(vec![photograph]), &options, &context).expect("renders");
+            let (mut levels, mut fine, mut light) = (vec![0; 1024], vec![0; 1024], vec![0.0; 1024]);
+            panorama.rgba8_row(0, &mut levels).expect("a row");
+            panorama.rgba16_row(0, &mut fine).expect("a row");
+            panorama.linear_row(0, &mut light).expect("a row");
+            for x in 0..256 {
+                let expected = TransferCurve::SRGB.linear(x as f64 / 255.0);
+                assert_eq!(usize::from(levels[4 * x]), x, "{blend:?}");
+                // Square roots in 16 bits are this fine, and coarser in the darkest hundredth.
+                assert!(fine[4 * x].abs_diff(x as u16 * 257) <= 2, "{blend:?} {x}: {}", fine[4 * x]);
+                assert!((f64::from(light[4 * x]) - expected).abs() < 1e-4, "{blend:?} {x}: {}", light[4 * x]);
+                assert_eq!(panorama.linear_pixel(x, 0).expect("in memory"), light[4 * x..4 * x + 4], "{blend:?}");
             }
         }
     }

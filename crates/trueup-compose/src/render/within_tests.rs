@@ -22,7 +22,7 @@ impl PhotographSource for Counting {
 const COUNT: usize = 10;
 
 /// Two rows of photographs, over many tiles.
-fn scene() -> (CanvasLayout, Vec<Correction>, Counting) {
+fn scene() -> (CanvasLayout, Corrections, Counting) {
     let placed = (0..COUNT)
         .map(|i| {
             let (left, top) = ((i / 2) as f64 * 310.0, (i % 2) as f64 * 190.0);
@@ -35,8 +35,8 @@ fn scene() -> (CanvasLayout, Vec<Correction>, Counting) {
         let raster = trueup_core::raster::Raster::from_data(420, 260, 3, data).expect("as many samples");
         trueup_core::raster::Photograph::Eight(raster)
     });
-    let corrections = (0..COUNT).map(|i| Correction::uniform(1.0 + 0.01 * i as f64)).collect();
-    (canvas(1670, 460, placed), corrections, Counting(Memory(pictures.collect()), AtomicUsize::new(0)))
+    let corrections: Vec<_> = (0..COUNT).map(|i| Correction::uniform(1.0 + 0.01 * i as f64)).collect();
+    (canvas(1670, 460, placed), corrections.into(), Counting(Memory(pictures.collect()), AtomicUsize::new(0)))
 }
 
 fn composed(blend: Blend, memory: usize, disk: &RamDisk, threads: usize) -> Result<(Panorama, usize)> {
@@ -93,7 +93,7 @@ fn gaps_take_up_the_colours_beside_them() {
     let layout = canvas(300, 320, vec![moved(0, 300.0, 200.0, |p| [p.x, p.y + 20.0])]);
     let (options, seams, context) = (RenderOptions::default(), SeamOptions::default(), StageContext::default());
     let mut panorama =
-        run(&layout, &[Correction::default()], &source, &options, &seams, &context).expect("one photograph");
+        run(&layout, &Corrections::plain(1), &source, &options, &seams, &context).expect("one photograph");
     let before = rows(&panorama);
     let gaps = Gaps::find(&layout, Coverage::of(&layout), 0.1);
     assert_eq!(panorama.fill(&gaps, &context).expect("in memory"), 300 * 20);

@@ -94,7 +94,7 @@ pub(crate) fn compare_overlaps(
 ) -> Result<PixelEvaluation> {
     let records: Vec<&ImageRecord> = project.used_images().collect();
     let layout = layout(used_grids(&records)?, positions, (scale, project.grid_canvas()));
-    let corrections = recorded_corrections(&records)?;
+    let corrections = recorded_corrections(project, &records)?;
 
     context.progress().begin(STAGE, records.len() as u64);
     let layers: Vec<Layer> = (0..records.len())

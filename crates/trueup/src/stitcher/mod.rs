@@ -7,8 +7,8 @@ mod results;
 
 use std::path::Path;
 
-use trueup_compose::exposure::{self, Correction, Thumbnail};
-use trueup_compose::layout::{CanvasLayout, Placed};
+use trueup_compose::exposure::{self, Corrections, Thumbnail};
+use trueup_compose::layout::CanvasLayout;
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::raster::Raster;
 use trueup_core::source::{PhotographSource, WorkingFrame};
@@ -202,7 +202,7 @@ impl<'a> Stitcher<'a> {
         });
         project.seconds.clone_from(clock.seconds());
         let layout = arrangement.written;
-        let corrections = as_placed(&layout, &corrections, |photograph| members.binary_search(&photograph).ok());
+        let corrections = corrections.of_placed(&layout, |photograph| members.binary_search(&photograph).ok());
         Ok(Alignment { project, layout, corrections, photographs: photographs.clone(), clock })
     }
 
@@ -214,7 +214,7 @@ impl<'a> Stitcher<'a> {
         reference: usize,
         photographs: &FilePhotographs,
         thumbnails: impl Iterator<Item = (&'t Raster<u8>, WorkingFrame, usize)>,
-    ) -> Result<Vec<Correction>> {
+    ) -> Result<Corrections> {
         let curve = photographs.transfer_curve();
         let thumbnails: Vec<Thumbnail> =
             thumbnails.map(|(raster, frame, camera)| Thumbnail { raster, curve: &curve, frame, camera }).collect();
@@ -228,15 +228,4 @@ impl<'a> Stitcher<'a> {
     fn report_rejected(&self, rejected: &RejectedSource) {
         self.context.report(Diagnostic::warning(&rejected.code, &rejected.name, &rejected.reason, &rejected.hint));
     }
-}
-
-/// The corrections of the photographs as `layout` places them, of which `position` tells which is a photograph's: one may be
-/// placed several times, or not at all, and its light is the same everywhere.
-fn as_placed(
-    layout: &CanvasLayout,
-    corrections: &[Correction],
-    position: impl Fn(usize) -> Option<usize>,
-) -> Vec<Correction> {
-    let correction = |placed: &Placed| corrections.get(position(placed.photograph)?).copied();
-    layout.placed.iter().filter_map(correction).collect()
 }

@@ -1,13 +1,13 @@
 //! From a project's record to the alignment it describes, without measuring or matching.
 
-use trueup_compose::exposure::Correction;
+use trueup_compose::exposure::Corrections;
 use trueup_compose::layout::CanvasLayout;
 use trueup_core::Result;
 use trueup_core::source::SourceImage;
 use trueup_io::colour::PhotographColours;
 use trueup_io::decode::FilePhotographs;
 
-use super::{Alignment, Stitcher, as_placed};
+use super::{Alignment, Stitcher};
 use crate::align::camera_groups;
 use crate::arrangement;
 use crate::budget::Budget;
@@ -58,7 +58,7 @@ impl Stitcher<'_> {
         }
         let layout = arrangement.written;
         // Photographs are numbered by their place among those used.
-        let corrections = as_placed(&layout, &corrections, Some);
+        let corrections = corrections.of_placed(&layout, Some);
         let mut alignment = Alignment { project, layout, corrections, photographs, clock };
         alignment.record_findings(self.context.take_diagnostics());
         alignment.project.seconds.clone_from(alignment.clock.seconds());
@@ -71,7 +71,7 @@ impl Stitcher<'_> {
         layout: &CanvasLayout,
         reference: usize,
         (photographs, at_once): (&FilePhotographs, usize),
-    ) -> Result<Vec<Correction>> {
+    ) -> Result<Corrections> {
         let images: Vec<&SourceImage> = photographs.images().iter().collect();
         let thumbnails = measure::thumbnails(photographs, at_once, self.options, self.context)?;
         let thumbnails =

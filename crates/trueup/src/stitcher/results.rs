@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use trueup_compose::exposure::Correction;
+use trueup_compose::exposure::Corrections;
 use trueup_compose::layout::CanvasLayout;
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::lines::LineSegment;
@@ -61,7 +61,7 @@ pub struct Alignment {
     /// The record so far; complete but for the seconds that composing and writing take.
     pub project: Project,
     pub(super) layout: CanvasLayout,
-    pub(super) corrections: Vec<Correction>,
+    pub(super) corrections: Corrections,
     pub(super) photographs: Arc<FilePhotographs>,
     pub(super) clock: Clock,
 }
@@ -73,7 +73,7 @@ impl Alignment {
     }
 
     /// Gain, colour and vignetting of every photograph placed.
-    pub(crate) fn corrections(&self) -> &[Correction] {
+    pub(crate) fn corrections(&self) -> &Corrections {
         &self.corrections
     }
 
