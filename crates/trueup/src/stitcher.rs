@@ -285,7 +285,7 @@ impl<'a> Stitcher<'a> {
         }
         let layout = arrangement.written;
         // Photographs are numbered by their place among those used.
-        let corrections = corrections.of_placed(&layout, |photograph| Some(photograph));
+        let corrections = corrections.of_placed(&layout, Some);
         let mut alignment = Alignment { project, layout, corrections, photographs, clock };
         alignment.record_findings(self.context.take_diagnostics());
         alignment.project.seconds.clone_from(alignment.clock.seconds());
