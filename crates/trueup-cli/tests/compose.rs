@@ -42,7 +42,7 @@ fn a_response_is_recorded() {
             (255.0 * shown.min(1.0).powf(1.0 / 2.2)).round() as u8
         };
         let pixels: Vec<u8> = pixels.iter().copied().map(pressed).collect();
-        desk.put(name, &jpeg(&pixels, WIDTH, HEIGHT));
+        desk.put(name, jpeg(&pixels, WIDTH, HEIGHT));
     }
     desk.stitch(&[&STREET_NAMES[..], &["--project", "pano.json"]].concat()).expect_success();
     let response = desk.json("pano.json")["response"].clone();
