@@ -172,6 +172,22 @@ fn the_response_is_recovered_from_three_exposures() {
     }
 }
 
+/// The same where a gain would exceed its limit: no response then.
+#[test]
+fn no_response_drives_gains_to_their_limit() {
+    let exposures = [1.0, 0.5, 2.0, 0.5, 2.0, 1.0];
+    let lights = exposures.map(|gain| Light { gain: [gain; 3], vignetting: [0.0; 3] });
+    let white = 1.0 - f64::exp(-2.5);
+    let by_film = |light: f64| TransferCurve::SRGB.encoded((1.0 - (-2.5 * light).exp()) / white);
+    let found_within =
+        |max_gain: f64| found(&lights, by_film, 1, &ExposureOptions { max_gain, ..ExposureOptions::default() });
+    assert!(!found_within(4.0).response.is_plain());
+    let limited = found_within(1.2);
+    assert!(limited.response.is_plain(), "{limited:?}");
+    let without = ExposureOptions { max_gain: 1.2, response: false, ..ExposureOptions::default() };
+    assert_eq!(limited, found(&lights, by_film, 1, &without));
+}
+
 #[test]
 fn photographs_of_one_exposure_say_nothing_of_the_response() {
     let lights = [Light { gain: [1.0; 3], vignetting: [0.0; 3] }; PLACES.len()];

@@ -94,7 +94,15 @@ pub(super) fn solve(
         }
         solution.casts = problem.casts(&weights, &solution);
     }
-    Ok(problem.corrections(&solution, reference))
+    let corrections = problem.corrections(&solution, reference);
+    // Gains grow with a response that stretches the light. At their limit photographs do not fit any longer, which is worse
+    // than what a response is good for.
+    let limits = [options.max_gain, options.max_gain.recip()];
+    let at_limit = |correction: &Correction| correction.gain.iter().any(|gain| limits.contains(gain));
+    if !corrections.response.is_plain() && corrections.photographs.iter().any(at_limit) {
+        return solve(cameras, observed, (reference, None), options, context);
+    }
+    Ok(corrections)
 }
 
 /// What is known of all unknowns.
