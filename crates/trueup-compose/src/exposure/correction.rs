@@ -101,15 +101,20 @@ impl From<Vec<Correction>> for Corrections {
     }
 }
 
-/// Linear light times a factor. Factors above 1 level off towards white, so that what the camera did not clip is not
-/// clipped here: `f x / (1 + (f^4 - 1) x^4)^(1/4)` rises from 0 to 1, and is within 1 % of `f x` up to x = 0.22 for f = 2.
+/// Smallest factor whose levelling off is undone: highlights are lifted by its inverse at most, since what lies between the
+/// levels next to white is mostly noise.
+const LEAST_LEVELLED: f32 = 0.6;
+
+/// Linear light times a factor f, `f x / (1 + (f^4 - 1) x^4)^(1/4)`.
+///
+/// Factors above 1 level off towards white: it rises from 0 to 1, so that what the camera did not clip is not clipped here,
+/// and is within 1 % of `f x` up to x = 0.22 for f = 2. Factors below 1 undo that: as cameras level highlights off when they
+/// expose longer, darkening spreads them. What is clipped stays white, or nearly so, instead of turning gray; and a sky of which
+/// only the blue is clipped stays blue instead of turning green.
 #[inline(always)]
 pub(crate) fn exposed(linear: f32, factor: f32) -> f32 {
-    if factor <= 1.0 {
-        return factor * linear;
-    }
     let square = |value: f32| value * value;
-    let levelled = 1.0 + (square(square(factor)) - 1.0) * square(square(linear));
+    let levelled = 1.0 + (square(square(factor.max(LEAST_LEVELLED))) - 1.0) * square(square(linear));
     factor * linear / levelled.sqrt().sqrt()
 }
 
@@ -182,9 +187,16 @@ mod tests {
     }
 
     #[test]
-    fn brightening_clips_nothing_and_darkening_is_plain() {
+    fn brightening_clips_nothing_and_darkening_undoes_it() {
         assert!((exposed(1.0, 3.0) - 1.0).abs() < 1e-6);
-        assert_eq!(exposed(0.5, 0.5), 0.25);
+        // 0.25 / (1 - (1 - 0.6^4) / 16)^(1/4)
+        assert!((exposed(0.5, 0.5) - 0.253_521).abs() < 1e-5);
+        assert!((exposed(0.1, 0.5) - 0.05).abs() < 1e-5);
+        // Clipped light stays white, but is lifted by no more than 1 / 0.6.
+        assert!((exposed(1.0, 0.8) - 1.0).abs() < 1e-6 && (exposed(1.0, 0.3) - 0.5).abs() < 1e-6);
+        for (level, factor) in [(0.3, 0.7), (0.9, 0.6), (0.99, 0.8), (0.7, 1.4)] {
+            assert!((exposed(exposed(level, factor), factor.recip()) - level).abs() < 1e-5, "{level} {factor}");
+        }
         // 0.4 / (1 + 15 * 0.0016)^(1/4)
         assert!((exposed(0.2, 2.0) - 0.397_636).abs() < 1e-5);
         let levels: Vec<f32> = (0..=100).map(|step| exposed(step as f32 / 100.0, 8.0)).collect();
