@@ -18,8 +18,9 @@ pub(crate) fn first_level([width, height]: [usize; 2]) -> u32 {
 /// Log2 of 8 pixels.
 pub(super) const LEAST_FIRST_LEVEL: u32 = 3;
 
-/// A level of more samples is not blended as a whole: 100 MB, of a canvas of 400 million pixels at an eighth.
-const MOST_SAMPLES: usize = 6_250_000;
+/// A level of more samples is not blended as a whole: 64 MB, of a canvas of 256 million pixels at an eighth. Some three such levels are
+/// held at once, of which a gigabyte must leave room for photographs.
+const MOST_SAMPLES: usize = 4_000_000;
 
 /// Points along each axis of a sample at which labels are asked for.
 const LABELS_PER_SAMPLE: usize = 4;

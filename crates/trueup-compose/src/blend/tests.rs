@@ -217,10 +217,12 @@ fn assert_that_tiles_give_the_whole(work: &Work<'_>, pictures: &[Option<Prepared
 #[test]
 fn the_level_that_is_blended_as_a_whole_follows_from_the_canvas() {
     assert_eq!(first_level([1, 1]), 3);
-    // 400 million pixels, the largest canvas there was before it depended on the size.
-    assert_eq!(first_level([20_000, 20_000]), 3);
+    // 2000 x 2000 samples of 8 pixels, and one more.
+    assert_eq!(first_level([16_000, 16_000]), 3);
+    assert_eq!(first_level([16_001, 16_000]), 4);
     assert_eq!(first_level([40_000, 25_000]), 4);
-    assert_eq!(first_level([400_000, 200_000]), 7);
+    // 3125 x 1563 samples of 128 pixels are too many.
+    assert_eq!(first_level([400_000, 200_000]), 8);
 }
 
 #[test]
