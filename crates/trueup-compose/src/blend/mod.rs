@@ -41,6 +41,7 @@ pub(crate) use needs::needed_bytes;
 use pyramid::Plane;
 use shelf::{Shelf, Supply};
 use tile::Tile;
+pub(crate) use tile::margin as tile_margin;
 use unrolled::Unrolled;
 
 /// A finished pixel: square roots of linear light and alpha, 65535 is 1.

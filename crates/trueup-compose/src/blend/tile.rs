@@ -16,7 +16,7 @@ use crate::unwanted::in_mask;
 /// Interpolating wants one sample beside the tile at every level, and reducing two of the finer level beside the middles of
 /// those that it makes: m samples of a level take 2 m + 2 of the one below. One at the coarsest of the fine levels, the
 /// last below `first_level`, becomes 3 2^(first_level - 1) - 2 pixels.
-const fn margin(first_level: u32) -> usize {
+pub(crate) const fn margin(first_level: u32) -> usize {
     2 << first_level
 }
 

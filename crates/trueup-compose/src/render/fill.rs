@@ -9,7 +9,7 @@ use trueup_core::{Result, StageContext};
 use super::panorama::{Panorama, Pixels, linear_of_sum};
 use super::store::{Pixel, Store};
 use crate::blend::pyramid::{Plane, colour};
-use crate::blend::{first_level, tile_side};
+use crate::blend::{first_level, tile_margin, tile_side};
 use crate::gaps::Gaps;
 
 /// A pixel whose colour can be looked at and set.
@@ -59,6 +59,7 @@ impl Panorama {
         }
     }
 }
+
 /// Tiles that are finished before they are put on the canvas; a number of threads must not show in the panorama.
 const TILES_AT_ONCE: usize = 64;
 
@@ -150,8 +151,7 @@ impl<'a> Canvas<'a> {
 
     /// Colours times the share covered of a tile with its margin; nothing where the gaps are.
     fn known<P: Shade>(&self, store: &Store<P>, tile: &Tile) -> Result<Plane<[f32; 4]>> {
-        // As far as the finest level's support and interpolation reach, see the blend's tiles.
-        let margin = 2 << self.first_level;
+        let margin = tile_margin(self.first_level);
         let columns =
             tile.columns.start.saturating_sub(margin)..(tile.columns.end + margin).min(self.width + 2 * self.lead);
         let rows = tile.rows.start.saturating_sub(margin)..(tile.rows.end + margin).min(self.height);
@@ -164,8 +164,8 @@ impl<'a> Canvas<'a> {
             for (y, pixels) in rows.clone().zip(pixels.chunks_exact(count)) {
                 let texels = &mut plane.row_mut(y)[first - columns.start..][..count];
                 for (x, (texel, &pixel)) in (start..).zip(texels.iter_mut().zip(pixels)) {
-                    let [r, g, b, share] = pixel.root();
                     if self.gaps.is_covered(x, y) {
+                        let [r, g, b, share] = pixel.root();
                         *texel = [r * share, g * share, b * share, share];
                     }
                 }
