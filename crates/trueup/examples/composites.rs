@@ -1,6 +1,6 @@
 //! How true panoramas are to their photographs with each way of blending: steps across seams and ghosts.
 //!
-//! `cargo run --release -p trueup --example composites -- SCALE FOLDER...` prints a line per folder and way.
+//! `cargo run --release -p trueup --example composites -- SCALE [OPTION=VALUE...] FOLDER...` prints a line per folder and way.
 
 use trueup::{Inputs, StageContext, StitchOptions, Stitcher};
 
@@ -8,8 +8,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let scale = arguments.next().ok_or("give a scale, 1 for full size, and folders of photographs")?;
     println!("folder\texposure\tblend\tlines_px\tstep\twrap_px\twrap_step\tcolumn_step\tghost\tghost_share\tseconds");
-    for folder in arguments {
-        if let Err(error) = measure(&folder, &scale) {
+    let mut options = StitchOptions::default();
+    options.set(&format!("canvas.scale={scale}"))?;
+    let (assignments, folders): (Vec<String>, Vec<String>) = arguments.partition(|argument| argument.contains('='));
+    assignments.iter().try_for_each(|assignment| options.set(assignment))?;
+    for folder in folders {
+        if let Err(error) = measure(&folder, options.clone()) {
             println!("{folder}\t{error}");
         }
     }
@@ -24,9 +28,7 @@ const WAYS: [[&str; 3]; 4] = [
     ["full", "reference", "multiband"],
 ];
 
-fn measure(folder: &str, scale: &str) -> Result<(), trueup::Error> {
-    let mut options = StitchOptions::default();
-    options.set(&format!("canvas.scale={scale}"))?;
+fn measure(folder: &str, mut options: StitchOptions) -> Result<(), trueup::Error> {
     let context = StageContext::default();
     let inputs = Inputs::new([folder]);
     let matched = Stitcher::new(&options, &context).match_photographs(&inputs)?.remembering();
