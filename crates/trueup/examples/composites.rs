@@ -7,7 +7,9 @@ use trueup::{Inputs, StageContext, StitchOptions, Stitcher};
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let scale = arguments.next().ok_or("give a scale, 1 for full size, and folders of photographs")?;
-    println!("folder\texposure\tblend\tlines_px\tstep\twrap_px\twrap_step\tcolumn_step\tghost\tghost_share\tseconds");
+    println!(
+        "folder\texposure\tblend\tlines_px\tstep\toverlap_step\twrap_px\twrap_step\tcolumn_step\tghost\tghost_share\tseconds"
+    );
     let mut options = StitchOptions::default();
     options.set(&format!("canvas.scale={scale}"))?;
     let (assignments, folders): (Vec<String>, Vec<String>) = arguments.partition(|argument| argument.contains('='));
@@ -44,9 +46,10 @@ fn measure(folder: &str, mut options: StitchOptions) -> Result<(), trueup::Error
         let seconds = start.elapsed().as_secs_f64();
         let found = stitcher.fidelity(alignment, &panorama)?;
         println!(
-            "{folder}\t{model}\t{blend}\t{}\t{:.3}\t{}\t{:.3}\t{:.3}\t{:.3}\t{:.4}\t{seconds:.2}",
+            "{folder}\t{model}\t{blend}\t{}\t{:.3}\t{:.3}\t{}\t{:.3}\t{:.3}\t{:.3}\t{:.4}\t{seconds:.2}",
             found.line_px,
             found.step,
+            found.overlap_step,
             found.wrap_px,
             found.wrap_step,
             found.column_step,

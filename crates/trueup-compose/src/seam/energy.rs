@@ -1,6 +1,7 @@
 //! What a seam costs.
 
 use super::SeamOptions;
+use super::shading::{FRACTION, slopes};
 use super::view::{CLIPPED, IGNORED, KEPT, PARTLY, View, WHOLLY};
 
 /// Costs are whole numbers; one grey level of 255 is this many.
@@ -25,6 +26,8 @@ pub(super) struct Scene<'a> {
     pub(super) views: &'a [View],
     /// Horizontal and vertical differences of the luma, for every pixel of every view.
     gradients: Vec<Vec<[i16; 2]>>,
+    /// Slopes of the shading, for every pixel of every view; empty if they do not count.
+    slopes: Vec<Vec<[i16; 2]>>,
     depths: Vec<Vec<u8>>,
     /// For every canvas pixel: bit flags of what all photographs say of it, see [`Self::has_whole`].
     anyone: Vec<u8>,
@@ -32,6 +35,7 @@ pub(super) struct Scene<'a> {
     pub(super) moving: &'a [u32],
     length: i32,
     gradient_weight: i32,
+    shading_weight: i32,
     depth_weight: i32,
     clipped_cost: i32,
     moving_cost: i32,
@@ -72,11 +76,13 @@ impl<'a> Scene<'a> {
             turn,
             views,
             gradients: views.iter().map(gradients).collect(),
+            slopes: if options.shading_weight > 0.0 { slopes(views, options.shading_reach) } else { Vec::new() },
             depths: views.iter().map(View::depths).collect(),
             anyone,
             moving,
             length: in_units(options.length),
             gradient_weight: in_units(options.gradient_weight),
+            shading_weight: in_units(options.shading_weight),
             depth_weight: in_units(options.depth_weight),
             clipped_cost: in_units(options.clipped_cost),
             moving_cost: in_units(options.moving_cost),
@@ -115,7 +121,7 @@ impl<'a> Scene<'a> {
 
     /// Cost of a seam between neighbouring canvas pixels, `a` shown at `p` and `b` at `q`; 0 for equal labels.
     ///
-    /// The differences at both pixels, of colours and of gradients: Kwatra and others, "Graphcut textures", SIGGRAPH
+    /// The differences at both pixels, of colours, gradients and shading: Kwatra and others, "Graphcut textures", SIGGRAPH
     /// 2003, equation 1, with the gradients added instead of divided by: a division draws seams into textured parts,
     /// which in photographs taken from different places fit worst.
     pub(super) fn seam_cost(&self, p: (usize, usize), a: usize, q: (usize, usize), b: usize) -> i32 {
@@ -144,7 +150,13 @@ impl<'a> Scene<'a> {
         let colour: i32 = (0..3).map(|c| i32::from(first[c].abs_diff(second[c]))).sum();
         let (g, h) = (self.gradients[a][i], self.gradients[b][j]);
         let gradient: i32 = (0..2).map(|axis| i32::from(g[axis] - h[axis]).abs()).sum();
-        (colour * UNIT / 3 + gradient * self.gradient_weight / 2).min(MAX_DIFFERENCE)
+        let mut difference = colour * UNIT / 3 + gradient * self.gradient_weight / 2;
+        if !self.slopes.is_empty() {
+            let (g, h) = (self.slopes[a][i], self.slopes[b][j]);
+            let slope: i32 = (0..2).map(|axis| (i32::from(g[axis]) - i32::from(h[axis])).abs()).sum();
+            difference += slope * self.shading_weight / FRACTION;
+        }
+        difference.min(MAX_DIFFERENCE)
     }
 }
 

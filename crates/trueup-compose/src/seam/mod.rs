@@ -9,6 +9,7 @@ mod expansion;
 mod labels;
 mod max_flow;
 mod moving;
+mod shading;
 mod view;
 
 use trueup_core::options::StageOptions;
@@ -43,6 +44,11 @@ trueup_core::options! {
         /// Weight of the difference of gradients beside that of colours. Higher keeps seams from crossing contours that do
         /// not meet.
         gradient_weight: f64 = 1.0, between(0.0, 100.0), "";
+        /// Weight of the difference of shading beside that of colours: of how the brightness changes over a few pixels, averaged
+        /// along a line. Higher keeps seams from where only a step could join the photographs.
+        shading_weight: f64 = 3.0, between(0.0, 100.0), "";
+        /// Pixels of the seams' canvas over which shading is averaged to either side; half of it across.
+        shading_reach: usize = 4, between(1.0, 64.0), "px";
         /// Cost of showing a photograph at its border instead of in its middle, per pixel of the canvas. Higher moves seams
         /// towards the middle of overlaps.
         depth_weight: f64 = 2.5, between(0.0, 100.0), "level";
@@ -81,7 +87,7 @@ pub(crate) fn small_size(canvas: [usize; 2], around: bool, options: &SeamOptions
 ///
 /// # Departures
 /// Coarse to fine as Lombaert, Sun, Grady, Xu, "A multilevel banded graph cuts method for fast image segmentation", ICCV
-/// 2005; things that moved are found first, and their parts kept together.
+/// 2005; things that moved are found first, and their parts kept together; differences of shading count, too.
 pub fn run(
     views: Vec<View>,
     size: [usize; 2],

@@ -49,6 +49,26 @@ fn a_thing_that_moved_is_shown_whole_or_not_at_all() {
     }
 }
 
+/// In the middle of the overlap one photograph brightens by 2 levels a column beside the other; they agree along one column, but no
+/// transition hides that slope. Elsewhere they differ by 12 levels of alternating sign, which mean nothing at a distance.
+#[test]
+fn seams_keep_away_from_slopes_of_shading() {
+    let slope = 70..90;
+    let level = |x: usize, y: usize| match (slope.contains(&x), (x + y) % 2) {
+        (true, _) => (2 * x - 40) as u8,
+        (false, 0) => 108,
+        (false, _) => 132,
+    };
+    let rows_within = |shading_weight: f64| {
+        let options = SeamOptions { shading_weight, ..SeamOptions::default() };
+        let views = vec![view(0..120, 0..60, |_, _| 120), view(40..160, 0..60, level)];
+        let seams = find(views, [160, 60], &options);
+        (0..60).filter(|y| slope.contains(&(0..160).find(|x| seams.labels()[y * 160 + x] == 1).unwrap_or(0))).count()
+    };
+    assert_eq!(rows_within(0.0), 60);
+    assert_eq!(rows_within(3.0), 0);
+}
+
 #[test]
 fn clipped_parts_are_shown_by_who_is_not_clipped() {
     let first = view(0..100, 0..60, |_, y| if y < 20 { 255 } else { 100 });

@@ -80,7 +80,7 @@ impl<'a> Stitcher<'a> {
     }
 
     /// Measures how true `panorama`, composed of `alignment`, is to its photographs: steps across its seams, and ghosts.
-    /// Renders every photograph alone on the canvas, five bytes a pixel of each.
+    /// Renders every photograph alone on the canvas, nine bytes a pixel of each.
     ///
     /// # Errors
     /// Those of reading the photographs; [`Error::Input`] if the two do not belong together; [`Error::Cancelled`].
