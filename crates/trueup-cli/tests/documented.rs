@@ -60,6 +60,10 @@ const MISTAKES: &[Mistake] = &[
     mistake("output folder does not exist", &["stitch", "a.jpg", "b.jpg", "-o", "none/pano.jpg"]),
     mistake("output is a folder", &["stitch", "a.jpg", "b.jpg", "-o", "notes.jpg"]),
     mistake("output is a photograph", &["stitch", "a.jpg", "b.jpg", "-o", "a.jpg"]),
+    mistake(
+        "transparent background in JPEG",
+        &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--background", "transparent"],
+    ),
     mistake("output format unknown", &["stitch", "a.jpg", "b.jpg", "-o", "pano.gif"]),
     mistake("option out of range", &["stitch", "a.jpg", "-o", "pano.jpg", "--scale", "-1"]),
     mistake("option of the wrong kind", &["stitch", "a.jpg", "-o", "pano.jpg", "--seed", "soon"]),
