@@ -15,3 +15,5 @@ mod masks;
 mod options;
 mod pictures;
 mod run;
+#[cfg(unix)]
+mod stopping;

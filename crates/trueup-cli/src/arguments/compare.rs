@@ -14,7 +14,8 @@ Examples:
   trueup compare set/ -o compared --truth set/truth.json  with GDIC and theta error
   trueup compare --tally results-*.json                   mean scores of what people ranked
 
-Exit status: 0 at least one panorama was made, 1 the input or the system failed, 2 wrong usage, 130 stopped by Ctrl-C.
+Exit status: 0 at least one panorama was made, 1 the input or the system failed, 2 wrong usage, 130 stopped by Ctrl-C,
+143 by a request to terminate.
 The folder appears when it is complete. An older comparison of that name is replaced then; no other folder is.";
 
 #[derive(Debug, Args)]
