@@ -234,3 +234,13 @@ fn scores_are_summed_up_over_files() {
         &["other.json: its format is not \"trueup-ranking\"", "Give a file that ranking.html saved"],
     );
 }
+
+#[test]
+fn what_the_format_cannot_show_is_refused_before_any_work() {
+    let desk = street_desk();
+    let run = compare(&desk, &["--set", "output.background=transparent"]);
+    run.expect_failure(2, &["writing vpg.jpg with a transparent background is not supported"]);
+    let run = compare(&desk, &["--methods", "vpg", "--entry", "deep: output.depth=16"]);
+    run.expect_failure(2, &["writing deep.jpg with 16 bits a sample is not supported"]);
+    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg"]);
+}

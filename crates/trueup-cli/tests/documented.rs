@@ -60,6 +60,7 @@ const MISTAKES: &[Mistake] = &[
     mistake("output folder does not exist", &["stitch", "a.jpg", "b.jpg", "-o", "none/pano.jpg"]),
     mistake("output is a folder", &["stitch", "a.jpg", "b.jpg", "-o", "notes.jpg"]),
     mistake("output is a photograph", &["stitch", "a.jpg", "b.jpg", "-o", "a.jpg"]),
+    mistake("scratch folder does not exist", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--scratch", "none"]),
     mistake(
         "transparent background in JPEG",
         &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--background", "transparent"],

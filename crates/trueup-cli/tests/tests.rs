@@ -5,6 +5,7 @@ mod cli;
 mod colour;
 mod compare;
 mod compose;
+mod destinations;
 mod determinism;
 mod documented;
 mod evaluate;

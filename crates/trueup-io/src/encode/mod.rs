@@ -38,6 +38,7 @@ use crate::format::{OutputFormat, PictureFormat};
 use codecs::from_tiff;
 use limits::{check_sides, largest_side, output_format};
 use pending::PendingFile;
+pub(crate) use pending::takes_nothing;
 use samples::Sample;
 
 pub use background::Background;
@@ -70,7 +71,7 @@ pub use unfinished::abandon_unfinished;
 /// # Errors
 /// [`Error::Options`] for options out of range; [`Error::Unsupported`] for other extensions, a depth that the format has
 /// not, or a transparent background where there is no transparency; [`Error::Limits`] for pictures larger than the format
-/// can hold; [`Error::Input`] for an empty picture, or a folder that does not exist; [`Error::Io`] if the
+/// can hold; [`Error::Input`] for an empty picture, or a folder that does not exist or takes no files; [`Error::Io`] if the
 /// operating system refuses; [`Error::Cancelled`]; and what the picture returns.
 pub fn write(
     path: &Path,
@@ -127,6 +128,14 @@ pub fn check_writable(path: &Path, options: &OutputOptions) -> Result<()> {
     }
 }
 
+/// Checks that the extension of `path` names a format that has the depth and the background asked for, wherever it lies.
+///
+/// # Errors
+/// [`Error::Unsupported`].
+pub fn check_format(path: &Path, options: &OutputOptions) -> Result<()> {
+    output_format(path, options).map(drop)
+}
+
 /// Checks that a file of any kind could be written to `path`: the folder exists and takes files, and `path` is no folder
 /// itself. Nothing is left behind.
 ///
@@ -139,7 +148,7 @@ pub fn check_place(path: &Path) -> Result<()> {
 /// Writes a file that appears complete or not at all; for reports and project files.
 ///
 /// # Errors
-/// [`Error::Input`] if the folder does not exist, [`Error::Io`] if the operating system refuses.
+/// [`Error::Input`] if the folder does not exist or takes no files, [`Error::Io`] if the operating system refuses.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut pending = PendingFile::create(path)?;
     std::io::Write::write_all(pending.file(), bytes).map_err(|error| Error::io("writing", path, error))?;

@@ -53,7 +53,7 @@ impl PendingFile {
             Some(metadata) => drop(builder.permissions(metadata.permissions())),
             None => allow_umask(&mut builder, NEW_FILE),
         }
-        let make = || builder.tempfile_in(folder).map_err(|error| Error::io("writing into", folder, error));
+        let make = || builder.tempfile_in(folder).map_err(|error| takes_nothing(folder, &error));
         let (temporary, entry) = UNFINISHED.begin(make, NamedTempFile::path)?;
         Ok(Self { temporary, target, _entry: entry })
     }
@@ -80,6 +80,13 @@ pub(super) fn require_folder(folder: &Path, shown: impl Display) -> Result<()> {
     }
     let reason = format!("the folder {} does not exist", folder.display());
     Err(Error::input(shown, reason, "Create it or choose another folder."))
+}
+
+/// Why nothing can be made in `folder`; the temporary name that was tried is nobody's concern.
+pub(crate) fn takes_nothing(folder: &Path, error: &std::io::Error) -> Error {
+    let cause = error.get_ref().and_then(std::error::Error::source).map_or(error.to_string(), ToString::to_string);
+    let reason = format!("nothing can be written into this folder ({cause})");
+    Error::input(folder.display(), reason, "Check its permissions or choose another folder.")
 }
 
 /// Gives what is built the permissions `mode` but for those that the user's umask withholds.

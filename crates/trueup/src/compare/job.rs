@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use rand::Rng;
+use trueup_core::options::OptionValue;
 use trueup_core::truth::Truth;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::encode::{self, PendingFolder};
+use trueup_io::source;
 
 use super::drawing::Drawing;
 use super::making::{Common, all_refused};
@@ -65,8 +67,11 @@ impl CompareJob {
     pub fn run(&self, options: &StitchOptions, context: &StageContext, pages: &MakePages) -> Result<Comparison> {
         options.validate()?;
         self.check_entries(options)?;
+        self.check_formats(options)?;
         let truth = self.truth.as_deref().map(read_truth).transpose()?;
         check_replaceable(&self.output)?;
+        let photographs = source::files(&self.inputs.photographs);
+        spare_photographs(&self.output, photographs.iter().map(PathBuf::as_path))?;
         let folder = PendingFolder::create(&self.output)?;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads)
@@ -78,6 +83,16 @@ impl CompareJob {
         check_replaceable(&self.output)?;
         folder.commit()?;
         Ok(comparison)
+    }
+
+    /// Refuses options that the panoramas' format cannot meet.
+    fn check_formats(&self, options: &StitchOptions) -> Result<()> {
+        for entry in &self.entries {
+            let options = entry.options(options)?;
+            let file = format!("{}.{}", entry.name, options.compare.format.display());
+            encode::check_format(Path::new(&file), &options.output)?;
+        }
+        Ok(())
     }
 
     fn check_entries(&self, options: &StitchOptions) -> Result<()> {
@@ -106,7 +121,6 @@ impl CompareJob {
         let cache = self.cache.as_ref().map(|folder| Cache::open(folder, &options.cache)).transpose()?;
         let stitcher = Stitcher::new(options, context).with_cache(cache.as_ref());
         let set = stitcher.match_photographs(&inputs)?.remembering();
-        spare_photographs(&self.output, set.photographs().images().iter().map(|image| image.path.as_path()))?;
         let pixels: f64 = set.photographs().images().iter().map(|image| (image.width * image.height) as f64).sum();
         let options = &at_page_size(options, pixels);
         let overlap_scale = overlaps::common_scale(pixels, options.measures.canvas_pixels);
