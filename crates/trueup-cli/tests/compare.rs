@@ -235,6 +235,21 @@ fn scores_are_summed_up_over_files() {
     );
 }
 
+/// Masks are those of `stitch`: the projects record them, and panoramas differ.
+#[test]
+fn masks_are_heeded_by_every_entry() {
+    let desk = street_desk();
+    let mask = image::GrayImage::from_fn(480, 360, |x, _| image::Luma([u8::from(x >= 240) * 255]));
+    mask.save(desk.join("mask.png")).expect("written");
+    compare(&desk, &[&QUICK[..], &["--mask", "b.jpg=mask.png", "--keep", "c.jpg=mask.png"]].concat()).expect_success();
+    for name in ["out/vpg.json", "out/levelled.json"] {
+        let project = desk.json(name);
+        assert_eq!(project["images"][1]["masks"], json!([{"path": "mask.png", "kind": "use"}]), "{name}");
+        assert_eq!(project["images"][2]["masks"], json!([{"path": "mask.png", "kind": "keep"}]), "{name}");
+    }
+    compare(&desk, &["--mask", "mask.png"]).expect_failure(2, &["--mask mask.png: it is not of the form NAME=FILE"]);
+}
+
 #[test]
 fn what_the_format_cannot_show_is_refused_before_any_work() {
     let desk = street_desk();

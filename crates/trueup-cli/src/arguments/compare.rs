@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::shared::{GeometryArgs, TuningArgs};
+use super::shared::{GeometryArgs, MaskArgs, TuningArgs};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -59,6 +59,9 @@ pub(crate) struct CompareArgs {
 
     #[command(flatten)]
     pub geometry: GeometryArgs,
+
+    #[command(flatten)]
+    pub masks: MaskArgs,
 
     #[command(flatten)]
     pub tuning: TuningArgs,
