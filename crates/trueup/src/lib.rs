@@ -67,7 +67,7 @@ pub use projection_record::ProjectionRecord;
 pub use pto::hugin_project;
 pub use recompose::ComposeJob;
 pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};
-pub use trueup_align::projection::{FlatKind, Projection};
+pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;
 pub use trueup_compose::render::Panorama;
