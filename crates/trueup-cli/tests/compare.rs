@@ -145,7 +145,7 @@ fn what_cannot_be_compared_is_refused_before_work_and_leaves_nothing() {
         (&["--entry", "x: matching.max_distance_ratio=0.5"], 2, &["shares features and matches"]),
         (&["--entry", "vpg: mesh.cell_px=20"], 1, &["two entries have this name"]),
         (&["--rank", "vpg,magic"], 1, &["magic: it is not compared", "Name entries that are compared"]),
-        (&["--rank", "vpg"], 1, &["1 entries cannot be ranked"]),
+        (&["--rank", "vpg"], 1, &["2 to 4 entries can be ranked, not 1"]),
         (&["--format", "gif"], 2, &["\"gif\" cannot be (allowed: jpg | png | webp)"]),
         (&["--truth", "none.json"], 1, &["reading none.json"]),
         (&["--reference", "q.jpg"], 1, &["q.jpg: no photograph of this name was given"]),

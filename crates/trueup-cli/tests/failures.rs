@@ -53,6 +53,7 @@ fn missing_files_folders_and_patterns() {
     let desk = Desk::new();
     std::fs::create_dir(desk.join("empty")).expect("a folder");
     desk.put("empty/notes.txt", "no picture");
+    desk.stitch(&[""]).expect_failure(2, &["a value is required for '<PHOTOS>...'"]);
     desk.stitch(&["none.jpg"]).expect_failure(1, &["none.jpg: there is no such file or folder"]);
     desk.stitch(&["empty"]).expect_failure(1, &["empty: the folder holds no JPEG, PNG, TIFF or WebP files"]);
     desk.stitch(&["none*.jpg"]).expect_failure(1, &["none*.jpg: no JPEG, PNG, TIFF or WebP file matches the pattern"]);
@@ -196,6 +197,7 @@ fn project_files_that_are_none() {
     inspect("later.json").expect_failure(1, &["later.json: its version is 99, this program reads version 1"]);
     inspect("damaged.json").expect_failure(1, &["damaged.json: the project is damaged ("]);
     inspect("none.json").expect_failure(1, &["reading none.json: No such file or directory"]);
+    inspect(".").expect_failure(1, &[".: it is a folder", "that `trueup stitch --project` wrote"]);
 }
 
 #[test]

@@ -122,6 +122,8 @@ fn profile_to_leave<'a>(metadata: &'a Metadata, options: &OutputOptions, always:
 /// # Errors
 /// As [`write()`].
 pub fn check_writable(path: &Path, options: &OutputOptions) -> Result<()> {
+    // Before its extension is missed, of which folders have none.
+    pending::refuse_folder(path)?;
     match output_format(path, options)? {
         OutputFormat::DeepZoom => deep_zoom::check_places(path),
         OutputFormat::Picture(_) => check_place(path),

@@ -34,9 +34,7 @@ impl PendingFile {
             Some(folder) => folder,
             None => Path::new("/"),
         };
-        if target.is_dir() {
-            return Err(Error::input(path.display(), "it is a folder", "Give the name of a file in it."));
-        }
+        refuse_folder(path)?;
         require_folder(folder, path.display())?;
         let existing = target.metadata().ok();
         if existing.as_ref().is_some_and(|metadata| metadata.permissions().readonly()) {
@@ -73,6 +71,14 @@ impl PendingFile {
     }
 }
 
+/// Refuses a folder where a file is to be.
+pub(super) fn refuse_folder(path: &Path) -> Result<()> {
+    match path.is_dir() {
+        true => Err(Error::input(path.display(), "it is a folder", "Give the name of a file in it.")),
+        false => Ok(()),
+    }
+}
+
 /// Refuses `shown`, which is to lie in `folder`, if that folder does not exist.
 pub(super) fn require_folder(folder: &Path, shown: impl Display) -> Result<()> {
     if folder.is_dir() {
@@ -82,9 +88,11 @@ pub(super) fn require_folder(folder: &Path, shown: impl Display) -> Result<()> {
     Err(Error::input(shown, reason, "Create it or choose another folder."))
 }
 
-/// Why nothing can be made in `folder`; the temporary name that was tried is nobody's concern.
+/// Why nothing can be made in `folder`.
 pub(crate) fn takes_nothing(folder: &Path, error: &std::io::Error) -> Error {
-    let cause = error.get_ref().and_then(std::error::Error::source).map_or(error.to_string(), ToString::to_string);
+    // The name that was tried, which follows, is temporary and nobody's concern.
+    let said = error.to_string();
+    let cause = said.split(" at path ").next().unwrap_or_default();
     let reason = format!("nothing can be written into this folder ({cause})");
     Error::input(folder.display(), reason, "Check its permissions or choose another folder.")
 }

@@ -11,7 +11,8 @@ impl StitchOptions {
     /// [`Error::Input`] for text that is not TOML, unknown stages or options, or values of the wrong type.
     pub fn merge_toml(&mut self, text: &str, file: &str) -> Result<()> {
         let hint = "List stages, options and their ranges with `trueup options`.";
-        let given: toml::Table = text.parse().map_err(|error| Error::input(file, first_line(&error), hint))?;
+        let not_toml = |error| Error::input(file, format!("it is no TOML ({})", first_line(&error)), hint);
+        let given: toml::Table = text.parse().map_err(not_toml)?;
         let mut merged = self.to_table()?;
         for (stage, values) in given {
             let Some(known) = merged.get_mut(&stage).and_then(toml::Value::as_table_mut) else {
