@@ -33,9 +33,9 @@ fn main() -> ExitCode {
     match outcome {
         Ok(status) => status,
         Err(error) => {
-            eprintln!("trueup-bench: error: {error}");
+            trueup_terminal::complain(&format!("trueup-bench: error: {error}\n"));
             match error {
-                Error::Cancelled => ExitCode::from(trueup_terminal::STATUS_INTERRUPTED),
+                Error::Cancelled => ExitCode::from(trueup_terminal::status_of_stopping()),
                 Error::Options(_) | Error::Unsupported { .. } => ExitCode::from(2),
                 _ => ExitCode::FAILURE,
             }
@@ -43,7 +43,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// A token that the first Ctrl-C cancels; the second ends the program.
+/// A token that the first request to stop cancels; the second ends the program.
 fn cancel_token() -> Arc<CancelToken> {
     trueup_terminal::cancel_token("trueup-bench", "stopping; what is done is kept", None)
 }

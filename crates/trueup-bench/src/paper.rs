@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use trueup::{Error, Result};
+use trueup::{Error, Result, check_place, write_atomically};
 
 use crate::arguments::PaperArguments;
 use crate::experiments::{CLAIM_EXPERIMENTS, EXPERIMENTS, Experiment, runtime};
@@ -31,6 +31,9 @@ pub(crate) fn run(arguments: &PaperArguments) -> Result<ExitCode> {
     make(&arguments.out)?;
     let data = arguments.data.clone().unwrap_or_else(|| arguments.out.join("data"));
     make(&data)?;
+    let rows_file = arguments.out.join("rows.csv");
+    check_place(&rows_file)?;
+    report::check(&arguments.out)?;
     let catalogue = match arguments.quick {
         true => Catalogue::quick(),
         false => Catalogue::full(arguments.panoramas.as_deref(), &arguments.truth_sets)?,
@@ -59,7 +62,7 @@ pub(crate) fn run(arguments: &PaperArguments) -> Result<ExitCode> {
     }
     let document = document(&results, &experiments, &claims, &runner, &wanted);
     report::write(&document, &arguments.out)?;
-    write_rows(&results.rows, &arguments.out.join("rows.csv"))?;
+    write_rows(&results.rows, &rows_file)?;
     Ok(conclude(arguments, &claims, start.elapsed().as_secs_f64()))
 }
 
@@ -134,7 +137,7 @@ fn write_rows(rows: &[Row], path: &Path) -> Result<()> {
             measures.iter().map(|name| found.get(*name).map_or(String::new(), f64::to_string)).collect();
         text.push_str(&csv::line(heads.into_iter().chain(&figures).map(String::as_str)));
     }
-    fs::write(path, text).map_err(|error| Error::io("writing", path, error))
+    write_atomically(path, text.as_bytes())
 }
 
 /// Prints what came of the claims, last of all; the exit status says whether all hold.

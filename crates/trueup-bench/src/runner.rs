@@ -26,7 +26,7 @@ pub(crate) struct Runner<'a> {
     pub jobs: usize,
     /// Threads of each.
     pub threads: usize,
-    /// Set by Ctrl-C.
+    /// Set by requests to stop.
     pub cancel: &'a CancelToken,
     /// Whether progress is kept quiet.
     pub quiet: bool,

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use trueup::{Error, MaskFile, MaskKind, Reference, StitchOptions};
+use trueup::{Error, MaskFile, MaskKind, Projection, ProjectionOptions, Reference, StitchOptions};
 
 use crate::arguments::{BudgetArgs, FileArgs, MaskArgs, PictureArgs, TuningArgs};
 use crate::failure::Failure;
@@ -43,18 +43,35 @@ pub(crate) fn options(
         read_config(&mut options, path)?;
     }
     let set = tuning.set.iter().map(|assignment| (format!("--set {assignment}"), assignment.clone()));
-    let flags = flags.iter().filter_map(|(flag, option, value)| {
+    let typed = flags.iter().filter_map(|(flag, option, value)| {
         let value = value.as_ref()?;
         Some((format!("{flag} {value}"), format!("{option}={value}")))
     });
     let mut wrong = Vec::new();
-    for (typed, assignment) in set.chain(flags) {
+    for (typed, assignment) in set.chain(typed) {
         if let Err(error) = options.set(&assignment) {
             wrong.push(format!("{typed}: {}", reason(error)));
         }
     }
+    // A projection that was not understood is not there.
+    if wrong.is_empty() {
+        wrong.extend(views_of_the_mesh(&options, flags));
+    }
     wrong.extend(options.all_invalid().iter().map(ToString::to_string));
     if wrong.is_empty() { Ok(options) } else { Err(Failure::options(wrong)) }
+}
+
+/// The flags that turn or bound a view where there is none: a mesh is drawn as it lies.
+fn views_of_the_mesh(options: &StitchOptions, flags: &[OptionFlag]) -> Vec<String> {
+    let ProjectionOptions { kind, yaw, pitch, roll, fov, .. } = options.projection;
+    let idle = [("--yaw", yaw), ("--pitch", pitch), ("--roll", roll), ("--fov", fov)];
+    let is_idle =
+        |flag: &str| kind == Projection::Mesh && idle.iter().any(|(name, value)| *name == flag && *value != 0.0);
+    let told = |(flag, _, value): &OptionFlag| {
+        let value = value.as_ref().filter(|_| is_idle(flag))?;
+        Some(format!("{flag} {value}: the panorama is drawn on the mesh, which has no view; add a --projection"))
+    };
+    flags.iter().filter_map(told).collect()
 }
 
 fn read_config(options: &mut StitchOptions, path: &Path) -> Result<(), Failure> {

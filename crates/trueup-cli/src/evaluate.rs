@@ -62,8 +62,10 @@ fn pixels(project: &Project, project_file: &Path) -> Result<Pixels, Error> {
 fn text(project: &Project, evaluation: Option<&Evaluation>, pixels: Option<&Pixels>) -> String {
     let mut page = Page::default();
     summary::measures(&mut page, project);
-    if project.measures.is_none() {
-        page.entry("measured", "the project file holds no measures: stitch again with this program");
+    match (&project.measures, project.used()) {
+        (Some(_), _) => {}
+        (None, 1) => page.entry("measured", "nothing: it takes two photographs, and this panorama has one"),
+        (None, _) => page.entry("measured", "the project file holds no measures: stitch again with this program"),
     }
     if let Some(evaluation) = evaluation {
         truth(&mut page, evaluation);

@@ -4,7 +4,7 @@ use std::fmt;
 use std::process::ExitCode;
 
 use trueup::{Error, InvalidOption};
-use trueup_terminal::STATUS_INTERRUPTED;
+use trueup_terminal::status_of_stopping;
 
 /// The input or the system failed.
 const STATUS_FAILURE: u8 = 1;
@@ -57,7 +57,7 @@ impl From<Error> for Failure {
             Error::NotApplicable { method, reason, hint } => {
                 failed(format!("the method {method} is not applicable: {reason}"), hint)
             }
-            Error::Cancelled => Self { status: STATUS_INTERRUPTED, ..failed(error.to_string(), String::new()) },
+            Error::Cancelled => Self { status: status_of_stopping(), ..failed(error.to_string(), String::new()) },
             other => failed(other.to_string(), String::new()),
         }
     }

@@ -16,6 +16,13 @@ pub(crate) fn run(args: &InspectArgs) -> Result<(), Failure> {
 
 /// Reads a project file.
 pub(crate) fn read(path: &Path) -> Result<Project, Error> {
+    if path.is_dir() {
+        return Err(Error::input(
+            path.display(),
+            "it is a folder",
+            "Give a file that `trueup stitch --project` wrote.",
+        ));
+    }
     let bytes = std::fs::read(path).map_err(|source| Error::Io { action: "reading", path: path.to_owned(), source })?;
     // What is no text is no JSON either; the project's own reader says so.
     let text = String::from_utf8_lossy(&bytes);

@@ -39,18 +39,18 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprint!("{failure}");
+            trueup_terminal::complain(&failure.to_string());
             failure.exit_code()
         }
     }
 }
 
-/// A token that the first Ctrl-C cancels; work that does not stop within a second is left, with nothing half written.
-/// The second Ctrl-C ends the program.
+/// A token that the first request to stop cancels; work that does not stop within a second is left, with nothing half
+/// written. The second Ctrl-C ends the program.
 fn cancel_token() -> Arc<CancelToken> {
     let last_resort = || {
         trueup::abandon_unfinished();
-        eprint!("{}", Failure::from(Error::Cancelled));
+        trueup_terminal::complain(&Failure::from(Error::Cancelled).to_string());
     };
     trueup_terminal::cancel_token("trueup", "", Some(last_resort))
 }

@@ -93,9 +93,11 @@ fn scale_sets_the_size_and_quality_the_bytes() {
 #[test]
 fn one_photograph_is_written_as_it_is_with_a_warning() {
     let desk = street_desk();
-    let run = finish(trueup(desk.path(), &["stitch", "a.jpg", "-o", "pano.png"]));
+    let run = finish(trueup(desk.path(), &["stitch", "a.jpg", "-o", "pano.png", "--project", "pano.json"]));
     assert!(run.expect_success().contains("warning   a.jpg: there is only one photograph to use"), "{}", run.stdout);
     assert_eq!(picture_size(&desk.join("pano.png")), (pictures::WIDTH as u32, pictures::HEIGHT as u32));
+    let evaluated = finish(trueup(desk.path(), &["evaluate", "pano.json"]));
+    assert!(evaluated.expect_success().contains("measured  nothing: it takes two photographs"), "{}", evaluated.stdout);
 }
 
 #[test]

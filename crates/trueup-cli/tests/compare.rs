@@ -145,7 +145,7 @@ fn what_cannot_be_compared_is_refused_before_work_and_leaves_nothing() {
         (&["--entry", "x: matching.max_distance_ratio=0.5"], 2, &["shares features and matches"]),
         (&["--entry", "vpg: mesh.cell_px=20"], 1, &["two entries have this name"]),
         (&["--rank", "vpg,magic"], 1, &["magic: it is not compared", "Name entries that are compared"]),
-        (&["--rank", "vpg"], 1, &["1 entries cannot be ranked"]),
+        (&["--rank", "vpg"], 1, &["2 to 4 entries can be ranked, not 1"]),
         (&["--format", "gif"], 2, &["\"gif\" cannot be (allowed: jpg | png | webp)"]),
         (&["--truth", "none.json"], 1, &["reading none.json"]),
         (&["--reference", "q.jpg"], 1, &["q.jpg: no photograph of this name was given"]),
@@ -233,4 +233,29 @@ fn scores_are_summed_up_over_files() {
         1,
         &["other.json: its format is not \"trueup-ranking\"", "Give a file that ranking.html saved"],
     );
+}
+
+/// Masks are those of `stitch`: the projects record them, and panoramas differ.
+#[test]
+fn masks_are_heeded_by_every_entry() {
+    let desk = street_desk();
+    let mask = image::GrayImage::from_fn(480, 360, |x, _| image::Luma([u8::from(x >= 240) * 255]));
+    mask.save(desk.join("mask.png")).expect("written");
+    compare(&desk, &[&QUICK[..], &["--mask", "b.jpg=mask.png", "--keep", "c.jpg=mask.png"]].concat()).expect_success();
+    for name in ["out/vpg.json", "out/levelled.json"] {
+        let project = desk.json(name);
+        assert_eq!(project["images"][1]["masks"], json!([{"path": "mask.png", "kind": "use"}]), "{name}");
+        assert_eq!(project["images"][2]["masks"], json!([{"path": "mask.png", "kind": "keep"}]), "{name}");
+    }
+    compare(&desk, &["--mask", "mask.png"]).expect_failure(2, &["--mask mask.png: it is not of the form NAME=FILE"]);
+}
+
+#[test]
+fn what_the_format_cannot_show_is_refused_before_any_work() {
+    let desk = street_desk();
+    let run = compare(&desk, &["--set", "output.background=transparent"]);
+    run.expect_failure(2, &["writing vpg.jpg with a transparent background is not supported"]);
+    let run = compare(&desk, &["--methods", "vpg", "--entry", "deep: output.depth=16"]);
+    run.expect_failure(2, &["writing deep.jpg with 16 bits a sample is not supported"]);
+    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg"]);
 }

@@ -1,7 +1,5 @@
 //! Bad input: what is said, with which exit status, and that nothing is left behind.
 
-use std::path::Path;
-
 use crate::pictures::{STREET_NAMES, claiming, noise, plain, street, street_desk};
 use crate::run::{Desk, Run, finish, trueup};
 
@@ -55,6 +53,7 @@ fn missing_files_folders_and_patterns() {
     let desk = Desk::new();
     std::fs::create_dir(desk.join("empty")).expect("a folder");
     desk.put("empty/notes.txt", "no picture");
+    desk.stitch(&[""]).expect_failure(2, &["a value is required for '<PHOTOS>...'"]);
     desk.stitch(&["none.jpg"]).expect_failure(1, &["none.jpg: there is no such file or folder"]);
     desk.stitch(&["empty"]).expect_failure(1, &["empty: the folder holds no JPEG, PNG, TIFF or WebP files"]);
     desk.stitch(&["none*.jpg"]).expect_failure(1, &["none*.jpg: no JPEG, PNG, TIFF or WebP file matches the pattern"]);
@@ -166,53 +165,6 @@ fn graphs_and_references_that_fit_no_photograph() {
 }
 
 #[test]
-fn outputs_that_cannot_be_written() {
-    let desk = street_desk();
-    std::fs::create_dir(desk.join("folder.jpg")).expect("a folder");
-    let to = |output: &str| finish(trueup(desk.path(), &["stitch", "a.jpg", "b.jpg", "-o", output]));
-    to("none/pano.jpg").expect_failure(1, &["none/pano.jpg: the folder none does not exist", "Create it"]);
-    to("folder.jpg").expect_failure(1, &["folder.jpg: it is a folder"]);
-    to("pano.gif").expect_failure(2, &["writing pano.gif as .gif is not supported", ".jpg, .jpeg, .png"]);
-    to("pano").expect_failure(2, &["writing pano without an extension is not supported"]);
-    let project = desk.stitch(&["a.jpg", "b.jpg", "--project", "none/p.json"]);
-    project.expect_failure(1, &["none/p.json: the folder none does not exist"]);
-    if Path::new("/proc/self").is_dir() {
-        // A file system that takes no files, not even from root.
-        to("/proc/pano.jpg").expect_failure(1, &["writing into /proc: "]);
-    }
-    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "folder.jpg"]);
-}
-
-/// A limit on the size of files stops the writing half way, as a full disk does.
-#[cfg(target_os = "linux")]
-#[test]
-fn a_full_disk_leaves_the_old_panorama_as_it_was() {
-    let desk = street_desk();
-    desk.put("pano.jpg", "the old panorama");
-    let mut command = std::process::Command::new("sh");
-    let script = "trap '' XFSZ; ulimit -f 8; exec \"$0\" stitch a.jpg b.jpg -o pano.jpg";
-    command.current_dir(desk.path()).args(["-c", script, env!("CARGO_BIN_EXE_trueup")]);
-    finish(command).expect_failure(1, &["pano.jpg: File too large"]);
-    assert_eq!(desk.read("pano.jpg"), b"the old panorama");
-    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "pano.jpg"]);
-}
-
-/// The same for the scratch file of a canvas that does not fit in memory.
-#[cfg(target_os = "linux")]
-#[test]
-fn a_disk_without_room_for_the_scratch_file_leaves_nothing_behind() {
-    let desk = street_desk();
-    desk.put("pano.jpg", "the old panorama");
-    let mut command = std::process::Command::new("sh");
-    let script =
-        "trap '' XFSZ; ulimit -f 8; exec \"$0\" stitch a.jpg b.jpg c.jpg d.jpg -o pano.jpg --scale 6 --memory 230MB";
-    command.current_dir(desk.path()).args(["-c", script, env!("CARGO_BIN_EXE_trueup")]);
-    finish(command).expect_failure(1, &["writing the scratch file in .: File too large"]);
-    assert_eq!(desk.read("pano.jpg"), b"the old panorama");
-    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "pano.jpg"]);
-}
-
-#[test]
 fn too_little_memory_is_refused_before_the_work() {
     let desk = street_desk();
     desk.put("pano.jpg", "the old panorama");
@@ -231,41 +183,6 @@ fn a_failure_leaves_the_old_panorama_as_it_was() {
     assert_eq!(desk.read("pano.jpg"), b"the old panorama");
 }
 
-/// Ctrl-C while the photographs are worked on.
-#[cfg(unix)]
-#[test]
-fn an_interrupted_stitch_leaves_nothing_behind() {
-    use std::io::Read;
-    use std::process::Stdio;
-    let desk = Desk::new();
-    // Large enough to take a good while at full scale.
-    for (name, seed) in [("1.jpg", 1), ("2.jpg", 2), ("3.jpg", 3), ("4.jpg", 4)] {
-        desk.put(name, noise(seed, 2400, 1800));
-    }
-    let arguments = [
-        "stitch",
-        "1.jpg",
-        "2.jpg",
-        "3.jpg",
-        "4.jpg",
-        "-o",
-        "pano.jpg",
-        "--set",
-        "stitch.working_pixels=4e6",
-        "--threads",
-        "1",
-    ];
-    let mut child = trueup(desk.path(), &arguments).stderr(Stdio::piped()).spawn().expect("the command starts");
-    std::thread::sleep(std::time::Duration::from_millis(400));
-    let signalled = std::process::Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status();
-    assert!(signalled.expect("sh runs").success(), "the command was still at work");
-    let status = child.wait().expect("it ends");
-    let mut said = String::new();
-    child.stderr.take().expect("piped").read_to_string(&mut said).expect("UTF-8");
-    assert_eq!((status.code(), said.as_str()), (Some(130), "trueup: error: stopped on request\n"));
-    assert_eq!(desk.files(), ["1.jpg", "2.jpg", "3.jpg", "4.jpg"]);
-}
-
 #[test]
 fn project_files_that_are_none() {
     let desk = Desk::new();
@@ -280,6 +197,7 @@ fn project_files_that_are_none() {
     inspect("later.json").expect_failure(1, &["later.json: its version is 99, this program reads version 1"]);
     inspect("damaged.json").expect_failure(1, &["damaged.json: the project is damaged ("]);
     inspect("none.json").expect_failure(1, &["reading none.json: No such file or directory"]);
+    inspect(".").expect_failure(1, &[".: it is a folder", "that `trueup stitch --project` wrote"]);
 }
 
 #[test]

@@ -153,3 +153,26 @@ fn deep_zoom_is_a_folder_and_a_file() {
     assert!(desk.files().ends_with(&["pano.dzi".to_owned(), "pano_files".to_owned()]), "{:?}", desk.files());
     assert_eq!(picture_size(&desk.join("pano_files/0/0_0.png")), (1, 1));
 }
+
+/// A panorama of photographs side by side has uncovered corners.
+#[test]
+fn what_is_not_covered_shows_the_background() {
+    let desk = street_desk();
+    let holes = |name: &str, background: &str| {
+        let arguments = ["stitch", "a.jpg", "b.jpg", "-o", name, "--scale", "0.5", "--background", background];
+        finish(trueup(desk.path(), &arguments)).expect_success();
+        image::open(desk.join(name)).expect("a panorama")
+    };
+    let transparent = holes("a.png", "transparent").to_rgba8();
+    let (x, y, _) = transparent.enumerate_pixels().find(|(_, _, pixel)| pixel[3] == 0).expect("a hole");
+    assert_eq!(holes("b.png", "auto").to_rgba8(), transparent);
+    let orange = holes("c.png", "#f80");
+    assert!(!orange.color().has_alpha());
+    assert_eq!(orange.to_rgb8().get_pixel(x, y).0, [255, 136, 0]);
+    let arguments = ["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--background"];
+    let refused = |background: &str| finish(trueup(desk.path(), &[&arguments[..], &[background]].concat()));
+    refused("transparent")
+        .expect_failure(2, &["writing pano.jpg with a transparent background is not supported", ".png, .tif or .webp"]);
+    refused("orange")
+        .expect_failure(2, &["--background orange: ", "auto | transparent | black | gray | white | #rgb | #rrggbb"]);
+}

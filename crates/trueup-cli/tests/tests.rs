@@ -5,6 +5,7 @@ mod cli;
 mod colour;
 mod compare;
 mod compose;
+mod destinations;
 mod determinism;
 mod documented;
 mod evaluate;
@@ -15,3 +16,5 @@ mod masks;
 mod options;
 mod pictures;
 mod run;
+#[cfg(unix)]
+mod stopping;

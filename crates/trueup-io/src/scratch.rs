@@ -8,6 +8,8 @@ use trueup_core::memory::bytes_in_words;
 use trueup_core::scratch::{ScratchFile, ScratchSpace};
 use trueup_core::{Error, Result};
 
+use crate::encode::takes_nothing;
+
 /// A folder for scratch files. They have no name where the operating system allows, and are removed by it when the
 /// program ends, however it does.
 #[derive(Debug, Clone)]
@@ -40,10 +42,24 @@ impl ScratchSpace for ScratchFolder {
             what = "the scratch file and the panorama";
         }
         check_room(&self.folder, needed, what)?;
-        let file = tempfile::tempfile_in(&self.folder)
-            .map_err(|error| Error::io("making a scratch file in", &self.folder, error))?;
-        Ok(Box::new(FileOnDisk { file, folder: self.folder.clone() }))
+        Ok(Box::new(FileOnDisk { file: scratch_file(&self.folder)?, folder: self.folder.clone() }))
     }
+}
+
+/// Checks that scratch files could be made in `folder`, before the long work that may need one. Nothing is left behind.
+///
+/// # Errors
+/// [`Error::Input`] if it is no folder or takes no files.
+pub fn check_scratch(folder: &Path) -> Result<()> {
+    if !folder.is_dir() {
+        let reason = "there is no such folder for scratch files";
+        return Err(Error::input(folder.display(), reason, "Create it or choose another folder (--scratch)."));
+    }
+    scratch_file(folder).map(drop)
+}
+
+fn scratch_file(folder: &Path) -> Result<File> {
+    tempfile::tempfile_in(folder).map_err(|error| takes_nothing(existing(folder), &error))
 }
 
 /// Refuses to put `needed` bytes of `what` into `folder` if its disk has not so much room. Where the operating system does
@@ -190,6 +206,7 @@ mod tests {
         let both = space.beside(folder.path(), u64::MAX).create(8).expect_err("no disk is so large").to_string();
         assert!(both.contains("the scratch file and the panorama"), "{both}");
         let missing = ScratchFolder::new(folder.path().join("absent")).create(8);
-        assert!(matches!(missing, Err(Error::Io { .. })), "{missing:?}");
+        assert!(matches!(missing, Err(Error::Input { .. })), "{missing:?}");
+        assert!(check_scratch(&folder.path().join("absent")).is_err() && check_scratch(folder.path()).is_ok());
     }
 }

@@ -3,15 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use trueup_compose::render::Blend;
 use trueup_core::{Error, Result, StageContext};
-use trueup_io::encode;
+use trueup_io::{encode, source};
 
-use crate::by_hand::no_seams;
 use crate::cache::Cache;
 use crate::inputs::Inputs;
 use crate::options::StitchOptions;
-use crate::project::{ImageRecord, Project};
+use crate::outputs::Outputs;
+use crate::project::Project;
 use crate::pto::hugin_project;
 use crate::stitcher::{Alignment, Stitcher};
 
@@ -59,6 +58,7 @@ impl StitchJob {
     pub fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<Written>> {
         options.validate()?;
         self.outputs().check(options)?;
+        self.spare_inputs(&self.outputs())?;
         let cache = self.cache.as_ref().map(|folder| Cache::open(folder, &options.cache)).transpose()?;
         thread_pool(self.threads)?.install(|| self.stitch(options, cache.as_ref(), context))
     }
@@ -66,13 +66,23 @@ impl StitchJob {
     fn stitch(&self, options: &StitchOptions, cache: Option<&Cache>, context: &StageContext) -> Result<Vec<Written>> {
         let stitcher = Stitcher::new(options, context).with_cache(cache);
         let aligned = stitcher.align(&self.inputs)?;
-        let several = aligned.alignments.len() > 1;
-        let mut written = Vec::new();
-        for (index, alignment) in aligned.alignments.into_iter().enumerate() {
-            let number = several.then_some(index + 1);
-            written.push(render_and_write(&stitcher, alignment, self.outputs().numbered(number))?);
+        let count = aligned.alignments.len();
+        let outputs: Vec<Outputs> =
+            (1..=count).map(|number| self.outputs().numbered((count > 1).then_some(number))).collect();
+        // Not before now is it known how many there are: the last panorama is not to fail when the others are made.
+        for outputs in outputs.iter().filter(|_| count > 1) {
+            outputs.check(options)?;
+            self.spare_inputs(outputs)?;
         }
-        Ok(written)
+        let all = aligned.alignments.into_iter().zip(outputs);
+        all.map(|(alignment, outputs)| render_and_write(&stitcher, alignment, outputs)).collect()
+    }
+
+    /// Refuses outputs that are among the inputs, before the inputs are looked into.
+    fn spare_inputs(&self, outputs: &Outputs) -> Result<()> {
+        let photographs = source::files(&self.inputs.photographs);
+        outputs
+            .spare(photographs.iter().map(PathBuf::as_path), self.inputs.masks.iter().map(|mask| mask.file.as_path()))
     }
 
     fn outputs(&self) -> Outputs {
@@ -86,44 +96,6 @@ impl StitchJob {
     }
 }
 
-/// The files that one panorama is written to; all but the first if wanted.
-#[derive(Debug, Clone)]
-pub(crate) struct Outputs {
-    pub panorama: PathBuf,
-    pub project: Option<PathBuf>,
-    pub hugin_project: Option<PathBuf>,
-    pub layers: Option<PathBuf>,
-    pub seams: Option<PathBuf>,
-}
-
-impl Outputs {
-    /// Refuses before work starts what could not be written when it is done.
-    pub fn check(&self, options: &StitchOptions) -> Result<()> {
-        encode::check_writable(&self.panorama, &options.output)?;
-        if let Some(layers) = &self.layers {
-            encode::check_layers_place(layers)?;
-        }
-        if let Some(seams) = &self.seams {
-            encode::check_labels_place(seams)?;
-            if !matches!(options.render.blend, Blend::MultiBand | Blend::None) {
-                return Err(no_seams());
-            }
-        }
-        [&self.project, &self.hugin_project].into_iter().flatten().try_for_each(|side| encode::check_place(side))
-    }
-
-    fn numbered(self, number: Option<usize>) -> Self {
-        let side = |path: Option<PathBuf>| path.map(|path| numbered(&path, number));
-        Self {
-            panorama: numbered(&self.panorama, number),
-            project: side(self.project),
-            hugin_project: side(self.hugin_project),
-            layers: side(self.layers),
-            seams: side(self.seams),
-        }
-    }
-}
-
 /// A pool of `threads` threads; 0 for one per core.
 pub(crate) fn thread_pool(threads: usize) -> Result<rayon::ThreadPool> {
     let built = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
@@ -132,10 +104,8 @@ pub(crate) fn thread_pool(threads: usize) -> Result<rayon::ThreadPool> {
 
 /// Composes an aligned panorama and writes it and what is wanted beside it.
 pub(crate) fn render_and_write(stitcher: &Stitcher<'_>, mut alignment: Alignment, outputs: Outputs) -> Result<Written> {
+    outputs.spare(alignment.project.images.iter().map(|image| Path::new(&image.path)), [])?;
     let Outputs { panorama: output, project: project_file, hugin_project: pto, layers, seams } = outputs;
-    for path in [Some(&output), layers.as_ref(), seams.as_ref()].into_iter().flatten() {
-        spare_photographs(path, &alignment.project)?;
-    }
     let (options, context) = (stitcher.options(), stitcher.context());
     let start = Instant::now();
     let panorama = Stitcher::new(options, context).writing_to(&output).compose(&alignment)?;
@@ -160,42 +130,4 @@ pub(crate) fn render_and_write(stitcher: &Stitcher<'_>, mut alignment: Alignment
         encode::write_atomically(path, hugin_project(&project)?.as_bytes())?;
     }
     Ok(Written { output, bytes, project_file, project })
-}
-
-/// `pano.jpg` becomes `pano-2.jpg`.
-fn numbered(path: &Path, number: Option<usize>) -> PathBuf {
-    let Some(number) = number else { return path.to_owned() };
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let name = match path.extension() {
-        Some(extension) => format!("{stem}-{number}.{}", extension.to_string_lossy()),
-        None => format!("{stem}-{number}"),
-    };
-    path.with_file_name(name)
-}
-
-/// Refuses to write a panorama over one of the photographs, which may be the only copy. An older panorama in the folder
-/// of the photographs is met here, too.
-fn spare_photographs(output: &Path, project: &Project) -> Result<()> {
-    let Ok(existing) = output.canonicalize() else { return Ok(()) };
-    let is_output = |image: &&ImageRecord| Path::new(&image.path).canonicalize().is_ok_and(|path| path == existing);
-    match project.images.iter().find(is_output) {
-        None => Ok(()),
-        Some(_) => Err(Error::input(
-            output.display(),
-            "this file is one of the photographs to be stitched",
-            "Give the panorama another name or folder, or move an older panorama away from the photographs.",
-        )),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn several_panoramas_are_numbered_before_the_extension() {
-        assert_eq!(numbered(Path::new("out/pano.jpg"), Some(2)), Path::new("out/pano-2.jpg"));
-        assert_eq!(numbered(Path::new("pano"), Some(1)), Path::new("pano-1"));
-        assert_eq!(numbered(Path::new("pano.jpg"), None), Path::new("pano.jpg"));
-    }
 }

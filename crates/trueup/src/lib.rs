@@ -39,6 +39,7 @@ mod memory;
 mod method;
 mod names;
 mod options;
+mod outputs;
 mod pairs;
 mod project;
 mod projection_record;
@@ -66,7 +67,7 @@ pub use projection_record::ProjectionRecord;
 pub use pto::hugin_project;
 pub use recompose::ComposeJob;
 pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};
-pub use trueup_align::projection::{FlatKind, Projection};
+pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;
 pub use trueup_compose::render::Panorama;
@@ -77,4 +78,6 @@ pub use trueup_core::raster::RowSource;
 pub use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 pub use trueup_core::truth::{ImageTruth, Truth};
 pub use trueup_core::{Error, Result, StageContext};
-pub use trueup_io::encode::{Metadata, OutputOptions, abandon_unfinished, write as write_picture};
+pub use trueup_io::encode::{
+    Metadata, OutputOptions, abandon_unfinished, check_place, write as write_picture, write_atomically,
+};

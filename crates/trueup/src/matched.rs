@@ -9,6 +9,7 @@ use crate::inputs::{Inputs, Reference};
 use crate::left_out::{self, LeftOut};
 use crate::masks::{MaskRecord, photograph_named};
 use crate::measure::Measured;
+use crate::names::several;
 
 /// Everything known after matching.
 #[derive(Debug)]
@@ -83,7 +84,7 @@ pub(crate) fn none_usable(inputs: Vec<(String, String, String)>) -> Error {
             let reasons: Vec<String> = inputs.iter().map(|(name, reason, _)| format!("{name}: {reason}")).collect();
             Error::input(
                 format!("{} files", inputs.len()),
-                format!("none of them can be used: {}", reasons.join("; ")),
+                format!("none of them can be used: {}", several(&reasons)),
                 "Name at least two overlapping photographs, or a folder that holds them.",
             )
         }
@@ -125,7 +126,7 @@ pub(crate) fn require_all(matched: &Matched, stitched: &[Vec<usize>]) -> Result<
     reasons.extend(matched.sources.rejected.iter().map(|one| format!("{}: {}", one.name, one.reason)));
     Err(Error::input(
         format!("{} of {given} photographs", given - used),
-        format!("they cannot be used although all are required: {}", reasons.join("; ")),
+        format!("they cannot be used although all are required: {}", several(&reasons)),
         "Leave --require-all out to stitch the others.",
     ))
 }

@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 
-use crate::files::{Outputs, Written, render_and_write, thread_pool};
+use crate::files::{Written, render_and_write, thread_pool};
 use crate::masks::{AllMasks, MaskFile, MaskRecord};
 use crate::options::StitchOptions;
+use crate::outputs::Outputs;
 use crate::project::{ImageRecord, Project};
 use crate::recorded::Recorded;
 use crate::replacements::{other_photographs, recorded_photographs};
@@ -68,6 +69,7 @@ impl ComposeJob {
             seams: self.seams.clone(),
         };
         outputs.check(options)?;
+        outputs.spare([], self.masks.iter().map(|mask| mask.file.as_path()))?;
         thread_pool(self.threads)?.install(|| {
             let stitcher = Stitcher::new(options, context);
             let images = self.find_photographs(options, context)?;

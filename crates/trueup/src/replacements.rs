@@ -128,10 +128,10 @@ fn all_of(found: impl Iterator<Item = Result<SourceImage>>, hint: &str) -> Resul
     match wrong.as_slice() {
         [] => Ok(images),
         [(subject, reason)] => Err(Error::input(subject, reason, hint)),
-        several => {
-            let reasons: Vec<String> = several.iter().map(|(subject, reason)| format!("{subject}: {reason}")).collect();
-            let subject = format!("{} of {} photographs", several.len(), several.len() + images.len());
-            Err(Error::input(subject, reasons.join("; "), hint))
+        many => {
+            let reasons: Vec<String> = many.iter().map(|(subject, reason)| format!("{subject}: {reason}")).collect();
+            let subject = format!("{} of {} photographs", many.len(), many.len() + images.len());
+            Err(Error::input(subject, crate::names::several(&reasons), hint))
         }
     }
 }

@@ -60,7 +60,7 @@ pub(super) fn measure(
             break ended;
         }
         if cancel.is_cancelled() {
-            // It got the same Ctrl-C, and may be gone already.
+            // It may have got the same Ctrl-C, and be gone already.
             let _ = child.kill();
             let _ = child.wait();
             return Err(Error::Cancelled);

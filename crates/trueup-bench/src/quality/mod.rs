@@ -9,7 +9,7 @@ mod tables;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use trueup::{CancelToken, Error, Result};
+use trueup::{CancelToken, Error, Result, check_place};
 
 use crate::arguments::QualityArguments;
 use crate::progress::Tracker;
@@ -17,15 +17,17 @@ use child::{Measured, measure};
 use discover::{StitchSet, find_sets};
 use row::{QualityRow, read_rows, write_rows};
 
-/// Stitches the sets, then writes the table and its CSV file.
+/// Stitches the sets, then writes the table and its CSV file, whose places are checked before.
 ///
 /// # Errors
 /// Those of finding the sets and the command, of writing; [`Error::Cancelled`]. A set that cannot be stitched is a row.
 pub(crate) fn run(arguments: &QualityArguments) -> Result<ExitCode> {
     let cancel = crate::cancel_token();
     let command = find_command(arguments.trueup.as_deref())?;
-    let sets = find_sets(&arguments.truth_sets, &arguments.real, arguments.manifest.as_deref())?;
     let csv_path = arguments.out.with_extension("csv");
+    page::check(&arguments.out)?;
+    check_place(&csv_path)?;
+    let sets = find_sets(&arguments.truth_sets, &arguments.real, arguments.manifest.as_deref())?;
     let previous = match &arguments.previous {
         Some(path) => read_rows(path)?,
         None if csv_path.exists() => read_rows(&csv_path)?,

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use trueup::{Error, Result};
+use trueup::{Error, Result, check_place, write_atomically};
 
 use super::discover::Part;
 use super::row::QualityRow;
@@ -17,6 +17,20 @@ const TEMPLATE: &str = include_str!("../../../../docs/quality.md");
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] if the page lacks a marker.
 pub(super) fn write(path: &Path, rows: &[QualityRow], previous: &[QualityRow]) -> Result<()> {
+    write_atomically(path, filled(path, rows, previous)?.as_bytes())
+}
+
+/// Checks that [`write()`] could write the page, before the long work that fills it.
+///
+/// # Errors
+/// As [`write()`].
+pub(super) fn check(path: &Path) -> Result<()> {
+    check_place(path)?;
+    filled(path, &[], &[]).map(drop)
+}
+
+/// The page with its tables.
+fn filled(path: &Path, rows: &[QualityRow], previous: &[QualityRow]) -> Result<String> {
     let mut page = match fs::read_to_string(path) {
         Ok(page) => page,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => TEMPLATE.to_owned(),
@@ -34,7 +48,7 @@ pub(super) fn write(path: &Path, rows: &[QualityRow], previous: &[QualityRow]) -
             })?;
         }
     }
-    fs::write(path, page).map_err(|error| Error::io("writing", path, error))
+    Ok(page)
 }
 
 fn content(
@@ -91,5 +105,19 @@ mod tests {
         assert!(page.contains("*Skipped: no data given (`--truth-sets DIR`).*"), "{page}");
         assert!(page.contains("*Skipped: no data given (`--real DIR`). Figures of version 0.0.9.*"), "{page}");
         assert!(page.contains("| hill | multi |"), "{page}");
+    }
+
+    #[test]
+    fn pages_that_cannot_be_written_are_refused_before_the_work() {
+        let folder = tempfile::tempdir().expect("folder");
+        let said = |path: &Path| check(path).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(said(folder.path()).contains("it is a folder"));
+        assert!(said(&folder.path().join("none/quality.md")).contains("does not exist"));
+        let page = folder.path().join("quality.md");
+        assert_eq!(said(&page), "");
+        assert!(!page.exists(), "nothing is left behind");
+        fs::write(&page, "no markers\n").expect("writes");
+        assert!(said(&page).contains("there is no place for the table"));
+        assert_eq!(fs::read_to_string(&page).expect("page"), "no markers\n");
     }
 }

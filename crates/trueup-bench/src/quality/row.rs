@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use trueup::{Error, Evaluation, Measures, Project, Result};
+use trueup::{Error, Evaluation, Measures, Project, Result, write_atomically};
 
 use super::child::Measured;
 use super::discover::{Part, StitchSet};
@@ -228,7 +228,7 @@ pub(super) fn write_rows(path: &Path, rows: &[QualityRow]) -> Result<()> {
     for row in rows {
         text.push_str(&csv::line(row.cells().iter().map(String::as_str)));
     }
-    fs::write(path, text).map_err(|error| Error::io("writing", path, error))
+    write_atomically(path, text.as_bytes())
 }
 
 /// Reads what [`write_rows`] wrote.

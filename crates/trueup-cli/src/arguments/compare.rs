@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
 
-use super::shared::{GeometryArgs, TuningArgs};
+use super::shared::{GeometryArgs, MaskArgs, TuningArgs};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -14,14 +15,15 @@ Examples:
   trueup compare set/ -o compared --truth set/truth.json  with GDIC and theta error
   trueup compare --tally results-*.json                   mean scores of what people ranked
 
-Exit status: 0 at least one panorama was made, 1 the input or the system failed, 2 wrong usage, 130 stopped by Ctrl-C.
+Exit status: 0 at least one panorama was made, 1 the input or the system failed, 2 wrong usage, 130 stopped by Ctrl-C, 143 by \
+a request to terminate.
 The folder appears when it is complete. An older comparison of that name is replaced then; no other folder is.";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct CompareArgs {
     /// Files, folders (their pictures, not those of folders inside) or glob patterns; JPEG, PNG, TIFF, WebP
-    #[arg(value_name = "PHOTOS", required_unless_present = "tally")]
+    #[arg(value_name = "PHOTOS", required_unless_present = "tally", value_parser = NonEmptyStringValueParser::new())]
     pub photographs: Vec<String>,
 
     /// The folder to write
@@ -58,6 +60,9 @@ pub(crate) struct CompareArgs {
 
     #[command(flatten)]
     pub geometry: GeometryArgs,
+
+    #[command(flatten)]
+    pub masks: MaskArgs,
 
     #[command(flatten)]
     pub tuning: TuningArgs,

@@ -75,7 +75,8 @@ pub(crate) struct PictureArgs {
     #[arg(long, value_name = "SHARE", allow_hyphen_values = true, help_heading = "View")]
     pub fill: Option<String>,
 
-    /// What shows where no photograph is, in formats without transparency: black, gray or white (output.background)
+    /// What shows where no photograph is: auto (transparent where the format can, else black), transparent, black, gray,
+    /// white, '#rrggbb' or '#rgb' (quoted: shells take # for a comment) (output.background)
     #[arg(long, value_name = "COLOUR", help_heading = "View")]
     pub background: Option<String>,
 }

@@ -1,6 +1,7 @@
 //! What may be typed after `trueup stitch`.
 
 use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
 
 use super::shared::{BudgetArgs, FileArgs, GeometryArgs, MaskArgs, MessageArgs, PictureArgs, TuningArgs};
 
@@ -15,14 +16,15 @@ Examples:
 
 Defaults are overruled by --config, that by --set, and that by the flags of their own (--scale, --quality, ...).
 
-Exit status: 0 a panorama was written, 1 the input or the system failed, 2 wrong usage, 130 stopped by Ctrl-C.
-The first Ctrl-C stops at the next safe place and leaves nothing half written; the second kills at once.";
+Exit status: 0 a panorama was written, 1 the input or the system failed, 2 wrong usage, 130 stopped by Ctrl-C, 143 by a \
+request to terminate. The first Ctrl-C stops at the next safe place and leaves nothing half written; the second kills at \
+once.";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct StitchArgs {
     /// Files, folders (their pictures, not those of folders inside) or glob patterns; JPEG, PNG, TIFF, WebP
-    #[arg(value_name = "PHOTOS", required = true)]
+    #[arg(value_name = "PHOTOS", required = true, value_parser = NonEmptyStringValueParser::new())]
     pub photographs: Vec<String>,
 
     #[command(flatten)]

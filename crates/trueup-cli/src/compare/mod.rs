@@ -59,7 +59,7 @@ fn checked(args: CompareArgs) -> Result<(CompareJob, StitchOptions), Failure> {
         reference: chosen::reference(args.geometry.reference),
         graph: args.geometry.graph,
         all: false,
-        masks: Vec::new(),
+        masks: chosen::masks(&args.masks)?,
         require_all: args.geometry.require_all,
     };
     let threads = chosen::threads(&args.tuning);

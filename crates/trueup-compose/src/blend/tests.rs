@@ -9,7 +9,7 @@ use super::*;
 use crate::exposure::Corrections;
 use crate::layout::Placed;
 use crate::render::prepared::Prepared;
-use crate::render::tests::Memory;
+use crate::render::test_pictures::Memory;
 use crate::render::{Blend, Resources, run as render};
 use crate::seam::Label;
 

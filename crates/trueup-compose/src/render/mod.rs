@@ -263,6 +263,12 @@ fn report_folds(layout: &CanvasLayout, context: &StageContext) {
 }
 
 #[cfg(test)]
-pub(crate) mod tests;
+mod grid_tests;
+#[cfg(test)]
+mod row_tests;
+#[cfg(test)]
+pub(crate) mod test_pictures;
+#[cfg(test)]
+mod tests;
 #[cfg(test)]
 mod within_tests;

@@ -204,7 +204,7 @@ mod tests {
     use trueup_core::mesh::GridMesh;
 
     use super::*;
-    use crate::render::tests::{Memory, RamDisk};
+    use crate::render::test_pictures::{Memory, RamDisk};
 
     fn layout(count: usize) -> CanvasLayout {
         let placed = (0..count)

@@ -297,7 +297,7 @@ impl<P: Pixel> Blocks<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::tests::RamDisk;
+    use crate::render::test_pictures::RamDisk;
 
     #[test]
     fn a_canvas_in_a_file_is_the_canvas() {

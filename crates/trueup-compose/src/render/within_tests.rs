@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use trueup_core::raster::RowSource;
 
-use super::tests::{Memory, RamDisk, bits, canvas, moved, noise, rows};
+use super::test_pictures::{Memory, RamDisk, bits, canvas, moved, noise, rows};
 use super::*;
 use crate::crop::Coverage;
 use crate::gaps::Gaps;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use trueup_core::{Error, Result};
 
-use super::pending::{PART, PREFIX, allow_umask, require_folder};
+use super::pending::{PART, PREFIX, allow_umask, require_folder, takes_nothing};
 use super::unfinished::{Entry, UNFINISHED};
 
 /// Permissions that any new folder asks for.
@@ -24,8 +24,8 @@ impl PendingFolder {
     /// Makes an empty folder beside `target`, whose parent folder must exist. What is at `target` stays as it is.
     ///
     /// # Errors
-    /// [`Error::Input`] if `target` is a file, has no name, or its parent does not exist; [`Error::Io`] if the operating
-    /// system refuses.
+    /// [`Error::Input`] if `target` is a file, has no name, or its parent does not exist or takes nothing; [`Error::Io`] if
+    /// the operating system refuses.
     pub fn create(target: &Path) -> Result<Self> {
         let shown = target.display();
         // A link is followed, so that the folder behind it is replaced and not the link; this names ".", too.
@@ -42,7 +42,7 @@ impl PendingFolder {
         let mut builder = tempfile::Builder::new();
         builder.prefix(PREFIX).suffix(PART);
         allow_umask(&mut builder, NEW_FOLDER);
-        let make = || builder.tempdir_in(parent).map_err(|error| Error::io("writing into", parent, error));
+        let make = || builder.tempdir_in(parent).map_err(|error| takes_nothing(parent, &error));
         let (temporary, entry) = UNFINISHED.begin(make, TempDir::path)?;
         Ok(Self { temporary, target, entry })
     }

@@ -1,4 +1,4 @@
-//! Depths, tiles, smaller copies, Deep Zoom, layers and labels, read back by other crates.
+//! Depths, backgrounds, tiles and smaller copies, read back by other crates.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -6,20 +6,19 @@ use std::io::BufReader;
 use ::tiff::decoder::{Decoder, DecodingResult};
 use ::tiff::tags::Tag;
 use tempfile::TempDir;
-use trueup_core::context::{CancelToken, Silent};
 
-use super::tests::{CancelAtEnd, FullDisk, Gradient, files_in, read};
+use super::tests::{Gradient, files_in, read};
 use super::*;
 
 /// Levels of red, green, blue and alpha by place, finer than 8 bits; the middle third may be transparent.
-struct Fine {
-    width: usize,
-    height: usize,
-    hole: bool,
+pub(super) struct Fine {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) hole: bool,
 }
 
 impl Fine {
-    fn pixel(&self, x: usize, y: usize) -> [u16; 4] {
+    pub(super) fn pixel(&self, x: usize, y: usize) -> [u16; 4] {
         if self.hole && (self.width / 3..self.width * 2 / 3).contains(&x) {
             return [0; 4];
         }
@@ -57,7 +56,7 @@ impl RowSource for Fine {
     }
 }
 
-fn written(name: &str, picture: &dyn RowSource, options: &OutputOptions) -> (TempDir, std::path::PathBuf) {
+pub(super) fn written(name: &str, picture: &dyn RowSource, options: &OutputOptions) -> (TempDir, std::path::PathBuf) {
     let folder = TempDir::new().expect("a temporary folder");
     let path = folder.path().join(name);
     let bytes = write(&path, picture, &Metadata::default(), options, &StageContext::default()).expect("written");
@@ -67,11 +66,11 @@ fn written(name: &str, picture: &dyn RowSource, options: &OutputOptions) -> (Tem
     (folder, path)
 }
 
-fn pages(path: &Path) -> Decoder<BufReader<File>> {
+pub(super) fn pages(path: &Path) -> Decoder<BufReader<File>> {
     Decoder::new(BufReader::new(File::open(path).expect("a file"))).expect("a TIFF")
 }
 
-fn sixteen(decoder: &mut Decoder<BufReader<File>>) -> Vec<u16> {
+pub(super) fn sixteen(decoder: &mut Decoder<BufReader<File>>) -> Vec<u16> {
     match decoder.read_image().expect("readable") {
         DecodingResult::U16(samples) => samples,
         other => panic!("{other:?}"),
@@ -153,15 +152,50 @@ fn strips_hold_every_depth() {
 }
 
 #[test]
-fn dropped_alpha_shows_the_background() {
+fn dropped_alpha_and_chosen_colours_show_the_background() {
     let picture = Gradient { width: 20, height: 20 };
-    let options = OutputOptions { alpha: Alpha::Drop, background: Background::White, ..OutputOptions::default() };
-    for name in ["a.png", "a.tif", "a.webp"] {
-        let (_folder, path) = written(name, &picture, &options);
-        let raster = read(&path);
-        assert_eq!(raster.channels(), 3, "{name}");
-        assert_eq!((raster.pixel(2, 3), raster.pixel(15, 3)), (&[255; 3][..], &picture.pixel(15, 3)[..3]));
+    let orange = Background::Colour([255, 136, 0]);
+    let cases = [
+        (Alpha::Drop, Background::WHITE, Some([255; 3])),
+        (Alpha::Drop, Background::Auto, Some([0; 3])),
+        (Alpha::Auto, orange, Some([255, 136, 0])),
+        (Alpha::Keep, orange, None),
+        (Alpha::Auto, Background::Auto, None),
+        (Alpha::Auto, Background::Transparent, None),
+    ];
+    for (alpha, background, shown) in cases {
+        let options = OutputOptions { alpha, background, ..OutputOptions::default() };
+        for name in ["a.png", "a.tif", "a.webp"] {
+            let (_folder, path) = written(name, &picture, &options);
+            let raster = read(&path);
+            let pixel = picture.pixel(15, 3);
+            match shown {
+                None => assert_eq!((raster.pixel(2, 3)[3], raster.pixel(15, 3)), (0, &pixel[..]), "{name} {options:?}"),
+                Some(shown) => assert_eq!((raster.pixel(2, 3), raster.pixel(15, 3)), (&shown[..], &pixel[..3])),
+            }
+        }
     }
+}
+
+#[test]
+fn a_transparent_background_is_refused_where_nothing_is_transparent() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let said = |name: &str, options: OutputOptions| {
+        let options = OutputOptions { background: Background::Transparent, ..options };
+        check_writable(&folder.path().join(name), &options).err().map(|error| error.to_string())
+    };
+    for (name, options, advice) in [
+        ("a.jpg", OutputOptions::default(), "End the name in .png, .tif or .webp"),
+        ("a.dzi", OutputOptions::default(), "Set output.dzi_format to png"),
+        ("a.png", OutputOptions { alpha: Alpha::Drop, ..OutputOptions::default() }, "Leave output.alpha at auto"),
+    ] {
+        let said = said(name, options).expect("refused");
+        assert!(said.contains("a transparent background is not supported") && said.contains(advice), "{said}");
+    }
+    let png_tiles = OutputOptions { dzi_format: DeepZoomFormat::Png, ..OutputOptions::default() };
+    assert_eq!(said("a.dzi", png_tiles), None);
+    assert_eq!(said("a.png", OutputOptions::default()), None);
+    assert!(files_in(&folder).is_empty());
 }
 
 #[test]
@@ -182,241 +216,4 @@ fn a_depth_that_a_format_has_not_is_refused_with_advice() {
     assert_eq!([depth("a.tif", 8), depth("a.jpg", 16), depth("a.dzi", 16)], [Depth::Eight; 3]);
     let chosen = OutputOptions { depth: Depth::Float, ..OutputOptions::default() };
     assert_eq!(chosen.with_depth_for(Path::new("a.tif"), 8).depth, Depth::Float);
-}
-
-/// The tiles of every level, put together by the arithmetic of the format, are the picture and its halves.
-#[test]
-fn deep_zoom_tiles_make_up_every_level() {
-    let picture = Gradient { width: 150, height: 97 };
-    let options = OutputOptions {
-        dzi_format: DeepZoomFormat::Png,
-        dzi_tile_px: 32,
-        dzi_overlap_px: 2,
-        ..OutputOptions::default()
-    };
-    let (folder, path) = written("pano.dzi", &picture, &options);
-    let mut names = files_in(&folder);
-    names.sort();
-    assert_eq!(names, ["pano.dzi", "pano_files"]);
-    let description = std::fs::read_to_string(&path).expect("a text");
-    for part in ["Format=\"png\"", "Overlap=\"2\"", "TileSize=\"32\"", "Width=\"150\"", "Height=\"97\""] {
-        assert!(description.contains(part), "{description}");
-    }
-    let mut tiles = 0;
-    for level in 0..=8_u32 {
-        // The size of a level by the format's own rule: 2^8 is the first power that holds 150 pixels.
-        let size = |length: usize| length.div_ceil(1 << (8 - level));
-        let (width, height) = (size(150), size(97));
-        let at_level = folder.path().join("pano_files").join(level.to_string());
-        for row in 0..height.div_ceil(32) {
-            for column in 0..width.div_ceil(32) {
-                let raster = read_small(&at_level.join(format!("{column}_{row}.png")));
-                tiles += 1;
-                let (left, top) = ((column * 32_usize).saturating_sub(2), (row * 32_usize).saturating_sub(2));
-                assert_eq!(raster.width(), ((column + 1) * 32 + 2).min(width) - left);
-                assert_eq!(raster.height(), ((row + 1) * 32 + 2).min(height) - top);
-                for y in 0..raster.height() {
-                    for x in 0..raster.width() {
-                        if level == 8 {
-                            assert_eq!(raster.pixel(x, y), picture.pixel(left + x, top + y));
-                        } else if left + x < (width / 2).saturating_sub(1) {
-                            assert_eq!(raster.pixel(x, y)[3], 0, "the left half is transparent at level {level}");
-                        }
-                    }
-                }
-            }
-        }
-    }
-    let found: usize = (0..=8)
-        .map(|level: u32| {
-            let folder = folder.path().join("pano_files").join(level.to_string());
-            std::fs::read_dir(folder).expect("a level").count()
-        })
-        .sum();
-    assert_eq!(found, tiles);
-}
-
-/// A PNG of any size, which photographs are not.
-fn read_small(path: &Path) -> trueup_core::raster::Raster<u8> {
-    let mut reader = png::Decoder::new(BufReader::new(File::open(path).expect("a file"))).read_info().expect("a PNG");
-    let mut bytes = vec![0; reader.output_buffer_size().expect("a size")];
-    let info = reader.next_frame(&mut bytes).expect("readable");
-    trueup_core::raster::Raster::from_data(info.width as usize, info.height as usize, 4, bytes).expect("RGBA")
-}
-
-#[test]
-fn deep_zoom_replaces_its_own_tiles_only() {
-    let options = OutputOptions::default();
-    let (folder, path) = written("pano.dzi", &Gradient { width: 300, height: 300 }, &options);
-    let tiles = folder.path().join("pano_files");
-    assert!(tiles.join("9/1_1.jpg").is_file());
-    write(&path, &Gradient { width: 200, height: 100 }, &Metadata::default(), &options, &StageContext::default())
-        .expect("written again");
-    assert!(!tiles.join("9").exists() && tiles.join("8/0_0.jpg").is_file());
-
-    let cancel = CancelToken::default();
-    let picture = CancelAtEnd(Gradient { width: 300, height: 300 }, &cancel);
-    let stopped = write(&path, &picture, &Metadata::default(), &options, &StageContext::new(&Silent, &cancel, 0));
-    assert!(matches!(stopped, Err(Error::Cancelled)), "{stopped:?}");
-    assert!(!tiles.join("9").exists() && tiles.join("8/0_0.jpg").is_file());
-    assert_eq!(files_in(&folder).len(), 2);
-
-    std::fs::write(tiles.join("8/notes.txt"), "mine").expect("written");
-    for refused in [
-        check_writable(&path, &options),
-        write(&path, &picture.0, &Metadata::default(), &options, &StageContext::default()).map(drop),
-    ] {
-        let message = refused.expect_err("notes are kept").to_string();
-        assert!(message.contains("notes.txt"), "{message}");
-    }
-    assert_eq!(files_in(&folder).len(), 2);
-}
-
-#[test]
-fn deep_zoom_does_not_depend_on_the_threads() {
-    let picture = Gradient { width: 600, height: 300 };
-    let bytes_with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        let (folder, _) = pool.install(|| written("a.dzi", &picture, &OutputOptions::default()));
-        let tile = |name: &str| std::fs::read(folder.path().join("a_files").join(name)).expect("a tile");
-        [tile("10/0_0.jpg"), tile("10/2_1.jpg"), tile("9/1_0.jpg"), tile("0/0_0.jpg")]
-    };
-    assert_eq!(bytes_with(1), bytes_with(3));
-}
-
-/// Two layers on a panorama of 400 x 300 pixels.
-struct TwoLayers;
-
-impl LayerSet for TwoLayers {
-    fn whole(&self) -> [usize; 2] {
-        [400, 300]
-    }
-    fn count(&self) -> usize {
-        2
-    }
-    fn pixels(&self) -> u64 {
-        200 * 100 * 2
-    }
-    fn open(&self, index: usize) -> Result<LayerPage<'_>> {
-        let rows = Box::new(Fine { width: 200, height: 100, hole: false });
-        Ok(LayerPage { name: ["a.jpg", "Übung.tif"][index].to_owned(), corner: [[10, 20], [150, 200]][index], rows })
-    }
-}
-
-#[test]
-fn layers_are_pages_with_a_place() {
-    let folder = TempDir::new().expect("a temporary folder");
-    let path = folder.path().join("layers.tif");
-    for layer_extent in [LayerExtent::Canvas, LayerExtent::Cropped] {
-        let options = OutputOptions { layer_extent, depth: Depth::Sixteen, ..OutputOptions::default() };
-        let bytes =
-            write_layers(&path, &TwoLayers, &Metadata::default(), &options, &StageContext::default()).expect("written");
-        assert_eq!(bytes, path.metadata().expect("a file").len());
-        let mut file = pages(&path);
-        for (index, [left, top]) in [[10, 20], [150, 200]].into_iter().enumerate() {
-            if index > 0 {
-                file.next_image().expect("another page");
-            }
-            let (width, height) = file.dimensions().expect("a size");
-            let samples = sixteen(&mut file);
-            let pixel = |x: usize, y: usize| &samples[(y * width as usize + x) * 4..][..4];
-            let layer = Fine { width: 200, height: 100, hole: false };
-            let numbers = |tag| file.get_tag_u32_vec(Tag::Unknown(tag)).expect("a tag");
-            let corner = match layer_extent {
-                LayerExtent::Canvas => {
-                    assert_eq!((width, height), (400, 300));
-                    assert_eq!((pixel(0, 0), pixel(left - 1, top)), (&[0; 4][..], &[0; 4][..]));
-                    assert_eq!(pixel(left + 3, top + 7), layer.pixel(3, 7));
-                    [0, 0]
-                }
-                LayerExtent::Cropped => {
-                    assert_eq!((width, height), (200, 100));
-                    assert_eq!(pixel(3, 7), layer.pixel(3, 7));
-                    [left as u32, top as u32]
-                }
-            };
-            let place = |file: &mut Decoder<_>, tag| match file.get_tag(Tag::Unknown(tag)).expect("a tag") {
-                ::tiff::decoder::ifd::Value::Rational(n, d) => f64::from(n) * 72.0 / f64::from(d),
-                other => panic!("{other:?}"),
-            };
-            let mut numbers = numbers;
-            assert_eq!((numbers(33300), numbers(33301)), (vec![400], vec![300]));
-            assert_eq!(numbers(297), [index as u32, 2]);
-            assert_eq!([place(&mut file, 286), place(&mut file, 287)], corner.map(f64::from));
-        }
-        assert!(!file.more_images());
-        let bytes = std::fs::read(&path).expect("a file");
-        assert!(bytes.windows(10).any(|some| some == "Übung.tif".as_bytes()));
-    }
-    assert!(check_layers_place(&folder.path().join("a.png")).is_err());
-    let options = OutputOptions::default();
-    for room in [0, 100, 5_000] {
-        let failed = tiff::write_pages(
-            &mut FullDisk { position: 0, room },
-            &TwoLayers,
-            &Metadata::default(),
-            &options,
-            &StageContext::default(),
-        );
-        assert!(matches!(failed, Err(Failure::Io(_))), "{failed:?}");
-    }
-}
-
-/// Labels that grow along the rows.
-struct Stripes(usize);
-
-impl LabelMap for Stripes {
-    fn size(&self) -> [usize; 2] {
-        [self.0 + 1, 5]
-    }
-    fn names(&self) -> Vec<String> {
-        (1..=self.0).map(|number| format!("IMG_{number}.jpg")).collect()
-    }
-    fn row(&self, _: usize, row: &mut Vec<u16>) -> Result<()> {
-        row.clear();
-        row.extend(0..=self.0 as u16);
-        Ok(())
-    }
-}
-
-#[test]
-fn labels_are_the_samples() {
-    let folder = TempDir::new().expect("a temporary folder");
-    let path = folder.path().join("seams.png");
-    for photographs in [3, 255, 300] {
-        write_labels(&path, &Stripes(photographs), &OutputOptions::default(), &StageContext::default())
-            .expect("written");
-        let mut decoder = png::Decoder::new(BufReader::new(File::open(&path).expect("a file")));
-        decoder.set_transformations(png::Transformations::IDENTITY);
-        let mut reader = decoder.read_info().expect("a PNG");
-        let named = reader
-            .info()
-            .utf8_text
-            .iter()
-            .any(|text| text.keyword == "Photograph 3" && text.get_text().is_ok_and(|text| text == "IMG_3.jpg"));
-        assert!(named);
-        let mut bytes = vec![0; reader.output_buffer_size().expect("a size")];
-        let info = reader.next_frame(&mut bytes).expect("readable");
-        let labels: Vec<u16> = match photographs {
-            ..=255 => bytes.iter().map(|&byte| u16::from(byte)).collect(),
-            _ => bytes.as_chunks::<2>().0.iter().map(|&pair| u16::from_be_bytes(pair)).collect(),
-        };
-        assert_eq!(info.color_type == png::ColorType::Indexed, photographs <= 255);
-        assert_eq!(labels[..photographs + 1], (0..=photographs as u16).collect::<Vec<_>>());
-        if photographs == 255 {
-            let palette = reader.info().palette.as_ref().expect("a palette").to_vec();
-            let mut colors: Vec<[u8; 3]> = palette.as_chunks::<3>().0.to_vec();
-            colors.sort_unstable();
-            colors.dedup();
-            assert_eq!(colors.len(), 256, "colours are distinct");
-        }
-    }
-    let failed = labels::write_map(
-        &mut FullDisk { position: 0, room: 50 },
-        &Stripes(300),
-        &OutputOptions::default(),
-        &StageContext::default(),
-    );
-    assert!(matches!(failed, Err(Failure::Io(_))));
-    assert!(check_labels_place(&folder.path().join("a.tif")).is_err());
 }

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use trueup_core::{Error, Result};
 
-use super::options::{Depth, OutputOptions};
-use super::{RGBA, tiff};
+use super::options::{Alpha, DeepZoomFormat, Depth, OutputOptions};
+use super::{Background, RGBA, tiff};
 use crate::format::{OutputFormat, PictureFormat};
 
-/// The format that the extension of `path` names; refuses one that has not the depth asked for.
+/// The format that the extension of `path` names; refuses one that has not the depth or the background asked for.
 pub(super) fn output_format(path: &Path, options: &OutputOptions) -> Result<OutputFormat> {
     let format = OutputFormat::of_extension(path).ok_or_else(|| {
         let what = match path.extension() {
@@ -17,13 +17,20 @@ pub(super) fn output_format(path: &Path, options: &OutputOptions) -> Result<Outp
         };
         Error::Unsupported { what, hint: "End the name in .jpg, .jpeg, .png, .tif, .tiff, .webp or .dzi.".to_owned() }
     })?;
+    check_depth(path, format, options)?;
+    check_background(path, format, options)?;
+    Ok(format)
+}
+
+/// Refuses a format that has not the depth asked for.
+fn check_depth(path: &Path, format: OutputFormat, options: &OutputOptions) -> Result<()> {
     let (what, has) = match options.depth {
-        Depth::Auto | Depth::Eight => return Ok(format),
+        Depth::Auto | Depth::Eight => return Ok(()),
         Depth::Sixteen => ("16 bits a sample", &[PictureFormat::Png, PictureFormat::Tiff][..]),
         Depth::Float => ("floating point samples", &[PictureFormat::Tiff][..]),
     };
     match format {
-        OutputFormat::Picture(picture) if has.contains(&picture) => Ok(format),
+        OutputFormat::Picture(picture) if has.contains(&picture) => Ok(()),
         _ => Err(Error::Unsupported {
             what: format!("writing {} with {what}", path.display()),
             hint: match options.depth {
@@ -33,6 +40,23 @@ pub(super) fn output_format(path: &Path, options: &OutputOptions) -> Result<Outp
             .to_owned(),
         }),
     }
+}
+
+/// Refuses a background that is to be transparent where nothing can be.
+fn check_background(path: &Path, format: OutputFormat, options: &OutputOptions) -> Result<()> {
+    let hint = match format {
+        _ if options.background != Background::Transparent => return Ok(()),
+        OutputFormat::Picture(PictureFormat::Jpeg) => {
+            "End the name in .png, .tif or .webp, or leave the background at auto, or choose a colour."
+        }
+        OutputFormat::DeepZoom if options.dzi_format == DeepZoomFormat::Jpeg => {
+            "Set output.dzi_format to png, or leave the background at auto, or choose a colour."
+        }
+        _ if options.alpha == Alpha::Drop => "Leave output.alpha at auto.",
+        OutputFormat::DeepZoom | OutputFormat::Picture(_) => return Ok(()),
+    };
+    let what = format!("writing {} with a transparent background", path.display());
+    Err(Error::Unsupported { what, hint: hint.to_owned() })
 }
 
 /// The longest side that a format can hold, and what to do about a longer one.

@@ -1,7 +1,12 @@
 //! Panoramas to files, row by row. A file appears complete or not at all.
 
+mod background;
+#[cfg(test)]
+mod by_hand_tests;
 mod codecs;
 mod deep_zoom;
+#[cfg(test)]
+mod deep_zoom_tests;
 mod expected;
 mod folder;
 #[cfg(test)]
@@ -33,15 +38,17 @@ use crate::format::{OutputFormat, PictureFormat};
 use codecs::from_tiff;
 use limits::{check_sides, largest_side, output_format};
 use pending::PendingFile;
+pub(crate) use pending::takes_nothing;
 use samples::Sample;
 
+pub use background::Background;
 pub use expected::expected_bytes;
 pub use folder::PendingFolder;
 pub use labels::{LabelMap, NOTHING, check_labels_place, write_labels};
 pub use metadata::Metadata;
 pub use options::{
-    Alpha, Background, BigTiff, ChromaSubsampling, DeepZoomFormat, Depth, LayerExtent, MetadataKept, OutputOptions,
-    OutputProfile, PngCompression, TiffCompression, TiffLayout,
+    Alpha, BigTiff, ChromaSubsampling, DeepZoomFormat, Depth, LayerExtent, MetadataKept, OutputOptions, OutputProfile,
+    PngCompression, TiffCompression, TiffLayout,
 };
 pub use tiff::{LayerPage, LayerSet, check_layers_place, write_layers};
 #[cfg(test)]
@@ -55,16 +62,17 @@ pub use unfinished::abandon_unfinished;
 /// the EXIF and XMP to embed; Deep Zoom has none.
 ///
 /// Rows are asked for in strips, in parallel on the current thread pool; only WebP needs a copy of the whole. JPEG is
-/// laid over the background, the other formats keep transparency unless [`OutputOptions::alpha`] says otherwise. A depth
-/// of [`Depth::Auto`] is taken for 8 bits, see [`OutputOptions::with_depth_for`]. The bytes written depend on the picture
-/// and the options alone. The file is written under another name in the same folder and renamed when it is complete, so
-/// that on any error nothing is left behind and an existing file stays as it was.
+/// laid over the background, the other formats keep transparency unless [`OutputOptions::background`] is a colour or
+/// [`OutputOptions::alpha`] says otherwise. A depth of [`Depth::Auto`] is taken for 8 bits, see
+/// [`OutputOptions::with_depth_for`]. The bytes written depend on the picture and the options alone. The file is written
+/// under another name in the same folder and renamed when it is complete, so that on any error nothing is left behind and
+/// an existing file stays as it was.
 ///
 /// # Errors
-/// [`Error::Options`] for options out of range; [`Error::Unsupported`] for other extensions, or a depth that the format
-/// has not; [`Error::Limits`] for pictures larger than the format can hold; [`Error::Input`] for an empty picture or a
-/// folder that does not exist; [`Error::Io`] if the operating system refuses; [`Error::Cancelled`]; and what the picture
-/// returns.
+/// [`Error::Options`] for options out of range; [`Error::Unsupported`] for other extensions, a depth that the format has
+/// not, or a transparent background where there is no transparency; [`Error::Limits`] for pictures larger than the format
+/// can hold; [`Error::Input`] for an empty picture, or a folder that does not exist or takes no files; [`Error::Io`] if the
+/// operating system refuses; [`Error::Cancelled`]; and what the picture returns.
 pub fn write(
     path: &Path,
     picture: &dyn RowSource,
@@ -108,16 +116,26 @@ fn profile_to_leave<'a>(metadata: &'a Metadata, options: &OutputOptions, always:
 }
 
 /// Checks that a panorama could be written to `path`, before the long work that makes one: the extension names a format
-/// that has the depth asked for, the folder exists and takes files, and `path` is no folder itself. Nothing is left
-/// behind.
+/// that has the depth and the background asked for, the folder exists and takes files, and `path` is no folder itself.
+/// Nothing is left behind.
 ///
 /// # Errors
 /// As [`write()`].
 pub fn check_writable(path: &Path, options: &OutputOptions) -> Result<()> {
+    // Before its extension is missed, of which folders have none.
+    pending::refuse_folder(path)?;
     match output_format(path, options)? {
         OutputFormat::DeepZoom => deep_zoom::check_places(path),
         OutputFormat::Picture(_) => check_place(path),
     }
+}
+
+/// Checks that the extension of `path` names a format that has the depth and the background asked for, wherever it lies.
+///
+/// # Errors
+/// [`Error::Unsupported`].
+pub fn check_format(path: &Path, options: &OutputOptions) -> Result<()> {
+    output_format(path, options).map(drop)
 }
 
 /// Checks that a file of any kind could be written to `path`: the folder exists and takes files, and `path` is no folder
@@ -132,7 +150,7 @@ pub fn check_place(path: &Path) -> Result<()> {
 /// Writes a file that appears complete or not at all; for reports and project files.
 ///
 /// # Errors
-/// [`Error::Input`] if the folder does not exist, [`Error::Io`] if the operating system refuses.
+/// [`Error::Input`] if the folder does not exist or takes no files, [`Error::Io`] if the operating system refuses.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut pending = PendingFile::create(path)?;
     std::io::Write::write_all(pending.file(), bytes).map_err(|error| Error::io("writing", path, error))?;
@@ -141,11 +159,8 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
 
 /// Samples of a pixel in the file: 4, or 3 without alpha.
 fn channels_of(picture: &dyn RowSource, options: &OutputOptions) -> usize {
-    match options.alpha {
-        Alpha::Keep => RGBA,
-        Alpha::Drop => RGBA - 1,
-        Alpha::Auto => RGBA - usize::from(picture.is_opaque()),
-    }
+    let opaque = options.alpha == Alpha::Auto && picture.is_opaque();
+    RGBA - usize::from(opaque || !options.background.keeps(options.alpha))
 }
 
 /// Samples of an RGBA pixel.

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use crate::format::{OutputFormat, PictureFormat};
 
+use super::Background;
+
 trueup_core::choice! {
     /// How finely JPEG stores colour, relative to brightness.
     pub enum ChromaSubsampling {
@@ -45,7 +47,7 @@ trueup_core::choice! {
 trueup_core::choice! {
     /// Whether pictures are written with transparency.
     pub enum Alpha {
-        /// Where it is not certain that every pixel is opaque.
+        /// Where it is not certain that every pixel is opaque, and no colour is chosen for the background.
         Auto = "auto",
         /// Always, where the format can.
         Keep = "keep",
@@ -109,18 +111,6 @@ trueup_core::choice! {
 }
 
 trueup_core::choice! {
-    /// What shows through where the panorama is transparent and the format cannot say so.
-    pub enum Background {
-        /// Black.
-        Black = "black",
-        /// Middle gray.
-        Gray = "gray",
-        /// White.
-        White = "white",
-    }
-}
-
-trueup_core::choice! {
     /// Which colour space panoramas are written in.
     pub enum OutputProfile {
         /// That of the photographs, whose profile is embedded.
@@ -149,17 +139,6 @@ impl Depth {
             Self::Auto | Self::Eight => 1,
             Self::Sixteen => 2,
             Self::Float => 4,
-        }
-    }
-}
-
-impl Background {
-    /// The value of all three channels.
-    pub(super) fn value(self) -> u8 {
-        match self {
-            Self::Black => 0,
-            Self::Gray => 128,
-            Self::White => 255,
         }
     }
 }
@@ -193,8 +172,8 @@ trueup_core::options! {
         dzi_format: DeepZoomFormat = DeepZoomFormat::Jpeg, Allowed::Any, "";
         /// How large the pages of a file of layers are.
         layer_extent: LayerExtent = LayerExtent::Canvas, Allowed::Any, "";
-        /// What shows through transparent parts where there is no transparency, as in JPEG.
-        background: Background = Background::Black, Allowed::Any, "";
+        /// What shows where no photograph is. A colour is laid under the panorama in every format, unless alpha is kept.
+        background: Background = Background::Auto, Allowed::Any, "";
         /// Which colour space panoramas are written in. Deep Zoom tiles and floating point samples are in sRGB's.
         profile: OutputProfile = OutputProfile::Keep, Allowed::Any, "";
         /// What panoramas tell of their photographs, in EXIF and XMP.

@@ -34,9 +34,7 @@ impl PendingFile {
             Some(folder) => folder,
             None => Path::new("/"),
         };
-        if target.is_dir() {
-            return Err(Error::input(path.display(), "it is a folder", "Give the name of a file in it."));
-        }
+        refuse_folder(path)?;
         require_folder(folder, path.display())?;
         let existing = target.metadata().ok();
         if existing.as_ref().is_some_and(|metadata| metadata.permissions().readonly()) {
@@ -53,7 +51,7 @@ impl PendingFile {
             Some(metadata) => drop(builder.permissions(metadata.permissions())),
             None => allow_umask(&mut builder, NEW_FILE),
         }
-        let make = || builder.tempfile_in(folder).map_err(|error| Error::io("writing into", folder, error));
+        let make = || builder.tempfile_in(folder).map_err(|error| takes_nothing(folder, &error));
         let (temporary, entry) = UNFINISHED.begin(make, NamedTempFile::path)?;
         Ok(Self { temporary, target, _entry: entry })
     }
@@ -73,6 +71,14 @@ impl PendingFile {
     }
 }
 
+/// Refuses a folder where a file is to be.
+pub(super) fn refuse_folder(path: &Path) -> Result<()> {
+    match path.is_dir() {
+        true => Err(Error::input(path.display(), "it is a folder", "Give the name of a file in it.")),
+        false => Ok(()),
+    }
+}
+
 /// Refuses `shown`, which is to lie in `folder`, if that folder does not exist.
 pub(super) fn require_folder(folder: &Path, shown: impl Display) -> Result<()> {
     if folder.is_dir() {
@@ -80,6 +86,15 @@ pub(super) fn require_folder(folder: &Path, shown: impl Display) -> Result<()> {
     }
     let reason = format!("the folder {} does not exist", folder.display());
     Err(Error::input(shown, reason, "Create it or choose another folder."))
+}
+
+/// Why nothing can be made in `folder`.
+pub(crate) fn takes_nothing(folder: &Path, error: &std::io::Error) -> Error {
+    // The name that was tried, which follows, is temporary and nobody's concern.
+    let said = error.to_string();
+    let cause = said.split(" at path ").next().unwrap_or_default();
+    let reason = format!("nothing can be written into this folder ({cause})");
+    Error::input(folder.display(), reason, "Check its permissions or choose another folder.")
 }
 
 /// Gives what is built the permissions `mode` but for those that the user's umask withholds.

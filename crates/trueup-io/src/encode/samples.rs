@@ -1,6 +1,7 @@
 //! Samples on their way from a picture into a file, at any depth.
 
 use trueup_core::Result;
+use trueup_core::colour::TransferCurve;
 use trueup_core::raster::RowSource;
 
 use super::Background;
@@ -18,11 +19,11 @@ pub(super) trait Sample: Copy + Default + PartialEq + Send + Sync + 'static {
     /// The mean of four pixels, each weighted by its alpha.
     fn mean(pixels: [[Self; 4]; 4]) -> [Self; 4];
 
-    /// A pixel laid over a background of one value.
-    fn over(pixel: [Self; 4], background: Self) -> [Self; 3];
+    /// A pixel laid over a background.
+    fn over(pixel: [Self; 4], background: [Self; 3]) -> [Self; 3];
 
-    /// The value of a background.
-    fn of(background: Background) -> Self;
+    /// The samples of a background.
+    fn of(background: Background) -> [Self; 3];
 
     /// Appends a row of samples as they are, in the machine's order of bytes.
     fn append(row: &[Self], bytes: &mut Vec<u8>);
@@ -57,18 +58,19 @@ macro_rules! whole_sample {
             }
 
             #[inline]
-            fn over([r, g, b, alpha]: [Self; 4], background: Self) -> [Self; 3] {
+            fn over([r, g, b, alpha]: [Self; 4], below: [Self; 3]) -> [Self; 3] {
                 const FULL: $wide = <$type>::MAX as $wide;
-                let (alpha, background) = (<$wide>::from(alpha), <$wide>::from(background));
+                let alpha = <$wide>::from(alpha);
                 // Rounded division.
-                [r, g, b].map(|value| {
-                    ((<$wide>::from(value) * alpha + background * (FULL - alpha) + FULL / 2) / FULL) as $type
-                })
+                let mixed = |value: Self, below: Self| {
+                    ((<$wide>::from(value) * alpha + <$wide>::from(below) * (FULL - alpha) + FULL / 2) / FULL) as $type
+                };
+                [mixed(r, below[0]), mixed(g, below[1]), mixed(b, below[2])]
             }
 
-            fn of(background: Background) -> Self {
+            fn of(background: Background) -> [Self; 3] {
                 // From 8 bits to as many as there are: 255 becomes the largest value.
-                <$type>::from(background.value()) * (<$type>::MAX / <$type>::from(u8::MAX))
+                background.levels().map(|level| <$type>::from(level) * (<$type>::MAX / <$type>::from(u8::MAX)))
             }
 
             fn append(row: &[Self], bytes: &mut Vec<u8>) {
@@ -106,18 +108,14 @@ impl Sample for f32 {
     }
 
     #[inline]
-    fn over([r, g, b, alpha]: [Self; 4], background: Self) -> [Self; 3] {
-        [r, g, b].map(|value| value * alpha + background * (1.0 - alpha))
+    fn over([r, g, b, alpha]: [Self; 4], below: [Self; 3]) -> [Self; 3] {
+        let mixed = |value: Self, below: Self| value * alpha + below * (1.0 - alpha);
+        [mixed(r, below[0]), mixed(g, below[1]), mixed(b, below[2])]
     }
 
-    fn of(background: Background) -> Self {
-        /// Linear light of the 8-bit level 128 (IEC 61966-2-1:1999, equation 6).
-        const MIDDLE_GRAY: f32 = 0.215_861;
-        match background {
-            Background::Black => 0.0,
-            Background::Gray => MIDDLE_GRAY,
-            Background::White => 1.0,
-        }
+    /// Floating point samples are in sRGB's primaries, so that levels are by its curve.
+    fn of(background: Background) -> [Self; 3] {
+        background.levels().map(|level| TransferCurve::SRGB.linear(f64::from(level) / f64::from(u8::MAX)) as f32)
     }
 
     fn append(row: &[Self], bytes: &mut Vec<u8>) {
@@ -136,7 +134,7 @@ impl Sample for f32 {
 }
 
 /// A row of RGBA as it is written: with `channels` 4 as it is, with 3 laid over the background. Replaces `out`.
-pub(super) fn flattened<S: Sample>(rgba: &[S], channels: usize, background: S, out: &mut Vec<S>) {
+pub(super) fn flattened<S: Sample>(rgba: &[S], channels: usize, background: [S; 3], out: &mut Vec<S>) {
     out.clear();
     match channels {
         4 => out.extend_from_slice(rgba),
@@ -160,10 +158,15 @@ mod tests {
 
     #[test]
     fn transparent_parts_show_the_background() {
-        assert_eq!(u8::over([200, 100, 0, 255], 128), [200, 100, 0]);
-        assert_eq!(u16::over([9, 9, 9, 0], u16::of(Background::White)), [65535; 3]);
-        assert_eq!(u16::of(Background::Gray), 128 * 257);
-        assert_eq!(f32::over([1.0, 0.5, 0.0, 0.5], 1.0), [1.0, 0.75, 0.5]);
+        assert_eq!(u8::over([200, 100, 0, 255], [128; 3]), [200, 100, 0]);
+        // 200 / 255 and 55 / 255 of 40, 60 and 80 over 1, 2 and 3, rounded.
+        assert_eq!(u8::over([40, 60, 80, 200], [1, 2, 3]), [32, 47, 63]);
+        assert_eq!(u16::over([9, 9, 9, 0], u16::of(Background::WHITE)), [65535; 3]);
+        assert_eq!(u16::of(Background::Colour([128, 1, 0])), [128 * 257, 257, 0]);
+        assert_eq!(f32::over([1.0, 0.5, 0.0, 0.5], [1.0, 1.0, 0.5]), [1.0, 0.75, 0.25]);
+        // IEC 61966-2-1:1999, equation 6: ((128 / 255 + 0.055) / 1.055)^2.4.
+        let [r, g, b] = f32::of(Background::Colour([128, 0, 255]));
+        assert!((r - 0.215_861).abs() < 1e-6 && g == 0.0 && b == 1.0, "{r} {g} {b}");
     }
 
     /// The bytes of two pixels of one channel: 1.0 is 3f800000, -2.0 is c0000000.

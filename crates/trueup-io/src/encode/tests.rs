@@ -113,7 +113,7 @@ fn jpeg_strips_join_without_a_trace() {
     for (width, height) in [(50, 500), (33, 48), (16, 49), (17, 16), (64, 96)] {
         let picture = Gradient { width, height };
         for jpeg_subsampling in subsamplings {
-            let options = OutputOptions { jpeg_subsampling, background: Background::White, ..OutputOptions::default() };
+            let options = OutputOptions { jpeg_subsampling, background: Background::WHITE, ..OutputOptions::default() };
             let path = folder.path().join("a.jpg");
             write(&path, &picture, &Metadata::default(), &options, &StageContext::default()).expect("written");
             let raster = read(&path);

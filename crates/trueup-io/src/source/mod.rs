@@ -133,6 +133,15 @@ pub fn scan(inputs: &[String], options: &SourceOptions, context: &StageContext) 
     Ok(sources)
 }
 
+/// The files that `inputs` name, as [`scan`] finds them, without a look into any: photographs and what is none.
+pub fn files(inputs: &[String]) -> Vec<PathBuf> {
+    let file = |candidate| match candidate {
+        Candidate::File(path) => Some(path),
+        Candidate::Rejected(..) => None,
+    };
+    inputs::expand(inputs).into_iter().filter_map(file).collect()
+}
+
 /// Decides over one candidate.
 fn examine(
     candidate: Candidate,

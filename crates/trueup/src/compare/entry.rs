@@ -35,7 +35,8 @@ impl Entry {
     pub fn method(name: &str) -> Result<Self> {
         Self::methods().into_iter().find(|entry| entry.name == name).ok_or_else(|| {
             let known = Method::choices().join(", ");
-            Error::input(name, "there is no such method", format!("The methods are {known}."))
+            let reason = format!("there is no such method; there are {known}");
+            Error::input(name, reason, "Choose one of them.")
         })
     }
 

@@ -4,28 +4,26 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use rand::Rng;
-use trueup_compose::layout::median_cell_scale;
 use trueup_core::options::OptionValue;
 use trueup_core::truth::Truth;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::encode::{self, PendingFolder};
+use trueup_io::source;
 
-use super::drawing::{self, Drawing};
+use super::drawing::Drawing;
+use super::making::{Common, all_refused};
 use super::place::{RECORD, check_replaceable, file_stems, spare_photographs};
-use super::record::{
-    COMPARISON_FORMAT, COMPARISON_VERSION, Compared, ComparedPhotograph, Comparison, PanoramaRecord, Refusal,
-};
+use super::record::{COMPARISON_FORMAT, COMPARISON_VERSION, Compared, ComparedPhotograph, Comparison};
 use super::{Entry, figures, overlaps, ranking};
 use crate::cache::Cache;
-use crate::evaluation::{evaluate, read_truth};
+use crate::evaluation::read_truth;
 use crate::inputs::Inputs;
 use crate::options::StitchOptions;
 use crate::project::{ImageRecord, Project};
-use crate::recorded::grid;
-use crate::stitcher::{Alignment, MatchedPhotographs, Stitcher};
+use crate::stitcher::Stitcher;
 
 /// Progress over the entries is reported as this.
-const STAGE: &str = "panoramas";
+pub(super) const STAGE: &str = "panoramas";
 
 /// What to compare, and where to put it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -58,25 +56,6 @@ pub struct Page {
 /// Makes a front's pages of a comparison and the drawings of its entries, one each, empty where there is no panorama.
 type MakePages<'a> = dyn Fn(&Comparison, &[Drawing]) -> Result<Vec<Page>> + Sync + 'a;
 
-/// What is the same for all entries.
-struct Common<'a> {
-    options: &'a StitchOptions,
-    set: &'a MatchedPhotographs,
-    truth: Option<&'a Truth>,
-    overlap_scale: f64,
-    folder: &'a Path,
-    context: &'a StageContext<'a>,
-}
-
-/// One entry and what came of it.
-struct Made {
-    compared: Compared,
-    drawing: Drawing,
-    project: Option<Project>,
-    /// The error behind a refusal.
-    error: Option<Error>,
-}
-
 impl CompareJob {
     /// Runs the job. Photographs are measured and matched once; every entry that can be made is made, the others are
     /// refused with their reason. `pages` adds the front's pages. The folder appears when it is complete; an older
@@ -88,8 +67,11 @@ impl CompareJob {
     pub fn run(&self, options: &StitchOptions, context: &StageContext, pages: &MakePages) -> Result<Comparison> {
         options.validate()?;
         self.check_entries(options)?;
+        self.check_formats(options)?;
         let truth = self.truth.as_deref().map(read_truth).transpose()?;
         check_replaceable(&self.output)?;
+        let photographs = source::files(&self.inputs.photographs);
+        spare_photographs(&self.output, photographs.iter().map(PathBuf::as_path))?;
         let folder = PendingFolder::create(&self.output)?;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads)
@@ -101,6 +83,16 @@ impl CompareJob {
         check_replaceable(&self.output)?;
         folder.commit()?;
         Ok(comparison)
+    }
+
+    /// Refuses options that the panoramas' format cannot meet.
+    fn check_formats(&self, options: &StitchOptions) -> Result<()> {
+        for entry in &self.entries {
+            let options = entry.options(options)?;
+            let file = format!("{}.{}", entry.name, options.compare.format.display());
+            encode::check_format(Path::new(&file), &options.output)?;
+        }
+        Ok(())
     }
 
     fn check_entries(&self, options: &StitchOptions) -> Result<()> {
@@ -129,7 +121,6 @@ impl CompareJob {
         let cache = self.cache.as_ref().map(|folder| Cache::open(folder, &options.cache)).transpose()?;
         let stitcher = Stitcher::new(options, context).with_cache(cache.as_ref());
         let set = stitcher.match_photographs(&inputs)?.remembering();
-        spare_photographs(&self.output, set.photographs().images().iter().map(|image| image.path.as_path()))?;
         let pixels: f64 = set.photographs().images().iter().map(|image| (image.width * image.height) as f64).sum();
         let options = &at_page_size(options, pixels);
         let overlap_scale = overlaps::common_scale(pixels, options.measures.canvas_pixels);
@@ -190,76 +181,6 @@ impl CompareJob {
     }
 }
 
-impl Common<'_> {
-    /// Makes one entry's panorama, or finds out why it cannot be made.
-    fn make(&self, entry: &Entry, stem: &str, inputs: &Inputs) -> Result<Made> {
-        let options = entry.options(self.options)?;
-        let mut made = Made { compared: Compared::of(entry), drawing: Drawing::default(), project: None, error: None };
-        let stitcher = Stitcher::new(&options, self.context);
-        let aligned = stitcher.align_matched(self.set, inputs).and_then(|aligned| {
-            let alignment = aligned.alignments.into_iter().next();
-            alignment.ok_or_else(|| Error::unsolvable(STAGE, &entry.name, "nothing was aligned", ""))
-        });
-        let outcome = match aligned {
-            Err(error) => Err(error),
-            Ok(alignment) => {
-                // A truth that does not fit one entry fits none.
-                made.compared.evaluation = self.truth.map(|truth| evaluate(&alignment.project, truth)).transpose()?;
-                self.finish(alignment, stem, &stitcher, &mut made)
-            }
-        };
-        if let Err(error) = outcome {
-            made.compared.diagnostics = self.context.take_diagnostics();
-            let Some(refusal) = refusal(&error) else { return Err(error) };
-            made.compared.refusal = Some(refusal);
-            made.error = Some(error);
-        }
-        Ok(made)
-    }
-
-    /// Measures, composes and writes an aligned panorama.
-    fn finish(&self, mut alignment: Alignment, stem: &str, stitcher: &Stitcher, made: &mut Made) -> Result<()> {
-        let compared = &mut made.compared;
-        let (anchor, scale) = reference_place(&alignment.project)?;
-        let pixels = overlaps::compare(self.set, &alignment.project, scale, self.overlap_scale, self.context)?;
-        (compared.pixels, compared.pixels_skipped) = match pixels {
-            Ok(pixels) => (Some(pixels), None),
-            Err(why) => (None, Some(why)),
-        };
-        made.drawing = drawing::draw(self.set, &alignment.project, &self.options.compare)?;
-
-        let file = format!("{stem}.{}", self.options.compare.format.display());
-        let start = Instant::now();
-        let panorama = stitcher.compose(&alignment)?;
-        alignment.record_seconds("render", start.elapsed());
-        let start = Instant::now();
-        let options = &alignment.project.options.output;
-        let bytes =
-            encode::write(&self.folder.join(&file), &panorama, &stitcher.metadata(&alignment), options, self.context)?;
-        drop(panorama);
-        alignment.record_seconds("output", start.elapsed());
-        alignment.record_findings(self.context.take_diagnostics());
-        let project = alignment.project;
-        let project_file = format!("{stem}.json");
-        encode::write_atomically(&self.folder.join(&project_file), project.to_json()?.as_bytes())?;
-        compared.diagnostics.clone_from(&project.diagnostics);
-        compared.measures.clone_from(&project.measures);
-        compared.seconds.clone_from(&project.seconds);
-        compared.panorama = Some(PanoramaRecord {
-            file,
-            project: project_file,
-            width: project.canvas.width,
-            height: project.canvas.height,
-            bytes,
-            scale,
-            anchor,
-            used: project.used(),
-        });
-        made.project = Some(project);
-        Ok(())
-    }
-}
-
 /// The options with the canvas of a page: `pixels` are those of all photographs.
 fn at_page_size(options: &StitchOptions, pixels: f64) -> StitchOptions {
     let mut options = options.clone();
@@ -270,36 +191,6 @@ fn at_page_size(options: &StitchOptions, pixels: f64) -> StitchOptions {
     };
     options.canvas.max_pixels = options.canvas.max_pixels.min(compare.max_pixels);
     options
-}
-
-/// Where the middle of the reference photograph lies in the panorama, and the panorama's pixels per pixel of it.
-fn reference_place(project: &Project) -> Result<([f64; 2], f64)> {
-    let reference = project.used_images().find(|image| image.path == project.reference);
-    let reference = reference.ok_or_else(|| Error::input("reference", "it is not in the panorama", ""))?;
-    let mesh = grid(reference)?;
-    Ok((mesh.warp([mesh.width / 2.0, mesh.height / 2.0].into()).into(), median_cell_scale(&mesh)))
-}
-
-/// What concerns one entry alone; `None` for what ends the whole comparison.
-fn refusal(error: &Error) -> Option<Refusal> {
-    let (subject, reason, hint) = match error {
-        Error::NotApplicable { reason, hint, .. } => (String::new(), reason.clone(), hint),
-        Error::Input { subject, reason, hint } => (subject.clone(), reason.clone(), hint),
-        Error::Unsolvable { stage, subject, why, hint } => (format!("{stage}: {subject}"), why.clone(), hint),
-        Error::Unsupported { what, hint } => (String::new(), format!("{what} is not supported"), hint),
-        Error::Limits { subject, needed, allowed, hint } => {
-            (subject.clone(), format!("{needed} needed, {allowed} allowed"), hint)
-        }
-        _ => return None,
-    };
-    let not_applicable = matches!(error, Error::NotApplicable { .. });
-    Some(Refusal { not_applicable, subject, reason, hint: hint.clone() })
-}
-
-/// The error when there is not one panorama: the first entry's, which is most often that of all.
-fn all_refused(made: Vec<Made>) -> Error {
-    let none = || Error::input("entries", "none of them made a panorama", "Look at each of them with `trueup stitch`.");
-    made.into_iter().find_map(|one| one.error).unwrap_or_else(none)
 }
 
 fn photograph(image: &ImageRecord) -> ComparedPhotograph {

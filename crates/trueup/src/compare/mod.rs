@@ -4,6 +4,7 @@ mod drawing;
 mod entry;
 mod figures;
 mod job;
+mod making;
 mod overlaps;
 mod place;
 mod ranking;

@@ -51,7 +51,7 @@ pub(crate) fn check_wanted(wanted: &[String], entries: &[Entry]) -> Result<()> {
     match wanted.len() {
         MIN_RANKED..=MAX_RANKED => Ok(()),
         count => {
-            let reason = format!("{count} entries cannot be ranked, {MIN_RANKED} to {MAX_RANKED} can");
+            let reason = format!("{MIN_RANKED} to {MAX_RANKED} entries can be ranked, not {count}");
             wrong(&wanted.join(","), reason, "Name two to four entries after --rank.")
         }
     }
@@ -103,8 +103,8 @@ mod tests {
         for (names, reason) in [
             (&["a", "q"][..], "it is not compared"),
             (&["a", "a"], "twice"),
-            (&["a"], "1 entries cannot be ranked"),
-            (&["a", "b", "c", "d", "e"], "5 entries cannot be ranked"),
+            (&["a"], "entries can be ranked, not 1"),
+            (&["a", "b", "c", "d", "e"], "entries can be ranked, not 5"),
         ] {
             let message = check(names).expect_err("must fail");
             assert!(message.contains(reason), "{message}");

@@ -1,5 +1,7 @@
 //! All options of all stages in one place.
 
+mod text;
+
 use serde::{Deserialize, Serialize};
 use trueup_align::cameras::CameraOptions;
 use trueup_align::match_points::MatchPointOptions;
@@ -210,145 +212,11 @@ impl StitchOptions {
         }
         Ok(differing)
     }
-
-    /// Reads a TOML text with a table per stage over the present values; what it does not name stays as it is.
-    ///
-    /// # Errors
-    /// [`Error::Input`] for text that is not TOML, unknown stages or options, or values of the wrong type.
-    pub fn merge_toml(&mut self, text: &str, file: &str) -> Result<()> {
-        let hint = "List stages, options and their ranges with `trueup options`.";
-        let given: toml::Table = text.parse().map_err(|error| Error::input(file, first_line(&error), hint))?;
-        let mut merged = self.to_table()?;
-        for (stage, values) in given {
-            let Some(known) = merged.get_mut(&stage).and_then(toml::Value::as_table_mut) else {
-                return Err(Error::input(file, format!("there is no stage \"{stage}\""), hint));
-            };
-            let toml::Value::Table(values) = values else {
-                return Err(Error::input(file, format!("\"{stage}\" must be a table, [{stage}]"), hint));
-            };
-            for (option, value) in values {
-                if !known.contains_key(&option) {
-                    return Err(Error::input(file, format!("there is no option \"{stage}.{option}\""), hint));
-                }
-                known.insert(option, value);
-            }
-        }
-        *self = merged.try_into().map_err(|error| Error::input(file, first_line(&error), hint))?;
-        Ok(())
-    }
-
-    /// Sets one option from text, as in `stage.option=value`.
-    ///
-    /// # Errors
-    /// [`Error::Input`] if there is no such option or the value is of the wrong type.
-    pub fn set(&mut self, assignment: &str) -> Result<()> {
-        let wrong = |reason: String| {
-            Error::input(assignment, reason, "Write stage.option=value; list the options with `trueup options`.")
-        };
-        let (name, value) = assignment.split_once('=').ok_or_else(|| wrong("there is no \"=\" in it".to_owned()))?;
-        let (stage, option) =
-            name.trim().split_once('.').ok_or_else(|| wrong("there is no \".\" in the name".to_owned()))?;
-        let value = value.trim();
-        let mut table = self.to_table()?;
-        let known = table
-            .get(stage)
-            .and_then(|stage| stage.get(option))
-            .cloned()
-            .ok_or_else(|| wrong(format!("there is no option \"{stage}.{option}\"")))?;
-        let parsed = match known {
-            toml::Value::Float(_) => value.parse().ok().map(toml::Value::Float),
-            toml::Value::Integer(_) => value.parse().ok().map(toml::Value::Integer),
-            toml::Value::Boolean(_) => value.parse().ok().map(toml::Value::Boolean),
-            _ => Some(toml::Value::String(value.to_owned())),
-        };
-        let allowed = || allowed_values(stage, option);
-        let parsed =
-            parsed.ok_or_else(|| wrong(format!("\"{value}\" is not {} (allowed: {})", in_words(&known), allowed())))?;
-        if let Some(values) = table.get_mut(stage).and_then(toml::Value::as_table_mut) {
-            values.insert(option.to_owned(), parsed);
-        }
-        // A number beyond its type (jpeg_quality=300) or an unknown choice fails here, before any range is looked at.
-        let merged = table.try_into();
-        *self =
-            merged.map_err(|_: toml::de::Error| wrong(format!("\"{value}\" cannot be (allowed: {})", allowed())))?;
-        Ok(())
-    }
-
-    fn to_table(&self) -> Result<toml::Table> {
-        toml::Table::try_from(self).map_err(|error| Error::input("options", error, "Report this as a defect."))
-    }
-}
-
-/// The allowed values of an option, in words.
-fn allowed_values(stage: &str, option: &str) -> String {
-    let name = format!("{stage}.{option}");
-    StitchOptions::describe().into_iter().find(|row| row.name == name).map_or(String::new(), |row| row.allowed)
-}
-
-fn in_words(value: &toml::Value) -> &'static str {
-    match value {
-        toml::Value::Float(_) => "a number",
-        toml::Value::Integer(_) => "a whole number",
-        toml::Value::Boolean(_) => "true or false",
-        _ => "a text",
-    }
-}
-
-/// TOML's errors span lines with a picture of the text; the reason is what users need.
-fn first_line(error: &toml::de::Error) -> String {
-    error.message().lines().next().unwrap_or_default().to_owned()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_default_is_valid_and_every_option_can_be_set_to_its_default() {
-        let mut options = StitchOptions::default();
-        options.validate().expect("defaults are valid");
-        for row in StitchOptions::describe() {
-            options.set(&format!("{}={}", row.name, row.default)).expect("a default can be written back");
-            assert!(!row.meaning.is_empty(), "{} has no meaning", row.name);
-        }
-        assert_eq!(options, StitchOptions::default());
-    }
-
-    #[test]
-    fn stage_tables_are_called_like_their_stages() {
-        let table = StitchOptions::default().to_table().expect("serialisable");
-        for stage in StitchOptions::stages() {
-            assert!(table.contains_key(stage), "{stage}");
-        }
-    }
-
-    #[test]
-    fn mistakes_say_what_is_wrong() {
-        let mut options = StitchOptions::default();
-        for (assignment, reason) in [
-            ("mesh.cell_px", "there is no \"=\""),
-            ("cell_px=3", "there is no \".\""),
-            ("mesh.cell=3", "there is no option \"mesh.cell\""),
-            ("mesh.cell_px=wide", "\"wide\" is not a number"),
-            ("stitch.method=magic", "\"magic\" cannot be (allowed: vpg"),
-            ("output.jpeg_quality=300", "\"300\" cannot be (allowed: 1 to 100)"),
-        ] {
-            let message = options.set(assignment).expect_err("must fail").to_string();
-            assert!(message.contains(reason), "{message}");
-        }
-        assert!(options.merge_toml("[mesh]\ncell = 3", "c.toml").is_err());
-        assert!(options.merge_toml("[mash]\ncell_px = 3", "c.toml").is_err());
-        assert!(options.merge_toml("mesh", "c.toml").is_err());
-        assert_eq!(options, StitchOptions::default());
-    }
-
-    #[test]
-    fn a_file_changes_only_what_it_names() {
-        let mut options = StitchOptions::default();
-        options.set("mesh.prior_weight=7.5").expect("valid");
-        options.merge_toml("[mesh]\ncell_px = 30.0\n[stitch]\nseed = 9", "c.toml").expect("valid");
-        assert_eq!((options.mesh.cell_px, options.mesh.prior_weight, options.stitch.seed), (30.0, 7.5, 9));
-    }
 
     #[test]
     fn all_bad_values_are_listed() {

@@ -1,51 +1,37 @@
 //! From matches to deformed grids for one group of overlapping photographs.
 
+mod component;
+mod overlaps;
+
 use std::borrow::Cow;
-use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::Arc;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use trueup_align::cameras::{self, CameraPrior, Cameras};
+use trueup_align::cameras::Cameras;
 use trueup_align::full_turn::{self, FullTurnCut};
-use trueup_align::match_points::{self, OverlapWarp};
+use trueup_align::match_points::OverlapWarp;
 use trueup_align::mesh::{self, Closure, Refinements, WarpedMesh};
 use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityOptions, SimilarityPrior};
 use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::{self, TriadOutcome};
 use trueup_align::warps::{self, WarpInput};
 use trueup_core::diagnostics::Diagnostic;
-use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
-use trueup_core::raster::Raster;
-use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 
 use crate::cache::Known;
 use crate::clock::Clock;
-use crate::measure::Measured;
 use crate::memory::{OverlapMemory, Overlaps};
 use crate::method::Shape;
 use crate::options::StitchOptions;
 use crate::refinement::Material;
 
-/// One group of overlapping photographs with everything the geometry stages need; indices are local, 0..N.
-pub(crate) struct Component<'a> {
-    /// Positions of the members among all photographs, ascending.
-    pub members: Vec<usize>,
-    pub images: Vec<&'a SourceImage>,
-    pub frames: Vec<WorkingFrame>,
-    pub lines: Vec<Vec<LineSegment>>,
-    /// Grey values at the working size, for those that were kept.
-    pub grays: Vec<Option<&'a Raster<u8>>>,
-    pub pairs: Vec<PairMatches>,
-    pub reference: usize,
-    /// Rotation that the user's graph wants of the reference photograph, radians clockwise.
-    pub reference_rotation: f64,
-}
+use component::name_seed;
+
+pub(crate) use component::{Component, camera_groups};
 
 /// The geometry of one group.
 #[derive(Debug, Serialize, Deserialize)]
@@ -56,76 +42,6 @@ pub(crate) struct Geometry {
     pub mesh: WarpedMesh,
     /// The pairs whose overlaps were to coincide.
     pub met: Vec<PairMatches>,
-}
-
-impl<'a> Component<'a> {
-    /// Cuts a component out of the measured photographs; pairs are renumbered to local indices.
-    pub fn new(
-        members: &[usize],
-        reference: usize,
-        reference_rotation: f64,
-        images: &'a [SourceImage],
-        measured: &'a [Option<Measured>],
-        pairs: &[PairMatches],
-    ) -> Self {
-        let local = |picture: usize| members.binary_search(&picture).ok();
-        let known = |picture: &usize| measured[*picture].as_ref();
-        let pairs = pairs
-            .iter()
-            .filter(|pair| pair.verdict.is_joined())
-            .filter_map(|pair| Some(PairMatches { a: local(pair.a)?, b: local(pair.b)?, ..pair.clone() }))
-            .collect();
-        Self {
-            members: members.to_vec(),
-            images: members.iter().map(|&picture| &images[picture]).collect(),
-            frames: members.iter().filter_map(known).map(|one| one.frame).collect(),
-            lines: members.iter().filter_map(known).map(|one| one.lines.clone()).collect(),
-            grays: members.iter().filter_map(known).map(|one| one.gray.as_ref()).collect(),
-            pairs,
-            reference: local(reference).unwrap_or(0),
-            reference_rotation,
-        }
-    }
-
-    fn names(&self) -> Vec<String> {
-        self.images.iter().map(|image| image.name.clone()).collect()
-    }
-
-    /// A number for each photograph that depends neither on its folder nor on the order of the inputs.
-    fn seeds(&self) -> Vec<u64> {
-        self.images.iter().map(|image| name_seed(&image.path)).collect()
-    }
-
-    /// Which photographs one camera took: [`camera_groups`].
-    pub(crate) fn camera_groups(&self) -> Vec<usize> {
-        camera_groups(&self.images)
-    }
-
-    /// What metadata say of the cameras, in working pixels.
-    fn camera_priors(&self) -> Vec<CameraPrior> {
-        self.images
-            .iter()
-            .zip(&self.frames)
-            .zip(self.camera_groups())
-            .map(|((image, frame), camera_group)| CameraPrior {
-                frame: *frame,
-                focal_px: image.focal_prior.map(|prior| prior.focal_px * frame.working_from_full),
-                camera_group,
-            })
-            .collect()
-    }
-}
-
-/// Which photographs one camera took, as far as models and sizes tell: a number for each.
-pub(crate) fn camera_groups(images: &[&SourceImage]) -> Vec<usize> {
-    let key = |image: &SourceImage| {
-        let (short, long) = (image.width.min(image.height), image.width.max(image.height));
-        (image.camera_model.clone(), short, long)
-    };
-    let mut keys: Vec<_> = images.iter().map(|image| key(image)).collect();
-    keys.sort();
-    keys.dedup();
-    images.iter().map(|image| keys.binary_search(&key(image)).unwrap_or(0)).collect()
 }
 
 /// [`run`], unless an earlier run found this geometry.
@@ -168,8 +84,8 @@ pub(crate) fn run(
         .map(|frame| GridMesh::regular(frame.width, frame.height, options.mesh.cell_px))
         .collect();
     let overlaps = match memory {
-        None => Arc::new(find_overlaps(component, &grids, options, context, clock)?),
-        Some(memory) => recall_overlaps(memory, component, &grids, options, context, clock)?,
+        None => Arc::new(overlaps::find(component, &grids, options, context, clock)?),
+        Some(memory) => overlaps::recall(memory, component, &grids, options, context, clock)?,
     };
     let Overlaps { cameras, pairs, warps, .. } = overlaps.as_ref();
     let triads = clock.time("vanishing points", || find_triads(component, cameras, options, context))?;
@@ -269,57 +185,6 @@ fn wanted_prior(shape: Shape, options: &StitchOptions) -> SimilarityOptions {
     SimilarityOptions { prior, ..options.similarity.clone() }
 }
 
-/// Cameras, the pairs that agree with them, and the grids carried across these.
-fn find_overlaps(
-    component: &Component,
-    grids: &[GridMesh],
-    options: &StitchOptions,
-    context: &StageContext,
-    clock: &mut Clock,
-) -> Result<Overlaps> {
-    let names = component.names();
-    let priors = component.camera_priors();
-    let cameras = in_one_step("cameras", context, clock, || {
-        cameras::run(&priors, &names, &component.pairs, component.reference, &options.cameras, context)
-    })?;
-    let pairs: Vec<PairMatches> = (0..component.pairs.len())
-        .filter(|position| cameras.contradicting.binary_search(position).is_err())
-        .map(|position| component.pairs[position].clone())
-        .collect();
-    let warps = clock.time("match points", || {
-        match_points::run(&component.frames, grids, &cameras.cameras, &pairs, &options.match_points, context)
-    })?;
-    Ok(Overlaps { cameras, pairs, warps, findings: Vec::new(), seconds: BTreeMap::new() })
-}
-
-fn recall_overlaps(
-    memory: &OverlapMemory,
-    component: &Component,
-    grids: &[GridMesh],
-    options: &StitchOptions,
-    context: &StageContext,
-    clock: &mut Clock,
-) -> Result<Arc<Overlaps>> {
-    let key = OverlapMemory::key(&component.members, component.reference, options);
-    let overlaps = match memory.recall(&key) {
-        Some(overlaps) => overlaps,
-        None => {
-            let before = context.take_diagnostics();
-            let mut own_clock = Clock::default();
-            let mut overlaps = find_overlaps(component, grids, options, context, &mut own_clock)?;
-            overlaps.seconds = own_clock.into_seconds();
-            overlaps.findings = context.take_diagnostics();
-            before.into_iter().for_each(|one| context.report(one));
-            let overlaps = Arc::new(overlaps);
-            memory.keep(key, &overlaps);
-            overlaps
-        }
-    };
-    overlaps.findings.iter().for_each(|one| context.report(one.clone()));
-    clock.add_all(&overlaps.seconds);
-    Ok(overlaps)
-}
-
 /// Times a stage that is one step and reports it as such.
 fn in_one_step<T>(stage: &str, context: &StageContext, clock: &mut Clock, work: impl FnOnce() -> T) -> T {
     context.progress().begin(stage, 1);
@@ -360,12 +225,6 @@ fn find_triads(
         .collect();
     context.progress().finish(STAGE);
     triads
-}
-
-/// A number for a file name, the same whatever folder it lies in and wherever it stands among the inputs.
-fn name_seed(path: &Path) -> u64 {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    name.bytes().fold(0, |hash: u64, byte| hash.wrapping_mul(31).wrapping_add(u64::from(byte)))
 }
 
 fn report_cut(cut: &FullTurnCut, closed: bool, component: &Component, context: &StageContext) {

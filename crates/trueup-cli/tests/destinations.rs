@@ -1,0 +1,102 @@
+//! Places that cannot be written to, or must not be.
+
+use std::path::Path;
+
+use crate::pictures::{put_street, room, street_desk};
+use crate::run::{Desk, finish, trueup};
+
+#[test]
+fn outputs_that_cannot_be_written() {
+    let desk = street_desk();
+    std::fs::create_dir(desk.join("folder.jpg")).expect("a folder");
+    let to = |output: &str| finish(trueup(desk.path(), &["stitch", "a.jpg", "b.jpg", "-o", output]));
+    to("none/pano.jpg").expect_failure(1, &["none/pano.jpg: the folder none does not exist", "Create it"]);
+    to("folder.jpg").expect_failure(1, &["folder.jpg: it is a folder"]);
+    to("./").expect_failure(1, &["./: it is a folder"]);
+    to("pano.gif").expect_failure(2, &["writing pano.gif as .gif is not supported", ".jpg, .jpeg, .png"]);
+    to("pano").expect_failure(2, &["writing pano without an extension is not supported"]);
+    let project = desk.stitch(&["a.jpg", "b.jpg", "--project", "none/p.json"]);
+    project.expect_failure(1, &["none/p.json: the folder none does not exist"]);
+    if Path::new("/proc/self").is_dir() {
+        // A file system that takes no files, not even from root.
+        to("/proc/pano.jpg").expect_failure(
+            1,
+            &["/proc: nothing can be written into this folder (No such file or directory (os error 2))\n", "Check its"],
+        );
+    }
+    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "folder.jpg"]);
+}
+
+/// A limit on the size of files stops the writing half way, as a full disk does.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_leaves_the_old_panorama_as_it_was() {
+    let desk = street_desk();
+    desk.put("pano.jpg", "the old panorama");
+    let mut command = std::process::Command::new("sh");
+    let script = "trap '' XFSZ; ulimit -f 8; exec \"$0\" stitch a.jpg b.jpg -o pano.jpg";
+    command.current_dir(desk.path()).args(["-c", script, env!("CARGO_BIN_EXE_trueup")]);
+    finish(command).expect_failure(1, &["pano.jpg: File too large"]);
+    assert_eq!(desk.read("pano.jpg"), b"the old panorama");
+    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "pano.jpg"]);
+}
+
+/// The same for the scratch file of a canvas that does not fit in memory.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_disk_without_room_for_the_scratch_file_leaves_nothing_behind() {
+    let desk = street_desk();
+    desk.put("pano.jpg", "the old panorama");
+    let mut command = std::process::Command::new("sh");
+    let script =
+        "trap '' XFSZ; ulimit -f 8; exec \"$0\" stitch a.jpg b.jpg c.jpg d.jpg -o pano.jpg --scale 6 --memory 230MB";
+    command.current_dir(desk.path()).args(["-c", script, env!("CARGO_BIN_EXE_trueup")]);
+    finish(command).expect_failure(1, &["writing the scratch file in .: File too large"]);
+    assert_eq!(desk.read("pano.jpg"), b"the old panorama");
+    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "pano.jpg"]);
+}
+
+/// The scratch folder is needed late, if at all, and looked at first.
+#[test]
+fn scratch_folders_that_are_none() {
+    let desk = street_desk();
+    desk.stitch(&["a.jpg", "b.jpg", "--scratch", "none"])
+        .expect_failure(1, &["none: there is no such folder for scratch files", "--scratch"]);
+    if Path::new("/proc/self").is_dir() {
+        desk.stitch(&["a.jpg", "b.jpg", "--scratch", "/proc"])
+            .expect_failure(1, &["/proc: nothing can be written into this folder ("]);
+    }
+}
+
+/// Files that were given to be read are not written over, whatever is to be written.
+#[test]
+fn photographs_and_masks_are_spared_before_any_work() {
+    let desk = street_desk();
+    desk.put("mask.png", "no picture: it is not looked into");
+    let photographs = ["a.jpg", "b.jpg", "--mask", "b.jpg=mask.png"];
+    for (flag, file, what) in [
+        ("--project", "a.jpg", "photographs to be stitched"),
+        ("--pto", "b.jpg", "photographs to be stitched"),
+        ("--seams", "mask.png", "masks"),
+    ] {
+        let before = desk.read(file);
+        let run = desk.stitch(&[&photographs[..], &[flag, file]].concat());
+        run.expect_failure(1, &[&format!("{file}: this file is one of the {what}")]);
+        assert_eq!(desk.read(file), before);
+    }
+}
+
+/// Two groups make two panoramas; how many there are is known late.
+#[test]
+fn a_place_for_the_last_panorama_is_wanted_before_the_first_is_made() {
+    let desk = Desk::new();
+    put_street(&desk);
+    for (name, bytes) in ["r1.jpg", "r2.jpg", "r3.jpg"].iter().zip(room()) {
+        desk.put(name, bytes);
+    }
+    std::fs::create_dir(desk.join("pano-2.jpg")).expect("a folder");
+    let files = desk.files();
+    let photographs = ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "r1.jpg", "r2.jpg", "r3.jpg", "--all"];
+    desk.stitch(&photographs).expect_failure(1, &["pano-2.jpg: it is a folder"]);
+    assert_eq!(desk.files(), files);
+}

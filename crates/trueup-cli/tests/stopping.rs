@@ -1,0 +1,77 @@
+//! Requests to stop: what ends the command, with which status, and that nothing is left behind.
+#![cfg(unix)]
+
+use std::io::Read;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use crate::pictures::noise;
+use crate::run::{Desk, finish, trueup};
+
+const PHOTOGRAPHS: [&str; 4] = ["1.jpg", "2.jpg", "3.jpg", "4.jpg"];
+
+/// Sends signals, one soon after the other, while photographs are worked on; `script` starts the command by `exec "$@"`.
+/// Returns the exit status and what was said, and fails the test if anything is left behind.
+fn stopped_by(script: &str, signals: &[&str]) -> (Option<i32>, String) {
+    let desk = Desk::new();
+    // Large enough to take a good while at full scale.
+    for (name, seed) in PHOTOGRAPHS.iter().zip(1..) {
+        desk.put(name, noise(seed, 2400, 1800));
+    }
+    let mut command = Command::new("sh");
+    command.current_dir(desk.path()).args(["-c", script, "sh", env!("CARGO_BIN_EXE_trueup"), "stitch"]);
+    command.args(PHOTOGRAPHS).args(["-o", "pano.jpg", "--set", "stitch.working_pixels=4e6", "--threads", "1"]);
+    let mut child = command.stderr(Stdio::piped()).spawn().expect("the command starts");
+    std::thread::sleep(Duration::from_millis(400));
+    for signal in signals {
+        let kill = format!("kill -{signal} {}", child.id());
+        let signalled = Command::new("sh").args(["-c", &kill]).status();
+        assert!(signalled.expect("sh runs").success(), "the command was still at work");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let status = child.wait().expect("it ends");
+    let mut said = String::new();
+    child.stderr.take().expect("piped").read_to_string(&mut said).expect("UTF-8");
+    assert_eq!(desk.files(), PHOTOGRAPHS);
+    (status.code(), said)
+}
+
+const PLAIN: &str = "exec \"$@\"";
+const SAID: &str = "trueup: error: stopped on request\n";
+
+#[test]
+fn ctrl_c_leaves_nothing_behind() {
+    assert_eq!(stopped_by(PLAIN, &["INT"]), (Some(130), SAID.to_owned()));
+}
+
+/// Some programs send the request twice, such as `timeout`.
+#[test]
+fn a_request_to_terminate_leaves_nothing_behind() {
+    assert_eq!(stopped_by(PLAIN, &["TERM"]), (Some(143), SAID.to_owned()));
+    assert_eq!(stopped_by(PLAIN, &["TERM", "TERM"]), (Some(143), SAID.to_owned()));
+}
+
+/// As `nohup` starts it, the command outlives its terminal: here until Ctrl-C.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_end_of_the_terminal_stops_it_unless_that_is_ignored() {
+    let own = std::fs::read_to_string("/proc/self/status").expect("Linux");
+    let ignored = own.lines().find_map(|line| line.strip_prefix("SigIgn:")).expect("ignored signals");
+    if ignored.trim().ends_with(['1', '3', '5', '7', '9', 'b', 'd', 'f']) {
+        eprintln!("half skipped: these tests themselves outlive their terminal, and what they start does so, too");
+    } else {
+        assert_eq!(stopped_by(PLAIN, &["HUP"]), (Some(129), SAID.to_owned()));
+    }
+    assert_eq!(stopped_by("trap '' HUP; exec \"$@\"", &["HUP", "INT"]), (Some(130), SAID.to_owned()));
+}
+
+/// Standard error that takes nothing, as of a terminal that is gone, changes no exit status.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_failure_that_cannot_be_told_is_still_a_failure() {
+    let desk = Desk::new();
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("a full device");
+    let mut command = trueup(desk.path(), &["stitch", "none.jpg", "-o", "pano.jpg"]);
+    command.stderr(full);
+    assert_eq!(finish(command).status, 1);
+}

@@ -1,0 +1,133 @@
+//! Where the pixels of a canvas row lie in a photograph.
+
+/// The inverse of one cell's bilinear map along one canvas row.
+///
+/// A point of the cell is `p = u e + v f + u v g` from its top left corner, with `e` the top edge, `f` the left edge and
+/// `g` the deviation from a parallelogram. Crossing `p - v f = u (e + v g)` with `e + v g` leaves a quadratic in v,
+/// `(g x f) v^2 + (e x f + p x g) v + p x e = 0`, whose discriminant's root is the Jacobian: its sign picks the root.
+///
+/// # Source
+/// The standard elimination; solved in the form 2c / (-b -+ sqrt(b^2 - 4ac)), which needs no case for parallelograms.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct InverseBilinear {
+    top_left: [f64; 2],
+    e: [f64; 2],
+    f: [f64; 2],
+    g: [f64; 2],
+    /// +1, or -1 for a mirrored cell.
+    orientation: f64,
+    source: [f64; 2],
+    source_size: [f64; 2],
+    y: f64,
+}
+
+fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+impl InverseBilinear {
+    /// For the cell with the given corners (top left, top right, bottom right, bottom left, canvas pixels), whose top left
+    /// is `source` in the photograph and whose extent there is `source_size`; `y` is the row's pixel centre.
+    pub(crate) fn new(corners: [[f64; 2]; 4], source: [f64; 2], source_size: [f64; 2], y: f64) -> Self {
+        let [a, b, c, d] = corners;
+        let e = [b[0] - a[0], b[1] - a[1]];
+        let f = [d[0] - a[0], d[1] - a[1]];
+        let g = [a[0] - b[0] + c[0] - d[0], a[1] - b[1] + c[1] - d[1]];
+        let middle = cross([e[0] + 0.5 * g[0], e[1] + 0.5 * g[1]], [f[0] + 0.5 * g[0], f[1] + 0.5 * g[1]]);
+        Self { top_left: a, e, f, g, orientation: if middle < 0.0 { -1.0 } else { 1.0 }, source, source_size, y }
+    }
+}
+
+/// Positions in a photograph for consecutive pixels of a canvas row, split into whole pixel and fraction: the position is
+/// `(column + fraction_x + 0.5, row + fraction_y + 0.5)`, fractions in [0, 1].
+#[derive(Debug, Default)]
+pub(crate) struct Positions {
+    pub(crate) column: Vec<i32>,
+    pub(crate) row: Vec<i32>,
+    pub(crate) fraction_x: Vec<f32>,
+    pub(crate) fraction_y: Vec<f32>,
+}
+
+impl Positions {
+    /// Position `index` in the photograph's pixels.
+    pub(crate) fn place(&self, index: usize) -> [f64; 2] {
+        [
+            f64::from(self.column[index]) + 0.5 + f64::from(self.fraction_x[index]),
+            f64::from(self.row[index]) + 0.5 + f64::from(self.fraction_y[index]),
+        ]
+    }
+
+    /// Makes room for `length` positions.
+    pub(crate) fn resize(&mut self, length: usize) {
+        self.column.resize(length, 0);
+        self.row.resize(length, 0);
+        self.fraction_x.resize(length, 0.0);
+        self.fraction_y.resize(length, 0.0);
+    }
+
+    /// Number of positions.
+    pub(crate) fn len(&self) -> usize {
+        self.column.len()
+    }
+}
+
+/// Fills `positions` for the canvas pixels from column `first` on.
+pub(crate) fn invert_row(cell: &InverseBilinear, first: usize, positions: &mut Positions) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { x86::invert_row(cell, first, positions) };
+    }
+    invert_row_portable(cell, first, positions);
+}
+
+/// A whole number within the range of `i32` as one; a plain cast checks the range and is not vectorised.
+#[inline(always)]
+fn low_bits(whole: f64) -> i32 {
+    // Adding 1.5 * 2^52 leaves the whole number in the low bits of the mantissa.
+    const ROUNDING: f64 = 6_755_399_441_055_744.0;
+    (whole + ROUNDING).to_bits() as i32
+}
+
+#[allow(clippy::manual_clamp)]
+#[inline(always)]
+fn invert_row_portable(cell: &InverseBilinear, first: usize, positions: &mut Positions) {
+    let InverseBilinear { top_left, e, f, g, orientation, source, source_size, y } = *cell;
+    let py = y - top_left[1];
+    let first_px = first as f64 + 0.5 - top_left[0];
+    let quadratic = cross(g, f);
+    let jacobian = cross(e, f);
+    let length = positions.column.len();
+    let (columns, rows) = (&mut positions.column[..length], &mut positions.row[..length]);
+    let (fractions_x, fractions_y) = (&mut positions.fraction_x[..length], &mut positions.fraction_y[..length]);
+    for index in 0..length {
+        let px = first_px + f64::from(index as i32);
+        let constant = px * e[1] - py * e[0];
+        let linear = jacobian + (px * g[1] - py * g[0]);
+        let discriminant = (linear * linear - 4.0 * quadratic * constant).max(0.0);
+        // `max` before `min` turns the NaN of a collapsed cell into a number.
+        let v = (-2.0 * constant / (linear + orientation * discriminant.sqrt())).max(0.0).min(1.0);
+        let along = [e[0] + v * g[0], e[1] + v * g[1]];
+        let u = (((px - v * f[0]) * along[0] + (py - v * f[1]) * along[1])
+            / (along[0] * along[0] + along[1] * along[1]))
+            .max(0.0)
+            .min(1.0);
+        let x = source[0] + u * source_size[0] - 0.5;
+        let y = source[1] + v * source_size[1] - 0.5;
+        let (column, row) = (x.floor(), y.floor());
+        columns[index] = low_bits(column);
+        rows[index] = low_bits(row);
+        fractions_x[index] = (x - column) as f32;
+        fractions_y[index] = (y - row) as f32;
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use super::{InverseBilinear, Positions};
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn invert_row(cell: &InverseBilinear, first: usize, positions: &mut Positions) {
+        super::invert_row_portable(cell, first, positions);
+    }
+}
