@@ -1,5 +1,7 @@
 //! What a seam costs.
 
+use rayon::prelude::*;
+
 use super::SeamOptions;
 use super::shading::{FRACTION, slopes};
 use super::view::{CLIPPED, IGNORED, KEPT, PARTLY, View, WHOLLY};
@@ -75,9 +77,9 @@ impl<'a> Scene<'a> {
             height,
             turn,
             views,
-            gradients: views.iter().map(gradients).collect(),
+            gradients: views.par_iter().map(gradients).collect(),
             slopes: if options.shading_weight > 0.0 { slopes(views, options.shading_reach) } else { Vec::new() },
-            depths: views.iter().map(View::depths).collect(),
+            depths: views.par_iter().map(View::depths).collect(),
             anyone,
             moving,
             length: in_units(options.length),
