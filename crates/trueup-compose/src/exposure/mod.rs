@@ -18,6 +18,8 @@ pub use correction::{Correction, Corrections, VIGNETTING_TERMS};
 pub(crate) use correction::{LightTable, exposed};
 pub use response::{RESPONSE_TERMS, Response};
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_core::colour::TransferCurve;
@@ -164,13 +166,16 @@ pub fn run(
     let turn = layout.period.map(|period| (period as f64 * scale).round() as usize);
     let [width, height] = [layout.width, layout.height].map(|length| (length as f64 * scale).ceil() as usize);
     let size = [turn.unwrap_or(width), height];
+    // Samples of a turn lie on the photographs, not on the canvas: the same wherever it is cut open.
+    let anchor = layout.period.and_then(|_| layout.placed.first()?.mesh.target.first().map(|vertex| vertex[0]));
     let patches: Vec<Patch> = layout
         .placed
         .par_iter()
         .zip(thumbnails)
         .map(|(placed, thumbnail)| {
             context.check_cancelled()?;
-            Ok(Patch::new(placed, thumbnail, scale, size, layout.period, options))
+            let placed = anchor.map_or(Cow::Borrowed(placed), |anchor| Cow::Owned(placed.moved(-anchor)));
+            Ok(Patch::new(&placed, thumbnail, scale, size, layout.period, options))
         })
         .collect::<Result<_>>()?;
     let observed: Vec<Observed> = (0..count)
