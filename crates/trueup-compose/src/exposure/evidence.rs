@@ -3,11 +3,13 @@
 use trueup_core::Result;
 use trueup_core::colour::TransferCurve;
 
+use super::equations::Problem;
+use super::overlap::Observed;
 use super::predicted::Predicted;
 use super::response::RESPONSE_TERMS;
 use super::robust::mean;
 use super::samples::Shared;
-use super::solve::{Differences, Observed, Problem, Solution};
+use super::solve::{Differences, Solution};
 
 /// Straight lines through the response's functions against the logarithm of light.
 #[derive(Default)]

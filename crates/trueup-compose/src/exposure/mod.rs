@@ -7,7 +7,9 @@
 //! for its vignetting.
 
 mod correction;
+mod equations;
 mod evidence;
+mod overlap;
 mod predicted;
 mod response;
 mod robust;
@@ -29,8 +31,9 @@ use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 
 use crate::layout::{CanvasLayout, check_mesh};
-use samples::{Patch, Shared, shared};
-use solve::{Observed, solve};
+use overlap::{Observed, compare};
+use samples::{Patch, shared};
+use solve::solve;
 
 const STAGE: &str = ExposureOptions::STAGE;
 
@@ -257,48 +260,6 @@ fn sampling_scale(layout: &CanvasLayout, samples: f64) -> f64 {
     // A turn is a whole number of samples.
     let whole = |period: usize| (period as f64 * scale).ceil() / period as f64;
     layout.period.map_or(scale, whole)
-}
-
-/// Compares two photographs by what they share; `None` if that is too little.
-fn compare(
-    mut samples: Vec<Shared>,
-    [first, second]: [usize; 2],
-    curve: &TransferCurve,
-    options: &ExposureOptions,
-) -> Option<Observed> {
-    if samples.len() < options.min_shared.max(1) {
-        return None;
-    }
-    let channel_medians = std::array::from_fn(|channel| {
-        let mut ratios: Vec<f32> = samples.iter().map(|sample| sample.log_ratio()[channel]).collect();
-        median(&mut ratios)
-    });
-    let mut ratios: Vec<f32> = samples.iter().map(Shared::brightness).collect();
-    let log_ratio = median(&mut ratios);
-    for ratio in &mut ratios {
-        *ratio = (*ratio - log_ratio).abs();
-    }
-    let deviation = NORMAL * f64::from(median(&mut ratios));
-    let pair = PairExposure { first, second, log_ratio: f64::from(log_ratio), deviation, samples: samples.len() };
-    // Neighbouring samples say the same; a few hundred of an overlap settle seven unknowns.
-    const KEPT: usize = 600;
-    let step = samples.len().div_ceil(KEPT);
-    let mut index = 0_usize;
-    samples.retain(|_| {
-        index += 1;
-        (index - 1).is_multiple_of(step)
-    });
-    let samples: Vec<Shared> = samples.into_iter().map(|sample| sample.with_variances(curve)).collect();
-    Some(Observed::new(pair, channel_medians, samples, options.pair_deviation))
-}
-
-/// Ratio of the standard deviation to the median absolute deviation of a normal distribution.
-const NORMAL: f64 = 1.4826;
-
-/// The median of at least one number (the upper one of an even count).
-fn median(values: &mut [f32]) -> f32 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 #[cfg(test)]
