@@ -92,8 +92,9 @@ trueup_core::options! {
         /// How far the response is expected to lie from the colour profile's curve, as a standard deviation of every
         /// coefficient of its natural logarithm.
         response_deviation: f64 = 0.5, between(1e-4, 100.0), "";
-        /// Largest gain; the smallest is its inverse.
-        max_gain: f64 = 8.0, between(1.0, 1000.0), "";
+        /// Largest gain; the smallest is its inverse. Photographs of sun and shade that each were exposed for what they show lie
+        /// up to five stops apart.
+        max_gain: f64 = 32.0, between(1.0, 1000.0), "";
     }
 }
 

@@ -184,6 +184,16 @@ fn gains_from_a_quarter_to_four_are_recovered() {
     }
 }
 
+/// From sun to shade, as cameras that expose by themselves go: four stops from the reference to the other end.
+#[test]
+fn exposures_four_stops_apart_are_followed() {
+    let lights = [4.0, 1.0, 0.25];
+    let shifts = [0.0, 100.0, 200.0];
+    let rasters: Vec<_> = shifts.iter().zip(lights).map(|(&shift, light)| picture(shift, light)).collect();
+    let gains = gains(&estimate(&shifts, &rasters, &ExposureOptions::default()));
+    assert!((gains[1] / 4.0 - 1.0).abs() < 0.02 && (gains[2] / 16.0 - 1.0).abs() < 0.03, "{gains:?}");
+}
+
 #[test]
 fn saturated_and_moving_things_do_not_count() {
     let shifts = [0.0, 100.0];
