@@ -6,6 +6,7 @@
 //! differs from the mean.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use trueup_core::colour::TransferCurve;
 
 use super::correction::VIGNETTING_TERMS;
@@ -57,23 +58,38 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// Most unknowns of a sample: two gains, the lenses of two cameras, the response.
+const MOST: usize = 2 + 2 * VIGNETTING_TERMS + RESPONSE_TERMS;
+
+/// What one overlap adds to the normal equations.
+struct Share {
+    /// Which unknowns its samples have.
+    unknowns: Vec<usize>,
+    normal: [[f64; MOST]; MOST],
+    right: [f64; MOST],
+}
+
 impl Problem<'_> {
-    /// The row of one sample: unknowns and their factors.
-    fn row(&self, pair: &PairExposure, sample: &Shared, row: &mut Vec<(usize, f64)>) {
-        row.clear();
-        row.push((pair.first, 1.0));
-        row.push((pair.second, -1.0));
-        let (first, second) = (self.lens_of[pair.first], self.lens_of[pair.second]);
-        let (a, b) = (powers(sample.radius[0]), powers(sample.radius[1]));
-        for term in 0..self.terms {
-            let at = |lens: usize| self.count + lens * self.terms + term;
-            if first == second {
-                row.push((at(first), a[term] - b[term]));
-            } else {
-                row.push((at(first), a[term]));
-                row.push((at(second), -b[term]));
-            }
+    /// Which unknowns the samples of an overlap have; [`Self::row`] tells their factors.
+    fn unknowns_of(&self, pair: &PairExposure) -> Vec<usize> {
+        let mut lenses = vec![self.lens_of[pair.first], self.lens_of[pair.second]];
+        lenses.dedup();
+        let coefficients = lenses.iter().flat_map(|lens| (0..self.terms).map(move |term| (lens, term)));
+        let coefficients = coefficients.map(|(lens, term)| self.count + lens * self.terms + term);
+        [pair.first, pair.second].into_iter().chain(coefficients).collect()
+    }
+
+    /// The factors of one sample's unknowns; the rest are 0.
+    fn row(&self, pair: &PairExposure, sample: &Shared) -> [f64; MOST] {
+        let mut row = [0.0; MOST];
+        (row[0], row[1]) = (1.0, -1.0);
+        let [own, others] = sample.radius.map(powers);
+        let second = if self.lens_of[pair.first] == self.lens_of[pair.second] { 2 } else { 2 + self.terms };
+        for (term, (own, others)) in own.into_iter().zip(others).take(self.terms).enumerate() {
+            row[2 + term] += own;
+            row[second + term] -= others;
         }
+        row
     }
 
     /// ln of the factor on a channel of `photograph` at the squared radius `r2`.
@@ -102,11 +118,12 @@ impl Problem<'_> {
     }
 
     pub(super) fn weigh(&self, solution: &Solution, weights: &mut [Vec<f64>]) {
-        let mut row = Vec::new();
-        for (index, (one, weights)) in self.observed.iter().zip(weights).enumerate() {
+        self.observed.par_iter().zip(weights).enumerate().for_each(|(index, (one, weights))| {
+            let unknowns = self.unknowns_of(&one.pair);
             for ((sample, ratio), weight) in solution.ratios(index, one).zip(weights.iter_mut()) {
-                self.row(&one.pair, sample, &mut row);
-                let model = row.iter().fold(0.0, |sum, &(at, factor)| sum + factor * solution.brightness[at]);
+                let row = self.row(&one.pair, sample);
+                let model =
+                    unknowns.iter().zip(row).fold(0.0, |sum, (&at, factor)| sum + factor * solution.brightness[at]);
                 // Without casts, what the channels differ from their mean is not looked at.
                 let residuals = std::array::from_fn(|channel| match self.options.model {
                     ExposureModel::Gain => mean(ratio) + model,
@@ -118,7 +135,7 @@ impl Problem<'_> {
                 *weight = magnitude(residuals);
             }
             weights_of(weights, &one.certainties);
-        }
+        });
     }
 
     /// Solves for gains and vignetting, the response being what it is; `None` if that cannot be.
@@ -151,20 +168,15 @@ impl Problem<'_> {
         let unknowns = self.unknowns + response_terms;
         let mut normal = DMatrix::<f64>::zeros(unknowns, unknowns);
         let mut right = DVector::<f64>::zeros(unknowns);
-        let mut row = Vec::new();
-        for (index, (one, weights)) in self.observed.iter().zip(weights).enumerate() {
-            let share = self.share(one);
-            let answers = &solution.answers[index];
-            for (((sample, ratio), weight), answers) in solution.ratios(index, one).zip(weights).zip(answers) {
-                self.row(&one.pair, sample, &mut row);
-                let differs = |term: usize| mean(std::array::from_fn(|channel| f64::from(answers[channel][term])));
-                row.extend((0..response_terms).map(|term| (self.unknowns + term, differs(term))));
-                let weight = weight * share;
-                for &(i, a) in &row {
-                    right[i] -= weight * a * mean(ratio);
-                    for &(j, b) in &row {
-                        normal[(i, j)] += weight * a * b;
-                    }
+        let shares = (0..self.observed.len()).into_par_iter();
+        let shares: Vec<Share> =
+            shares.map(|index| self.share_of(index, &weights[index], solution, response_terms)).collect();
+        // One after the other, so that the sums are the same for any number of threads.
+        for share in shares {
+            for (&i, (right_of, row)) in share.unknowns.iter().zip(share.right.iter().zip(&share.normal)) {
+                right[i] += right_of;
+                for (&j, value) in share.unknowns.iter().zip(row) {
+                    normal[(i, j)] += value;
                 }
             }
         }
@@ -183,6 +195,31 @@ impl Problem<'_> {
             }
         }
         Some(normal.cholesky()?.solve(&right))
+    }
+
+    /// What an overlap adds to the normal equations.
+    fn share_of(&self, index: usize, weights: &[f64], solution: &Solution, response_terms: usize) -> Share {
+        let one = &self.observed[index];
+        let mut unknowns = self.unknowns_of(&one.pair);
+        let own = unknowns.len();
+        unknowns.extend((0..response_terms).map(|term| self.unknowns + term));
+        let mut share = Share { unknowns, normal: [[0.0; MOST]; MOST], right: [0.0; MOST] };
+        let trust = self.share(one);
+        let samples = solution.ratios(index, one).zip(weights).zip(&solution.answers[index]);
+        for (((sample, ratio), weight), answers) in samples {
+            let mut row = self.row(&one.pair, sample);
+            for (term, factor) in row[own..].iter_mut().take(response_terms).enumerate() {
+                *factor = mean(std::array::from_fn(|channel| f64::from(answers[channel][term])));
+            }
+            let (weight, ratio) = (weight * trust, mean(ratio));
+            for (a, (right, sums)) in row.into_iter().zip(share.right.iter_mut().zip(&mut share.normal)) {
+                *right -= weight * a * ratio;
+                for (sum, b) in sums.iter_mut().zip(row) {
+                    *sum += weight * a * b;
+                }
+            }
+        }
+        share
     }
 
     /// What red, green and blue differ from the brightness, as logarithms of gains.
