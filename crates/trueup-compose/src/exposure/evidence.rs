@@ -1,13 +1,16 @@
 //! What the overlaps say of the response, and how much it does to them.
 
+use rayon::prelude::*;
 use trueup_core::Result;
 use trueup_core::colour::TransferCurve;
 
+use super::equations::Problem;
+use super::overlap::Observed;
 use super::predicted::Predicted;
 use super::response::RESPONSE_TERMS;
 use super::robust::mean;
 use super::samples::Shared;
-use super::solve::{Differences, Observed, Problem, Solution};
+use super::solve::{Differences, Solution};
 
 /// Straight lines through the response's functions against the logarithm of light.
 #[derive(Default)]
@@ -30,6 +33,18 @@ impl Line {
         }
     }
 
+    /// The lines through the points of both.
+    fn merged(self, other: &Self) -> Self {
+        let sums = |a: [f64; RESPONSE_TERMS], b: [f64; RESPONSE_TERMS]| std::array::from_fn(|term| a[term] + b[term]);
+        Self {
+            count: self.count + other.count,
+            light: self.light + other.light,
+            squares: self.squares + other.squares,
+            terms: sums(self.terms, other.terms),
+            products: sums(self.products, other.products),
+        }
+    }
+
     /// The slopes of the lines; 0 where all light is the same.
     fn slopes(&self) -> [f64; RESPONSE_TERMS] {
         let spread = self.squares - self.light * self.light / self.count;
@@ -44,8 +59,8 @@ impl Problem<'_> {
     /// By how much the functions of the response differ in every sample, by what the solution says the photographs show.
     pub(super) fn predict(&self, solution: &mut Solution, profile: &TransferCurve) -> Result<()> {
         let predicted = Predicted::new(profile, &solution.response)?;
-        let mut line = Line::default();
-        let mut of = |one: &Observed| -> Vec<Differences> {
+        let of = |one: &Observed| -> (Vec<Differences>, Line) {
+            let mut line = Line::default();
             let samples = one.samples.iter().map(|sample| {
                 std::array::from_fn(|channel| {
                     let factor = |photograph, r2| self.log_factor(solution, photograph, channel, r2);
@@ -56,11 +71,11 @@ impl Problem<'_> {
                     std::array::from_fn(|term| (terms[0][term] - terms[1][term]) as f32)
                 })
             });
-            samples.collect()
+            (samples.collect(), line)
         };
-        let answers = self.observed.iter().map(&mut of).collect();
+        let (answers, lines): (_, Vec<Line>) = self.observed.par_iter().map(of).unzip();
         solution.answers = answers;
-        solution.slopes = line.slopes();
+        solution.slopes = lines.iter().fold(Line::default(), Line::merged).slopes();
         Ok(())
     }
 

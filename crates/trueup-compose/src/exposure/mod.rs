@@ -7,7 +7,9 @@
 //! for its vignetting.
 
 mod correction;
+mod equations;
 mod evidence;
+mod overlap;
 mod predicted;
 mod response;
 mod robust;
@@ -18,6 +20,8 @@ pub use correction::{Correction, Corrections, VIGNETTING_TERMS};
 pub(crate) use correction::{LightTable, exposed};
 pub use response::{RESPONSE_TERMS, Response};
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_core::colour::TransferCurve;
@@ -27,8 +31,9 @@ use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 
 use crate::layout::{CanvasLayout, check_mesh};
-use samples::{Patch, Shared, shared};
-use solve::{Observed, solve};
+use overlap::{Observed, compare};
+use samples::{Patch, shared};
+use solve::solve;
 
 const STAGE: &str = ExposureOptions::STAGE;
 
@@ -87,8 +92,9 @@ trueup_core::options! {
         /// How far the response is expected to lie from the colour profile's curve, as a standard deviation of every
         /// coefficient of its natural logarithm.
         response_deviation: f64 = 0.5, between(1e-4, 100.0), "";
-        /// Largest gain; the smallest is its inverse.
-        max_gain: f64 = 8.0, between(1.0, 1000.0), "";
+        /// Largest gain; the smallest is its inverse. Photographs of sun and shade that each were exposed for what they show lie
+        /// up to five stops apart.
+        max_gain: f64 = 32.0, between(1.0, 1000.0), "";
     }
 }
 
@@ -164,13 +170,16 @@ pub fn run(
     let turn = layout.period.map(|period| (period as f64 * scale).round() as usize);
     let [width, height] = [layout.width, layout.height].map(|length| (length as f64 * scale).ceil() as usize);
     let size = [turn.unwrap_or(width), height];
+    // Samples of a turn lie on the photographs, not on the canvas: the same wherever it is cut open.
+    let anchor = layout.period.and_then(|_| layout.placed.first()?.mesh.target.first().map(|vertex| vertex[0]));
     let patches: Vec<Patch> = layout
         .placed
         .par_iter()
         .zip(thumbnails)
         .map(|(placed, thumbnail)| {
             context.check_cancelled()?;
-            Ok(Patch::new(placed, thumbnail, scale, size, layout.period, options))
+            let placed = anchor.map_or(Cow::Borrowed(placed), |anchor| Cow::Owned(placed.moved(-anchor)));
+            Ok(Patch::new(&placed, thumbnail, scale, size, layout.period, options))
         })
         .collect::<Result<_>>()?;
     let observed: Vec<Observed> = (0..count)
@@ -252,48 +261,6 @@ fn sampling_scale(layout: &CanvasLayout, samples: f64) -> f64 {
     // A turn is a whole number of samples.
     let whole = |period: usize| (period as f64 * scale).ceil() / period as f64;
     layout.period.map_or(scale, whole)
-}
-
-/// Compares two photographs by what they share; `None` if that is too little.
-fn compare(
-    mut samples: Vec<Shared>,
-    [first, second]: [usize; 2],
-    curve: &TransferCurve,
-    options: &ExposureOptions,
-) -> Option<Observed> {
-    if samples.len() < options.min_shared.max(1) {
-        return None;
-    }
-    let channel_medians = std::array::from_fn(|channel| {
-        let mut ratios: Vec<f32> = samples.iter().map(|sample| sample.log_ratio()[channel]).collect();
-        median(&mut ratios)
-    });
-    let mut ratios: Vec<f32> = samples.iter().map(Shared::brightness).collect();
-    let log_ratio = median(&mut ratios);
-    for ratio in &mut ratios {
-        *ratio = (*ratio - log_ratio).abs();
-    }
-    let deviation = NORMAL * f64::from(median(&mut ratios));
-    let pair = PairExposure { first, second, log_ratio: f64::from(log_ratio), deviation, samples: samples.len() };
-    // Neighbouring samples say the same; a few hundred of an overlap settle seven unknowns.
-    const KEPT: usize = 600;
-    let step = samples.len().div_ceil(KEPT);
-    let mut index = 0_usize;
-    samples.retain(|_| {
-        index += 1;
-        (index - 1).is_multiple_of(step)
-    });
-    let samples: Vec<Shared> = samples.into_iter().map(|sample| sample.with_variances(curve)).collect();
-    Some(Observed::new(pair, channel_medians, samples, options.pair_deviation))
-}
-
-/// Ratio of the standard deviation to the median absolute deviation of a normal distribution.
-const NORMAL: f64 = 1.4826;
-
-/// The median of at least one number (the upper one of an even count).
-fn median(values: &mut [f32]) -> f32 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 #[cfg(test)]

@@ -80,10 +80,18 @@ impl Response {
     /// # Errors
     /// [`Error::Input`] if that is no curve that rises from 0 to 1.
     pub fn curve(&self, profile: &TransferCurve) -> Result<TransferCurve> {
+        self.curve_of(profile, STEPS)
+    }
+
+    /// The same from a table of so many steps.
+    ///
+    /// # Errors
+    /// As [`Self::curve`].
+    pub(super) fn curve_of(&self, profile: &TransferCurve, steps: usize) -> Result<TransferCurve> {
         if self.is_plain() {
             return Ok(profile.clone());
         }
-        let light = (0..=STEPS).map(|step| self.light(profile, step as f64 / STEPS as f64)).collect();
+        let light = (0..=steps).map(|step| self.light(profile, step as f64 / steps as f64)).collect();
         TransferCurve::table(light).ok_or_else(|| {
             Error::input(
                 "response",

@@ -1,6 +1,6 @@
 //! Weights by residuals.
 
-use super::NORMAL;
+use super::overlap::NORMAL;
 
 /// Residual, in standard deviations of the overlap, at which a sample counts half. Tuning constant of the Cauchy
 /// estimator for 95 % efficiency (Holland, Welsch, "Robust regression using iteratively reweighted least-squares", 1977).

@@ -57,16 +57,20 @@ fn falloff(r2: f64) -> f64 {
     -0.5 * r2 - 0.2 * r2 * r2
 }
 
+/// Columns of the cylinder in the tests of full turns.
+const AROUND: usize = 480;
+
+/// A photograph at column `shift` of the cylinder whose light is `gain` times the scene's.
+fn picture_around(shift: usize, gain: f64) -> Raster<u8> {
+    let level = |i: usize| encoded(gain * scene(((i % WIDTH + shift) % AROUND) as f64, (i / WIDTH) as f64));
+    let data = (0..WIDTH * HEIGHT).flat_map(|i| [level(i); 3]).collect();
+    Raster::from_data(WIDTH, HEIGHT, 3, data).expect("as many samples")
+}
+
 /// Two photographs on a cylinder of 480 columns, the second 300 to the right of the first: they meet only across the ends.
 #[test]
 fn overlaps_across_the_ends_of_a_full_turn_count() {
-    const AROUND: usize = 480;
-    let picture = |shift: usize, gain: f64| {
-        let level = |i: usize| encoded(gain * scene(((i % WIDTH + shift) % AROUND) as f64, (i / WIDTH) as f64));
-        let data = (0..WIDTH * HEIGHT).flat_map(|i| [level(i); 3]).collect();
-        Raster::from_data(WIDTH, HEIGHT, 3, data).expect("as many samples")
-    };
-    let rasters = [picture(0, 1.0), picture(300, 0.7)];
+    let rasters = [picture_around(0, 1.0), picture_around(300, 0.7)];
     let frame = WorkingFrame::new(WIDTH, HEIGHT, 480_000.0);
     let thumbnails: Vec<Thumbnail> =
         rasters.iter().map(|raster| Thumbnail { raster, curve: &TransferCurve::SRGB, frame, camera: 0 }).collect();
@@ -86,6 +90,34 @@ fn overlaps_across_the_ends_of_a_full_turn_count() {
     }
     let alone = run(&flat, &thumbnails, 0, &options, &StageContext::default()).expect("estimates");
     assert!(alone.pairs.is_empty());
+}
+
+/// The same samples are compared wherever the turn is cut open, though the cuts lie between them.
+#[test]
+fn a_full_turn_is_corrected_alike_wherever_it_is_cut_open() {
+    let shifts = [0_usize, 170, 330];
+    let rasters = [picture_around(0, 1.0), picture_around(170, 0.7), picture_around(330, 1.4)];
+    let frame = WorkingFrame::new(WIDTH, HEIGHT, 480_000.0);
+    let thumbnails: Vec<Thumbnail> =
+        rasters.iter().map(|raster| Thumbnail { raster, curve: &TransferCurve::SRGB, frame, camera: 0 }).collect();
+    let cut_at = |cut: f64| {
+        let around = |shift: usize| (shift as f64 - cut).rem_euclid(AROUND as f64) - 0.25 * WIDTH as f64;
+        let layout = CanvasLayout { width: AROUND, period: Some(AROUND), ..layout(&shifts.map(around)) };
+        run(&layout, &thumbnails, 0, &ExposureOptions::default(), &StageContext::default()).expect("estimates")
+    };
+    let whole = cut_at(0.0);
+    assert_eq!(whole.pairs.len(), 3);
+    for cut in [0.7, 33.3, 201.6, 239.9, 424.25] {
+        let other = cut_at(cut);
+        assert_eq!(other.pairs.len(), 3, "{cut}");
+        for (one, other) in whole.corrections.photographs.iter().zip(&other.corrections.photographs) {
+            for channel in 0..3 {
+                let ratio = one.gain[channel] / other.gain[channel];
+                assert!((ratio - 1.0).abs() < 1e-9, "{cut}: {one:?} {other:?}");
+            }
+            assert!((one.at_radius(1.0) / other.at_radius(1.0) - 1.0).abs() < 1e-9, "{cut}: {one:?} {other:?}");
+        }
+    }
 }
 
 #[test]
@@ -150,6 +182,16 @@ fn gains_from_a_quarter_to_four_are_recovered() {
             GainAnchor::Mean => assert!(corrections.map(|one| one.brightness().ln()).sum::<f64>().abs() < 1e-9),
         }
     }
+}
+
+/// From sun to shade, as cameras that expose by themselves go: four stops from the reference to the other end.
+#[test]
+fn exposures_four_stops_apart_are_followed() {
+    let lights = [4.0, 1.0, 0.25];
+    let shifts = [0.0, 100.0, 200.0];
+    let rasters: Vec<_> = shifts.iter().zip(lights).map(|(&shift, light)| picture(shift, light)).collect();
+    let gains = gains(&estimate(&shifts, &rasters, &ExposureOptions::default()));
+    assert!((gains[1] / 4.0 - 1.0).abs() < 0.02 && (gains[2] / 16.0 - 1.0).abs() < 0.03, "{gains:?}");
 }
 
 #[test]

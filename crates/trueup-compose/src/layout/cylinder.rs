@@ -57,7 +57,7 @@ pub(crate) fn columns_around(columns: Range<usize>, period: Option<usize>) -> (R
 
 impl Placed {
     /// The photograph moved to the right.
-    fn moved(&self, by: f64) -> Self {
+    pub(crate) fn moved(&self, by: f64) -> Self {
         let mut moved = self.clone();
         for vertex in &mut moved.mesh.target {
             vertex[0] += by;

@@ -1,0 +1,70 @@
+//! What two photographs that overlap say of each other.
+
+use trueup_core::colour::TransferCurve;
+
+use super::samples::Shared;
+use super::{ExposureOptions, PairExposure};
+
+/// An overlap and its samples.
+pub(super) struct Observed {
+    pub(super) pair: PairExposure,
+    /// Medians of the samples' logarithms, by channel.
+    pub(super) channel_medians: [f32; 3],
+    pub(super) samples: Vec<Shared>,
+    /// How much each sample counts by its noise alone, 1 on average.
+    pub(super) certainties: Vec<f64>,
+}
+
+impl Observed {
+    /// `deviation` is the uncertainty that samples have beside their noise.
+    fn new(pair: PairExposure, channel_medians: [f32; 3], samples: Vec<Shared>, deviation: f64) -> Self {
+        let variance =
+            |sample: &Shared| deviation.powi(2) + sample.variances.iter().copied().map(f64::from).sum::<f64>();
+        let mut certainties: Vec<f64> = samples.iter().map(|sample| variance(sample).recip()).collect();
+        let mean = certainties.iter().sum::<f64>() / certainties.len().max(1) as f64;
+        certainties.iter_mut().for_each(|certainty| *certainty /= mean);
+        Self { pair, channel_medians, samples, certainties }
+    }
+}
+
+/// Compares two photographs by what they share; `None` if that is too little.
+pub(super) fn compare(
+    mut samples: Vec<Shared>,
+    [first, second]: [usize; 2],
+    curve: &TransferCurve,
+    options: &ExposureOptions,
+) -> Option<Observed> {
+    if samples.len() < options.min_shared.max(1) {
+        return None;
+    }
+    let channel_medians = std::array::from_fn(|channel| {
+        let mut ratios: Vec<f32> = samples.iter().map(|sample| sample.log_ratio()[channel]).collect();
+        median(&mut ratios)
+    });
+    let mut ratios: Vec<f32> = samples.iter().map(Shared::brightness).collect();
+    let log_ratio = median(&mut ratios);
+    for ratio in &mut ratios {
+        *ratio = (*ratio - log_ratio).abs();
+    }
+    let deviation = NORMAL * f64::from(median(&mut ratios));
+    let pair = PairExposure { first, second, log_ratio: f64::from(log_ratio), deviation, samples: samples.len() };
+    // Neighbouring samples say the same; a few hundred of an overlap settle seven unknowns.
+    const KEPT: usize = 600;
+    let step = samples.len().div_ceil(KEPT);
+    let mut index = 0_usize;
+    samples.retain(|_| {
+        index += 1;
+        (index - 1).is_multiple_of(step)
+    });
+    let samples: Vec<Shared> = samples.into_iter().map(|sample| sample.with_variances(curve)).collect();
+    Some(Observed::new(pair, channel_medians, samples, options.pair_deviation))
+}
+
+/// Ratio of the standard deviation to the median absolute deviation of a normal distribution.
+pub(super) const NORMAL: f64 = 1.4826;
+
+/// The median of at least one number (the upper one of an even count).
+fn median(values: &mut [f32]) -> f32 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f32::total_cmp).1
+}
