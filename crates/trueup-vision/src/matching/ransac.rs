@@ -34,7 +34,7 @@ const BATCH: usize = 16;
 pub struct Search {
     /// How far a match may lie from where the homography predicts it, in pixels of b.
     pub inlier_px: f64,
-    /// Probability of having drawn a sample of inliers at which drawing ends.
+    /// Probability of having drawn a sample of inliers; `PATIENCE` times as many as that takes are drawn.
     pub confidence: f64,
     /// Largest number of samples.
     pub max_samples: usize,
