@@ -42,7 +42,8 @@ impl<'a> LocalOptimiser<'a> {
     }
 
     /// The plausible map of least cost on the way from `start` to the nearest minimum of the sum over all matches of
-    /// min(1, error^2 / inlier_px^2), and that cost; `start` itself is taken as plausible.
+    /// min(1, error^2 / inlier_px^2), and that cost; `start` itself is taken as plausible. The way ends
+    /// early where it arrives at the cost `known` of a minimum found before.
     ///
     /// # Source
     /// Chum, Matas and Kittler, Locally optimized RANSAC, with shrinking thresholds; the cost is that of Torr and Zisserman,
@@ -50,7 +51,12 @@ impl<'a> LocalOptimiser<'a> {
     ///
     /// # Departures
     /// A step is a small projective map of b after the present one, so that no denominators appear in its equations.
-    pub fn optimise(&self, start: &Homography, is_plausible: &impl Fn(&Homography) -> bool) -> (Homography, f64) {
+    pub fn optimise(
+        &self,
+        start: &Homography,
+        known: f64,
+        is_plausible: &impl Fn(&Homography) -> bool,
+    ) -> (Homography, f64) {
         let mut current = Homography(self.normalised_from_pixels * start.0);
         let (mut best, mut best_cost) = (*start, f64::INFINITY);
         for step in 0..MAX_STEPS {
@@ -62,7 +68,8 @@ impl<'a> LocalOptimiser<'a> {
                     (best, best_cost) = (in_pixels, sums.cost);
                 }
             }
-            if step > FIRST_THRESHOLDS.len() && decrease <= SETTLED * best_cost {
+            let is_known = (sums.cost / known - 1.0).abs() <= SETTLED;
+            if is_known || (step > FIRST_THRESHOLDS.len() && decrease <= SETTLED * best_cost) {
                 break;
             }
             let Some(next) = sums.step().map(|step| step * current.0) else { break };
@@ -163,7 +170,7 @@ mod tests {
     }
 
     fn optimised(points: &MatchedPoints, start: &Homography) -> (Homography, f64) {
-        LocalOptimiser::new(points, INLIER_PX).expect("places differ").optimise(start, &|_| true)
+        LocalOptimiser::new(points, INLIER_PX).expect("places differ").optimise(start, f64::INFINITY, &|_| true)
     }
 
     #[test]
@@ -195,7 +202,7 @@ mod tests {
         let points = points(1.5);
         let optimiser = LocalOptimiser::new(&points, INLIER_PX).expect("places differ");
         let same = |found: Homography| (found.0 / found.0[(2, 2)] - rough().0).amax() < 1e-9;
-        assert!(same(optimiser.optimise(&rough(), &|_| false).0));
+        assert!(same(optimiser.optimise(&rough(), f64::INFINITY, &|_| false).0));
         let four = points.select(&[1, 2, 3, 4]);
         assert!(same(optimised(&four, &rough()).0));
         let one_place = MatchedPoints { in_b: vec![Vector2::new(1.0, 2.0); 60], ..points };

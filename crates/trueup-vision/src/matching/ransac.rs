@@ -109,7 +109,7 @@ pub fn find_homography(
     let (mut best, mut best_cost) = (None, count as f64);
     // Optimises a hypothesis; if it leads to the best so far, its inliers tell how many samples are needed.
     let mut optimise = |hypothesis: &Homography, needed: &mut usize| {
-        let (optimised, cost) = local.optimise(hypothesis, &is_plausible);
+        let (optimised, cost) = local.optimise(hypothesis, best_cost, &is_plausible);
         if cost < best_cost {
             (best, best_cost) = (Some(optimised), cost);
             *needed = (*needed).min(enough(points.agreeing(&optimised, search.inlier_px).len()));
