@@ -4,13 +4,14 @@
 //! (`ransac`), the pair is judged by how many do, and the matches of a joined pair are completed by further planes
 //! (`planes`) and by a second look near the predicted places (`guided`).
 
+mod duplicates;
 mod guided;
+mod local;
 mod options;
 mod overlap;
 mod planes;
 mod putative;
 mod ransac;
-mod refine;
 mod search;
 #[cfg(test)]
 mod tests;
@@ -19,13 +20,13 @@ use std::collections::BTreeSet;
 
 use rand::Rng;
 use rayon::prelude::*;
-use trueup_core::diagnostics::Diagnostic;
 use trueup_core::geometry::Homography;
 use trueup_core::matches::{PairMatches, PairVerdict, PointMatch};
 use trueup_core::options::StageOptions;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 
+pub use duplicates::{is_near_duplicate, report_near_duplicates};
 pub use options::MatchingOptions;
 pub use putative::{PutativeMatch, putative_matches};
 pub use search::{Kernel, Nearest, Neighbour};
@@ -37,10 +38,6 @@ use ransac::{Consensus, MatchedPoints, NoConsensus, Search};
 
 /// The stage's name in progress and generators.
 const STAGE: &str = MatchingOptions::STAGE;
-/// Mean displacement of the inliers below which two pictures show the same view, in working pixels.
-const DUPLICATE_DISPLACEMENT_PX: f64 = 3.0;
-/// Share of the matches in the overlap that agree, above which they may be the same view.
-const DUPLICATE_AGREEMENT: f64 = 0.95;
 
 /// What matching needs to know of a picture.
 #[derive(Debug, Clone, Copy)]
@@ -90,13 +87,6 @@ pub fn run(
     matched
 }
 
-/// Reports the pairs that show the same view, as diagnostics with the code `near-duplicate`.
-pub fn report_near_duplicates(pairs: &[PairMatches], context: &StageContext<'_>) {
-    for pair in pairs.iter().filter(|pair| is_near_duplicate(pair)) {
-        context.report(near_duplicate(pair));
-    }
-}
-
 /// Matches two pictures and judges whether they overlap.
 ///
 /// A pair is joined if its homography is believable in the overlap it predicts, and the matches that agree with it are
@@ -144,6 +134,7 @@ pub fn match_pair(
         confidence: options.confidence,
         max_samples: options.max_samples,
         useful_inliers: pair.needed,
+        start: None,
     };
     let is_plausible = plausibility(a.frame, b.frame, options);
     let global = ransac::find_homography(&points, &search, &is_plausible, &mut generator);
@@ -284,22 +275,4 @@ pub(crate) fn check_features(index: usize, features: &Features) -> Result<()> {
         "descriptors and points do not fit together, or positions are not finite",
         "Detect the features anew.",
     ))
-}
-
-/// Whether a joined pair shows the same view: its inliers hardly move and nearly all agree.
-pub fn is_near_duplicate(pair: &PairMatches) -> bool {
-    let displacement = |at: &PointMatch| (at.in_b[0] - at.in_a[0]).hypot(at.in_b[1] - at.in_a[1]);
-    let total: f64 = pair.inliers.iter().map(displacement).sum();
-    pair.verdict.is_joined()
-        && pair.agreeing as f64 > DUPLICATE_AGREEMENT * pair.in_overlap as f64
-        && total < DUPLICATE_DISPLACEMENT_PX * pair.inliers.len() as f64
-}
-
-fn near_duplicate(pair: &PairMatches) -> Diagnostic {
-    Diagnostic::warning(
-        "near-duplicate",
-        format!("{} - {}", pair.a, pair.b),
-        format!("the two pictures show the same view: {} of {} matches agree", pair.agreeing, pair.in_overlap),
-        "Leave one of them out, unless both are wanted.",
-    )
 }

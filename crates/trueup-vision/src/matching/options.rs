@@ -16,7 +16,8 @@ trueup_core::options! {
         distance_deviations: f64 = 4.25, between(0.0, 100.0), "standard deviations";
         /// How far a match may lie from where the global homography predicts it.
         inlier_px: f64 = 5.0, between(0.5, 50.0), "px";
-        /// Probability of having drawn one sample of inliers at which drawing ends.
+        /// Probability of having drawn a sample of inliers; eight times as many as that takes are drawn, because not every
+        /// sample of inliers leads to the best homography.
         confidence: f64 = 0.995, between(0.5, 0.999999), "";
         /// Largest number of samples drawn for the global homography. More finds pairs of which fewer matches agree.
         max_samples: usize = 6000, between(1.0, 1000000.0), "samples";

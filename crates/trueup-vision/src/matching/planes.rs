@@ -28,11 +28,12 @@ pub fn find_planes(
     is_plausible: impl Fn(&Homography) -> bool,
     generator: &mut impl Rng,
 ) -> Vec<Consensus> {
-    let search = Search {
+    let mut search = Search {
         inlier_px: options.plane_inlier_px,
         confidence: options.confidence,
         max_samples: options.max_plane_samples,
         useful_inliers: options.min_plane_inliers,
+        start: Some(*global),
     };
     let mut left = points.agreeing(global, max_displacement_px);
     let mut planes = Vec::new();
@@ -44,6 +45,7 @@ pub fn find_planes(
         let inliers: Vec<usize> = found.inliers.iter().map(|&k| left[k]).collect();
         left.retain(|index| inliers.binary_search(index).is_err());
         planes.push(Consensus { b_from_a: found.b_from_a, inliers });
+        search.start = None;
     }
     planes
 }

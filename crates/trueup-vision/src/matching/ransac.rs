@@ -2,26 +2,30 @@
 //!
 //! # Source
 //! Fischler and Bolles, Random sample consensus; the cost is MSAC's (Torr and Zisserman, MLESAC, section 4), samples of
-//! the most distinctive matches come first as in PROSAC (Chum and Matas, 2005), and every new best is optimised locally
+//! the most distinctive matches come first as in PROSAC (Chum and Matas, 2005), and promising ones are optimised locally
 //! (Chum, Matas and Kittler, Locally optimized RANSAC).
+//!
+//! # Departures
+//! Photographs with parallax have several maps that many matches agree on nearly equally, and a sample without outliers may
+//! lead to any of them. That the draw does not decide between them, more is drawn than the textbook asks for
+//! (`PATIENCE`), and samples are optimised that are nearly as good as the best sample (`PROMISING`): measured against an
+//! optimised map, hardly a sample would be good enough to lead anywhere else.
 
 use nalgebra::{Matrix3, Vector2};
 use rand::{Rng, RngExt};
 use trueup_core::geometry::Homography;
 
-use super::refine;
+use super::local::LocalOptimiser;
 
 /// Matches in a sample.
 const SAMPLE: usize = 4;
 /// Twice the smallest area of a triangle of sample points, in square pixels; below, the three count as collinear.
 const MIN_TRIANGLE_PX2: f64 = 20.0;
-/// Thresholds of the local optimisation's rounds, in units of the final one.
-const LOCAL_THRESHOLDS: [f64; 4] = [2.0, 1.5, 1.0, 1.0];
-/// Rounds of final refinement and new choice of inliers.
-const FINAL_ROUNDS: usize = 4;
-/// How many times the samples that would give one without outliers are drawn before useful inliers count as absent:
-/// such a sample may still be too noisy or too narrow.
+/// How many times the samples that would give one without outliers are drawn: such a sample may still be too noisy, too
+/// narrow, or of another plane.
 const PATIENCE: usize = 8;
+/// A sample's map is optimised if it explains at least this share of what the best sample's map explains.
+const PROMISING: f64 = 0.8;
 /// Matches measured between two looks at whether a hypothesis can still win.
 const BATCH: usize = 16;
 
@@ -30,12 +34,14 @@ const BATCH: usize = 16;
 pub struct Search {
     /// How far a match may lie from where the homography predicts it, in pixels of b.
     pub inlier_px: f64,
-    /// Probability of having drawn a sample of inliers at which drawing ends.
+    /// Probability of having drawn a sample of inliers; `PATIENCE` times as many as that takes are drawn.
     pub confidence: f64,
     /// Largest number of samples.
     pub max_samples: usize,
     /// Inliers below which the answer is of no use; drawing ends where so many would have been found.
     pub useful_inliers: usize,
+    /// A map that may be about right, tried before all samples.
+    pub start: Option<Homography>,
 }
 
 /// A homography and the matches that agree with it.
@@ -81,10 +87,9 @@ impl MatchedPoints {
     }
 }
 
-/// The plausible homography of least truncated squared forward transfer error, refined on its inliers.
+/// The plausible homography of least truncated squared forward transfer error.
 ///
-/// The error of a match counts at most `inlier_px`; hypotheses that cannot win any more are dropped early. The result
-/// minimises the symmetric transfer error of its inliers.
+/// The error of a match counts at most `inlier_px`; hypotheses that cannot win any more are dropped early.
 ///
 /// # Errors
 /// [`NoConsensus`] if there are fewer than four matches or no sample gives a plausible map.
@@ -95,36 +100,43 @@ pub fn find_homography(
     generator: &mut impl Rng,
 ) -> Result<Consensus, NoConsensus> {
     let count = points.in_a.len();
-    if count < SAMPLE {
-        return Err(NoConsensus::NoSample);
-    }
+    let local = LocalOptimiser::new(points, search.inlier_px).filter(|_| count >= SAMPLE);
+    let local = local.ok_or(NoConsensus::NoSample)?;
+    let enough =
+        |inliers: usize| PATIENCE.saturating_mul(samples_needed(inliers as f64 / count as f64, search.confidence));
     let mut failure = NoConsensus::NoSample;
-    let mut best: Option<Homography> = None;
-    let mut best_cost = count as f64;
-    let hopeless =
-        PATIENCE.saturating_mul(samples_needed(search.useful_inliers as f64 / count as f64, search.confidence));
-    let mut needed = search.max_samples.min(hopeless);
+    let mut needed = search.max_samples.min(enough(search.useful_inliers));
+    let (mut best, mut best_cost) = (None, count as f64);
+    // Optimises a hypothesis; if it leads to the best so far, its inliers tell how many samples are needed.
+    let mut optimise = |hypothesis: &Homography, needed: &mut usize| {
+        let (optimised, cost) = local.optimise(hypothesis, best_cost, &is_plausible);
+        if cost < best_cost {
+            (best, best_cost) = (Some(optimised), cost);
+            *needed = (*needed).min(enough(points.agreeing(&optimised, search.inlier_px).len()));
+        }
+    };
+    if let Some(start) = search.start.filter(&is_plausible) {
+        optimise(&start, &mut needed);
+    }
     let mut pool = ProgressivePool::new(count, needed);
+    // How many matches the best sample's map explains, each by 1 - error^2 / inlier_px^2.
+    let mut explained: f64 = 0.0;
     let mut drawn = 0;
     while drawn < needed {
         drawn += 1;
         let sample = pool.draw(generator);
         let Some(hypothesis) = through_sample(points, &sample) else { continue };
-        let Some(cost) = truncated_cost(points, &hypothesis, search.inlier_px, best_cost) else { continue };
-        if !is_plausible(&hypothesis) {
-            if points.agreeing(&hypothesis, search.inlier_px).len() >= search.useful_inliers {
-                failure = NoConsensus::Implausible;
-            }
-            continue;
+        let bound = count as f64 - PROMISING * explained;
+        let Some(cost) = truncated_cost(points, &hypothesis, search.inlier_px, bound) else { continue };
+        if is_plausible(&hypothesis) {
+            explained = explained.max(count as f64 - cost);
+            optimise(&hypothesis, &mut needed);
+        } else if points.agreeing(&hypothesis, search.inlier_px).len() >= search.useful_inliers {
+            failure = NoConsensus::Implausible;
         }
-        let (hypothesis, cost) = optimise_locally(points, hypothesis, cost, search.inlier_px, &is_plausible);
-        (best, best_cost) = (Some(hypothesis), cost);
-        let agreeing = points.agreeing(&hypothesis, search.inlier_px).len();
-        needed = needed.min(samples_needed(agreeing as f64 / count as f64, search.confidence));
     }
-    let refined = finish(points, best.ok_or(failure)?, search.inlier_px, &is_plausible);
-    let inliers = points.agreeing(&refined, search.inlier_px);
-    Ok(Consensus { b_from_a: refined, inliers })
+    let b_from_a = best.ok_or(failure)?;
+    Ok(Consensus { b_from_a, inliers: points.agreeing(&b_from_a, search.inlier_px) })
 }
 
 /// Samples after which one is all inliers with the probability asked for.
@@ -229,91 +241,5 @@ fn truncated_cost(points: &MatchedPoints, hypothesis: &Homography, inlier_px: f6
     Some(cost)
 }
 
-/// Fits the map to its inliers at shrinking thresholds as long as that lowers the cost.
-fn optimise_locally(
-    points: &MatchedPoints,
-    hypothesis: Homography,
-    cost: f64,
-    inlier_px: f64,
-    is_plausible: &impl Fn(&Homography) -> bool,
-) -> (Homography, f64) {
-    let (mut best, mut best_cost, mut current) = (hypothesis, cost, hypothesis);
-    for factor in LOCAL_THRESHOLDS {
-        let chosen = points.select(&points.agreeing(&current, factor * inlier_px));
-        if chosen.in_a.len() <= SAMPLE {
-            break;
-        }
-        let Some(fit) = fit_visible(&chosen) else { break };
-        current = fit;
-        if let Some(cost) = truncated_cost(points, &current, inlier_px, best_cost)
-            && is_plausible(&current)
-        {
-            (best, best_cost) = (current, cost);
-        }
-    }
-    (best, best_cost)
-}
-
-/// Least-squares map, signed so that the points are in front; `None` if degenerate or the points lie on both sides.
-fn fit_visible(points: &MatchedPoints) -> Option<Homography> {
-    let fit = Homography::fit(&points.in_a, &points.in_b, None)?;
-    let sign = fit.denominator(*points.in_a.first()?).signum();
-    let signed = Homography(fit.0 * sign);
-    points.in_a.iter().all(|&point| signed.denominator(point) > 0.0).then_some(signed)
-}
-
-/// Refines on the inliers and chooses these again until they stay; keeps the map of least cost.
-fn finish(
-    points: &MatchedPoints,
-    found: Homography,
-    inlier_px: f64,
-    is_plausible: &impl Fn(&Homography) -> bool,
-) -> Homography {
-    let all = points.in_a.len() as f64;
-    let mut best = found;
-    let mut best_cost = truncated_cost(points, &found, inlier_px, f64::INFINITY).unwrap_or(all);
-    let mut inliers = points.agreeing(&found, inlier_px);
-    for _ in 0..FINAL_ROUNDS {
-        if inliers.len() <= SAMPLE {
-            break;
-        }
-        let Some(refined) = refine::minimise_symmetric_error(&best, &points.select(&inliers)) else { break };
-        let Some(cost) = truncated_cost(points, &refined, inlier_px, best_cost) else { break };
-        if !is_plausible(&refined) {
-            break;
-        }
-        (best, best_cost) = (refined, cost);
-        let chosen = points.agreeing(&best, inlier_px);
-        if chosen == inliers {
-            break;
-        }
-        inliers = chosen;
-    }
-    best
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_number_of_samples_is_that_of_the_textbook() {
-        // ln(1 - 0.995) / ln(1 - p) with p = 0.225^4 and 0.2^4, as in the reference implementation; 0.5^4 by hand.
-        assert_eq!(samples_needed(0.225, 0.995), 2065);
-        assert_eq!(samples_needed(0.5, 0.995), 83);
-        assert_eq!(samples_needed(1.0, 0.995), 1);
-        assert_eq!(samples_needed(0.0, 0.995), usize::MAX);
-    }
-
-    #[test]
-    fn four_matches_determine_the_map_unless_it_turns_them_over() {
-        let h = Homography(Matrix3::new(1.05, 0.08, 200.0, -0.06, 1.02, 30.0, -4e-4, 6e-5, 1.0));
-        let in_a = [(0.0, 0.0), (640.0, 10.0), (600.0, 480.0), (20.0, 400.0)].map(|(x, y)| Vector2::new(x, y));
-        let points = MatchedPoints { in_a: in_a.to_vec(), in_b: in_a.map(|p| h.apply(p)).to_vec() };
-        let found = through_sample(&points, &[0, 1, 2, 3]).expect("general position");
-        assert!((found.0 / found.0[(2, 2)] - h.0).amax() < 1e-9);
-        let swapped =
-            MatchedPoints { in_b: vec![points.in_b[1], points.in_b[0], points.in_b[2], points.in_b[3]], ..points };
-        assert!(through_sample(&swapped, &[0, 1, 2, 3]).is_none());
-    }
-}
+mod tests;

@@ -6,12 +6,14 @@ mod recalling;
 mod results;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use trueup_compose::exposure::{self, Corrections, Thumbnail};
 use trueup_compose::layout::CanvasLayout;
 use trueup_core::diagnostics::Diagnostic;
+use trueup_core::mask::Masks;
 use trueup_core::raster::Raster;
-use trueup_core::source::{PhotographSource, WorkingFrame};
+use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
 use trueup_core::{Result, StageContext};
 use trueup_io::colour::PhotographColours;
 use trueup_io::decode::FilePhotographs;
@@ -89,16 +91,13 @@ impl<'a> Stitcher<'a> {
         let mut clock = Clock::default();
         let sources = clock.time("source", || source::scan(&inputs.photographs, &self.options.source, self.context))?;
         self.check_any(&sources, inputs)?;
-        let measuring = Budget::new(self.options).measuring(&sources.images, self.options)?;
         let masks = AllMasks::read(&inputs.masks, &sources.images, &self.options.source, self.context)?;
-        let colours = PhotographColours::survey(&sources.images, self.context);
-        let photographs = FilePhotographs::new(sources.images.clone(), measuring.kept_bytes).in_colours(colours);
-        let photographs = std::sync::Arc::new(photographs.with_masks(masks.masks));
+        let (photographs, at_once) = self.open(sources.images.clone(), masks.masks)?;
         let keys = match self.cache {
             Some(_) => clock.time("source", || photograph_keys(&photographs, self.options, self.context))?,
             None => Vec::new(),
         };
-        let known = (self.known(&keys), measuring.at_once);
+        let known = (self.known(&keys), at_once);
         let matched = self.match_all((sources, masks.records), &photographs, known, inputs, &mut clock)?;
         if let Some(cache) = self.cache {
             cache.report(self.context);
@@ -151,6 +150,14 @@ impl<'a> Stitcher<'a> {
             alignments.push(alignment);
         }
         Ok(Aligned { alignments })
+    }
+
+    /// The photographs with their masks, in one colour space, and how many of them may be measured at once.
+    fn open(&self, images: Vec<SourceImage>, masks: Vec<Masks>) -> Result<(Arc<FilePhotographs>, usize)> {
+        let measuring = Budget::new(self.options).measuring(&images, self.options)?;
+        let colours = PhotographColours::survey(&images, self.context);
+        let photographs = FilePhotographs::new(images, measuring.kept_bytes).in_colours(colours);
+        Ok((Arc::new(photographs.with_masks(masks)), measuring.at_once))
     }
 
     fn known<'k>(&'k self, keys: &'k [Option<Key>]) -> Option<Known<'k>> {

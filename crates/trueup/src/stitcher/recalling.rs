@@ -10,7 +10,6 @@ use trueup_io::decode::FilePhotographs;
 use super::{Alignment, Stitcher};
 use crate::align::camera_groups;
 use crate::arrangement;
-use crate::budget::Budget;
 use crate::clock::Clock;
 use crate::masks::AllMasks;
 use crate::measure;
@@ -36,17 +35,14 @@ impl Stitcher<'_> {
         self.options.validate()?;
         let mut clock = Clock::default();
         let Recorded { used, layout, corrections, reference } = Recorded::new(project)?;
-        let measuring = Budget::new(self.options).measuring(&images, self.options)?;
-        let colours = PhotographColours::survey(&images, self.context);
-        let photographs = FilePhotographs::new(images, measuring.kept_bytes).in_colours(colours);
-        let photographs = std::sync::Arc::new(photographs.with_masks(masks.masks));
+        let (photographs, at_once) = self.open(images, masks.masks)?;
         let arrangement =
             clock.time("canvas", || arrangement::recall(layout, reference, project, self.options, self.context))?;
         let corrections = match self.options.exposure == project.options.exposure {
             true => corrections,
-            false => clock.time("exposure", || {
-                self.correct_anew(&arrangement.plane, reference, (&photographs, measuring.at_once))
-            })?,
+            false => {
+                clock.time("exposure", || self.correct_anew(&arrangement.plane, reference, (&photographs, at_once)))?
+            }
         };
         let same_canvas = self.options.canvas == project.options.canvas;
         let mut project = Project { options: self.options.clone(), ..project.clone() };
