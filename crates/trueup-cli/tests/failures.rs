@@ -114,6 +114,9 @@ fn black_photographs() {
     desk.put("black.jpg", plain(320, 240, 0));
     desk.put("white.jpg", plain(320, 240, 255));
     desk.stitch(&["black.jpg", "white.jpg"]).expect_failure(1, &["no overlapping photographs found"]);
+    // A reference that was not given is found before the photographs are measured.
+    desk.stitch(&["black.jpg", "white.jpg", "--reference", "q.jpg"])
+        .expect_failure(1, &["q.jpg: no photograph of this name was given, so it cannot be the reference"]);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use trueup_align::stitch_graph::{GraphFile, StitchGraph};
 use trueup_core::matches::PairMatches;
+use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
 use trueup_io::source::{RejectedSource, Sources};
 
@@ -10,6 +11,11 @@ use crate::left_out::{self, LeftOut};
 use crate::masks::{MaskRecord, photograph_named};
 use crate::measure::Measured;
 use crate::names::several;
+
+/// The photograph the user calls `name` for the reference: by name, by path, or by the end of its path.
+pub(crate) fn reference_named(images: &[SourceImage], name: &str) -> Result<usize> {
+    photograph_named(images, name, "so it cannot be the reference")
+}
 
 /// Everything known after matching.
 #[derive(Debug)]
@@ -30,9 +36,8 @@ impl Matched {
         self.sources.images.iter().map(|image| image.name.clone()).collect()
     }
 
-    /// The photograph the user calls `name`: by name, by path, or by the end of its path.
     pub fn picture_named(&self, name: &str) -> Result<usize> {
-        photograph_named(&self.sources.images, name, "so it cannot be the reference")
+        reference_named(&self.sources.images, name)
     }
 
     pub fn reference_of(&self, members: &[usize], inputs: &Inputs) -> Result<usize> {

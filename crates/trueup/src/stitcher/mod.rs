@@ -24,10 +24,10 @@ use crate::arrangement;
 use crate::budget::Budget;
 use crate::cache::{Cache, Key, Known, photograph_keys};
 use crate::clock::Clock;
-use crate::inputs::Inputs;
+use crate::inputs::{Inputs, Reference};
 use crate::left_out::LeftOut;
 use crate::masks::AllMasks;
-use crate::matched::require_all;
+use crate::matched::{reference_named, require_all};
 use crate::measures;
 use crate::names;
 use crate::options::StitchOptions;
@@ -80,8 +80,8 @@ impl<'a> Stitcher<'a> {
     /// or other options of the later stages.
     ///
     /// # Errors
-    /// [`Error::Options`]; [`Error::Input`] when no photograph can be read or the graph does not fit the photographs;
-    /// [`Error::Cancelled`].
+    /// [`Error::Options`]; [`Error::Input`] when no photograph can be read, or the graph or the reference does not fit the
+    /// photographs; [`Error::Cancelled`].
     ///
     /// [`Error::Cancelled`]: trueup_core::Error::Cancelled
     /// [`Error::Input`]: trueup_core::Error::Input
@@ -91,6 +91,9 @@ impl<'a> Stitcher<'a> {
         let mut clock = Clock::default();
         let sources = clock.time("source", || source::scan(&inputs.photographs, &self.options.source, self.context))?;
         self.check_any(&sources, inputs)?;
+        if let Reference::Named(name) = &inputs.reference {
+            reference_named(&sources.images, name)?;
+        }
         let masks = AllMasks::read(&inputs.masks, &sources.images, &self.options.source, self.context)?;
         let (photographs, at_once) = self.open(sources.images.clone(), masks.masks)?;
         let keys = match self.cache {
