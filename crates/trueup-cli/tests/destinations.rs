@@ -27,33 +27,32 @@ fn outputs_that_cannot_be_written() {
     assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "folder.jpg"]);
 }
 
-/// A limit on the size of files stops the writing half way, as a full disk does.
+/// Stitches with a limit on the size of files, which stops the writing half way, as a full disk does: that fails as `said`, and
+/// leaves the old panorama as it was and nothing behind.
 #[cfg(target_os = "linux")]
-#[test]
-fn a_full_disk_leaves_the_old_panorama_as_it_was() {
+fn fails_on_a_full_disk(arguments: &str, said: &str) {
     let desk = street_desk();
     desk.put("pano.jpg", "the old panorama");
     let mut command = std::process::Command::new("sh");
-    let script = "trap '' XFSZ; ulimit -f 8; exec \"$0\" stitch a.jpg b.jpg -o pano.jpg";
-    command.current_dir(desk.path()).args(["-c", script, env!("CARGO_BIN_EXE_trueup")]);
-    finish(command).expect_failure(1, &["pano.jpg: File too large"]);
+    let script = format!("trap '' XFSZ; ulimit -f 8; exec \"$0\" stitch {arguments} -o pano.jpg");
+    command.current_dir(desk.path()).args(["-c", &script, env!("CARGO_BIN_EXE_trueup")]);
+    finish(command).expect_failure(1, &[said]);
     assert_eq!(desk.read("pano.jpg"), b"the old panorama");
     assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "pano.jpg"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_leaves_the_old_panorama_as_it_was() {
+    fails_on_a_full_disk("a.jpg b.jpg", "pano.jpg: File too large");
 }
 
 /// The same for the scratch file of a canvas that does not fit in memory.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_disk_without_room_for_the_scratch_file_leaves_nothing_behind() {
-    let desk = street_desk();
-    desk.put("pano.jpg", "the old panorama");
-    let mut command = std::process::Command::new("sh");
-    let script =
-        "trap '' XFSZ; ulimit -f 8; exec \"$0\" stitch a.jpg b.jpg c.jpg d.jpg -o pano.jpg --scale 6 --memory 230MB";
-    command.current_dir(desk.path()).args(["-c", script, env!("CARGO_BIN_EXE_trueup")]);
-    finish(command).expect_failure(1, &["writing the scratch file in .: File too large"]);
-    assert_eq!(desk.read("pano.jpg"), b"the old panorama");
-    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "pano.jpg"]);
+    let arguments = "a.jpg b.jpg c.jpg d.jpg --scale 6 --memory 230MB";
+    fails_on_a_full_disk(arguments, "writing the scratch file in .: File too large");
 }
 
 /// The scratch folder is needed late, if at all, and looked at first.

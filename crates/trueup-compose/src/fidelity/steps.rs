@@ -30,8 +30,8 @@ pub(super) struct LineSteps {
     pub(super) columns: Steps,
 }
 
-/// Where a stretch of a line lies, whether it runs down, and between whom.
-type Stretch = (usize, usize, bool, [u16; 2]);
+/// Where a stretch of a line lies, whether it runs down, and between whom; `None` stands for all who cover it.
+type Stretch = (usize, usize, bool, Option<[u16; 2]>);
 
 /// For each stretch and each photograph that may be shown there, sums of the panorama's steps and its own, and their number.
 #[derive(Default)]
@@ -59,9 +59,6 @@ struct Place {
     down: bool,
 }
 
-/// Stands for the pair of stretches that lie between no two photographs in particular.
-const ALL: [u16; 2] = [u16::MAX; 2];
-
 impl Measured<'_> {
     pub(super) fn steps(&self) -> LineSteps {
         let (width, height) = (self.gray.width(), self.gray.height());
@@ -70,18 +67,18 @@ impl Measured<'_> {
             for x in 0..width {
                 let here = self.shown[y * width + x];
                 if let Some(&below) = self.shown.get((y + 1) * width + x).filter(|&&below| below != here) {
-                    self.add(&mut seams, Place { x, y, down: false }, [here, below]);
+                    self.add(&mut seams, Place { x, y, down: false }, Some([here, below]));
                 }
                 if x + 1 < width || self.turn > 0 {
                     let (place, pair) = (Place { x, y, down: true }, [here, self.shown[y * width + (x + 1) % width]]);
                     if x + 1 == width {
-                        self.add(&mut wrap, place, pair);
+                        self.add(&mut wrap, place, Some(pair));
                     }
                     if self.turn > 0 && x + 1 < width && (x + 1).is_multiple_of(STRETCH_PX) {
-                        self.add(&mut columns, place, pair);
+                        self.add(&mut columns, place, Some(pair));
                     }
                     if pair[0] != pair[1] {
-                        self.add(&mut seams, place, pair);
+                        self.add(&mut seams, place, Some(pair));
                     }
                 }
             }
@@ -97,7 +94,7 @@ impl Measured<'_> {
                 let (down, across) = ((x + 1).is_multiple_of(STEP_REACH), (y + 1).is_multiple_of(STEP_REACH));
                 let Some(runs_down) = (down || across).then(|| self.goes_over_across(x, y)).flatten() else { continue };
                 if if runs_down { down } else { across } {
-                    self.add(&mut stretches, Place { x, y, down: runs_down }, ALL);
+                    self.add(&mut stretches, Place { x, y, down: runs_down }, None);
                 }
             }
         }
@@ -147,9 +144,9 @@ impl Measured<'_> {
         Some(pixels)
     }
 
-    /// Adds the steps at a place on a line between two photographs, both of which must cover its pixels, or between [`ALL`] that
-    /// do, two at least.
-    fn add(&self, stretches: &mut Stretches, place: Place, pair: [u16; 2]) {
+    /// Adds the steps at a place on a line between two photographs, both of which must cover its pixels, or without a `pair`
+    /// between all that do, two at least.
+    fn add(&self, stretches: &mut Stretches, place: Place, pair: Option<[u16; 2]>) {
         let Some(pixels) = self.pixels(place) else { return };
         let step_of = |value: &dyn Fn(usize, usize) -> Option<f64>| -> Option<f64> {
             let mut step = 0.0;
@@ -163,12 +160,11 @@ impl Measured<'_> {
             let layer = self.layers.get(usize::from(label))?;
             Some((label, step_of(&|x, y| level(layer, x, y, self.turn))?))
         };
-        let mut found: Vec<(u16, f64)> = if pair == ALL {
-            (0..self.layers.len()).filter_map(|label| of_photograph(label as u16)).collect()
-        } else {
-            pair.into_iter().filter_map(of_photograph).collect()
+        let mut found: Vec<(u16, f64)> = match pair {
+            Some(pair) => pair.into_iter().filter_map(of_photograph).collect(),
+            None => (0..self.layers.len()).filter_map(|label| of_photograph(label as u16)).collect(),
         };
-        let enough = found.len() >= pair.len();
+        let enough = found.len() >= 2;
         // Both sides of the ends of a turn may show the same.
         found.dedup();
         let own = step_of(&|x, y| Some(f64::from(self.gray.pixel(x, y)[0])));

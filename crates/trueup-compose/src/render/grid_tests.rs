@@ -5,18 +5,25 @@ use proptest::prelude::*;
 
 use super::test_pictures::moved;
 use crate::deformed_grid::DeformedGrid;
+use crate::layout::Placed;
 use crate::simd::{Positions, invert_row};
+
+/// A moved photograph, every vertex of its mesh moved a little more.
+fn jittered(jitter: &[f64]) -> Placed {
+    let mut placed = moved(0, 120.0, 100.0, |p| [p.x + 10.0, p.y + 10.0]);
+    for (index, vertex) in placed.mesh.target.iter_mut().enumerate() {
+        vertex[0] += jitter[2 * index];
+        vertex[1] += jitter[2 * index + 1];
+    }
+    placed
+}
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
     #[test]
     fn jittered_grids_have_no_holes_and_no_double_hits(jitter in prop::collection::vec(-6.0..6.0_f64, 2 * 7 * 6)) {
-        let mut placed = moved(0, 120.0, 100.0, |p| [p.x + 10.0, p.y + 10.0]);
-        for (index, vertex) in placed.mesh.target.iter_mut().enumerate() {
-            vertex[0] += jitter[2 * index];
-            vertex[1] += jitter[2 * index + 1];
-        }
+        let placed = jittered(&jitter);
         let grid = DeformedGrid::new(&placed.mesh, 1.0, true, 140, 120);
         let all: Vec<u32> = (0..grid.cells.len() as u32).collect();
         let (mut owner, mut runs) = (Vec::new(), Vec::new());
@@ -38,11 +45,7 @@ proptest! {
 
     #[test]
     fn inverting_the_grid_returns_to_the_pixel(jitter in prop::collection::vec(-6.0..6.0_f64, 2 * 7 * 6)) {
-        let mut placed = moved(0, 120.0, 100.0, |p| [p.x + 10.0, p.y + 10.0]);
-        for (index, vertex) in placed.mesh.target.iter_mut().enumerate() {
-            vertex[0] += jitter[2 * index];
-            vertex[1] += jitter[2 * index + 1];
-        }
+        let placed = jittered(&jitter);
         let grid = DeformedGrid::new(&placed.mesh, 1.0, false, 140, 120);
         let all: Vec<u32> = (0..grid.cells.len() as u32).collect();
         let (mut owner, mut runs, mut positions) = (Vec::new(), Vec::new(), Positions::default());

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::SeamOptions;
 use super::shading::{FRACTION, slopes};
-use super::view::{CLIPPED, IGNORED, KEPT, PARTLY, View, WHOLLY};
+use super::view::{CLIPPED, IGNORED, KEPT, PARTLY, View, ViewPixel, WHOLLY, luma};
 
 /// Costs are whole numbers; one grey level of 255 is this many.
 pub(super) const UNIT: i32 = 16;
@@ -170,18 +170,8 @@ fn in_units(levels: f64) -> i32 {
 /// Central differences of the luma over covered pixels; one-sided or zero at the border.
 fn gradients(view: &View) -> Vec<[i16; 2]> {
     let (width, height) = (view.columns.len(), view.rows.len());
-    // Rec. 601 in 256ths.
-    let luma: Vec<i16> = view
-        .pixels
-        .iter()
-        .map(|p| {
-            if p[3] & PARTLY == 0 {
-                -1
-            } else {
-                ((77 * i32::from(p[0]) + 150 * i32::from(p[1]) + 29 * i32::from(p[2])) >> 8) as i16
-            }
-        })
-        .collect();
+    let or_none = |pixel: &ViewPixel| if pixel[3] & PARTLY == 0 { -1 } else { (luma(pixel) >> 8) as i16 };
+    let luma: Vec<i16> = view.pixels.iter().map(or_none).collect();
     let mut out = vec![[0; 2]; width * height];
     for (index, out) in out.iter_mut().enumerate() {
         let (x, y) = (index % width, index / width);

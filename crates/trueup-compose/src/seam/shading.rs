@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::view::{View, WHOLLY};
+use super::view::{View, WHOLLY, luma};
 
 /// Parts of a grey level in which slopes are counted.
 pub(super) const FRACTION: i32 = 64;
@@ -83,11 +83,6 @@ impl Sums {
         let (sum, count) = (of(0), of(1));
         (count > 0).then(|| ((u64::from(sum) * FRACTION as u64) / (u64::from(count) << 8)) as i32)
     }
-}
-
-/// Rec. 601 luma in 256ths of a level.
-fn luma(pixel: &super::ViewPixel) -> u32 {
-    77 * u32::from(pixel[0]) + 150 * u32::from(pixel[1]) + 29 * u32::from(pixel[2])
 }
 
 #[cfg(test)]

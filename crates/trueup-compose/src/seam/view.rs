@@ -20,6 +20,11 @@ pub const KEPT: u8 = 16;
 /// One pixel of a view: red, green and blue (square root of linear light, 255 is white) and flags.
 pub type ViewPixel = [u8; 4];
 
+/// Brightness of a pixel in 256ths of a level: Rec. 601 luma.
+pub(super) fn luma(pixel: &ViewPixel) -> u32 {
+    77 * u32::from(pixel[0]) + 150 * u32::from(pixel[1]) + 29 * u32::from(pixel[2])
+}
+
 /// A photograph on a small canvas: the box it lies in.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct View {
