@@ -10,14 +10,14 @@ use trueup_core::mesh::GridMesh;
 
 const WIDTH: f64 = 800.0;
 const HEIGHT: f64 = 600.0;
-/// Radians between neighbours: a third of the view is shared.
+/// Radians between neighbors: a third of the view is shared.
 const STEP: f64 = 0.7;
 
 fn main() {
     divan::main();
 }
 
-/// The grid of picture `from` in its neighbour, `direction` +1 or -1.
+/// The grid of picture `from` in its neighbor, `direction` +1 or -1.
 fn warp(grid: &GridMesh, from: usize, direction: f64) -> OverlapWarp {
     let camera = |yaw: f64| Camera::new(700.0, WIDTH, HEIGHT, &rotation_about_y(yaw).transpose());
     let (here, there) = (camera(0.0), camera(direction * STEP));

@@ -92,7 +92,7 @@ fn truth(page: &mut Page, found: &Evaluation) {
         page.item("theta", &format!("{mean:.3} degrees off on average, {most:.3} at most"));
     }
     let (ld, mean, corners) = (found.ld, found.ld_mean, found.ld_corners);
-    page.item("LD", &format!("{ld:.3}e-2 at most, {mean:.3}e-2 on average; {corners:.3}e-2 by centre and corners"));
+    page.item("LD", &format!("{ld:.3}e-2 at most, {mean:.3}e-2 on average; {corners:.3}e-2 by center and corners"));
     page.item("folds", &format!("{} folded cells", found.folds));
     page.item(
         "alignment",
@@ -111,7 +111,7 @@ fn compared(page: &mut Page, found: &PixelEvaluation) {
     let (pairs, scale) = (found.pairs, found.scale);
     page.entry("pixels", &format!("{} in {pairs} overlaps, at {scale:.3} of the panorama's size", found.pixels));
     page.item("NCC", &format!("RMSE {:.4}, MSE {:.4}", found.ncc_rmse, found.ncc_mse));
-    page.item("grey", &format!("MSE {:.2}", found.intensity_mse));
+    page.item("gray", &format!("MSE {:.2}", found.intensity_mse));
     let quality = [
         found.psnr_db.map(|decibels| format!("PSNR {decibels:.2} dB")),
         found.ssim.map(|similarity| format!("SSIM {similarity:.4}")),

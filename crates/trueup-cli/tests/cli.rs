@@ -159,7 +159,7 @@ fn a_bad_file_among_good_ones_is_left_out_with_its_reason() {
         "left out  broken.jpg: ",
         "left out  text.jpg: its content is not a JPEG",
         "left out  missing.jpg: there is no such file or folder",
-        "left out  black.jpg: no overlap found: nothing in it was recognised elsewhere",
+        "left out  black.jpg: no overlap found: nothing in it was recognized elsewhere",
         "left out  empty.jpg: the file is empty (0 bytes)",
         "left out  again.jpg: it has the same bytes as b.jpg, which is used",
     ] {

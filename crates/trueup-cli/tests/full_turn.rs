@@ -60,7 +60,7 @@ fn difference(desk: &Desk, name: &str, pairs: impl Iterator<Item = (u32, u32)>) 
     differences.iter().sum::<f64>() / differences.len() as f64
 }
 
-/// The last column beside the first differs no more than neighbours do elsewhere.
+/// The last column beside the first differs no more than neighbors do elsewhere.
 fn assert_ends_meet(desk: &Desk, name: &str) {
     let (width, _) = image::image_dimensions(desk.join(name)).expect("a panorama");
     let across = difference(desk, name, [(width - 1, 0)].into_iter());
@@ -101,7 +101,7 @@ fn the_ends_meet_however_it_is_composed() {
     assert!(u64::from(height) < project["canvas"]["height"].as_u64().expect("a height"));
     assert_ends_meet(&desk, "rows.png");
 
-    // Each photograph's left third is not to be seen: most of each is shown by its neighbour, across the ends as well.
+    // Each photograph's left third is not to be seen: most of each is shown by its neighbor, across the ends as well.
     let third = WIDTH as u32 / 3;
     let mask = GrayImage::from_fn(WIDTH as u32, HEIGHT as u32, |x, _| Luma([u8::from(x >= third) * 255]));
     mask.save(desk.join("mask.png")).expect("written");

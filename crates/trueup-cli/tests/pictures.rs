@@ -52,7 +52,7 @@ pub fn street_truth() -> String {
         .expect("a valid scene");
     let cameras = cameras(&scene, seed, STREET_NAMES.len());
     let images = cameras.iter().zip(STREET_NAMES).map(|(camera, name)| truth_of(camera, name.to_owned())).collect();
-    serde_json::to_string(&trueup::Truth { source: "a street".to_owned(), images, level: None }).expect("serialisable")
+    serde_json::to_string(&trueup::Truth { source: "a street".to_owned(), images, level: None }).expect("serializable")
 }
 
 /// Kind and seed of the street.
@@ -83,7 +83,7 @@ pub fn jpeg(rgb: &[u8], width: usize, height: usize) -> Vec<u8> {
     bytes
 }
 
-/// A picture of one colour.
+/// A picture of one color.
 pub fn plain(width: usize, height: usize, value: u8) -> Vec<u8> {
     jpeg(&vec![value; width * height * 3], width, height)
 }

@@ -2,7 +2,7 @@
 
 mod cache;
 mod cli;
-mod colour;
+mod color;
 mod compare;
 mod compose;
 mod destinations;

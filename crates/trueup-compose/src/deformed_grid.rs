@@ -1,9 +1,9 @@
 //! A deformed grid seen from the canvas: which cell covers a canvas pixel, and where in the photograph it looks.
 //!
-//! Cells are filled row by row from the crossings of their straight edges with the line through the pixel centres. A
+//! Cells are filled row by row from the crossings of their straight edges with the line through the pixel centers. A
 //! crossing is computed from the edge's two vertices in an order that does not depend on the cell, so two cells that
 //! share an edge meet at exactly the same pixel: inside a grid without folds every pixel belongs to exactly one cell
-//! (the left and top edges belong to a cell, the right and bottom ones to its neighbour).
+//! (the left and top edges belong to a cell, the right and bottom ones to its neighbor).
 
 use std::ops::Range;
 
@@ -125,8 +125,8 @@ impl DeformedGrid {
         Self {
             cells,
             size,
-            rows: first_centre_from(top, height)..first_centre_from(bottom, height),
-            columns: first_centre_from(left, width)..first_centre_from(right, width),
+            rows: first_center_from(top, height)..first_center_from(bottom, height),
+            columns: first_center_from(left, width)..first_center_from(right, width),
         }
     }
 
@@ -167,16 +167,16 @@ impl DeformedGrid {
         owner.clear();
         owner.resize(columns.len(), NO_CELL);
         runs.clear();
-        let centre_y = y as f64 + 0.5;
+        let center_y = y as f64 + 0.5;
         for &index in candidates {
             let cell = &self.cells[index as usize];
-            if cell.y_range[0] > centre_y || cell.y_range[1] <= centre_y {
+            if cell.y_range[0] > center_y || cell.y_range[1] <= center_y {
                 continue;
             }
-            let (crossings, count) = cell.crossings(centre_y);
+            let (crossings, count) = cell.crossings(center_y);
             for pair in crossings[..count].chunks_exact(2) {
-                let first = first_centre_from(pair[0], columns.end).max(start);
-                let end = first_centre_from(pair[1], columns.end).max(first);
+                let first = first_center_from(pair[0], columns.end).max(start);
+                let end = first_center_from(pair[1], columns.end).max(first);
                 owner[first - start..end - start].fill(index);
             }
         }
@@ -217,7 +217,7 @@ impl DeformedGrid {
 
 impl DeformedGrid {
     /// Tells `found` of every canvas pixel in `columns` and `rows` that a cell covers: (x, y), the place in the photograph
-    /// that its centre shows, and the pixel's size there.
+    /// that its center shows, and the pixel's size there.
     pub(crate) fn each_place(
         &self,
         columns: &Range<usize>,
@@ -269,16 +269,16 @@ impl Cell {
         Self { corners, source, source_size, footprint, near_border, x_range, y_range }
     }
 
-    /// Where the cell's outline crosses the line y = `centre_y`, from left to right: an even number of places.
-    fn crossings(&self, centre_y: f64) -> ([f64; 4], usize) {
+    /// Where the cell's outline crosses the line y = `center_y`, from left to right: an even number of places.
+    fn crossings(&self, center_y: f64) -> ([f64; 4], usize) {
         let mut found = [f64::INFINITY; 4];
         let mut count = 0;
         for corner in 0..4 {
             let (from, to) = (self.corners[corner], self.corners[(corner + 1) % 4]);
             // The same order of vertices for both cells of an edge, so that both compute the same bits.
             let (upper, lower) = if (from.y, from.x) <= (to.y, to.x) { (from, to) } else { (to, from) };
-            if upper.y <= centre_y && centre_y < lower.y {
-                found[count] = upper.x + (centre_y - upper.y) * ((lower.x - upper.x) / (lower.y - upper.y));
+            if upper.y <= center_y && center_y < lower.y {
+                found[count] = upper.x + (center_y - upper.y) * ((lower.x - upper.x) / (lower.y - upper.y));
                 count += 1;
             }
         }
@@ -292,8 +292,8 @@ impl Cell {
     }
 }
 
-/// Index of the first pixel whose centre is not left of (or above) `position`, within 0 to `limit`.
-fn first_centre_from(position: f64, limit: usize) -> usize {
+/// Index of the first pixel whose center is not left of (or above) `position`, within 0 to `limit`.
+fn first_center_from(position: f64, limit: usize) -> usize {
     // The cast saturates.
     ((position - 0.5).ceil().max(0.0) as usize).min(limit)
 }

@@ -3,7 +3,7 @@
 //! The stages, one module each:
 //!
 //! * [`layout`]: deformed grids in any common unit to one canvas in pixels;
-//! * [`exposure`]: reduced photographs to gain, colour cast and vignetting of each;
+//! * [`exposure`]: reduced photographs to gain, color cast and vignetting of each;
 //! * [`render`]: full-resolution photographs, layout and corrections to a [`render::Panorama`], along the seams that
 //!   [`seam`] finds;
 //! * [`gaps`]: what no photograph covers, and what of that is small enough to be filled;

@@ -23,9 +23,9 @@ pub(crate) const WHOLE: f32 = 1.0 - 1e-3;
 /// the border; the smooth step has no such lines to be seen.
 #[derive(Debug)]
 pub(crate) struct Feather {
-    /// Profile at the centres of the columns -1 to W.
+    /// Profile at the centers of the columns -1 to W.
     x: Vec<f32>,
-    /// Profile at the centres of the rows -1 to H.
+    /// Profile at the centers of the rows -1 to H.
     y: Vec<f32>,
     size: [f32; 2],
 }
@@ -45,13 +45,13 @@ impl Feather {
         Self { x: profile(size[0]), y: profile(size[1]), size: size.map(|length| length as f32) }
     }
 
-    /// Feather from 0 to 1 at a position: pixel and fraction beyond its centre.
+    /// Feather from 0 to 1 at a position: pixel and fraction beyond its center.
     #[inline(always)]
     pub(crate) fn at(&self, column: i32, row: i32, fraction_x: f32, fraction_y: f32) -> f32 {
         profile_at(&self.x, column, fraction_x) * profile_at(&self.y, row, fraction_y)
     }
 
-    /// The share of a canvas pixel that the photograph covers: 1/2 where the border runs through its centre, falling to
+    /// The share of a canvas pixel that the photograph covers: 1/2 where the border runs through its center, falling to
     /// 0 and rising to 1 over one canvas pixel. `footprint` is the size of a canvas pixel in photograph pixels.
     #[inline(always)]
     pub(crate) fn coverage(&self, position: [f32; 2], footprint: [f32; 2]) -> f32 {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::{matrix_from_rows, rows_of};
 
-/// A rotating pinhole camera: square pixels, no skew, no lens distortion, principal point at the picture's centre.
+/// A rotating pinhole camera: square pixels, no skew, no lens distortion, principal point at the picture's center.
 ///
 /// Bearings `(u - c_x, v - c_y, f)` are in the camera frame (x right, y down, z forward).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -19,7 +19,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A camera of focal length `focal_px` looking at the centre of a `width` x `height` picture.
+    /// A camera of focal length `focal_px` looking at the center of a `width` x `height` picture.
     pub fn new(focal_px: f64, width: f64, height: f64, camera_from_world: &Matrix3<f64>) -> Self {
         Self { focal_px, principal_point: [width / 2.0, height / 2.0], camera_from_world: rows_of(camera_from_world) }
     }
@@ -34,7 +34,7 @@ impl Camera {
         self.camera_from_world = rows_of(camera_from_world);
     }
 
-    /// The bearing of a pixel in the camera frame, z = 1 (not normalised).
+    /// The bearing of a pixel in the camera frame, z = 1 (not normalized).
     pub fn bearing(&self, pixel: Vector2<f64>) -> Vector3<f64> {
         Vector3::new(
             (pixel.x - self.principal_point[0]) / self.focal_px,
@@ -71,9 +71,9 @@ mod tests {
     use crate::geometry::rotation_about_y;
 
     #[test]
-    fn a_pan_moves_the_centre_by_focal_times_tangent() {
+    fn a_pan_moves_the_center_by_focal_times_tangent() {
         let first = Camera::new(500.0, 640.0, 480.0, &Matrix3::identity());
-        // Turning the camera to the right (camera_from_world = pan^T) moves the old centre to the left.
+        // Turning the camera to the right (camera_from_world = pan^T) moves the old center to the left.
         let pan = rotation_about_y(0.2);
         let second = Camera::new(500.0, 640.0, 480.0, &pan.transpose());
         let moved = first.transfer(&second, Vector2::new(320.0, 240.0)).expect("in front");

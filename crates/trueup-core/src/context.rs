@@ -1,4 +1,4 @@
-//! What every stage receives beside its input and options: progress, cancellation, seed and a sink for diagnostics.
+//! What every stage receives beside its input and options: progress, cancellation, seed and a sink for findings.
 
 use std::sync::Mutex;
 use std::sync::PoisonError;
@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::diagnostics::Diagnostic;
+use crate::diagnostics::{Diagnostic, Reported};
 use crate::error::{Error, Result};
 
 /// Receives the progress of long work. Called from any thread.
@@ -53,7 +53,7 @@ pub struct StageContext<'a> {
     progress: &'a dyn Progress,
     cancel: &'a CancelToken,
     seed: u64,
-    diagnostics: Mutex<Vec<Diagnostic>>,
+    findings: Mutex<Vec<Diagnostic>>,
 }
 
 impl std::fmt::Debug for StageContext<'_> {
@@ -75,10 +75,10 @@ impl Default for StageContext<'_> {
 impl<'a> StageContext<'a> {
     /// A context that reports to `progress`, stops on `cancel` and derives every random choice from `seed`.
     pub fn new(progress: &'a dyn Progress, cancel: &'a CancelToken, seed: u64) -> Self {
-        Self { progress, cancel, seed, diagnostics: Mutex::new(Vec::new()) }
+        Self { progress, cancel, seed, findings: Mutex::default() }
     }
 
-    /// The same cancellation and seed, for a part of the work whose progress is told by the whole. Diagnostics are its own.
+    /// The same cancellation and seed, for a part of the work whose progress is told by the whole. Findings are its own.
     pub fn without_progress(&self) -> StageContext<'a> {
         Self::new(&SILENT, self.cancel, self.seed)
     }
@@ -109,12 +109,34 @@ impl<'a> StageContext<'a> {
 
     /// Records a finding. Stages call this from their sequential part only, so that the order is always the same.
     pub fn report(&self, diagnostic: Diagnostic) {
-        self.diagnostics.lock().unwrap_or_else(PoisonError::into_inner).push(diagnostic);
+        self.findings.lock().unwrap_or_else(PoisonError::into_inner).push(diagnostic);
+    }
+
+    /// The findings recorded so far, in order.
+    pub fn findings(&self) -> Vec<Diagnostic> {
+        self.findings.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Takes the findings recorded so far, in order.
     pub fn take_diagnostics(&self) -> Vec<Diagnostic> {
-        std::mem::take(&mut self.diagnostics.lock().unwrap_or_else(PoisonError::into_inner))
+        std::mem::take(&mut self.findings.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Runs `work` with a sink of its own, and hands out what it found there beside its product. Work done in parallel
+    /// gathers its findings item by item, so that [`Self::absorb`] can put them into the order of the items.
+    ///
+    /// # Errors
+    /// Those of `work`.
+    pub fn gather<T>(&self, work: impl FnOnce(&StageContext) -> Result<T>) -> Result<Reported<T>> {
+        let nested = StageContext { findings: Mutex::default(), ..*self };
+        let value = work(&nested)?;
+        Ok(Reported { value, findings: nested.findings.into_inner().unwrap_or_else(PoisonError::into_inner) })
+    }
+
+    /// Records the findings of a part of the work, and hands out its product.
+    pub fn absorb<T>(&self, part: Reported<T>) -> T {
+        self.findings.lock().unwrap_or_else(PoisonError::into_inner).extend(part.findings);
+        part.value
     }
 }
 
@@ -123,6 +145,7 @@ mod tests {
     use rand::Rng;
 
     use super::*;
+    use crate::diagnostics::Subject;
 
     #[test]
     fn generators_differ_by_subject_and_repeat() {
@@ -131,6 +154,22 @@ mod tests {
         assert_eq!(draw("matching", 3), draw("matching", 3));
         assert_ne!(draw("matching", 3), draw("matching", 4));
         assert_ne!(draw("matching", 3), draw("vanishing", 3));
+    }
+
+    #[test]
+    fn parts_of_the_work_gather_findings_of_their_own() {
+        let context = StageContext::default();
+        let note = |code: &str| Diagnostic::note(code, Subject::stage("test"), "", "");
+        context.report(note("first"));
+        let part = |code: &'static str| context.gather(|nested| Ok(nested.report(note(code)))).expect("a part");
+        let (second, third) = (part("second"), part("third"));
+        assert_eq!(context.findings().len(), 1, "nested findings stay where they were gathered");
+        context.absorb(third);
+        context.absorb(second);
+        let codes: Vec<String> = context.findings().into_iter().map(|finding| finding.code).collect();
+        assert_eq!(codes, ["first", "third", "second"]);
+        let failed: Result<Reported<()>> = context.gather(|_| Err(Error::Cancelled));
+        assert!(matches!(failed, Err(Error::Cancelled)));
     }
 
     #[test]

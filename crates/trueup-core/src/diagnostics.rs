@@ -12,6 +12,54 @@ pub enum Severity {
     Warning,
 }
 
+/// What a finding is about. Photographs go by number where stages work, and get their names where a person reads them:
+/// [`Subject::named`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Subject {
+    /// One photograph, by its number.
+    Photograph(usize),
+    /// Two photographs, by their numbers.
+    Pair(usize, usize),
+    /// A stage of the work, by its name, or the whole panorama.
+    Stage(String),
+    /// A file or folder that is no photograph of the set, as the user knows it.
+    File(String),
+}
+
+impl Subject {
+    /// A stage, by its name.
+    pub fn stage(name: impl Into<String>) -> Self {
+        Self::Stage(name.into())
+    }
+
+    /// A file, by its name or path.
+    pub fn file(name: impl ToString) -> Self {
+        Self::File(name.to_string())
+    }
+
+    /// The subject in words: photographs by their `names`, a number that has none as it is.
+    pub fn named(&self, names: &[impl AsRef<str>]) -> String {
+        let name =
+            |number: usize| names.get(number).map_or_else(|| number.to_string(), |name| name.as_ref().to_owned());
+        match self {
+            Self::Photograph(number) => name(*number),
+            Self::Pair(a, b) => format!("{} - {}", name(*a), name(*b)),
+            Self::Stage(text) | Self::File(text) => text.clone(),
+        }
+    }
+
+    /// The same subject where photographs are numbered otherwise: photograph `k` is now `renumbered(k)`.
+    #[must_use]
+    pub fn renumbered(self, renumbered: impl Fn(usize) -> usize) -> Self {
+        match self {
+            Self::Photograph(number) => Self::Photograph(renumbered(number)),
+            Self::Pair(a, b) => Self::Pair(renumbered(a), renumbered(b)),
+            other => other,
+        }
+    }
+}
+
 /// One finding about a photograph, a pair or the whole panorama.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Diagnostic {
@@ -19,8 +67,8 @@ pub struct Diagnostic {
     pub code: String,
     /// How much it matters.
     pub severity: Severity,
-    /// The photograph's name, "a - b" for a pair, or the stage's name.
-    pub subject: String,
+    /// What it is about.
+    pub subject: Subject,
     /// What was found, with the numbers that led to it.
     pub message: String,
     /// What the user can do about it; empty when there is nothing to do.
@@ -29,28 +77,74 @@ pub struct Diagnostic {
 
 impl Diagnostic {
     /// A note. `code` must be a stable kebab-case name.
-    pub fn note(code: &str, subject: impl ToString, message: impl ToString, hint: impl ToString) -> Self {
+    pub fn note(code: &str, subject: Subject, message: impl ToString, hint: impl ToString) -> Self {
         Self::new(Severity::Note, code, subject, message, hint)
     }
 
     /// A warning. `code` must be a stable kebab-case name.
-    pub fn warning(code: &str, subject: impl ToString, message: impl ToString, hint: impl ToString) -> Self {
+    pub fn warning(code: &str, subject: Subject, message: impl ToString, hint: impl ToString) -> Self {
         Self::new(Severity::Warning, code, subject, message, hint)
     }
 
-    fn new(
-        severity: Severity,
-        code: &str,
-        subject: impl ToString,
-        message: impl ToString,
-        hint: impl ToString,
-    ) -> Self {
-        Self {
-            code: code.to_owned(),
-            severity,
-            subject: subject.to_string(),
-            message: message.to_string(),
-            hint: hint.to_string(),
+    fn new(severity: Severity, code: &str, subject: Subject, message: impl ToString, hint: impl ToString) -> Self {
+        Self { code: code.to_owned(), severity, subject, message: message.to_string(), hint: hint.to_string() }
+    }
+}
+
+/// A stage's product with what was found on the way.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Reported<T> {
+    /// The product.
+    pub value: T,
+    /// The findings, in the order in which they were made.
+    pub findings: Vec<Diagnostic>,
+}
+
+impl<T> Reported<T> {
+    /// The same findings beside what `change` makes of the product.
+    pub fn map<U>(self, change: impl FnOnce(T) -> U) -> Reported<U> {
+        Reported { value: change(self.value), findings: self.findings }
+    }
+
+    /// The same where photographs are numbered otherwise, see [`Subject::renumbered`].
+    #[must_use]
+    pub fn renumbered(mut self, renumbered: impl Fn(usize) -> usize) -> Self {
+        for finding in &mut self.findings {
+            let subject = std::mem::replace(&mut finding.subject, Subject::Photograph(0));
+            finding.subject = subject.renumbered(&renumbered);
         }
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn photographs_get_their_names_where_they_are_read() {
+        let names = ["a.jpg", "b.jpg"];
+        assert_eq!(Subject::Photograph(1).named(&names), "b.jpg");
+        assert_eq!(Subject::Pair(0, 1).named(&names), "a.jpg - b.jpg");
+        assert_eq!(Subject::Pair(0, 7).named(&names), "a.jpg - 7");
+        assert_eq!(Subject::stage("mesh").named(&names), "mesh");
+        assert_eq!(Subject::file("photograph 1").named(&names), "photograph 1");
+    }
+
+    #[test]
+    fn numbers_of_a_group_become_those_of_the_set() {
+        let members = [4, 7];
+        let finding = |subject| Diagnostic::note("some-code", subject, "", "");
+        let found = Reported {
+            value: (),
+            findings: vec![
+                finding(Subject::Photograph(1)),
+                finding(Subject::Pair(0, 1)),
+                finding(Subject::stage("mesh")),
+            ],
+        };
+        let subjects: Vec<Subject> =
+            found.renumbered(|local| members[local]).findings.into_iter().map(|one| one.subject).collect();
+        assert_eq!(subjects, [Subject::Photograph(7), Subject::Pair(4, 7), Subject::stage("mesh")]);
     }
 }

@@ -1,6 +1,6 @@
 //! Interpolation between samples.
 
-/// Weights of four neighbouring samples for a position `fraction` (in [0, 1]) beyond the second of them: cubic convolution
+/// Weights of four neighboring samples for a position `fraction` (in [0, 1]) beyond the second of them: cubic convolution
 /// with a = -1/2 (the Catmull-Rom spline), exact for parabolas. They add up to 1.
 ///
 /// # Source

@@ -2,7 +2,7 @@
 //!
 //! # Conventions, written once
 //!
-//! * **Pixels.** x points right, y points down. The picture's top left corner is (0, 0) and the centre of its first
+//! * **Pixels.** x points right, y points down. The picture's top left corner is (0, 0) and the center of its first
 //!   pixel is (0.5, 0.5). Lengths in pixels end in `_px`.
 //! * **Working pixels.** Measurement happens on a reduced copy of each photograph. One real number per photograph,
 //!   `working_from_full`, scales full-resolution coordinates to working coordinates; both axes share it exactly, and
@@ -16,7 +16,7 @@
 #![forbid(unsafe_code)]
 
 pub mod camera;
-pub mod colour;
+pub mod color;
 pub mod context;
 pub mod diagnostics;
 pub mod error;

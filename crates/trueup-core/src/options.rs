@@ -104,6 +104,21 @@ impl OptionValue for String {
     }
 }
 
+/// Who has a reason to change an option.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Tier {
+    /// Everyone who makes panoramas.
+    Basic,
+    /// Those who know the method, for photographs that are out of the ordinary, or for experiments.
+    Expert,
+}
+
+/// The tier of an option: basic where its declaration says so. Used by the code that [`options!`](crate::options!) generates.
+pub const fn tier_of(basic: &[&str]) -> Tier {
+    if basic.is_empty() { Tier::Expert } else { Tier::Basic }
+}
+
 /// One row of the option reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OptionDescription {
@@ -115,8 +130,10 @@ pub struct OptionDescription {
     pub allowed: String,
     /// The unit; empty for pure numbers and choices.
     pub unit: &'static str,
-    /// What it means and when it matters.
+    /// What it means and when to change it.
     pub meaning: String,
+    /// Who has a reason to change it.
+    pub tier: Tier,
     /// The alternatives of a choice with their meanings; empty for other options.
     pub choices: Vec<ChoiceDescription>,
 }
@@ -179,14 +196,15 @@ pub fn check_option<T: OptionValue>(stage: &str, name: &str, value: &T, allowed:
     })
 }
 
-/// Declares a stage's options: struct, defaults, ranges, units, reference.
+/// Declares a stage's options: struct, defaults, ranges, units, reference. An option that everyone has a reason to change
+/// is marked `basic` after its unit; the others are for experts.
 ///
 /// ```
 /// trueup_core::options! {
 ///     /// How features are found.
 ///     pub struct FeatureOptions("features") {
 ///         /// Scale levels per octave.
-///         levels_per_octave: u32 = 3, between(1.0, 8.0), "levels";
+///         levels_per_octave: u32 = 3, between(1.0, 8.0), "levels", basic;
 ///         /// Whether descriptors are compared by the Hellinger kernel.
 ///         root_sift: bool = false, Allowed::Any, "";
 ///     }
@@ -202,7 +220,7 @@ macro_rules! options {
         pub struct $name:ident($stage:literal) {
             $(
                 $(#[doc = $doc:literal])*
-                $field:ident : $type:ty = $default:expr, $allowed:expr, $unit:literal;
+                $field:ident : $type:ty = $default:expr, $allowed:expr, $unit:literal $(, $tier:ident)?;
             )*
         }
     ) => {
@@ -245,6 +263,7 @@ macro_rules! options {
                         allowed: $crate::options::allowed_in_words::<$type>($allowed),
                         unit: $unit,
                         meaning: $crate::options::joined(&[$($doc),*]),
+                        tier: $crate::options::tier_of(&[$(stringify!($tier))?]),
                         choices: <$type>::described_choices(),
                     },
                 )*]
@@ -316,7 +335,7 @@ mod tests {
         pub struct TestOptions("test") {
             /// A length
             /// over two lines.
-            length_px: f64 = 2.5, between(0.0, 10.0), "px";
+            length_px: f64 = 2.5, between(0.0, 10.0), "px", basic;
             /// A count.
             count: usize = 4, between(1.0, 8.0), "";
             /// A choice.
@@ -343,6 +362,7 @@ mod tests {
         assert_eq!(rows[0].allowed, "0 to 10");
         assert_eq!(rows[0].unit, "px");
         assert_eq!(rows[0].meaning, "A length over two lines.");
+        assert_eq!((rows[0].tier, rows[1].tier), (Tier::Basic, Tier::Expert));
         assert_eq!(rows[2].default, "exact");
         assert_eq!(rows[2].allowed, "fast | exact");
         let choices: Vec<(&str, &str)> =

@@ -10,7 +10,7 @@ pub const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
 
 /// A picture of `width` x `height` pixels with `channels` interleaved samples each.
 ///
-/// Sample `c` of the pixel whose centre is at (x + 0.5, y + 0.5) is `data[(y * width + x) * channels + c]`.
+/// Sample `c` of the pixel whose center is at (x + 0.5, y + 0.5) is `data[(y * width + x) * channels + c]`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Raster<T> {
     width: usize,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::colour::TransferCurve;
+use crate::color::TransferCurve;
 use crate::error::Result;
 use crate::mask::Masks;
 use crate::raster::Photograph;

@@ -83,9 +83,9 @@ pub struct ImageTruth {
     pub rotation: [[f64; 3]; 3],
     /// Angle from the picture's down to the world's vertical, positive towards the right, degrees.
     pub gamma_deg: f64,
-    /// Centre of projection in the world, metres; absent where all pictures share one.
+    /// Center of projection in the world, metres; absent where all pictures share one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub centre: Option<[f64; 3]>,
+    pub center: Option<[f64; 3]>,
     /// File name of the depth map beside `truth.json`, where one was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<String>,
@@ -157,7 +157,7 @@ mod tests {
             focal_px: 4.0,
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             gamma_deg: 0.0,
-            centre: None,
+            center: None,
             depth: None,
         }
     }

@@ -1,7 +1,7 @@
 //! Files to memory and back: finding and decoding photographs, reading their metadata, writing panoramas.
 //!
 //! * [`source`] turns paths, folders and glob patterns into [`trueup_core::source::SourceImage`]s, reading headers only.
-//! * [`colour`] finds out which colours they mean;
+//! * [`color`] finds out which colors they mean;
 //! * [`decode`] reads their pixels: whole photographs, and the reduced pictures that measurement works on.
 //! * [`provenance`] gathers what a panorama tells of its photographs;
 //! * [`encode`] writes a panorama row by row; a file appears complete or not at all.
@@ -10,7 +10,7 @@
 //! Sizes are checked from the header before pixels are allocated, and no input makes these functions panic.
 #![forbid(unsafe_code)]
 
-pub mod colour;
+pub mod color;
 pub mod decode;
 pub mod encode;
 mod format;

@@ -45,7 +45,7 @@ fn pictures(count: usize, matched: usize, inliers: usize) -> [Features; 2] {
     })
 }
 
-/// Both directions' nearest neighbours of 8000 x 8000 descriptors.
+/// Both directions' nearest neighbors of 8000 x 8000 descriptors.
 #[divan::bench(args = [1, 2])]
 fn search_8000_by_8000(bencher: Bencher, threads: usize) {
     let (a, b) = (descriptors(1, FEATURES), descriptors(2, FEATURES));

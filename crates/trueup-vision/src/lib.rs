@@ -1,6 +1,6 @@
 //! Pixels to measurements: SIFT features, matching, pairing and line segments.
 //!
-//! Positions are in the pixels of the picture given (working pixels in the pipeline), corner at (0, 0), the centre of
+//! Positions are in the pixels of the picture given (working pixels in the pipeline), corner at (0, 0), the center of
 //! the first pixel at (0.5, 0.5).
 
 pub mod features;

@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Exposure model and anchor, and blending: as published panoramas are blended, then with colour, then with seams.
+/// Exposure model and anchor, and blending: as published panoramas are blended, then with color, then with seams.
 const WAYS: [[&str; 3]; 4] = [
     ["gain", "mean", "feather"],
     ["full", "reference", "feather"],

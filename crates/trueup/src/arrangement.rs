@@ -7,7 +7,7 @@ use trueup_align::projection::{self, Placement, Projection, Shot, View};
 use trueup_compose::crop::{self, Crop, Rectangle};
 use trueup_compose::layout::{self, CanvasLayout, CanvasOptions, Frame, Placed};
 use trueup_core::camera::Camera;
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::geometry::matrix_from_rows;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Error, Result, StageContext};
@@ -207,11 +207,11 @@ fn report_cut(
     let size = [written.width, written.height].map(|length| length as f64);
     for placed in &plane.placed {
         let shown = || written.placed.iter().filter(|other| other.photograph == placed.photograph);
-        let subject = format!("photograph {}", placed.photograph);
+        let subject = Subject::Photograph(placed.photograph);
         let hint = "Choose an equirectangular projection, widen projection.fov, or turn the view (yaw, pitch).";
         if shown().next().is_none() {
             let message = format!("it lies outside of the {} view and is not shown", view.flat.kind.name());
-            context.report(Diagnostic::warning("projection-left-out", subject, message, hint));
+            context.report(Diagnostic::warning("projection-left-out", subject.clone(), message, hint));
         } else if !view.flat.kind.turns() && options.projection.fov == 0.0 {
             let outside = shown().map(|other| share_outside(&other.mesh, size)).fold(1.0, f64::min);
             /// Less than this is a corner.

@@ -16,10 +16,10 @@ pub(crate) struct LeftOut {
 pub(crate) fn explain(picture: usize, component: &[usize], pairs: &[PairMatches], names: &[String]) -> LeftOut {
     let touching = |pair: &&PairMatches| pair.a == picture || pair.b == picture;
     if let Some(joined) = pairs.iter().filter(touching).find(|pair| pair.verdict.is_joined()) {
-        let neighbour = other(joined, picture);
+        let neighbor = other(joined, picture);
         return LeftOut {
             code: "other-panorama",
-            reason: format!("it belongs to another panorama, with {}", names[neighbour]),
+            reason: format!("it belongs to another panorama, with {}", names[neighbor]),
             hint: "Use --all to stitch every group of overlapping photographs.".to_owned(),
         };
     }
@@ -31,12 +31,12 @@ pub(crate) fn explain(picture: usize, component: &[usize], pairs: &[PairMatches]
     match best {
         Some(pair) if pair.putative > 0 => LeftOut {
             code: "no-overlap",
-            reason: format!("no overlap found: best neighbour {}, {}", names[other(pair, picture)], counts(pair)),
+            reason: format!("no overlap found: best neighbor {}, {}", names[other(pair, picture)], counts(pair)),
             hint: hint(pair).to_owned(),
         },
         _ => LeftOut {
             code: "no-overlap",
-            reason: "no overlap found: nothing in it was recognised elsewhere".to_owned(),
+            reason: "no overlap found: nothing in it was recognized elsewhere".to_owned(),
             hint: "Leave it out if it belongs elsewhere; otherwise shoot again with more overlap and detail."
                 .to_owned(),
         },
@@ -95,11 +95,11 @@ mod tests {
     }
 
     #[test]
-    fn the_best_neighbour_and_its_counts_are_named() {
+    fn the_best_neighbor_and_its_counts_are_named() {
         let pairs = [pair(0, 2, 5, PairVerdict::TooFewInliers), pair(1, 2, 9, PairVerdict::TooFewInliers)];
         let left_out = explain(2, &[0, 1], &pairs, &names());
         assert_eq!(left_out.code, "no-overlap");
-        assert_eq!(left_out.reason, "no overlap found: best neighbour 1.jpg, 9 of 24 matches agree (15 needed)");
+        assert_eq!(left_out.reason, "no overlap found: best neighbor 1.jpg, 9 of 24 matches agree (15 needed)");
     }
 
     #[test]

@@ -30,7 +30,7 @@ pub(crate) struct Measured {
     pub features: Features,
     /// In working pixels.
     pub lines: Vec<LineSegment>,
-    /// Grey values at the working size, kept if the mesh is to be refined by pixels.
+    /// Gray values at the working size, kept if the mesh is to be refined by pixels.
     pub gray: Option<Raster<u8>>,
     pub thumbnail: Raster<u8>,
     pub thumbnail_frame: WorkingFrame,

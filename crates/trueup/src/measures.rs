@@ -119,7 +119,7 @@ pub(crate) fn run(
     let verticals = vertical_lines(component, geometry, &working, options);
     let certain: Vec<Option<VerticalLines>> =
         verticals.iter().map(|found| found.filter(|found| found.is_certain(&options.measures))).collect();
-    let distortion = metrics::local_distortion(&working, Outside::Centre, period);
+    let distortion = metrics::local_distortion(&working, Outside::Center, period);
     Measures {
         upright: upright(&certain),
         estimated_gdic_deg: estimated_inconsistency(&certain, &working, component.reference),

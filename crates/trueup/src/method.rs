@@ -83,7 +83,7 @@ impl Alignment {
 }
 
 trueup_core::choice! {
-    /// What of the photographs' structure is kept, beyond the neighbourhoods of grid vertices.
+    /// What of the photographs' structure is kept, beyond the neighborhoods of grid vertices.
     pub enum Structure {
         /// Nothing.
         None = "none",

@@ -1,11 +1,13 @@
 //! The record of a stitch: what `--project` writes and other tools read. Documented in docs/project-file.md.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use trueup_compose::exposure::{Correction, Response};
 use trueup_core::diagnostics::Diagnostic;
 use trueup_core::matches::PairVerdict;
+use trueup_io::source::unique_names;
 
 use crate::masks::MaskRecord;
 use crate::measures::Measures;
@@ -176,9 +178,9 @@ pub struct Project {
     pub measures: Option<Measures>,
     /// Size of the panorama.
     pub canvas: Canvas,
-    /// Name of the colour space it was composed in; empty in files of programs that knew one only.
+    /// Name of the color space it was composed in; empty in files of programs that knew one only.
     #[serde(default)]
-    pub colour_space: String,
+    pub color_space: String,
     /// What the cameras' response adds to that space's transfer curve: all factors act on the light by it. Nothing in files
     /// of programs that estimated none.
     #[serde(default)]
@@ -218,6 +220,13 @@ impl Project {
     /// The photographs in the panorama, in the order given.
     pub fn used_images(&self) -> impl Iterator<Item = &ImageRecord> {
         self.images.iter().filter(|image| image.status == ImageStatus::Used)
+    }
+
+    /// The names by which people know the photographs, in the order of [`Self::images`]: file names, with as much of their
+    /// folders as tells them apart.
+    pub fn photograph_names(&self) -> Vec<String> {
+        let paths: Vec<&Path> = self.images.iter().map(|image| Path::new(&image.path)).collect();
+        unique_names(&paths)
     }
 
     /// Number of photographs in the panorama.

@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use trueup_core::geometry::matrix_from_rows;
-use trueup_io::colour::PhotographColours;
+use trueup_io::color::PhotographColors;
 use trueup_io::encode::{Metadata, OutputOptions, OutputProfile};
 use trueup_io::provenance::{self, Subject};
 
 use crate::project::{ImageRecord, Project};
 
-/// What the files of the photographs tell, as far as the options let it pass, and the profile of `colours`.
-pub(crate) fn metadata(project: &Project, colours: Option<&PhotographColours>, options: &OutputOptions) -> Metadata {
+/// What the files of the photographs tell, as far as the options let it pass, and the profile of `colors`.
+pub(crate) fn metadata(project: &Project, colors: Option<&PhotographColors>, options: &OutputOptions) -> Metadata {
     let used: Vec<&ImageRecord> = project.used_images().collect();
     let paths: Vec<&Path> = used.iter().map(|image| Path::new(&image.path)).collect();
     let yaws: Vec<Option<f64>> = used.iter().map(|image| yaw(image)).collect();
@@ -20,11 +20,11 @@ pub(crate) fn metadata(project: &Project, colours: Option<&PhotographColours>, o
         yaws: &yaws,
         width: project.canvas.width,
         height: project.canvas.height,
-        is_srgb: options.profile == OutputProfile::Srgb || colours.is_none_or(PhotographColours::is_srgb),
+        is_srgb: options.profile == OutputProfile::Srgb || colors.is_none_or(PhotographColors::is_srgb),
         spherical: project.projection.and_then(|projection| projection.sphere),
         pose_deg: project.projection.map_or([0.0; 2], |projection| [projection.pitch_deg, projection.roll_deg]),
     };
-    let icc = colours.and_then(PhotographColours::icc).map(<[u8]>::to_vec);
+    let icc = colors.and_then(PhotographColors::icc).map(<[u8]>::to_vec);
     Metadata { icc, ..provenance::describe(&subject, options.metadata) }
 }
 

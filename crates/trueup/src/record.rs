@@ -2,7 +2,7 @@
 
 use trueup_compose::exposure::{Correction, Corrections, Response};
 use trueup_compose::layout::{CanvasLayout, Placed};
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::geometry::{matrix_from_rows, rows_of};
 use trueup_core::mesh::GridMesh;
 use trueup_core::source::SourceImage;
@@ -77,7 +77,7 @@ impl Matched {
             },
             measures: None,
             canvas: Canvas { width: 0, height: 0, full_turn: false },
-            colour_space: String::new(),
+            color_space: String::new(),
             response: Response::default(),
             projection: None,
             mesh_canvas: None,
@@ -127,9 +127,9 @@ pub(crate) fn place(component: &Component, geometry: Option<&Geometry>) -> Vec<P
 /// What is found on the way from the geometry to the panorama, each time anew.
 const FOUND_IN_COMPOSING: [&str; 8] = [
     "canvas-reduced",
-    "colour-converted",
-    "colour-profile-damaged",
-    "colour-profile-ignored",
+    "color-converted",
+    "color-profile-damaged",
+    "color-profile-ignored",
     "grid-folded",
     "photograph-replaced",
     "projection-cut",
@@ -157,7 +157,7 @@ pub(crate) fn record_composition(
         if path != record.path {
             project.diagnostics.push(Diagnostic::note(
                 "photograph-replaced",
-                record.file_name(),
+                Subject::Photograph(position),
                 format!("{path} is shown"),
                 "",
             ));

@@ -23,7 +23,7 @@ pub(crate) fn needs_pixels(options: &StitchOptions) -> bool {
     options.stitch.align.uses_lines() || options.stitch.align.uses_pixels()
 }
 
-/// Grey values rounded to eight bits.
+/// Gray values rounded to eight bits.
 pub(crate) fn eight_bit(gray: &Raster<f32>) -> Raster<u8> {
     let mut rounded = Raster::new(gray.width(), gray.height(), 1);
     for (rounded, &value) in rounded.data_mut().iter_mut().zip(gray.data()) {

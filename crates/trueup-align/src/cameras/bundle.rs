@@ -72,7 +72,7 @@ struct PairTerm {
 
 impl Problem<'_> {
     /// Refines `parameters` until the cost settles; `huber_px` bounds the influence of a single match.
-    pub fn minimise(
+    pub fn minimize(
         &self,
         mut parameters: Parameters,
         model: &FocalModel,
@@ -258,7 +258,7 @@ fn pair_term(cameras: &[Camera], pair: &PairObservations, huber_px: f64) -> Pair
     term
 }
 
-/// Adds one transfer's linearised residual; `columns` are (rotation of `from`, rotation of `to`, focal of `from`, focal
+/// Adds one transfer's linearized residual; `columns` are (rotation of `from`, rotation of `to`, focal of `from`, focal
 /// of `to`) among the pair's local unknowns.
 #[allow(clippy::too_many_arguments, reason = "the two directions of a match differ in every one of these")]
 fn accumulate(

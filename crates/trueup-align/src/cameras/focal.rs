@@ -8,7 +8,7 @@ use super::observations::{Observations, PairObservations};
 use super::rotations::fit_rotation;
 use super::{CameraOptions, CameraPrior};
 
-/// Focal lengths (source, target) of the rotating cameras behind a homography in centred coordinates, if both are real.
+/// Focal lengths (source, target) of the rotating cameras behind a homography in centered coordinates, if both are real.
 ///
 /// Of the two values that the rows (source) and the columns (target) of the homography give, the one with the larger
 /// denominator is taken.
@@ -102,16 +102,16 @@ fn common_relative_focal(
 
 /// Median over pairs and pictures of the homographies' focal lengths, in diagonals.
 fn median_from_homographies(priors: &[CameraPrior], pairs: &[&PairMatches]) -> Option<f64> {
-    let centre = |k: usize| {
+    let center = |k: usize| {
         let frame = &priors[k].frame;
         Matrix3::new(1.0, 0.0, frame.width / 2.0, 0.0, 1.0, frame.height / 2.0, 0.0, 0.0, 1.0)
     };
     let mut estimates = Vec::new();
     for pair in pairs {
         let Some(rows) = &pair.b_from_a else { continue };
-        let Some(back) = centre(pair.b).try_inverse() else { continue };
-        let centred = back * Homography::from_rows(rows).0 * centre(pair.a);
-        if let Some((source, target)) = focal_from_homography(&centred) {
+        let Some(back) = center(pair.b).try_inverse() else { continue };
+        let centered = back * Homography::from_rows(rows).0 * center(pair.a);
+        if let Some((source, target)) = focal_from_homography(&centered) {
             estimates.push(source / priors[pair.a].frame.diagonal());
             estimates.push(target / priors[pair.b].frame.diagonal());
         }

@@ -12,7 +12,7 @@ mod rotations;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Result, StageContext};
@@ -109,7 +109,6 @@ pub struct Cameras {
 /// data contradict it, which keeps short rows from drifting.
 pub fn run(
     priors: &[CameraPrior],
-    names: &[String],
     pairs: &[PairMatches],
     reference: usize,
     options: &CameraOptions,
@@ -127,7 +126,7 @@ pub fn run(
             let pair = &pairs[position];
             context.report(Diagnostic::note(
                 "pair-contradicts",
-                format!("{} - {}", names[pair.a], names[pair.b]),
+                Subject::Pair(pair.a, pair.b),
                 format!(
                     "this overlap contradicts the others by {:.1} px and is not used",
                     solution.pair_rms_px[position]
@@ -141,7 +140,7 @@ pub fn run(
     if solution.focal_failed {
         context.report(Diagnostic::warning(
             "focal-uncertain",
-            "cameras",
+            Subject::stage("cameras"),
             "the focal length cannot be told from these pictures; a common value was used",
             "Keep the camera's metadata in the files, or overlap the pictures more.",
         ));
@@ -213,12 +212,12 @@ fn refine(
     let mut per_picture = options.focal_sharing == FocalSharing::PerPicture;
     let first_model = if per_picture { &own } else { &shared };
 
-    let coarse = problem.minimise(start.clone(), first_model, options.coarse_huber_px, context)?;
-    let mut fine = problem.minimise(coarse, first_model, options.fine_huber_px, context)?;
+    let coarse = problem.minimize(start.clone(), first_model, options.coarse_huber_px, context)?;
+    let mut fine = problem.minimize(coarse, first_model, options.fine_huber_px, context)?;
     if options.focal_sharing == FocalSharing::Auto && priors.len() > 1 {
-        let free = problem.minimise(fine.clone(), &own, options.coarse_huber_px, context)?;
+        let free = problem.minimize(fine.clone(), &own, options.coarse_huber_px, context)?;
         if problem.is_sound(&free) && focal_spread(&shared, &fine.focal_px, &free.focal_px) > options.zoom_spread {
-            fine = problem.minimise(free, &own, options.fine_huber_px, context)?;
+            fine = problem.minimize(free, &own, options.fine_huber_px, context)?;
             per_picture = true;
         }
     }
@@ -230,8 +229,8 @@ fn refine(
     let common = sorted[sorted.len() / 2];
     let fixed = Parameters { focal_px: vec![common; priors.len()], rotations: start.rotations };
     let fixed_model = FocalModel::fixed(priors.len());
-    let coarse = problem.minimise(fixed, &fixed_model, options.coarse_huber_px, context)?;
-    Ok((problem.minimise(coarse, &fixed_model, options.fine_huber_px, context)?, false, true))
+    let coarse = problem.minimize(fixed, &fixed_model, options.coarse_huber_px, context)?;
+    Ok((problem.minimize(coarse, &fixed_model, options.fine_huber_px, context)?, false, true))
 }
 
 /// The largest robust spread, within a group, of the ratio of free to shared focal lengths: half the range between the

@@ -44,7 +44,7 @@ pub(super) fn relative_rotations(
 }
 
 /// Rotations that agree with all relative ones as well as possible: the spanning tree gives a start, then every
-/// rotation moves to the robust mean of what its neighbours predict until nothing moves.
+/// rotation moves to the robust mean of what its neighbors predict until nothing moves.
 ///
 /// # Source
 /// Hartley, Aftab and Trumpf, "L1 rotation averaging using the Weiszfeld algorithm" (2011); the weights 1/(sd + error)
@@ -60,17 +60,17 @@ pub(super) fn average(
     /// Errors below this (radians) are noise and are averaged plainly.
     const NOISE: f64 = 2e-3;
     let count = graph.pictures;
-    let mut neighbours: Vec<Vec<(usize, Matrix3<f64>, f64)>> = vec![Vec::new(); count];
+    let mut neighbors: Vec<Vec<(usize, Matrix3<f64>, f64)>> = vec![Vec::new(); count];
     for (pair, rotation) in pairs.iter().zip(relative) {
         let weight = pair.agreeing as f64;
-        neighbours[pair.b].push((pair.a, *rotation, weight));
-        neighbours[pair.a].push((pair.b, rotation.transpose(), weight));
+        neighbors[pair.b].push((pair.a, *rotation, weight));
+        neighbors[pair.a].push((pair.b, rotation.transpose(), weight));
     }
     let mut rotations = vec![Matrix3::identity(); count];
     for component in &graph.components {
         let root = if component.contains(&reference) { reference } else { component[0] };
         for step in graph.spanning_tree(component, root) {
-            if let Some((_, turn, _)) = neighbours[step.child].iter().find(|(other, ..)| *other == step.parent) {
+            if let Some((_, turn, _)) = neighbors[step.child].iter().find(|(other, ..)| *other == step.parent) {
                 rotations[step.child] = turn * rotations[step.parent];
             }
         }
@@ -79,7 +79,7 @@ pub(super) fn average(
         let mut largest: f64 = 0.0;
         for k in 0..count {
             let (mut step, mut total) = (Vector3::zeros(), 0.0);
-            for (other, turn, weight) in &neighbours[k] {
+            for (other, turn, weight) in &neighbors[k] {
                 let error = log_rotation(&relative_rotation(&rotations[k], &(turn * rotations[*other])));
                 let weight = weight / (NOISE + error.norm());
                 step += error * weight;

@@ -62,13 +62,12 @@ fn matched(truth: &[Camera], noise_px: f64, gross: f64) -> Vec<PairMatches> {
     pairs
 }
 
-fn estimate(truth: &[Camera], pairs: &[PairMatches], known_focal: Option<f64>, groups: &[usize]) -> Cameras {
+fn estimate(pairs: &[PairMatches], known_focal: Option<f64>, groups: &[usize]) -> Cameras {
     let priors: Vec<CameraPrior> = groups
         .iter()
         .map(|&camera_group| CameraPrior { frame: frame(), focal_px: known_focal, camera_group })
         .collect();
-    let names: Vec<String> = (0..truth.len()).map(|k| format!("{k}.jpg")).collect();
-    run(&priors, &names, pairs, 0, &CameraOptions::default(), &StageContext::default()).expect("solvable")
+    run(&priors, pairs, 0, &CameraOptions::default(), &StageContext::default()).expect("solvable")
 }
 
 /// Largest angle between estimated and true rotations relative to picture 0, in degrees.
@@ -87,7 +86,7 @@ fn a_row_without_metadata_is_recovered_despite_gross_errors() {
     let rolls = [3.0, -5.0, 1.0, 7.0, -2.0, 4.0];
     let truth: Vec<Camera> =
         (0..6).map(|k| camera(700.0, 22.0 * f64::from(k), 2.0 * f64::from(k % 3), rolls[k as usize])).collect();
-    let cameras = estimate(&truth, &matched(&truth, 0.5, 0.1), None, &[0; 6]);
+    let cameras = estimate(&matched(&truth, 0.5, 0.1), None, &[0; 6]);
     assert!(!cameras.per_picture_focal);
     let error = worst_rotation_error(&truth, &cameras.cameras);
     assert!(error < 0.25, "rotation error {error} deg");
@@ -99,7 +98,7 @@ fn a_row_without_metadata_is_recovered_despite_gross_errors() {
 #[test]
 fn a_full_turn_closes_from_a_wrong_focal_length() {
     let truth: Vec<Camera> = (0..16).map(|k| camera(650.0, 22.5 * f64::from(k), 1.0, 0.5)).collect();
-    let cameras = estimate(&truth, &matched(&truth, 0.3, 0.0), Some(800.0), &[0; 16]);
+    let cameras = estimate(&matched(&truth, 0.3, 0.0), Some(800.0), &[0; 16]);
     assert!(worst_rotation_error(&truth, &cameras.cameras) < 0.1);
     assert!((cameras.cameras[3].focal_px / 650.0 - 1.0).abs() < 0.005);
 }
@@ -108,7 +107,7 @@ fn a_full_turn_closes_from_a_wrong_focal_length() {
 fn a_zoom_is_noticed() {
     let focal = [700.0, 700.0, 900.0, 700.0, 900.0, 900.0];
     let truth: Vec<Camera> = (0..6).map(|k| camera(focal[k], 14.0 * k as f64, 0.0, 2.0)).collect();
-    let cameras = estimate(&truth, &matched(&truth, 0.3, 0.0), None, &[0; 6]);
+    let cameras = estimate(&matched(&truth, 0.3, 0.0), None, &[0; 6]);
     assert!(cameras.per_picture_focal);
     for (camera, wanted) in cameras.cameras.iter().zip(focal) {
         assert!((camera.focal_px / wanted - 1.0).abs() < 0.03, "{} for {wanted}", camera.focal_px);
@@ -120,10 +119,9 @@ fn another_reference_gives_the_same_shape() {
     let truth: Vec<Camera> = (0..5).map(|k| camera(700.0, 20.0 * f64::from(k), 3.0, f64::from(k))).collect();
     let pairs = matched(&truth, 0.5, 0.05);
     let priors = vec![CameraPrior { frame: frame(), focal_px: None, camera_group: 0 }; 5];
-    let names: Vec<String> = (0..5).map(|k| k.to_string()).collect();
     let solved = |reference| {
         let context = StageContext::default();
-        run(&priors, &names, &pairs, reference, &CameraOptions::default(), &context).expect("solvable").cameras
+        run(&priors, &pairs, reference, &CameraOptions::default(), &context).expect("solvable").cameras
     };
     // By rounding only: another start could end in another local minimum.
     assert!(worst_rotation_error(&solved(0), &solved(3)) < 1e-6);
@@ -141,7 +139,7 @@ fn an_absurd_start_or_a_pure_shift_never_ends_the_run() {
     let mut pairs = matched(&truth, 0.0, 0.0);
     pairs[0].inliers = shift;
     for known in [None, Some(1e9), Some(1e-9), Some(f64::NAN)] {
-        let cameras = estimate(&truth, &pairs, known, &[0; 2]);
+        let cameras = estimate(&pairs, known, &[0; 2]);
         assert!(cameras.cameras.iter().all(|camera| camera.focal_px.is_finite() && camera.focal_px > 0.0));
         assert!(cameras.cameras.iter().all(|camera| camera.rotation().iter().all(|entry| entry.is_finite())));
     }
@@ -156,7 +154,7 @@ fn a_pair_that_contradicts_the_rest_is_set_aside() {
         one.in_b[0] += 70.0;
     }
     pairs[wrong].inliers.truncate(30);
-    let cameras = estimate(&truth, &pairs, Some(700.0), &[0; 4]);
+    let cameras = estimate(&pairs, Some(700.0), &[0; 4]);
     assert_eq!(cameras.contradicting, [wrong]);
     assert!(worst_rotation_error(&truth, &cameras.cameras) < 0.1);
     assert!(wrap_angle(cameras.pair_rms_px[wrong]) != 0.0);

@@ -1,7 +1,7 @@
 //! A homography for every place: the direct linear transform with weights that fall off with distance.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2};
-use trueup_core::geometry::{Homography, Normalisation};
+use trueup_core::geometry::{Homography, Normalization};
 
 use super::MatchPointOptions;
 
@@ -17,10 +17,10 @@ use super::MatchPointOptions;
 pub struct MovingDlt {
     /// Match positions in source pixels, for the weights.
     positions: Vec<Vector2<f64>>,
-    /// Normalised (x, y) and (x', y').
+    /// Normalized (x, y) and (x', y').
     rows: Vec<[f64; 4]>,
-    normalised_from_source: Matrix3<f64>,
-    target_from_normalised: Matrix3<f64>,
+    normalized_from_source: Matrix3<f64>,
+    target_from_normalized: Matrix3<f64>,
     /// The solution with equal weights, where the iteration for each vertex starts.
     global: SVector<f64, 9>,
 }
@@ -31,20 +31,20 @@ impl MovingDlt {
         if source.len() < 4 || source.len() != target.len() {
             return None;
         }
-        let (normalised_source, normalised_target) = (Normalisation::of(source)?, Normalisation::of(target)?);
+        let (normalized_source, normalized_target) = (Normalization::of(source)?, Normalization::of(target)?);
         let rows: Vec<[f64; 4]> = source
             .iter()
             .zip(target)
             .map(|(&p, &q)| {
-                let (p, q) = (normalised_source.apply(p), normalised_target.apply(q));
+                let (p, q) = (normalized_source.apply(p), normalized_target.apply(q));
                 [p.x, p.y, q.x, q.y]
             })
             .collect();
         let mut dlt = Self {
             positions: source.to_vec(),
             rows,
-            normalised_from_source: normalised_source.matrix(),
-            target_from_normalised: normalised_target.inverse(),
+            normalized_from_source: normalized_source.matrix(),
+            target_from_normalized: normalized_target.inverse(),
             global: SVector::zeros(),
         };
         let eigen = dlt.normal_matrix(|_| 1.0).symmetric_eigen();
@@ -78,8 +78,8 @@ impl MovingDlt {
                 break;
             }
         }
-        let normalised = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]);
-        let matrix = self.target_from_normalised * normalised * self.normalised_from_source;
+        let normalized = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]);
+        let matrix = self.target_from_normalized * normalized * self.normalized_from_source;
         let scale = matrix[(2, 2)];
         let matrix = matrix / scale;
         matrix.iter().all(|entry| entry.is_finite()).then_some(Homography(matrix))

@@ -18,7 +18,7 @@ trueup_core::choice! {
     /// The shape that the similarity prior asks of each picture.
     pub enum BaseShape {
         /// The picture on the level sphere, unrolled between the equirectangular and the Mercator projection
-        /// (`mesh.conformality`); nearly a similarity around the picture's centre.
+        /// (`mesh.conformality`); nearly a similarity around the picture's center.
         Sphere = "sphere",
         /// A similarity of the whole picture, as published.
         Similarity = "similarity",
@@ -125,8 +125,8 @@ struct SphereView {
 }
 
 impl Base {
-    /// The base of a picture: on the level sphere, turned so that its rotation at the picture's centre is the wanted one.
-    /// A picture whose centre is within 20 degrees of a pole cannot be unrolled; it gets the plain similarity.
+    /// The base of a picture: on the level sphere, turned so that its rotation at the picture's center is the wanted one.
+    /// A picture whose center is within 20 degrees of a pole cannot be unrolled; it gets the plain similarity.
     fn new(
         options: &MeshOptions,
         camera: &Camera,
@@ -143,8 +143,8 @@ impl Base {
         if !is_moderate(view.forward) {
             return plain;
         }
-        let at_centre = derivative_at_centre(options.conformality, &view.level_from_camera, camera.focal_px);
-        let turn = conjugate_product(at_centre, similarity).normalize();
+        let at_center = derivative_at_center(options.conformality, &view.level_from_camera, camera.focal_px);
+        let turn = conjugate_product(at_center, similarity).normalize();
         Self { factor: turn * wanted.units_per_radian, sphere: Some(view) }
     }
 
@@ -200,15 +200,15 @@ impl SphereView {
     }
 
     /// Longitude relative to the viewing direction and unrolled latitude of a pixel. Beyond the largest latitude the
-    /// unrolled picture goes on straight, along rays from its centre.
+    /// unrolled picture goes on straight, along rays from its center.
     fn unrolled(&self, pixel: Vector2<f64>) -> Vector2<f64> {
         let Some(share) = self.moderate_share(pixel) else { return self.projected(self.ray(pixel)) };
-        let centre = Vector2::from(self.camera.principal_point);
-        let last = centre + (pixel - centre) * share;
+        let center = Vector2::from(self.camera.principal_point);
+        let last = center + (pixel - center) * share;
         self.projected(self.ray(last)) + self.derivative(self.ray(last), pixel - last)
     }
 
-    /// The share of the way from the picture's centre to `pixel` after which it is too near a pole; `None` if it is
+    /// The share of the way from the picture's center to `pixel` after which it is too near a pole; `None` if it is
     /// moderate to the end.
     fn moderate_share(&self, pixel: Vector2<f64>) -> Option<f64> {
         /// Steps in which the first steep place is sought: the way may pass a pole and come back.
@@ -218,8 +218,8 @@ impl SphereView {
         if self.moderate_all_over {
             return None;
         }
-        let centre = Vector2::from(self.camera.principal_point);
-        let steep = |share: f64| !is_moderate(self.ray(centre + (pixel - centre) * share));
+        let center = Vector2::from(self.camera.principal_point);
+        let steep = |share: f64| !is_moderate(self.ray(center + (pixel - center) * share));
         let first = (1..=STEPS).find(|&step| steep(step as f64 / STEPS as f64))?;
         let (mut inside, mut outside) = ((first - 1) as f64 / STEPS as f64, first as f64 / STEPS as f64);
         for _ in 0..HALVINGS {
@@ -254,8 +254,8 @@ pub(crate) fn is_moderate(ray: Vector3<f64>) -> bool {
     (ray.y / ray.norm()).abs() <= STEEPEST
 }
 
-/// The similarity closest to the projection's derivative at the picture's centre, per pixel.
-fn derivative_at_centre(conformality: f64, level_from_camera: &Matrix3<f64>, focal_px: f64) -> Vector2<f64> {
+/// The similarity closest to the projection's derivative at the picture's center, per pixel.
+fn derivative_at_center(conformality: f64, level_from_camera: &Matrix3<f64>, focal_px: f64) -> Vector2<f64> {
     let forward: Vector3<f64> = level_from_camera.column(2).into_owned();
     let horizontal = forward.x.hypot(forward.z);
     let east = Vector3::new(forward.z, 0.0, -forward.x) / horizontal;
@@ -281,9 +281,9 @@ mod tests {
         Camera::new(700.0, 800.0, 600.0, &world_from_camera.transpose())
     }
 
-    /// The base's direction at the centre, from finite differences over one small grid, must be upright.
+    /// The base's direction at the center, from finite differences over one small grid, must be upright.
     #[test]
-    fn a_picture_turned_by_its_roll_stands_upright_at_the_centre() {
+    fn a_picture_turned_by_its_roll_stands_upright_at_the_center() {
         let grid = GridMesh::regular(800.0, 600.0, 2.0);
         for conformality in [0.0, 0.8, 1.0] {
             let options = MeshOptions { conformality, ..MeshOptions::default() };
@@ -291,10 +291,10 @@ mod tests {
             let wanted = WantedSimilarity { scale: 1.0, theta: 0.2, units_per_radian: 700.0 };
             let base = Base::new(&options, &camera, &grid, &Matrix3::identity(), wanted).places(&grid);
             // Down in the picture is (sin roll, cos roll) where the camera's roll is 0.2.
-            let centre = grid.columns * (grid.rows / 2) + grid.columns / 2;
+            let center = grid.columns * (grid.rows / 2) + grid.columns / 2;
             let down = Vector2::new(0.2_f64.sin(), 0.2_f64.cos());
-            let by_x = (base[centre + 1] - base[centre - 1]) / (2.0 * grid.cell_width());
-            let by_y = (base[centre + grid.columns] - base[centre - grid.columns]) / (2.0 * grid.cell_height());
+            let by_x = (base[center + 1] - base[center - 1]) / (2.0 * grid.cell_width());
+            let by_y = (base[center + grid.columns] - base[center - grid.columns]) / (2.0 * grid.cell_height());
             let moved = by_x * down.x + by_y * down.y;
             assert!((moved.x / moved.y).abs() < 1e-4, "{conformality}: {moved}");
         }
@@ -316,10 +316,10 @@ mod tests {
         for conformality in [0.0, 0.8, 1.0] {
             let grid = GridMesh::regular(800.0, 600.0, 40.0);
             let view = SphereView::new(conformality, &camera(0.3, 1.0, 0.1), &grid, &Matrix3::identity());
-            let (centre, corner) = (Vector2::new(400.0, 300.0), Vector2::new(500.0, 0.0));
+            let (center, corner) = (Vector2::new(400.0, 300.0), Vector2::new(500.0, 0.0));
             let share = view.moderate_share(corner).expect("a steep corner");
-            assert!(share > 0.1 && share < 0.99 && view.moderate_share(centre).is_none(), "{share}");
-            let at = |along: f64| view.unrolled(centre + (corner - centre) * along);
+            assert!(share > 0.1 && share < 0.99 && view.moderate_share(center).is_none(), "{share}");
+            let at = |along: f64| view.unrolled(center + (corner - center) * along);
             let step = 1e-4;
             assert!((at(share + 1e-7) - at(share - 1e-7)).norm() < 1e-5);
             let before = (at(share - step) - at(share - 2.0 * step)) / step;

@@ -100,8 +100,8 @@ mod tests {
                     })
                     .collect(),
             };
-            let neighbours = |k: usize| [carried(k, k + 1), carried(k + 1, k)];
-            let within = (0..PICTURES - 1).flat_map(neighbours).collect();
+            let neighbors = |k: usize| [carried(k, k + 1), carried(k + 1, k)];
+            let within = (0..PICTURES - 1).flat_map(neighbors).collect();
             let across = vec![carried(PICTURES - 1, 0), carried(0, PICTURES - 1)];
             Self { cameras, grids, within, across, turns: vec![1.0, -1.0] }
         }
@@ -131,7 +131,7 @@ mod tests {
         let period = warped.period.expect("a full turn");
         assert!((period - TAU * FOCAL_PX).abs() < 1e-6, "{period}");
         assert!(warped.alignment_rms < 1e-6 && warped.relative_gradient < 1e-9, "{warped:?}");
-        assert!(context.take_diagnostics().is_empty());
+        assert!(context.findings().is_empty());
     }
 
     /// The matches lie a ring's circumference apart whatever the focal length: the period follows them, not the base.
@@ -167,7 +167,7 @@ mod tests {
         let ring = Ring::new();
         let open = ring.deformed(1.0, 1.5 * TAU * FOCAL_PX, &context);
         assert_eq!(open.period, None);
-        let found = context.take_diagnostics();
+        let found = context.findings();
         assert_eq!((found[0].code.as_str(), found[0].severity), ("full-turn-open", Severity::Warning));
         assert!(found[0].message.contains("67 %"), "{}", found[0].message);
         // As without any closure.

@@ -1,8 +1,8 @@
 //! How far overlaps are apart beyond the noise of what says so.
 //!
 //! The plain mesh meets overlaps to a tenth of a pixel where the photographs were taken from one point, better than any
-//! single match or cell of pixels says. Drawn to each of them it would follow their noise. Noise differs from neighbour to
-//! neighbour; a true misalignment is common to them. The product of neighbours' distances is therefore, on the mean, the
+//! single match or cell of pixels says. Drawn to each of them it would follow their noise. Noise differs from neighbor to
+//! neighbor; a true misalignment is common to them. The product of neighbors' distances is therefore, on the mean, the
 //! square of the true one, and evidence weighs by it, as the prior variance of what is estimated says in a Wiener filter.
 
 use nalgebra::{Matrix2, Vector2};
@@ -19,7 +19,7 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// What a match says of the square, per axis, that has no neighbour to confirm it.
+    /// What a match says of the square, per axis, that has no neighbor to confirm it.
     fn beyond_noise(&self) -> f64 {
         /// Standard deviation of a match per axis that is not exceeded by much: matches are found to half of it.
         const NOISE_PX: f64 = 1.0;
@@ -27,16 +27,16 @@ impl Evidence {
     }
 }
 
-/// Square, per axis, of the misalignment that neighbours have in common, around every piece of evidence. Where
-/// none has a neighbour, what exceeds the usual noise.
+/// Square, per axis, of the misalignment that neighbors have in common, around every piece of evidence. Where
+/// none has a neighbor, what exceeds the usual noise.
 pub(super) fn common_squares(evidence: &[Evidence]) -> Vec<f64> {
     /// Closer matches share their pixels and so their noise.
     const NEAREST_PX: f64 = 8.0;
     /// Two cells of the usual grid: what is common over less, a grid cannot follow.
     const FARTHEST_PX: f64 = 80.0;
-    /// Neighbours that are compared with one another.
-    const NEIGHBOURS: usize = 12;
-    /// Products with which a neighbourhood is drawn to the mean of all.
+    /// Neighbors that are compared with one another.
+    const NEIGHBORS: usize = 12;
+    /// Products with which a neighborhood is drawn to the mean of all.
     const DRAWN: f64 = 24.0;
     let mut overall = [0.0; 2];
     let around: Vec<[f64; 2]> = evidence
@@ -47,9 +47,9 @@ pub(super) fn common_squares(evidence: &[Evidence]) -> Vec<f64> {
                 .map(|other| ((other.place - one.place).norm_squared(), other))
                 .filter(|(square, _)| *square <= FARTHEST_PX.powi(2))
                 .collect();
-            if near.len() > NEIGHBOURS {
-                near.select_nth_unstable_by(NEIGHBOURS - 1, |one, other| one.0.total_cmp(&other.0));
-                near.truncate(NEIGHBOURS);
+            if near.len() > NEIGHBORS {
+                near.select_nth_unstable_by(NEIGHBORS - 1, |one, other| one.0.total_cmp(&other.0));
+                near.truncate(NEIGHBORS);
             }
             // The selection leaves no order, and sums depend on theirs.
             near.sort_by(|one, other| one.0.total_cmp(&other.0));
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_neighbour_must_exceed_the_usual_noise() {
+    fn what_has_no_neighbor_must_exceed_the_usual_noise() {
         assert_eq!(common_squares(&[]), [0.0; 0]);
         let lonely = |gap: f64| {
             let known = Matrix2::from_diagonal(&Vector2::new(1.0, 0.0));

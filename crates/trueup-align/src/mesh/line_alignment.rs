@@ -9,7 +9,7 @@
 //! A sample of a line is drawn to the matched line's own image at its foot, not to the chord between that line's ends, and
 //! straightness is the chord's deviation relative to the base's: where the base is a similarity both are the published
 //! terms, where it is a sphere unrolled, a straight line of the scene is rightly curved. Robust weights that narrow, and
-//! weights by what neighbouring matches have in common (`evidence`).
+//! weights by what neighboring matches have in common (`evidence`).
 
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
@@ -41,7 +41,7 @@ trueup_core::options! {
         /// Factor on that distance from round to round: where depth differs within a cell, the surface that most matches
         /// are on wins.
         narrowing: f64 = 0.7, between(0.01, 1.0), "";
-        /// Misalignment, common to neighbouring matches of a pair, from which on they weigh fully; with less their weight
+        /// Misalignment, common to neighboring matches of a pair, from which on they weigh fully; with less their weight
         /// falls with its square.
         full_px: f64 = 0.7, between(0.001, 1000.0), "panorama units, per axis";
         /// Times the mesh is solved with lines and weights found on the solution before.
@@ -106,7 +106,7 @@ pub(super) struct Present<'a> {
 
 impl LineAlignmentInput<'_> {
     /// The shares of their weights that all matches have: how much of the distances in the `present` grids is common to
-    /// neighbours.
+    /// neighbors.
     pub(super) fn shares(&self, present: &Present) -> Shares {
         let mut pairs: Vec<(usize, usize)> = self.points.iter().map(|pair| (pair.a, pair.b)).collect();
         pairs.extend(self.matched.iter().map(|pair| (pair.a, pair.b)));

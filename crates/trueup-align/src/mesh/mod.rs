@@ -21,7 +21,7 @@ mod structure;
 
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Error, Result, StageContext};
 
@@ -153,7 +153,7 @@ pub fn run_refined(
     };
     context.report(Diagnostic::warning(
         "full-turn-open",
-        "mesh",
+        Subject::stage("mesh"),
         format!("the photographs go all the way round, but the panorama's ends do not meet: {contradiction}"),
         "Look whether the photographs beside the cut show the same; --graph names the pairs to be matched.",
     ));

@@ -101,8 +101,8 @@ impl Problem<'_> {
 
     /// Keeps the outlines of the pictures where they are in `meshes`.
     ///
-    /// Where neighbours were taken from different places their pixels would bend and turn the pictures against each other;
-    /// how a picture stands is the prior's to say. Its outline lies over the inside of a neighbour, which can give way.
+    /// Where neighbors were taken from different places their pixels would bend and turn the pictures against each other;
+    /// how a picture stands is the prior's to say. Its outline lies over the inside of a neighbor, which can give way.
     fn hold_outlines(&self, equations: &mut NormalEquations, meshes: &[GridMesh], weight: f64) {
         for (picture, mesh) in meshes.iter().enumerate() {
             let is_outer = |at: usize, length: usize| at == 0 || at + 1 == length;

@@ -1,4 +1,4 @@
-//! The energies of grid edges: E_l keeps every edge in a similarity with its neighbourhood, E_g draws that similarity to
+//! The energies of grid edges: E_l keeps every edge in a similarity with its neighborhood, E_g draws that similarity to
 //! the prior's scale and rotation.
 
 use nalgebra::Vector2;
@@ -12,7 +12,7 @@ use super::{MeshOptions, NormalEquations, PUBLISHED_CELL_PX};
 /// E_l and E_g of one picture, both relative to a base grid: with a base that is a similarity of the picture they are the
 /// published energies.
 ///
-/// For an edge from a to b the neighbourhood is the 4-neighbours of a and of b without a. The similarity c + i s that
+/// For an edge from a to b the neighborhood is the 4-neighbors of a and of b without a. The similarity c + i s that
 /// maps the undeformed differences from a to the deformed ones best is linear in the vertices:
 /// sum_m conj(d_m) (v_m - v_a) / sum |d_m|^2 with complex numbers for points of the plane.
 #[derive(Debug)]
@@ -33,19 +33,19 @@ impl<'a> SimilarityEnergy<'a> {
     /// to cell, which can miss the nearest.
     pub fn new(grid: &'a GridMesh, base: &'a [Vector2<f64>], overlap: &[bool], options: &MeshOptions) -> Self {
         let columns = grid.columns - 1;
-        let centre = |cell: usize| {
+        let center = |cell: usize| {
             Vector2::new(
                 ((cell % columns) as f64 + 0.5) * grid.cell_width(),
                 ((cell / columns) as f64 + 0.5) * grid.cell_height(),
             )
         };
-        let bearing: Vec<Vector2<f64>> = (0..overlap.len()).filter(|&cell| overlap[cell]).map(centre).collect();
+        let bearing: Vec<Vector2<f64>> = (0..overlap.len()).filter(|&cell| overlap[cell]).map(center).collect();
         let diagonal = grid.width.hypot(grid.height);
         // The published weights belong to 40 px cells: E_g has no unit, the other energies are in pixels.
         let unit = options.cell_px / PUBLISHED_CELL_PX;
         let cell_weights = (0..overlap.len())
             .map(|cell| {
-                let here = centre(cell);
+                let here = center(cell);
                 let nearest = bearing.iter().map(|other| (other - here).norm()).min_by(f64::total_cmp);
                 unit * (options.prior_weight + options.prior_slope * nearest.unwrap_or(0.0) / diagonal)
             })
@@ -94,13 +94,13 @@ impl<'a> SimilarityEnergy<'a> {
     }
 
     fn add_edge(&self, picture: usize, a: usize, b: usize, weight: f64, equations: &mut NormalEquations) {
-        let neighbourhood = self.neighbourhood(a, b);
+        let neighborhood = self.neighborhood(a, b);
         let origin = self.grid.source(a);
         let difference = |m: usize| self.grid.source(m) - origin;
-        let total: f64 = neighbourhood.iter().map(|&m| difference(m).norm_squared()).sum();
-        let mut similarity: Vec<(usize, Coefficient)> = Vec::with_capacity(neighbourhood.len() + 1);
+        let total: f64 = neighborhood.iter().map(|&m| difference(m).norm_squared()).sum();
+        let mut similarity: Vec<(usize, Coefficient)> = Vec::with_capacity(neighborhood.len() + 1);
         let mut at_origin = Vector2::zeros();
-        for &m in &neighbourhood {
+        for &m in &neighborhood {
             let d = difference(m);
             let factor = Vector2::new(d.x, -d.y) / total;
             similarity.push((m, factor));
@@ -133,8 +133,8 @@ impl<'a> SimilarityEnergy<'a> {
         members.iter().fold(Vector2::zeros(), |sum, &(m, factor)| sum + product(factor, self.base[m]))
     }
 
-    /// The 4-neighbours of a and b without a, ascending, each once.
-    fn neighbourhood(&self, a: usize, b: usize) -> Vec<usize> {
+    /// The 4-neighbors of a and b without a, ascending, each once.
+    fn neighborhood(&self, a: usize, b: usize) -> Vec<usize> {
         let (rows, columns) = (self.grid.rows, self.grid.columns);
         let mut found = Vec::with_capacity(8);
         for vertex in [a, b] {

@@ -6,7 +6,7 @@ use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 
 use super::normal_equations::{MeshSolution, NormalEquations};
 
-/// Solves normal equations of the same grids again and again: the symbolic factorisation is made anew only when vertices
+/// Solves normal equations of the same grids again and again: the symbolic factorization is made anew only when vertices
 /// couple that never coupled before.
 #[derive(Debug, Default)]
 pub struct MeshSolver {

@@ -27,7 +27,7 @@ const CUT_SHARE: f64 = 0.25;
 ///
 /// On a full turn whose ends meet, distances are taken modulo its `period`.
 ///
-/// `cameras` are the true ones, of one common centre, in the pixels of the grids' pictures. 40 x 30 points are carried
+/// `cameras` are the true ones, of one common center, in the pixels of the grids' pictures. 40 x 30 points are carried
 /// from each picture to all later ones.
 pub fn true_alignment(meshes: &[GridMesh], cameras: &[Camera], period: Option<f64>) -> Option<f64> {
     if meshes.len() != cameras.len() {

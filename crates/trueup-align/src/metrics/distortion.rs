@@ -13,11 +13,11 @@ const COLLAPSED: f64 = 1e-6;
 /// When a cell counts as lying outside a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outside {
-    /// Its centre does.
-    Centre,
-    /// Its centre and its four corners do: fewer cells at the border of overlaps, where grids are stretched least. LD is
+    /// Its center does.
+    Center,
+    /// Its center and its four corners do: fewer cells at the border of overlaps, where grids are stretched least. LD is
     /// larger by 0 to 7 % on panoramas of one row.
-    CentreAndCorners,
+    CenterAndCorners,
 }
 
 /// The local distortion of a panorama.
@@ -62,13 +62,13 @@ pub fn local_distortion(meshes: &[GridMesh], outside: Outside, period: Option<f6
         };
         let alone = |point: Vector2<f64>| (0..meshes.len()).all(|other| other == k || !is_in(other, point));
         let vertices_alone: Vec<bool> = match outside {
-            Outside::CentreAndCorners => (0..mesh.len()).map(|vertex| alone(target(mesh, vertex))).collect(),
-            Outside::Centre => vec![true; mesh.len()],
+            Outside::CenterAndCorners => (0..mesh.len()).map(|vertex| alone(target(mesh, vertex))).collect(),
+            Outside::Center => vec![true; mesh.len()],
         };
         let (mut sum, mut count) = (0.0, 0_usize);
         for cell in cells(mesh) {
-            let centre = cell.iter().map(|&corner| target(mesh, corner)).sum::<Vector2<f64>>() / 4.0;
-            if !cell.iter().all(|&corner| vertices_alone[corner]) || !alone(centre) {
+            let center = cell.iter().map(|&corner| target(mesh, corner)).sum::<Vector2<f64>>() / 4.0;
+            if !cell.iter().all(|&corner| vertices_alone[corner]) || !alone(center) {
                 continue;
             }
             match cell_distortion(mesh, cell) {
@@ -148,7 +148,7 @@ mod tests {
         let map = |p: Vector2<f64>| p / (1.0 - p.x / 100.0);
         mesh.target = (0..4).map(|vertex| map(mesh.source(vertex)).into()).collect();
         assert!(
-            (local_distortion(&[mesh], Outside::CentreAndCorners, None).worst - 0.196748261 / 1.303776091).abs() < 1e-8
+            (local_distortion(&[mesh], Outside::CenterAndCorners, None).worst - 0.196748261 / 1.303776091).abs() < 1e-8
         );
     }
 
@@ -156,13 +156,13 @@ mod tests {
     fn covered_cells_are_not_judged_and_turned_ones_are_counted() {
         let whole = mapped(|p| p);
         let hidden = mapped(|p| p * 0.5 + Vector2::new(50.0, 50.0));
-        assert_eq!(local_distortion(&[hidden, whole.clone()], Outside::Centre, None).pictures[0], None);
+        assert_eq!(local_distortion(&[hidden, whole.clone()], Outside::Center, None).pictures[0], None);
         let mut folded = whole;
         folded.target[12] = [390.0, 290.0];
-        assert!(local_distortion(&[folded], Outside::Centre, None).folds > 0);
+        assert!(local_distortion(&[folded], Outside::Center, None).folds > 0);
     }
 
-    /// Two pictures of 100 x 100 px overlap by 14 px: of ten columns of cells, the ninth has its centre outside the other
+    /// Two pictures of 100 x 100 px overlap by 14 px: of ten columns of cells, the ninth has its center outside the other
     /// picture and two corners inside.
     #[test]
     fn the_corners_rule_leaves_out_cells_that_the_other_picture_cuts() {
@@ -174,8 +174,8 @@ mod tests {
             vertex[0] += bent(Vector2::new(86.0, 0.0)).x;
         }
         let meshes = [left, right];
-        let strict = local_distortion(&meshes, Outside::CentreAndCorners, None).pictures[0].expect("cells");
-        let loose = local_distortion(&meshes, Outside::Centre, None).pictures[0].expect("cells");
+        let strict = local_distortion(&meshes, Outside::CenterAndCorners, None).pictures[0].expect("cells");
+        let loose = local_distortion(&meshes, Outside::Center, None).pictures[0].expect("cells");
         assert!(loose > strict, "the distortion grows to the right: {loose} {strict}");
     }
 
@@ -184,7 +184,7 @@ mod tests {
         #[test]
         fn affine_maps_have_none(a in 0.5..2.0_f64, b in -0.4..0.4_f64, c in -0.4..0.4_f64, d in 0.5..2.0_f64) {
             let mesh = mapped(|p| Vector2::new(a * p.x + b * p.y + 17.0, c * p.x + d * p.y - 3.0));
-            let distortion = local_distortion(&[mesh], Outside::CentreAndCorners, None);
+            let distortion = local_distortion(&[mesh], Outside::CenterAndCorners, None);
             prop_assert!(distortion.worst < 1e-9 && distortion.folds == 0);
         }
     }

@@ -28,5 +28,5 @@ pub use outline::folded_cells;
 pub use overlap::{Overlap, OverlapMeasures, mean_over_overlaps};
 pub use reprojection::{MatchedPair, Reprojection, reprojection};
 pub use straightness::Straightness;
-pub use upright::{Uprightness, centre_rotation};
+pub use upright::{Uprightness, center_rotation};
 pub use vertical_lines::{LinedPicture, VerticalLines, vertical_lines, vertical_segments};

@@ -115,7 +115,7 @@ mod tests {
         let mut mesh = GridMesh::regular(50.0, 50.0, 10.0);
         assert_eq!(folded_cells(&mesh), 0);
         // Vertex (2, 2) goes beyond the diagonal of the cell to its lower right, which becomes concave; then out of it,
-        // which turns that cell over and crosses its two neighbours.
+        // which turns that cell over and crosses its two neighbors.
         mesh.target[2 * 6 + 2] = [27.0, 27.0];
         assert_eq!(folded_cells(&mesh), 1);
         mesh.target[2 * 6 + 2] = [45.0, 45.0];

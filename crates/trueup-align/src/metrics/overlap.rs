@@ -4,19 +4,19 @@ use trueup_core::raster::Raster;
 
 use super::similarity_index;
 
-/// Highest grey value.
+/// Highest gray value.
 pub(super) const WHITE: f64 = 255.0;
 /// Side of the windows whose correlation is taken, pixels.
 const WINDOW: usize = 3;
-/// Standard deviation of the grey values below which a window has no texture to correlate.
+/// Standard deviation of the gray values below which a window has no texture to correlate.
 const FLAT: f64 = 1.0;
 
 /// Two pictures on one grid of pixels.
 #[derive(Debug, Clone, Copy)]
 pub struct Overlap<'a> {
-    /// Grey values of the first, 0 to 255, one channel.
+    /// Gray values of the first, 0 to 255, one channel.
     pub a: &'a Raster<f32>,
-    /// Grey values of the second, of the same size.
+    /// Gray values of the second, of the same size.
     pub b: &'a Raster<f32>,
     /// Whether a pixel is covered by both, of the same size.
     pub covered: &'a Raster<bool>,
@@ -27,11 +27,11 @@ pub struct Overlap<'a> {
 pub struct OverlapMeasures {
     /// |Omega|: pixels that both cover, without those at the overlap's border.
     pub pixels: usize,
-    /// Root mean square over windows of 1 - NCC (normalised cross correlation of 3 x 3 pixels), 0 to 2.
+    /// Root mean square over windows of 1 - NCC (normalized cross correlation of 3 x 3 pixels), 0 to 2.
     pub ncc_rmse: f64,
     /// Its square.
     pub ncc_mse: f64,
-    /// Mean square difference of the grey values.
+    /// Mean square difference of the gray values.
     pub intensity_mse: f64,
     /// Peak signal to noise ratio after evening out the brightness, decibels; `None` if they are equal.
     pub psnr_db: Option<f64>,
@@ -44,7 +44,7 @@ impl Overlap<'_> {
     /// Measures the overlap. `None` if the sizes differ, if there is no overlap, or if there is no texture in it.
     ///
     /// Windows that are flat in both pictures are passed over; one that is flat in one of them only counts as uncorrelated.
-    /// For PSNR and SSIM both pictures are first brought to the geometric mean of their mean grey values.
+    /// For PSNR and SSIM both pictures are first brought to the geometric mean of their mean gray values.
     ///
     /// # Source
     /// Seam-guided and direct alignment papers for the NCC measure; Wang, Bovik, Sheikh, Simoncelli, Image Quality
@@ -66,10 +66,10 @@ impl Overlap<'_> {
         Some(OverlapMeasures { pixels, ncc_rmse: ncc_mse.sqrt(), ncc_mse, intensity_mse, psnr_db, ssim })
     }
 
-    /// Factors that bring both pictures to the geometric mean of their mean grey values; 1 if one is black.
+    /// Factors that bring both pictures to the geometric mean of their mean gray values; 1 if one is black.
     fn gains(&self, inside: &Raster<bool>) -> [f64; 2] {
         let sum = |gray: &Raster<f32>| -> f64 {
-            gray.data().iter().zip(inside.data()).filter(|&(_, &inside)| inside).map(|(&grey, _)| f64::from(grey)).sum()
+            gray.data().iter().zip(inside.data()).filter(|&(_, &inside)| inside).map(|(&gray, _)| f64::from(gray)).sum()
         };
         let ratio = sum(self.b) / sum(self.a);
         if ratio.is_finite() && ratio > 0.0 { [ratio.sqrt(), 1.0 / ratio.sqrt()] } else { [1.0, 1.0] }
@@ -92,7 +92,7 @@ impl Overlap<'_> {
         for y in 0..inside.height() {
             for x in (0..inside.width()).filter(|&x| inside.pixel(x, y)[0]) {
                 let (a, b) = (window(self.a, x, y), window(self.b, x, y));
-                let correlation = match (centred(&a), centred(&b)) {
+                let correlation = match (centered(&a), centered(&b)) {
                     (None, None) => continue,
                     (Some(a), Some(b)) => a.iter().zip(&b).map(|(a, b)| a * b).sum(),
                     _ => 0.0,
@@ -105,20 +105,20 @@ impl Overlap<'_> {
     }
 }
 
-/// The 3 x 3 grey values around a pixel that is not on the raster's border.
+/// The 3 x 3 gray values around a pixel that is not on the raster's border.
 fn window(gray: &Raster<f32>, x: usize, y: usize) -> [f64; WINDOW * WINDOW] {
     std::array::from_fn(|k| f64::from(gray.pixel(x + k % WINDOW - WINDOW / 2, y + k / WINDOW - WINDOW / 2)[0]))
 }
 
 /// A window of mean 0 and length 1; `None` if it is flat.
-fn centred(window: &[f64; WINDOW * WINDOW]) -> Option<[f64; WINDOW * WINDOW]> {
+fn centered(window: &[f64; WINDOW * WINDOW]) -> Option<[f64; WINDOW * WINDOW]> {
     let count = window.len() as f64;
     let mean = window.iter().sum::<f64>() / count;
     let norm = window.iter().map(|value| (value - mean).powi(2)).sum::<f64>().sqrt();
     (norm >= FLAT * count.sqrt()).then(|| window.map(|value| (value - mean) / norm))
 }
 
-/// The pixels whose square neighbourhood up to `radius` pixels away is covered; none at the raster's border.
+/// The pixels whose square neighborhood up to `radius` pixels away is covered; none at the raster's border.
 pub(super) fn eroded(covered: &Raster<bool>, radius: usize) -> Raster<bool> {
     let (width, height) = (covered.width(), covered.height());
     let along_rows = all_within(width, height, radius, |x, y| covered.pixel(x, y)[0]);

@@ -12,7 +12,7 @@ const SIGMA_PX: f64 = 1.5;
 const C1: f64 = (0.01 * WHITE) * (0.01 * WHITE);
 const C2: f64 = (0.03 * WHITE) * (0.03 * WHITE);
 
-/// Mean structural similarity over the windows that lie wholly in the overlap, the grey values multiplied by `gains`;
+/// Mean structural similarity over the windows that lie wholly in the overlap, the gray values multiplied by `gains`;
 /// `None` without such a window.
 pub(super) fn mean(overlap: &Overlap, gains: [f64; 2]) -> Option<f64> {
     let (width, height) = (overlap.covered.width(), overlap.covered.height());
@@ -20,7 +20,7 @@ pub(super) fn mean(overlap: &Overlap, gains: [f64; 2]) -> Option<f64> {
     if !inside.data().contains(&true) {
         return None;
     }
-    let scaled = |gray: &Raster<f32>, gain: f64| gray.data().iter().map(|&grey| gain * f64::from(grey)).collect();
+    let scaled = |gray: &Raster<f32>, gain: f64| gray.data().iter().map(|&gray| gain * f64::from(gray)).collect();
     let (a, b): (Vec<f64>, Vec<f64>) = (scaled(overlap.a, gains[0]), scaled(overlap.b, gains[1]));
     let product = |one: &[f64], two: &[f64]| -> Vec<f64> { one.iter().zip(two).map(|(one, two)| one * two).collect() };
     let blurred = |values: &[f64]| blurred(values, width, height);

@@ -32,11 +32,11 @@ impl Straightness {
             return None;
         }
         let count = points.len() as f64;
-        let centre = points.iter().sum::<Vector2<f64>>() / count;
-        let moment: Matrix2<f64> = points.iter().map(|point| (point - centre) * (point - centre).transpose()).sum();
+        let center = points.iter().sum::<Vector2<f64>>() / count;
+        let moment: Matrix2<f64> = points.iter().map(|point| (point - center) * (point - center).transpose()).sum();
         let eigen = moment.symmetric_eigen();
         let across: Vector2<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
-        let distances = points.iter().map(|point| (point - centre).dot(&across).abs());
+        let distances = points.iter().map(|point| (point - center).dot(&across).abs());
         let (squares, largest_px) =
             distances.fold((0.0, 0.0_f64), |(sum, largest), one| (sum + one * one, largest.max(one)));
         Some(Self { length_px, rms_px: (squares / count).sqrt(), largest_px })

@@ -6,7 +6,7 @@ use trueup_core::mesh::GridMesh;
 use super::outline::target;
 
 /// Clockwise rotation of a picture's middle, radians: of the line between the vertices above and below its middle one.
-pub fn centre_rotation(mesh: &GridMesh) -> f64 {
+pub fn center_rotation(mesh: &GridMesh) -> f64 {
     let (row, column) = (mesh.rows / 2, mesh.columns / 2);
     let (above, below) = (row.saturating_sub(1), (row + 1).min(mesh.rows - 1));
     let along = target(mesh, below * mesh.columns + column) - target(mesh, above * mesh.columns + column);
@@ -42,7 +42,7 @@ impl Uprightness {
     /// How far pictures whose true [`super::vertical_angle`]s are `gammas` stand from upright in the middle; `None` without
     /// pictures, or if the lists differ in length.
     pub fn against(meshes: &[GridMesh], gammas: &[f64]) -> Option<Self> {
-        let off = |(mesh, gamma): (&GridMesh, &f64)| wrap_angle(centre_rotation(mesh) - gamma);
+        let off = |(mesh, gamma): (&GridMesh, &f64)| wrap_angle(center_rotation(mesh) - gamma);
         if meshes.len() != gammas.len() {
             return None;
         }
@@ -65,7 +65,7 @@ mod tests {
     #[test]
     fn a_turned_picture_has_its_turn() {
         for angle in [-3.0, -0.4, 0.0, 0.7, 2.9] {
-            assert!((centre_rotation(&turned(angle)) - angle).abs() < 1e-12);
+            assert!((center_rotation(&turned(angle)) - angle).abs() < 1e-12);
         }
     }
 

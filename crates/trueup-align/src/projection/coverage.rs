@@ -48,12 +48,12 @@ impl Coverage {
                 covered = [true; STEPS];
                 continue;
             }
-            let centre = ahead.x.atan2(ahead.z);
-            let from_centre = directions.iter().map(|direction| wrap_angle(direction.x.atan2(direction.z) - centre));
+            let center = ahead.x.atan2(ahead.z);
+            let from_center = directions.iter().map(|direction| wrap_angle(direction.x.atan2(direction.z) - center));
             let (left, right) =
-                from_centre.fold((0.0_f64, 0.0_f64), |(left, right), one| (left.min(one), right.max(one)));
+                from_center.fold((0.0_f64, 0.0_f64), |(left, right), one| (left.min(one), right.max(one)));
             let step = |longitude: f64| (longitude / TAU * STEPS as f64).round() as i64;
-            for index in step(centre + left)..=step(centre + right) {
+            for index in step(center + left)..=step(center + right) {
                 covered[index.rem_euclid(STEPS as i64) as usize] = true;
             }
         }

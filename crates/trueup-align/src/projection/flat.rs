@@ -15,7 +15,7 @@ pub enum FlatKind {
     Cylindrical,
     /// Mercator's.
     Mercator,
-    /// A plane seen from the centre.
+    /// A plane seen from the center.
     Perspective,
     /// Panini's.
     Panini,

@@ -132,7 +132,7 @@ impl<'a> Drawing<'a> {
             .lines
             .clone()
             .unwrap_or_else(|| GridLines::even(self.shot.mesh.columns, self.shot.mesh.rows));
-        // What is smaller than this share of a pixel is not seen, not even at a pole, half a pixel from the first row's centres.
+        // What is smaller than this share of a pixel is not seen, not even at a pole, half a pixel from the first row's centers.
         let smallest = 0.125 * (self.shot.camera.focal_px / self.placement.canvas_from_plane).max(1.0);
         for _ in 0..ROUNDS {
             let places = self.places(&lines);
@@ -177,11 +177,11 @@ impl<'a> Drawing<'a> {
             return vec![grid(target)].into_iter().filter(|mesh| mesh.whole_cells().next().is_some()).collect();
         }
         let mut grids = Vec::new();
-        for (centre, half) in self.sectors(&places) {
+        for (center, half) in self.sectors(&places) {
             let unrolled = |place: &Option<Vector2<f64>>| {
                 let Some(place) = place else { return NOWHERE };
-                let aside = wrap_angle(place.x - centre);
-                if aside.abs() <= half { [centre + aside, place.y] } else { NOWHERE }
+                let aside = wrap_angle(place.x - center);
+                if aside.abs() <= half { [center + aside, place.y] } else { NOWHERE }
             };
             let mesh = grid(places.iter().map(unrolled).collect());
             if mesh.whole_cells().next().is_none() {
@@ -213,12 +213,12 @@ impl<'a> Drawing<'a> {
             shows(self.shot, pole)
         };
         let ahead = self.view_from_camera.column(2);
-        let centre = ahead.x.atan2(ahead.z);
-        let farthest = places.iter().flatten().map(|place| wrap_angle(place.x - centre).abs()).fold(0.0, f64::max);
+        let center = ahead.x.atan2(ahead.z);
+        let farthest = places.iter().flatten().map(|place| wrap_angle(place.x - center).abs()).fold(0.0, f64::max);
         if farthest > HALF_ROUND || level_pole(-1.0) || level_pole(1.0) {
             return (0..4).map(|k| (wrap_angle((f64::from(k) + 0.5) * PI / 2.0), PI / 2.0)).collect();
         }
-        vec![(centre, PI)]
+        vec![(center, PI)]
     }
 }
 

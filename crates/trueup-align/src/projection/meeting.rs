@@ -7,7 +7,7 @@
 //! and directions that need no correction get none. The mesh's own shape, its plane and its drift over long rows are
 //! forgotten by this; only what it knows of overlaps remains, so that any mesh will do, of whatever method.
 //!
-//! Near the poles the mesh knows nothing: photographs that look there cannot be unrolled, and pull at their neighbours. They
+//! Near the poles the mesh knows nothing: photographs that look there cannot be unrolled, and pull at their neighbors. They
 //! are drawn as their cameras see.
 //!
 //! # Source
@@ -68,7 +68,7 @@ struct Sight {
 }
 
 /// How far the mesh of a photograph is believed that reaches this far from the horizon (radians). The mesh's sphere is unrolled up
-/// to 70 degrees, and what lies beyond pulls at its neighbours.
+/// to 70 degrees, and what lies beyond pulls at its neighbors.
 fn trust(steepest: f64) -> f64 {
     const WHOLE_DEG: f64 = 55.0;
     const NONE_DEG: f64 = 65.0;

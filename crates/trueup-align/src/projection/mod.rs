@@ -26,7 +26,7 @@ pub use view::View;
 trueup_core::choice! {
     /// What the panorama is drawn on.
     pub enum Projection {
-        /// The solved mesh itself: every photograph as natural as its neighbours allow.
+        /// The solved mesh itself: every photograph as natural as its neighbors allow.
         Mesh = "mesh",
         /// The one of the others that suits the angle of view: perspective up to 100 degrees, Panini's up to 180, the
         /// cylinder up to 220, and the equirectangular projection for more, for full turns and for steep views.

@@ -118,7 +118,7 @@ impl Deviations {
 /// The rotations with the turns that the segments ask for. The common frame stays; `frame`'s columns are the scene's
 /// directions in it.
 ///
-/// Minimises sum over segments of weight (Geman-McClure) (residual / `line_error_px`)^2 plus sum over overlaps of
+/// Minimizes sum over segments of weight (Geman-McClure) (residual / `line_error_px`)^2 plus sum over overlaps of
 /// (w_i - w_j)^T information (w_i - w_j) over turns w_i in the common frame that sum to zero, by reweighted Gauss-Newton
 /// steps from a coarse to a fine scale of the loss. A turn of all cameras together is not sought: `frame` is the segments'
 /// own choice for these.
@@ -141,7 +141,7 @@ pub(super) fn corrected_rotations(
             let (normal, gradient) = vote.turn_equations(index, &turned, frame, axis_weights, scale, options);
             let mut block = matrix.fixed_view_mut::<3, 3>(3 * index, 3 * index);
             block += normal * line_information;
-            // The residual is linearised at the present turn; the unknown is the whole turn.
+            // The residual is linearized at the present turn; the unknown is the whole turn.
             let mut part = right.fixed_rows_mut::<3>(3 * index);
             part += (normal * turns[index] - gradient) * line_information;
         }
@@ -255,11 +255,11 @@ mod tests {
     fn segments_do_not_turn_cameras_that_overlaps_are_sure_of() {
         let mut scene = sweep(0.0);
         let (sine, cosine) = 0.5_f64.to_radians().sin_cos();
-        let centre = Vector2::new(SIZE.0, SIZE.1) / 2.0;
+        let center = Vector2::new(SIZE.0, SIZE.1) / 2.0;
         for line in &mut scene.lines[3] {
             for end in [&mut line.start, &mut line.end] {
-                let from = Vector2::from(*end) - centre;
-                *end = (centre + Vector2::new(cosine * from.x - sine * from.y, sine * from.x + cosine * from.y)).into();
+                let from = Vector2::from(*end) - center;
+                *end = (center + Vector2::new(cosine * from.x - sine * from.y, sine * from.x + cosine * from.y)).into();
             }
         }
         let errors = scene.errors_deg(&scene.prior(&SimilarityOptions::default()));

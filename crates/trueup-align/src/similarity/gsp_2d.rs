@@ -18,7 +18,7 @@ const TURN_WEIGHT: f64 = 1.0;
 
 /// One side's view of an edge.
 #[derive(Debug, Clone, Copy)]
-struct Neighbour {
+struct Neighbor {
     index: usize,
     /// The turns theta_index - theta_here that the overlap allows; `None` without a warped overlap.
     range: Option<TurnRange>,
@@ -57,15 +57,15 @@ pub(super) fn upright(input: &PriorInput<'_>, down: Vector3<f64>) -> Upright {
             (overlap.range, TurnTerm { i: edge.a, j: edge.b, turn, weight: TURN_WEIGHT * TURN_WEIGHT })
         })
         .collect();
-    let mut neighbours = vec![Vec::new(); input.cameras.len()];
+    let mut neighbors = vec![Vec::new(); input.cameras.len()];
     for &(range, TurnTerm { i, j, turn, .. }) in &turns {
-        neighbours[i].push(Neighbour { index: j, range, best: turn });
-        neighbours[j].push(Neighbour { index: i, range: range.map(|range| range.reversed()), best: -turn });
+        neighbors[i].push(Neighbor { index: j, range, best: turn });
+        neighbors[j].push(Neighbor { index: i, range: range.map(|range| range.reversed()), best: -turn });
     }
-    for of_one in &mut neighbours {
-        of_one.sort_by_key(|neighbour| neighbour.index);
+    for of_one in &mut neighbors {
+        of_one.sort_by_key(|neighbor| neighbor.index);
     }
-    let decided = walk(&neighbours, input.reference, input.turn);
+    let decided = walk(&neighbors, input.reference, input.turn);
     let hard: Vec<DataTerm> = decided
         .iter()
         .enumerate()
@@ -85,9 +85,9 @@ pub(super) fn upright(input: &PriorInput<'_>, down: Vector3<f64>) -> Upright {
 
 /// Decides the pictures one after the other, from the reference outwards: those that may be upright first. Pictures that
 /// cannot be reached stay as they are.
-fn walk(neighbours: &[Vec<Neighbour>], reference: usize, reference_theta: f64) -> Vec<Decided> {
-    let mut decided: Vec<Option<Decided>> = vec![None; neighbours.len()];
-    let mut visited = vec![false; neighbours.len()];
+fn walk(neighbors: &[Vec<Neighbor>], reference: usize, reference_theta: f64) -> Vec<Decided> {
+    let mut decided: Vec<Option<Decided>> = vec![None; neighbors.len()];
+    let mut visited = vec![false; neighbors.len()];
     decided[reference] = Some(Decided { theta: reference_theta, held: true });
     // A picture and the turn it takes unless it is upright by the time it is reached.
     let mut queue = VecDeque::from([(reference, reference_theta)]);
@@ -96,7 +96,7 @@ fn walk(neighbours: &[Vec<Neighbour>], reference: usize, reference_theta: f64) -
             continue;
         }
         let theta = decided[here].get_or_insert(Decided { theta: otherwise, held: false }).theta;
-        for &Neighbour { index, range, best } in &neighbours[here] {
+        for &Neighbor { index, range, best } in &neighbors[here] {
             if decided[index].is_some() {
                 continue;
             }

@@ -82,7 +82,7 @@ impl Graph {
     }
 }
 
-/// A pair whose homography turns everything by minus the best turn about the picture's centre.
+/// A pair whose homography turns everything by minus the best turn about the picture's center.
 fn pair(edge: &Edge) -> PairMatches {
     let (sine, cosine) = (-edge.best.to_radians()).sin_cos();
     let (x, y) = (SIZE.0 / 2.0, SIZE.1 / 2.0);
@@ -125,7 +125,7 @@ fn the_graphs_of_these_tests_have_the_turns_they_state() {
 }
 
 /// Triangle: edge 0 - 1 allows 4 to 8 degrees and wants 6, so it takes 6 with weight 1; the others hold 0 with weight 100.
-/// As complex numbers, e = exp(6i deg): minimise |e z0 - z1|^2 + 100 |z1 - z2|^2 + 100 |z0 - z2|^2.
+/// As complex numbers, e = exp(6i deg): minimize |e z0 - z1|^2 + 100 |z1 - z2|^2 + 100 |z0 - z2|^2.
 /// z0 = 1 gives z1 = (e + 50) / 51, z2 = (e + 101) / 102; z2 = 1 gives z1 = (e + 101) / 102, z0 = (conj(e) + 101) / 102.
 /// arg(e + 50) = atan(0.10452846 / 50.99452190) = 0.11744460 degrees, arg(e + 101) = 0.05871921 degrees.
 #[test]
@@ -187,7 +187,7 @@ fn gsp_2d_asks_upright_pictures_first() {
     assert_close(&graph.theta_deg(PriorMethod::Gsp2d, 0), &[0.0, 0.0, 0.0]);
 }
 
-/// None may be upright. As complex numbers with z0 = 1, minimise |e^10i - z1|^2 + |e^10i z1 - z2|^2 + |e^26i - z2|^2
+/// None may be upright. As complex numbers with z0 = 1, minimize |e^10i - z1|^2 + |e^10i z1 - z2|^2 + |e^26i - z2|^2
 /// (degrees): z2 = (e^20i + 2 e^26i) / 3, z1 = (2 e^10i + e^16i) / 3; their angles are
 /// 20 + atan2(2 sin 6, 1 + 2 cos 6) = 24.00081306 and 10 + atan2(sin 6, 2 + cos 6) = 11.99918694 degrees.
 #[test]

@@ -31,7 +31,7 @@ mod tests;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::geometry::{matrix_from_rows, roll_from_down, rows_of, wrap_angle};
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
@@ -305,7 +305,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
         PriorMethod::Gsp3d => (unguided(), Some(gsp_3d::upright(input, &rotations, straightened.down))),
     };
     if let Some(clause) = guidance.failed_clause.as_ref().filter(|_| !guidance.used) {
-        context.report(Diagnostic::note("vanishing-guidance-refused", STAGE, clause, REFUSED_HINT));
+        context.report(Diagnostic::note("vanishing-guidance-refused", Subject::stage(STAGE), clause, REFUSED_HINT));
     }
     let upright = upright.unwrap_or_else(|| fallback(&rotations, &level));
     let level_from_world = straighten::level_from_world(&upright.down, &rotations);

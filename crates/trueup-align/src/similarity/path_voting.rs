@@ -1,4 +1,4 @@
-//! Path voting: how far neighbours up to a few edges away confirm a picture's own roll.
+//! Path voting: how far neighbors up to a few edges away confirm a picture's own roll.
 
 use trueup_core::geometry::wrap_angle;
 
@@ -23,26 +23,26 @@ struct Path {
 impl PathVote {
     /// The weight psi_i of every picture: a sigmoid of the supporting share; 0 for pictures without a roll.
     ///
-    /// `rolls`: each inlier's own roll alpha_i; `neighbours[i]`: pairs (j, beta_ij) with beta_ij predicting
+    /// `rolls`: each inlier's own roll alpha_i; `neighbors[i]`: pairs (j, beta_ij) with beta_ij predicting
     /// alpha_j - alpha_i. A supporting path counts by its length L, an opposing one by `max_edges` + 1 - L: a long path
     /// that agrees and a short one that does not say most.
     ///
     /// # Source
-    /// The paper's section on robust weighting; the sigmoid's slope 10 and centre 0.5 are not printed there.
-    pub fn weights(&self, rolls: &[Option<f64>], neighbours: &[Vec<(usize, f64)>]) -> Vec<f64> {
+    /// The paper's section on robust weighting; the sigmoid's slope 10 and center 0.5 are not printed there.
+    pub fn weights(&self, rolls: &[Option<f64>], neighbors: &[Vec<(usize, f64)>]) -> Vec<f64> {
         const SLOPE: f64 = 10.0;
-        const CENTRE: f64 = 0.5;
+        const CENTER: f64 = 0.5;
         let weight = |index: usize| {
             rolls[index].map_or(0.0, |own| {
-                let share = self.supporting_share(index, own, rolls, neighbours);
-                1.0 / (1.0 + (-SLOPE * (share - CENTRE)).exp())
+                let share = self.supporting_share(index, own, rolls, neighbors);
+                1.0 / (1.0 + (-SLOPE * (share - CENTER)).exp())
             })
         };
         (0..rolls.len()).map(weight).collect()
     }
 
     /// The supporting share of all paths from `start`; one half without any path.
-    fn supporting_share(&self, start: usize, own: f64, rolls: &[Option<f64>], neighbours: &[Vec<(usize, f64)>]) -> f64 {
+    fn supporting_share(&self, start: usize, own: f64, rolls: &[Option<f64>], neighbors: &[Vec<(usize, f64)>]) -> f64 {
         let (mut support, mut opposition) = (0.0, 0.0);
         let mut paths_left = self.max_paths;
         let mut frontier = vec![Path { nodes: vec![start], turn: 0.0 }];
@@ -51,7 +51,7 @@ impl PathVote {
             let mut next = Vec::new();
             for path in &frontier {
                 let Some(&last) = path.nodes.last() else { continue };
-                for &(end, beta) in &neighbours[last] {
+                for &(end, beta) in &neighbors[last] {
                     let Some(roll) = rolls[end].filter(|_| !path.nodes.contains(&end) && paths_left > 0) else {
                         continue;
                     };

@@ -42,7 +42,7 @@ pub(super) fn focal_scales(focals: &[f64]) -> Vec<f64> {
     focals.iter().map(|focal| if mean > 0.0 && mean.is_finite() { 1.0 / focal / mean } else { 1.0 }).collect()
 }
 
-/// Minimises sum w (sqrt(eta) s_i - s_j / sqrt(eta))^2 subject to sum s_i = N.
+/// Minimizes sum w (sqrt(eta) s_i - s_j / sqrt(eta))^2 subject to sum s_i = N.
 fn hull_scales(edges: &[PairMatches], count: usize) -> Option<Vec<f64>> {
     let mut system = DMatrix::<f64>::zeros(count + 1, count + 1);
     for edge in edges {

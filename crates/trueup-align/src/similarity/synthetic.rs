@@ -120,7 +120,7 @@ impl Scene {
 }
 
 impl Sweep {
-    /// Rolls, camera-to-world rotations, and an edge to the right and the lower neighbour.
+    /// Rolls, camera-to-world rotations, and an edge to the right and the lower neighbor.
     fn place(&self, generator: &mut impl Rng) -> (Vec<f64>, Vec<Matrix3<f64>>, Vec<PairMatches>) {
         const ROW_STEP_DEG: f64 = 25.0;
         const PITCH_SD_DEG: f64 = 4.0;
@@ -223,7 +223,7 @@ pub(crate) fn picture_lines(
     segments
 }
 
-/// A segment between points given from the picture's centre.
+/// A segment between points given from the picture's center.
 fn segment(start: [f64; 2], end: [f64; 2]) -> LineSegment {
     let place = |point: [f64; 2]| [point[0] + SIZE.0 / 2.0, point[1] + SIZE.1 / 2.0];
     LineSegment { start: place(start), end: place(end), width_px: 2.0, significance: 10.0 }

@@ -318,7 +318,7 @@ pub(super) fn overlap(scene: &Scene, from: usize, to: usize) -> OverlapWarp {
     OverlapWarp { from, to, vertices: (0..grid.len()).map(carry).collect() }
 }
 
-/// Neighbours in a row that looks 40 degrees up are twisted against each other by 13 degrees, and none is rolled for it:
+/// Neighbors in a row that looks 40 degrees up are twisted against each other by 13 degrees, and none is rolled for it:
 /// the level sphere has the twist already.
 #[test]
 fn the_fallback_does_not_roll_steep_rows() {

@@ -256,7 +256,7 @@ impl Scene<'_> {
         std::array::from_fn(|axis| if axis == vertical { 1.0 } else { horizontal })
     }
 
-    /// The frame that all segments vote for, unless it left the neighbourhood of the pictures' own.
+    /// The frame that all segments vote for, unless it left the neighborhood of the pictures' own.
     fn refined(&self, frame: &Matrix3<f64>, axis_weights: &[f64; 3]) -> Matrix3<f64> {
         let refined = self.vote.refine_frame(frame, axis_weights, self.options);
         let limit = MAX_REFINEMENT_TOLERANCES * self.options.joint_tolerance_deg.to_radians();
@@ -309,10 +309,10 @@ impl Scene<'_> {
         let predicted = rolls(down, rotations);
         let turns: Vec<(usize, usize, f64)> =
             self.input.edges.iter().map(|edge| self.turn(edge.a, edge.b, &predicted)).collect();
-        let mut neighbours = vec![Vec::new(); own.len()];
+        let mut neighbors = vec![Vec::new(); own.len()];
         for &(i, j, beta) in &turns {
-            neighbours[i].push((j, beta));
-            neighbours[j].push((i, -beta));
+            neighbors[i].push((j, beta));
+            neighbors[j].push((i, -beta));
         }
         let vote = PathVote {
             max_edges: self.options.max_path_edges,
@@ -320,7 +320,7 @@ impl Scene<'_> {
             max_paths: self.options.max_paths,
         };
         guidance.weights = match self.options.path_voting {
-            true => vote.weights(own, &neighbours),
+            true => vote.weights(own, &neighbors),
             false => own.iter().map(|roll| f64::from(u8::from(roll.is_some()))).collect(),
         };
         let data: Vec<DataTerm> = own
@@ -334,7 +334,7 @@ impl Scene<'_> {
         let vectors = solve_unit_vectors(own.len(), &data, &turns);
         let theta = match vectors {
             Some(vectors) => vectors.iter().zip(&predicted).map(|(vector, &roll)| angle_of(vector, roll)).collect(),
-            // Some picture has neither a roll of its own nor a neighbour.
+            // Some picture has neither a roll of its own nor a neighbor.
             None => predicted,
         };
         Some(Upright { down: *down, theta, rotations: rotations.to_vec() })

@@ -22,7 +22,7 @@ pub(super) struct TurnTerm {
 
 /// The vectors (u_i, v_i) of least energy; `None` if the terms leave some undetermined.
 ///
-/// Vectors are not normalised: a short one means that its terms contradict each other. Dense Cholesky of a 2N x 2N
+/// Vectors are not normalized: a short one means that its terms contradict each other. Dense Cholesky of a 2N x 2N
 /// matrix.
 ///
 /// # Source

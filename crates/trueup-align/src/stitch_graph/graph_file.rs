@@ -5,7 +5,7 @@
 //! * `NAME -- NAME` or `INDEX -- INDEX`: the two pictures overlap. Names are file names, indices count from 0 in the
 //!   order in which the pictures were given.
 //! * `{key | value | comment}` as in the graph files of the GSP data sets: `matching_graph_image_edges-I` lists the
-//!   neighbours of picture I, `center_image_index` names the reference, `center_image_rotation_angle` its rotation in
+//!   neighbors of picture I, `center_image_index` names the reference, `center_image_rotation_angle` its rotation in
 //!   degrees; `images_count` must fit the pictures given.
 
 use trueup_core::{Error, Result};
@@ -63,8 +63,8 @@ fn keyed_line(fields: &str, names: &[String], graph: &mut GraphFile) -> std::res
     let (key, value) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
     if let Some(owner) = key.strip_prefix("matching_graph_image_edges-") {
         let owner = index(owner, names)?;
-        for neighbour in value.split([' ', ',']).filter(|word| !word.is_empty()) {
-            graph.edges.push(ordered(owner, index(neighbour, names)?)?);
+        for neighbor in value.split([' ', ',']).filter(|word| !word.is_empty()) {
+            graph.edges.push(ordered(owner, index(neighbor, names)?)?);
         }
         return Ok(());
     }
@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn the_gsp_notation_is_read() {
-        let text = "{center_image_index | 1 | centre}\n{center_image_rotation_angle | -3.5 | angle}\n\
+        let text = "{center_image_index | 1 | center}\n{center_image_rotation_angle | -3.5 | angle}\n\
                     {images_count | 3 | count}\n{matching_graph_image_edges-0 | 1 2 | edges}";
         let graph = parse_graph_file(text, &names(), "g.txt").expect("valid");
         assert_eq!(graph.edges, [(0, 1), (0, 2)]);

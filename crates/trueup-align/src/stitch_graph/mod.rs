@@ -75,17 +75,17 @@ impl StitchGraph {
             graph.add_node(());
         }
         for edge in self.edges_of(component) {
-            // petgraph minimises: the heaviest edges must come first.
+            // petgraph minimizes: the heaviest edges must come first.
             graph.add_edge(NodeIndex::new(edge.a), NodeIndex::new(edge.b), -(edge.weight as i64));
         }
-        let mut neighbours: Vec<Vec<(i64, usize)>> = vec![Vec::new(); self.pictures];
+        let mut neighbors: Vec<Vec<(i64, usize)>> = vec![Vec::new(); self.pictures];
         for element in min_spanning_tree(&graph) {
             if let Element::Edge { source, target, weight } = element {
-                neighbours[source].push((weight, target));
-                neighbours[target].push((weight, source));
+                neighbors[source].push((weight, target));
+                neighbors[target].push((weight, source));
             }
         }
-        for list in &mut neighbours {
+        for list in &mut neighbors {
             list.sort_unstable();
         }
         let mut steps = Vec::with_capacity(component.len().saturating_sub(1));
@@ -93,7 +93,7 @@ impl StitchGraph {
         let mut queue = std::collections::VecDeque::from([root]);
         placed[root] = true;
         while let Some(parent) = queue.pop_front() {
-            for &(_, child) in &neighbours[parent] {
+            for &(_, child) in &neighbors[parent] {
                 if !std::mem::replace(&mut placed[child], true) {
                     steps.push(TreeStep { parent, child });
                     queue.push_back(child);
@@ -108,10 +108,10 @@ impl StitchGraph {
     pub fn central_picture(&self, component: &[usize]) -> usize {
         let root = component.first().copied().unwrap_or(0);
         let tree = self.spanning_tree(component, root);
-        let mut neighbours: Vec<Vec<usize>> = vec![Vec::new(); self.pictures];
+        let mut neighbors: Vec<Vec<usize>> = vec![Vec::new(); self.pictures];
         for step in &tree {
-            neighbours[step.parent].push(step.child);
-            neighbours[step.child].push(step.parent);
+            neighbors[step.parent].push(step.child);
+            neighbors[step.child].push(step.parent);
         }
         let weight = |picture: usize| -> usize {
             self.edges.iter().filter(|edge| edge.a == picture || edge.b == picture).map(|edge| edge.weight).sum()
@@ -119,7 +119,7 @@ impl StitchGraph {
         component
             .iter()
             .copied()
-            .min_by_key(|&picture| (eccentricity(&neighbours, picture), usize::MAX - weight(picture), picture))
+            .min_by_key(|&picture| (eccentricity(&neighbors, picture), usize::MAX - weight(picture), picture))
             .unwrap_or(root)
     }
 }
@@ -146,14 +146,14 @@ fn components(pictures: usize, edges: &[GraphEdge]) -> Vec<Vec<usize>> {
 }
 
 /// Steps from `start` to the farthest node of its tree.
-fn eccentricity(neighbours: &[Vec<usize>], start: usize) -> usize {
-    let mut distance = vec![usize::MAX; neighbours.len()];
+fn eccentricity(neighbors: &[Vec<usize>], start: usize) -> usize {
+    let mut distance = vec![usize::MAX; neighbors.len()];
     let mut queue = std::collections::VecDeque::from([start]);
     distance[start] = 0;
     let mut farthest = 0;
     while let Some(node) = queue.pop_front() {
         farthest = distance[node];
-        for &next in &neighbours[node] {
+        for &next in &neighbors[node] {
             if distance[next] == usize::MAX {
                 distance[next] = distance[node] + 1;
                 queue.push_back(next);
@@ -197,14 +197,14 @@ mod tests {
     }
 
     #[test]
-    fn the_tree_uses_the_heaviest_edges_and_the_centre_is_in_the_middle() {
+    fn the_tree_uses_the_heaviest_edges_and_the_center_is_in_the_middle() {
         let pairs = [pair(0, 1, 100), pair(1, 2, 80), pair(0, 2, 20), pair(2, 3, 60), pair(3, 4, 60)];
         let graph = StitchGraph::new(5, &pairs);
         let component = graph.components[0].clone();
-        let centre = graph.central_picture(&component);
-        assert_eq!(centre, 2);
+        let center = graph.central_picture(&component);
+        assert_eq!(center, 2);
         let steps: Vec<(usize, usize)> =
-            graph.spanning_tree(&component, centre).iter().map(|step| (step.parent, step.child)).collect();
+            graph.spanning_tree(&component, center).iter().map(|step| (step.parent, step.child)).collect();
         assert_eq!(steps, [(2, 1), (2, 3), (1, 0), (3, 4)]);
     }
 }

@@ -6,7 +6,7 @@ use trueup_core::source::WorkingFrame;
 
 use super::VanishingOptions;
 
-/// Usable segments of one picture, longest first, as planes through the camera's centre.
+/// Usable segments of one picture, longest first, as planes through the camera's center.
 #[derive(Debug, Clone)]
 pub(crate) struct InterpretationPlanes {
     /// Unit normals in the camera frame.
@@ -27,7 +27,7 @@ pub(crate) struct InterpretationPlanes {
 }
 
 impl InterpretationPlanes {
-    /// Keeps the segments that are finite, long enough and no artefact of the picture's border, the longest first.
+    /// Keeps the segments that are finite, long enough and no artifact of the picture's border, the longest first.
     ///
     /// Empty if the focal length or the frame is not a positive number.
     pub fn new(lines: &[LineSegment], focal_px: f64, frame: &WorkingFrame, options: &VanishingOptions) -> Self {
@@ -46,9 +46,9 @@ impl InterpretationPlanes {
         kept.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         kept.truncate(options.max_lines);
         let mut planes = Self::with_capacity(kept.len());
-        let centre = Vector2::new(frame.width / 2.0, frame.height / 2.0);
+        let center = Vector2::new(frame.width / 2.0, frame.height / 2.0);
         for (index, length) in kept {
-            planes.push(index, &lines[index], length, centre, focal_px, options.weight_cap_px);
+            planes.push(index, &lines[index], length, center, focal_px, options.weight_cap_px);
         }
         planes
     }
@@ -65,8 +65,8 @@ impl InterpretationPlanes {
         }
     }
 
-    fn push(&mut self, index: usize, line: &LineSegment, length: f64, centre: Vector2<f64>, focal_px: f64, cap: f64) {
-        let (start, end) = (Vector2::from(line.start) - centre, Vector2::from(line.end) - centre);
+    fn push(&mut self, index: usize, line: &LineSegment, length: f64, center: Vector2<f64>, focal_px: f64, cap: f64) {
+        let (start, end) = (Vector2::from(line.start) - center, Vector2::from(line.end) - center);
         let moment = start.push(focal_px).cross(&end.push(focal_px));
         let norm = moment.norm();
         if !(norm > 0.0 && norm.is_finite()) {

@@ -1,6 +1,6 @@
 //! Per picture: three mutually orthogonal vanishing directions from its line segments and its focal length.
 //!
-//! A segment and the camera's centre span the *interpretation plane* of the segment; its unit normal n is orthogonal to
+//! A segment and the camera's center span the *interpretation plane* of the segment; its unit normal n is orthogonal to
 //! the segment's direction in space. A vanishing direction v is a bearing in the camera frame that many normals are
 //! orthogonal to: n . v = 0. No vanishing point in pixels is ever formed, so that one at infinity is no special case.
 //!
@@ -35,7 +35,7 @@ trueup_core::options! {
         min_length_diagonal: f64 = 0.025, between(0.0, 1.0), "diagonals";
         /// Most segments used; the longest are kept.
         max_lines: usize = 400, between(10.0, 1e5), "segments";
-        /// A segment this close to the picture's border, and parallel to it, is an artefact of the frame.
+        /// A segment this close to the picture's border, and parallel to it, is an artifact of the frame.
         border_margin_px: f64 = 5.0, between(0.0, 1e3), "working px";
         /// Length at which a segment's weight stops growing.
         weight_cap_px: f64 = 120.0, between(1.0, 1e4), "working px";
@@ -152,7 +152,7 @@ const NEEDED_CLUSTERS: usize = 2;
 
 /// Finds the three vanishing directions of one picture.
 ///
-/// `lines` are in the working pixels of `frame`, `focal_px` too; segments that are too short, not finite or artefacts
+/// `lines` are in the working pixels of `frame`, `focal_px` too; segments that are too short, not finite or artifacts
 /// of the frame are ignored. `generator` drives the choice of hypotheses: the same generator gives the same triad.
 /// Cost: about `draws * 90 / step_deg * search_lines` evaluations, 1 to 2 ms with the defaults.
 ///

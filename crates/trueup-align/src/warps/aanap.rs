@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector2};
 use rand::Rng;
 use rand::seq::index::sample;
 use rayon::prelude::*;
-use trueup_core::geometry::{Homography, Normalisation};
+use trueup_core::geometry::{Homography, Normalization};
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
@@ -19,7 +19,7 @@ use crate::match_points::MovingDlt;
 /// Places the pictures one after the other, each between its local homography and a similarity.
 ///
 /// # Source
-/// Lin et al., "Adaptive as-natural-as-possible image stitching" (2015), sections 3.1 to 3.3: linearised homography with
+/// Lin et al., "Adaptive as-natural-as-possible image stitching" (2015), sections 3.1 to 3.3: linearized homography with
 /// Student-t weights, the similarity of least rotation among the planes of the matches, and the smooth change from one to
 /// the other, in which the reference takes part.
 ///
@@ -43,7 +43,7 @@ pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &Stag
 /// How one picture joins those placed.
 #[derive(Debug)]
 struct Join {
-    /// The picture under its local homographies, linearised away from the overlap.
+    /// The picture under its local homographies, linearized away from the overlap.
     local: GridMesh,
     global: Homography,
     picture_from_global: Homography,
@@ -71,9 +71,9 @@ impl Join {
         let local = GridMesh { target, ..grid.clone() };
         let similarity = global_similarity(data, options, generator)?;
         let parent = placed[step.parent].as_ref()?;
-        let centre = |mesh: &GridMesh| mesh.warp(Vector2::new(mesh.width / 2.0, mesh.height / 2.0));
-        let from = centre(parent);
-        let axis = (centre(&local) - from).try_normalize(f64::MIN_POSITIVE)?;
+        let center = |mesh: &GridMesh| mesh.warp(Vector2::new(mesh.width / 2.0, mesh.height / 2.0));
+        let from = center(parent);
+        let axis = (center(&local) - from).try_normalize(f64::MIN_POSITIVE)?;
         let along = corners(grid.width, grid.height).map(|corner| axis.dot(&(local.warp(corner) - from)));
         let low = along.iter().copied().fold(f64::INFINITY, f64::min);
         let high = along.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -122,7 +122,7 @@ impl Join {
     }
 }
 
-/// Local homographies inside the rectangle around the matches, their linearisation outside.
+/// Local homographies inside the rectangle around the matches, their linearization outside.
 struct LocalHomographies<'a> {
     dlt: &'a MovingDlt,
     decay: f64,
@@ -173,21 +173,21 @@ impl<'a> LocalHomographies<'a> {
     fn place(&self, point: Vector2<f64>) -> Vector2<f64> {
         let nearest = point.sup(&self.low).inf(&self.high);
         let outside = ((point - nearest).norm() / self.unit).min(1.0);
-        let inner = || self.homography(point).map_or_else(|| self.linearised(point), |local| local.apply(point));
+        let inner = || self.homography(point).map_or_else(|| self.linearized(point), |local| local.apply(point));
         if outside == 0.0 {
             return inner();
         }
-        let linearised = self.linearised(point);
+        let linearized = self.linearized(point);
         if outside >= 1.0 {
-            return linearised;
+            return linearized;
         }
         // A smooth step over one unit of distance, so that nothing jumps at the rectangle's border.
         let share = outside * outside * (3.0 - 2.0 * outside);
-        linearised * share + inner() * (1.0 - share)
+        linearized * share + inner() * (1.0 - share)
     }
 
     /// Mean of the local homographies' tangents at the anchors, by Student's t of the distance.
-    fn linearised(&self, point: Vector2<f64>) -> Vector2<f64> {
+    fn linearized(&self, point: Vector2<f64>) -> Vector2<f64> {
         let (mut sum, mut total) = (Vector2::zeros(), 0.0);
         for (anchor, homography) in &self.anchors {
             let offset = point - anchor;
@@ -202,7 +202,7 @@ impl<'a> LocalHomographies<'a> {
 
 /// The similarity of least rotation among those of the planes that the matches lie on.
 fn global_similarity(data: &Anchored, options: &WarpOptions, generator: &mut impl Rng) -> Option<Matrix3<f64>> {
-    let (from, to) = (Normalisation::of(&data.points)?, Normalisation::of(&data.places)?);
+    let (from, to) = (Normalization::of(&data.points)?, Normalization::of(&data.places)?);
     let mut left: Vec<usize> = (0..data.points.len()).collect();
     let mut candidates: Vec<Matrix3<f64>> = Vec::new();
     loop {
@@ -228,7 +228,7 @@ fn global_similarity(data: &Anchored, options: &WarpOptions, generator: &mut imp
 fn largest_plane(
     data: &Anchored,
     left: &[usize],
-    (from, to): (&Normalisation, &Normalisation),
+    (from, to): (&Normalization, &Normalization),
     tolerance: f64,
     generator: &mut impl Rng,
 ) -> Vec<usize> {
@@ -246,7 +246,7 @@ fn largest_plane(
     while taken < needed {
         taken += 1.0;
         let chosen = sample(generator, left.len(), SAMPLE_SIZE);
-        let of = |points: &[Vector2<f64>], by: &Normalisation| -> [Vector2<f64>; SAMPLE_SIZE] {
+        let of = |points: &[Vector2<f64>], by: &Normalization| -> [Vector2<f64>; SAMPLE_SIZE] {
             std::array::from_fn(|k| by.apply(points[left[chosen.index(k)]]))
         };
         let Some(plane) = Homography::from_four_points(&of(&data.points, from), &of(&data.places, to)) else {

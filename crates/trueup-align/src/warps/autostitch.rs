@@ -26,7 +26,7 @@ trueup_core::choice! {
 /// Places every picture by its camera alone.
 ///
 /// The longitude origin is the sum of the viewing directions. A picture that straddles the cut opposite to it stays whole,
-/// on its centre's side; where the pictures go all the way round, the cut is the one that the overlaps were cut at.
+/// on its center's side; where the pictures go all the way round, the cut is the one that the overlaps were cut at.
 ///
 /// # Source
 /// Brown and Lowe, "Automatic panoramic image stitching using invariant features" (2007), sections 4 and 5; Szeliski,
@@ -116,8 +116,8 @@ impl View<'_> {
         let mut longitudes = vec![0.0; grid.len()];
         let (middle_row, middle_column) = (grid.rows / 2, grid.columns / 2);
         let index = |row: usize, column: usize| row * grid.columns + column;
-        let centre = index(middle_row, middle_column);
-        longitudes[centre] = wrap_angle(wrapped(centre));
+        let center = index(middle_row, middle_column);
+        longitudes[center] = wrap_angle(wrapped(center));
         let follow = |longitudes: &mut Vec<f64>, from: usize, to: usize| {
             longitudes[to] = longitudes[from] + wrap_angle(wrapped(to) - longitudes[from]);
         };
@@ -152,14 +152,14 @@ impl View<'_> {
     }
 }
 
-/// The largest difference of longitude between neighbours of the grid.
+/// The largest difference of longitude between neighbors of the grid.
 fn longest_step(grid: &GridMesh, longitudes: &[f64]) -> f64 {
     let mut longest: f64 = 0.0;
     for vertex in 0..grid.len() {
         let right = (vertex % grid.columns + 1 < grid.columns).then(|| vertex + 1);
         let below = (vertex + grid.columns < grid.len()).then(|| vertex + grid.columns);
-        for neighbour in [right, below].into_iter().flatten() {
-            longest = longest.max((longitudes[neighbour] - longitudes[vertex]).abs());
+        for neighbor in [right, below].into_iter().flatten() {
+            longest = longest.max((longitudes[neighbor] - longitudes[vertex]).abs());
         }
     }
     longest
@@ -187,8 +187,8 @@ mod tests {
             let placed = example.place_with(WarpModel::Autostitch, &with(projection)).expect("a pair");
             assert_eq!(placed.folds, 0);
             assert!(misalignment(&example, &placed.meshes) < 0.5);
-            let centre = placed.meshes[1].warp(Vector2::new(WIDTH / 2.0, HEIGHT / 2.0));
-            assert!((centre - Vector2::new(700.0 * expected, 0.0)).norm() < 0.2, "{projection:?}: {centre}");
+            let center = placed.meshes[1].warp(Vector2::new(WIDTH / 2.0, HEIGHT / 2.0));
+            assert!((center - Vector2::new(700.0 * expected, 0.0)).norm() < 0.2, "{projection:?}: {center}");
         }
     }
 

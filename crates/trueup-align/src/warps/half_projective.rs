@@ -107,7 +107,7 @@ fn hop_distances(input: &WarpInput<'_>) -> Vec<Vec<usize>> {
 /// A warp of all pictures.
 #[derive(Debug)]
 struct Plan {
-    /// For each picture the homography into the plane of `ref`, its centre the origin.
+    /// For each picture the homography into the plane of `ref`, its center the origin.
     onto_ref: Vec<Homography>,
     warp: Warp,
 }
@@ -142,10 +142,10 @@ impl Plan {
         }
         let frame = &input.frames[source];
         let (x, y) = (frame.width / 2.0, frame.height / 2.0);
-        let to_centre = Homography(Matrix3::new(1.0, 0.0, -x, 0.0, 1.0, -y, 0.0, 0.0, 1.0));
-        let from_centre = Homography(Matrix3::new(1.0, 0.0, x, 0.0, 1.0, y, 0.0, 0.0, 1.0));
-        let onto_ref: Vec<Homography> = onto_source.iter().map(|homography| to_centre.after(homography)).collect();
-        let target_from_ref = onto(input, target, options.pair_homographies)?[source].after(&from_centre);
+        let to_center = Homography(Matrix3::new(1.0, 0.0, -x, 0.0, 1.0, -y, 0.0, 0.0, 1.0));
+        let from_center = Homography(Matrix3::new(1.0, 0.0, x, 0.0, 1.0, y, 0.0, 0.0, 1.0));
+        let onto_ref: Vec<Homography> = onto_source.iter().map(|homography| to_center.after(homography)).collect();
+        let target_from_ref = onto(input, target, options.pair_homographies)?[source].after(&from_center);
         let scale = target_from_ref.0[(2, 2)];
         if scale <= options.min_depth {
             return Ok(None);
@@ -153,7 +153,7 @@ impl Plan {
         let target_from_ref = Homography(target_from_ref.0 / scale);
         let samples: Vec<Vec<Sample>> =
             (0..onto_ref.len()).map(|picture| sampled(input, picture, &onto_ref[picture])).collect();
-        let centres = input
+        let centers = input
             .frames
             .iter()
             .zip(&onto_ref)
@@ -165,7 +165,7 @@ impl Plan {
                 cost.map(|cost| (cost, Warp::Affine(target_from_ref)))
             }
             Some(direction) => {
-                let along: Vec<f64> = centres.map(|centre| direction.dot(&centre)).collect();
+                let along: Vec<f64> = centers.map(|center| direction.dot(&center)).collect();
                 let start = (
                     along.iter().copied().fold(f64::INFINITY, f64::min),
                     along.iter().copied().fold(f64::NEG_INFINITY, f64::max),

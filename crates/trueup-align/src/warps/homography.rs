@@ -86,7 +86,7 @@ fn of_pair(input: &WarpInput<'_>, from: usize, to: usize) -> Result<Homography> 
         .ok_or_else(|| undetermined(input, from))
 }
 
-/// The homography from one picture to a neighbour, its denominator the depth.
+/// The homography from one picture to a neighbor, its denominator the depth.
 pub(super) fn of_pair_or_cameras(
     input: &WarpInput<'_>,
     from: usize,

@@ -67,7 +67,7 @@ pub(super) fn depth_at(homography: &Homography, camera: &Camera, point: Vector2<
     homography.denominator(point) / camera.bearing(point).norm()
 }
 
-/// Refuses a homography that carries a point of an overlap behind its neighbour's plane.
+/// Refuses a homography that carries a point of an overlap behind its neighbor's plane.
 pub(super) fn check_depth_in_overlap(
     model: WarpModel,
     input: &WarpInput<'_>,
@@ -79,14 +79,14 @@ pub(super) fn check_depth_in_overlap(
     let camera = &input.cameras[picture];
     match overlap.iter().all(|&point| depth_at(homography, camera, point) > options.min_depth) {
         true => Ok(()),
-        false => Err(refuse(model, input, picture, "has matches that do not lie in front of its neighbour")),
+        false => Err(refuse(model, input, picture, "has matches that do not lie in front of its neighbor")),
     }
 }
 
 /// Refuses placed pictures that are not finite, too far away, too large or folded.
 pub(super) fn check(model: WarpModel, input: &WarpInput<'_>, meshes: &[GridMesh], options: &WarpOptions) -> Result<()> {
     let anchor = &meshes[input.reference];
-    let centre = anchor.warp(Vector2::new(anchor.width / 2.0, anchor.height / 2.0));
+    let center = anchor.warp(Vector2::new(anchor.width / 2.0, anchor.height / 2.0));
     let area = target_area(anchor);
     // The reference's own scale in the panorama.
     let scale = (area / (anchor.width * anchor.height)).sqrt();
@@ -96,7 +96,7 @@ pub(super) fn check(model: WarpModel, input: &WarpInput<'_>, meshes: &[GridMesh]
         if !finite {
             return Err(refuse(model, input, picture, "cannot be placed"));
         }
-        let farthest = mesh.target.iter().map(|&vertex| (Vector2::from(vertex) - centre).norm()).fold(0.0, f64::max);
+        let farthest = mesh.target.iter().map(|&vertex| (Vector2::from(vertex) - center).norm()).fold(0.0, f64::max);
         if farthest > reach {
             let reason = format!(
                 "would lie {:.0} diagonals of the reference away (warps.max_reach allows {})",

@@ -29,10 +29,10 @@ trueup_core::options! {
         apap_weight_floor: f64 = 0.0015, between(0.0, 1.0), "";
         /// The same distance in the method aanap; 156.25 is the published 12.5 squared.
         aanap_decay_px: f64 = 156.25, between(1.0, 10000.0), "working px";
-        /// Degrees of freedom of Student's t by which anchors are weighed in the linearised homography of aanap.
+        /// Degrees of freedom of Student's t by which anchors are weighed in the linearized homography of aanap.
         aanap_freedom: f64 = 5.0, between(0.1, 1000.0), "";
         /// Largest distance of a match from a plane's homography in aanap's search for the similarity, in units in which
-        /// matches are 1.4 from their centre on average.
+        /// matches are 1.4 from their center on average.
         aanap_plane_tolerance: f64 = 0.01, between(1e-5, 1.0), "";
         /// Matches that make a plane in that search.
         aanap_plane_matches: usize = 50, between(4.0, 1e6), "matches";
@@ -41,7 +41,7 @@ trueup_core::options! {
         /// Depth, relative to the distance, below which a viewing direction counts as beside or behind the panorama's
         /// plane; 0.02 is 88.9 degrees off its axis.
         min_depth: f64 = 0.02, between(1e-6, 0.9), "";
-        /// Farthest that a picture may reach from the reference's centre.
+        /// Farthest that a picture may reach from the reference's center.
         max_reach: f64 = 20.0, between(1.0, 1e6), "reference diagonals";
         /// Largest area of a picture in the panorama.
         max_area_ratio: f64 = 25.0, between(1.0, 1e6), "reference areas";

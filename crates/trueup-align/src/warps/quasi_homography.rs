@@ -21,7 +21,7 @@ use crate::stitch_graph::StitchGraph;
 /// point reaches the horizon. The map and its derivative are continuous across the line.
 ///
 /// # Source
-/// Li, Xu and Wang, "Quasi-homography warps in image stitching" (2018): slope preservation and scale linearisation.
+/// Li, Xu and Wang, "Quasi-homography warps in image stitching" (2018): slope preservation and scale linearization.
 ///
 /// # Departures
 /// The published system of equations is in the picture's own axes, where both families of lines converge; along the
@@ -97,11 +97,11 @@ impl Beyond {
     }
 }
 
-/// Places every picture relative to its neighbour in the tree of the strongest overlaps that leads to the reference.
+/// Places every picture relative to its neighbor in the tree of the strongest overlaps that leads to the reference.
 ///
 /// # Departures
-/// The published warp is for two pictures. Here the warp of a picture onto its neighbour's plane is followed by the
-/// neighbour's own warp, which is defined beyond its border too; overlaps that are not in the tree meet only nearly.
+/// The published warp is for two pictures. Here the warp of a picture onto its neighbor's plane is followed by the
+/// neighbor's own warp, which is defined beyond its border too; overlaps that are not in the tree meet only nearly.
 pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &StageContext<'_>) -> Result<Vec<GridMesh>> {
     context.check_cancelled()?;
     let model = WarpModel::QuasiHomography;

@@ -7,7 +7,7 @@ use trueup_core::geometry::Homography;
 /// A homography that turns into a similarity across the lines u = `first` and u = `second`, u being the direction in
 /// which the homography's denominator falls.
 ///
-/// Coordinates have their origin at the picture's centre. The map and its derivative are continuous across both lines.
+/// Coordinates have their origin at the picture's center. The map and its derivative are continuous across both lines.
 ///
 /// # Source
 /// Chang, Sato and Chuang, "Shape-preserving half-projective warps for image stitching" (2014), section 3; the

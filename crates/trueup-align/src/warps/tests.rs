@@ -23,7 +23,7 @@ pub(super) struct Example {
 }
 
 impl Example {
-    /// Cameras panned to these yaws in degrees; neighbours in the list overlap.
+    /// Cameras panned to these yaws in degrees; neighbors in the list overlap.
     pub fn panned(yaws_deg: &[f64], reference: usize) -> Self {
         let turned = |yaw: &f64| Camera::new(FOCAL_PX, WIDTH, HEIGHT, &rotation_about_y(yaw.to_radians()).transpose());
         Self::new(yaws_deg.iter().map(turned).collect(), reference)
@@ -140,10 +140,10 @@ fn homographies_meet_and_leave_the_reference_in_place() {
             let apart = Vector2::from(placed.meshes[1].target[vertex]) - example.grids[1].source(vertex);
             assert!(apart.norm() < 1e-9);
         }
-        // The centre of the picture panned by 25 degrees lies at f tan 25.
-        let centre = placed.meshes[2].warp(Vector2::new(WIDTH / 2.0, HEIGHT / 2.0));
+        // The center of the picture panned by 25 degrees lies at f tan 25.
+        let center = placed.meshes[2].warp(Vector2::new(WIDTH / 2.0, HEIGHT / 2.0));
         let expected = WIDTH / 2.0 + FOCAL_PX * 25_f64.to_radians().tan();
-        assert!((centre.x - expected).abs() < 0.1 && (centre.y - HEIGHT / 2.0).abs() < 0.1, "{centre}");
+        assert!((center.x - expected).abs() < 0.1 && (center.y - HEIGHT / 2.0).abs() < 0.1, "{center}");
     }
 }
 

@@ -77,7 +77,7 @@ pub(crate) struct PictureArgs {
 
     /// What shows where no photograph is: auto (transparent where the format can, else black), transparent, black, gray,
     /// white, '#rrggbb' or '#rgb' (quoted: shells take # for a comment) (output.background)
-    #[arg(long, value_name = "COLOUR", help_heading = "View")]
+    #[arg(long, value_name = "COLOR", help_heading = "View")]
     pub background: Option<String>,
 }
 

@@ -163,6 +163,7 @@ fn upright(project: &Project) -> String {
 
 /// Warnings, and with `verbose` notes, that are not told elsewhere.
 fn findings(page: &mut Page, project: &Project, verbose: bool) {
+    let names = project.photograph_names();
     for diagnostic in &project.diagnostics {
         let label = match diagnostic.severity {
             Severity::Warning => "warning",
@@ -171,7 +172,7 @@ fn findings(page: &mut Page, project: &Project, verbose: bool) {
         if (diagnostic.severity == Severity::Note && !verbose) || tells_of_left_out(diagnostic, project) {
             continue;
         }
-        page.entry(label, &format!("{}: {}", diagnostic.subject, diagnostic.message));
+        page.entry(label, &format!("{}: {}", diagnostic.subject.named(&names), diagnostic.message));
         if !diagnostic.hint.is_empty() {
             page.entry("", &diagnostic.hint);
         }

@@ -19,8 +19,8 @@ fn project() -> Project {
         "canvas": {{"width": 70, "height": 31}},
         "seconds": {{"features": 0.5, "render": 2.0, "mesh": 0.01}},
         "diagnostics": [
-            {{"code": "no-overlap", "severity": "warning", "subject": "c.jpg", "message": "no overlap found", "hint": "Shoot one."}},
-            {{"code": "full-turn", "severity": "note", "subject": "mesh", "message": "all the way round", "hint": ""}}]}}"#,
+            {{"code": "no-overlap", "severity": "warning", "subject": {{"photograph": 2}}, "message": "no overlap found", "hint": "Shoot one."}},
+            {{"code": "full-turn", "severity": "note", "subject": {{"stage": "mesh"}}, "message": "all the way round", "hint": ""}}]}}"#,
         image("x/a.jpg", used),
         image("x/b.jpg", used),
         image("x/c.jpg", left_out)

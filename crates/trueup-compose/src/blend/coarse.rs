@@ -174,7 +174,7 @@ pub(super) fn base(sampled: Plane<[f32; 4]>) -> Plane<[f32; 4]> {
 /// Share of samples that are there only so that others have something to be compared with.
 const NEXT_TO_NOTHING: f32 = 1e-3;
 
-/// Gives samples beside covered ones their neighbours' colour with next to no share, so that finer samples between the two
+/// Gives samples beside covered ones their neighbors' color with next to no share, so that finer samples between the two
 /// always have something to be compared with.
 fn spread(plane: &mut Plane<[f32; 4]>) {
     let (width, height) = (plane.columns.len(), plane.rows.len());

@@ -10,8 +10,8 @@
 //! But for the finest and the widest, bands are weighted by masks of the next coarser level: what differs between two
 //! photographs goes over within the width of its own contours instead of half of it, and shows less of a step.
 //!
-//! Samples carry the share that is covered, colours are multiplied by it, and sums are divided by the sum of the shares
-//! (normalised convolution: Knutsson, Westin, CVPR 1993), so that what lies beside a picture never bleeds into it.
+//! Samples carry the share that is covered, colors are multiplied by it, and sums are divided by the sum of the shares
+//! (normalized convolution: Knutsson, Westin, CVPR 1993), so that what lies beside a picture never bleeds into it.
 
 use std::ops::Range;
 
@@ -40,7 +40,7 @@ impl Texel for [f32; 4] {
     }
 }
 
-/// A part of one level; all outside is zero. Four channels are three of colour times the share, and the share.
+/// A part of one level; all outside is zero. Four channels are three of color times the share, and the share.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Plane<T> {
     pub(crate) columns: Range<usize>,
@@ -183,12 +183,12 @@ fn two<T: Texel>(a: T, b: T) -> T {
     T::default().plus(a, 0.5).plus(b, 0.5)
 }
 
-/// A smaller share of a sample, a 64th of a step of 16 bits, is none: its colour would be made of rounding.
+/// A smaller share of a sample, a 64th of a step of 16 bits, is none: its color would be made of rounding.
 pub(crate) const LEAST_SHARE: f32 = 1.0 / (1 << 22) as f32;
 
-/// Colour divided by the share; `None` where nothing is covered.
+/// Color divided by the share; `None` where nothing is covered.
 #[inline(always)]
-pub(crate) fn colour(texel: [f32; 4]) -> Option<[f32; 3]> {
+pub(crate) fn color(texel: [f32; 4]) -> Option<[f32; 3]> {
     (texel[3] > LEAST_SHARE).then(|| {
         let scale = 1.0 / texel[3];
         [texel[0] * scale, texel[1] * scale, texel[2] * scale]
@@ -204,7 +204,7 @@ fn mean([r, g, b, weight]: [f32; 4]) -> Option<[f32; 3]> {
 /// Makes every sample that is covered at all count the same when it is interpolated.
 pub(crate) fn level_shares(plane: &mut Plane<[f32; 4]>) {
     for texel in &mut plane.texels {
-        *texel = match colour(*texel) {
+        *texel = match color(*texel) {
             Some([r, g, b]) => [r, g, b, 1.0],
             None => [0.0; 4],
         };
@@ -223,7 +223,7 @@ pub(crate) fn add_detail(
     let mut coarser = coarser.clone();
     level_shares(&mut coarser);
     let smooth = coarser.expanded(&level.columns, &level.rows);
-    for_each_weighted(sum, level, mask, |index, own| match colour(smooth.texels[index]) {
+    for_each_weighted(sum, level, mask, |index, own| match color(smooth.texels[index]) {
         Some(base) => [own[0] - base[0], own[1] - base[1], own[2] - base[2]],
         None => [0.0; 3],
     });
@@ -255,11 +255,11 @@ fn for_each_weighted(
         let shift = level.columns.start - sum.columns.start;
         let sums = &mut sum.row_mut(y)[shift..shift + width];
         for (x, (sum, (own, mask))) in sums.iter_mut().zip(own.iter().zip(mask)).enumerate() {
-            if let Some(own_colour) = colour(*own) {
+            if let Some(own_color) = color(*own) {
                 // Where a picture ends, its samples are means of one side only: they soon count nothing beside others.
                 let share = own[3].max(LEAST_TRUST);
                 let weight = (mask + LEAST_WEIGHT) * (share * share) * (share * share);
-                let [r, g, b] = value(start + x, own_colour);
+                let [r, g, b] = value(start + x, own_color);
                 *sum = sum.plus([r, g, b, 1.0], weight);
             }
         }
@@ -271,7 +271,7 @@ fn for_each_weighted(
 pub(crate) fn collapse(sum: &mut Plane<[f32; 4]>, coarser: Option<&Plane<[f32; 4]>>) {
     let smooth = coarser.map(|coarser| coarser.expanded(&sum.columns, &sum.rows));
     for (index, texel) in sum.texels.iter_mut().enumerate() {
-        let base = smooth.as_ref().map_or(Some([0.0; 3]), |smooth| colour(smooth.texels[index]));
+        let base = smooth.as_ref().map_or(Some([0.0; 3]), |smooth| color(smooth.texels[index]));
         *texel = match (mean(*texel), base) {
             (Some(detail), Some(base)) => [detail[0] + base[0], detail[1] + base[1], detail[2] + base[2], 1.0],
             _ => [0.0; 4],
@@ -295,14 +295,14 @@ mod tests {
 
     #[test]
     fn an_even_picture_stays_even_up_to_its_border() {
-        // Covered in an odd box only; the colour is 0.3 wherever anything is covered.
+        // Covered in an odd box only; the color is 0.3 wherever anything is covered.
         let source = plane(29, 23, |x, y| if x > 4 && y < 17 { [0.3, 0.6, 0.9, 1.0] } else { [0.0; 4] });
         let reduced = source.reduced();
         assert_eq!((reduced.columns.clone(), reduced.rows.clone()), (0..15, 0..12));
         let back = reduced.expanded(&source.columns, &source.rows);
         for (texel, original) in back.texels.iter().zip(&source.texels) {
             if original[3] > 0.0 {
-                let [r, g, b] = colour(*texel).expect("covered");
+                let [r, g, b] = color(*texel).expect("covered");
                 assert!((r - 0.3).abs() < 1e-6 && (g - 0.6).abs() < 1e-6 && (b - 0.9).abs() < 1e-6);
             }
         }

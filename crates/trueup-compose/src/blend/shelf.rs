@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use rayon::prelude::*;
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::Photograph;
 use trueup_core::source::PhotographSource;

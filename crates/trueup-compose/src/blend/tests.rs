@@ -1,6 +1,6 @@
 use proptest::prelude::*;
 use std::borrow::Cow;
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 use trueup_core::mesh::GridMesh;
 
 use trueup_core::raster::{Photograph, Raster};
@@ -58,7 +58,7 @@ fn composed(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOp
 }
 
 fn root_of(level: u8) -> u16 {
-    (crate::transfer_curve::Linearise::of(&TransferCurve::SRGB).linear(f32::from(level)).sqrt() * 65535.0 + 0.5) as u16
+    (crate::transfer_curve::Linearize::of(&TransferCurve::SRGB).linear(f32::from(level)).sqrt() * 65535.0 + 0.5) as u16
 }
 
 #[test]
@@ -375,7 +375,7 @@ proptest! {
         let panorama = render(&layout, &corrections, &Memory(pictures), &options, &SeamOptions::default(), &context);
         let panorama = panorama.expect("renders");
         let used = &levels[..lefts.len()];
-        let linear = |level: u8| crate::transfer_curve::Linearise::of(&TransferCurve::SRGB).linear(f32::from(level));
+        let linear = |level: u8| crate::transfer_curve::Linearize::of(&TransferCurve::SRGB).linear(f32::from(level));
         let low = used.iter().map(|&level| linear(level)).fold(f32::INFINITY, f32::min) - 1e-4;
         let high = used.iter().map(|&level| linear(level)).fold(0.0, f32::max) + 1e-4;
         for y in 0..layout.height {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use trueup_core::mask::Mask;
 
 use super::bases::Base;
-use super::pyramid::{Plane, add_detail, collapse, colour, level_shares};
+use super::pyramid::{Plane, add_detail, collapse, color, level_shares};
 use super::{Finished, Work};
 use crate::render::prepared::{Prepared, Scratch, Window};
 use crate::seam::{Label, NOBODY};
@@ -89,7 +89,7 @@ impl Tile {
             .levels
             .as_ref()
             .and_then(|levels| self.offset(&levels.blended, levels.bases.at(label), work.first_level));
-        let offsets = offset.iter().flat_map(|plane| &plane.texels).map(|texel| colour(*texel).unwrap_or_default());
+        let offsets = offset.iter().flat_map(|plane| &plane.texels).map(|texel| color(*texel).unwrap_or_default());
         let offsets = offsets.chain(std::iter::repeat([0.0; 3]));
         pixels.iter().zip(offsets).map(|(pixel, offset)| finished(*pixel, offset)).collect()
     }
@@ -109,8 +109,8 @@ impl Tile {
                 if !base.plane.columns.contains(&x) {
                     continue;
                 }
-                let own = colour(own[x - base.plane.columns.start]);
-                if let (Some(own), Some(all)) = (own, colour(all[x - blended.columns.start])) {
+                let own = color(own[x - base.plane.columns.start]);
+                if let (Some(own), Some(all)) = (own, color(all[x - blended.columns.start])) {
                     *texel = [all[0] - own[0], all[1] - own[1], all[2] - own[2], 1.0];
                     any |= texel[..3].iter().any(|channel| channel.abs() > NO_CHANGE);
                 }

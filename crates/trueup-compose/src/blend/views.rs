@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 use trueup_core::mask::{Mask, Masks};
 use trueup_core::mesh::GridMesh;
 use trueup_core::options::StageOptions;

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 use trueup_core::{Error, Result};
 
 use super::response::Response;
 use crate::layout::{CanvasLayout, Placed};
-use crate::transfer_curve::Linearise;
+use crate::transfer_curve::Linearize;
 
 /// Even powers of the radius in the model of vignetting: r^2, r^4, r^6.
 pub const VIGNETTING_TERMS: usize = 3;
@@ -95,7 +95,7 @@ impl Corrections {
 }
 
 impl From<Vec<Correction>> for Corrections {
-    /// Factors on the light by the colour profile's own curve.
+    /// Factors on the light by the color profile's own curve.
     fn from(photographs: Vec<Correction>) -> Self {
         Self { response: Response::default(), photographs }
     }
@@ -121,11 +121,11 @@ pub(crate) fn exposed(linear: f32, factor: f32) -> f32 {
 /// From a photograph's samples to corrected light, as the inner loops read it: its transfer curve and its [`Correction`].
 #[derive(Debug, Clone)]
 pub(crate) struct LightTable {
-    pub(crate) linearise: Arc<Linearise>,
+    pub(crate) linearize: Arc<Linearize>,
     pub(crate) gain: [f32; 3],
     /// Factor at r^2 = index / (length - 2), one entry beyond the corner; empty without vignetting.
     falloff: Vec<f32>,
-    centre: [f32; 2],
+    center: [f32; 2],
     /// Table steps per squared pixel.
     steps_per_px2: f32,
 }
@@ -142,10 +142,10 @@ impl LightTable {
         let factor = |index: usize| correction.at_radius((index as f64 / STEPS as f64).min(1.0)) as f32;
         let corner = 0.25 * (size[0] * size[0] + size[1] * size[1]);
         Self {
-            linearise: Linearise::of(curve),
+            linearize: Linearize::of(curve),
             gain: correction.gain.map(|gain| gain as f32),
             falloff: (0..last).map(factor).collect(),
-            centre: size.map(|length| 0.5 * length as f32),
+            center: size.map(|length| 0.5 * length as f32),
             steps_per_px2: (STEPS as f64 / corner) as f32,
         }
     }
@@ -158,7 +158,7 @@ impl LightTable {
     /// The factor against vignetting at a position in the photograph, pixels; only where [`Self::varies`].
     #[inline(always)]
     pub(crate) fn at(&self, x: f32, y: f32) -> f32 {
-        let (dx, dy) = (x - self.centre[0], y - self.centre[1]);
+        let (dx, dy) = (x - self.center[0], y - self.center[1]);
         let step = ((dx * dx + dy * dy) * self.steps_per_px2).min(STEPS as f32);
         let index = step as usize;
         match self.falloff.get(index..index + 2) {

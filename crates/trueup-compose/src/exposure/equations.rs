@@ -2,12 +2,12 @@
 //!
 //! Brightness, vignetting and response first: unknowns x_k (ln gain of photograph k), a_c (coefficients of camera c) and b
 //! (of the response), one equation per sample, `x_i - x_j + a (p(r_i) - p(r_j)) + b (f(e_i) - f(e_j)) = -ln(I_i / I_j)`,
-//! with weights from the residuals. The colour cast follows with the same weights: the same equations for what each channel
+//! with weights from the residuals. The color cast follows with the same weights: the same equations for what each channel
 //! differs from the mean.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 
 use super::correction::VIGNETTING_TERMS;
 use super::overlap::Observed;
@@ -17,7 +17,7 @@ use super::samples::Shared;
 use super::solve::Solution;
 use super::{ExposureModel, ExposureOptions, PairExposure};
 
-/// Neighbouring samples see the same things; an overlap is worth about this share of its samples.
+/// Neighboring samples see the same things; an overlap is worth about this share of its samples.
 const INDEPENDENT: f64 = 0.01;
 
 /// By how much the mean slope of the response may differ from the profile's, both on logarithms: none, but for rounding.

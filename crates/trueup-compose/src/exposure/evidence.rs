@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use trueup_core::Result;
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 
 use super::equations::Problem;
 use super::overlap::Observed;

@@ -1,9 +1,9 @@
-//! One look for all photographs: gain, colour cast and vignetting, estimated together where photographs overlap.
+//! One look for all photographs: gain, color cast and vignetting, estimated together where photographs overlap.
 //!
 //! All factors act on linear light, so that they add up as logarithms: what photograph i shows of a place, times its gain,
 //! times its lens's correction there, equals the same of photograph j. The overlaps give one such equation per sample and
 //! channel; moving things and ghosts are weighed down by their residuals, saturated samples do not take part. What is linear
-//! light is estimated, too, as a [`Response`] beside the colour profile's curve. What the reference shows stays as it is, but
+//! light is estimated, too, as a [`Response`] beside the color profile's curve. What the reference shows stays as it is, but
 //! for its vignetting.
 
 mod correction;
@@ -24,7 +24,7 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::Raster;
 use trueup_core::source::WorkingFrame;
@@ -52,17 +52,17 @@ trueup_core::choice! {
     pub enum ExposureModel {
         /// Brightness: one gain per photograph.
         Gain = "gain",
-        /// Brightness, colour cast (a gain per channel) and vignetting (one lens per camera).
+        /// Brightness, color cast (a gain per channel) and vignetting (one lens per camera).
         Full = "full",
     }
 }
 
 trueup_core::options! {
-    /// How brightness, colour and vignetting of the photographs are evened out.
+    /// How brightness, color and vignetting of the photographs are evened out.
     pub struct ExposureOptions("exposure") {
         /// Whether anything is evened out at all; without, every photograph keeps its light.
         enabled: bool = true, Allowed::Any, "";
-        /// What may differ between the photographs: their brightness, or colour cast and vignetting, too.
+        /// What may differ between the photographs: their brightness, or color cast and vignetting, too.
         model: ExposureModel = ExposureModel::Full, Allowed::Any, "";
         /// Which photograph's look the panorama keeps.
         anchor: GainAnchor = GainAnchor::Reference, Allowed::Any, "";
@@ -81,15 +81,15 @@ trueup_core::options! {
         /// rows of photographs from drifting in brightness, higher follows the measured ratios.
         gain_deviation: f64 = 2.0, between(1e-3, 100.0), "";
         /// How far a channel's gain is expected to lie from the mean of the channels, as a standard deviation of natural
-        /// logarithms. Lower keeps long rows of photographs from drifting in colour.
+        /// logarithms. Lower keeps long rows of photographs from drifting in color.
         cast_deviation: f64 = 0.2, between(1e-3, 100.0), "";
         /// How strong vignetting is expected to be, as a standard deviation of every coefficient of its natural logarithm.
         /// Lower trusts that the lenses are good, higher follows the overlaps.
         vignetting_deviation: f64 = 0.6, between(1e-4, 100.0), "";
         /// Whether the cameras' response is estimated beside the full model, one for all photographs; without, their samples
-        /// are taken for light by the colour profile's curve.
+        /// are taken for light by the color profile's curve.
         response: bool = true, Allowed::Any, "";
-        /// How far the response is expected to lie from the colour profile's curve, as a standard deviation of every
+        /// How far the response is expected to lie from the color profile's curve, as a standard deviation of every
         /// coefficient of its natural logarithm.
         response_deviation: f64 = 0.5, between(1e-4, 100.0), "";
         /// Largest gain; the smallest is its inverse. Photographs of sun and shade that each were exposed for what they show lie
@@ -151,7 +151,7 @@ pub struct Exposure {
 ///
 /// # Departures
 /// All errors are on logarithms, where the whole model is linear; the published error of the gains on intensities draws
-/// them towards zero and is led by bright outliers. The response is a correction of the transfer curve of the photographs' colour
+/// them towards zero and is led by bright outliers. The response is a correction of the transfer curve of the photographs' color
 /// space, one for all channels, whose mean slope stays that of the curve; its functions are read off the light that both
 /// photographs together say, not off each one's own noisy sample.
 pub fn run(
@@ -203,7 +203,7 @@ pub fn run(
         .collect();
     let cameras: Vec<usize> = thumbnails.iter().map(|thumbnail| thumbnail.camera).collect();
     let response_asked = options.response && options.model == ExposureModel::Full;
-    // One response is fitted for one colour profile.
+    // One response is fitted for one color profile.
     let profile = thumbnails
         .first()
         .map(|thumbnail| thumbnail.curve)

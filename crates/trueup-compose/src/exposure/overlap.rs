@@ -1,6 +1,6 @@
 //! What two photographs that overlap say of each other.
 
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 
 use super::samples::Shared;
 use super::{ExposureOptions, PairExposure};
@@ -48,7 +48,7 @@ pub(super) fn compare(
     }
     let deviation = NORMAL * f64::from(median(&mut ratios));
     let pair = PairExposure { first, second, log_ratio: f64::from(log_ratio), deviation, samples: samples.len() };
-    // Neighbouring samples say the same; a few hundred of an overlap settle seven unknowns.
+    // Neighboring samples say the same; a few hundred of an overlap settle seven unknowns.
     const KEPT: usize = 600;
     let step = samples.len().div_ceil(KEPT);
     let mut index = 0_usize;

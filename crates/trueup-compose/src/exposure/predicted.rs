@@ -6,7 +6,7 @@
 //! exposure then say nothing about the response, as is right.
 
 use trueup_core::Result;
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 
 use super::response::{RESPONSE_TERMS, Response};
 

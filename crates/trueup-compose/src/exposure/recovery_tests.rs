@@ -33,7 +33,7 @@ impl Dice {
     }
 }
 
-/// The scene's linear light from near black to white, with soft things and edges of its own colours.
+/// The scene's linear light from near black to white, with soft things and edges of its own colors.
 fn scene(x: f64, y: f64) -> [f64; 3] {
     let slow = 1.3 * (x / 61.0 + 0.7).sin() * (y / 53.0).cos() + 0.8 * (x / 29.0 - y / 41.0).sin();
     let block = ((x / 34.0).floor() * 12.9898 + (y / 27.0).floor() * 78.233).sin();

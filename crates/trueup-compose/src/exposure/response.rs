@@ -1,13 +1,13 @@
-//! What the cameras' real response adds to the colour profile's transfer curve.
+//! What the cameras' real response adds to the color profile's transfer curve.
 
 use serde::{Deserialize, Serialize};
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 use trueup_core::{Error, Result};
 
 /// Functions that the correction of the response is made of.
 pub const RESPONSE_TERMS: usize = 4;
 
-/// The response of the photographs' cameras, one for all, as a correction of the colour profile's curve: a sample that is
+/// The response of the photographs' cameras, one for all, as a correction of the color profile's curve: a sample that is
 /// encoded as e and stands for the light l by the profile came from the light `l exp(c . f(e))`, but for a factor that is
 /// the same for all levels.
 ///

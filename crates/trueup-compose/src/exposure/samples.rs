@@ -2,14 +2,14 @@
 
 use std::ops::{Range, RangeInclusive};
 
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 use trueup_core::raster::Raster;
 
 use super::{ExposureOptions, Thumbnail};
 use crate::deformed_grid::{DeformedGrid, Run};
 use crate::layout::{Placed, TURNS};
 use crate::simd::{Positions, invert_row};
-use crate::transfer_curve::Linearise;
+use crate::transfer_curve::Linearize;
 
 /// Natural logarithms of the light of one photograph on the grid of samples; NaN where it says nothing.
 pub(super) struct Patch {
@@ -81,8 +81,8 @@ impl Patch {
         footprints.sort_by(f64::total_cmp);
         let footprint = footprints.get(footprints.len() / 2).copied().unwrap_or(1.0);
         let block = (footprint * thumbnail.frame.working_from_full).round().max(1.0) as usize;
-        let linearise = Linearise::of(thumbnail.curve);
-        let light = block_means(thumbnail.raster, &linearise, block, options.darkest..=options.brightest);
+        let linearize = Linearize::of(thumbnail.curve);
+        let light = block_means(thumbnail.raster, &linearize, block, options.darkest..=options.brightest);
         let from_full = thumbnail.frame.working_from_full / block as f64;
         let half = grid.size.map(|length| 0.5 * length);
         let corner = half[0] * half[0] + half[1] * half[1];
@@ -148,7 +148,7 @@ fn intersect(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
 
 /// Natural logarithm of the mean linear light of blocks of `block` x `block` pixels, by channel; NaN where a sample lies
 /// outside `telling`.
-fn block_means(raster: &Raster<u8>, linearise: &Linearise, block: usize, telling: RangeInclusive<u8>) -> Raster<f32> {
+fn block_means(raster: &Raster<u8>, linearize: &Linearize, block: usize, telling: RangeInclusive<u8>) -> Raster<f32> {
     let (width, height) = (raster.width().div_ceil(block), raster.height().div_ceil(block));
     let mut means = Raster::new(width, height, 3);
     for y in 0..height {
@@ -158,7 +158,7 @@ fn block_means(raster: &Raster<u8>, linearise: &Linearise, block: usize, telling
                 let end = ((x + 1) * block).min(raster.width());
                 for pixel in raster.row(row)[3 * x * block..3 * end].as_chunks::<3>().0 {
                     for (sum, &level) in sum.iter_mut().zip(pixel) {
-                        *sum += linearise.linear(f32::from(level));
+                        *sum += linearize.linear(f32::from(level));
                         tells &= telling.contains(&level);
                     }
                     count += 1;

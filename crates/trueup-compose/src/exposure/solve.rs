@@ -1,7 +1,7 @@
 //! The robust least-squares problem over all overlaps: its repetitions, and what comes of them.
 
 use nalgebra::DVector;
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 use trueup_core::{Result, StageContext};
 
 use super::correction::{Correction, Corrections};

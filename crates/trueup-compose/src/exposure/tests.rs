@@ -121,7 +121,7 @@ fn a_full_turn_is_corrected_alike_wherever_it_is_cut_open() {
 }
 
 #[test]
-fn gain_colour_and_vignetting_are_recovered_together() {
+fn gain_color_and_vignetting_are_recovered_together() {
     let shifts = [0.0, 110.0, 190.0, 300.0, 400.0];
     let lights = [1.0, 0.25, 1.9, 4.0, 0.6];
     let casts = [[1.0, 1.0, 1.0], [1.1, 1.0, 0.9], [0.92, 1.0, 1.05], [1.0, 1.05, 1.1], [0.95, 1.0, 1.0]];

@@ -13,7 +13,7 @@ use trueup_core::{Error, Result};
 use crate::distance::border_distances;
 use crate::render::Layer;
 
-/// How true a panorama is to its photographs; grey levels from 0 to 255 of encoded luma.
+/// How true a panorama is to its photographs; gray levels from 0 to 255 of encoded luma.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Fidelity {
     /// Places along the lines where the photograph shown changes.
@@ -38,7 +38,7 @@ pub struct Fidelity {
     pub ghost_share: f64,
 }
 
-/// Gradient distance from which on a ghost is seen, grey levels a pixel.
+/// Gradient distance from which on a ghost is seen, gray levels a pixel.
 pub const GHOST_LEVEL: f64 = 8.0;
 
 /// Measures `panorama` against `layers`, its photographs on the same canvas; `shown` is the position of the photograph

@@ -51,7 +51,7 @@ impl Stretches {
     }
 }
 
-/// A place on a line: between the pixel and its right neighbour if the line runs `down`, else the one below.
+/// A place on a line: between the pixel and its right neighbor if the line runs `down`, else the one below.
 #[derive(Clone, Copy)]
 struct Place {
     x: usize,

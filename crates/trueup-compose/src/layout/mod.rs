@@ -8,7 +8,7 @@ mod tests;
 
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::mesh::GridMesh;
 use trueup_core::options::StageOptions;
 use trueup_core::{Error, Result, StageContext};
@@ -39,7 +39,7 @@ trueup_core::options! {
         /// Share of the covered pixels that the largest rectangle must keep for `crop = auto` to crop to it.
         min_kept: f64 = 0.75, between(0.0, 1.0), "";
         /// Gaps between and beside the photographs of up to twice this width, as a share of a photograph's side, are filled with
-        /// a smooth surface over their borders' colours: small ones in an even sky or wall are not noticed. 0 fills nothing.
+        /// a smooth surface over their borders' colors: small ones in an even sky or wall are not noticed. 0 fills nothing.
         fill: f64 = 0.0, between(0.0, 1.0), "";
     }
 }
@@ -209,7 +209,7 @@ fn fitted(
         let [wanted_width, wanted_height] = size(wanted);
         context.report(Diagnostic::warning(
             "canvas-reduced",
-            STAGE,
+            Subject::stage(STAGE),
             format!(
                 "a canvas of {wanted_width:.0} x {wanted_height:.0} px is above the limit of {max_pixels:.0} px; it was \
                  reduced to {width:.0} x {height:.0}"

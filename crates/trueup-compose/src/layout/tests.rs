@@ -21,7 +21,7 @@ fn the_reference_keeps_its_pixel_scale() {
     let half = CanvasOptions { scale: 0.5, ..CanvasOptions::default() };
     let layout = run(pictures, 1, &half, &context).expect("two grids");
     assert_eq!((layout.width, layout.height), (250, 150));
-    assert!(context.take_diagnostics().is_empty());
+    assert!(context.findings().is_empty());
 }
 
 #[test]
@@ -31,7 +31,7 @@ fn a_canvas_above_the_limit_is_reduced_and_reported() {
     let layout = run(vec![placed(1.0, [0.0, 0.0])], 0, &options, &context).expect("one grid");
     assert!(layout.width * layout.height <= 1000);
     assert!(layout.width * layout.height > 900, "{} x {}", layout.width, layout.height);
-    assert_eq!(context.take_diagnostics()[0].code, "canvas-reduced");
+    assert_eq!(context.findings()[0].code, "canvas-reduced");
 }
 
 #[test]
@@ -110,7 +110,7 @@ fn a_canvas_that_runs_away_is_reduced() {
     let far = vec![placed(1.0, [0.0, 0.0]), placed(1.0, [4e7, 0.0])];
     let layout = run(far, 0, &options, &context).expect("two grids");
     assert!(layout.width * layout.height <= 400_000_000);
-    assert_eq!(context.take_diagnostics()[0].code, "canvas-reduced");
+    assert_eq!(context.findings()[0].code, "canvas-reduced");
     // One of them enlarged to 1.2 billion pixels is what was asked for.
     let large = CanvasOptions { scale: 16.0, ..options };
     let mut photograph = placed(1.0, [0.0, 0.0]);
@@ -118,7 +118,7 @@ fn a_canvas_that_runs_away_is_reduced() {
     photograph.mesh.target.iter_mut().flatten().for_each(|coordinate| *coordinate *= 10.0);
     let layout = run(vec![photograph], 0, &large, &context).expect("one grid");
     assert_eq!((layout.width, layout.height), (64_000, 48_000));
-    assert!(context.take_diagnostics().is_empty());
+    assert!(context.findings().is_empty());
 }
 
 #[test]

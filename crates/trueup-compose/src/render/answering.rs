@@ -1,7 +1,7 @@
 //! Photographs whose samples are read by the response of their cameras.
 
 use trueup_core::Result;
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 use trueup_core::mask::Masks;
 use trueup_core::raster::Photograph;
 use trueup_core::source::PhotographSource;
@@ -9,7 +9,7 @@ use trueup_core::source::PhotographSource;
 use crate::exposure::Response;
 use crate::transfer_curve::Encoding;
 
-/// The same photographs with the corrected curve in place of their colour profile's: all that reads samples or writes the
+/// The same photographs with the corrected curve in place of their color profile's: all that reads samples or writes the
 /// panorama takes it from here, so that what is shown as it was taken keeps its samples.
 pub(super) struct Answering<'a> {
     photographs: &'a dyn PhotographSource,

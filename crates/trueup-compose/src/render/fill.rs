@@ -1,4 +1,4 @@
-//! Filling gaps: a smooth surface over the colours along their borders.
+//! Filling gaps: a smooth surface over the colors along their borders.
 
 use std::ops::Range;
 
@@ -8,15 +8,15 @@ use trueup_core::{Result, StageContext};
 
 use super::panorama::{Panorama, Pixels, linear_of_sum};
 use super::store::{Pixel, Store};
-use crate::blend::pyramid::{Plane, colour};
+use crate::blend::pyramid::{Plane, color};
 use crate::blend::{first_level, tile_margin, tile_side};
 use crate::gaps::Gaps;
 
-/// A pixel whose colour can be looked at and set.
+/// A pixel whose color can be looked at and set.
 trait Shade: Pixel {
     /// Square roots of linear light, and the share that is covered.
     fn root(self) -> [f32; 4];
-    /// A pixel of that colour, covered wholly.
+    /// A pixel of that color, covered wholly.
     fn of_root(root: [f32; 3]) -> Self;
 }
 
@@ -107,7 +107,7 @@ impl<'a> Canvas<'a> {
     fn new([width, height]: [usize; 2], gaps: &'a Gaps) -> Self {
         let first_level = first_level([width, height]);
         let side = tile_side(first_level);
-        // A gap is two radii wide at most; its borders' colours come from a little farther away.
+        // A gap is two radii wide at most; its borders' colors come from a little farther away.
         let reach = (4.0 * gaps.radius()).ceil() as usize;
         let lead = if gaps.is_around() { reach.clamp(1, width).next_multiple_of(side) } else { 0 };
         Self { gaps, width, height, lead, first_level }
@@ -118,7 +118,7 @@ impl<'a> Canvas<'a> {
         (x + self.lead.div_ceil(self.width) * self.width - self.lead) % self.width
     }
 
-    /// The tiles of the panorama at and beside gaps, and all whose colours these may need.
+    /// The tiles of the panorama at and beside gaps, and all whose colors these may need.
     fn tiles(&self) -> (Vec<Tile>, Vec<Tile>) {
         let side = tile_side(self.first_level);
         let end = self.lead + self.width;
@@ -149,7 +149,7 @@ impl<'a> Canvas<'a> {
         (wanted, sources)
     }
 
-    /// Colours times the share covered of a tile with its margin; nothing where the gaps are.
+    /// Colors times the share covered of a tile with its margin; nothing where the gaps are.
     fn known<P: Shade>(&self, store: &Store<P>, tile: &Tile) -> Result<Plane<[f32; 4]>> {
         let margin = tile_margin(self.first_level);
         let columns =
@@ -227,7 +227,7 @@ impl<'a> Canvas<'a> {
                 let share = own[3];
                 if share < 1.0
                     && self.gaps.is_small(x, y)
-                    && let Some(smooth) = colour(texel)
+                    && let Some(smooth) = color(texel)
                 {
                     *pixel = P::of_root([0, 1, 2].map(|k| share * own[k] + (1.0 - share) * smooth[k]));
                     filled += 1;
@@ -238,7 +238,7 @@ impl<'a> Canvas<'a> {
     }
 }
 
-/// A sample counts as wholly known if this share of its surroundings is, its inverse: colours reach into a gap as far as the
+/// A sample counts as wholly known if this share of its surroundings is, its inverse: colors reach into a gap as far as the
 /// finest level that knows any, so that each place of a gap takes up what is next to it.
 const SATURATION: f32 = 16.0;
 
@@ -249,9 +249,9 @@ fn pulled(mut levels: Vec<Plane<[f32; 4]>>, coarser: Option<&Plane<[f32; 4]>>) -
         if let Some(coarser) = whole.as_ref().or(coarser) {
             let smooth = coarser.expanded(&level.columns, &level.rows);
             for (texel, smooth) in level.texels.iter_mut().zip(&smooth.texels) {
-                if let Some([r, g, b]) = colour(*smooth) {
+                if let Some([r, g, b]) = color(*smooth) {
                     let known = (SATURATION * texel[3]).min(1.0);
-                    let [own_r, own_g, own_b] = colour(*texel).unwrap_or_default();
+                    let [own_r, own_g, own_b] = color(*texel).unwrap_or_default();
                     *texel = [r + known * (own_r - r), g + known * (own_g - g), b + known * (own_b - b), 1.0];
                 }
             }

@@ -24,7 +24,7 @@ pub struct Layer {
     pub left: usize,
     /// First row of the canvas.
     pub top: usize,
-    /// Rec. 601 luma of the encoded colours, 0 to 255, one channel; 0 outside the photograph.
+    /// Rec. 601 luma of the encoded colors, 0 to 255, one channel; 0 outside the photograph.
     pub gray: Raster<f32>,
     /// Whether the photograph covers the whole pixel; one channel.
     pub covered: Raster<bool>,

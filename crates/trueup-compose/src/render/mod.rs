@@ -21,7 +21,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::options::StageOptions;
 use trueup_core::source::PhotographSource;
 use trueup_core::{Error, Result, StageContext};
@@ -55,8 +55,8 @@ trueup_core::choice! {
 trueup_core::choice! {
     /// What a canvas pixel shows where photographs overlap.
     pub enum Blend {
-        /// The photograph that the seams give it to, blended over the seams with its neighbours: contours over a few
-        /// pixels, colours over many.
+        /// The photograph that the seams give it to, blended over the seams with its neighbors: contours over a few
+        /// pixels, colors over many.
         MultiBand = "multiband",
         /// The mean of all, each weighted by its distance from its own border.
         Feather = "feather",
@@ -75,7 +75,7 @@ trueup_core::options! {
         /// What a pixel shows where photographs overlap.
         blend: Blend = Blend::MultiBand, Allowed::Any, "";
         /// Widest transition of multi-band blending, as a share of the photographs' shorter side on the canvas. Higher
-        /// evens out more of what differs in brightness and colour.
+        /// evens out more of what differs in brightness and color.
         transition: f64 = 0.1, between(0.0, 1.0), "";
         /// Power of the feather weight. Higher values let the photograph that lies deepest prevail, which shortens the
         /// transition and with it ghosts; 1 blends over the whole overlap.
@@ -254,7 +254,7 @@ fn report_folds(layout: &CanvasLayout, context: &StageContext) {
             let triangles = 2 * (placed.mesh.rows - 1) * (placed.mesh.columns - 1);
             context.report(Diagnostic::warning(
                 "grid-folded",
-                format!("photograph {}", placed.photograph),
+                Subject::Photograph(placed.photograph),
                 format!("{folded} of {triangles} triangles of its grid are folded over"),
                 "The photograph may not fit the others: leave it out, or try another method.",
             ));

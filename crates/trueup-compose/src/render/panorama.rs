@@ -58,7 +58,7 @@ impl Panorama {
         }))
     }
 
-    /// Linear light by the colour profile.
+    /// Linear light by the color profile.
     fn profile_light(&self, [r, g, b, opacity]: [f32; 4]) -> [f32; 4] {
         let [r, g, b] = [r, g, b].map(|light| self.encoding.profile_light(light));
         [r, g, b, opacity]

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Photograph;
 use trueup_core::{Error, Result};

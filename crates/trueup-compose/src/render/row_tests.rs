@@ -1,6 +1,6 @@
 //! Rows of panoramas and of single layers, at every depth.
 
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 use trueup_core::raster::{Photograph, Raster, RowSource};
 
 use super::test_pictures::{Memory, canvas, compose, gradient, moved, noise, render};
@@ -8,7 +8,7 @@ use super::*;
 use crate::exposure::Response;
 use crate::layout::{self, CanvasOptions};
 
-/// A gradient of grey moved by (30, 20): its layer is that box, with the levels it has.
+/// A gradient of gray moved by (30, 20): its layer is that box, with the levels it has.
 #[test]
 fn a_layer_is_one_photograph_where_it_lies() {
     let photographs = Memory(vec![gradient(100, 80, |x, _| x), gradient(60, 40, |x, y| 50.0 + x + 2.0 * y)]);

@@ -154,7 +154,7 @@ impl<P: Pixel> Store<P> {
     }
 }
 
-/// Memory for rows that were read at once: neighbouring rows are asked for next.
+/// Memory for rows that were read at once: neighboring rows are asked for next.
 const BANDS_BYTES: usize = 64 << 20;
 
 /// Rows read at once: as many as make reads of every block worth a disk's while.

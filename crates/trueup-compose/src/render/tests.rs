@@ -57,7 +57,7 @@ fn a_shift_by_half_a_pixel_moves_a_gradient_by_half_a_step() {
             assert!((got - expected).abs() <= 1.0, "({x}, {y}): {got} for {expected}");
         }
     }
-    // The border runs through the centres of the first column: half covered, and no darker for it.
+    // The border runs through the centers of the first column: half covered, and no darker for it.
     let edge = &bytes[(20 * 65) * 4..][..4];
     assert_eq!(edge[3], 128);
     assert!(edge[0] >= 41, "{edge:?}");
@@ -67,8 +67,8 @@ fn a_shift_by_half_a_pixel_moves_a_gradient_by_half_a_step() {
 fn the_border_is_anti_aliased_where_it_runs_askew() {
     let picture = gradient(60, 60, |_, _| 180.0);
     let turn = nalgebra::Rotation2::new(0.3);
-    let centre = Vector2::new(50.0, 50.0);
-    let layout = canvas(100, 100, vec![moved(0, 60.0, 60.0, |p| (turn * (p - Vector2::repeat(30.0)) + centre).into())]);
+    let center = Vector2::new(50.0, 50.0);
+    let layout = canvas(100, 100, vec![moved(0, 60.0, 60.0, |p| (turn * (p - Vector2::repeat(30.0)) + center).into())]);
     let bytes = rows(&render(&layout, vec![picture], &RenderOptions::default()));
     let covered: f64 = bytes.chunks_exact(4).map(|pixel| f64::from(pixel[3]) / 255.0).sum();
     assert!((covered - 3600.0).abs() < 4.0, "{covered}");
@@ -133,7 +133,7 @@ fn a_reduced_panorama_shows_means_not_single_samples() {
 #[test]
 fn folds_are_counted_and_every_pixel_is_hit_once() {
     let mut folded = moved(0, 60.0, 60.0, |p| p.into());
-    // Pull an inner vertex across its right neighbour.
+    // Pull an inner vertex across its right neighbor.
     folded.mesh.target[5] = [55.0, 20.0];
     let layout = canvas(60, 60, vec![folded]);
     let context = StageContext::default();
@@ -142,7 +142,7 @@ fn folds_are_counted_and_every_pixel_is_hit_once() {
     let panorama = compose(&layout, &Corrections::plain(1), &photographs, &options, &context).expect("renders");
     let Pixels::Sums(sums) = &panorama.pixels else { panic!("a mean") };
     assert!((0..60).all(|y| sums.row(y).expect("in memory").iter().all(|sum| sum[3] <= 1.0)));
-    let diagnostics = context.take_diagnostics();
+    let diagnostics = context.findings();
     assert_eq!(diagnostics[0].code, "grid-folded");
     assert!(diagnostics[0].message.starts_with("2 of 18"), "{}", diagnostics[0].message);
 }

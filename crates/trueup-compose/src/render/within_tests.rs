@@ -85,7 +85,7 @@ fn fill(panorama: &mut Panorama) -> usize {
 }
 
 #[test]
-fn gaps_take_up_the_colours_beside_them() {
+fn gaps_take_up_the_colors_beside_them() {
     // A photograph that is dark on the left and bright on the right, below a strip of 20 rows.
     let halves = (0..300 * 200).flat_map(|at| [if at % 300 < 150 { 40_u8 } else { 200 }; 3]).collect();
     let raster = trueup_core::raster::Raster::from_data(300, 200, 3, halves).expect("as many samples");

@@ -10,7 +10,7 @@ pub(crate) trait Kernel {
     /// Value at `distance` samples from the middle.
     fn at(distance: f32) -> f32;
 
-    /// Weights of four neighbouring samples for a position `fraction` (in [0, 1]) beyond the second of them.
+    /// Weights of four neighboring samples for a position `fraction` (in [0, 1]) beyond the second of them.
     fn taps(fraction: f32) -> [f32; 4];
 }
 

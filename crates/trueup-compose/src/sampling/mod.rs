@@ -44,7 +44,7 @@ impl Sample for u16 {
 /// Interpolates a photograph at every position: red, green, blue and alpha from 0 to 255, not yet clamped.
 ///
 /// Positions outside see the nearest sample. `stretch` is how much wider than a sample the kernel is, along x and y: 1 to
-/// interpolate, more to average where the photograph is reduced. Colours next to transparent samples are weighted by
+/// interpolate, more to average where the photograph is reduced. Colors next to transparent samples are weighted by
 /// alpha, so that what lies under a mask does not show. `at_border` is scratch space.
 pub(crate) fn interpolate<K: Kernel>(
     photograph: &Photograph,
@@ -239,7 +239,7 @@ fn average_inside<T: Sample, const C: usize>(
     sum
 }
 
-/// First sample and normalised weights of a kernel widened by `stretch` around `position` (0 at the first sample).
+/// First sample and normalized weights of a kernel widened by `stretch` around `position` (0 at the first sample).
 #[inline(always)]
 fn widened_taps<K: Kernel>(position: f64, stretch: f64, taps: &mut [f32; MAX_TAPS]) -> (i64, &[f32]) {
     let stretch = stretch.clamp(1.0, MAX_STRETCH);
@@ -252,17 +252,17 @@ fn widened_taps<K: Kernel>(position: f64, stretch: f64, taps: &mut [f32; MAX_TAP
         *weight = K::at(start + tap as f32 * step);
         sum += *weight;
     }
-    let normalise = 1.0 / sum;
+    let normalize = 1.0 / sum;
     for weight in &mut taps[..count] {
-        *weight *= normalise;
+        *weight *= normalize;
     }
     (first as i64, &taps[..count])
 }
 
-/// A weighted sum of colours multiplied by their alpha.
+/// A weighted sum of colors multiplied by their alpha.
 #[derive(Debug, Default)]
 struct PremultipliedSum {
-    colour: [f32; 3],
+    color: [f32; 3],
     alpha: f32,
     weight: f32,
 }
@@ -271,7 +271,7 @@ impl PremultipliedSum {
     #[inline(always)]
     fn add(&mut self, pixel: [f32; 4], weight: f32) {
         let weighted = weight * pixel[3];
-        for (sum, level) in self.colour.iter_mut().zip(pixel) {
+        for (sum, level) in self.color.iter_mut().zip(pixel) {
             *sum += weighted * level;
         }
         self.alpha += weighted;
@@ -282,7 +282,7 @@ impl PremultipliedSum {
         if self.alpha <= 0.0 {
             return [0.0; 4];
         }
-        let [r, g, b] = self.colour.map(|sum| sum / self.alpha);
+        let [r, g, b] = self.color.map(|sum| sum / self.alpha);
         [r, g, b, self.alpha / self.weight]
     }
 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use trueup_core::raster::{Photograph, Raster};
 
 /// The photograph at half the size: every sample the mean of 2 x 2. Coordinates are exactly halved; the last column or
-/// row of an odd size averages the samples it has. Colours are weighted by alpha where there is one.
+/// row of an odd size averages the samples it has. Colors are weighted by alpha where there is one.
 pub(crate) fn reduce_by_two(photograph: &Photograph) -> Photograph {
     match photograph {
         Photograph::Eight(raster) => Photograph::Eight(halve(raster, u32::from, |mean| mean as u8)),
@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_under_a_mask_do_not_bleed() {
+    fn colors_under_a_mask_do_not_bleed() {
         let raster = Raster::from_data(2, 1, 4, vec![200_u16, 0, 0, 65535, 9, 9, 9, 0]).expect("two pixels");
         let Photograph::Sixteen(reduced) = reduce_by_two(&Photograph::Sixteen(raster)) else { panic!("same depth") };
         assert_eq!(reduced.data(), [200, 0, 0, 32768]);

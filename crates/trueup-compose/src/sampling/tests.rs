@@ -88,7 +88,7 @@ fn a_widened_kernel_removes_what_the_canvas_cannot_hold() {
 }
 
 #[test]
-fn colours_under_transparency_do_not_show() {
+fn colors_under_transparency_do_not_show() {
     let data = (0..8 * 8).flat_map(|i| if i % 8 < 4 { [180_u8, 90, 30, 255] } else { [0, 255, 0, 0] }).collect();
     let picture = Photograph::Eight(Raster::from_data(8, 8, 4, data).expect("8 x 8"));
     for stretch in [[1.0, 1.0], [1.7, 1.7]] {

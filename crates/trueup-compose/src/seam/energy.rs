@@ -6,7 +6,7 @@ use super::SeamOptions;
 use super::shading::{FRACTION, slopes};
 use super::view::{CLIPPED, IGNORED, KEPT, PARTLY, View, ViewPixel, WHOLLY, luma};
 
-/// Costs are whole numbers; one grey level of 255 is this many.
+/// Costs are whole numbers; one gray level of 255 is this many.
 pub(super) const UNIT: i32 = 16;
 
 /// Cost of a pixel that the user does not want so: no seam that saves it is too long.
@@ -121,9 +121,9 @@ impl<'a> Scene<'a> {
         cost + if unwanted { UNWANTED } else { 0 }
     }
 
-    /// Cost of a seam between neighbouring canvas pixels, `a` shown at `p` and `b` at `q`; 0 for equal labels.
+    /// Cost of a seam between neighboring canvas pixels, `a` shown at `p` and `b` at `q`; 0 for equal labels.
     ///
-    /// The differences at both pixels, of colours, gradients and shading: Kwatra and others, "Graphcut textures", SIGGRAPH
+    /// The differences at both pixels, of colors, gradients and shading: Kwatra and others, "Graphcut textures", SIGGRAPH
     /// 2003, equation 1, with the gradients added instead of divided by: a division draws seams into textured parts,
     /// which in photographs taken from different places fit worst.
     pub(super) fn seam_cost(&self, p: (usize, usize), a: usize, q: (usize, usize), b: usize) -> i32 {
@@ -133,7 +133,7 @@ impl<'a> Scene<'a> {
         self.cost_of(p, q, self.difference(a, b, p) + self.difference(a, b, q))
     }
 
-    /// Cost of a seam between neighbouring pixels from the sum of the differences at both.
+    /// Cost of a seam between neighboring pixels from the sum of the differences at both.
     #[inline]
     pub(super) fn cost_of(&self, p: (usize, usize), q: (usize, usize), difference: i32) -> i32 {
         let (at_p, at_q) = (self.moving[p.1 * self.width + p.0], self.moving[q.1 * self.width + q.0]);
@@ -149,10 +149,10 @@ impl<'a> Scene<'a> {
         if first[3] & second[3] & PARTLY == 0 {
             return UNSEEN;
         }
-        let colour: i32 = (0..3).map(|c| i32::from(first[c].abs_diff(second[c]))).sum();
+        let color: i32 = (0..3).map(|c| i32::from(first[c].abs_diff(second[c]))).sum();
         let (g, h) = (self.gradients[a][i], self.gradients[b][j]);
         let gradient: i32 = (0..2).map(|axis| i32::from(g[axis] - h[axis]).abs()).sum();
-        let mut difference = colour * UNIT / 3 + gradient * self.gradient_weight / 2;
+        let mut difference = color * UNIT / 3 + gradient * self.gradient_weight / 2;
         if !self.slopes.is_empty() {
             let (g, h) = (self.slopes[a][i], self.slopes[b][j]);
             let slope: i32 = (0..2).map(|axis| (i32::from(g[axis]) - i32::from(h[axis])).abs()).sum();
@@ -162,7 +162,7 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Grey levels as a cost.
+/// Gray levels as a cost.
 fn in_units(levels: f64) -> i32 {
     (levels * f64::from(UNIT)).round() as i32
 }

@@ -94,7 +94,7 @@ impl Expansions {
                 }
             }
         }
-        // Neighbours left of and above the box.
+        // Neighbors left of and above the box.
         for x in columns.clone() {
             if rows.start > 0 {
                 self.join(scene, labels, label, (columns, rows), [(x, rows.start - 1), (x, rows.start)], DOWN);
@@ -120,7 +120,7 @@ impl Expansions {
         changed
     }
 
-    /// Adds the cost of a seam between neighbouring pixels p and q. A node on the sink's side takes the new label.
+    /// Adds the cost of a seam between neighboring pixels p and q. A node on the sink's side takes the new label.
     fn join(
         &mut self,
         scene: &Scene<'_>,

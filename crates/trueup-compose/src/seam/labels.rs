@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::moving::neighbours;
+use super::moving::neighbors;
 use super::view::{PARTLY, View, WHOLLY};
 use super::{Label, NOBODY};
 
@@ -77,7 +77,7 @@ impl Seams {
                 }
                 let (x, y) = (at % self.width, at / self.width);
                 let near = (y.saturating_sub(1)..(y + 2).min(self.height))
-                    .flat_map(|v| neighbours(x, self.width, self.turn).map(move |u| (u, v)))
+                    .flat_map(|v| neighbors(x, self.width, self.turn).map(move |u| (u, v)))
                     .map(|(u, v)| old[v * self.width + u]);
                 // NOBODY is the largest label.
                 self.labels[at] = near.min().unwrap_or(NOBODY);

@@ -1,4 +1,4 @@
-//! Minimum cut of a grid whose nodes are joined to their four neighbours and to the two terminals.
+//! Minimum cut of a grid whose nodes are joined to their four neighbors and to the two terminals.
 //!
 //! # Source
 //! Boykov, Kolmogorov, "An experimental comparison of min-cut/max-flow algorithms for energy minimization in vision",
@@ -11,7 +11,7 @@
 
 use std::collections::VecDeque;
 
-/// Directions to the four neighbours: right, down, left, up. `direction ^ 2` leads back.
+/// Directions to the four neighbors: right, down, left, up. `direction ^ 2` leads back.
 pub(super) const RIGHT: usize = 0;
 pub(super) const DOWN: usize = 1;
 
@@ -31,7 +31,7 @@ pub(super) struct GridFlow {
     stride: usize,
     /// Residual capacity from the source (above zero) or to the sink (below zero).
     excess: Vec<i32>,
-    /// Residual capacities to the four neighbours.
+    /// Residual capacities to the four neighbors.
     residual: Vec<[i32; 4]>,
     tree: Vec<u8>,
     parent: Vec<u8>,
@@ -72,15 +72,15 @@ impl GridFlow {
         self.excess[node] = self.excess[node].saturating_add(amount);
     }
 
-    /// Makes it cost `there` to have `node` on the source's side and its neighbour in `direction` on the sink's, and `back`
+    /// Makes it cost `there` to have `node` on the source's side and its neighbor in `direction` on the sink's, and `back`
     /// for the reverse; both at least 0.
     pub(super) fn add_arcs(&mut self, node: usize, direction: usize, there: i32, back: i32) {
-        let other = self.neighbour(node, direction);
+        let other = self.neighbor(node, direction);
         self.residual[node][direction] += there;
         self.residual[other][direction ^ 2] += back;
     }
 
-    fn neighbour(&self, node: usize, direction: usize) -> usize {
+    fn neighbor(&self, node: usize, direction: usize) -> usize {
         match direction {
             RIGHT => node + 1,
             DOWN => node + self.stride,
@@ -94,7 +94,7 @@ impl GridFlow {
     fn growth_capacity(&self, node: usize, direction: usize) -> i32 {
         match self.tree[node] {
             SOURCE => self.residual[node][direction],
-            _ => self.residual[self.neighbour(node, direction)][direction ^ 2],
+            _ => self.residual[self.neighbor(node, direction)][direction ^ 2],
         }
     }
 
@@ -137,13 +137,13 @@ impl GridFlow {
         }
     }
 
-    /// Extends the tree of `node` to its free neighbours; returns the direction of an arc to the other tree.
+    /// Extends the tree of `node` to its free neighbors; returns the direction of an arc to the other tree.
     fn grow(&mut self, node: usize) -> Option<usize> {
         for direction in 0..4 {
             if self.growth_capacity(node, direction) <= 0 {
                 continue;
             }
-            let other = self.neighbour(node, direction);
+            let other = self.neighbor(node, direction);
             if self.tree[other] == FREE {
                 self.tree[other] = self.tree[node];
                 self.join(other, direction ^ 2, node);
@@ -166,7 +166,7 @@ impl GridFlow {
 
     /// Pushes what fits along the path that the arc from `node` in `direction` closes.
     fn augment(&mut self, node: usize, direction: usize) {
-        let other = self.neighbour(node, direction);
+        let other = self.neighbor(node, direction);
         // The arc runs from the source's tree to the sink's.
         let (from, along, to) =
             if self.tree[node] == SOURCE { (node, direction, other) } else { (other, direction ^ 2, node) };
@@ -174,7 +174,7 @@ impl GridFlow {
         let mut at = from;
         while self.parent[at] < TERMINAL {
             let up = usize::from(self.parent[at]);
-            at = self.neighbour(at, up);
+            at = self.neighbor(at, up);
             amount = amount.min(self.residual[at][up ^ 2]);
         }
         amount = amount.min(self.excess[at]);
@@ -182,7 +182,7 @@ impl GridFlow {
         while self.parent[at] < TERMINAL {
             let up = usize::from(self.parent[at]);
             amount = amount.min(self.residual[at][up]);
-            at = self.neighbour(at, up);
+            at = self.neighbor(at, up);
         }
         amount = amount.min(-self.excess[at]);
 
@@ -190,7 +190,7 @@ impl GridFlow {
         at = from;
         while self.parent[at] < TERMINAL {
             let up = usize::from(self.parent[at]);
-            let above = self.neighbour(at, up);
+            let above = self.neighbor(at, up);
             self.push(above, up ^ 2, amount);
             if self.residual[above][up ^ 2] == 0 {
                 self.orphan(at);
@@ -205,7 +205,7 @@ impl GridFlow {
         while self.parent[at] < TERMINAL {
             let up = usize::from(self.parent[at]);
             self.push(at, up, amount);
-            let above = self.neighbour(at, up);
+            let above = self.neighbor(at, up);
             if self.residual[at][up] == 0 {
                 self.orphan(at);
             }
@@ -218,7 +218,7 @@ impl GridFlow {
     }
 
     fn push(&mut self, node: usize, direction: usize, amount: i32) {
-        let other = self.neighbour(node, direction);
+        let other = self.neighbor(node, direction);
         self.residual[node][direction] -= amount;
         self.residual[other][direction ^ 2] += amount;
     }
@@ -236,7 +236,7 @@ impl GridFlow {
             let mut best: Option<(u32, usize)> = None;
             for direction in 0..4 {
                 if self.capacity_from_parent(node, direction) > 0
-                    && let Some(distance) = self.distance_to_terminal(self.neighbour(node, direction), tree)
+                    && let Some(distance) = self.distance_to_terminal(self.neighbor(node, direction), tree)
                     && best.is_none_or(|(least, _)| distance < least)
                 {
                     best = Some((distance, direction));
@@ -249,7 +249,7 @@ impl GridFlow {
                 continue;
             }
             for direction in 0..4 {
-                let other = self.neighbour(node, direction);
+                let other = self.neighbor(node, direction);
                 if self.tree[other] != tree {
                     continue;
                 }
@@ -268,7 +268,7 @@ impl GridFlow {
     /// Residual capacity of the tree arc between `node` and a possible parent in `direction`.
     fn capacity_from_parent(&self, node: usize, direction: usize) -> i32 {
         match self.tree[node] {
-            SOURCE => self.residual[self.neighbour(node, direction)][direction ^ 2],
+            SOURCE => self.residual[self.neighbor(node, direction)][direction ^ 2],
             _ => self.residual[node][direction],
         }
     }
@@ -286,7 +286,7 @@ impl GridFlow {
             match self.parent[at] {
                 TERMINAL => break 1,
                 ORPHAN | NOBODY => return None,
-                up => at = self.neighbour(at, usize::from(up)),
+                up => at = self.neighbor(at, usize::from(up)),
             }
             steps += 1;
         };
@@ -299,7 +299,7 @@ impl GridFlow {
             if self.parent[at] >= TERMINAL {
                 break;
             }
-            at = self.neighbour(at, usize::from(self.parent[at]));
+            at = self.neighbor(at, usize::from(self.parent[at]));
             left -= 1;
         }
         Some(distance + steps)

@@ -39,12 +39,12 @@ trueup_core::options! {
         band_px: usize = 3, between(1.0, 64.0), "px";
         /// Rounds over all photographs on the coarse canvas, at most.
         rounds: usize = 2, between(1.0, 100.0), "";
-        /// Cost of a seam for its length alone, grey levels of difference. Higher makes seams shorter.
+        /// Cost of a seam for its length alone, gray levels of difference. Higher makes seams shorter.
         length: f64 = 2.0, between(0.0, 255.0), "level";
-        /// Weight of the difference of gradients beside that of colours. Higher keeps seams from crossing contours that do
+        /// Weight of the difference of gradients beside that of colors. Higher keeps seams from crossing contours that do
         /// not meet.
         gradient_weight: f64 = 1.0, between(0.0, 100.0), "";
-        /// Weight of the difference of shading beside that of colours: of how the brightness changes over a few pixels, averaged
+        /// Weight of the difference of shading beside that of colors: of how the brightness changes over a few pixels, averaged
         /// along a line. Higher keeps seams from where only a step could join the photographs.
         shading_weight: f64 = 3.0, between(0.0, 100.0), "";
         /// Pixels of the seams' canvas over which shading is averaged to either side; half of it across.
@@ -173,8 +173,8 @@ fn search(
             clock += 1;
             last_try[label] = clock;
             if expansions.expand(scene, &mut labels, label, (&view.columns, &view.rows), &|_| true) {
-                for (other, neighbour) in scene.views.iter().enumerate() {
-                    if other != label && view.meets(neighbour, scene.turn) {
+                for (other, neighbor) in scene.views.iter().enumerate() {
+                    if other != label && view.meets(neighbor, scene.turn) {
                         last_change[other] = clock;
                     }
                 }

@@ -19,7 +19,7 @@ pub(super) fn moving_things(
 ) -> Vec<u32> {
     let mut difference = vec![0_u8; width * height];
     for y in 0..height {
-        // Photographs whose box meets the row; neighbours in their order are compared.
+        // Photographs whose box meets the row; neighbors in their order are compared.
         let met: Vec<&View> = views.iter().filter(|view| view.rows.contains(&y)).collect();
         for x in 0..width {
             let mut last: Option<&View> = None;
@@ -39,17 +39,17 @@ pub(super) fn moving_things(
     label_parts(&difference, [width, height], turn, options.moving_low, options.moving_high)
 }
 
-/// Smallest difference of `a` at (x, y) from `b` at that pixel and its eight neighbours, mean of the channels.
+/// Smallest difference of `a` at (x, y) from `b` at that pixel and its eight neighbors, mean of the channels.
 fn unlike(a: &View, b: &View, (x, y): (usize, usize), turn: usize) -> u8 {
     let Some(at) = a.index_around(x, y, turn) else { return 0 };
-    let colour = a.pixels[at];
+    let color = a.pixels[at];
     let mut least = u16::MAX;
     for v in y.saturating_sub(1)..=y + 1 {
-        for u in neighbours(x, usize::MAX, turn) {
+        for u in neighbors(x, usize::MAX, turn) {
             if let Some(index) = b.index_around(u, v, turn) {
                 let other = b.pixels[index];
                 if other[3] & WHOLLY != 0 {
-                    least = least.min((0..3).map(|c| u16::from(colour[c].abs_diff(other[c]))).sum());
+                    least = least.min((0..3).map(|c| u16::from(color[c].abs_diff(other[c]))).sum());
                 }
             }
         }
@@ -58,7 +58,7 @@ fn unlike(a: &View, b: &View, (x, y): (usize, usize), turn: usize) -> u8 {
 }
 
 /// A column and those beside it, of `width` columns; on a cylinder of `turn` columns both are there.
-pub(super) fn neighbours(x: usize, width: usize, turn: usize) -> impl Iterator<Item = usize> {
+pub(super) fn neighbors(x: usize, width: usize, turn: usize) -> impl Iterator<Item = usize> {
     let around = move |x: usize| if turn > 0 { x % turn } else { x };
     let first = if turn > 0 { x + turn - 1 } else { x.saturating_sub(1) };
     let end = if turn > 0 { x + turn + 2 } else { (x + 2).min(width) };
@@ -79,7 +79,7 @@ fn label_parts(difference: &[u8], [width, height]: [usize; 2], turn: usize, low:
         while let Some(at) = open.pop_front() {
             let (x, y) = (at % width, at / width);
             for v in y.saturating_sub(1)..(y + 2).min(height) {
-                for u in neighbours(x, width, turn) {
+                for u in neighbors(x, width, turn) {
                     let next = v * width + u;
                     if number[next] == 0 && f64::from(difference[next]) >= low {
                         number[next] = parts;

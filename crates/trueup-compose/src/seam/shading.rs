@@ -4,11 +4,11 @@ use rayon::prelude::*;
 
 use super::view::{View, WHOLLY, luma};
 
-/// Parts of a grey level in which slopes are counted.
+/// Parts of a gray level in which slopes are counted.
 pub(super) const FRACTION: i32 = 64;
 
 /// For every pixel of every view, across and down: the mean brightness on one side minus that on the other, in
-/// [`FRACTION`]s of a grey level; 0 where one side shows nothing.
+/// [`FRACTION`]s of a gray level; 0 where one side shows nothing.
 ///
 /// The sides are `reach / 2` pixels deep, at least one, and reach `reach` pixels to either side along the line between
 /// them. Where two photographs differ in this, a panorama cannot go over from one to the other without a slope that

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::distance::border_distances;
 
-/// What is known of one pixel of a [`View`] beside its colour.
+/// What is known of one pixel of a [`View`] beside its color.
 ///
 /// The photograph covers it in part.
 pub const PARTLY: u8 = 1;

@@ -24,7 +24,7 @@ pub(crate) struct Contribution<'a> {
     pub(crate) combine: Combine,
 }
 
-/// Linearises `samples` (red, green, blue, alpha from 0 to 255), weighs them and joins them to the canvas pixels `sums`.
+/// Linearizes `samples` (red, green, blue, alpha from 0 to 255), weighs them and joins them to the canvas pixels `sums`.
 pub(crate) fn accumulate(
     contribution: Contribution<'_>,
     positions: &Positions,
@@ -49,7 +49,7 @@ fn accumulate_portable(
     const PER_LEVEL: f32 = 1.0 / 255.0;
     let Contribution { feather, light, border_footprint, combine } = contribution;
     let (gain, varies) = (light.gain, light.varies());
-    let linearise = light.linearise.as_ref();
+    let linearize = light.linearize.as_ref();
     let length = sums.len();
     let (columns, rows) = (&positions.column[..length], &positions.row[..length]);
     let (fractions_x, fractions_y) = (&positions.fraction_x[..length], &positions.fraction_y[..length]);
@@ -66,7 +66,7 @@ fn accumulate_portable(
         let inside = if combine == Combine::Equal { 1.0 } else { feather.at(column, row, fraction_x, fraction_y) };
         let weight = weight(share, inside);
         let lift = if varies { light.at(column as f32 + 0.5 + fraction_x, row as f32 + 0.5 + fraction_y) } else { 1.0 };
-        let light = |level: f32, gain: f32| exposed(linearise.linear(level), gain * lift);
+        let light = |level: f32, gain: f32| exposed(linearize.linear(level), gain * lift);
         let (r, g, b) = (light(r, gain[0]), light(g, gain[1]), light(b, gain[2]));
         let sum = &mut sums[index];
         *sum = [sum[0] + r * weight, sum[1] + g * weight, sum[2] + b * weight, sum[3] + weight];
@@ -99,7 +99,7 @@ fn develop_portable(development: Development<'_>, positions: &Positions, samples
     const PER_LEVEL: f32 = 1.0 / 255.0;
     let Development { feather, light, border_footprint } = development;
     let (gain, varies) = (light.gain, light.varies());
-    let linearise = light.linearise.as_ref();
+    let linearize = light.linearize.as_ref();
     let length = samples.len();
     let (columns, rows) = (&positions.column[..length], &positions.row[..length]);
     let (fractions_x, fractions_y) = (&positions.fraction_x[..length], &positions.fraction_y[..length]);
@@ -112,7 +112,7 @@ fn develop_portable(development: Development<'_>, positions: &Positions, samples
             share *= feather.coverage(position, footprint);
         }
         let lift = if varies { light.at(position[0], position[1]) } else { 1.0 };
-        let root = |level: f32, gain: f32| exposed(linearise.linear(level), gain * lift).sqrt();
+        let root = |level: f32, gain: f32| exposed(linearize.linear(level), gain * lift).sqrt();
         *sample = [root(r, gain[0]), root(g, gain[1]), root(b, gain[2]), share];
     }
 }

@@ -27,7 +27,7 @@ fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
 
 impl InverseBilinear {
     /// For the cell with the given corners (top left, top right, bottom right, bottom left, canvas pixels), whose top left
-    /// is `source` in the photograph and whose extent there is `source_size`; `y` is the row's pixel centre.
+    /// is `source` in the photograph and whose extent there is `source_size`; `y` is the row's pixel center.
     pub(crate) fn new(corners: [[f64; 2]; 4], source: [f64; 2], source_size: [f64; 2], y: f64) -> Self {
         let [a, b, c, d] = corners;
         let e = [b[0] - a[0], b[1] - a[1]];
@@ -81,7 +81,7 @@ pub(crate) fn invert_row(cell: &InverseBilinear, first: usize, positions: &mut P
     invert_row_portable(cell, first, positions);
 }
 
-/// A whole number within the range of `i32` as one; a plain cast checks the range and is not vectorised.
+/// A whole number within the range of `i32` as one; a plain cast checks the range and is not vectorized.
 #[inline(always)]
 fn low_bits(whole: f64) -> i32 {
     // Adding 1.5 * 2^52 leaves the whole number in the low bits of the mantissa.

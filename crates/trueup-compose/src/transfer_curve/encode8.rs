@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, LazyLock};
 
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 
 use super::table_of;
 

@@ -1,19 +1,19 @@
-//! The transfer curve of the panorama's colour space, both ways, by table.
+//! The transfer curve of the panorama's color space, both ways, by table.
 //!
 //! The tables of sRGB's curve are made once; those of another curve when they are asked for, which takes less than a
 //! millisecond.
 
 mod encode16;
 mod encode8;
-mod linearise;
+mod linearize;
 
 use std::sync::{Arc, LazyLock, OnceLock};
 
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 
 pub(crate) use encode8::{Encode, EncodeRoots};
 pub(crate) use encode16::{Encode16, EncodeRoots16};
-pub(crate) use linearise::Linearise;
+pub(crate) use linearize::Linearize;
 
 /// The table of a curve: sRGB's own if it is that, else a new one.
 fn table_of<T>(curve: &TransferCurve, srgb: &LazyLock<Arc<T>>, new: impl Fn(&TransferCurve) -> T) -> Arc<T> {
@@ -24,7 +24,7 @@ fn table_of<T>(curve: &TransferCurve, srgb: &LazyLock<Arc<T>>, new: impl Fn(&Tra
 #[derive(Debug, Clone)]
 pub(crate) struct Encoding {
     curve: TransferCurve,
-    /// The colour profile's own curve, where pixels are light by another one.
+    /// The color profile's own curve, where pixels are light by another one.
     profile: Option<TransferCurve>,
     pub(crate) linear: Arc<Encode>,
     pub(crate) roots: Arc<EncodeRoots>,
@@ -39,12 +39,12 @@ impl Encoding {
         Self { linear, roots, linear16: OnceLock::new(), roots16: OnceLock::new(), curve, profile: None }
     }
 
-    /// The same for a picture with the colour profile of `profile`, whatever light its pixels hold.
+    /// The same for a picture with the color profile of `profile`, whatever light its pixels hold.
     pub(crate) fn of_profile(self, profile: &TransferCurve) -> Self {
         Self { profile: (self.curve != *profile).then(|| profile.clone()), ..self }
     }
 
-    /// The colour profile's linear light of what the curve takes for `light`.
+    /// The color profile's linear light of what the curve takes for `light`.
     pub(crate) fn profile_light(&self, light: f32) -> f32 {
         match &self.profile {
             Some(profile) => profile.linear(self.curve.encoded(f64::from(light))) as f32,

@@ -11,9 +11,9 @@ fn curves() -> Vec<TransferCurve> {
 #[test]
 fn every_level_survives_the_round_trip() {
     for curve in curves() {
-        let (linearise, encoding) = (Linearise::of(&curve), Encoding::new(curve.clone()));
+        let (linearize, encoding) = (Linearize::of(&curve), Encoding::new(curve.clone()));
         for level in 0..=255_u8 {
-            let linear = linearise.linear(f32::from(level));
+            let linear = linearize.linear(f32::from(level));
             assert_eq!(encoding.linear.level(linear), level, "{curve:?}");
             assert_eq!(encoding.roots.level((linear.sqrt() * 65535.0 + 0.5) as u16), level, "{curve:?}");
         }
@@ -69,7 +69,7 @@ fn sixteen_bits_are_off_by_hardly_more_than_half_a_level() {
     }
 }
 
-/// The roots of neighbouring levels differ; a level that passes through them comes back to within the root's own step.
+/// The roots of neighboring levels differ; a level that passes through them comes back to within the root's own step.
 #[test]
 fn sixteen_bits_pass_through_roots() {
     let encode = EncodeRoots16::of(&TransferCurve::SRGB);
@@ -85,16 +85,16 @@ fn sixteen_bits_pass_through_roots() {
 #[test]
 fn linear_light_between_levels_follows_the_formula() {
     for curve in curves() {
-        let linearise = Linearise::of(&curve);
+        let linearize = Linearize::of(&curve);
         // The others have kinks.
         let tolerance = if curve == TransferCurve::SRGB { 2e-7 } else { 4e-6 };
         for step in 0..=25_500 {
             let level = step as f32 / 100.0;
             let exact = curve.linear(f64::from(level) / 255.0);
-            assert!((f64::from(linearise.linear(level)) - exact).abs() < tolerance, "{curve:?} {level}");
+            assert!((f64::from(linearize.linear(level)) - exact).abs() < tolerance, "{curve:?} {level}");
         }
-        assert_eq!(linearise.linear(-9.0), 0.0);
-        assert_eq!(linearise.linear(400.0), 1.0);
-        assert_eq!(linearise.linear(f32::NAN), 0.0);
+        assert_eq!(linearize.linear(-9.0), 0.0);
+        assert_eq!(linearize.linear(400.0), 1.0);
+        assert_eq!(linearize.linear(f32::NAN), 0.0);
     }
 }

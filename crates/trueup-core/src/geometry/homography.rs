@@ -61,7 +61,7 @@ impl Homography {
 
     /// The map through four points; `None` if three of them are collinear (up to rounding).
     pub fn from_four_points(source: &[Vector2<f64>; 4], target: &[Vector2<f64>; 4]) -> Option<Self> {
-        let (source_norm, target_norm) = (Normalisation::of(source)?, Normalisation::of(target)?);
+        let (source_norm, target_norm) = (Normalization::of(source)?, Normalization::of(target)?);
         let mut system = SMatrix::<f64, 8, 8>::zeros();
         let mut right = SVector::<f64, 8>::zeros();
         for k in 0..4 {
@@ -75,11 +75,11 @@ impl Homography {
             right[2 * k + 1] = -rows[1][8];
         }
         let h = system.lu().solve(&right)?;
-        let normalised = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], 1.0);
-        finite(Self(target_norm.inverse() * normalised * source_norm.matrix()))
+        let normalized = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], 1.0);
+        finite(Self(target_norm.inverse() * normalized * source_norm.matrix()))
     }
 
-    /// The weighted algebraic least-squares map (DLT with Hartley's normalisation); `None` with fewer than four
+    /// The weighted algebraic least-squares map (DLT with Hartley's normalization); `None` with fewer than four
     /// points or a degenerate configuration.
     ///
     /// # Source
@@ -88,7 +88,7 @@ impl Homography {
         if source.len() < 4 || source.len() != target.len() {
             return None;
         }
-        let (source_norm, target_norm) = (Normalisation::of(source)?, Normalisation::of(target)?);
+        let (source_norm, target_norm) = (Normalization::of(source)?, Normalization::of(target)?);
         let mut normal = SMatrix::<f64, 9, 9>::zeros();
         for k in 0..source.len() {
             let weight = weights.map_or(1.0, |weights| weights[k]);
@@ -101,8 +101,8 @@ impl Homography {
         let eigen = normal.symmetric_eigen();
         let smallest = eigen.eigenvalues.imin();
         let h = eigen.eigenvectors.column(smallest);
-        let normalised = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]);
-        finite(Self(target_norm.inverse() * normalised * source_norm.matrix()))
+        let normalized = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]);
+        finite(Self(target_norm.inverse() * normalized * source_norm.matrix()))
     }
 }
 
@@ -123,37 +123,37 @@ fn finite(homography: Homography) -> Option<Homography> {
     scaled.iter().all(|entry| entry.is_finite()).then_some(Homography(scaled))
 }
 
-/// Hartley's normalisation of a point set: centroid to the origin, mean distance to sqrt(2).
+/// Hartley's normalization of a point set: centroid to the origin, mean distance to sqrt(2).
 #[derive(Debug, Clone, Copy)]
-pub struct Normalisation {
-    centre: Vector2<f64>,
+pub struct Normalization {
+    center: Vector2<f64>,
     scale: f64,
 }
 
-impl Normalisation {
-    /// The normalisation of `points`; `None` if they coincide or there are none.
+impl Normalization {
+    /// The normalization of `points`; `None` if they coincide or there are none.
     pub fn of(points: &[Vector2<f64>]) -> Option<Self> {
         const COINCIDENT: f64 = 1e-9;
         let count = points.len() as f64;
-        let centre = points.iter().sum::<Vector2<f64>>() / count;
-        let spread = points.iter().map(|point| (point - centre).norm()).sum::<f64>() / count;
-        (spread > COINCIDENT).then(|| Self { centre, scale: std::f64::consts::SQRT_2 / spread })
+        let center = points.iter().sum::<Vector2<f64>>() / count;
+        let spread = points.iter().map(|point| (point - center).norm()).sum::<f64>() / count;
+        (spread > COINCIDENT).then(|| Self { center, scale: std::f64::consts::SQRT_2 / spread })
     }
 
-    /// A point in normalised coordinates.
+    /// A point in normalized coordinates.
     pub fn apply(&self, point: Vector2<f64>) -> Vector2<f64> {
-        (point - self.centre) * self.scale
+        (point - self.center) * self.scale
     }
 
-    /// `normalised_from_point` as a matrix.
+    /// `normalized_from_point` as a matrix.
     pub fn matrix(&self) -> Matrix3<f64> {
-        let (s, c) = (self.scale, self.centre);
+        let (s, c) = (self.scale, self.center);
         Matrix3::new(s, 0.0, -s * c.x, 0.0, s, -s * c.y, 0.0, 0.0, 1.0)
     }
 
-    /// `point_from_normalised` as a matrix.
+    /// `point_from_normalized` as a matrix.
     pub fn inverse(&self) -> Matrix3<f64> {
-        let (s, c) = (1.0 / self.scale, self.centre);
+        let (s, c) = (1.0 / self.scale, self.center);
         Matrix3::new(s, 0.0, c.x, 0.0, s, c.y, 0.0, 0.0, 1.0)
     }
 }

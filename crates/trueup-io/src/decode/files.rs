@@ -3,14 +3,14 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 use trueup_core::mask::Masks;
 use trueup_core::raster::Photograph;
 use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
 use trueup_core::{Error, Result};
 
 use super::{WorkingPicture, photograph, reduce_photograph};
-use crate::colour::PhotographColours;
+use crate::color::PhotographColors;
 
 /// Photographs in files. What [`working`](Self::working) decodes is kept, within a budget of bytes, until
 /// [`photograph`](PhotographSource::photograph) asks for it, so that a small set is decoded once.
@@ -21,7 +21,7 @@ pub struct FilePhotographs {
     images: Vec<SourceImage>,
     /// By index; those beyond the end have none.
     masks: Vec<Masks>,
-    colours: Option<PhotographColours>,
+    colors: Option<PhotographColors>,
     kept: Mutex<Kept>,
     /// Bytes that the samples of each took when it was decoded; 0 before.
     bytes: Vec<AtomicUsize>,
@@ -40,7 +40,7 @@ impl FilePhotographs {
         let photographs = images.iter().map(|_| None).collect();
         let bytes = images.iter().map(|_| AtomicUsize::new(0)).collect();
         let kept = Mutex::new(Kept { photographs, free_bytes: cache_bytes });
-        Self { images, masks: Vec::new(), colours: None, bytes, kept }
+        Self { images, masks: Vec::new(), colors: None, bytes, kept }
     }
 
     /// The same with what the photographer wants of the photographs' parts, in their order.
@@ -49,14 +49,14 @@ impl FilePhotographs {
         Self { masks, ..self }
     }
 
-    /// In one colour space: `colours` are those of the same photographs. Without, samples are handed out as they are.
-    pub fn in_colours(self, colours: PhotographColours) -> Self {
-        Self { colours: Some(colours), ..self }
+    /// In one color space: `colors` are those of the same photographs. Without, samples are handed out as they are.
+    pub fn in_colors(self, colors: PhotographColors) -> Self {
+        Self { colors: Some(colors), ..self }
     }
 
-    /// The colour space that photographs are handed out in, if it was asked for.
-    pub fn colours(&self) -> Option<&PhotographColours> {
-        self.colours.as_ref()
+    /// The color space that photographs are handed out in, if it was asked for.
+    pub fn colors(&self) -> Option<&PhotographColors> {
+        self.colors.as_ref()
     }
 
     /// The photographs this hands out, in order.
@@ -89,7 +89,7 @@ impl FilePhotographs {
 
     fn decode(&self, index: usize, image: &SourceImage) -> Result<Photograph> {
         let mut photograph = photograph(image)?;
-        if let Some(conversion) = self.colours.as_ref().and_then(|colours| colours.conversion(index)) {
+        if let Some(conversion) = self.colors.as_ref().and_then(|colors| colors.conversion(index)) {
             photograph = conversion.apply(photograph, &image.name)?;
         }
         if let Some(bytes) = self.bytes.get(index) {
@@ -143,6 +143,6 @@ impl PhotographSource for FilePhotographs {
     }
 
     fn transfer_curve(&self) -> TransferCurve {
-        self.colours.as_ref().map_or(TransferCurve::SRGB, |colours| colours.transfer_curve().clone())
+        self.colors.as_ref().map_or(TransferCurve::SRGB, |colors| colors.transfer_curve().clone())
     }
 }

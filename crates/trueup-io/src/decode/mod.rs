@@ -24,7 +24,7 @@ pub(crate) use tiff_kinds::{Kind as TiffKind, inspect as inspect_tiff};
 pub struct WorkingPicture {
     /// Rec. 601 luma of the encoded values, 0 to 255, one channel: the whole pixels inside the working frame.
     pub gray: Raster<f32>,
-    /// A small RGB picture for comparing colours and for reports: the whole pixels inside `thumbnail_frame`.
+    /// A small RGB picture for comparing colors and for reports: the whole pixels inside `thumbnail_frame`.
     pub thumbnail: Raster<u8>,
     /// Size and scale of the thumbnail; its corner is the photograph's corner, like that of the working frame.
     pub thumbnail_frame: WorkingFrame,

@@ -77,7 +77,7 @@ fn spans(length: usize, scale: f64, target_length: usize) -> Vec<Span> {
 }
 
 /// Reduces `source` by `scale` to `width` x `height` pixels from the corner (0, 0). The result is gray (from one channel)
-/// or RGB (from three, and from four with the colours multiplied by alpha), 0 to 255.
+/// or RGB (from three, and from four with the colors multiplied by alpha), 0 to 255.
 ///
 /// Columns are averaged first, whole rows at a time: that runs through memory in order and in vector registers, and
 /// leaves the rows, which do not, with the few rows that remain.
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn alpha_weighs_the_colours() {
+    fn alpha_weighs_the_colors() {
         let source = Raster::from_data(2, 1, 4, vec![200_u8, 100, 50, 255, 200, 100, 50, 0]).expect("8 samples");
         let reduced = area_average(&source, 0.5, 1, 1);
         assert_eq!(reduced.channels(), 3);

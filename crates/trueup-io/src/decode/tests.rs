@@ -142,10 +142,10 @@ fn every_kind_of_jpeg_is_decoded_but_none_that_is_cut_off() {
     }
 }
 
-/// Optimised tables make the encoder write a scan per component. The coefficients are the same, so that the pixels are,
-/// but for how colour is interpolated.
+/// Optimized tables make the encoder write a scan per component. The coefficients are the same, so that the pixels are,
+/// but for how color is interpolated.
 #[test]
-fn jpegs_with_a_scan_per_component_and_reduced_colour_are_decoded() {
+fn jpegs_with_a_scan_per_component_and_reduced_color_are_decoded() {
     let folder = TempDir::new().expect("a temporary folder");
     let smooth = |x: u32, y: u32| [x * 5, y * 7, 100 + x].map(|value| value as u8);
     let pixels: Vec<u8> = (0..HEIGHT).flat_map(|y| (0..WIDTH).flat_map(move |x| smooth(x, y))).collect();

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::{CompressionMethod, PhotometricInterpretation, SampleFormat, Tag};
 use tiff::{ColorType, TiffError, TiffResult};
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 use trueup_core::raster::{Photograph, Raster};
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
@@ -25,7 +25,7 @@ const YCBCR_COEFFICIENTS: Tag = Tag::Unknown(529);
 pub(crate) struct TiffFacts {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Bits of a sample; of a palette's colours.
+    /// Bits of a sample; of a palette's colors.
     pub(crate) bits: u16,
     pub(crate) kind: Kind,
 }
@@ -43,7 +43,7 @@ pub(crate) enum Kind {
     SmallGray(u8),
     /// Gray and alpha.
     GrayAlpha,
-    /// Brightness and two colour differences.
+    /// Brightness and two color differences.
     YCbCr,
 }
 
@@ -80,15 +80,15 @@ fn facts<R: Read + Seek>(decoder: &mut Decoder<R>) -> TiffResult<TiffFacts> {
         ColorType::Gray(bits @ (2 | 4)) => facts(8, Kind::SmallGray(bits)),
         ColorType::Multiband { bit_depth: 8 | 16, num_samples: 2 } => facts(bits, Kind::GrayAlpha),
         ColorType::YCbCr(8) => {
-            check_colour_resolution(decoder)?;
+            check_color_resolution(decoder)?;
             facts(8, Kind::YCbCr)
         }
         _ => facts(bits, Kind::General),
     })
 }
 
-/// Refuses colour differences stored at a lower resolution, unless within JPEG.
-fn check_colour_resolution<R: Read + Seek>(decoder: &mut Decoder<R>) -> TiffResult<()> {
+/// Refuses color differences stored at a lower resolution, unless within JPEG.
+fn check_color_resolution<R: Read + Seek>(decoder: &mut Decoder<R>) -> TiffResult<()> {
     let compression = decoder.find_tag_unsigned::<u16>(Tag::Compression)?;
     let sampling = decoder.find_tag_unsigned_vec::<u16>(Tag::ChromaSubsampling)?;
     if compression == Some(CompressionMethod::ModernJPEG.to_u16()) || sampling == Some(vec![1, 1]) {
@@ -247,7 +247,7 @@ fn palette(image: &SourceImage, mut bytes: Vec<u8>, found: TiffFacts, bits: u8) 
     let Samples::Eight(packed) = Samples::read(image, &mut decoder, found)? else {
         return Err(damaged(image, "its samples are not what its header says"));
     };
-    // Colours have 16 bits; some programs write 8.
+    // Colors have 16 bits; some programs write 8.
     let small = colors.iter().all(|&color| color <= u16::from(u8::MAX));
     let eight = |color: u16| if small { color as u8 } else { ((u32::from(color) + 128) / 257) as u8 };
     let rgb = |index: u8| [0, count, 2 * count].map(|first| eight(colors[first + usize::from(index)]));

@@ -160,7 +160,7 @@ fn photograph_error(image: &SourceImage) -> String {
 }
 
 #[test]
-fn colour_differences_become_colours() {
+fn color_differences_become_colors() {
     let form = Form { photometric: 6, bits: &[8; 3], sampling: Some([1, 1]), ..Form::default() };
     // Rec. 601: 0.299 R + 0.587 G + 0.114 B, (B - Y) / 1.772 + 128, (R - Y) / 1.402 + 128 of 200, 100, 50.
     let samples: Vec<u8> = [124, 86, 182].repeat(SIDE * SIDE);

@@ -16,27 +16,27 @@ pub enum Background {
     Auto,
     /// Transparent; formats without transparency are refused.
     Transparent,
-    /// A colour, in every format: levels of red, green and blue in the colour space of the file.
-    Colour([u8; 3]),
+    /// A color, in every format: levels of red, green and blue in the color space of the file.
+    Color([u8; 3]),
 }
 
-/// Colours that have names.
+/// Colors that have names.
 const NAMED: [(&str, Background); 3] =
     [("black", Background::BLACK), ("gray", Background::GRAY), ("white", Background::WHITE)];
 
 impl Background {
     /// Black.
-    pub const BLACK: Self = Self::Colour([0; 3]);
+    pub const BLACK: Self = Self::Color([0; 3]);
     /// Middle gray.
-    pub const GRAY: Self = Self::Colour([128; 3]);
+    pub const GRAY: Self = Self::Color([128; 3]);
     /// White.
-    pub const WHITE: Self = Self::Colour([255; 3]);
+    pub const WHITE: Self = Self::Color([255; 3]);
 
     /// The levels that transparent parts are laid over.
     pub(super) fn levels(self) -> [u8; 3] {
         match self {
             Self::Auto | Self::Transparent => [0; 3],
-            Self::Colour(levels) => levels,
+            Self::Color(levels) => levels,
         }
     }
 
@@ -45,7 +45,7 @@ impl Background {
         match alpha {
             Alpha::Keep => true,
             Alpha::Drop => false,
-            Alpha::Auto => !matches!(self, Self::Colour(_)),
+            Alpha::Auto => !matches!(self, Self::Color(_)),
         }
     }
 }
@@ -56,11 +56,11 @@ impl FromStr for Background {
     /// `auto`, `transparent`, a name, or red, green and blue in hexadecimal digits, two or one each: `#ff8800`, `#f80`.
     fn from_str(text: &str) -> Result<Self, String> {
         let lower = text.trim().to_ascii_lowercase();
-        let named = || NAMED.iter().find(|(name, _)| *name == lower).map(|(_, colour)| *colour);
+        let named = || NAMED.iter().find(|(name, _)| *name == lower).map(|(_, color)| *color);
         match lower.as_str() {
             "auto" => Some(Self::Auto),
             "transparent" => Some(Self::Transparent),
-            _ => lower.strip_prefix('#').and_then(levels_of).map(Self::Colour).or_else(named),
+            _ => lower.strip_prefix('#').and_then(levels_of).map(Self::Color).or_else(named),
         }
         .ok_or_else(|| format!("\"{text}\" is no background; allowed are {}", Self::choices().join(", ")))
     }
@@ -81,12 +81,12 @@ fn levels_of(digits: &str) -> Option<[u8; 3]> {
 impl fmt::Display for Background {
     /// As it can be read again.
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = NAMED.iter().find(|(_, colour)| colour == self).map(|(name, _)| *name);
+        let name = NAMED.iter().find(|(_, color)| color == self).map(|(name, _)| *name);
         match (self, name) {
             (Self::Auto, _) => formatter.write_str("auto"),
             (Self::Transparent, _) => formatter.write_str("transparent"),
-            (Self::Colour(_), Some(name)) => formatter.write_str(name),
-            (Self::Colour([r, g, b]), None) => write!(formatter, "#{r:02x}{g:02x}{b:02x}"),
+            (Self::Color(_), Some(name)) => formatter.write_str(name),
+            (Self::Color([r, g, b]), None) => write!(formatter, "#{r:02x}{g:02x}{b:02x}"),
         }
     }
 }
@@ -120,7 +120,7 @@ impl OptionValue for Background {
             ("gray", "Middle gray, #808080."),
             ("white", "White."),
             ("#rgb", "Red, green and blue, a hexadecimal digit each: #f80 is #ff8800."),
-            ("#rrggbb", "The same with two digits each, in the colour space of the file."),
+            ("#rrggbb", "The same with two digits each, in the color space of the file."),
         ]
         .map(|(name, meaning)| ChoiceDescription::new(name, &[meaning]))
         .to_vec()
@@ -132,14 +132,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colours_are_read_as_people_write_them_and_written_back() {
+    fn colors_are_read_as_people_write_them_and_written_back() {
         for (text, background, back) in [
             ("auto", Background::Auto, "auto"),
             ("Transparent", Background::Transparent, "transparent"),
             ("gray", Background::GRAY, "gray"),
             ("#ffffff", Background::WHITE, "white"),
-            ("#F80", Background::Colour([255, 136, 0]), "#ff8800"),
-            (" #0a1B2c ", Background::Colour([10, 27, 44]), "#0a1b2c"),
+            ("#F80", Background::Color([255, 136, 0]), "#ff8800"),
+            (" #0a1B2c ", Background::Color([10, 27, 44]), "#0a1b2c"),
         ] {
             assert_eq!(text.parse(), Ok(background), "{text}");
             assert_eq!(background.to_string(), back);
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_colour_leaves_nothing_transparent_unless_alpha_is_wanted() {
+    fn a_color_leaves_nothing_transparent_unless_alpha_is_wanted() {
         assert!(Background::Auto.keeps(Alpha::Auto) && Background::Transparent.keeps(Alpha::Auto));
         assert!(!Background::WHITE.keeps(Alpha::Auto) && Background::WHITE.keeps(Alpha::Keep));
         assert!(!Background::Auto.keeps(Alpha::Drop));

@@ -135,7 +135,7 @@ fn labels_are_the_samples() {
             let mut colors: Vec<[u8; 3]> = palette.as_chunks::<3>().0.to_vec();
             colors.sort_unstable();
             colors.dedup();
-            assert_eq!(colors.len(), 256, "colours are distinct");
+            assert_eq!(colors.len(), 256, "colors are distinct");
         }
     }
     let failed = labels::write_map(

@@ -10,7 +10,7 @@ const LOSSY: f64 = 0.1;
 /// The same without loss, for every byte of a sample.
 const LOSSLESS: f64 = 0.8;
 /// Channels of a pixel without transparency.
-const COLOURS: f64 = 3.0;
+const COLORS: f64 = 3.0;
 
 /// Bytes that a panorama of `width` x `height` pixels will take in `path`, a file or the files of a Deep Zoom pyramid: exact
 /// where nothing is compressed and nothing transparent, else at the low end of what photographs take. 0 for formats that are
@@ -22,7 +22,7 @@ pub fn expected_bytes(path: &Path, width: usize, height: usize, options: &Output
         Some(OutputFormat::DeepZoom) if options.dzi_format == DeepZoomFormat::Png => LOSSLESS,
         Some(OutputFormat::DeepZoom | OutputFormat::Picture(PictureFormat::Jpeg)) => LOSSY,
         Some(OutputFormat::Picture(PictureFormat::Tiff)) if options.tiff_compression == TiffCompression::None => {
-            COLOURS * sample_bytes
+            COLORS * sample_bytes
         }
         Some(OutputFormat::Picture(_)) => LOSSLESS * sample_bytes,
     };

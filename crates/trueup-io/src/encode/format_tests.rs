@@ -152,9 +152,9 @@ fn strips_hold_every_depth() {
 }
 
 #[test]
-fn dropped_alpha_and_chosen_colours_show_the_background() {
+fn dropped_alpha_and_chosen_colors_show_the_background() {
     let picture = Gradient { width: 20, height: 20 };
-    let orange = Background::Colour([255, 136, 0]);
+    let orange = Background::Color([255, 136, 0]);
     let cases = [
         (Alpha::Drop, Background::WHITE, Some([255; 3])),
         (Alpha::Drop, Background::Auto, Some([0; 3])),

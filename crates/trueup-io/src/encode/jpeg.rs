@@ -98,7 +98,7 @@ fn encode_strip(
     Ok(coded)
 }
 
-/// Sets how finely colour is stored.
+/// Sets how finely color is stored.
 pub(super) fn set_sampling<W: JfifWrite>(encoder: &mut Encoder<W>, options: &OutputOptions) {
     encoder.set_sampling_factor(match options.jpeg_subsampling {
         ChromaSubsampling::Full => SamplingFactor::F_1_1,

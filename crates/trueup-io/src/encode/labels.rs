@@ -53,7 +53,7 @@ pub fn check_labels_place(path: &Path) -> Result<()> {
 
 /// Writes labels to a PNG at `path`; returns its length in bytes.
 ///
-/// Up to 255 photographs are indices into a palette of distinct colours, of which index 0 is transparent; more are 16-bit
+/// Up to 255 photographs are indices into a palette of distinct colors, of which index 0 is transparent; more are 16-bit
 /// gray. Either way the samples are the labels, and text chunks `Photograph N` hold the names. The file appears complete or
 /// not at all.
 ///
@@ -85,7 +85,7 @@ pub(super) fn write_map(
         encoder.set_color(ColorType::Indexed);
         encoder.set_depth(BitDepth::Eight);
         encoder.set_palette(palette(names.len()));
-        // All other colours are opaque.
+        // All other colors are opaque.
         encoder.set_trns(vec![0]);
     } else {
         encoder.set_color(ColorType::Grayscale);
@@ -116,7 +116,7 @@ pub(super) fn write_map(
     Ok(())
 }
 
-/// Black, then a colour for every photograph: hues a golden angle apart, so that neighbours in number differ most, in three
+/// Black, then a color for every photograph: hues a golden angle apart, so that neighbors in number differ most, in three
 /// brightnesses.
 fn palette(photographs: usize) -> Vec<u8> {
     const GOLDEN: f64 = 0.618_033_988_749_895;

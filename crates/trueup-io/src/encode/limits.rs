@@ -47,10 +47,10 @@ fn check_background(path: &Path, format: OutputFormat, options: &OutputOptions) 
     let hint = match format {
         _ if options.background != Background::Transparent => return Ok(()),
         OutputFormat::Picture(PictureFormat::Jpeg) => {
-            "End the name in .png, .tif or .webp, or leave the background at auto, or choose a colour."
+            "End the name in .png, .tif or .webp, or leave the background at auto, or choose a color."
         }
         OutputFormat::DeepZoom if options.dzi_format == DeepZoomFormat::Jpeg => {
-            "Set output.dzi_format to png, or leave the background at auto, or choose a colour."
+            "Set output.dzi_format to png, or leave the background at auto, or choose a color."
         }
         _ if options.alpha == Alpha::Drop => "Leave output.alpha at auto.",
         OutputFormat::DeepZoom | OutputFormat::Picture(_) => return Ok(()),

@@ -2,9 +2,9 @@
 
 use std::borrow::Cow;
 
-use crate::colour::srgb_profile;
+use crate::color::srgb_profile;
 
-/// EXIF, colour profile and XMP to be written into a file. Without a profile the picture is in sRGB, and is marked so.
+/// EXIF, color profile and XMP to be written into a file. Without a profile the picture is in sRGB, and is marked so.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Metadata {
     /// An EXIF block: a TIFF structure from its byte order mark on.

@@ -32,7 +32,7 @@ use trueup_core::options::StageOptions;
 use trueup_core::raster::RowSource;
 use trueup_core::{Error, Result, StageContext};
 
-use crate::colour::{InSrgb, is_srgb};
+use crate::color::{InSrgb, is_srgb};
 use crate::format::{OutputFormat, PictureFormat};
 
 use codecs::from_tiff;
@@ -58,11 +58,11 @@ pub use unfinished::abandon_unfinished;
 /// Writes a panorama to `path`, in the format its extension names; returns the file's length in bytes, for Deep Zoom that
 /// of all files.
 ///
-/// `metadata` describes the picture: its colour profile, which [`OutputOptions::profile`] may have it converted from, and
+/// `metadata` describes the picture: its color profile, which [`OutputOptions::profile`] may have it converted from, and
 /// the EXIF and XMP to embed; Deep Zoom has none.
 ///
 /// Rows are asked for in strips, in parallel on the current thread pool; only WebP needs a copy of the whole. JPEG is
-/// laid over the background, the other formats keep transparency unless [`OutputOptions::background`] is a colour or
+/// laid over the background, the other formats keep transparency unless [`OutputOptions::background`] is a color or
 /// [`OutputOptions::alpha`] says otherwise. A depth of [`Depth::Auto`] is taken for 8 bits, see
 /// [`OutputOptions::with_depth_for`]. The bytes written depend on the picture and the options alone. The file is written
 /// under another name in the same folder and renamed when it is complete, so that on any error nothing is left behind and

@@ -7,7 +7,7 @@ use crate::format::{OutputFormat, PictureFormat};
 use super::Background;
 
 trueup_core::choice! {
-    /// How finely JPEG stores colour, relative to brightness.
+    /// How finely JPEG stores color, relative to brightness.
     pub enum ChromaSubsampling {
         /// As finely as brightness.
         Full = "4:4:4",
@@ -47,7 +47,7 @@ trueup_core::choice! {
 trueup_core::choice! {
     /// Whether pictures are written with transparency.
     pub enum Alpha {
-        /// Where it is not certain that every pixel is opaque, and no colour is chosen for the background.
+        /// Where it is not certain that every pixel is opaque, and no color is chosen for the background.
         Auto = "auto",
         /// Always, where the format can.
         Keep = "keep",
@@ -111,11 +111,11 @@ trueup_core::choice! {
 }
 
 trueup_core::choice! {
-    /// Which colour space panoramas are written in.
+    /// Which color space panoramas are written in.
     pub enum OutputProfile {
         /// That of the photographs, whose profile is embedded.
         Keep = "keep",
-        /// sRGB, for places that ignore profiles; colours it does not have are clipped.
+        /// sRGB, for places that ignore profiles; colors it does not have are clipped.
         Srgb = "srgb",
     }
 }
@@ -127,7 +127,7 @@ trueup_core::choice! {
         Keep = "keep",
         /// All but the place.
         NoLocation = "no-location",
-        /// Nothing. The colour profile and the crop of a spherical panorama, which viewers need, are written all the same.
+        /// Nothing. The color profile and the crop of a spherical panorama, which viewers need, are written all the same.
         None = "none",
     }
 }
@@ -152,7 +152,7 @@ trueup_core::options! {
         alpha: Alpha = Alpha::Auto, Allowed::Any, "";
         /// JPEG quality on the usual scale of the Independent JPEG Group.
         jpeg_quality: u8 = 92, between(1.0, 100.0), "";
-        /// How finely JPEG stores colour.
+        /// How finely JPEG stores color.
         jpeg_subsampling: ChromaSubsampling = ChromaSubsampling::Quarter, Allowed::Any, "";
         /// How hard PNG compression tries.
         png_compression: PngCompression = PngCompression::Fast, Allowed::Any, "";
@@ -166,15 +166,15 @@ trueup_core::options! {
         tiff_big: BigTiff = BigTiff::Auto, Allowed::Any, "";
         /// Side of Deep Zoom tiles, without what overlaps.
         dzi_tile_px: usize = 254, between(16.0, 8192.0), "px";
-        /// By how much Deep Zoom tiles reach into their neighbours.
+        /// By how much Deep Zoom tiles reach into their neighbors.
         dzi_overlap_px: usize = 1, between(0.0, 8.0), "px";
         /// Format of Deep Zoom tiles.
         dzi_format: DeepZoomFormat = DeepZoomFormat::Jpeg, Allowed::Any, "";
         /// How large the pages of a file of layers are.
         layer_extent: LayerExtent = LayerExtent::Canvas, Allowed::Any, "";
-        /// What shows where no photograph is. A colour is laid under the panorama in every format, unless alpha is kept.
+        /// What shows where no photograph is. A color is laid under the panorama in every format, unless alpha is kept.
         background: Background = Background::Auto, Allowed::Any, "";
-        /// Which colour space panoramas are written in. Deep Zoom tiles and floating point samples are in sRGB's.
+        /// Which color space panoramas are written in. Deep Zoom tiles and floating point samples are in sRGB's.
         profile: OutputProfile = OutputProfile::Keep, Allowed::Any, "";
         /// What panoramas tell of their photographs, in EXIF and XMP.
         metadata: MetadataKept = MetadataKept::Keep, Allowed::Any, "";

@@ -15,7 +15,7 @@ const RGBA: usize = 4;
 pub(super) struct Tiling {
     /// Side of a tile without overlap, in pixels.
     pub(super) side: usize,
-    /// Pixels by which a tile reaches into its neighbours.
+    /// Pixels by which a tile reaches into its neighbors.
     pub(super) overlap: usize,
 }
 
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn tiles_overlap_their_neighbours_only() {
+    fn tiles_overlap_their_neighbors_only() {
         let tiling = Tiling { side: 254, overlap: 1 };
         assert_eq!((tiling.span(0, 600), tiling.span(1, 600), tiling.span(2, 600)), (0..255, 253..509, 507..600));
         assert_eq!((tiling.count(508), tiling.count(509), tiling.count(1)), (2, 3, 1));

@@ -1,7 +1,7 @@
 //! Samples on their way from a picture into a file, at any depth.
 
 use trueup_core::Result;
-use trueup_core::colour::TransferCurve;
+use trueup_core::color::TransferCurve;
 use trueup_core::raster::RowSource;
 
 use super::Background;
@@ -162,10 +162,10 @@ mod tests {
         // 200 / 255 and 55 / 255 of 40, 60 and 80 over 1, 2 and 3, rounded.
         assert_eq!(u8::over([40, 60, 80, 200], [1, 2, 3]), [32, 47, 63]);
         assert_eq!(u16::over([9, 9, 9, 0], u16::of(Background::WHITE)), [65535; 3]);
-        assert_eq!(u16::of(Background::Colour([128, 1, 0])), [128 * 257, 257, 0]);
+        assert_eq!(u16::of(Background::Color([128, 1, 0])), [128 * 257, 257, 0]);
         assert_eq!(f32::over([1.0, 0.5, 0.0, 0.5], [1.0, 1.0, 0.5]), [1.0, 0.75, 0.25]);
         // IEC 61966-2-1:1999, equation 6: ((128 / 255 + 0.055) / 1.055)^2.4.
-        let [r, g, b] = f32::of(Background::Colour([128, 0, 255]));
+        let [r, g, b] = f32::of(Background::Color([128, 0, 255]));
         assert!((r - 0.215_861).abs() < 1e-6 && g == 0.0 && b == 1.0, "{r} {g} {b}");
     }
 

@@ -38,7 +38,7 @@ pub(crate) struct ExifFields {
     /// Model, trimmed.
     pub(crate) model: Option<String>,
     /// ColorSpace: 1 sRGB, 65535 uncalibrated, by some cameras 2 for Adobe RGB.
-    pub(crate) colour_space: Option<u32>,
+    pub(crate) color_space: Option<u32>,
     /// InteroperabilityIndex, trimmed; not read from a TIFF's own directories.
     pub(crate) interoperability: Option<String>,
 }
@@ -62,7 +62,7 @@ impl ExifFields {
             focal_plane_unit: value(Tag::FocalPlaneResolutionUnit).and_then(|value| value.get_uint(0)),
             make: text(Tag::Make),
             model: text(Tag::Model),
-            colour_space: value(Tag::ColorSpace).and_then(|value| value.get_uint(0)),
+            color_space: value(Tag::ColorSpace).and_then(|value| value.get_uint(0)),
             interoperability: text(Tag::InteroperabilityIndex),
         }
     }
@@ -89,7 +89,7 @@ impl ExifFields {
         fields.focal_mm = number(FOCAL_LENGTH);
         fields.focal_35mm = number(FOCAL_LENGTH_IN_35MM_FILM);
         fields.focal_plane_resolution = number(FOCAL_PLANE_X_RESOLUTION);
-        fields.colour_space = number(COLOR_SPACE).map(|space| space as u32);
+        fields.color_space = number(COLOR_SPACE).map(|space| space as u32);
         fields.focal_plane_unit = number(FOCAL_PLANE_RESOLUTION_UNIT).map(|unit| unit as u32);
         Some(fields)
     }

@@ -69,7 +69,7 @@ impl Told {
     }
 }
 
-/// The metadata of a panorama but for its colour profile. Photographs whose EXIF cannot be read tell nothing.
+/// The metadata of a panorama but for its color profile. Photographs whose EXIF cannot be read tell nothing.
 pub fn describe(subject: &Subject<'_>, kept: MetadataKept) -> Metadata {
     if kept == MetadataKept::None {
         let nothing = gpano::Facts::default();

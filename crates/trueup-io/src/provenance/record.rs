@@ -73,8 +73,8 @@ const VERSION: &[u8] = b"0232";
 
 /// The version that every block states.
 const FLASHPIX: &[u8] = b"0100";
-/// Colour samples lie in the middle of the pixels they belong to, as means of them do.
-const CENTRED: u16 = 1;
+/// Color samples lie in the middle of the pixels they belong to, as means of them do.
+const CENTERD: u16 = 1;
 /// The order of components: Y, Cb, Cr, none.
 const YCBCR: [u8; 4] = [1, 2, 3, 0];
 
@@ -112,8 +112,8 @@ pub(super) fn fields(
     }
     add(Tag::ResolutionUnit, Value::Short(vec![INCH]));
     add(Tag::FlashpixVersion, Value::Undefined(FLASHPIX.to_vec(), 0));
-    // How a JPEG stores colours; the other formats have no such thing, and readers pass over it.
-    add(Tag::YCbCrPositioning, Value::Short(vec![CENTRED]));
+    // How a JPEG stores colors; the other formats have no such thing, and readers pass over it.
+    add(Tag::YCbCrPositioning, Value::Short(vec![CENTERD]));
     add(Tag::ComponentsConfiguration, Value::Undefined(YCBCR.to_vec(), 0));
     if let Some(moment) = earliest {
         add(Tag::DateTimeOriginal, ascii(&moment.local));

@@ -1,4 +1,4 @@
-//! Recognises a file that was given twice and files with the same bytes.
+//! Recognizes a file that was given twice and files with the same bytes.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};

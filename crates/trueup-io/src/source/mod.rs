@@ -10,7 +10,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::options::StageOptions;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
@@ -22,6 +22,7 @@ use duplicates::Accepted;
 use inputs::Candidate;
 
 pub use inputs::natural_order;
+pub use names::unique_names;
 
 /// The largest file that is opened. Files are read into memory to be decoded; no photograph is this large.
 const MAX_FILE_BYTES: u64 = 4 << 30;
@@ -113,7 +114,7 @@ pub fn scan(inputs: &[String], options: &SourceOptions, context: &StageContext) 
     options.check()?;
     let candidates = inputs::expand(inputs);
     let paths: Vec<&Path> = candidates.iter().map(Candidate::path).collect();
-    let names = names::unique_names(&paths);
+    let names = unique_names(&paths);
 
     context.progress().begin(SourceOptions::STAGE, candidates.len() as u64);
     let mut sources = Sources::default();
@@ -121,7 +122,8 @@ pub fn scan(inputs: &[String], options: &SourceOptions, context: &StageContext) 
     for (candidate, name) in candidates.into_iter().zip(names) {
         context.check_cancelled()?;
         let path = candidate.path().to_owned();
-        match examine(candidate, &name, options, &mut accepted, context) {
+        let number = sources.images.len();
+        match examine(candidate, &name, number, options, &mut accepted, context) {
             Ok(image) => sources.images.push(image),
             Err(Rejection { code, reason, hint }) => {
                 sources.rejected.push(RejectedSource { path, name, code: code.to_owned(), reason, hint });
@@ -142,10 +144,11 @@ pub fn files(inputs: &[String]) -> Vec<PathBuf> {
     inputs::expand(inputs).into_iter().filter_map(file).collect()
 }
 
-/// Decides over one candidate.
+/// Decides over one candidate, which is to be photograph `number`.
 fn examine(
     candidate: Candidate,
     name: &str,
+    number: usize,
     options: &SourceOptions,
     accepted: &mut Accepted,
     context: &StageContext,
@@ -155,7 +158,7 @@ fn examine(
         Candidate::File(path) => path,
     };
     let (mut file, length) = open(&path)?;
-    let format = recognise(&mut file, length)?;
+    let format = recognize(&mut file, length)?;
     let header = read_header(&file, format).map_err(|error| match error {
         HeaderError::Damaged(words) => Rejection::new(
             "picture-damaged",
@@ -172,7 +175,7 @@ fn examine(
     if header.is_float {
         context.report(Diagnostic::note(
             "floating-point",
-            name,
+            Subject::Photograph(number),
             "its samples are floating point numbers, taken for linear light with 1 for white; what is brighter is white",
             "If it looks wrong, export it with 16 bits a sample.",
         ));
@@ -189,7 +192,7 @@ fn examine(
         TagVerdict::Applied(tag) if (1..=8).contains(&tag) => tag,
         TagVerdict::Applied(_) => 1,
         TagVerdict::Stale => {
-            context.report(stale_tag_note(name, &header));
+            context.report(stale_tag_note(number, &header));
             1
         }
     };
@@ -202,11 +205,11 @@ fn examine(
     Ok(SourceImage { path, name: name.to_owned(), width, height, orientation, focal_prior, camera_model })
 }
 
-fn stale_tag_note(name: &str, header: &Header) -> Diagnostic {
+fn stale_tag_note(number: usize, header: &Header) -> Diagnostic {
     let tag = header.exif.orientation.unwrap_or(1);
     Diagnostic::note(
         "orientation-tag-stale",
-        name,
+        Subject::Photograph(number),
         format!(
             "the EXIF orientation tag ({tag}, a quarter turn) was not applied: the pixels are stored upright already, \
              {} x {}",
@@ -246,7 +249,7 @@ fn open(path: &Path) -> std::result::Result<(File, u64), Rejection> {
 }
 
 /// Tells the format by the file's first bytes.
-fn recognise(file: &mut File, length: u64) -> std::result::Result<PictureFormat, Rejection> {
+fn recognize(file: &mut File, length: u64) -> std::result::Result<PictureFormat, Rejection> {
     if length == 0 {
         return Err(Rejection::new(
             "file-empty",

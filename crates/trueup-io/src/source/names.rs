@@ -4,7 +4,7 @@ use std::path::Path;
 
 /// For each path its file name, or as many trailing parts of the path as tell it from the others. Paths that are the
 /// same throughout keep the same, whole name.
-pub(crate) fn unique_names(paths: &[&Path]) -> Vec<String> {
+pub fn unique_names(paths: &[&Path]) -> Vec<String> {
     let longest = paths.iter().map(|path| path.components().count()).max().unwrap_or(0);
     let mut parts = vec![1; paths.len()];
     // Each round lengthens the names that still collide; a name can grow by at most the longest path's parts.

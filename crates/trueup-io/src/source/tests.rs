@@ -185,13 +185,17 @@ fn stale_orientation_tags_are_not_applied() {
         let context = StageContext::default();
         let options = SourceOptions { trust_orientation, ..SourceOptions::default() };
         let sources = scan(&inputs, &options, &context).expect("three pictures");
-        let notes: Vec<String> = context.take_diagnostics().into_iter().map(|note| note.code + &note.subject).collect();
+        let notes: Vec<String> = context
+            .findings()
+            .into_iter()
+            .map(|note| format!("{} {}", note.code, note.subject.named(&["true.jpg", "stale.jpg"])))
+            .collect();
         let facts: Vec<_> = sources.images.iter().map(|i| (i.orientation, i.width, i.height)).collect();
         (facts, notes)
     };
     let (auto, notes) = facts(OrientationTrust::Auto);
     assert_eq!(auto, [(8, 24, 32), (1, 24, 32), (3, 24, 32)]);
-    assert_eq!(notes, ["orientation-tag-stalestale.jpg"]);
+    assert_eq!(notes, ["orientation-tag-stale stale.jpg"]);
     assert_eq!(facts(OrientationTrust::Always).0, [(8, 24, 32), (8, 32, 24), (3, 24, 32)]);
     assert_eq!(facts(OrientationTrust::Never).0, [(1, 32, 24), (1, 24, 32), (1, 24, 32)]);
 }

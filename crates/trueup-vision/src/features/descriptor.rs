@@ -22,13 +22,13 @@ const GRID: usize = 16;
 /// Spatial bins that the grid covers.
 const COVERED_BINS: f64 = SPATIAL_BINS as f64 + 1.0;
 
-/// Grey values sampled on a side: the corners of the gradient cells.
+/// Gray values sampled on a side: the corners of the gradient cells.
 const CORNERS: usize = GRID + 1;
 
-/// Largest component of the normalised descriptor (Lowe 2004, section 6.1).
+/// Largest component of the normalized descriptor (Lowe 2004, section 6.1).
 const CLAMP: f32 = 0.2;
 
-/// The factor from a component of the normalised descriptor to its byte (Lowe's implementation).
+/// The factor from a component of the normalized descriptor to its byte (Lowe's implementation).
 const QUANTISATION: f32 = 512.0;
 
 /// Describes the surroundings of a point in a plane whose blur is about `sigma` samples.
@@ -37,7 +37,7 @@ const QUANTISATION: f32 = 512.0;
 /// Lowe 2004, section 6.
 ///
 /// # Departures
-/// Lowe takes the gradients of all pixels around the point and rotates them. Here grey values are sampled on a grid of
+/// Lowe takes the gradients of all pixels around the point and rotates them. Here gray values are sampled on a grid of
 /// [`CORNERS`] x [`CORNERS`] that is already turned and scaled with the point, and gradients are differences on that
 /// grid. Its step is 0.94 times the blur, so that the blur leaves little to see between the samples, and the
 /// weights of interpolation are the same for all points.
@@ -48,7 +48,7 @@ pub(super) struct Describe<'a> {
     pub(super) sigma: f64,
     /// Direction of the point, radians clockwise on the screen from the x axis.
     pub(super) angle: f64,
-    /// Whether to take square roots of the L1-normalised components.
+    /// Whether to take square roots of the L1-normalized components.
     pub(super) root_sift: bool,
 }
 
@@ -59,12 +59,12 @@ impl Kernel for Describe<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) -> Option<Descriptor> {
         let grid = Grid {
-            centre: self.position,
+            center: self.position,
             step: BIN_WIDTH * self.sigma * COVERED_BINS / GRID as f64,
             angle: self.angle,
         };
         let corners = sample::<CORNERS>(self.plane, &grid);
-        quantised(histogram(&corners), self.root_sift)
+        quantized(histogram(&corners), self.root_sift)
     }
 }
 
@@ -127,16 +127,16 @@ static BIN_WEIGHTS: LazyLock<[[f32; GRID]; SPATIAL_BINS]> = LazyLock::new(|| {
     std::array::from_fn(|bin| {
         std::array::from_fn(|line| {
             let place = ((line as f64 + 0.5) / GRID as f64 - 0.5) * COVERED_BINS;
-            let centre = bin as f64 - 0.5 * (SPATIAL_BINS as f64 - 1.0);
+            let center = bin as f64 - 0.5 * (SPATIAL_BINS as f64 - 1.0);
             let window = place / (0.5 * SPATIAL_BINS as f64);
-            ((1.0 - (place - centre).abs()).max(0.0) * (-0.5 * window * window).exp()) as f32
+            ((1.0 - (place - center).abs()).max(0.0) * (-0.5 * window * window).exp()) as f32
         })
     })
 });
 
-/// Normalises, clamps, normalises again and rounds to bytes.
+/// Normalizes, clamps, normalizes again and rounds to bytes.
 #[inline(always)]
-fn quantised(mut histogram: [f32; DESCRIPTOR_LENGTH], root_sift: bool) -> Option<Descriptor> {
+fn quantized(mut histogram: [f32; DESCRIPTOR_LENGTH], root_sift: bool) -> Option<Descriptor> {
     let length = dot(&histogram, &histogram).sqrt();
     if !(length > f32::MIN_POSITIVE && length.is_finite()) {
         return None;

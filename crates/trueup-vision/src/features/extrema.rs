@@ -8,10 +8,10 @@ use super::FeatureOptions;
 use super::scale_space::Octave;
 use super::simd::{InstructionSet, Kernel, Lanes, MAX_LANES};
 
-/// Responses below this many grey levels are rounding errors of a flat picture.
+/// Responses below this many gray levels are rounding errors of a flat picture.
 const ROUNDING_NOISE: f32 = 1e-3;
 
-/// How often an extremum may move to a neighbouring sample before it is given up.
+/// How often an extremum may move to a neighboring sample before it is given up.
 const MAX_MOVES: usize = 5;
 
 /// A move is made when the extremum lies farther than this from the sample, in samples.
@@ -33,14 +33,14 @@ pub(super) struct Extremum {
     pub(super) position: [f64; 2],
     /// Blur in the octave's samples.
     pub(super) sigma: f64,
-    /// Interpolated difference of Gaussians, in grey levels; positive for dark blobs.
+    /// Interpolated difference of Gaussians, in gray levels; positive for dark blobs.
     pub(super) response: f64,
 }
 
 /// All extrema of one octave that pass the peak and edge thresholds, row by row.
 ///
 /// # Source
-/// Lowe 2004, sections 3.1 and 4: 26 neighbours, quadratic fit in position and scale, ratio of principal curvatures.
+/// Lowe 2004, sections 3.1 and 4: 26 neighbors, quadratic fit in position and scale, ratio of principal curvatures.
 ///
 /// # Departures
 /// The place is then fitted once more, in the plane interpolated to the extremum's scale.
@@ -78,7 +78,7 @@ pub(super) fn find(
 /// A sample may fall this much short of the peak threshold, because the interpolated peak is higher.
 const LOOSE_FACTOR: f32 = 0.5;
 
-/// A sample that is the greatest or least of its 27 neighbours.
+/// A sample that is the greatest or least of its 27 neighbors.
 struct Candidate {
     level: usize,
     x: usize,
@@ -89,7 +89,7 @@ struct Candidate {
 struct ScanBand<'a> {
     octave: &'a Octave,
     rows: std::ops::Range<usize>,
-    /// Smallest absolute difference, in grey levels.
+    /// Smallest absolute difference, in gray levels.
     threshold: f32,
 }
 
@@ -115,9 +115,9 @@ impl Kernel for ScanBand<'_> {
             column_extremes::<L>(&recent, differences, padded, &mut extremes);
             for level in 1..differences - 1 {
                 let slot = ((y % 3) * differences + level) * padded;
-                let centre = &recent[slot..slot + padded];
+                let center = &recent[slot..slot + padded];
                 let (greatest, least) = extremes[2 * (level - 1) * padded..][..2 * padded].split_at(padded);
-                compare_row::<L>(centre, greatest, least, self.threshold, planes[0].width, |x| {
+                compare_row::<L>(center, greatest, least, self.threshold, planes[0].width, |x| {
                     found.push(Candidate { level, x, y });
                 });
             }
@@ -141,7 +141,7 @@ fn subtract_row<L: Lanes>(octave: &Octave, y: usize, padded: usize, recent: &mut
     }
 }
 
-/// The greatest and least over three rows and three neighbouring levels, column by column.
+/// The greatest and least over three rows and three neighboring levels, column by column.
 #[inline(always)]
 fn column_extremes<L: Lanes>(recent: &[f32], differences: usize, padded: usize, extremes: &mut [f32]) {
     for x in (0..padded).step_by(L::COUNT) {
@@ -160,10 +160,10 @@ fn column_extremes<L: Lanes>(recent: &[f32], differences: usize, padded: usize, 
     }
 }
 
-/// Calls `found` with the columns, border excluded, where the centre is as great or as small as all its neighbours.
+/// Calls `found` with the columns, border excluded, where the center is as great or as small as all its neighbors.
 #[inline(always)]
 fn compare_row<L: Lanes>(
-    centre: &[f32],
+    center: &[f32],
     greatest: &[f32],
     least: &[f32],
     threshold: f32,
@@ -173,7 +173,7 @@ fn compare_row<L: Lanes>(
     let (positive, negative) = (L::splat(threshold), L::splat(-threshold));
     for x in (0..width).step_by(L::COUNT) {
         let at = MAX_LANES + x;
-        let value = L::load(centre, at);
+        let value = L::load(center, at);
         let (bright, dark) = (value.at_least(positive), negative.at_least(value));
         if bright | dark == 0 {
             continue;

@@ -29,7 +29,7 @@ use simd::InstructionSet;
 /// Length of a SIFT descriptor: 4 x 4 spatial bins of 8 orientations.
 pub const DESCRIPTOR_LENGTH: usize = 128;
 
-/// A SIFT descriptor, quantised to bytes.
+/// A SIFT descriptor, quantized to bytes.
 pub type Descriptor = [u8; DESCRIPTOR_LENGTH];
 
 /// A place that looks distinctive at one scale.
@@ -39,7 +39,7 @@ pub struct FeaturePoint {
     pub position: [f64; 2],
     /// Standard deviation of the Gaussian at which it was found, in the picture's pixels.
     pub scale_px: f64,
-    /// Absolute difference-of-Gaussians response, in grey levels of 0 to 255.
+    /// Absolute difference-of-Gaussians response, in gray levels of 0 to 255.
     pub response: f64,
 }
 
@@ -51,7 +51,7 @@ pub struct FeaturePoint {
 pub struct Features {
     /// The points, strongest response first.
     pub points: Vec<FeaturePoint>,
-    /// The descriptors; those of one point are neighbours, in the order of the points.
+    /// The descriptors; those of one point are neighbors, in the order of the points.
     pub descriptors: Vec<Descriptor>,
     /// For every descriptor, the index of its point.
     pub descriptor_points: Vec<u32>,
@@ -107,13 +107,13 @@ trueup_core::options! {
         base_sigma: f64 = 1.6, between(0.8, 3.2), "samples";
         /// Blur the picture is assumed to have already.
         nominal_blur_px: f64 = 0.5, between(0.0, 2.0), "px";
-        /// Smallest difference-of-Gaussians response of a point, in grey levels of 0 to 255.
-        peak_threshold: f64 = 0.0, between(0.0, 255.0), "grey levels";
+        /// Smallest difference-of-Gaussians response of a point, in gray levels of 0 to 255.
+        peak_threshold: f64 = 0.0, between(0.0, 255.0), "gray levels";
         /// Largest ratio of the two principal curvatures; points above it lie on edges.
         edge_threshold: f64 = 10.0, between(1.0, 1000.0), "";
         /// Most dominant orientations of a point, each with its own descriptor.
         max_orientations: usize = 4, between(1.0, 18.0), "orientations";
-        /// Whether descriptors are L1-normalised and square-rooted (RootSIFT).
+        /// Whether descriptors are L1-normalized and square-rooted (RootSIFT).
         root_sift: bool = false, Allowed::Any, "";
     }
 }
@@ -124,8 +124,8 @@ const MAX_PIXELS: usize = 1 << 28;
 /// Points described by one task.
 const POINTS_PER_TASK: usize = 64;
 
-/// Rows within which points count as neighbours in the order of work.
-const NEIGHBOUR_ROWS: usize = 16;
+/// Rows within which points count as neighbors in the order of work.
+const NEIGHBOR_ROWS: usize = 16;
 
 /// Finds and describes the features of a picture.
 ///
@@ -179,7 +179,7 @@ fn detect_with(
 /// What [`describe`] finds for each extremum, in their order.
 ///
 /// The work goes from place to place, not from strong to weak: the planes are far larger than any cache, and
-/// neighbours share what is in it.
+/// neighbors share what is in it.
 fn described(
     octaves: &[Octave],
     extrema: &[Extremum],
@@ -189,7 +189,7 @@ fn described(
 ) -> Result<Vec<Option<Described>>> {
     let place = |extremum: &Extremum| {
         let [x, y] = extremum.sample;
-        (extremum.octave, extremum.level, y / NEIGHBOUR_ROWS, x)
+        (extremum.octave, extremum.level, y / NEIGHBOR_ROWS, x)
     };
     let mut order: Vec<usize> = (0..extrema.len()).collect();
     order.sort_by_key(|&index| place(&extrema[index]));
@@ -214,7 +214,7 @@ fn check(image: &Raster<f32>, options: &FeatureOptions) -> Result<()> {
         return Err(Error::input(
             "picture for feature detection",
             format!("it has {} channels", image.channels()),
-            "Give a grey picture of one channel.",
+            "Give a gray picture of one channel.",
         ));
     }
     let pixels = image.data().len() * if options.double_image { 4 } else { 1 };
@@ -253,7 +253,7 @@ fn describe(
         .filter_map(|angle| instructions.run(descriptor::Describe { plane, position, sigma, angle, root_sift }))
         .collect();
     let point = FeaturePoint {
-        // Sample k lies on pixel k * step, whose centre is half a pixel further.
+        // Sample k lies on pixel k * step, whose center is half a pixel further.
         position: position.map(|coordinate| coordinate * octave.step_px + 0.5),
         scale_px: sigma * octave.step_px,
         response: extremum.response.abs(),

@@ -21,7 +21,7 @@ const PEAK_SHARE: f32 = 0.8;
 /// Gradients sampled on a side of the window.
 const GRID: usize = 16;
 
-/// Grey values sampled on a side: the corners of the gradient cells.
+/// Gray values sampled on a side: the corners of the gradient cells.
 const CORNERS: usize = GRID + 1;
 
 /// Finds the directions at a point in a plane whose blur is about `sigma` samples.
@@ -31,7 +31,7 @@ const CORNERS: usize = GRID + 1;
 ///
 /// # Departures
 /// Lowe takes the gradients of all pixels in the window. Here they are taken on a grid of [`GRID`] x [`GRID`] cells that
-/// is centred on the point and 0.5625 times the blur apart, as for the descriptor. The histogram is smoothed.
+/// is centered on the point and 0.5625 times the blur apart, as for the descriptor. The histogram is smoothed.
 pub(super) struct Orientations<'a> {
     pub(super) plane: &'a Plane,
     /// Position (x, y) in samples.
@@ -48,7 +48,7 @@ impl Kernel for Orientations<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) -> Vec<f64> {
         let step = 2.0 * WINDOW_REACH * WINDOW * self.sigma / GRID as f64;
-        let corners = sample::<CORNERS>(self.plane, &Grid { centre: self.position, step, angle: 0.0 });
+        let corners = sample::<CORNERS>(self.plane, &Grid { center: self.position, step, angle: 0.0 });
         peaks(&smoothed(&histogram(&corners)), self.limit)
     }
 }
@@ -57,7 +57,7 @@ impl Kernel for Orientations<'_> {
 #[inline(always)]
 fn histogram(corners: &[[f32; CORNERS]; CORNERS]) -> [f32; BINS] {
     let window = &*WINDOW_WEIGHTS;
-    // Neighbouring cells often fall into one bin; two histograms halve the wait for the previous addition.
+    // Neighboring cells often fall into one bin; two histograms halve the wait for the previous addition.
     let mut histograms = [[0.0_f32; BINS + 2]; 2];
     for v in 0..GRID {
         let (mut weights, turns) = gradients::<CORNERS, GRID>(&corners[v], &corners[v + 1]);

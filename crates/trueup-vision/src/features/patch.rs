@@ -1,18 +1,18 @@
-//! Grey values and gradients on a small grid that is placed, turned and scaled with a point.
+//! Gray values and gradients on a small grid that is placed, turned and scaled with a point.
 
 use super::scale_space::Plane;
 
 /// A square grid in a plane.
 pub(super) struct Grid {
-    /// Centre of the grid (x, y), in the plane's samples.
-    pub(super) centre: [f64; 2],
+    /// Center of the grid (x, y), in the plane's samples.
+    pub(super) center: [f64; 2],
     /// Distance of two grid points, in the plane's samples.
     pub(super) step: f64,
     /// Direction of the grid's first axis, radians clockwise on the screen from the plane's.
     pub(super) angle: f64,
 }
 
-/// Grey values at `N` x `N` grid points, by bilinear interpolation. Outside the picture its edge is continued.
+/// Gray values at `N` x `N` grid points, by bilinear interpolation. Outside the picture its edge is continued.
 #[inline(always)]
 pub(super) fn sample<const N: usize>(plane: &Plane, grid: &Grid) -> [[f32; N]; N] {
     // The last sample is left to the one before it, with a weight of nearly one.
@@ -20,7 +20,7 @@ pub(super) fn sample<const N: usize>(plane: &Plane, grid: &Grid) -> [[f32; N]; N
     let (last_x, last_y) = ((plane.width - 1) as f32 - EDGE, (plane.height - 1) as f32 - EDGE);
     let (sin, cos) = grid.angle.sin_cos();
     let (sin, cos) = ((sin * grid.step) as f32, (cos * grid.step) as f32);
-    let [centre_x, centre_y] = grid.centre.map(|coordinate| coordinate as f32);
+    let [center_x, center_y] = grid.center.map(|coordinate| coordinate as f32);
     let half = (N - 1) as f32 / 2.0;
     let mut values = [[0.0; N]; N];
     for (v, row) in values.iter_mut().enumerate() {
@@ -28,8 +28,8 @@ pub(super) fn sample<const N: usize>(plane: &Plane, grid: &Grid) -> [[f32; N]; N
         let (mut index, mut fraction_x, mut fraction_y) = ([0_u32; N], [0.0_f32; N], [0.0_f32; N]);
         for u in 0..N {
             let offset = u as f32 - half;
-            let x = (centre_x + cos * offset - sin * v).clamp(0.0, last_x);
-            let y = (centre_y + sin * offset + cos * v).clamp(0.0, last_y);
+            let x = (center_x + cos * offset - sin * v).clamp(0.0, last_x);
+            let y = (center_y + sin * offset + cos * v).clamp(0.0, last_y);
             let (whole_x, whole_y) = (x as u32, y as u32);
             index[u] = whole_y * plane.stride as u32 + whole_x;
             fraction_x[u] = x - whole_x as f32;

@@ -177,7 +177,7 @@ pub(super) fn blurred(source: &Plane, sigma: f64, instructions: InstructionSet) 
     target
 }
 
-/// Half of a symmetric kernel: the centre tap, then the taps at distance 1, 2 and so on; the whole sums to one.
+/// Half of a symmetric kernel: the center tap, then the taps at distance 1, 2 and so on; the whole sums to one.
 fn gaussian_taps(sigma: f64) -> Vec<f32> {
     let reach = (KERNEL_REACH * sigma).ceil() as usize;
     let weights = |width: f64| -> Vec<f64> {
@@ -283,9 +283,9 @@ fn convolve<L: Lanes, const N: usize>(
     target: &mut [f32],
     at: usize,
 ) {
-    let centre_tap = L::splat(taps[0]);
-    let centre = &source[before(0)..before(0) + N * L::COUNT];
-    let mut sums: [L; N] = std::array::from_fn(|n| L::load(centre, n * L::COUNT) * centre_tap);
+    let center_tap = L::splat(taps[0]);
+    let center = &source[before(0)..before(0) + N * L::COUNT];
+    let mut sums: [L; N] = std::array::from_fn(|n| L::load(center, n * L::COUNT) * center_tap);
     for (distance, &tap) in taps.iter().enumerate().skip(1) {
         let tap = L::splat(tap);
         let first = &source[before(distance)..before(distance) + N * L::COUNT];

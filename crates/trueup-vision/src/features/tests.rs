@@ -7,22 +7,22 @@ use super::*;
 /// A round Gaussian bump.
 #[derive(Clone, Copy)]
 struct Blob {
-    centre: [f64; 2],
+    center: [f64; 2],
     sigma: f64,
     amplitude: f64,
 }
 
-/// The sum of blobs on mid grey, sampled at the pixel centres.
+/// The sum of blobs on mid gray, sampled at the pixel centers.
 fn render(width: usize, height: usize, blobs: &[Blob]) -> Raster<f32> {
     let mut image = vec![128.0; width * height];
     for blob in blobs {
         let reach = 5.0 * blob.sigma;
-        let range = |centre: f64, size: usize| {
-            (centre - reach).clamp(0.0, size as f64) as usize..(centre + reach).clamp(0.0, size as f64) as usize
+        let range = |center: f64, size: usize| {
+            (center - reach).clamp(0.0, size as f64) as usize..(center + reach).clamp(0.0, size as f64) as usize
         };
-        for y in range(blob.centre[1], height) {
-            for x in range(blob.centre[0], width) {
-                let (dx, dy) = (x as f64 + 0.5 - blob.centre[0], y as f64 + 0.5 - blob.centre[1]);
+        for y in range(blob.center[1], height) {
+            for x in range(blob.center[0], width) {
+                let (dx, dy) = (x as f64 + 0.5 - blob.center[0], y as f64 + 0.5 - blob.center[1]);
                 image[y * width + x] += blob.amplitude * (-0.5 * (dx * dx + dy * dy) / blob.sigma.powi(2)).exp();
             }
         }
@@ -36,7 +36,7 @@ fn texture_blobs(count: usize, size: f64) -> Vec<Blob> {
     let mut generator = StageContext::default().generator("features test", 0);
     (0..count)
         .map(|_| Blob {
-            centre: [generator.random_range(0.0..size), generator.random_range(0.0..size)],
+            center: [generator.random_range(0.0..size), generator.random_range(0.0..size)],
             sigma: 1.3 * generator.random_range(0.0_f64..2.5).exp2(),
             amplitude: generator.random_range(-60.0..60.0),
         })
@@ -57,14 +57,14 @@ fn blobs_are_found_where_they_are() {
         let options = FeatureOptions { double_image, sparse_points: 0, ..FeatureOptions::default() };
         for (sigma, offset) in [(2.6, 0.0), (2.6, 0.31), (3.1, 0.5), (4.0, 0.77), (6.3, 0.12), (9.0, 0.6), (13.0, 0.9)]
         {
-            // Pixel (100, 90) has its centre at (100.5, 90.5).
-            let centre = [100.5 + offset, 90.5 - 0.7 * offset];
-            let image = render(200, 180, &[Blob { centre, sigma, amplitude: 90.0 }]);
+            // Pixel (100, 90) has its center at (100.5, 90.5).
+            let center = [100.5 + offset, 90.5 - 0.7 * offset];
+            let image = render(200, 180, &[Blob { center, sigma, amplitude: 90.0 }]);
             let strongest = find(&image, &options).points[0];
-            let error = distance(strongest.position, centre);
+            let error = distance(strongest.position, center);
             assert!(error < 0.05, "sigma {sigma}, offset {offset}, doubled {double_image}: {error} px");
             // The difference of Gaussians between s and 2^(1/3) s is greatest where their geometric mean is the
-            // blob's own blur (derivative of its response at the blob's centre, with the blur assumed present).
+            // blob's own blur (derivative of its response at the blob's center, with the blur assumed present).
             let expected = (sigma.powi(2) + options.nominal_blur_px.powi(2)).sqrt() * (-1.0_f64 / 6.0).exp2();
             let ratio = strongest.scale_px / expected;
             assert!((0.93..1.07).contains(&ratio), "sigma {sigma}: found {}, expected {expected}", strongest.scale_px);
@@ -84,7 +84,7 @@ fn repeated(angle: f64, scale: f64, options: &FeatureOptions) -> (usize, usize, 
     };
     let moved: Vec<Blob> = blobs
         .iter()
-        .map(|blob| Blob { centre: target_from_source(blob.centre), sigma: scale * blob.sigma, ..*blob })
+        .map(|blob| Blob { center: target_from_source(blob.center), sigma: scale * blob.sigma, ..*blob })
         .collect();
     let source = find(&render(size as usize, size as usize, &blobs), options);
     let target = find(&render(size as usize, size as usize, &moved), options);
@@ -94,8 +94,8 @@ fn repeated(angle: f64, scale: f64, options: &FeatureOptions) -> (usize, usize, 
     for (descriptor, &index) in source.descriptors.iter().zip(&source.descriptor_points) {
         let point = source.points[index as usize];
         let expected = target_from_source(point.position);
-        let from_centre = distance(point.position, [0.5 * size; 2]);
-        if index >= 150 || from_centre * scale.max(1.0) > 80.0 || point.scale_px * scale < smallest {
+        let from_center = distance(point.position, [0.5 * size; 2]);
+        if index >= 150 || from_center * scale.max(1.0) > 80.0 || point.scale_px * scale < smallest {
             continue;
         }
         tested += 1;

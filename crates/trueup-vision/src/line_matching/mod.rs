@@ -7,8 +7,8 @@
 //! The guided line matching of dual-feature warping (Li and others, ICCV 2015), reconstructed.
 //!
 //! # Departures
-//! The description of a segment is the mean grey values of bands beside it, in a few sections along the part that both
-//! pictures show; alike means a high normalised correlation.
+//! The description of a segment is the mean gray values of bands beside it, in a few sections along the part that both
+//! pictures show; alike means a high normalized correlation.
 
 mod strip;
 
@@ -29,7 +29,7 @@ trueup_core::options! {
         max_distance_px: f64 = 5.0, between(0.0, 1000.0), "working px";
         /// Share of the shorter segment, along the line, that the two must have in common.
         min_overlap: f64 = 0.5, between(0.0, 1.0), "";
-        /// Least likeness (normalised correlation) of what lies beside two segments.
+        /// Least likeness (normalized correlation) of what lies beside two segments.
         min_likeness: f64 = 0.7, between(-1.0, 1.0), "";
         /// Largest ratio of the best match's unlikeness to the second best's.
         max_ratio: f64 = 0.8, between(0.0, 1.0), "";
@@ -45,10 +45,10 @@ pub struct LineMatch {
     pub in_b: usize,
 }
 
-/// One picture of a pair: grey values 0 to 255 in one channel, and its segments.
+/// One picture of a pair: gray values 0 to 255 in one channel, and its segments.
 #[derive(Debug, Clone, Copy)]
 pub struct LinedPicture<'a> {
-    /// Grey values.
+    /// Gray values.
     pub gray: &'a Raster<u8>,
     /// Segments in its pixels.
     pub lines: &'a [LineSegment],

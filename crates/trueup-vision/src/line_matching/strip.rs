@@ -20,14 +20,14 @@ pub(super) struct Stretch {
     pub b: [Vector2<f64>; 2],
 }
 
-/// Normalised correlation of what lies beside the stretch in both pictures, -1 to 1; `None` where it leaves a picture or
+/// Normalized correlation of what lies beside the stretch in both pictures, -1 to 1; `None` where it leaves a picture or
 /// has no contrast.
 pub(super) fn likeness(a: &Raster<u8>, b: &Raster<u8>, stretch: &Stretch) -> Option<f64> {
-    let (a, b) = (centred(strip(a, stretch.a)?)?, centred(strip(b, stretch.b)?)?);
+    let (a, b) = (centered(strip(a, stretch.a)?)?, centered(strip(b, stretch.b)?)?);
     Some(a.iter().zip(&b).map(|(a, b)| a * b).sum())
 }
 
-/// Mean grey values of the bands of every section.
+/// Mean gray values of the bands of every section.
 fn strip(gray: &Raster<u8>, [start, end]: [Vector2<f64>; 2]) -> Option<[f64; VALUES]> {
     let along = (end - start).try_normalize(f64::EPSILON)?;
     let across = Vector2::new(-along.y, along.x);
@@ -38,7 +38,7 @@ fn strip(gray: &Raster<u8>, [start, end]: [Vector2<f64>; 2]) -> Option<[f64; VAL
             let middle = start.lerp(&end, share);
             for (band, value) in bands.iter_mut().enumerate() {
                 let offset = (band as f64 - BANDS as f64 + 0.5) * BAND_PX;
-                *value += grey_at(gray, middle + across * offset)? / POINTS as f64;
+                *value += gray_at(gray, middle + across * offset)? / POINTS as f64;
             }
         }
     }
@@ -46,16 +46,16 @@ fn strip(gray: &Raster<u8>, [start, end]: [Vector2<f64>; 2]) -> Option<[f64; VAL
 }
 
 /// Mean 0 and length 1; `None` if all are nearly equal.
-fn centred(values: [f64; VALUES]) -> Option<[f64; VALUES]> {
-    /// Least standard deviation, grey levels.
+fn centered(values: [f64; VALUES]) -> Option<[f64; VALUES]> {
+    /// Least standard deviation, gray levels.
     const FLAT: f64 = 2.0;
     let mean = values.iter().sum::<f64>() / VALUES as f64;
     let norm = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>().sqrt();
     (norm >= FLAT * (VALUES as f64).sqrt()).then(|| values.map(|value| (value - mean) / norm))
 }
 
-/// Bilinear grey value; `None` outside the outermost pixels' centres.
-fn grey_at(gray: &Raster<u8>, point: Vector2<f64>) -> Option<f64> {
+/// Bilinear gray value; `None` outside the outermost pixels' centers.
+fn gray_at(gray: &Raster<u8>, point: Vector2<f64>) -> Option<f64> {
     let (x, y) = (point.x - 0.5, point.y - 0.5);
     let inside = x >= 0.0 && y >= 0.0 && x < gray.width() as f64 - 1.0 && y < gray.height() as f64 - 1.0;
     if !inside {

@@ -8,7 +8,7 @@ use super::*;
 const WIDTH: usize = 400;
 const HEIGHT: usize = 200;
 
-/// Vertical planks from 5 to 14 px wide: their grey values and the edges between them. Every edge is a step, so that
+/// Vertical planks from 5 to 14 px wide: their gray values and the edges between them. Every edge is a step, so that
 /// most look alike but for the planks' brightness.
 fn planks(shift: f64, gain: f64, bias: f64) -> (Raster<u8>, Vec<LineSegment>) {
     let mut generator = StageContext::default().generator("planks", 7);

@@ -13,7 +13,7 @@ const ROWS_PER_TASK: usize = 16;
 
 /// Level lines and gradient magnitudes at the nodes between the pixels of the reduced picture.
 ///
-/// Arrays are padded by one element on every side, which is never aligned with anything, so that neighbours need no
+/// Arrays are padded by one element on every side, which is never aligned with anything, so that neighbors need no
 /// check of the border: the element at column x and row y of the padded arrays lies at (x, y) in corner coordinates of
 /// the reduced picture.
 #[derive(Debug)]
@@ -30,7 +30,7 @@ impl GradientField {
     ///
     /// # Source
     /// IPOL, sections 2.1 to 2.4. The gradient averages two differences on each axis; pixels whose magnitude is not
-    /// above `quantisation / sin(angle_tolerance)` have no direction (their level line is (0, 0)).
+    /// above `quantization / sin(angle_tolerance)` have no direction (their level line is (0, 0)).
     pub(super) fn new(image: &Raster<f32>, options: &LineOptions) -> Self {
         let reduced = reduce(image, options.scale, options.sigma_scale);
         let picture_from_field = 1.0 / options.scale;
@@ -45,7 +45,7 @@ impl GradientField {
             };
         }
         let stride = width + 2;
-        let threshold = (options.quantisation / options.angle_tolerance_deg.to_radians().sin()) as f32;
+        let threshold = (options.quantization / options.angle_tolerance_deg.to_radians().sin()) as f32;
         let mut level_lines = vec![[0.0_f32; 2]; stride * (height + 2)];
         let mut magnitudes = vec![0.0_f32; stride * (height + 2)];
         let inside = stride..stride * (height + 1);
@@ -92,7 +92,7 @@ impl GradientField {
         &self.level_lines
     }
 
-    /// Gradient magnitudes in grey levels per reduced pixel; 0 where there is no level line.
+    /// Gradient magnitudes in gray levels per reduced pixel; 0 where there is no level line.
     pub(super) fn magnitudes(&self) -> &[f32] {
         &self.magnitudes
     }
@@ -148,7 +148,7 @@ fn gradient_row(upper: &[f32], lower: &[f32], threshold: f32, lines: &mut [[f32;
     }
 }
 
-/// The picture smoothed by a Gaussian of `sigma_scale / scale` pixels and sampled at the centres of pixels that are
+/// The picture smoothed by a Gaussian of `sigma_scale / scale` pixels and sampled at the centers of pixels that are
 /// `1 / scale` wide; corners coincide. A scale of 1 only copies.
 fn reduce(image: &Raster<f32>, scale: f64, sigma_scale: f64) -> Raster<f32> {
     if scale >= 1.0 || image.data().is_empty() {
@@ -187,11 +187,11 @@ impl AxisFilter {
         let mut starts = Vec::with_capacity(outputs);
         let mut weights = vec![0.0_f32; outputs * taps];
         for (output, weights) in weights.chunks_exact_mut(taps.max(1)).enumerate() {
-            let centre = (output as f64 + 0.5) / scale;
-            let first = centre.floor() as isize - reach;
+            let center = (output as f64 + 0.5) / scale;
+            let first = center.floor() as isize - reach;
             let start = first.clamp(0, (length - taps) as isize);
             let inputs = first..first + 2 * reach + 2;
-            let weight_of = |input: isize| (-0.5 * ((input as f64 + 0.5 - centre) / sigma).powi(2)).exp();
+            let weight_of = |input: isize| (-0.5 * ((input as f64 + 0.5 - center) / sigma).powi(2)).exp();
             let total: f64 = inputs.clone().map(weight_of).sum();
             for input in inputs {
                 let inside = mirror(input, length as isize) - start;
@@ -244,7 +244,7 @@ mod tests {
         let reduced = reduce(&flat, 0.8, 0.6);
         assert_eq!((reduced.width(), reduced.height()), (8, 5));
         assert!(reduced.data().iter().all(|&sample| (sample - 90.0).abs() < 1e-4));
-        // A ramp of one level a pixel, x + 0.5 at its centres, stays a ramp of the same corner coordinates.
+        // A ramp of one level a pixel, x + 0.5 at its centers, stays a ramp of the same corner coordinates.
         let ramp = Raster::from_data(40, 1, 1, (0..40).map(|x| x as f32 + 0.5).collect()).expect("sizes agree");
         let filter = AxisFilter::new(40, 0.8, 0.6);
         let mut output = vec![0.0; 32];

@@ -2,7 +2,7 @@
 //!
 //! The steps, a file each: `gradient` reduces the picture and finds level-line directions, `region` grows connected
 //! pixels of one direction, `rectangle` fits and improves rectangles, `significance` counts false alarms,
-//! `refine` fits the segment again to sub-pixel edge points of the picture itself, `tidy` drops frame artefacts,
+//! `refine` fits the segment again to sub-pixel edge points of the picture itself, `tidy` drops frame artifacts,
 //! merges and sorts.
 //!
 //! # Source
@@ -13,7 +13,7 @@
 //! * Directions are unit vectors and never angles: a pixel is aligned within `tau` if `|a x b| <= tan(tau) a . b`.
 //!   The decisions are those of the papers; no arc tangent is taken but for the few regions that need a narrower
 //!   tolerance.
-//! * The rectangle keeps both of its sides apart from its axis, and the segment stays on the axis through the centre
+//! * The rectangle keeps both of its sides apart from its axis, and the segment stays on the axis through the center
 //!   of mass when one side is cut away; the papers move the axis to the middle of what remains.
 //! * Tolerances of regrown regions never exceed the first one.
 //! * The border of the picture is mirrored at the edge of its outermost pixels.
@@ -48,9 +48,9 @@ trueup_core::options! {
         scale: f64 = 0.8, between(0.1, 1.0), "";
         /// Standard deviation of the Gaussian that goes with the reduction, in pixels of the reduced picture.
         sigma_scale: f64 = 0.6, between(0.1, 4.0), "reduced px";
-        /// Bound on the error of a grey level by quantisation. Pixels whose gradient could turn by more than
+        /// Bound on the error of a gray level by quantization. Pixels whose gradient could turn by more than
         /// `angle_tolerance_deg` under this error take no part.
-        quantisation: f64 = 2.0, between(0.0, 64.0), "grey levels of 0 to 255";
+        quantization: f64 = 2.0, between(0.0, 64.0), "gray levels of 0 to 255";
         /// How far the level line of a pixel may turn from the direction of its region.
         angle_tolerance_deg: f64 = 22.5, between(1.0, 60.0), "deg";
         /// Smallest -log10 of the number of false alarms a segment may have; 0 admits one false segment a picture.
@@ -66,12 +66,12 @@ trueup_core::options! {
         refine: bool = true, Allowed::Any, "";
         /// Segments shorter than this are not refined: too few edge points.
         refine_min_length_px: f64 = 12.0, between(4.0, 1e6), "px";
-        /// Segments along the picture's frame are artefacts of scans and of earlier warps: dropped if more than
+        /// Segments along the picture's frame are artifacts of scans and of earlier warps: dropped if more than
         /// `border_share` of their length lies within this distance of one border. 0 keeps them all.
         border_distance_px: f64 = 5.0, between(0.0, 1000.0), "px";
         /// See `border_distance_px`.
         border_share: f64 = 0.8, between(0.0, 1.0), "";
-        /// Whether neighbours on one line are joined.
+        /// Whether neighbors on one line are joined.
         merge: bool = false, Allowed::Any, "";
         /// Largest angle between segments that are joined.
         merge_angle_deg: f64 = 2.0, between(0.0, 45.0), "deg";
@@ -90,7 +90,7 @@ const MAX_PIXELS: usize = 1 << 31;
 /// Seeds between two looks at the cancel token.
 const SEEDS_PER_CHECK: usize = 8192;
 
-/// The straight line segments of a picture with one channel of grey levels 0 to 255, longest first.
+/// The straight line segments of a picture with one channel of gray levels 0 to 255, longest first.
 ///
 /// Positions are in the picture's pixels, its corner at (0, 0): a step edge between columns c - 1 and c lies at x = c.
 /// Segments are directed so that the brighter side is on their right on the screen (travelling up, brighter towards
@@ -128,7 +128,7 @@ fn check(image: &Raster<f32>, options: &LineOptions) -> Result<()> {
         return Err(Error::input(
             "picture for line detection",
             format!("{} channels", image.channels()),
-            "Give one channel of grey levels 0 to 255.",
+            "Give one channel of gray levels 0 to 255.",
         ));
     }
     if image.data().len() > MAX_PIXELS {

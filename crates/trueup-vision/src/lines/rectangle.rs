@@ -15,26 +15,26 @@ const MIN_IMPROVED_WIDTH_PX: f64 = 0.5;
 /// The narrowest rectangle of a region: a row of pixels is one pixel wide.
 const MIN_WIDTH_PX: f64 = 1.0;
 
-/// Pixel centres this close outside a rectangle count as inside: those that define its sides must.
+/// Pixel centers this close outside a rectangle count as inside: those that define its sides must.
 const BOUNDARY_SLACK_PX: f64 = 1e-6;
 
-/// A rectangle in the padded field's coordinates: a centre, a direction, and intervals along and across it.
+/// A rectangle in the padded field's coordinates: a center, a direction, and intervals along and across it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rectangle {
-    centre: [f64; 2],
+    center: [f64; 2],
     /// Unit vector; level lines run its way.
     direction: [f64; 2],
-    /// Interval along the direction, from the centre.
+    /// Interval along the direction, from the center.
     along: [f64; 2],
-    /// Interval along (-direction.y, direction.x), from the centre.
+    /// Interval along (-direction.y, direction.x), from the center.
     across: [f64; 2],
     /// Probability that a pixel of noise is aligned: twice the tolerance over 2 pi.
     probability: f64,
 }
 
 impl Rectangle {
-    /// The rectangle of the region `indices`: through its centre of mass along the principal axis of its inertia, with
-    /// gradient magnitudes for masses, and as large as to hold all the pixels' centres.
+    /// The rectangle of the region `indices`: through its center of mass along the principal axis of its inertia, with
+    /// gradient magnitudes for masses, and as large as to hold all the pixels' centers.
     ///
     /// `towards` is any vector within a quarter turn of the wanted direction. `None` if the region has no mass.
     ///
@@ -54,9 +54,9 @@ impl Rectangle {
         if mass <= 0.0 {
             return None;
         }
-        let centre = [sum_x / mass, sum_y / mass];
+        let center = [sum_x / mass, sum_y / mass];
         let (xx, xy, yy) = weighted().fold((0.0, 0.0, 0.0), |(xx, xy, yy), (x, y, weight)| {
-            let (dx, dy) = (x - centre[0], y - centre[1]);
+            let (dx, dy) = (x - center[0], y - center[1]);
             (xx + weight * dx * dx, xy + weight * dx * dy, yy + weight * dy * dy)
         });
         let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
@@ -66,14 +66,14 @@ impl Rectangle {
         }
         let (mut along, mut across) = ([0.0_f64; 2], [0.0_f64; 2]);
         for (x, y, _) in weighted() {
-            let (dx, dy) = (x - centre[0], y - centre[1]);
+            let (dx, dy) = (x - center[0], y - center[1]);
             let (a, b) = (dx * direction[0] + dy * direction[1], dy * direction[0] - dx * direction[1]);
             along = [along[0].min(a), along[1].max(a)];
             across = [across[0].min(b), across[1].max(b)];
         }
         let missing = 0.5 * (MIN_WIDTH_PX - (across[1] - across[0])).max(0.0);
         across = [across[0] - missing, across[1] + missing];
-        Some(Self { centre, direction, along, across, probability })
+        Some(Self { center, direction, along, across, probability })
     }
 
     /// Width, in reduced pixels.
@@ -90,7 +90,7 @@ impl Rectangle {
         pixels as f64 / (self.length() * self.width()).max(f64::MIN_POSITIVE)
     }
 
-    /// Start and end of the axis: through the centre of mass unless that side was cut away.
+    /// Start and end of the axis: through the center of mass unless that side was cut away.
     pub(super) fn axis(&self) -> [[f64; 2]; 2] {
         let offset = 0.0_f64.clamp(self.across[0], self.across[1]);
         self.along.map(|along| self.point(along, offset))
@@ -98,10 +98,10 @@ impl Rectangle {
 
     fn point(&self, along: f64, across: f64) -> [f64; 2] {
         let [x, y] = self.direction;
-        [self.centre[0] + along * x - across * y, self.centre[1] + along * y + across * x]
+        [self.center[0] + along * x - across * y, self.center[1] + along * y + across * x]
     }
 
-    /// Pixels whose centre is inside, and how many of them are aligned with the direction.
+    /// Pixels whose center is inside, and how many of them are aligned with the direction.
     fn count(&self, field: &GradientField) -> (usize, usize) {
         let corners = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(a, b)| self.point(self.along[a], self.across[b])[1]);
         let top = corners.iter().copied().fold(f64::INFINITY, f64::min) - BOUNDARY_SLACK_PX;
@@ -130,7 +130,7 @@ impl Rectangle {
 
     /// The columns of row `y` that are inside, as an interval that may be empty.
     fn row_interval(&self, y: f64) -> (f64, f64) {
-        let dy = y - self.centre[1];
+        let dy = y - self.center[1];
         let [x, slope] = self.direction;
         // along = dx x + dy slope, across = dy x - dx slope: each bounds dx unless its factor vanishes.
         let bounds = [(x, dy * slope, self.along), (-slope, dy * x, self.across)];
@@ -147,7 +147,7 @@ impl Rectangle {
             left = left.max(a.min(b));
             right = right.min(a.max(b));
         }
-        (left + self.centre[0], right + self.centre[0])
+        (left + self.center[0], right + self.center[0])
     }
 
     fn significance(&self, field: &GradientField, false_alarms: &FalseAlarms) -> f64 {

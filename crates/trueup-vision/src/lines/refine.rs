@@ -12,7 +12,7 @@ use trueup_core::raster::Raster;
 /// with it how blurred the edge is.
 const SHARP_SIGMA_PX: f64 = 1.0;
 
-/// The same for blurred edges: suppresses more noise, but would see the neighbours of sharp edges.
+/// The same for blurred edges: suppresses more noise, but would see the neighbors of sharp edges.
 const BLURRED_SIGMA_PX: f64 = 1.5;
 
 /// Edges whose own blur has at least this standard deviation, in pixels, are blurred.
@@ -83,7 +83,7 @@ impl Filter {
         Self { sigma, reach, weights }
     }
 
-    /// The slope of a profile at the centre of `column`.
+    /// The slope of a profile at the center of `column`.
     fn slope(&self, profile: &Profile, column: usize) -> f32 {
         self.weights[..self.reach]
             .iter()
@@ -159,7 +159,7 @@ impl<'a> EdgeProfiles<'a> {
         }
     }
 
-    /// The edge point of each row whose centre is between the ends.
+    /// The edge point of each row whose center is between the ends.
     fn edge_points(&self, fit: &Fit, (from, to): (f64, f64), major: usize, scan: &Scan, points: &mut Vec<EdgePoint>) {
         points.clear();
         let (rows, columns, row_step, column_step) = if major == 1 {
@@ -170,9 +170,9 @@ impl<'a> EdgeProfiles<'a> {
         let first = (from - 0.5).ceil().max(0.0) as usize;
         let end = ((to - 0.5).floor() + 1.0).clamp(0.0, rows as f64) as usize;
         for row in first..end {
-            let centre = row as f64 + 0.5;
+            let center = row as f64 + 0.5;
             let profile = Profile { samples: self.image.data(), start: row * row_step, step: column_step, columns };
-            points.extend(scan.peak(&profile, centre, fit.at(centre)));
+            points.extend(scan.peak(&profile, center, fit.at(center)));
         }
     }
 }
@@ -217,7 +217,7 @@ impl Scan<'_> {
         if !(before > 0.0 && after > 0.0 && before <= slope && after <= slope) {
             return None;
         }
-        let [left, right] = [before, after].map(|neighbour| f64::from(neighbour / slope).ln());
+        let [left, right] = [before, after].map(|neighbor| f64::from(neighbor / slope).ln());
         let curvature = left + right;
         let bend = f64::from(before - 2.0 * slope + after);
         if !(curvature < 0.0 && bend < 0.0) {

@@ -76,7 +76,7 @@ impl<'a> RegionGrower<'a> {
     fn grow(&mut self, seed: u32, tolerance: f64) {
         let lines = self.field.level_lines();
         let stride = self.field.stride();
-        // The neighbours, from the one at the upper left on.
+        // The neighbors, from the one at the upper left on.
         let offsets = [0, 1, 2, stride, stride + 2, 2 * stride, 2 * stride + 1, 2 * stride + 2];
         let tangent = tolerance.tan() as f32;
         self.region.clear();
@@ -86,14 +86,14 @@ impl<'a> RegionGrower<'a> {
         let mut next = 0;
         while let Some(&index) = self.region.get(next) {
             next += 1;
-            // Pixels of the field have all eight neighbours in the padded arrays.
+            // Pixels of the field have all eight neighbors in the padded arrays.
             let first = index as usize - stride - 1;
             for offset in offsets {
-                let neighbour = first + offset;
-                if !self.used[neighbour] && is_aligned(lines[neighbour], sum, tangent) {
-                    self.used[neighbour] = true;
-                    sum = [sum[0] + lines[neighbour][0], sum[1] + lines[neighbour][1]];
-                    self.region.push(neighbour as u32);
+                let neighbor = first + offset;
+                if !self.used[neighbor] && is_aligned(lines[neighbor], sum, tangent) {
+                    self.used[neighbor] = true;
+                    sum = [sum[0] + lines[neighbor][0], sum[1] + lines[neighbor][1]];
+                    self.region.push(neighbor as u32);
                 }
             }
         }

@@ -7,7 +7,7 @@ use super::*;
 const DARK: f64 = 60.0;
 const BRIGHT: f64 = 200.0;
 
-/// The share of a unit pixel on the positive side of a line at signed distance `distance` of its centre, the line's
+/// The share of a unit pixel on the positive side of a line at signed distance `distance` of its center, the line's
 /// unit normal being (a, b): the distribution of the sum of two uniform variables of widths |a| and |b|.
 fn coverage(distance: f64, a: f64, b: f64) -> f64 {
     let (a, b) = (a.abs(), b.abs());
@@ -171,8 +171,8 @@ fn pixels_that_are_not_numbers_take_no_part() {
 #[test]
 fn wrong_input_is_refused() {
     let context = StageContext::default();
-    let colour = Raster::new(20, 20, 3);
-    assert!(matches!(detect(&colour, &LineOptions::default(), &context), Err(Error::Input { .. })));
+    let color = Raster::new(20, 20, 3);
+    assert!(matches!(detect(&color, &LineOptions::default(), &context), Err(Error::Input { .. })));
     let options = LineOptions { scale: f64::NAN, min_density: 2.0, ..LineOptions::default() };
     let Err(Error::Options(invalid)) = detect(&Raster::new(20, 20, 1), &options, &context) else {
         panic!("options out of range are refused");

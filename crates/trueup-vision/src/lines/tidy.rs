@@ -1,4 +1,4 @@
-//! What happens to the segments after detection: frame artefacts dropped, neighbours merged, longest first.
+//! What happens to the segments after detection: frame artifacts dropped, neighbors merged, longest first.
 
 use trueup_core::lines::LineSegment;
 
@@ -16,7 +16,7 @@ pub(super) fn tidy(mut segments: Vec<LineSegment>, width: f64, height: f64, opti
     segments
 }
 
-/// Segments with neighbours on one line joined within the `merge_` options, whatever [`LineOptions::merge`] says; longest
+/// Segments with neighbors on one line joined within the `merge_` options, whatever [`LineOptions::merge`] says; longest
 /// first. The segments must be ordered so.
 pub fn merged(segments: &[LineSegment], options: &LineOptions) -> Vec<LineSegment> {
     let mut joined = merge(segments, options);
@@ -86,7 +86,7 @@ fn merge(segments: &[LineSegment], options: &LineOptions) -> Vec<LineSegment> {
 
 /// The segment over both, if `shorter` continues `longer` in the same sense.
 ///
-/// Its line passes through the lengths' common centre of mass along their principal axis.
+/// Its line passes through the lengths' common center of mass along their principal axis.
 fn join(longer: &LineSegment, shorter: &LineSegment, options: &LineOptions) -> Option<LineSegment> {
     let (direction, length) = unit(longer)?;
     let (other, other_length) = unit(shorter)?;
@@ -105,11 +105,11 @@ fn join(longer: &LineSegment, shorter: &LineSegment, options: &LineOptions) -> O
     if start_off.abs().max(end_off.abs()) > options.merge_distance_px || gap > options.merge_gap_px {
         return None;
     }
-    let (axis, centre) = common_axis([(longer, direction, length), (shorter, other, other_length)]);
-    let along = |point: [f64; 2]| (point[0] - centre[0]) * axis[0] + (point[1] - centre[1]) * axis[1];
+    let (axis, center) = common_axis([(longer, direction, length), (shorter, other, other_length)]);
+    let along = |point: [f64; 2]| (point[0] - center[0]) * axis[0] + (point[1] - center[1]) * axis[1];
     let low = along(longer.start).min(along(shorter.start));
     let high = along(longer.end).max(along(shorter.end));
-    let at = |along: f64| [centre[0] + along * axis[0], centre[1] + along * axis[1]];
+    let at = |along: f64| [center[0] + along * axis[0], center[1] + along * axis[1]];
     Some(LineSegment {
         start: at(low),
         end: at(high),
@@ -124,14 +124,14 @@ fn unit(segment: &LineSegment) -> Option<([f64; 2], f64)> {
     (length > 0.0).then_some((direction, length))
 }
 
-/// Principal axis and centre of mass of two uniform rods, the axis in the sense of the first.
+/// Principal axis and center of mass of two uniform rods, the axis in the sense of the first.
 fn common_axis(rods: [(&LineSegment, [f64; 2], f64); 2]) -> ([f64; 2], [f64; 2]) {
     let middles = rods.map(|(rod, ..)| [0.5 * (rod.start[0] + rod.end[0]), 0.5 * (rod.start[1] + rod.end[1])]);
     let total = rods[0].2 + rods[1].2;
-    let centre = [0, 1].map(|axis| (middles[0][axis] * rods[0].2 + middles[1][axis] * rods[1].2) / total);
+    let center = [0, 1].map(|axis| (middles[0][axis] * rods[0].2 + middles[1][axis] * rods[1].2) / total);
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
     for ((_, direction, length), middle) in rods.iter().zip(middles) {
-        let [dx, dy] = [middle[0] - centre[0], middle[1] - centre[1]];
+        let [dx, dy] = [middle[0] - center[0], middle[1] - center[1]];
         // A rod's own second moment along itself is length^3 / 12.
         let own = length.powi(3) / 12.0;
         xx += length * dx * dx + own * direction[0] * direction[0];
@@ -141,5 +141,5 @@ fn common_axis(rods: [(&LineSegment, [f64; 2], f64); 2]) -> ([f64; 2], [f64; 2])
     let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
     let axis = [angle.cos(), angle.sin()];
     let along = rods[0].1[0] * axis[0] + rods[0].1[1] * axis[1];
-    (if along < 0.0 { axis.map(|component| -component) } else { axis }, centre)
+    (if along < 0.0 { axis.map(|component| -component) } else { axis }, center)
 }

@@ -1,7 +1,7 @@
 //! Pairs of pictures that show the same view.
 
 use trueup_core::StageContext;
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::matches::{PairMatches, PointMatch};
 
 /// Mean displacement of the inliers below which two pictures show the same view, in working pixels.
@@ -28,7 +28,7 @@ pub fn is_near_duplicate(pair: &PairMatches) -> bool {
 fn near_duplicate(pair: &PairMatches) -> Diagnostic {
     Diagnostic::warning(
         "near-duplicate",
-        format!("{} - {}", pair.a, pair.b),
+        Subject::Pair(pair.a, pair.b),
         format!("the two pictures show the same view: {} of {} matches agree", pair.agreeing, pair.in_overlap),
         "Leave one of them out, unless both are wanted.",
     )

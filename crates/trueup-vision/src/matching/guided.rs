@@ -174,9 +174,9 @@ impl PointGrid {
         radius_px: f64,
     ) -> impl Iterator<Item = usize> + 'a {
         let index = (place - self.origin) / self.cell_px;
-        let range = |centre: f64, count: usize| {
-            let low = (centre - 1.0).floor().max(0.0) as usize;
-            let high = (centre + 2.0).floor().clamp(0.0, count as f64) as usize;
+        let range = |center: f64, count: usize| {
+            let low = (center - 1.0).floor().max(0.0) as usize;
+            let high = (center + 2.0).floor().clamp(0.0, count as f64) as usize;
             low.min(high)..high
         };
         let columns = range(index.x, self.columns);

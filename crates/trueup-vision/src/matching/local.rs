@@ -1,7 +1,7 @@
-//! Local optimisation: from a hypothesis down to the nearest minimum of the truncated transfer error.
+//! Local optimization: from a hypothesis down to the nearest minimum of the truncated transfer error.
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2};
-use trueup_core::geometry::{Homography, Normalisation};
+use trueup_core::geometry::{Homography, Normalization};
 
 use super::ransac::MatchedPoints;
 
@@ -24,20 +24,20 @@ pub struct LocalOptimiser<'a> {
     /// Places in b moved to the origin and scaled to unit spread, where all entries of a step are of like size.
     in_b: Vec<Vector2<f64>>,
     inlier: f64,
-    normalised_from_pixels: Matrix3<f64>,
-    pixels_from_normalised: Matrix3<f64>,
+    normalized_from_pixels: Matrix3<f64>,
+    pixels_from_normalized: Matrix3<f64>,
 }
 
 impl<'a> LocalOptimiser<'a> {
     /// For the given matches; errors count up to `inlier_px`. `None` if the places in b coincide.
     pub fn new(points: &'a MatchedPoints, inlier_px: f64) -> Option<Self> {
-        let frame = Normalisation::of(&points.in_b)?;
+        let frame = Normalization::of(&points.in_b)?;
         Some(Self {
             in_a: &points.in_a,
             in_b: points.in_b.iter().map(|&place| frame.apply(place)).collect(),
             inlier: inlier_px * frame.matrix()[(0, 0)],
-            normalised_from_pixels: frame.matrix(),
-            pixels_from_normalised: frame.inverse(),
+            normalized_from_pixels: frame.matrix(),
+            pixels_from_normalized: frame.inverse(),
         })
     }
 
@@ -47,23 +47,23 @@ impl<'a> LocalOptimiser<'a> {
     ///
     /// # Source
     /// Chum, Matas and Kittler, Locally optimized RANSAC, with shrinking thresholds; the cost is that of Torr and Zisserman,
-    /// MLESAC, section 4, minimised by Gauss and Newton's method.
+    /// MLESAC, section 4, minimized by Gauss and Newton's method.
     ///
     /// # Departures
     /// A step is a small projective map of b after the present one, so that no denominators appear in its equations.
-    pub fn optimise(
+    pub fn optimize(
         &self,
         start: &Homography,
         known: f64,
         is_plausible: &impl Fn(&Homography) -> bool,
     ) -> (Homography, f64) {
-        let mut current = Homography(self.normalised_from_pixels * start.0);
+        let mut current = Homography(self.normalized_from_pixels * start.0);
         let (mut best, mut best_cost) = (*start, f64::INFINITY);
         for step in 0..MAX_STEPS {
             let sums = self.sums(&current.0, FIRST_THRESHOLDS.get(step).copied().unwrap_or(1.0));
             let decrease = best_cost - sums.cost;
             if decrease > 0.0 {
-                let in_pixels = Homography(self.pixels_from_normalised * current.0);
+                let in_pixels = Homography(self.pixels_from_normalized * current.0);
                 if step == 0 || is_plausible(&in_pixels) {
                     (best, best_cost) = (in_pixels, sums.cost);
                 }
@@ -78,7 +78,7 @@ impl<'a> LocalOptimiser<'a> {
         (Homography(best.0 / best.0.amax()), best_cost)
     }
 
-    /// What the matches within `reach` thresholds of a map into normalised places say.
+    /// What the matches within `reach` thresholds of a map into normalized places say.
     fn sums(&self, map: &Matrix3<f64>, reach: f64) -> Sums {
         let scale = self.inlier.powi(2).recip();
         let mut sums = Sums::default();
@@ -169,13 +169,13 @@ mod tests {
         pairs.map(|(&a, &b)| ((b - map.apply(a)).norm_squared() / INLIER_PX.powi(2)).min(1.0)).sum()
     }
 
-    fn optimised(points: &MatchedPoints, start: &Homography) -> (Homography, f64) {
-        LocalOptimiser::new(points, INLIER_PX).expect("places differ").optimise(start, f64::INFINITY, &|_| true)
+    fn optimized(points: &MatchedPoints, start: &Homography) -> (Homography, f64) {
+        LocalOptimiser::new(points, INLIER_PX).expect("places differ").optimize(start, f64::INFINITY, &|_| true)
     }
 
     #[test]
     fn exact_matches_among_wrong_ones_give_the_exact_map() {
-        let (found, cost) = optimised(&points(0.0), &rough());
+        let (found, cost) = optimized(&points(0.0), &rough());
         assert!((found.0 / found.0[(2, 2)] - example().0).amax() < 1e-6);
         assert!((cost - 12.0).abs() < 1e-9, "the wrong matches alone cost: {cost}");
     }
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn the_result_is_a_minimum_of_the_cost_it_states() {
         let points = points(1.5);
-        let (found, least) = optimised(&points, &rough());
+        let (found, least) = optimized(&points, &rough());
         let found = Homography(found.0 / found.0[(2, 2)]);
         assert!((least - cost(&found, &points)).abs() < 1e-9);
         assert!(least < cost(&rough(), &points));
@@ -200,11 +200,11 @@ mod tests {
     #[test]
     fn implausible_maps_and_too_few_matches_leave_the_start() {
         let points = points(1.5);
-        let optimiser = LocalOptimiser::new(&points, INLIER_PX).expect("places differ");
+        let optimizer = LocalOptimiser::new(&points, INLIER_PX).expect("places differ");
         let same = |found: Homography| (found.0 / found.0[(2, 2)] - rough().0).amax() < 1e-9;
-        assert!(same(optimiser.optimise(&rough(), f64::INFINITY, &|_| false).0));
+        assert!(same(optimizer.optimize(&rough(), f64::INFINITY, &|_| false).0));
         let four = points.select(&[1, 2, 3, 4]);
-        assert!(same(optimised(&four, &rough()).0));
+        assert!(same(optimized(&four, &rough()).0));
         let one_place = MatchedPoints { in_b: vec![Vector2::new(1.0, 2.0); 60], ..points };
         assert!(LocalOptimiser::new(&one_place, INLIER_PX).is_none());
     }

@@ -29,7 +29,7 @@ use trueup_core::{Error, Result, StageContext};
 pub use duplicates::{is_near_duplicate, report_near_duplicates};
 pub use options::MatchingOptions;
 pub use putative::{PutativeMatch, putative_matches};
-pub use search::{Kernel, Nearest, Neighbour};
+pub use search::{Kernel, Nearest, Neighbor};
 
 use crate::features::Features;
 use guided::Follower;

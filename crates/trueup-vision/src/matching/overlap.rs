@@ -40,7 +40,7 @@ impl<'a> Overlap<'a> {
     /// factor of at most `max_area_ratio`.
     ///
     /// # Departures
-    /// Outside the overlap nothing is asked: in a wide picture turned far from its neighbour, parts that the neighbour
+    /// Outside the overlap nothing is asked: in a wide picture turned far from its neighbor, parts that the neighbor
     /// does not see lie on or beyond its horizon, rightly.
     pub fn is_plausible(&self, max_area_ratio: f64) -> bool {
         let corners = self.corners_in_a();

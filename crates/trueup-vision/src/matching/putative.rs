@@ -45,15 +45,15 @@ pub fn putative_matches(a: &Features, b: &Features, options: &MatchingOptions) -
         let (squared_distance, point_b) = descriptors_a
             .range(point_a)
             .map(|row| {
-                let neighbour = nearest.nearest_column(row);
-                (neighbour.squared_distance, b.descriptor_points[neighbour.descriptor] as usize)
+                let neighbor = nearest.nearest_column(row);
+                (neighbor.squared_distance, b.descriptor_points[neighbor.descriptor] as usize)
             })
             .min()?;
         let back = descriptors_b
             .range(point_b)
             .map(|column| {
-                let neighbour = nearest.nearest_row(column);
-                (neighbour.squared_distance, a.descriptor_points[neighbour.descriptor] as usize)
+                let neighbor = nearest.nearest_row(column);
+                (neighbor.squared_distance, a.descriptor_points[neighbor.descriptor] as usize)
             })
             .min();
         if options.mutual && back != Some((squared_distance, point_a)) {

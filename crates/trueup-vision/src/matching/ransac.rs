@@ -2,14 +2,14 @@
 //!
 //! # Source
 //! Fischler and Bolles, Random sample consensus; the cost is MSAC's (Torr and Zisserman, MLESAC, section 4), samples of
-//! the most distinctive matches come first as in PROSAC (Chum and Matas, 2005), and promising ones are optimised locally
+//! the most distinctive matches come first as in PROSAC (Chum and Matas, 2005), and promising ones are optimized locally
 //! (Chum, Matas and Kittler, Locally optimized RANSAC).
 //!
 //! # Departures
 //! Photographs with parallax have several maps that many matches agree on nearly equally, and a sample without outliers may
 //! lead to any of them. That the draw does not decide between them, more is drawn than the textbook asks for
-//! (`PATIENCE`), and samples are optimised that are nearly as good as the best sample (`PROMISING`): measured against an
-//! optimised map, hardly a sample would be good enough to lead anywhere else.
+//! (`PATIENCE`), and samples are optimized that are nearly as good as the best sample (`PROMISING`): measured against an
+//! optimized map, hardly a sample would be good enough to lead anywhere else.
 
 use nalgebra::{Matrix3, Vector2};
 use rand::{Rng, RngExt};
@@ -24,7 +24,7 @@ const MIN_TRIANGLE_PX2: f64 = 20.0;
 /// How many times the samples that would give one without outliers are drawn: such a sample may still be too noisy, too
 /// narrow, or of another plane.
 const PATIENCE: usize = 8;
-/// A sample's map is optimised if it explains at least this share of what the best sample's map explains.
+/// A sample's map is optimized if it explains at least this share of what the best sample's map explains.
 const PROMISING: f64 = 0.8;
 /// Matches measured between two looks at whether a hypothesis can still win.
 const BATCH: usize = 16;
@@ -107,16 +107,16 @@ pub fn find_homography(
     let mut failure = NoConsensus::NoSample;
     let mut needed = search.max_samples.min(enough(search.useful_inliers));
     let (mut best, mut best_cost) = (None, count as f64);
-    // Optimises a hypothesis; if it leads to the best so far, its inliers tell how many samples are needed.
-    let mut optimise = |hypothesis: &Homography, needed: &mut usize| {
-        let (optimised, cost) = local.optimise(hypothesis, best_cost, &is_plausible);
+    // Optimizes a hypothesis; if it leads to the best so far, its inliers tell how many samples are needed.
+    let mut optimize = |hypothesis: &Homography, needed: &mut usize| {
+        let (optimized, cost) = local.optimize(hypothesis, best_cost, &is_plausible);
         if cost < best_cost {
-            (best, best_cost) = (Some(optimised), cost);
-            *needed = (*needed).min(enough(points.agreeing(&optimised, search.inlier_px).len()));
+            (best, best_cost) = (Some(optimized), cost);
+            *needed = (*needed).min(enough(points.agreeing(&optimized, search.inlier_px).len()));
         }
     };
     if let Some(start) = search.start.filter(&is_plausible) {
-        optimise(&start, &mut needed);
+        optimize(&start, &mut needed);
     }
     let mut pool = ProgressivePool::new(count, needed);
     // How many matches the best sample's map explains, each by 1 - error^2 / inlier_px^2.
@@ -130,7 +130,7 @@ pub fn find_homography(
         let Some(cost) = truncated_cost(points, &hypothesis, search.inlier_px, bound) else { continue };
         if is_plausible(&hypothesis) {
             explained = explained.max(count as f64 - cost);
-            optimise(&hypothesis, &mut needed);
+            optimize(&hypothesis, &mut needed);
         } else if points.agreeing(&hypothesis, search.inlier_px).len() >= search.useful_inliers {
             failure = NoConsensus::Implausible;
         }

@@ -114,7 +114,7 @@ fn levels(places: &[(f64, &[u8])]) -> Features {
 }
 
 #[test]
-fn the_second_neighbour_decides_by_its_distance() {
+fn the_second_neighbor_decides_by_its_distance() {
     let options = MatchingOptions::default();
     let a = levels(&[(0.0, &[100])]);
     // 16 / 20 = 0.8 passes, 17 / 20 does not.
@@ -125,7 +125,7 @@ fn the_second_neighbour_decides_by_its_distance() {
 }
 
 #[test]
-fn a_second_neighbour_at_the_same_place_does_not_count() {
+fn a_second_neighbor_at_the_same_place_does_not_count() {
     let options = MatchingOptions::default();
     let a = levels(&[(0.0, &[100])]);
     let near = Scene { a: a.clone(), b: levels(&[(0.0, &[101]), (2.9, &[102]), (50.0, &[150])]) };
@@ -310,14 +310,17 @@ fn results_do_not_depend_on_threads_and_follow_the_order_of_pairs() {
         let matched = pool.install(|| run(&features, &frames, &pairs, &BTreeSet::new(), &options, &context));
         let matched = matched.expect("valid pictures");
         report_near_duplicates(&matched, &context);
-        (matched, context.take_diagnostics())
+        (matched, context.findings())
     };
     let (matched, diagnostics) = run_on(1);
     assert_eq!((matched.clone(), diagnostics.clone()), run_on(2));
     assert_eq!(matched.iter().map(|pair| (pair.a, pair.b)).collect::<Vec<_>>(), [(1, 2), (0, 2), (0, 1)]);
     assert!(matched.iter().all(|pair| pair.verdict.is_joined()));
     assert_eq!(diagnostics.len(), 1);
-    assert_eq!((diagnostics[0].code.as_str(), diagnostics[0].subject.as_str()), ("near-duplicate", "0 - 2"));
+    assert_eq!(
+        (diagnostics[0].code.as_str(), &diagnostics[0].subject),
+        ("near-duplicate", &trueup_core::diagnostics::Subject::Pair(0, 2))
+    );
 }
 
 #[test]

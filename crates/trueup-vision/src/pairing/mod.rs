@@ -16,8 +16,8 @@ trueup_core::options! {
     pub struct PairingOptions("pairing") {
         /// All pairs are matched of at most so many pictures; of more, those that a quick look proposes.
         exhaustive_up_to: usize = 40, between(0.0, 100000.0), "pictures";
-        /// For every picture, the neighbours proposed: those with which it has most matches at a quick look.
-        neighbours: usize = 8, between(1.0, 1000.0), "pictures";
+        /// For every picture, the neighbors proposed: those with which it has most matches at a quick look.
+        neighbors: usize = 8, between(1.0, 1000.0), "pictures";
         /// Strongest features of each picture that the quick look compares.
         subset: usize = 1000, between(16.0, 100000.0), "features";
         /// Whether pictures that follow one another are proposed whatever the quick look says.
@@ -34,14 +34,14 @@ pub struct CandidatePairs {
     pub exhaustive: bool,
 }
 
-/// Proposes all pairs of few pictures, and of many, for each picture the `neighbours` with which the strongest features
+/// Proposes all pairs of few pictures, and of many, for each picture the `neighbors` with which the strongest features
 /// have most putative matches (the smaller index winning ties, none with no match at all).
 ///
 /// # Errors
 /// [`trueup_core::Error::Options`]; [`trueup_core::Error::Input`] if features contradict themselves; [`trueup_core::Error::Cancelled`].
 ///
 /// # Departures
-/// Brown and Lowe (section 3.1) take the 6 neighbours with most matches; we take 8, as the quick look is coarser, and
+/// Brown and Lowe (section 3.1) take the 6 neighbors with most matches; we take 8, as the quick look is coarser, and
 /// propose consecutive pictures, which photographers overlap.
 pub fn propose(features: &[Features], options: &PairingOptions, context: &StageContext<'_>) -> Result<CandidatePairs> {
     options.check()?;
@@ -107,11 +107,11 @@ pub fn quick_looks(
     looks
 }
 
-/// A picture's pairs with its proposed neighbours.
+/// A picture's pairs with its proposed neighbors.
 fn nearest(picture: usize, looks: &[Vec<usize>], options: &PairingOptions) -> Vec<(usize, usize)> {
     let matches = |other: usize| looks[picture.max(other)][picture.min(other)];
     let mut others: Vec<usize> = (0..looks.len()).filter(|&other| other != picture && matches(other) > 0).collect();
     others.sort_by_key(|&other| (std::cmp::Reverse(matches(other)), other));
-    others.truncate(options.neighbours);
+    others.truncate(options.neighbors);
     others.into_iter().map(|other| (picture.min(other), picture.max(other))).collect()
 }

@@ -37,7 +37,7 @@ fn few_pictures_are_paired_with_all() {
 
 #[test]
 fn many_pictures_are_paired_with_those_that_look_alike() {
-    let options = PairingOptions { exhaustive_up_to: 5, neighbours: 2, subset: 16, consecutive: false };
+    let options = PairingOptions { exhaustive_up_to: 5, neighbors: 2, subset: 16, consecutive: false };
     // Only the strongest 16 of 20 features are compared, of which the first 6 are the previous picture's last.
     let proposed = propose(&row(12, 10), &options, &StageContext::default()).expect("valid");
     for picture in 1..12 {
@@ -48,7 +48,7 @@ fn many_pictures_are_paired_with_those_that_look_alike() {
 }
 
 #[test]
-fn pictures_without_features_are_paired_with_their_neighbours_in_order_only() {
+fn pictures_without_features_are_paired_with_their_neighbors_in_order_only() {
     let options = PairingOptions { exhaustive_up_to: 0, ..PairingOptions::default() };
     let empty = vec![Features::default(); 4];
     let proposed = propose(&empty, &options, &StageContext::default()).expect("valid");
@@ -60,7 +60,7 @@ fn pictures_without_features_are_paired_with_their_neighbours_in_order_only() {
 
 #[test]
 fn bad_options_and_cancelling_are_errors() {
-    let options = PairingOptions { neighbours: 0, ..PairingOptions::default() };
+    let options = PairingOptions { neighbors: 0, ..PairingOptions::default() };
     let outcome = propose(&[], &options, &StageContext::default());
     assert!(matches!(outcome, Err(Error::Options(invalid)) if invalid.len() == 1));
     let token = trueup_core::context::CancelToken::default();

@@ -17,7 +17,7 @@ pub(crate) struct Component<'a> {
     pub images: Vec<&'a SourceImage>,
     pub frames: Vec<WorkingFrame>,
     pub lines: Vec<Vec<LineSegment>>,
-    /// Grey values at the working size, for those that were kept.
+    /// Gray values at the working size, for those that were kept.
     pub grays: Vec<Option<&'a Raster<u8>>>,
     pub pairs: Vec<PairMatches>,
     pub reference: usize,

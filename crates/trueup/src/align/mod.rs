@@ -16,7 +16,7 @@ use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityOptions,
 use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::{self, TriadOutcome};
 use trueup_align::warps::{self, WarpInput};
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
@@ -60,12 +60,9 @@ pub(crate) fn run_or_recall(
         findings.into_iter().for_each(|one| context.report(one));
         return Ok(geometry);
     }
-    let before = context.take_diagnostics();
-    let geometry = run(component, options, context, clock, None, photographs)?;
-    let findings = context.take_diagnostics();
-    known.keep_geometry(&key, &geometry, &findings);
-    before.into_iter().chain(findings).for_each(|one| context.report(one));
-    Ok(geometry)
+    let found = context.gather(|context| run(component, options, context, clock, None, photographs))?;
+    known.keep_geometry(&key, &found.value, &found.findings);
+    Ok(context.absorb(found))
 }
 
 /// Runs the geometry stages in their order. With a `memory`, cameras and overlaps that it holds are not found again.
@@ -235,5 +232,5 @@ fn report_cut(cut: &FullTurnCut, closed: bool, component: &Component, context: &
         true => format!("a full turn: the ends meet, between {pairs}"),
         false => format!("the photographs go all the way round; the panorama is cut between {pairs}"),
     };
-    context.report(Diagnostic::note("full-turn", "mesh", message, ""));
+    context.report(Diagnostic::note("full-turn", Subject::stage("mesh"), message, ""));
 }

@@ -21,10 +21,9 @@ pub(super) fn find(
     context: &StageContext,
     clock: &mut Clock,
 ) -> Result<Overlaps> {
-    let names = component.names();
     let priors = component.camera_priors();
     let cameras = in_one_step("cameras", context, clock, || {
-        cameras::run(&priors, &names, &component.pairs, component.reference, &options.cameras, context)
+        cameras::run(&priors, &component.pairs, component.reference, &options.cameras, context)
     })?;
     let pairs: Vec<PairMatches> = (0..component.pairs.len())
         .filter(|position| cameras.contradicting.binary_search(position).is_err())
@@ -49,12 +48,9 @@ pub(super) fn recall(
     let overlaps = match memory.recall(&key) {
         Some(overlaps) => overlaps,
         None => {
-            let before = context.take_diagnostics();
             let mut own_clock = Clock::default();
-            let mut overlaps = find(component, grids, options, context, &mut own_clock)?;
-            overlaps.seconds = own_clock.into_seconds();
-            overlaps.findings = context.take_diagnostics();
-            before.into_iter().for_each(|one| context.report(one));
+            let found = context.gather(|context| find(component, grids, options, context, &mut own_clock))?;
+            let overlaps = Overlaps { seconds: own_clock.into_seconds(), findings: found.findings, ..found.value };
             let overlaps = Arc::new(overlaps);
             memory.keep(key, &overlaps);
             overlaps

@@ -18,7 +18,7 @@ use std::time::{Duration, SystemTime};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::encode;
 
@@ -99,7 +99,7 @@ impl Cache {
     pub(crate) fn report(&self, context: &StageContext) {
         let trouble = std::mem::take(&mut *self.trouble.lock().unwrap_or_else(PoisonError::into_inner));
         for (code, message) in trouble {
-            context.report(Diagnostic::note(code, self.folder.display().to_string(), message, ""));
+            context.report(Diagnostic::note(code, Subject::file(self.folder.display()), message, ""));
         }
     }
 

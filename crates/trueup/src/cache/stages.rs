@@ -26,7 +26,7 @@ const GEOMETRY: &str = "geometry";
 /// The kinds of entries.
 pub(super) const KINDS: [&str; 4] = [MEASURED, PAIR, LOOKS, GEOMETRY];
 
-/// The keys of photographs, by what decides their measurements: their bytes, how they are turned and masked, the colour
+/// The keys of photographs, by what decides their measurements: their bytes, how they are turned and masked, the color
 /// space that they are brought to, options.
 /// `None` for files that cannot be read.
 ///
@@ -41,7 +41,7 @@ pub(crate) fn photograph_keys(
         .part(&options.features)?
         .part(&options.lines)?
         .part(&(options.stitch.working_pixels, options.stitch.thumbnail_pixels))?
-        .part(&photographs.colours().map(|colours| (colours.name(), colours.icc())))?
+        .part(&photographs.colors().map(|colors| (colors.name(), colors.icc())))?
         .finish();
     let key = |index: usize| -> Result<Option<Key>> {
         context.check_cancelled()?;

@@ -54,7 +54,7 @@ fn damaged_entries_are_told_of_once_and_made_again() {
     }
     let context = StageContext::default();
     cache.report(&context);
-    let codes: Vec<String> = context.take_diagnostics().into_iter().map(|one| one.code).collect();
+    let codes: Vec<String> = context.findings().into_iter().map(|one| one.code).collect();
     assert_eq!(codes, ["cache-entry-damaged"]);
     cache.store(KIND, &key(0), &"content");
     assert_eq!(cache.load::<String>(KIND, &key(0)).as_deref(), Some("content"));

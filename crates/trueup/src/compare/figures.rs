@@ -103,7 +103,7 @@ const FIGURES: [Figure; 23] = [
         "95 of 100 matched points are not farther apart."),
     figure!("ncc", "overlap NCC", "", 4, Lower, true, false,
         |c| Some(c.pixels.as_ref()?.ncc_rmse),
-        "How unlike the photographs look where they overlap: root mean square of 1 - normalised cross correlation; 0 is perfect."),
+        "How unlike the photographs look where they overlap: root mean square of 1 - normalized cross correlation; 0 is perfect."),
     figure!("ssim", "overlap SSIM", "", 4, Higher, false, false,
         |c| c.pixels.as_ref()?.ssim,
         "How alike the photographs look where they overlap: structural similarity; 1 is perfect."),

@@ -240,7 +240,7 @@ mod tests {
 
     #[test]
     fn damaged_files_are_refused() {
-        let good = serde_json::to_string(&results("x", &[("1", "Ann", "a b")])).expect("serialisable");
+        let good = serde_json::to_string(&results("x", &[("1", "Ann", "a b")])).expect("serializable");
         assert!(parse(good.as_bytes(), "r.json").is_ok());
         for (text, reason) in [
             ("Dear diary".to_owned(), "not a file of rankings"),

@@ -52,7 +52,7 @@ pub struct Evaluation {
     /// The largest such error.
     pub theta_error_max_deg: Option<f64>,
     /// The paper's local distortion LD (equations 12 and 13), times 100: the largest over the pictures. Judged are cells
-    /// whose centre lies outside all other pictures.
+    /// whose center lies outside all other pictures.
     pub ld: f64,
     /// Mean over the pictures of the same.
     pub ld_mean: f64,
@@ -120,7 +120,7 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     let turn = |rotations: &[f64], reference| mean_relative_turn(rotations, &gammas, reference).map(f64::to_degrees);
     let thetas: Option<Vec<f64>> = records.iter().map(|record| Some(record.theta_deg?.to_radians())).collect();
     let theta_errors = thetas.as_ref().and_then(|thetas| relative_turns(thetas, &gammas, 0));
-    let distortion = metrics::local_distortion(&meshes, Outside::Centre, period);
+    let distortion = metrics::local_distortion(&meshes, Outside::Center, period);
     let pictures = (0..known.len()).map(|k| PictureEvaluation {
         file: known[k].truth.file.clone(),
         upright_deg: upright.pictures[k].to_degrees(),
@@ -139,7 +139,7 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
         theta_error_max_deg: theta_errors.as_ref().map(|errors| largest(errors).to_degrees()),
         ld: HUNDREDTHS * distortion.worst,
         ld_mean: HUNDREDTHS * distortion.mean,
-        ld_corners: HUNDREDTHS * metrics::local_distortion(&meshes, Outside::CentreAndCorners, period).worst,
+        ld_corners: HUNDREDTHS * metrics::local_distortion(&meshes, Outside::CenterAndCorners, period).worst,
         folds: meshes.iter().map(folded_cells).sum(),
         align_px: alignment(&known, &meshes, period),
         pictures: pictures.collect(),
@@ -196,9 +196,9 @@ fn too_few(count: usize) -> Error {
     )
 }
 
-/// [`metrics::true_alignment`] where all pictures share one centre of projection.
+/// [`metrics::true_alignment`] where all pictures share one center of projection.
 fn alignment(known: &[Known], meshes: &[GridMesh], period: Option<f64>) -> Option<f64> {
-    if known.iter().any(|one| one.truth.centre != known[0].truth.centre) {
+    if known.iter().any(|one| one.truth.center != known[0].truth.center) {
         return None;
     }
     let camera = |one: &Known| {

@@ -11,7 +11,7 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
 use trueup_core::source::{PhotographSource, SourceImage};
 use trueup_core::{Error, Result, StageContext};
-use trueup_io::colour::PhotographColours;
+use trueup_io::color::PhotographColors;
 use trueup_io::decode::FilePhotographs;
 
 use crate::project::{Canvas, ImageRecord, Project};
@@ -27,7 +27,7 @@ const MAX_LAYER_PX: f64 = 40e6;
 /// How alike photographs look where they overlap on the panorama, means over the overlapping pairs weighted by their
 /// overlaps' size.
 ///
-/// Grey values (Rec. 601 luma) go from 0 to 255, after the exposures were evened out as in the panorama.
+/// Gray values (Rec. 601 luma) go from 0 to 255, after the exposures were evened out as in the panorama.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PixelEvaluation {
     /// Size of the canvas that was compared on, relative to the panorama's. The figures depend on it.
@@ -40,7 +40,7 @@ pub struct PixelEvaluation {
     pub ncc_rmse: f64,
     /// Mean square of the same.
     pub ncc_mse: f64,
-    /// Mean square difference of grey values.
+    /// Mean square difference of gray values.
     pub intensity_mse: f64,
     /// Peak signal to noise ratio after evening out each pair's brightness, decibels; `None` if all are equal.
     pub psnr_db: Option<f64>,
@@ -63,8 +63,8 @@ pub fn evaluate_pixels(project: &Project, project_folder: &Path, context: &Stage
         .iter()
         .map(|record| find_photograph(record, project_folder, &project.options.source, context))
         .collect::<Result<Vec<SourceImage>>>()?;
-    let colours = PhotographColours::survey(&images, context);
-    let photographs = FilePhotographs::new(images, 0).in_colours(colours);
+    let colors = PhotographColors::survey(&images, context);
+    let photographs = FilePhotographs::new(images, 0).in_colors(colors);
     let meshes = used_grids(&records)?;
     let scale = scale(&meshes, project.options.measures.canvas_pixels);
     let positions: Vec<usize> = (0..records.len()).collect();

@@ -30,7 +30,7 @@ fn truth(gammas: [f64; 2]) -> Truth {
         focal_px: 40.0,
         rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         gamma_deg,
-        centre: None,
+        center: None,
         depth: None,
     };
     Truth {
@@ -91,6 +91,6 @@ fn damaged_grids_are_refused_by_name() {
 fn pictures_from_different_places_have_no_alignment() {
     let mut moved = truth([0.0, 0.0]);
     assert!(evaluate(&project([0.0, 0.0]), &moved).expect("fits").align_px.is_some());
-    moved.images[0].centre = Some([0.0, 0.0, 1.0]);
+    moved.images[0].center = Some([0.0, 0.0, 1.0]);
     assert_eq!(evaluate(&project([0.0, 0.0]), &moved).expect("fits").align_px, None);
 }

@@ -37,7 +37,7 @@ trueup_core::options! {
         method: Method = Method::Vpg, Allowed::Any, "";
         /// What draws overlapping photographs together: more is slower and shows fewer ghosts.
         align: Alignment = Alignment::Points, Allowed::Any, "";
-        /// What of the photographs' structure is kept, beyond the neighbourhoods of grid vertices.
+        /// What of the photographs' structure is kept, beyond the neighborhoods of grid vertices.
         structure: Structure = Structure::None, Allowed::Any, "";
         /// Photographs are measured on a copy reduced to at most this many pixels; the panorama itself is made from
         /// the full photographs.
@@ -56,7 +56,7 @@ trueup_core::options! {
 
 macro_rules! stage_options {
     ($($(#[doc = $doc:literal])* $field:ident : $type:ty),* $(,)?) => {
-        /// The options of every stage. Serialised as one table per stage; unknown tables and fields are denied.
+        /// The options of every stage. Serialized as one table per stage; unknown tables and fields are denied.
         #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
         #[serde(deny_unknown_fields, default)]
         pub struct StitchOptions {

@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn stage_tables_are_called_like_their_stages() {
-        let table = StitchOptions::default().to_table().expect("serialisable");
+        let table = StitchOptions::default().to_table().expect("serializable");
         for stage in StitchOptions::stages() {
             assert!(table.contains_key(stage), "{stage}");
         }

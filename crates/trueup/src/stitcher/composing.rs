@@ -8,7 +8,7 @@ use trueup_compose::gaps::Gaps;
 use trueup_compose::layout::CanvasLayout;
 use trueup_compose::render::{self, Panorama};
 use trueup_core::Result;
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_io::encode::{self, Metadata};
 use trueup_io::scratch::{ScratchFolder, check_room};
 
@@ -58,7 +58,7 @@ impl<'a> Stitcher<'a> {
             let message =
                 format!("{percent:.2} % of it is shown by no photograph and was filled with a smooth surface");
             let hint = "Leave --fill out to leave it empty.";
-            self.context.report(Diagnostic::note("gaps-filled", "panorama", message, hint));
+            self.context.report(Diagnostic::note("gaps-filled", Subject::stage("panorama"), message, hint));
         }
     }
 
@@ -74,9 +74,9 @@ impl<'a> Stitcher<'a> {
         Ok(ScratchFolder::new(named.unwrap_or_else(|| folder.to_owned())).beside(folder, bytes))
     }
 
-    /// What the panorama's file is to tell: its colour profile, and of its photographs what the options let pass.
+    /// What the panorama's file is to tell: its color profile, and of its photographs what the options let pass.
     pub fn metadata(&self, alignment: &Alignment) -> Metadata {
-        provenance::metadata(&alignment.project, alignment.photographs.colours(), &self.options.output)
+        provenance::metadata(&alignment.project, alignment.photographs.colors(), &self.options.output)
     }
 
     /// Measures how true `panorama`, composed of `alignment`, is to its photographs: steps across its seams, and ghosts.

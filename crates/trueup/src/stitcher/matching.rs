@@ -1,7 +1,7 @@
 //! From the photographs found to the groups that overlap.
 
 use trueup_align::stitch_graph::{GraphFile, StitchGraph, parse_graph_file};
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result};
 use trueup_io::decode::FilePhotographs;
@@ -86,10 +86,9 @@ impl Stitcher<'_> {
         match decodable.as_slice() {
             [] => return Err(matched.none_usable()),
             [only] => {
-                let name = &matched.sources.images[*only].name;
                 self.context.report(Diagnostic::warning(
                     "single-photograph",
-                    name,
+                    Subject::Photograph(*only),
                     "there is only one photograph to use; it is written as it is",
                     "Name at least two overlapping photographs, or a folder that holds them.",
                 ));

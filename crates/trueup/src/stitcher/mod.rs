@@ -10,12 +10,12 @@ use std::sync::Arc;
 
 use trueup_compose::exposure::{self, Corrections, Thumbnail};
 use trueup_compose::layout::CanvasLayout;
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::mask::Masks;
 use trueup_core::raster::Raster;
 use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
 use trueup_core::{Result, StageContext};
-use trueup_io::colour::PhotographColours;
+use trueup_io::color::PhotographColors;
 use trueup_io::decode::FilePhotographs;
 use trueup_io::source::{self, RejectedSource};
 
@@ -29,7 +29,6 @@ use crate::left_out::LeftOut;
 use crate::masks::AllMasks;
 use crate::matched::{reference_named, require_all};
 use crate::measures;
-use crate::names;
 use crate::options::StitchOptions;
 use crate::record::{fill_geometry, place};
 
@@ -129,18 +128,17 @@ impl<'a> Stitcher<'a> {
         if inputs.require_all {
             require_all(matched, &components)?;
         }
-        for (index, image) in matched.sources.images.iter().enumerate() {
+        for index in 0..matched.sources.images.len() {
             if !components.iter().any(|component| component.contains(&index)) {
                 photographs.forget(index);
-                self.report_left_out(&image.name, &matched.why_left_out(index, &components));
+                self.report_left_out(index, &matched.why_left_out(index, &components));
             }
         }
         for rejected in &matched.sources.rejected {
             self.report_rejected(rejected);
         }
-        let file_names = matched.names();
         let found = findings.iter().cloned().chain(self.context.take_diagnostics());
-        let shared_diagnostics: Vec<_> = found.map(|one| names::by_name(one, &file_names)).collect();
+        let shared_diagnostics: Vec<_> = found.collect();
 
         let mut alignments = Vec::new();
         for component in &components {
@@ -148,18 +146,18 @@ impl<'a> Stitcher<'a> {
             if let Some(cache) = self.cache {
                 cache.report(self.context);
             }
-            let own = self.context.take_diagnostics().into_iter().map(|one| names::by_name(one, &file_names));
+            let own = self.context.take_diagnostics();
             alignment.project.diagnostics = shared_diagnostics.iter().cloned().chain(own).collect();
             alignments.push(alignment);
         }
         Ok(Aligned { alignments })
     }
 
-    /// The photographs with their masks, in one colour space, and how many of them may be measured at once.
+    /// The photographs with their masks, in one color space, and how many of them may be measured at once.
     fn open(&self, images: Vec<SourceImage>, masks: Vec<Masks>) -> Result<(Arc<FilePhotographs>, usize)> {
         let measuring = Budget::new(self.options).measuring(&images, self.options)?;
-        let colours = PhotographColours::survey(&images, self.context);
-        let photographs = FilePhotographs::new(images, measuring.kept_bytes).in_colours(colours);
+        let colors = PhotographColors::survey(&images, self.context);
+        let photographs = FilePhotographs::new(images, measuring.kept_bytes).in_colors(colors);
         Ok((Arc::new(photographs.with_masks(masks)), measuring.at_once))
     }
 
@@ -185,14 +183,17 @@ impl<'a> Stitcher<'a> {
             Component::new(members, reference, rotation, &matched.sources.images, &matched.measured, &matched.pairs);
         let geometry = match members.len() {
             1 => None,
-            _ => Some(match (memory, self.known(&set.keys)) {
-                (None, Some(known)) => {
-                    align::run_or_recall(&component, self.options, self.context, &mut clock, &known, photographs)?
-                }
-                (memory, _) => {
-                    align::run(&component, self.options, self.context, &mut clock, memory.as_ref(), photographs)?
-                }
-            }),
+            _ => {
+                let found = self.context.gather(|context| match (memory, self.known(&set.keys)) {
+                    (None, Some(known)) => {
+                        align::run_or_recall(&component, self.options, context, &mut clock, &known, photographs)
+                    }
+                    (memory, _) => {
+                        align::run(&component, self.options, context, &mut clock, memory.as_ref(), photographs)
+                    }
+                })?;
+                Some(self.context.absorb(found.renumbered(|local| members[local])))
+            }
         };
         let placed = place(&component, geometry.as_ref());
         let sources = arrangement::Sources::of_geometry(placed, &component, geometry.as_ref());
@@ -206,7 +207,7 @@ impl<'a> Stitcher<'a> {
         })?;
         let mut project = matched.project(self.options, members, stitched);
         fill_geometry(&mut project, &component, geometry.as_ref(), &arrangement, &corrections);
-        project.colour_space = photographs.colours().map(PhotographColours::name).unwrap_or_default();
+        project.color_space = photographs.colors().map(PhotographColors::name).unwrap_or_default();
         project.measures = geometry.as_ref().map(|geometry| {
             clock.time("measures", || measures::run(&component, geometry, &arrangement.plane, self.options))
         });
@@ -231,11 +232,21 @@ impl<'a> Stitcher<'a> {
         Ok(exposure::run(layout, &thumbnails, reference, &self.options.exposure, self.context)?.corrections)
     }
 
-    fn report_left_out(&self, name: &str, left_out: &LeftOut) {
-        self.context.report(Diagnostic::warning(left_out.code, name, &left_out.reason, &left_out.hint));
+    fn report_left_out(&self, photograph: usize, left_out: &LeftOut) {
+        self.context.report(Diagnostic::warning(
+            left_out.code,
+            Subject::Photograph(photograph),
+            &left_out.reason,
+            &left_out.hint,
+        ));
     }
 
     fn report_rejected(&self, rejected: &RejectedSource) {
-        self.context.report(Diagnostic::warning(&rejected.code, &rejected.name, &rejected.reason, &rejected.hint));
+        self.context.report(Diagnostic::warning(
+            &rejected.code,
+            Subject::file(&rejected.name),
+            &rejected.reason,
+            &rejected.hint,
+        ));
     }
 }

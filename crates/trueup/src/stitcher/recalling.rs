@@ -4,7 +4,7 @@ use trueup_compose::exposure::Corrections;
 use trueup_compose::layout::CanvasLayout;
 use trueup_core::Result;
 use trueup_core::source::SourceImage;
-use trueup_io::colour::PhotographColours;
+use trueup_io::color::PhotographColors;
 use trueup_io::decode::FilePhotographs;
 
 use super::{Alignment, Stitcher};
@@ -48,7 +48,7 @@ impl Stitcher<'_> {
         let mut project = Project { options: self.options.clone(), ..project.clone() };
         let images = photographs.images();
         record_composition(&mut project, &used, images, &masks.records, &arrangement, &corrections);
-        project.colour_space = photographs.colours().map(PhotographColours::name).unwrap_or_default();
+        project.color_space = photographs.colors().map(PhotographColors::name).unwrap_or_default();
         if !same_canvas {
             project.measures = None;
         }

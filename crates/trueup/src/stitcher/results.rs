@@ -13,7 +13,6 @@ use crate::cache::Key;
 use crate::clock::Clock;
 use crate::matched::Matched;
 use crate::memory::OverlapMemory;
-use crate::names;
 use crate::project::Project;
 
 /// What [`Stitcher::align`](super::Stitcher::align) found: one alignment per group of
@@ -72,7 +71,7 @@ impl Alignment {
         &self.layout
     }
 
-    /// Gain, colour and vignetting of every photograph placed.
+    /// Gain, color and vignetting of every photograph placed.
     pub(crate) fn corrections(&self) -> &Corrections {
         &self.corrections
     }
@@ -84,8 +83,7 @@ impl Alignment {
 
     /// Adds what composing found to the record.
     pub(crate) fn record_findings(&mut self, findings: Vec<Diagnostic>) {
-        let names: Vec<String> = self.photographs.images().iter().map(|image| image.name.clone()).collect();
-        self.project.diagnostics.extend(findings.into_iter().map(|one| names::by_name(one, &names)));
+        self.project.diagnostics.extend(findings);
     }
 
     /// Adds the wall seconds that a later stage took to the record.

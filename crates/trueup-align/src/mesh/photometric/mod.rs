@@ -1,9 +1,9 @@
 //! Photometric alignment: the pixels of overlapping pictures themselves draw the grids together.
 //!
 //! # Source
-//! After the photometric term of generalised content-preserving warps (Chen and others, 2018), reconstructed: direct
+//! After the photometric term of generalized content-preserving warps (Chen and others, 2018), reconstructed: direct
 //! alignment as in Lucas and Kanade (1981), linear in the vertices of both grids, next to the energies of the mesh. The
-//! averaged slope of both pictures is that of efficient second-order minimisation (Benhimane and Malis, 2004).
+//! averaged slope of both pictures is that of efficient second-order minimization (Benhimane and Malis, 2004).
 //!
 //! # Departures
 //! Every number that is not an option's is a reconstruction; gain and bias of a cell come from means and standard
@@ -24,19 +24,19 @@ pub use pyramid::Pyramid;
 trueup_core::options! {
     /// How pixels align the grids (`stitch.align = photometric`).
     pub struct PhotometricOptions("photometric") {
-        /// Weight of a squared difference of grey levels, for samples 4 px apart.
-        weight: f64 = 0.01, between(0.0, 1000.0), "per grey level squared";
+        /// Weight of a squared difference of gray levels, for samples 4 px apart.
+        weight: f64 = 0.01, between(0.0, 1000.0), "per gray level squared";
         /// Standard deviation of the difference that the weight belongs to: overlaps that agree better weigh more.
-        noise_level: f64 = 10.0, between(0.1, 255.0), "grey levels";
+        noise_level: f64 = 10.0, between(0.1, 255.0), "gray levels";
         /// Smaller deviations are not believed: rounding and compression differ from place to place.
-        least_noise: f64 = 3.0, between(0.1, 255.0), "grey levels";
-        /// Misalignment, common to neighbouring cells of an overlap, from which on its pixels weigh fully; with less their
+        least_noise: f64 = 3.0, between(0.1, 255.0), "gray levels";
+        /// Misalignment, common to neighboring cells of an overlap, from which on its pixels weigh fully; with less their
         /// weight falls with its square.
         full_px: f64 = 0.5, between(0.001, 1000.0), "panorama units, per axis";
         /// Distance of the samples in the finest pictures; twice as far in each coarser one.
         spacing_px: f64 = 4.0, between(1.0, 1000.0), "working px";
-        /// Samples with a smaller change of grey in both pictures are passed over.
-        min_gradient: f64 = 2.0, between(0.0, 255.0), "grey levels per working px";
+        /// Samples with a smaller change of gray in both pictures are passed over.
+        min_gradient: f64 = 2.0, between(0.0, 255.0), "gray levels per working px";
         /// Pictures of halved size that are aligned one after the other, the smallest first.
         levels: usize = 3, between(1.0, 8.0), "";
         /// Most rounds at a level; each solves the mesh once.
@@ -46,8 +46,8 @@ trueup_core::options! {
         /// A round that raises the root mean square distance of match points by more than this, over all rounds, is
         /// undone.
         max_departure_px: f64 = 1.0, between(0.0, 1000.0), "panorama units";
-        /// Strength, in samples, with which the colour difference in a cell is drawn to that of the whole overlap.
-        colour_ridge: f64 = 10.0, between(0.0, 1000000.0), "samples";
+        /// Strength, in samples, with which the color difference in a cell is drawn to that of the whole overlap.
+        color_ridge: f64 = 10.0, between(0.0, 1000000.0), "samples";
         /// Largest difference in contrast that is believed.
         max_gain: f64 = 4.0, between(1.0, 100.0), "";
         /// Overlaps with fewer samples are left as they are.
@@ -70,8 +70,8 @@ pub struct PhotometricInput<'a> {
 }
 
 impl PhotometricInput<'_> {
-    /// Adds the equations of all overlaps, linearised around the present grids, at a level; gives the mean difference in
-    /// grey levels. `solved` are the grids whose vertices are unknown, `fine` the same subdivided along their bases,
+    /// Adds the equations of all overlaps, linearized around the present grids, at a level; gives the mean difference in
+    /// gray levels. `solved` are the grids whose vertices are unknown, `fine` the same subdivided along their bases,
     /// `shares` the share of its weight that every overlap has.
     pub(super) fn add(
         &self,
@@ -102,7 +102,7 @@ impl PhotometricInput<'_> {
     }
 
     /// For every overlap the share of its weight that it has: how much of the misalignment that its pixels see, at the
-    /// size at which they see most, is common to neighbouring cells.
+    /// size at which they see most, is common to neighboring cells.
     pub(super) fn shares(
         &self,
         warps: &[OverlapWarp],

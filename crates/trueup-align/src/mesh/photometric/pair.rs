@@ -1,4 +1,4 @@
-//! One overlap seen through its pixels: samples, the colour model between the two pictures, and their equations.
+//! One overlap seen through its pixels: samples, the color model between the two pictures, and their equations.
 
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
@@ -7,7 +7,7 @@ use trueup_core::mesh::GridMesh;
 use super::super::evidence::quotient;
 use super::super::normal_equations::{Metric, Share};
 use super::PhotometricOptions;
-use super::pyramid::{Grey, Pyramid};
+use super::pyramid::{Gray, Pyramid};
 use crate::match_points::OverlapWarp;
 
 /// Vertices of one cell in each picture.
@@ -33,8 +33,8 @@ pub(super) struct Overlap<'a> {
 struct Sample {
     corners: [[u32; 4]; 2],
     shares: [[f64; 4]; 2],
-    /// Grey values; their slopes are per panorama unit.
-    grey: [Grey; 2],
+    /// Gray values; their slopes are per panorama unit.
+    gray: [Gray; 2],
     /// Bilinear place by the solved vertices in the first picture minus that in the second: what the bases' sags differ by.
     gap: Vector2<f64>,
 }
@@ -42,16 +42,16 @@ struct Sample {
 /// All samples of an overlap with what they differ by.
 struct Compared {
     samples: Vec<Sample>,
-    colours: Colours,
+    colors: Colors,
     residuals: Vec<f64>,
     /// Their standard deviation, robustly, and the weights that follow.
     sigma: f64,
     weights: Vec<f64>,
 }
 
-/// The second picture's grey values as the first would show them: gain times value plus bias.
+/// The second picture's gray values as the first would show them: gain times value plus bias.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Colour {
+struct Color {
     gain: f64,
     bias: f64,
 }
@@ -71,10 +71,10 @@ pub(super) struct OverlapEquations {
 }
 
 impl Overlap<'_> {
-    /// The linearised photometric equations around the present grids, at a level of the pyramids.
+    /// The linearized photometric equations around the present grids, at a level of the pyramids.
     /// `share` of its weight is what the overlap has.
     pub fn equations(&self, level: usize, share: f64, options: &PhotometricOptions) -> OverlapEquations {
-        let Some(Compared { samples, colours, residuals, sigma, weights }) = self.compared(level, options) else {
+        let Some(Compared { samples, colors, residuals, sigma, weights }) = self.compared(level, options) else {
             return OverlapEquations { cells: Vec::new(), misfit: [0.0; 2] };
         };
         let noise = (options.noise_level / sigma.max(options.least_noise)).powi(2);
@@ -89,7 +89,7 @@ impl Overlap<'_> {
             .map(|group| {
                 let mut cells = CellPair::empty(pictures, &samples[group[0]]);
                 for &k in group {
-                    let gain = colours.of_sample(&samples[k]).gain;
+                    let gain = colors.of_sample(&samples[k]).gain;
                     cells.add(&samples[k], gain, residuals[k], share * weights[k]);
                 }
                 cells
@@ -107,21 +107,21 @@ impl Overlap<'_> {
         if samples.len() < options.min_samples {
             return None;
         }
-        let colours = Colours::of(&samples, self.solved[0], options);
-        let residuals: Vec<f64> = samples.iter().map(|sample| colours.residual(sample)).collect();
+        let colors = Colors::of(&samples, self.solved[0], options);
+        let residuals: Vec<f64> = samples.iter().map(|sample| colors.residual(sample)).collect();
         let sigma = spread(&residuals);
         let weights = residuals.iter().map(|residual| tukey_weight(residual / sigma)).collect();
-        Some(Compared { samples, colours, residuals, sigma, weights })
+        Some(Compared { samples, colors, residuals, sigma, weights })
     }
 
-    /// Square, per axis, of the misalignment that the pixels of neighbouring cells have in common, at a level.
+    /// Square, per axis, of the misalignment that the pixels of neighboring cells have in common, at a level.
     pub fn common_square(&self, level: usize, options: &PhotometricOptions) -> f64 {
         let Some(compared) = self.compared(level, options) else { return 0.0 };
         let grid = self.solved[0];
         let per_sample = compared.sigma.max(options.least_noise).powi(-2);
         let mut cells = vec![(Matrix2::zeros(), Vector2::zeros()); grid.len()];
         for ((sample, residual), weight) in compared.samples.iter().zip(&compared.residuals).zip(&compared.weights) {
-            let slope = sample.mean_slope(compared.colours.of_sample(sample).gain);
+            let slope = sample.mean_slope(compared.colors.of_sample(sample).gain);
             let (information, pull) = &mut cells[sample.corners[0][0] as usize];
             *information += slope * slope.transpose() * (weight * per_sample);
             *pull -= slope * (residual * weight * per_sample);
@@ -138,8 +138,8 @@ impl Overlap<'_> {
         let (mut sum, mut squares) = ([0.0; 2], 0.0);
         for vertex in 0..grid.len() {
             let right = Some(vertex + 1).filter(|next| next % grid.columns != 0);
-            for neighbour in [right, Some(vertex + grid.columns)].into_iter().flatten() {
-                if let (Some((one, seen)), Some(Some((other, seen_there)))) = (own[vertex], own.get(neighbour)) {
+            for neighbor in [right, Some(vertex + grid.columns)].into_iter().flatten() {
+                if let (Some((one, seen)), Some(Some((other, seen_there)))) = (own[vertex], own.get(neighbor)) {
                     sum[0] += one.dot(other);
                     squares += one.dot(other).powi(2);
                     sum[1] += (seen * seen_there.transpose()).trace();
@@ -168,20 +168,20 @@ impl Overlap<'_> {
         let (corners_here, shares_here) = self.solved[0].bilinear(point);
         let start = self.warp.at(self.solved[0], point)?;
         let there = self.fine[1].source_of(self.fine[0].warp(point), start)?;
-        let here_grey = self.pyramids[0].at(level, point)?;
-        let there_grey = self.pyramids[1].at(level, there)?;
-        if here_grey.slope.norm().max(there_grey.slope.norm()) < min_gradient {
+        let here_gray = self.pyramids[0].at(level, point)?;
+        let there_gray = self.pyramids[1].at(level, there)?;
+        if here_gray.slope.norm().max(there_gray.slope.norm()) < min_gradient {
             return None;
         }
         let (corners_there, shares_there) = self.solved[1].bilinear(there);
-        let grey = [
-            on_panorama(here_grey, &self.fine[0].derivative(point))?,
-            on_panorama(there_grey, &self.fine[1].derivative(there))?,
+        let gray = [
+            on_panorama(here_gray, &self.fine[0].derivative(point))?,
+            on_panorama(there_gray, &self.fine[1].derivative(there))?,
         ];
         Some(Sample {
             corners: [corners_here, corners_there].map(|corners| corners.map(|corner| corner as u32)),
             shares: [shares_here, shares_there],
-            grey,
+            gray,
             gap: self.solved[0].warp(point) - self.solved[1].warp(there),
         })
     }
@@ -190,7 +190,7 @@ impl Overlap<'_> {
 impl Sample {
     /// Mean of both pictures' slopes, the second's as the first would show it with a gain.
     fn mean_slope(&self, gain: f64) -> Vector2<f64> {
-        0.5 * (gain * self.grey[1].slope + self.grey[0].slope)
+        0.5 * (gain * self.gray[1].slope + self.gray[0].slope)
     }
 }
 
@@ -199,12 +199,12 @@ fn spacing_px(level: usize, options: &PhotometricOptions) -> f64 {
     options.spacing_px * 2.0_f64.powi(level as i32)
 }
 
-/// The grey value with its slope per panorama unit.
-fn on_panorama(grey: Grey, derivative: &Matrix2<f64>) -> Option<Grey> {
-    Some(Grey { slope: derivative.try_inverse()?.transpose() * grey.slope, ..grey })
+/// The gray value with its slope per panorama unit.
+fn on_panorama(gray: Gray, derivative: &Matrix2<f64>) -> Option<Gray> {
+    Some(Gray { slope: derivative.try_inverse()?.transpose() * gray.slope, ..gray })
 }
 
-/// Standard deviation of residuals, grey levels, of which less than half are outliers.
+/// Standard deviation of residuals, gray levels, of which less than half are outliers.
 fn spread(residuals: &[f64]) -> f64 {
     /// Least standard deviation: that of rounding both pictures.
     const ROUNDING: f64 = 0.5;
@@ -219,14 +219,14 @@ fn tukey_weight(residual: f64) -> f64 {
     if share.abs() < 1.0 { (1.0 - share * share).powi(2) } else { 0.0 }
 }
 
-/// A colour model for every cell of the first picture.
-struct Colours {
-    overall: Colour,
+/// A color model for every cell of the first picture.
+struct Colors {
+    overall: Color,
     /// By the cell's first vertex.
-    cells: Vec<Option<Colour>>,
+    cells: Vec<Option<Color>>,
 }
 
-/// Sums from which a colour model follows.
+/// Sums from which a color model follows.
 #[derive(Clone, Copy, Default)]
 struct Moments {
     count: f64,
@@ -238,8 +238,8 @@ impl Moments {
     fn add(&mut self, sample: &Sample) {
         self.count += 1.0;
         for side in 0..2 {
-            self.sums[side] += sample.grey[side].value;
-            self.squares[side] += sample.grey[side].value.powi(2);
+            self.sums[side] += sample.gray[side].value;
+            self.squares[side] += sample.gray[side].value.powi(2);
         }
     }
 
@@ -249,7 +249,7 @@ impl Moments {
     }
 }
 
-impl Colours {
+impl Colors {
     /// # Departures
     /// The gain is the quotient of the standard deviations. The least-squares gain of one picture on the other shrinks
     /// while the pictures are not yet aligned, and would explain the misalignment as lack of contrast.
@@ -263,34 +263,34 @@ impl Colours {
         let [here, there] = all.deviations();
         let gain = if here > 0.0 && there > 0.0 { (here / there).sqrt() } else { 1.0 };
         let gain = gain.clamp(1.0 / options.max_gain, options.max_gain);
-        let overall = Colour { gain, bias: (all.sums[0] - gain * all.sums[1]) / all.count.max(1.0) };
+        let overall = Color { gain, bias: (all.sums[0] - gain * all.sums[1]) / all.count.max(1.0) };
         let variance = there / all.count.max(1.0);
         let cells = cells
             .iter()
             .map(|cell| {
                 let [here, there] = cell.deviations();
-                let ridge = options.colour_ridge;
+                let ridge = options.color_ridge;
                 let drawn = (here + ridge * gain * gain * variance) / (there + ridge * variance);
                 let gain = if drawn.is_finite() && drawn > 0.0 { drawn.sqrt() } else { gain };
                 let gain = gain.clamp(1.0 / options.max_gain, options.max_gain);
                 let count = cell.count + ridge;
-                // What the ridge contributes is the overall model at the overlap's mean grey value.
+                // What the ridge contributes is the overall model at the overlap's mean gray value.
                 let mean = all.sums[1] / all.count.max(1.0);
                 let wanted = ridge * (overall.bias + (overall.gain - gain) * mean);
                 let bias = (cell.sums[0] - gain * cell.sums[1] + wanted) / count;
-                (cell.count > 0.0 && count > 0.0).then_some(Colour { gain, bias })
+                (cell.count > 0.0 && count > 0.0).then_some(Color { gain, bias })
             })
             .collect();
         Self { overall, cells }
     }
 
-    fn of_sample(&self, sample: &Sample) -> Colour {
+    fn of_sample(&self, sample: &Sample) -> Color {
         self.cells[sample.corners[0][0] as usize].unwrap_or(self.overall)
     }
 
     fn residual(&self, sample: &Sample) -> f64 {
-        let Colour { gain, bias } = self.of_sample(sample);
-        gain * sample.grey[1].value + bias - sample.grey[0].value
+        let Color { gain, bias } = self.of_sample(sample);
+        gain * sample.gray[1].value + bias - sample.gray[0].value
     }
 }
 

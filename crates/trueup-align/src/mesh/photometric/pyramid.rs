@@ -3,25 +3,25 @@
 use nalgebra::Vector2;
 use trueup_core::raster::Raster;
 
-/// A picture's grey values at several sizes, the finest first, each half as large as the one before and blurred by a
+/// A picture's gray values at several sizes, the finest first, each half as large as the one before and blurred by a
 /// binomial of standard deviation one of its own pixels.
 ///
-/// Eight bits a pixel: rounding adds 0.3 grey levels, well below any photograph's noise, and 72 pictures of the usual
+/// Eight bits a pixel: rounding adds 0.3 gray levels, well below any photograph's noise, and 72 pictures of the usual
 /// working size take 46 MB.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pyramid {
     levels: Vec<Raster<u8>>,
 }
 
-/// Grey value and its change per working pixel.
+/// Gray value and its change per working pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Grey {
+pub(super) struct Gray {
     pub value: f64,
     pub slope: Vector2<f64>,
 }
 
 impl Pyramid {
-    /// Of grey values 0 to 255, one channel; at least one level, none smaller than needed for a gradient.
+    /// Of gray values 0 to 255, one channel; at least one level, none smaller than needed for a gradient.
     pub fn new(gray: &Raster<u8>, levels: usize) -> Self {
         /// Smallest side of a level, pixels.
         const SMALLEST: usize = 16;
@@ -41,9 +41,9 @@ impl Pyramid {
         self.levels.len()
     }
 
-    /// The grey value at a place in working pixels, in a level (0 the finest; the coarsest there is if there are fewer);
+    /// The gray value at a place in working pixels, in a level (0 the finest; the coarsest there is if there are fewer);
     /// `None` within two of the level's pixels of the border.
-    pub(super) fn at(&self, level: usize, point: Vector2<f64>) -> Option<Grey> {
+    pub(super) fn at(&self, level: usize, point: Vector2<f64>) -> Option<Gray> {
         let level = level.min(self.levels.len() - 1);
         let gray = &self.levels[level];
         let pixel_per_working = 0.5_f64.powi(level as i32);
@@ -64,7 +64,7 @@ impl Pyramid {
         };
         let corner = |of: &dyn Fn(usize, usize) -> f64| between([of(1, 1), of(1, 2), of(2, 1), of(2, 2)]);
         let half = 0.5 * pixel_per_working;
-        Some(Grey {
+        Some(Gray {
             value: corner(&|r, c| rows[r][c]),
             slope: Vector2::new(
                 half * corner(&|r, c| rows[r][c + 1] - rows[r][c - 1]),
@@ -128,10 +128,10 @@ mod tests {
         let pyramid = Pyramid::new(&gray, 3);
         assert_eq!(pyramid.levels(), 3);
         for level in 0..3 {
-            let grey = pyramid.at(level, Vector2::new(50.25, 40.5)).expect("inside");
-            // The pixel centre (c + 0.5) holds c: the ramp is x + y - 1.
-            assert!((grey.value - 89.75).abs() < 0.6, "level {level}: {}", grey.value);
-            assert!((grey.slope - Vector2::new(1.0, 1.0)).norm() < 0.2, "level {level}: {}", grey.slope);
+            let gray = pyramid.at(level, Vector2::new(50.25, 40.5)).expect("inside");
+            // The pixel center (c + 0.5) holds c: the ramp is x + y - 1.
+            assert!((gray.value - 89.75).abs() < 0.6, "level {level}: {}", gray.value);
+            assert!((gray.slope - Vector2::new(1.0, 1.0)).norm() < 0.2, "level {level}: {}", gray.slope);
         }
         assert_eq!(pyramid.at(0, Vector2::new(0.5, 40.0)), None);
         assert_eq!(pyramid.at(2, Vector2::new(117.0, 40.0)), None);

@@ -10,7 +10,7 @@ use trueup_core::{Error, Result, StageContext};
 
 use super::directory::Place;
 use super::{BUFFER_BYTES, DEFAULT_TILE_PX, Form, MAX_SIDE, write_picture};
-use crate::colour::InSrgb;
+use crate::color::InSrgb;
 use crate::encode::pending::PendingFile;
 use crate::encode::{
     Depth, Failure, LayerExtent, Metadata, OutputOptions, RGBA, TiffLayout, check_place, check_sides, from_tiff,
@@ -67,7 +67,7 @@ pub fn check_layers_place(path: &Path) -> Result<()> {
 ///
 /// Every page has alpha, the name of its layer, its number, and its place in the panorama (XPosition, YPosition at 72
 /// pixels an inch; ImageFullWidth, ImageFullLength). [`OutputOptions::layer_extent`] decides whether it is as large as the
-/// panorama. Of `metadata`, the pages have the colour profile. The file appears complete or not at all.
+/// panorama. Of `metadata`, the pages have the color profile. The file appears complete or not at all.
 ///
 /// # Errors
 /// Those of [`write()`](crate::encode::write()), and of [`LayerSet::open`].

@@ -1,18 +1,18 @@
-//! Exact nearest-neighbour search over byte descriptors, both directions in one pass.
+//! Exact nearest-neighbor search over byte descriptors, both directions in one pass.
 //!
 //! # How
 //!
 //! Squared distances are whole numbers, |a|^2 + |b|^2 - 2ab, at most 128 * 255^2 < 2^23. A distance and a 9-bit number
-//! therefore fit one 32-bit key, and the minimum of keys is the nearest neighbour with the smaller number winning ties.
+//! therefore fit one 32-bit key, and the minimum of keys is the nearest neighbor with the smaller number winning ties.
 //! One pass over all products keeps, for every row (a descriptor of the first picture), the two smallest keys of each
 //! of 16 interleaved lanes of columns, and for every column the smallest key over the rows.
 //!
 //! # Exactness
 //!
-//! The nearest neighbours of rows and columns are exact. What else is asked of a row is the nearest column that is
+//! The nearest neighbors of rows and columns are exact. What else is asked of a row is the nearest column that is
 //! not *excluded* (too close in the picture to the nearest one). In a lane, the smallest key that is not excluded
 //! answers; only where both keys of a lane are excluded is the lane searched again, column by column. So the second
-//! neighbour is exact too: see [`Nearest::nearest_allowed`].
+//! neighbor is exact too: see [`Nearest::nearest_allowed`].
 
 mod kernels;
 #[cfg(test)]
@@ -55,7 +55,7 @@ struct LaneBest {
 ///
 /// Ordered by distance, then index: the minimum is the nearest, the smaller index winning ties.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Neighbour {
+pub struct Neighbor {
     /// Squared distance in descriptor units.
     pub squared_distance: u32,
     /// Index of the descriptor.
@@ -69,7 +69,7 @@ pub struct Nearest<'a> {
     columns: &'a [Descriptor],
     /// For every pass over columns, for every row.
     lane_bests: Vec<Vec<LaneBest>>,
-    column_nearest: Vec<Neighbour>,
+    column_nearest: Vec<Neighbor>,
 }
 
 impl<'a> Nearest<'a> {
@@ -94,18 +94,18 @@ impl<'a> Nearest<'a> {
     }
 
     /// The row nearest to a column.
-    pub fn nearest_row(&self, column: usize) -> Neighbour {
+    pub fn nearest_row(&self, column: usize) -> Neighbor {
         self.column_nearest[column]
     }
 
     /// The column nearest to a row.
-    pub fn nearest_column(&self, row: usize) -> Neighbour {
+    pub fn nearest_column(&self, row: usize) -> Neighbor {
         let lanes = self.lane_bests.iter().enumerate().flat_map(|(pass, bests)| {
             let first = bests[row].first.0;
             (0..LANES).map(move |lane| (pass, lane, first[lane]))
         });
-        let nearest = lanes.map(|(pass, lane, key)| self.neighbour(pass, lane, key)).min();
-        nearest.unwrap_or(Neighbour { squared_distance: u32::MAX, descriptor: 0 })
+        let nearest = lanes.map(|(pass, lane, key)| self.neighbor(pass, lane, key)).min();
+        nearest.unwrap_or(Neighbor { squared_distance: u32::MAX, descriptor: 0 })
     }
 
     /// The squared distance from a row to the nearest column that `excluded` does not name; `None` if it names all.
@@ -119,7 +119,7 @@ impl<'a> Nearest<'a> {
         for (pass, bests) in self.lane_bests.iter().enumerate() {
             for lane in 0..LANES {
                 let keys = [bests[row].first.0[lane], bests[row].second.0[lane]];
-                let candidates = keys.map(|key| (key != u32::MAX).then(|| self.neighbour(pass, lane, key)));
+                let candidates = keys.map(|key| (key != u32::MAX).then(|| self.neighbor(pass, lane, key)));
                 match candidates.into_iter().flatten().find(|candidate| !excluded(candidate.descriptor)) {
                     Some(candidate) => lower(candidate.squared_distance),
                     None => hidden.push((pass, lane)),
@@ -140,11 +140,11 @@ impl<'a> Nearest<'a> {
         nearest
     }
 
-    fn neighbour(&self, pass: usize, lane: usize, key: u32) -> Neighbour {
+    fn neighbor(&self, pass: usize, lane: usize, key: u32) -> Neighbor {
         let block = (key & ((1 << SHIFT) - 1)) as usize;
         // The last block repeats the last column to be full.
         let descriptor = (pass * COLUMNS_PER_PASS + block * LANES + lane).min(self.columns.len() - 1);
-        Neighbour { squared_distance: key >> SHIFT, descriptor }
+        Neighbor { squared_distance: key >> SHIFT, descriptor }
     }
 }
 
@@ -187,7 +187,7 @@ impl PackedRows {
     }
 
     /// The two smallest keys of every lane for every row, and the nearest row of every column.
-    fn compare(&self, columns: &PackedColumns) -> (Vec<LaneBest>, Vec<Neighbour>) {
+    fn compare(&self, columns: &PackedColumns) -> (Vec<LaneBest>, Vec<Neighbor>) {
         const TILES_PER_TASK: usize = ROWS_PER_TASK / ROWS;
         let mut bests = vec![[LaneBest { first: FARTHEST, second: FARTHEST }; ROWS]; self.terms.len()];
         let task_nearest: Vec<Vec<Lanes>> = bests
@@ -257,15 +257,15 @@ impl PackedColumns {
 }
 
 /// The nearest row of every column from the keys of every task's rows.
-fn nearest_rows(task_nearest: &[Vec<Lanes>]) -> Vec<Neighbour> {
+fn nearest_rows(task_nearest: &[Vec<Lanes>]) -> Vec<Neighbor> {
     let columns = task_nearest.first().map_or(0, |nearest| nearest.len() * LANES);
     let nearest_of = |column: usize| {
         let candidates = task_nearest.iter().enumerate().map(|(task, nearest)| {
             let key = nearest[column / LANES].0[column % LANES];
             let row = (key & ((1 << SHIFT) - 1)) as usize;
-            Neighbour { squared_distance: key >> SHIFT, descriptor: task * ROWS_PER_TASK + row }
+            Neighbor { squared_distance: key >> SHIFT, descriptor: task * ROWS_PER_TASK + row }
         });
-        candidates.min().unwrap_or(Neighbour { squared_distance: u32::MAX, descriptor: 0 })
+        candidates.min().unwrap_or(Neighbor { squared_distance: u32::MAX, descriptor: 0 })
     };
     (0..columns).map(nearest_of).collect()
 }

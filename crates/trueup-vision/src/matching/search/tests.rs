@@ -26,12 +26,12 @@ fn coarse_descriptors(seed: u64, count: usize) -> Vec<Descriptor> {
     descriptors
 }
 
-fn naive(query: &Descriptor, candidates: &[Descriptor]) -> Neighbour {
-    let neighbours = candidates.iter().enumerate().map(|(descriptor, candidate)| {
+fn naive(query: &Descriptor, candidates: &[Descriptor]) -> Neighbor {
+    let neighbors = candidates.iter().enumerate().map(|(descriptor, candidate)| {
         let squared = |(&a, &b): (&u8, &u8)| (i32::from(a) - i32::from(b)).pow(2) as u32;
-        Neighbour { squared_distance: query.iter().zip(candidate).map(squared).sum(), descriptor }
+        Neighbor { squared_distance: query.iter().zip(candidate).map(squared).sum(), descriptor }
     });
-    neighbours.min().expect("there are candidates")
+    neighbors.min().expect("there are candidates")
 }
 
 fn check_against_naive(kernel: Kernel, rows: &[Descriptor], columns: &[Descriptor]) {
@@ -70,9 +70,9 @@ fn searches_of_more_than_one_pass_and_task_are_seamless() {
     columns[COLUMNS_PER_PASS + 2] = rows[ROWS_PER_TASK + 2];
     for kernel in Kernel::available() {
         let nearest = Nearest::search_with(kernel, &rows, &columns).expect("not empty");
-        let expected = Neighbour { squared_distance: 0, descriptor: COLUMNS_PER_PASS + 1 };
+        let expected = Neighbor { squared_distance: 0, descriptor: COLUMNS_PER_PASS + 1 };
         assert_eq!(nearest.nearest_column(ROWS_PER_TASK + 2), expected);
-        let back = Neighbour { squared_distance: 0, descriptor: ROWS_PER_TASK + 2 };
+        let back = Neighbor { squared_distance: 0, descriptor: ROWS_PER_TASK + 2 };
         assert_eq!(nearest.nearest_row(COLUMNS_PER_PASS + 2), back);
         assert_eq!(nearest.nearest_column(3), naive(&rows[3], &columns));
     }

@@ -1,0 +1,21 @@
+//! Color profiles: which colors the numbers of photographs mean, and one color space for all of them.
+//!
+//! * [`PhotographColors::survey`] reads what every photograph says of its colors and chooses the panorama's space;
+//! * decoding then converts the photographs that were in another ([`crate::decode::FilePhotographs::in_colors`]);
+//! * [`crate::encode`] embeds the space's profile, or converts the panorama to sRGB.
+//!
+//! # Source
+//! ICC.1:2022 (profile format). Conversions are colorimetric and relative to white, by `moxcms`.
+
+mod convert;
+mod embedded;
+mod icc;
+mod rows;
+mod survey;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use icc::is_srgb;
+pub use icc::srgb_profile;
+pub(crate) use rows::InSrgb;
+pub use survey::PhotographColors;

@@ -1,0 +1,153 @@
+//! One color space for photographs that may be in several.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use trueup_core::StageContext;
+use trueup_core::color::TransferCurve;
+use trueup_core::diagnostics::{Diagnostic, Subject};
+use trueup_core::source::SourceImage;
+
+use super::convert::Conversion;
+use super::embedded;
+use super::icc::{RgbSpace, Understood, description, understand};
+
+/// Gamuts whose areas differ by less than this share are equally wide.
+const SAME_AREA: f64 = 1e-3;
+
+/// The color space that a set of photographs is brought to, and which of them it changes.
+#[derive(Debug, Clone)]
+pub struct PhotographColors {
+    space: RgbSpace,
+    /// For each photograph; `None` where its samples are in that space already.
+    conversions: Vec<Option<Conversion>>,
+}
+
+/// What the samples of one photograph mean.
+struct Meaning {
+    /// The profile of RGB samples, and the space if a panorama can be composed in it.
+    rgb: (Arc<moxcms::ColorProfile>, Option<RgbSpace>),
+    /// The curve of gray samples.
+    gray: TransferCurve,
+    name: String,
+}
+
+impl Meaning {
+    fn of_space(space: RgbSpace) -> Self {
+        Self { name: space.name(), gray: space.curve.clone(), rgb: (space.profile.clone(), Some(space)) }
+    }
+}
+
+impl PhotographColors {
+    /// Reads what photographs say of their colors, from their headers, and chooses a space for all of them.
+    ///
+    /// Where all are in one space, that is it, and nothing is converted. Otherwise it is the one with the widest gamut, so
+    /// that no photograph loses colors; of equals, that of the first photograph. Photographs that say nothing are in
+    /// sRGB, or in Adobe RGB if their EXIF names it. Spaces given by tables or by a different curve for each channel are
+    /// converted to the one chosen among the others, or to sRGB; gray has no gamut and does not take part in the choice.
+    /// A profile that cannot be understood is as good as none; a warning says so.
+    pub fn survey(images: &[SourceImage], context: &StageContext) -> Self {
+        let read: Vec<(Meaning, Option<Diagnostic>)> =
+            images.par_iter().enumerate().map(|(number, image)| meaning(number, image)).collect();
+        let (meanings, findings): (Vec<_>, Vec<_>) = read.into_iter().unzip();
+        findings.into_iter().flatten().for_each(|finding| context.report(finding));
+        let mut space: Option<&RgbSpace> = None;
+        for candidate in meanings.iter().filter_map(|meaning| meaning.rgb.1.as_ref()) {
+            let wider = |space: &RgbSpace| candidate.gamut_area() > (1.0 + SAME_AREA) * space.gamut_area();
+            if space.is_none_or(wider) {
+                space = Some(candidate);
+            }
+        }
+        let space = space.cloned().unwrap_or_else(RgbSpace::srgb);
+        let conversions: Vec<_> = meanings.iter().map(|meaning| conversion(meaning, &space)).collect();
+        for (number, (meaning, conversion)) in meanings.iter().zip(&conversions).enumerate() {
+            if conversion.as_ref().is_some_and(|conversion| conversion.rgb.is_some()) {
+                context.report(Diagnostic::note(
+                    "color-converted",
+                    Subject::Photograph(number),
+                    format!("its colors were converted from {} to the panorama's {}", meaning.name, space.name()),
+                    "",
+                ));
+            }
+        }
+        Self { space, conversions }
+    }
+
+    /// The profile to embed in the panorama; `None` for sRGB.
+    pub fn icc(&self) -> Option<&[u8]> {
+        self.space.icc.as_deref()
+    }
+
+    /// Whether the space is sRGB.
+    pub fn is_srgb(&self) -> bool {
+        self.space.is_same(&RgbSpace::srgb())
+    }
+
+    /// How the panorama's samples stand for light.
+    pub fn transfer_curve(&self) -> &TransferCurve {
+        &self.space.curve
+    }
+
+    /// The name of the space.
+    pub fn name(&self) -> String {
+        self.space.name()
+    }
+
+    /// What has to be done to photograph `index`.
+    pub(crate) fn conversion(&self, index: usize) -> Option<&Conversion> {
+        self.conversions.get(index)?.as_ref()
+    }
+}
+
+fn meaning(number: usize, image: &SourceImage) -> (Meaning, Option<Diagnostic>) {
+    let embedded = embedded::read(&image.path);
+    let srgb = || Meaning::of_space(RgbSpace::srgb());
+    let Some(icc) = embedded.icc else {
+        let space = if embedded.is_adobe_rgb { RgbSpace::adobe_rgb() } else { RgbSpace::srgb() };
+        return (Meaning::of_space(space), None);
+    };
+    match understand(&icc) {
+        Understood::Space(space) => (Meaning::of_space(space), None),
+        Understood::Tables(profile) => {
+            let name = description(&profile);
+            (Meaning { rgb: (profile, None), gray: TransferCurve::SRGB, name }, None)
+        }
+        // Gray samples say nothing of a gamut, and colors in the same file say nothing of themselves.
+        Understood::Gray(gray) => (Meaning { rgb: (RgbSpace::srgb().profile, None), gray, ..srgb() }, None),
+        Understood::Foreign(kind) => {
+            let finding = Diagnostic::note(
+                "color-profile-ignored",
+                Subject::Photograph(number),
+                format!("its ICC profile is for {kind}; its colors are taken for sRGB"),
+                "Export it in sRGB if its colors look wrong.",
+            );
+            (srgb(), Some(finding))
+        }
+        Understood::Damaged(reason) => {
+            let finding = Diagnostic::warning(
+                "color-profile-damaged",
+                Subject::Photograph(number),
+                format!("its ICC profile cannot be used ({reason}); its colors are taken for sRGB"),
+                "Export the photograph again with its profile, or in sRGB.",
+            );
+            (srgb(), Some(finding))
+        }
+    }
+}
+
+fn conversion(meaning: &Meaning, space: &RgbSpace) -> Option<Conversion> {
+    let srgb = RgbSpace::srgb();
+    let is_there = match &meaning.rgb.1 {
+        Some(own) => own.is_same(space),
+        // Colors beside a gray profile are sRGB; tables always have to be followed.
+        None => Arc::ptr_eq(&meaning.rgb.0, &srgb.profile) && srgb.is_same(space),
+    };
+    let rgb = (!is_there).then(|| meaning.rgb.0.clone());
+    let gray = (!meaning.gray.is_same(&space.curve)).then(|| meaning.gray.clone());
+    (rgb.is_some() || gray.is_some()).then(|| Conversion {
+        rgb,
+        gray,
+        target: space.profile.clone(),
+        target_curve: space.curve.clone(),
+    })
+}

@@ -1,0 +1,103 @@
+//! T7: whether a method's freedom buys alignment, and what it costs in direction.
+
+use trueup::Result;
+
+use crate::methods::{Family, Method, VPG, methods_of};
+use crate::report::document::{Block, Claim, Section, Table, number};
+use crate::results::Results;
+use crate::sets::{Catalogue, SetSpec};
+use crate::statistics::mean;
+use crate::trial::Trial;
+
+/// The experiment's name.
+pub(crate) const NAME: &str = "alignment";
+
+/// Larger sets are left out: their pixels take minutes to compare and say the same.
+const MAX_PICTURES: usize = 16;
+
+/// Every method on the study's sets of moderate size and on the given ones, with their pixels compared.
+pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
+    let mut trials = Vec::new();
+    for set in catalogue.study.iter().chain(&catalogue.given) {
+        if set.pictures()? <= MAX_PICTURES {
+            let of_method = |one: &Method| Trial::new(NAME, &set.name, one.name, one.overrides);
+            trials.extend(methods().map(|one| Trial { pixels: true, ..of_method(one) }));
+        }
+    }
+    Ok(trials)
+}
+
+/// The methods of the tables: each prior, and what bends the mesh further.
+fn methods() -> impl Iterator<Item = &'static Method> {
+    methods_of(Family::Prior).chain(methods_of(Family::Alignment))
+}
+
+/// GDIC that alignment may cost, degrees: less than the rectangle in GDIC errs by itself.
+const MAX_COST_DEG: f64 = 0.2;
+
+/// What aligns further lowers the error and leaves the direction alone.
+pub(crate) fn claims(results: &Results) -> Vec<Claim> {
+    let sets = &results.catalogue.study;
+    let value = |name, measure| mean(&results.values_of_all(NAME, sets, name, measure));
+    let of_method = |one: &Method| {
+        let error = value(one.name, "ncc_mse").zip(value(VPG, "ncc_mse"));
+        let gdic = value(one.name, "gdic_deg").zip(value(VPG, "gdic_deg"));
+        let verdict =
+            error.zip(gdic).map(|((error, before), (gdic, own))| error < before && (gdic - own).abs() <= MAX_COST_DEG);
+        let (error, before) = error.unzip();
+        let (gdic, own) = gdic.unzip();
+        Claim {
+            text: format!("`{}` aligns better than VPG alone and turns the photographs alike.", one.name),
+            holds: verdict,
+            evidence: format!(
+                "Mean NCC MSE {} against {}, GDIC {} against {} degrees (alike means within {MAX_COST_DEG}).",
+                number(error, 4),
+                number(before, 4),
+                number(gdic, 2),
+                number(own, 2)
+            ),
+            brief: format!("{} NCC MSE {} against {}", one.name, number(error, 4), number(before, 4)),
+        }
+    };
+    methods_of(Family::Alignment).map(of_method).collect()
+}
+
+/// A table per family of sets.
+pub(crate) fn section(results: &Results) -> Section {
+    let mut section = Section::new(NAME, "T7: alignment against direction");
+    section.say(
+        "The paper adds dual-feature warping (DFW) or content-preserving warping (GCPW) to VPG and finds the alignment error fall \
+         while GDIC stays. The list of methods above says which row stands beside which of them. **NCC MSE**: mean square of one minus \
+         the normalized cross-correlation of 3 x 3 windows where photographs overlap on the panorama. **gray MSE**: mean square \
+         difference of gray values, 0 to 255, after evening out the exposures. **matches**: root mean square distance of matched \
+         points, source pixels.",
+    );
+    section.blocks.extend(claims(results).into_iter().map(Block::Claim));
+    let caption = format!("Means over the study's sets of at most {MAX_PICTURES} photographs.");
+    section.blocks.push(Block::Table(table(results, &results.catalogue.study, "t7-alignment", &caption)));
+    if !results.catalogue.given.is_empty() {
+        let caption = format!("Means over the given sets of at most {MAX_PICTURES} photographs.");
+        section.blocks.push(Block::Table(table(results, &results.catalogue.given, "t7-given", &caption)));
+    }
+    section
+}
+
+fn table(results: &Results, sets: &[SetSpec], id: &str, caption: &str) -> Table {
+    let columns = ["method", "NCC MSE", "gray MSE", "PSNR dB", "SSIM", "matches px", "GDIC deg", "LD x 1e-2", "folds"];
+    let mut table = Table::new(id, caption, columns);
+    for one in methods() {
+        let value = |measure| mean(&results.values_of_all(NAME, sets, one.name, measure));
+        table.push([
+            one.name.to_owned(),
+            number(value("ncc_mse"), 4),
+            number(value("intensity_mse"), 1),
+            number(value("psnr_db"), 2),
+            number(value("ssim"), 4),
+            number(value("match_rms_px"), 3),
+            number(value("gdic_deg"), 2),
+            number(value("ld"), 2),
+            number(value("folds"), 1),
+        ]);
+    }
+    table
+}
