@@ -38,7 +38,8 @@ pub(crate) fn run(
     let mut matched: BTreeMap<(usize, usize), PairMatches> = candidates.iter().filter_map(recall).collect();
     let missing: Vec<_> =
         candidates.iter().copied().filter(|&(a, b)| !matched.contains_key(&(a.min(b), a.max(b)))).collect();
-    for pair in matching::run(features, frames, &missing, &forced, &options.matching, context)? {
+    let input = matching::MatchingInput { features, frames, pairs: &missing, forced: &forced };
+    for pair in matching::run(&input, &options.matching, context)? {
         if let Some(known) = known {
             known.keep_pair(&pair, forced.contains(&(pair.a, pair.b)), options);
         }
@@ -60,7 +61,7 @@ fn propose(
     };
     let earlier: Vec<Vec<Option<usize>>> = (0..features.len()).map(|b| known.looks(b, options)).collect();
     let recall = |a: usize, b: usize| earlier[b][a];
-    let looks = pairing::quick_looks(features, &recall, &options.pairing, context)?;
+    let looks = pairing::quick_looks(features, &recall, context)?;
     for (b, looks) in looks.iter().enumerate() {
         if earlier[b].iter().any(Option::is_none) {
             known.keep_looks(b, looks, options);

@@ -110,8 +110,8 @@ impl Known<'_> {
         }
     }
 
-    fn looks_key(&self, b: usize, options: &StitchOptions) -> Option<Key> {
-        Some(KeyMaker::new(LOOKS).key(&self.keys[b]?).part(&options.pairing.subset).ok()?.finish())
+    fn looks_key(&self, b: usize, _options: &StitchOptions) -> Option<Key> {
+        Some(KeyMaker::new(LOOKS).key(&self.keys[b]?).finish())
     }
 
     /// The geometry of a component and what was reported on the way.
@@ -126,7 +126,7 @@ impl Known<'_> {
     /// Everything that decides the geometry of a component.
     pub fn geometry_key(&self, component: &Component, options: &StitchOptions) -> Option<Key> {
         let StitchOptions { cameras, vanishing, similarity, match_points, mesh, warps, lines, .. } = options;
-        let StitchOptions { line_matching, line_alignment, structure, photometric, .. } = options;
+        let StitchOptions { line_alignment, structure, photometric, .. } = options;
         let working = &options.stitch;
         let images: Vec<_> =
             component.images.iter().map(|image| (&image.name, image.path.file_name(), image.focal_prior)).collect();
@@ -139,7 +139,7 @@ impl Known<'_> {
             .ok()?
             .part(&(cameras, vanishing, similarity, match_points, mesh, warps, lines))
             .ok()?
-            .part(&(line_matching, line_alignment, structure, photometric))
+            .part(&(line_alignment, structure, photometric))
             .ok()?
             .part(&(images, component.camera_groups(), &component.pairs))
             .ok()?

@@ -120,7 +120,7 @@ mod tests {
         let common = StitchOptions::default();
         for shared in [
             "matching.max_distance_ratio=0.5",
-            "features.levels_per_octave=4",
+            "features.peak_threshold=1",
             "stitch.working_pixels=100000",
             "stitch.seed=3",
         ] {

@@ -21,7 +21,6 @@ use trueup_core::{Error, Result};
 use trueup_io::encode::OutputOptions;
 use trueup_io::source::SourceOptions;
 use trueup_vision::features::FeatureOptions;
-use trueup_vision::line_matching::LineMatchingOptions;
 use trueup_vision::lines::LineOptions;
 use trueup_vision::matching::MatchingOptions;
 use trueup_vision::pairing::PairingOptions;
@@ -109,8 +108,6 @@ stage_options! {
     match_points: MatchPointOptions,
     /// How the grids are deformed.
     mesh: MeshOptions,
-    /// How segments of overlapping pictures are matched.
-    line_matching: LineMatchingOptions,
     /// How matched lines align the grids.
     line_alignment: LineAlignmentOptions,
     /// How long lines keep their shape.
