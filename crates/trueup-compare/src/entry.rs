@@ -121,7 +121,7 @@ mod tests {
         let common = StitchOptions::default();
         for shared in [
             "matching.max_distance_ratio=0.5",
-            "features.levels_per_octave=4",
+            "features.peak_threshold=1",
             "working.pixels=100000",
             "random.seed=3",
         ] {

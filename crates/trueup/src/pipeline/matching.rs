@@ -70,7 +70,9 @@ fn match_pairs(input: &MatchInput, options: &MatchOptions, context: &StageContex
     let mut matched: BTreeMap<(usize, usize), PairMatches> = candidates.iter().filter_map(recall).collect();
     let missing: Vec<(usize, usize)> =
         candidates.iter().copied().filter(|pair| !matched.contains_key(&ordered(pair))).collect();
-    for pair in matching::run(input.features, input.frames, &missing, &forced, &options.matching, context)? {
+    let unmatched =
+        matching::MatchingInput { features: input.features, frames: input.frames, pairs: &missing, forced: &forced };
+    for pair in matching::run(&unmatched, &options.matching, context)? {
         // Numbers of photographs belong to this run.
         input.memo.store(PAIR, key(pair.a, pair.b).as_ref(), &PairMatches { a: 0, b: 1, ..pair.clone() });
         matched.insert((pair.a, pair.b), pair);
@@ -96,7 +98,7 @@ fn propose(input: &MatchInput, options: &MatchOptions, context: &StageContext) -
         })
         .collect();
     let recall = |a: usize, b: usize| earlier[b][a];
-    let looks = pairing::quick_looks(features, &recall, &options.pairing, context)?;
+    let looks = pairing::quick_looks(features, &recall, context)?;
     for (b, looks) in looks.iter().enumerate() {
         if earlier[b].iter().any(Option::is_none) {
             let looks: Vec<(Key, usize)> =

@@ -11,7 +11,7 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::FilePhotographs;
-use trueup_vision::line_matching::{self, LinedPicture};
+use trueup_vision::line_matching::{self, PhotographWithLines};
 use trueup_vision::lines;
 
 use super::component::Component;
@@ -47,7 +47,7 @@ impl RefinementSources {
     ) -> Result<Self> {
         let mut sources = Self::default();
         if options.stitch.structure == Structure::Lines {
-            sources.chains = component.lines.par_iter().map(|lines| lines::merged(lines, &options.lines)).collect();
+            sources.chains = component.lines.par_iter().map(|lines| lines::merged(lines)).collect();
         }
         if !needs_pixels(options) {
             return Ok(sources);
@@ -69,10 +69,10 @@ impl RefinementSources {
                 .into_par_iter()
                 .map(|warp| {
                     context.check_cancelled()?;
-                    let side = |k: usize| LinedPicture { gray: &grays[k], lines: &component.lines[k] };
+                    let side = |k: usize| PhotographWithLines { gray: &grays[k], lines: &component.lines[k] };
                     let (a, b) = (side(warp.from), side(warp.to));
                     let carry = |point| warp.at(&grids[warp.from], point);
-                    let found = line_matching::find(a, b, carry, &options.line_matching);
+                    let found = line_matching::find(a, b, carry);
                     let lines = found.iter().map(|one| [a.lines[one.in_a], b.lines[one.in_b]]).collect();
                     Ok(PairLines { a: warp.from, b: warp.to, lines })
                 })
