@@ -158,7 +158,7 @@ fn vertical_lines(
                 focal_px: camera.focal_px,
                 expected_down: camera.rotation() * down,
             };
-            metrics::vertical_lines(&picture, &working[k], &options.vanishing, &options.measures)
+            metrics::vertical_lines(&picture, &working[k], &options.measures)
         })
         .collect()
 }

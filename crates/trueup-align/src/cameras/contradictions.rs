@@ -21,9 +21,8 @@ pub(super) fn contradicting_pairs(
 ) -> Vec<usize> {
     let mut dropped = not_needed(cameras.len(), pairs, &suspects(pair_rms_px, max_rms_px));
     let level = similarity::level_by_cameras(cameras);
-    let goes_round = |left_out: &dyn Fn(usize) -> bool| {
-        full_turn::goes_round(cameras, &edges_without(pairs, left_out), &level)
-    };
+    let goes_round =
+        |left_out: &dyn Fn(usize) -> bool| full_turn::goes_round(cameras, &edges_without(pairs, left_out), &level);
     if goes_round(&|_| false) && !goes_round(&|position| dropped.contains(&position)) {
         let all = dropped.clone();
         let closes = |pair: usize| goes_round(&|position| position != pair && all.contains(&position));

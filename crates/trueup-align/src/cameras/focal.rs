@@ -76,9 +76,7 @@ fn focal_from_homography(target_from_source: &Matrix3<f64>) -> Option<FocalLengt
 /// The square root of whichever quotient is positive; of two, that with the larger denominator.
 fn better_root(first: Quotient, second: Quotient) -> Option<f64> {
     match (first.root(), second.root()) {
-        (Some(one), Some(other)) => {
-            Some(if first.denominator.abs() >= second.denominator.abs() { one } else { other })
-        }
+        (Some(one), Some(other)) => Some(if first.denominator.abs() >= second.denominator.abs() { one } else { other }),
         (one, other) => one.or(other),
     }
 }

@@ -80,9 +80,8 @@ pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageCont
         let used: Vec<&PairMatches> = active.iter().map(|&position| &pairs[position]).collect();
         solve(priors, &used, anchor, options, context)
     };
-    let residuals_of = |cameras: &[Camera]| -> Vec<f64> {
-        pairs.iter().map(|pair| observations::pair_rms(cameras, pair)).collect()
-    };
+    let residuals_of =
+        |cameras: &[Camera]| -> Vec<f64> { pairs.iter().map(|pair| observations::pair_rms(cameras, pair)).collect() };
     let mut active: Vec<usize> = (0..pairs.len()).collect();
     let mut solution = solve_with(&active)?;
     let mut pair_rms_px = residuals_of(&solution.cameras);

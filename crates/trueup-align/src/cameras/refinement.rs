@@ -76,11 +76,7 @@ pub(super) fn refine(
 }
 
 /// The rotations refined from `start` with all focal lengths fixed to the median start value.
-fn with_common_focal(
-    problem: &BundleAdjustment<'_>,
-    start: &Parameters,
-    context: &StageContext,
-) -> Result<Parameters> {
+fn with_common_focal(problem: &BundleAdjustment<'_>, start: &Parameters, context: &StageContext) -> Result<Parameters> {
     let mut sorted = start.focal_px.clone();
     sorted.sort_by(f64::total_cmp);
     let common = sorted[sorted.len() / 2];

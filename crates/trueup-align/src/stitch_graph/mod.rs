@@ -53,11 +53,8 @@ pub struct TreeStep {
 impl StitchGraph {
     /// The graph of the joined pairs among `pictures` pictures.
     pub fn new(pictures: usize, pairs: &[PairMatches]) -> Self {
-        let mut edges: Vec<GraphEdge> = pairs
-            .iter()
-            .filter(|pair| pair.verdict.is_joined())
-            .map(GraphEdge::of)
-            .collect();
+        let mut edges: Vec<GraphEdge> =
+            pairs.iter().filter(|pair| pair.verdict.is_joined()).map(GraphEdge::of).collect();
         edges.sort_by_key(|edge| (edge.a, edge.b));
         Self::from_edges(pictures, edges)
     }
