@@ -74,7 +74,7 @@ fn verticals(image: &ImageRecord, lines: &[LineSegment], frame: &WorkingFrame, o
     // Down is the levelled world's second axis; without a rotation, cameras are expected to be held level.
     let down = image.rotation.map_or(Vector3::y(), |rows| Vector3::new(rows[0][1], rows[1][1], rows[2][1]));
     let picture = LinedPicture { lines, frame, focal_px: focal_px * frame.working_from_full, expected_down: down };
-    vertical_segments(&picture, &options.vanishing, &options.measures)
+    vertical_segments(&picture, &options.measures)
 }
 
 /// Positions of the longest segments, ascending.

@@ -15,7 +15,21 @@ use trueup_core::geometry::{cross_matrix, exp_rotation, nearest_rotation};
 use trueup_core::{Result, StageContext};
 
 use super::observations::{Observations, PairObservations};
-use super::{CameraOptions, CameraPrior, focal};
+use super::prior::CameraPrior;
+
+/// Most iterations of one pass; it settles long before, unless the data contradict themselves.
+const MAX_ITERATIONS: usize = 100;
+/// Damping at the start of a pass, relative to the diagonal of the normal matrix.
+const FIRST_DAMPING: f64 = 1e-4;
+/// Damping beyond which no step is tried any more.
+const LARGEST_DAMPING: f64 = 1e12;
+/// Relative decrease of the cost below which a pass has settled.
+const SETTLED: f64 = 1e-8;
+/// Standard deviation of an estimated start value of the focal length, relative: it only keeps a focal length that the
+/// matches leave open from running away.
+const ESTIMATED_FOCAL_SD: f64 = 0.3;
+/// A focal length within this factor of the shortest believed one was stopped there.
+const STOPPED_SHORT: f64 = 1.001;
 
 /// Unknowns of one pair: rotation of a, rotation of b, log focal length of a, of b.
 const LOCAL: usize = 8;
@@ -29,6 +43,13 @@ pub(super) struct Parameters {
     pub rotations: Vec<Matrix3<f64>>,
 }
 
+impl Parameters {
+    /// The cameras of this state.
+    pub(super) fn cameras(&self, priors: &[CameraPrior]) -> Vec<Camera> {
+        (0..priors.len()).map(|k| priors[k].camera(self.focal_px[k], &self.rotations[k])).collect()
+    }
+}
+
 /// Which unknown scales which picture's focal length; `None` holds it fixed.
 pub(super) struct FocalModel {
     pub parameter_of: Vec<Option<usize>>,
@@ -37,7 +58,7 @@ pub(super) struct FocalModel {
 
 impl FocalModel {
     /// One unknown per camera group.
-    pub fn shared(priors: &[CameraPrior]) -> Self {
+    pub(super) fn shared(priors: &[CameraPrior]) -> Self {
         let mut groups: Vec<usize> = priors.iter().map(|prior| prior.camera_group).collect();
         groups.sort_unstable();
         groups.dedup();
@@ -46,22 +67,26 @@ impl FocalModel {
     }
 
     /// One unknown per picture.
-    pub fn per_picture(pictures: usize) -> Self {
+    pub(super) fn per_picture(pictures: usize) -> Self {
         Self { parameter_of: (0..pictures).map(Some).collect(), parameters: pictures }
     }
 
     /// No unknowns: focal lengths stay as they are.
-    pub fn fixed(pictures: usize) -> Self {
+    pub(super) fn fixed(pictures: usize) -> Self {
         Self { parameter_of: vec![None; pictures], parameters: 0 }
     }
 }
 
-pub(super) struct Problem<'a> {
+/// The sum of squares that is minimized over [`Parameters`].
+pub(super) struct BundleAdjustment<'a> {
     pub priors: &'a [CameraPrior],
     pub observations: &'a Observations,
-    pub start_focal: Vec<f64>,
+    /// What the focal lengths are drawn towards, working pixels.
+    pub start_focal_px: Vec<f64>,
+    /// The photograph whose rotation is fixed.
     pub reference: usize,
-    pub options: &'a CameraOptions,
+    /// Standard deviation, relative, of a start focal length that comes from metadata.
+    pub known_focal_sd: f64,
 }
 
 /// The quadratic model of one pair's cost.
@@ -70,21 +95,18 @@ struct PairTerm {
     gradient: LocalVector,
 }
 
-impl Problem<'_> {
+impl BundleAdjustment<'_> {
     /// Refines `parameters` until the cost settles; `huber_px` bounds the influence of a single match.
-    pub fn minimize(
+    pub(super) fn minimize(
         &self,
         mut parameters: Parameters,
         model: &FocalModel,
         huber_px: f64,
         context: &StageContext,
     ) -> Result<Parameters> {
-        const FIRST_DAMPING: f64 = 1e-4;
-        const LARGEST_DAMPING: f64 = 1e12;
-        const SETTLED: f64 = 1e-8;
         let mut cost = self.cost(&parameters, model, huber_px);
         let mut damping = FIRST_DAMPING;
-        for _ in 0..self.options.max_iterations {
+        for _ in 0..MAX_ITERATIONS {
             context.check_cancelled()?;
             let (normal, gradient) = self.normal_equations(&parameters, model, huber_px);
             let mut decrease = 0.0;
@@ -112,11 +134,10 @@ impl Problem<'_> {
 
     /// Whether the solution can be used: finite, and no focal length at the short end of its range. (At the long end the
     /// pictures are merely close to affine, which is harmless.)
-    pub fn is_sound(&self, parameters: &Parameters) -> bool {
-        const MARGIN: f64 = 1.001;
+    pub(super) fn is_sound(&self, parameters: &Parameters) -> bool {
         parameters.rotations.iter().all(|rotation| rotation.iter().all(|entry| entry.is_finite()))
             && parameters.focal_px.iter().zip(self.priors).all(|(&focal_px, prior)| {
-                focal_px.is_finite() && focal_px > MARGIN * focal::clamp(0.0, prior, self.options)
+                focal_px.is_finite() && focal_px > STOPPED_SHORT * prior.believable_focal_px(0.0)
             })
     }
 
@@ -137,29 +158,20 @@ impl Problem<'_> {
         })
     }
 
-    fn cameras(&self, parameters: &Parameters) -> Vec<Camera> {
-        (0..self.priors.len())
-            .map(|k| {
-                let frame = &self.priors[k].frame;
-                Camera::new(parameters.focal_px[k], frame.width, frame.height, &parameters.rotations[k])
-            })
-            .collect()
-    }
-
     /// Pull of the focal lengths towards their start values: (ln f - ln f0) / sd, one per picture with a free one.
     fn focal_prior(&self, parameters: &Parameters, model: &FocalModel) -> Vec<(usize, f64, f64)> {
         (0..self.priors.len())
             .filter_map(|k| {
                 let column = 3 * self.priors.len() + model.parameter_of[k]?;
                 let known = self.priors[k].focal_px.is_some();
-                let sd = if known { self.options.known_focal_sd } else { self.options.estimated_focal_sd };
-                Some((column, (parameters.focal_px[k] / self.start_focal[k]).ln() / sd, 1.0 / sd))
+                let sd = if known { self.known_focal_sd } else { ESTIMATED_FOCAL_SD };
+                Some((column, (parameters.focal_px[k] / self.start_focal_px[k]).ln() / sd, 1.0 / sd))
             })
             .collect()
     }
 
     fn cost(&self, parameters: &Parameters, model: &FocalModel, huber_px: f64) -> f64 {
-        let cameras = self.cameras(parameters);
+        let cameras = parameters.cameras(self.priors);
         let costs: Vec<f64> =
             self.observations.pairs.par_iter().map(|pair| pair_cost(&cameras, pair, huber_px)).collect();
         let prior: f64 = self.focal_prior(parameters, model).iter().map(|(_, residual, _)| residual * residual).sum();
@@ -172,7 +184,7 @@ impl Problem<'_> {
         model: &FocalModel,
         huber_px: f64,
     ) -> (faer::Mat<f64>, faer::Mat<f64>) {
-        let cameras = self.cameras(parameters);
+        let cameras = parameters.cameras(self.priors);
         let unknowns = self.unknowns(model);
         let mut normal = faer::Mat::<f64>::zeros(unknowns, unknowns);
         let mut gradient = faer::Mat::<f64>::zeros(unknowns, 1);
@@ -204,7 +216,7 @@ impl Problem<'_> {
             moved.rotations[k] = nearest_rotation(&(exp_rotation(&turn) * parameters.rotations[k]));
             if let Some(parameter) = model.parameter_of[k] {
                 let stretched = parameters.focal_px[k] * step[(3 * self.priors.len() + parameter, 0)].exp();
-                moved.focal_px[k] = focal::clamp(stretched, &self.priors[k], self.options);
+                moved.focal_px[k] = self.priors[k].believable_focal_px(stretched);
             }
         }
         moved
@@ -250,49 +262,69 @@ fn pair_term(cameras: &[Camera], pair: &PairObservations, huber_px: f64) -> Pair
     let b_from_a = b.rotation() * a.rotation().transpose();
     let a_from_b = b_from_a.transpose();
     let mut term = PairTerm { normal: LocalMatrix::zeros(), gradient: LocalVector::zeros() };
+    let there = Transfer {
+        from: a,
+        to: b,
+        to_from_from: &b_from_a,
+        columns: TransferColumns { from_rotation: 0, to_rotation: 3, from_focal: 6, to_focal: 7 },
+    };
+    let back = Transfer {
+        from: b,
+        to: a,
+        to_from_from: &a_from_b,
+        columns: TransferColumns { from_rotation: 3, to_rotation: 0, from_focal: 7, to_focal: 6 },
+    };
     for one in &pair.matches {
-        // (rotation, focal) columns of the camera the bearing leaves and of the camera it arrives in.
-        accumulate(&mut term, a, b, &b_from_a, one.in_a, one.in_b, [0, 3, 6, 7], huber_px);
-        accumulate(&mut term, b, a, &a_from_b, one.in_b, one.in_a, [3, 0, 7, 6], huber_px);
+        there.accumulate(&mut term, one.in_a, one.in_b, huber_px);
+        back.accumulate(&mut term, one.in_b, one.in_a, huber_px);
     }
     term
 }
 
-/// Adds one transfer's linearized residual; `columns` are (rotation of `from`, rotation of `to`, focal of `from`, focal
-/// of `to`) among the pair's local unknowns.
-#[allow(clippy::too_many_arguments, reason = "the two directions of a match differ in every one of these")]
-fn accumulate(
-    term: &mut PairTerm,
-    from: &Camera,
-    to: &Camera,
-    turn: &Matrix3<f64>,
-    source: [f64; 2],
-    target: [f64; 2],
-    columns: [usize; 4],
-    huber_px: f64,
-) {
-    let bearing = from.bearing(Vector2::from(source));
-    let arrived = turn * bearing;
-    let Some(place) = to.project(arrived) else { return };
-    let residual = Vector2::from(target) - place;
-    let weight = huber(residual.norm(), huber_px).1;
+/// Where a transfer's unknowns are among the eight of its pair; rotations take three columns.
+struct TransferColumns {
+    from_rotation: usize,
+    to_rotation: usize,
+    from_focal: usize,
+    to_focal: usize,
+}
 
-    let (inverse_depth, focal_px) = (1.0 / arrived.z, to.focal_px);
-    let projection = Matrix2x3::new(1.0, 0.0, -arrived.x * inverse_depth, 0.0, 1.0, -arrived.y * inverse_depth)
-        * (focal_px * inverse_depth);
-    // residual = target - projection(arrived), hence the minus signs.
-    let by_to_rotation = projection * cross_matrix(&arrived);
-    let by_from_rotation = -(projection * turn * cross_matrix(&bearing));
-    let by_from_focal = projection * turn * Vector3::new(bearing.x, bearing.y, 0.0);
-    let by_to_focal = -(place - Vector2::from(to.principal_point));
+/// One direction of a pair: points of `from` are carried into `to`.
+struct Transfer<'a> {
+    from: &'a Camera,
+    to: &'a Camera,
+    /// Rotation from the frame of `from` to that of `to`.
+    to_from_from: &'a Matrix3<f64>,
+    columns: TransferColumns,
+}
 
-    let mut jacobian = SMatrix::<f64, 2, LOCAL>::zeros();
-    jacobian.fixed_columns_mut::<3>(columns[0]).copy_from(&by_from_rotation);
-    jacobian.fixed_columns_mut::<3>(columns[1]).copy_from(&by_to_rotation);
-    jacobian.column_mut(columns[2]).copy_from(&by_from_focal);
-    jacobian.column_mut(columns[3]).copy_from(&by_to_focal);
-    term.normal += jacobian.transpose() * jacobian * weight;
-    term.gradient += jacobian.transpose() * residual * weight;
+impl Transfer<'_> {
+    /// Adds the linearized residual of a match of `source` with `target`.
+    fn accumulate(&self, term: &mut PairTerm, source: [f64; 2], target: [f64; 2], huber_px: f64) {
+        let Self { from, to, to_from_from, columns } = self;
+        let bearing = from.bearing(Vector2::from(source));
+        let arrived = *to_from_from * bearing;
+        let Some(place) = to.project(arrived) else { return };
+        let residual = Vector2::from(target) - place;
+        let weight = huber(residual.norm(), huber_px).1;
+
+        let (inverse_depth, focal_px) = (1.0 / arrived.z, to.focal_px);
+        let projection = Matrix2x3::new(1.0, 0.0, -arrived.x * inverse_depth, 0.0, 1.0, -arrived.y * inverse_depth)
+            * (focal_px * inverse_depth);
+        // residual = target - projection(arrived), hence the minus signs.
+        let by_to_rotation = projection * cross_matrix(&arrived);
+        let by_from_rotation = -(projection * *to_from_from * cross_matrix(&bearing));
+        let by_from_focal = projection * *to_from_from * Vector3::new(bearing.x, bearing.y, 0.0);
+        let by_to_focal = -(place - Vector2::from(to.principal_point));
+
+        let mut jacobian = SMatrix::<f64, 2, LOCAL>::zeros();
+        jacobian.fixed_columns_mut::<3>(columns.from_rotation).copy_from(&by_from_rotation);
+        jacobian.fixed_columns_mut::<3>(columns.to_rotation).copy_from(&by_to_rotation);
+        jacobian.column_mut(columns.from_focal).copy_from(&by_from_focal);
+        jacobian.column_mut(columns.to_focal).copy_from(&by_to_focal);
+        term.normal += jacobian.transpose() * jacobian * weight;
+        term.gradient += jacobian.transpose() * residual * weight;
+    }
 }
 
 #[cfg(test)]
@@ -313,13 +345,12 @@ mod tests {
             PointMatch { in_a: [520.0, 410.0], in_b: [300.0, 440.0] },
         ];
         let observations = Observations { pairs: vec![PairObservations { a: 0, b: 1, matches }] };
-        let options = CameraOptions::default();
-        let problem = Problem {
+        let problem = BundleAdjustment {
             priors: &priors,
             observations: &observations,
-            start_focal: vec![500.0, 520.0],
+            start_focal_px: vec![500.0, 520.0],
             reference: 0,
-            options: &options,
+            known_focal_sd: 0.1,
         };
         let model = FocalModel::per_picture(2);
         let at = Parameters {

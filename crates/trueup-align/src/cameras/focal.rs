@@ -5,102 +5,130 @@ use trueup_core::geometry::Homography;
 use trueup_core::matches::PairMatches;
 
 use super::observations::{Observations, PairObservations};
+use super::prior::CameraPrior;
 use super::rotations::fit_rotation;
-use super::{CameraOptions, CameraPrior};
 
-/// Focal lengths (source, target) of the rotating cameras behind a homography in centered coordinates, if both are real.
+/// A normal lens: the focal length equals the diagonal. Used when the photographs tell nothing.
+const NORMAL_LENS: f64 = 1.0;
+/// Candidates for the common focal length run from a very wide lens, in diagonals, ...
+const SHORTEST: f64 = 0.3;
+/// ... in steps of 8 % ...
+const STEP: f64 = 1.08;
+/// ... to a long one.
+const CANDIDATES: i32 = 36;
+/// Matches of a pair, spread evenly, that candidates are judged by.
+const SAMPLE: usize = 48;
+/// Distance in working pixels at which the cost of a match stops growing while candidates are judged.
+const MATCH_COST_LIMIT_PX: f64 = 20.0;
+
+/// The focal lengths of the two cameras behind a homography, in its pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct FocalLengths {
+    source: f64,
+    target: f64,
+}
+
+/// A quotient that is the square of a focal length.
+#[derive(Debug, Clone, Copy)]
+struct Quotient {
+    numerator: f64,
+    denominator: f64,
+}
+
+impl Quotient {
+    fn over(numerator: f64, denominator: f64) -> Self {
+        Self { numerator, denominator }
+    }
+
+    /// The square root, where it is real.
+    fn root(self) -> Option<f64> {
+        let quotient = self.numerator / self.denominator;
+        (quotient.is_finite() && quotient > 0.0).then(|| quotient.sqrt())
+    }
+}
+
+/// Focal lengths of the rotating cameras behind a homography in centered coordinates, if both are real.
 ///
 /// Of the two values that the rows (source) and the columns (target) of the homography give, the one with the larger
 /// denominator is taken.
 ///
 /// # Source
 /// Szeliski and Shum, "Creating full view panoramic image mosaics" (1997), section 5.
-pub fn focal_from_homography(target_from_source: &Matrix3<f64>) -> Option<(f64, f64)> {
+fn focal_from_homography(target_from_source: &Matrix3<f64>) -> Option<FocalLengths> {
     let h = |row: usize, column: usize| target_from_source[(row, column)];
     let source = better_root(
-        (-h(0, 2) * h(1, 2), h(0, 0) * h(1, 0) + h(0, 1) * h(1, 1)),
-        (h(1, 2).powi(2) - h(0, 2).powi(2), h(0, 0).powi(2) + h(0, 1).powi(2) - h(1, 0).powi(2) - h(1, 1).powi(2)),
+        Quotient::over(-h(0, 2) * h(1, 2), h(0, 0) * h(1, 0) + h(0, 1) * h(1, 1)),
+        Quotient::over(
+            h(1, 2).powi(2) - h(0, 2).powi(2),
+            h(0, 0).powi(2) + h(0, 1).powi(2) - h(1, 0).powi(2) - h(1, 1).powi(2),
+        ),
     )?;
     let target = better_root(
-        (-(h(0, 0) * h(0, 1) + h(1, 0) * h(1, 1)), h(2, 0) * h(2, 1)),
-        (h(0, 0).powi(2) + h(1, 0).powi(2) - h(0, 1).powi(2) - h(1, 1).powi(2), h(2, 1).powi(2) - h(2, 0).powi(2)),
+        Quotient::over(-(h(0, 0) * h(0, 1) + h(1, 0) * h(1, 1)), h(2, 0) * h(2, 1)),
+        Quotient::over(
+            h(0, 0).powi(2) + h(1, 0).powi(2) - h(0, 1).powi(2) - h(1, 1).powi(2),
+            h(2, 1).powi(2) - h(2, 0).powi(2),
+        ),
     )?;
-    Some((source, target))
+    Some(FocalLengths { source, target })
 }
 
-/// The square root of whichever quotient (numerator, denominator) is positive; of two, that with the larger denominator.
-fn better_root(first: (f64, f64), second: (f64, f64)) -> Option<f64> {
-    let value = |(numerator, denominator): (f64, f64)| {
-        let quotient = numerator / denominator;
-        (quotient.is_finite() && quotient > 0.0).then(|| quotient.sqrt())
-    };
-    match (value(first), value(second)) {
-        (Some(one), Some(other)) => Some(if first.1.abs() >= second.1.abs() { one } else { other }),
+/// The square root of whichever quotient is positive; of two, that with the larger denominator.
+fn better_root(first: Quotient, second: Quotient) -> Option<f64> {
+    match (first.root(), second.root()) {
+        (Some(one), Some(other)) => Some(if first.denominator.abs() >= second.denominator.abs() { one } else { other }),
         (one, other) => one.or(other),
     }
 }
 
-/// A focal length for every picture: from metadata where there is any, else from the pictures.
+/// A focal length for every photograph: from metadata where there is any, else from the photographs.
 ///
-/// Pictures without metadata get a common value (relative to their diagonal), found by trying a range of values and the
+/// Photographs without metadata get a common value (relative to their diagonal), found by trying a range of values and the
 /// homographies' own estimates and keeping the one under which rotations explain the matches best.
 pub(super) fn initial_focal_lengths(
     priors: &[CameraPrior],
     pairs: &[&PairMatches],
     observations: &Observations,
-    options: &CameraOptions,
 ) -> Vec<f64> {
     let known: Vec<Option<f64>> = priors
         .iter()
-        .map(|prior| prior.focal_px.filter(|focal| focal.is_finite()).map(|focal| clamp(focal, prior, options)))
+        .map(|prior| prior.focal_px.filter(|focal| focal.is_finite()).map(|focal| prior.believable_focal_px(focal)))
         .collect();
-    let relative = common_relative_focal(priors, pairs, observations, &known, options);
+    let relative = common_relative_focal(priors, pairs, observations, &known);
+    filled_in(priors, &known, relative)
+}
+
+/// The known focal lengths; for the others `relative` diagonals.
+fn filled_in(priors: &[CameraPrior], known: &[Option<f64>], relative: f64) -> Vec<f64> {
     priors
         .iter()
-        .zip(&known)
-        .map(|(prior, known)| known.unwrap_or_else(|| clamp(relative * prior.frame.diagonal(), prior, options)))
+        .zip(known)
+        .map(|(prior, known)| known.unwrap_or_else(|| prior.believable_focal_px(relative * prior.frame.diagonal())))
         .collect()
 }
 
-/// Limits a focal length to the allowed multiples of the picture's longer side.
-pub(super) fn clamp(focal_px: f64, prior: &CameraPrior, options: &CameraOptions) -> f64 {
-    let longer = prior.frame.width.max(prior.frame.height);
-    focal_px.clamp(options.min_focal * longer, options.max_focal * longer)
-}
-
-/// The focal length, in diagonals, that explains the pairs best when all pictures without metadata share it.
+/// The focal length, in diagonals, that explains the pairs best when all photographs without metadata share it.
 fn common_relative_focal(
     priors: &[CameraPrior],
     pairs: &[&PairMatches],
     observations: &Observations,
     known: &[Option<f64>],
-    options: &CameraOptions,
 ) -> f64 {
-    /// A normal lens: the focal length equals the diagonal. Used when the pictures tell nothing.
-    const NORMAL_LENS: f64 = 1.0;
-    /// Candidates run from a very wide to a long lens in steps of 8 %.
-    const SHORTEST: f64 = 0.3;
-    const STEP: f64 = 1.08;
-    const CANDIDATES: i32 = 36;
     if known.iter().all(Option::is_some) {
         return NORMAL_LENS;
     }
     let mut candidates: Vec<f64> = (0..CANDIDATES).map(|k| SHORTEST * STEP.powi(k)).collect();
     candidates.extend(median_from_homographies(priors, pairs));
     let cost = |relative: f64| -> f64 {
-        let focal: Vec<f64> = priors
-            .iter()
-            .zip(known)
-            .map(|(prior, known)| known.unwrap_or_else(|| clamp(relative * prior.frame.diagonal(), prior, options)))
-            .collect();
-        observations.pairs.iter().map(|pair| rotation_cost(priors, &focal, pair, options)).sum()
+        let focal = filled_in(priors, known, relative);
+        observations.pairs.iter().map(|pair| rotation_cost(priors, &focal, pair)).sum()
     };
     let costs: Vec<f64> = candidates.iter().map(|&candidate| cost(candidate)).collect();
     let best = (0..candidates.len()).min_by(|&one, &other| costs[one].total_cmp(&costs[other]));
     best.filter(|&best| costs[best] > 0.0 && costs[best].is_finite()).map_or(NORMAL_LENS, |best| candidates[best])
 }
 
-/// Median over pairs and pictures of the homographies' focal lengths, in diagonals.
+/// Median over pairs and photographs of the homographies' focal lengths, in diagonals.
 fn median_from_homographies(priors: &[CameraPrior], pairs: &[&PairMatches]) -> Option<f64> {
     let center = |k: usize| {
         let frame = &priors[k].frame;
@@ -111,7 +139,7 @@ fn median_from_homographies(priors: &[CameraPrior], pairs: &[&PairMatches]) -> O
         let Some(rows) = &pair.b_from_a else { continue };
         let Some(back) = center(pair.b).try_inverse() else { continue };
         let centered = back * Homography::from_rows(rows).0 * center(pair.a);
-        if let Some((source, target)) = focal_from_homography(&centered) {
+        if let Some(FocalLengths { source, target }) = focal_from_homography(&centered) {
             estimates.push(source / priors[pair.a].frame.diagonal());
             estimates.push(target / priors[pair.b].frame.diagonal());
         }
@@ -121,35 +149,24 @@ fn median_from_homographies(priors: &[CameraPrior], pairs: &[&PairMatches]) -> O
 }
 
 /// How badly the best rotation explains a pair: Huber-like sum of transfer errors over a subset of the matches.
-fn rotation_cost(priors: &[CameraPrior], focal: &[f64], pair: &PairObservations, options: &CameraOptions) -> f64 {
-    const SAMPLE: usize = 48;
+fn rotation_cost(priors: &[CameraPrior], focal: &[f64], pair: &PairObservations) -> f64 {
     let step = pair.matches.len().div_ceil(SAMPLE).max(1);
     let sample: Vec<_> = pair.matches.iter().copied().step_by(step).collect();
-    let (camera_a, camera_b) = (pinhole(&priors[pair.a], focal[pair.a]), pinhole(&priors[pair.b], focal[pair.b]));
-    let rotation = fit_rotation(&camera_a, &camera_b, &sample);
-    let turned = trueup_core::camera::Camera::new(
-        focal[pair.b],
-        priors[pair.b].frame.width,
-        priors[pair.b].frame.height,
-        &rotation,
-    );
-    let limit = options.coarse_huber_px;
+    let (prior_a, prior_b) = (&priors[pair.a], &priors[pair.b]);
+    let camera_a = prior_a.unturned_camera(focal[pair.a]);
+    let rotation = fit_rotation(&camera_a, &prior_b.unturned_camera(focal[pair.b]), &sample);
+    let turned = prior_b.camera(focal[pair.b], &rotation);
     let sum: f64 = sample
         .iter()
         .map(|one| {
             let error = camera_a
                 .transfer(&turned, Vector2::from(one.in_a))
-                .map_or(limit, |place| (place - Vector2::from(one.in_b)).norm());
-            error.min(limit)
+                .map_or(MATCH_COST_LIMIT_PX, |place| (place - Vector2::from(one.in_b)).norm());
+            error.min(MATCH_COST_LIMIT_PX)
         })
         .sum();
     // Pairs count by their matches, not by the size of the sample.
     sum * pair.matches.len() as f64 / sample.len().max(1) as f64
-}
-
-/// The camera of a prior with the identity rotation.
-pub(super) fn pinhole(prior: &CameraPrior, focal_px: f64) -> trueup_core::camera::Camera {
-    trueup_core::camera::Camera::new(focal_px, prior.frame.width, prior.frame.height, &Matrix3::identity())
 }
 
 #[cfg(test)]
@@ -168,7 +185,7 @@ mod tests {
         let inverse = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0 / 800.0, 1.0 / 800.0, 1.0));
         for scale in [1.0, -0.37] {
             let homography = intrinsic(1000.0) * rotation * inverse * scale;
-            let (source, target) = focal_from_homography(&homography).expect("regular");
+            let FocalLengths { source, target } = focal_from_homography(&homography).expect("regular");
             assert!((source - 800.0).abs() < 1e-9 * 800.0, "{source}");
             assert!((target - 1000.0).abs() < 1e-9 * 1000.0, "{target}");
         }

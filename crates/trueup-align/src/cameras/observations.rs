@@ -4,7 +4,16 @@ use nalgebra::Vector2;
 use trueup_core::camera::Camera;
 use trueup_core::matches::{PairMatches, PointMatch};
 
-use super::{CameraOptions, CameraPrior};
+use super::prior::CameraPrior;
+
+/// Matches used per pair in bundle adjustment: more hardly sharpen a pair's few unknowns.
+const MATCHES_PER_PAIR: usize = 200;
+/// Matches used in all, so that time stays bounded; pairs share them evenly when there are many.
+const MATCHES_IN_ALL: usize = 16_000;
+/// Matches that every pair may use, however many pairs there are.
+const FEWEST_MATCHES: usize = 24;
+/// Cells along each side of the grid that matches are spread over.
+const CELLS: usize = 16;
 
 /// The matches of one pair.
 pub(super) struct PairObservations {
@@ -19,10 +28,10 @@ pub(super) struct Observations {
 }
 
 impl Observations {
-    pub fn choose(priors: &[CameraPrior], pairs: &[&PairMatches], options: &CameraOptions) -> Self {
-        const FEWEST: usize = 24;
-        let share = options.matches_in_all / pairs.len().max(1);
-        let limit = options.matches_per_pair.min(share.max(FEWEST));
+    /// Chooses the matches of `pairs`, in their order.
+    pub(super) fn choose(priors: &[CameraPrior], pairs: &[&PairMatches]) -> Self {
+        let share = MATCHES_IN_ALL / pairs.len().max(1);
+        let limit = MATCHES_PER_PAIR.min(share.max(FEWEST_MATCHES));
         let pairs = pairs
             .iter()
             .map(|pair| PairObservations {
@@ -37,7 +46,6 @@ impl Observations {
 
 /// At most `limit` matches, taken in turns from the cells of a grid over picture a, in their given order.
 fn spread_evenly(matches: &[PointMatch], prior: &CameraPrior, limit: usize) -> Vec<PointMatch> {
-    const CELLS: usize = 16;
     if matches.len() <= limit {
         return matches.to_vec();
     }

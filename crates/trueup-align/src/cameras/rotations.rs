@@ -5,9 +5,8 @@ use trueup_core::camera::Camera;
 use trueup_core::geometry::{exp_rotation, log_rotation, nearest_rotation};
 use trueup_core::matches::{PairMatches, PointMatch};
 
-use super::focal::pinhole;
 use super::observations::Observations;
-use super::{CameraPrior, relative_rotation};
+use super::prior::CameraPrior;
 use crate::stitch_graph::StitchGraph;
 
 /// The rotation from camera a's frame to camera b's that fits the matched bearings best (Wahba's problem, solved by the
@@ -25,6 +24,11 @@ pub(super) fn fit_rotation(a: &Camera, b: &Camera, matches: &[PointMatch]) -> Ma
     nearest_rotation(&correlation)
 }
 
+/// Rotation of camera j seen from camera i: `R_j R_i^T`.
+pub(super) fn relative_rotation(first: &Matrix3<f64>, second: &Matrix3<f64>) -> Matrix3<f64> {
+    second * first.transpose()
+}
+
 /// `R_b R_a^T` of every pair.
 pub(super) fn relative_rotations(
     priors: &[CameraPrior],
@@ -36,8 +40,8 @@ pub(super) fn relative_rotations(
         .iter()
         .zip(&observations.pairs)
         .map(|(pair, observed)| {
-            let a = pinhole(&priors[pair.a], focal_px[pair.a]);
-            let b = pinhole(&priors[pair.b], focal_px[pair.b]);
+            let a = priors[pair.a].unturned_camera(focal_px[pair.a]);
+            let b = priors[pair.b].unturned_camera(focal_px[pair.b]);
             fit_rotation(&a, &b, &observed.matches)
         })
         .collect()

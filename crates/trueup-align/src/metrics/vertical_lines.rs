@@ -7,7 +7,7 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::source::WorkingFrame;
 
 use super::MeasureOptions;
-use crate::vanishing::{InterpretationPlanes, VanishingOptions};
+use crate::vanishing::{FULL_WEIGHT_LENGTH_PX, InterpretationPlanes};
 
 /// Steps of the search for the vertical, each with a smaller scale of the robust loss, then as many at the last scale.
 const STEPS: usize = 10;
@@ -53,17 +53,12 @@ pub struct LinedPicture<'a> {
 /// The vertical vanishing direction is the one that the picture's segments point to nearest to where it is expected, by
 /// iteratively reweighted least squares on the segments' interpretation planes; its lines are those within
 /// `measures.vertical_tolerance_deg`. Each is carried to the panorama by `mesh`, which lies over the working frame; `lean` is the
-/// circular mean of their angles to the panorama's vertical, weighted by length up to `vanishing.weight_cap_px`.
+/// circular mean of their angles to the panorama's vertical, weighted by length up to 120 px.
 ///
 /// `None` if its segments point to no such direction, only within one strip, or if the picture looks within 15 degrees of straight up or down, where
 /// there is no upright.
-pub fn vertical_lines(
-    picture: &LinedPicture,
-    mesh: &GridMesh,
-    vanishing: &VanishingOptions,
-    options: &MeasureOptions,
-) -> Option<VerticalLines> {
-    let (planes, down) = planes_and_down(picture, vanishing, options)?;
+pub fn vertical_lines(picture: &LinedPicture, mesh: &GridMesh, options: &MeasureOptions) -> Option<VerticalLines> {
+    let (planes, down) = planes_and_down(picture, options)?;
     let leans: Vec<Lean> = pointing_down(&planes, &down, options)
         .filter_map(|k| {
             let share = planes.midpoints[k].x / picture.frame.width + 0.5;
@@ -81,8 +76,8 @@ pub fn vertical_lines(
 
 /// Which of a picture's segments are its vertical lines: those whose direction [`vertical_lines`] measures, by their
 /// positions in `picture.lines`, ascending. Empty where that finds none to measure.
-pub fn vertical_segments(picture: &LinedPicture, vanishing: &VanishingOptions, options: &MeasureOptions) -> Vec<usize> {
-    let Some((planes, down)) = planes_and_down(picture, vanishing, options) else { return Vec::new() };
+pub fn vertical_segments(picture: &LinedPicture, options: &MeasureOptions) -> Vec<usize> {
+    let Some((planes, down)) = planes_and_down(picture, options) else { return Vec::new() };
     let mut segments: Vec<usize> = pointing_down(&planes, &down, options).map(|plane| planes.indices[plane]).collect();
     segments.sort_unstable();
     segments
@@ -90,13 +85,9 @@ pub fn vertical_segments(picture: &LinedPicture, vanishing: &VanishingOptions, o
 
 /// A picture's segments as planes and their vertical vanishing direction; `None` if they point to none, or if the picture
 /// looks within 15 degrees of straight up or down.
-fn planes_and_down(
-    picture: &LinedPicture,
-    vanishing: &VanishingOptions,
-    options: &MeasureOptions,
-) -> Option<(InterpretationPlanes, Vector3<f64>)> {
-    let planes = InterpretationPlanes::new(picture.lines, picture.focal_px, picture.frame, vanishing);
-    let down = vertical_direction(&planes, &picture.expected_down, vanishing, options)?;
+fn planes_and_down(picture: &LinedPicture, options: &MeasureOptions) -> Option<(InterpretationPlanes, Vector3<f64>)> {
+    let planes = InterpretationPlanes::new(picture.lines, picture.focal_px, picture.frame);
+    let down = vertical_direction(&planes, &picture.expected_down, options)?;
     // Not a number is no direction either.
     (down.x.hypot(down.y) >= MIN_SINE).then_some((planes, down))
 }
@@ -148,7 +139,6 @@ fn standard_error(leans: &[Lean], mean: f64, strips: usize) -> Option<f64> {
 fn vertical_direction(
     planes: &InterpretationPlanes,
     expected: &Vector3<f64>,
-    vanishing: &VanishingOptions,
     options: &MeasureOptions,
 ) -> Option<Vector3<f64>> {
     let (first, last) = (options.vertical_search_deg.to_radians(), options.vertical_scale_deg.to_radians());
@@ -162,7 +152,7 @@ fn vertical_direction(
             let normal = &planes.normals[k];
             let off = normal.dot(&down).clamp(-1.0, 1.0).asin() / scale;
             // Geman and McClure's weight; a line of full length has weight 1 beside the expectation's.
-            let weight = planes.weights[k] / vanishing.weight_cap_px / (1.0 + off * off).powi(2);
+            let weight = planes.weights[k] / FULL_WEIGHT_LENGTH_PX / (1.0 + off * off).powi(2);
             moment + normal * normal.transpose() * weight
         });
         let eigen = moment.symmetric_eigen();
@@ -218,8 +208,8 @@ mod tests {
         let (lines, frame, camera) = picture();
         let picture = LinedPicture { lines: &lines, frame: &frame, focal_px: FOCAL_PX, expected_down: expected };
         let mesh = unrolled(&camera, turn);
-        let (vanishing, options) = (VanishingOptions::default(), MeasureOptions::default());
-        vertical_lines(&picture, &mesh, &vanishing, &options).expect("ten lines")
+        let options = MeasureOptions::default();
+        vertical_lines(&picture, &mesh, &options).expect("ten lines")
     }
 
     #[test]
@@ -242,7 +232,7 @@ mod tests {
         let (lines, frame, camera) = picture();
         let found = |down: Vector3<f64>| {
             let picture = LinedPicture { lines: &lines, frame: &frame, focal_px: FOCAL_PX, expected_down: down };
-            vertical_segments(&picture, &VanishingOptions::default(), &MeasureOptions::default())
+            vertical_segments(&picture, &MeasureOptions::default())
         };
         // Plumb and level lines take turns in the picture.
         assert_eq!(found(camera.rotation() * Vector3::y()), [0, 2, 4, 6, 8, 10, 12, 14, 16, 18]);
@@ -252,11 +242,11 @@ mod tests {
     #[test]
     fn without_lines_or_straight_down_there_is_no_direction() {
         let (lines, frame, camera) = picture();
-        let (vanishing, options) = (VanishingOptions::default(), MeasureOptions::default());
+        let options = MeasureOptions::default();
         let mesh = unrolled(&camera, 0.0);
         let find = |lines: &[LineSegment], expected_down| {
             let picture = LinedPicture { lines, frame: &frame, focal_px: FOCAL_PX, expected_down };
-            vertical_lines(&picture, &mesh, &vanishing, &options)
+            vertical_lines(&picture, &mesh, &options)
         };
         assert_eq!(find(&[], Vector3::y()), None);
         assert_eq!(find(&lines[..1], Vector3::y()), None);

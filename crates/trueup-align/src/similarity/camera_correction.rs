@@ -10,8 +10,7 @@ use trueup_core::camera::Camera;
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
 use trueup_core::matches::PairMatches;
 
-use super::SimilarityOptions;
-use super::joint::{LineVote, scales};
+use super::joint::{AxisWeights, LineVote, scales};
 
 /// Where there is parallax, a relative rotation absorbs most of it: the mean of the reciprocal depths of an overlap, which
 /// acts like a rotation about the picture's axes, is several times their spread, which is what remains to be seen.
@@ -19,6 +18,10 @@ const ABSORBED_ACROSS: f64 = 4.0;
 /// The same for the rotation about the viewing direction, which parallax resembles less.
 const ABSORBED_ALONG: f64 = 1.5;
 
+/// What the segments of one photograph together leave uncertain, as if each erred alone by this much. Working pixels.
+const LINE_ERROR_PX: f64 = 0.5;
+/// Least error of an overlap's relative rotation, working pixels; where the matches show parallax, that counts.
+const MIN_OVERLAP_ERROR_PX: f64 = 0.1;
 /// Information, 1 / rad^2, that holds the common turn: a standard deviation of a ten-thousandth of a degree.
 const COMMON_TURN_INFORMATION: f64 = 3e11;
 
@@ -35,11 +38,7 @@ pub(super) struct RelativeCertainty {
 ///
 /// Independent errors of matches average out; parallax moves whole regions together and is all the more wrong about the
 /// rotation for it.
-pub(super) fn relative_certainties(
-    cameras: &[Camera],
-    edges: &[PairMatches],
-    options: &SimilarityOptions,
-) -> Vec<RelativeCertainty> {
+pub(super) fn relative_certainties(cameras: &[Camera], edges: &[PairMatches]) -> Vec<RelativeCertainty> {
     edges
         .iter()
         .map(|edge| {
@@ -48,7 +47,7 @@ pub(super) fn relative_certainties(
             let focal_px = 0.5 * (a.focal_px + b.focal_px);
             let about = |absorbed: f64| {
                 let variance = noise + absorbed.powi(2) * parallax;
-                focal_px.powi(2) / variance.max(options.min_overlap_error_px.powi(2))
+                focal_px.powi(2) / variance.max(MIN_OVERLAP_ERROR_PX.powi(2))
             };
             let in_camera = Vector3::new(about(ABSORBED_ACROSS), about(ABSORBED_ACROSS), about(ABSORBED_ALONG));
             let rotation = a.rotation();
@@ -118,7 +117,7 @@ impl Deviations {
 /// The rotations with the turns that the segments ask for. The common frame stays; `frame`'s columns are the scene's
 /// directions in it.
 ///
-/// Minimizes sum over segments of weight (Geman-McClure) (residual / `line_error_px`)^2 plus sum over overlaps of
+/// Minimizes sum over segments of weight (Geman-McClure) (residual / [`LINE_ERROR_PX`])^2 plus sum over overlaps of
 /// (w_i - w_j)^T information (w_i - w_j) over turns w_i in the common frame that sum to zero, by reweighted Gauss-Newton
 /// steps from a coarse to a fine scale of the loss. A turn of all cameras together is not sought: `frame` is the segments'
 /// own choice for these.
@@ -127,42 +126,25 @@ pub(super) fn corrected_rotations(
     certainties: &[RelativeCertainty],
     vote: &LineVote,
     frame: &Matrix3<f64>,
-    axis_weights: &[f64; 3],
-    options: &SimilarityOptions,
+    axis_weights: &AxisWeights,
 ) -> Vec<Matrix3<f64>> {
     let count = rotations.len();
     let mut turns = vec![Vector3::<f64>::zeros(); count];
-    let line_information = options.line_error_px.powi(-2);
-    for scale in scales(options) {
+    let line_information = LINE_ERROR_PX.powi(-2);
+    for scale in scales() {
         let mut matrix = DMatrix::<f64>::zeros(3 * count, 3 * count);
         let mut right = DVector::<f64>::zeros(3 * count);
         for (index, rotation) in rotations.iter().enumerate() {
             let turned = rotation * exp_rotation(&turns[index]);
-            let (normal, gradient) = vote.turn_equations(index, &turned, frame, axis_weights, scale, options);
+            let (normal, gradient) = vote.turn_equations(index, &turned, frame, axis_weights, scale);
             let mut block = matrix.fixed_view_mut::<3, 3>(3 * index, 3 * index);
             block += normal * line_information;
             // The residual is linearized at the present turn; the unknown is the whole turn.
             let mut part = right.fixed_rows_mut::<3>(3 * index);
             part += (normal * turns[index] - gradient) * line_information;
         }
-        for edge in certainties {
-            for (row, column, sign) in
-                [(edge.i, edge.i, 1.0), (edge.j, edge.j, 1.0), (edge.i, edge.j, -1.0), (edge.j, edge.i, -1.0)]
-            {
-                let mut block = matrix.fixed_view_mut::<3, 3>(3 * row, 3 * column);
-                block += edge.information * sign;
-            }
-        }
-        // The penalty holds the sum of the turns at zero.
-        for row in 0..3 * count {
-            for column in (row % 3..3 * count).step_by(3) {
-                matrix[(row, column)] += COMMON_TURN_INFORMATION;
-            }
-        }
-        // Directions that neither segments nor overlaps fix stay as they are.
-        for entry in 0..3 * count {
-            matrix[(entry, entry)] += 1.0;
-        }
+        add_overlaps(&mut matrix, certainties);
+        hold_common_turn(&mut matrix);
         let Some(factor) = matrix.cholesky() else { return rotations.to_vec() };
         let solution = factor.solve(&right);
         for (index, turn) in turns.iter_mut().enumerate() {
@@ -175,11 +157,37 @@ pub(super) fn corrected_rotations(
     rotations.iter().zip(&turns).map(|(rotation, turn)| nearest_rotation(&(rotation * exp_rotation(turn)))).collect()
 }
 
+/// Adds (w_i - w_j)^T information (w_i - w_j) of every overlap.
+fn add_overlaps(matrix: &mut DMatrix<f64>, certainties: &[RelativeCertainty]) {
+    for edge in certainties {
+        for (row, column, sign) in
+            [(edge.i, edge.i, 1.0), (edge.j, edge.j, 1.0), (edge.i, edge.j, -1.0), (edge.j, edge.i, -1.0)]
+        {
+            let mut block = matrix.fixed_view_mut::<3, 3>(3 * row, 3 * column);
+            block += edge.information * sign;
+        }
+    }
+}
+
+/// Holds the sum of the turns at zero, and directions that neither segments nor overlaps fix as they are.
+fn hold_common_turn(matrix: &mut DMatrix<f64>) {
+    let unknowns = matrix.nrows();
+    for row in 0..unknowns {
+        for column in (row % 3..unknowns).step_by(3) {
+            matrix[(row, column)] += COMMON_TURN_INFORMATION;
+        }
+    }
+    for entry in 0..unknowns {
+        matrix[(entry, entry)] += 1.0;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use trueup_core::matches::PointMatch;
 
-    use super::super::synthetic::{FOCAL_PX, SIZE, Scene, Sweep, World, joined};
+    use super::super::options::SimilarityOptions;
+    use super::super::synthetic::{FOCAL_PX, SIZE, Sweep, SyntheticScene, World, joined};
     use super::super::tests::with_lines;
     use super::*;
 
@@ -215,9 +223,9 @@ mod tests {
     }
 
     /// A sweep whose overlaps hold matches at their true places.
-    fn sweep(camera_noise_deg: f64) -> Scene {
+    fn sweep(camera_noise_deg: f64) -> SyntheticScene {
         let world = World::Manhattan { noise_deg: 1.0, bad_share: 0.0 };
-        let mut scene = with_lines(Scene::new(Sweep::default(), world, camera_noise_deg, 21), 20, 0.3);
+        let mut scene = with_lines(SyntheticScene::new(Sweep::default(), world, camera_noise_deg, 21), 20, 0.3);
         let truth: Vec<Camera> = scene
             .world_from_camera
             .iter()

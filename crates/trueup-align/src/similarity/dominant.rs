@@ -13,7 +13,10 @@ const ORTHOGONAL: f64 = 0.173_648_177_666_930_33;
 const MIN_CROSS: f64 = 0.5;
 /// Hypotheses, by cost, that are refined.
 const REFINED: usize = 20;
+/// Iterations after which the refinement of a hypothesis stops in any case.
 const MAX_ITERATIONS: usize = 20;
+/// Hypotheses that join directions of two photographs, beside three per photograph.
+const MAX_CROSS_PAIRS: usize = 2000;
 /// Step in radians below which the refinement has converged.
 const CONVERGED: f64 = 1e-9;
 
@@ -28,8 +31,8 @@ pub(super) struct Dominant {
 
 /// The frame of least truncated cost sum_i min(r_i, `cut`); `None` without any triad.
 ///
-/// `triads`: per picture the directions as columns in one common frame. At most `max_cross_pairs` hypotheses that join
-/// directions of two pictures are tried beside three per picture.
+/// `triads`: per picture the directions as columns in one common frame. At most
+/// [`MAX_CROSS_PAIRS`] hypotheses that join directions of two photographs are tried beside three per photograph.
 ///
 /// # Source
 /// The paper's eq. 3 and 4.
@@ -37,15 +40,10 @@ pub(super) struct Dominant {
 /// # Departures
 /// The cost is truncated at the rejection threshold: the plain sum is moved by outliers, by 2 to 6 degrees with 10 to 60
 /// per cent of them. Order and sign of the directions are free ([`match_triad`]).
-pub(super) fn dominant_frame(
-    triads: &[Option<Matrix3<f64>>],
-    cut: f64,
-    max_cross_pairs: usize,
-    generator: &mut impl Rng,
-) -> Option<Dominant> {
+pub(super) fn dominant_frame(triads: &[Option<Matrix3<f64>>], cut: f64, generator: &mut impl Rng) -> Option<Dominant> {
     let present: Vec<Matrix3<f64>> = triads.iter().flatten().copied().collect();
     let mut ranked: Vec<(f64, Matrix3<f64>)> = Vec::new();
-    for frame in hypotheses(&present, max_cross_pairs, generator) {
+    for frame in hypotheses(&present, generator) {
         ranked.push((cost(&frame, &present, cut), frame));
     }
     // A stable sort keeps the order of the hypotheses among equals.
@@ -64,9 +62,9 @@ pub(super) fn dominant_frame(
     })
 }
 
-fn hypotheses(present: &[Matrix3<f64>], max_cross_pairs: usize, generator: &mut impl Rng) -> Vec<Matrix3<f64>> {
+fn hypotheses(present: &[Matrix3<f64>], generator: &mut impl Rng) -> Vec<Matrix3<f64>> {
     let direction = |index: usize| -> Vector3<f64> { present[index / 3].column(index % 3).into_owned() };
-    let mut pairs: Vec<(usize, usize)> = Vec::with_capacity(3 * present.len() + max_cross_pairs);
+    let mut pairs: Vec<(usize, usize)> = Vec::with_capacity(3 * present.len() + MAX_CROSS_PAIRS);
     for picture in 0..present.len() {
         pairs.extend([(0, 1), (1, 2), (2, 0)].map(|(a, b)| (3 * picture + a, 3 * picture + b)));
     }
@@ -79,7 +77,7 @@ fn hypotheses(present: &[Matrix3<f64>], max_cross_pairs: usize, generator: &mut 
         }
     }
     // A partial Fisher-Yates shuffle draws without replacement.
-    let kept = across.len().min(max_cross_pairs);
+    let kept = across.len().min(MAX_CROSS_PAIRS);
     if kept < across.len() {
         for place in 0..kept {
             let other = generator.random_range(place..across.len());

@@ -10,7 +10,7 @@ use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 use trueup_core::source::WorkingFrame;
 
-use super::PriorInput;
+use super::input::PriorInput;
 use super::weighted_solve::TurnTerm;
 use crate::match_points::OverlapWarp;
 

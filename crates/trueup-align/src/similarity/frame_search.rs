@@ -10,13 +10,24 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::SimilarityOptions;
 use super::joint::LineVote;
-use super::vertical_vote::cone;
+use super::vertical_vote::{SEARCH_DEG, cone};
 use crate::vanishing::orthonormal_complement;
 
 /// Turns about a vertical that are scored: steps of 1.5 degrees over the quarter turn after which a frame repeats.
 const TURNS: usize = 60;
+
+/// Segments that are scored, shared out evenly among the photographs, the longest first.
+const MAX_SEGMENTS: usize = 1200;
+/// Fewer segments in all photographs together are no evidence.
+const MIN_SEGMENTS: usize = 10;
+/// Largest angle between a segment and a direction for the segment to support it, degrees.
+const TOLERANCE_DEG: f64 = 1.5;
+/// Step of the vertical, degrees.
+const STEP_DEG: f64 = 2.0;
+/// How far a frame must stand out to guide where the photographs do not agree, standard deviations. Measured: chosen on
+/// the 130 sets of the gate's experiment and on real sets.
+pub(super) const GUIDING_SIGNIFICANCE: f64 = 7.0;
 
 /// The best frame and how far it stands out.
 #[derive(Debug, Clone, Copy)]
@@ -35,22 +46,18 @@ struct Ring {
     turn: usize,
 }
 
-/// Scores all frames whose vertical is within `options.vertical_search_deg` of `expected`.
+/// Scores all frames whose vertical is within [`SEARCH_DEG`] of `expected`.
 ///
 /// The score of a frame is the sum over segments of weight times (1 - (sine / sine of the tolerance)^2) for the frame's
-/// direction that fits best. `None` with fewer than `options.min_pooled_lines` segments.
-pub(super) fn search_frame(
-    vote: &LineVote,
-    expected: &Vector3<f64>,
-    options: &SimilarityOptions,
-) -> Option<PooledFrame> {
-    let segments = vote.longest(options.max_pooled_lines);
-    if segments.len() < options.min_pooled_lines {
+/// direction that fits best. `None` with fewer than [`MIN_SEGMENTS`] segments.
+pub(super) fn search_frame(vote: &LineVote, expected: &Vector3<f64>) -> Option<PooledFrame> {
+    let segments = vote.longest(MAX_SEGMENTS);
+    if segments.len() < MIN_SEGMENTS {
         return None;
     }
-    let tolerance = options.pooled_tolerance_deg.to_radians().sin();
-    let step = options.pooled_step_deg.to_radians();
-    let verticals = cone(expected, options.vertical_search_deg.to_radians(), step);
+    let tolerance = TOLERANCE_DEG.to_radians().sin();
+    let step = STEP_DEG.to_radians();
+    let verticals = cone(expected, SEARCH_DEG.to_radians(), step);
     let rings: Vec<Ring> = verticals.par_iter().map(|vertical| ring(vertical, &segments, tolerance)).collect();
     let count = (rings.len() * TURNS) as f64;
     let mean = rings.iter().map(|ring| ring.sum).sum::<f64>() / count;

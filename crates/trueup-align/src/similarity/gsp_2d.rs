@@ -6,8 +6,9 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::edge_range::{OverlapTurns, TurnRange};
+use super::input::PriorInput;
+use super::upright::Upright;
 use super::weighted_solve::{DataTerm, TurnTerm, solve_unit_vectors};
-use super::{PriorInput, Upright};
 
 /// How far outside its range a turn still passes for allowed, radians: 1.5 degrees.
 const SLACK: f64 = 1.5 * std::f64::consts::PI / 180.0;

@@ -3,8 +3,9 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::edge_range::allowed_turns;
+use super::input::PriorInput;
+use super::upright::{Upright, rolls};
 use super::weighted_solve::{DataTerm, solve_unit_vectors};
-use super::{PriorInput, Upright, rolls};
 
 /// Residual weight that ties the reference to its straightened roll.
 const REFERENCE_WEIGHT: f64 = 1e4;

@@ -7,9 +7,11 @@ use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 use trueup_core::source::WorkingFrame;
 
-use super::synthetic::{FOCAL_PX, SIZE, Scene, Sweep, World, joined};
+use super::synthetic::{FOCAL_PX, SIZE, Sweep, SyntheticScene, World, joined};
 use super::tests::{missing, overlap};
 use super::*;
+use crate::match_points::OverlapWarp;
+use crate::vanishing::{TriadOutcome, VanishingOptions};
 
 const CELL_PX: f64 = 40.0;
 
@@ -22,7 +24,7 @@ struct Edge {
     best: f64,
 }
 
-fn edge(a: usize, b: usize, (low, high): (f64, f64), best: f64) -> Edge {
+fn edge(a: usize, b: usize, [low, high]: [f64; 2], best: f64) -> Edge {
     Edge { a, b, low, high, best }
 }
 
@@ -112,7 +114,7 @@ fn assert_close(found: &[f64], expected: &[f64]) {
 
 #[test]
 fn the_graphs_of_these_tests_have_the_turns_they_state() {
-    let graph = Graph::new(2, &[edge(0, 1, (-3.0, 8.0), 4.0)]);
+    let graph = Graph::new(2, &[edge(0, 1, [-3.0, 8.0], 4.0)]);
     let homography = Homography::from_rows(&graph.edges[0].b_from_a.expect("given"));
     let turned = homography.apply(Vector2::new(500.0, 300.0)) - Vector2::new(400.0, 300.0);
     assert!((turned.y.atan2(turned.x).to_degrees() + 4.0).abs() < 1e-9);
@@ -131,7 +133,7 @@ fn the_graphs_of_these_tests_have_the_turns_they_state() {
 #[test]
 fn gsp_3d_spreads_a_contradiction_from_the_reference() {
     let graph =
-        Graph::new(3, &[edge(0, 1, (4.0, 8.0), 6.0), edge(0, 2, (-5.0, 5.0), 3.0), edge(1, 2, (-5.0, 5.0), -2.0)]);
+        Graph::new(3, &[edge(0, 1, [4.0, 8.0], 6.0), edge(0, 2, [-5.0, 5.0], 3.0), edge(1, 2, [-5.0, 5.0], -2.0)]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp3d, 0), &[0.0, 0.117_444_60, 0.058_719_21]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp3d, 2), &[-0.058_719_21, 0.058_719_21, 0.0]);
 }
@@ -139,14 +141,14 @@ fn gsp_3d_spreads_a_contradiction_from_the_reference() {
 /// On a chain nothing contradicts the edge that is out of range: its turn is taken whole.
 #[test]
 fn gsp_3d_takes_the_turn_of_the_lines_where_the_overlap_refuses_the_cameras() {
-    let graph = Graph::new(3, &[edge(0, 1, (4.0, 8.0), 6.0), edge(1, 2, (-5.0, 5.0), 3.0)]);
+    let graph = Graph::new(3, &[edge(0, 1, [4.0, 8.0], 6.0), edge(1, 2, [-5.0, 5.0], 3.0)]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp3d, 0), &[0.0, 6.0, 6.0]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp3d, 1), &[-6.0, 0.0, 0.0]);
 }
 
 #[test]
 fn gsp_3d_does_not_depend_on_the_reference_where_overlaps_agree_with_the_cameras() {
-    let mut scene = Scene::new(Sweep { count: 4, ..Sweep::default() }, World::Random, 0.0, 31);
+    let mut scene = SyntheticScene::new(Sweep { count: 4, ..Sweep::default() }, World::Random, 0.0, 31);
     scene.triads = vec![missing(); 4];
     let overlaps: Vec<OverlapWarp> = scene
         .edges
@@ -174,7 +176,7 @@ fn gsp_3d_does_not_depend_on_the_reference_where_overlaps_agree_with_the_cameras
 #[test]
 fn gsp_2d_leaves_pictures_upright_where_the_overlaps_let_it_and_depends_on_the_reference() {
     let graph =
-        Graph::new(4, &[edge(0, 1, (-1.0, 3.0), 1.0), edge(1, 2, (1.4, 4.0), 2.0), edge(2, 3, (1.6, 5.0), 3.0)]);
+        Graph::new(4, &[edge(0, 1, [-1.0, 3.0], 1.0), edge(1, 2, [1.4, 4.0], 2.0), edge(2, 3, [1.6, 5.0], 3.0)]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp2d, 0), &[0.0, 0.0, 0.0, 3.0]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp2d, 3), &[-6.0, -5.0, -3.0, 0.0]);
 }
@@ -183,7 +185,7 @@ fn gsp_2d_leaves_pictures_upright_where_the_overlaps_let_it_and_depends_on_the_r
 #[test]
 fn gsp_2d_asks_upright_pictures_first() {
     let graph =
-        Graph::new(3, &[edge(0, 1, (8.0, 12.0), 10.0), edge(0, 2, (-1.0, 1.0), 0.5), edge(1, 2, (-2.0, 2.0), 1.0)]);
+        Graph::new(3, &[edge(0, 1, [8.0, 12.0], 10.0), edge(0, 2, [-1.0, 1.0], 0.5), edge(1, 2, [-2.0, 2.0], 1.0)]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp2d, 0), &[0.0, 0.0, 0.0]);
 }
 
@@ -193,7 +195,7 @@ fn gsp_2d_asks_upright_pictures_first() {
 #[test]
 fn gsp_2d_shares_out_what_does_not_close() {
     let graph =
-        Graph::new(3, &[edge(0, 1, (8.0, 12.0), 10.0), edge(0, 2, (24.0, 28.0), 26.0), edge(1, 2, (8.0, 12.0), 10.0)]);
+        Graph::new(3, &[edge(0, 1, [8.0, 12.0], 10.0), edge(0, 2, [24.0, 28.0], 26.0), edge(1, 2, [8.0, 12.0], 10.0)]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp2d, 0), &[0.0, 11.999_186_94, 24.000_813_06]);
 }
 
@@ -201,7 +203,7 @@ fn gsp_2d_shares_out_what_does_not_close() {
 /// methods in three dimensions turn the whole panorama.
 #[test]
 fn the_wanted_turn_is_the_references_in_two_dimensions_and_everyones_in_three() {
-    let graph = Graph::new(2, &[edge(0, 1, (-11.0, -9.0), -9.5)]);
+    let graph = Graph::new(2, &[edge(0, 1, [-11.0, -9.0], -9.5)]);
     let degrees = |prior: &SimilarityPrior| prior.theta.iter().map(|theta| theta.to_degrees()).collect::<Vec<f64>>();
     assert_close(&degrees(&graph.prior(PriorMethod::Gsp2d, 0, 10.0)), &[10.0, 0.0]);
     assert_close(&degrees(&graph.prior(PriorMethod::Gsp3d, 0, 10.0)), &[10.0, 0.5]);
@@ -210,7 +212,7 @@ fn the_wanted_turn_is_the_references_in_two_dimensions_and_everyones_in_three() 
 /// Focal lengths 700, 1400, 2100: 1 / f is as 6 : 3 : 2, of mean 11 / 3.
 #[test]
 fn scales_are_the_inverse_focal_lengths_of_mean_one() {
-    let graph = Graph::new(3, &[edge(0, 1, (-5.0, 5.0), 1.0), edge(1, 2, (-5.0, 5.0), 1.0)]);
+    let graph = Graph::new(3, &[edge(0, 1, [-5.0, 5.0], 1.0), edge(1, 2, [-5.0, 5.0], 1.0)]);
     for (prior, reference) in [(PriorMethod::Gsp2d, 0), (PriorMethod::Gsp3d, 2)] {
         let prior = graph.prior(prior, reference, 0.0);
         for (scale, expected) in prior.scale.iter().zip([18.0 / 11.0, 9.0 / 11.0, 6.0 / 11.0]) {
@@ -224,7 +226,7 @@ fn scales_are_the_inverse_focal_lengths_of_mean_one() {
 
 #[test]
 fn pictures_that_are_joined_to_none_keep_their_rolls() {
-    let graph = Graph::new(3, &[edge(0, 1, (4.0, 8.0), 6.0)]);
+    let graph = Graph::new(3, &[edge(0, 1, [4.0, 8.0], 6.0)]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp3d, 0), &[0.0, 0.0, 0.0]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp2d, 0), &[0.0, 6.0, 0.0]);
 }
@@ -234,8 +236,8 @@ fn the_published_priors_are_the_same_on_one_and_two_threads() {
     let edges: Vec<Edge> = (0..11)
         .flat_map(|index| {
             let low = (7 * index % 5) as f64 - 2.0;
-            let next = edge(index, index + 1, (low, low + 3.0), low + 1.0);
-            [Some(next), (index + 3 < 12).then(|| edge(index, index + 3, (low - 1.0, low + 1.0), low))]
+            let next = edge(index, index + 1, [low, low + 3.0], low + 1.0);
+            [Some(next), (index + 3 < 12).then(|| edge(index, index + 3, [low - 1.0, low + 1.0], low))]
         })
         .flatten()
         .collect();
@@ -270,7 +272,7 @@ fn a_segment_counts_if_any_part_of_it_shows() {
 
 #[test]
 fn a_reference_that_does_not_exist_is_an_error() {
-    let graph = Graph::new(2, &[edge(0, 1, (-1.0, 1.0), 0.0)]);
+    let graph = Graph::new(2, &[edge(0, 1, [-1.0, 1.0], 0.0)]);
     let vanishing = VanishingOptions::default();
     let input = graph.input(&vanishing, 2);
     let error = run(&input, &SimilarityOptions::default(), &StageContext::default()).expect_err("no such picture");

@@ -11,9 +11,14 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
 
-use super::SimilarityOptions;
 use crate::vanishing::{InterpretationPlanes, orthonormal_complement};
 
+/// Scale of the robust loss at which the refinement starts, working pixels.
+const START_SCALE_PX: f64 = 4.0;
+/// Scale of the robust loss at which the refinement ends, working pixels.
+const END_SCALE_PX: f64 = 0.5;
+/// Largest angle between a segment and a direction for the segment to vote, degrees.
+pub(super) const TOLERANCE_DEG: f64 = 3.0;
 /// Iterations at each scale of the loss.
 const ITERATIONS_PER_SCALE: usize = 4;
 /// Factor between successive scales.
@@ -26,6 +31,39 @@ const MAX_GROUPS: usize = 8;
 const FEW_GROUPS: f64 = 0.66;
 /// Rounds of iterations at the last scale that a refinement without a group takes from the full one's result.
 const REPEATS: usize = 3;
+
+/// Factors on the weights of the segments of each axis (column) of a frame.
+pub(super) type AxisWeights = [f64; 3];
+
+/// Photographs that are not asked: those whose position is `group` modulo `groups`.
+#[derive(Debug, Clone, Copy)]
+struct LeftOut {
+    group: usize,
+    groups: usize,
+}
+
+/// A segment that supports an axis of a frame.
+#[derive(Debug, Clone, Copy)]
+struct Supporter {
+    /// The axis: a column of the frame.
+    axis: usize,
+    /// P x Q of the segment's ends, in the common frame.
+    moment: Vector3<f64>,
+    /// axis . moment / reach: how far the axis misses the segment, in pixels at the segment.
+    residual_px: f64,
+    /// The segment's weight times that of the robust loss.
+    weight: f64,
+    /// 2 |f v_xy - m v_z|.
+    reach: f64,
+}
+
+/// The axis that a segment fits best, as in [`Supporter`].
+#[derive(Debug, Clone, Copy)]
+struct NearestAxis {
+    axis: usize,
+    residual_px: f64,
+    reach: f64,
+}
 
 /// The usable segments of all pictures with their cameras.
 #[derive(Debug)]
@@ -88,13 +126,8 @@ impl LineVote {
 
     /// Refines a frame (columns are directions in the common frame) over SO(3); `axis_weights` multiply the weights of
     /// the segments of each axis.
-    pub fn refine_frame(
-        &self,
-        start: &Matrix3<f64>,
-        axis_weights: &[f64; 3],
-        options: &SimilarityOptions,
-    ) -> Matrix3<f64> {
-        self.refine_frame_without(None, start, axis_weights, scales(options), options)
+    pub fn refine_frame(&self, start: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {
+        self.refine_frame_without(None, start, axis_weights, scales())
     }
 
     fn mean_weight(&self) -> f64 {
@@ -108,20 +141,15 @@ impl LineVote {
     /// # Source
     /// Efron and Tibshirani, An Introduction to the Bootstrap, chapter 11. Pictures, not segments, are left out, because
     /// the segments of one picture err together.
-    pub fn axis_deviations(
-        &self,
-        frame: &Matrix3<f64>,
-        axis_weights: &[f64; 3],
-        options: &SimilarityOptions,
-    ) -> [f64; 3] {
+    pub fn axis_deviations(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> [f64; 3] {
         let groups = self.pictures.len().min(MAX_GROUPS);
         if groups < 2 {
             return [f64::INFINITY; 3];
         }
-        let last = || std::iter::repeat_n(options.joint_scale_px, REPEATS);
+        let last = || std::iter::repeat_n(END_SCALE_PX, REPEATS);
         let frames: Vec<Matrix3<f64>> = (0..groups)
             .into_par_iter()
-            .map(|group| self.refine_frame_without(Some((group, groups)), frame, axis_weights, last(), options))
+            .map(|group| self.refine_frame_without(Some(LeftOut { group, groups }), frame, axis_weights, last()))
             .collect();
         std::array::from_fn(|axis| {
             let mean: Vector3<f64> =
@@ -132,25 +160,24 @@ impl LineVote {
         })
     }
 
-    /// `left_out`: every picture whose position is (first) modulo (second) is not asked.
+    /// [`Self::refine_frame`] over given scales of the loss, by all photographs but those left out.
     fn refine_frame_without(
         &self,
-        left_out: Option<(usize, usize)>,
+        left_out: Option<LeftOut>,
         start: &Matrix3<f64>,
-        axis_weights: &[f64; 3],
+        axis_weights: &AxisWeights,
         scales: impl Iterator<Item = f64>,
-        options: &SimilarityOptions,
     ) -> Matrix3<f64> {
-        let asked = |index: usize| left_out.is_none_or(|(group, groups)| index % groups != group);
+        let asked = |index: usize| left_out.is_none_or(|LeftOut { group, groups }| index % groups != group);
         let mut frame = *start;
         for scale in scales {
             for _ in 0..ITERATIONS_PER_SCALE {
                 let (mut matrix, mut gradient) = (Matrix3::identity() * DAMPING, Vector3::zeros());
-                self.for_each_supporter(&frame, 3, scale, options, asked, |axis, moment, residual, weight, reach| {
-                    let jacobian = Vector3::ith(axis, 1.0).cross(&frame.tr_mul(&moment)) / reach;
-                    let weight = weight * axis_weights[axis];
+                self.for_each_supporter(&frame, 3, scale, asked, |one| {
+                    let jacobian = Vector3::ith(one.axis, 1.0).cross(&frame.tr_mul(&one.moment)) / one.reach;
+                    let weight = one.weight * axis_weights[one.axis];
                     matrix += jacobian * jacobian.transpose() * weight;
-                    gradient += jacobian * (weight * residual);
+                    gradient += jacobian * (weight * one.residual_px);
                 });
                 let Some(inverse) = matrix.try_inverse() else { return frame };
                 let step: Vector3<f64> = -(inverse * gradient);
@@ -168,26 +195,25 @@ impl LineVote {
         index: usize,
         rotation: &Matrix3<f64>,
         frame: &Matrix3<f64>,
-        axis_weights: &[f64; 3],
+        axis_weights: &AxisWeights,
         scale: f64,
-        options: &SimilarityOptions,
     ) -> (Matrix3<f64>, Vector3<f64>) {
         let (mut matrix, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
         let picture = &self.pictures[index];
         let mean = self.mean_weight();
-        picture.for_each_supporter(rotation, frame, 3, scale, options, |axis, moment, residual, weight, reach| {
-            let jacobian = frame.column(axis).cross(&moment) / reach;
-            let weight = weight * axis_weights[axis] / mean;
+        picture.for_each_supporter(rotation, frame, 3, scale, |one| {
+            let jacobian = frame.column(one.axis).cross(&one.moment) / one.reach;
+            let weight = one.weight * axis_weights[one.axis] / mean;
             matrix += jacobian * jacobian.transpose() * weight;
-            gradient += jacobian * (weight * residual);
+            gradient += jacobian * (weight * one.residual_px);
         });
         (matrix, gradient)
     }
 
     /// Refines one direction of the common frame alone, over the sphere.
-    pub fn refine_direction(&self, start: &Vector3<f64>, options: &SimilarityOptions) -> Vector3<f64> {
+    pub fn refine_direction(&self, start: &Vector3<f64>) -> Vector3<f64> {
         let mut direction = *start;
-        for scale in scales(options) {
+        for scale in scales() {
             for _ in 0..ITERATIONS_PER_SCALE {
                 let (first, second) = orthonormal_complement(&direction);
                 let frame = Matrix3::from_columns(&[direction, first, second]);
@@ -196,12 +222,11 @@ impl LineVote {
                     &frame,
                     1,
                     scale,
-                    options,
                     |_| true,
-                    |_, moment, residual, weight, reach| {
-                        let jacobian = Vector2::new(first.dot(&moment), second.dot(&moment)) / reach;
-                        matrix += jacobian * jacobian.transpose() * weight;
-                        gradient += jacobian * (weight * residual);
+                    |one| {
+                        let jacobian = Vector2::new(first.dot(&one.moment), second.dot(&one.moment)) / one.reach;
+                        matrix += jacobian * jacobian.transpose() * one.weight;
+                        gradient += jacobian * (one.weight * one.residual_px);
                     },
                 );
                 let Some(inverse) = matrix.try_inverse() else { return direction };
@@ -212,20 +237,18 @@ impl LineVote {
         direction
     }
 
-    /// Calls, for the pictures `asked`, `visit(axis, moment in the common frame, residual, weight, reach)` for every segment that supports one of
-    /// the first `axes_used` axes of `frame`; residual = axis . moment / reach in pixels.
+    /// Calls `visit` for every segment of the photographs `asked` that supports one of the first `axes_used` axes of `frame`.
     fn for_each_supporter(
         &self,
         frame: &Matrix3<f64>,
         axes_used: usize,
         scale: f64,
-        options: &SimilarityOptions,
         asked: impl Fn(usize) -> bool,
-        mut visit: impl FnMut(usize, Vector3<f64>, f64, f64, f64),
+        mut visit: impl FnMut(Supporter),
     ) {
         for (index, picture) in self.pictures.iter().enumerate() {
             if asked(index) {
-                picture.for_each_supporter(&picture.rotation, frame, axes_used, scale, options, &mut visit);
+                picture.for_each_supporter(&picture.rotation, frame, axes_used, scale, &mut visit);
             }
         }
     }
@@ -244,15 +267,15 @@ impl LineVote {
 }
 
 impl PictureLines {
-    /// The axis (of the first `axes_used`) with the smallest residual in pixels, that residual, and the reach 2 |f v_xy - m v_z|.
-    fn nearest_axis(&self, axes: &Matrix3<f64>, axes_used: usize, line: usize) -> Option<(usize, f64, f64)> {
-        let mut best: Option<(usize, f64, f64)> = None;
+    /// The axis (of the first `axes_used`) with the smallest residual, not weighed by the loss.
+    fn nearest_axis(&self, axes: &Matrix3<f64>, axes_used: usize, line: usize) -> Option<NearestAxis> {
+        let mut best: Option<NearestAxis> = None;
         for axis in 0..axes_used {
             let direction: Vector3<f64> = axes.column(axis).into_owned();
             let reach = self.reach(&direction, line);
-            let residual = direction.dot(&self.planes.moments[line]) / reach;
-            if residual.is_finite() && best.is_none_or(|best| residual.abs() < best.1.abs()) {
-                best = Some((axis, residual, reach));
+            let residual_px = direction.dot(&self.planes.moments[line]) / reach;
+            if residual_px.is_finite() && best.is_none_or(|best| residual_px.abs() < best.residual_px.abs()) {
+                best = Some(NearestAxis { axis, residual_px, reach });
             }
         }
         best
@@ -265,20 +288,21 @@ impl PictureLines {
         frame: &Matrix3<f64>,
         axes_used: usize,
         scale: f64,
-        options: &SimilarityOptions,
-        mut visit: impl FnMut(usize, Vector3<f64>, f64, f64, f64),
+        mut visit: impl FnMut(Supporter),
     ) {
-        let widest = options.joint_tolerance_deg.to_radians().sin();
+        let widest = TOLERANCE_DEG.to_radians().sin();
         let axes = rotation * frame;
         for line in 0..self.planes.len() {
-            let Some((axis, residual, reach)) = self.nearest_axis(&axes, axes_used, line) else { continue };
-            if residual.abs() * 2.0 > widest * self.planes.lengths[line] {
+            let Some(nearest) = self.nearest_axis(&axes, axes_used, line) else { continue };
+            let NearestAxis { axis, residual_px, reach } = nearest;
+            if residual_px.abs() * 2.0 > widest * self.planes.lengths[line] {
                 continue;
             }
             // Geman-McClure.
-            let robust = 1.0 / (1.0 + (residual / scale).powi(2)).powi(2);
+            let robust = 1.0 / (1.0 + (residual_px / scale).powi(2)).powi(2);
             let moment = rotation.tr_mul(&self.planes.moments[line]);
-            visit(axis, moment, residual, self.planes.weights[line] * robust, reach);
+            let weight = self.planes.weights[line] * robust;
+            visit(Supporter { axis, moment, residual_px, weight, reach });
         }
     }
 
@@ -302,9 +326,9 @@ impl PictureLines {
 }
 
 /// The scales of the loss in pixels, from coarse to fine.
-pub(super) fn scales(options: &SimilarityOptions) -> impl Iterator<Item = f64> {
-    let last = options.joint_scale_px;
-    let steps = (options.joint_start_scale_px / last).max(1.0).ln() / -SHRINK.ln();
+pub(super) fn scales() -> impl Iterator<Item = f64> {
+    let last = END_SCALE_PX;
+    let steps = (START_SCALE_PX / last).max(1.0).ln() / -SHRINK.ln();
     let steps = steps.ceil() as i32;
     (0..=steps).rev().map(move |step| last / SHRINK.powi(step))
 }

@@ -4,18 +4,19 @@ use trueup_core::camera::Camera;
 use trueup_core::geometry::rotation_about_z;
 
 use super::SimilarityOptions;
+use super::frame_search::GUIDING_SIGNIFICANCE;
 use super::joint::LineVote;
-use super::synthetic::{Scene, Sweep, World};
+use super::synthetic::{Sweep, SyntheticScene, World};
 use super::tests::{missing, with_lines};
-use crate::vanishing::{InterpretationPlanes, VanishingOptions};
+use crate::vanishing::InterpretationPlanes;
 
 fn max(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, f64::max)
 }
 
 /// Eight pictures of 60 segments each, none with vanishing directions of its own.
-fn without_triads(per_direction: usize, clutter: usize) -> Scene {
-    let mut scene = with_lines(Scene::new(Sweep::default(), World::Random, 0.0, 12), clutter, 0.5);
+fn without_triads(per_direction: usize, clutter: usize) -> SyntheticScene {
+    let mut scene = with_lines(SyntheticScene::new(Sweep::default(), World::Random, 0.0, 12), clutter, 0.5);
     scene.triads = vec![missing(); scene.triads.len()];
     for lines in &mut scene.lines {
         // `with_lines` draws 20 along each axis, the clutter after them.
@@ -42,26 +43,24 @@ fn clutter_stands_out_nowhere() {
     for clutter in [5, 20, 60] {
         let scene = without_triads(0, clutter);
         let guidance = scene.prior(&SimilarityOptions::default()).guidance;
-        let options = SimilarityOptions::default();
-        assert!(!guidance.used && guidance.significance.is_some_and(|figure| figure < options.pooled_significance));
+        assert!(!guidance.used && guidance.significance.is_some_and(|figure| figure < GUIDING_SIGNIFICANCE));
     }
 }
 
 #[test]
 fn pictures_that_contradict_each_other_leave_the_vertical_uncertain() {
-    let mut scene = with_lines(Scene::new(Sweep::default(), World::Random, 0.0, 11), 0, 0.3);
-    let deviation = |scene: &Scene| {
+    let mut scene = with_lines(SyntheticScene::new(Sweep::default(), World::Random, 0.0, 11), 0, 0.3);
+    let deviation = |scene: &SyntheticScene| {
         let planes = |k: usize| {
             let (focal_px, frame) = (scene.cameras[k].focal_px, &scene.frames[k]);
-            InterpretationPlanes::new(&scene.lines[k], focal_px, frame, &VanishingOptions::default())
+            InterpretationPlanes::new(&scene.lines[k], focal_px, frame)
         };
         let rotations: Vec<_> = scene.cameras.iter().map(Camera::rotation).collect();
         let focals: Vec<f64> = scene.cameras.iter().map(|camera| camera.focal_px).collect();
         let vote = LineVote::new(&rotations, &focals, (0..rotations.len()).map(planes).collect());
-        let options = SimilarityOptions::default();
         // The true frame in the cameras' world.
         let frame = rotations[0].transpose() * scene.world_from_camera[0].transpose();
-        vote.axis_deviations(&vote.refine_frame(&frame, &[1.0; 3], &options), &[1.0; 3], &options)[1]
+        vote.axis_deviations(&vote.refine_frame(&frame, &[1.0; 3]), &[1.0; 3])[1]
     };
     let agreed = deviation(&scene);
     assert!(agreed < 0.1_f64.to_radians(), "{agreed}");

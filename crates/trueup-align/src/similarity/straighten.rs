@@ -1,9 +1,12 @@
 //! Straightening ("wave correction"): a vertical from the cameras alone.
 
 use nalgebra::{Matrix3, Vector3};
+use trueup_core::camera::Camera;
+
+use crate::vanishing::orthonormal_complement;
 
 /// Second eigenvalue of the mean moment of the x axes below which the pictures do not fix a vertical.
-pub(super) const CONDITIONED: f64 = 0.05;
+const CONDITIONED: f64 = 0.05;
 
 /// The vertical that the cameras' x axes span a plane orthogonal to.
 #[derive(Debug, Clone, Copy)]
@@ -13,6 +16,17 @@ pub(super) struct Straightened {
     /// Whether the x axes point in sufficiently different directions; otherwise `down` is the mean of the y axes,
     /// freed of the x direction.
     pub conditioned: bool,
+}
+
+/// What the cameras alone say of the vertical.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CameraVertical<'a> {
+    /// The cameras' rotations, from the common frame to each camera.
+    pub rotations: &'a [Matrix3<f64>],
+    /// By [`straighten`], as published.
+    pub straightened: Straightened,
+    /// By [`straighten_with_pitch`]: down, in the common frame.
+    pub level: Vector3<f64>,
 }
 
 /// The vertical that makes the cameras' x axes horizontal.
@@ -77,7 +91,14 @@ pub(super) fn level_from_world(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) 
     let z = horizontal(ahead)
         .try_normalize(CANCELLED)
         .or_else(|| horizontal(first).try_normalize(CANCELLED))
-        .unwrap_or_else(|| crate::vanishing::orthonormal_complement(down).0);
+        .unwrap_or_else(|| orthonormal_complement(down).0);
     let x = down.cross(&z);
     Matrix3::from_rows(&[x.transpose(), down.transpose(), z.transpose()])
+}
+
+/// The rotation that levels the common frame by the cameras alone; y down, the mean viewing direction above
+/// z.
+pub(crate) fn level_by_cameras(cameras: &[Camera]) -> Matrix3<f64> {
+    let rotations: Vec<Matrix3<f64>> = cameras.iter().map(|camera| camera.rotation()).collect();
+    level_from_world(&straighten(&rotations).down, &rotations)
 }

@@ -4,14 +4,15 @@ use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, RngExt};
 use trueup_core::StageContext;
 use trueup_core::camera::Camera;
-use trueup_core::geometry::{exp_rotation, random_rotation, rotation_about_x, rotation_about_y, rotation_about_z};
+use trueup_core::geometry::{
+    exp_rotation, random_rotation, rotation_about_x, rotation_about_y, rotation_about_z, rows_of,
+};
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::{PairMatches, PairVerdict, PointMatch};
 use trueup_core::source::WorkingFrame;
 
 use super::{PriorInput, SimilarityOptions, SimilarityPrior, run};
 use crate::vanishing::{Triad, TriadOutcome, VanishingOptions};
-use trueup_core::geometry::rows_of;
 
 /// A normally distributed number (Box and Muller).
 pub(crate) fn normal(generator: &mut impl Rng) -> f64 {
@@ -42,7 +43,7 @@ impl Default for Sweep {
 
 /// True cameras and what is measured of them.
 #[derive(Debug, Clone)]
-pub(crate) struct Scene {
+pub(crate) struct SyntheticScene {
     /// True rolls in radians.
     pub roll: Vec<f64>,
     /// True rotations from camera to world.
@@ -66,7 +67,7 @@ pub(crate) enum World {
 pub(crate) const SIZE: (f64, f64) = (800.0, 600.0);
 pub(crate) const FOCAL_PX: f64 = 700.0;
 
-impl Scene {
+impl SyntheticScene {
     pub fn new(sweep: Sweep, world: World, camera_noise_deg: f64, seed: u64) -> Self {
         let mut generator = StageContext::default().generator("synthetic", seed);
         let (roll, world_from_camera, edges) = sweep.place(&mut generator);
@@ -115,6 +116,7 @@ impl Scene {
     /// Per picture |theta - roll| in degrees.
     pub fn errors_deg(&self, prior: &SimilarityPrior) -> Vec<f64> {
         let error = |(theta, roll): (&f64, &f64)| trueup_core::geometry::wrap_angle(theta - roll).abs().to_degrees();
+        assert_eq!(prior.theta.len(), self.roll.len());
         prior.theta.iter().zip(&self.roll).map(error).collect()
     }
 }

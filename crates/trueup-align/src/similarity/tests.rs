@@ -2,13 +2,15 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use proptest::prelude::*;
 use trueup_core::StageContext;
 use trueup_core::geometry::{
-    nearest_rotation, random_rotation, rotation_about_x, rotation_about_y, rotation_about_z, wrap_angle,
+    nearest_rotation, random_rotation, roll_from_down, rotation_about_x, rotation_about_y, rotation_about_z, rows_of,
+    wrap_angle,
 };
-use trueup_core::matches::PointMatch;
+use trueup_core::matches::{PairMatches, PointMatch};
 
-use super::synthetic::{Scene, Sweep, World, joined, noise_rotation, picture_lines};
+use super::synthetic::{Sweep, SyntheticScene, World, joined, noise_rotation, picture_lines};
 use super::*;
-use trueup_core::geometry::{roll_from_down, rows_of};
+use crate::match_points::OverlapWarp;
+use crate::vanishing::{TriadOutcome, VanishingOptions};
 
 const CLEAN: World = World::Manhattan { noise_deg: 0.0, bad_share: 0.0 };
 
@@ -53,7 +55,7 @@ fn one_camera_of_known_roll_is_told_to_turn_by_it() {
 #[test]
 fn clean_scenes_are_upright() {
     for (seed, sweep) in configurations().into_iter().enumerate() {
-        let scene = Scene::new(sweep, CLEAN, 0.0, seed as u64);
+        let scene = SyntheticScene::new(sweep, CLEAN, 0.0, seed as u64);
         let prior = scene.prior(&paper());
         assert!(prior.guidance.used, "{sweep:?}: {:?}", prior.guidance.failed_clause);
         assert!(max(&scene.errors_deg(&prior)) < 1e-6, "{sweep:?}");
@@ -71,7 +73,7 @@ fn noise_of_one_degree_leaves_less_than_half_a_degree() {
     let errors: Vec<f64> = (0..20)
         .map(|seed| {
             let sweep = Sweep { count: 15, rows: 3, pitch_base_deg: 8.0, ..Sweep::default() };
-            let scene = Scene::new(sweep, world, 0.2, seed);
+            let scene = SyntheticScene::new(sweep, world, 0.2, seed);
             mean(&scene.errors_deg(&scene.prior(&paper())))
         })
         .collect();
@@ -81,7 +83,7 @@ fn noise_of_one_degree_leaves_less_than_half_a_degree() {
 #[test]
 fn the_twist_of_pitched_cameras_is_biased_and_the_world_roll_is_not() {
     let sweep = Sweep { pitch_base_deg: 20.0, roll_sd_deg: 2.0, ..Sweep::default() };
-    let scene = Scene::new(sweep, CLEAN, 0.0, 3);
+    let scene = SyntheticScene::new(sweep, CLEAN, 0.0, 3);
     let relative = scene.prior(&SimilarityOptions { beta_mode: BetaMode::Relative, ..paper() });
     assert!(max(&scene.errors_deg(&relative)) > 5.0);
     assert!(max(&scene.errors_deg(&scene.prior(&paper()))) < 1e-6);
@@ -90,7 +92,7 @@ fn the_twist_of_pitched_cameras_is_biased_and_the_world_roll_is_not() {
 #[test]
 fn the_world_frame_of_the_cameras_does_not_matter() {
     let world = World::Manhattan { noise_deg: 1.0, bad_share: 0.2 };
-    let scene = Scene::new(Sweep { count: 10, pitch_base_deg: 15.0, ..Sweep::default() }, world, 0.2, 1);
+    let scene = SyntheticScene::new(Sweep { count: 10, pitch_base_deg: 15.0, ..Sweep::default() }, world, 0.2, 1);
     let expected = scene.prior(&paper());
     for reference in 0..10 {
         // The frame of each camera in turn, as a reference would make it.
@@ -111,7 +113,7 @@ fn the_world_frame_of_the_cameras_does_not_matter() {
 fn focal_ratios_come_back_as_scales() {
     let focals = [900.0, 1125.0, 720.0, 900.0, 1000.0, 810.0];
     let sweep = Sweep { count: 6, roll_sd_deg: 3.0, ..Sweep::default() };
-    let scene = Scene::new(sweep, CLEAN, 0.0, 5);
+    let scene = SyntheticScene::new(sweep, CLEAN, 0.0, 5);
     let (width, height) = (1000.0, 750.0);
     let mut generator = StageContext::default().generator("matches", 0);
     let camera = |i: usize| Camera::new(focals[i], width, height, &scene.world_from_camera[i].transpose());
@@ -139,7 +141,7 @@ fn accepted(world: World, camera_noise_deg: f64, count: usize) -> usize {
     (0..100)
         .filter(|&seed| {
             let sweep = Sweep { count, rows: if count >= 15 { 3 } else { 1 }, ..Sweep::default() };
-            Scene::new(sweep, world, camera_noise_deg, seed).prior(&paper()).guidance.used
+            SyntheticScene::new(sweep, world, camera_noise_deg, seed).prior(&paper()).guidance.used
         })
         .count()
 }
@@ -206,7 +208,7 @@ fn wave_correction(rotations: &[Matrix3<f64>]) -> Vec<f64> {
 #[test]
 fn straightening_is_wave_correction() {
     for (seed, sweep) in configurations().into_iter().enumerate() {
-        let scene = Scene::new(sweep, CLEAN, 0.2, 40 + seed as u64);
+        let scene = SyntheticScene::new(sweep, CLEAN, 0.2, 40 + seed as u64);
         let rotations: Vec<Matrix3<f64>> = scene.cameras.iter().map(Camera::rotation).collect();
         let straightened = straighten::straighten(&rotations);
         assert!(straightened.conditioned);
@@ -222,7 +224,7 @@ fn straightening_is_wave_correction() {
 fn one_picture_and_parallel_pictures_have_a_finite_prior() {
     for count in [1, 2] {
         let sweep = Sweep { count, yaw_step_deg: 0.0, ..Sweep::default() };
-        let mut scene = Scene::new(sweep, World::Random, 0.0, 9);
+        let mut scene = SyntheticScene::new(sweep, World::Random, 0.0, 9);
         scene.triads = vec![missing(); count];
         let prior = scene.prior(&SimilarityOptions::default());
         assert!(!prior.guidance.used && prior.guidance.failed_clause.is_some());
@@ -236,7 +238,7 @@ pub(super) fn missing() -> TriadOutcome {
 
 #[test]
 fn a_triad_that_is_not_finite_counts_as_missing() {
-    let mut scene = Scene::new(Sweep::default(), CLEAN, 0.0, 0);
+    let mut scene = SyntheticScene::new(Sweep::default(), CLEAN, 0.0, 0);
     scene.triads[3] = synthetic::found(&Matrix3::from_element(f64::NAN));
     let prior = scene.prior(&paper());
     assert!(prior.guidance.used && prior.guidance.residuals[3].is_none());
@@ -245,7 +247,7 @@ fn a_triad_that_is_not_finite_counts_as_missing() {
 
 #[test]
 fn malformed_input_is_an_error() {
-    let scene = Scene::new(Sweep::default(), CLEAN, 0.0, 0);
+    let scene = SyntheticScene::new(Sweep::default(), CLEAN, 0.0, 0);
     let mut broken = scene.cameras.clone();
     broken[2].focal_px = f64::NAN;
     let vanishing = VanishingOptions::default();
@@ -260,7 +262,7 @@ fn malformed_input_is_an_error() {
 }
 
 /// Segments for every picture of a scene; the true cameras draw them.
-pub(super) fn with_lines(mut scene: Scene, clutter: usize, noise_px: f64) -> Scene {
+pub(super) fn with_lines(mut scene: SyntheticScene, clutter: usize, noise_px: f64) -> SyntheticScene {
     let mut generator = StageContext::default().generator("lines", 0);
     scene.lines = scene
         .world_from_camera
@@ -273,7 +275,7 @@ pub(super) fn with_lines(mut scene: Scene, clutter: usize, noise_px: f64) -> Sce
 #[test]
 fn joint_refinement_is_better_than_the_triads() {
     let world = World::Manhattan { noise_deg: 1.0, bad_share: 0.2 };
-    let scene = with_lines(Scene::new(Sweep::default(), world, 0.0, 11), 40, 0.5);
+    let scene = with_lines(SyntheticScene::new(Sweep::default(), world, 0.0, 11), 40, 0.5);
     let joint = mean(&scene.errors_deg(&scene.prior(&SimilarityOptions::default())));
     let alone = mean(&scene.errors_deg(&scene.prior(&paper())));
     assert!(joint < 0.03 && joint < alone, "{joint} and {alone}");
@@ -281,7 +283,8 @@ fn joint_refinement_is_better_than_the_triads() {
 
 #[test]
 fn a_clear_vertical_guides_alone_and_a_faint_one_does_not() {
-    let mut scene = with_lines(Scene::new(Sweep { count: 3, ..Sweep::default() }, World::Random, 0.0, 12), 5, 0.5);
+    let mut scene =
+        with_lines(SyntheticScene::new(Sweep { count: 3, ..Sweep::default() }, World::Random, 0.0, 12), 5, 0.5);
     scene.triads = vec![missing(); 3];
     // Of the three directions the vertical's segments are kept.
     for lines in &mut scene.lines {
@@ -308,7 +311,7 @@ fn the_overlap_range_takes_the_shortest_arc() {
 }
 
 /// The grid vertices of one camera carried into another.
-pub(super) fn overlap(scene: &Scene, from: usize, to: usize) -> OverlapWarp {
+pub(super) fn overlap(scene: &SyntheticScene, from: usize, to: usize) -> OverlapWarp {
     let frame = scene.frames[from];
     let grid = trueup_core::mesh::GridMesh::regular(frame.width, frame.height, 40.0);
     let carry = |vertex| {
@@ -323,7 +326,7 @@ pub(super) fn overlap(scene: &Scene, from: usize, to: usize) -> OverlapWarp {
 #[test]
 fn the_fallback_does_not_roll_steep_rows() {
     let sweep = Sweep { count: 2, yaw_step_deg: 20.0, pitch_base_deg: 40.0, roll_sd_deg: 2.0, ..Sweep::default() };
-    let scene = Scene::new(sweep, CLEAN, 0.0, 21);
+    let scene = SyntheticScene::new(sweep, CLEAN, 0.0, 21);
     let overlaps = [overlap(&scene, 0, 1), overlap(&scene, 1, 0)];
     let vanishing = VanishingOptions::default();
     let input = PriorInput { overlaps: &overlaps, ..scene.input(&vanishing) };
@@ -347,7 +350,7 @@ proptest! {
     #[test]
     fn a_rolled_picture_rolls_its_prior(turn in -0.5..0.5_f64, seed in 0_u64..100) {
         let world = World::Manhattan { noise_deg: 0.5, bad_share: 0.0 };
-        let scene = Scene::new(Sweep::default(), world, 0.1, seed);
+        let scene = SyntheticScene::new(Sweep::default(), world, 0.1, seed);
         let mut rolled = scene.clone();
         // Turning every camera about its axis leaves the world where it is.
         let about_axis = rotation_about_z(-turn);
@@ -367,7 +370,7 @@ proptest! {
     #[test]
     fn permuted_pictures_permute_the_prior(shift in 1_usize..8, seed in 0_u64..100) {
         let world = World::Manhattan { noise_deg: 0.5, bad_share: 0.0 };
-        let scene = Scene::new(Sweep::default(), world, 0.1, seed);
+        let scene = SyntheticScene::new(Sweep::default(), world, 0.1, seed);
         let mut permuted = scene.clone();
         permuted.cameras.rotate_left(shift);
         permuted.triads.rotate_left(shift);
@@ -386,7 +389,7 @@ proptest! {
 #[test]
 fn the_prior_is_the_same_on_one_and_two_threads() {
     let world = World::Manhattan { noise_deg: 1.0, bad_share: 0.2 };
-    let scene = with_lines(Scene::new(Sweep::default(), world, 0.1, 2), 40, 0.5);
+    let scene = with_lines(SyntheticScene::new(Sweep::default(), world, 0.1, 2), 40, 0.5);
     let with_threads = |count| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().expect("a thread pool");
         pool.install(|| scene.prior(&SimilarityOptions::default()))

@@ -2,10 +2,19 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::SimilarityOptions;
 use super::joint::{LineVote, Support};
 use crate::vanishing::orthonormal_complement;
 
+/// How far from the cameras' own vertical the segments' is sought, degrees.
+pub(super) const SEARCH_DEG: f64 = 25.0;
+/// Largest angle between a segment and the vertical for the segment to support it, degrees.
+const TOLERANCE_DEG: f64 = 2.0;
+/// Largest score of a rival direction, relative to the vertical's, that leaves no doubt about it.
+const MAX_RIVALRY: f64 = 0.5;
+/// Least share of the segments' weight that supports a vertical without doubt.
+const MIN_SHARE: f64 = 0.15;
+/// Least share of the photographs that support a vertical without doubt, each by three segments or more.
+const MIN_PHOTOGRAPHS: f64 = 0.6;
 /// Rivals nearer to the peak than this many tolerances belong to the peak.
 const PEAK_RADIUS: f64 = 3.0;
 
@@ -20,16 +29,27 @@ pub(super) struct VerticalPeak {
     pub rivalry: f64,
 }
 
-/// Searches the directions within `options.vertical_search_deg` of `expected` and refines the best.
+impl VerticalPeak {
+    /// Its share of `total_weight`, the weight of all segments.
+    pub(super) fn share(&self, total_weight: f64) -> f64 {
+        self.support.score / total_weight
+    }
+
+    /// Whether the segments, of this weight and on so many photographs, leave no doubt about it.
+    pub(super) fn is_clear(&self, total_weight: f64, photographs: usize) -> bool {
+        let needed = MIN_PHOTOGRAPHS * photographs as f64;
+        self.rivalry <= MAX_RIVALRY
+            && self.share(total_weight) >= MIN_SHARE
+            && self.support.pictures as f64 >= needed.max(2.0)
+    }
+}
+
+/// Searches the directions within [`SEARCH_DEG`] of `expected` and refines the best.
 ///
 /// `None` without any supporting segment.
-pub(super) fn vertical_peak(
-    vote: &LineVote,
-    expected: &Vector3<f64>,
-    options: &SimilarityOptions,
-) -> Option<VerticalPeak> {
-    let tolerance = options.vertical_tolerance_deg.to_radians();
-    let candidates = cone(expected, options.vertical_search_deg.to_radians(), tolerance * 0.7);
+pub(super) fn vertical_peak(vote: &LineVote, expected: &Vector3<f64>) -> Option<VerticalPeak> {
+    let tolerance = TOLERANCE_DEG.to_radians();
+    let candidates = cone(expected, SEARCH_DEG.to_radians(), tolerance * 0.7);
     let scored: Vec<(f64, Vector3<f64>)> =
         candidates.into_iter().map(|direction| (vote.support(&direction, tolerance).score, direction)).collect();
     // The first of equals, so that the order of the candidates decides.
@@ -39,7 +59,7 @@ pub(super) fn vertical_peak(
             best = candidate;
         }
     }
-    let down = vote.refine_direction(&best.1, options);
+    let down = vote.refine_direction(&best.1);
     // A few segments can carry the refinement away from where the search found them.
     if down.dot(&best.1) < (PEAK_RADIUS * tolerance).cos() {
         return None;

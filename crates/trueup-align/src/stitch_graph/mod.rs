@@ -22,7 +22,14 @@ pub struct GraphEdge {
     pub weight: usize,
 }
 
-/// Overlapping pictures as a graph.
+impl GraphEdge {
+    /// The edge of a joined pair.
+    pub fn of(pair: &PairMatches) -> Self {
+        Self { a: pair.a, b: pair.b, weight: pair.agreeing }
+    }
+}
+
+/// Overlapping photographs as a graph.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StitchGraph {
     /// Number of pictures, joined or not.
@@ -46,11 +53,8 @@ pub struct TreeStep {
 impl StitchGraph {
     /// The graph of the joined pairs among `pictures` pictures.
     pub fn new(pictures: usize, pairs: &[PairMatches]) -> Self {
-        let mut edges: Vec<GraphEdge> = pairs
-            .iter()
-            .filter(|pair| pair.verdict.is_joined())
-            .map(|pair| GraphEdge { a: pair.a, b: pair.b, weight: pair.agreeing })
-            .collect();
+        let mut edges: Vec<GraphEdge> =
+            pairs.iter().filter(|pair| pair.verdict.is_joined()).map(GraphEdge::of).collect();
         edges.sort_by_key(|edge| (edge.a, edge.b));
         Self::from_edges(pictures, edges)
     }
@@ -105,7 +109,7 @@ impl StitchGraph {
 
     /// The picture in the middle of the component: the spanning tree's node with the fewest steps to the farthest one,
     /// ties by the larger sum of edge weights, then by the smaller index.
-    pub fn central_picture(&self, component: &[usize]) -> usize {
+    pub fn central_photograph(&self, component: &[usize]) -> usize {
         let root = component.first().copied().unwrap_or(0);
         let tree = self.spanning_tree(component, root);
         let mut neighbors: Vec<Vec<usize>> = vec![Vec::new(); self.pictures];
@@ -201,7 +205,7 @@ mod tests {
         let pairs = [pair(0, 1, 100), pair(1, 2, 80), pair(0, 2, 20), pair(2, 3, 60), pair(3, 4, 60)];
         let graph = StitchGraph::new(5, &pairs);
         let component = graph.components[0].clone();
-        let center = graph.central_picture(&component);
+        let center = graph.central_photograph(&component);
         assert_eq!(center, 2);
         let steps: Vec<(usize, usize)> =
             graph.spanning_tree(&component, center).iter().map(|step| (step.parent, step.child)).collect();

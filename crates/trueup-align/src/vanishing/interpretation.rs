@@ -1,12 +1,21 @@
-//! The interpretation planes of a picture's segments.
+//! The interpretation planes of a photograph's segments.
 
 use nalgebra::{Vector2, Vector3};
 use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
 
-use super::VanishingOptions;
+/// Shortest segment used, working pixels ...
+const MIN_LENGTH_PX: f64 = 20.0;
+/// ... and as a fraction of the photograph's diagonal; the larger of both holds.
+const MIN_LENGTH_DIAGONAL: f64 = 0.025;
+/// Most segments used; the longest are kept.
+const MAX_SEGMENTS: usize = 400;
+/// A segment this close to the photograph's border, and parallel to it, is an artifact of the frame. Working pixels.
+const BORDER_MARGIN_PX: f64 = 5.0;
+/// Length in working pixels at which a segment's weight, which is its length, stops growing.
+pub(crate) const FULL_WEIGHT_LENGTH_PX: f64 = 120.0;
 
-/// Usable segments of one picture, longest first, as planes through the camera's center.
+/// Usable segments of one photograph, longest first, as planes through the camera's center.
 #[derive(Debug, Clone)]
 pub(crate) struct InterpretationPlanes {
     /// Unit normals in the camera frame.
@@ -27,28 +36,28 @@ pub(crate) struct InterpretationPlanes {
 }
 
 impl InterpretationPlanes {
-    /// Keeps the segments that are finite, long enough and no artifact of the picture's border, the longest first.
+    /// Keeps the segments that are finite, long enough and no artifact of the photograph's border, the longest first.
     ///
     /// Empty if the focal length or the frame is not a positive number.
-    pub fn new(lines: &[LineSegment], focal_px: f64, frame: &WorkingFrame, options: &VanishingOptions) -> Self {
+    pub(crate) fn new(lines: &[LineSegment], focal_px: f64, frame: &WorkingFrame) -> Self {
         let usable = focal_px.is_finite() && focal_px > 0.0 && frame.diagonal().is_finite();
-        let min_length = options.min_length_px.max(options.min_length_diagonal * frame.diagonal());
+        let min_length = MIN_LENGTH_PX.max(MIN_LENGTH_DIAGONAL * frame.diagonal());
         let mut kept: Vec<(usize, f64)> = lines
             .iter()
             .enumerate()
             .map(|(index, line)| (index, line.length()))
             // A comparison with NaN is false: segments that are not finite are dropped here too.
             .filter(|&(index, length)| {
-                usable && length >= min_length && length.is_finite() && !on_border(&lines[index], frame, options)
+                usable && length >= min_length && length.is_finite() && !on_border(&lines[index], frame)
             })
             .collect();
         // Ties are broken by the position in the input, so that the order is the same everywhere.
         kept.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        kept.truncate(options.max_lines);
+        kept.truncate(MAX_SEGMENTS);
         let mut planes = Self::with_capacity(kept.len());
         let center = Vector2::new(frame.width / 2.0, frame.height / 2.0);
-        for (index, length) in kept {
-            planes.push(index, &lines[index], length, center, focal_px, options.weight_cap_px);
+        for (index, _) in kept {
+            planes.push(index, &lines[index], center, focal_px);
         }
         planes
     }
@@ -65,14 +74,15 @@ impl InterpretationPlanes {
         }
     }
 
-    fn push(&mut self, index: usize, line: &LineSegment, length: f64, center: Vector2<f64>, focal_px: f64, cap: f64) {
+    fn push(&mut self, index: usize, line: &LineSegment, center: Vector2<f64>, focal_px: f64) {
         let (start, end) = (Vector2::from(line.start) - center, Vector2::from(line.end) - center);
         let moment = start.push(focal_px).cross(&end.push(focal_px));
         let norm = moment.norm();
         if !(norm > 0.0 && norm.is_finite()) {
             return;
         }
-        let weight = length.min(cap);
+        let length = line.length();
+        let weight = length.min(FULL_WEIGHT_LENGTH_PX);
         self.normals.push(moment / norm);
         self.moments.push(moment);
         self.midpoints.push((start + end) / 2.0);
@@ -83,16 +93,16 @@ impl InterpretationPlanes {
     }
 
     /// Number of usable segments.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.normals.len()
     }
 }
 
-/// Whether both ends lie within the margin of one and the same side of the picture.
-fn on_border(line: &LineSegment, frame: &WorkingFrame, options: &VanishingOptions) -> bool {
-    let margin = options.border_margin_px;
+/// Whether both ends lie within the margin of one and the same side of the photograph.
+fn on_border(line: &LineSegment, frame: &WorkingFrame) -> bool {
     let ends = [line.start, line.end];
     [(0, frame.width), (1, frame.height)].into_iter().any(|(axis, extent)| {
-        ends.iter().all(|end| end[axis] < margin) || ends.iter().all(|end| end[axis] > extent - margin)
+        ends.iter().all(|end| end[axis] < BORDER_MARGIN_PX)
+            || ends.iter().all(|end| end[axis] > extent - BORDER_MARGIN_PX)
     })
 }

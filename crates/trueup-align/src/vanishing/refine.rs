@@ -3,7 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
 
-use super::{InterpretationPlanes, VanishingOptions};
+use super::interpretation::InterpretationPlanes;
+use super::options::VanishingOptions;
 
 /// Iterations after which the refinement stops in any case.
 const MAX_ITERATIONS: usize = 30;
@@ -11,6 +12,10 @@ const MAX_ITERATIONS: usize = 30;
 const CONVERGED: f64 = 1e-8;
 /// Damping that keeps an axis without any segment where it is.
 const DAMPING: f64 = 1e-9;
+/// Scale of the robust (Geman-McClure) loss, degrees between a direction and a segment's interpretation plane.
+const LOSS_SCALE_DEG: f64 = 1.5;
+/// Largest such angle for a segment to be counted in a direction's cluster, degrees.
+const CLUSTER_DEG: f64 = 6.0;
 /// Standard deviation of a normal distribution over its median absolute deviation.
 const SD_OVER_MAD: f64 = 1.4826;
 
@@ -32,10 +37,10 @@ impl RefinedTriad {
     ///
     /// # Source
     /// Gauss-Newton for the right perturbation V exp([d]x) of r = n . v_k: dr/dd = e_k x (V^T n); Geman-McClure weights.
-    pub fn refine(start: &Matrix3<f64>, planes: &InterpretationPlanes, options: &VanishingOptions) -> Self {
+    pub(crate) fn refine(start: &Matrix3<f64>, planes: &InterpretationPlanes, options: &VanishingOptions) -> Self {
         let mut triad = nearest_rotation(start);
         let tolerance = options.tolerance_deg.to_radians().sin();
-        let scale = options.refine_scale_deg.to_radians().sin();
+        let scale = LOSS_SCALE_DEG.to_radians().sin();
         for _ in 0..MAX_ITERATIONS {
             let normal_equations = NormalEquations::at(&triad, planes, tolerance, scale);
             let damped = normal_equations.matrix + Matrix3::identity() * DAMPING;
@@ -55,7 +60,7 @@ impl RefinedTriad {
     }
 
     /// The covariance in radians squared of d in V exp([d]x); infinite if the segments leave an axis free.
-    pub fn covariance(&self) -> Matrix3<f64> {
+    pub(super) fn covariance(&self) -> Matrix3<f64> {
         let inverse = self.information.try_inverse();
         inverse.map_or(Matrix3::from_diagonal_element(f64::INFINITY), |inverse| {
             inverse * self.residual_sd * self.residual_sd
@@ -63,13 +68,8 @@ impl RefinedTriad {
     }
 
     /// For each of `line_count` segments the direction it belongs to, and the number of segments of each direction.
-    pub fn clusters(
-        &self,
-        planes: &InterpretationPlanes,
-        line_count: usize,
-        options: &VanishingOptions,
-    ) -> (Vec<Option<u8>>, [usize; 3]) {
-        let limit = options.cluster_deg.to_radians().sin();
+    pub(super) fn clusters(&self, planes: &InterpretationPlanes, line_count: usize) -> (Vec<Option<u8>>, [usize; 3]) {
+        let limit = CLUSTER_DEG.to_radians().sin();
         let mut clusters = vec![None; line_count];
         let mut counts = [0; 3];
         for (normal, &index) in planes.normals.iter().zip(&planes.indices) {

@@ -3,10 +3,18 @@
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, RngExt};
 
-use super::{InterpretationPlanes, VanishingOptions};
+use super::interpretation::InterpretationPlanes;
+use super::options::VanishingOptions;
 
 /// Sine of the angle between two interpretation planes below which they do not determine a direction.
 const PARALLEL_PLANES: f64 = 1e-4;
+
+/// Step of the second direction about the first, degrees.
+const STEP_DEG: f64 = 2.0;
+/// Segments, longest first, that hypotheses are scored on before the best are refined on all.
+const SCORED_SEGMENTS: usize = 200;
+/// Hypotheses that are refined.
+const REFINED_HYPOTHESES: usize = 5;
 
 /// The best-scored triads (columns are directions in the camera frame), best first; ties keep the order of the draws.
 pub(super) fn best_hypotheses(
@@ -16,7 +24,7 @@ pub(super) fn best_hypotheses(
 ) -> Vec<Matrix3<f64>> {
     let cumulative = cumulative_weights(&planes.weights);
     let mut scorer = Scorer::new(planes, options);
-    let mut best: Vec<(f64, Matrix3<f64>)> = Vec::with_capacity(options.refined + 1);
+    let mut best: Vec<(f64, Matrix3<f64>)> = Vec::with_capacity(REFINED_HYPOTHESES + 1);
     for _ in 0..options.draws {
         let (a, b) = (draw(&cumulative, generator), draw(&cumulative, generator));
         let cross = planes.normals[a].cross(&planes.normals[b]);
@@ -28,7 +36,7 @@ pub(super) fn best_hypotheses(
         let (score, triad) = scorer.best_turn(&(cross / norm));
         let place = best.partition_point(|entry| entry.0 >= score);
         best.insert(place, (score, triad));
-        best.truncate(options.refined);
+        best.truncate(REFINED_HYPOTHESES);
     }
     best.into_iter().map(|(_, triad)| triad).collect()
 }
@@ -71,10 +79,10 @@ struct Scorer<'a> {
 
 impl<'a> Scorer<'a> {
     fn new(planes: &'a InterpretationPlanes, options: &VanishingOptions) -> Self {
-        let count = planes.len().min(options.search_lines);
+        let count = planes.len().min(SCORED_SEGMENTS);
         // A quarter turn suffices: the next quarter swaps the second and third direction.
-        let steps = (90.0 / options.step_deg).ceil().max(1.0) as usize;
-        let turns = (0..steps).map(|k| (options.step_deg * k as f64).to_radians().sin_cos()).collect();
+        let steps = (90.0 / STEP_DEG).ceil().max(1.0) as usize;
+        let turns = (0..steps).map(|k| (STEP_DEG * k as f64).to_radians().sin_cos()).collect();
         let sine = options.tolerance_deg.to_radians().sin();
         Self { planes, count, turns, inverse_tolerance_squared: 1.0 / (sine * sine), components: vec![[0.0; 3]; count] }
     }

@@ -105,7 +105,7 @@ impl Matched {
             Reference::Named(name) => Some(reference_named(&self.set.images, name)?),
             Reference::Auto => self.graph_file.reference,
         };
-        Ok(wished.filter(|wished| members.contains(wished)).unwrap_or_else(|| self.graph.central_picture(members)))
+        Ok(wished.filter(|wished| members.contains(wished)).unwrap_or_else(|| self.graph.central_photograph(members)))
     }
 
     /// The error when not one photograph could be decoded.

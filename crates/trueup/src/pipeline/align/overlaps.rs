@@ -57,7 +57,8 @@ pub(super) fn run(
 fn find(component: &Component, options: &OverlapOptions, context: &StageContext) -> Result<Overlaps> {
     let priors = component.camera_priors();
     let cameras = context.in_one_step("cameras", || {
-        cameras::run(&priors, &component.pairs, component.reference, options.cameras, context)
+        let input = cameras::CameraInput { priors: &priors, pairs: &component.pairs, reference: component.reference };
+        cameras::run(&input, options.cameras, context)
     })?;
     let pairs: Vec<PairMatches> = (0..component.pairs.len())
         .filter(|position| cameras.contradicting.binary_search(position).is_err())

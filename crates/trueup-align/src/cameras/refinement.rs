@@ -1,0 +1,106 @@
+//! Bundle adjustment from coarse to fine, with the focal lengths that the options and the data ask for.
+
+use trueup_core::{Result, StageContext};
+
+use super::bundle::{BundleAdjustment, FocalModel, Parameters};
+use super::observations::Observations;
+use super::options::{CameraOptions, FocalSharing};
+use super::prior::CameraPrior;
+
+/// Distance in working pixels beyond which the influence of a match grows only linearly, in the first pass: the start
+/// values are that far off.
+const COARSE_HUBER_PX: f64 = 20.0;
+/// The same in the final pass, working pixels: a few times the error of a match.
+const FINE_HUBER_PX: f64 = 2.0;
+/// Relative spread of separately estimated focal lengths above which [`FocalSharing::Auto`] lets every photograph have its
+/// own.
+const ZOOM_SPREAD: f64 = 0.03;
+
+/// What to refine: the photographs, what was observed of them and which of them the others turn about.
+#[derive(Clone, Copy)]
+pub(super) struct RefinementInput<'a> {
+    pub priors: &'a [CameraPrior],
+    pub observations: &'a Observations,
+    /// The photograph whose rotation stays.
+    pub anchor: usize,
+}
+
+/// Refined cameras and what became of their focal lengths.
+pub(super) struct Refined {
+    pub parameters: Parameters,
+    /// Whether every photograph has a focal length of its own.
+    pub per_picture_focal: bool,
+    /// Whether no focal length could be found, and a common one was taken.
+    pub focal_failed: bool,
+}
+
+/// Refines `start`.
+///
+/// # Errors
+/// [`trueup_core::Error::Cancelled`].
+pub(super) fn refine(
+    input: RefinementInput<'_>,
+    start: &Parameters,
+    options: &CameraOptions,
+    context: &StageContext,
+) -> Result<Refined> {
+    let RefinementInput { priors, observations, anchor } = input;
+    let start_focal_px = start.focal_px.clone();
+    let problem = BundleAdjustment {
+        priors,
+        observations,
+        start_focal_px,
+        reference: anchor,
+        known_focal_sd: options.known_focal_sd,
+    };
+    // Start values that already differ (metadata of a zoom) keep their ratios inside a shared model.
+    let shared = FocalModel::shared(priors);
+    let own = FocalModel::per_picture(priors.len());
+    let mut per_picture_focal = options.focal_sharing == FocalSharing::PerPicture;
+    let first_model = if per_picture_focal { &own } else { &shared };
+
+    let coarse = problem.minimize(start.clone(), first_model, COARSE_HUBER_PX, context)?;
+    let mut fine = problem.minimize(coarse, first_model, FINE_HUBER_PX, context)?;
+    if options.focal_sharing == FocalSharing::Auto && priors.len() > 1 {
+        let free = problem.minimize(fine.clone(), &own, COARSE_HUBER_PX, context)?;
+        if problem.is_sound(&free) && focal_spread(&shared, &fine.focal_px, &free.focal_px) > ZOOM_SPREAD {
+            fine = problem.minimize(free, &own, FINE_HUBER_PX, context)?;
+            per_picture_focal = true;
+        }
+    }
+    if problem.is_sound(&fine) {
+        return Ok(Refined { parameters: fine, per_picture_focal, focal_failed: false });
+    }
+    let parameters = with_common_focal(&problem, start, context)?;
+    Ok(Refined { parameters, per_picture_focal: false, focal_failed: true })
+}
+
+/// The rotations refined from `start` with all focal lengths fixed to the median start value.
+fn with_common_focal(problem: &BundleAdjustment<'_>, start: &Parameters, context: &StageContext) -> Result<Parameters> {
+    let mut sorted = start.focal_px.clone();
+    sorted.sort_by(f64::total_cmp);
+    let common = sorted[sorted.len() / 2];
+    let fixed = Parameters { focal_px: vec![common; sorted.len()], rotations: start.rotations.clone() };
+    let model = FocalModel::fixed(sorted.len());
+    let coarse = problem.minimize(fixed, &model, COARSE_HUBER_PX, context)?;
+    problem.minimize(coarse, &model, FINE_HUBER_PX, context)
+}
+
+/// The largest robust spread, within a group, of the ratio of free to shared focal lengths: half the range between the
+/// quartile-like order statistics, which one runaway picture cannot move.
+fn focal_spread(shared: &FocalModel, shared_focal: &[f64], free_focal: &[f64]) -> f64 {
+    let mut spread: f64 = 0.0;
+    for group in 0..shared.parameters {
+        let mut logs: Vec<f64> = (0..shared_focal.len())
+            .filter(|&k| shared.parameter_of[k] == Some(group))
+            .map(|k| (free_focal[k] / shared_focal[k]).ln())
+            .collect();
+        if logs.len() < 2 {
+            continue;
+        }
+        logs.sort_by(f64::total_cmp);
+        let (low, high) = (logs.len() / 4, logs.len() - 1 - logs.len() / 4);
+        spread = spread.max(0.5 * (logs[high] - logs[low]));
+    }
+    spread
+}
