@@ -14,7 +14,7 @@ trueup_core::choice! {
         Gsp3d = "gsp-3d",
         /// One homography per photograph, onto the plane of the reference.
         Homography = "homography",
-        /// Straightened cameras on a sphere, a cylinder or a plane (warps.projection), as AutoStitch has them.
+        /// Straightened cameras on a sphere, a cylinder or a plane (warps.surface), as AutoStitch has them.
         Autostitch = "autostitch",
         /// As-projective-as-possible: a homography for every grid vertex.
         Apap = "apap",

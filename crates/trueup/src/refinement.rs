@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 use trueup_align::match_points::OverlapWarp;
-use trueup_align::mesh::{LineAlignmentInput, PhotometricInput, Pyramid, Refinements, StraightInput, StructureInput};
+use trueup_align::mesh::{GrayPyramid, LineAlignmentInput, PhotometricInput, Refinements, StraightInput, StructureInput};
 use trueup_core::lines::{LineSegment, PairLines};
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
@@ -36,7 +36,7 @@ pub(crate) fn eight_bit(gray: &Raster<f32>) -> Raster<u8> {
 /// What the refinements that the options ask for are made from.
 #[derive(Debug, Default)]
 pub(crate) struct Material {
-    pyramids: Vec<Pyramid>,
+    pyramids: Vec<GrayPyramid>,
     matched: Vec<PairLines>,
     chains: Vec<Vec<LineSegment>>,
 }
@@ -89,7 +89,7 @@ impl Material {
                 .collect::<Result<_>>()?;
         }
         if options.stitch.align.uses_pixels() {
-            material.pyramids = grays.par_iter().map(|gray| Pyramid::new(gray, options.photometric.levels)).collect();
+            material.pyramids = grays.par_iter().map(|gray| GrayPyramid::new(gray)).collect();
         }
         Ok(material)
     }

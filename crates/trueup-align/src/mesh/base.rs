@@ -1,4 +1,4 @@
-//! The base: how each picture's grid would lie if only the prior were asked.
+//! The base: how each photograph's grid would lie if only the prior were asked.
 //!
 //! The similarity energies compare every grid edge with the base, so the base decides which shape is free of cost.
 
@@ -9,21 +9,9 @@ use trueup_core::camera::Camera;
 use trueup_core::geometry::{roll_from_down, rotation_about_x};
 use trueup_core::mesh::GridMesh;
 
-use super::MeshOptions;
 use super::complex::{conjugate_product, product};
-
+use super::options::{BaseShape, MeshOptions};
 use crate::similarity::SimilarityPrior;
-
-trueup_core::choice! {
-    /// The shape that the similarity prior asks of each picture.
-    pub enum BaseShape {
-        /// The picture on the level sphere, unrolled between the equirectangular and the Mercator projection
-        /// (`mesh.conformality`); nearly a similarity around the picture's center.
-        Sphere = "sphere",
-        /// A similarity of the whole picture, as published.
-        Similarity = "similarity",
-    }
-}
 
 /// The unrolled place of a latitude (radians): Mercator's projection of a share of it, stretched back to the whole, so that
 /// the scale at the horizon is 1. A share of 4/5 is Miller's projection; its derivative is 1 / cos(share latitude).
@@ -36,24 +24,24 @@ fn unrolled_latitude(latitude: f64, conformality: f64) -> f64 {
     if conformality < EQUIRECTANGULAR { latitude } else { (conformality * latitude).tan().asinh() / conformality }
 }
 
-/// What the prior wants of one picture.
+/// What the prior wants of one photograph.
 #[derive(Debug, Clone, Copy)]
 struct WantedSimilarity {
     /// Scale s_i.
     scale: f64,
     /// Clockwise rotation theta_i in radians.
     theta: f64,
-    /// Panorama units per radian of the sphere, the same for all pictures: the mean of s_i f_i.
+    /// Panorama units per radian of the sphere, the same for all photographs: the mean of s_i f_i.
     units_per_radian: f64,
 }
 
-/// The bases of all pictures under a similarity prior.
+/// The bases of all photographs under a similarity prior.
 ///
 /// `cameras` are those that the prior was made from; the bases follow them as the prior's lines correct them.
 ///
-/// Where the pictures together look more than 40 degrees up or down and one looks at a pole, the sphere is tilted so that
+/// Where the photographs together look more than 40 degrees up or down and one looks at a pole, the sphere is tilted so that
 /// their mean direction is level: verticals then converge as they do for the eye, and nothing is torn.
-pub fn bases(cameras: &[Camera], grids: &[GridMesh], prior: &SimilarityPrior, options: &MeshOptions) -> Vec<Base> {
+pub fn bases(cameras: &[Camera], grids: &[GridMesh], prior: &SimilarityPrior, options: &MeshOptions) -> Vec<BaseMap> {
     let cameras = &prior.corrected_cameras(cameras);
     let units_per_radian = units_per_radian(cameras, prior);
     let level_from_world = prior.level_from_world();
@@ -68,7 +56,7 @@ pub fn bases(cameras: &[Camera], grids: &[GridMesh], prior: &SimilarityPrior, op
                 None => prior.theta[k],
             };
             let wanted = WantedSimilarity { scale: prior.scale[k], theta, units_per_radian };
-            Base::new(options, &cameras[k], &grids[k], &frame, wanted)
+            BaseMap::new(options, &cameras[k], &grids[k], &frame, wanted)
         })
         .collect()
 }
@@ -88,7 +76,7 @@ pub fn turn_length(cameras: &[Camera], prior: &SimilarityPrior) -> f64 {
 fn tilt_from_level(cameras: &[Camera], level_from_world: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     /// Radians, 40 degrees.
     const STEEP: f64 = 0.7;
-    /// Length of the mean direction below which the pictures look all round and have none.
+    /// Length of the mean direction below which the photographs look all round and have none.
     const ONE_WAY: f64 = 0.5;
     let forwards: Vec<Vector3<f64>> =
         cameras.iter().map(|camera| level_from_world * camera.rotation().row(2).transpose()).collect();
@@ -99,20 +87,20 @@ fn tilt_from_level(cameras: &[Camera], level_from_world: &Matrix3<f64>) -> Optio
     (reaches_pole && one_way && pitch.abs() > STEEP).then(|| rotation_about_x(pitch))
 }
 
-/// The base of one picture: a smooth map from its pixels to panorama units, up to translation.
+/// The base of one photograph: a smooth map from its pixels to panorama units, up to translation.
 ///
 /// # Departures
-/// The published prior is one similarity per picture. Pictures that look up cannot follow it: their overlaps meet along
-/// meridians that converge, and the compromise tilts every picture's own verticals. The sphere's own shape satisfies the
+/// The published prior is one similarity per photograph. Photographs that look up cannot follow it: their overlaps meet along
+/// meridians that converge, and the compromise tilts every photograph's own verticals. The sphere's own shape satisfies the
 /// overlaps and the prior at once; where the view is narrow or level it differs little from the similarity.
 #[derive(Debug, Clone)]
-pub struct Base {
-    /// Factor on the unrolled sphere, or on the picture itself, as a complex number.
+pub struct BaseMap {
+    /// Factor on the unrolled sphere, or on the photograph itself, as a complex number.
     factor: Vector2<f64>,
     sphere: Option<SphereView>,
 }
 
-/// A picture on the level sphere.
+/// A photograph on the level sphere.
 #[derive(Debug, Clone)]
 struct SphereView {
     /// 0 for the equirectangular projection, 1 for Mercator's.
@@ -120,13 +108,13 @@ struct SphereView {
     camera: Camera,
     level_from_camera: Matrix3<f64>,
     forward: Vector3<f64>,
-    /// Whether no vertex of the picture's grid comes near a pole.
+    /// Whether no vertex of the photograph's grid comes near a pole.
     moderate_all_over: bool,
 }
 
-impl Base {
-    /// The base of a picture: on the level sphere, turned so that its rotation at the picture's center is the wanted one.
-    /// A picture whose center is within 20 degrees of a pole cannot be unrolled; it gets the plain similarity.
+impl BaseMap {
+    /// The base of a photograph: on the level sphere, turned so that its rotation at the photograph's center is the wanted one.
+    /// A photograph whose center is within 20 degrees of a pole cannot be unrolled; it gets the plain similarity.
     fn new(
         options: &MeshOptions,
         camera: &Camera,
@@ -148,7 +136,7 @@ impl Base {
         Self { factor: turn * wanted.units_per_radian, sphere: Some(view) }
     }
 
-    /// The picture of a camera on the level sphere, upright.
+    /// The photograph of a camera on the level sphere, upright.
     #[cfg(test)]
     pub(super) fn on_level_sphere(
         camera: &Camera,
@@ -160,7 +148,7 @@ impl Base {
         Self::new(options, camera, grid, &Matrix3::identity(), wanted)
     }
 
-    /// The plain similarity of a picture.
+    /// The plain similarity of a photograph.
     pub fn similarity(scale: f64, theta: f64) -> Self {
         Self { factor: Vector2::new(scale * theta.cos(), scale * theta.sin()), sphere: None }
     }
@@ -200,7 +188,7 @@ impl SphereView {
     }
 
     /// Longitude relative to the viewing direction and unrolled latitude of a pixel. Beyond the largest latitude the
-    /// unrolled picture goes on straight, along rays from its center.
+    /// unrolled photograph goes on straight, along rays from its center.
     fn unrolled(&self, pixel: Vector2<f64>) -> Vector2<f64> {
         let Some(share) = self.moderate_share(pixel) else { return self.projected(self.ray(pixel)) };
         let center = Vector2::from(self.camera.principal_point);
@@ -208,7 +196,7 @@ impl SphereView {
         self.projected(self.ray(last)) + self.derivative(self.ray(last), pixel - last)
     }
 
-    /// The share of the way from the picture's center to `pixel` after which it is too near a pole; `None` if it is
+    /// The share of the way from the photograph's center to `pixel` after which it is too near a pole; `None` if it is
     /// moderate to the end.
     fn moderate_share(&self, pixel: Vector2<f64>) -> Option<f64> {
         /// Steps in which the first steep place is sought: the way may pass a pole and come back.
@@ -254,7 +242,7 @@ pub(crate) fn is_moderate(ray: Vector3<f64>) -> bool {
     (ray.y / ray.norm()).abs() <= STEEPEST
 }
 
-/// The similarity closest to the projection's derivative at the picture's center, per pixel.
+/// The similarity closest to the projection's derivative at the photograph's center, per pixel.
 fn derivative_at_center(conformality: f64, level_from_camera: &Matrix3<f64>, focal_px: f64) -> Vector2<f64> {
     let forward: Vector3<f64> = level_from_camera.column(2).into_owned();
     let horizontal = forward.x.hypot(forward.z);
@@ -283,14 +271,14 @@ mod tests {
 
     /// The base's direction at the center, from finite differences over one small grid, must be upright.
     #[test]
-    fn a_picture_turned_by_its_roll_stands_upright_at_the_center() {
+    fn a_photograph_turned_by_its_roll_stands_upright_at_the_center() {
         let grid = GridMesh::regular(800.0, 600.0, 2.0);
         for conformality in [0.0, 0.8, 1.0] {
             let options = MeshOptions { conformality, ..MeshOptions::default() };
             let camera = camera(0.7, -0.4, 0.2);
             let wanted = WantedSimilarity { scale: 1.0, theta: 0.2, units_per_radian: 700.0 };
-            let base = Base::new(&options, &camera, &grid, &Matrix3::identity(), wanted).places(&grid);
-            // Down in the picture is (sin roll, cos roll) where the camera's roll is 0.2.
+            let base = BaseMap::new(&options, &camera, &grid, &Matrix3::identity(), wanted).places(&grid);
+            // Down in the photograph is (sin roll, cos roll) where the camera's roll is 0.2.
             let center = grid.columns * (grid.rows / 2) + grid.columns / 2;
             let down = Vector2::new(0.2_f64.sin(), 0.2_f64.cos());
             let by_x = (base[center + 1] - base[center - 1]) / (2.0 * grid.cell_width());
@@ -302,7 +290,7 @@ mod tests {
 
     /// A full turn that looks up a little has its mean direction near the pole without looking there.
     #[test]
-    fn only_pictures_that_look_one_way_are_tilted_level() {
+    fn only_photographs_that_look_one_way_are_tilted_level() {
         let tilt = |cameras: &[Camera]| tilt_from_level(cameras, &Matrix3::identity());
         let turn: Vec<Camera> = (0..12).map(|k| camera(f64::from(k) * TAU / 12.0, 1.25, 0.0)).collect();
         assert!(tilt(&turn[..1]).is_some());
@@ -310,7 +298,7 @@ mod tests {
         assert!(tilt(&[turn, lower].concat()).is_none());
     }
 
-    /// The corners of a picture that looks 57 degrees up are beyond the largest latitude: value and slope go on across it.
+    /// The corners of a photograph that looks 57 degrees up are beyond the largest latitude: value and slope go on across it.
     #[test]
     fn steep_corners_go_on_straight() {
         for conformality in [0.0, 0.8, 1.0] {
@@ -339,10 +327,10 @@ mod tests {
     }
 
     #[test]
-    fn pictures_near_a_pole_get_the_plain_similarity() {
+    fn photographs_near_a_pole_get_the_plain_similarity() {
         let grid = GridMesh::regular(800.0, 600.0, 40.0);
         let wanted = WantedSimilarity { scale: 1.0, theta: 0.0, units_per_radian: 700.0 };
-        let base = Base::new(&MeshOptions::default(), &camera(0.0, -1.3, 0.0), &grid, &Matrix3::identity(), wanted)
+        let base = BaseMap::new(&MeshOptions::default(), &camera(0.0, -1.3, 0.0), &grid, &Matrix3::identity(), wanted)
             .places(&grid);
         assert!((base[grid.len() - 1] - grid.source(grid.len() - 1)).norm() < 1e-9);
     }

@@ -33,7 +33,7 @@ pub fn folded_cells(mesh: &GridMesh) -> usize {
     cells(mesh).filter(|&cell| !is_sound(mesh, cell)).count()
 }
 
-/// The deformed border of a picture, a closed polygon, ready to be asked for many points.
+/// The deformed border of a photograph, a closed polygon, ready to be asked for many points.
 #[derive(Debug)]
 pub(super) struct Outline {
     ring: Vec<Vector2<f64>>,
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_area_of_a_sheared_picture_is_its_own() {
+    fn the_area_of_a_sheared_photograph_is_its_own() {
         let mut mesh = GridMesh::regular(40.0, 30.0, 10.0);
         for vertex in &mut mesh.target {
             vertex[0] += 3.0 * vertex[1] - 500.0;

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use trueup_align::cameras::Cameras;
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points::OverlapWarp;
-use trueup_align::mesh::{self, Closure, Refinements, WarpedMesh};
+use trueup_align::mesh::{self, Closure, MeshInput, Refinements, WarpedMesh};
 use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityOptions, SimilarityPrior};
 use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::{self, TriadOutcome};
@@ -121,7 +121,9 @@ pub(crate) fn run(
             // What is turned as a whole does not go round along the panorama's rows.
             let closure = closure.filter(|_| component.reference_rotation == 0.0);
             let refinements = Refinements { closure, ..material.refinements(component, &met, options) };
-            mesh::run_refined(&grids, &kept, &bases, component.reference, &options.mesh, &refinements, context)
+            let reference = component.reference;
+            let input = MeshInput { grids: &grids, warps: &kept, bases: &bases, reference, refinements };
+            mesh::run(&input, &options.mesh, context)
         }
         Shape::Warp(model) => {
             let fine: Vec<GridMesh> = grids.iter().map(|grid| mesh::divided(grid, options.mesh.subdivision)).collect();

@@ -18,12 +18,12 @@
 use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 
-use super::Shot;
 use super::coverage::steepest;
+use super::photograph::PosedPhotograph;
 
 /// By how many of its own pixels each vertex of a photograph's grid looks aside, row-major.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Meeting {
+pub struct ParallaxShift {
     /// One for each vertex; bilinear between.
     pub aside: Vec<Vector2<f64>>,
 }
@@ -33,27 +33,27 @@ pub struct Meeting {
 /// * `period`: the turn of the mesh's plane, if it closes on itself.
 /// * `max_parallax`: the largest angle in radians between where a camera sees a place and where it is drawn; from half of it
 ///   on, corrections fade, since a mesh that has to contradict its cameras more than that is torn itself.
-pub fn meeting(shots: &[Shot], period: Option<f64>, max_parallax: f64) -> Vec<Meeting> {
-    let trusts: Vec<f64> = shots.iter().map(|shot| trust(steepest(shot))).collect();
-    let bounds: Vec<_> = shots.iter().map(|shot| shot.mesh.bounds()).collect();
-    (0..shots.len())
+pub fn parallax_shifts(photographs: &[PosedPhotograph], period: Option<f64>, max_parallax: f64) -> Vec<ParallaxShift> {
+    let trusts: Vec<f64> = photographs.iter().map(|photograph| trust(steepest(photograph))).collect();
+    let bounds: Vec<_> = photographs.iter().map(|photograph| photograph.mesh.bounds()).collect();
+    (0..photographs.len())
         .into_par_iter()
         .map(|k| {
-            let shot = &shots[k];
-            let aside = (0..shot.mesh.len()).map(|vertex| {
-                let pixel = shot.mesh.source(vertex);
-                let direction = shot.camera.world_direction(pixel);
-                let own = Sight { direction, weight: depth(shot, pixel), trust: trusts[k] };
-                let place = Vector2::from(shot.mesh.target[vertex]);
-                let others = (0..shots.len()).filter(|&other| other != k).filter_map(|other| {
-                    let seen = sight(&shots[other], &bounds[other], place, &own.direction, period)?;
+            let photograph = &photographs[k];
+            let aside = (0..photograph.mesh.len()).map(|vertex| {
+                let pixel = photograph.mesh.source(vertex);
+                let direction = photograph.camera.world_direction(pixel);
+                let own = Sight { direction, weight: depth(photograph, pixel), trust: trusts[k] };
+                let place = Vector2::from(photograph.mesh.target[vertex]);
+                let others = (0..photographs.len()).filter(|&other| other != k).filter_map(|other| {
+                    let seen = sight(&photographs[other], &bounds[other], place, &own.direction, period)?;
                     Some(Sight { trust: trusts[other], ..seen })
                 });
                 let drawn = common_direction(own, others, max_parallax);
-                let back = shot.camera.project(shot.camera.rotation() * drawn);
+                let back = photograph.camera.project(photograph.camera.rotation() * drawn);
                 back.map_or(Vector2::zeros(), |back| back - pixel)
             });
-            Meeting { aside: aside.collect() }
+            ParallaxShift { aside: aside.collect() }
         })
         .collect()
 }
@@ -77,7 +77,7 @@ fn trust(steepest: f64) -> f64 {
 
 /// How another photograph sees the `place` that is expected in `direction`; `None` if it does not show it.
 fn sight(
-    other: &Shot,
+    other: &PosedPhotograph,
     bounds: &(Vector2<f64>, Vector2<f64>),
     place: Vector2<f64>,
     direction: &Vector3<f64>,
@@ -105,9 +105,9 @@ fn sight(
 }
 
 /// 1 in the middle of a photograph, 0 on its border.
-fn depth(shot: &Shot, pixel: Vector2<f64>) -> f64 {
+fn depth(photograph: &PosedPhotograph, pixel: Vector2<f64>) -> f64 {
     let along = |position: f64, length: f64| (2.0 * position.min(length - position) / length).max(0.0);
-    along(pixel.x, shot.mesh.width) * along(pixel.y, shot.mesh.height)
+    along(pixel.x, photograph.mesh.width) * along(pixel.y, photograph.mesh.height)
 }
 
 /// Where a place is drawn: the mean of all sights, faded towards the own one as they contradict each other. All photographs
@@ -135,8 +135,8 @@ mod tests {
 
     /// Two photographs 30 degrees apart on an unrolled sphere of 700 pixels a radian. What the second one's mesh says is
     /// moved by `moved` panorama pixels against its camera.
-    fn pair(moved: [f64; 2]) -> Vec<Shot> {
-        let shot = |yaw: f64, moved: [f64; 2]| {
+    fn pair(moved: [f64; 2]) -> Vec<PosedPhotograph> {
+        let photograph = |yaw: f64, moved: [f64; 2]| {
             let level_from_camera = rotation_about_y(yaw);
             let camera = Camera::new(700.0, 800.0, 600.0, &level_from_camera.transpose());
             let mut mesh = GridMesh::regular(800.0, 600.0, 20.0);
@@ -146,23 +146,26 @@ mod tests {
                 let place = Vector2::new(yaw + ray.x.atan2(ray.z), ray.y.asin()) * 700.0;
                 mesh.target[vertex] = (place + Vector2::from(moved)).into();
             }
-            Shot { camera, mesh }
+            PosedPhotograph { camera, mesh }
         };
-        vec![shot(0.0, [0.0; 2]), shot(30_f64.to_radians(), moved)]
+        vec![photograph(0.0, [0.0; 2]), photograph(30_f64.to_radians(), moved)]
     }
 
     /// The direction a photograph draws a pixel in.
-    fn drawn(shots: &[Shot], meetings: &[Meeting], k: usize, pixel: Vector2<f64>) -> Vector3<f64> {
-        let (corners, shares) = shots[k].mesh.bilinear(pixel);
-        let aside = (0..4).fold(Vector2::zeros(), |sum, one| sum + meetings[k].aside[corners[one]] * shares[one]);
-        shots[k].camera.world_direction(pixel + aside)
+    fn drawn(photographs: &[PosedPhotograph], shifts: &[ParallaxShift], k: usize, pixel: Vector2<f64>) -> Vector3<f64> {
+        let (corners, shares) = photographs[k].mesh.bilinear(pixel);
+        let aside = (0..4).fold(Vector2::zeros(), |sum, one| sum + shifts[k].aside[corners[one]] * shares[one]);
+        photographs[k].camera.world_direction(pixel + aside)
     }
 
     #[test]
     fn what_agrees_stays() {
-        let shots = pair([0.0; 2]);
-        for meeting in meeting(&shots, None, 0.03) {
-            let largest = meeting.aside.iter().map(Vector2::norm).fold(0.0, f64::max);
+        let photographs = pair([0.0; 2]);
+        let shifts = parallax_shifts(&photographs, None, 0.03);
+        assert_eq!(shifts.len(), 2);
+        for (shift, photograph) in shifts.iter().zip(&photographs) {
+            assert_eq!(shift.aside.len(), photograph.mesh.len());
+            let largest = shift.aside.iter().map(Vector2::norm).fold(0.0, f64::max);
             assert!(largest < 0.15, "the grid's own sag, not {largest}");
         }
     }
@@ -170,35 +173,45 @@ mod tests {
     /// Pixels that the mesh puts at the same place are drawn in the same direction; where a photograph is alone it stays.
     #[test]
     fn overlaps_meet_and_the_rest_stays() {
-        let shots = pair([4.0, -3.0]);
-        let meetings = meeting(&shots, None, 0.03);
+        let photographs = pair([4.0, -3.0]);
+        let shifts = parallax_shifts(&photographs, None, 0.03);
         for pixel in [[450.0, 300.0], [600.0, 200.0], [700.0, 450.0]].map(Vector2::from) {
-            let start = shots[0].camera.transfer(&shots[1].camera, pixel).expect("in front");
-            let same = shots[1].mesh.source_of(shots[0].mesh.warp(pixel), start).expect("overlapping");
-            let before = shots[0].camera.world_direction(pixel).angle(&shots[1].camera.world_direction(same)) * 700.0;
+            let start = photographs[0].camera.transfer(&photographs[1].camera, pixel).expect("in front");
+            let same = photographs[1].mesh.source_of(photographs[0].mesh.warp(pixel), start).expect("overlapping");
+            let before =
+                photographs[0].camera.world_direction(pixel).angle(&photographs[1].camera.world_direction(same))
+                    * 700.0;
             assert!((before - 5.0).abs() < 0.3, "{before}");
-            let apart = drawn(&shots, &meetings, 0, pixel).angle(&drawn(&shots, &meetings, 1, same)) * 700.0;
+            let apart = drawn(&photographs, &shifts, 0, pixel).angle(&drawn(&photographs, &shifts, 1, same)) * 700.0;
             assert!(apart < 0.1, "{apart} px at {pixel}");
         }
-        let alone = drawn(&shots, &meetings, 0, Vector2::new(100.0, 300.0));
-        assert!(alone.angle(&shots[0].camera.world_direction(Vector2::new(100.0, 300.0))) < 1e-12);
+        let alone = drawn(&photographs, &shifts, 0, Vector2::new(100.0, 300.0));
+        assert!(alone.angle(&photographs[0].camera.world_direction(Vector2::new(100.0, 300.0))) < 1e-12);
     }
 
     /// A mesh that contradicts its cameras by 50 pixels (4 degrees) is not believed.
     #[test]
     fn contradictions_are_left_to_the_cameras() {
-        let shots = pair([50.0, 0.0]);
-        let asides = meeting(&shots, None, 0.03);
-        assert!(asides.iter().flat_map(|meeting| &meeting.aside).all(|aside| aside.norm() < 1e-6));
+        let photographs = pair([50.0, 0.0]);
+        let shifts = parallax_shifts(&photographs, None, 0.03);
+        assert_eq!(shifts.len(), 2);
+        for (shift, photograph) in shifts.iter().zip(&photographs) {
+            assert_eq!(shift.aside.len(), photograph.mesh.len());
+            assert!(shift.aside.iter().all(|aside| aside.norm() < 1e-6));
+        }
     }
 
     /// The same pair with the second mesh a turn farther.
     #[test]
     fn overlaps_meet_across_the_turn() {
-        let near = meeting(&pair([4.0, -3.0]), None, 0.03);
+        let near = parallax_shifts(&pair([4.0, -3.0]), None, 0.03);
         let period = std::f64::consts::TAU * 700.0;
-        let far = meeting(&pair([4.0 + period, -3.0]), Some(period), 0.03);
+        let far = parallax_shifts(&pair([4.0 + period, -3.0]), Some(period), 0.03);
+        assert_eq!((near.len(), far.len()), (2, 2));
+        let moved = near.iter().flat_map(|shift| &shift.aside).map(Vector2::norm).fold(0.0, f64::max);
+        assert!(moved > 1.0, "the overlap asks for {moved} px only");
         for (near, far) in near.iter().zip(&far) {
+            assert_eq!(near.aside.len(), far.aside.len());
             let largest = near.aside.iter().zip(&far.aside).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
             assert!(largest < 1e-2, "{largest}");
         }
