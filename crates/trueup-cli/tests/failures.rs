@@ -1,5 +1,6 @@
 //! Bad input: what is said, with which exit status, and that nothing is left behind.
 
+use crate::full_turn::photographs;
 use crate::pictures::{STREET_NAMES, claiming, noise, plain, street, street_desk};
 use crate::run::{Desk, Run, finish, trueup};
 
@@ -122,7 +123,8 @@ fn black_photographs() {
 #[test]
 fn a_method_that_cannot_place_the_photographs() {
     let desk = Desk::new();
-    // Three steps of 36 degrees and half a photograph's width, 32 degrees: 90 degrees are passed whatever the reference.
+    // Of four photographs 36 degrees apart one is at least two steps from the reference: with half its own width, 32
+    // degrees, it reaches beyond 90.
     let names = ["0.jpg", "1.jpg", "2.jpg", "3.jpg"];
     for (name, bytes) in names.iter().zip(photographs()) {
         desk.put(name, bytes);

@@ -1,8 +1,8 @@
 //! Where the vertices of one photograph's grid appear in another: the data of the alignment energy.
 //!
 //! # Source
-//! Chen and Chuang, "Natural image stitching with the global similarity prior" (2016), section 3.1: grid vertices carried
-//! by local homographies replace the feature matches, because they cover the overlap uniformly.
+//! Chen and Chuang, "Natural image stitching with the global similarity prior" (2016), section 3.1: grid vertices
+//! carried by local homographies replace the feature matches, because they cover the overlap uniformly.
 
 mod moving_dlt;
 mod residual;
@@ -31,8 +31,8 @@ pub struct OverlapWarp {
 }
 
 impl OverlapWarp {
-    /// Where a pixel of photograph `from` is in `to`, by the vertices of `grid` around it: interpolated, or at the overlap's
-    /// border moved like the nearest vertex that is carried. `None` outside the overlap.
+    /// Where a pixel of photograph `from` is in `to`, by the vertices of `grid` around it: interpolated, or at the
+    /// overlap's border moved like the nearest vertex that is carried. `None` outside the overlap.
     pub fn at(&self, grid: &GridMesh, point: Vector2<f64>) -> Option<Vector2<f64>> {
         let (corners, shares) = grid.bilinear(point);
         let places = corners.map(|corner| self.vertices.get(corner).copied().flatten().map(Vector2::from));

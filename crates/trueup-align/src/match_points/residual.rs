@@ -5,8 +5,8 @@ use trueup_core::camera::Camera;
 
 use super::moving_dlt::DECAY_PX;
 
-/// Largest distance of a carried vertex from where the model without local corrections has it, in diagonals of the other
-/// photograph: beyond, a few wrong matches speak.
+/// Largest distance of a carried vertex from where the model without local corrections has it, in diagonals of the
+/// other photograph: beyond, a few wrong matches speak.
 pub(super) const MAX_DEVIATION: f64 = 0.1;
 
 /// Carries points from one photograph to another by the cameras, plus a smooth correction.
@@ -16,8 +16,8 @@ pub(super) const MAX_DEVIATION: f64 = 0.1;
 /// places are as consistent as the cameras; with parallax it follows the matches.
 ///
 /// # Departures
-/// The published method carries vertices by moving DLT from the matches alone. On rotating cameras that adds the noise of
-/// a few local matches, and extrapolates it where there are none.
+/// The published method carries vertices by moving DLT from the matches alone. On rotating cameras that adds the noise
+/// of a few local matches, and extrapolates it where there are none.
 pub(super) struct CameraResidual<'a> {
     from: &'a Camera,
     to: &'a Camera,
@@ -32,7 +32,7 @@ struct Sample {
 }
 
 impl<'a> CameraResidual<'a> {
-    pub fn new(from: &'a Camera, to: &'a Camera, source: &[Vector2<f64>], target: &[Vector2<f64>]) -> Self {
+    pub(super) fn new(from: &'a Camera, to: &'a Camera, source: &[Vector2<f64>], target: &[Vector2<f64>]) -> Self {
         let samples = source
             .iter()
             .zip(target)
@@ -46,7 +46,7 @@ impl<'a> CameraResidual<'a> {
     }
 
     /// The place of `point` in the other photograph; `None` behind its camera or far outside.
-    pub fn at(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
+    pub(super) fn at(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
         let place = self.from.transfer(self.to, point)?;
         let [x, y] = self.to.principal_point;
         let near = (place.x - x).abs() <= x + self.margin && (place.y - y).abs() <= y + self.margin;

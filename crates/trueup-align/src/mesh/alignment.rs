@@ -47,7 +47,12 @@ pub(super) struct AlignmentEnergy {
 
 impl AlignmentEnergy {
     /// The match points of all warps. `places` are the bases' places of the grids' vertices.
-    pub fn new(grids: &[GridMesh], warps: &[OverlapWarp], bases: &[BaseMap], places: &[Vec<Vector2<f64>>]) -> Self {
+    pub(super) fn new(
+        grids: &[GridMesh],
+        warps: &[OverlapWarp],
+        bases: &[BaseMap],
+        places: &[Vec<Vector2<f64>>],
+    ) -> Self {
         let within = Closure { warps, turns: &[], expected: 0.0 };
         let mut energy = Self { points: Vec::new() };
         energy.join(&within, grids, bases, places);
@@ -55,7 +60,13 @@ impl AlignmentEnergy {
     }
 
     /// Takes in the match points of `closure`.
-    pub fn join(&mut self, closure: &Closure, grids: &[GridMesh], bases: &[BaseMap], places: &[Vec<Vector2<f64>>]) {
+    pub(super) fn join(
+        &mut self,
+        closure: &Closure,
+        grids: &[GridMesh],
+        bases: &[BaseMap],
+        places: &[Vec<Vector2<f64>>],
+    ) {
         let turns = closure.turns.iter().copied().chain(std::iter::repeat(0.0));
         let points = closure.warps.iter().zip(turns).flat_map(|(warp, turns)| {
             warp.vertices.iter().take(grids[warp.from].len()).enumerate().filter_map(move |(vertex, place)| {
@@ -69,14 +80,15 @@ impl AlignmentEnergy {
         self.points.extend(points);
     }
 
-    /// For every match point across the cut of a full turn, the way from its place at the left end to that at the right.
-    pub fn apart(&self, meshes: &[GridMesh]) -> Vec<Vector2<f64>> {
+    /// For every match point across the cut of a full turn, the way from its place at the left end to that at the
+    /// right.
+    pub(super) fn apart(&self, meshes: &[GridMesh]) -> Vec<Vector2<f64>> {
         let across = self.points.iter().filter(|point| point.turns != 0.0);
         across.map(|point| point.distance(meshes) * point.turns).collect()
     }
 
     /// Adds the energy, each match point weighted by `weight` squared.
-    pub fn add(&self, weight: f64, equations: &mut NormalEquations, grids: &[GridMesh]) {
+    pub(super) fn add(&self, weight: f64, equations: &mut NormalEquations, grids: &[GridMesh]) {
         for point in &self.points {
             let (corners, shares) = grids[point.to].bilinear(Vector2::from(point.place));
             let to: [(usize, f64); 4] = std::array::from_fn(|k| (corners[k], -shares[k]));
@@ -91,9 +103,9 @@ impl AlignmentEnergy {
         }
     }
 
-    /// For every photograph and grid cell (row-major), whether a match point lies in it: a vertex carried elsewhere counts
-    /// for the cell to its lower right.
-    pub fn overlap_cells(&self, grids: &[GridMesh]) -> Vec<Vec<bool>> {
+    /// For every photograph and grid cell (row-major), whether a match point lies in it: a vertex carried elsewhere
+    /// counts for the cell to its lower right.
+    pub(super) fn overlap_cells(&self, grids: &[GridMesh]) -> Vec<Vec<bool>> {
         let mut cells: Vec<Vec<bool>> =
             grids.iter().map(|grid| vec![false; (grid.rows - 1) * (grid.columns - 1)]).collect();
         for point in &self.points {
@@ -107,7 +119,7 @@ impl AlignmentEnergy {
 
     /// Root mean square distance of the two places of a match point in the deformed `meshes`, across a full turn's cut
     /// modulo `period`; 0 without match points.
-    pub fn rms(&self, meshes: &[GridMesh], period: Option<f64>) -> f64 {
+    pub(super) fn rms(&self, meshes: &[GridMesh], period: Option<f64>) -> f64 {
         let turn = Vector2::new(period.unwrap_or(0.0), 0.0);
         let squares = self.points.iter().map(|point| (point.distance(meshes) - turn * point.turns).norm_squared());
         (squares.sum::<f64>() / self.points.len().max(1) as f64).sqrt()

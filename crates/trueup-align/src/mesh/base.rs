@@ -13,8 +13,9 @@ use super::complex::{conjugate_product, product};
 use super::options::{BaseShape, MeshOptions};
 use crate::similarity::SimilarityPrior;
 
-/// The unrolled place of a latitude (radians): Mercator's projection of a share of it, stretched back to the whole, so that
-/// the scale at the horizon is 1. A share of 4/5 is Miller's projection; its derivative is 1 / cos(share latitude).
+/// The unrolled place of a latitude (radians): Mercator's projection of a share of it, stretched back to the whole, so
+/// that the scale at the horizon is 1. A share of 4/5 is Miller's projection; its derivative is 1 / cos(share
+/// latitude).
 ///
 /// # Source
 /// O. M. Miller, "Notes on cylindrical world map projections" (1942).
@@ -39,8 +40,8 @@ struct WantedSimilarity {
 ///
 /// `cameras` are those that the prior was made from; the bases follow them as the prior's lines correct them.
 ///
-/// Where the photographs together look more than 40 degrees up or down and one looks at a pole, the sphere is tilted so that
-/// their mean direction is level: verticals then converge as they do for the eye, and nothing is torn.
+/// Where the photographs together look more than 40 degrees up or down and one looks at a pole, the sphere is tilted so
+/// that their mean direction is level: verticals then converge as they do for the eye, and nothing is torn.
 pub fn bases(cameras: &[Camera], grids: &[GridMesh], prior: &SimilarityPrior, options: &MeshOptions) -> Vec<BaseMap> {
     let cameras = &prior.corrected_cameras(cameras);
     let units_per_radian = units_per_radian(cameras, prior);
@@ -90,9 +91,10 @@ fn tilt_from_level(cameras: &[Camera], level_from_world: &Matrix3<f64>) -> Optio
 /// The base of one photograph: a smooth map from its pixels to panorama units, up to translation.
 ///
 /// # Departures
-/// The published prior is one similarity per photograph. Photographs that look up cannot follow it: their overlaps meet along
-/// meridians that converge, and the compromise tilts every photograph's own verticals. The sphere's own shape satisfies the
-/// overlaps and the prior at once; where the view is narrow or level it differs little from the similarity.
+/// The published prior is one similarity per photograph. Photographs that look up cannot follow it: their overlaps meet
+/// along meridians that converge, and the compromise tilts every photograph's own verticals. The sphere's own shape
+/// satisfies the overlaps and the prior at once; where the view is narrow or level it differs little from the
+/// similarity.
 #[derive(Debug, Clone)]
 pub struct BaseMap {
     /// Factor on the unrolled sphere, or on the photograph itself, as a complex number.
@@ -113,8 +115,9 @@ struct SphereView {
 }
 
 impl BaseMap {
-    /// The base of a photograph: on the level sphere, turned so that its rotation at the photograph's center is the wanted one.
-    /// A photograph whose center is within 20 degrees of a pole cannot be unrolled; it gets the plain similarity.
+    /// The base of a photograph: on the level sphere, turned so that its rotation at the photograph's center is the
+    /// wanted one. A photograph whose center is within 20 degrees of a pole cannot be unrolled; it gets the plain
+    /// similarity.
     fn new(
         options: &MeshOptions,
         camera: &Camera,
@@ -163,7 +166,8 @@ impl BaseMap {
         (0..grid.len()).map(|vertex| self.at(grid.source(vertex))).collect()
     }
 
-    /// How far the base at `pixel` is from its own bilinear interpolation over the grid's cell, whose `places` are given.
+    /// How far the base at `pixel` is from its own bilinear interpolation over the grid's cell, whose `places` are
+    /// given.
     pub fn sag(&self, grid: &GridMesh, places: &[Vector2<f64>], pixel: Vector2<f64>) -> Vector2<f64> {
         if self.sphere.is_none() {
             return Vector2::zeros();
@@ -298,7 +302,8 @@ mod tests {
         assert!(tilt(&[turn, lower].concat()).is_none());
     }
 
-    /// The corners of a photograph that looks 57 degrees up are beyond the largest latitude: value and slope go on across it.
+    /// The corners of a photograph that looks 57 degrees up are beyond the largest latitude: value and slope go on
+    /// across it.
     #[test]
     fn steep_corners_go_on_straight() {
         for conformality in [0.0, 0.8, 1.0] {

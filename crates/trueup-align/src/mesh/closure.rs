@@ -22,14 +22,14 @@ impl Closure<'_> {
     /// Why the ends of a panorama that was laid out without the closure cannot be the same place; `None` if they can.
     ///
     /// `apart` holds, for every match point, the way from where the left end has it to where the right end has it. What
-    /// the ends are off is spread over the whole turn when it is closed; more than that takes up comes of wrong matches or
-    /// cameras.
+    /// the ends are off is spread over the whole turn when it is closed; more than that takes up comes of wrong matches
+    /// or cameras.
     pub(super) fn contradiction(&self, apart: &[Vector2<f64>]) -> Option<String> {
         /// Largest difference in height of the ends, and largest spread of what the match points say, as shares of the
         /// period: a slope of 1.7 degrees.
         const MOST_OFF: f64 = 0.03;
-        /// Largest difference of the period from that by the cameras, as its share. Focal lengths may be off by a tenth and
-        /// more although all matches agree on the period.
+        /// Largest difference of the period from that by the cameras, as its share. Focal lengths may be off by a tenth
+        /// and more although all matches agree on the period.
         const MOST_STRETCH: f64 = 0.25;
         let Some(x) = median(apart.iter().map(|one| one.x)) else {
             return Some("no point of their overlap was carried across".to_owned());
@@ -73,8 +73,8 @@ mod tests {
     const PHOTOGRAPHS: usize = 10;
     const FOCAL_PX: f64 = 400.0;
 
-    /// A ring of level photographs 36 degrees apart, with all match points; those across the cut, between the last and the
-    /// first, apart, with their turns.
+    /// A ring of level photographs 36 degrees apart, with all match points; those across the cut, between the last and
+    /// the first, apart, with their turns.
     struct Ring {
         cameras: Vec<Camera>,
         grids: Vec<GridMesh>,

@@ -27,7 +27,7 @@ pub(super) struct PhotographPixel {
 
 impl CurrentGrids<'_> {
     /// Distance in the panorama of a pixel of one photograph from one of another.
-    pub fn gap(&self, one: PhotographPixel, other: PhotographPixel) -> Vector2<f64> {
+    pub(super) fn gap(&self, one: PhotographPixel, other: PhotographPixel) -> Vector2<f64> {
         self.fine[one.photograph].warp(one.at) - self.fine[other.photograph].warp(other.at)
     }
 }
@@ -42,7 +42,7 @@ pub(super) struct PixelPair {
 }
 
 impl PixelPair {
-    pub fn new(one: PhotographPixel, other: PhotographPixel, grids: &CurrentGrids) -> Self {
+    pub(super) fn new(one: PhotographPixel, other: PhotographPixel, grids: &CurrentGrids) -> Self {
         let (a, b) = (one.photograph, other.photograph);
         let (corners_a, shares_a) = grids.solved[a].bilinear(one.at);
         let (corners_b, shares_b) = grids.solved[b].bilinear(other.at);
@@ -56,7 +56,7 @@ impl PixelPair {
     }
 
     /// Adds the squared distance of the two, weighed by `metric`.
-    pub fn add(&self, metric: Metric, equations: &mut NormalEquations) {
+    pub(super) fn add(&self, metric: Metric, equations: &mut NormalEquations) {
         equations.add_sum(&self.members, metric, self.value);
     }
 }

@@ -1,9 +1,10 @@
 //! How far overlaps are apart beyond the noise of what says so.
 //!
 //! The plain mesh meets overlaps to a tenth of a pixel where the photographs were taken from one point, better than any
-//! single match or cell of pixels says. Drawn to each of them it would follow their noise. Noise differs from neighbor to
-//! neighbor; a true misalignment is common to them. The product of neighbors' distances is therefore, on the mean, the
-//! square of the true one, and evidence weighs by it, as the prior variance of what is estimated says in a Wiener filter.
+//! single match or cell of pixels says. Drawn to each of them it would follow their noise. Noise differs from neighbor
+//! to neighbor; a true misalignment is common to them. The product of neighbors' distances is therefore, on the mean,
+//! the square of the true one, and evidence weighs by it, as the prior variance of what is estimated says in a Wiener
+//! filter.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -88,13 +89,13 @@ pub(super) struct CommonSum {
 
 impl CommonSum {
     /// The mean square that the sums come to; not negative.
-    pub fn mean_square(self) -> f64 {
+    pub(super) fn mean_square(self) -> f64 {
         if self.units > 0.0 { (self.products / self.units).max(0.0) } else { 0.0 }
     }
 }
 
-/// The share of its weight that evidence has where the misalignment has a mean square of `common` per axis, and would have
-/// its whole weight from `full_px` on.
+/// The share of its weight that evidence has where the misalignment has a mean square of `common` per axis, and would
+/// have its whole weight from `full_px` on.
 pub(super) fn share(common: f64, full_px: f64) -> f64 {
     (common / (full_px * full_px)).min(1.0)
 }

@@ -6,7 +6,8 @@ use super::base::BaseMap;
 use super::refinements::Refinements;
 use crate::match_points::OverlapWarp;
 
-/// The grids of one component and what is wanted of them. Photographs are counted 0..N; `grids` and `bases` have N entries.
+/// The grids of one component and what is wanted of them. Photographs are counted 0..N; `grids` and `bases` have N
+/// entries.
 #[derive(Debug, Clone, Copy)]
 pub struct MeshInput<'a> {
     /// The undeformed grids.

@@ -1,15 +1,15 @@
-//! Dual-feature alignment: matched lines and matched points beside the match points, and straight lines kept as straight as
-//! the base has them.
+//! Dual-feature alignment: matched lines and matched points beside the match points, and straight lines kept as
+//! straight as the base has them.
 //!
 //! # Source
 //! After dual-feature warping (Li, Yuan, Sun, Liu, "Dual-feature warping-based motion model estimation", 2015),
 //! reconstructed.
 //!
 //! # Departures
-//! A sample of a line is drawn to the matched line's own image at its foot, not to the chord between that line's ends, and
-//! straightness is the chord's deviation relative to the base's: where the base is a similarity both are the published
-//! terms, where it is a sphere unrolled, a straight line of the scene is rightly curved. Robust weights that narrow, and
-//! weights by what neighboring matches have in common (`evidence`).
+//! A sample of a line is drawn to the matched line's own image at its foot, not to the chord between that line's ends,
+//! and straightness is the chord's deviation relative to the base's: where the base is a similarity both are the
+//! published terms, where it is a sphere unrolled, a straight line of the scene is rightly curved. Robust weights that
+//! narrow, and weights by what neighboring matches have in common (`evidence`).
 
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
@@ -25,11 +25,11 @@ use super::straight_line::{DeviationTerm, StraightLine};
 trueup_core::options! {
     /// How matched lines align the grids (`stitch.align = lines`).
     pub struct LineAlignmentOptions("line_alignment") {
-        /// Weight of a squared distance of a line's sample from the matched line. Raise it where edges still show double,
-        /// lower it where wrong line matches pull.
+        /// Weight of a squared distance of a line's sample from the matched line. Raise it where edges still show
+        /// double, lower it where wrong line matches pull.
         weight: f64 = 80.0, between(0.0, 10000.0), "per working px squared";
-        /// Weight of a squared deviation from straight of a sample of any long line, while lines or pixels align overlaps.
-        /// Raise it where straight edges are bent by aligning.
+        /// Weight of a squared deviation from straight of a sample of any long line, while lines or pixels align
+        /// overlaps. Raise it where straight edges are bent by aligning.
         straightness: f64 = 5.0, between(0.0, 10000.0), "per working px squared";
     }
 }
@@ -92,8 +92,8 @@ impl LineAlignmentInput<'_> {
     /// The shares of their weights that all matches have: how much of the distances in the current `grids` is common to
     /// neighbors.
     pub(super) fn shares(&self, grids: &CurrentGrids) -> MatchShares {
-        /// Misalignment, common to neighboring matches of a pair, from which on they weigh fully, panorama units per axis;
-        /// with less their weight falls with its square.
+        /// Misalignment, common to neighboring matches of a pair, from which on they weigh fully, panorama units per
+        /// axis; with less their weight falls with its square.
         const FULL_PX: f64 = 0.7;
         let mut pairs: Vec<(usize, usize)> = self.points.iter().map(|pair| (pair.a, pair.b)).collect();
         pairs.extend(self.matched.iter().map(|pair| (pair.a, pair.b)));
@@ -130,8 +130,8 @@ impl LineAlignmentInput<'_> {
         }
     }
 
-    /// What the matched points and lines of a pair say; distances beyond the robust one count as that. Lines whose middles
-    /// do not meet say nothing.
+    /// What the matched points and lines of a pair say; distances beyond the robust one count as that. Lines whose
+    /// middles do not meet say nothing.
     fn evidence(&self, a: usize, b: usize, grids: &CurrentGrids) -> Vec<(Match, Evidence)> {
         let points = self.points.iter().enumerate().filter(|(_, points)| (points.a, points.b) == (a, b));
         let points = points.flat_map(|(list, points)| chosen(points).map(move |chosen| (list, chosen)));
@@ -154,8 +154,8 @@ impl LineAlignmentInput<'_> {
         points.chain(lines).collect()
     }
 
-    /// Adds the equations of matched lines and matched points around the current grids, with the `shares` of their weights;
-    /// matches `robust_px` apart have half of that.
+    /// Adds the equations of matched lines and matched points around the current grids, with the `shares` of their
+    /// weights; matches `robust_px` apart have half of that.
     pub(super) fn add(
         &self,
         equations: &mut NormalEquations,

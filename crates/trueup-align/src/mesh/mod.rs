@@ -2,8 +2,8 @@
 //!
 //! Energies, one file each: alignment of the overlaps (`alignment`); local similarity of the grid's edges and their
 //! agreement with the similarity prior (`similarity`); and what refines the plain mesh: matched lines and points
-//! (`line_alignment`), pixels (`photometric`), long lines that keep their shape (`structure`). Unknown are the vertices of
-//! all grids in the panorama. `problem` holds the plain mesh, `rounds` the order of the refinements.
+//! (`line_alignment`), pixels (`photometric`), long lines that keep their shape (`structure`). Unknown are the vertices
+//! of all grids in the panorama. `problem` holds the plain mesh, `rounds` the order of the refinements.
 //!
 //! # Source
 //! Chen and Chuang (2016), section 3; VPG section IV with its global similarity.
@@ -41,7 +41,7 @@ pub use input::MeshInput;
 pub use line_alignment::{LineAlignmentInput, LineAlignmentOptions, StraightInput};
 pub use options::{BaseShape, MeshOptions};
 pub use photometric::{GrayPyramid, PhotometricInput, PhotometricOptions};
-use problem::Problem;
+use problem::MeshProblem;
 pub use refinements::Refinements;
 pub use structure::{StructureInput, StructureOptions};
 pub use subdivision::divided;
@@ -49,10 +49,11 @@ pub use warped_mesh::WarpedMesh;
 pub(crate) use warped_mesh::count_folds;
 use warped_mesh::total_folds;
 
-/// Deforms the undeformed grids so that overlaps align and every edge keeps to its photograph's base, and refines them as
-/// asked.
+/// Deforms the undeformed grids so that overlaps align and every edge keeps to its photograph's base, and refines them
+/// as asked.
 ///
-/// A full turn is closed if its ends can meet; otherwise the warning `full-turn-open` says why not, and it is left open.
+/// A full turn is closed if its ends can meet; otherwise the warning `full-turn-open` says why not, and it is left
+/// open.
 ///
 /// # Errors
 /// [`trueup_core::Error::Unsolvable`] if the system is not positive definite or the solution is not finite;
@@ -64,11 +65,11 @@ pub fn run(input: &MeshInput, options: &MeshOptions, context: &StageContext) -> 
     refinements.check(grids.len())?;
     let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(*grids).map(|(base, grid)| base.places(grid)).collect();
     let alignment = AlignmentEnergy::new(grids, input.warps, bases, &places);
-    let open = Problem::new(input, &places, &alignment, options, context);
+    let open = MeshProblem::new(input, &places, &alignment, options, context);
     let Some(closure) = &refinements.closure else { return open.deform(refinements) };
     let mut alignment = alignment.clone();
     alignment.join(closure, grids, bases, &places);
-    let closed = Problem { alignment: &alignment, closing: closure.warps, ..open };
+    let closed = MeshProblem { alignment: &alignment, closing: closure.warps, ..open };
     let plain = open.solve_refined(open.equations(), &Refinements::default())?;
     let contradiction = match closure.contradiction(&alignment.apart(&plain.meshes)) {
         Some(contradiction) => contradiction,

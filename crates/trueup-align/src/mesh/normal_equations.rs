@@ -63,12 +63,12 @@ pub(super) struct Metric {
 
 impl Metric {
     /// All directions alike.
-    pub fn isotropic(weight: f64) -> Self {
+    pub(super) fn isotropic(weight: f64) -> Self {
         Self { xx: weight, xy: 0.0, yy: weight }
     }
 
     /// Only what goes along `direction`: weight (direction . residual)^2.
-    pub fn along(direction: Vector2<f64>, weight: f64) -> Self {
+    pub(super) fn along(direction: Vector2<f64>, weight: f64) -> Self {
         Self {
             xx: weight * direction.x * direction.x,
             xy: weight * direction.x * direction.y,
@@ -77,7 +77,7 @@ impl Metric {
     }
 
     /// The matrix times a vector.
-    pub fn apply(&self, value: Vector2<f64>) -> Vector2<f64> {
+    pub(super) fn apply(&self, value: Vector2<f64>) -> Vector2<f64> {
         Vector2::new(self.xx * value.x + self.xy * value.y, self.xy * value.x + self.yy * value.y)
     }
 
@@ -108,7 +108,7 @@ pub(super) struct GridSum<'a> {
 
 impl NormalEquations {
     /// Empty equations for the vertices of `grids`.
-    pub fn new(grids: &[GridMesh]) -> Self {
+    pub(super) fn new(grids: &[GridMesh]) -> Self {
         let mut first = vec![0];
         for grid in grids {
             first.push(first[first.len() - 1] + grid.len());
@@ -126,12 +126,12 @@ impl NormalEquations {
     }
 
     /// Number of scalar unknowns, without the length of a full turn.
-    pub fn unknowns(&self) -> usize {
+    pub(super) fn unknowns(&self) -> usize {
         self.right.len()
     }
 
     /// Adds |sum_m coefficient_m v_m - value|^2 for vertices `members` of grid `photograph`, each of which occurs once.
-    pub fn add_inside(&mut self, photograph: usize, members: &[(usize, Coefficient)], value: Vector2<f64>) {
+    pub(super) fn add_inside(&mut self, photograph: usize, members: &[(usize, Coefficient)], value: Vector2<f64>) {
         let first = self.first[photograph];
         for &(m, factor_m) in members {
             let gradient = conjugate_product(factor_m, value);
@@ -147,7 +147,7 @@ impl NormalEquations {
     }
 
     /// Adds squared_weight |sum_m weight_m v_m - value|^2, the sum over both of `sums`, which are of different grids.
-    pub fn add_between(&mut self, sums: &[GridSum; 2], value: Vector2<f64>, squared_weight: f64) {
+    pub(super) fn add_between(&mut self, sums: &[GridSum; 2], value: Vector2<f64>, squared_weight: f64) {
         for &GridSum { photograph, members } in sums {
             for &(m, weight_m) in members {
                 let unknown = 2 * (self.first[photograph] + m);
@@ -175,7 +175,7 @@ impl NormalEquations {
     /// Makes the length of a full turn, P, an unknown and adds what it contributes to
     /// squared_weight |sum_m weight_m v_m - (turns P, 0) - value|^2 beyond the same without P (see
     /// [`Self::add_between`]).
-    pub fn add_period(&mut self, sums: &[GridSum; 2], turns: f64, value: f64, squared_weight: f64) {
+    pub(super) fn add_period(&mut self, sums: &[GridSum; 2], turns: f64, value: f64, squared_weight: f64) {
         let unknowns = self.unknowns();
         let border = self.border.get_or_insert_with(|| Border { couplings: vec![0.0; unknowns], own: 0.0, right: 0.0 });
         for &GridSum { photograph, members } in sums {
@@ -188,12 +188,12 @@ impl NormalEquations {
     }
 
     /// Adds weight |v - source place|^2 for the first vertex of grid `photograph`, whose source is (0, 0).
-    pub fn anchor(&mut self, photograph: usize, weight: f64) {
+    pub(super) fn anchor(&mut self, photograph: usize, weight: f64) {
         self.add_block_inside(photograph, 0, 0, [weight, 0.0, 0.0, weight]);
     }
 
     /// Adds |sum_m weight_m v_m - value|^2, weighed by `metric`, for any vertices; a vertex may occur more than once.
-    pub fn add_sum(&mut self, members: &[WeightedVertex], metric: Metric, value: Vector2<f64>) {
+    pub(super) fn add_sum(&mut self, members: &[WeightedVertex], metric: Metric, value: Vector2<f64>) {
         let pull = metric.apply(value);
         for (position, one) in members.iter().enumerate() {
             self.add_right(one.photograph, one.vertex, pull * one.weight);
@@ -203,11 +203,12 @@ impl NormalEquations {
         }
     }
 
-    /// Adds the normal equations of several residuals over the same `members` at once: `metrics` holds the lower triangle,
-    /// row by row, of the members' couplings, `right` the right side of each. The members' weights do not count.
+    /// Adds the normal equations of several residuals over the same `members` at once: `metrics` holds the lower
+    /// triangle, row by row, of the members' couplings, `right` the right side of each. The members' weights do not
+    /// count.
     ///
     /// Slices that are too short leave the rest out.
-    pub fn add_summed(&mut self, members: &[WeightedVertex], metrics: &[Metric], right: &[Vector2<f64>]) {
+    pub(super) fn add_summed(&mut self, members: &[WeightedVertex], metrics: &[Metric], right: &[Vector2<f64>]) {
         let mut metrics = metrics.iter();
         for (position, (one, &pull)) in members.iter().zip(right).enumerate() {
             self.add_right(one.photograph, one.vertex, pull);
@@ -224,8 +225,8 @@ impl NormalEquations {
         self.right[unknown + 1] += pull.y;
     }
 
-    /// Adds a symmetric block for an unordered pair of members. Two different members that are the same vertex couple in
-    /// both orders.
+    /// Adds a symmetric block for an unordered pair of members. Two different members that are the same vertex couple
+    /// in both orders.
     fn add_coupling(&mut self, one: &WeightedVertex, other: &WeightedVertex, same_member: bool, block: Block) {
         if one.photograph != other.photograph {
             let (m, n) = (self.first[one.photograph] + one.vertex, self.first[other.photograph] + other.vertex);
@@ -238,7 +239,7 @@ impl NormalEquations {
     }
 
     /// The grids with the solution as their targets.
-    pub fn meshes(&self, grids: &[GridMesh], solution: &[f64]) -> Vec<GridMesh> {
+    pub(super) fn meshes(&self, grids: &[GridMesh], solution: &[f64]) -> Vec<GridMesh> {
         grids
             .iter()
             .enumerate()
@@ -268,8 +269,8 @@ impl NormalEquations {
         }
     }
 
-    /// All blocks (row vertex >= column vertex), sorted by column, then row; couplings between grids merged in the order
-    /// in which they were added.
+    /// All blocks (row vertex >= column vertex), sorted by column, then row; couplings between grids merged in the
+    /// order in which they were added.
     fn blocks(&self) -> Vec<(u32, u32, Block)> {
         let mut blocks = Vec::with_capacity(self.inside.len() * SLOTS / 2 + self.between.len());
         for (photograph, &columns) in self.columns.iter().enumerate() {
@@ -305,7 +306,7 @@ impl NormalEquations {
     }
 
     /// The lower triangle as a sparse matrix.
-    pub fn matrix(&self) -> Option<SparseColMat<usize, f64>> {
+    pub(super) fn matrix(&self) -> Option<SparseColMat<usize, f64>> {
         let blocks = self.blocks();
         let unknowns = self.unknowns();
         let mut column_starts = Vec::with_capacity(unknowns + 1);

@@ -18,7 +18,7 @@ use crate::match_points::OverlapWarp;
 
 /// What all rounds of solving have in common.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Problem<'a> {
+pub(super) struct MeshProblem<'a> {
     pub grids: &'a [GridMesh],
     pub warps: &'a [OverlapWarp],
     pub bases: &'a [BaseMap],
@@ -44,9 +44,9 @@ pub(super) struct Solved {
     pub relative_gradient: f64,
 }
 
-impl<'a> Problem<'a> {
+impl<'a> MeshProblem<'a> {
     /// The plain mesh of `input`; `places` are the bases' places of the grids' vertices.
-    pub fn new(
+    pub(super) fn new(
         input: &MeshInput<'a>,
         places: &'a [Vec<Vector2<f64>>],
         alignment: &'a AlignmentEnergy,
@@ -69,9 +69,9 @@ impl<'a> Problem<'a> {
     }
 }
 
-impl Problem<'_> {
+impl MeshProblem<'_> {
     /// The energies of the plain mesh.
-    pub fn equations(&self) -> NormalEquations {
+    pub(super) fn equations(&self) -> NormalEquations {
         /// Any positive weight anchors the one free translation exactly; 1 keeps the system well conditioned.
         const ANCHOR_WEIGHT: f64 = 1.0;
         let mut equations = NormalEquations::new(self.grids);
@@ -87,7 +87,7 @@ impl Problem<'_> {
         equations
     }
 
-    pub fn deform(&self, refinements: &Refinements) -> Result<WarpedMesh> {
+    pub(super) fn deform(&self, refinements: &Refinements) -> Result<WarpedMesh> {
         let Solved { meshes, period, relative_gradient } = self.solve_refined(self.equations(), refinements)?;
         let alignment_rms = self.alignment.rms(&meshes, period);
         let meshes = self.delivered(&meshes);
@@ -95,7 +95,7 @@ impl Problem<'_> {
         Ok(WarpedMesh { meshes, alignment_rms, folds, relative_gradient, period })
     }
 
-    pub fn solve(&self, solver: &mut MeshSolver, equations: &NormalEquations) -> Result<Solved> {
+    pub(super) fn solve(&self, solver: &mut MeshSolver, equations: &NormalEquations) -> Result<Solved> {
         self.context.check_cancelled()?;
         let unsolvable = |why: &str| {
             Error::unsolvable(
@@ -118,7 +118,7 @@ impl Problem<'_> {
     }
 
     /// Solved grids with the subdivision that they are delivered with.
-    pub fn delivered(&self, solved: &[GridMesh]) -> Vec<GridMesh> {
+    pub(super) fn delivered(&self, solved: &[GridMesh]) -> Vec<GridMesh> {
         (0..solved.len())
             .map(|k| subdivided(&solved[k], &self.bases[k], &self.places[k], self.options.subdivision))
             .collect()

@@ -187,8 +187,8 @@ fn lists_must_have_an_entry_per_photograph() {
     assert!(error.expect_err("too few").to_string().contains("1 are given for 2 photographs"));
 }
 
-/// The gradient of the matched-line term against differences of its energy, written down anew: a line of the first photograph
-/// and one of the second, which is turned and shifted, normals and feet kept as they are.
+/// The gradient of the matched-line term against differences of its energy, written down anew: a line of the first
+/// photograph and one of the second, which is turned and shifted, normals and feet kept as they are.
 #[test]
 fn the_matched_lines_equations_are_the_gradient_of_their_energy() {
     const ANGLE: f64 = 0.1;
@@ -297,7 +297,7 @@ fn aligned_believing_all(grids: &[GridMesh], warps: &[OverlapWarp], input: &Phot
     let alignment = AlignmentEnergy::new(grids, warps, &bases, &places);
     let (options, context) = (MeshOptions::default(), StageContext::default());
     let mesh_input = MeshInput { grids, warps, bases: &bases, reference: 0, refinements: Refinements::default() };
-    let problem = Problem::new(&mesh_input, &places, &alignment, &options, &context);
+    let problem = MeshProblem::new(&mesh_input, &places, &alignment, &options, &context);
     let (mut solver, mut equations) = (solver::MeshSolver::default(), problem.equations());
     let plain = problem.solve(&mut solver, &equations).expect("solvable");
     problem.hold_outlines(&mut equations, &plain.meshes, 1.0);

@@ -20,8 +20,8 @@ pub struct Refinements<'a> {
     pub straight: Option<StraightInput<'a>>,
     /// Pixels that align overlaps.
     pub photometric: Option<PhotometricInput<'a>>,
-    /// Weight with which every photograph's outline stays where the plain mesh has it while lines or pixels align overlaps
-    /// (on residuals).
+    /// Weight with which every photograph's outline stays where the plain mesh has it while lines or pixels align
+    /// overlaps (on residuals).
     pub outline_weight: f64,
 }
 

@@ -8,7 +8,7 @@ use super::current_grids::CurrentGrids;
 use super::line_alignment::{LineAlignmentInput, ROBUST_PX, StraightInput};
 use super::normal_equations::NormalEquations;
 use super::photometric::{LEVELS, PhotometricInput};
-use super::problem::{Problem, Solved};
+use super::problem::{MeshProblem, Solved};
 use super::refinements::Refinements;
 use super::solver::MeshSolver;
 use super::warped_mesh::total_folds;
@@ -23,9 +23,9 @@ pub(super) struct PixelAlignment<'a> {
     pub straight: Option<StraightInput<'a>>,
 }
 
-impl Problem<'_> {
+impl MeshProblem<'_> {
     /// Solves the plain `equations`, then with one refinement after the other.
-    pub fn solve_refined(&self, mut equations: NormalEquations, refinements: &Refinements) -> Result<Solved> {
+    pub(super) fn solve_refined(&self, mut equations: NormalEquations, refinements: &Refinements) -> Result<Solved> {
         let mut solver = MeshSolver::default();
         if let Some(structure) = &refinements.structure {
             structure.add(&mut equations, &self.current(self.grids, self.grids));
@@ -46,8 +46,8 @@ impl Problem<'_> {
         Ok(solved)
     }
 
-    /// Rounds of line alignment; with the last round's equations. A step that folds the grids is shortened; if that does
-    /// not help it is undone and ends the rounds.
+    /// Rounds of line alignment; with the last round's equations. A step that folds the grids is shortened; if that
+    /// does not help it is undone and ends the rounds.
     fn align_lines(
         &self,
         solver: &mut MeshSolver,
@@ -86,9 +86,10 @@ impl Problem<'_> {
 
     /// Keeps the outlines of the photographs where they are in `meshes`.
     ///
-    /// Where neighbors were taken from different places their pixels would bend and turn the photographs against each other;
-    /// how a photograph stands is the prior's to say. Its outline lies over the inside of a neighbor, which can give way.
-    pub fn hold_outlines(&self, equations: &mut NormalEquations, meshes: &[GridMesh], weight: f64) {
+    /// Where neighbors were taken from different places their pixels would bend and turn the photographs against each
+    /// other; how a photograph stands is the prior's to say. Its outline lies over the inside of a neighbor, which can
+    /// give way.
+    pub(super) fn hold_outlines(&self, equations: &mut NormalEquations, meshes: &[GridMesh], weight: f64) {
         for (photograph, mesh) in meshes.iter().enumerate() {
             let is_outer = |at: usize, length: usize| at == 0 || at + 1 == length;
             for vertex in 0..mesh.len() {
@@ -102,7 +103,7 @@ impl Problem<'_> {
 
     /// Rounds of photometric alignment, from coarse to fine. A step that folds the grids or tears match points apart is
     /// shortened; if that does not help it is undone, and ends its level.
-    pub fn align_pixels(
+    pub(super) fn align_pixels(
         &self,
         solver: &mut MeshSolver,
         equations: &NormalEquations,
@@ -113,7 +114,8 @@ impl Problem<'_> {
         const ROUNDS: usize = 4;
         /// A level ends when the mean difference falls by less than this share in a round.
         const SETTLED: f64 = 0.01;
-        /// A round that raises the root mean square distance of match points by more than this is undone, panorama units.
+        /// A round that raises the root mean square distance of match points by more than this is undone, panorama
+        /// units.
         const MAX_DEPARTURE_PX: f64 = 1.0;
         let PixelAlignment { input, shares, straight } = *pixels;
         let mut best = start;

@@ -13,8 +13,8 @@ pub(super) const PUBLISHED_CELL_PX: f64 = 40.0;
 /// Growth of the prior's weight with the distance from the overlap, per diagonal of the photograph; as published.
 pub(super) const PRIOR_SLOPE: f64 = 20.0;
 
-/// E_l and E_g of one photograph, both relative to a base grid: with a base that is a similarity of the photograph they are the
-/// published energies.
+/// E_l and E_g of one photograph, both relative to a base grid: with a base that is a similarity of the photograph they
+/// are the published energies.
 ///
 /// For an edge from a to b the neighborhood is the 4-neighbors of a and of b without a. The similarity c + i s that
 /// maps the undeformed differences from a to the deformed ones best is linear in the vertices:
@@ -30,13 +30,13 @@ pub(super) struct SimilarityEnergy<'a> {
 
 impl<'a> SimilarityEnergy<'a> {
     /// `base` holds a place for every vertex of `grid`, up to translation: the shape without cost. `overlap` tells for
-    /// every cell whether match points lie in it: the prior's weight grows with the distance to the nearest such cell, by
-    /// `prior_slope` per diagonal (see [`PRIOR_SLOPE`]).
+    /// every cell whether match points lie in it: the prior's weight grows with the distance to the nearest such cell,
+    /// by `prior_slope` per diagonal (see [`PRIOR_SLOPE`]).
     ///
     /// # Departures
     /// The distance is the exact one to the nearest cell with match points; the published code propagates it from cell
     /// to cell, which can miss the nearest.
-    pub fn new(
+    pub(super) fn new(
         grid: &'a GridMesh,
         base: &'a [Vector2<f64>],
         overlap: &[bool],
@@ -65,7 +65,7 @@ impl<'a> SimilarityEnergy<'a> {
     }
 
     /// Adds both energies for every edge of the grid of `photograph`.
-    pub fn add(&self, photograph: usize, equations: &mut NormalEquations) {
+    pub(super) fn add(&self, photograph: usize, equations: &mut NormalEquations) {
         let (rows, columns) = (self.grid.rows, self.grid.columns);
         for row in 0..rows {
             for column in 0..columns {

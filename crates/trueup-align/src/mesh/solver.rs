@@ -17,8 +17,8 @@ pub(super) struct MeshSolution {
     pub relative_gradient: f64,
 }
 
-/// Solves normal equations of the same grids again and again: the symbolic factorization is made anew only when vertices
-/// couple that never coupled before.
+/// Solves normal equations of the same grids again and again: the symbolic factorization is made anew only when
+/// vertices couple that never coupled before.
 #[derive(Debug, Default)]
 pub(super) struct MeshSolver {
     order: Option<EliminationOrder>,
@@ -33,7 +33,7 @@ struct EliminationOrder {
 
 impl MeshSolver {
     /// The least-squares solution; `None` if the matrix is not positive definite.
-    pub fn solve(&mut self, equations: &NormalEquations) -> Option<MeshSolution> {
+    pub(super) fn solve(&mut self, equations: &NormalEquations) -> Option<MeshSolution> {
         let matrix = self.in_known_pattern(equations.matrix()?)?;
         let order = self.order.as_ref()?;
         let factor = Llt::try_new_with_symbolic(order.symbolic.clone(), matrix.as_ref(), faer::Side::Lower).ok()?;

@@ -28,7 +28,7 @@ pub(super) struct StraightLine {
 
 impl StraightLine {
     /// At least three samples.
-    pub fn along(photograph: usize, line: &LineSegment, grids: &[GridMesh]) -> Self {
+    pub(super) fn along(photograph: usize, line: &LineSegment, grids: &[GridMesh]) -> Self {
         let steps = (line.length() / SPACING_PX).ceil().max(2.0) as usize;
         let (start, end) = (Vector2::from(line.start), Vector2::from(line.end));
         let at = |k: usize| grids[photograph].bilinear(start.lerp(&end, k as f64 / steps as f64));
@@ -36,7 +36,7 @@ impl StraightLine {
     }
 
     /// Adds weight |phi(p_k) - (1 - u_k) phi(p_0) - u_k phi(p_n)|^2 relative to the base for every inner sample.
-    pub fn add(&self, term: DeviationTerm, weight: f64, equations: &mut NormalEquations, grids: &CurrentGrids) {
+    pub(super) fn add(&self, term: DeviationTerm, weight: f64, equations: &mut NormalEquations, grids: &CurrentGrids) {
         let last = self.samples.len() - 1;
         let place = |sample: usize| {
             let (corners, shares) = self.samples[sample];

@@ -1,11 +1,12 @@
 //! Long straight lines keep the shape that the base gives them, across the cells of a grid.
 //!
 //! # Source
-//! The structure term of GES-GSP (Du and others, "Geometric structure preserving warp for natural image stitching", CVPR
-//! 2022): samples of a long curve keep their coordinates in the frame of the curve's chord.
+//! The structure term of GES-GSP (Du and others, "Geometric structure preserving warp for natural image stitching",
+//! CVPR 2022): samples of a long curve keep their coordinates in the frame of the curve's chord.
 //!
 //! # Departures
-//! The curves are chains of collinear segments, whose samples lie on the chord; relative to the base, as all energies here.
+//! The curves are chains of collinear segments, whose samples lie on the chord; relative to the base, as all energies
+//! here.
 
 use trueup_core::lines::LineSegment;
 

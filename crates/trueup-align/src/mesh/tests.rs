@@ -15,7 +15,8 @@ fn rotation_deg(mesh: &GridMesh) -> f64 {
     crate::metrics::best_rotation(mesh).to_degrees()
 }
 
-/// Two 400 x 300 photographs 20 degrees apart, rolled by 5 and 17 degrees, as in the numeric check of the specification.
+/// Two 400 x 300 photographs 20 degrees apart, rolled by 5 and 17 degrees, as in the numeric check of the
+/// specification.
 fn two_photographs() -> (Vec<GridMesh>, Vec<OverlapWarp>) {
     let camera = |yaw: f64, roll: f64| {
         let world_from_camera = rotation_about_y(yaw.to_radians()) * rotation_about_z(roll.to_radians());
@@ -48,7 +49,7 @@ fn run_evenly(grids: &[GridMesh], warps: &[OverlapWarp], bases: &[BaseMap], refe
     let alignment = AlignmentEnergy::new(grids, warps, bases, &places);
     let (options, context) = (options(), StageContext::default());
     let input = MeshInput { grids, warps, bases, reference, refinements: Refinements::default() };
-    let problem = Problem { prior_slope: 0.0, ..Problem::new(&input, &places, &alignment, &options, &context) };
+    let problem = MeshProblem { prior_slope: 0.0, ..MeshProblem::new(&input, &places, &alignment, &options, &context) };
     problem.deform(&Refinements::default()).expect("solvable")
 }
 

@@ -15,8 +15,8 @@ pub struct WarpedMesh {
     pub folds: usize,
     /// Relative gradient |A^T (A x - b)| / |A^T b| of the energy at the solution.
     pub relative_gradient: f64,
-    /// Length of a full turn in panorama units: places this far apart in x are the same. `None` if the photographs do not go
-    /// all the way round, or their ends do not meet.
+    /// Length of a full turn in panorama units: places this far apart in x are the same. `None` if the photographs do
+    /// not go all the way round, or their ends do not meet.
     #[serde(default)]
     pub period: Option<f64>,
 }

@@ -13,22 +13,22 @@ const ACROSS: usize = 40;
 const DOWN: usize = 30;
 /// Distance from the border of the first and last of them, pixels.
 const MARGIN_PX: f64 = 2.0;
-/// Distance from the border of the other photograph beyond which a point counts as seen there: left and above, right and
-/// below, pixels.
+/// Distance from the border of the other photograph beyond which a point counts as seen there: left and above, right
+/// and below, pixels.
 const SEEN_PX: [f64; 2] = [1.0, 2.0];
 /// Overlaps with fewer sampled points are passed over.
 const MIN_POINTS: usize = 20;
 /// An open full turn is cut somewhere: points this share of the panorama's width apart lie at the cut and are no error.
 const CUT_SHARE: f64 = 0.25;
 
-/// Root mean square distance in the panorama between the two places of what two photographs both show, over all overlapping
-/// pairs, divided by the photographs' mean scale: in their own pixels. `None` if no two photographs overlap or the lists differ
-/// in length.
+/// Root mean square distance in the panorama between the two places of what two photographs both show, over all
+/// overlapping pairs, divided by the photographs' mean scale: in their own pixels. `None` if no two photographs overlap
+/// or the lists differ in length.
 ///
 /// On a full turn whose ends meet, distances are taken modulo its `period`.
 ///
-/// `cameras` are the true ones, of one common center, in the pixels of the grids' photographs. 40 x 30 points are carried
-/// from each photograph to all later ones.
+/// `cameras` are the true ones, of one common center, in the pixels of the grids' photographs. 40 x 30 points are
+/// carried from each photograph to all later ones.
 pub fn true_alignment(meshes: &[GridMesh], cameras: &[Camera], period: Option<f64>) -> Option<f64> {
     if meshes.len() != cameras.len() {
         return None;

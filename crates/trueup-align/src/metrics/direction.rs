@@ -63,7 +63,8 @@ pub fn relative_turns(rotations: &[f64], gammas: &[f64], reference: usize) -> Op
     Some((0..rotations.len()).map(|k| wrap_angle(deviation(k) - deviation(reference))).collect())
 }
 
-/// The paper's GDIC, of [`rectangle_rotation`]s: mean of |[`relative_turns`]| over the photographs but `reference`, radians; `None` where those are.
+/// The paper's GDIC, of [`rectangle_rotation`]s: mean of |[`relative_turns`]| over the photographs but `reference`,
+/// radians; `None` where those are.
 ///
 /// # Source
 /// VPG equation 14.

@@ -15,8 +15,8 @@ const COLLAPSED: f64 = 1e-6;
 pub enum Outside {
     /// Its center does.
     Center,
-    /// Its center and its four corners do: fewer cells at the border of overlaps, where grids are stretched least. LD is
-    /// larger by 0 to 7 % on panoramas of one row.
+    /// Its center and its four corners do: fewer cells at the border of overlaps, where grids are stretched least. LD
+    /// is larger by 0 to 7 % on panoramas of one row.
     CenterAndCorners,
 }
 
@@ -36,10 +36,10 @@ pub struct LocalDistortion {
 
 /// The local distortion of photographs deformed by `meshes`.
 ///
-/// In every cell that lies outside all other photographs, the area's change under the homography through its four corners is
-/// sampled at evenly spaced points, one a pixel but at most 16 x 16; its standard deviation over its mean is the cell's
-/// distortion. Similarities and affine maps have none. The figure grows with the size of the cells: compare grids of equal
-/// cells only.
+/// In every cell that lies outside all other photographs, the area's change under the homography through its four
+/// corners is sampled at evenly spaced points, one a pixel but at most 16 x 16; its standard deviation over its mean is
+/// the cell's distortion. Similarities and affine maps have none. The figure grows with the size of the cells: compare
+/// grids of equal cells only.
 ///
 /// On a full turn whose ends meet, places that differ by its `period` are the same.
 ///
@@ -93,8 +93,8 @@ pub fn local_distortion(meshes: &[GridMesh], outside: Outside, period: Option<f6
 /// Standard deviation over mean of the area's change in a cell; `None` for a degenerate one.
 ///
 /// The homography from the cell divides by w = 1 + g u + h v, u and v from 0 to 1 along its sides, and changes areas in
-/// proportion to w^-3 (Heckbert, Fundamentals of Texture Mapping and Image Warping, 1989, section 2.2.3): g and h are all
-/// it takes.
+/// proportion to w^-3 (Heckbert, Fundamentals of Texture Mapping and Image Warping, 1989, section 2.2.3): g and h are
+/// all it takes.
 fn cell_distortion(mesh: &GridMesh, cell: [usize; 4]) -> Option<f64> {
     if !is_sound(mesh, cell) {
         return None;
@@ -140,8 +140,8 @@ mod tests {
         mesh
     }
 
-    /// One cell of 16 x 16 px under w = 1 - x / 100: det J = det H / w^3. Standard deviation over mean of (1 - x / 100)^-3
-    /// at x = 0.5, 1.5 ... 15.5, computed apart: 0.196748261 / 1.303776091.
+    /// One cell of 16 x 16 px under w = 1 - x / 100: det J = det H / w^3. Standard deviation over mean of (1 - x /
+    /// 100)^-3 at x = 0.5, 1.5 ... 15.5, computed apart: 0.196748261 / 1.303776091.
     #[test]
     fn a_known_perspective_has_its_known_distortion() {
         let mut mesh = GridMesh::regular(16.0, 16.0, 16.0);
@@ -162,8 +162,8 @@ mod tests {
         assert!(local_distortion(&[folded], Outside::Center, None).folds > 0);
     }
 
-    /// Two photographs of 100 x 100 px overlap by 14 px: of ten columns of cells, the ninth has its center outside the other
-    /// photograph and two corners inside.
+    /// Two photographs of 100 x 100 px overlap by 14 px: of ten columns of cells, the ninth has its center outside the
+    /// other photograph and two corners inside.
     #[test]
     fn the_corners_rule_leaves_out_cells_that_the_other_photograph_cuts() {
         let bent = |p: Vector2<f64>| Vector2::new(p.x + 1e-3 * p.x * p.x, p.y + 1e-4 * p.x * p.x * p.y);

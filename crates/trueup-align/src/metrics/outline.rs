@@ -44,7 +44,7 @@ pub(super) struct Outline {
 }
 
 impl Outline {
-    pub fn new(mesh: &GridMesh) -> Self {
+    pub(super) fn new(mesh: &GridMesh) -> Self {
         let (rows, columns) = (mesh.rows, mesh.columns);
         let top = 0..columns;
         let right = (1..rows).map(|row| row * columns + columns - 1);
@@ -74,7 +74,7 @@ impl Outline {
     }
 
     /// Whether a point lies inside, by the even-odd rule.
-    pub fn contains(&self, point: Vector2<f64>) -> bool {
+    pub(super) fn contains(&self, point: Vector2<f64>) -> bool {
         let beyond = |axis: usize| !(self.low[axis]..=self.high[axis]).contains(&point[axis]);
         if beyond(0) || beyond(1) {
             return false;
@@ -88,7 +88,7 @@ impl Outline {
     }
 
     /// The area inside, by the shoelace formula, at least 0.
-    pub fn area(&self) -> f64 {
+    pub(super) fn area(&self) -> f64 {
         let twice: f64 = (0..self.ring.len()).map(|edge| self.edge(edge)).map(|(from, to)| from.perp(&to)).sum();
         0.5 * twice.abs()
     }

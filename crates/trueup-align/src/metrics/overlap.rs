@@ -31,8 +31,9 @@ pub struct OverlapMeasures {
 impl OverlapPixels<'_> {
     /// Measures the overlap. `None` if the sizes differ, if there is no overlap, or if there is no texture in it.
     ///
-    /// Windows that are flat in both photographs are passed over; one that is flat in one of them only counts as uncorrelated.
-    /// For PSNR and SSIM both photographs are first brought to the geometric mean of their mean gray values.
+    /// Windows that are flat in both photographs are passed over; one that is flat in one of them only counts as
+    /// uncorrelated. For PSNR and SSIM both photographs are first brought to the geometric mean of their mean gray
+    /// values.
     ///
     /// # Source
     /// Seam-guided and direct alignment papers for the NCC measure; Wang, Bovik, Sheikh, Simoncelli, Image Quality

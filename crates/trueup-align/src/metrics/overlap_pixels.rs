@@ -30,7 +30,8 @@ pub(super) fn eroded(covered: &Raster<bool>, radius: usize) -> Raster<bool> {
     eroded
 }
 
-/// For each of `lines` lines of `length` values, whether all within `radius` of it along the line hold; line after line.
+/// For each of `lines` lines of `length` values, whether all within `radius` of it along the line hold; line after
+/// line.
 fn all_within(length: usize, lines: usize, radius: usize, holds: impl Fn(usize, usize) -> bool) -> Vec<bool> {
     let mut all = vec![false; length * lines];
     for line in 0..lines {

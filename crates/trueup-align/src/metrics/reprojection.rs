@@ -29,9 +29,9 @@ pub struct MatchedPair<'a> {
     pub matches: Vec<PointMatch>,
 }
 
-/// Measures how far apart matched points land, each distance divided by the local scale there, the root mean square of the
-/// two photographs' own. `None` without a match that lies in unfolded places of both. On a full turn whose ends meet, distances
-/// are taken modulo its `period`.
+/// Measures how far apart matched points land, each distance divided by the local scale there, the root mean square of
+/// the two photographs' own. `None` without a match that lies in unfolded places of both. On a full turn whose ends
+/// meet, distances are taken modulo its `period`.
 pub fn reprojection(pairs: &[MatchedPair], period: Option<f64>) -> Option<Reprojection> {
     let mut distances: Vec<f64> = pairs
         .iter()

@@ -4,7 +4,8 @@ use nalgebra::{Matrix2, Vector2};
 use trueup_core::lines::LineSegment;
 use trueup_core::mesh::GridMesh;
 
-/// Shortest line whose straightness is judged, as a share of the photograph's diagonal: shorter ones hardly show a bend.
+/// Shortest line whose straightness is judged, as a share of the photograph's diagonal: shorter ones hardly show a
+/// bend.
 pub const LONG_LINE_DIAGONAL: f64 = 0.1;
 /// Distance of the points of a line that are carried to the panorama, working pixels.
 pub const LINE_STEP_PX: f64 = 3.0;
@@ -26,8 +27,8 @@ pub struct Straightness {
 
 impl Straightness {
     /// Carries a segment to the panorama point by point, `step_px` apart at most and at least three, and measures their
-    /// distances from the straight line that fits them best (total least squares). `None` if that is no line: no length,
-    /// or not finite.
+    /// distances from the straight line that fits them best (total least squares). `None` if that is no line: no
+    /// length, or not finite.
     ///
     /// `mesh` lies over the photograph that the segment's pixels are of.
     pub fn of(line: &LineSegment, mesh: &GridMesh, step_px: f64) -> Option<Self> {
@@ -84,8 +85,8 @@ mod tests {
         assert!(straight.largest_px < 1e-9 && straight.rms_px < 1e-9);
     }
 
-    /// y = a x^2 over 0 to L about its best line: a (t^2 - L^2 / 12), t from the middle; largest a L^2 / 6 at the ends, RMS
-    /// a L^2 / sqrt(180). a = 1e-4, L = 300: 1.5 and 0.67082 px, for points close together.
+    /// y = a x^2 over 0 to L about its best line: a (t^2 - L^2 / 12), t from the middle; largest a L^2 / 6 at the ends,
+    /// RMS a L^2 / sqrt(180). a = 1e-4, L = 300: 1.5 and 0.67082 px, for points close together.
     #[test]
     fn a_parabola_has_its_known_bend() {
         let mesh = mapped(|p| Vector2::new(p.x, 1e-4 * p.x * p.x));

@@ -5,7 +5,8 @@ use trueup_core::mesh::GridMesh;
 
 use super::outline::target;
 
-/// Clockwise rotation of a photograph's middle, radians: of the line between the vertices above and below its middle one.
+/// Clockwise rotation of a photograph's middle, radians: of the line between the vertices above and below its middle
+/// one.
 fn center_rotation(mesh: &GridMesh) -> f64 {
     let (row, column) = (mesh.rows / 2, mesh.columns / 2);
     let (above, below) = (row.saturating_sub(1), (row + 1).min(mesh.rows - 1));

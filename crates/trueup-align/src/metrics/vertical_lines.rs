@@ -10,11 +10,13 @@ use crate::vanishing::{InterpretationPlanes, VanishingOptions};
 
 /// A photograph with fewer vertical lines says nothing certain of its direction.
 const MIN_LINES: usize = 6;
-/// Nor does one whose vertical lines disagree so much that the standard error of their mean direction is larger, degrees.
+/// Nor does one whose vertical lines disagree so much that the standard error of their mean direction is larger,
+/// degrees.
 const MAX_STANDARD_ERROR_DEG: f64 = 0.25;
 /// Upright strips of a photograph whose lines are taken to err alike, as those of one thing do.
 const STRIPS: usize = 12;
-/// Largest angle between the vertical and a segment's interpretation plane for the segment to be a vertical line, degrees.
+/// Largest angle between the vertical and a segment's interpretation plane for the segment to be a vertical line,
+/// degrees.
 const TOLERANCE_DEG: f64 = 1.5;
 /// Steps of the search for the vertical, each with a smaller scale of the robust loss, then as many at the last scale.
 const STEPS: usize = 10;
@@ -30,7 +32,8 @@ pub struct VerticalLines {
     pub standard_error: f64,
     /// Segments that point to the vertical vanishing direction.
     pub lines: usize,
-    /// The angle in the photograph between its downward axis and the vertical, from the lines' common vanishing direction.
+    /// The angle in the photograph between its downward axis and the vertical, from the lines' common vanishing
+    /// direction.
     pub gamma: f64,
 }
 
@@ -56,13 +59,13 @@ pub struct VerticalLinesInput<'a> {
 
 /// Finds the vertical lines of a photograph and their direction in the panorama.
 ///
-/// The vertical vanishing direction is the one that the photograph's segments point to nearest to where it is expected, by
-/// iteratively reweighted least squares on the segments' interpretation planes; its lines are those within
-/// 1.5 degrees. Each is carried to the panorama by `mesh`, which lies over the working frame; `lean` is the
-/// circular mean of their angles to the panorama's vertical, weighted by length up to `vanishing.weight_cap_px`.
+/// The vertical vanishing direction is the one that the photograph's segments point to nearest to where it is expected,
+/// by iteratively reweighted least squares on the segments' interpretation planes; its lines are those within 1.5
+/// degrees. Each is carried to the panorama by `mesh`, which lies over the working frame; `lean` is the circular mean
+/// of their angles to the panorama's vertical, weighted by length up to `vanishing.weight_cap_px`.
 ///
-/// `None` if its segments point to no such direction, only within one strip, or if the photograph looks within 15 degrees of straight up or down, where
-/// there is no upright.
+/// `None` if its segments point to no such direction, only within one strip, or if the photograph looks within 15
+/// degrees of straight up or down, where there is no upright.
 pub fn vertical_lines(
     photograph: &VerticalLinesInput,
     mesh: &GridMesh,
@@ -93,8 +96,8 @@ pub fn vertical_segments(photograph: &VerticalLinesInput, vanishing: &VanishingO
     segments
 }
 
-/// A photograph's segments as planes and their vertical vanishing direction; `None` if they point to none, or if the photograph
-/// looks within 15 degrees of straight up or down.
+/// A photograph's segments as planes and their vertical vanishing direction; `None` if they point to none, or if the
+/// photograph looks within 15 degrees of straight up or down.
 fn planes_and_down(
     photograph: &VerticalLinesInput,
     vanishing: &VanishingOptions,
@@ -273,9 +276,9 @@ mod tests {
         assert_eq!(find(&lines[..0], Vector3::z()), None);
     }
 
-    /// Two lines of equal weight, 0.01 rad either side of their mean: variance 2e-4, of the mean 1e-4. Each twice, in the
-    /// same strips, says no more; four of them in four strips halve the variance of the mean with 3 in place of 4 degrees
-    /// of freedom: sqrt(4e-4 / 4 / 3).
+    /// Two lines of equal weight, 0.01 rad either side of their mean: variance 2e-4, of the mean 1e-4. Each twice, in
+    /// the same strips, says no more; four of them in four strips halve the variance of the mean with 3 in place of 4
+    /// degrees of freedom: sqrt(4e-4 / 4 / 3).
     #[test]
     fn the_standard_error_is_that_of_a_mean_of_strips() {
         let lean = |angle, strip| Lean { angle, weight: 5.0, strip };

@@ -23,8 +23,8 @@ pub struct Placement<'a> {
     pub closed: bool,
 }
 
-/// A grid of one photograph on the plane. A photograph may have several: on both sides of a turn's cut, or in sectors around
-/// a pole; none where it shows nothing in the view.
+/// A grid of one photograph on the plane. A photograph may have several: on both sides of a turn's cut, or in sectors
+/// around a pole; none where it shows nothing in the view.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlacedGrid {
     /// Index of the photograph.
@@ -33,8 +33,8 @@ pub struct PlacedGrid {
     pub mesh: GridMesh,
 }
 
-/// Largest distance of a bilinear cell from the true map, in canvas pixels or photograph pixels, whichever is kinder: where the
-/// canvas is stretched, detail is the photograph's. Half of it for each axis.
+/// Largest distance of a bilinear cell from the true map, in canvas pixels or photograph pixels, whichever is kinder:
+/// where the canvas is stretched, detail is the photograph's. Half of it for each axis.
 const LARGEST_SAG_PX: f64 = 0.3;
 /// Radians beyond the view's end that are drawn: whole cells lie across its border then.
 const MARGIN: f64 = 0.09;
@@ -112,8 +112,8 @@ impl<'a> Drawing<'a> {
             .collect()
     }
 
-    /// How far the middle of two vertices' places is from the place of the pixel between, in pixels; `None` where there is
-    /// nothing to see.
+    /// How far the middle of two vertices' places is from the place of the pixel between, in pixels; `None` where there
+    /// is nothing to see.
     fn sag(&self, from: DrawnVertex, to: DrawnVertex) -> Option<f64> {
         /// A cell that is wider on the turn goes round a pole.
         const WIDEST: f64 = PI / 2.0;
@@ -145,7 +145,8 @@ impl<'a> Drawing<'a> {
             .lines
             .clone()
             .unwrap_or_else(|| GridLines::even(self.photograph.mesh.columns, self.photograph.mesh.rows));
-        // What is smaller than this share of a pixel is not seen, not even at a pole, half a pixel from the first row's centers.
+        // What is smaller than this share of a pixel is not seen, not even at a pole, half a pixel from the first row's
+        // centers.
         let smallest = 0.125 * (self.photograph.camera.focal_px / self.placement.canvas_from_plane).max(1.0);
         for _ in 0..ROUNDS {
             let places = self.places(&lines);
@@ -218,9 +219,9 @@ impl<'a> Drawing<'a> {
         grids
     }
 
-    /// The longitudes around which the photograph is unrolled, and how far to both sides: its own middle, or four directions
-    /// around a pole that it shows or all but shows. Sectors overlap by a quarter turn, so that each cell narrower than
-    /// that is whole in one of them.
+    /// The longitudes around which the photograph is unrolled, and how far to both sides: its own middle, or four
+    /// directions around a pole that it shows or all but shows. Sectors overlap by a quarter turn, so that each cell
+    /// narrower than that is whole in one of them.
     fn sectors(&self, places: &[Option<Vector2<f64>>]) -> Vec<(f64, f64)> {
         /// Radians to one side of its middle above which a photograph may as well go round.
         const HALF_ROUND: f64 = 0.8 * PI;
@@ -281,8 +282,8 @@ mod tests {
         place(photographs, &shifts, &Placement { view, canvas_from_plane: 700.0, closed })
     }
 
-    /// Anywhere in a cell, the bilinear place is within the limit of the true one; the error counts on the sphere where the
-    /// plane is stretched.
+    /// Anywhere in a cell, the bilinear place is within the limit of the true one; the error counts on the sphere where
+    /// the plane is stretched.
     #[test]
     fn cells_follow_the_projection() {
         for kind in FlatKind::ALL {

@@ -2,8 +2,8 @@
 //!
 //! * [`flat`](Flat): each projection as a map between directions and a plane;
 //! * [`ProjectionView`]: where the viewer looks, how much is shown, and which projection suits;
-//! * [`parallax_shifts`]: what the solved mesh knows beyond the cameras: by how much each photograph must give way so that
-//!   overlaps meet in spite of parallax;
+//! * [`parallax_shifts`]: what the solved mesh knows beyond the cameras: by how much each photograph must give way so
+//!   that overlaps meet in spite of parallax;
 //! * [`place`]: every photograph's grid on the plane.
 //!
 //! Directions are in the level world: x right, y down, z forward.

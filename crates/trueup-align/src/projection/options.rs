@@ -33,22 +33,22 @@ trueup_core::options! {
         /// What the panorama is drawn on. Choose another than the mesh for straight lines over a wide view, for full
         /// turns and for viewers of spherical panoramas.
         kind: Projection = Projection::Mesh, Allowed::Any, "", basic;
-        /// Turns the viewer to the right of where the panorama faces: change it to bring another place to the middle. Not
-        /// for the mesh, as the next three.
+        /// Turns the viewer to the right of where the panorama faces: change it to bring another place to the middle.
+        /// Not for the mesh, as the next three.
         yaw: f64 = 0.0, between(-360.0, 360.0), "degrees", basic;
         /// Turns the viewer up: change it where the panorama shows too much ground, or too much sky.
         pitch: f64 = 0.0, between(-90.0, 90.0), "degrees", basic;
         /// Turns the viewer clockwise: change it where the panorama leans.
         roll: f64 = 0.0, between(-180.0, 180.0), "degrees", basic;
-        /// Horizontal field of view that may be shown; 0 shows what is there, as far as the projection carries well. Lower
-        /// it to leave stretched sides out, raise it to see them.
+        /// Horizontal field of view that may be shown; 0 shows what is there, as far as the projection carries well.
+        /// Lower it to leave stretched sides out, raise it to see them.
         fov: f64 = 0.0, between(0.0, 360.0), "degrees", basic;
-        /// Distance of Panini's viewpoint behind the cylinder's axis: 0 is perspective, 1 Panini's own, more is flatter.
-        /// Lower it where slanting lines bend too much, raise it where the sides are too large.
+        /// Distance of Panini's viewpoint behind the cylinder's axis: 0 is perspective, 1 Panini's own, more is
+        /// flatter. Lower it where slanting lines bend too much, raise it where the sides are too large.
         panini_distance: f64 = 1.0, between(0.0, 10.0), "";
-        /// How far photographs may contradict each other because of parallax and still be made to meet; beyond, each stays
-        /// where its camera looks. Raise it for hand-held photographs of near things that show double, lower it where
-        /// meeting bends them.
+        /// How far photographs may contradict each other because of parallax and still be made to meet; beyond, each
+        /// stays where its camera looks. Raise it for hand-held photographs of near things that show double, lower it
+        /// where meeting bends them.
         max_parallax_deg: f64 = 2.0, between(0.0, 45.0), "degrees";
     }
 }

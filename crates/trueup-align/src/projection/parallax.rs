@@ -1,19 +1,20 @@
 //! Parallax: how far photographs give way so that overlaps meet.
 //!
-//! Cameras that only turn leave a residual in every overlap where the photographer moved. The solved mesh has aligned the
-//! overlaps as well as it could; which pixel of one photograph meets which pixel of another is read off it, and both are
-//! drawn in the same direction: a mean of the directions in which their cameras see the place. Each photograph weighs as
-//! deep as the place lies in it, so that nothing moves where a photograph is alone, nothing jumps where another one ends,
-//! and directions that need no correction get none. The mesh's own shape, its plane and its drift over long rows are
-//! forgotten by this; only what it knows of overlaps remains, so that any mesh will do, of whatever method.
+//! Cameras that only turn leave a residual in every overlap where the photographer moved. The solved mesh has aligned
+//! the overlaps as well as it could; which pixel of one photograph meets which pixel of another is read off it, and
+//! both are drawn in the same direction: a mean of the directions in which their cameras see the place. Each photograph
+//! weighs as deep as the place lies in it, so that nothing moves where a photograph is alone, nothing jumps where
+//! another one ends, and directions that need no correction get none. The mesh's own shape, its plane and its drift
+//! over long rows are forgotten by this; only what it knows of overlaps remains, so that any mesh will do, of whatever
+//! method.
 //!
-//! Near the poles the mesh knows nothing: photographs that look there cannot be unrolled, and pull at their neighbors. They
-//! are drawn as their cameras see.
+//! Near the poles the mesh knows nothing: photographs that look there cannot be unrolled, and pull at their neighbors.
+//! They are drawn as their cameras see.
 //!
 //! # Source
-//! H.-Y. Shum and R. Szeliski, "Construction and refinement of panoramic mosaics with global and local alignment" (2000),
-//! section 5: local alignment ("deghosting") towards the mean ray; here the correspondences are the mesh's, and the
-//! weights make the field continuous.
+//! H.-Y. Shum and R. Szeliski, "Construction and refinement of panoramic mosaics with global and local alignment"
+//! (2000), section 5: local alignment ("deghosting") towards the mean ray; here the correspondences are the mesh's, and
+//! the weights make the field continuous.
 
 use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
@@ -31,8 +32,8 @@ pub struct ParallaxShift {
 /// What the overlaps ask of every photograph.
 ///
 /// * `period`: the turn of the mesh's plane, if it closes on itself.
-/// * `max_parallax`: the largest angle in radians between where a camera sees a place and where it is drawn; from half of it
-///   on, corrections fade, since a mesh that has to contradict its cameras more than that is torn itself.
+/// * `max_parallax`: the largest angle in radians between where a camera sees a place and where it is drawn; from half
+///   of it on, corrections fade, since a mesh that has to contradict its cameras more than that is torn itself.
 pub fn parallax_shifts(photographs: &[PosedPhotograph], period: Option<f64>, max_parallax: f64) -> Vec<ParallaxShift> {
     let trusts: Vec<f64> = photographs.iter().map(|photograph| trust(steepest(photograph))).collect();
     let bounds: Vec<_> = photographs.iter().map(|photograph| photograph.mesh.bounds()).collect();
@@ -67,8 +68,8 @@ struct Sight {
     trust: f64,
 }
 
-/// How far the mesh of a photograph is believed that reaches this far from the horizon (radians). The mesh's sphere is unrolled up
-/// to 70 degrees, and what lies beyond pulls at its neighbors.
+/// How far the mesh of a photograph is believed that reaches this far from the horizon (radians). The mesh's sphere is
+/// unrolled up to 70 degrees, and what lies beyond pulls at its neighbors.
 fn trust(steepest: f64) -> f64 {
     const WHOLE_DEG: f64 = 55.0;
     const NONE_DEG: f64 = 65.0;
@@ -83,7 +84,8 @@ fn sight(
     direction: &Vector3<f64>,
     period: Option<f64>,
 ) -> Option<Sight> {
-    /// How far outside of the other photograph the camera may expect the place for a look at the mesh, as a share of its size.
+    /// How far outside of the other photograph the camera may expect the place for a look at the mesh, as a share of
+    /// its size.
     const ASIDE: f64 = 0.25;
     let expected = other.camera.project(other.camera.rotation() * direction)?;
     let size = Vector2::new(other.mesh.width, other.mesh.height);
@@ -110,8 +112,8 @@ fn depth(photograph: &PosedPhotograph, pixel: Vector2<f64>) -> f64 {
     along(pixel.x, photograph.mesh.width) * along(pixel.y, photograph.mesh.height)
 }
 
-/// Where a place is drawn: the mean of all sights, faded towards the own one as they contradict each other. All photographs
-/// that see the place come to the same mean and the same fading.
+/// Where a place is drawn: the mean of all sights, faded towards the own one as they contradict each other. All
+/// photographs that see the place come to the same mean and the same fading.
 fn common_direction(own: Sight, others: impl Iterator<Item = Sight>, max_parallax: f64) -> Vector3<f64> {
     let sights: Vec<Sight> = std::iter::once(own).chain(others).collect();
     let sum: Vector3<f64> = sights.iter().map(|sight| sight.direction * sight.weight).sum();
@@ -133,8 +135,8 @@ mod tests {
 
     use super::*;
 
-    /// Two photographs 30 degrees apart on an unrolled sphere of 700 pixels a radian. What the second one's mesh says is
-    /// moved by `moved` panorama pixels against its camera.
+    /// Two photographs 30 degrees apart on an unrolled sphere of 700 pixels a radian. What the second one's mesh says
+    /// is moved by `moved` panorama pixels against its camera.
     fn pair(moved: [f64; 2]) -> Vec<PosedPhotograph> {
         let photograph = |yaw: f64, moved: [f64; 2]| {
             let level_from_camera = rotation_about_y(yaw);
@@ -170,7 +172,8 @@ mod tests {
         }
     }
 
-    /// Pixels that the mesh puts at the same place are drawn in the same direction; where a photograph is alone it stays.
+    /// Pixels that the mesh puts at the same place are drawn in the same direction; where a photograph is alone it
+    /// stays.
     #[test]
     fn overlaps_meet_and_the_rest_stays() {
         let photographs = pair([4.0, -3.0]);

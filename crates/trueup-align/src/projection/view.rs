@@ -26,8 +26,8 @@ pub struct ProjectionView {
     pub closed: bool,
 }
 
-/// Mean pitch in radians (40 degrees) from which photographs that look one way are shown looking there: drawn upright, they would be
-/// stretched beyond recognition. The mesh's sphere is tilted from there, too.
+/// Mean pitch in radians (40 degrees) from which photographs that look one way are shown looking there: drawn upright,
+/// they would be stretched beyond recognition. The mesh's sphere is tilted from there, too.
 const STEEP: f64 = 0.7;
 /// Length of the mean viewing direction below which the photographs look all round and have no such pitch.
 const ONE_WAY: f64 = 0.5;
@@ -35,10 +35,10 @@ const ONE_WAY: f64 = 0.5;
 impl ProjectionView {
     /// The view that the options ask for.
     ///
-    /// `dominant`: the scene's directions in the level world (columns), if lines guided the panorama. The viewer faces the
-    /// horizontal one that is nearest to the photographs' middle (up to 45 degrees
-    /// aside): always for full turns, whose middle is arbitrary, and for planes where nothing more is cut off by it; a
-    /// cylinder looks the same wherever its middle is.
+    /// `dominant`: the scene's directions in the level world (columns), if lines guided the panorama. The viewer faces
+    /// the horizontal one that is nearest to the photographs' middle (up to 45 degrees aside): always for full turns,
+    /// whose middle is arbitrary, and for planes where nothing more is cut off by it; a cylinder looks the same
+    /// wherever its middle is.
     pub fn choose(
         photographs: &[PosedPhotograph],
         dominant: Option<&Matrix3<f64>>,
@@ -89,10 +89,10 @@ fn nearest_facade(dominant: &Matrix3<f64>, middle: f64) -> Option<f64> {
 
 /// The projection asked for, or the one that suits.
 ///
-/// A plane is what one wide lens would have drawn, and people are used to its stretching up to about 100 degrees. Panini's
-/// keeps verticals and the lines into the depth straight up to about 180; beyond, the far sides grow too large, while a cylinder
-/// stays even, up to where nobody sees it as one view any more. Full turns belong to viewers of spherical panoramas, and
-/// what reaches more than 45 degrees up or down (several rows) is stretched by all of these.
+/// A plane is what one wide lens would have drawn, and people are used to its stretching up to about 100 degrees.
+/// Panini's keeps verticals and the lines into the depth straight up to about 180; beyond, the far sides grow too
+/// large, while a cylinder stays even, up to where nobody sees it as one view any more. Full turns belong to viewers of
+/// spherical panoramas, and what reaches more than 45 degrees up or down (several rows) is stretched by all of these.
 fn flat_kind(coverage: &SphereCoverage, options: &ProjectionOptions) -> FlatKind {
     /// Degrees across.
     const PERSPECTIVE: f64 = 100.0;
@@ -146,8 +146,8 @@ mod tests {
         assert_eq!(kind(&[row(2, 0.0), row(2, 35.0)].concat()), FlatKind::Equirectangular);
     }
 
-    /// Facades at 20 and 110 degrees: a narrow panorama faces the nearer one, a wide plane keeps to its middle, since its far
-    /// side would be cut.
+    /// Facades at 20 and 110 degrees: a narrow panorama faces the nearer one, a wide plane keeps to its middle, since
+    /// its far side would be cut.
     #[test]
     fn the_viewer_faces_the_nearest_facade() {
         let dominant = rotation_about_y(20_f64.to_radians());

@@ -1,5 +1,5 @@
-//! Adaptive as-natural-as-possible warps (AANAP): a local homography in the overlap that turns into a similarity away from
-//! it.
+//! Adaptive as-natural-as-possible warps (AANAP): a local homography in the overlap that turns into a similarity away
+//! from it.
 
 use nalgebra::{Matrix3, Vector2};
 use rand::Rng;
@@ -21,13 +21,13 @@ use crate::match_points::MovingDlt;
 /// Places the photographs one after the other, each between its local homography and a similarity.
 ///
 /// # Source
-/// Lin et al., "Adaptive as-natural-as-possible image stitching" (2015), sections 3.1 to 3.3: linearized homography with
-/// Student-t weights, the similarity of least rotation among the planes of the matches, and the smooth change from one to
-/// the other, in which the reference takes part.
+/// Lin et al., "Adaptive as-natural-as-possible image stitching" (2015), sections 3.1 to 3.3: linearized homography
+/// with Student-t weights, the similarity of least rotation among the planes of the matches, and the smooth change from
+/// one to the other, in which the reference takes part.
 ///
 /// # Departures
-/// The published method is for two photographs. Here each further one is fitted to the places that its matches have in the
-/// panorama by then, and moves what is placed already in the same way; `warps.adapt_reference` turns that off.
+/// The published method is for two photographs. Here each further one is fitted to the places that its matches have in
+/// the panorama by then, and moves what is placed already in the same way; `warps.adapt_reference` turns that off.
 pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &StageContext<'_>) -> Result<Vec<GridMesh>> {
     one_after_another(input, context, |step, data, placed| {
         let mut generator = context.generator(STAGE, input.seeds[step.photograph]);

@@ -14,15 +14,15 @@ use super::options::WarpOptions;
 use super::placement::one_after_another;
 use crate::match_points::MovingDlt;
 
-/// Places the photographs one after the other: each vertex goes where the homography goes that fits the matches around it
-/// best.
+/// Places the photographs one after the other: each vertex goes where the homography goes that fits the matches around
+/// it best.
 ///
 /// # Source
 /// Zaragoza et al., "As-projective-as-possible image stitching with moving DLT" (2013), equations 9 to 13.
 ///
 /// # Departures
-/// The published method is for two photographs. Here each further one is fitted to the places that its matches have in the
-/// panorama by then, as deformed as these are.
+/// The published method is for two photographs. Here each further one is fitted to the places that its matches have in
+/// the panorama by then, as deformed as these are.
 pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &StageContext<'_>) -> Result<Vec<GridMesh>> {
     let weighting = Weighting { kernel: options.apap_kernel, decay_px: options.apap_decay_px, floor: WEIGHT_FLOOR };
     place_weighted(input, weighting, context)

@@ -15,8 +15,9 @@ use crate::mesh::divided;
 
 /// Places every photograph by its camera alone.
 ///
-/// The longitude origin is the sum of the viewing directions. A photograph that straddles the cut opposite to it stays whole,
-/// on its center's side; where the photographs go all the way round, the cut is the one that the overlaps were cut at.
+/// The longitude origin is the sum of the viewing directions. A photograph that straddles the cut opposite to it stays
+/// whole, on its center's side; where the photographs go all the way round, the cut is the one that the overlaps were
+/// cut at.
 ///
 /// # Source
 /// Brown and Lowe, "Automatic panoramic image stitching using invariant features" (2007), sections 4 and 5; Szeliski,
@@ -27,7 +28,8 @@ pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions) -> Result<Vec<
     (0..input.grids.len()).map(|photograph| OnSurface { input, options, photograph, origin, radius }.place()).collect()
 }
 
-/// Length of a full turn in panorama units, where the photographs go all the way round a sphere or a cylinder and stay level.
+/// Length of a full turn in panorama units, where the photographs go all the way round a sphere or a cylinder and stay
+/// level.
 pub(super) fn period(model: WarpModel, input: &WarpInput<'_>, options: &WarpOptions) -> Option<f64> {
     let unrolled = model == WarpModel::Autostitch && options.surface != AutostitchSurface::Plane;
     (unrolled && input.cut_yaw.is_some() && input.turn == 0.0).then(|| TAU * input.cameras[input.reference].focal_px)
@@ -100,8 +102,8 @@ impl OnSurface<'_> {
         }
     }
 
-    /// Longitudes of all vertices from the origin, without a jump: along the middle row from its middle, then up and down
-    /// every column.
+    /// Longitudes of all vertices from the origin, without a jump: along the middle row from its middle, then up and
+    /// down every column.
     fn longitudes(&self, grid: &GridMesh, directions: &[Vector3<f64>]) -> Result<Vec<f64>> {
         let wrapped = |vertex: usize| directions[vertex].x.atan2(directions[vertex].z) - self.origin;
         let mut longitudes = vec![0.0; grid.len()];

@@ -15,7 +15,8 @@ use super::options::WarpOptions;
 use super::sphp::SphpWarp;
 use crate::stitch_graph::StitchGraph;
 
-/// Offsets of the first line that are tried, in working pixels of a photograph whose longer side is [`PUBLISHED_SIDE_PX`].
+/// Offsets of the first line that are tried, in working pixels of a photograph whose longer side is
+/// [`PUBLISHED_SIDE_PX`].
 const FIRST_OFFSETS: [f64; 2] = [-300.0, 600.0];
 /// Offsets of the second line.
 const SECOND_OFFSETS: [f64; 2] = [-300.0, 200.0];
@@ -30,18 +31,18 @@ const SAMPLE_STEP_PX: f64 = 40.0;
 
 /// Places all photographs by one half-projective warp.
 ///
-/// The panorama lies on the plane of a photograph `tar` where the warp is a homography, and follows the photograph `ref` where
-/// it is a similarity; tried are the two photographs farthest apart in the graph and the reference with the one farthest from
-/// it, in both roles, and all pairs of lines on a raster. The least distorted one is taken: that with the smallest sum of
-/// squared distances of the Jacobians from each photograph's best similarity.
+/// The panorama lies on the plane of a photograph `tar` where the warp is a homography, and follows the photograph
+/// `ref` where it is a similarity; tried are the two photographs farthest apart in the graph and the reference with the
+/// one farthest from it, in both roles, and all pairs of lines on a raster. The least distorted one is taken: that with
+/// the smallest sum of squared distances of the Jacobians from each photograph's best similarity.
 ///
 /// # Source
-/// Chang, Sato and Chuang, "Shape-preserving half-projective warps for image stitching" (2014), sections 3 and 4; ranges
-/// and step of the lines as in the authors' program.
+/// Chang, Sato and Chuang, "Shape-preserving half-projective warps for image stitching" (2014), sections 3 and 4;
+/// ranges and step of the lines as in the authors' program.
 ///
 /// # Departures
-/// Jacobians are sampled every 40 px instead of at every pixel. For more than two photographs the paper leaves the choice of
-/// the pair to the user.
+/// Jacobians are sampled every 40 px instead of at every pixel. For more than two photographs the paper leaves the
+/// choice of the pair to the user.
 pub(super) fn place(
     model: WarpModel,
     input: &WarpInput<'_>,
@@ -237,8 +238,8 @@ fn least_distorted(
     least.map(|(cost, warp)| (cost, Warp::Halves(Box::new(warp))))
 }
 
-/// Sum over the photographs of the squared distances of the derivatives from the photograph's best similarity; `None` where the
-/// warp has no derivative.
+/// Sum over the photographs of the squared distances of the derivatives from the photograph's best similarity; `None`
+/// where the warp has no derivative.
 fn distortion(samples: &[Vec<Sample>], jacobian: impl Fn(Vector2<f64>) -> Option<Matrix2<f64>>) -> Option<f64> {
     let mut cost = 0.0;
     for of_photograph in samples {

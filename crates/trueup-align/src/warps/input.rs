@@ -14,8 +14,8 @@ use crate::match_points::OverlapWarp;
 /// The stage's name in progress and generators.
 pub(super) const STAGE: &str = WarpOptions::STAGE;
 
-/// What a warp model is made from. Photographs are counted 0..N; `cameras`, `frames`, `grids`, `match_grids`, `names` and
-/// `seeds` have N entries.
+/// What a warp model is made from. Photographs are counted 0..N; `cameras`, `frames`, `grids`, `match_grids`, `names`
+/// and `seeds` have N entries.
 #[derive(Debug, Clone, Copy)]
 pub struct WarpInput<'a> {
     /// Cameras in working pixels, in any common world frame.
@@ -32,7 +32,8 @@ pub struct WarpInput<'a> {
     pub overlaps: &'a [OverlapWarp],
     /// Names of the photographs, for messages.
     pub names: &'a [String],
-    /// For each photograph a number that does not depend on the order of the photographs; random choices derive from it.
+    /// For each photograph a number that does not depend on the order of the photographs; random choices derive from
+    /// it.
     pub seeds: &'a [u64],
     /// The photograph that stays in place in models that have such a one.
     pub reference: usize,

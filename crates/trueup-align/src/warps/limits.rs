@@ -11,8 +11,8 @@ use super::input::WarpInput;
 use super::model::WarpModel;
 use crate::mesh::count_folds;
 
-/// Depth, relative to the distance, below which a viewing direction counts as beside or behind the panorama's plane: 88.9
-/// degrees off its axis.
+/// Depth, relative to the distance, below which a viewing direction counts as beside or behind the panorama's plane:
+/// 88.9 degrees off its axis.
 pub(super) const MIN_DEPTH: f64 = 0.02;
 
 /// How far photographs may be deformed.
@@ -34,7 +34,8 @@ const TOO_WIDE: &str = "Use the method vpg or autostitch, or stitch fewer photog
 /// What a user can do where the sphere does not help either.
 const TOO_STEEP: &str = "Use the method vpg, or leave this photograph out.";
 
-/// The refusal of a set by a model. `reason` says which photograph and why; the angle that the photograph reaches is added.
+/// The refusal of a set by a model. `reason` says which photograph and why; the angle that the photograph reaches is
+/// added.
 pub(super) fn refuse(model: WarpModel, input: &WarpInput<'_>, photograph: usize, reason: &str) -> Error {
     let angle = farthest_angle(input, photograph).to_degrees();
     let (name, reference) = (&input.names[photograph], &input.names[input.reference]);

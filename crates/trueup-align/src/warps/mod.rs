@@ -1,8 +1,8 @@
 //! Warp models: methods that place the photographs by closed formulas instead of the mesh energies.
 //!
 //! One file a model. All start from the same matches, cameras and grids and yield the same [`WarpedMesh`] as the mesh
-//! energies do, so that renderer and measures are shared. A set of photographs that a model cannot place is refused with
-//! [`trueup_core::Error::NotApplicable`]: what cannot lie on one plane is not torn or blown up instead.
+//! energies do, so that renderer and measures are shared. A set of photographs that a model cannot place is refused
+//! with [`trueup_core::Error::NotApplicable`]: what cannot lie on one plane is not torn or blown up instead.
 
 mod aanap;
 mod apap;
@@ -34,8 +34,8 @@ pub use options::{AutostitchSurface, HomographySource, WarpOptions};
 /// Places the photographs by a warp model.
 ///
 /// # Errors
-/// [`Error::Options`]; [`Error::Unsolvable`] for lists of different lengths; [`Error::NotApplicable`] if the model cannot
-/// place these photographs, with the angle they reach; [`Error::Cancelled`].
+/// [`Error::Options`]; [`Error::Unsolvable`] for lists of different lengths; [`Error::NotApplicable`] if the model
+/// cannot place these photographs, with the angle they reach; [`Error::Cancelled`].
 pub fn run(
     model: WarpModel,
     input: &WarpInput<'_>,

@@ -30,20 +30,20 @@ trueup_core::options! {
         /// Where the homographies of the method homography come from. Choose the pairs where the photographs were taken
         /// from different places.
         homographies: HomographySource = HomographySource::Cameras, Allowed::Any, "";
-        /// Where those of the methods sphp, sphp-free and quasi-homography come from. Choose the cameras where the pairs'
-        /// own homographies do not agree.
+        /// Where those of the methods sphp, sphp-free and quasi-homography come from. Choose the cameras where the
+        /// pairs' own homographies do not agree.
         pair_homographies: HomographySource = HomographySource::Pairs, Allowed::Any, "";
-        /// The surface that the method autostitch projects onto. Choose the plane for narrow views with straight lines, the
-        /// cylinder for verticals that stay straight.
+        /// The surface that the method autostitch projects onto. Choose the plane for narrow views with straight lines,
+        /// the cylinder for verticals that stay straight.
         surface: AutostitchSurface = AutostitchSurface::Spherical, Allowed::Any, "";
-        /// How the weight of a match falls with its distance from a vertex in the method apap. Change it to compare with
-        /// results made by the paper's formula.
+        /// How the weight of a match falls with its distance from a vertex in the method apap. Change it to compare
+        /// with results made by the paper's formula.
         apap_kernel: DistanceKernel = DistanceKernel::Code, Allowed::Any, "";
-        /// Distance over which that weight falls to 1/e; 72.25 is the published 8.5 squared. Lower it where overlaps still
-        /// show double, raise it where they are bent.
+        /// Distance over which that weight falls to 1/e; 72.25 is the published 8.5 squared. Lower it where overlaps
+        /// still show double, raise it where they are bent.
         apap_decay_px: f64 = 72.25, between(1.0, 10000.0), "working px";
-        /// Whether the method aanap moves the photographs that are placed already along with the one that joins them. Turn it
-        /// off to keep the reference as it was taken, at the price of ghosts.
+        /// Whether the method aanap moves the photographs that are placed already along with the one that joins them.
+        /// Turn it off to keep the reference as it was taken, at the price of ghosts.
         adapt_reference: bool = true, Allowed::Any, "";
     }
 }

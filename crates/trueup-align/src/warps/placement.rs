@@ -26,8 +26,8 @@ pub(super) struct Anchored {
     pub places: Vec<Vector2<f64>>,
 }
 
-/// The photographs in the order in which they join the reference: always the one that shares most matches with those placed,
-/// ties by index.
+/// The photographs in the order in which they join the reference: always the one that shares most matches with those
+/// placed, ties by index.
 ///
 /// # Errors
 /// [`trueup_core::Error::Unsolvable`] if a photograph shares no match with the others.
@@ -49,8 +49,8 @@ pub(super) fn order(input: &WarpInput<'_>) -> Result<Vec<Step>> {
     Ok(steps)
 }
 
-/// Places the photographs in [`order`], the reference undeformed: `join` makes the grid of each further one from its matches
-/// with those placed, which it may move.
+/// Places the photographs in [`order`], the reference undeformed: `join` makes the grid of each further one from its
+/// matches with those placed, which it may move.
 ///
 /// # Errors
 /// Those of [`order`] and of `join`; [`trueup_core::Error::Cancelled`].

@@ -15,13 +15,13 @@ use crate::stitch_graph::StitchGraph;
 
 /// A homography up to a line, and beyond it the map that keeps the homography's lines but not its growing scale.
 ///
-/// Let u be the direction in the photograph in which the homography's denominator falls, and v the direction across. Lines
-/// of constant u become parallel lines, lines of constant v a pencil: a point's place is where its two lines meet. Along
-/// every line of the pencil the parallels stand at the same coordinate xi(u) = (a u + b) / (d - c u). Up to the line
-/// u = `partition` the map is the homography; beyond, xi continues by its tangent, and the parallels of u are drawn where
-/// xi says while the pencil stays: the point moves to H(u', v) with xi(u') = xi(partition) + xi'(partition) (u -
-/// partition). Straight lines of constant v stay straight, scale across grows linearly instead of hyperbolically, and no
-/// point reaches the horizon. The map and its derivative are continuous across the line.
+/// Let u be the direction in the photograph in which the homography's denominator falls, and v the direction across.
+/// Lines of constant u become parallel lines, lines of constant v a pencil: a point's place is where its two lines
+/// meet. Along every line of the pencil the parallels stand at the same coordinate xi(u) = (a u + b) / (d - c u). Up to
+/// the line u = `partition` the map is the homography; beyond, xi continues by its tangent, and the parallels of u are
+/// drawn where xi says while the pencil stays: the point moves to H(u', v) with xi(u') = xi(partition) + xi'(partition)
+/// (u - partition). Straight lines of constant v stay straight, scale across grows linearly instead of hyperbolically,
+/// and no point reaches the horizon. The map and its derivative are continuous across the line.
 ///
 /// # Source
 /// Li, Xu and Wang, "Quasi-homography warps in image stitching" (2018): slope preservation and scale linearization.
@@ -83,8 +83,8 @@ impl QuasiHomography {
         self.homography.apply(point + beyond.direction * (beyond.drawn_back(u) - u))
     }
 
-    /// Direction of growth in the photograph, unit length, and the coordinate along it where the homography ends; `None` for
-    /// affine maps.
+    /// Direction of growth in the photograph, unit length, and the coordinate along it where the homography ends;
+    /// `None` for affine maps.
     #[cfg(test)]
     fn partition(&self) -> Option<(Vector2<f64>, f64)> {
         self.beyond.map(|beyond| (beyond.direction, beyond.partition))
@@ -104,8 +104,8 @@ impl Beyond {
 /// Places every photograph relative to its neighbor in the tree of the strongest overlaps that leads to the reference.
 ///
 /// # Departures
-/// The published warp is for two photographs. Here the warp of a photograph onto its neighbor's plane is followed by the
-/// neighbor's own warp, which is defined beyond its border too; overlaps that are not in the tree meet only nearly.
+/// The published warp is for two photographs. Here the warp of a photograph onto its neighbor's plane is followed by
+/// the neighbor's own warp, which is defined beyond its border too; overlaps that are not in the tree meet only nearly.
 pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &StageContext<'_>) -> Result<Vec<GridMesh>> {
     context.check_cancelled()?;
     let model = WarpModel::QuasiHomography;
@@ -162,7 +162,8 @@ mod tests {
     }
 
     proptest! {
-        /// Inside it is the homography; beyond, a line of constant v keeps its image and is walked at even steps across.
+        /// Inside it is the homography; beyond, a line of constant v keeps its image and is walked at even steps
+        /// across.
         #[test]
         fn inside_it_is_the_homography_and_beyond_its_lines_at_linear_scale(v in -300.0..300.0_f64, far in 1.0..2000.0_f64) {
             let (warp, homography) = (example(), homography());

@@ -1,5 +1,5 @@
-//! The shape-preserving half-projective warp (SPHP): a homography on one side, a similarity on the other, and a quadratic
-//! or cubic transition between.
+//! The shape-preserving half-projective warp (SPHP): a homography on one side, a similarity on the other, and a
+//! quadratic or cubic transition between.
 
 use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector4};
 use trueup_core::geometry::Homography;
@@ -7,7 +7,8 @@ use trueup_core::geometry::Homography;
 /// A homography that turns into a similarity across the lines u = `first` and u = `second`, u being the direction in
 /// which the homography's denominator falls.
 ///
-/// Coordinates have their origin at the photograph's center. The map and its derivative are continuous across both lines.
+/// Coordinates have their origin at the photograph's center. The map and its derivative are continuous across both
+/// lines.
 ///
 /// # Source
 /// Chang, Sato and Chuang, "Shape-preserving half-projective warps for image stitching" (2014), section 3; the

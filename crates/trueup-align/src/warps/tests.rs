@@ -28,18 +28,18 @@ pub(super) struct Example {
 
 impl Example {
     /// Cameras panned to these yaws in degrees; neighbors in the list overlap.
-    pub fn panned(yaws_deg: &[f64], reference: usize) -> Self {
+    pub(super) fn panned(yaws_deg: &[f64], reference: usize) -> Self {
         let turned = |yaw: &f64| Camera::new(FOCAL_PX, WIDTH, HEIGHT, &rotation_about_y(yaw.to_radians()).transpose());
         Self::new(yaws_deg.iter().map(turned).collect(), reference)
     }
 
-    pub fn new(cameras: Vec<Camera>, reference: usize) -> Self {
+    pub(super) fn new(cameras: Vec<Camera>, reference: usize) -> Self {
         let carry = |a: usize, b: usize, point| cameras[a].transfer(&cameras[b], point);
         let pairs = (1..cameras.len()).map(|b| matched(b - 1, b, |point| carry(b - 1, b, point))).collect();
         Self::with_pairs(cameras, pairs, reference)
     }
 
-    pub fn with_pairs(cameras: Vec<Camera>, pairs: Vec<PairMatches>, reference: usize) -> Self {
+    pub(super) fn with_pairs(cameras: Vec<Camera>, pairs: Vec<PairMatches>, reference: usize) -> Self {
         let count = cameras.len();
         Self {
             cameras,
@@ -53,7 +53,7 @@ impl Example {
     }
 
     /// The same photographs and matches counted from the other end.
-    pub fn reversed(&self) -> Self {
+    pub(super) fn reversed(&self) -> Self {
         let last = self.cameras.len() - 1;
         let swapped = |one: &PointMatch| PointMatch { in_a: one.in_b, in_b: one.in_a };
         let turned = |pair: &PairMatches| PairMatches {
@@ -69,7 +69,7 @@ impl Example {
         reversed
     }
 
-    pub fn input(&self) -> WarpInput<'_> {
+    pub(super) fn input(&self) -> WarpInput<'_> {
         WarpInput {
             cameras: &self.cameras,
             frames: &self.frames,
@@ -86,16 +86,16 @@ impl Example {
         }
     }
 
-    pub fn place(&self, model: WarpModel) -> Result<WarpedMesh> {
+    pub(super) fn place(&self, model: WarpModel) -> Result<WarpedMesh> {
         self.place_with(model, &WarpOptions::default())
     }
 
     /// With other limits than those that a user meets.
-    pub fn place_within(&self, model: WarpModel, limits: &Limits) -> Result<WarpedMesh> {
+    pub(super) fn place_within(&self, model: WarpModel, limits: &Limits) -> Result<WarpedMesh> {
         run_within(model, &self.input(), &WarpOptions::default(), limits, &StageContext::default())
     }
 
-    pub fn place_with(&self, model: WarpModel, options: &WarpOptions) -> Result<WarpedMesh> {
+    pub(super) fn place_with(&self, model: WarpModel, options: &WarpOptions) -> Result<WarpedMesh> {
         run(model, &self.input(), options, &StageContext::default())
     }
 }

@@ -2,7 +2,7 @@
 
 use trueup_core::mesh::GridMesh;
 
-use super::sample::Sample;
+use super::sample::PixelSample;
 
 /// Largest difference in contrast that is believed.
 const MAX_GAIN: f64 = 4.0;
@@ -32,7 +32,7 @@ struct Moments {
 }
 
 impl Moments {
-    fn add(&mut self, sample: &Sample) {
+    fn add(&mut self, sample: &PixelSample) {
         self.count += 1.0;
         for side in 0..2 {
             self.sums[side] += sample.gray[side].value;
@@ -48,9 +48,9 @@ impl Moments {
 
 impl Colors {
     /// # Departures
-    /// The gain is the quotient of the standard deviations. The least-squares gain of one photograph on the other shrinks
-    /// while the photographs are not yet aligned, and would explain the misalignment as lack of contrast.
-    pub fn of(samples: &[Sample], grid: &GridMesh) -> Self {
+    /// The gain is the quotient of the standard deviations. The least-squares gain of one photograph on the other
+    /// shrinks while the photographs are not yet aligned, and would explain the misalignment as lack of contrast.
+    pub(super) fn of(samples: &[PixelSample], grid: &GridMesh) -> Self {
         let mut all = Moments::default();
         let mut cells = vec![Moments::default(); grid.len()];
         for sample in samples {
@@ -80,11 +80,11 @@ impl Colors {
         Self { overall, cells }
     }
 
-    pub fn of_sample(&self, sample: &Sample) -> Color {
+    pub(super) fn of_sample(&self, sample: &PixelSample) -> Color {
         self.cells[sample.corners[0][0] as usize].unwrap_or(self.overall)
     }
 
-    pub fn residual(&self, sample: &Sample) -> f64 {
+    pub(super) fn residual(&self, sample: &PixelSample) -> f64 {
         let Color { gain, bias } = self.of_sample(sample);
         gain * sample.gray[1].value + bias - sample.gray[0].value
     }

@@ -40,8 +40,8 @@ pub struct PhotometricInput<'a> {
 }
 
 impl PhotometricInput<'_> {
-    /// Adds the equations of all overlaps, linearized around the current grids, at a level; gives the mean difference in
-    /// gray levels. `shares` holds the share of its weight that every overlap has.
+    /// Adds the equations of all overlaps, linearized around the current grids, at a level; gives the mean difference
+    /// in gray levels. `shares` holds the share of its weight that every overlap has.
     pub(super) fn add(
         &self,
         equations: &mut NormalEquations,
@@ -80,8 +80,8 @@ impl PhotometricInput<'_> {
         context: &StageContext,
     ) -> Result<Vec<f64>> {
         context.check_cancelled()?;
-        /// Misalignment, common to neighboring cells of an overlap, from which on its pixels weigh fully, panorama units per
-        /// axis; with less their weight falls with its square.
+        /// Misalignment, common to neighboring cells of an overlap, from which on its pixels weigh fully, panorama
+        /// units per axis; with less their weight falls with its square.
         const FULL_PX: f64 = 0.5;
         let share = |overlap: &PhotometricOverlap| {
             let most = (0..LEVELS).map(|level| overlap.common_square(level)).fold(0.0, f64::max);

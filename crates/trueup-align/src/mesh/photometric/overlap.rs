@@ -8,7 +8,7 @@ use super::super::evidence::CommonSum;
 use super::super::normal_equations::{Metric, WeightedVertex};
 use super::colors::Colors;
 use super::pyramid::{Gray, GrayPyramid};
-use super::sample::Sample;
+use super::sample::PixelSample;
 use crate::match_points::OverlapWarp;
 
 /// Vertices of one cell in each photograph.
@@ -27,8 +27,8 @@ const SPACING_PX: f64 = 4.0;
 const MIN_GRADIENT: f64 = 2.0;
 /// Overlaps with fewer samples are left as they are.
 const MIN_SAMPLES: usize = 50;
-/// Smaller standard deviations of the difference are not believed, gray levels: rounding and compression differ from place
-/// to place.
+/// Smaller standard deviations of the difference are not believed, gray levels: rounding and compression differ from
+/// place to place.
 const LEAST_NOISE: f64 = 3.0;
 
 /// One direction of a pair: the photograph whose pixels are sampled, and the one they are looked up in.
@@ -43,7 +43,7 @@ pub(super) struct PhotometricOverlap<'a> {
 
 /// All samples of an overlap with what they differ by.
 struct Compared {
-    samples: Vec<Sample>,
+    samples: Vec<PixelSample>,
     colors: Colors,
     residuals: Vec<f64>,
     /// Their standard deviation, robustly, and the weights that follow.
@@ -68,9 +68,9 @@ pub(super) struct OverlapEquations {
 impl PhotometricOverlap<'_> {
     /// The linearized photometric equations around the current grids, at a level of the pyramids. `weight` is that of a
     /// squared difference of gray levels in this overlap, for samples of the finest level and the usual noise.
-    pub fn equations(&self, level: usize, weight: f64) -> OverlapEquations {
-        /// Standard deviation of the difference that the weight belongs to, gray levels: overlaps that agree better weigh
-        /// more.
+    pub(super) fn equations(&self, level: usize, weight: f64) -> OverlapEquations {
+        /// Standard deviation of the difference that the weight belongs to, gray levels: overlaps that agree better
+        /// weigh more.
         const USUAL_NOISE: f64 = 10.0;
         let Some(Compared { samples, colors, residuals, sigma, weights }) = self.compared(level) else {
             return OverlapEquations { cells: Vec::new(), misfit: [0.0; 2] };
@@ -113,7 +113,7 @@ impl PhotometricOverlap<'_> {
     }
 
     /// Square, per axis, of the misalignment that the pixels of neighboring cells have in common, at a level.
-    pub fn common_square(&self, level: usize) -> f64 {
+    pub(super) fn common_square(&self, level: usize) -> f64 {
         let Some(compared) = self.compared(level) else { return 0.0 };
         let grid = self.solved[0];
         let per_sample = compared.sigma.max(LEAST_NOISE).powi(-2);
@@ -124,8 +124,8 @@ impl PhotometricOverlap<'_> {
             *information += slope * slope.transpose() * (weight * per_sample);
             *pull -= slope * (residual * weight * per_sample);
         }
-        // Each cell's own displacement, drawn to none with the weight of the mesh's match points, and what share of a true
-        // one it has.
+        // Each cell's own displacement, drawn to none with the weight of the mesh's match points, and what share of a
+        // true one it has.
         let own: Vec<Option<(Vector2<f64>, Matrix2<f64>)>> = cells
             .iter()
             .map(|(information, pull)| {
@@ -148,7 +148,7 @@ impl PhotometricOverlap<'_> {
         CommonSum { products: sum.products - squares.sqrt(), ..sum }.mean_square()
     }
 
-    fn samples(&self, level: usize) -> Vec<Sample> {
+    fn samples(&self, level: usize) -> Vec<PixelSample> {
         let spacing = spacing_px(level);
         let (columns, rows) = (self.solved[0].width / spacing, self.solved[0].height / spacing);
         (0..rows as usize)
@@ -162,7 +162,7 @@ impl PhotometricOverlap<'_> {
             .collect()
     }
 
-    fn sample(&self, point: Vector2<f64>, level: usize) -> Option<Sample> {
+    fn sample(&self, point: Vector2<f64>, level: usize) -> Option<PixelSample> {
         let (corners_here, shares_here) = self.solved[0].bilinear(point);
         let start = self.warp.at(self.solved[0], point)?;
         let there = self.fine[1].source_of(self.fine[0].warp(point), start)?;
@@ -176,7 +176,7 @@ impl PhotometricOverlap<'_> {
             on_panorama(here_gray, &self.fine[0].derivative(point))?,
             on_panorama(there_gray, &self.fine[1].derivative(there))?,
         ];
-        Some(Sample {
+        Some(PixelSample {
             corners: [corners_here, corners_there].map(|corners| corners.map(|corner| corner as u32)),
             shares: [shares_here, shares_there],
             gray,
@@ -211,7 +211,7 @@ fn tukey_weight(residual: f64) -> f64 {
 }
 
 impl CellPair {
-    fn empty(photographs: [usize; 2], sample: &Sample) -> Self {
+    fn empty(photographs: [usize; 2], sample: &PixelSample) -> Self {
         let members = std::array::from_fn(|k| WeightedVertex {
             photograph: photographs[k / 4],
             vertex: sample.corners[k / 4][k % 4] as usize,
@@ -224,7 +224,7 @@ impl CellPair {
     ///
     /// The slope is the mean of both photographs': with it a step errs in the third order of the misalignment, with one
     /// photograph's alone in the second.
-    fn add(&mut self, sample: &Sample, gain: f64, residual: f64, weight: f64) {
+    fn add(&mut self, sample: &PixelSample, gain: f64, residual: f64, weight: f64) {
         let slope = sample.mean_slope(gain);
         let metric = Metric::along(slope, weight);
         let value = slope.dot(&sample.gap) - residual;

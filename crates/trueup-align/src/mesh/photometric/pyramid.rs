@@ -9,8 +9,8 @@ pub(in crate::mesh) const LEVELS: usize = 3;
 /// A photograph's gray values at several sizes, the finest first, each half as large as the one before and blurred by a
 /// binomial of standard deviation one of its own pixels.
 ///
-/// Eight bits a pixel: rounding adds 0.3 gray levels, well below any photograph's noise, and 72 photographs of the usual
-/// working size take 46 MB.
+/// Eight bits a pixel: rounding adds 0.3 gray levels, well below any photograph's noise, and 72 photographs of the
+/// usual working size take 46 MB.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GrayPyramid {
     levels: Vec<Raster<u8>>,
@@ -45,8 +45,8 @@ impl GrayPyramid {
         self.levels.len()
     }
 
-    /// The gray value at a place in working pixels, in a level (0 the finest; the coarsest there is if there are fewer);
-    /// `None` within two of the level's pixels of the border.
+    /// The gray value at a place in working pixels, in a level (0 the finest; the coarsest there is if there are
+    /// fewer); `None` within two of the level's pixels of the border.
     pub(super) fn at(&self, level: usize, point: Vector2<f64>) -> Option<Gray> {
         let level = level.min(self.levels.len() - 1);
         let gray = &self.levels[level];
