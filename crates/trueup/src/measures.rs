@@ -218,8 +218,7 @@ fn long_lines(component: &Component, working: &[GridMesh]) -> Option<LongLines> 
             long.filter_map(move |line| Some((k, Straightness::of(line, &working[k], metrics::LINE_STEP_PX)?)))
         })
         .collect();
-    let bent: Vec<&(usize, Straightness)> =
-        measured.iter().filter(|(_, line)| line.is_bent()).collect();
+    let bent: Vec<&(usize, Straightness)> = measured.iter().filter(|(_, line)| line.is_bent()).collect();
     let longest = bent.iter().max_by(|one, two| one.1.length_px.total_cmp(&two.1.length_px));
     let mean = measured.iter().map(|(_, line)| line.rms_px / line.length_px).sum::<f64>() / measured.len() as f64;
     (!measured.is_empty()).then(|| LongLines {

@@ -4,7 +4,9 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 use trueup_align::match_points::OverlapWarp;
-use trueup_align::mesh::{GrayPyramid, LineAlignmentInput, PhotometricInput, Refinements, StraightInput, StructureInput};
+use trueup_align::mesh::{
+    GrayPyramid, LineAlignmentInput, PhotometricInput, Refinements, StraightInput, StructureInput,
+};
 use trueup_core::lines::{LineSegment, PairLines};
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;

@@ -5,7 +5,7 @@ use trueup_core::geometry::{Homography, Normalization};
 
 /// Distance over which the influence of a match on a vertex falls to 1/e, working px: the published 8.5 squared.
 pub(super) const DECAY_PX: f64 = 72.25;
-/// Smallest weight of a match; it keeps vertices far from all matches determined. As published.
+/// Smallest weight of a match; it keeps vertices far from all matches determined.
 const WEIGHT_FLOOR: f64 = 0.0015;
 
 /// Matches prepared for fitting many local homographies.

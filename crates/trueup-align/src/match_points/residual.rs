@@ -5,8 +5,7 @@ use trueup_core::camera::Camera;
 
 use super::moving_dlt::DECAY_PX;
 
-/// Largest distance of a carried vertex from where the model without local corrections has it, in diagonals of the
-/// other photograph: beyond, a few wrong matches speak.
+/// Largest distance of a carried vertex from its place without local corrections, in diagonals of the other photograph.
 pub(super) const MAX_DEVIATION: f64 = 0.1;
 
 /// Carries points from one photograph to another by the cameras, plus a smooth correction.

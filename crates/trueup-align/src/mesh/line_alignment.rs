@@ -36,7 +36,7 @@ trueup_core::options! {
 
 /// Distance of the samples of a matched line, working px: two or more in every cell of the usual grid.
 const SPACING_PX: f64 = 20.0;
-/// Most matched points of a pair: more hardly add to what they say of the grid's cells.
+/// Most matched points of a pair; published: 300.
 const MAX_POINTS: usize = 1000;
 /// Distance at which a match has half its weight in the first round, panorama units.
 pub(super) const ROBUST_PX: f64 = 3.0;
@@ -64,7 +64,7 @@ pub struct StraightInput<'a> {
 impl StraightInput<'_> {
     /// Adds the equations of straight lines around the current grids.
     pub(super) fn add(&self, equations: &mut NormalEquations, grids: &CurrentGrids) {
-        /// Lines from this length on are kept straight, working px: shorter ones hardly show a bend.
+        /// Lines from this length on are kept straight, working px.
         const STRAIGHT_LENGTH_PX: f64 = 50.0;
         for (photograph, lines) in self.lines.iter().enumerate() {
             for line in lines.iter().filter(|line| line.length() >= STRAIGHT_LENGTH_PX) {
@@ -163,7 +163,8 @@ impl LineAlignmentInput<'_> {
         shares: &MatchShares,
         robust_px: f64,
     ) {
-        /// Weight of the squared distance of matched points, per working px squared.
+        /// Weight of the squared distance of matched points, per working px squared; published: 1, without outlines that
+        /// are held and match points that know nothing of parallax.
         const POINT_WEIGHT: f64 = 16.0;
         for (pair, share) in self.matched.iter().zip(&shares.lines) {
             for (&[line_a, line_b], share) in pair.lines.iter().zip(share) {

@@ -28,7 +28,7 @@ pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &Stag
     place_weighted(input, weighting, context)
 }
 
-/// Smallest weight of a match; it keeps vertices far from all matches determined. As published.
+/// Smallest weight of a match; it keeps vertices far from all matches determined.
 const WEIGHT_FLOOR: f64 = 0.0015;
 
 /// How the weight of a match falls with its distance from a vertex.

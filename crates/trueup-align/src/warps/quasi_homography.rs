@@ -82,13 +82,6 @@ impl QuasiHomography {
         }
         self.homography.apply(point + beyond.direction * (beyond.drawn_back(u) - u))
     }
-
-    /// Direction of growth in the photograph, unit length, and the coordinate along it where the homography ends;
-    /// `None` for affine maps.
-    #[cfg(test)]
-    fn partition(&self) -> Option<(Vector2<f64>, f64)> {
-        self.beyond.map(|beyond| (beyond.direction, beyond.partition))
-    }
 }
 
 impl Beyond {
@@ -167,7 +160,7 @@ mod tests {
         #[test]
         fn inside_it_is_the_homography_and_beyond_its_lines_at_linear_scale(v in -300.0..300.0_f64, far in 1.0..2000.0_f64) {
             let (warp, homography) = (example(), homography());
-            let (direction, partition) = warp.partition().expect("projective");
+            let Beyond { direction, partition, .. } = warp.beyond.expect("projective");
             let across = Vector2::new(-direction.y, direction.x);
             let at = |u: f64| direction * u + across * v;
             prop_assert!((warp.apply(at(partition - far)) - homography.apply(at(partition - far))).norm() < 1e-9);
@@ -182,7 +175,7 @@ mod tests {
         #[test]
         fn value_and_derivative_are_continuous_across_the_line(v in -300.0..300.0_f64) {
             let warp = example();
-            let (direction, partition) = warp.partition().expect("projective");
+            let Beyond { direction, partition, .. } = warp.beyond.expect("projective");
             let across = Vector2::new(-direction.y, direction.x);
             let at = |u: f64| warp.apply(direction * u + across * v);
             let (near, step) = (1e-9, 1e-3);

@@ -123,12 +123,6 @@ impl SphpWarp {
     pub(super) fn similarity_rotation(&self) -> f64 {
         self.similarity[(1, 0)].atan2(self.similarity[(0, 0)])
     }
-
-    /// Direction of u, from the homography side to the similarity side, unit length.
-    #[cfg(test)]
-    fn direction(&self) -> Vector2<f64> {
-        Vector2::from(self.direction)
-    }
 }
 
 fn polynomial(coefficients: &Vector4<f64>, u: f64) -> f64 {
@@ -172,7 +166,8 @@ mod tests {
     fn the_warp_is_smooth_across_both_lines() {
         for zero_rotation in [false, true] {
             let warp = example(zero_rotation);
-            let (along, across) = (warp.direction(), Vector2::new(-warp.direction().y, warp.direction().x));
+            let along = Vector2::from(warp.direction);
+            let across = Vector2::new(-along.y, along.x);
             for line in [-60.0, 220.0] {
                 for v in [-200.0, 0.0, 150.0] {
                     let at = |u: f64| warp.apply(along * u + across * v);

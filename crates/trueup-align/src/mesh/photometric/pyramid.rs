@@ -39,12 +39,6 @@ impl GrayPyramid {
         Self { levels: pyramid }
     }
 
-    /// Number of levels.
-    #[cfg(test)]
-    fn levels(&self) -> usize {
-        self.levels.len()
-    }
-
     /// The gray value at a place in working pixels, in a level (0 the finest; the coarsest there is if there are
     /// fewer); `None` within two of the level's pixels of the border.
     pub(super) fn at(&self, level: usize, point: Vector2<f64>) -> Option<Gray> {
@@ -130,7 +124,7 @@ mod tests {
             }
         }
         let pyramid = GrayPyramid::new(&gray);
-        assert_eq!(pyramid.levels(), 3);
+        assert_eq!(pyramid.levels.len(), 3);
         for level in 0..3 {
             let gray = pyramid.at(level, Vector2::new(50.25, 40.5)).expect("inside");
             // The pixel center (c + 0.5) holds c: the ramp is x + y - 1.
