@@ -1,95 +1,80 @@
 //! The order in which further energies refine a mesh.
 
 use nalgebra::Vector2;
+use trueup_core::Result;
 use trueup_core::mesh::GridMesh;
-use trueup_core::{Error, Result};
 
-use super::line_alignment::Present;
-use super::{
-    Closure, LineAlignmentInput, MeshSolver, NormalEquations, PhotometricInput, Problem, Solved, StraightInput,
-    StructureInput, count_folds,
-};
+use super::current_grids::CurrentGrids;
+use super::line_alignment::{LineAlignmentInput, ROBUST_PX, StraightInput};
+use super::normal_equations::NormalEquations;
+use super::photometric::{LEVELS, PhotometricInput};
+use super::problem::{MeshProblem, Solved};
+use super::refinements::Refinements;
+use super::solver::MeshSolver;
+use super::warped_mesh::total_folds;
 
-/// Energies beyond those of the plain mesh; by default none.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Refinements<'a> {
-    /// What closes a full turn.
-    pub closure: Option<Closure<'a>>,
-    /// Long lines that keep their shape.
-    pub structure: Option<StructureInput<'a>>,
-    /// Lines and points that align overlaps.
-    pub lines: Option<LineAlignmentInput<'a>>,
-    /// Lines that keep straight while lines or pixels align overlaps.
+/// What the rounds of photometric alignment are made from.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PixelAlignment<'a> {
+    pub input: &'a PhotometricInput<'a>,
+    /// The share of its weight that every overlap has.
+    pub shares: &'a [f64],
+    /// Lines that are kept straight meanwhile.
     pub straight: Option<StraightInput<'a>>,
-    /// Pixels that align overlaps.
-    pub photometric: Option<PhotometricInput<'a>>,
-    /// Weight with which every picture's outline stays where the plain mesh has it while lines or pixels align overlaps
-    /// (on residuals).
-    pub outline_weight: f64,
 }
 
-impl Refinements<'_> {
-    /// Refuses lists that do not have an entry for every one of `pictures`.
-    pub(super) fn check(&self, pictures: usize) -> Result<()> {
-        let given = [
-            ("pyramids", self.photometric.map(|input| input.pyramids.len())),
-            ("lists of lines", self.straight.map(|input| input.lines.len())),
-            ("lists of chains", self.structure.map(|input| input.chains.len())),
-        ];
-        for (what, given) in given {
-            if let Some(given) = given.filter(|&given| given != pictures) {
-                let reason = format!("{given} are given for {pictures} pictures");
-                return Err(Error::input(what, reason, "Give one for every picture."));
-            }
-        }
-        Ok(())
-    }
-}
-
-impl Problem<'_> {
+impl MeshProblem<'_> {
     /// Solves the plain `equations`, then with one refinement after the other.
     pub(super) fn solve_refined(&self, mut equations: NormalEquations, refinements: &Refinements) -> Result<Solved> {
         let mut solver = MeshSolver::default();
         if let Some(structure) = &refinements.structure {
-            let present = Present { solved: self.grids, fine: self.grids, places: self.places };
-            structure.add(&mut equations, &present);
+            structure.add(&mut equations, &self.current(self.grids, self.grids));
         }
         let mut solved = self.solve(&mut solver, &equations)?;
         if refinements.photometric.is_some() || refinements.lines.is_some() {
             self.hold_outlines(&mut equations, &solved.meshes, refinements.outline_weight);
         }
         if let Some(input) = &refinements.lines {
-            (equations, solved) = self.align_lines(&mut solver, equations, (input, refinements.straight), solved)?;
+            (equations, solved) = self.align_lines(&mut solver, equations, input, refinements.straight, solved)?;
         }
         if let Some(input) = &refinements.photometric {
-            solved = self.align_pixels(&mut solver, &equations, (input, refinements.straight), solved)?;
+            let fine = self.delivered(&solved.meshes);
+            let shares = input.shares(self.warps, &self.current(&solved.meshes, &fine), self.context)?;
+            let pixels = PixelAlignment { input, shares: &shares, straight: refinements.straight };
+            solved = self.align_pixels(&mut solver, &equations, &pixels, solved)?;
         }
         Ok(solved)
     }
 
-    /// Rounds of line alignment; with the last round's equations. A step that folds the grids is shortened; if that does
-    /// not help it is undone and ends the rounds.
+    /// Rounds of line alignment; with the last round's equations. A step that folds the grids is shortened; if that
+    /// does not help it is undone and ends the rounds.
     fn align_lines(
         &self,
         solver: &mut MeshSolver,
         equations: NormalEquations,
-        (input, straight): (&LineAlignmentInput, Option<StraightInput>),
+        input: &LineAlignmentInput,
+        straight: Option<StraightInput>,
         start: Solved,
     ) -> Result<(NormalEquations, Solved)> {
+        /// Times the mesh is solved with lines and weights found on the solution before.
+        const ROUNDS: usize = 4;
+        /// Factor on the robust distance from round to round: where depth differs within a cell, the surface that most
+        /// matches are on wins.
+        const NARROWING: f64 = 0.7;
         let mut best = start;
         let mut fine = self.delivered(&best.meshes);
         let folds = total_folds(&fine);
-        let shares = input.shares(&Present { solved: &best.meshes, fine: &fine, places: self.places });
+        let shares = input.shares(&self.current(&best.meshes, &fine));
         let mut last = None;
-        let mut robust_px = input.options.robust_px;
-        for _ in 0..input.options.rounds {
+        let mut robust_px = ROBUST_PX;
+        for _ in 0..ROUNDS {
             let mut with_lines = equations.clone();
-            let present = Present { solved: &best.meshes, fine: &fine, places: self.places };
-            input.add(&mut with_lines, &present, &shares, robust_px);
-            robust_px *= input.options.narrowing;
+            let grids = self.current(&best.meshes, &fine);
+            input.add(&mut with_lines, &grids, &shares, robust_px);
+            robust_px *= NARROWING;
             let mut all = with_lines.clone();
             if let Some(straight) = straight {
-                straight.add(&mut all, &present);
+                straight.add(&mut all, &grids);
             }
             let next = self.solve(solver, &all)?;
             let Some(step) = self.longest_step(&best, next, |_, fine| total_folds(fine) <= folds) else { break };
@@ -99,17 +84,18 @@ impl Problem<'_> {
         Ok((last.unwrap_or(equations), best))
     }
 
-    /// Keeps the outlines of the pictures where they are in `meshes`.
+    /// Keeps the outlines of the photographs where they are in `meshes`.
     ///
-    /// Where neighbors were taken from different places their pixels would bend and turn the pictures against each other;
-    /// how a picture stands is the prior's to say. Its outline lies over the inside of a neighbor, which can give way.
-    fn hold_outlines(&self, equations: &mut NormalEquations, meshes: &[GridMesh], weight: f64) {
-        for (picture, mesh) in meshes.iter().enumerate() {
+    /// Where neighbors were taken from different places their pixels would bend and turn the photographs against each
+    /// other; how a photograph stands is the prior's to say. Its outline lies over the inside of a neighbor, which can
+    /// give way.
+    pub(super) fn hold_outlines(&self, equations: &mut NormalEquations, meshes: &[GridMesh], weight: f64) {
+        for (photograph, mesh) in meshes.iter().enumerate() {
             let is_outer = |at: usize, length: usize| at == 0 || at + 1 == length;
             for vertex in 0..mesh.len() {
                 if is_outer(vertex / mesh.columns, mesh.rows) || is_outer(vertex % mesh.columns, mesh.columns) {
                     let now = Vector2::from(mesh.target[vertex]);
-                    equations.add_inside(picture, &[(vertex, Vector2::new(weight, 0.0))], now * weight);
+                    equations.add_inside(photograph, &[(vertex, Vector2::new(weight, 0.0))], now * weight);
                 }
             }
         }
@@ -117,33 +103,39 @@ impl Problem<'_> {
 
     /// Rounds of photometric alignment, from coarse to fine. A step that folds the grids or tears match points apart is
     /// shortened; if that does not help it is undone, and ends its level.
-    fn align_pixels(
+    pub(super) fn align_pixels(
         &self,
         solver: &mut MeshSolver,
         equations: &NormalEquations,
-        (input, straight): (&PhotometricInput, Option<StraightInput>),
+        pixels: &PixelAlignment,
         start: Solved,
     ) -> Result<Solved> {
-        let options = input.options;
+        /// Most rounds at a level; each solves the mesh once.
+        const ROUNDS: usize = 4;
+        /// A level ends when the mean difference falls by less than this share in a round.
+        const SETTLED: f64 = 0.01;
+        /// A round that raises the root mean square distance of match points by more than this is undone, panorama
+        /// units.
+        const MAX_DEPARTURE_PX: f64 = 1.0;
+        let PixelAlignment { input, shares, straight } = *pixels;
         let mut best = start;
         let mut fine = self.delivered(&best.meshes);
         let folds = total_folds(&fine);
-        let shares = input.shares(self.warps, [&best.meshes, &fine], self.context)?;
-        for level in (0..options.levels).rev() {
+        for level in (0..LEVELS).rev() {
             let mut before = f64::INFINITY;
-            for _ in 0..options.rounds {
+            for _ in 0..ROUNDS {
                 let mut with_pixels = equations.clone();
-                let misfit =
-                    input.add(&mut with_pixels, self.warps, [&best.meshes, &fine], (level, &shares), self.context)?;
-                if misfit >= before * (1.0 - options.settled) {
+                let grids = self.current(&best.meshes, &fine);
+                let misfit = input.add(&mut with_pixels, self.warps, &grids, level, shares, self.context)?;
+                if misfit >= before * (1.0 - SETTLED) {
                     break;
                 }
                 before = misfit;
                 if let Some(straight) = straight {
-                    straight.add(&mut with_pixels, &Present { solved: &best.meshes, fine: &fine, places: self.places });
+                    straight.add(&mut with_pixels, &grids);
                 }
                 let next = self.solve(solver, &with_pixels)?;
-                let most_rms = self.alignment.rms(&best.meshes, best.period) + options.max_departure_px;
+                let most_rms = self.alignment.rms(&best.meshes, best.period) + MAX_DEPARTURE_PX;
                 let is_sound = |step: &Solved, fine: &[GridMesh]| {
                     total_folds(fine) <= folds && self.alignment.rms(&step.meshes, step.period) <= most_rms
                 };
@@ -154,6 +146,11 @@ impl Problem<'_> {
         Ok(best)
     }
 
+    /// The grids around which the next equations are made.
+    fn current<'b>(&'b self, solved: &'b [GridMesh], fine: &'b [GridMesh]) -> CurrentGrids<'b> {
+        CurrentGrids { solved, fine, places: self.places }
+    }
+
     /// The whole step from one solution to another, or its half or quarter, whichever is sound first; with the grids as
     /// delivered.
     fn longest_step(
@@ -162,6 +159,7 @@ impl Problem<'_> {
         to: Solved,
         is_sound: impl Fn(&Solved, &[GridMesh]) -> bool,
     ) -> Option<(Solved, Vec<GridMesh>)> {
+        /// What is tried, the longest first.
         const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
         SHARES.iter().find_map(|&share| {
             let meshes: Vec<GridMesh> =
@@ -183,8 +181,4 @@ fn between(from: &GridMesh, to: &GridMesh, share: f64) -> GridMesh {
         .map(|(from, to)| [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis])))
         .collect();
     GridMesh { target, ..to.clone() }
-}
-
-pub(super) fn total_folds(meshes: &[GridMesh]) -> usize {
-    meshes.iter().map(count_folds).sum()
 }
