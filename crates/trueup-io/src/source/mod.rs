@@ -3,6 +3,7 @@
 mod duplicates;
 mod inputs;
 mod names;
+mod rejection;
 #[cfg(test)]
 mod tests;
 
@@ -15,17 +16,23 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 
-use crate::format::{self, PictureFormat, SUPPORTED};
-use crate::metadata::{Header, HeaderError, TagVerdict, judge_orientation, read_header};
+use crate::format::{HeaderError, Reading};
+use crate::formats;
+use crate::metadata::header::{Header, read_header};
+use crate::metadata::orientation::{TagVerdict, judge_orientation};
 
 use duplicates::Accepted;
 use inputs::Candidate;
+use rejection::Rejection;
 
 pub use inputs::natural_order;
 pub use names::unique_names;
 
 /// The largest file that is opened. Files are read into memory to be decoded; no photograph is this large.
 const MAX_FILE_BYTES: u64 = 4 << 30;
+
+/// Shortest side in pixels that a photograph must have: the features and lines of smaller ones connect nothing.
+const MIN_SIDE_PX: usize = 16;
 
 trueup_core::choice! {
     /// When the EXIF orientation tag is applied.
@@ -42,12 +49,11 @@ trueup_core::choice! {
 trueup_core::options! {
     /// Which files are accepted as photographs.
     pub struct SourceOptions("source") {
-        /// Largest photograph that is accepted; larger ones are rejected by their header, before memory is taken.
+        /// Largest photograph that is accepted; larger ones are rejected by their header, before memory is taken. Raise it if
+        /// a photograph is truly so large; lower it to protect a server.
         max_megapixels: f64 = 300.0, between(0.001, 10_000.0), "megapixels";
-        /// Shortest side a photograph must have to be worth stitching.
-        min_side_px: usize = 16, between(1.0, 65_535.0), "px";
-        /// When the EXIF orientation tag is applied.
-        trust_orientation: OrientationTrust = OrientationTrust::Auto, Allowed::Any, "";
+        /// When the EXIF orientation tag is applied. Choose always or never if photographs lie on their side.
+        trust_orientation: OrientationTrust = OrientationTrust::Auto, Allowed::Any, "", basic;
     }
 }
 
@@ -84,20 +90,6 @@ impl RejectedSource {
     }
 }
 
-/// A reason for rejection, before it is tied to a file.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Rejection {
-    pub(crate) code: &'static str,
-    pub(crate) reason: String,
-    pub(crate) hint: String,
-}
-
-impl Rejection {
-    pub(crate) fn new(code: &'static str, reason: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self { code, reason: reason.into(), hint: hint.into() }
-    }
-}
-
 /// Finds the photographs that `inputs` name and reads their headers.
 ///
 /// An input is a file, a folder (its pictures, not those of folders inside it, hidden files left out) or a pattern with
@@ -111,6 +103,20 @@ impl Rejection {
 /// # Errors
 /// [`Error::Options`] for options out of range, [`Error::Cancelled`]. Never for what is in the files.
 pub fn scan(inputs: &[String], options: &SourceOptions, context: &StageContext) -> Result<Sources> {
+    scan_from_side(MIN_SIDE_PX, inputs, options, context)
+}
+
+/// [`scan`] that accepts pictures of any size from a pixel on.
+pub(crate) fn scan_any_size(inputs: &[String], options: &SourceOptions, context: &StageContext<'_>) -> Result<Sources> {
+    scan_from_side(1, inputs, options, context)
+}
+
+fn scan_from_side(
+    min_side_px: usize,
+    inputs: &[String],
+    options: &SourceOptions,
+    context: &StageContext<'_>,
+) -> Result<Sources> {
     options.check()?;
     let candidates = inputs::expand(inputs);
     let paths: Vec<&Path> = candidates.iter().map(Candidate::path).collect();
@@ -123,7 +129,9 @@ pub fn scan(inputs: &[String], options: &SourceOptions, context: &StageContext) 
         context.check_cancelled()?;
         let path = candidate.path().to_owned();
         let number = sources.images.len();
-        match examine(candidate, &name, number, options, &mut accepted, context) {
+        let examined = open_candidate(candidate, options, min_side_px)
+            .and_then(|opened| examine(opened, &name, number, options, &mut accepted, context));
+        match examined {
             Ok(image) => sources.images.push(image),
             Err(Rejection { code, reason, hint }) => {
                 sources.rejected.push(RejectedSource { path, name, code: code.to_owned(), reason, hint });
@@ -144,22 +152,27 @@ pub fn files(inputs: &[String]) -> Vec<PathBuf> {
     inputs::expand(inputs).into_iter().filter_map(file).collect()
 }
 
-/// Decides over one candidate, which is to be photograph `number`.
-fn examine(
+/// A candidate whose header was read, and whose size is accepted.
+struct OpenedPicture {
+    path: PathBuf,
+    /// Bytes of the file.
+    length: u64,
+    header: Header,
+}
+
+/// Reads a candidate's header.
+fn open_candidate(
     candidate: Candidate,
-    name: &str,
-    number: usize,
     options: &SourceOptions,
-    accepted: &mut Accepted,
-    context: &StageContext,
-) -> std::result::Result<SourceImage, Rejection> {
+    min_side_px: usize,
+) -> std::result::Result<OpenedPicture, Rejection> {
     let path = match candidate {
         Candidate::Rejected(_, rejection) => return Err(rejection),
         Candidate::File(path) => path,
     };
     let (mut file, length) = open(&path)?;
     let format = recognize(&mut file, length)?;
-    let header = read_header(&file, format).map_err(|error| match error {
+    let header = read_header(file, format).map_err(|error| match error {
         HeaderError::Damaged(words) => Rejection::new(
             "picture-damaged",
             format!("its header cannot be read ({words})"),
@@ -171,8 +184,22 @@ fn examine(
             "Export it as gray or RGB with 8 or 16 bits a sample.",
         ),
     })?;
-    check_size(&header, options)?;
-    if header.is_float {
+    check_size(&header, options, min_side_px)?;
+    Ok(OpenedPicture { path, length, header })
+}
+
+/// Decides over one picture, which is to be photograph `number`.
+fn examine(
+    opened: OpenedPicture,
+    name: &str,
+    number: usize,
+    options: &SourceOptions,
+    accepted: &mut Accepted,
+    context: &StageContext<'_>,
+) -> std::result::Result<SourceImage, Rejection> {
+    let OpenedPicture { path, length, header } = opened;
+    let stored = header.stored;
+    if stored.is_float {
         context.report(Diagnostic::note(
             "floating-point",
             Subject::Photograph(number),
@@ -184,7 +211,7 @@ fn examine(
 
     let tag = header.exif.orientation;
     let verdict = match options.trust_orientation {
-        OrientationTrust::Auto => judge_orientation(tag, header.stored_width, header.stored_height),
+        OrientationTrust::Auto => judge_orientation(tag, stored.width, stored.height),
         OrientationTrust::Always => TagVerdict::Applied(tag.and_then(|tag| u8::try_from(tag).ok()).unwrap_or(1)),
         OrientationTrust::Never => TagVerdict::Applied(1),
     };
@@ -197,8 +224,8 @@ fn examine(
         }
     };
     let (width, height) = match orientation {
-        5..=8 => (header.stored_height, header.stored_width),
-        _ => (header.stored_width, header.stored_height),
+        5..=8 => (stored.height, stored.width),
+        _ => (stored.width, stored.height),
     };
     let focal_prior = header.focal_prior();
     let camera_model = header.exif.camera_model();
@@ -213,7 +240,7 @@ fn stale_tag_note(number: usize, header: &Header) -> Diagnostic {
         format!(
             "the EXIF orientation tag ({tag}, a quarter turn) was not applied: the pixels are stored upright already, \
              {} x {}",
-            header.stored_width, header.stored_height
+            header.stored.width, header.stored.height
         ),
         "If the photograph now lies on its side, set source.trust_orientation to always.",
     )
@@ -249,7 +276,7 @@ fn open(path: &Path) -> std::result::Result<(File, u64), Rejection> {
 }
 
 /// Tells the format by the file's first bytes.
-fn recognize(file: &mut File, length: u64) -> std::result::Result<PictureFormat, Rejection> {
+fn recognize(file: &mut File, length: u64) -> std::result::Result<&'static Reading, Rejection> {
     if length == 0 {
         return Err(Rejection::new(
             "file-empty",
@@ -257,28 +284,29 @@ fn recognize(file: &mut File, length: u64) -> std::result::Result<PictureFormat,
             "Copy it again from the camera or leave it out.",
         ));
     }
-    let start = format::read_start(file).map_err(|error| {
+    let start = formats::read_start(file).map_err(|error| {
         Rejection::new("file-unreadable", format!("it cannot be read ({error})"), "Check the file and its permissions.")
     })?;
-    if let Some(format) = PictureFormat::of_content(&start) {
+    if let Some(format) = formats::reading_of(&start) {
         return Ok(format);
     }
-    Err(match format::describe_foreign_content(&start) {
+    let readable = formats::readable_names();
+    Err(match formats::describe_foreign_content(&start) {
         Some(what) => Rejection::new(
             "format-unsupported",
             format!("it is {what}, a format that is not read"),
-            format!("Convert it to {SUPPORTED}."),
+            format!("Convert it to {readable}."),
         ),
         None => Rejection::new(
             "not-a-picture",
-            format!("its content is not a {SUPPORTED} picture, whatever its name says"),
-            format!("Give photographs in {SUPPORTED}."),
+            format!("its content is not a {readable} picture, whatever its name says"),
+            format!("Give photographs in {readable}."),
         ),
     })
 }
 
-fn check_size(header: &Header, options: &SourceOptions) -> std::result::Result<(), Rejection> {
-    let (width, height) = (header.stored_width, header.stored_height);
+fn check_size(header: &Header, options: &SourceOptions, min_side_px: usize) -> std::result::Result<(), Rejection> {
+    let (width, height) = (header.stored.width, header.stored.height);
     let megapixels = width as f64 * height as f64 / 1e6;
     if megapixels > options.max_megapixels {
         return Err(Rejection::new(
@@ -290,10 +318,10 @@ fn check_size(header: &Header, options: &SourceOptions) -> std::result::Result<(
             "Export a smaller copy, or raise source.max_megapixels if the picture is truly this large.",
         ));
     }
-    if width.min(height) < options.min_side_px {
+    if width.min(height) < min_side_px {
         return Err(Rejection::new(
             "picture-too-small",
-            format!("{width} x {height} px are too few to stitch, each side needs {}", options.min_side_px),
+            format!("{width} x {height} px are too few to stitch, each side needs {min_side_px}"),
             "Give the photograph in its original size.",
         ));
     }
