@@ -10,7 +10,7 @@ use trueup_core::raster::{Photograph, RowSource};
 use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
 
-use crate::encode::failure::Failure;
+use crate::encode::failure::WriteFailure;
 use crate::encode::metadata::Metadata;
 use crate::encode::options::{Depth, OutputOptions};
 use crate::metadata::exif_fields::ExifFields;
@@ -146,7 +146,7 @@ pub(crate) enum Writer {
             &Metadata,
             &OutputOptions,
             &StageContext<'_>,
-        ) -> std::result::Result<(), Failure>,
+        ) -> std::result::Result<(), WriteFailure>,
     ),
     /// Makes several files and folders beside each other.
     Files {

@@ -7,7 +7,7 @@ use ::tiff::decoder::Decoder;
 use ::tiff::tags::Tag;
 use tempfile::TempDir;
 
-use super::failure::Failure;
+use super::failure::WriteFailure;
 use super::format_tests::{Fine, pages, sixteen};
 use super::tests::FullDisk;
 use super::*;
@@ -86,7 +86,7 @@ fn layers_are_pages_with_a_place() {
             &options,
             &StageContext::default(),
         );
-        assert!(matches!(failed, Err(Failure::Io(_))), "{failed:?}");
+        assert!(matches!(failed, Err(WriteFailure::Io(_))), "{failed:?}");
     }
 }
 
@@ -145,6 +145,6 @@ fn labels_are_the_samples() {
         &OutputOptions::default(),
         &StageContext::default(),
     );
-    assert!(matches!(failed, Err(Failure::Io(_))));
+    assert!(matches!(failed, Err(WriteFailure::Io(_))));
     assert!(check_labels_place(&folder.path().join("a.tif")).is_err());
 }

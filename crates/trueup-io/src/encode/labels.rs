@@ -8,7 +8,7 @@ use trueup_core::options::StageOptions;
 use trueup_core::{Error, Result, StageContext};
 
 use super::destination::check_sides;
-use super::failure::Failure;
+use super::failure::WriteFailure;
 use super::options::OutputOptions;
 use super::pending::{PendingFile, check_place};
 use super::strips::{BUFFER_BYTES, STRIP_ROWS};
@@ -72,7 +72,7 @@ pub(super) fn write_map(
     map: &dyn LabelMap,
     options: &OutputOptions,
     context: &StageContext<'_>,
-) -> std::result::Result<(), Failure> {
+) -> std::result::Result<(), WriteFailure> {
     let names = map.names();
     let [width, height] = map.size();
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);

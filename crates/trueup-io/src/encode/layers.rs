@@ -8,7 +8,7 @@ use trueup_core::raster::RowSource;
 use trueup_core::{Error, Result, StageContext};
 
 use super::destination::check_sides;
-use super::failure::Failure;
+use super::failure::WriteFailure;
 use super::metadata::Metadata;
 use super::options::{Depth, LayerExtent, OutputOptions};
 use super::pending::{PendingFile, check_place};
@@ -95,7 +95,7 @@ pub(super) fn write_pages(
     metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext<'_>,
-) -> std::result::Result<(), Failure> {
+) -> std::result::Result<(), WriteFailure> {
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
     context.progress().begin(OutputOptions::STAGE, set.count() as u64);
     let form = PageForm::of_layers(options);
@@ -115,7 +115,7 @@ fn write_each(
     options: &OutputOptions,
     form: PageForm,
     context: &StageContext<'_>,
-) -> std::result::Result<(), Failure> {
+) -> std::result::Result<(), WriteFailure> {
     let whole = set.whole();
     let converted = metadata.profile_to_leave(options, options.depth == Depth::Float);
     let icc = metadata.icc.clone().filter(|_| converted.is_none());

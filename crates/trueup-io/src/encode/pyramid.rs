@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::failure::Failure;
+use super::failure::WriteFailure;
 use super::samples::{OutputSample, RGBA};
 
 /// How every level is cut into tiles.
@@ -95,8 +95,8 @@ impl<S: OutputSample> TilePyramid<S> {
     pub(crate) fn push(
         &mut self,
         rows: &[S],
-        emit: &mut dyn FnMut(TileRow<'_, S>) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+        emit: &mut dyn FnMut(TileRow<'_, S>) -> Result<(), WriteFailure>,
+    ) -> Result<(), WriteFailure> {
         let mut halves: Vec<S>;
         let mut rows = rows;
         for index in 0..self.levels.len() {
@@ -125,8 +125,8 @@ impl<S: OutputSample> Level<S> {
         &mut self,
         level: usize,
         tiling: Tiling,
-        emit: &mut dyn FnMut(TileRow<'_, S>) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+        emit: &mut dyn FnMut(TileRow<'_, S>) -> Result<(), WriteFailure>,
+    ) -> Result<(), WriteFailure> {
         while self.next < tiling.count(self.height) && tiling.span(self.next, self.height).end <= self.end() {
             let span = tiling.span(self.next, self.height);
             let row = self.width * RGBA;

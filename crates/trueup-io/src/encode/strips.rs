@@ -5,7 +5,7 @@ use trueup_core::StageContext;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::RowSource;
 
-use super::failure::Failure;
+use super::failure::WriteFailure;
 use super::options::{Alpha, OutputOptions};
 use super::samples::{OutputSample, RGBA};
 
@@ -27,8 +27,8 @@ pub(crate) fn for_each_strip<S: OutputSample>(
     picture: &dyn RowSource,
     rows: usize,
     context: &StageContext<'_>,
-    consume: &mut dyn FnMut(&[S]) -> Result<(), Failure>,
-) -> Result<(), Failure> {
+    consume: &mut dyn FnMut(&[S]) -> Result<(), WriteFailure>,
+) -> Result<(), WriteFailure> {
     let row_samples = picture.width() * RGBA;
     let mut strip = vec![S::default(); row_samples * rows.min(picture.height())];
     for first in (0..picture.height()).step_by(rows.max(1)) {

@@ -4,7 +4,7 @@ use tempfile::TempDir;
 use trueup_core::context::{CancelToken, Silent};
 use trueup_core::raster::{Photograph, Raster};
 
-use super::failure::Failure;
+use super::failure::WriteFailure;
 use super::*;
 use crate::format::Output;
 use crate::formats;
@@ -292,8 +292,8 @@ fn a_full_disk_is_an_error_in_every_format() {
             };
             let disk: &mut dyn Output = &mut FullDisk { position: 0, room };
             let result = write(disk, picture, &metadata, options, &context);
-            let Err(Failure::Io(error)) = result else { panic!("{name}, room {room}: {result:?}") };
-            let message = Failure::Io(error).at(Path::new("a.jpg")).to_string();
+            let Err(WriteFailure::Io(error)) = result else { panic!("{name}, room {room}: {result:?}") };
+            let message = WriteFailure::Io(error).at(Path::new("a.jpg")).to_string();
             assert!(message.starts_with("writing a.jpg"), "{message}");
         }
     }

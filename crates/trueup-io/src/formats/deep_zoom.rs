@@ -16,7 +16,7 @@ use trueup_core::{Error, Result, StageContext};
 
 use super::jpeg::write::set_sampling;
 use super::png::{compression, failure};
-use crate::encode::failure::Failure;
+use crate::encode::failure::WriteFailure;
 use crate::encode::folder::PendingFolder;
 use crate::encode::options::{DeepZoomFormat, Depth, OutputOptions};
 use crate::encode::pending::PendingFile;
@@ -149,7 +149,7 @@ fn write_tiles(
     picture: &dyn RowSource,
     options: &OutputOptions,
     context: &StageContext<'_>,
-) -> std::result::Result<u64, Failure> {
+) -> std::result::Result<u64, WriteFailure> {
     let tiling = Tiling { side: options.dzi_tile_px, overlap: options.dzi_overlap_px };
     let sizes = level_sizes(picture.width(), picture.height(), |_, _| false);
     let folders: Vec<PathBuf> =
@@ -185,7 +185,7 @@ fn tile(
     tiling: Tiling,
     channels: usize,
     options: &OutputOptions,
-) -> std::result::Result<Vec<u8>, Failure> {
+) -> std::result::Result<Vec<u8>, WriteFailure> {
     let columns = tiling.span(column, tiles.width);
     let background = u8::of(options.background);
     let (mut samples, mut row) = (Vec::new(), Vec::new());

@@ -12,7 +12,7 @@ use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
 
 use super::decoded::{HEADER_BYTES, check_unchanged, damaged, decoding_limit, eight, sample_count, sixteen};
-use crate::encode::failure::Failure;
+use crate::encode::failure::WriteFailure;
 use crate::encode::metadata::Metadata;
 use crate::encode::options::{Depth, OutputOptions, PngCompression};
 use crate::encode::samples::{OutputSample, RGBA, flattened};
@@ -105,7 +105,7 @@ pub(super) fn write(
     metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext<'_>,
-) -> std::result::Result<(), Failure> {
+) -> std::result::Result<(), WriteFailure> {
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
     let channels = channels_of(picture, options);
     let info = info(metadata, picture.width() as u32, picture.height() as u32);
@@ -160,9 +160,9 @@ pub(crate) fn compression(options: &OutputOptions) -> Compression {
 }
 
 /// Why a PNG could not be written.
-pub(crate) fn failure(error: EncodingError) -> Failure {
+pub(crate) fn failure(error: EncodingError) -> WriteFailure {
     match error {
-        EncodingError::IoError(error) => Failure::Io(error),
-        other => Failure::Io(std::io::Error::other(other)),
+        EncodingError::IoError(error) => WriteFailure::Io(error),
+        other => WriteFailure::Io(std::io::Error::other(other)),
     }
 }

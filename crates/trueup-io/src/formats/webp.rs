@@ -8,7 +8,7 @@ use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
 
 use super::decoded::{check_unchanged, damaged, eight, sample_count};
-use crate::encode::failure::Failure;
+use crate::encode::failure::WriteFailure;
 use crate::encode::metadata::Metadata;
 use crate::encode::options::{Depth, OutputOptions};
 use crate::encode::samples::{OutputSample, RGBA, flattened};
@@ -71,7 +71,7 @@ pub(super) fn write(
     metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext<'_>,
-) -> std::result::Result<(), Failure> {
+) -> std::result::Result<(), WriteFailure> {
     let channels = channels_of(picture, options);
     let mut pixels = Vec::with_capacity(picture.width() * picture.height() * channels);
     let mut samples = Vec::new();

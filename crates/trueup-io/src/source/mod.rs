@@ -3,11 +3,12 @@
 mod duplicates;
 mod inputs;
 mod names;
+mod opened;
+mod options;
 mod rejection;
 #[cfg(test)]
 mod tests;
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -16,46 +17,20 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 
-use crate::format::{HeaderError, Reading};
-use crate::formats;
-use crate::metadata::header::{Header, read_header};
+use crate::metadata::header::Header;
 use crate::metadata::orientation::{TagVerdict, judge_orientation};
 
 use duplicates::Accepted;
 use inputs::Candidate;
+use opened::{OpenedPicture, open_candidate};
 use rejection::Rejection;
 
 pub use inputs::natural_order;
 pub use names::unique_names;
-
-/// The largest file that is opened. Files are read into memory to be decoded; no photograph is this large.
-const MAX_FILE_BYTES: u64 = 4 << 30;
+pub use options::{OrientationTrust, SourceOptions};
 
 /// Shortest side in pixels that a photograph must have: the features and lines of smaller ones connect nothing.
 const MIN_SIDE_PX: usize = 16;
-
-trueup_core::choice! {
-    /// When the EXIF orientation tag is applied.
-    pub enum OrientationTrust {
-        /// Unless the stored size shows that the pixels were turned already.
-        Auto = "auto",
-        /// Whenever the tag is present.
-        Always = "always",
-        /// Pixels are taken as they are stored.
-        Never = "never",
-    }
-}
-
-trueup_core::options! {
-    /// Which files are accepted as photographs.
-    pub struct SourceOptions("source") {
-        /// Largest photograph that is accepted; larger ones are rejected by their header, before memory is taken. Raise it if
-        /// a photograph is truly so large; lower it to protect a server.
-        max_megapixels: f64 = 300.0, between(0.001, 10_000.0), "megapixels";
-        /// When the EXIF orientation tag is applied. Choose always or never if photographs lie on their side.
-        trust_orientation: OrientationTrust = OrientationTrust::Auto, Allowed::Any, "", basic;
-    }
-}
 
 /// What [`scan`] found.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -152,42 +127,6 @@ pub fn files(inputs: &[String]) -> Vec<PathBuf> {
     inputs::expand(inputs).into_iter().filter_map(file).collect()
 }
 
-/// A candidate whose header was read, and whose size is accepted.
-struct OpenedPicture {
-    path: PathBuf,
-    /// Bytes of the file.
-    length: u64,
-    header: Header,
-}
-
-/// Reads a candidate's header.
-fn open_candidate(
-    candidate: Candidate,
-    options: &SourceOptions,
-    min_side_px: usize,
-) -> std::result::Result<OpenedPicture, Rejection> {
-    let path = match candidate {
-        Candidate::Rejected(_, rejection) => return Err(rejection),
-        Candidate::File(path) => path,
-    };
-    let (mut file, length) = open(&path)?;
-    let format = recognize(&mut file, length)?;
-    let header = read_header(file, format).map_err(|error| match error {
-        HeaderError::Damaged(words) => Rejection::new(
-            "picture-damaged",
-            format!("its header cannot be read ({words})"),
-            "Export it again or leave it out.",
-        ),
-        HeaderError::Unsupported(words) => Rejection::new(
-            "format-unsupported",
-            format!("it is of a kind that is not read ({words})"),
-            "Export it as gray or RGB with 8 or 16 bits a sample.",
-        ),
-    })?;
-    check_size(&header, options, min_side_px)?;
-    Ok(OpenedPicture { path, length, header })
-}
-
 /// Decides over one picture, which is to be photograph `number`.
 fn examine(
     opened: OpenedPicture,
@@ -244,86 +183,4 @@ fn stale_tag_note(number: usize, header: &Header) -> Diagnostic {
         ),
         "If the photograph now lies on its side, set source.trust_orientation to always.",
     )
-}
-
-/// Opens a file; tells its length in bytes.
-fn open(path: &Path) -> std::result::Result<(File, u64), Rejection> {
-    let unreadable = |error: std::io::Error| {
-        Rejection::new("file-unreadable", format!("it cannot be read ({error})"), "Check the file and its permissions.")
-    };
-    // Looked at before it is opened: opening a named pipe would wait for its writer.
-    let metadata = std::fs::metadata(path).map_err(unreadable)?;
-    if metadata.is_dir() {
-        return Err(Rejection::new(
-            "folder-not-file",
-            "it is a folder, not a picture",
-            "Give the folder itself to use the pictures in it.",
-        ));
-    }
-    if !metadata.is_file() {
-        return Err(Rejection::new("file-unreadable", "it is not a regular file", "Give a picture file."));
-    }
-    let length = metadata.len();
-    if length > MAX_FILE_BYTES {
-        let gibibytes = length as f64 / (1_u64 << 30) as f64;
-        return Err(Rejection::new(
-            "picture-too-large",
-            format!("the file has {gibibytes:.1} GiB, at most {} are read", MAX_FILE_BYTES >> 30),
-            "Export a smaller copy of it.",
-        ));
-    }
-    Ok((File::open(path).map_err(unreadable)?, length))
-}
-
-/// Tells the format by the file's first bytes.
-fn recognize(file: &mut File, length: u64) -> std::result::Result<&'static Reading, Rejection> {
-    if length == 0 {
-        return Err(Rejection::new(
-            "file-empty",
-            "the file is empty (0 bytes)",
-            "Copy it again from the camera or leave it out.",
-        ));
-    }
-    let start = formats::read_start(file).map_err(|error| {
-        Rejection::new("file-unreadable", format!("it cannot be read ({error})"), "Check the file and its permissions.")
-    })?;
-    if let Some(format) = formats::reading_of(&start) {
-        return Ok(format);
-    }
-    let readable = formats::readable_names();
-    Err(match formats::describe_foreign_content(&start) {
-        Some(what) => Rejection::new(
-            "format-unsupported",
-            format!("it is {what}, a format that is not read"),
-            format!("Convert it to {readable}."),
-        ),
-        None => Rejection::new(
-            "not-a-picture",
-            format!("its content is not a {readable} picture, whatever its name says"),
-            format!("Give photographs in {readable}."),
-        ),
-    })
-}
-
-fn check_size(header: &Header, options: &SourceOptions, min_side_px: usize) -> std::result::Result<(), Rejection> {
-    let (width, height) = (header.stored.width, header.stored.height);
-    let megapixels = width as f64 * height as f64 / 1e6;
-    if megapixels > options.max_megapixels {
-        return Err(Rejection::new(
-            "picture-too-large",
-            format!(
-                "{width} x {height} px are {megapixels:.0} megapixels, at most {} are accepted",
-                options.max_megapixels
-            ),
-            "Export a smaller copy, or raise source.max_megapixels if the picture is truly this large.",
-        ));
-    }
-    if width.min(height) < min_side_px {
-        return Err(Rejection::new(
-            "picture-too-small",
-            format!("{width} x {height} px are too few to stitch, each side needs {min_side_px}"),
-            "Give the photograph in its original size.",
-        ));
-    }
-    Ok(())
 }

@@ -7,7 +7,7 @@ use trueup_core::options::StageOptions;
 use trueup_core::raster::RowSource;
 
 use super::segments::with_metadata;
-use crate::encode::failure::Failure;
+use crate::encode::failure::WriteFailure;
 use crate::encode::metadata::Metadata;
 use crate::encode::options::{ChromaSubsampling, OutputOptions};
 use crate::encode::samples::{OutputSample, RGBA, flattened};
@@ -34,7 +34,7 @@ pub(crate) fn write(
     metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext<'_>,
-) -> Result<(), Failure> {
+) -> Result<(), WriteFailure> {
     let height = picture.height();
     let firsts: Vec<usize> = (0..height).step_by(STRIP_ROWS).collect();
     let mut strip_number = 0_usize;
@@ -45,7 +45,7 @@ pub(crate) fn write(
                 context.check_cancelled()?;
                 encode_strip(picture, first, STRIP_ROWS.min(height - first), options)
             })
-            .collect::<Result<_, Failure>>()?;
+            .collect::<Result<_, WriteFailure>>()?;
         for strip in strips {
             let (header, coded) = split_scan(&strip).ok_or_else(malformed)?;
             if strip_number == 0 {
@@ -75,7 +75,7 @@ fn encode_strip(
     first: usize,
     rows: usize,
     options: &OutputOptions,
-) -> Result<Vec<u8>, Failure> {
+) -> Result<Vec<u8>, WriteFailure> {
     let width = picture.width();
     let mut row = vec![0; width * RGBA];
     let (mut rgb, mut flat) = (Vec::with_capacity(width * rows * 3), Vec::new());
@@ -138,6 +138,6 @@ fn with_height(header: &[u8], height: usize) -> Option<Vec<u8>> {
     }
 }
 
-fn malformed() -> Failure {
-    Failure::Io(std::io::Error::other("the JPEG encoder gave an unexpected result"))
+fn malformed() -> WriteFailure {
+    WriteFailure::Io(std::io::Error::other("the JPEG encoder gave an unexpected result"))
 }

@@ -10,7 +10,7 @@ use trueup_core::StageContext;
 use trueup_core::raster::RowSource;
 
 use crate::encode::background::Background;
-use crate::encode::failure::Failure;
+use crate::encode::failure::WriteFailure;
 use crate::encode::options::Depth;
 use crate::encode::pyramid::{TilePyramid, TileRow, Tiling};
 use crate::encode::samples::{OutputSample, RGBA, flattened};
@@ -33,7 +33,7 @@ pub(super) struct BlockForm {
 
 /// Where a block is in the file, in bytes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Block {
+pub(super) struct WrittenBlock {
     offset: u64,
     length: u64,
 }
@@ -46,7 +46,7 @@ pub(super) struct StoredBlocks {
 }
 
 impl StoredBlocks {
-    fn add(&mut self, block: Block) {
+    fn add(&mut self, block: WrittenBlock) {
         self.offsets.push(block.offset);
         self.lengths.push(block.length);
     }
@@ -55,20 +55,20 @@ impl StoredBlocks {
 /// A file that takes blocks, one behind the other.
 pub(super) trait BlockSink {
     /// Writes a block; tells where.
-    fn write_block(&mut self, bytes: &[u8]) -> Result<Block, Failure>;
+    fn write_block(&mut self, bytes: &[u8]) -> Result<WrittenBlock, WriteFailure>;
 }
 
 impl<W: Write + Seek, K: TiffKind> BlockSink for DirectoryEncoder<'_, W, K> {
-    fn write_block(&mut self, bytes: &[u8]) -> Result<Block, Failure> {
-        Ok(Block { offset: self.write_data(bytes).map_err(failure)?, length: bytes.len() as u64 })
+    fn write_block(&mut self, bytes: &[u8]) -> Result<WrittenBlock, WriteFailure> {
+        Ok(WrittenBlock { offset: self.write_data(bytes).map_err(failure)?, length: bytes.len() as u64 })
     }
 }
 
 /// Why a TIFF could not be written.
-pub(super) fn failure(error: TiffError) -> Failure {
+pub(super) fn failure(error: TiffError) -> WriteFailure {
     match error {
-        TiffError::IoError(error) => Failure::Io(error),
-        other => Failure::Io(std::io::Error::other(other)),
+        TiffError::IoError(error) => WriteFailure::Io(error),
+        other => WriteFailure::Io(std::io::Error::other(other)),
     }
 }
 
@@ -78,7 +78,7 @@ pub(super) fn write_strips(
     picture: &dyn RowSource,
     form: BlockForm,
     context: &StageContext<'_>,
-) -> Result<StoredBlocks, Failure> {
+) -> Result<StoredBlocks, WriteFailure> {
     match form.depth {
         Depth::Auto | Depth::Eight => strips_of::<u8>(sink, picture, form, context),
         Depth::Sixteen => strips_of::<u16>(sink, picture, form, context),
@@ -94,7 +94,7 @@ pub(super) fn write_tiles(
     levels: Levels<'_>,
     form: BlockForm,
     context: &StageContext<'_>,
-) -> Result<Vec<StoredBlocks>, Failure> {
+) -> Result<Vec<StoredBlocks>, WriteFailure> {
     match form.depth {
         Depth::Auto | Depth::Eight => tiles_of::<u8>(sink, picture, levels, form, context),
         Depth::Sixteen => tiles_of::<u16>(sink, picture, levels, form, context),
@@ -116,7 +116,7 @@ fn strips_of<S: OutputSample>(
     picture: &dyn RowSource,
     form: BlockForm,
     context: &StageContext<'_>,
-) -> Result<StoredBlocks, Failure> {
+) -> Result<StoredBlocks, WriteFailure> {
     let row = picture.width() * RGBA;
     let mut stored = StoredBlocks::default();
     // As many strips at a time as can be compressed side by side.
@@ -140,12 +140,12 @@ fn tiles_of<S: OutputSample>(
     levels: Levels<'_>,
     form: BlockForm,
     context: &StageContext<'_>,
-) -> Result<Vec<StoredBlocks>, Failure> {
+) -> Result<Vec<StoredBlocks>, WriteFailure> {
     let Levels { sizes, side } = levels;
     let tiling = Tiling { side, overlap: 0 };
     let mut pyramid = TilePyramid::<S>::new(sizes, tiling);
     let mut stored: Vec<StoredBlocks> = sizes.iter().map(|_| StoredBlocks::default()).collect();
-    let mut empty: Option<Block> = None;
+    let mut empty: Option<WrittenBlock> = None;
     let columns: Vec<usize> = (0..tiling.count(picture.width())).collect();
     for_each_strip::<S>(picture, STRIP_ROWS.min(side), context, &mut |rows| {
         pyramid.push(rows, &mut |tiles| {

@@ -10,7 +10,7 @@ use tiff::tags::{
 
 use super::blocks::{BlockForm, StoredBlocks, failure};
 use super::metadata::{Ascii, HangingDirectories, write_tags};
-use crate::encode::failure::Failure;
+use crate::encode::failure::WriteFailure;
 use crate::encode::metadata::Metadata;
 use crate::encode::options::Depth;
 use crate::encode::samples::RGBA;
@@ -80,7 +80,7 @@ pub(super) fn write_directory<W: Write + Seek, K: TiffKind>(
     mut directory: DirectoryEncoder<'_, W, K>,
     page: PageTags<'_>,
     stored: &StoredBlocks,
-) -> Result<(), Failure> {
+) -> Result<(), WriteFailure> {
     let channels = page.form.channels;
     let is_float = page.form.depth == Depth::Float;
     let bits = 8 * u16::from(page.form.depth.sample_bytes());
@@ -129,7 +129,7 @@ fn write_blocks<W: Write + Seek, K: TiffKind>(
     directory: &mut DirectoryEncoder<'_, W, K>,
     blocks: BlockLayout,
     stored: &StoredBlocks,
-) -> Result<(), Failure> {
+) -> Result<(), WriteFailure> {
     let (offsets, lengths) = match blocks {
         BlockLayout::Strips(rows) => {
             directory.write_tag(Tag::RowsPerStrip, rows as u32).map_err(failure)?;
@@ -150,7 +150,7 @@ fn write_numbers<W: Write + Seek, K: TiffKind>(
     directory: &mut DirectoryEncoder<'_, W, K>,
     tag: Tag,
     values: &[u64],
-) -> Result<(), Failure> {
+) -> Result<(), WriteFailure> {
     let short: Result<Vec<u32>, _> = values.iter().map(|&value| u32::try_from(value)).collect();
     match short {
         Ok(values) => directory.write_tag(tag, &values[..]),
@@ -162,7 +162,7 @@ fn write_numbers<W: Write + Seek, K: TiffKind>(
 fn write_place<W: Write + Seek, K: TiffKind>(
     directory: &mut DirectoryEncoder<'_, W, K>,
     place: &PagePlace<'_>,
-) -> Result<(), Failure> {
+) -> Result<(), WriteFailure> {
     let resolution = Rational { n: PIXELS_PER_INCH, d: 1 };
     let inches = |pixels: u32| Rational { n: pixels, d: PIXELS_PER_INCH };
     let rationals = [

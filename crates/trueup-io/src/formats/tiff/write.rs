@@ -9,7 +9,7 @@ use trueup_core::raster::RowSource;
 use super::blocks::{BlockForm, Levels, failure, write_strips, write_tiles};
 use super::directory::{BlockLayout, PageMetadata, PageTags, write_directory};
 use super::metadata::write_directories;
-use crate::encode::failure::Failure;
+use crate::encode::failure::WriteFailure;
 use crate::encode::metadata::Metadata;
 use crate::encode::options::{BigTiff, OutputOptions, TiffCompression, TiffLayout};
 use crate::encode::pyramid::level_sizes;
@@ -37,7 +37,7 @@ pub(crate) fn write(
     metadata: &Metadata,
     options: &OutputOptions,
     context: &StageContext<'_>,
-) -> Result<(), Failure> {
+) -> Result<(), WriteFailure> {
     let form = PageForm::of(picture, options);
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
     let is_big = form.is_big(picture.width() as u64 * picture.height() as u64, options);
@@ -54,7 +54,7 @@ pub(crate) enum TiffPages<'a> {
 
 impl<'a> TiffPages<'a> {
     /// A file without pages, with 64-bit offsets or with 32-bit ones.
-    pub(crate) fn begin(output: &'a mut dyn Output, is_big: bool) -> Result<Self, Failure> {
+    pub(crate) fn begin(output: &'a mut dyn Output, is_big: bool) -> Result<Self, WriteFailure> {
         Ok(match is_big {
             true => Self::Big(TiffEncoder::new_big(output).map_err(failure)?),
             false => Self::Classic(TiffEncoder::new(output).map_err(failure)?),
@@ -69,7 +69,7 @@ impl<'a> TiffPages<'a> {
         form: PageForm,
         place: Option<&PagePlace<'_>>,
         context: &StageContext<'_>,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), WriteFailure> {
         match self {
             Self::Classic(encoder) => write_picture(encoder, picture, metadata, form, place, context),
             Self::Big(encoder) => write_picture(encoder, picture, metadata, form, place, context),
@@ -135,7 +135,7 @@ fn write_picture<W: Write + Seek, K: TiffKind>(
     form: PageForm,
     place: Option<&PagePlace<'_>>,
     context: &StageContext<'_>,
-) -> Result<(), Failure> {
+) -> Result<(), WriteFailure> {
     let hanging = write_directories(encoder, metadata).map_err(failure)?;
     let page = |[width, height]: [usize; 2], level, blocks| PageTags {
         width: width as u32,
