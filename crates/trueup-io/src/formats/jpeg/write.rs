@@ -1,15 +1,17 @@
 //! JPEG in strips that are encoded in parallel.
 
-use std::io::Write;
-
 use jpeg_encoder::{ChromaSubsamplingMethod, ColorType, Encoder, JfifWrite, SamplingFactor};
 use rayon::prelude::*;
 use trueup_core::StageContext;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::RowSource;
 
-use super::samples::{Sample, flattened};
-use super::{ChromaSubsampling, Failure, Metadata, OutputOptions, RGBA};
+use super::segments::with_metadata;
+use crate::encode::failure::WriteFailure;
+use crate::encode::metadata::Metadata;
+use crate::encode::options::{ChromaSubsampling, OutputOptions};
+use crate::encode::samples::{OutputSample, RGBA, flattened};
+use crate::format::Output;
 
 /// Rows of a strip: a multiple of 8 and of 16, the heights of a minimum coded unit, and few enough that the units of a
 /// strip of the largest width fit the 16-bit restart interval.
@@ -26,13 +28,13 @@ const STRIPS_PER_THREAD: usize = 4;
 ///
 /// # Source
 /// ITU-T T.81 sections B.2 (headers), E.1.3 to E.1.4 (restart intervals) and F.1.2 (byte alignment of their ends).
-pub(super) fn write(
-    file: &mut impl Write,
+pub(crate) fn write(
+    file: &mut dyn Output,
     picture: &dyn RowSource,
     metadata: &Metadata,
     options: &OutputOptions,
-    context: &StageContext,
-) -> Result<(), Failure> {
+    context: &StageContext<'_>,
+) -> Result<(), WriteFailure> {
     let height = picture.height();
     let firsts: Vec<usize> = (0..height).step_by(STRIP_ROWS).collect();
     let mut strip_number = 0_usize;
@@ -43,11 +45,11 @@ pub(super) fn write(
                 context.check_cancelled()?;
                 encode_strip(picture, first, STRIP_ROWS.min(height - first), options)
             })
-            .collect::<Result<_, Failure>>()?;
+            .collect::<Result<_, WriteFailure>>()?;
         for strip in strips {
             let (header, coded) = split_scan(&strip).ok_or_else(malformed)?;
             if strip_number == 0 {
-                file.write_all(&metadata.jpeg_headers(&with_height(header, height).ok_or_else(malformed)?))?;
+                file.write_all(&with_metadata(&with_height(header, height).ok_or_else(malformed)?, metadata))?;
             } else {
                 file.write_all(&[0xff, RESTART_0 + ((strip_number - 1) % 8) as u8])?;
             }
@@ -73,7 +75,7 @@ fn encode_strip(
     first: usize,
     rows: usize,
     options: &OutputOptions,
-) -> Result<Vec<u8>, Failure> {
+) -> Result<Vec<u8>, WriteFailure> {
     let width = picture.width();
     let mut row = vec![0; width * RGBA];
     let (mut rgb, mut flat) = (Vec::with_capacity(width * rows * 3), Vec::new());
@@ -99,7 +101,7 @@ fn encode_strip(
 }
 
 /// Sets how finely color is stored.
-pub(super) fn set_sampling<W: JfifWrite>(encoder: &mut Encoder<W>, options: &OutputOptions) {
+pub(crate) fn set_sampling<W: JfifWrite>(encoder: &mut Encoder<W>, options: &OutputOptions) {
     encoder.set_sampling_factor(match options.jpeg_subsampling {
         ChromaSubsampling::Full => SamplingFactor::F_1_1,
         ChromaSubsampling::HalfWidth => SamplingFactor::F_2_1,
@@ -136,6 +138,6 @@ fn with_height(header: &[u8], height: usize) -> Option<Vec<u8>> {
     }
 }
 
-fn malformed() -> Failure {
-    Failure::Io(std::io::Error::other("the JPEG encoder gave an unexpected result"))
+fn malformed() -> WriteFailure {
+    WriteFailure::Io(std::io::Error::other("the JPEG encoder gave an unexpected result"))
 }

@@ -1,22 +1,22 @@
 //! Layers: one page for every photograph.
 
-use std::io::{BufWriter, Seek, Write};
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use tiff::encoder::{TiffEncoder, TiffKind};
 use trueup_core::options::StageOptions;
 use trueup_core::raster::RowSource;
 use trueup_core::{Error, Result, StageContext};
 
-use super::directory::Place;
-use super::{BUFFER_BYTES, DEFAULT_TILE_PX, Form, MAX_SIDE, write_picture};
+use super::destination::check_sides;
+use super::failure::WriteFailure;
+use super::metadata::Metadata;
+use super::options::{Depth, LayerExtent, OutputOptions};
+use super::pending::{PendingFile, check_place};
+use super::strips::BUFFER_BYTES;
 use crate::color::InSrgb;
-use crate::encode::pending::PendingFile;
-use crate::encode::{
-    Depth, Failure, LayerExtent, Metadata, OutputOptions, RGBA, TiffLayout, check_place, check_sides, from_tiff,
-    profile_to_leave,
-};
-use crate::format::PictureFormat;
+use crate::format::{Output, SideLimit};
+use crate::formats::tiff::TIFF;
+use crate::formats::tiff::write::{PageForm, PagePlace, SIDES, TiffPages};
 
 /// One page of a file of layers.
 pub struct LayerPage<'a> {
@@ -54,7 +54,7 @@ pub trait LayerSet {
 /// # Errors
 /// As [`write_layers`].
 pub fn check_layers_place(path: &Path) -> Result<()> {
-    if PictureFormat::of_extension(path) == Some(PictureFormat::Tiff) {
+    if TIFF.names(path) {
         return check_place(path);
     }
     Err(Error::Unsupported {
@@ -81,7 +81,7 @@ pub fn write_layers(
     options.check()?;
     check_layers_place(path)?;
     let [width, height] = set.whole();
-    check_sides(path, (MAX_SIDE, "Lower canvas.scale."), width, height)?;
+    check_sides(path, SideLimit { advice: "Lower canvas.scale.", ..SIDES }, width, height)?;
     let mut pending = PendingFile::create(path)?;
     write_pages(pending.file(), set, metadata, options, context).map_err(|failure| failure.at(path))?;
     context.check_cancelled()?;
@@ -89,51 +89,35 @@ pub fn write_layers(
 }
 
 /// Writes all pages to a file.
-pub(crate) fn write_pages(
-    file: &mut (impl Write + Seek),
+pub(super) fn write_pages(
+    file: &mut dyn Output,
     set: &dyn LayerSet,
     metadata: &Metadata,
     options: &OutputOptions,
-    context: &StageContext,
-) -> std::result::Result<(), Failure> {
+    context: &StageContext<'_>,
+) -> std::result::Result<(), WriteFailure> {
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
     context.progress().begin(OutputOptions::STAGE, set.count() as u64);
-    let form = Form::of_layers(options);
+    let form = PageForm::of_layers(options);
     // Pages as large as the panorama take room for the layers alone: empty tiles are stored once.
-    if form.is_big(set.pixels(), options) {
-        let mut encoder = TiffEncoder::new_big(&mut output).map_err(from_tiff)?;
-        write_each(&mut encoder, set, metadata, options, form, context)?;
-    } else {
-        let mut encoder = TiffEncoder::new(&mut output).map_err(from_tiff)?;
-        write_each(&mut encoder, set, metadata, options, form, context)?;
-    }
+    let mut pages = TiffPages::begin(&mut output, form.is_big(set.pixels(), options))?;
+    write_each(&mut pages, set, metadata, options, form, context)?;
+    drop(pages);
     output.flush()?;
     context.progress().finish(OutputOptions::STAGE);
     Ok(())
 }
 
-impl Form {
-    /// Layers have alpha, and tiles unless strips are asked for: tiles in which nothing is take no room.
-    fn of_layers(options: &OutputOptions) -> Self {
-        let tile = match options.tiff_layout {
-            TiffLayout::Strips => None,
-            TiffLayout::Auto | TiffLayout::Tiles256 => Some(DEFAULT_TILE_PX),
-            TiffLayout::Tiles512 => Some(512),
-        };
-        Self { overviews: false, ..Self::new(RGBA, tile, options) }
-    }
-}
-
-fn write_each<W: Write + Seek, K: TiffKind>(
-    encoder: &mut TiffEncoder<W, K>,
+fn write_each(
+    pages: &mut TiffPages<'_>,
     set: &dyn LayerSet,
     metadata: &Metadata,
     options: &OutputOptions,
-    form: Form,
-    context: &StageContext,
-) -> std::result::Result<(), Failure> {
+    form: PageForm,
+    context: &StageContext<'_>,
+) -> std::result::Result<(), WriteFailure> {
     let whole = set.whole();
-    let converted = profile_to_leave(metadata, options, options.depth == Depth::Float);
+    let converted = metadata.profile_to_leave(options, options.depth == Depth::Float);
     let icc = metadata.icc.clone().filter(|_| converted.is_none());
     let metadata = Metadata { icc, ..Metadata::default() };
     for index in 0..set.count() {
@@ -147,14 +131,14 @@ fn write_each<W: Write + Seek, K: TiffKind>(
             LayerExtent::Canvas => [0, 0],
         };
         let to_u32 = |pair: [usize; 2]| pair.map(|length| length as u32);
-        let place = Place { name: &page.name, number, corner: to_u32(corner), whole: to_u32(whole) };
+        let place = PagePlace { name: &page.name, number, corner: to_u32(corner), whole: to_u32(whole) };
         // The progress of the whole file is that of its pages.
         let quiet = context.without_progress();
         match options.layer_extent {
-            LayerExtent::Cropped => write_picture(encoder, rows, &metadata, form, Some(&place), &quiet)?,
+            LayerExtent::Cropped => pages.add(rows, &metadata, form, Some(&place), &quiet)?,
             LayerExtent::Canvas => {
                 let rows = OnCanvas { layer: rows, corner: page.corner, whole };
-                write_picture(encoder, &rows, &metadata, form, Some(&place), &quiet)?;
+                pages.add(&rows, &metadata, form, Some(&place), &quiet)?;
             }
         }
         context.progress().advance(OutputOptions::STAGE, 1);

@@ -8,7 +8,7 @@ use tiff::encoder::{DirectoryEncoder, Rational, SRational, TiffEncoder, TiffKind
 use tiff::tags::{Tag, Type};
 use tiff::{TiffError, TiffResult};
 
-use super::metadata::Metadata;
+use crate::encode::metadata::Metadata;
 
 /// Tag of the ICC profile (ICC.1:2022, annex B.5).
 const ICC_PROFILE: u16 = 34_675;
@@ -28,7 +28,7 @@ pub(crate) const OF_JPEG: [exif::Tag; 4] = [
 
 /// Where the directories that hang on the picture's were written.
 #[derive(Debug, Default)]
-pub(super) struct Hanging {
+pub(super) struct HangingDirectories {
     fields: Vec<Field>,
     exif: Option<u64>,
     gps: Option<u64>,
@@ -39,16 +39,16 @@ pub(super) struct Hanging {
 pub(super) fn write_directories<W: Write + Seek, K: TiffKind>(
     encoder: &mut TiffEncoder<W, K>,
     metadata: &Metadata,
-) -> TiffResult<Hanging> {
+) -> TiffResult<HangingDirectories> {
     let exif = metadata.exif.clone().and_then(|bytes| exif::Reader::new().read_raw(bytes).ok());
-    let Some(exif) = exif else { return Ok(Hanging::default()) };
+    let Some(exif) = exif else { return Ok(HangingDirectories::default()) };
     let of = |context: Context| -> Vec<Field> {
         let wanted = exif.fields().filter(|field| {
             field.ifd_num == In::PRIMARY && field.tag.context() == context && !OF_JPEG.contains(&field.tag)
         });
         wanted.cloned().collect()
     };
-    Ok(Hanging {
+    Ok(HangingDirectories {
         fields: of(Context::Tiff),
         exif: directory(encoder, &of(Context::Exif))?,
         gps: directory(encoder, &of(Context::Gps))?,
@@ -71,7 +71,7 @@ fn directory<W: Write + Seek, K: TiffKind>(
 pub(super) fn write_tags<W: Write + Seek, K: TiffKind>(
     directory: &mut DirectoryEncoder<'_, W, K>,
     metadata: &Metadata,
-    hanging: &Hanging,
+    hanging: &HangingDirectories,
     with_profile: bool,
 ) -> TiffResult<()> {
     hanging.fields.iter().try_for_each(|field| write_field(directory, field))?;

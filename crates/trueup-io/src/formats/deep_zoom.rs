@@ -14,26 +14,46 @@ use rayon::prelude::*;
 use trueup_core::raster::RowSource;
 use trueup_core::{Error, Result, StageContext};
 
-use super::codecs::{from_png, png_compression};
-use super::folder::PendingFolder;
-use super::pending::PendingFile;
-use super::pyramid::{Pyramid, TileRow, Tiling, level_sizes};
-use super::samples::{Sample, flattened};
-use super::{DeepZoomFormat, Failure, OutputOptions, RGBA, channels_of, for_each_strip, jpeg};
+use super::jpeg::write::set_sampling;
+use super::png::{compression, failure};
+use crate::encode::failure::WriteFailure;
+use crate::encode::folder::PendingFolder;
+use crate::encode::options::{DeepZoomFormat, Depth, OutputOptions};
+use crate::encode::pending::PendingFile;
+use crate::encode::pyramid::{TilePyramid, TileRow, Tiling, level_sizes};
+use crate::encode::samples::{OutputSample, RGBA, flattened};
+use crate::encode::strips::{STRIP_ROWS, channels_of, for_each_strip};
+use crate::format::{Format, LOSSLESS_BYTES, LOSSY_BYTES, SideLimit, Transparency, Writer, Writing};
 
-/// Rows made at a time.
-const ROWS: usize = 64;
+/// The declaration. Sizes are of 32 bits, of which programs take half. Viewers of tiles know no profiles.
+pub(crate) static DEEP_ZOOM: Format = Format {
+    name: "Deep Zoom",
+    extensions: &["dzi"],
+    rare_extensions: &[],
+    reading: None,
+    writing: Some(Writing {
+        depths: &[Depth::Eight],
+        transparency: Transparency::With {
+            has: |options| options.dzi_format == DeepZoomFormat::Png,
+            case: "with PNG tiles",
+            advice: "Set output.dzi_format to png",
+        },
+        sides: SideLimit { largest: (1 << 31) - 1, advice: "Write a smaller panorama." },
+        has_profile: false,
+        memory: "twice one row of tiles",
+        bytes_per_pixel: |options| match options.dzi_format {
+            DeepZoomFormat::Jpeg => LOSSY_BYTES,
+            DeepZoomFormat::Png => LOSSLESS_BYTES,
+        },
+        writer: Writer::Files { write, check_places },
+    }),
+};
 
 /// Writes NAME.dzi and the folder NAME_files; returns the bytes of all files together.
 ///
 /// Both are made under other names and renamed when they are complete, the folder first: what the .dzi file describes is
 /// there. An older folder of tiles is replaced.
-pub(super) fn write(
-    path: &Path,
-    picture: &dyn RowSource,
-    options: &OutputOptions,
-    context: &StageContext,
-) -> Result<u64> {
+fn write(path: &Path, picture: &dyn RowSource, options: &OutputOptions, context: &StageContext<'_>) -> Result<u64> {
     let mut description = PendingFile::create(path)?;
     let folder = tiles_folder(path);
     check_replaceable(&folder)?;
@@ -47,7 +67,7 @@ pub(super) fn write(
 }
 
 /// Checks that [`write`] could put its files in their places.
-pub(super) fn check_places(path: &Path) -> Result<()> {
+fn check_places(path: &Path) -> Result<()> {
     PendingFile::create(path)?;
     let folder = tiles_folder(path);
     check_replaceable(&folder)?;
@@ -128,8 +148,8 @@ fn write_tiles(
     folder: &Path,
     picture: &dyn RowSource,
     options: &OutputOptions,
-    context: &StageContext,
-) -> std::result::Result<u64, Failure> {
+    context: &StageContext<'_>,
+) -> std::result::Result<u64, WriteFailure> {
     let tiling = Tiling { side: options.dzi_tile_px, overlap: options.dzi_overlap_px };
     let sizes = level_sizes(picture.width(), picture.height(), |_, _| false);
     let folders: Vec<PathBuf> =
@@ -142,8 +162,8 @@ fn write_tiles(
         DeepZoomFormat::Png => channels_of(picture, options),
     };
     let written = AtomicU64::new(0);
-    let mut pyramid = Pyramid::<u8>::new(&sizes, tiling);
-    for_each_strip::<u8>(picture, ROWS, context, |rows| {
+    let mut pyramid = TilePyramid::<u8>::new(&sizes, tiling);
+    for_each_strip::<u8>(picture, STRIP_ROWS, context, &mut |rows| {
         pyramid.push(rows, &mut |tiles| {
             (0..tiling.count(tiles.width)).into_par_iter().try_for_each(|column| {
                 context.check_cancelled()?;
@@ -165,7 +185,7 @@ fn tile(
     tiling: Tiling,
     channels: usize,
     options: &OutputOptions,
-) -> std::result::Result<Vec<u8>, Failure> {
+) -> std::result::Result<Vec<u8>, WriteFailure> {
     let columns = tiling.span(column, tiles.width);
     let background = u8::of(options.background);
     let (mut samples, mut row) = (Vec::new(), Vec::new());
@@ -179,17 +199,17 @@ fn tile(
     match options.dzi_format {
         DeepZoomFormat::Jpeg => {
             let mut encoder = JpegEncoder::new(&mut coded, options.jpeg_quality);
-            jpeg::set_sampling(&mut encoder, options);
+            set_sampling(&mut encoder, options);
             encoder.encode(&samples, width, height, JpegColorType::Rgb).map_err(std::io::Error::other)?;
         }
         DeepZoomFormat::Png => {
-            let mut encoder = PngEncoder::new(&mut coded, u32::from(width), u32::from(height));
+            let mut encoder = PngEncoder::new(&mut coded as &mut dyn Write, u32::from(width), u32::from(height));
             encoder.set_color(if channels == RGBA { PngColorType::Rgba } else { PngColorType::Rgb });
             encoder.set_depth(BitDepth::Eight);
-            encoder.set_compression(png_compression(options));
-            let mut writer = encoder.write_header().map_err(from_png)?;
-            writer.write_image_data(&samples).map_err(from_png)?;
-            writer.finish().map_err(from_png)?;
+            encoder.set_compression(compression(options));
+            let mut writer = encoder.write_header().map_err(failure)?;
+            writer.write_image_data(&samples).map_err(failure)?;
+            writer.finish().map_err(failure)?;
         }
     }
     Ok(coded)

@@ -1,38 +1,14 @@
-//! Whole EXIF fields of a file, to be handed on.
+//! Whole EXIF fields from a TIFF's own directories.
 
-use std::fs::File;
-use std::io::{BufReader, Read, Seek};
-use std::path::Path;
+use std::io::{Read, Seek};
 
 use exif::{Context, Field, In, Tag, Value};
 use tiff::decoder::Decoder;
 use tiff::decoder::ifd::Value as TiffValue;
 use tiff::tags::{IfdPointer, Tag as TiffTag};
 
-use super::read_exif_block;
-use crate::format::{PictureFormat, read_start};
-
-/// The fields of these tags that a file has, of the picture itself. A file that cannot be read has none; damaged fields are
-/// left out.
-pub(crate) fn read_fields(path: &Path, wanted: &[Tag]) -> Vec<Field> {
-    try_read(path, wanted).unwrap_or_default()
-}
-
-fn try_read(path: &Path, wanted: &[Tag]) -> Option<Vec<Field>> {
-    let mut file = File::open(path).ok()?;
-    let format = PictureFormat::of_content(&read_start(&mut file).ok()?)?;
-    let mut reader = BufReader::new(file);
-    reader.rewind().ok()?;
-    if format == PictureFormat::Tiff {
-        return from_tiff(&mut Decoder::new(reader).ok()?, wanted);
-    }
-    let exif = read_exif_block(&mut reader)?;
-    let fields = wanted.iter().filter_map(|&tag| exif.get_field(tag, In::PRIMARY)).cloned();
-    Some(fields.collect())
-}
-
-/// From a TIFF's own directories.
-fn from_tiff<R: Read + Seek>(decoder: &mut Decoder<R>, wanted: &[Tag]) -> Option<Vec<Field>> {
+/// The fields of these tags.
+pub(crate) fn read<R: Read + Seek>(decoder: &mut Decoder<R>, wanted: &[Tag]) -> Option<Vec<Field>> {
     let mut fields = Vec::new();
     for &tag in wanted.iter().filter(|tag| tag.context() == Context::Tiff) {
         let value = decoder.find_tag(TiffTag::from_u16_exhaustive(tag.number())).ok().flatten();
