@@ -18,11 +18,11 @@ by a request to terminate.";
 #[command(name = "trueup-bench", version, after_help = EXAMPLES, max_term_width = 110)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
-    pub command: Command,
+    pub command: BenchCommand,
 }
 
 #[derive(Debug, Subcommand)]
-pub(crate) enum Command {
+pub(crate) enum BenchCommand {
     /// Run the paper's experiments and our own, and write one report
     ///
     /// Writes report.md, report.html, a CSV file per table and every single result (rows.jsonl, rows.csv). What is stored there

@@ -16,7 +16,8 @@ use crate::report::{self, overview};
 use crate::results::Results;
 use crate::runner::Runner;
 use crate::sets::Catalogue;
-use crate::store::Store;
+use crate::stopping;
+use crate::store::ResultStore;
 use crate::trial::{Row, Trial, fingerprint};
 
 /// Runs the experiments that were asked for.
@@ -39,8 +40,8 @@ pub(crate) fn run(arguments: &PaperArguments) -> Result<ExitCode> {
         false => Catalogue::full(arguments.panoramas.as_deref(), &arguments.truth_sets)?,
     };
     let version = program_version()?;
-    let store = Store::open(&arguments.out.join("rows.jsonl"), arguments.reuse.then_some(version.as_str()))?;
-    let cancel = crate::cancel_token();
+    let store = ResultStore::open(&arguments.out.join("rows.jsonl"), arguments.reuse.then_some(version.as_str()))?;
+    let cancel = stopping::cancel_token();
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = if arguments.jobs == 0 { cores } else { arguments.jobs };
     let threads = (cores / jobs).max(1);

@@ -10,7 +10,7 @@ use trueup::{CancelToken, Error, Inputs, MatchedPhotographs, Reference, Result, 
 use crate::measure;
 use crate::progress::Tracker;
 use crate::sets::{ReadySet, SetSpec, central};
-use crate::store::Store;
+use crate::store::ResultStore;
 use crate::trial::{Row, Trial};
 
 /// What every trial needs beside itself.
@@ -19,7 +19,7 @@ pub(crate) struct Runner<'a> {
     /// Folder of the sets that are made.
     pub data: PathBuf,
     /// Where results go.
-    pub store: &'a Store,
+    pub store: &'a ResultStore,
     /// Version and fingerprint of the program.
     pub version: String,
     /// Sets that are worked on at a time.
@@ -236,7 +236,7 @@ mod tests {
             Trial { seed: 1, ..Trial::new("test", &set.name, "default", &[]) },
         ];
         let run = || {
-            let store = Store::open(&path, None).expect("opens");
+            let store = ResultStore::open(&path, None).expect("opens");
             let runner = Runner {
                 data: folder.path().join("data"),
                 store: &store,
@@ -256,7 +256,7 @@ mod tests {
         assert_eq!(run(), first);
         assert_eq!(std::fs::read_to_string(&path).expect("rows"), stored);
         cancel.cancel();
-        let store = Store::open(&path, None).expect("opens");
+        let store = ResultStore::open(&path, None).expect("opens");
         let runner = Runner {
             data: folder.path().join("data"),
             store: &store,

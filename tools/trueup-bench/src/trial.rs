@@ -72,8 +72,8 @@ impl Trial {
     }
 
     /// What identifies the run. `set_fingerprint` stands for the set's content.
-    pub(crate) fn key(&self, set_fingerprint: &str, version: &str) -> Key {
-        Key {
+    pub(crate) fn key(&self, set_fingerprint: &str, version: &str) -> TrialKey {
+        TrialKey {
             experiment: self.experiment.to_owned(),
             set: self.set.clone(),
             variant: self.variant.clone(),
@@ -88,7 +88,7 @@ impl Trial {
 
 /// What identifies a result: the same key, the same figures.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub(crate) struct Key {
+pub(crate) struct TrialKey {
     /// [`Trial::experiment`].
     pub experiment: String,
     /// [`Trial::set`].
@@ -112,7 +112,7 @@ pub(crate) struct Key {
 pub(crate) struct Row {
     /// What was run.
     #[serde(flatten)]
-    pub key: Key,
+    pub key: TrialKey,
     /// The figures by name, units in the names. What could not be measured is absent.
     pub measures: BTreeMap<String, f64>,
     /// Why vanishing points were not believed, or what went wrong; often empty.

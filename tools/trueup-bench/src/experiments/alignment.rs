@@ -2,7 +2,7 @@
 
 use trueup::Result;
 
-use crate::methods::{Family, Method, VPG, methods_of};
+use crate::methods::{ComparedMethod, Family, VPG, methods_of};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::Results;
 use crate::sets::{Catalogue, SetSpec};
@@ -20,7 +20,7 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let mut trials = Vec::new();
     for set in catalogue.study.iter().chain(&catalogue.given) {
         if set.pictures()? <= MAX_PICTURES {
-            let of_method = |one: &Method| Trial::new(NAME, &set.name, one.name, one.overrides);
+            let of_method = |one: &ComparedMethod| Trial::new(NAME, &set.name, one.name, &one.overrides());
             trials.extend(methods().map(|one| Trial { pixels: true, ..of_method(one) }));
         }
     }
@@ -28,7 +28,7 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
 }
 
 /// The methods of the tables: each prior, and what bends the mesh further.
-fn methods() -> impl Iterator<Item = &'static Method> {
+fn methods() -> impl Iterator<Item = &'static ComparedMethod> {
     methods_of(Family::Prior).chain(methods_of(Family::Alignment))
 }
 
@@ -39,7 +39,7 @@ const MAX_COST_DEG: f64 = 0.2;
 pub(crate) fn claims(results: &Results) -> Vec<Claim> {
     let sets = &results.catalogue.study;
     let value = |name, measure| mean(&results.values_of_all(NAME, sets, name, measure));
-    let of_method = |one: &Method| {
+    let of_method = |one: &ComparedMethod| {
         let error = value(one.name, "ncc_mse").zip(value(VPG, "ncc_mse"));
         let gdic = value(one.name, "gdic_deg").zip(value(VPG, "gdic_deg"));
         let verdict =

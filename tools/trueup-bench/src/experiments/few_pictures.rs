@@ -2,7 +2,8 @@
 
 use trueup::Result;
 
-use crate::report::charts::{Chart, Mark, Series};
+use crate::published_forms::DIVERGENCE_GATE;
+use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Section, Table, number};
 use crate::results::Results;
 use crate::sets::Catalogue;
@@ -16,7 +17,7 @@ const COUNTS: std::ops::RangeInclusive<usize> = 2..=6;
 /// Scenes of each class: the first of the gate's.
 const SCENES: usize = 24;
 
-const VARIANTS: [(&str, &[&str]); 2] = [("full gate", &[]), ("divergence alone", &["similarity.gate=paper"])];
+const VARIANTS: [(&str, &[&str]); 2] = [("full gate", &[]), ("divergence alone", &DIVERGENCE_GATE)];
 
 /// The first two to six photographs of the gate's sets.
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
@@ -100,7 +101,7 @@ pub(crate) fn section(results: &Results) -> Section {
         for (variant, _) in VARIANTS {
             let points = COUNTS
                 .filter_map(|count| Some((count as f64, fallback_percent(&rows(results, manhattan, count, variant))?)));
-            series.push(Series::plain(&format!("{class}, {variant}"), Mark::Line, points));
+            series.push(Series::plain(&format!("{class}, {variant}"), SeriesMark::Line, points));
         }
     }
     let mut chart = Chart::new("pictures", "fallback, %", series);

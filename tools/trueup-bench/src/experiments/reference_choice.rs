@@ -3,7 +3,7 @@
 use trueup::Result;
 
 use crate::methods::{Family, GSP_2D, GSP_3D, VPG, methods_of};
-use crate::report::charts::{Chart, Mark, Series};
+use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::{Results, short_name};
 use crate::sets::{Catalogue, SetSpec};
@@ -26,7 +26,7 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     for set in sets(catalogue) {
         for reference in 0..set.pictures()? {
             for one in methods_of(Family::Prior) {
-                let trial = Trial::new(NAME, &set.name, one.name, one.overrides);
+                let trial = Trial::new(NAME, &set.name, one.name, &one.overrides());
                 trials.push(Trial { reference: Some(reference), ..trial });
             }
         }
@@ -113,7 +113,7 @@ pub(crate) fn section(results: &Results) -> Section {
     section.blocks.push(Block::Table(table));
     for set in sets(results.catalogue) {
         let lines = methods_of(Family::Prior)
-            .map(|one| Series::plain(one.name, Mark::Line, by_reference(results, set, one.name)));
+            .map(|one| Series::plain(one.name, SeriesMark::Line, by_reference(results, set, one.name)));
         let chart = Chart::new("reference photograph", "GDIC, degrees", lines.collect());
         section.draw(&format!("Set {}: GDIC for every reference.", short_name(&set.name)), chart.svg());
     }

@@ -4,7 +4,7 @@ use trueup::Result;
 
 use super::grid::{GridRow, id_of, table};
 use super::paper_figures::WARPS;
-use crate::methods::{APAP, Family, Method, SPHP, SPHP_FREE, VPG, VPG_PUBLISHED, methods_of};
+use crate::methods::{APAP, ComparedMethod, Family, SPHP, SPHP_FREE, VPG, VPG_PUBLISHED, methods_of};
 use crate::report::document::{Block, Claim, Section, number};
 use crate::results::{Results, short_name};
 use crate::sets::{Catalogue, SetSpec};
@@ -28,17 +28,17 @@ fn sets(catalogue: &Catalogue) -> Vec<SetSpec> {
 }
 
 /// The methods without a prior.
-fn warps() -> impl Iterator<Item = &'static Method> {
+fn warps() -> impl Iterator<Item = &'static ComparedMethod> {
     methods_of(Family::Warp).chain(methods_of(Family::WideWarp))
 }
 
 /// The methods of the tables.
-fn methods() -> impl Iterator<Item = &'static Method> {
+fn methods() -> impl Iterator<Item = &'static ComparedMethod> {
     methods_of(Family::Prior).chain(warps())
 }
 
 /// Whether a method is run on every size of a set, not only the largest: the warps, and what they are compared with.
-fn on_every_size(one: &Method) -> bool {
+fn on_every_size(one: &ComparedMethod) -> bool {
     one.family != Family::Prior || [VPG, VPG_PUBLISHED].contains(&one.name)
 }
 
@@ -50,7 +50,7 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
         for one in methods() {
             let smallest = if on_every_size(one) { SMALLEST.min(largest) } else { largest };
             for pictures in smallest..=largest {
-                let trial = Trial::new(NAME, &set.name, one.name, one.overrides);
+                let trial = Trial::new(NAME, &set.name, one.name, &one.overrides());
                 trials.push(Trial { pictures: Some(pictures), central: true, ..trial });
             }
         }
@@ -150,7 +150,7 @@ pub(crate) fn section(results: &Results) -> Section {
 }
 
 /// A method's figures on the largest number of photographs each.
-fn grid_row(results: &Results, sets: &[SetSpec], one: &Method, measure: &str) -> GridRow {
+fn grid_row(results: &Results, sets: &[SetSpec], one: &ComparedMethod, measure: &str) -> GridRow {
     let mut values = Vec::new();
     let cells = sets.iter().map(|set| {
         let most = sizes(results, set, one.name).into_iter().max();
@@ -190,22 +190,22 @@ mod tests {
     use super::*;
     use crate::methods::method;
 
-    fn result(variant: &str, pictures: usize, outcome: (&str, f64)) -> Row {
+    fn result(variant: &str, pictures: usize, measure: &str, value: f64) -> Row {
         let trial = Trial { pictures: Some(pictures), ..Trial::new(NAME, "study/05", variant, &[]) };
-        let note = if outcome.0 == "refused" { "too wide".to_owned() } else { String::new() };
-        Row { key: trial.key("set", "1"), measures: BTreeMap::from([(outcome.0.to_owned(), outcome.1)]), note }
+        let note = if measure == "refused" { "too wide".to_owned() } else { String::new() };
+        Row { key: trial.key("set", "1"), measures: BTreeMap::from([(measure.to_owned(), value)]), note }
     }
 
     #[test]
     fn the_largest_reduction_counts_and_refusals_are_stated() {
         let catalogue = Catalogue::full(None, &[]).expect("no folders");
         let rows = vec![
-            result("homography", 5, ("refused", 1.0)),
-            result("homography", 3, ("gdic_deg", 6.0)),
-            result("homography", 4, ("gdic_deg", 8.0)),
-            result(VPG_PUBLISHED, 4, ("gdic_deg", 1.0)),
-            result(VPG_PUBLISHED, 5, ("gdic_deg", 2.0)),
-            result("apap", 5, ("refused", 1.0)),
+            result("homography", 5, "refused", 1.0),
+            result("homography", 3, "gdic_deg", 6.0),
+            result("homography", 4, "gdic_deg", 8.0),
+            result(VPG_PUBLISHED, 4, "gdic_deg", 1.0),
+            result(VPG_PUBLISHED, 5, "gdic_deg", 2.0),
+            result("apap", 5, "refused", 1.0),
         ];
         let results = Results { catalogue: &catalogue, rows };
         let set = &catalogue.study[4];

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use trueup::{Error, Evaluation, Measures, Project, Result, write_atomically};
 
-use super::child::Measured;
+use super::child::MeasuredStitch;
 use super::discover::{Part, StitchSet};
 use crate::report::csv;
 use crate::sets::read_truth;
@@ -100,7 +100,7 @@ impl QualityRow {
     ///
     /// # Errors
     /// Those of reading the record and the truth.
-    pub(super) fn new(set: &StitchSet, measured: &Measured) -> Result<Self> {
+    pub(super) fn new(set: &StitchSet, measured: &MeasuredStitch) -> Result<Self> {
         let mut row = Self {
             seconds: Some(measured.seconds),
             peak_mb: Some(measured.peak_bytes as f64 / BYTES_PER_MB),

@@ -9,10 +9,9 @@ use trueup_core::geometry::exp_rotation;
 use trueup_core::truth::{Level, LevelOrigin};
 use trueup_core::{Error, Result};
 
-use crate::camera_from_world;
-use crate::rig::focal_px;
+use crate::rig::{camera_from_world, focal_px};
 
-use super::view::View;
+use super::view::PinholeView;
 
 /// Largest width and height of a view, as of a rendered picture; pixels.
 const MAX_SIDE_PX: usize = 16_384;
@@ -201,10 +200,10 @@ impl CutSpec {
     }
 
     /// The pinhole camera of a view, in the panorama's frame.
-    pub(super) fn camera_of(&self, view: &ViewSpec) -> View {
+    pub(super) fn camera_of(&self, view: &ViewSpec) -> PinholeView {
         let (width, height) = self.size(view);
         let rotation = camera_from_world(view.yaw, view.pitch, view.roll);
-        View::new(width, height, focal_px(width, self.hfov_deg(view)), &rotation)
+        PinholeView::new(width, height, focal_px(width, self.hfov_deg(view)), &rotation)
     }
 }
 
