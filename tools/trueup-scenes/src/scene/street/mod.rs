@@ -16,6 +16,7 @@ use house::house;
 use pavement::pavement;
 use shared::{FRONT, KERB, REACH, ROAD, StreetMaterials};
 pub(super) use square::build as build_turned;
+
 /// Builds a street along z with the eye on its roadway.
 pub(super) fn build(seed: u64) -> Builder {
     let mut builder = Builder::new(seed, 2);

@@ -3,12 +3,15 @@
 use crate::material::{MaterialId, Pattern, SurfaceMaterial};
 use crate::scene::builder::Builder;
 
-/// Half the width of the roadway and of the whole street, and how far it runs either way, metres.
+/// Half the width of the roadway, metres.
 pub(super) const ROAD: f64 = 3.6;
-
+/// Half the width of the street from front to front, metres.
 pub(super) const FRONT: f64 = 6.4;
+/// How far the street runs either way, metres.
 pub(super) const REACH: f64 = 75.0;
+/// Height of the pavement above the roadway, metres.
 pub(super) const KERB: f64 = 0.13;
+
 /// Materials shared along the street.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StreetMaterials {
@@ -26,6 +29,7 @@ pub(super) struct StreetMaterials {
 }
 
 impl StreetMaterials {
+    /// Adds them to a scene under construction.
     pub(super) fn new(builder: &mut Builder) -> Self {
         let mut add = |material: SurfaceMaterial| builder.material(material);
         Self {
