@@ -53,7 +53,7 @@ pub(crate) struct PaperArguments {
     #[arg(long, value_name = "DIR")]
     pub panoramas: Option<PathBuf>,
 
-    /// Folder of folders that each hold pictures and their truth.json; may be repeated
+    /// Folder of folders that each hold photographs and their truth.json; may be repeated
     #[arg(long, value_name = "DIR")]
     pub truth_sets: Vec<PathBuf>,
 
@@ -85,7 +85,7 @@ pub(crate) struct QualityArguments {
     #[arg(long, value_name = "FILE.tsv")]
     pub manifest: Option<PathBuf>,
 
-    /// Folder of folders that each hold pictures and their truth.json; may be repeated
+    /// Folder of folders that each hold photographs and their truth.json; may be repeated
     #[arg(long, value_name = "DIR")]
     pub truth_sets: Vec<PathBuf>,
 

@@ -130,7 +130,7 @@ pub(crate) static METHODS: [ComparedMethod; 17] = [
     },
     ComparedMethod {
         name: "homography",
-        meaning: "one homography per picture, onto the plane of the reference",
+        meaning: "one homography per photograph, onto the plane of the reference",
         options: &[&["stitch.method=homography"], &PUBLISHED_WARP_GRID],
         paper: None,
         family: Family::Warp,

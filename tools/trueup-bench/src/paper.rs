@@ -132,8 +132,9 @@ fn write_rows(rows: &[Row], path: &Path) -> Result<()> {
     let mut text = csv::line(heads.into_iter().chain(measures.iter().copied()));
     let optional = |number: Option<usize>| number.map_or(String::new(), |number| number.to_string());
     for Row { key, measures: found, note } in rows {
-        let (seed, reference, pictures) = (key.seed.to_string(), optional(key.reference), optional(key.pictures));
-        let heads = [&key.experiment, &key.set, &key.variant, &seed, &reference, &pictures, note, &key.version];
+        let (seed, reference, photographs) =
+            (key.seed.to_string(), optional(key.reference), optional(key.photograph_count));
+        let heads = [&key.experiment, &key.set, &key.variant, &seed, &reference, &photographs, note, &key.version];
         let figures: Vec<String> =
             measures.iter().map(|name| found.get(*name).map_or(String::new(), f64::to_string)).collect();
         text.push_str(&csv::line(heads.into_iter().chain(&figures).map(String::as_str)));

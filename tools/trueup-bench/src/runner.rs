@@ -42,7 +42,8 @@ struct SetTrials<'t> {
 impl Runner<'_> {
     /// Runs what is not stored yet and returns all rows in the order of the trials.
     ///
-    /// A trial whose photographs cannot be stitched has a row that says why, marked `refused` if another method could; sets that cannot be made or read end the run.
+    /// A trial whose photographs cannot be stitched has a row that says why, marked `refused` if another method could; sets
+    /// that cannot be made or read end the run.
     ///
     /// # Errors
     /// Those of making and reading sets, of options that cannot be, of writing; [`Error::Cancelled`].
@@ -56,7 +57,7 @@ impl Runner<'_> {
         }
         let tracker = Tracker::new("trials", trials.len() as u64, self.quiet);
         // The largest sets first, so that none is left over for one worker at the end.
-        groups.sort_by_key(|group| group.set.pictures().unwrap_or(0));
+        groups.sort_by_key(|group| group.set.photograph_count().unwrap_or(0));
         let queue = Mutex::new(groups);
         let found: Mutex<BTreeMap<(String, usize), Row>> = Mutex::default();
         let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).pop();
@@ -166,19 +167,19 @@ impl Runner<'_> {
 /// What decides whether two trials can share their matches.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct MatchingKey {
-    pictures: Option<usize>,
+    photograph_count: Option<usize>,
     central: bool,
     overrides: Vec<String>,
 }
 
 impl MatchingKey {
     fn new(trial: &Trial) -> Self {
-        Self { pictures: trial.pictures, central: trial.central, overrides: trial.matching_overrides() }
+        Self { photograph_count: trial.photograph_count, central: trial.central, overrides: trial.matching_overrides() }
     }
 }
 
 fn inputs_of(ready: &ReadySet, trial: &Trial) -> Inputs {
-    let count = trial.pictures.unwrap_or(ready.photographs.len());
+    let count = trial.photograph_count.unwrap_or(ready.photographs.len());
     if let Some((middle, around)) = central(&ready.truth, count).filter(|_| trial.central) {
         let mut inputs = Inputs::new(around.iter().map(|&position| ready.photographs[position].clone()));
         inputs.reference = Reference::Named(ready.photographs[middle].clone());

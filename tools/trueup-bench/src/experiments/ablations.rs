@@ -75,12 +75,12 @@ pub(crate) fn section(results: &Results) -> Section {
     let mut section = Section::new(NAME, "Ablations");
     section.say(
         "One part changed at a time, on the study's sets, without noise and with every tenth vanishing direction replaced. The \
-         default finds and refines the directions of all pictures together, which hides much of what the paper's parts do; the \
-         published form takes each picture's own and keeps one similarity per picture.",
+         default finds and refines the directions of all photographs together, which hides much of what the paper's parts do; the \
+         published form takes each photograph's own and keeps one similarity per photograph.",
     );
     for (base, _) in BASES {
         let caption =
-            format!("Changes to the {base} form. Means over the study's sets; worst: the worst picture of any set.");
+            format!("Changes to the {base} form. Means over the study's sets; worst: the worst photograph of any set.");
         let columns = [
             "change",
             "theta error deg",

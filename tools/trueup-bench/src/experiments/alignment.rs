@@ -13,13 +13,13 @@ use crate::trial::Trial;
 pub(crate) const NAME: &str = "alignment";
 
 /// Larger sets are left out: their pixels take minutes to compare and say the same.
-const MAX_PICTURES: usize = 16;
+const MAX_PHOTOGRAPHS: usize = 16;
 
 /// Every method on the study's sets of moderate size and on the given ones, with their pixels compared.
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let mut trials = Vec::new();
     for set in catalogue.study.iter().chain(&catalogue.given) {
-        if set.pictures()? <= MAX_PICTURES {
+        if set.photograph_count()? <= MAX_PHOTOGRAPHS {
             let of_method = |one: &ComparedMethod| Trial::new(NAME, &set.name, one.name, &one.overrides());
             trials.extend(methods().map(|one| Trial { pixels: true, ..of_method(one) }));
         }
@@ -73,10 +73,10 @@ pub(crate) fn section(results: &Results) -> Section {
          points, source pixels.",
     );
     section.blocks.extend(claims(results).into_iter().map(Block::Claim));
-    let caption = format!("Means over the study's sets of at most {MAX_PICTURES} photographs.");
+    let caption = format!("Means over the study's sets of at most {MAX_PHOTOGRAPHS} photographs.");
     section.blocks.push(Block::Table(table(results, &results.catalogue.study, "t7-alignment", &caption)));
     if !results.catalogue.given.is_empty() {
-        let caption = format!("Means over the given sets of at most {MAX_PICTURES} photographs.");
+        let caption = format!("Means over the given sets of at most {MAX_PHOTOGRAPHS} photographs.");
         section.blocks.push(Block::Table(table(results, &results.catalogue.given, "t7-given", &caption)));
     }
     section

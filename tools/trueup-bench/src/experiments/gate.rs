@@ -99,15 +99,15 @@ pub(crate) fn claims(results: &Results) -> Vec<Claim> {
 pub(crate) fn section(results: &Results) -> Section {
     let mut section = Section::new(NAME, "T5: the gate");
     section.say(
-        "The divergence says how badly the pictures' vanishing points fit one Manhattan world. The paper believes them up to 0.10 \
-         and shows 65 Manhattan scenes and 65 others. Ours are small rendered sets. The full gate asks further: how many pictures \
+        "The divergence says how badly the photographs' vanishing points fit one Manhattan world. The paper believes them up to 0.10 \
+         and shows 65 Manhattan scenes and 65 others. Ours are small rendered sets. The full gate asks further: how many photographs \
          agree, and whether the vertical is where straightened cameras put it. Where it refuses, the vertical alone may still guide.",
     );
     section.blocks.extend(claims(results).into_iter().map(Block::Claim));
     let (manhattan, other) = (class(results, true, PAPER), class(results, false, PAPER));
     section.blocks.extend([counts(results), divergences(results), larger_sets(results)].map(Block::Table));
     section.draw(
-        "Divergence of every set; the last bin holds sets whose pictures show no vanishing points at all.",
+        "Divergence of every set; the last bin holds sets whose photographs show no vanishing points at all.",
         histogram(&manhattan, &other),
     );
     let Some(curve) = roc::curve(&manhattan.divergences, &other.divergences) else {

@@ -151,15 +151,15 @@ pub(crate) fn section(results: &Results) -> Section {
     section.draw("Direction inconsistency of every method on the study's sets.", gdic_chart(results, sets));
     section.say(
         "GDIC contains the deviation of the smallest rectangle around a perspective grid, half a degree or so even for a \
-         perfectly turned picture. The table below is free of it: the error of the turn that the prior wants, before any mesh, \
-         and how far what stands vertical in the pictures deviates from the panorama's vertical.",
+         perfectly turned photograph. The table below is free of it: the error of the turn that the prior wants, before any mesh, \
+         and how far what stands vertical in the photographs deviates from the panorama's vertical.",
     );
     for (measure, title) in [
         (
             "theta_error_deg",
-            "Error of the prior's turn relative to the reference (theta error), degrees, mean over the pictures",
+            "Error of the prior's turn relative to the reference (theta error), degrees, mean over the photographs",
         ),
-        ("upright_deg", "Deviation from upright in the panorama, degrees, mean over the pictures"),
+        ("upright_deg", "Deviation from upright in the panorama, degrees, mean over the photographs"),
         (
             "align_px",
             "Alignment: distance in source pixels between the two places of one point, where all photographs were taken from one place",

@@ -1,4 +1,4 @@
-//! Cameras that look up: where the published relative roll and one similarity per picture fail.
+//! Cameras that look up: where the published relative roll and one similarity per photograph fail.
 
 use trueup::Result;
 
@@ -36,7 +36,7 @@ pub(crate) fn section(results: &Results) -> Section {
     section.say(
         "Rows of seven photographs whose cameras look up by the stated angle, rooms and streets. Two level cameras that look up \
          have a relative rotation with a twist of its own: taken for a roll, as published, it bends the row. One similarity per \
-         picture cannot follow verticals that converge.",
+         photograph cannot follow verticals that converge.",
     );
     let mut pitches: Vec<f64> = results.catalogue.pitch.iter().map(|one| one.pitch_deg).collect();
     pitches.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! T4: every picture in turn as the reference.
+//! T4: every photograph in turn as the reference.
 
 use trueup::Result;
 
@@ -24,7 +24,7 @@ fn sets(catalogue: &Catalogue) -> impl Iterator<Item = &SetSpec> {
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let mut trials = Vec::new();
     for set in sets(catalogue) {
-        for reference in 0..set.pictures()? {
+        for reference in 0..set.photograph_count()? {
             for one in methods_of(Family::Prior) {
                 let trial = Trial::new(NAME, &set.name, one.name, &one.overrides());
                 trials.push(Trial { reference: Some(reference), ..trial });
@@ -75,7 +75,8 @@ pub(crate) fn claims(results: &Results) -> Vec<Claim> {
             holds: two.map(|widest| widest > FLAT_DEG && higher == means.len()),
             evidence: format!(
                 "GSP-2D's GDIC differs by up to {} degrees, and by more than {FLAT_DEG} on {varying} of {} sets (where every \
-                 overlap lets its pictures stand as they are, it leaves them so whatever the reference), GSP-3D's by up to {}; the mean over the references is higher with \
+                 overlap lets its photographs stand as they are, it leaves them so whatever the reference), GSP-3D's by up to \
+                 {}; the mean over the references is higher with \
                  GSP-3D than with VPG on {higher} of {} sets.",
                 number(two, 3),
                 means.len(),

@@ -52,7 +52,7 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let study = catalogue.study.iter().map(|set| (set, catalogue.seeds));
     let given = catalogue.given.iter().map(|set| (set, catalogue.seeds.min(SEEDS_OF_GIVEN_SETS)));
     for (set, seeds) in study.chain(given) {
-        let seeds = if set.pictures()? > MANY_PICTURES { seeds.min(SEEDS_OF_LARGE_SETS) } else { seeds };
+        let seeds = if set.photograph_count()? > MANY_PICTURES { seeds.min(SEEDS_OF_LARGE_SETS) } else { seeds };
         for share in NOISE_SHARES {
             let noise = format!("vanishing.outlier_share={share}");
             for (name, overrides) in schemes {

@@ -46,12 +46,12 @@ fn on_every_size(one: &ComparedMethod) -> bool {
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let mut trials = Vec::new();
     for set in sets(catalogue) {
-        let largest = set.pictures()?.min(LARGEST);
+        let largest = set.photograph_count()?.min(LARGEST);
         for one in methods() {
             let smallest = if on_every_size(one) { SMALLEST.min(largest) } else { largest };
-            for pictures in smallest..=largest {
+            for photographs in smallest..=largest {
                 let trial = Trial::new(NAME, &set.name, one.name, &one.overrides());
-                trials.push(Trial { pictures: Some(pictures), central: true, ..trial });
+                trials.push(Trial { photograph_count: Some(photographs), central: true, ..trial });
             }
         }
     }
@@ -59,40 +59,40 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
 }
 
 /// The result of a method on so many photographs of a set.
-fn row<'a>(results: &'a Results, set: &SetSpec, method: &str, pictures: usize) -> Option<&'a Row> {
-    results
-        .of(NAME)
-        .find(|row| row.key.set == set.name && row.key.variant == method && row.key.pictures == Some(pictures))
+fn row<'a>(results: &'a Results, set: &SetSpec, method: &str, photographs: usize) -> Option<&'a Row> {
+    results.of(NAME).find(|row| {
+        row.key.set == set.name && row.key.variant == method && row.key.photograph_count == Some(photographs)
+    })
 }
 
 /// The sizes that were tried, the largest first.
 fn sizes(results: &Results, set: &SetSpec, method: &str) -> Vec<usize> {
     let rows = results.of(NAME).filter(|row| row.key.set == set.name && row.key.variant == method);
-    let mut sizes: Vec<usize> = rows.filter_map(|row| row.key.pictures).collect();
+    let mut sizes: Vec<usize> = rows.filter_map(|row| row.key.photograph_count).collect();
     sizes.sort_unstable_by(|a, b| b.cmp(a));
     sizes
 }
 
 /// The result on the largest number of photographs that the method makes a panorama of.
 fn largest<'a>(results: &'a Results, set: &SetSpec, method: &str) -> Option<(usize, &'a Row)> {
-    sizes(results, set, method).into_iter().find_map(|pictures| {
-        let row = row(results, set, method, pictures)?;
-        row.measure("gdic_deg").map(|_| (pictures, row))
+    sizes(results, set, method).into_iter().find_map(|photographs| {
+        let row = row(results, set, method, photographs)?;
+        row.measure("gdic_deg").map(|_| (photographs, row))
     })
 }
 
 /// GDIC of a warp and of VPG, in that order, on the same photographs, for every set that the warp does.
-fn same_pictures(results: &Results, warp: &str, ours: &str) -> Vec<(f64, f64)> {
+fn same_photographs(results: &Results, warp: &str, ours: &str) -> Vec<(f64, f64)> {
     let of_set = |set: &SetSpec| {
-        let (pictures, found) = largest(results, set, warp)?;
-        Some((found.measure("gdic_deg")?, row(results, set, ours, pictures)?.measure("gdic_deg")?))
+        let (photographs, found) = largest(results, set, warp)?;
+        Some((found.measure("gdic_deg")?, row(results, set, ours, photographs)?.measure("gdic_deg")?))
     };
     sets(results.catalogue).iter().filter_map(of_set).collect()
 }
 
 /// Mean GDIC of a warp, that of VPG on the same photographs, and the number of sets.
 fn compared(results: &Results, warp: &str) -> Option<(f64, f64, usize)> {
-    let (theirs, ours): (Vec<f64>, Vec<f64>) = same_pictures(results, warp, VPG_PUBLISHED).into_iter().unzip();
+    let (theirs, ours): (Vec<f64>, Vec<f64>) = same_photographs(results, warp, VPG_PUBLISHED).into_iter().unzip();
     Some((mean(&theirs)?, mean(&ours)?, ours.len()))
 }
 
@@ -157,10 +157,10 @@ fn grid_row(results: &Results, sets: &[SetSpec], one: &ComparedMethod, measure: 
         match largest(results, set, one.name) {
             None if most.is_some() => "n/a".to_owned(),
             None => number(None, 2),
-            Some((pictures, row)) => {
+            Some((photographs, row)) => {
                 values.extend(row.measure(measure));
                 let figure = number(row.measure(measure), 2);
-                if Some(pictures) == most { figure } else { format!("{figure} ({pictures})") }
+                if Some(photographs) == most { figure } else { format!("{figure} ({photographs})") }
             }
         }
     });
@@ -173,10 +173,10 @@ fn refusals(results: &Results, sets: &[SetSpec]) -> Vec<String> {
     let mut points = Vec::new();
     for one in warps() {
         for set in sets {
-            let done = largest(results, set, one.name).map(|(pictures, _)| pictures);
+            let done = largest(results, set, one.name).map(|(photographs, _)| photographs);
             let next = sizes(results, set, one.name).into_iter().rfind(|size| done.is_none_or(|done| *size > done));
             let Some(row) = next.and_then(|size| row(results, set, one.name, size)) else { continue };
-            let (name, size) = (short_name(&set.name), row.key.pictures.unwrap_or(0));
+            let (name, size) = (short_name(&set.name), row.key.photograph_count.unwrap_or(0));
             points.push(format!("`{}` on {size} photographs of {name}: {}", one.name, row.note));
         }
     }
@@ -190,8 +190,8 @@ mod tests {
     use super::*;
     use crate::methods::method;
 
-    fn result(variant: &str, pictures: usize, measure: &str, value: f64) -> Row {
-        let trial = Trial { pictures: Some(pictures), ..Trial::new(NAME, "study/05", variant, &[]) };
+    fn result(variant: &str, photographs: usize, measure: &str, value: f64) -> Row {
+        let trial = Trial { photograph_count: Some(photographs), ..Trial::new(NAME, "study/05", variant, &[]) };
         let note = if measure == "refused" { "too wide".to_owned() } else { String::new() };
         Row { key: trial.key("set", "1"), measures: BTreeMap::from([(measure.to_owned(), value)]), note }
     }
@@ -209,8 +209,8 @@ mod tests {
         ];
         let results = Results { catalogue: &catalogue, rows };
         let set = &catalogue.study[4];
-        assert_eq!(largest(&results, set, "homography").map(|(pictures, _)| pictures), Some(4));
-        assert_eq!(same_pictures(&results, "homography", VPG_PUBLISHED), [(8.0, 1.0)]);
+        assert_eq!(largest(&results, set, "homography").map(|(photographs, _)| photographs), Some(4));
+        assert_eq!(same_photographs(&results, "homography", VPG_PUBLISHED), [(8.0, 1.0)]);
         let expected = ["`homography` on 5 photographs of 05: too wide", "`apap` on 5 photographs of 05: too wide"];
         assert_eq!(refusals(&results, std::slice::from_ref(set)), expected);
         let one = method(APAP).expect("a method");

@@ -27,7 +27,7 @@ pub(crate) struct Catalogue {
     pub pitch: Vec<PitchSet>,
     /// Sets of the study whose metadata are wrong.
     pub focal: Vec<FocalSet>,
-    /// Short names of the study's sets that every picture in turn is the reference of.
+    /// Short names of the study's sets that every photograph in turn is the reference of.
     pub reference_sets: Vec<&'static str>,
     /// Number of seeds of the noise on vanishing directions.
     pub seeds: u64,
@@ -218,7 +218,7 @@ fn name_of(folder: &Path) -> String {
 mod tests {
     use super::*;
 
-    /// Writes a picture of one middle gray.
+    /// Writes a panorama of one middle gray.
     fn write_gray_png(path: &Path, width: u32, height: u32) {
         let file = std::fs::File::create(path).expect("a file");
         let mut writer = png::Encoder::new(file, width, height).write_header().expect("a header");
@@ -255,7 +255,7 @@ mod tests {
         for set in sets {
             let ready = set.prepare(&data, &context).expect("cut");
             assert!(!ready.photographs.is_empty(), "{}", set.name);
-            assert_eq!(ready.photographs.len(), set.pictures().expect("count"), "{}", set.name);
+            assert_eq!(ready.photographs.len(), set.photograph_count().expect("count"), "{}", set.name);
             // What is there is taken as it is.
             std::fs::remove_file(&ready.photographs[0]).expect("removed");
             let again = set.prepare(&data, &context).expect("there");

@@ -57,7 +57,7 @@ mod tests {
         let around = (0..12).map(|step| 30.0 * f64::from(step));
         let rows: Vec<[f64; 2]> =
             [50.0, 5.0, -40.0].iter().flat_map(|up| around.clone().map(|yaw| [yaw, *up])).collect();
-        let (middle, nearest) = central(&looking(&rows), 3).expect("pictures");
+        let (middle, nearest) = central(&looking(&rows), 3).expect("photographs");
         assert!((12..24).contains(&middle) && nearest.contains(&middle));
     }
 }

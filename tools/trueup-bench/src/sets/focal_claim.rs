@@ -7,7 +7,7 @@ use trueup::{Error, Result};
 
 use super::ready::{ReadySet, TRUTH_FILE};
 
-/// Copies a set into `folder`; its pictures' EXIF claim `factor` times their true focal length.
+/// Copies a set into `folder`; its photographs' EXIF claim `factor` times their true focal length.
 pub(super) fn write(original: &ReadySet, factor: f64, folder: &Path) -> Result<()> {
     for (photograph, truth) in original.photographs.iter().zip(&original.truth.images) {
         let source = Path::new(photograph);
@@ -37,7 +37,7 @@ fn with_exif(jpeg: &[u8], exif: &[u8]) -> Option<Vec<u8>> {
 
 const EXIF_HEADER: &[u8] = b"Exif\0\0";
 
-/// The TIFF structure of an EXIF block (EXIF 3.0, section 4.6): the focal length on a sensor 36 mm wide, the picture's size,
+/// The TIFF structure of an EXIF block (EXIF 3.0, section 4.6): the focal length on a sensor 36 mm wide, the photograph's size,
 /// the sensor's resolution.
 fn focal_exif(focal_px: f64, width: usize, height: usize) -> Vec<u8> {
     const SENSOR_MM: f64 = 36.0;

@@ -26,7 +26,7 @@ pub(crate) struct ReadySet {
 pub(super) fn ready(folder: &Path) -> Result<ReadySet> {
     let (truth, text) = read_truth(folder)?;
     let paths: Vec<PathBuf> = truth.images.iter().map(|image| folder.join(&image.file)).collect();
-    // Pictures that were made anew from the same truth differ in their size.
+    // Photographs that were made anew from the same truth differ in their size.
     let size = |path: &PathBuf| fs::metadata(path).map_or(0, |found| found.len());
     let sizes: Vec<u64> = paths.iter().map(size).collect();
     let photographs = paths.iter().map(|path| path.display().to_string()).collect();
@@ -37,7 +37,7 @@ pub(super) fn ready(folder: &Path) -> Result<ReadySet> {
 pub(crate) fn read_truth(folder: &Path) -> Result<(Truth, String)> {
     let path = folder.join(TRUTH_FILE);
     let text = fs::read_to_string(&path).map_err(|error| Error::io("reading", &path, error))?;
-    let hint = "Give the truth.json that was written together with the pictures.";
+    let hint = "Give the truth.json that was written together with the photographs.";
     let truth: Truth = serde_json::from_str(&text).map_err(|error| Error::input(path.display(), error, hint))?;
     truth.check(&path.display().to_string())?;
     Ok((truth, text))
@@ -53,7 +53,7 @@ pub(crate) fn truth_folders(parent: &Path) -> Result<Vec<PathBuf>> {
         entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.join(TRUTH_FILE).is_file()).collect();
     folders.sort();
     if folders.is_empty() {
-        let hint = "Name a folder whose folders each hold pictures and their truth.json.";
+        let hint = "Name a folder whose folders each hold photographs and their truth.json.";
         return Err(Error::input(parent.display(), "no folder in it holds a truth.json", hint));
     }
     Ok(folders)

@@ -87,13 +87,13 @@ impl SetSpec {
     ///
     /// # Errors
     /// Those of reading a folder's truth.
-    pub(crate) fn pictures(&self) -> Result<usize> {
+    pub(crate) fn photograph_count(&self) -> Result<usize> {
         match &self.source {
             SetSource::Catalogue(request) => Ok(request.kind.set(request.number).map_or(0, |(_, rig)| rig.pictures)),
             SetSource::Rendered(recipe) => Ok(recipe.rig.pictures),
             SetSource::Cut(_, kind) => Ok(from_panorama::views_of(*kind)),
             SetSource::Folder(folder) => Ok(read_truth(folder)?.0.images.len()),
-            SetSource::FocalClaimed(original, _) => original.pictures(),
+            SetSource::FocalClaimed(original, _) => original.photograph_count(),
         }
     }
 
@@ -168,7 +168,7 @@ fn made(folder: &Path, recipe: &str, make: impl FnOnce() -> Result<()>) -> Resul
     if fs::read_to_string(&marker).is_ok_and(|found| found == recipe) {
         return ready(folder);
     }
-    // Pictures of another recipe must not stay among the new ones.
+    // Photographs of another recipe must not stay among the new ones.
     if folder.exists() {
         if !marker.exists() && fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) {
             let unfinished = folder.join(UNFINISHED);
