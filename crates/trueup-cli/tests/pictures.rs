@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use jpeg_encoder::{ColorType, Encoder};
 use trueup_scenes::{
-    LightQuality, PosedCamera, Quality, RigOptions, Scene, SceneKind, SceneOptions, render, rig, truth_of,
+    LightQuality, LitScene, PosedCamera, Quality, RigOptions, SceneKind, SceneOptions, render, rig, truth_of,
 };
 
 use crate::run::Desk;
@@ -34,13 +34,13 @@ pub fn room() -> &'static [Vec<u8>] {
 }
 
 fn photograph_scene(kind: SceneKind, seed: u64, pictures: usize) -> Vec<Vec<u8>> {
-    let scene = Scene::new(&SceneOptions { kind, seed, light: LightQuality::Fast, ..SceneOptions::default() })
+    let scene = LitScene::new(&SceneOptions { kind, seed, light: LightQuality::Fast, ..SceneOptions::default() })
         .expect("a valid scene");
     let cameras = cameras(&scene, seed, pictures);
     cameras.iter().map(|camera| render(&scene, camera, Quality::Preview).data().to_vec()).collect()
 }
 
-fn cameras(scene: &Scene, seed: u64, pictures: usize) -> Vec<PosedCamera> {
+fn cameras(scene: &LitScene, seed: u64, pictures: usize) -> Vec<PosedCamera> {
     let options = RigOptions { seed, pictures, width: WIDTH, height: HEIGHT, ..RigOptions::default() };
     rig(&options, &scene.viewpoint()).expect("valid options")
 }
@@ -48,7 +48,7 @@ fn cameras(scene: &Scene, seed: u64, pictures: usize) -> Vec<PosedCamera> {
 /// The truth of the street's photographs, as JSON.
 pub fn street_truth() -> String {
     let (kind, seed) = STREET;
-    let scene = Scene::new(&SceneOptions { kind, seed, light: LightQuality::Fast, ..SceneOptions::default() })
+    let scene = LitScene::new(&SceneOptions { kind, seed, light: LightQuality::Fast, ..SceneOptions::default() })
         .expect("a valid scene");
     let cameras = cameras(&scene, seed, STREET_NAMES.len());
     let images = cameras.iter().zip(STREET_NAMES).map(|(camera, name)| truth_of(camera, name.to_owned())).collect();

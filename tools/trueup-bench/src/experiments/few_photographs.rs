@@ -1,8 +1,9 @@
-//! Two to six pictures: how often vanishing points are believed, and how upright the panorama is.
+//! Two to six photographs: how often vanishing points are believed, and how upright the panorama is.
 
 use trueup::Result;
 
-use crate::report::charts::{Chart, Mark, Series};
+use crate::published_forms::DIVERGENCE_GATE;
+use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Section, Table, number};
 use crate::results::Results;
 use crate::sets::Catalogue;
@@ -16,7 +17,7 @@ const COUNTS: std::ops::RangeInclusive<usize> = 2..=6;
 /// Scenes of each class: the first of the gate's.
 const SCENES: usize = 24;
 
-const VARIANTS: [(&str, &[&str]); 2] = [("full gate", &[]), ("divergence alone", &["similarity.gate=paper"])];
+const VARIANTS: [(&str, &[&str]); 2] = [("full gate", &[]), ("divergence alone", &DIVERGENCE_GATE)];
 
 /// The first two to six photographs of the gate's sets.
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
@@ -27,7 +28,7 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
             for count in COUNTS {
                 for (name, overrides) in VARIANTS {
                     let trial = Trial::new(NAME, &set.name, name, overrides);
-                    trials.push(Trial { pictures: Some(count), ..trial });
+                    trials.push(Trial { photograph_count: Some(count), ..trial });
                 }
             }
         }
@@ -35,7 +36,7 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     Ok(trials)
 }
 
-/// Rows of one class, count and gate in which every picture was used.
+/// Rows of one class, count and gate in which every photograph was used.
 fn rows<'a>(results: &'a Results, manhattan: bool, count: usize, variant: &str) -> Vec<&'a Row> {
     let of_class = |row: &&Row| {
         let set = results.catalogue.gate.iter().find(|set| set.name == row.key.set);
@@ -43,7 +44,7 @@ fn rows<'a>(results: &'a Results, manhattan: bool, count: usize, variant: &str) 
     };
     results
         .of(NAME)
-        .filter(|row| row.key.pictures == Some(count) && row.key.variant == variant)
+        .filter(|row| row.key.photograph_count == Some(count) && row.key.variant == variant)
         .filter(of_class)
         .filter(|row| row.measure("used") == Some(count as f64))
         .collect()
@@ -59,14 +60,14 @@ fn fallback_percent(rows: &[&Row]) -> Option<f64> {
 
 /// Table and lines.
 pub(crate) fn section(results: &Results) -> Section {
-    let mut section = Section::new(NAME, "Few pictures");
+    let mut section = Section::new(NAME, "Few photographs");
     section.say(
-        "A single picture always fits its own vanishing points, and two fit each other once in a while: with few pictures the \
+        "A single photograph always fits its own vanishing points, and two fit each other once in a while: with few photographs the \
          divergence alone proves little. The first two to six photographs of rendered scenes, as far as they hang together. \
          Fallback means that cameras were levelled without vanishing points: wrong for a Manhattan scene, right for another.",
     );
     let columns = [
-        "pictures",
+        "photographs",
         "gate",
         "Manhattan sets",
         "fallback %",
@@ -76,7 +77,7 @@ pub(crate) fn section(results: &Results) -> Section {
         "fallback %, others",
         "upright deg, others, median",
     ];
-    let mut table = Table::new("few-pictures", "Fallback by number of pictures.", columns);
+    let mut table = Table::new("few-pictures", "Fallback by number of photographs.", columns);
     for count in COUNTS {
         for (variant, _) in VARIANTS {
             let (yes, other) = (rows(results, true, count, variant), rows(results, false, count, variant));
@@ -100,11 +101,11 @@ pub(crate) fn section(results: &Results) -> Section {
         for (variant, _) in VARIANTS {
             let points = COUNTS
                 .filter_map(|count| Some((count as f64, fallback_percent(&rows(results, manhattan, count, variant))?)));
-            series.push(Series::plain(&format!("{class}, {variant}"), Mark::Line, points));
+            series.push(Series::plain(&format!("{class}, {variant}"), SeriesMark::Line, points));
         }
     }
-    let mut chart = Chart::new("pictures", "fallback, %", series);
+    let mut chart = Chart::new("photographs", "fallback, %", series);
     chart.y_max = Some(100.0);
-    section.draw("Share of the sets that fall back, by number of pictures.", chart.svg());
+    section.draw("Share of the sets that fall back, by number of photographs.", chart.svg());
     section
 }
