@@ -73,7 +73,7 @@ pub use trueup_compose::fidelity::Fidelity;
 pub use trueup_compose::render::Panorama;
 pub use trueup_core::context::{CancelToken, Progress, Silent};
 pub use trueup_core::diagnostics::{Diagnostic, Severity};
-pub use trueup_core::options::{InvalidOption, OptionDescription};
+pub use trueup_core::options::{InvalidOption, OptionDescription, Tier};
 pub use trueup_core::raster::RowSource;
 pub use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 pub use trueup_core::truth::{ImageTruth, Truth};
