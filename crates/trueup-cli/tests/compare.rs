@@ -3,13 +3,13 @@
 use serde_json::{Value, json};
 
 use crate::pictures::{noise, street, street_desk, street_truth};
-use crate::run::{Desk, Run, finish, trueup};
+use crate::run::{Desk, FinishedRun, finish, trueup};
 
 /// Two entries that are made quickly.
 const QUICK: [&str; 6] =
     ["--methods", "vpg", "--entry", "levelled: similarity.prior=straightening", "--set", "compare.page_pixels=200000"];
 
-fn compare(desk: &Desk, arguments: &[&str]) -> Run {
+fn compare(desk: &Desk, arguments: &[&str]) -> FinishedRun {
     finish(trueup(desk.path(), &[&["compare", "a.jpg", "b.jpg", "c.jpg", "-o", "out"], arguments].concat()))
 }
 

@@ -1,10 +1,10 @@
 //! Bad input: what is said, with which exit status, and that nothing is left behind.
 
 use crate::pictures::{STREET_NAMES, claiming, noise, plain, street, street_desk};
-use crate::run::{Desk, Run, finish, trueup};
+use crate::run::{Desk, FinishedRun, finish, trueup};
 
 /// Stitches one file of the given content beside nothing else.
-fn stitch_alone(name: &str, bytes: impl AsRef<[u8]>) -> Run {
+fn stitch_alone(name: &str, bytes: impl AsRef<[u8]>) -> FinishedRun {
     let desk = Desk::new();
     desk.put(name, bytes);
     let run = desk.stitch(&[name]);

@@ -1,9 +1,9 @@
 //! `trueup options`, `--set`, `--config`, help.
 
 use crate::pictures::street_desk;
-use crate::run::{Desk, Run, finish, trueup};
+use crate::run::{Desk, FinishedRun, finish, trueup};
 
-fn run(arguments: &[&str]) -> Run {
+fn run(arguments: &[&str]) -> FinishedRun {
     finish(trueup(Desk::new().path(), arguments))
 }
 

@@ -6,13 +6,13 @@ use std::process::Command;
 use tempfile::TempDir;
 
 /// What a run of the command left behind.
-pub struct Run {
+pub struct FinishedRun {
     pub status: i32,
     pub stdout: String,
     pub stderr: String,
 }
 
-impl Run {
+impl FinishedRun {
     /// Fails the test unless the run ended with `status` and standard error holds every one of `parts`.
     #[track_caller]
     pub fn expect_failure(&self, status: i32, parts: &[&str]) {
@@ -43,9 +43,9 @@ pub fn trueup(folder: &Path, arguments: &[&str]) -> Command {
 
 /// Runs a command to its end.
 #[track_caller]
-pub fn finish(mut command: Command) -> Run {
+pub fn finish(mut command: Command) -> FinishedRun {
     let output = command.output().expect("the command starts");
-    Run {
+    FinishedRun {
         status: output.status.code().expect("the command ends by itself"),
         stdout: String::from_utf8(output.stdout).expect("UTF-8"),
         stderr: String::from_utf8(output.stderr).expect("UTF-8"),
@@ -91,7 +91,7 @@ impl Desk {
 
     /// `trueup stitch ARGUMENTS -o pano.jpg`, at a small scale that keeps tests quick.
     #[track_caller]
-    pub fn stitch(&self, arguments: &[&str]) -> Run {
+    pub fn stitch(&self, arguments: &[&str]) -> FinishedRun {
         let all = [&["stitch", "-o", "pano.jpg", "--scale", "0.5"], arguments].concat();
         finish(trueup(self.path(), &all))
     }

@@ -91,7 +91,8 @@ impl OptionFlag {
         };
         let (summary, rest) = first_sentence(&option.meaning);
         let facts = self.facts(option);
-        let whole = [summary, rest, self.note].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ");
+        let whole =
+            [summary, rest, self.note].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ");
         argument
             .value_name(self.value_name(option))
             .value_parser(AnyText::with_choices_of(option))
