@@ -51,7 +51,9 @@ fn the_order_of_the_photographs_hardly_matters() {
     };
     let in_order = rotations(&["a.jpg", "b.jpg", "c.jpg", "d.jpg"]);
     for order in [["d.jpg", "c.jpg", "b.jpg", "a.jpg"], ["c.jpg", "a.jpg", "d.jpg", "b.jpg"]] {
-        for (path, theta_deg) in rotations(&order) {
+        let rotations = rotations(&order);
+        assert_eq!(rotations.len(), order.len());
+        for (path, theta_deg) in rotations {
             let change = (theta_deg - in_order[&path]).abs();
             assert!(change < 0.2, "{path} turns by {change} degrees more in the order {order:?}");
         }

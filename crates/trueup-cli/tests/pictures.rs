@@ -121,8 +121,8 @@ pub fn claiming(bytes: &[u8], width: u16, height: u16) -> Vec<u8> {
     bytes
 }
 
-/// A JPEG file with EXIF: the focal length in millimetres as a fraction, and its 35 mm equivalent.
-pub fn with_focal_length(bytes: &[u8], millimetres: (u32, u32), equivalent: u16) -> Vec<u8> {
+/// A JPEG file with EXIF: the focal length in millimeters as a fraction, and its 35 mm equivalent.
+pub fn with_focal_length(bytes: &[u8], millimeters: [u32; 2], equivalent: u16) -> Vec<u8> {
     const HEADER: [u8; 8] = *b"II\x2a\0\x08\0\0\0";
     let mut tiff = HEADER.to_vec();
     let entry = |tiff: &mut Vec<u8>, tag: u16, kind: u16, value: u32| {
@@ -140,8 +140,8 @@ pub fn with_focal_length(bytes: &[u8], millimetres: (u32, u32), equivalent: u16)
     entry(&mut tiff, 0x920a, 5, 56);
     entry(&mut tiff, 0xa405, 3, u32::from(equivalent));
     tiff.extend(0_u32.to_le_bytes());
-    tiff.extend(millimetres.0.to_le_bytes());
-    tiff.extend(millimetres.1.to_le_bytes());
+    tiff.extend(millimeters[0].to_le_bytes());
+    tiff.extend(millimeters[1].to_le_bytes());
 
     let length = u16::try_from(2 + 6 + tiff.len()).expect("short metadata");
     let segment = [&[0xff, 0xe1], &length.to_be_bytes()[..], b"Exif\0\0", &tiff].concat();
