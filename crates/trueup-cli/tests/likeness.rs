@@ -18,7 +18,7 @@ const GAP: u32 = 8;
 
 /// How alike two pictures are.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Likeness {
+pub(crate) enum Likeness {
     /// They differ in size: expected and actual width and height.
     OtherSize([u32; 2], [u32; 2]),
     /// They differ in their pixels: by the mean, and by what [`HIGH_SHARE`] of the pixels do not exceed.
@@ -27,7 +27,7 @@ pub enum Likeness {
 
 impl Likeness {
     /// Compares pixel by pixel, where one of the pictures shows anything, by the channel that differs most.
-    pub fn of(expected: &RgbaImage, actual: &RgbaImage) -> Self {
+    pub(crate) fn of(expected: &RgbaImage, actual: &RgbaImage) -> Self {
         if expected.dimensions() != actual.dimensions() {
             return Self::OtherSize(expected.dimensions().into(), actual.dimensions().into());
         }
@@ -44,7 +44,7 @@ impl Likeness {
     }
 
     /// Whether they are as alike as two pictures of the same panorama.
-    pub fn is_close(self) -> bool {
+    pub(crate) fn is_close(self) -> bool {
         matches!(self, Self::Pixels { mean, high } if mean <= MEAN_TOLERANCE && high <= HIGH_TOLERANCE)
     }
 }
@@ -72,7 +72,7 @@ fn difference(expected: Rgba<u8>, actual: Rgba<u8>) -> [u8; 4] {
 }
 
 /// The expected picture, the actual one and, if they have one size, their difference, enlarged; white where alpha differs.
-pub fn side_by_side(expected: &RgbaImage, actual: &RgbaImage) -> RgbaImage {
+pub(crate) fn side_by_side(expected: &RgbaImage, actual: &RgbaImage) -> RgbaImage {
     let mut pictures = vec![expected.clone(), actual.clone()];
     if expected.dimensions() == actual.dimensions() {
         pictures.push(RgbaImage::from_fn(expected.width(), expected.height(), |x, y| {
@@ -93,7 +93,7 @@ pub fn side_by_side(expected: &RgbaImage, actual: &RgbaImage) -> RgbaImage {
 }
 
 /// Writes a PNG file as small as can be; without alpha where all of it is opaque.
-pub fn write_small(picture: &RgbaImage, path: &Path) {
+pub(crate) fn write_small(picture: &RgbaImage, path: &Path) {
     let picture = DynamicImage::ImageRgba8(picture.clone());
     let opaque = picture.as_rgba8().is_some_and(|rgba| rgba.pixels().all(|pixel| pixel[3] == 255));
     let picture = if opaque { DynamicImage::ImageRgb8(picture.to_rgb8()) } else { picture };

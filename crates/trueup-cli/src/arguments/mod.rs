@@ -24,7 +24,7 @@ Examples:
   trueup inspect pano.json --verbose
   trueup evaluate pano.json --truth truth.json
   trueup compare holiday/ -o holiday-compared
-  trueup options mesh";
+  trueup options --expert";
 
 /// Panoramas that stand upright: photographs in, a natural panorama out, and the reasons why it looks as it does.
 #[derive(Debug, Parser)]

@@ -254,6 +254,16 @@ mod tests {
     }
 
     #[test]
+    fn every_flag_stands_on_its_page() {
+        let command_line = include_str!("../../../../docs/command-line.md");
+        let compare = include_str!("../../../../docs/compare.md");
+        for row in OPTION_FLAGS {
+            let page = if row.subcommands == COMPARE { compare } else { command_line };
+            assert!(page.contains(&format!("`--{}", row.flag)), "--{} is not documented", row.flag);
+        }
+    }
+
+    #[test]
     fn names_with_a_stop_in_them_end_no_sentence() {
         assert_eq!(first_sentence("Of stage.option. More."), ("Of stage.option.", "More."));
         assert_eq!(first_sentence("One sentence."), ("One sentence.", ""));
