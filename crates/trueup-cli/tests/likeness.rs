@@ -6,9 +6,14 @@ use std::path::Path;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{DynamicImage, GenericImage, Rgba, RgbaImage};
 
-/// What two pictures of the same panorama may differ by, in levels of 255.
-const MEAN_TOLERANCE: f64 = 0.5;
-const HIGH_TOLERANCE: f64 = 16.0;
+/// What two pictures of the same panorama may differ by on average, in levels of 255.
+///
+/// Measured on the references: another seed of every random choice, as another machine's rounding may be, differs by 0.00 (and
+/// where it does by one level); `render.blend=none` in place of `multiband`, which differ least of the blend modes, by 0.29,
+/// the mesh with cells smaller by a tenth by 0.47.
+const MEAN_TOLERANCE: f64 = 0.1;
+/// What all but a thousandth of the pixels may differ by: blend modes differ by 16 and more, a seam elsewhere by 14.
+const HIGH_TOLERANCE: f64 = 4.0;
 /// The share of the pixels that differ by at most the high difference.
 const HIGH_SHARE: f64 = 0.999;
 /// Differences are shown so many times larger than they are.
@@ -115,8 +120,8 @@ fn detail(shift: f64, gain: f64) -> RgbaImage {
 fn what_is_seen_to_differ_is_told_and_rounding_is_not() {
     let expected = detail(0.0, 1.0);
     assert_eq!(Likeness::of(&expected, &expected), Likeness::Pixels { mean: 0.0, high: 0.0 });
-    assert!(Likeness::of(&expected, &detail(0.01, 1.0)).is_close());
-    for (what, actual) in [("a shift", detail(0.1, 1.0)), ("a gain", detail(0.0, 1.02))] {
+    assert!(Likeness::of(&expected, &detail(0.001, 1.0)).is_close());
+    for (what, actual) in [("a shift", detail(0.05, 1.0)), ("a gain", detail(0.0, 1.01))] {
         let likeness = Likeness::of(&expected, &actual);
         assert!(!likeness.is_close(), "{what}: {likeness}");
     }

@@ -100,9 +100,6 @@ fn compare(name: &str, actual: &Path) -> Result<(), String> {
         return Err(format!("{name}: there is no {}", reference.display()));
     };
     let likeness = Likeness::of(&expected, &actual);
-    if std::env::var_os("TRUEUP_TELL").is_some() {
-        eprintln!("{name}: {likeness}");
-    }
     if likeness.is_close() {
         return Ok(());
     }
