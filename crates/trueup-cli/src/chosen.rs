@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use trueup::{Error, MaskFile, MaskKind, Projection, Reference, StitchOptions};
+use trueup::{Error, MaskFile, MaskKind, Outputs, Projection, Reference, StitchOptions};
 
 use crate::arguments::{FileArgs, MaskArgs, TuningArgs, TypedOptions};
 use crate::failure::Failure;
@@ -33,10 +33,10 @@ pub(crate) fn options(
         set(one.typed(), &format!("{}={}", one.flag.option, one.value));
     }
     // A projection that was not understood is not there.
-    if wrong.is_empty() && options.projection.kind == Projection::Mesh {
+    if wrong.is_empty() && options.arrange.projection.kind == Projection::Mesh {
         wrong.extend(views_of_the_mesh(typed));
     }
-    wrong.extend(options.all_invalid().iter().map(ToString::to_string));
+    wrong.extend(options.invalid().iter().map(ToString::to_string));
     if wrong.is_empty() { Ok(options) } else { Err(Failure::options(wrong)) }
 }
 
@@ -77,6 +77,11 @@ pub(crate) fn reference(typed: Option<String>) -> Reference {
     }
 }
 
+/// The files that were asked for.
+pub(crate) fn outputs(args: FileArgs) -> Outputs {
+    Outputs { panorama: args.output, beside: args.beside.0 }
+}
+
 /// The masks that were typed.
 pub(crate) fn masks(args: &MaskArgs) -> Result<Vec<MaskFile>, Failure> {
     let ignoring = args.mask.iter().map(|typed| mask("--mask", typed, MaskKind::Use));
@@ -98,14 +103,8 @@ fn mask(flag: &str, typed: &str, kind: MaskKind) -> Result<MaskFile, Failure> {
 
 /// Refuses one name for two files.
 pub(crate) fn check_files(args: &FileArgs) -> Result<(), Failure> {
-    let files = [
-        ("--output", Some(&args.output)),
-        ("--project", args.project.as_ref()),
-        ("--pto", args.pto.as_ref()),
-        ("--layers", args.layers.as_ref()),
-        ("--seams", args.seams.as_ref()),
-    ];
-    let given: Vec<(&str, &PathBuf)> = files.iter().filter_map(|(flag, path)| Some((*flag, (*path)?))).collect();
+    let beside = args.beside.0.iter().map(|(kind, path)| (format!("--{}", kind.flag()), path));
+    let given: Vec<(String, &PathBuf)> = std::iter::once(("--output".to_owned(), &args.output)).chain(beside).collect();
     for (index, (flag, path)) in given.iter().enumerate() {
         if let Some((other, _)) = given[..index].iter().find(|(_, other)| other == path) {
             let message = format!("{} cannot be the file of both {other} and {flag}", path.display());

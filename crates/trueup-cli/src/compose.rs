@@ -15,7 +15,7 @@ use crate::summary;
 pub(crate) fn run(args: ComposeArgs) -> Result<(), Failure> {
     let (quiet, verbose) = (args.messages.quiet, args.messages.verbose);
     let (job, options) = checked(args)?;
-    let written = progress::shown(quiet, options.stitch.seed, |context| job.run(&options, context))?;
+    let written = progress::shown(quiet, |context| job.run(&options, context))?;
     if quiet { Ok(()) } else { output::print(&summary::of_written(&[written], verbose)) }
 }
 
@@ -31,11 +31,7 @@ fn checked(args: ComposeArgs) -> Result<(ComposeJob, StitchOptions), Failure> {
         project_folder,
         photographs: args.photos,
         masks: chosen::masks(&args.masks)?,
-        output: args.files.output,
-        new_project: args.files.project,
-        hugin_project: args.files.pto,
-        layers: args.files.layers,
-        seams: args.files.seams,
+        outputs: chosen::outputs(args.files),
         threads: chosen::threads(&args.tuning),
     };
     Ok((job, options))

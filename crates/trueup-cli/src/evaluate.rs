@@ -50,8 +50,7 @@ fn against(project: &Project, project_file: &Path, truth_file: &Path) -> Result<
 /// Photographs that are gone or cannot be compared leave the other measures as they are.
 fn pixels(project: &Project, project_file: &Path) -> Result<PixelOutcome, Error> {
     let folder = project_file.parent().unwrap_or(Path::new(""));
-    let seed = project.options.stitch.seed;
-    match progress::shown(false, seed, |context| trueup::evaluate_pixels(project, folder, context)) {
+    match progress::shown(false, |context| trueup::evaluate_pixels(project, folder, context)) {
         Ok(pixels) => Ok(Ok(pixels)),
         Err(Error::Input { subject, reason, .. }) => Ok(Err(format!("{reason}: {subject}"))),
         Err(Error::Unsolvable { why, .. }) => Ok(Err(why)),

@@ -20,7 +20,7 @@ const CHOICE_INDENT: usize = INDENT.len() + 2 + CHOICE_WIDTH;
 pub(crate) fn run(args: &OptionsArgs) -> Result<(), Failure> {
     let mut rows = StitchOptions::describe();
     if let Some(stage) = &args.stage {
-        let stages = StitchOptions::stages();
+        let stages: Vec<&str> = StitchOptions::tables().into_iter().map(|(table, _)| table).collect();
         if !stages.contains(&stage.as_str()) {
             return Err(Failure::usage(
                 format!("there is no stage \"{stage}\""),

@@ -11,10 +11,10 @@ const TEMPLATE: &str = "{prefix:16} {bar:32} {pos:>6} of {len:<6} {elapsed}";
 
 /// What `work` comes to, with its progress on standard error, or with none of it if `quiet`, until the first request to
 /// stop. The bars are gone when it returns.
-pub(crate) fn shown<T>(quiet: bool, seed: u64, work: impl FnOnce(&StageContext) -> T) -> T {
+pub(crate) fn shown<T>(quiet: bool, work: impl FnOnce(&StageContext) -> T) -> T {
     let cancel = cancel_token();
     let bars = Bars::new(quiet);
-    let outcome = work(&StageContext::new(&bars, &cancel, seed));
+    let outcome = work(&StageContext::new(&bars, &cancel));
     bars.clear();
     outcome
 }

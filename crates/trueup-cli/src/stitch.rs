@@ -12,7 +12,7 @@ use crate::summary;
 pub(crate) fn run(args: StitchArgs) -> Result<(), Failure> {
     let (quiet, verbose) = (args.messages.quiet, args.messages.verbose);
     let CheckedStitch { job, options } = CheckedStitch::new(args)?;
-    let written = progress::shown(quiet, options.stitch.seed, |context| job.run(&options, context))?;
+    let written = progress::shown(quiet, |context| job.run(&options, context))?;
     if quiet { Ok(()) } else { output::print(&summary::of_written(&written, verbose)) }
 }
 
@@ -37,11 +37,7 @@ impl CheckedStitch {
         };
         let job = StitchJob {
             inputs,
-            output: files.output,
-            project: files.project,
-            hugin_project: files.pto,
-            layers: files.layers,
-            seams: files.seams,
+            outputs: chosen::outputs(files),
             cache: geometry.cache,
             threads: chosen::threads(&args.tuning),
         };
@@ -68,12 +64,15 @@ mod tests {
     fn flags_overrule_set_and_set_overrules_the_file() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("c.toml");
-        std::fs::write(&file, "[canvas]\nscale = 0.5\n[stitch]\nseed = 3\n[output]\njpeg_quality = 70\n")
+        std::fs::write(&file, "[canvas]\nscale = 0.5\n[random]\nseed = 3\n[output]\njpeg_quality = 70\n")
             .expect("written");
         let config = file.to_str().expect("UTF-8");
-        let given = ["--config", config, "--scale", "2", "--set", "canvas.scale=0.25", "--set", "stitch.seed=4"];
+        let given = ["--config", config, "--scale", "2", "--set", "canvas.scale=0.25", "--set", "random.seed=4"];
         let options = checked(&given).map(|checked| checked.options).expect("valid");
-        assert_eq!((options.canvas.scale, options.stitch.seed, options.output.jpeg_quality), (2.0, 4, 70));
+        assert_eq!(
+            (options.arrange.canvas.scale, options.matching.random.seed, options.compose.output.jpeg_quality),
+            (2.0, 4, 70)
+        );
     }
 
     #[test]

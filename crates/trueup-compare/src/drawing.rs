@@ -7,9 +7,8 @@ use trueup_core::lines::LineSegment;
 use trueup_core::mesh::GridMesh;
 use trueup_core::source::WorkingFrame;
 
-use trueup::StitchOptions;
-use trueup::{ImageRecord, Project};
 use trueup::MatchedPhotographs;
+use trueup::{ImageRecord, Project};
 
 /// Points in panorama pixels, to be joined.
 pub type Polyline = Vec<[f64; 2]>;
@@ -51,12 +50,10 @@ pub(crate) fn draw(set: &MatchedPhotographs, project: &Project) -> Result<Drawin
     let used = project.images.iter().enumerate().filter(|(_, image)| image.mesh.is_some());
     for (position, image) in used {
         let mesh = image.grid()?;
-        drawing
-            .grids
-            .push(PhotographGrid { path: image.path.clone(), lines: grid_lines(&mesh, DRAWN_GRID_LINES) });
+        drawing.grids.push(PhotographGrid { path: image.path.clone(), lines: grid_lines(&mesh, DRAWN_GRID_LINES) });
         let Some((lines, frame)) = set.lines_of(position) else { continue };
         let working = GridMesh { width: frame.width, height: frame.height, ..mesh };
-        let vertical = verticals(image, lines, &frame, &project.options);
+        let vertical = verticals(image, lines, &frame);
         for segment in longest(lines, DRAWN_LINES) {
             let drawn = carried(&lines[segment], &working);
             match vertical.binary_search(&segment) {
@@ -69,7 +66,7 @@ pub(crate) fn draw(set: &MatchedPhotographs, project: &Project) -> Result<Drawin
 }
 
 /// Positions of the vertical segments, as the measures of uprightness find them.
-fn verticals(image: &ImageRecord, lines: &[LineSegment], frame: &WorkingFrame, options: &StitchOptions) -> Vec<usize> {
+fn verticals(image: &ImageRecord, lines: &[LineSegment], frame: &WorkingFrame) -> Vec<usize> {
     let Some(focal_px) = image.focal_px else { return Vec::new() };
     // Down is the levelled world's second axis; without a rotation, cameras are expected to be held level.
     let down = image.rotation.map_or(Vector3::y(), |rows| Vector3::new(rows[0][1], rows[1][1], rows[2][1]));

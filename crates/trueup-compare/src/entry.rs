@@ -119,12 +119,9 @@ mod tests {
     #[test]
     fn what_all_share_cannot_depart() {
         let common = StitchOptions::default();
-        for shared in [
-            "matching.max_distance_ratio=0.5",
-            "features.peak_threshold=1",
-            "working.pixels=100000",
-            "random.seed=3",
-        ] {
+        for shared in
+            ["matching.max_distance_ratio=0.5", "features.peak_threshold=1", "working.pixels=100000", "random.seed=3"]
+        {
             let entry = ComparisonEntry::parse(&format!("other: {shared}")).expect("well formed");
             assert!(entry.options(&common).expect_err("shared").to_string().contains("shares features"), "{shared}");
         }

@@ -4,9 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use rand::Rng;
-use trueup::{
-    ImageRecord, Inputs, PhotographCache, Project, StitchOptions, Stitcher, read_truth, thread_pool,
-};
+use trueup::{ImageRecord, Inputs, PhotographCache, Project, StitchOptions, Stitcher, read_truth, thread_pool};
 use trueup_core::options::{InvalidOption, OptionValue};
 use trueup_core::truth::Truth;
 use trueup_core::{Error, Result, StageContext};
@@ -131,7 +129,11 @@ impl CompareJob {
     ) -> Result<Comparison> {
         let start = Instant::now();
         let inputs = Inputs { all: false, ..self.inputs.clone() };
-        let cache = self.cache.as_ref().map(|folder| PhotographCache::open(folder, options.run.resources.cache_bytes)).transpose()?;
+        let cache = self
+            .cache
+            .as_ref()
+            .map(|folder| PhotographCache::open(folder, options.run.resources.cache_bytes))
+            .transpose()?;
         let stitcher = Stitcher::new(options, context).with_cache(cache.as_ref());
         let set = stitcher.match_photographs(&inputs)?.remembering();
         let pixels: f64 = set.images().iter().map(|image| (image.width * image.height) as f64).sum();

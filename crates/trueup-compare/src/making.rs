@@ -2,10 +2,8 @@
 
 use std::path::Path;
 
+use trueup::{Alignment, Inputs, MatchedPhotographs, Outputs, Project, SideOutput, StitchOptions, Stitcher, evaluate};
 use trueup_compose::layout::median_cell_scale;
-use trueup::{
-    Alignment, Inputs, MatchedPhotographs, Outputs, Project, SideOutput, StitchOptions, Stitcher, evaluate,
-};
 use trueup_core::options::OptionValue;
 use trueup_core::truth::Truth;
 use trueup_core::{Error, Result, StageContext};
@@ -76,8 +74,7 @@ impl Common<'_> {
         };
         made.drawing = drawing::draw(self.set, &alignment.project)?;
         let (file, project_file) = (format!("{stem}.{}", self.format.display()), format!("{stem}.json"));
-        let outputs =
-            Outputs::new(self.folder.join(&file)).with(SideOutput::Project, self.folder.join(&project_file));
+        let outputs = Outputs::new(self.folder.join(&file)).with(SideOutput::Project, self.folder.join(&project_file));
         let written = outputs.write(stitcher, alignment)?;
         let project = written.project;
         compared.diagnostics.clone_from(&project.diagnostics);

@@ -2,9 +2,9 @@
 
 use trueup_core::{Error, Result, StageContext};
 
-use trueup::{PixelEvaluation, compare_overlaps, scale_up_to};
-use trueup::{ImageStatus, Project};
 use trueup::MatchedPhotographs;
+use trueup::{ImageStatus, Project};
+use trueup::{PixelEvaluation, compare_overlaps, scale_up_to};
 
 /// The pixel measures, or why there are none.
 pub(crate) type Pixels = std::result::Result<PixelEvaluation, String>;

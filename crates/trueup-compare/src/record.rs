@@ -8,9 +8,9 @@ use trueup_core::diagnostics::Diagnostic;
 use super::entry::ComparisonEntry;
 use super::figures::ComparisonFigure;
 use super::ranking::Ranking;
-use trueup::{Evaluation, PixelEvaluation};
 use trueup::Measures;
 use trueup::StitchOptions;
+use trueup::{Evaluation, PixelEvaluation};
 
 /// The `format` field of every comparison file.
 pub const COMPARISON_FORMAT: &str = "trueup-comparison";

@@ -76,19 +76,19 @@ static NEVER: CancelToken = CancelToken(AtomicBool::new(false));
 impl Default for StageContext<'_> {
     /// Silent, never cancelled, seed 0: for tests and small programs.
     fn default() -> Self {
-        Self::new(&SILENT, &NEVER, 0)
+        Self::new(&SILENT, &NEVER)
     }
 }
 
 impl<'a> StageContext<'a> {
-    /// A context that reports to `progress`, stops on `cancel` and derives every random choice from `seed`.
-    pub fn new(progress: &'a dyn Progress, cancel: &'a CancelToken, seed: u64) -> Self {
-        Self { progress, cancel, seed, sink: Mutex::default() }
+    /// A context that reports to `progress` and stops on `cancel`; random choices derive from 0, see [`Self::seeded`].
+    pub fn new(progress: &'a dyn Progress, cancel: &'a CancelToken) -> Self {
+        Self { progress, cancel, seed: 0, sink: Mutex::default() }
     }
 
     /// The same cancellation and seed, for a part of the work whose progress is told by the whole. Findings are its own.
     pub fn without_progress(&self) -> StageContext<'a> {
-        Self::new(&SILENT, self.cancel, self.seed)
+        Self::new(&SILENT, self.cancel).seeded(self.seed)
     }
 
     /// Where progress goes.
@@ -104,14 +104,9 @@ impl<'a> StageContext<'a> {
         if self.cancel.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
     }
 
-    /// The number from which every random choice derives.
-    pub fn seed(&self) -> u64 {
-        self.seed
-    }
-
     /// The same progress and cancellation, with random choices from `seed`. Findings are its own.
     pub fn seeded(&self, seed: u64) -> StageContext<'a> {
-        Self::new(self.progress, self.cancel, seed)
+        Self { seed, ..Self::new(self.progress, self.cancel) }
     }
 
     /// The number from which every random choice derives.
@@ -187,7 +182,7 @@ impl<'a> StageContext<'a> {
     /// # Errors
     /// Those of `work`.
     pub fn gather<T>(&self, work: impl FnOnce(&StageContext) -> Result<T>) -> Result<Reported<T>> {
-        let nested = Self::new(self.progress, self.cancel, self.seed);
+        let nested = self.seeded(self.seed);
         let value = work(&nested)?;
         let Sink { findings, seconds } = nested.sink.into_inner().unwrap_or_else(PoisonError::into_inner);
         Ok(Reported { value, findings, seconds })
@@ -239,7 +234,7 @@ mod tests {
     #[test]
     fn cancelled_context_says_so() {
         let token = CancelToken::default();
-        let context = StageContext::new(&SILENT, &token, 0);
+        let context = StageContext::new(&SILENT, &token);
         assert!(context.check_cancelled().is_ok());
         token.cancel();
         assert!(matches!(context.check_cancelled(), Err(Error::Cancelled)));

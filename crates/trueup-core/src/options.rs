@@ -301,6 +301,18 @@ macro_rules! choice {
             $( $(#[doc = $doc])* #[serde(rename = $text)] $variant, )*
         }
 
+        impl $name {
+            /// The names of the alternatives, in their order.
+            #[allow(dead_code)]
+            pub const NAMES: &'static [&'static str] = &[$($text),*];
+
+            /// The alternative of this name, as [`$crate::options::OptionValue::display`] writes it.
+            #[allow(dead_code)]
+            pub fn named(name: &str) -> Option<Self> {
+                match name { $($text => Some(Self::$variant),)* _ => None }
+            }
+        }
+
         impl $crate::options::OptionValue for $name {
             fn display(&self) -> String {
                 match self { $(Self::$variant => $text.to_owned(),)* }

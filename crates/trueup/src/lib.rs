@@ -37,15 +37,14 @@ pub use options::{
 };
 pub use pipeline::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use project::{
-    Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
-    ProjectionRecord, hugin_project,
+    Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord,
+    Project, ProjectionRecord, hugin_project,
 };
 pub use report::evaluation::{
-    Evaluation, PictureEvaluation, PixelEvaluation, compare_overlaps, evaluate, evaluate_pixels, read_truth, scale_up_to,
+    Evaluation, PictureEvaluation, PixelEvaluation, compare_overlaps, evaluate, evaluate_pixels, read_truth,
+    scale_up_to,
 };
-pub use report::measures::{
-    BentLine, LongLines, Measures, PictureMeasures, ReprojectionMeasures, UprightMeasures,
-};
+pub use report::measures::{BentLine, LongLines, Measures, PictureMeasures, ReprojectionMeasures, UprightMeasures};
 pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;

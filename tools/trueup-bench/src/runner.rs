@@ -93,7 +93,7 @@ impl Runner<'_> {
 
     /// The rows of one set's trials, in their order.
     fn run_set(&self, set: &SetSpec, trials: &[&Trial], tracker: &Tracker) -> Result<Vec<Row>> {
-        let context = StageContext::new(&Silent, self.cancel, 0);
+        let context = StageContext::new(&Silent, self.cancel);
         let ready = set.prepare(&self.data, &context)?;
         let mut matched: Option<(MatchingKey, Result<MatchedPhotographs>)> = None;
         let mut rows = vec![None; trials.len()];
@@ -139,7 +139,7 @@ impl Runner<'_> {
     fn match_set(&self, ready: &ReadySet, trial: &Trial) -> Result<MatchedPhotographs> {
         let unseeded = Trial { seed: 0, overrides: trial.matching_overrides(), ..trial.clone() };
         let options = unseeded.options()?;
-        let context = StageContext::new(&Silent, self.cancel, 0);
+        let context = StageContext::new(&Silent, self.cancel);
         Stitcher::new(&options, &context)
             .match_photographs(&inputs_of(ready, trial))
             .map(MatchedPhotographs::remembering)
@@ -152,7 +152,7 @@ impl Runner<'_> {
         trial: &Trial,
     ) -> Result<(BTreeMap<String, f64>, String)> {
         let options = trial.options()?;
-        let context = StageContext::new(&Silent, self.cancel, trial.seed);
+        let context = StageContext::new(&Silent, self.cancel);
         let aligned = Stitcher::new(&options, &context).align_matched(photographs, &inputs_of(ready, trial))?;
         let first = aligned.alignments.into_iter().next();
         let project = first.ok_or_else(|| Error::input(&trial.set, "nothing was aligned", "Look at the set."))?.project;

@@ -47,6 +47,14 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', help_heading = "What is compared")]
     pub rank: Option<Vec<String>>,
 
+    /// Size of the panoramas, relative to the reference photograph's pixels; without it, one that suits a page
+    #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Output")]
+    pub scale: Option<f64>,
+
+    /// The panoramas' format: jpg, png or webp
+    #[arg(long, value_name = "FORMAT", help_heading = "Output")]
+    pub format: Option<String>,
+
     #[command(flatten)]
     pub geometry: GeometryArgs,
 

@@ -4,6 +4,7 @@ mod compare;
 mod compose;
 mod option_flags;
 mod shared;
+mod side_outputs;
 mod stitch;
 
 use std::path::PathBuf;

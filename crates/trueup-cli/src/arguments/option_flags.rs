@@ -7,7 +7,6 @@ use trueup::{OptionDescription, StitchOptions};
 
 /// The subcommands that make panoramas, by the names that they are typed with.
 const STITCH: &[&str] = &["stitch"];
-const COMPARE: &[&str] = &["compare"];
 const STITCH_AND_COMPOSE: &[&str] = &["stitch", "compose"];
 const STITCH_AND_COMPARE: &[&str] = &["stitch", "compare"];
 const ALL: &[&str] = &["stitch", "compose", "compare"];
@@ -19,8 +18,6 @@ const TUNING: &str = "Tuning";
 /// Every flag that sets an option: the flag, the option, the heading in the help, the subcommands that take it.
 pub(crate) const OPTION_FLAGS: &[OptionFlag] = &[
     OptionFlag::new("scale", "canvas.scale", OUTPUT, STITCH_AND_COMPOSE),
-    OptionFlag::new("scale", "compare.scale", OUTPUT, COMPARE),
-    OptionFlag::new("format", "compare.format", OUTPUT, COMPARE),
     OptionFlag::new("quality", "output.jpeg_quality", OUTPUT, ALL),
     OptionFlag::new("depth", "output.depth", OUTPUT, STITCH_AND_COMPOSE),
     OptionFlag::new("projection", "projection.kind", VIEW, STITCH_AND_COMPOSE),
@@ -36,9 +33,9 @@ pub(crate) const OPTION_FLAGS: &[OptionFlag] = &[
     OptionFlag::new("method", "stitch.method", TUNING, STITCH),
     OptionFlag::new("align", "stitch.align", TUNING, STITCH),
     OptionFlag::new("structure", "stitch.structure", TUNING, STITCH),
-    OptionFlag::new("seed", "stitch.seed", TUNING, STITCH_AND_COMPARE),
-    OptionFlag::new("memory", "stitch.memory", TUNING, STITCH_AND_COMPOSE).value("AMOUNT"),
-    OptionFlag::new("scratch", "stitch.scratch", TUNING, STITCH_AND_COMPOSE).value("DIR"),
+    OptionFlag::new("seed", "random.seed", TUNING, STITCH_AND_COMPARE),
+    OptionFlag::new("memory", "resources.memory", TUNING, STITCH_AND_COMPOSE).value("AMOUNT"),
+    OptionFlag::new("scratch", "resources.scratch", TUNING, STITCH_AND_COMPOSE).value("DIR"),
 ];
 
 /// A flag that sets an option.
@@ -250,16 +247,13 @@ mod tests {
                 assert!(help.contains(part), "{part} is not in\n{help}");
             }
         }
-        assert!(!help.contains("--format"), "a flag of another subcommand:\n{help}");
     }
 
     #[test]
     fn every_flag_stands_on_its_page() {
         let command_line = include_str!("../../../../docs/command-line.md");
-        let compare = include_str!("../../../../docs/compare.md");
         for row in OPTION_FLAGS {
-            let page = if row.subcommands == COMPARE { compare } else { command_line };
-            assert!(page.contains(&format!("`--{}", row.flag)), "--{} is not documented", row.flag);
+            assert!(command_line.contains(&format!("`--{}", row.flag)), "--{} is not documented", row.flag);
         }
     }
 

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::side_outputs::SideOutputArgs;
+
 /// More threads than this are a typing mistake, and starting them would hang the machine.
 const MAX_THREADS: i64 = 1024;
 
@@ -14,21 +16,8 @@ pub(crate) struct FileArgs {
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     pub output: PathBuf,
 
-    /// Write the panorama's record (geometry, pairs, reasons, timings) as JSON
-    #[arg(long, value_name = "FILE.json", help_heading = "Output")]
-    pub project: Option<PathBuf>,
-
-    /// Write the cameras as a project of the Hugin stitcher
-    #[arg(long, value_name = "FILE.pto", help_heading = "Output")]
-    pub pto: Option<PathBuf>,
-
-    /// Write the photographs as layers, aligned and corrected, one to a page (output.layer_extent)
-    #[arg(long, value_name = "FILE.tif", help_heading = "Output")]
-    pub layers: Option<PathBuf>,
-
-    /// Write which photograph is shown where
-    #[arg(long, value_name = "FILE.png", help_heading = "Output")]
-    pub seams: Option<PathBuf>,
+    #[command(flatten)]
+    pub beside: SideOutputArgs,
 }
 
 /// How the geometry is found where none is recorded.

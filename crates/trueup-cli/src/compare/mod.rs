@@ -3,8 +3,10 @@
 mod pages;
 mod summary;
 
-use trueup::compare::{CompareJob, Comparison, Drawing, Entry, Page, read_rankings, tally};
 use trueup::{Error, Inputs, StitchOptions};
+use trueup_compare::{
+    CompareJob, Comparison, ComparisonEntry, ComparisonPage, Drawing, PanoramaFormat, read_rankings, tally,
+};
 
 use crate::arguments::CompareArgs;
 use crate::chosen;
@@ -18,15 +20,17 @@ pub(crate) fn run(args: CompareArgs) -> Result<(), Failure> {
     }
     let quiet = args.quiet;
     let (job, options) = checked(args)?;
-    let compared = progress::shown(quiet, options.stitch.seed, |context| job.run(&options, context, &pages))?;
+    let compared = progress::shown(quiet, |context| job.run(&options, context, &pages))?;
     if quiet { Ok(()) } else { output::print(&summary::text(&compared, &job.output)) }
 }
 
 /// The pages of a comparison.
-fn pages(comparison: &Comparison, drawings: &[Drawing]) -> Result<Vec<Page>, Error> {
-    let mut pages = vec![Page { name: "index.html".to_owned(), text: pages::side_by_side(comparison, drawings)? }];
+fn pages(comparison: &Comparison, drawings: &[Drawing]) -> Result<Vec<ComparisonPage>, Error> {
+    let mut pages =
+        vec![ComparisonPage { name: "index.html".to_owned(), text: pages::side_by_side(comparison, drawings)? }];
     if let Some(ranking) = &comparison.ranking {
-        pages.push(Page { name: "ranking.html".to_owned(), text: pages::blind_ranking(comparison, ranking)? });
+        pages
+            .push(ComparisonPage { name: "ranking.html".to_owned(), text: pages::blind_ranking(comparison, ranking)? });
     }
     Ok(pages)
 }
@@ -60,15 +64,35 @@ fn checked(args: CompareArgs) -> Result<(CompareJob, StitchOptions), Failure> {
     // The command demands an output wherever this is called.
     let output = args.output.unwrap_or_default();
     let cache = args.geometry.cache;
-    Ok((CompareJob { inputs, entries, truth: args.truth, ranked: args.rank, output, cache, threads }, options))
+    let job = CompareJob {
+        inputs,
+        entries,
+        truth: args.truth,
+        ranked: args.rank,
+        scale: args.scale,
+        format: format(args.format.as_deref())?,
+        output,
+        cache,
+        threads,
+    };
+    Ok((job, options))
+}
+
+/// The panoramas' format that was typed, or that of most photographs.
+fn format(typed: Option<&str>) -> Result<PanoramaFormat, Failure> {
+    let Some(typed) = typed else { return Ok(PanoramaFormat::Jpeg) };
+    PanoramaFormat::named(typed).ok_or_else(|| {
+        let allowed = PanoramaFormat::NAMES.join(" | ");
+        Failure::options(vec![format!("--format {typed}: \"{typed}\" cannot be (allowed: {allowed})")])
+    })
 }
 
 /// The methods that were named, or all, then the entries that were typed. Every one that cannot be is listed.
-fn entries(methods: &[String], typed: &[String], options: &StitchOptions) -> Result<Vec<Entry>, Failure> {
+fn entries(methods: &[String], typed: &[String], options: &StitchOptions) -> Result<Vec<ComparisonEntry>, Failure> {
     let mut wrong = Vec::new();
-    let mut entries = if methods.is_empty() { Entry::methods() } else { Vec::new() };
-    let named = methods.iter().map(|name| (format!("--methods {name}"), Entry::method(name.trim())));
-    let typed = typed.iter().map(|text| (format!("--entry \"{text}\""), Entry::parse(text)));
+    let mut entries = if methods.is_empty() { ComparisonEntry::methods() } else { Vec::new() };
+    let named = methods.iter().map(|name| (format!("--methods {name}"), ComparisonEntry::method(name.trim())));
+    let typed = typed.iter().map(|text| (format!("--entry \"{text}\""), ComparisonEntry::parse(text)));
     for (argument, entry) in named.chain(typed) {
         match entry.and_then(|entry| entry.options(options).map(|_| entry)) {
             Ok(entry) => entries.push(entry),

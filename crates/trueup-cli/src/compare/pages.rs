@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 use trueup::Error;
-use trueup::compare::{Comparison, Drawing, Polyline, Ranking};
+use trueup_compare::{Comparison, Drawing, Polyline, Ranking};
 
 const INDEX: &str = include_str!("index.html");
 const INDEX_STYLE: &str = include_str!("index.css");
@@ -43,8 +43,8 @@ pub(crate) fn blind_ranking(comparison: &Comparison, ranking: &Ranking) -> Resul
         })
         .collect();
     let data = json!({
-        "format": trueup::compare::RANKING_FORMAT,
-        "version": trueup::compare::RANKING_VERSION,
+        "format": trueup_compare::RANKING_FORMAT,
+        "version": trueup_compare::RANKING_VERSION,
         "comparison": comparison.id,
         "panoramas": panoramas,
     });

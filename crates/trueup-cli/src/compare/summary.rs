@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use trueup::compare::{Better, Compared, Comparison, Figure, Refusal, Tally};
+use trueup_compare::{Better, Compared, Comparison, ComparisonFigure, Refusal, Tally};
 
 /// Figures in the table: more do not fit beside each other.
 const COLUMNS: usize = 6;
@@ -21,8 +21,8 @@ pub(crate) fn text(comparison: &Comparison, folder: &Path) -> String {
     for photograph in comparison.photographs.iter().filter(|photograph| !photograph.reason.is_empty()) {
         let _ = writeln!(text, "  left out  {}: {}", photograph.path, photograph.reason);
     }
-    let shown = |figure: &&Figure| figure.main && figure.better != Better::Neither;
-    let figures: Vec<&Figure> = comparison.figures.iter().filter(shown).take(COLUMNS).collect();
+    let shown = |figure: &&ComparisonFigure| figure.main && figure.better != Better::Neither;
+    let figures: Vec<&ComparisonFigure> = comparison.figures.iter().filter(shown).take(COLUMNS).collect();
     let width = comparison.entries.iter().map(|entry| entry.name.chars().count()).max().unwrap_or(0);
     let headings: Vec<String> = figures.iter().map(|figure| heading(figure)).collect();
     let _ = writeln!(text, "\n{:width$}  {}", "", headings.join("  "));
@@ -37,7 +37,7 @@ pub(crate) fn text(comparison: &Comparison, folder: &Path) -> String {
     text
 }
 
-fn heading(figure: &Figure) -> String {
+fn heading(figure: &ComparisonFigure) -> String {
     let unit = if figure.unit.is_empty() { String::new() } else { format!(" {}", figure.unit) };
     format!("{}{unit}", figure.name)
 }
@@ -49,7 +49,7 @@ fn told(refusal: &Refusal) -> String {
 }
 
 /// A figure as wide as its heading, with the gap that follows.
-fn cell(entry: &Compared, figure: &Figure, heading: &str) -> String {
+fn cell(entry: &Compared, figure: &ComparisonFigure, heading: &str) -> String {
     let value = match entry.figures.get(figure.key) {
         Some(value) => format!("{value:.*}", figure.decimals),
         None => "-".to_owned(),

@@ -57,7 +57,7 @@ pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool
 pub(crate) fn of_written(written: &[Written], verbose: bool) -> String {
     let one = |written: &Written| {
         let file =
-            PanoramaFile { panorama: &written.output, bytes: written.bytes, project: written.project_file.as_deref() };
+            PanoramaFile { panorama: &written.outputs.panorama, bytes: written.bytes, project: written.project_file() };
         text(&written.project, Some(&file), verbose)
     };
     written.iter().map(one).collect::<Vec<_>>().join("\n")

@@ -81,7 +81,7 @@ fn deep_zoom_replaces_its_own_tiles_only() {
 
     let cancel = CancelToken::default();
     let picture = CancelAtEnd(Gradient { width: 300, height: 300 }, &cancel);
-    let stopped = write(&path, &picture, &Metadata::default(), &options, &StageContext::new(&Silent, &cancel, 0));
+    let stopped = write(&path, &picture, &Metadata::default(), &options, &StageContext::new(&Silent, &cancel));
     assert!(matches!(stopped, Err(Error::Cancelled)), "{stopped:?}");
     assert!(!tiles.join("9").exists() && tiles.join("8/0_0.jpg").is_file());
     assert_eq!(files_in(&folder).len(), 2);

@@ -235,7 +235,7 @@ fn a_stop_leaves_the_old_file_and_nothing_else() {
             &picture,
             &Metadata::default(),
             &OutputOptions::default(),
-            &StageContext::new(&Silent, &cancel, 0),
+            &StageContext::new(&Silent, &cancel),
         );
         assert!(matches!(stopped, Err(Error::Cancelled)), "{name}: {stopped:?}");
         assert_eq!(std::fs::read(&path).expect("the old file"), b"old");

@@ -248,7 +248,7 @@ fn options_out_of_range_are_refused_and_a_stop_is_obeyed() {
     assert!(matches!(scan(&[], &bad, &StageContext::default()), Err(Error::Options(_))));
     let cancel = trueup_core::context::CancelToken::default();
     cancel.cancel();
-    let context = StageContext::new(&trueup_core::context::Silent, &cancel, 0);
+    let context = StageContext::new(&trueup_core::context::Silent, &cancel);
     let stopped = scan(&["nowhere.jpg".to_owned()], &SourceOptions::default(), &context);
     assert!(matches!(stopped, Err(Error::Cancelled)));
 }

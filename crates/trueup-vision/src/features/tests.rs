@@ -261,7 +261,7 @@ fn unusable_input_is_refused() {
     }
     let token = CancelToken::default();
     token.cancel();
-    let cancelled = StageContext::new(&Silent, &token, 0);
+    let cancelled = StageContext::new(&Silent, &token);
     assert!(matches!(detect(&Raster::new(20, 20, 1), &options, &cancelled), Err(Error::Cancelled)));
 }
 

@@ -186,7 +186,7 @@ fn wrong_input_is_refused() {
     assert_eq!(invalid.len(), 1);
     let token = CancelToken::default();
     token.cancel();
-    let cancelled = StageContext::new(&Silent, &token, 0);
+    let cancelled = StageContext::new(&Silent, &token);
     assert!(matches!(detect(&Raster::new(20, 20, 1), &LineOptions::default(), &cancelled), Err(Error::Cancelled)));
 }
 

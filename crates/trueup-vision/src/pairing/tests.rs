@@ -69,7 +69,7 @@ fn bad_options_and_cancelling_are_errors() {
     assert!(matches!(outcome, Err(Error::Options(invalid)) if invalid.len() == 1));
     let token = trueup_core::context::CancelToken::default();
     token.cancel();
-    let context = StageContext::new(&trueup_core::context::Silent, &token, 0);
+    let context = StageContext::new(&trueup_core::context::Silent, &token);
     let options = PairingOptions { exhaustive_up_to: 1, ..PairingOptions::default() };
     assert!(matches!(propose(&row(3, 5), &options, &context), Err(Error::Cancelled)));
 }

@@ -2,9 +2,9 @@
 
 mod compose;
 pub(crate) mod inputs;
+mod layers;
 pub(crate) mod masks;
 pub(crate) mod names;
-mod layers;
 mod outputs;
 mod side_outputs;
 mod stitch;

@@ -64,19 +64,19 @@ macro_rules! side_outputs {
 }
 
 side_outputs! {
-    /// Cameras, grids, measures and reasons as JSON: what `trueup compose` and other programs read
+    /// Write the panorama's record (geometry, pairs, reasons, timings) as JSON
     Project("project", "FILE.json")
         checked by |path, _| encode::check_place(path),
         written by Writer::Record(Project::to_json);
-    /// The cameras as a Hugin project, for programs that read .pto files
+    /// Write the cameras as a project of the Hugin stitcher
     HuginProject("pto", "FILE.pto")
         checked by |path, _| encode::check_place(path),
         written by Writer::Record(hugin_project);
-    /// Every photograph, aligned and evened out, on a page of a TIFF, to finish by hand
+    /// Write the photographs as layers, aligned and corrected, one to a page (output.layer_extent)
     Layers("layers", "FILE.tif")
         checked by |path, _| encode::check_layers_place(path),
         written by Writer::Photographs(|stitcher, alignment, path| stitcher.write_layers(alignment, path).map(drop));
-    /// Which photograph is shown at every pixel, as a PNG of numbers
+    /// Write which photograph is shown where
     Seams("seams", "FILE.png")
         checked by |path, options| {
             encode::check_labels_place(path)?;

@@ -62,7 +62,7 @@ impl Outputs {
 
 impl Written {
     /// The project's file, if one was wanted.
-    pub fn project_file(&self) -> Option<&PathBuf> {
-        self.outputs.beside.get(&SideOutput::Project)
+    pub fn project_file(&self) -> Option<&Path> {
+        self.outputs.beside.get(&SideOutput::Project).map(PathBuf::as_path)
     }
 }

@@ -25,7 +25,7 @@ impl fmt::Display for Key {
 }
 
 /// Collects what decides a result.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub(crate) struct KeyMaker(blake3::Hasher);
 
 impl KeyMaker {

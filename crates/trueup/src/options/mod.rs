@@ -27,8 +27,8 @@ use trueup_vision::lines::LineOptions;
 use trueup_vision::matching::MatchingOptions;
 use trueup_vision::pairing::PairingOptions;
 
-pub use method::{Evidence, Method, Structure};
 pub(crate) use method::MethodForm;
+pub use method::{Evidence, Method, Structure};
 
 trueup_core::options! {
     /// What photographs are measured on.

@@ -87,7 +87,11 @@ impl ArrangeInput {
 /// # Errors
 /// Those of the layout; [`Error::NotApplicable`] if a projection is asked for and no cameras are known;
 /// [`Error::Unsolvable`] if nothing lies in the view.
-pub(crate) fn run(input: ArrangeInput, options: &ArrangeOptions, context: &StageContext) -> Result<Reported<Arrangement>> {
+pub(crate) fn run(
+    input: ArrangeInput,
+    options: &ArrangeOptions,
+    context: &StageContext,
+) -> Result<Reported<Arrangement>> {
     context.gather(|context| context.time("canvas", || lay_out(input, options, context)))
 }
 

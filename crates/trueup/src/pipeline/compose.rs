@@ -7,7 +7,7 @@ use trueup_compose::layout::CanvasLayout;
 use trueup_compose::render::{self, Panorama, Resources};
 use trueup_core::diagnostics::{Diagnostic, Reported, Subject};
 use trueup_core::raster::Raster;
-use trueup_core::source::WorkingFrame;
+use trueup_core::source::{PhotographSource, WorkingFrame};
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 
@@ -72,7 +72,11 @@ pub(crate) struct ComposeInput<'a> {
 /// # Errors
 /// Those of reading the photographs and of a scratch file; [`trueup_core::Error::Limits`];
 /// [`trueup_core::Error::Cancelled`].
-pub(crate) fn run(input: &ComposeInput, options: &ComposeOptions, context: &StageContext) -> Result<Reported<Panorama>> {
+pub(crate) fn run(
+    input: &ComposeInput,
+    options: &ComposeOptions,
+    context: &StageContext,
+) -> Result<Reported<Panorama>> {
     let ComposeInput { layout, corrections, photographs, resources, fill } = input;
     context.gather(|context| {
         let parts = (&options.render, &options.seam);

@@ -77,7 +77,8 @@ impl Matched {
     /// [`Error::Input`] if the reference is no photograph's name.
     pub fn component<'a>(&'a self, members: &[usize], inputs: &Inputs) -> Result<Component<'a>> {
         let reference = self.reference_of(members, inputs)?;
-        let rotation_deg = self.graph_file.reference_rotation_deg.filter(|_| self.graph_file.reference == Some(reference));
+        let rotation_deg =
+            self.graph_file.reference_rotation_deg.filter(|_| self.graph_file.reference == Some(reference));
         let rotation = rotation_deg.unwrap_or(0.0).to_radians();
         Ok(Component::new(members, reference, rotation, &self.set.images, &self.measured, &self.pairs))
     }

@@ -74,8 +74,7 @@ pub(crate) fn run(
             Some(_) => context.time("source", || set.keys(context))?,
             None => vec![None; set.images.len()],
         };
-        let keys: Vec<Option<Key>> =
-            contents.into_iter().map(|content| memo.key(MEASURED, content, options)).collect();
+        let keys: Vec<Option<Key>> = contents.into_iter().map(|content| memo.key(MEASURED, content, options)).collect();
         let count = set.images.len();
         context.progress().begin(STAGE, count as u64);
         let start = Instant::now();

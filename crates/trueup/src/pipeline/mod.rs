@@ -27,7 +27,7 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::color::PhotographColors;
 use trueup_io::encode::Metadata;
 
-use self::align::component::{Component, camera_groups};
+use self::align::component::camera_groups;
 use self::align::{AlignInput, Geometry};
 use self::arrange::{ArrangeInput, Arrangement};
 use self::budget::Budget;
@@ -228,12 +228,12 @@ impl<'a> Stitcher<'a> {
         let corrections = context.absorb(compose::light(&light, &self.options.compose, context)?);
         let mut project = unfilled(matched, self.options, members, groups);
         let geometry = geometry.as_ref();
-        let found = GeometryRecord { component: &component, geometry, arrangement: &arrangement, corrections: &corrections };
+        let found =
+            GeometryRecord { component: &component, geometry, arrangement: &arrangement, corrections: &corrections };
         fill_geometry(&mut project, &found);
         project.color_space = photographs.colors().map(PhotographColors::name).unwrap_or_default();
-        project.measures = geometry.map(|geometry| {
-            context.time("measures", || measures::run(&component, geometry, &arrangement.plane, self.options))
-        });
+        project.measures = geometry
+            .map(|geometry| context.time("measures", || measures::run(&component, geometry, &arrangement.plane)));
         let layout = arrangement.written;
         let corrections = corrections.of_placed(&layout, |photograph| members.binary_search(&photograph).ok());
         let directions = geometry.map(|geometry| geometry.triads.clone()).unwrap_or_default();
@@ -259,8 +259,7 @@ impl<'a> Stitcher<'a> {
                 false => self.light_anew(&set, &arrangement, reference, context)?,
             };
             let same_canvas = self.options.arrange.canvas == project.options.arrange.canvas;
-            let mut project =
-                Project { options: self.options.clone(), seconds: Default::default(), ..project.clone() };
+            let mut project = Project { options: self.options.clone(), seconds: Default::default(), ..project.clone() };
             record_composition(&mut project, &used, &set, &arrangement, &corrections);
             project.color_space = set.files.colors().map(PhotographColors::name).unwrap_or_default();
             if !same_canvas {
@@ -375,4 +374,3 @@ fn known_directions<'d>(
         known => Ok(known),
     }
 }
-

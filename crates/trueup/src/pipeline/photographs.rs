@@ -86,8 +86,7 @@ impl PhotographSet {
         let key = |index: usize| -> Result<Option<KeyMaker>> {
             context.check_cancelled()?;
             let image = &self.images[index];
-            let mut maker =
-                KeyMaker::new().part(&color_space).part(&(image.width, image.height, image.orientation));
+            let mut maker = KeyMaker::new().part(&color_space).part(&(image.width, image.height, image.orientation));
             if let Masks { ignored: Some(ignored), .. } = self.files.masks(index) {
                 maker = maker.part(&ignored.words());
             }

@@ -24,70 +24,70 @@ pub(crate) fn unfilled(
     members: &[usize],
     stitched: &[Vec<usize>],
 ) -> Project {
-        let images = matched
-            .set
-            .images
-            .iter()
-            .enumerate()
-            .map(|(index, image)| {
-                let (reason, hint) = match members.contains(&index) {
-                    true => Default::default(),
-                    false => {
-                        let why = matched.why_left_out(index, stitched);
-                        (why.reason, why.hint)
-                    }
-                };
-                let component = matched.graph.components.iter().position(|component| component.contains(&index));
-                ImageRecord {
-                    width: image.width,
-                    height: image.height,
-                    orientation: image.orientation,
-                    component: component.filter(|_| matched.measured[index].is_some()),
-                    masks: matched.set.masks[index].clone(),
-                    ..left_out_record(image.path.display().to_string(), reason, hint)
+    let images = matched
+        .set
+        .images
+        .iter()
+        .enumerate()
+        .map(|(index, image)| {
+            let (reason, hint) = match members.contains(&index) {
+                true => Default::default(),
+                false => {
+                    let why = matched.why_left_out(index, stitched);
+                    (why.reason, why.hint)
                 }
-            })
-            .chain(matched.set.rejected.iter().map(|rejected| {
-                left_out_record(rejected.path.display().to_string(), rejected.reason.clone(), rejected.hint.clone())
-            }))
-            .collect();
-        let pairs = matched.pairs.iter().map(|pair| PairRecord {
-            a: pair.a,
-            b: pair.b,
-            matches: pair.putative,
-            inliers: pair.agreeing,
-            needed: pair.needed,
-            verdict: pair.verdict,
-        });
-        Project {
-            format: PROJECT_FORMAT.to_owned(),
-            version: PROJECT_VERSION,
-            method: trueup_core::options::OptionValue::display(&options.align.stitch.method),
-            options: options.clone(),
-            reference: String::new(),
-            images,
-            pairs: pairs.collect(),
-            manhattan: ManhattanRecord {
-                divergence: None,
-                threshold: options.align.similarity.max_divergence,
-                significance: None,
-                vertical_deviation_deg: None,
-                accepted: false,
-                pooled: false,
-                failed_clause: Some("a single photograph is left as it is".to_owned()),
-                dominant: None,
-                inliers: Vec::new(),
-            },
-            measures: None,
-            canvas: Canvas { width: 0, height: 0, full_turn: false },
-            color_space: String::new(),
-            response: Response::default(),
-            projection: None,
-            mesh_canvas: None,
-            seconds: std::collections::BTreeMap::new(),
-            diagnostics: Vec::new(),
-        }
+            };
+            let component = matched.graph.components.iter().position(|component| component.contains(&index));
+            ImageRecord {
+                width: image.width,
+                height: image.height,
+                orientation: image.orientation,
+                component: component.filter(|_| matched.measured[index].is_some()),
+                masks: matched.set.masks[index].clone(),
+                ..left_out_record(image.path.display().to_string(), reason, hint)
+            }
+        })
+        .chain(matched.set.rejected.iter().map(|rejected| {
+            left_out_record(rejected.path.display().to_string(), rejected.reason.clone(), rejected.hint.clone())
+        }))
+        .collect();
+    let pairs = matched.pairs.iter().map(|pair| PairRecord {
+        a: pair.a,
+        b: pair.b,
+        matches: pair.putative,
+        inliers: pair.agreeing,
+        needed: pair.needed,
+        verdict: pair.verdict,
+    });
+    Project {
+        format: PROJECT_FORMAT.to_owned(),
+        version: PROJECT_VERSION,
+        method: trueup_core::options::OptionValue::display(&options.align.stitch.method),
+        options: options.clone(),
+        reference: String::new(),
+        images,
+        pairs: pairs.collect(),
+        manhattan: ManhattanRecord {
+            divergence: None,
+            threshold: options.align.similarity.max_divergence,
+            significance: None,
+            vertical_deviation_deg: None,
+            accepted: false,
+            pooled: false,
+            failed_clause: Some("a single photograph is left as it is".to_owned()),
+            dominant: None,
+            inliers: Vec::new(),
+        },
+        measures: None,
+        canvas: Canvas { width: 0, height: 0, full_turn: false },
+        color_space: String::new(),
+        response: Response::default(),
+        projection: None,
+        mesh_canvas: None,
+        seconds: std::collections::BTreeMap::new(),
+        diagnostics: Vec::new(),
     }
+}
 fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
     ImageRecord {
         path,
@@ -259,7 +259,7 @@ pub(crate) fn fill_geometry(project: &mut Project, found: &GeometryRecord) {
                 MethodForm::Warp(_) => Some(format!("the method {} does not ask them", project.method)),
             },
             dominant: guidance.dominant,
-            inliers: guidance.inliers.iter().map(|&k| component.set.images[k].path.display().to_string()).collect(),
+            inliers: guidance.inliers.iter().map(|&k| component.images[k].path.display().to_string()).collect(),
         };
     }
 }

@@ -11,7 +11,6 @@ use trueup_core::matches::PointMatch;
 use trueup_core::mesh::GridMesh;
 
 use super::evaluation::HUNDREDTHS;
-use crate::options::StitchOptions;
 use crate::pipeline::align::Geometry;
 use crate::pipeline::align::component::Component;
 
@@ -103,12 +102,7 @@ pub struct PictureMeasures {
 }
 
 /// Measures a panorama whose grids lie on the canvas of `layout`.
-pub(crate) fn run(
-    component: &Component,
-    geometry: &Geometry,
-    layout: &CanvasLayout,
-    options: &StitchOptions,
-) -> Measures {
+pub(crate) fn run(component: &Component, geometry: &Geometry, layout: &CanvasLayout) -> Measures {
     let meshes: Vec<&GridMesh> = layout.placed.iter().map(|placed| &placed.mesh).collect();
     let period = layout.period.map(|columns| columns as f64);
     // The same grids over the working pictures, in whose pixels lines are.
@@ -117,7 +111,7 @@ pub(crate) fn run(
         .zip(&component.frames)
         .map(|(&mesh, frame)| GridMesh { width: frame.width, height: frame.height, ..mesh.clone() })
         .collect();
-    let verticals = vertical_lines(component, geometry, &working, options);
+    let verticals = vertical_lines(component, geometry, &working);
     let certain: Vec<Option<VerticalLines>> =
         verticals.iter().map(|found| found.filter(|found| found.is_certain())).collect();
     let distortion = metrics::local_distortion(&working, Outside::Center, period);
@@ -142,12 +136,7 @@ pub(crate) fn run(
     }
 }
 
-fn vertical_lines(
-    component: &Component,
-    geometry: &Geometry,
-    working: &[GridMesh],
-    options: &StitchOptions,
-) -> Vec<Option<VerticalLines>> {
+fn vertical_lines(component: &Component, geometry: &Geometry, working: &[GridMesh]) -> Vec<Option<VerticalLines>> {
     let down = geometry.prior.level_from_world().row(1).transpose();
     (0..working.len())
         .into_par_iter()

@@ -78,7 +78,7 @@ pub(crate) fn run(runner: &Runner, catalogue: &Catalogue) -> Result<Vec<Row>> {
     for (trial, threads) in &trials {
         let Some(set) = catalogue.study.iter().find(|set| set.name == trial.set) else { continue };
         tracker.working_on(&trial.set);
-        let context = StageContext::new(&Silent, runner.cancel, 0);
+        let context = StageContext::new(&Silent, runner.cancel);
         let ready = set.prepare(&runner.data, &context)?;
         let key = trial.key(&ready.fingerprint, &runner.version);
         let row = match runner.store.get(&key) {

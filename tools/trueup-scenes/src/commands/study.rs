@@ -87,7 +87,7 @@ impl StudyArguments {
             }
         }
         let (counter, cancel) = (Counter::default(), CancelToken::default());
-        let context = StageContext::new(&counter, &cancel, 0);
+        let context = StageContext::new(&counter, &cancel);
         for (request, out) in requests {
             let outcome = request.write(&out, &context)?;
             let word = if outcome == SetOutcome::Kept { "kept" } else { "rendered" };

@@ -176,5 +176,7 @@ impl Drop for PhotographCache {
 fn is_entry(path: &Path) -> bool {
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     path.extension().is_some_and(|extension| extension == EXTENSION)
-        && stem.split_once('-').is_some_and(|(kind, key)| KINDS.iter().any(|known| known.0 == kind) && Key::is_written(key))
+        && stem
+            .split_once('-')
+            .is_some_and(|(kind, key)| KINDS.iter().any(|known| known.0 == kind) && Key::is_written(key))
 }

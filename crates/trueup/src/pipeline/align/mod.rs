@@ -13,13 +13,14 @@ use trueup_align::cameras::Cameras;
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points::OverlapWarp;
 use trueup_align::mesh::{self, MeshInput, Refinements, WarpedMesh};
-use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityPrior};
+use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityOptions, SimilarityPrior};
 use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::TriadOutcome;
 use trueup_align::warps::{self, WarpInput, WarpModel};
 use trueup_core::diagnostics::Reported;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
+use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 
@@ -70,10 +71,9 @@ pub(crate) fn run(input: &AlignInput, options: &AlignOptions, context: &StageCon
 /// Everything that decides the geometry; `None` if nothing is kept, or directions are given by hand.
 fn geometry_key(input: &AlignInput, options: &AlignOptions) -> Option<Key> {
     let AlignInput { component, key, memo, directions, .. } = input;
-    let file_name = |image: &&trueup_core::source::SourceImage| {
-        image.path.file_name().map(|file| file.to_string_lossy().into_owned())
-    };
-    let images: Vec<_> = component.images.iter().map(|image| (&image.name, file_name(image), image.focal_prior)).collect();
+    let file_name = |image: &&SourceImage| image.path.file_name().map(|file| file.to_string_lossy().into_owned());
+    let images: Vec<_> =
+        component.images.iter().map(|image| (&image.name, file_name(image), image.focal_prior)).collect();
     let own = key.clone().filter(|_| directions.is_none())?;
     let own = own
         .part(&images)
@@ -154,7 +154,7 @@ fn find_prior(
         turn: component.reference_rotation,
         reference: component.reference,
     };
-    similarity::run(&input, &trueup_align::similarity::SimilarityOptions { prior, ..options.similarity.clone() }, context)
+    similarity::run(&input, &SimilarityOptions { prior, ..options.similarity.clone() }, context)
 }
 
 /// What the grids are deformed by.
