@@ -1,5 +1,6 @@
 //! Measurements to geometry: stitch graph, cameras, vanishing points, similarity prior and mesh.
 #![forbid(unsafe_code)]
+#![warn(unreachable_pub)]
 
 pub mod cameras;
 pub mod full_turn;

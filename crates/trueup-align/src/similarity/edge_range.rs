@@ -33,7 +33,7 @@ pub(super) struct TurnRange {
 
 impl TurnRange {
     /// The shortest arc that holds all of `turns`; `None` without any.
-    pub fn around(turns: &[f64]) -> Option<Self> {
+    pub(super) fn around(turns: &[f64]) -> Option<Self> {
         let mut sorted: Vec<f64> = turns.iter().copied().filter(|turn| turn.is_finite()).map(wrap_angle).collect();
         sorted.sort_by(f64::total_cmp);
         let (&first, &last) = (sorted.first()?, sorted.last()?);
@@ -48,19 +48,19 @@ impl TurnRange {
     }
 
     /// Whether the range holds `turn`.
-    pub fn contains(&self, turn: f64) -> bool {
+    pub(super) fn contains(&self, turn: f64) -> bool {
         /// Slack for turns that were computed on two ways, radians.
         const ROUNDING: f64 = 1e-9;
         self.contains_within(turn, ROUNDING)
     }
 
     /// The range of the turns the other way.
-    pub fn reversed(&self) -> Self {
+    pub(super) fn reversed(&self) -> Self {
         Self { start: -self.start - self.extent, extent: self.extent }
     }
 
     /// Whether the range, longer by `slack` (radians) at both ends, holds `turn`.
-    pub fn contains_within(&self, turn: f64, slack: f64) -> bool {
+    pub(super) fn contains_within(&self, turn: f64, slack: f64) -> bool {
         self.extent >= PI || (turn - self.start + slack).rem_euclid(TAU) <= self.extent + 2.0 * slack
     }
 }
@@ -76,7 +76,7 @@ pub(super) struct OverlapTurns {
 
 impl OverlapTurns {
     /// Asks the grid edges of both directions.
-    pub fn of(input: &PriorInput<'_>, edge: &PairMatches) -> Self {
+    pub(super) fn of(input: &PriorInput<'_>, edge: &PairMatches) -> Self {
         let candidates = overlap_turns(input, edge.a, edge.b);
         let range = TurnRange::around(&candidates);
         Self { candidates, range }
@@ -84,7 +84,7 @@ impl OverlapTurns {
 
     /// The turn of least line distortion, or the middle candidate where no segment crosses the overlap; `None` without
     /// either.
-    pub fn best(&self, input: &PriorInput<'_>, edge: &PairMatches) -> Option<f64> {
+    pub(super) fn best(&self, input: &PriorInput<'_>, edge: &PairMatches) -> Option<f64> {
         least_line_distortion(input, edge).or_else(|| circular_median(&self.candidates))
     }
 }

@@ -91,7 +91,7 @@ pub(super) struct Support {
 
 impl LineVote {
     /// `rotations` and `planes` per picture; `focals` in the pixels of the planes.
-    pub fn new(rotations: &[Matrix3<f64>], focals: &[f64], planes: Vec<InterpretationPlanes>) -> Self {
+    pub(super) fn new(rotations: &[Matrix3<f64>], focals: &[f64], planes: Vec<InterpretationPlanes>) -> Self {
         let pictures = rotations
             .iter()
             .zip(focals)
@@ -102,12 +102,12 @@ impl LineVote {
     }
 
     /// The usable segments of picture `index`.
-    pub fn planes(&self, index: usize) -> &InterpretationPlanes {
+    pub(super) fn planes(&self, index: usize) -> &InterpretationPlanes {
         &self.pictures[index].planes
     }
 
     /// Normals in the common frame and weights of about `most` segments, the longest of every picture.
-    pub fn longest(&self, most: usize) -> Vec<(Vector3<f64>, f64)> {
+    pub(super) fn longest(&self, most: usize) -> Vec<(Vector3<f64>, f64)> {
         let of_each = most.div_ceil(self.pictures.len().max(1));
         let of_picture = |picture: &PictureLines| -> Vec<(Vector3<f64>, f64)> {
             let normals = picture.planes.normals.iter().take(of_each);
@@ -120,13 +120,13 @@ impl LineVote {
     }
 
     /// The sum of the segments' weights.
-    pub fn total_weight(&self) -> f64 {
+    pub(super) fn total_weight(&self) -> f64 {
         self.pictures.iter().map(|picture| picture.planes.total_weight).sum()
     }
 
     /// Refines a frame (columns are directions in the common frame) over SO(3); `axis_weights` multiply the weights of
     /// the segments of each axis.
-    pub fn refine_frame(&self, start: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {
+    pub(super) fn refine_frame(&self, start: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {
         self.refine_frame_without(None, start, axis_weights, scales())
     }
 
@@ -141,7 +141,7 @@ impl LineVote {
     /// # Source
     /// Efron and Tibshirani, An Introduction to the Bootstrap, chapter 11. Pictures, not segments, are left out, because
     /// the segments of one picture err together.
-    pub fn axis_deviations(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> [f64; 3] {
+    pub(super) fn axis_deviations(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> [f64; 3] {
         let groups = self.pictures.len().min(MAX_GROUPS);
         if groups < 2 {
             return [f64::INFINITY; 3];
@@ -190,7 +190,7 @@ impl LineVote {
     /// Normal matrix and gradient, in px^2 per rad^2 and px^2 per rad, of the squared residuals of picture `index` under a
     /// small turn in the common frame, for the camera `rotation` in place of the picture's own. Segments weigh 1 on
     /// average, times the robust loss of `scale` pixels and their axis' weight.
-    pub fn turn_equations(
+    pub(super) fn turn_equations(
         &self,
         index: usize,
         rotation: &Matrix3<f64>,
@@ -211,7 +211,7 @@ impl LineVote {
     }
 
     /// Refines one direction of the common frame alone, over the sphere.
-    pub fn refine_direction(&self, start: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn refine_direction(&self, start: &Vector3<f64>) -> Vector3<f64> {
         let mut direction = *start;
         for scale in scales() {
             for _ in 0..ITERATIONS_PER_SCALE {
@@ -254,7 +254,7 @@ impl LineVote {
     }
 
     /// How strongly the segments support `direction`.
-    pub fn support(&self, direction: &Vector3<f64>, tolerance: f64) -> Support {
+    pub(super) fn support(&self, direction: &Vector3<f64>, tolerance: f64) -> Support {
         let mut total = Support { score: 0.0, lines: 0, pictures: 0 };
         for picture in &self.pictures {
             let (score, lines) = picture.support(&(picture.rotation * direction), tolerance);

@@ -68,7 +68,7 @@ pub(crate) const SIZE: (f64, f64) = (800.0, 600.0);
 pub(crate) const FOCAL_PX: f64 = 700.0;
 
 impl SyntheticScene {
-    pub fn new(sweep: Sweep, world: World, camera_noise_deg: f64, seed: u64) -> Self {
+    pub(crate) fn new(sweep: Sweep, world: World, camera_noise_deg: f64, seed: u64) -> Self {
         let mut generator = StageContext::default().generator("synthetic", seed);
         let (roll, world_from_camera, edges) = sweep.place(&mut generator);
         let gauge = random_rotation(&mut generator);
@@ -94,7 +94,7 @@ impl SyntheticScene {
     }
 
     /// What the prior is made from, without overlaps.
-    pub fn input<'a>(&'a self, vanishing: &'a VanishingOptions) -> PriorInput<'a> {
+    pub(crate) fn input<'a>(&'a self, vanishing: &'a VanishingOptions) -> PriorInput<'a> {
         PriorInput {
             cameras: &self.cameras,
             triads: &self.triads,
@@ -109,12 +109,12 @@ impl SyntheticScene {
         }
     }
 
-    pub fn prior(&self, options: &SimilarityOptions) -> SimilarityPrior {
+    pub(crate) fn prior(&self, options: &SimilarityOptions) -> SimilarityPrior {
         run(&self.input(&VanishingOptions::default()), options, &StageContext::default()).expect("a well-formed scene")
     }
 
     /// Per picture |theta - roll| in degrees.
-    pub fn errors_deg(&self, prior: &SimilarityPrior) -> Vec<f64> {
+    pub(crate) fn errors_deg(&self, prior: &SimilarityPrior) -> Vec<f64> {
         let error = |(theta, roll): (&f64, &f64)| trueup_core::geometry::wrap_angle(theta - roll).abs().to_degrees();
         assert_eq!(prior.theta.len(), self.roll.len());
         prior.theta.iter().zip(&self.roll).map(error).collect()
