@@ -1,8 +1,9 @@
-//! What every stage receives beside its input and options: progress, cancellation, seed and a sink for findings.
+//! What every stage receives beside its input and options: progress, cancellation, seed and a sink for findings and times.
 
-use std::sync::Mutex;
-use std::sync::PoisonError;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -46,6 +47,13 @@ impl CancelToken {
     }
 }
 
+/// What stages tell beside their products.
+#[derive(Debug, Default)]
+struct Sink {
+    findings: Vec<Diagnostic>,
+    seconds: BTreeMap<String, f64>,
+}
+
 /// What a stage may use of the world around it.
 ///
 /// Parallel work runs on the thread pool that is current when the stage is called; a stage starts no threads.
@@ -53,7 +61,7 @@ pub struct StageContext<'a> {
     progress: &'a dyn Progress,
     cancel: &'a CancelToken,
     seed: u64,
-    findings: Mutex<Vec<Diagnostic>>,
+    sink: Mutex<Sink>,
 }
 
 impl std::fmt::Debug for StageContext<'_> {
@@ -75,7 +83,7 @@ impl Default for StageContext<'_> {
 impl<'a> StageContext<'a> {
     /// A context that reports to `progress`, stops on `cancel` and derives every random choice from `seed`.
     pub fn new(progress: &'a dyn Progress, cancel: &'a CancelToken, seed: u64) -> Self {
-        Self { progress, cancel, seed, findings: Mutex::default() }
+        Self { progress, cancel, seed, sink: Mutex::default() }
     }
 
     /// The same cancellation and seed, for a part of the work whose progress is told by the whole. Findings are its own.
@@ -96,6 +104,21 @@ impl<'a> StageContext<'a> {
         if self.cancel.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
     }
 
+    /// The number from which every random choice derives.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// The same progress and cancellation, with random choices from `seed`. Findings are its own.
+    pub fn seeded(&self, seed: u64) -> StageContext<'a> {
+        Self::new(self.progress, self.cancel, seed)
+    }
+
+    /// The number from which every random choice derives.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
     /// A generator for one subject of one stage (an image's or a pair's index), so that results depend neither on the
     /// order of the work nor on the number of threads.
     pub fn generator(&self, stage: &str, subject: u64) -> ChaCha8Rng {
@@ -109,17 +132,53 @@ impl<'a> StageContext<'a> {
 
     /// Records a finding. Stages call this from their sequential part only, so that the order is always the same.
     pub fn report(&self, diagnostic: Diagnostic) {
-        self.findings.lock().unwrap_or_else(PoisonError::into_inner).push(diagnostic);
+        self.sink().findings.push(diagnostic);
     }
 
     /// The findings recorded so far, in order.
     pub fn findings(&self) -> Vec<Diagnostic> {
-        self.findings.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.sink().findings.clone()
     }
 
-    /// Takes the findings recorded so far, in order.
-    pub fn take_diagnostics(&self) -> Vec<Diagnostic> {
-        std::mem::take(&mut self.findings.lock().unwrap_or_else(PoisonError::into_inner))
+    /// Wall seconds recorded so far, by the name of the stage that took them.
+    pub fn seconds(&self) -> BTreeMap<String, f64> {
+        self.sink().seconds.clone()
+    }
+
+    /// Runs `work` and records its wall time as that of `stage`.
+    pub fn time<T>(&self, stage: &str, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let result = work();
+        self.spent(stage, start.elapsed());
+        result
+    }
+
+    /// [`Self::time`] for a stage that is one step, and is reported as such.
+    pub fn in_one_step<T>(&self, stage: &str, work: impl FnOnce() -> T) -> T {
+        self.progress.begin(stage, 1);
+        let result = self.time(stage, work);
+        self.progress.advance(stage, 1);
+        self.progress.finish(stage);
+        result
+    }
+
+    /// Records wall time that `stage` took.
+    pub fn spent(&self, stage: &str, duration: Duration) {
+        *self.sink().seconds.entry(stage.to_owned()).or_default() += duration.as_secs_f64();
+    }
+
+    /// Records `wall` time as that of stages that ran interleaved, in proportion to the time that each was busy on any
+    /// thread.
+    pub fn share(&self, wall: Duration, busy: &[(&str, Duration)]) {
+        let total: f64 = busy.iter().map(|(_, duration)| duration.as_secs_f64()).sum();
+        for (stage, duration) in busy {
+            let part = if total > 0.0 { duration.as_secs_f64() / total } else { 0.0 };
+            self.spent(stage, wall.mul_f64(part));
+        }
+    }
+
+    fn sink(&self) -> MutexGuard<'_, Sink> {
+        self.sink.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Runs `work` with a sink of its own, and hands out what it found there beside its product. Work done in parallel
@@ -128,14 +187,19 @@ impl<'a> StageContext<'a> {
     /// # Errors
     /// Those of `work`.
     pub fn gather<T>(&self, work: impl FnOnce(&StageContext) -> Result<T>) -> Result<Reported<T>> {
-        let nested = StageContext { findings: Mutex::default(), ..*self };
+        let nested = Self::new(self.progress, self.cancel, self.seed);
         let value = work(&nested)?;
-        Ok(Reported { value, findings: nested.findings.into_inner().unwrap_or_else(PoisonError::into_inner) })
+        let Sink { findings, seconds } = nested.sink.into_inner().unwrap_or_else(PoisonError::into_inner);
+        Ok(Reported { value, findings, seconds })
     }
 
     /// Records the findings of a part of the work, and hands out its product.
     pub fn absorb<T>(&self, part: Reported<T>) -> T {
-        self.findings.lock().unwrap_or_else(PoisonError::into_inner).extend(part.findings);
+        let mut sink = self.sink();
+        sink.findings.extend(part.findings);
+        for (stage, seconds) in part.seconds {
+            *sink.seconds.entry(stage).or_default() += seconds;
+        }
         part.value
     }
 }

@@ -1,5 +1,7 @@
 //! Findings a stage reports beside its product: data, not log lines.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 /// How much a [`Diagnostic`] matters to the panorama.
@@ -15,7 +17,7 @@ pub enum Severity {
 /// What a finding is about. Photographs go by number where stages work, and get their names where a person reads them:
 /// [`Subject::named`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[serde(rename_all = "kebab-case", from = "RecordedSubject")]
 pub enum Subject {
     /// One photograph, by its number.
     Photograph(usize),
@@ -25,6 +27,34 @@ pub enum Subject {
     Stage(String),
     /// A file or folder that is no photograph of the set, as the user knows it.
     File(String),
+}
+
+/// A subject as it may be recorded: by kind, or as a mere text in files of programs that knew no kinds.
+#[derive(Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum KnownSubject {
+    Photograph(usize),
+    Pair(usize, usize),
+    Stage(String),
+    File(String),
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum RecordedSubject {
+    Known(KnownSubject),
+    Text(String),
+}
+
+impl From<RecordedSubject> for Subject {
+    fn from(recorded: RecordedSubject) -> Self {
+        match recorded {
+            RecordedSubject::Known(KnownSubject::Photograph(number)) => Self::Photograph(number),
+            RecordedSubject::Known(KnownSubject::Pair(a, b)) => Self::Pair(a, b),
+            RecordedSubject::Known(KnownSubject::Stage(name)) => Self::Stage(name),
+            RecordedSubject::Known(KnownSubject::File(name)) | RecordedSubject::Text(name) => Self::File(name),
+        }
+    }
 }
 
 impl Subject {
@@ -92,18 +122,30 @@ impl Diagnostic {
 }
 
 /// A stage's product with what was found on the way.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reported<T> {
     /// The product.
     pub value: T,
     /// The findings, in the order in which they were made.
     pub findings: Vec<Diagnostic>,
+    /// Wall seconds by the name of the stage that took them.
+    pub seconds: BTreeMap<String, f64>,
 }
 
 impl<T> Reported<T> {
     /// The same findings beside what `change` makes of the product.
     pub fn map<U>(self, change: impl FnOnce(T) -> U) -> Reported<U> {
-        Reported { value: change(self.value), findings: self.findings }
+        Reported { value: change(self.value), findings: self.findings, seconds: self.seconds }
+    }
+
+    /// The product, and what was told beside it.
+    pub fn split(self) -> (T, Reported<()>) {
+        (self.value, Reported { value: (), findings: self.findings, seconds: self.seconds })
+    }
+
+    /// What was told beside the product.
+    pub fn told(&self) -> Reported<()> {
+        Reported { value: (), findings: self.findings.clone(), seconds: self.seconds.clone() }
     }
 
     /// The same where photographs are numbered otherwise, see [`Subject::renumbered`].
@@ -132,6 +174,16 @@ mod tests {
     }
 
     #[test]
+    fn subjects_are_read_as_they_are_written_and_as_they_were_texts_once() {
+        for subject in [Subject::Photograph(3), Subject::Pair(1, 2), Subject::stage("mesh"), Subject::file("a.jpg")] {
+            let written = serde_json::to_string(&subject).expect("written");
+            assert_eq!(serde_json::from_str::<Subject>(&written).expect("read"), subject, "{written}");
+        }
+        assert_eq!(serde_json::from_str::<Subject>("\"a.jpg\"").expect("read"), Subject::file("a.jpg"));
+        assert_eq!(serde_json::to_string(&Subject::Photograph(3)).expect("written"), r#"{"photograph":3}"#);
+    }
+
+    #[test]
     fn numbers_of_a_group_become_those_of_the_set() {
         let members = [4, 7];
         let finding = |subject| Diagnostic::note("some-code", subject, "", "");
@@ -142,6 +194,7 @@ mod tests {
                 finding(Subject::Pair(0, 1)),
                 finding(Subject::stage("mesh")),
             ],
+            seconds: BTreeMap::new(),
         };
         let subjects: Vec<Subject> =
             found.renumbered(|local| members[local]).findings.into_iter().map(|one| one.subject).collect();

@@ -11,11 +11,21 @@ fn main() {
     divan::main();
 }
 
-/// Sizes in pixels: the pipeline's working size and one megapixel.
-const SIZES: [(usize, usize); 2] = [(800, 600), (1224, 817)];
+/// A size in pixels.
+#[derive(Debug, Clone, Copy)]
+struct Size {
+    width: usize,
+    height: usize,
+}
+
+/// The pipeline's working size and one megapixel.
+const SIZES: [Size; 2] = [Size { width: 800, height: 600 }, Size { width: 1224, height: 817 }];
+
+/// Of so few points a picture counts as sparse: it is searched again, doubled.
+const SPARSE: usize = 999;
 
 /// Noise at many scales, each half as fine and as strong again: the spectrum of photographs, roughly.
-fn texture(width: usize, height: usize) -> Raster<f32> {
+fn texture(Size { width, height }: Size) -> Raster<f32> {
     const SCALES: u32 = 7;
     let mut generator = StageContext::default().generator("features bench", 0);
     let mut samples = vec![128.0_f32; width * height];
@@ -38,32 +48,34 @@ fn texture(width: usize, height: usize) -> Raster<f32> {
     Raster::from_data(width, height, 1, samples).unwrap_or_default()
 }
 
-fn run(bencher: Bencher, (width, height): (usize, usize), double_image: bool, threads: usize) {
-    let image = texture(width, height);
-    let options = FeatureOptions { double_image, ..FeatureOptions::default() };
+fn run(bencher: Bencher, size: Size, max_points: usize, threads: usize) {
+    let image = texture(size);
+    let options = FeatureOptions { max_points, ..FeatureOptions::default() };
     // Zero threads means as many as there are processors.
     let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(threads).build() else { return };
     bencher
-        .counter(ItemsCount::new(width * height))
+        .counter(ItemsCount::new(size.width * size.height))
         .bench_local(|| pool.install(|| detect(&image, &options, &StageContext::default())));
 }
 
 #[divan::bench(args = SIZES)]
-fn one_thread(bencher: Bencher, size: (usize, usize)) {
-    run(bencher, size, false, 1);
+fn one_thread(bencher: Bencher, size: Size) {
+    run(bencher, size, FeatureOptions::default().max_points, 1);
 }
 
 #[divan::bench(args = SIZES)]
-fn all_threads(bencher: Bencher, size: (usize, usize)) {
-    run(bencher, size, false, 0);
+fn all_threads(bencher: Bencher, size: Size) {
+    run(bencher, size, FeatureOptions::default().max_points, 0);
 }
 
+/// At the original size and doubled.
 #[divan::bench(args = SIZES)]
-fn one_thread_doubled(bencher: Bencher, size: (usize, usize)) {
-    run(bencher, size, true, 1);
+fn one_thread_sparse(bencher: Bencher, size: Size) {
+    run(bencher, size, SPARSE, 1);
 }
 
+/// At the original size and doubled.
 #[divan::bench(args = SIZES)]
-fn all_threads_doubled(bencher: Bencher, size: (usize, usize)) {
-    run(bencher, size, true, 0);
+fn all_threads_sparse(bencher: Bencher, size: Size) {
+    run(bencher, size, SPARSE, 0);
 }

@@ -8,8 +8,18 @@ fn main() {
     divan::main();
 }
 
+/// A size in pixels.
+#[derive(Debug, Clone, Copy)]
+struct Size {
+    width: usize,
+    height: usize,
+}
+
+const SIZES: [Size; 3] =
+    [Size { width: 800, height: 600 }, Size { width: 1168, height: 879 }, Size { width: 1488, height: 1120 }];
+
 /// Facades of bricks and windows on a receding wall: about as many segments a megapixel as a photograph of a town.
-fn facades(width: usize, height: usize) -> Raster<f32> {
+fn facades(Size { width, height }: Size) -> Raster<f32> {
     let mut state = 1_u32;
     let samples = (0..width * height).map(|index| {
         let (x, y) = ((index % width) as f32, (index / width) as f32);
@@ -32,20 +42,12 @@ fn facades(width: usize, height: usize) -> Raster<f32> {
     Raster::from_data(width, height, 1, samples.collect()).expect("sizes agree")
 }
 
-#[divan::bench(args = [(800, 600), (1168, 879), (1488, 1120)])]
-fn detect_refined(bencher: divan::Bencher, (width, height): (usize, usize)) {
-    measure(bencher, width, height, &LineOptions::default());
-}
-
-#[divan::bench(args = [(800, 600), (1168, 879), (1488, 1120)])]
-fn detect_plain(bencher: divan::Bencher, (width, height): (usize, usize)) {
-    measure(bencher, width, height, &LineOptions { refine: false, ..LineOptions::default() });
-}
-
-fn measure(bencher: divan::Bencher, width: usize, height: usize, options: &LineOptions) {
-    let image = facades(width, height);
+#[divan::bench(args = SIZES)]
+fn detect_lines(bencher: divan::Bencher, size: Size) {
+    let image = facades(size);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool of one thread");
+    let run = || detect(&image, &LineOptions::default(), &StageContext::default());
     bencher
-        .counter(divan::counter::ItemsCount::new(width * height))
-        .bench_local(|| pool.install(|| detect(&image, options, &StageContext::default())).map(|found| found.len()));
+        .counter(divan::counter::ItemsCount::new(size.width * size.height))
+        .bench_local(|| pool.install(run).map(|found| found.len()));
 }

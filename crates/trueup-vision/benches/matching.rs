@@ -1,14 +1,16 @@
 //! Speed of the exhaustive search and of the verification of a pair, on generated descriptors.
 
+use std::collections::BTreeSet;
+
 use divan::Bencher;
 use rand::{Rng, RngExt};
 use rayon::ThreadPool;
 use trueup_core::StageContext;
 use trueup_core::source::WorkingFrame;
 use trueup_vision::features::{DESCRIPTOR_LENGTH, Descriptor, FeaturePoint, Features};
-use trueup_vision::matching::{Kernel, MatchingOptions, Nearest, Picture, match_pair, putative_matches};
+use trueup_vision::matching::{MatchingInput, MatchingOptions, Nearest, SearchKernel, putative_matches, run};
 
-/// Features of a picture at the detector's cap.
+/// Features of a photograph at the detector's cap.
 const FEATURES: usize = 8000;
 
 fn main() {
@@ -26,8 +28,8 @@ fn descriptors(subject: u64, count: usize) -> Vec<Descriptor> {
     descriptors
 }
 
-/// Pictures of which `matched` features look alike, the first `inliers` of them shifted by 200 pixels.
-fn pictures(count: usize, matched: usize, inliers: usize) -> [Features; 2] {
+/// Photographs of which `matched` features look alike, the first `inliers` of them shifted by 200 pixels.
+fn photographs(count: usize, matched: usize, inliers: usize) -> [Features; 2] {
     let mut generator = StageContext::default().generator("bench", 0);
     let mut b = descriptors(2, count);
     let a = descriptors(1, count);
@@ -54,8 +56,8 @@ fn search_8000_by_8000(bencher: Bencher, threads: usize) {
 }
 
 /// The same on one thread with every instruction set.
-#[divan::bench(args = Kernel::available(), sample_count = 10)]
-fn search_by_kernel(bencher: Bencher, kernel: Kernel) {
+#[divan::bench(args = SearchKernel::available(), sample_count = 10)]
+fn search_by_kernel(bencher: Bencher, kernel: SearchKernel) {
     let (a, b) = (descriptors(1, FEATURES), descriptors(2, FEATURES));
     let pool = pool(1);
     bencher.bench_local(|| pool.install(|| Nearest::search_with(kernel, &a, &b)));
@@ -64,20 +66,20 @@ fn search_by_kernel(bencher: Bencher, kernel: Kernel) {
 /// The same up to the putative matches, 3000 of them.
 #[divan::bench(args = [1, 2])]
 fn putative_8000_by_8000(bencher: Bencher, threads: usize) {
-    let [a, b] = pictures(FEATURES, 3000, 1500);
+    let [a, b] = photographs(FEATURES, 3000, 1500);
     let (pool, options) = (pool(threads), MatchingOptions::default());
     bencher.bench_local(|| pool.install(|| putative_matches(&a, &b, &options)));
 }
 
-/// A whole pair of 600 matches, half of them outliers, without guided matches.
+/// A whole pair of 600 matches, half of them outliers, with and without guided matches.
 #[divan::bench(args = [true, false])]
 fn verify_half_outliers(bencher: Bencher, guided: bool) {
-    let [a, b] = pictures(600, 600, 300);
+    let features = photographs(600, 600, 300);
     let frame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
     let options = MatchingOptions { guided, ..MatchingOptions::default() };
     let context = StageContext::default();
-    let a = Picture { index: 0, features: &a, frame: &frame };
-    let b = Picture { index: 1, features: &b, frame: &frame };
+    let forced = BTreeSet::new();
+    let input = MatchingInput { features: &features, frames: &[frame; 2], pairs: &[(0, 1)], forced: &forced };
     let pool = pool(1);
-    bencher.bench_local(|| pool.install(|| match_pair(a, b, false, &options, &context)));
+    bencher.bench_local(|| pool.install(|| run(&input, &options, &context)));
 }

@@ -1,3 +1,4 @@
+#![warn(unreachable_pub)]
 //! Pixels to measurements: SIFT features, matching, pairing and line segments.
 //!
 //! Positions are in the pixels of the picture given (working pixels in the pipeline), corner at (0, 0), the center of

@@ -2,10 +2,10 @@
 
 use std::sync::LazyLock;
 
+use super::feature::{DESCRIPTOR_LENGTH, Descriptor};
 use super::patch::{Grid, gradients, sample};
-use super::scale_space::Plane;
-use super::simd::{Kernel, Lanes};
-use super::{DESCRIPTOR_LENGTH, Descriptor};
+use super::scale_space::BlurredPlane;
+use super::simd::{Lanes, VectorKernel};
 
 /// Spatial bins on a side.
 const SPATIAL_BINS: usize = 4;
@@ -29,7 +29,7 @@ const CORNERS: usize = GRID + 1;
 const CLAMP: f32 = 0.2;
 
 /// The factor from a component of the normalized descriptor to its byte (Lowe's implementation).
-const QUANTISATION: f32 = 512.0;
+const QUANTIZATION: f32 = 512.0;
 
 /// Describes the surroundings of a point in a plane whose blur is about `sigma` samples.
 ///
@@ -42,17 +42,15 @@ const QUANTISATION: f32 = 512.0;
 /// grid. Its step is 0.94 times the blur, so that the blur leaves little to see between the samples, and the
 /// weights of interpolation are the same for all points.
 pub(super) struct Describe<'a> {
-    pub(super) plane: &'a Plane,
+    pub(super) plane: &'a BlurredPlane,
     /// Position (x, y) in samples.
     pub(super) position: [f64; 2],
     pub(super) sigma: f64,
     /// Direction of the point, radians clockwise on the screen from the x axis.
     pub(super) angle: f64,
-    /// Whether to take square roots of the L1-normalized components.
-    pub(super) root_sift: bool,
 }
 
-impl Kernel for Describe<'_> {
+impl VectorKernel for Describe<'_> {
     /// `None` where the surroundings are flat or not finite.
     type Output = Option<Descriptor>;
 
@@ -64,7 +62,7 @@ impl Kernel for Describe<'_> {
             angle: self.angle,
         };
         let corners = sample::<CORNERS>(self.plane, &grid);
-        quantized(histogram(&corners), self.root_sift)
+        quantized(histogram(&corners))
     }
 }
 
@@ -136,7 +134,7 @@ static BIN_WEIGHTS: LazyLock<[[f32; GRID]; SPATIAL_BINS]> = LazyLock::new(|| {
 
 /// Normalizes, clamps, normalizes again and rounds to bytes.
 #[inline(always)]
-fn quantized(mut histogram: [f32; DESCRIPTOR_LENGTH], root_sift: bool) -> Option<Descriptor> {
+fn quantized(mut histogram: [f32; DESCRIPTOR_LENGTH]) -> Option<Descriptor> {
     let length = dot(&histogram, &histogram).sqrt();
     if !(length > f32::MIN_POSITIVE && length.is_finite()) {
         return None;
@@ -145,17 +143,10 @@ fn quantized(mut histogram: [f32; DESCRIPTOR_LENGTH], root_sift: bool) -> Option
     for component in &mut histogram {
         *component = if *component < limit { *component } else { limit };
     }
-    if root_sift {
-        let sum = dot(&histogram, &[1.0; DESCRIPTOR_LENGTH]);
-        for component in &mut histogram {
-            *component = (*component / sum).sqrt();
-        }
-    } else {
-        let length = dot(&histogram, &histogram).sqrt();
-        for component in &mut histogram {
-            *component /= length;
-        }
+    let length = dot(&histogram, &histogram).sqrt();
+    for component in &mut histogram {
+        *component /= length;
     }
     // The conversion to a byte stops at 255.
-    Some(histogram.map(|component| (component * QUANTISATION + 0.5) as u8))
+    Some(histogram.map(|component| (component * QUANTIZATION + 0.5) as u8))
 }

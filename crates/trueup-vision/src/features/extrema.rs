@@ -4,12 +4,18 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
 use trueup_core::{Result, StageContext};
 
-use super::FeatureOptions;
-use super::scale_space::Octave;
-use super::simd::{InstructionSet, Kernel, Lanes, MAX_LANES};
+use super::options::FeatureOptions;
+use super::scale_space::{BASE_SIGMA, LEVELS_PER_OCTAVE, Octave};
+use super::simd::{InstructionSet, Lanes, MAX_LANES, VectorKernel};
+
+/// Largest ratio of the two principal curvatures of a point; above it, it lies on an edge (Lowe 2004, section 4.1).
+const MAX_CURVATURE_RATIO: f64 = 10.0;
 
 /// Responses below this many gray levels are rounding errors of a flat picture.
 const ROUNDING_NOISE: f32 = 1e-3;
+
+/// A sample may fall this much short of the peak threshold, because the interpolated peak is higher.
+const LOOSE_FACTOR: f32 = 0.5;
 
 /// How often an extremum may move to a neighboring sample before it is given up.
 const MAX_MOVES: usize = 5;
@@ -25,7 +31,7 @@ const BAND_ROWS: usize = 64;
 pub(super) struct Extremum {
     /// Index of its octave.
     pub(super) octave: usize,
-    /// Index of the difference's lower plane, 1 to `levels_per_octave`.
+    /// Index of the difference's lower plane, 1 to [`LEVELS_PER_OCTAVE`].
     pub(super) level: usize,
     /// The nearest sample (column, row).
     pub(super) sample: [usize; 2],
@@ -75,9 +81,6 @@ pub(super) fn find(
     Ok(extrema)
 }
 
-/// A sample may fall this much short of the peak threshold, because the interpolated peak is higher.
-const LOOSE_FACTOR: f32 = 0.5;
-
 /// A sample that is the greatest or least of its 27 neighbors.
 struct Candidate {
     level: usize,
@@ -93,7 +96,7 @@ struct ScanBand<'a> {
     threshold: f32,
 }
 
-impl Kernel for ScanBand<'_> {
+impl VectorKernel for ScanBand<'_> {
     type Output = Vec<Candidate>;
 
     #[inline(always)]
@@ -194,7 +197,6 @@ fn compare_row<L: Lanes>(
 /// Fits a quadratic to the 27 samples around a candidate and applies the thresholds.
 fn refine(octaves: &[Octave], octave: usize, candidate: &Candidate, options: &FeatureOptions) -> Option<Extremum> {
     let planes = &octaves[octave].planes;
-    let levels = options.levels_per_octave;
     let (mut level, mut x, mut y) = (candidate.level, candidate.x, candidate.y);
     for _ in 0..=MAX_MOVES {
         let fit = Quadratic::around(&octaves[octave], level, x, y);
@@ -208,19 +210,19 @@ fn refine(octaves: &[Octave], octave: usize, candidate: &Candidate, options: &Fe
         if moves == Vector3::zeros() {
             let (place, response) = fit.extremum_at(offset[2])?;
             let accepted = response.abs() >= options.peak_threshold.max(f64::from(ROUNDING_NOISE))
-                && !fit.is_edge(options.edge_threshold);
+                && !fit.is_edge(MAX_CURVATURE_RATIO);
             return accepted.then(|| Extremum {
                 octave,
                 level,
                 sample: [x, y],
                 position: [x as f64 + place[0], y as f64 + place[1]],
-                sigma: options.base_sigma * ((level as f64 + offset[2]) / levels as f64).exp2(),
+                sigma: BASE_SIGMA * ((level as f64 + offset[2]) / LEVELS_PER_OCTAVE as f64).exp2(),
                 response,
             });
         }
         x = moved(x, moves[0], planes[0].width - 2)?;
         y = moved(y, moves[1], planes[0].height - 2)?;
-        level = moved(level, moves[2], levels)?;
+        level = moved(level, moves[2], LEVELS_PER_OCTAVE)?;
     }
     None
 }

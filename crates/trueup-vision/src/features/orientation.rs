@@ -3,8 +3,8 @@
 use std::sync::LazyLock;
 
 use super::patch::{Grid, gradients, sample};
-use super::scale_space::Plane;
-use super::simd::{Kernel, Lanes};
+use super::scale_space::BlurredPlane;
+use super::simd::{Lanes, VectorKernel};
 
 /// Bins of the direction histogram (Lowe 2004, section 5).
 const BINS: usize = 36;
@@ -17,6 +17,9 @@ const WINDOW_REACH: f64 = 3.0;
 
 /// A peak counts from this share of the greatest on (Lowe 2004, section 5).
 const PEAK_SHARE: f32 = 0.8;
+
+/// Most directions of a point, each with a descriptor of its own (Lowe sets no limit).
+const MAX_ORIENTATIONS: usize = 4;
 
 /// Gradients sampled on a side of the window.
 const GRID: usize = 16;
@@ -33,15 +36,13 @@ const CORNERS: usize = GRID + 1;
 /// Lowe takes the gradients of all pixels in the window. Here they are taken on a grid of [`GRID`] x [`GRID`] cells that
 /// is centered on the point and 0.5625 times the blur apart, as for the descriptor. The histogram is smoothed.
 pub(super) struct Orientations<'a> {
-    pub(super) plane: &'a Plane,
+    pub(super) plane: &'a BlurredPlane,
     /// Position (x, y) in samples.
     pub(super) position: [f64; 2],
     pub(super) sigma: f64,
-    /// Most directions returned, strongest first.
-    pub(super) limit: usize,
 }
 
-impl Kernel for Orientations<'_> {
+impl VectorKernel for Orientations<'_> {
     /// Radians, clockwise on the screen from the x axis, strongest first.
     type Output = Vec<f64>;
 
@@ -49,7 +50,7 @@ impl Kernel for Orientations<'_> {
     fn run<L: Lanes>(self) -> Vec<f64> {
         let step = 2.0 * WINDOW_REACH * WINDOW * self.sigma / GRID as f64;
         let corners = sample::<CORNERS>(self.plane, &Grid { center: self.position, step, angle: 0.0 });
-        peaks(&smoothed(&histogram(&corners)), self.limit)
+        peaks(&smoothed(&histogram(&corners)))
     }
 }
 
@@ -104,7 +105,7 @@ fn smoothed(histogram: &[f32; BINS]) -> [f32; BINS] {
 }
 
 /// The peaks between the bins by a parabola through three of them, strongest first.
-fn peaks(histogram: &[f32; BINS], limit: usize) -> Vec<f64> {
+fn peaks(histogram: &[f32; BINS]) -> Vec<f64> {
     let greatest = histogram.iter().copied().fold(0.0, f32::max);
     let mut found: Vec<(f32, f64)> = Vec::new();
     for bin in 0..BINS {
@@ -116,6 +117,6 @@ fn peaks(histogram: &[f32; BINS], limit: usize) -> Vec<f64> {
         }
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    found.truncate(limit);
+    found.truncate(MAX_ORIENTATIONS);
     found.into_iter().map(|(_, angle)| angle).collect()
 }

@@ -1,6 +1,7 @@
 //! Gray values and gradients on a small grid that is placed, turned and scaled with a point.
 
-use super::scale_space::Plane;
+use super::maths::turns;
+use super::scale_space::BlurredPlane;
 
 /// A square grid in a plane.
 pub(super) struct Grid {
@@ -14,7 +15,7 @@ pub(super) struct Grid {
 
 /// Gray values at `N` x `N` grid points, by bilinear interpolation. Outside the picture its edge is continued.
 #[inline(always)]
-pub(super) fn sample<const N: usize>(plane: &Plane, grid: &Grid) -> [[f32; N]; N] {
+pub(super) fn sample<const N: usize>(plane: &BlurredPlane, grid: &Grid) -> [[f32; N]; N] {
     // The last sample is left to the one before it, with a weight of nearly one.
     const EDGE: f32 = 1e-3;
     let (last_x, last_y) = ((plane.width - 1) as f32 - EDGE, (plane.height - 1) as f32 - EDGE);
@@ -63,12 +64,12 @@ pub(super) fn gradients<const CORNERS: usize, const CELLS: usize>(
     lower: &[f32; CORNERS],
 ) -> ([f32; CELLS], [f32; CELLS]) {
     const { assert!(CORNERS == CELLS + 1) };
-    let (mut magnitude, mut turns) = ([0.0_f32; CELLS], [0.0_f32; CELLS]);
+    let (mut magnitude, mut direction) = ([0.0_f32; CELLS], [0.0_f32; CELLS]);
     for u in 0..CELLS {
         let (main, other) = (lower[u + 1] - upper[u], lower[u] - upper[u + 1]);
         let (gx, gy) = (main - other, main + other);
         magnitude[u] = (gx * gx + gy * gy).sqrt();
-        turns[u] = super::maths::turns(gy, gx);
+        direction[u] = turns(gy, gx);
     }
-    (magnitude, turns)
+    (magnitude, direction)
 }

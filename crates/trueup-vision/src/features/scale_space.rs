@@ -4,8 +4,16 @@ use rayon::prelude::*;
 use trueup_core::raster::Raster;
 use trueup_core::{Result, StageContext};
 
-use super::FeatureOptions;
-use super::simd::{InstructionSet, Kernel, Lanes, MAX_LANES};
+use super::simd::{InstructionSet, Lanes, MAX_LANES, VectorKernel};
+
+/// Scales sampled in each doubling of scale (Lowe 2004, section 3.2).
+pub(super) const LEVELS_PER_OCTAVE: usize = 3;
+
+/// Blur of the first level of each octave, in the octave's samples (Lowe 2004, section 3.3).
+pub(super) const BASE_SIGMA: f64 = 1.6;
+
+/// Blur that a photograph is assumed to have already, in its pixels (Lowe 2004, section 3.3).
+pub(super) const ASSUMED_BLUR_PX: f64 = 0.5;
 
 /// Smallest side of an octave, in its samples.
 const MIN_OCTAVE_SIDE: usize = 8;
@@ -21,7 +29,7 @@ const STRIP_COLUMNS: usize = 256;
 
 /// One blurred copy of the picture, rows padded for vector loads.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Plane {
+pub(super) struct BlurredPlane {
     /// Samples in a row.
     pub(super) width: usize,
     /// Rows.
@@ -32,7 +40,7 @@ pub(super) struct Plane {
     pub(super) data: Vec<f32>,
 }
 
-impl Plane {
+impl BlurredPlane {
     fn new(width: usize, height: usize) -> Self {
         // An odd number of vectors a row keeps the rows of one column in different cache sets.
         let stride = (width.div_ceil(MAX_LANES) | 1) * MAX_LANES;
@@ -57,8 +65,17 @@ impl Plane {
 pub(super) struct Octave {
     /// Distance of two samples, in the picture's pixels: a power of two.
     pub(super) step_px: f64,
-    /// `levels_per_octave + 3` planes; plane s has blur `base_sigma * 2^(s / levels_per_octave)` samples.
-    pub(super) planes: Vec<Plane>,
+    /// [`LEVELS_PER_OCTAVE`] + 3 planes; plane s has blur [`BASE_SIGMA`] 2^(s / [`LEVELS_PER_OCTAVE`]) samples.
+    pub(super) planes: Vec<BlurredPlane>,
+}
+
+/// At which size a photograph is searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SearchSize {
+    /// As it is.
+    Original,
+    /// Doubled, which shows finer detail.
+    Doubled,
 }
 
 /// Builds all octaves of a picture of one channel.
@@ -72,37 +89,35 @@ pub(super) struct Octave {
 /// is exact.
 pub(super) fn build(
     image: &Raster<f32>,
-    options: &FeatureOptions,
+    size: SearchSize,
     instructions: InstructionSet,
     context: &StageContext,
 ) -> Result<Vec<Octave>> {
-    let levels = options.levels_per_octave;
-    let (mut base, mut step_px) = (plane_of(image), 1.0);
-    if options.double_image {
-        base = doubled(&base);
-        step_px = 0.5;
-    }
-    let present_blur = options.nominal_blur_px / step_px;
-    let missing_blur = (options.base_sigma.powi(2) - present_blur.powi(2)).max(0.0).sqrt();
+    let (mut base, mut step_px) = match size {
+        SearchSize::Original => (plane_of(image), 1.0),
+        SearchSize::Doubled => (doubled(&plane_of(image)), 0.5),
+    };
+    let assumed_blur = ASSUMED_BLUR_PX / step_px;
+    let missing_blur = (BASE_SIGMA.powi(2) - assumed_blur.powi(2)).max(0.0).sqrt();
     base = blurred(&base, missing_blur, instructions);
     let mut octaves = Vec::new();
     while base.width.min(base.height) >= MIN_OCTAVE_SIDE {
         let mut planes = vec![std::mem::take(&mut base)];
-        for level in 1..levels + 3 {
+        for level in 1..LEVELS_PER_OCTAVE + 3 {
             context.check_cancelled()?;
-            let blur = |level: usize| options.base_sigma * (level as f64 / levels as f64).exp2();
+            let blur = |level: usize| BASE_SIGMA * (level as f64 / LEVELS_PER_OCTAVE as f64).exp2();
             let step = (blur(level).powi(2) - blur(level - 1).powi(2)).sqrt();
             planes.push(blurred(&planes[level - 1], step, instructions));
         }
-        base = halved(&planes[levels]);
+        base = halved(&planes[LEVELS_PER_OCTAVE]);
         octaves.push(Octave { step_px, planes });
         step_px *= 2.0;
     }
     Ok(octaves)
 }
 
-fn plane_of(image: &Raster<f32>) -> Plane {
-    let mut plane = Plane::new(image.width(), image.height());
+fn plane_of(image: &Raster<f32>) -> BlurredPlane {
+    let mut plane = BlurredPlane::new(image.width(), image.height());
     let width = plane.width;
     plane.bands().for_each(|(first, rows)| {
         let stride = (width.div_ceil(MAX_LANES) | 1) * MAX_LANES;
@@ -114,8 +129,8 @@ fn plane_of(image: &Raster<f32>) -> Plane {
 }
 
 /// Twice the samples: sample 2k lies on sample k of the source, so that positions scale by two exactly.
-fn doubled(source: &Plane) -> Plane {
-    let mut target = Plane::new(2 * source.width, 2 * source.height);
+fn doubled(source: &BlurredPlane) -> BlurredPlane {
+    let mut target = BlurredPlane::new(2 * source.width, 2 * source.height);
     let stride = target.stride;
     let last = source.height - 1;
     target.bands().for_each(|(first, rows)| {
@@ -153,8 +168,8 @@ fn half_way(a: f32, b: f32, c: f32, d: f32) -> f32 {
 }
 
 /// Every second sample: sample k of the result lies on sample 2k of the source.
-fn halved(source: &Plane) -> Plane {
-    let mut target = Plane::new(source.width.div_ceil(2), source.height.div_ceil(2));
+fn halved(source: &BlurredPlane) -> BlurredPlane {
+    let mut target = BlurredPlane::new(source.width.div_ceil(2), source.height.div_ceil(2));
     let stride = target.stride;
     target.bands().for_each(|(first, rows)| {
         for (offset, row) in rows.chunks_exact_mut(stride).enumerate() {
@@ -168,9 +183,9 @@ fn halved(source: &Plane) -> Plane {
 }
 
 /// Convolves with a Gaussian of standard deviation `sigma` samples; the picture's edge is continued outwards.
-pub(super) fn blurred(source: &Plane, sigma: f64, instructions: InstructionSet) -> Plane {
+fn blurred(source: &BlurredPlane, sigma: f64, instructions: InstructionSet) -> BlurredPlane {
     let taps = gaussian_taps(sigma);
-    let mut target = Plane::new(source.width, source.height);
+    let mut target = BlurredPlane::new(source.width, source.height);
     target.bands().for_each_init(Vec::new, |scratch, (first_row, rows)| {
         instructions.run(BlurBand { source, taps: &taps, first_row, rows, scratch });
     });
@@ -202,7 +217,7 @@ fn gaussian_taps(sigma: f64) -> Vec<f32> {
 
 /// Blurs some rows of a plane: columns first, into scratch rows, then those rows.
 struct BlurBand<'a> {
-    source: &'a Plane,
+    source: &'a BlurredPlane,
     taps: &'a [f32],
     first_row: usize,
     /// The rows to write, with the stride of `source`.
@@ -210,7 +225,7 @@ struct BlurBand<'a> {
     scratch: &'a mut Vec<f32>,
 }
 
-impl Kernel for BlurBand<'_> {
+impl VectorKernel for BlurBand<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -239,7 +254,13 @@ impl Kernel for BlurBand<'_> {
 
 /// Row `y` of the plane convolved along its columns, for some columns.
 #[inline(always)]
-fn blur_columns<L: Lanes>(source: &Plane, taps: &[f32], y: usize, columns: std::ops::Range<usize>, target: &mut [f32]) {
+fn blur_columns<L: Lanes>(
+    source: &BlurredPlane,
+    taps: &[f32],
+    y: usize,
+    columns: std::ops::Range<usize>,
+    target: &mut [f32],
+) {
     let row_start = |row: usize| row.min(source.height - 1) * source.stride;
     let mut x = columns.start;
     while x < columns.end {
@@ -317,7 +338,7 @@ mod tests {
 
     #[test]
     fn a_constant_stays_constant_and_a_ramp_stays_a_ramp_inside() {
-        let mut plane = Plane::new(70, 50);
+        let mut plane = BlurredPlane::new(70, 50);
         let stride = plane.stride;
         for y in 0..50 {
             for x in 0..70 {

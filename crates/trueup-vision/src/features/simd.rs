@@ -49,7 +49,7 @@ impl InstructionSet {
 
     /// Runs a kernel compiled for this instruction set.
     #[inline]
-    pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+    pub(super) fn run<K: VectorKernel>(self, kernel: K) -> K::Output {
         match self.0 {
             Kind::Portable => kernel.run::<Portable>(),
             // SAFETY: this value exists only if `available` found AVX2.
@@ -65,7 +65,7 @@ impl InstructionSet {
 /// A piece of work written once for all vector widths.
 ///
 /// `run` and everything it calls must be `#[inline(always)]`, so that it is compiled with the caller's instructions.
-pub(super) trait Kernel {
+pub(super) trait VectorKernel {
     /// What the work returns.
     type Output;
     /// Does the work with vectors of type `L`.
@@ -151,17 +151,17 @@ mod x86 {
     };
     use std::ops::{Add, Mul, Sub};
 
-    use super::{Kernel, Lanes};
+    use super::{Lanes, VectorKernel};
 
     /// Compiles the kernel with AVX2.
     #[target_feature(enable = "avx2")]
-    pub(super) fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
+    pub(super) fn run_avx2<K: VectorKernel>(kernel: K) -> K::Output {
         kernel.run::<Eight>()
     }
 
     /// Compiles the kernel with AVX-512F.
     #[target_feature(enable = "avx512f,avx2")]
-    pub(super) fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
+    pub(super) fn run_avx512<K: VectorKernel>(kernel: K) -> K::Output {
         kernel.run::<Sixteen>()
     }
 

@@ -1,6 +1,6 @@
-//! Line segments of two pictures that show the same edge.
+//! Line segments of two photographs that show the same edge.
 //!
-//! A transfer between the pictures says where a segment should be; what lies along both sides of it, which of several
+//! A transfer between the photographs says where a segment should be; what lies along both sides of it, which of several
 //! parallel ones it is.
 //!
 //! # Source
@@ -8,7 +8,7 @@
 //!
 //! # Departures
 //! The description of a segment is the mean gray values of bands beside it, in a few sections along the part that both
-//! pictures show; alike means a high normalized correlation.
+//! photographs show; alike means a high normalized correlation.
 
 mod strip;
 
@@ -18,36 +18,36 @@ use trueup_core::raster::Raster;
 
 use strip::{Stretch, likeness};
 
-trueup_core::options! {
-    /// How segments of overlapping pictures are matched (`stitch.align = lines`).
-    pub struct LineMatchingOptions("line_matching") {
-        /// Shorter segments are not matched.
-        min_length_px: f64 = 25.0, between(4.0, 100000.0), "working px";
-        /// Largest angle between a segment and where the other is carried.
-        max_angle_deg: f64 = 5.0, between(0.0, 45.0), "deg";
-        /// Largest distance of a carried segment's ends from the other's line.
-        max_distance_px: f64 = 5.0, between(0.0, 1000.0), "working px";
-        /// Share of the shorter segment, along the line, that the two must have in common.
-        min_overlap: f64 = 0.5, between(0.0, 1.0), "";
-        /// Least likeness (normalized correlation) of what lies beside two segments.
-        min_likeness: f64 = 0.7, between(-1.0, 1.0), "";
-        /// Largest ratio of the best match's unlikeness to the second best's.
-        max_ratio: f64 = 0.8, between(0.0, 1.0), "";
-    }
-}
+/// Shorter segments are not matched, in working pixels.
+const MIN_LENGTH_PX: f64 = 25.0;
 
-/// A segment of the first picture and one of the second, by their indices.
+/// Largest angle between a segment and where the other is carried, in degrees.
+const MAX_ANGLE_DEG: f64 = 5.0;
+
+/// Largest distance of a carried segment's ends from the other's line, in working pixels.
+const MAX_DISTANCE_PX: f64 = 5.0;
+
+/// Share of the shorter segment, along the line, that the two must have in common.
+const MIN_OVERLAP: f64 = 0.5;
+
+/// Least likeness (normalized correlation) of what lies beside two segments.
+const MIN_LIKENESS: f64 = 0.7;
+
+/// Largest ratio of the best match's unlikeness to the second best's.
+const MAX_RATIO: f64 = 0.8;
+
+/// A segment of the first photograph and one of the second, by their indices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LineMatch {
-    /// In the first picture.
+    /// In the first photograph.
     pub in_a: usize,
-    /// In the second picture.
+    /// In the second photograph.
     pub in_b: usize,
 }
 
-/// One picture of a pair: gray values 0 to 255 in one channel, and its segments.
+/// A photograph of a pair, at its working size: gray values 0 to 255 in one channel, and its segments.
 #[derive(Debug, Clone, Copy)]
-pub struct LinedPicture<'a> {
+pub struct PhotographWithLines<'a> {
     /// Gray values.
     pub gray: &'a Raster<u8>,
     /// Segments in its pixels.
@@ -64,16 +64,15 @@ struct Candidate {
     likeness: f64,
 }
 
-/// Pairs of segments that show the same edge, each segment at most once, in the order of the first picture's.
+/// Pairs of segments that show the same edge, each segment at most once, in the order of the first photograph's.
 ///
-/// `b_from_a` carries a pixel of the first picture to the second, `None` outside the overlap.
+/// `b_from_a` carries a pixel of the first photograph to the second, `None` outside the overlap.
 pub fn find(
-    a: LinedPicture,
-    b: LinedPicture,
+    a: PhotographWithLines,
+    b: PhotographWithLines,
     b_from_a: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
-    options: &LineMatchingOptions,
 ) -> Vec<LineMatch> {
-    let candidates = candidates(a, b, b_from_a, options);
+    let candidates = candidates(a, b, b_from_a);
     let is_best = |one: &Candidate, rivals: &dyn Fn(&Candidate) -> bool, lines: [&LineSegment; 2]| {
         // Another piece of the same edge is no rival.
         let [own_a, own_b] = lines;
@@ -83,7 +82,7 @@ pub fn find(
             if same {
                 return other.likeness <= one.likeness;
             }
-            UNSURE + 1.0 - one.likeness <= options.max_ratio * (UNSURE + 1.0 - other.likeness)
+            UNSURE + 1.0 - one.likeness <= MAX_RATIO * (UNSURE + 1.0 - other.likeness)
         })
     };
     candidates
@@ -97,19 +96,18 @@ pub fn find(
 }
 
 fn candidates(
-    a: LinedPicture,
-    b: LinedPicture,
+    a: PhotographWithLines,
+    b: PhotographWithLines,
     b_from_a: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
-    options: &LineMatchingOptions,
 ) -> Vec<Candidate> {
-    let long_enough = |line: &&LineSegment| line.length() >= options.min_length_px;
+    let long_enough = |line: &&LineSegment| line.length() >= MIN_LENGTH_PX;
     let mut found = Vec::new();
     for (in_a, line_a) in a.lines.iter().enumerate().filter(|(_, line)| long_enough(line)) {
-        let Some(carried) = Carried::of(line_a, &b_from_a, options.min_length_px) else { continue };
+        let Some(carried) = Carried::of(line_a, &b_from_a) else { continue };
         for (in_b, line_b) in b.lines.iter().enumerate().filter(|(_, line)| long_enough(line)) {
-            let Some(stretch) = carried.common(line_b, options) else { continue };
+            let Some(stretch) = carried.common(line_b) else { continue };
             let Some(likeness) = likeness(a.gray, b.gray, &stretch) else { continue };
-            if likeness >= options.min_likeness {
+            if likeness >= MIN_LIKENESS {
                 found.push(Candidate { in_a, in_b, likeness });
             }
         }
@@ -125,19 +123,15 @@ fn continues(one: &LineSegment, other: &LineSegment) -> bool {
     [other.start, other.end].iter().all(|&end| along.perp(&(Vector2::from(end) - start)).abs() <= BESIDE_PX)
 }
 
-/// The part of a segment that lies in the overlap, in both pictures.
+/// The part of a segment that lies in the overlap, in both photographs.
 struct Carried {
     here: [Vector2<f64>; 2],
     there: [Vector2<f64>; 2],
 }
 
 impl Carried {
-    /// `None` if less than `min_length_px` of the segment is carried over.
-    fn of(
-        line: &LineSegment,
-        b_from_a: &impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
-        min_length_px: f64,
-    ) -> Option<Self> {
+    /// `None` if less than [`MIN_LENGTH_PX`] of the segment is carried over.
+    fn of(line: &LineSegment, b_from_a: &impl Fn(Vector2<f64>) -> Option<Vector2<f64>>) -> Option<Self> {
         /// Distance of the points that are carried.
         const STEP_PX: f64 = 5.0;
         let (start, end) = (Vector2::from(line.start), Vector2::from(line.end));
@@ -147,27 +141,27 @@ impl Carried {
             points.filter_map(|point| Some((point, b_from_a(point)?))).collect();
         let (first, last) = (carried.first()?, carried.last()?);
         let long_enough =
-            (last.0 - first.0).norm() >= min_length_px && (last.1 - first.1).norm() >= min_length_px / 2.0;
+            (last.0 - first.0).norm() >= MIN_LENGTH_PX && (last.1 - first.1).norm() >= MIN_LENGTH_PX / 2.0;
         long_enough.then_some(Self { here: [first.0, last.0], there: [first.1, last.1] })
     }
 
-    /// What the segment has in common with one of the other picture; `None` if the two cannot be the same edge.
-    fn common(&self, line: &LineSegment, options: &LineMatchingOptions) -> Option<Stretch> {
+    /// What the segment has in common with one of the other photograph; `None` if the two cannot be the same edge.
+    fn common(&self, line: &LineSegment) -> Option<Stretch> {
         let [start, end] = [line.start, line.end].map(Vector2::from);
         let length = line.length();
         let along = (end - start) / length;
         let [from, to] = self.there;
         let (sine, cosine) = ((to - from).perp(&along), (to - from).dot(&along));
         // Segments know their brighter side: the same edge has the same sense.
-        if cosine <= 0.0 || sine.abs() > cosine * options.max_angle_deg.to_radians().tan() {
+        if cosine <= 0.0 || sine.abs() > cosine * MAX_ANGLE_DEG.to_radians().tan() {
             return None;
         }
-        if self.there.iter().any(|point| along.perp(&(point - start)).abs() > options.max_distance_px) {
+        if self.there.iter().any(|point| along.perp(&(point - start)).abs() > MAX_DISTANCE_PX) {
             return None;
         }
         let [low, high] = self.there.map(|point| along.dot(&(point - start)));
         let (first, last) = (low.max(0.0), high.min(length));
-        if last - first < options.min_overlap * (high - low).min(length) {
+        if last - first < MIN_OVERLAP * (high - low).min(length) {
             return None;
         }
         let here = |at: f64| self.here[0].lerp(&self.here[1], (at - low) / (high - low));

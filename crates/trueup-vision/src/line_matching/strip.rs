@@ -1,4 +1,4 @@
-//! What lies beside a segment, compared between two pictures.
+//! What lies beside a segment, compared between two photographs.
 
 use nalgebra::Vector2;
 use trueup_core::raster::Raster;
@@ -14,13 +14,13 @@ const BAND_PX: f64 = 2.0;
 /// Values that describe a stretch: sections of bands.
 const VALUES: usize = SECTIONS * 2 * BANDS;
 
-/// The same stretch of an edge in two pictures, from its first to its last point.
+/// The same stretch of an edge in two photographs, from its first to its last point.
 pub(super) struct Stretch {
-    pub a: [Vector2<f64>; 2],
-    pub b: [Vector2<f64>; 2],
+    pub(super) a: [Vector2<f64>; 2],
+    pub(super) b: [Vector2<f64>; 2],
 }
 
-/// Normalized correlation of what lies beside the stretch in both pictures, -1 to 1; `None` where it leaves a picture or
+/// Normalized correlation of what lies beside the stretch in both photographs, -1 to 1; `None` where it leaves one or
 /// has no contrast.
 pub(super) fn likeness(a: &Raster<u8>, b: &Raster<u8>, stretch: &Stretch) -> Option<f64> {
     let (a, b) = (centered(strip(a, stretch.a)?)?, centered(strip(b, stretch.b)?)?);

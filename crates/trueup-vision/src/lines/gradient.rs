@@ -1,9 +1,27 @@
-//! The reduced picture's gradient: magnitudes and unit vectors along the level lines.
+//! The reduced image's gradient: magnitudes and unit vectors along the level lines.
 
 use rayon::prelude::*;
 use trueup_core::raster::Raster;
 
-use super::LineOptions;
+/// Reduction of the image before its gradient is taken, which removes aliasing and the staircase of pixels (IPOL,
+/// section 2.1).
+const REDUCTION: f64 = 0.8;
+
+/// Factor from the reduced image's coordinates to the image's.
+pub(super) const IMAGE_FROM_FIELD: f64 = 1.0 / REDUCTION;
+
+/// Standard deviation of the Gaussian that goes with the reduction, in pixels of the reduced image (IPOL, section 2.1).
+const SIGMA_REDUCED_PX: f64 = 0.6;
+
+/// Bound on the error of a gray level by quantization, in levels of 0 to 255 (IPOL, section 2.2). Pixels whose gradient
+/// could turn by more than [`ANGLE_TOLERANCE_DEG`] under this error take no part.
+const QUANTIZATION: f64 = 2.0;
+
+/// How far the level line of a pixel may turn from the direction of its region, in degrees (IPOL, section 2.4).
+pub(super) const ANGLE_TOLERANCE_DEG: f64 = 22.5;
+
+/// Classes of gradient magnitude by which seeds are ordered (IPOL, section 2.3).
+const MAGNITUDE_CLASSES: usize = 1024;
 
 /// The Gaussian is cut where it has fallen to 10^-3 of its peak: sqrt(2 ln 1000) standard deviations.
 const GAUSSIAN_REACH_SIGMAS: f64 = 3.717;
@@ -11,41 +29,37 @@ const GAUSSIAN_REACH_SIGMAS: f64 = 3.717;
 /// Rows a thread reduces at a time.
 const ROWS_PER_TASK: usize = 16;
 
-/// Level lines and gradient magnitudes at the nodes between the pixels of the reduced picture.
+/// Level lines and gradient magnitudes at the nodes between the pixels of the reduced image.
 ///
 /// Arrays are padded by one element on every side, which is never aligned with anything, so that neighbors need no
 /// check of the border: the element at column x and row y of the padded arrays lies at (x, y) in corner coordinates of
-/// the reduced picture.
+/// the reduced image.
 #[derive(Debug)]
 pub(super) struct GradientField {
     width: usize,
     height: usize,
-    picture_from_field: f64,
     level_lines: Vec<[f32; 2]>,
     magnitudes: Vec<f32>,
 }
 
 impl GradientField {
-    /// Reduces the picture and takes its gradient on 2 x 2 pixels.
+    /// Reduces the image and takes its gradient.
+    pub(super) fn new(image: &Raster<f32>) -> Self {
+        Self::of_reduced(&reduce(image, REDUCTION, SIGMA_REDUCED_PX))
+    }
+
+    /// The gradient on 2 x 2 pixels.
     ///
     /// # Source
     /// IPOL, sections 2.1 to 2.4. The gradient averages two differences on each axis; pixels whose magnitude is not
-    /// above `quantization / sin(angle_tolerance)` have no direction (their level line is (0, 0)).
-    pub(super) fn new(image: &Raster<f32>, options: &LineOptions) -> Self {
-        let reduced = reduce(image, options.scale, options.sigma_scale);
-        let picture_from_field = 1.0 / options.scale;
+    /// above [`QUANTIZATION`] / sin([`ANGLE_TOLERANCE_DEG`]) have no direction (their level line is (0, 0)).
+    fn of_reduced(reduced: &Raster<f32>) -> Self {
         let (width, height) = (reduced.width().saturating_sub(1), reduced.height().saturating_sub(1));
         if width == 0 || height == 0 {
-            return Self {
-                width: 0,
-                height: 0,
-                picture_from_field,
-                level_lines: vec![[0.0; 2]; 4],
-                magnitudes: vec![0.0; 4],
-            };
+            return Self { width: 0, height: 0, level_lines: vec![[0.0; 2]; 4], magnitudes: vec![0.0; 4] };
         }
         let stride = width + 2;
-        let threshold = (options.quantization / options.angle_tolerance_deg.to_radians().sin()) as f32;
+        let threshold = (QUANTIZATION / ANGLE_TOLERANCE_DEG.to_radians().sin()) as f32;
         let mut level_lines = vec![[0.0_f32; 2]; stride * (height + 2)];
         let mut magnitudes = vec![0.0_f32; stride * (height + 2)];
         let inside = stride..stride * (height + 1);
@@ -64,7 +78,7 @@ impl GradientField {
                     &mut magnitudes[nodes],
                 );
             });
-        Self { width, height, picture_from_field, level_lines, magnitudes }
+        Self { width, height, level_lines, magnitudes }
     }
 
     /// Nodes across, without padding.
@@ -80,11 +94,6 @@ impl GradientField {
     /// Elements from one row of the padded arrays to the next.
     pub(super) fn stride(&self) -> usize {
         self.width + 2
-    }
-
-    /// Factor from the reduced picture's coordinates to the picture's.
-    pub(super) fn picture_from_field(&self) -> f64 {
-        self.picture_from_field
     }
 
     /// Unit vectors along the level lines, the brighter side to their right on the screen; (0, 0) where there is none.
@@ -103,25 +112,25 @@ impl GradientField {
         (f64::from(index % stride), f64::from(index / stride))
     }
 
-    /// The elements that have a level line, those of the largest magnitude first, in `bins` classes; row by row
-    /// inside a class (IPOL, section 2.3).
-    pub(super) fn seeds(&self, bins: usize) -> Vec<u32> {
+    /// The elements that have a level line, those of the largest magnitude first, in [`MAGNITUDE_CLASSES`] classes; row by
+    /// row inside a class (IPOL, section 2.3).
+    pub(super) fn seeds(&self) -> Vec<u32> {
+        const LAST_CLASS: usize = MAGNITUDE_CLASSES - 1;
         let largest = self.magnitudes.iter().copied().fold(0.0_f32, f32::max);
         if largest <= 0.0 {
             return Vec::new();
         }
-        let bins = bins.max(1);
-        let class_from_magnitude = bins as f32 / largest;
+        let class_from_magnitude = MAGNITUDE_CLASSES as f32 / largest;
         // Class 0 holds the largest magnitudes.
-        let class_of = |magnitude: f32| bins - 1 - ((magnitude * class_from_magnitude) as usize).min(bins - 1);
-        let mut starts = vec![0_usize; bins + 1];
+        let class_of = |magnitude: f32| LAST_CLASS - ((magnitude * class_from_magnitude) as usize).min(LAST_CLASS);
+        let mut starts = vec![0_usize; MAGNITUDE_CLASSES + 1];
         for &magnitude in self.magnitudes.iter().filter(|&&magnitude| magnitude > 0.0) {
             starts[class_of(magnitude) + 1] += 1;
         }
-        for class in 0..bins {
+        for class in 0..MAGNITUDE_CLASSES {
             starts[class + 1] += starts[class];
         }
-        let mut seeds = vec![0_u32; starts[bins]];
+        let mut seeds = vec![0_u32; starts[MAGNITUDE_CLASSES]];
         for (index, &magnitude) in self.magnitudes.iter().enumerate() {
             if magnitude > 0.0 {
                 let next = &mut starts[class_of(magnitude)];
@@ -148,10 +157,10 @@ fn gradient_row(upper: &[f32], lower: &[f32], threshold: f32, lines: &mut [[f32;
     }
 }
 
-/// The picture smoothed by a Gaussian of `sigma_scale / scale` pixels and sampled at the centers of pixels that are
-/// `1 / scale` wide; corners coincide. A scale of 1 only copies.
+/// The image smoothed by a Gaussian of `sigma_scale / scale` pixels and sampled at the centers of pixels that are
+/// `1 / scale` wide; corners coincide. `scale` is below 1.
 fn reduce(image: &Raster<f32>, scale: f64, sigma_scale: f64) -> Raster<f32> {
-    if scale >= 1.0 || image.data().is_empty() {
+    if image.data().is_empty() {
         return image.clone();
     }
     let columns = AxisFilter::new(image.width(), scale, sigma_scale);
@@ -253,10 +262,22 @@ mod tests {
     }
 
     #[test]
+    fn strong_reductions_of_any_size_stay_within_the_levels() {
+        for (width, height) in [(0, 0), (1, 1), (1, 500), (500, 1), (2, 2), (3, 8), (8, 8), (200, 100)] {
+            let samples = (0..width * height).map(|index| ((index * 7919) % 256) as f32).collect();
+            let busy = Raster::from_data(width, height, 1, samples).expect("sizes agree");
+            let reduced = reduce(&busy, 0.1, 4.0);
+            let sides = [reduced.width(), reduced.height()];
+            assert!(width < 10 || height < 10 || sides == [width / 10, height / 10], "{sides:?}");
+            assert!(reduced.data().iter().all(|level| (-0.01..=255.01).contains(level)), "{width} x {height}");
+        }
+    }
+
+    #[test]
     fn level_lines_have_the_brighter_side_on_their_right() {
         // Brighter towards larger x: up the screen.
         let image = Raster::from_data(2, 2, 1, vec![0.0, 100.0, 0.0, 100.0]).expect("sizes agree");
-        let field = GradientField::new(&image, &LineOptions { scale: 1.0, ..LineOptions::default() });
+        let field = GradientField::of_reduced(&image);
         assert_eq!(field.level_lines()[field.stride() + 1], [0.0, -1.0]);
         assert_eq!(field.magnitudes()[field.stride() + 1], 100.0);
     }
@@ -264,9 +285,9 @@ mod tests {
     #[test]
     fn seeds_come_by_falling_magnitude() {
         let image = Raster::from_data(4, 2, 1, vec![0.0, 10.0, 60.0, 100.0, 0.0, 10.0, 60.0, 100.0]).expect("sizes");
-        let field = GradientField::new(&image, &LineOptions { scale: 1.0, ..LineOptions::default() });
+        let field = GradientField::of_reduced(&image);
         let first = field.stride() as u32 + 1;
-        assert_eq!(field.seeds(1024), [first + 1, first + 2, first]);
+        assert_eq!(field.seeds(), [first + 1, first + 2, first]);
     }
 
     #[test]

@@ -20,7 +20,7 @@ const BOUNDARY_SLACK_PX: f64 = 1e-6;
 
 /// A rectangle in the padded field's coordinates: a center, a direction, and intervals along and across it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rectangle {
+pub(super) struct LineSupportRectangle {
     center: [f64; 2],
     /// Unit vector; level lines run its way.
     direction: [f64; 2],
@@ -32,7 +32,7 @@ pub(super) struct Rectangle {
     probability: f64,
 }
 
-impl Rectangle {
+impl LineSupportRectangle {
     /// The rectangle of the region `indices`: through its center of mass along the principal axis of its inertia, with
     /// gradient magnitudes for masses, and as large as to hold all the pixels' centers.
     ///
@@ -181,18 +181,18 @@ pub(super) fn is_aligned(line: [f32; 2], direction: [f32; 2], tangent: f32) -> b
 /// # Source
 /// IPOL, section 2.8.
 pub(super) fn improve(
-    rectangle: Rectangle,
+    rectangle: LineSupportRectangle,
     field: &GradientField,
     false_alarms: &FalseAlarms,
     enough: f64,
-) -> (Rectangle, f64) {
+) -> (LineSupportRectangle, f64) {
     const HALF: f64 = 0.5 * WIDTH_STEP_PX;
-    let steps: [fn(Rectangle) -> Option<Rectangle>; 5] = [
-        Rectangle::finer,
+    let steps: [fn(LineSupportRectangle) -> Option<LineSupportRectangle>; 5] = [
+        LineSupportRectangle::finer,
         |rectangle| rectangle.narrower(HALF, HALF),
         |rectangle| rectangle.narrower(WIDTH_STEP_PX, 0.0),
         |rectangle| rectangle.narrower(0.0, WIDTH_STEP_PX),
-        Rectangle::finer,
+        LineSupportRectangle::finer,
     ];
     let mut best = (rectangle, rectangle.significance(field, false_alarms));
     for step in steps {

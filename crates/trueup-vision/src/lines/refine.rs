@@ -107,6 +107,16 @@ impl Fit {
     }
 }
 
+/// The pixel rows (or columns, for flat segments) that a segment crosses, by its extent along the major axis.
+#[derive(Debug, Clone, Copy)]
+struct Crossing {
+    /// 1 if the major axis is y, 0 if it is x.
+    major: usize,
+    from: f64,
+    /// Not less than `from`.
+    to: f64,
+}
+
 /// An edge point: where, how much it weighs, and how wide the filtered edge is there.
 #[derive(Debug, Clone, Copy)]
 struct EdgePoint {
@@ -138,12 +148,13 @@ impl<'a> EdgeProfiles<'a> {
         let first = Fit { origin, offset: 0.5 * (segment.start[minor] + segment.end[minor]), slope };
         // The brighter side is on the right: for larger y that is smaller x; for larger x it is larger y.
         let sign = if (to > from) == (major == 0) { 1.0 } else { -1.0 };
+        let crossing = Crossing { major, from: from.min(to), to: from.max(to) };
         let mut fit = first;
         let mut points = Vec::with_capacity((to - from).abs() as usize + 2);
         let (mut filter, mut parabola_share) = (&self.sharp, 0.0);
         for search in SEARCH_PX {
             let scan = Scan { filter, sign, search, parabola_share };
-            self.edge_points(&fit, (from.min(to), from.max(to)), major, &scan, &mut points);
+            self.edge_points(&fit, &crossing, &scan, &mut points);
             if points.len() < MIN_POINTS || (points.len() as f64) < MIN_POINT_SHARE * (to - from).abs() {
                 return;
             }
@@ -159,16 +170,16 @@ impl<'a> EdgeProfiles<'a> {
         }
     }
 
-    /// The edge point of each row whose center is between the ends.
-    fn edge_points(&self, fit: &Fit, (from, to): (f64, f64), major: usize, scan: &Scan, points: &mut Vec<EdgePoint>) {
+    /// Replaces `points` by the edge point of each row whose center is between the ends.
+    fn edge_points(&self, fit: &Fit, crossing: &Crossing, scan: &Scan, points: &mut Vec<EdgePoint>) {
         points.clear();
-        let (rows, columns, row_step, column_step) = if major == 1 {
+        let (rows, columns, row_step, column_step) = if crossing.major == 1 {
             (self.image.height(), self.image.width(), self.image.width(), 1)
         } else {
             (self.image.width(), self.image.height(), 1, self.image.width())
         };
-        let first = (from - 0.5).ceil().max(0.0) as usize;
-        let end = ((to - 0.5).floor() + 1.0).clamp(0.0, rows as f64) as usize;
+        let first = (crossing.from - 0.5).ceil().max(0.0) as usize;
+        let end = ((crossing.to - 0.5).floor() + 1.0).clamp(0.0, rows as f64) as usize;
         for row in first..end {
             let center = row as f64 + 0.5;
             let profile = Profile { samples: self.image.data(), start: row * row_step, step: column_step, columns };

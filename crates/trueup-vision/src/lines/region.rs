@@ -1,11 +1,13 @@
 //! Connected pixels whose level lines share a direction.
 
-use super::LineOptions;
-use super::gradient::GradientField;
-use super::rectangle::{Rectangle, is_aligned};
+use super::gradient::{ANGLE_TOLERANCE_DEG, GradientField};
+use super::rectangle::{LineSupportRectangle, is_aligned};
 
 /// The smallest region a rectangle can be fitted to.
 const MIN_REGION: usize = 2;
+
+/// Smallest share of a rectangle's area that its region must fill; sparser regions bend and are cut (IPOL, section 2.6).
+const MIN_DENSITY: f64 = 0.7;
 
 /// What a step of the reduction of a sparse region leaves of its radius (IPOL, section 2.6).
 const RADIUS_REDUCTION: f64 = 0.75;
@@ -24,18 +26,16 @@ pub(super) struct RegionGrower<'a> {
     /// Sum of the region's level lines: its direction.
     sum: [f32; 2],
     tolerance: f64,
-    min_density: f64,
 }
 
 impl<'a> RegionGrower<'a> {
-    pub(super) fn new(field: &'a GradientField, options: &LineOptions) -> Self {
+    pub(super) fn new(field: &'a GradientField) -> Self {
         Self {
             field,
             used: field.magnitudes().iter().map(|&magnitude| magnitude <= 0.0).collect(),
             region: Vec::new(),
             sum: [0.0; 2],
-            tolerance: options.angle_tolerance_deg.to_radians(),
-            min_density: options.min_density,
+            tolerance: ANGLE_TOLERANCE_DEG.to_radians(),
         }
     }
 
@@ -46,7 +46,7 @@ impl<'a> RegionGrower<'a> {
 
     /// Grows a region from `seed` and fits its rectangle; `None` if the seed is taken, or the region is smaller than
     /// `min_region` or cannot be made dense enough.
-    pub(super) fn rectangle_from(&mut self, seed: u32, min_region: usize) -> Option<Rectangle> {
+    pub(super) fn rectangle_from(&mut self, seed: u32, min_region: usize) -> Option<LineSupportRectangle> {
         if self.used[seed as usize] {
             return None;
         }
@@ -55,18 +55,18 @@ impl<'a> RegionGrower<'a> {
             return None;
         }
         let rectangle = self.fit()?;
-        if rectangle.density(self.region.len()) >= self.min_density {
+        if rectangle.density(self.region.len()) >= MIN_DENSITY {
             return Some(rectangle);
         }
         let rectangle = self.grow_narrowly(seed, &rectangle)?;
-        if rectangle.density(self.region.len()) >= self.min_density {
+        if rectangle.density(self.region.len()) >= MIN_DENSITY {
             return Some(rectangle);
         }
         self.shrink(seed, rectangle)
     }
 
-    fn fit(&self) -> Option<Rectangle> {
-        Rectangle::around(&self.region, self.field, self.sum.map(f64::from), self.aligned_probability())
+    fn fit(&self) -> Option<LineSupportRectangle> {
+        LineSupportRectangle::around(&self.region, self.field, self.sum.map(f64::from), self.aligned_probability())
     }
 
     /// Adds 8-connected pixels within `tolerance` of the region's mean direction until there are none.
@@ -104,7 +104,7 @@ impl<'a> RegionGrower<'a> {
     ///
     /// # Source
     /// IPOL, section 2.6.
-    fn grow_narrowly(&mut self, seed: u32, rectangle: &Rectangle) -> Option<Rectangle> {
+    fn grow_narrowly(&mut self, seed: u32, rectangle: &LineSupportRectangle) -> Option<LineSupportRectangle> {
         let lines = self.field.level_lines();
         let seed_line = lines[seed as usize];
         let near = squared(rectangle.width());
@@ -132,11 +132,11 @@ impl<'a> RegionGrower<'a> {
     ///
     /// # Source
     /// IPOL, section 2.6.
-    fn shrink(&mut self, seed: u32, mut rectangle: Rectangle) -> Option<Rectangle> {
+    fn shrink(&mut self, seed: u32, mut rectangle: LineSupportRectangle) -> Option<LineSupportRectangle> {
         let (x, y) = self.field.position(seed);
         let mut radius_squared =
             rectangle.axis().map(|end| squared(end[0] - x) + squared(end[1] - y)).into_iter().fold(0.0, f64::max);
-        while rectangle.density(self.region.len()) < self.min_density {
+        while rectangle.density(self.region.len()) < MIN_DENSITY {
             radius_squared *= squared(RADIUS_REDUCTION);
             let (field, used) = (self.field, &mut self.used);
             self.region.retain(|&index| {

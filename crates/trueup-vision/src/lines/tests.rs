@@ -51,12 +51,18 @@ fn steps(size: usize) -> Raster<f32> {
     picture
 }
 
-fn detect_with(image: &Raster<f32>, options: &LineOptions) -> Vec<LineSegment> {
-    detect(image, options, &StageContext::default()).expect("valid input")
+fn found(image: &Raster<f32>) -> Vec<LineSegment> {
+    found_from(image, 0.0)
 }
 
-fn plain() -> LineOptions {
-    LineOptions { refine: false, ..LineOptions::default() }
+fn found_from(image: &Raster<f32>, min_length_px: f64) -> Vec<LineSegment> {
+    detect(image, &LineOptions { min_length_px }, &StageContext::default()).expect("valid input")
+}
+
+/// Those of some significance, not refined.
+fn rough(image: &Raster<f32>, min_significance: f64) -> Vec<LineSegment> {
+    let segments = segments_of_field(&GradientField::new(image), min_significance, &StageContext::default());
+    tidy::longest_first(segments.expect("not cancelled"), 0.0, MAX_SEGMENTS)
 }
 
 /// Signed distance of the segment's middle from the true line, and its turn from it in degrees.
@@ -69,8 +75,8 @@ fn errors(segment: &LineSegment, point: [f64; 2], normal_angle: f64) -> (f64, f6
 
 #[test]
 fn a_step_between_columns_is_found_at_their_border() {
-    for options in [plain(), LineOptions::default(), LineOptions { scale: 1.0, ..plain() }] {
-        let segments = detect_with(&half_plane(100, [40.0, 50.0], 0.0), &options);
+    let image = half_plane(100, [40.0, 50.0], 0.0);
+    for segments in [rough(&image, MIN_SIGNIFICANCE), found(&image)] {
         assert_eq!(segments.len(), 1);
         let segment = segments[0];
         assert!((segment.start[0] - 40.0).abs() < 1e-2 && (segment.end[0] - 40.0).abs() < 1e-2, "{segment:?}");
@@ -87,10 +93,9 @@ fn tilted_steps_are_found_within_a_fiftieth_of_a_pixel_once_refined() {
         for offset in [0.0, 0.2, 0.5, 0.77] {
             let point = [80.0 + offset, 80.0 - 0.3 * offset];
             let image = half_plane(160, point, degrees.to_radians());
-            for (options, max_distance_px, max_turn_deg) in
-                [(plain(), 0.08, 0.05), (LineOptions::default(), 0.02, 0.02)]
+            for (segments, max_distance_px, max_turn_deg) in
+                [(rough(&image, MIN_SIGNIFICANCE), 0.08, 0.05), (found(&image), 0.02, 0.02)]
             {
-                let segments = detect_with(&image, &options);
                 assert_eq!(segments.len(), 1, "{degrees} deg");
                 let (distance, turn) = errors(&segments[0], point, degrees.to_radians());
                 assert!(distance.abs() < max_distance_px, "{degrees} deg, offset {offset}: {distance} px");
@@ -111,7 +116,7 @@ fn both_sides_of_a_bar_are_segments_of_opposite_directions() {
     for y in 10..50 {
         image.row_mut(y)[30..42].fill(180.0);
     }
-    let segments = detect_with(&image, &LineOptions { min_length_px: 20.0, ..LineOptions::default() });
+    let segments = found_from(&image, 20.0);
     assert_eq!(segments.len(), 2);
     let mut sides: Vec<(f64, f64)> =
         segments.iter().map(|segment| (segment.start[0], segment.end[1] - segment.start[1])).collect();
@@ -122,47 +127,48 @@ fn both_sides_of_a_bar_are_segments_of_opposite_directions() {
 
 #[test]
 fn refinement_makes_noisy_directions_better() {
-    let (mut rough, mut refined) = (0.0, 0.0);
+    let (mut before, mut after) = (0.0, 0.0);
     for index in 0..12 {
         let (point, angle) = ([75.3, 75.0], 0.13 + 0.5 * f64::from(index));
         let mut image = half_plane(150, point, angle);
         let disturbance = noise(150, 150, 4.0);
         image.data_mut().iter_mut().zip(disturbance.data()).for_each(|(sample, noise)| *sample += noise - 128.0);
-        rough += errors(&detect_with(&image, &plain())[0], point, angle).1.powi(2);
-        refined += errors(&detect_with(&image, &LineOptions::default())[0], point, angle).1.powi(2);
+        before += errors(&rough(&image, MIN_SIGNIFICANCE)[0], point, angle).1.powi(2);
+        after += errors(&found(&image)[0], point, angle).1.powi(2);
     }
-    assert!(refined < 0.7 * rough, "{refined} deg^2 against {rough} deg^2");
-    assert!((refined / 12.0).sqrt() < 0.03, "{refined} deg^2");
+    assert!(after < 0.7 * before, "{after} deg^2 against {before} deg^2");
+    assert!((after / 12.0).sqrt() < 0.03, "{after} deg^2");
 }
 
 #[test]
 fn noise_has_hardly_any_segments() {
     // One false alarm a picture is what a significance of 0 stands for.
-    let segments = detect_with(&noise(300, 200, 30.0), &LineOptions::default());
+    let picture = noise(300, 200, 30.0);
+    let segments = found(&picture);
     assert!(segments.len() <= 3, "{} segments", segments.len());
-    let sure = LineOptions { min_significance: 3.0, ..LineOptions::default() };
-    assert!(detect_with(&noise(300, 200, 30.0), &sure).is_empty());
+    assert!(rough(&picture, 3.0).is_empty());
+    // There are gradients enough to be taken for lines.
+    assert!(GradientField::new(&picture).seeds().len() > 10_000);
 }
 
 #[test]
 fn pictures_without_content_have_no_segments() {
     for (width, height) in [(0, 0), (1, 1), (1, 500), (500, 1), (2, 2), (3, 8), (8, 8), (200, 100)] {
         let black = Raster::new(width, height, 1);
-        assert!(detect_with(&black, &LineOptions::default()).is_empty(), "{width} x {height}");
+        assert!(found(&black).is_empty(), "{width} x {height}");
         let samples = (0..width * height).map(|index| ((index * 7919) % 256) as f32).collect();
         let busy = Raster::from_data(width, height, 1, samples).expect("sizes agree");
-        detect_with(&busy, &LineOptions::default());
-        detect_with(&busy, &LineOptions { scale: 0.1, sigma_scale: 4.0, ..LineOptions::default() });
+        assert!(found(&busy).iter().all(|segment| segment.start.iter().chain(&segment.end).all(|end| end.is_finite())));
     }
 }
 
 #[test]
 fn pixels_that_are_not_numbers_take_no_part() {
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX] {
-        assert!(detect_with(&Raster::from_data(40, 40, 1, vec![bad; 1600]).expect("sizes"), &plain()).is_empty());
+        assert!(found(&Raster::from_data(40, 40, 1, vec![bad; 1600]).expect("sizes")).is_empty());
         let mut image = half_plane(100, [40.0, 50.0], 0.0);
         image.pixel_mut(80, 50)[0] = bad;
-        let segments = detect_with(&image, &LineOptions::default());
+        let segments = found(&image);
         assert!(segments.iter().all(|segment| segment.start.iter().chain(&segment.end).all(|end| end.is_finite())));
         assert!(segments.iter().any(|segment| segment.length() > 95.0));
     }
@@ -173,11 +179,11 @@ fn wrong_input_is_refused() {
     let context = StageContext::default();
     let color = Raster::new(20, 20, 3);
     assert!(matches!(detect(&color, &LineOptions::default(), &context), Err(Error::Input { .. })));
-    let options = LineOptions { scale: f64::NAN, min_density: 2.0, ..LineOptions::default() };
+    let options = LineOptions { min_length_px: f64::NAN };
     let Err(Error::Options(invalid)) = detect(&Raster::new(20, 20, 1), &options, &context) else {
         panic!("options out of range are refused");
     };
-    assert_eq!(invalid.len(), 2);
+    assert_eq!(invalid.len(), 1);
     let token = CancelToken::default();
     token.cancel();
     let cancelled = StageContext::new(&Silent, &token, 0);
@@ -189,7 +195,7 @@ fn any_number_of_threads_gives_the_same_segments() {
     let picture = steps(256);
     let with_threads = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| detect_with(&picture, &LineOptions::default()))
+        pool.install(|| found(&picture))
     };
     let alone = with_threads(1);
     assert!(alone.len() > 10, "{} segments", alone.len());
@@ -200,23 +206,24 @@ fn any_number_of_threads_gives_the_same_segments() {
 #[test]
 fn segments_come_longest_first_and_no_more_than_asked_for() {
     let picture = steps(256);
-    let all = detect_with(&picture, &LineOptions::default());
+    let all = found(&picture);
     assert!(all.windows(2).all(|pair| pair[0].length() >= pair[1].length()));
-    let few = detect_with(&picture, &LineOptions { max_segments: 5, ..LineOptions::default() });
-    assert_eq!(few, all[..5]);
-    let long = detect_with(&picture, &LineOptions { min_length_px: 50.0, ..LineOptions::default() });
+    let shuffled = all.iter().rev().copied().collect();
+    assert_eq!(tidy::longest_first(shuffled, 0.0, 5), all[..5]);
+    let long = found_from(&picture, 50.0);
     assert!(!long.is_empty() && long.iter().all(|segment| segment.length() >= 50.0));
 }
 
 #[test]
 fn segments_along_the_frame_are_dropped() {
     let framed = half_plane(100, [3.0, 50.0], 0.0);
-    assert!(detect_with(&framed, &LineOptions::default()).is_empty());
-    assert_eq!(detect_with(&framed, &LineOptions { border_distance_px: 0.0, ..LineOptions::default() }).len(), 1);
+    assert!(found(&framed).is_empty());
+    let kept = detect_keeping_frame(&framed, &LineOptions::default(), &StageContext::default());
+    assert_eq!(kept.expect("valid input").len(), 1);
     // Far enough, or only partly near.
-    assert_eq!(detect_with(&half_plane(100, [8.0, 50.0], 0.0), &LineOptions::default()).len(), 1);
-    assert_eq!(detect_with(&half_plane(100, [3.0, 3.0], 0.8), &LineOptions::default()).len(), 0);
-    assert_eq!(detect_with(&half_plane(100, [4.0, 50.0], 0.1), &LineOptions::default()).len(), 1);
+    assert_eq!(found(&half_plane(100, [8.0, 50.0], 0.0)).len(), 1);
+    assert_eq!(found(&half_plane(100, [3.0, 3.0], 0.8)).len(), 0);
+    assert_eq!(found(&half_plane(100, [4.0, 50.0], 0.1)).len(), 1);
 }
 
 #[test]
@@ -226,13 +233,15 @@ fn an_interrupted_edge_is_merged_if_asked_to() {
     for y in 54..66 {
         image.row_mut(y).fill(130.0);
     }
-    let long = LineOptions { min_length_px: 30.0, border_distance_px: 0.0, ..LineOptions::default() };
-    let near_edge = |segments: Vec<LineSegment>| -> Vec<LineSegment> {
-        segments.into_iter().filter(|segment| errors(segment, point, 0.3).1.abs() < 5.0).collect()
+    let near_edge = |segments: &[LineSegment]| -> Vec<LineSegment> {
+        let near = |segment: &&LineSegment| segment.length() >= 30.0 && errors(segment, point, 0.3).1.abs() < 5.0;
+        segments.iter().filter(near).copied().collect()
     };
-    let apart = near_edge(detect_with(&image, &long));
+    let segments = detect_keeping_frame(&image, &LineOptions::default(), &StageContext::default());
+    let segments = segments.expect("valid input");
+    let apart = near_edge(&segments);
     assert_eq!(apart.len(), 2, "{apart:?}");
-    let merged = near_edge(detect_with(&image, &LineOptions { merge: true, ..long }));
+    let merged = near_edge(&merged(&segments));
     assert_eq!(merged.len(), 1, "{merged:?}");
     assert!(merged[0].length() > 110.0);
     let (distance, turn) = errors(&merged[0], point, 0.3);
@@ -256,7 +265,7 @@ proptest! {
     /// Where the edge goes, the segment goes: any direction, any sub-pixel position.
     #[test]
     fn segments_follow_the_edge(angle in 0.0..std::f64::consts::TAU, x in 45.0..55.0, y in 45.0..55.0) {
-        let segments = detect_with(&half_plane(100, [x, y], angle), &LineOptions::default());
+        let segments = found(&half_plane(100, [x, y], angle));
         prop_assert_eq!(segments.len(), 1);
         let (distance, turn) = errors(&segments[0], [x, y], angle);
         prop_assert!(distance.abs() < 0.05 && turn.abs() < 0.03, "{} px, {} deg", distance, turn);
@@ -266,8 +275,8 @@ proptest! {
     #[test]
     fn a_quarter_turn_turns_the_segments(angle in 0.0..std::f64::consts::TAU, x in 30.0..50.0) {
         let image = half_plane(80, [x, 40.0], angle);
-        let original = detect_with(&image, &LineOptions::default());
-        let turned = detect_with(&quarter_turn(&image), &LineOptions::default());
+        let original = found(&image);
+        let turned = found(&quarter_turn(&image));
         prop_assert_eq!(original.len(), turned.len());
         for (original, turned) in original.iter().zip(&turned) {
             for (end, other) in [(original.start, turned.start), (original.end, turned.end)] {
@@ -283,8 +292,7 @@ proptest! {
         let mut generator = StageContext::default().generator("any", seed);
         let samples = (0..width * height).map(|_| f32::from_bits(generator.next_u32())).collect();
         let image = Raster::from_data(width, height, 1, samples).expect("sizes agree");
-        let options = LineOptions { min_significance: -10.0, merge: true, ..LineOptions::default() };
-        for segment in detect_with(&image, &options) {
+        for segment in found(&image).into_iter().chain(merged(&rough(&image, -10.0))) {
             prop_assert!(segment.start.iter().chain(&segment.end).all(|coordinate| coordinate.is_finite()));
         }
     }

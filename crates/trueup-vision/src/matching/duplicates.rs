@@ -1,10 +1,10 @@
-//! Pairs of pictures that show the same view.
+//! Pairs of photographs that show the same view.
 
 use trueup_core::StageContext;
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::matches::{PairMatches, PointMatch};
 
-/// Mean displacement of the inliers below which two pictures show the same view, in working pixels.
+/// Mean displacement of the inliers below which two photographs show the same view, in working pixels.
 const DUPLICATE_DISPLACEMENT_PX: f64 = 3.0;
 /// Share of the matches in the overlap that agree, above which they may be the same view.
 const DUPLICATE_AGREEMENT: f64 = 0.95;
@@ -17,7 +17,7 @@ pub fn report_near_duplicates(pairs: &[PairMatches], context: &StageContext<'_>)
 }
 
 /// Whether a joined pair shows the same view: its inliers hardly move and nearly all agree.
-pub fn is_near_duplicate(pair: &PairMatches) -> bool {
+fn is_near_duplicate(pair: &PairMatches) -> bool {
     let displacement = |at: &PointMatch| (at.in_b[0] - at.in_a[0]).hypot(at.in_b[1] - at.in_a[1]);
     let total: f64 = pair.inliers.iter().map(displacement).sum();
     pair.verdict.is_joined()

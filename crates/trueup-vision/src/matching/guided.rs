@@ -4,105 +4,111 @@ use nalgebra::Vector2;
 use trueup_core::geometry::Homography;
 use trueup_core::matches::PointMatch;
 
-use super::MatchingOptions;
-use super::overlap::Overlap;
-use super::putative::PutativeMatch;
+use super::overlap::PredictedOverlap;
+use super::putative::{PutativeMatch, SECOND_SEPARATION_PX};
 use super::search::squared_distance;
-use crate::features::Features;
+use crate::features::{Descriptor, Features};
+
+/// How far around the predicted place a match and its rivals are sought, in working pixels.
+const RADIUS_PX: f64 = 12.0;
+
+/// Largest ratio of the distances to the nearest and the second-nearest point there: the place tells already, so that it
+/// may be larger than without a prediction.
+const MAX_DISTANCE_RATIO: f64 = 0.9;
 
 /// The part of the inliers, ordered by distance, that a guided match may not exceed.
 const DISTANCE_QUANTILE: f64 = 0.9;
 
-/// A map and the matches that follow it.
+/// The map that one plane's matches follow.
 #[derive(Debug, Clone)]
-pub struct Follower {
-    /// Where the match's surroundings go.
-    pub b_from_a: Homography,
+pub(super) struct PlaneMap {
+    /// Where the surroundings of its matches go.
+    pub(super) b_from_a: Homography,
     /// How far a match may lie from there.
-    pub inlier_px: f64,
+    pub(super) inlier_px: f64,
+}
+
+/// A joined pair and what is known of it.
+pub(super) struct GuidedInput<'a> {
+    /// All features of the first photograph.
+    pub(super) a: &'a Features,
+    /// All features of the second.
+    pub(super) b: &'a Features,
+    /// The matches found so far.
+    pub(super) known: &'a [PutativeMatch],
+    /// For every one of them, the index of the plane whose map it follows.
+    pub(super) plane_of_known: &'a [usize],
+    /// The planes' maps.
+    pub(super) planes: &'a [PlaneMap],
+    /// The overlap that the global homography predicts.
+    pub(super) overlap: &'a PredictedOverlap<'a>,
 }
 
 /// More matches of a joined pair: points of a that have none yet are sought in b near the place that the map of their
 /// nearest match predicts.
 ///
-/// `maps` holds for every one of `matches` the index of its map in `followers`. A match is kept if it is within its
-/// map's tolerance; nearest of the points of b in `guided_radius_px` by `guided_distance_ratio`; no farther than most
-/// of the matches already known; and the nearest of those that want the same point of b.
-pub fn guided_matches(
-    (a, b): (&Features, &Features),
-    matches: &[PutativeMatch],
-    maps: &[usize],
-    followers: &[Follower],
-    overlap: &Overlap<'_>,
-    options: &MatchingOptions,
-) -> Vec<PutativeMatch> {
-    let mut distances: Vec<u32> = matches.iter().map(|known| known.squared_distance).collect();
+/// A match is kept if it is within its map's tolerance; nearest of the points of b in [`RADIUS_PX`] by
+/// [`MAX_DISTANCE_RATIO`]; no farther than most of the matches already known; and the nearest of those that want the same
+/// point of b.
+pub(super) fn guided_matches(input: &GuidedInput<'_>) -> Vec<PutativeMatch> {
+    let mut distances: Vec<u32> = input.known.iter().map(|known| known.squared_distance).collect();
     distances.sort_unstable();
     let rank = (distances.len() as f64 * DISTANCE_QUANTILE) as usize;
     let Some(&farthest) = distances.get(rank.min(distances.len().saturating_sub(1))) else { return Vec::new() };
-    let (mut taken_a, mut taken_b) = (vec![false; a.points.len()], vec![false; b.points.len()]);
-    for known in matches {
+    let (mut taken_a, mut taken_b) = (vec![false; input.a.points.len()], vec![false; input.b.points.len()]);
+    for known in input.known {
         taken_a[known.point_a] = true;
         taken_b[known.point_b] = true;
     }
-    let grid = PointGrid::new(b, options.guided_radius_px);
+    let grid = PointGrid::new(input.b, RADIUS_PX);
     let mut found: Vec<PutativeMatch> = Vec::new();
-    for (point_a, point) in a.points.iter().enumerate().filter(|&(point_a, _)| !taken_a[point_a]) {
-        if overlap.point_in_b(point.position.into()).is_none() {
+    for (point_a, point) in input.a.points.iter().enumerate().filter(|&(point_a, _)| !taken_a[point_a]) {
+        if input.overlap.point_in_b(point.position.into()).is_none() {
             continue;
         }
-        let follower = &followers[nearest_map(point.position, matches, maps)];
-        let predicted = follower.b_from_a.apply(point.position.into());
-        let candidate = nearest_in_reach(a, b, point_a, predicted, &grid, options);
+        let plane = &input.planes[nearest_plane(point.position, input.known, input.plane_of_known)];
+        let predicted = plane.b_from_a.apply(point.position.into());
+        let candidate = nearest_in_reach(input, point_a, predicted, &grid);
         let Some(candidate) = candidate.filter(|candidate| candidate.squared_distance <= farthest) else { continue };
         let error = (Vector2::from(candidate.at.in_b) - predicted).norm();
-        if error <= follower.inlier_px && !taken_b[candidate.point_b] {
+        if error <= plane.inlier_px && !taken_b[candidate.point_b] {
             found.push(candidate);
         }
     }
     one_per_point_of_b(found)
 }
 
-/// The map of the match nearest in a.
-fn nearest_map(position: [f64; 2], matches: &[PutativeMatch], maps: &[usize]) -> usize {
-    let first = maps.first().copied().unwrap_or(0);
-    if maps.iter().all(|&map| map == first) {
+/// The plane of the match nearest in a.
+fn nearest_plane(position: [f64; 2], known: &[PutativeMatch], plane_of_known: &[usize]) -> usize {
+    let first = plane_of_known.first().copied().unwrap_or(0);
+    if plane_of_known.iter().all(|&plane| plane == first) {
         return first;
     }
     let distance = |known: &PutativeMatch| (known.at.in_a[0] - position[0]).hypot(known.at.in_a[1] - position[1]);
-    let nearest = matches.iter().zip(maps).min_by(|(j, _), (k, _)| distance(j).total_cmp(&distance(k)));
-    nearest.map_or(first, |(_, &map)| map)
+    let nearest = known.iter().zip(plane_of_known).min_by(|(j, _), (k, _)| distance(j).total_cmp(&distance(k)));
+    nearest.map_or(first, |(_, &plane)| plane)
 }
 
 /// The point of b that looks most alike near the predicted place, unless another place there looks nearly as alike.
 fn nearest_in_reach(
-    a: &Features,
-    b: &Features,
+    input: &GuidedInput<'_>,
     point_a: usize,
     predicted: Vector2<f64>,
     grid: &PointGrid,
-    options: &MatchingOptions,
 ) -> Option<PutativeMatch> {
-    let candidates: Vec<(u32, usize)> = grid
-        .near(b, predicted, options.guided_radius_px)
-        .map(|point_b| (point_distance(a, point_a, b, point_b), point_b))
-        .collect();
-    let &(distance, point_b) = candidates.iter().min()?;
+    let (a, b) = (input.a, input.b);
+    let candidates: Vec<(u32, usize)> =
+        grid.near(b, predicted, RADIUS_PX).map(|point_b| (point_distance(a, point_a, b, point_b), point_b)).collect();
+    let &(squared_distance, point_b) = candidates.iter().min()?;
     let place = b.points[point_b].position;
     let elsewhere = |&&(_, point): &&(u32, usize)| {
         let [x, y] = b.points[point].position;
-        (x - place[0]).hypot(y - place[1]) > options.second_separation_px
+        (x - place[0]).hypot(y - place[1]) > SECOND_SEPARATION_PX
     };
     let second = candidates.iter().filter(elsewhere).map(|&(distance, _)| distance).min();
-    let ratio = second.map_or(0.0, |second| (f64::from(distance) / f64::from(second.max(1))).sqrt());
+    let ratio = second.map_or(0.0, |second| (f64::from(squared_distance) / f64::from(second.max(1))).sqrt());
     let at = PointMatch { in_a: a.points[point_a].position, in_b: place };
-    (ratio <= options.guided_distance_ratio).then_some(PutativeMatch {
-        point_a,
-        point_b,
-        squared_distance: distance,
-        ratio,
-        at,
-    })
+    (ratio <= MAX_DISTANCE_RATIO).then_some(PutativeMatch { point_a, point_b, squared_distance, ratio, at })
 }
 
 /// The smallest squared distance over the points' descriptors.
@@ -111,7 +117,7 @@ fn point_distance(a: &Features, point_a: usize, b: &Features, point_b: usize) ->
     of_a.iter().flat_map(|x| of_b.iter().map(move |y| squared_distance(x, y))).min().unwrap_or(u32::MAX)
 }
 
-fn descriptors(features: &Features, point: usize) -> &[crate::features::Descriptor] {
+fn descriptors(features: &Features, point: usize) -> &[Descriptor] {
     let start = features.descriptor_points.partition_point(|&owner| (owner as usize) < point);
     let end = features.descriptor_points.partition_point(|&owner| (owner as usize) <= point);
     &features.descriptors[start..end]
@@ -125,7 +131,7 @@ fn one_per_point_of_b(mut found: Vec<PutativeMatch>) -> Vec<PutativeMatch> {
     found
 }
 
-/// The points of a picture by square cells.
+/// The points of a photograph by square cells.
 struct PointGrid {
     cell_px: f64,
     origin: Vector2<f64>,

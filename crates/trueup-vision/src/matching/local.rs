@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2};
 use trueup_core::geometry::{Homography, Normalization};
 
-use super::ransac::MatchedPoints;
+use super::matched_points::MatchedPoints;
 
 /// Thresholds of the first steps, in units of the final one: a sample of four sees its surroundings only roughly.
 const FIRST_THRESHOLDS: [f64; 2] = [2.0, 1.5];
@@ -19,7 +19,7 @@ type Step = SVector<f64, 8>;
 
 /// Moves homographies to where fewer matches disagree, and by less.
 #[derive(Debug)]
-pub struct LocalOptimiser<'a> {
+pub(super) struct LocalOptimizer<'a> {
     in_a: &'a [Vector2<f64>],
     /// Places in b moved to the origin and scaled to unit spread, where all entries of a step are of like size.
     in_b: Vec<Vector2<f64>>,
@@ -28,9 +28,9 @@ pub struct LocalOptimiser<'a> {
     pixels_from_normalized: Matrix3<f64>,
 }
 
-impl<'a> LocalOptimiser<'a> {
+impl<'a> LocalOptimizer<'a> {
     /// For the given matches; errors count up to `inlier_px`. `None` if the places in b coincide.
-    pub fn new(points: &'a MatchedPoints, inlier_px: f64) -> Option<Self> {
+    pub(super) fn new(points: &'a MatchedPoints, inlier_px: f64) -> Option<Self> {
         let frame = Normalization::of(&points.in_b)?;
         Some(Self {
             in_a: &points.in_a,
@@ -51,7 +51,7 @@ impl<'a> LocalOptimiser<'a> {
     ///
     /// # Departures
     /// A step is a small projective map of b after the present one, so that no denominators appear in its equations.
-    pub fn optimize(
+    pub(super) fn optimize(
         &self,
         start: &Homography,
         known: f64,
@@ -170,7 +170,7 @@ mod tests {
     }
 
     fn optimized(points: &MatchedPoints, start: &Homography) -> (Homography, f64) {
-        LocalOptimiser::new(points, INLIER_PX).expect("places differ").optimize(start, f64::INFINITY, &|_| true)
+        LocalOptimizer::new(points, INLIER_PX).expect("places differ").optimize(start, f64::INFINITY, &|_| true)
     }
 
     #[test]
@@ -200,12 +200,12 @@ mod tests {
     #[test]
     fn implausible_maps_and_too_few_matches_leave_the_start() {
         let points = points(1.5);
-        let optimizer = LocalOptimiser::new(&points, INLIER_PX).expect("places differ");
+        let optimizer = LocalOptimizer::new(&points, INLIER_PX).expect("places differ");
         let same = |found: Homography| (found.0 / found.0[(2, 2)] - rough().0).amax() < 1e-9;
         assert!(same(optimizer.optimize(&rough(), f64::INFINITY, &|_| false).0));
         let four = points.select(&[1, 2, 3, 4]);
         assert!(same(optimized(&four, &rough()).0));
         let one_place = MatchedPoints { in_b: vec![Vector2::new(1.0, 2.0); 60], ..points };
-        assert!(LocalOptimiser::new(&one_place, INLIER_PX).is_none());
+        assert!(LocalOptimizer::new(&one_place, INLIER_PX).is_none());
     }
 }

@@ -1,38 +1,38 @@
-//! The overlap of two pictures that a homography predicts, and whether it is believable there.
+//! The overlap of two photographs that a homography predicts, and whether it is believable there.
 
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use trueup_core::geometry::Homography;
 use trueup_core::matches::PointMatch;
 use trueup_core::source::WorkingFrame;
 
-/// A homography between two pictures' frames, both ways.
+/// A homography between two photographs' frames, both ways.
 #[derive(Debug, Clone, Copy)]
-pub struct Overlap<'a> {
+pub(super) struct PredictedOverlap<'a> {
     b_from_a: Homography,
     a_from_b: Homography,
     frame_a: &'a WorkingFrame,
     frame_b: &'a WorkingFrame,
 }
 
-impl<'a> Overlap<'a> {
+impl<'a> PredictedOverlap<'a> {
     /// `b_from_a` signed so that its denominator is positive on the visible side; `None` if it is singular.
-    pub fn new(b_from_a: Homography, frame_a: &'a WorkingFrame, frame_b: &'a WorkingFrame) -> Option<Self> {
+    pub(super) fn new(b_from_a: Homography, frame_a: &'a WorkingFrame, frame_b: &'a WorkingFrame) -> Option<Self> {
         let a_from_b = b_from_a.inverse()?;
         Some(Self { b_from_a, a_from_b, frame_a, frame_b })
     }
 
     /// Where a point of a is in b; `None` if it is not in the overlap.
-    pub fn point_in_b(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
+    pub(super) fn point_in_b(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
         visible(&self.b_from_a, point, self.frame_b)
     }
 
     /// Where a point of b is in a; `None` if it is not in the overlap.
-    pub fn point_in_a(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
+    pub(super) fn point_in_a(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
         visible(&self.a_from_b, point, self.frame_a)
     }
 
     /// Whether both ends of a match lie in the overlap.
-    pub fn contains(&self, at: &PointMatch) -> bool {
+    pub(super) fn contains(&self, at: &PointMatch) -> bool {
         self.point_in_b(at.in_a.into()).is_some() && self.point_in_a(at.in_b.into()).is_some()
     }
 
@@ -40,9 +40,9 @@ impl<'a> Overlap<'a> {
     /// factor of at most `max_area_ratio`.
     ///
     /// # Departures
-    /// Outside the overlap nothing is asked: in a wide picture turned far from its neighbor, parts that the neighbor
+    /// Outside the overlap nothing is asked: in a wide photograph turned far from its neighbor, parts that the neighbor
     /// does not see lie on or beyond its horizon, rightly.
-    pub fn is_plausible(&self, max_area_ratio: f64) -> bool {
+    pub(super) fn is_plausible(&self, max_area_ratio: f64) -> bool {
         let corners = self.corners_in_a();
         let area_ratio = |corner: &Vector2<f64>| self.b_from_a.jacobian(*corner).determinant();
         corners.len() >= 3
@@ -50,7 +50,7 @@ impl<'a> Overlap<'a> {
     }
 
     /// The corners of the overlap, a convex polygon in a; empty if there is none.
-    pub fn corners_in_a(&self) -> Vec<Vector2<f64>> {
+    fn corners_in_a(&self) -> Vec<Vector2<f64>> {
         let (width, height) = (self.frame_a.width, self.frame_a.height);
         let mut polygon = vec![
             Vector2::new(0.0, 0.0),
@@ -59,7 +59,7 @@ impl<'a> Overlap<'a> {
             Vector2::new(0.0, height),
         ];
         // Inside b means 0 <= x/w <= W and 0 <= y/w <= H with w > 0: linear in the point of a.
-        let rows: [Vector3; 3] = std::array::from_fn(|row| self.b_from_a.0.row(row).transpose());
+        let rows: [Vector3<f64>; 3] = std::array::from_fn(|row| self.b_from_a.0.row(row).transpose());
         let [x, y, w] = rows;
         for line in [x, w * self.frame_b.width - x, y, w * self.frame_b.height - y] {
             polygon = clip(&polygon, &line);
@@ -68,8 +68,6 @@ impl<'a> Overlap<'a> {
     }
 }
 
-type Vector3 = nalgebra::Vector3<f64>;
-
 fn visible(target_from_source: &Homography, point: Vector2<f64>, target: &WorkingFrame) -> Option<Vector2<f64>> {
     let in_front = target_from_source.denominator(point) > 0.0;
     let mapped = target_from_source.apply(point);
@@ -77,7 +75,7 @@ fn visible(target_from_source: &Homography, point: Vector2<f64>, target: &Workin
 }
 
 /// The part of a convex polygon where `line` (x, y, 1) is not negative (one step of Sutherland and Hodgman).
-fn clip(polygon: &[Vector2<f64>], line: &Vector3) -> Vec<Vector2<f64>> {
+fn clip(polygon: &[Vector2<f64>], line: &Vector3<f64>) -> Vec<Vector2<f64>> {
     let side = |point: &Vector2<f64>| line.x * point.x + line.y * point.y + line.z;
     let mut kept = Vec::with_capacity(polygon.len() + 1);
     for (index, from) in polygon.iter().enumerate() {
@@ -116,7 +114,7 @@ mod tests {
     fn a_shift_by_half_a_width_overlaps_by_half() {
         let frame = frame();
         let shift = Homography(Matrix3::new(1.0, 0.0, -400.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0));
-        let overlap = Overlap::new(shift, &frame, &frame).expect("regular");
+        let overlap = PredictedOverlap::new(shift, &frame, &frame).expect("regular");
         let corners = overlap.corners_in_a();
         assert_eq!(corners.len(), 4);
         assert!(corners.iter().all(|corner| (400.0..=800.0).contains(&corner.x)));
@@ -129,7 +127,7 @@ mod tests {
     fn wide_pictures_turned_far_are_plausible() {
         let frame = frame();
         for turn_deg in [-70.0, 70.0] {
-            let overlap = Overlap::new(turned(90.0, turn_deg), &frame, &frame).expect("regular");
+            let overlap = PredictedOverlap::new(turned(90.0, turn_deg), &frame, &frame).expect("regular");
             assert!(overlap.is_plausible(20.0), "{turn_deg}");
         }
     }
@@ -143,7 +141,7 @@ mod tests {
             Matrix3::new(1.0, 0.0, 900.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
         ];
         for map in maps {
-            let overlap = Overlap::new(Homography(map), &frame, &frame).expect("regular");
+            let overlap = PredictedOverlap::new(Homography(map), &frame, &frame).expect("regular");
             assert!(!overlap.is_plausible(20.0), "{map}");
         }
     }

@@ -2,19 +2,27 @@
 
 use trueup_core::matches::PointMatch;
 
-use super::MatchingOptions;
-use super::search::Nearest;
+use super::options::MatchingOptions;
+use super::search::{Nearest, Neighbor};
 use crate::features::Features;
 
 /// Matches whose end points are nearer than this in both pictures are one match.
 const DUPLICATE_PX: f64 = 0.5;
 
+/// How far from the nearest point the second-nearest must lie in the photograph, in working pixels; nearer ones are the
+/// same place.
+pub(super) const SECOND_SEPARATION_PX: f64 = 3.0;
+
+/// Matches are dropped whose squared distance exceeds the pair's mean by more than so many standard deviations (as in the
+/// implementation of natural image stitching with the global similarity prior).
+const DISTANCE_DEVIATIONS: f64 = 4.25;
+
 /// Two points that look alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PutativeMatch {
-    /// Index of the point in picture a.
+    /// Index of the point in photograph a.
     pub point_a: usize,
-    /// Index of the point in picture b.
+    /// Index of the point in photograph b.
     pub point_b: usize,
     /// Squared distance of their nearest descriptors.
     pub squared_distance: u32,
@@ -24,11 +32,10 @@ pub struct PutativeMatch {
     pub at: PointMatch,
 }
 
-/// The putative matches of two pictures, in the order of the points of a.
+/// The putative matches of two photographs, in the order of the points of a.
 ///
 /// A point's distance to another is the smallest over their descriptors. A match is kept if its point of b is nearest
-/// to that of a, and the reverse (`mutual`); if the nearest point of b that lies farther than `second_separation_px`
-/// from it is farther away by the factor 1 / `max_distance_ratio`; and if its distance does not stand out of the pair's.
+/// to that of a, and the reverse; if the nearest point of b that lies farther than [`SECOND_SEPARATION_PX`] from it is farther away by the factor 1 / `max_distance_ratio`; and if its distance does not stand out of the pair's.
 /// Of duplicates, which share both places, the nearest is kept.
 ///
 /// # Source
@@ -42,51 +49,57 @@ pub fn putative_matches(a: &Features, b: &Features, options: &MatchingOptions) -
     let descriptors_a = PointDescriptors::of(a);
     let descriptors_b = PointDescriptors::of(b);
     let candidates = (0..a.points.len()).filter_map(|point_a| {
-        let (squared_distance, point_b) = descriptors_a
-            .range(point_a)
-            .map(|row| {
-                let neighbor = nearest.nearest_column(row);
-                (neighbor.squared_distance, b.descriptor_points[neighbor.descriptor] as usize)
-            })
-            .min()?;
-        let back = descriptors_b
-            .range(point_b)
-            .map(|column| {
-                let neighbor = nearest.nearest_row(column);
-                (neighbor.squared_distance, a.descriptor_points[neighbor.descriptor] as usize)
-            })
-            .min();
-        if options.mutual && back != Some((squared_distance, point_a)) {
+        let to_b = |row: usize| NearPoint::of(nearest.nearest_column(row), b);
+        let to_a = |column: usize| NearPoint::of(nearest.nearest_row(column), a);
+        let found = descriptors_a.range(point_a).map(to_b).min()?;
+        let back = descriptors_b.range(found.point).map(to_a).min();
+        if back != Some(NearPoint { squared_distance: found.squared_distance, point: point_a }) {
             return None;
         }
-        let ratio = distance_ratio(&nearest, descriptors_a.range(point_a), b, (squared_distance, point_b), options)?;
-        let at = PointMatch { in_a: a.points[point_a].position, in_b: b.points[point_b].position };
-        Some(PutativeMatch { point_a, point_b, squared_distance, ratio, at })
+        let ratio = distance_ratio(&nearest, descriptors_a.range(point_a), b, found, options.max_distance_ratio)?;
+        let at = PointMatch { in_a: a.points[point_a].position, in_b: b.points[found.point].position };
+        Some(PutativeMatch { point_a, point_b: found.point, squared_distance: found.squared_distance, ratio, at })
     });
-    cut_outstanding(without_duplicates(candidates.collect()), options.distance_deviations)
+    cut_outstanding(without_duplicates(candidates.collect()), DISTANCE_DEVIATIONS)
 }
 
-/// The ratio of the distances to the nearest point and to the second; `None` if it is too large.
+/// A point and how far its nearest descriptor is; ordered by distance, then index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct NearPoint {
+    squared_distance: u32,
+    point: usize,
+}
+
+impl NearPoint {
+    /// The point that a descriptor belongs to.
+    fn of(neighbor: Neighbor, features: &Features) -> Self {
+        let point = features.descriptor_points[neighbor.descriptor] as usize;
+        Self { squared_distance: neighbor.squared_distance, point }
+    }
+}
+
+/// The ratio of the distances to the nearest point of b and to the second; `None` if it is too large. `rows` are the
+/// descriptors of the point of a.
 fn distance_ratio(
     nearest: &Nearest<'_>,
     rows: std::ops::Range<usize>,
     b: &Features,
-    (squared_distance, point_b): (u32, usize),
-    options: &MatchingOptions,
+    first: NearPoint,
+    max_distance_ratio: f64,
 ) -> Option<f64> {
-    let max_squared_ratio = options.max_distance_ratio.powi(2);
-    let enough = (f64::from(squared_distance) / max_squared_ratio).floor() as u32;
-    let place = b.points[point_b].position;
+    let max_squared_ratio = max_distance_ratio.powi(2);
+    let enough = (f64::from(first.squared_distance) / max_squared_ratio).floor() as u32;
+    let place = b.points[first.point].position;
     let same_place = |column: usize| {
         let point = b.descriptor_points[column] as usize;
         let [x, y] = b.points[point].position;
-        point == point_b || (x - place[0]).hypot(y - place[1]) <= options.second_separation_px
+        point == first.point || (x - place[0]).hypot(y - place[1]) <= SECOND_SEPARATION_PX
     };
     let second = rows.filter_map(|row| nearest.nearest_allowed(row, enough, same_place)).min();
     let Some(second) = second else { return Some(0.0) };
-    let accepted = f64::from(squared_distance) <= max_squared_ratio * f64::from(second);
+    let accepted = f64::from(first.squared_distance) <= max_squared_ratio * f64::from(second);
     // Two equal points at distance zero are no better than each other.
-    (accepted && second > 0).then(|| (f64::from(squared_distance) / f64::from(second)).sqrt())
+    (accepted && second > 0).then(|| (f64::from(first.squared_distance) / f64::from(second)).sqrt())
 }
 
 /// Which descriptors belong to each point.

@@ -15,12 +15,15 @@ use nalgebra::{Matrix3, Vector2};
 use rand::{Rng, RngExt};
 use trueup_core::geometry::Homography;
 
-use super::local::LocalOptimiser;
+use super::local::LocalOptimizer;
+use super::matched_points::{MatchedPoints, squared_error};
 
 /// Matches in a sample.
 const SAMPLE: usize = 4;
 /// Twice the smallest area of a triangle of sample points, in square pixels; below, the three count as collinear.
 const MIN_TRIANGLE_PX2: f64 = 20.0;
+/// Probability of having drawn a sample of inliers (Fischler and Bolles); [`PATIENCE`] times as many as that takes are drawn.
+const CONFIDENCE: f64 = 0.995;
 /// How many times the samples that would give one without outliers are drawn: such a sample may still be too noisy, too
 /// narrow, or of another plane.
 const PATIENCE: usize = 8;
@@ -31,60 +34,33 @@ const BATCH: usize = 16;
 
 /// How a homography is sought.
 #[derive(Debug, Clone, Copy)]
-pub struct Search {
+pub(super) struct HomographySearch {
     /// How far a match may lie from where the homography predicts it, in pixels of b.
-    pub inlier_px: f64,
-    /// Probability of having drawn a sample of inliers; `PATIENCE` times as many as that takes are drawn.
-    pub confidence: f64,
+    pub(super) inlier_px: f64,
     /// Largest number of samples.
-    pub max_samples: usize,
+    pub(super) max_samples: usize,
     /// Inliers below which the answer is of no use; drawing ends where so many would have been found.
-    pub useful_inliers: usize,
+    pub(super) useful_inliers: usize,
     /// A map that may be about right, tried before all samples.
-    pub start: Option<Homography>,
+    pub(super) start: Option<Homography>,
 }
 
 /// A homography and the matches that agree with it.
 #[derive(Debug, Clone)]
-pub struct Consensus {
+pub(super) struct Consensus {
     /// The map; its denominator is positive at the agreeing matches.
-    pub b_from_a: Homography,
+    pub(super) b_from_a: Homography,
     /// Indices of the agreeing matches, ascending.
-    pub inliers: Vec<usize>,
+    pub(super) inliers: Vec<usize>,
 }
 
 /// Why no homography was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NoConsensus {
+pub(super) enum NoConsensus {
     /// No sample gave one that could be right.
     NoSample,
     /// The useful ones were not plausible.
     Implausible,
-}
-
-/// Matched points, most distinctive first.
-#[derive(Debug, Clone, Default)]
-pub struct MatchedPoints {
-    /// In picture a.
-    pub in_a: Vec<Vector2<f64>>,
-    /// In picture b.
-    pub in_b: Vec<Vector2<f64>>,
-}
-
-impl MatchedPoints {
-    /// The matches of the given indices.
-    pub fn select(&self, indices: &[usize]) -> Self {
-        Self {
-            in_a: indices.iter().map(|&index| self.in_a[index]).collect(),
-            in_b: indices.iter().map(|&index| self.in_b[index]).collect(),
-        }
-    }
-
-    /// Indices of the matches within `inlier_px` of where a homography predicts them, forward, on the visible side.
-    pub fn agreeing(&self, b_from_a: &Homography, inlier_px: f64) -> Vec<usize> {
-        let agrees = |&k: &usize| squared_error(&b_from_a.0, self.in_a[k], self.in_b[k]) <= inlier_px.powi(2);
-        (0..self.in_a.len()).filter(agrees).collect()
-    }
 }
 
 /// The plausible homography of least truncated squared forward transfer error.
@@ -93,17 +69,16 @@ impl MatchedPoints {
 ///
 /// # Errors
 /// [`NoConsensus`] if there are fewer than four matches or no sample gives a plausible map.
-pub fn find_homography(
+pub(super) fn find_homography(
     points: &MatchedPoints,
-    search: &Search,
+    search: &HomographySearch,
     is_plausible: impl Fn(&Homography) -> bool,
     generator: &mut impl Rng,
 ) -> Result<Consensus, NoConsensus> {
     let count = points.in_a.len();
-    let local = LocalOptimiser::new(points, search.inlier_px).filter(|_| count >= SAMPLE);
+    let local = LocalOptimizer::new(points, search.inlier_px).filter(|_| count >= SAMPLE);
     let local = local.ok_or(NoConsensus::NoSample)?;
-    let enough =
-        |inliers: usize| PATIENCE.saturating_mul(samples_needed(inliers as f64 / count as f64, search.confidence));
+    let enough = |inliers: usize| PATIENCE.saturating_mul(samples_needed(inliers as f64 / count as f64));
     let mut failure = NoConsensus::NoSample;
     let mut needed = search.max_samples.min(enough(search.useful_inliers));
     let (mut best, mut best_cost) = (None, count as f64);
@@ -139,12 +114,12 @@ pub fn find_homography(
     Ok(Consensus { b_from_a, inliers: points.agreeing(&b_from_a, search.inlier_px) })
 }
 
-/// Samples after which one is all inliers with the probability asked for.
-fn samples_needed(inlier_ratio: f64, confidence: f64) -> usize {
+/// Samples after which one is all inliers with the probability [`CONFIDENCE`].
+fn samples_needed(inlier_ratio: f64) -> usize {
     if inlier_ratio >= 1.0 {
         return 1;
     }
-    let needed = (1.0 - confidence).ln() / (1.0 - inlier_ratio.powi(SAMPLE as i32)).ln();
+    let needed = (1.0 - CONFIDENCE).ln() / (1.0 - inlier_ratio.powi(SAMPLE as i32)).ln();
     if needed.is_finite() { needed.ceil().max(1.0) as usize } else { usize::MAX }
 }
 
@@ -217,14 +192,6 @@ fn triangle_areas(p: &[Vector2<f64>; SAMPLE]) -> [f64; SAMPLE] {
 /// The matrix that maps the unit vectors to the first three points and (1, 1, 1) to the fourth.
 fn basis(p: &[Vector2<f64>; SAMPLE], areas: &[f64; SAMPLE]) -> Matrix3<f64> {
     Matrix3::from_columns(&std::array::from_fn::<_, 3, _>(|k| p[k].push(1.0) * (areas[k + 1] / areas[0])))
-}
-
-/// Squared forward transfer error; infinite behind the horizon.
-fn squared_error(h: &Matrix3<f64>, a: Vector2<f64>, b: Vector2<f64>) -> f64 {
-    let w = h[(2, 0)] * a.x + h[(2, 1)] * a.y + h[(2, 2)];
-    let x = h[(0, 0)] * a.x + h[(0, 1)] * a.y + h[(0, 2)] - b.x * w;
-    let y = h[(1, 0)] * a.x + h[(1, 1)] * a.y + h[(1, 2)] - b.y * w;
-    if w > 0.0 { (x * x + y * y) / (w * w) } else { f64::INFINITY }
 }
 
 /// Sum over the matches of min(1, error^2 / inlier_px^2); `None` once it reaches `bound`.

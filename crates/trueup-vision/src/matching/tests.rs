@@ -1,6 +1,9 @@
 use nalgebra::{Matrix3, Vector2};
 use proptest::prelude::*;
 use rand::{Rng, RngExt};
+use trueup_core::diagnostics::Subject;
+use trueup_core::geometry::Homography;
+use trueup_core::matches::PairVerdict;
 
 use super::*;
 use crate::features::{DESCRIPTOR_LENGTH, Descriptor, FeaturePoint};
@@ -8,22 +11,22 @@ use crate::features::{DESCRIPTOR_LENGTH, Descriptor, FeaturePoint};
 const WIDTH: f64 = 800.0;
 const HEIGHT: f64 = 600.0;
 
-/// Two pictures under construction.
+/// Two photographs under construction.
 #[derive(Default)]
-struct Scene {
+struct PhotographPair {
     a: Features,
     b: Features,
 }
 
-impl Scene {
-    /// A point seen in both pictures.
+impl PhotographPair {
+    /// A point seen in both photographs.
     fn add(&mut self, in_a: Vector2<f64>, in_b: Vector2<f64>, generator: &mut impl Rng) {
         let descriptor = random_descriptor(generator);
         push(&mut self.a, in_a, &[descriptor]);
         push(&mut self.b, in_b, &[descriptor.map(|element| element.saturating_add(1))]);
     }
 
-    /// Points of one plane that both pictures see, with noise of up to `noise_px`.
+    /// Points of one plane that both photographs see, with noise of up to `noise_px`.
     fn add_plane(&mut self, b_from_a: &Homography, count: usize, noise_px: f64, generator: &mut impl Rng) {
         let mut left = count;
         while left > 0 {
@@ -46,10 +49,16 @@ impl Scene {
     }
 
     fn matched(&self, forced: bool, options: &MatchingOptions) -> PairMatches {
+        self.matched_by(usize::MAX, forced, options)
+    }
+
+    /// The same, of which the strongest `compared_features` are compared.
+    fn matched_by(&self, compared_features: usize, forced: bool, options: &MatchingOptions) -> PairMatches {
         let frame = frame();
-        let a = Picture { index: 0, features: &self.a, frame: &frame };
-        let b = Picture { index: 1, features: &self.b, frame: &frame };
-        match_pair(a, b, forced, options, &StageContext::default()).expect("valid scene")
+        let a = PhotographFeatures { index: 0, features: &self.a, frame: &frame };
+        let b = PhotographFeatures { index: 1, features: &self.b, frame: &frame };
+        let input = PairInput { a, b, forced, compared_features };
+        match_pair(&input, options, &StageContext::default()).expect("valid scene")
     }
 
     fn putative(&self, options: &MatchingOptions) -> Vec<(usize, usize)> {
@@ -119,7 +128,7 @@ fn the_second_neighbor_decides_by_its_distance() {
     let a = levels(&[(0.0, &[100])]);
     // 16 / 20 = 0.8 passes, 17 / 20 does not.
     for (nearest, expected) in [(116, vec![(0, 0)]), (117, vec![])] {
-        let scene = Scene { a: a.clone(), b: levels(&[(0.0, &[nearest]), (50.0, &[80])]) };
+        let scene = PhotographPair { a: a.clone(), b: levels(&[(0.0, &[nearest]), (50.0, &[80])]) };
         assert_eq!(scene.putative(&options), expected);
     }
 }
@@ -128,9 +137,9 @@ fn the_second_neighbor_decides_by_its_distance() {
 fn a_second_neighbor_at_the_same_place_does_not_count() {
     let options = MatchingOptions::default();
     let a = levels(&[(0.0, &[100])]);
-    let near = Scene { a: a.clone(), b: levels(&[(0.0, &[101]), (2.9, &[102]), (50.0, &[150])]) };
+    let near = PhotographPair { a: a.clone(), b: levels(&[(0.0, &[101]), (2.9, &[102]), (50.0, &[150])]) };
     assert_eq!(near.putative(&options), [(0, 0)]);
-    let far = Scene { a, b: levels(&[(0.0, &[101]), (3.1, &[101]), (50.0, &[150])]) };
+    let far = PhotographPair { a, b: levels(&[(0.0, &[101]), (3.1, &[101]), (50.0, &[150])]) };
     assert_eq!(far.putative(&options), []);
 }
 
@@ -138,7 +147,7 @@ fn a_second_neighbor_at_the_same_place_does_not_count() {
 fn points_are_as_far_as_their_nearest_descriptors() {
     let options = MatchingOptions::default();
     // The second point's second descriptor is nearest; its other one is no rival.
-    let scene = Scene { a: levels(&[(0.0, &[10, 200])]), b: levels(&[(0.0, &[150]), (50.0, &[90, 198])]) };
+    let scene = PhotographPair { a: levels(&[(0.0, &[10, 200])]), b: levels(&[(0.0, &[150]), (50.0, &[90, 198])]) };
     let found = putative_matches(&scene.a, &scene.b, &options);
     assert_eq!(found.len(), 1);
     assert_eq!((found[0].point_b, found[0].squared_distance), (1, 4));
@@ -146,18 +155,20 @@ fn points_are_as_far_as_their_nearest_descriptors() {
 }
 
 #[test]
-fn mutual_matches_are_asked_for_by_default() {
-    let scene = Scene { a: levels(&[(0.0, &[100]), (60.0, &[110])]), b: levels(&[(0.0, &[108]), (50.0, &[250])]) };
+fn matches_are_mutual() {
+    let scene =
+        PhotographPair { a: levels(&[(0.0, &[100]), (60.0, &[110])]), b: levels(&[(0.0, &[108]), (50.0, &[250])]) };
     assert_eq!(scene.putative(&MatchingOptions::default()), [(1, 0)]);
-    let one_way = MatchingOptions { mutual: false, ..MatchingOptions::default() };
-    assert_eq!(scene.putative(&one_way), [(0, 0), (1, 0)]);
+    // Alone, the other point of a finds the same point of b.
+    let alone = PhotographPair { a: levels(&[(0.0, &[100])]), b: scene.b };
+    assert_eq!(alone.putative(&MatchingOptions::default()), [(0, 0)]);
 }
 
 #[test]
 fn of_duplicates_the_nearest_stays() {
     let a = levels(&[(0.0, &[50]), (0.4, &[150]), (30.0, &[240])]);
     let b = levels(&[(10.0, &[52]), (10.3, &[151]), (90.0, &[240])]);
-    assert_eq!(Scene { a, b }.putative(&MatchingOptions::default()), [(1, 1), (2, 2)]);
+    assert_eq!(PhotographPair { a, b }.putative(&MatchingOptions::default()), [(1, 1), (2, 2)]);
 }
 
 proptest! {
@@ -166,11 +177,11 @@ proptest! {
     #[test]
     fn a_homography_is_found_among_sixty_percent_outliers(seed in 0_u64..1000) {
         let mut generator = generator(seed);
-        let mut scene = Scene::default();
+        let mut scene = PhotographPair::default();
         scene.add_plane(&example_map(), 80, 0.5, &mut generator);
         scene.add_outliers(120, &mut generator);
         // Noise may push matches at the border out of the predicted overlap.
-        let pair = scene.matched(false, &MatchingOptions { brown_lowe_beta: 0.2, ..MatchingOptions::default() });
+        let pair = scene.matched(false, &MatchingOptions::default());
         prop_assert_eq!(pair.verdict, PairVerdict::Joined);
         prop_assert!((76..=86).contains(&pair.agreeing));
         let rows = pair.b_from_a.expect("joined");
@@ -182,31 +193,44 @@ proptest! {
 fn both_planes_of_a_scene_are_found() {
     let mut generator = generator(1);
     let shift = |x: f64| Homography(Matrix3::new(1.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0));
-    let mut scene = Scene::default();
+    let mut scene = PhotographPair::default();
     scene.add_plane(&shift(-200.0), 120, 0.3, &mut generator);
     scene.add_plane(&shift(-230.0), 70, 0.3, &mut generator);
     let pair = scene.matched(false, &MatchingOptions::default());
     assert_eq!(pair.verdict, PairVerdict::Joined);
     assert!((120..130).contains(&pair.agreeing));
     assert!(pair.inliers.len() >= 188, "{}", pair.inliers.len());
-    let one_plane = MatchingOptions { min_plane_inliers: 1000, guided: false, ..MatchingOptions::default() };
-    assert_eq!(scene.matched(false, &one_plane).inliers.len(), pair.agreeing);
+    let unguided = MatchingOptions { guided: false, ..MatchingOptions::default() };
+    assert!(scene.matched(false, &unguided).inliers.len() > pair.agreeing + 60);
+}
+
+#[test]
+fn few_matches_are_no_plane_of_their_own() {
+    let mut generator = generator(1);
+    let shift = |x: f64| Homography(Matrix3::new(1.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0));
+    let mut scene = PhotographPair::default();
+    scene.add_plane(&shift(-200.0), 120, 0.3, &mut generator);
+    scene.add_plane(&shift(-230.0), 35, 0.3, &mut generator);
+    let unguided = MatchingOptions { guided: false, ..MatchingOptions::default() };
+    let pair = scene.matched(false, &unguided);
+    assert!((120..130).contains(&pair.agreeing));
+    assert_eq!(pair.inliers.len(), pair.agreeing);
 }
 
 #[test]
 fn a_plane_far_from_the_global_homography_is_left_out() {
     let mut generator = generator(1);
     let shift = |x: f64| Homography(Matrix3::new(1.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0));
-    let mut scene = Scene::default();
+    let mut scene = PhotographPair::default();
     scene.add_plane(&shift(-100.0), 120, 0.3, &mut generator);
     scene.add_plane(&shift(-400.0), 70, 0.3, &mut generator);
     assert_eq!(scene.matched(false, &MatchingOptions::default()).inliers.len(), 120);
 }
 
 #[test]
-fn unrelated_pictures_are_not_joined() {
+fn unrelated_photographs_are_not_joined() {
     let mut generator = generator(2);
-    let mut scene = Scene::default();
+    let mut scene = PhotographPair::default();
     for _ in 0..300 {
         push(&mut scene.a, random_place(&mut generator), &[random_descriptor(&mut generator)]);
         push(&mut scene.b, random_place(&mut generator), &[random_descriptor(&mut generator)]);
@@ -214,7 +238,7 @@ fn unrelated_pictures_are_not_joined() {
     let pair = scene.matched(false, &MatchingOptions::default());
     assert_eq!((pair.verdict, pair.b_from_a), (PairVerdict::TooFewMatches, None));
     for seed in 0..20 {
-        let mut scene = Scene::default();
+        let mut scene = PhotographPair::default();
         scene.add_outliers(60, &mut StageContext::default().generator("outliers", seed));
         for forced in [false, true] {
             let pair = scene.matched(forced, &MatchingOptions::default());
@@ -225,7 +249,7 @@ fn unrelated_pictures_are_not_joined() {
 
 #[test]
 fn nothing_matches_nothing() {
-    let mut scene = Scene::default();
+    let mut scene = PhotographPair::default();
     assert_eq!(scene.matched(false, &MatchingOptions::default()).verdict, PairVerdict::TooFewMatches);
     let mut generator = generator(3);
     scene.add_plane(&example_map(), 3, 0.0, &mut generator);
@@ -236,7 +260,7 @@ fn nothing_matches_nothing() {
 #[test]
 fn collinear_matches_have_no_homography() {
     let mut generator = generator(4);
-    let mut scene = Scene::default();
+    let mut scene = PhotographPair::default();
     for k in 0..40 {
         let place = Vector2::new(f64::from(k) * 12.0, 300.0);
         scene.add(place, place, &mut generator);
@@ -246,9 +270,9 @@ fn collinear_matches_have_no_homography() {
 }
 
 #[test]
-fn a_homography_that_explodes_the_picture_is_not_believed() {
+fn a_homography_that_explodes_the_photograph_is_not_believed() {
     let mut generator = generator(4);
-    let mut scene = Scene::default();
+    let mut scene = PhotographPair::default();
     let explosion = Homography(Matrix3::new(6.0, 0.0, -2000.0, 0.0, 6.0, -1500.0, 0.0, 0.0, 1.0));
     scene.add_plane(&explosion, 60, 0.3, &mut generator);
     let pair = scene.matched(true, &MatchingOptions::default());
@@ -258,7 +282,7 @@ fn a_homography_that_explodes_the_picture_is_not_believed() {
 #[test]
 fn the_users_graph_joins_pairs_with_fewer_inliers() {
     let mut generator = generator(5);
-    let mut scene = Scene::default();
+    let mut scene = PhotographPair::default();
     scene.add_plane(&example_map(), 10, 0.3, &mut generator);
     let alone = scene.matched(false, &MatchingOptions::default());
     assert_eq!((alone.verdict, alone.agreeing, alone.needed), (PairVerdict::TooFewInliers, 10, 15));
@@ -269,7 +293,7 @@ fn the_users_graph_joins_pairs_with_fewer_inliers() {
 #[test]
 fn ambiguous_points_are_matched_near_their_predicted_places() {
     let mut generator = generator(6);
-    let mut scene = Scene::default();
+    let mut scene = PhotographPair::default();
     scene.add_plane(&example_map(), 60, 0.3, &mut generator);
     // Twenty windows that all look the same.
     let window = random_descriptor(&mut generator);
@@ -286,19 +310,18 @@ fn ambiguous_points_are_matched_near_their_predicted_places() {
 #[test]
 fn weak_features_are_matched_near_the_places_that_the_strong_ones_predict() {
     let mut generator = generator(9);
-    let mut scene = Scene::default();
+    let mut scene = PhotographPair::default();
     scene.add_plane(&example_map(), 120, 0.0, &mut generator);
-    let few = MatchingOptions { compared_features: 50, ..MatchingOptions::default() };
-    let pair = scene.matched(false, &few);
+    let pair = scene.matched_by(50, false, &MatchingOptions::default());
     assert_eq!((pair.putative, pair.inliers.len()), (50, 120));
-    let unguided = MatchingOptions { guided: false, ..few };
-    assert_eq!(scene.matched(false, &unguided).inliers.len(), 50);
+    let unguided = MatchingOptions { guided: false, ..MatchingOptions::default() };
+    assert_eq!(scene.matched_by(50, false, &unguided).inliers.len(), 50);
 }
 
 #[test]
 fn results_do_not_depend_on_threads_and_follow_the_order_of_pairs() {
     let mut generator = generator(7);
-    let mut scene = Scene::default();
+    let mut scene = PhotographPair::default();
     scene.add_plane(&example_map(), 100, 1.0, &mut generator);
     scene.add_outliers(80, &mut generator);
     let features = [scene.a.clone(), scene.b, scene.a];
@@ -307,8 +330,10 @@ fn results_do_not_depend_on_threads_and_follow_the_order_of_pairs() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         let context = StageContext::default();
         let options = MatchingOptions::default();
-        let matched = pool.install(|| run(&features, &frames, &pairs, &BTreeSet::new(), &options, &context));
-        let matched = matched.expect("valid pictures");
+        let forced = BTreeSet::new();
+        let input = MatchingInput { features: &features, frames: &frames, pairs: &pairs, forced: &forced };
+        let matched = pool.install(|| run(&input, &options, &context));
+        let matched = matched.expect("valid photographs");
         report_near_duplicates(&matched, &context);
         (matched, context.findings())
     };
@@ -317,18 +342,16 @@ fn results_do_not_depend_on_threads_and_follow_the_order_of_pairs() {
     assert_eq!(matched.iter().map(|pair| (pair.a, pair.b)).collect::<Vec<_>>(), [(1, 2), (0, 2), (0, 1)]);
     assert!(matched.iter().all(|pair| pair.verdict.is_joined()));
     assert_eq!(diagnostics.len(), 1);
-    assert_eq!(
-        (diagnostics[0].code.as_str(), &diagnostics[0].subject),
-        ("near-duplicate", &trueup_core::diagnostics::Subject::Pair(0, 2))
-    );
+    assert_eq!((diagnostics[0].code.as_str(), &diagnostics[0].subject), ("near-duplicate", &Subject::Pair(0, 2)));
 }
 
 #[test]
 fn contradictory_input_is_an_error() {
     let (frame, context) = (frame(), StageContext::default());
     let match_with = |features: &Features, index: usize| {
-        let a = Picture { index: 0, features, frame: &frame };
-        match_pair(a, Picture { index, ..a }, false, &MatchingOptions::default(), &context)
+        let a = PhotographFeatures { index: 0, features, frame: &frame };
+        let pair = PairInput::new(a, PhotographFeatures { index, ..a }, false);
+        match_pair(&pair, &MatchingOptions::default(), &context)
     };
     let good = levels(&[(0.0, &[1])]);
     assert!(matches!(match_with(&good, 0), Err(Error::Input { .. })));
@@ -336,6 +359,8 @@ fn contradictory_input_is_an_error() {
     assert!(matches!(match_with(&ownerless, 1), Err(Error::Input { .. })));
     let nowhere = levels(&[(f64::NAN, &[1])]);
     assert!(matches!(match_with(&nowhere, 1), Err(Error::Input { .. })));
-    let missing = run(&[good], &[frame], &[(0, 1)], &BTreeSet::new(), &MatchingOptions::default(), &context);
+    let forced = BTreeSet::new();
+    let input = MatchingInput { features: &[good], frames: &[frame], pairs: &[(0, 1)], forced: &forced };
+    let missing = run(&input, &MatchingOptions::default(), &context);
     assert!(matches!(missing, Err(Error::Input { .. })));
 }

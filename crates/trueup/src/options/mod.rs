@@ -1,12 +1,14 @@
-//! All options of all stages in one place.
+//! All options of all phases in one place.
 
+mod method;
+mod retired;
 mod text;
 
 use serde::{Deserialize, Serialize};
 use trueup_align::cameras::CameraOptions;
 use trueup_align::match_points::MatchPointOptions;
 use trueup_align::mesh::{LineAlignmentOptions, MeshOptions, PhotometricOptions, StructureOptions};
-use trueup_align::metrics::MeasureOptions;
+use trueup_align::metrics::PixelMeasureOptions;
 use trueup_align::projection::ProjectionOptions;
 use trueup_align::similarity::SimilarityOptions;
 use trueup_align::vanishing::VanishingOptions;
@@ -21,152 +23,222 @@ use trueup_core::{Error, Result};
 use trueup_io::encode::OutputOptions;
 use trueup_io::source::SourceOptions;
 use trueup_vision::features::FeatureOptions;
-use trueup_vision::line_matching::LineMatchingOptions;
 use trueup_vision::lines::LineOptions;
 use trueup_vision::matching::MatchingOptions;
 use trueup_vision::pairing::PairingOptions;
 
-use crate::cache::CacheOptions;
-use crate::compare::CompareOptions;
-use crate::method::{Alignment, Method, Structure};
+pub use method::{Evidence, Method, Structure};
+pub(crate) use method::MethodForm;
 
 trueup_core::options! {
-    /// What holds for the whole run.
-    pub struct WorkingOptions("stitch") {
-        /// How the panorama's shape is found.
-        method: Method = Method::Vpg, Allowed::Any, "";
-        /// What draws overlapping photographs together: more is slower and shows fewer ghosts.
-        align: Alignment = Alignment::Points, Allowed::Any, "";
-        /// What of the photographs' structure is kept, beyond the neighborhoods of grid vertices.
-        structure: Structure = Structure::None, Allowed::Any, "";
-        /// Photographs are measured on a copy reduced to at most this many pixels; the panorama itself is made from
-        /// the full photographs.
-        working_pixels: f64 = 480000.0, between(10000.0, 100000000.0), "px";
-        /// Size of the small pictures that exposure is compared on.
-        thumbnail_pixels: f64 = 30000.0, between(100.0, 1000000.0), "px";
-        /// Memory that the work may take; auto is a quarter of the machine's, or more where less is too little. The panorama
-        /// is the same with any amount: with less, its canvas goes to a scratch file and photographs are decoded again.
-        memory: MemoryBudget = MemoryBudget::Auto, Allowed::Any, "";
-        /// Folder for the scratch file; empty for the folder of the panorama.
-        scratch: String = String::new(), Allowed::Any, "";
-        /// Every random choice derives from this number.
+    /// What photographs are measured on.
+    pub struct WorkingOptions("working") {
+        /// Photographs are measured on a copy reduced to at most this many pixels; the panorama itself is made from the full
+        /// photographs. Raise it for very fine detail or small overlaps; time grows in proportion.
+        pixels: f64 = 480000.0, between(10000.0, 100000000.0), "px";
+    }
+}
+
+trueup_core::options! {
+    /// Where random choices come from.
+    pub struct RandomOptions("random") {
+        /// Every random choice, from the verification of pairs on, derives from this number. Change it to see how much of a
+        /// result is chance.
         seed: u64 = 0, between(0.0, 9007199254740992.0), "";
     }
 }
 
-macro_rules! stage_options {
-    ($($(#[doc = $doc:literal])* $field:ident : $type:ty),* $(,)?) => {
-        /// The options of every stage. Serialized as one table per stage; unknown tables and fields are denied.
+trueup_core::options! {
+    /// How the panorama's shape is found.
+    pub struct ShapeOptions("stitch") {
+        /// How the panorama's shape is found. Choose another one to compare, or for photographs that it serves better.
+        method: Method = Method::Vpg, Allowed::Any, "", basic;
+        /// What draws overlapping photographs together. Where things stand twice or lines break at seams, take more: it is
+        /// slower and shows fewer ghosts.
+        align: Evidence = Evidence::Points, Allowed::Any, "", basic;
+        /// What of the photographs' structure is kept, beyond the neighborhoods of grid vertices. Choose lines where long
+        /// edges bend.
+        structure: Structure = Structure::None, Allowed::Any, "";
+    }
+}
+
+trueup_core::options! {
+    /// What the work may take of the machine. Nothing of it changes the panorama.
+    pub struct ResourceOptions("resources") {
+        /// Memory that the work may take; auto is a quarter of the machine's, or more where less is too little. With less, the
+        /// canvas goes to a scratch file and photographs are decoded again. Set it where other programs need theirs.
+        memory: MemoryBudget = MemoryBudget::Auto, Allowed::Any, "", basic;
+        /// Folder for the scratch file; empty for the folder of the panorama. Set it where that disk is slow or full.
+        scratch: String = String::new(), Allowed::Any, "";
+        /// Size of the photograph cache up to which results are kept, where a folder for it is given; those not used for the
+        /// longest time go first.
+        cache_bytes: f64 = 4e9, between(0.0, 1e15), "bytes";
+    }
+}
+
+/// A part of the work, in its order. What it makes depends on its own options and on those of the phases before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Phase {
+    /// From pixels to features and lines.
+    Measure,
+    /// From features to pairs and their graph.
+    Match,
+    /// From pairs to geometry: cameras and deformed grids.
+    Align,
+    /// From geometry to a view, a canvas and what of it is kept.
+    Arrange,
+    /// From canvas and pixels to light, seams and the panorama.
+    Compose,
+}
+
+macro_rules! phases {
+    ($(
+        $(#[doc = $phase_doc:literal])*
+        $phase_field:ident : $phase_type:ident ($phase:expr) {
+            $($(#[doc = $doc:literal])* $field:ident : $type:ty,)*
+        }
+    )*) => {
+        $(
+            $(#[doc = $phase_doc])*
+            #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+            pub struct $phase_type {
+                $($(#[doc = $doc])* pub $field: $type,)*
+            }
+        )*
+
+        /// The options of every phase. Serialized as one table per stage; unknown tables and fields are denied.
         #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-        #[serde(deny_unknown_fields, default)]
+        #[serde(from = "Tables", into = "Tables")]
         pub struct StitchOptions {
-            $($(#[doc = $doc])* pub $field: $type,)*
+            $($(#[doc = $phase_doc])* pub $phase_field: $phase_type,)*
+        }
+
+        /// [`StitchOptions`] as people write them: the tables of all phases side by side.
+        #[derive(Default, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields, default)]
+        struct Tables {
+            $($($field: $type,)*)*
+        }
+
+        impl From<Tables> for StitchOptions {
+            fn from(tables: Tables) -> Self {
+                Self { $($phase_field: $phase_type { $($field: tables.$field,)* },)* }
+            }
+        }
+
+        impl From<StitchOptions> for Tables {
+            fn from(options: StitchOptions) -> Self {
+                Self { $($($field: options.$phase_field.$field,)*)* }
+            }
         }
 
         impl StitchOptions {
             /// Every option outside its allowed range; empty when all is well.
-            pub fn invalid(&self) -> Vec<InvalidOption> {
+            fn out_of_range(&self) -> Vec<InvalidOption> {
                 let mut invalid = Vec::new();
-                $(invalid.extend(self.$field.invalid());)*
+                $($(invalid.extend(self.$phase_field.$field.invalid());)*)*
                 invalid
             }
 
-            /// A row per option of every stage, with defaults, ranges and units.
+            /// A row per option, with defaults, ranges and units, in the order of the phases.
             pub fn describe() -> Vec<OptionDescription> {
                 let mut rows = Vec::new();
-                $(rows.extend(<$type>::describe());)*
+                $($(rows.extend(<$type>::describe());)*)*
                 rows
             }
 
-            /// The stages' names, as in `stage.option`.
-            pub fn stages() -> Vec<&'static str> {
-                vec![$(<$type>::STAGE),*]
+            /// The tables' names, as in `table.option`, each with the phase that its options belong to; `None` for those that
+            /// decide how the work is done and told, but not what comes of it.
+            pub fn tables() -> Vec<(&'static str, Option<Phase>)> {
+                vec![$($((<$type>::STAGE, $phase),)*)*]
             }
         }
     };
 }
 
-stage_options! {
-    /// What holds for the whole run.
-    stitch: WorkingOptions,
-    /// Which files are accepted.
-    source: SourceOptions,
-    /// How features are found.
-    features: FeatureOptions,
-    /// How line segments are found.
-    lines: LineOptions,
-    /// Which pairs are tried.
-    pairing: PairingOptions,
-    /// How pairs are matched and verified.
-    matching: MatchingOptions,
-    /// How cameras are estimated.
-    cameras: CameraOptions,
-    /// How vanishing points are found.
-    vanishing: VanishingOptions,
-    /// How rotations and scales are wanted.
-    similarity: SimilarityOptions,
-    /// How overlaps are sampled.
-    match_points: MatchPointOptions,
-    /// How the grids are deformed.
-    mesh: MeshOptions,
-    /// How segments of overlapping pictures are matched.
-    line_matching: LineMatchingOptions,
-    /// How matched lines align the grids.
-    line_alignment: LineAlignmentOptions,
-    /// How long lines keep their shape.
-    structure: StructureOptions,
-    /// How pixels align the grids.
-    photometric: PhotometricOptions,
-    /// How the methods that are warp models place the photographs.
-    warps: WarpOptions,
-    /// What the panorama is drawn on, and where the viewer looks.
-    projection: ProjectionOptions,
-    /// How large the panorama is.
-    canvas: CanvasOptions,
-    /// How exposures are evened out.
-    exposure: ExposureOptions,
-    /// Where one photograph ends and the next begins.
-    seam: SeamOptions,
-    /// How photographs are resampled and blended.
-    render: RenderOptions,
-    /// How the panorama is encoded.
-    output: OutputOptions,
-    /// How the panorama is measured.
-    measures: MeasureOptions,
-    /// How methods are compared side by side.
-    compare: CompareOptions,
-    /// How much is kept between runs.
-    cache: CacheOptions,
+phases! {
+    /// How photographs are measured.
+    measure: MeasureOptions (Some(Phase::Measure)) {
+        /// Which files are accepted.
+        source: SourceOptions,
+        /// What photographs are measured on.
+        working: WorkingOptions,
+        /// How features are found.
+        features: FeatureOptions,
+        /// How line segments are found.
+        lines: LineOptions,
+    }
+    /// How photographs are matched.
+    matching: MatchOptions (Some(Phase::Match)) {
+        /// Where random choices come from.
+        random: RandomOptions,
+        /// Which pairs are tried.
+        pairing: PairingOptions,
+        /// How pairs are matched and verified.
+        matching: MatchingOptions,
+    }
+    /// How the panorama's geometry is found.
+    align: AlignOptions (Some(Phase::Align)) {
+        /// How the panorama's shape is found.
+        stitch: ShapeOptions,
+        /// How cameras are estimated.
+        cameras: CameraOptions,
+        /// How vanishing points are found.
+        vanishing: VanishingOptions,
+        /// How rotations and scales are wanted.
+        similarity: SimilarityOptions,
+        /// How overlaps are sampled.
+        match_points: MatchPointOptions,
+        /// How the grids are deformed.
+        mesh: MeshOptions,
+        /// How matched lines align the grids.
+        line_alignment: LineAlignmentOptions,
+        /// How long lines keep their shape.
+        structure: StructureOptions,
+        /// How pixels align the grids.
+        photometric: PhotometricOptions,
+        /// How the methods that are warp models place the photographs.
+        warps: WarpOptions,
+    }
+    /// How the panorama is laid out.
+    arrange: ArrangeOptions (Some(Phase::Arrange)) {
+        /// What the panorama is drawn on, and where the viewer looks.
+        projection: ProjectionOptions,
+        /// How large the panorama is.
+        canvas: CanvasOptions,
+    }
+    /// How the panorama is composed and encoded.
+    compose: ComposeOptions (Some(Phase::Compose)) {
+        /// How exposures are evened out.
+        exposure: ExposureOptions,
+        /// Where one photograph ends and the next begins.
+        seam: SeamOptions,
+        /// How photographs are resampled and blended.
+        render: RenderOptions,
+        /// How the panorama is encoded.
+        output: OutputOptions,
+    }
+    /// What decides how the work is done, but not what comes of it.
+    run: RunOptions (None) {
+        /// What the work may take of the machine.
+        resources: ResourceOptions,
+        /// How the panorama is measured.
+        measures: PixelMeasureOptions,
+    }
 }
 
-/// The stages whose options a project's panorama may be composed with anew; those of the others are recorded with the
-/// geometry.
-const COMPOSING: [&str; 10] = [
-    SourceOptions::STAGE,
-    ProjectionOptions::STAGE,
-    CanvasOptions::STAGE,
-    ExposureOptions::STAGE,
-    SeamOptions::STAGE,
-    RenderOptions::STAGE,
-    OutputOptions::STAGE,
-    MeasureOptions::STAGE,
-    CompareOptions::STAGE,
-    CacheOptions::STAGE,
-];
-
-/// Options of other stages that change no result.
-const SPEED_ONLY: [&str; 2] = ["stitch.memory", "stitch.scratch"];
-
 impl StitchOptions {
-    /// The stages that composing a recorded panorama takes options for, in words.
-    pub fn composing_stages() -> String {
-        COMPOSING.join(", ")
+    /// The tables that composing a recorded panorama takes options from, in words.
+    pub fn composing_tables() -> String {
+        let composing = Self::tables().into_iter().filter(|(_, phase)| !is_geometry(*phase));
+        composing.map(|(table, _)| table).collect::<Vec<_>>().join(", ")
     }
 
     /// Every option outside its allowed range, and every one that does not go with another; empty when all is well.
-    pub fn all_invalid(&self) -> Vec<InvalidOption> {
-        let mut invalid = self.invalid();
-        invalid.extend(self.projection.beyond_the_projection());
+    pub fn invalid(&self) -> Vec<InvalidOption> {
+        let mut invalid = self.out_of_range();
+        invalid.extend(self.arrange.projection.beyond_the_projection());
         invalid
     }
 
@@ -175,43 +247,38 @@ impl StitchOptions {
     /// # Errors
     /// [`Error::Options`] with the complete list of options outside their range.
     pub fn validate(&self) -> Result<()> {
-        let invalid = self.all_invalid();
+        let invalid = self.invalid();
         if invalid.is_empty() { Ok(()) } else { Err(Error::Options(invalid)) }
     }
 
     /// Whether photographs are found, measured and matched by these options as by `other`, so that what was matched by the
     /// one can be aligned by the other.
     pub fn matches_alike(&self, other: &Self) -> bool {
-        let working = |options: &Self| {
-            let WorkingOptions { working_pixels, thumbnail_pixels, seed, .. } = options.stitch;
-            (working_pixels, thumbnail_pixels, seed)
-        };
-        working(self) == working(other)
-            && self.source == other.source
-            && self.features == other.features
-            && self.lines == other.lines
-            && self.pairing == other.pairing
-            && self.matching == other.matching
+        self.measure == other.measure && self.matching == other.matching
     }
 
-    /// The options, `stage.option`, of what was finished before a panorama is composed, in which these options differ from
-    /// `recorded` ones: those of the geometry, which a project records once and for all.
+    /// The options, `table.option`, of the phases up to the geometry in which these options differ from `recorded` ones: a
+    /// project records the geometry once and for all.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if options cannot be written (never).
     pub fn differing_geometry(&self, recorded: &Self) -> Result<Vec<String>> {
         let (own, recorded) = (self.to_table()?, recorded.to_table()?);
         let mut differing = Vec::new();
-        for stage in Self::stages().into_iter().filter(|stage| !COMPOSING.contains(stage)) {
+        for (stage, _) in Self::tables().into_iter().filter(|(_, phase)| is_geometry(*phase)) {
             let table =
                 |table: &toml::Table| table.get(stage).and_then(toml::Value::as_table).cloned().unwrap_or_default();
             let recorded = table(&recorded);
-            for (option, value) in table(&own) {
-                let name = format!("{stage}.{option}");
-                if recorded.get(&option) != Some(&value) && !SPEED_ONLY.contains(&name.as_str()) {
-                    differing.push(name);
-                }
-            }
+            let changed = table(&own).into_iter().filter(|(option, value)| recorded.get(option) != Some(value));
+            differing.extend(changed.map(|(option, _)| format!("{stage}.{option}")));
         }
         Ok(differing)
     }
+}
+
+/// Whether options of this phase take part in the geometry.
+fn is_geometry(phase: Option<Phase>) -> bool {
+    phase.is_some_and(|phase| phase <= Phase::Align)
 }
 
 #[cfg(test)]
@@ -221,9 +288,9 @@ mod tests {
     #[test]
     fn all_bad_values_are_listed() {
         let mut options = StitchOptions::default();
-        options.mesh.cell_px = -1.0;
-        options.stitch.working_pixels = f64::INFINITY;
+        options.align.mesh.cell_px = -1.0;
+        options.measure.working.pixels = f64::INFINITY;
         let message = options.validate().expect_err("two bad values").to_string();
-        assert!(message.contains("mesh.cell_px = -1") && message.contains("stitch.working_pixels = inf"), "{message}");
+        assert!(message.contains("mesh.cell_px = -1") && message.contains("working.pixels = inf"), "{message}");
     }
 }

@@ -3,9 +3,10 @@
 use trueup_core::{Error, Result};
 
 use super::StitchOptions;
+use super::retired::Retired;
 
 impl StitchOptions {
-    /// Reads a TOML text with a table per stage over the present values; what it does not name stays as it is.
+    /// Reads a TOML text with tables over the present values; what it does not name stays as it is.
     ///
     /// # Errors
     /// [`Error::Input`] for text that is not TOML, unknown stages or options, or values of the wrong type.
@@ -15,17 +16,18 @@ impl StitchOptions {
         let given: toml::Table = text.parse().map_err(not_toml)?;
         let mut merged = self.to_table()?;
         for (stage, values) in given {
-            let Some(known) = merged.get_mut(&stage).and_then(toml::Value::as_table_mut) else {
-                return Err(Error::input(file, format!("there is no stage \"{stage}\""), hint));
-            };
             let toml::Value::Table(values) = values else {
                 return Err(Error::input(file, format!("\"{stage}\" must be a table, [{stage}]"), hint));
             };
+            let mut known = merged.get_mut(&stage).and_then(toml::Value::as_table_mut);
+            if known.is_none() && !values.keys().any(|option| Retired::of(&format!("{stage}.{option}")).is_some()) {
+                return Err(Error::input(file, format!("there is no table \"{stage}\""), hint));
+            }
             for (option, value) in values {
-                if !known.contains_key(&option) {
-                    return Err(Error::input(file, format!("there is no option \"{stage}.{option}\""), hint));
+                match known.as_mut().and_then(|known| known.get_mut(&option)) {
+                    Some(present) => *present = value,
+                    None => return Err(Error::input(file, no_option(&format!("{stage}.{option}")), hint)),
                 }
-                known.insert(option, value);
             }
         }
         *self = merged.try_into().map_err(|error| Error::input(file, first_line(&error), hint))?;
@@ -38,7 +40,7 @@ impl StitchOptions {
     /// [`Error::Input`] if there is no such option or the value is of the wrong type.
     pub fn set(&mut self, assignment: &str) -> Result<()> {
         let wrong = |reason: String| {
-            Error::input(assignment, reason, "Write stage.option=value; list the options with `trueup options`.")
+            Error::input(assignment, reason, "Write table.option=value; list the options with `trueup options`.")
         };
         let (name, value) = assignment.split_once('=').ok_or_else(|| wrong("there is no \"=\" in it".to_owned()))?;
         let (stage, option) =
@@ -49,7 +51,7 @@ impl StitchOptions {
             .get(stage)
             .and_then(|stage| stage.get(option))
             .cloned()
-            .ok_or_else(|| wrong(format!("there is no option \"{stage}.{option}\"")))?;
+            .ok_or_else(|| wrong(no_option(&format!("{stage}.{option}"))))?;
         let parsed = match known {
             toml::Value::Float(_) => value.parse().ok().map(toml::Value::Float),
             toml::Value::Integer(_) => value.parse().ok().map(toml::Value::Integer),
@@ -69,9 +71,53 @@ impl StitchOptions {
         Ok(())
     }
 
+    /// Brings options as a project of an earlier version recorded them up to date: those that have another name by now get
+    /// it, those that are fixed at the recorded value by now are dropped.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if one is fixed at another value by now.
+    pub(crate) fn update_recorded(recorded: &mut serde_json::Value, file: &str) -> Result<()> {
+        let Some(tables) = recorded.as_object_mut() else { return Ok(()) };
+        let mut renamed = Vec::new();
+        for (table, values) in tables.iter_mut() {
+            let Some(values) = values.as_object_mut() else { continue };
+            let names: Vec<String> = values.keys().cloned().collect();
+            for option in names {
+                let name = format!("{table}.{option}");
+                let Some(retired) = Retired::of(&name) else { continue };
+                let value = values.remove(&option).unwrap_or_default();
+                match retired {
+                    Retired::Renamed(new) => renamed.push((new, value)),
+                    Retired::Fixed(_) if toml::Value::try_from(&value).is_ok_and(|value| retired.is_now(&value)) => {}
+                    Retired::Fixed(_) => {
+                        let reason = format!("it is of an earlier version: {}", retired.reason(&name));
+                        return Err(Error::input(file, reason, "Stitch the photographs again."));
+                    }
+                }
+            }
+        }
+        for (new, value) in renamed {
+            let Some((table, option)) = new.split_once('.') else { continue };
+            let table = tables.entry(table).or_insert_with(|| serde_json::json!({}));
+            if let Some(values) = table.as_object_mut() {
+                values.insert(option.to_owned(), value);
+            }
+        }
+        let known = Self::tables();
+        tables.retain(|name, values| {
+            known.iter().any(|(table, _)| table == name) || values.as_object().is_none_or(|values| !values.is_empty())
+        });
+        Ok(())
+    }
+
     pub(super) fn to_table(&self) -> Result<toml::Table> {
         toml::Table::try_from(self).map_err(|error| Error::input("options", error, "Report this as a defect."))
     }
+}
+
+/// Why an option cannot be set that is none.
+fn no_option(name: &str) -> String {
+    Retired::of(name).map_or_else(|| format!("there is no option \"{name}\""), |retired| retired.reason(name))
 }
 
 /// The allowed values of an option, in words.
@@ -112,7 +158,7 @@ mod tests {
     #[test]
     fn stage_tables_are_called_like_their_stages() {
         let table = StitchOptions::default().to_table().expect("serializable");
-        for stage in StitchOptions::stages() {
+        for (stage, _) in StitchOptions::tables() {
             assert!(table.contains_key(stage), "{stage}");
         }
     }
@@ -127,6 +173,8 @@ mod tests {
             ("mesh.cell_px=wide", "\"wide\" is not a number"),
             ("stitch.method=magic", "\"magic\" cannot be (allowed: vpg"),
             ("output.jpeg_quality=300", "\"300\" cannot be (allowed: 1 to 100)"),
+            ("stitch.seed=3", "\"stitch.seed\" is now \"random.seed\""),
+            ("stitch.thumbnail_pixels=3", "\"stitch.thumbnail_pixels\" is now fixed at 30000 px"),
         ] {
             let message = options.set(assignment).expect_err("must fail").to_string();
             assert!(message.contains(reason), "{message}");
@@ -134,6 +182,8 @@ mod tests {
         assert!(options.merge_toml("[mesh]\ncell = 3", "c.toml").is_err());
         assert!(options.merge_toml("[mash]\ncell_px = 3", "c.toml").is_err());
         assert!(options.merge_toml("mesh", "c.toml").is_err());
+        let renamed = options.merge_toml("[cache]\nmax_bytes = 3", "c.toml").expect_err("renamed").to_string();
+        assert!(renamed.contains("\"cache.max_bytes\" is now \"resources.cache_bytes\""), "{renamed}");
         assert_eq!(options, StitchOptions::default());
     }
 
@@ -141,7 +191,8 @@ mod tests {
     fn a_file_changes_only_what_it_names() {
         let mut options = StitchOptions::default();
         options.set("mesh.prior_weight=7.5").expect("valid");
-        options.merge_toml("[mesh]\ncell_px = 30.0\n[stitch]\nseed = 9", "c.toml").expect("valid");
-        assert_eq!((options.mesh.cell_px, options.mesh.prior_weight, options.stitch.seed), (30.0, 7.5, 9));
+        options.merge_toml("[mesh]\ncell_px = 30.0\n[random]\nseed = 9", "c.toml").expect("valid");
+        let mesh = &options.align.mesh;
+        assert_eq!((mesh.cell_px, mesh.prior_weight, options.matching.random.seed), (30.0, 7.5, 9));
     }
 }

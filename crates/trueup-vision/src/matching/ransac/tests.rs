@@ -5,10 +5,10 @@ use super::*;
 #[test]
 fn the_number_of_samples_is_that_of_the_textbook() {
     // ln(1 - 0.995) / ln(1 - p) with p = 0.225^4 and 0.2^4, as in the reference implementation; 0.5^4 by hand.
-    assert_eq!(samples_needed(0.225, 0.995), 2065);
-    assert_eq!(samples_needed(0.5, 0.995), 83);
-    assert_eq!(samples_needed(1.0, 0.995), 1);
-    assert_eq!(samples_needed(0.0, 0.995), usize::MAX);
+    assert_eq!(samples_needed(0.225), 2065);
+    assert_eq!(samples_needed(0.5), 83);
+    assert_eq!(samples_needed(1.0), 1);
+    assert_eq!(samples_needed(0.0), usize::MAX);
 }
 
 #[test]
@@ -51,7 +51,7 @@ fn scene(planes: &[Homography], counts: &[usize], outliers: usize, noise_px: f64
 
 /// What is found with each of fifty seeds.
 fn found_by_fifty_draws(points: &MatchedPoints) -> Vec<Consensus> {
-    let search = Search { inlier_px: 5.0, confidence: 0.995, max_samples: 6000, useful_inliers: 15, start: None };
+    let search = HomographySearch { inlier_px: 5.0, max_samples: 6000, useful_inliers: 15, start: None };
     let with_seed = |seed| StageContext::default().generator("ransac", seed);
     (0..50).map(|seed| find_homography(points, &search, |_| true, &mut with_seed(seed)).expect("a map")).collect()
 }

@@ -1,14 +1,14 @@
 //! Tiles of squared distances between bytes, one kernel per instruction set, all with the same results.
 //!
-//! A kernel compares [`ROWS`] descriptors with one block of [`LANES`] columns. Its products are whole numbers, so that
+//! A kernel compares `ROWS` descriptors with one block of `LANES` columns. Its products are whole numbers, so that
 //! the order of summation does not matter and every kernel returns the same bits.
 #![allow(unsafe_code)] // Runtime-dispatched vector instructions; nowhere else in the matching.
 
-use super::{LANES, LaneBest, Lanes, ROWS, SHIFT};
+use super::keys::{LANES, LaneBest, LaneWords, ROWS, SHIFT};
 
 /// The instruction set a search runs on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kernel {
+pub enum SearchKernel {
     /// Plain Rust, for every processor.
     Portable,
     /// 16-bit multiply-add on 256-bit registers.
@@ -19,7 +19,7 @@ pub enum Kernel {
     Avx512Vnni,
 }
 
-impl Kernel {
+impl SearchKernel {
     /// The kernels this processor can run, slowest first.
     pub fn available() -> Vec<Self> {
         #[allow(unused_mut)]
@@ -40,13 +40,13 @@ impl Kernel {
     }
 
     /// The fastest kernel this processor can run.
-    pub fn best() -> Self {
+    pub(super) fn best() -> Self {
         Self::available().last().copied().unwrap_or(Self::Portable)
     }
 
     /// Elements of a descriptor in one packed word: four bytes (unsigned columns, signed rows), two 16-bit numbers, or
     /// one 32-bit floating-point number, in which whole numbers up to 2^24, and so all products here, are exact.
-    pub fn elements_per_word(self) -> usize {
+    pub(super) fn elements_per_word(self) -> usize {
         match self {
             Self::Portable => 1,
             Self::Avx2 => 2,
@@ -60,42 +60,47 @@ impl Kernel {
 /// With `dot` the product of a packed row and a packed column, `(row_terms + column_terms) - (dot << (SHIFT + 1))` is
 /// the squared distance shifted left by [`SHIFT`], in wrapping 32-bit arithmetic.
 #[derive(Debug, Clone, Copy)]
-pub struct Tile<'a> {
+pub(super) struct DistanceTile<'a> {
     /// Packed rows, one after the other.
-    pub rows: &'a [u32],
+    pub(super) rows: &'a [u32],
     /// Shifted squared norms of the rows.
-    pub row_terms: &'a [u32; ROWS],
+    pub(super) row_terms: &'a [u32; ROWS],
     /// The same with the row's number added.
-    pub numbered_row_terms: &'a [u32; ROWS],
+    pub(super) numbered_row_terms: &'a [u32; ROWS],
     /// The packed block: for every word of a descriptor, that word of [`LANES`] columns.
-    pub block: &'a [Lanes],
+    pub(super) block: &'a [LaneWords],
     /// Shifted norm terms of the columns.
-    pub column_terms: &'a Lanes,
+    pub(super) column_terms: &'a LaneWords,
     /// The block's number.
-    pub block_number: u32,
+    pub(super) block_number: u32,
 }
 
 /// Lowers `row_best` and `column_best` by the keys of a tile.
 ///
 /// # Panics
 /// If the tile was not packed for `kernel`, or the processor lacks it: both are errors of the caller in this crate.
-pub fn lower(kernel: Kernel, tile: &Tile<'_>, row_best: &mut [LaneBest; ROWS], column_best: &mut Lanes) {
+pub(super) fn lower(
+    kernel: SearchKernel,
+    tile: &DistanceTile<'_>,
+    row_best: &mut [LaneBest; ROWS],
+    column_best: &mut LaneWords,
+) {
     match kernel {
-        Kernel::Portable => portable(tile, row_best, column_best),
+        SearchKernel::Portable => portable(tile, row_best, column_best),
         #[cfg(target_arch = "x86_64")]
-        Kernel::Avx2 => {
+        SearchKernel::Avx2 => {
             assert!(is_x86_feature_detected!("avx2"), "the kernel needs AVX2");
             // SAFETY: the processor has the instructions the function is compiled for.
             unsafe { x86::avx2(tile, row_best, column_best) }
         }
         #[cfg(target_arch = "x86_64")]
-        Kernel::AvxVnni => {
+        SearchKernel::AvxVnni => {
             assert!(is_x86_feature_detected!("avxvnni"), "the kernel needs AVX-VNNI");
             // SAFETY: the processor has the instructions the function is compiled for; AVX-VNNI implies AVX2.
             unsafe { x86::avx_vnni(tile, row_best, column_best) }
         }
         #[cfg(target_arch = "x86_64")]
-        Kernel::Avx512Vnni => {
+        SearchKernel::Avx512Vnni => {
             assert!(is_x86_feature_detected!("avx512vnni"), "the kernel needs AVX-512 VNNI");
             // SAFETY: the processor has the instructions the function is compiled for; VNNI implies AVX-512F.
             unsafe { x86::avx512_vnni(tile, row_best, column_best) }
@@ -105,7 +110,7 @@ pub fn lower(kernel: Kernel, tile: &Tile<'_>, row_best: &mut [LaneBest; ROWS], c
     }
 }
 
-fn portable(tile: &Tile<'_>, row_best: &mut [LaneBest; ROWS], column_best: &mut Lanes) {
+fn portable(tile: &DistanceTile<'_>, row_best: &mut [LaneBest; ROWS], column_best: &mut LaneWords) {
     let words = tile.block.len();
     for (row, best) in row_best.iter_mut().enumerate() {
         let mut dots = [0.0_f32; LANES];
@@ -130,7 +135,7 @@ fn portable(tile: &Tile<'_>, row_best: &mut [LaneBest; ROWS], column_best: &mut 
 mod x86 {
     use std::arch::x86_64::*;
 
-    use super::{LaneBest, Lanes, ROWS, SHIFT, Tile};
+    use super::{DistanceTile, LaneBest, LaneWords, ROWS, SHIFT};
 
     const DOT_SHIFT: u32 = SHIFT + 1;
     /// Words of a descriptor whose bytes are multiplied four at a time.
@@ -139,9 +144,9 @@ mod x86 {
     const PAIR_WORDS: usize = 64;
 
     #[target_feature(enable = "avx512f,avx512vnni")]
-    pub fn avx512_vnni(tile: &Tile<'_>, row_best: &mut [LaneBest; ROWS], column_best: &mut Lanes) {
+    pub(super) fn avx512_vnni(tile: &DistanceTile<'_>, row_best: &mut [LaneBest; ROWS], column_best: &mut LaneWords) {
         let rows: &[u32; ROWS * BYTE_WORDS] = tile.rows.try_into().expect("rows are packed for this kernel");
-        let block: &[Lanes; BYTE_WORDS] = tile.block.try_into().expect("columns are packed for this kernel");
+        let block: &[LaneWords; BYTE_WORDS] = tile.block.try_into().expect("columns are packed for this kernel");
         let mut dots = [_mm512_setzero_si512(); ROWS];
         for (word, columns) in block.iter().enumerate() {
             let columns = load_512(columns);
@@ -169,15 +174,15 @@ mod x86 {
 
     #[inline]
     #[target_feature(enable = "avx512f")]
-    fn load_512(lanes: &Lanes) -> __m512i {
-        // SAFETY: `Lanes` is 64 bytes, aligned to 64.
+    fn load_512(lanes: &LaneWords) -> __m512i {
+        // SAFETY: `LaneWords` is 64 bytes, aligned to 64.
         unsafe { _mm512_load_si512(std::ptr::from_ref(lanes).cast()) }
     }
 
     #[inline]
     #[target_feature(enable = "avx512f")]
-    fn store_512(lanes: &mut Lanes, value: __m512i) {
-        // SAFETY: `Lanes` is 64 bytes, aligned to 64.
+    fn store_512(lanes: &mut LaneWords, value: __m512i) {
+        // SAFETY: `LaneWords` is 64 bytes, aligned to 64.
         unsafe { _mm512_store_si512(std::ptr::from_mut(lanes).cast(), value) }
     }
 
@@ -188,9 +193,9 @@ mod x86 {
     macro_rules! kernel_256 {
         ($name:ident, $features:literal, $words:ident, $dot:expr) => {
             #[target_feature(enable = $features)]
-            pub fn $name(tile: &Tile<'_>, row_best: &mut [LaneBest; ROWS], column_best: &mut Lanes) {
+            pub(super) fn $name(tile: &DistanceTile<'_>, row_best: &mut [LaneBest; ROWS], column_best: &mut LaneWords) {
                 let rows: &[u32; ROWS * $words] = tile.rows.try_into().expect("rows are packed for this kernel");
-                let block: &[Lanes; $words] = tile.block.try_into().expect("columns are packed for this kernel");
+                let block: &[LaneWords; $words] = tile.block.try_into().expect("columns are packed for this kernel");
                 for start in (0..ROWS).step_by(ROWS_AT_ONCE) {
                     let mut dots = [[_mm256_setzero_si256(); 2]; ROWS_AT_ONCE];
                     for (word, columns) in block.iter().enumerate() {
@@ -215,7 +220,13 @@ mod x86 {
     /// Lowers the bests by the keys of one row.
     #[inline]
     #[target_feature(enable = "avx2")]
-    fn lower_256(tile: &Tile<'_>, row: usize, dot: [__m256i; 2], best: &mut LaneBest, column_best: &mut Lanes) {
+    fn lower_256(
+        tile: &DistanceTile<'_>,
+        row: usize,
+        dot: [__m256i; 2],
+        best: &mut LaneBest,
+        column_best: &mut LaneWords,
+    ) {
         let (mut first, mut second) = (load_256(&best.first), load_256(&best.second));
         let (terms, mut lowest) = (load_256(tile.column_terms), load_256(column_best));
         let row_term = _mm256_set1_epi32(tile.row_terms[row].wrapping_add(tile.block_number) as i32);
@@ -235,17 +246,17 @@ mod x86 {
 
     #[inline]
     #[target_feature(enable = "avx2")]
-    fn load_256(lanes: &Lanes) -> [__m256i; 2] {
+    fn load_256(lanes: &LaneWords) -> [__m256i; 2] {
         let half: *const __m256i = std::ptr::from_ref(lanes).cast();
-        // SAFETY: `Lanes` is 64 bytes, aligned to 64: two registers, each aligned to 32.
+        // SAFETY: `LaneWords` is 64 bytes, aligned to 64: two registers, each aligned to 32.
         unsafe { [_mm256_load_si256(half), _mm256_load_si256(half.add(1))] }
     }
 
     #[inline]
     #[target_feature(enable = "avx2")]
-    fn store_256(lanes: &mut Lanes, value: [__m256i; 2]) {
+    fn store_256(lanes: &mut LaneWords, value: [__m256i; 2]) {
         let half: *mut __m256i = std::ptr::from_mut(lanes).cast();
-        // SAFETY: `Lanes` is 64 bytes, aligned to 64: two registers, each aligned to 32.
+        // SAFETY: `LaneWords` is 64 bytes, aligned to 64: two registers, each aligned to 32.
         unsafe {
             _mm256_store_si256(half, value[0]);
             _mm256_store_si256(half.add(1), value[1]);

@@ -15,52 +15,17 @@
 //! neighbor is exact too: see [`Nearest::nearest_allowed`].
 
 mod kernels;
+mod keys;
+mod packed;
 #[cfg(test)]
 mod tests;
 
-use rayon::prelude::*;
+pub use kernels::SearchKernel;
+pub use keys::Neighbor;
 
-pub use kernels::Kernel;
-
-use crate::features::{DESCRIPTOR_LENGTH, Descriptor};
-
-/// Columns compared at once.
-const LANES: usize = 16;
-/// Rows compared at once.
-const ROWS: usize = 16;
-/// Bits of a key that hold a row's or a block's number.
-const SHIFT: u32 = 9;
-/// Columns whose block numbers fit a key.
-const COLUMNS_PER_PASS: usize = LANES << SHIFT;
-/// Rows a thread takes at once; their numbers fit a key.
-const ROWS_PER_TASK: usize = 256;
-/// Makes unsigned bytes signed for the kernels that multiply unsigned by signed bytes.
-const BYTE_OFFSET: u32 = 128;
-
-/// One 32-bit number per lane.
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(64))]
-struct Lanes([u32; LANES]);
-
-const FARTHEST: Lanes = Lanes([u32::MAX; LANES]);
-
-/// The two smallest keys of every lane.
-#[derive(Debug, Clone, Copy)]
-struct LaneBest {
-    first: Lanes,
-    second: Lanes,
-}
-
-/// A descriptor and how far it is.
-///
-/// Ordered by distance, then index: the minimum is the nearest, the smaller index winning ties.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Neighbor {
-    /// Squared distance in descriptor units.
-    pub squared_distance: u32,
-    /// Index of the descriptor.
-    pub descriptor: usize,
-}
+use crate::features::Descriptor;
+use keys::{COLUMNS_PER_PASS, LANES, LaneBest, SHIFT};
+use packed::{PackedColumns, PackedRows};
 
 /// The answers of one search of rows against columns.
 #[derive(Debug)]
@@ -75,11 +40,11 @@ pub struct Nearest<'a> {
 impl<'a> Nearest<'a> {
     /// Compares all descriptors of `rows` with all of `columns`; `None` if either is empty.
     pub fn search(rows: &'a [Descriptor], columns: &'a [Descriptor]) -> Option<Self> {
-        Self::search_with(Kernel::best(), rows, columns)
+        Self::search_with(SearchKernel::best(), rows, columns)
     }
 
-    /// The same on a kernel of choice, which this processor must be able to run ([`Kernel::available`]).
-    pub fn search_with(kernel: Kernel, rows: &'a [Descriptor], columns: &'a [Descriptor]) -> Option<Self> {
+    /// The same on a kernel of choice, which this processor must be able to run ([`SearchKernel::available`]).
+    pub fn search_with(kernel: SearchKernel, rows: &'a [Descriptor], columns: &'a [Descriptor]) -> Option<Self> {
         if rows.is_empty() || columns.is_empty() {
             return None;
         }
@@ -149,153 +114,6 @@ impl<'a> Nearest<'a> {
 }
 
 /// The squared Euclidean distance of two descriptors.
-pub fn squared_distance(a: &Descriptor, b: &Descriptor) -> u32 {
+pub(super) fn squared_distance(a: &Descriptor, b: &Descriptor) -> u32 {
     a.iter().zip(b).map(|(&a, &b)| u32::from(a.abs_diff(b)).pow(2)).sum()
-}
-
-/// Descriptors packed as rows, a multiple of [`ROWS`] (the last one repeated, which never wins a tie).
-#[derive(Debug)]
-struct PackedRows {
-    kernel: Kernel,
-    count: usize,
-    words: Vec<u32>,
-    terms: Vec<[u32; ROWS]>,
-    numbered_terms: Vec<[u32; ROWS]>,
-}
-
-impl PackedRows {
-    /// `descriptors` must not be empty.
-    fn new(kernel: Kernel, descriptors: &[Descriptor]) -> Self {
-        let last = descriptors.len() - 1;
-        let padded = descriptors.len().next_multiple_of(ROWS);
-        let offset = row_offset(kernel);
-        let mut packed = Self {
-            kernel,
-            count: descriptors.len(),
-            words: Vec::with_capacity(padded * words_per_descriptor(kernel)),
-            terms: vec![[0; ROWS]; padded / ROWS],
-            numbered_terms: vec![[0; ROWS]; padded / ROWS],
-        };
-        for row in 0..padded {
-            let descriptor = &descriptors[row.min(last)];
-            packed.words.extend(packed_words(kernel, descriptor, offset));
-            let term = squared_norm(descriptor) << SHIFT;
-            packed.terms[row / ROWS][row % ROWS] = term;
-            packed.numbered_terms[row / ROWS][row % ROWS] = term + (row % ROWS_PER_TASK) as u32;
-        }
-        packed
-    }
-
-    /// The two smallest keys of every lane for every row, and the nearest row of every column.
-    fn compare(&self, columns: &PackedColumns) -> (Vec<LaneBest>, Vec<Neighbor>) {
-        const TILES_PER_TASK: usize = ROWS_PER_TASK / ROWS;
-        let mut bests = vec![[LaneBest { first: FARTHEST, second: FARTHEST }; ROWS]; self.terms.len()];
-        let task_nearest: Vec<Vec<Lanes>> = bests
-            .par_chunks_mut(TILES_PER_TASK)
-            .enumerate()
-            .map(|(task, bests)| {
-                let mut nearest = vec![FARTHEST; columns.terms.len()];
-                for (tile, best) in bests.iter_mut().enumerate() {
-                    self.compare_tile(task * TILES_PER_TASK + tile, columns, best, &mut nearest);
-                }
-                nearest
-            })
-            .collect();
-        let mut bests = bests.into_flattened();
-        bests.truncate(self.count);
-        (bests, nearest_rows(&task_nearest))
-    }
-
-    fn compare_tile(
-        &self,
-        tile: usize,
-        columns: &PackedColumns,
-        best: &mut [LaneBest; ROWS],
-        column_nearest: &mut [Lanes],
-    ) {
-        let words = words_per_descriptor(self.kernel);
-        for (block, nearest) in column_nearest.iter_mut().enumerate() {
-            let tile = kernels::Tile {
-                rows: &self.words[tile * ROWS * words..(tile + 1) * ROWS * words],
-                row_terms: &self.terms[tile],
-                numbered_row_terms: &self.numbered_terms[tile],
-                block: &columns.words[block * words..(block + 1) * words],
-                column_terms: &columns.terms[block],
-                block_number: block as u32,
-            };
-            kernels::lower(self.kernel, &tile, best, nearest);
-        }
-    }
-}
-
-/// Descriptors packed as blocks of columns, at most [`COLUMNS_PER_PASS`] (the last one repeated to fill its block).
-#[derive(Debug)]
-struct PackedColumns {
-    words: Vec<Lanes>,
-    terms: Vec<Lanes>,
-}
-
-impl PackedColumns {
-    /// `descriptors` must not be empty.
-    fn new(kernel: Kernel, descriptors: &[Descriptor]) -> Self {
-        let last = descriptors.len() - 1;
-        let (blocks, words) = (descriptors.len().div_ceil(LANES), words_per_descriptor(kernel));
-        let mut packed =
-            Self { words: vec![Lanes([0; LANES]); blocks * words], terms: vec![Lanes([0; LANES]); blocks] };
-        for column in 0..blocks * LANES {
-            let (block, lane) = (column / LANES, column % LANES);
-            let descriptor = &descriptors[column.min(last)];
-            for (word, value) in packed_words(kernel, descriptor, 0).enumerate() {
-                packed.words[block * words + word].0[lane] = value;
-            }
-            // Kernels may see rows less an offset: ab = (a - offset) b + offset sum(b).
-            let missing = 2 * row_offset(kernel) * sum(descriptor);
-            packed.terms[block].0[lane] = squared_norm(descriptor).wrapping_sub(missing) << SHIFT;
-        }
-        packed
-    }
-}
-
-/// The nearest row of every column from the keys of every task's rows.
-fn nearest_rows(task_nearest: &[Vec<Lanes>]) -> Vec<Neighbor> {
-    let columns = task_nearest.first().map_or(0, |nearest| nearest.len() * LANES);
-    let nearest_of = |column: usize| {
-        let candidates = task_nearest.iter().enumerate().map(|(task, nearest)| {
-            let key = nearest[column / LANES].0[column % LANES];
-            let row = (key & ((1 << SHIFT) - 1)) as usize;
-            Neighbor { squared_distance: key >> SHIFT, descriptor: task * ROWS_PER_TASK + row }
-        });
-        candidates.min().unwrap_or(Neighbor { squared_distance: u32::MAX, descriptor: 0 })
-    };
-    (0..columns).map(nearest_of).collect()
-}
-
-fn words_per_descriptor(kernel: Kernel) -> usize {
-    DESCRIPTOR_LENGTH / kernel.elements_per_word()
-}
-
-/// What rows are packed less, to make bytes signed where the kernel multiplies unsigned by signed bytes.
-fn row_offset(kernel: Kernel) -> u32 {
-    if kernel.elements_per_word() == 4 { BYTE_OFFSET } else { 0 }
-}
-
-/// The words a kernel multiplies; bytes less `offset` as two's complement.
-fn packed_words(kernel: Kernel, descriptor: &Descriptor, offset: u32) -> impl Iterator<Item = u32> + '_ {
-    let elements = kernel.elements_per_word();
-    descriptor.chunks_exact(elements).map(move |chunk| match chunk {
-        [element] => f32::from(*element).to_bits(),
-        _ => {
-            let bits = (u32::BITS as usize / elements) as u32;
-            let packed = |&element: &u8| u32::from(element).wrapping_sub(offset) & ((1 << bits) - 1);
-            chunk.iter().rev().fold(0, |word, element| (word << bits) | packed(element))
-        }
-    })
-}
-
-fn squared_norm(descriptor: &Descriptor) -> u32 {
-    descriptor.iter().map(|&element| u32::from(element).pow(2)).sum()
-}
-
-fn sum(descriptor: &Descriptor) -> u32 {
-    descriptor.iter().map(|&element| u32::from(element)).sum()
 }

@@ -2,7 +2,9 @@ use proptest::prelude::*;
 use rand::Rng;
 use trueup_core::StageContext;
 
+use super::keys::ROWS_PER_TASK;
 use super::*;
+use crate::features::DESCRIPTOR_LENGTH;
 
 fn random_descriptors(seed: u64, count: usize) -> Vec<Descriptor> {
     let mut generator = StageContext::default().generator("test", seed);
@@ -34,7 +36,7 @@ fn naive(query: &Descriptor, candidates: &[Descriptor]) -> Neighbor {
     neighbors.min().expect("there are candidates")
 }
 
-fn check_against_naive(kernel: Kernel, rows: &[Descriptor], columns: &[Descriptor]) {
+fn check_against_naive(kernel: SearchKernel, rows: &[Descriptor], columns: &[Descriptor]) {
     let nearest = Nearest::search_with(kernel, rows, columns).expect("not empty");
     for (row, descriptor) in rows.iter().enumerate() {
         let best = naive(descriptor, columns);
@@ -55,7 +57,7 @@ proptest! {
 
     #[test]
     fn every_kernel_agrees_with_the_definition(seed in 0_u64..1000, rows in 1_usize..70, columns in 1_usize..90) {
-        for kernel in Kernel::available() {
+        for kernel in SearchKernel::available() {
             check_against_naive(kernel, &random_descriptors(seed, rows), &random_descriptors(seed + 1, columns));
             check_against_naive(kernel, &coarse_descriptors(seed, rows), &coarse_descriptors(seed + 1, columns));
         }
@@ -68,7 +70,7 @@ fn searches_of_more_than_one_pass_and_task_are_seamless() {
     let mut columns = random_descriptors(2, COLUMNS_PER_PASS + 3);
     columns[COLUMNS_PER_PASS + 1] = rows[ROWS_PER_TASK + 2];
     columns[COLUMNS_PER_PASS + 2] = rows[ROWS_PER_TASK + 2];
-    for kernel in Kernel::available() {
+    for kernel in SearchKernel::available() {
         let nearest = Nearest::search_with(kernel, &rows, &columns).expect("not empty");
         let expected = Neighbor { squared_distance: 0, descriptor: COLUMNS_PER_PASS + 1 };
         assert_eq!(nearest.nearest_column(ROWS_PER_TASK + 2), expected);
@@ -81,7 +83,7 @@ fn searches_of_more_than_one_pass_and_task_are_seamless() {
 #[test]
 fn the_farthest_descriptors_do_not_overflow_a_key() {
     let (black, white) = ([[0; DESCRIPTOR_LENGTH]], [[255; DESCRIPTOR_LENGTH]]);
-    for kernel in Kernel::available() {
+    for kernel in SearchKernel::available() {
         let nearest = Nearest::search_with(kernel, &black, &white).expect("not empty");
         assert_eq!(nearest.nearest_column(0).squared_distance, 128 * 255 * 255);
         assert_eq!(nearest.nearest_allowed(0, 0, |_| true), None);

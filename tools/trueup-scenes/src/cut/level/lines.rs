@@ -7,7 +7,7 @@ use trueup_core::raster::Photograph;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::reduce_photograph;
-use trueup_vision::lines::{LineOptions, detect};
+use trueup_vision::lines::{LineOptions, detect_keeping_frame};
 
 use crate::camera_from_world;
 use crate::cut::panorama::Panorama360;
@@ -84,8 +84,7 @@ fn lines_of_view(
     // The smallest thumbnail: it is not used.
     let gray = reduce_photograph(&picture, panorama.name(), &frame, 1.0)?.gray;
     // The view's border is no frame of a photograph.
-    let line_options = LineOptions { border_distance_px: 0.0, ..LineOptions::default() };
-    let segments = detect(&gray, &line_options, context)?;
+    let segments = detect_keeping_frame(&gray, &LineOptions::default(), context)?;
     let lines = segments.iter().filter_map(|segment| {
         let (normal, length) = plane_of(segment, views, index)?;
         let steepest = normal.y.abs().min(1.0).asin();

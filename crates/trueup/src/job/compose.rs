@@ -1,0 +1,77 @@
+//! From a project to a file: a recorded panorama is composed again.
+
+use std::path::PathBuf;
+
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result, StageContext};
+
+use super::masks::{AllMasks, MaskFile, MaskRecord};
+use super::outputs::Outputs;
+use super::threads::thread_pool;
+use super::write::Written;
+use crate::options::StitchOptions;
+use crate::pipeline::Stitcher;
+use crate::project::read::Recorded;
+use crate::project::record::{ImageRecord, Project};
+use crate::project::replace::{other_photographs, recorded_photographs};
+
+/// Which recorded panorama to compose, of which photographs, and where to put it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ComposeJob {
+    /// The record of a stitch.
+    pub project: Project,
+    /// The folder that the project's file lies in: recorded paths are looked up there first, then from the current folder.
+    pub project_folder: PathBuf,
+    /// A folder with other photographs of the same names (whatever their extensions) and sizes, to be shown instead.
+    pub photographs: Option<PathBuf>,
+    /// Pictures that mark what is to be ignored or kept, in place of the recorded ones of the photographs they name.
+    pub masks: Vec<MaskFile>,
+    /// The files to be written; of the side outputs, the project is the new panorama's own record.
+    pub outputs: Outputs,
+    /// Number of threads; 0 for one per core.
+    pub threads: usize,
+}
+
+impl ComposeJob {
+    /// Runs the job: nothing is measured or matched, the geometry is the recorded one. With the recorded options and
+    /// photographs, the panorama is the very one that was stitched.
+    ///
+    /// # Errors
+    /// [`Error::Options`]; [`Error::Unsupported`] if an option of the geometry differs from the recorded one;
+    /// [`Error::Input`] if the project was damaged, or photographs are missing or have other sizes; those of composing and
+    /// writing; [`Error::Cancelled`].
+    pub fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<Written> {
+        options.validate()?;
+        let differing = options.differing_geometry(&self.project.options)?;
+        if !differing.is_empty() {
+            return Err(Error::Unsupported {
+                what: format!("composing a recorded panorama with another {}", differing.join(", ")),
+                hint: format!(
+                    "Its geometry was found with the recorded value: stitch the photographs again. Composing heeds {}.",
+                    StitchOptions::composing_tables()
+                ),
+            });
+        }
+        // Before files are looked for: a project that was edited to nonsense names itself.
+        Recorded::new(&self.project)?;
+        self.outputs.check(options)?;
+        self.outputs.refuse_inputs([], self.masks.iter().map(|mask| mask.file.as_path()))?;
+        thread_pool(self.threads)?.install(|| {
+            let stitcher = Stitcher::new(options, context);
+            let images = self.find_photographs(options, context)?;
+            let mut masks = AllMasks::read(&self.masks, &images, &options.measure.source, context)?;
+            let recorded: Vec<&[MaskRecord]> = self.project.used_images().map(|one| one.masks.as_slice()).collect();
+            masks.recall(&recorded, &images, &self.project_folder, &options.measure.source, context)?;
+            let alignment = stitcher.recall(&self.project, images, masks)?;
+            self.outputs.write(&stitcher, alignment)
+        })
+    }
+
+    fn find_photographs(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<SourceImage>> {
+        let records: Vec<&ImageRecord> = self.project.used_images().collect();
+        match &self.photographs {
+            Some(folder) => other_photographs(&records, folder, &options.measure.source, context),
+            None => recorded_photographs(&records, &self.project_folder, &options.measure.source, context),
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! What is to be stitched, and what the user wants of it.
+
+use std::path::PathBuf;
+
+use trueup_align::stitch_graph::{GraphFile, parse_graph_file};
+use trueup_core::{Error, Result};
+
+use super::masks::MaskFile;
+
+/// Which photograph sets the panorama's pixel scale and stays in place.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Reference {
+    /// The photograph in the middle of the stitch graph.
+    #[default]
+    Auto,
+    /// The photograph of this name (file name, or path as given).
+    Named(String),
+}
+
+/// Photographs and wishes that are no tuning.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Inputs {
+    /// Files, folders and glob patterns, in the user's order.
+    pub photographs: Vec<String>,
+    /// Which photograph is the reference.
+    pub reference: Reference,
+    /// A stitch graph in a text file: only its pairs are matched.
+    pub graph: Option<PathBuf>,
+    /// Stitch every group of overlapping photographs, not only the largest.
+    pub all: bool,
+    /// Pictures that mark what is to be ignored or kept of the photographs.
+    pub masks: Vec<MaskFile>,
+    /// Fail unless every photograph given is used.
+    pub require_all: bool,
+}
+
+impl Inputs {
+    /// What the graph file says of photographs called `names`; nothing without one.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be read; [`Error::Input`] if it is none.
+    pub(crate) fn graph_file(&self, names: &[String]) -> Result<GraphFile> {
+        let Some(path) = &self.graph else { return Ok(GraphFile::default()) };
+        let text = std::fs::read_to_string(path).map_err(|error| Error::io("reading", path, error))?;
+        parse_graph_file(&text, names, &path.display().to_string())
+    }
+
+    /// Photographs with no further wishes.
+    pub fn new<S: Into<String>>(photographs: impl IntoIterator<Item = S>) -> Self {
+        Self { photographs: photographs.into_iter().map(Into::into).collect(), ..Self::default() }
+    }
+}

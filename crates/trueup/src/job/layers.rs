@@ -1,0 +1,130 @@
+//! What people who finish a panorama by hand want beside it: every photograph as a layer, and who is shown where.
+
+use std::path::Path;
+
+use trueup_compose::render::{self, Panorama};
+use trueup_compose::seam::{NOBODY, Seams};
+use trueup_core::{Error, Result};
+use trueup_io::decode;
+use trueup_io::encode::{self, LabelMap, LayerPage, LayerSet, OutputOptions};
+
+use crate::pipeline::{Alignment, Stitcher};
+
+impl Alignment {
+    /// Most bits that a sample of the photographs used has: 8, 16, or 32 and 64 for floating point.
+    ///
+    /// # Errors
+    /// If a photograph's file can no longer be read.
+    pub fn photograph_bits(&self) -> Result<u16> {
+        let images = self.photographs().images();
+        let mut bits = self.layout().placed.iter().map(|placed| decode::sample_bits(&images[placed.photograph]));
+        bits.try_fold(8, |most, bits| bits.map(|bits| most.max(bits)))
+    }
+
+    fn name(&self, position: usize) -> String {
+        self.photographs().images()[self.layout().placed[position].photograph].name.clone()
+    }
+}
+
+impl Stitcher<'_> {
+    /// How the panorama is written to `path`: the options, with the depth that its photographs ask for.
+    ///
+    /// # Errors
+    /// Those of [`Alignment::photograph_bits`].
+    pub fn output_options(&self, alignment: &Alignment, path: &Path) -> Result<OutputOptions> {
+        let output = &self.options().compose.output;
+        // Photographs are asked only where it matters.
+        match output.depth {
+            encode::Depth::Auto => Ok(output.with_depth_for(path, alignment.photograph_bits()?)),
+            _ => Ok(output.clone()),
+        }
+    }
+
+    /// Writes every photograph of `alignment`, aligned and corrected, to a page of a TIFF; returns its length in bytes.
+    ///
+    /// # Errors
+    /// Those of [`encode::write_layers`] and of reading the photographs.
+    pub fn write_layers(&self, alignment: &Alignment, path: &Path) -> Result<u64> {
+        let options = self.output_options(alignment, path)?;
+        let layers = Layers { stitcher: self, alignment, shown: shown(alignment) };
+        encode::write_layers(path, &layers, &self.metadata(alignment), &options, self.context())
+    }
+
+    /// Writes which photograph `panorama`, composed of `alignment`, shows at every pixel to a PNG; returns its length in
+    /// bytes.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] if photographs were averaged; those of [`encode::write_labels`].
+    pub fn write_seams(&self, alignment: &Alignment, panorama: &Panorama, path: &Path) -> Result<u64> {
+        let seams = panorama.seams().ok_or_else(no_seams)?;
+        let labels = Labels { alignment, seams };
+        encode::write_labels(path, &labels, &self.options().compose.output, self.context())
+    }
+}
+
+/// The refusal of seams where photographs are averaged.
+pub(crate) fn no_seams() -> Error {
+    Error::Unsupported {
+        what: "writing the seams of a panorama whose photographs are averaged".to_owned(),
+        hint: "Set render.blend to multiband or none.".to_owned(),
+    }
+}
+
+/// Positions of the photographs that lie on the canvas.
+fn shown(alignment: &Alignment) -> Vec<usize> {
+    let layout = alignment.layout();
+    (0..layout.placed.len()).filter(|&position| !render::layer_size(layout, position).contains(&0)).collect()
+}
+
+struct Layers<'a> {
+    stitcher: &'a Stitcher<'a>,
+    alignment: &'a Alignment,
+    shown: Vec<usize>,
+}
+
+impl LayerSet for Layers<'_> {
+    fn whole(&self) -> [usize; 2] {
+        [self.alignment.layout().width, self.alignment.layout().height]
+    }
+
+    fn count(&self) -> usize {
+        self.shown.len()
+    }
+
+    fn pixels(&self) -> u64 {
+        let size = |&position: &usize| render::layer_size(self.alignment.layout(), position);
+        self.shown.iter().map(size).map(|[width, height]| width as u64 * height as u64).sum()
+    }
+
+    fn open(&self, index: usize) -> Result<LayerPage<'_>> {
+        let position = self.shown[index];
+        let (layout, corrections) = (self.alignment.layout(), self.alignment.corrections());
+        let options = &self.stitcher.options().compose.render;
+        let rows = render::layer_rows(layout, corrections, position, self.alignment.photographs(), options)?;
+        let name = self.alignment.name(position);
+        let rows = rows.ok_or_else(|| Error::input(&name, "it lies outside the panorama", "Leave it out."))?;
+        Ok(LayerPage { name, corner: [rows.left, rows.top], rows: Box::new(rows) })
+    }
+}
+
+struct Labels<'a> {
+    alignment: &'a Alignment,
+    seams: &'a Seams,
+}
+
+impl LabelMap for Labels<'_> {
+    fn size(&self) -> [usize; 2] {
+        [self.alignment.layout().width, self.alignment.layout().height]
+    }
+
+    fn names(&self) -> Vec<String> {
+        (0..self.alignment.layout().placed.len()).map(|position| self.alignment.name(position)).collect()
+    }
+
+    fn row(&self, y: usize, row: &mut Vec<u16>) -> Result<()> {
+        self.seams.row_on_canvas(y, self.size(), row);
+        // The first photograph is 1; NOBODY is the largest label.
+        row.iter_mut().for_each(|label| *label = if *label == NOBODY { encode::NOTHING } else { *label + 1 });
+        Ok(())
+    }
+}

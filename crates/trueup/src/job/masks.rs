@@ -1,0 +1,168 @@
+//! Masks by the photographer: from names and files to marks on photographs.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use trueup_core::lines::LineSegment;
+use trueup_core::mask::{Mask, Masks};
+use trueup_core::raster::Raster;
+use trueup_core::source::{SourceImage, WorkingFrame};
+use trueup_core::{Error, Result, StageContext};
+use trueup_io::decode;
+use trueup_io::source::SourceOptions;
+use trueup_vision::features::Features;
+
+use super::names::photograph_named;
+
+/// What a mask means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MaskKind {
+    /// White parts are used; black or transparent ones are ignored: not looked at, and not shown where another photograph
+    /// can be.
+    Use,
+    /// White parts are shown, whatever other photographs show there; black or transparent ones are left to the seams.
+    Keep,
+}
+
+/// A picture that marks parts of a photograph.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MaskFile {
+    /// The photograph's name, or path as given.
+    pub photograph: String,
+    /// The picture, in the size of the photograph as it is shown.
+    pub file: PathBuf,
+    /// What it means.
+    pub kind: MaskKind,
+}
+
+/// A mask as the project records it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MaskRecord {
+    /// The picture's file as it was given.
+    pub path: String,
+    /// What it means.
+    pub kind: MaskKind,
+}
+
+/// The masks of every photograph.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct AllMasks {
+    /// By photograph.
+    pub masks: Vec<Masks>,
+    /// What is recorded of them, by photograph.
+    pub records: Vec<Vec<MaskRecord>>,
+}
+
+impl AllMasks {
+    /// Reads the masks that `files` name, of any of `images`. Several of one kind on one photograph count together.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if a photograph is not there or a mask cannot be read or has another size; [`Error::Cancelled`].
+    pub fn read(
+        files: &[MaskFile],
+        images: &[SourceImage],
+        options: &SourceOptions,
+        context: &StageContext,
+    ) -> Result<Self> {
+        let mut all = Self { masks: vec![Masks::default(); images.len()], records: vec![Vec::new(); images.len()] };
+        for one in files {
+            let position = photograph_named(images, &one.photograph, "so nothing of it can be masked")?;
+            let record = MaskRecord { path: one.file.display().to_string(), kind: one.kind };
+            all.add(position, &images[position], &one.file, record, options, context)?;
+        }
+        Ok(all)
+    }
+
+    /// Reads the masks that a project recorded of the photographs `images`, in their order; relative paths are looked up
+    /// in the project's folder first.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn recall(
+        &mut self,
+        recorded: &[&[MaskRecord]],
+        images: &[SourceImage],
+        project_folder: &Path,
+        options: &SourceOptions,
+        context: &StageContext,
+    ) -> Result<()> {
+        for (position, (records, image)) in recorded.iter().zip(images).enumerate() {
+            // Masks given anew stand in place of the recorded ones of that photograph.
+            if !self.records[position].is_empty() {
+                continue;
+            }
+            for record in *records {
+                let places = [project_folder.join(&record.path), PathBuf::from(&record.path)];
+                let file = places.iter().find(|path| path.is_file()).ok_or_else(|| {
+                    Error::input(
+                        &record.path,
+                        format!("this mask of {} is not there", image.name),
+                        "Put it back, or give another mask of this photograph with --mask or --keep.",
+                    )
+                })?;
+                let record = MaskRecord { path: file.display().to_string(), kind: record.kind };
+                self.add(position, image, file, record, options, context)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn add(
+        &mut self,
+        position: usize,
+        image: &SourceImage,
+        file: &Path,
+        record: MaskRecord,
+        options: &SourceOptions,
+        context: &StageContext,
+    ) -> Result<()> {
+        let white = decode::mask(file, image, options, context)?;
+        let masks = &mut self.masks[position];
+        match record.kind {
+            MaskKind::Use => merge(&mut masks.ignored, white.inverted()),
+            MaskKind::Keep => merge(&mut masks.kept, white),
+        }
+        self.records[position].push(record);
+        Ok(())
+    }
+}
+
+fn merge(known: &mut Option<Arc<Mask>>, more: Mask) {
+    *known = Some(Arc::new(match known.take() {
+        Some(known) => more.or(&known),
+        None => more,
+    }));
+}
+
+/// The features of a photograph outside its ignored parts.
+pub(crate) fn outside(features: &Features, ignored: &Mask, frame: &WorkingFrame) -> Features {
+    features.filtered(|point| !ignored.contains(point.position.map(|length| length / frame.working_from_full)))
+}
+
+/// The segments of which most lies outside the ignored parts.
+pub(crate) fn lines_outside(lines: Vec<LineSegment>, ignored: &Mask, frame: &WorkingFrame) -> Vec<LineSegment> {
+    /// Points along a segment that are looked at.
+    const POINTS: usize = 9;
+    let is_ignored = |line: &LineSegment, point: usize| {
+        let share = point as f64 / (POINTS - 1) as f64;
+        let along = |axis: usize| line.start[axis] + share * (line.end[axis] - line.start[axis]);
+        ignored.contains([along(0), along(1)].map(|length| length / frame.working_from_full))
+    };
+    let mostly_outside = |line: &LineSegment| 2 * (0..POINTS).filter(|&point| is_ignored(line, point)).count() < POINTS;
+    lines.into_iter().filter(mostly_outside).collect()
+}
+
+/// Blackens the ignored parts of a thumbnail: what is too dark to tell brightness takes no part in evening it out.
+pub(crate) fn blacken(thumbnail: &mut Raster<u8>, ignored: &Mask, frame: &WorkingFrame) {
+    let size = [1.0 / frame.working_from_full; 2];
+    for y in 0..thumbnail.height() {
+        for x in 0..thumbnail.width() {
+            let place = [x, y].map(|pixel| (pixel as f64 + 0.5) / frame.working_from_full);
+            if ignored.any_within(place, size) {
+                thumbnail.pixel_mut(x, y).fill(0);
+            }
+        }
+    }
+}

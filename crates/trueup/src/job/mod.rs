@@ -1,0 +1,21 @@
+//! Jobs: what is to be stitched, and the files that are to come of it.
+
+mod compose;
+pub(crate) mod inputs;
+pub(crate) mod masks;
+pub(crate) mod names;
+mod layers;
+mod outputs;
+mod side_outputs;
+mod stitch;
+mod threads;
+mod write;
+
+pub use compose::ComposeJob;
+pub use inputs::{Inputs, Reference};
+pub use masks::{MaskFile, MaskKind, MaskRecord};
+pub use outputs::Outputs;
+pub use side_outputs::SideOutput;
+pub use stitch::StitchJob;
+pub use threads::thread_pool;
+pub use write::Written;

@@ -1,0 +1,88 @@
+//! Files that can be wanted beside the panorama: each declared once, with its flag, its checks and its writer.
+
+use std::path::Path;
+
+use trueup_compose::render::{Blend, Panorama};
+use trueup_core::Result;
+use trueup_io::encode;
+
+use super::layers::no_seams;
+use crate::options::StitchOptions;
+use crate::pipeline::{Alignment, Stitcher};
+use crate::project::hugin::hugin_project;
+use crate::project::record::Project;
+
+/// What a file beside the panorama is written from.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Writer {
+    /// The panorama, while it is at hand.
+    Panorama(fn(&Stitcher, &Alignment, &Panorama, &Path) -> Result<()>),
+    /// The aligned photographs, when the panorama is written.
+    Photographs(fn(&Stitcher, &Alignment, &Path) -> Result<()>),
+    /// The record, when all else is written: its text.
+    Record(fn(&Project) -> Result<String>),
+}
+
+macro_rules! side_outputs {
+    ($($(#[doc = $doc:literal])* $variant:ident($flag:literal, $value:literal) checked by $check:expr, written by $writer:expr;)*) => {
+        /// A file that can be wanted beside the panorama.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+        pub enum SideOutput {
+            $($(#[doc = $doc])* $variant,)*
+        }
+
+        impl SideOutput {
+            /// All there are.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),*];
+
+            /// The name of the flag that asks for it, without dashes.
+            pub fn flag(self) -> &'static str {
+                match self { $(Self::$variant => $flag,)* }
+            }
+
+            /// What the flag's value is called.
+            pub fn value_name(self) -> &'static str {
+                match self { $(Self::$variant => $value,)* }
+            }
+
+            /// What it is, in words.
+            pub fn meaning(self) -> String {
+                match self { $(Self::$variant => trueup_core::options::joined(&[$($doc),*]),)* }
+            }
+
+            /// Refuses before work starts what could not be written to `path` when it is done.
+            pub(super) fn check(self, path: &Path, options: &StitchOptions) -> Result<()> {
+                let check: fn(&Path, &StitchOptions) -> Result<()> = match self { $(Self::$variant => $check,)* };
+                check(path, options)
+            }
+
+            pub(super) fn writer(self) -> Writer {
+                match self { $(Self::$variant => $writer,)* }
+            }
+        }
+    };
+}
+
+side_outputs! {
+    /// Cameras, grids, measures and reasons as JSON: what `trueup compose` and other programs read
+    Project("project", "FILE.json")
+        checked by |path, _| encode::check_place(path),
+        written by Writer::Record(Project::to_json);
+    /// The cameras as a Hugin project, for programs that read .pto files
+    HuginProject("pto", "FILE.pto")
+        checked by |path, _| encode::check_place(path),
+        written by Writer::Record(hugin_project);
+    /// Every photograph, aligned and evened out, on a page of a TIFF, to finish by hand
+    Layers("layers", "FILE.tif")
+        checked by |path, _| encode::check_layers_place(path),
+        written by Writer::Photographs(|stitcher, alignment, path| stitcher.write_layers(alignment, path).map(drop));
+    /// Which photograph is shown at every pixel, as a PNG of numbers
+    Seams("seams", "FILE.png")
+        checked by |path, options| {
+            encode::check_labels_place(path)?;
+            if matches!(options.compose.render.blend, Blend::MultiBand | Blend::None) { Ok(()) } else { Err(no_seams()) }
+        },
+        written by Writer::Panorama(|stitcher, alignment, panorama, path| {
+            stitcher.write_seams(alignment, panorama, path).map(drop)
+        });
+}

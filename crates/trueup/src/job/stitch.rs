@@ -1,0 +1,69 @@
+//! From photographs to files: the whole job with its outputs.
+
+use std::path::PathBuf;
+
+use trueup_core::{Result, StageContext};
+use trueup_io::source;
+
+use super::inputs::Inputs;
+use super::outputs::Outputs;
+use super::threads::thread_pool;
+use super::write::Written;
+use crate::memo::PhotographCache;
+use crate::options::StitchOptions;
+use crate::pipeline::Stitcher;
+
+/// What to stitch and where to put it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StitchJob {
+    /// The photographs.
+    pub inputs: Inputs,
+    /// The files to be written. With [`Inputs::all`] and several panoramas, they are numbered.
+    pub outputs: Outputs,
+    /// A folder for results that later runs can use, see [`PhotographCache`]; made if it is not there.
+    pub cache: Option<PathBuf>,
+    /// Number of threads; 0 for one per core.
+    pub threads: usize,
+}
+
+impl StitchJob {
+    /// Runs the job. Outputs are checked before work starts, written beside their place and renamed.
+    ///
+    /// # Errors
+    /// Those of [`Stitcher::align`] and [`Stitcher::compose`], and those of writing; [`trueup_core::Error::Input`] if the
+    /// output is one of the photographs. Panoramas already written stay.
+    pub fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<Written>> {
+        options.validate()?;
+        self.check(&self.outputs, options)?;
+        let max_bytes = options.run.resources.cache_bytes;
+        let cache = self.cache.as_ref().map(|folder| PhotographCache::open(folder, max_bytes)).transpose()?;
+        thread_pool(self.threads)?.install(|| self.stitch(options, cache.as_ref(), context))
+    }
+
+    fn stitch(
+        &self,
+        options: &StitchOptions,
+        cache: Option<&PhotographCache>,
+        context: &StageContext,
+    ) -> Result<Vec<Written>> {
+        let stitcher = Stitcher::new(options, context).with_cache(cache);
+        let aligned = stitcher.align(&self.inputs)?;
+        let count = aligned.alignments.len();
+        let outputs: Vec<Outputs> =
+            (1..=count).map(|number| self.outputs.numbered((count > 1).then_some(number))).collect();
+        // Not before now is it known how many there are: the last panorama is not to fail when the others are made.
+        for outputs in outputs.iter().filter(|_| count > 1) {
+            self.check(outputs, options)?;
+        }
+        let all = aligned.alignments.into_iter().zip(&outputs);
+        all.map(|(alignment, outputs)| outputs.write(&stitcher, alignment)).collect()
+    }
+
+    /// Refuses outputs that cannot be written, or are among the inputs, before the inputs are looked into.
+    fn check(&self, outputs: &Outputs, options: &StitchOptions) -> Result<()> {
+        outputs.check(options)?;
+        let photographs = source::files(&self.inputs.photographs);
+        let masks = self.inputs.masks.iter().map(|mask| mask.file.as_path());
+        outputs.refuse_inputs(photographs.iter().map(PathBuf::as_path), masks)
+    }
+}

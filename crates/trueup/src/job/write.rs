@@ -1,0 +1,68 @@
+//! From an aligned panorama to its files.
+
+use std::path::{Path, PathBuf};
+
+use trueup_core::Result;
+use trueup_io::encode;
+
+use super::outputs::Outputs;
+use super::side_outputs::{SideOutput, Writer};
+use crate::pipeline::{Alignment, Stitcher};
+use crate::project::record::Project;
+
+/// A panorama that was written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Written {
+    /// Its files.
+    pub outputs: Outputs,
+    /// The size of the panorama's file in bytes.
+    pub bytes: u64,
+    /// The record.
+    pub project: Project,
+}
+
+impl Outputs {
+    /// Composes an aligned panorama and writes it and what is wanted beside it.
+    ///
+    /// # Errors
+    /// Those of [`Stitcher::compose`] and of writing; [`trueup_core::Error::Input`] if a file is one of the photographs.
+    pub fn write(&self, stitcher: &Stitcher, mut alignment: Alignment) -> Result<Written> {
+        self.refuse_inputs(alignment.project.images.iter().map(|image| Path::new(&image.path)), [])?;
+        let panorama = stitcher.to_be_written(&self.panorama).compose(&mut alignment)?;
+        let written = stitcher.context().gather(|context| {
+            context.time("output", || {
+                let options = stitcher.output_options(&alignment, &self.panorama)?;
+                let metadata = stitcher.metadata(&alignment);
+                let bytes = encode::write(&self.panorama, &panorama, &metadata, &options, context)?;
+                for (kind, path) in &self.beside {
+                    if let Writer::Panorama(write) = kind.writer() {
+                        write(stitcher, &alignment, &panorama, path)?;
+                    }
+                }
+                drop(panorama);
+                for (kind, path) in &self.beside {
+                    if let Writer::Photographs(write) = kind.writer() {
+                        write(stitcher, &alignment, path)?;
+                    }
+                }
+                Ok(bytes)
+            })
+        })?;
+        let (bytes, told) = written.split();
+        alignment.record(told);
+        let project = alignment.project;
+        for (kind, path) in &self.beside {
+            if let Writer::Record(text) = kind.writer() {
+                encode::write_atomically(path, text(&project)?.as_bytes())?;
+            }
+        }
+        Ok(Written { outputs: self.clone(), bytes, project })
+    }
+}
+
+impl Written {
+    /// The project's file, if one was wanted.
+    pub fn project_file(&self) -> Option<&PathBuf> {
+        self.outputs.beside.get(&SideOutput::Project)
+    }
+}

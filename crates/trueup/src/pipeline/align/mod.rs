@@ -1,0 +1,206 @@
+//! The align phase: from matches to deformed grids for one group of overlapping photographs.
+
+pub(crate) mod component;
+mod overlaps;
+mod refinement;
+mod turn;
+mod vanishing;
+
+use std::borrow::Cow;
+
+use serde::{Deserialize, Serialize};
+use trueup_align::cameras::Cameras;
+use trueup_align::full_turn::{self, FullTurnCut};
+use trueup_align::match_points::OverlapWarp;
+use trueup_align::mesh::{self, Refinements, WarpedMesh};
+use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityPrior};
+use trueup_align::stitch_graph::GraphEdge;
+use trueup_align::vanishing::TriadOutcome;
+use trueup_align::warps::{self, WarpInput, WarpModel};
+use trueup_core::diagnostics::Reported;
+use trueup_core::matches::PairMatches;
+use trueup_core::mesh::GridMesh;
+use trueup_core::{Result, StageContext};
+use trueup_io::decode::FilePhotographs;
+
+use self::component::Component;
+use self::overlaps::Overlaps;
+use self::refinement::RefinementSources;
+use self::turn::{Turn, report_cut};
+use crate::memo::{GEOMETRY, Key, KeyMaker, Memo};
+use crate::options::{AlignOptions, MethodForm};
+
+pub(crate) use self::refinement::needs_pixels;
+
+/// What the phase works on.
+#[derive(Debug)]
+pub(crate) struct AlignInput<'a> {
+    pub component: &'a Component<'a>,
+    /// The photographs' pixels, looked at again only if the options ask for some that were not kept.
+    pub photographs: &'a FilePhotographs,
+    /// Vanishing directions of each photograph that are known already, in place of those that its lines tell.
+    pub directions: Option<&'a [TriadOutcome]>,
+    /// What decides the measurements of each photograph of the set, and the matches; `None` where they cannot be known
+    /// again.
+    pub key: Option<KeyMaker>,
+    /// Where earlier results are found.
+    pub memo: Memo<'a>,
+}
+
+/// The geometry of one group of photographs.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct Geometry {
+    pub cameras: Cameras,
+    pub triads: Vec<TriadOutcome>,
+    pub prior: SimilarityPrior,
+    pub mesh: WarpedMesh,
+    /// The pairs whose overlaps are to coincide.
+    pub coinciding: Vec<PairMatches>,
+}
+
+/// Finds the geometry of a group, unless an earlier run did. Photographs are numbered within the group.
+///
+/// # Errors
+/// Those of the stages; [`trueup_core::Error::NotApplicable`] if a warp model cannot place the photographs;
+/// [`trueup_core::Error::Cancelled`].
+pub(crate) fn run(input: &AlignInput, options: &AlignOptions, context: &StageContext) -> Result<Reported<Geometry>> {
+    input.memo.run(GEOMETRY, geometry_key(input, options).as_ref(), input, options, find_geometry, context)
+}
+
+/// Everything that decides the geometry; `None` if nothing is kept, or directions are given by hand.
+fn geometry_key(input: &AlignInput, options: &AlignOptions) -> Option<Key> {
+    let AlignInput { component, key, memo, directions, .. } = input;
+    let file_name = |image: &&trueup_core::source::SourceImage| {
+        image.path.file_name().map(|file| file.to_string_lossy().into_owned())
+    };
+    let images: Vec<_> = component.images.iter().map(|image| (&image.name, file_name(image), image.focal_prior)).collect();
+    let own = key.clone().filter(|_| directions.is_none())?;
+    let own = own
+        .part(&images)
+        .part(&component.camera_groups())
+        .part(&component.pairs)
+        .part(&(component.reference, component.reference_rotation));
+    memo.key(GEOMETRY, Some(own), options)
+}
+
+/// The stages in their order.
+fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageContext) -> Result<Geometry> {
+    let component = input.component;
+    let grids: Vec<GridMesh> = component
+        .frames
+        .iter()
+        .map(|frame| GridMesh::regular(frame.width, frame.height, options.mesh.cell_px))
+        .collect();
+    let overlaps = overlaps::run(component, options, input.memo, context)?;
+    let Overlaps { cameras, pairs, warps } = &overlaps.value;
+    let triads = match input.directions {
+        Some(known) => known.to_vec(),
+        None => vanishing::run(component, cameras, &options.vanishing, context)?,
+    };
+    let prior = context.in_one_step("prior", || find_prior(component, &overlaps.value, &triads, options, context))?;
+
+    let edges: Vec<GraphEdge> =
+        pairs.iter().map(|pair| GraphEdge { a: pair.a, b: pair.b, weight: pair.agreeing }).collect();
+    let cut = full_turn::find_cut(&cameras.cameras, &edges, &prior.level_from_world());
+    let turn = cut.as_ref().map(|cut| Turn::new(cut, warps));
+    let within: Cow<'_, [OverlapWarp]> = turn.as_ref().map_or(warps.into(), |turn| turn.within.as_slice().into());
+    let unsevered = |pair: &&PairMatches| {
+        let severed = |cut: &FullTurnCut| cut.severed.binary_search(&(pair.a, pair.b)).is_ok();
+        !cut.as_ref().is_some_and(severed)
+    };
+    let within_turn: Vec<PairMatches> = pairs.iter().filter(unsevered).cloned().collect();
+    let deformation = Deformation {
+        input,
+        grids: &grids,
+        cameras,
+        prior: &prior,
+        warps: &within,
+        pairs: &within_turn,
+        turn: turn.as_ref(),
+        cut: cut.as_ref(),
+    };
+    let mesh = context.in_one_step("mesh", || match options.stitch.method.form() {
+        MethodForm::Mesh(_) => deformation.by_mesh(options, context),
+        MethodForm::Warp(model) => deformation.by_warp(model, options, context),
+    })?;
+    if let Some(cut) = &cut {
+        report_cut(cut, mesh.period.is_some(), component, context);
+    }
+    let coinciding = if mesh.period.is_some() { pairs.clone() } else { within_turn };
+    Ok(Geometry { cameras: cameras.clone(), triads, prior, mesh, coinciding })
+}
+
+/// How every photograph is to be turned and scaled, under the prior that the method means.
+fn find_prior(
+    component: &Component,
+    overlaps: &Overlaps,
+    triads: &[TriadOutcome],
+    options: &AlignOptions,
+    context: &StageContext,
+) -> Result<SimilarityPrior> {
+    let prior = match options.stitch.method.form() {
+        MethodForm::Mesh(prior) => prior,
+        MethodForm::Warp(_) => PriorMethod::Straightening,
+    };
+    let input = PriorInput {
+        cameras: &overlaps.cameras.cameras,
+        triads,
+        lines: &component.lines,
+        frames: &component.frames,
+        edges: &overlaps.pairs,
+        overlaps: &overlaps.warps,
+        cell_px: options.mesh.cell_px,
+        vanishing: &options.vanishing,
+        turn: component.reference_rotation,
+        reference: component.reference,
+    };
+    similarity::run(&input, &trueup_align::similarity::SimilarityOptions { prior, ..options.similarity.clone() }, context)
+}
+
+/// What the grids are deformed by.
+struct Deformation<'a> {
+    input: &'a AlignInput<'a>,
+    /// Even grids over the working photographs.
+    grids: &'a [GridMesh],
+    cameras: &'a Cameras,
+    prior: &'a SimilarityPrior,
+    /// The overlaps and pairs that do not lie across the cut of a full turn.
+    warps: &'a [OverlapWarp],
+    pairs: &'a [PairMatches],
+    turn: Option<&'a Turn>,
+    cut: Option<&'a FullTurnCut>,
+}
+
+impl Deformation<'_> {
+    fn by_mesh(&self, options: &AlignOptions, context: &StageContext) -> Result<WarpedMesh> {
+        let AlignInput { component, photographs, .. } = self.input;
+        let cameras = &self.cameras.cameras;
+        let bases = mesh::bases(cameras, self.grids, self.prior, &options.mesh);
+        let sources = RefinementSources::new(component, self.grids, self.warps, photographs, options, context)?;
+        let closure = self.turn.and_then(|turn| turn.closure(mesh::turn_length(cameras, self.prior)));
+        // What is turned as a whole does not go round along the panorama's rows.
+        let closure = closure.filter(|_| component.reference_rotation == 0.0);
+        let refinements = Refinements { closure, ..sources.refinements(component, self.pairs, options) };
+        mesh::run_refined(self.grids, self.warps, &bases, component.reference, &options.mesh, &refinements, context)
+    }
+
+    fn by_warp(&self, model: WarpModel, options: &AlignOptions, context: &StageContext) -> Result<WarpedMesh> {
+        let component = self.input.component;
+        let fine: Vec<GridMesh> = self.grids.iter().map(|grid| mesh::divided(grid, options.mesh.subdivision)).collect();
+        let input = WarpInput {
+            cameras: &self.cameras.cameras,
+            frames: &component.frames,
+            grids: &fine,
+            pairs: self.pairs,
+            match_grids: self.grids,
+            overlaps: self.warps,
+            names: &component.names(),
+            seeds: &component.seeds(),
+            reference: component.reference,
+            level_from_world: self.prior.level_from_world(),
+            cut_yaw: self.cut.map(|cut| cut.yaw),
+            turn: component.reference_rotation,
+        };
+        warps::run(model, &input, &options.warps, context)
+    }
+}

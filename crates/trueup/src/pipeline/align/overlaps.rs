@@ -1,0 +1,73 @@
+//! Cameras and the overlaps that follow from them: what most methods share.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+use trueup_align::cameras::{self, CameraOptions, Cameras};
+use trueup_align::match_points::{self, MatchPointOptions, OverlapWarp};
+use trueup_core::diagnostics::Reported;
+use trueup_core::matches::PairMatches;
+use trueup_core::mesh::GridMesh;
+use trueup_core::{Result, StageContext};
+
+use super::component::Component;
+use crate::memo::{Memo, OVERLAPS};
+use crate::options::AlignOptions;
+
+/// The options that overlaps depend on.
+#[derive(Debug, Serialize)]
+struct OverlapOptions<'a> {
+    cameras: &'a CameraOptions,
+    match_points: &'a MatchPointOptions,
+    /// `mesh.cell_px`.
+    cell_px: f64,
+}
+
+/// Cameras and the overlaps that follow from them.
+#[derive(Debug, Clone)]
+pub(super) struct Overlaps {
+    pub cameras: Cameras,
+    /// The pairs that the cameras agree with.
+    pub pairs: Vec<PairMatches>,
+    /// Their grids carried across them.
+    pub warps: Vec<OverlapWarp>,
+}
+
+/// Estimates the cameras and carries grids across the overlaps, unless this was done before for the same group of the set.
+///
+/// # Errors
+/// Those of the two stages.
+pub(super) fn run(
+    component: &Component,
+    options: &AlignOptions,
+    memo: Memo,
+    context: &StageContext,
+) -> Result<Arc<Reported<Overlaps>>> {
+    let options = OverlapOptions {
+        cameras: &options.cameras,
+        match_points: &options.match_points,
+        cell_px: options.mesh.cell_px,
+    };
+    let group = (&component.members, component.reference);
+    let overlaps = memo.run_in_memory(OVERLAPS, &group, component, &options, find, context)?;
+    context.absorb(overlaps.told());
+    Ok(overlaps)
+}
+
+fn find(component: &Component, options: &OverlapOptions, context: &StageContext) -> Result<Overlaps> {
+    let priors = component.camera_priors();
+    let cameras = context.in_one_step("cameras", || {
+        let input = cameras::CameraInput { priors: &priors, pairs: &component.pairs, reference: component.reference };
+        cameras::run(&input, options.cameras, context)
+    })?;
+    let pairs: Vec<PairMatches> = (0..component.pairs.len())
+        .filter(|position| cameras.contradicting.binary_search(position).is_err())
+        .map(|position| component.pairs[position].clone())
+        .collect();
+    let grids: Vec<GridMesh> =
+        component.frames.iter().map(|frame| GridMesh::regular(frame.width, frame.height, options.cell_px)).collect();
+    let warps = context.time("match points", || {
+        match_points::run(&component.frames, &grids, &cameras.cameras, &pairs, options.match_points, context)
+    })?;
+    Ok(Overlaps { cameras, pairs, warps })
+}

@@ -1,0 +1,288 @@
+//! The arrange phase: from the solved mesh to the canvas that is composed: projection, frame, crop.
+//!
+//! Works from what a stitch has at hand as from what its project records: grids in any plane and levelled cameras.
+
+use nalgebra::Matrix3;
+use trueup_align::projection::{self, Placement, Projection, Shot, View};
+use trueup_compose::crop::{self, Crop, Rectangle};
+use trueup_compose::layout::{self, CanvasLayout, CanvasOptions, Frame, Placed};
+use trueup_core::camera::Camera;
+use trueup_core::diagnostics::{Diagnostic, Reported, Subject};
+use trueup_core::geometry::matrix_from_rows;
+use trueup_core::mesh::GridMesh;
+use trueup_core::{Error, Result, StageContext};
+
+use super::align::Geometry;
+use super::align::component::Component;
+use crate::options::ArrangeOptions;
+use crate::project::projection::ProjectionRecord;
+use crate::project::record::{ImageRecord, Project};
+
+/// What the phase works on.
+#[derive(Debug, Clone)]
+pub(crate) struct ArrangeInput {
+    /// Every photograph once, in the plane of the solved mesh, in any unit.
+    pub placed: Vec<Placed>,
+    /// Which of them sets the pixel scale.
+    pub reference: usize,
+    /// Their cameras in the photographs' own pixels, in the level world; `None` where none are known.
+    pub cameras: Option<Vec<Camera>>,
+    /// The scene's dominant directions in the level world (columns), if they are known.
+    pub dominant: Option<Matrix3<f64>>,
+    /// The turn of the plane of `placed` in its unit, if it closes on itself.
+    pub period: Option<f64>,
+}
+
+/// A canvas, and how it came about.
+#[derive(Debug, Clone)]
+pub(crate) struct Arrangement {
+    /// Every photograph once in the plane of the mesh, in pixels of the canvas if that is the mesh's; for measures, exposure
+    /// and the record.
+    pub plane: CanvasLayout,
+    /// The canvas's pixel (0, 0) in `plane`'s pixels; zero but for a cropped mesh.
+    pub plane_shift: [f64; 2],
+    /// What is composed.
+    pub written: CanvasLayout,
+    /// How directions were drawn; `None` for the mesh.
+    pub projection: Option<ProjectionRecord>,
+}
+
+impl ArrangeInput {
+    /// What a stitch knows of a group of photographs.
+    pub fn of_geometry(placed: Vec<Placed>, component: &Component, geometry: Option<&Geometry>) -> Self {
+        let cameras = geometry.map(|geometry| {
+            let level_from_world = geometry.prior.level_from_world();
+            let corrected = geometry.prior.corrected_cameras(&geometry.cameras.cameras);
+            let full = corrected.iter().zip(&component.frames).zip(&placed).map(|((camera, frame), placed)| {
+                let camera_from_level = camera.rotation() * level_from_world.transpose();
+                let focal_px = camera.focal_px / frame.working_from_full;
+                Camera::new(focal_px, placed.mesh.width, placed.mesh.height, &camera_from_level)
+            });
+            full.collect()
+        });
+        let dominant = geometry.and_then(|geometry| geometry.prior.guidance.dominant);
+        let dominant = dominant.as_ref().map(matrix_from_rows);
+        let period = geometry.and_then(|geometry| geometry.mesh.period);
+        Self { placed, reference: component.reference, cameras, dominant, period }
+    }
+
+    /// What a project knows of the photographs used, whose grids are `placed` in its order: composing from the record starts
+    /// here.
+    pub fn of_project(placed: Vec<Placed>, reference: usize, project: &Project) -> Self {
+        let camera = |(record, placed): (&ImageRecord, &Placed)| {
+            let camera_from_level = record.upright_rotation.or(record.rotation)?;
+            let mesh = &placed.mesh;
+            Some(Camera::new(record.focal_px?, mesh.width, mesh.height, &matrix_from_rows(&camera_from_level)))
+        };
+        let cameras = project.used_images().zip(&placed).map(camera).collect();
+        let dominant = project.manhattan.dominant.as_ref();
+        let period = project.grid_canvas().period();
+        Self { placed, reference, cameras, dominant: dominant.map(matrix_from_rows), period }
+    }
+}
+
+/// Arranges the photographs as the options ask: projected, laid on a canvas, cropped. Photographs go by their numbers in
+/// `placed`.
+///
+/// # Errors
+/// Those of the layout; [`Error::NotApplicable`] if a projection is asked for and no cameras are known;
+/// [`Error::Unsolvable`] if nothing lies in the view.
+pub(crate) fn run(input: ArrangeInput, options: &ArrangeOptions, context: &StageContext) -> Result<Reported<Arrangement>> {
+    context.gather(|context| context.time("canvas", || lay_out(input, options, context)))
+}
+
+fn lay_out(input: ArrangeInput, options: &ArrangeOptions, context: &StageContext) -> Result<Arrangement> {
+    let ArrangeInput { placed, reference, cameras, dominant, period } = input;
+    let is_drawn = cameras.is_none() || options.projection.kind == Projection::Mesh;
+    let lay = |context: &StageContext| layout::run_around(placed, reference, period, &options.canvas, context);
+    // A canvas that is never drawn is of a size that is nobody's concern.
+    let plane = if is_drawn { lay(context)? } else { context.gather(lay)?.value };
+    on_plane(Plane { layout: plane, reference, cameras, dominant }, options, context)
+}
+
+/// Arranges the photographs of `project`, recorded on `plane`, as the options ask: with the recorded options as they were
+/// recorded, to the last bit.
+///
+/// # Errors
+/// As [`run`].
+pub(crate) fn recall(
+    plane: CanvasLayout,
+    reference: usize,
+    project: &Project,
+    options: &ArrangeOptions,
+    context: &StageContext,
+) -> Result<Reported<Arrangement>> {
+    context.gather(|context| {
+        context.time("canvas", || {
+            let recorded = &project.options.arrange;
+            let may_be_cropped = project.projection.is_none() && recorded.canvas.crop != Crop::None;
+            if may_be_cropped && options == recorded {
+                let whole = Rectangle { columns: 0..plane.width, rows: 0..plane.height };
+                let written = crop::cropped(plane.clone(), &whole);
+                return Ok(Arrangement { plane, plane_shift: [0.0; 2], written, projection: None });
+            }
+            let CanvasOptions { crop, min_kept, fill, .. } = recorded.canvas;
+            let same_plane = CanvasOptions { crop, min_kept, fill, ..options.canvas.clone() } == recorded.canvas;
+            let input = ArrangeInput::of_project(plane.placed.clone(), reference, project);
+            if may_be_cropped || !same_plane {
+                return lay_out(input, options, context);
+            }
+            let ArrangeInput { cameras, dominant, .. } = input;
+            on_plane(Plane { layout: plane, reference, cameras, dominant }, options, context)
+        })
+    })
+}
+
+/// Photographs that lie on the mesh's canvas.
+struct Plane {
+    layout: CanvasLayout,
+    /// Which of them sets the pixel scale.
+    reference: usize,
+    /// See [`ArrangeInput::cameras`].
+    cameras: Option<Vec<Camera>>,
+    /// See [`ArrangeInput::dominant`].
+    dominant: Option<Matrix3<f64>>,
+}
+
+fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> Result<Arrangement> {
+    let Plane { layout: plane, reference, cameras, dominant } = plane;
+    let wanted = options.projection.kind;
+    let Some(cameras) = cameras.filter(|_| wanted != Projection::Mesh) else {
+        if !matches!(wanted, Projection::Mesh | Projection::Auto) {
+            return Err(Error::not_applicable(
+                format!("projection.kind = {}", trueup_core::options::OptionValue::display(&wanted)),
+                "no cameras are known: there is one photograph alone, or its record lacks them",
+                "Stitch at least two overlapping photographs, or leave the projection to mesh.",
+            ));
+        }
+        let (written, plane_shift) = framed(plane.clone(), options);
+        return Ok(Arrangement { plane, plane_shift, written, projection: None });
+    };
+    let shots: Vec<Shot> = cameras
+        .iter()
+        .zip(&plane.placed)
+        .map(|(camera, placed)| Shot { camera: *camera, mesh: placed.mesh.clone() })
+        .collect();
+    let view = View::choose(&shots, dominant.as_ref(), &options.projection);
+    let drawn = draw(&shots, &plane, &view, reference, options, context)?;
+    let (written, _) = framed(drawn, options);
+    report_cut(&plane, &written, &view, options, context);
+    let projection = Some(ProjectionRecord::new(&view, &written));
+    Ok(Arrangement { plane, plane_shift: [0.0; 2], written, projection })
+}
+
+/// The photographs on the view's canvas.
+fn draw(
+    shots: &[Shot],
+    plane: &CanvasLayout,
+    view: &View,
+    reference: usize,
+    options: &ArrangeOptions,
+    context: &StageContext,
+) -> Result<CanvasLayout> {
+    let max_parallax = options.projection.max_parallax_deg.to_radians();
+    let meetings = projection::meeting(shots, plane.period.map(|period| period as f64), max_parallax);
+    context.check_cancelled()?;
+    // The reference keeps its own pixels in the middle of the projection.
+    let canvas_from_plane = options.canvas.scale * shots[reference].camera.focal_px;
+    let placement = Placement { view, canvas_from_plane, closed: view.closed };
+    let placed = projection::place(shots, &meetings, &placement)
+        .into_iter()
+        .map(|grid| Placed { photograph: plane.placed[grid.shot].photograph, mesh: grid.mesh })
+        .collect();
+    context.check_cancelled()?;
+    let reach = view.flat.reach(view.half);
+    let frame = Frame {
+        canvas_from_target: canvas_from_plane,
+        window: Some([-reach, reach]),
+        period: view.flat.period().filter(|_| view.closed),
+    };
+    layout::framed(placed, &frame, &options.canvas, context)
+}
+
+/// The layout as it is cropped, and by how much it moved.
+fn framed(layout: CanvasLayout, options: &ArrangeOptions) -> (CanvasLayout, [f64; 2]) {
+    match crop::choose(&layout, &options.canvas) {
+        None => (layout, [0.0; 2]),
+        Some(kept) => {
+            let shift = [kept.columns.start, kept.rows.start].map(|start| start as f64);
+            (crop::cropped(layout, &kept), shift)
+        }
+    }
+}
+
+/// Says which photographs are not shown, or not wholly though nobody asked for that.
+fn report_cut(
+    plane: &CanvasLayout,
+    written: &CanvasLayout,
+    view: &View,
+    options: &ArrangeOptions,
+    context: &StageContext,
+) {
+    let size = [written.width, written.height].map(|length| length as f64);
+    for placed in &plane.placed {
+        let shown = || written.placed.iter().filter(|other| other.photograph == placed.photograph);
+        let subject = Subject::Photograph(placed.photograph);
+        let hint = "Choose an equirectangular projection, widen projection.fov, or turn the view (yaw, pitch).";
+        if shown().next().is_none() {
+            let message = format!("it lies outside of the {} view and is not shown", view.flat.kind.name());
+            context.report(Diagnostic::warning("projection-left-out", subject.clone(), message, hint));
+        } else if !view.flat.kind.turns() && options.projection.fov == 0.0 {
+            let outside = shown().map(|other| share_outside(&other.mesh, size)).fold(1.0, f64::min);
+            /// Less than this is a corner.
+            const NOTABLE: f64 = 0.02;
+            if outside > NOTABLE {
+                let [across, _] = view.half.map(|half| 2.0 * half.to_degrees());
+                let message = format!(
+                    "{:.0} % of it lies outside of the {} view, which is {across:.0} degrees wide and as high as carries well",
+                    100.0 * outside,
+                    view.flat.kind.name()
+                );
+                context.report(Diagnostic::note("projection-cut", subject, message, hint));
+            }
+        }
+    }
+}
+
+/// Share of the grid's vertices that lie outside of a canvas.
+fn share_outside(mesh: &GridMesh, size: [f64; 2]) -> f64 {
+    // Vertices lie closer where the projection bends more; each counts for the photograph around it.
+    let weight = |vertex: usize| {
+        let (row, column) = (vertex / mesh.columns, vertex % mesh.columns);
+        let at = |row: usize, column: usize| mesh.source(row * mesh.columns + column);
+        let low = at(row.saturating_sub(1), column.saturating_sub(1));
+        let high = at((row + 1).min(mesh.rows - 1), (column + 1).min(mesh.columns - 1));
+        (high - low).product()
+    };
+    let (mut outside, mut all) = (0.0, 0.0);
+    for vertex in 0..mesh.len() {
+        let shown = (0..2).all(|axis| (0.0..=size[axis]).contains(&mesh.target[vertex][axis]));
+        all += weight(vertex);
+        outside += if shown { 0.0 } else { weight(vertex) };
+    }
+    outside / all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_single_photograph_has_no_projection() {
+        let mesh = GridMesh::regular(40.0, 30.0, 40.0);
+        let input = |period| ArrangeInput {
+            placed: vec![Placed { photograph: 0, mesh: mesh.clone() }],
+            reference: 0,
+            cameras: None,
+            dominant: None,
+            period,
+        };
+        let mut options = ArrangeOptions::default();
+        options.projection.kind = Projection::Perspective;
+        let refused = run(input(None), &options, &StageContext::default()).expect_err("no camera");
+        assert!(matches!(refused, Error::NotApplicable { .. }), "{refused}");
+        options.projection.kind = Projection::Auto;
+        let kept = run(input(None), &options, &StageContext::default()).expect("as it is").value;
+        assert_eq!((kept.written.width, kept.written.height, kept.projection), (40, 30, None));
+    }
+}

@@ -1,0 +1,173 @@
+//! How much memory the work may take, and how the stages divide it. The division decides what is kept and what is done at
+//! once, never what comes out.
+
+use trueup_compose::render::Resources;
+use trueup_core::memory::{MemoryBudget, bytes_in_words};
+use trueup_core::scratch::ScratchSpace;
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result};
+
+use crate::options::ResourceOptions;
+
+/// What the program takes beside what is counted: itself, features and matches, meshes, and what the allocator cannot give
+/// back. A whole stitch of five small photographs peaks at 111 MB, of which their pixels are a part.
+const PROGRAM_BYTES: usize = 96_000_000;
+
+/// The share of the machine's memory that is taken without being asked for less or more: 1 / 4.
+const AUTOMATIC_SHARE: u64 = 4;
+
+/// Where the machine does not say how much memory it has, it is taken to have so much.
+const ASSUMED_MACHINE: u64 = 8_000_000_000;
+
+/// Bytes that finding features takes per working pixel: the levels of the scale space of a picture of twice the size.
+const FEATURE_BYTES: f64 = 240.0;
+
+/// Bytes of a photograph's pixel that was not decoded yet.
+const PIXEL_BYTES: usize = 4;
+
+/// A photograph on its way into memory takes this many times its size: what the decoder holds beside its pixels, and its
+/// copy when it is turned upright.
+const DECODING: usize = 2;
+
+/// Memory to be divided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Budget {
+    /// Bytes to be taken in all.
+    memory: usize,
+    /// Bytes that may be taken where less is too little to work at all.
+    ceiling: usize,
+}
+
+impl Budget {
+    /// What the options allow on this machine.
+    pub fn new(options: &ResourceOptions) -> Self {
+        match options.memory {
+            MemoryBudget::Bytes(bytes) => {
+                let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
+                Self { memory: bytes, ceiling: bytes }
+            }
+            MemoryBudget::Auto => {
+                let (machine, free) = machine_memory();
+                let memory = usize::try_from(machine / AUTOMATIC_SHARE).unwrap_or(usize::MAX);
+                Self { memory, ceiling: usize::try_from(free).unwrap_or(usize::MAX).max(memory) }
+            }
+        }
+    }
+
+    /// How many photographs may be measured at once on copies of `working_pixels`, and how many bytes of them kept until they are composed.
+    ///
+    /// # Errors
+    /// [`Error::Limits`] with the numbers if the largest is too large to be measured alone.
+    pub fn measuring(&self, images: &[SourceImage], working_pixels: f64) -> Result<Measuring> {
+        let bytes = |image: &SourceImage| image.width.saturating_mul(image.height).saturating_mul(PIXEL_BYTES);
+        let Some(largest) = images.iter().max_by_key(|image| bytes(image)) else {
+            return Ok(Measuring { at_once: usize::MAX, kept_bytes: 0 });
+        };
+        let features = (FEATURE_BYTES * working_pixels) as usize;
+        let one = bytes(largest).saturating_mul(DECODING).saturating_add(features);
+        let least = one.saturating_add(PROGRAM_BYTES);
+        if least > self.ceiling {
+            let words = |bytes: usize| bytes_in_words(bytes as u64);
+            return Err(Error::Limits {
+                subject: format!("measuring {} ({} x {} px)", largest.name, largest.width, largest.height),
+                needed: format!("at least {} of memory", words(least)),
+                allowed: words(self.ceiling),
+                hint: "Raise --memory (resources.memory), or give smaller photographs.".to_owned(),
+            });
+        }
+        let memory = self.memory.max(least) - PROGRAM_BYTES;
+        // Keeping some of many saves little; keeping all of a small set saves decoding it twice.
+        let all: usize = images.iter().map(bytes).fold(0, usize::saturating_add);
+        let kept_bytes = if all <= memory / 4 { all } else { 0 };
+        Ok(Measuring { at_once: ((memory - kept_bytes) / one).max(1), kept_bytes })
+    }
+
+    /// What composing may take while `kept` bytes of photographs are held elsewhere.
+    pub fn composing<'a>(&self, kept: usize, scratch: &'a dyn ScratchSpace) -> Resources<'a> {
+        let left = |bytes: usize| bytes.saturating_sub(PROGRAM_BYTES).saturating_sub(kept);
+        Resources { memory: left(self.memory), ceiling: left(self.ceiling), scratch }
+    }
+}
+
+/// How photographs are measured within the budget.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Measuring {
+    /// Photographs at once, at least 1.
+    pub at_once: usize,
+    /// Bytes of decoded photographs to be kept.
+    pub kept_bytes: usize,
+}
+
+/// Bytes of memory that this machine, or the container that the program runs in, has, and how many of them are free.
+fn machine_memory() -> (u64, u64) {
+    let (mut total, mut free) = (0, 0);
+    // An error where the operating system is not known.
+    if let Ok(mut system) = sysinfo::System::new() {
+        system.refresh_memory();
+        (total, free) = (system.total_memory(), system.available_memory());
+        if let Some(container) = system.cgroup_limits().filter(|container| container.total_memory > 0) {
+            total = total.min(container.total_memory);
+            free = free.min(container.free_memory);
+        }
+    }
+    if total == 0 { (ASSUMED_MACHINE, ASSUMED_MACHINE / AUTOMATIC_SHARE) } else { (total, free) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::StitchOptions;
+
+    fn images(count: usize, width: usize, height: usize) -> Vec<SourceImage> {
+        let image = |index: usize| SourceImage {
+            path: format!("{index}.jpg").into(),
+            name: format!("{index}.jpg"),
+            width,
+            height,
+            orientation: 1,
+            focal_prior: None,
+            camera_model: None,
+        };
+        (0..count).map(image).collect()
+    }
+
+    const WORKING_PIXELS: f64 = 480_000.0;
+
+    fn budget(memory: &str) -> Budget {
+        let mut options = StitchOptions::default();
+        options.set(&format!("resources.memory={memory}")).expect("an amount");
+        Budget::new(&options.run.resources)
+    }
+
+    #[test]
+    fn small_sets_are_kept_and_large_ones_are_measured_a_few_at_a_time() {
+        let measuring = |memory: &str, count: usize| {
+            budget(memory).measuring(&images(count, 6000, 4000), WORKING_PIXELS).expect("enough")
+        };
+        assert_eq!(measuring("4GB", 8).kept_bytes, 8 * 96_000_000);
+        assert_eq!(measuring("4GB", 60).kept_bytes, 0);
+        // One takes 192 MB and 115 MB for its features.
+        assert_eq!(measuring("4GB", 60).at_once, 12);
+        assert_eq!(measuring("500MB", 60).at_once, 1);
+    }
+
+    #[test]
+    fn the_number_in_a_refusal_is_enough() {
+        let refused = |memory: &str| {
+            budget(memory).measuring(&images(3, 6000, 4000), WORKING_PIXELS).err().map(|error| error.to_string())
+        };
+        let message = refused("100MB").expect("too little");
+        assert!(
+            message.contains("2.jpg (6000 x 4000 px): at least 403 MB of memory needed, 100 MB allowed"),
+            "{message}"
+        );
+        assert_eq!(refused("404MB"), None);
+    }
+
+    #[test]
+    fn without_a_word_a_share_of_the_machine_is_taken_and_more_if_it_must_be() {
+        let Budget { memory, ceiling } = Budget::new(&ResourceOptions::default());
+        assert!(memory > 0 && ceiling >= memory);
+        assert_eq!(budget("2GB"), Budget { memory: 2_000_000_000, ceiling: 2_000_000_000 });
+    }
+}

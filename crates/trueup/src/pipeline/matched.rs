@@ -1,0 +1,241 @@
+//! The photographs after matching: what is known of them, which groups they make, and what cannot go on.
+
+use trueup_align::stitch_graph::{GraphFile, StitchGraph};
+use trueup_core::diagnostics::{Diagnostic, Subject};
+use trueup_core::matches::PairMatches;
+use trueup_core::source::WorkingFrame;
+use trueup_core::{Error, Result, StageContext};
+use trueup_vision::features::Features;
+
+use super::align::component::Component;
+use super::compose::SmallPhotograph;
+use super::measure::{Measurements, concerns_one_photograph};
+use super::measured::Measured;
+use super::photographs::PhotographSet;
+use crate::job::inputs::{Inputs, Reference};
+use crate::job::names::reference_named;
+use crate::memo::{Key, KeyMaker};
+use crate::report::left_out::{LeftOut, counts, explain, none_usable, reason_of_rejected, strength};
+use crate::report::several::several;
+
+/// Everything known of the photographs after matching.
+#[derive(Debug)]
+pub(crate) struct Matched {
+    pub set: PhotographSet,
+    /// `None` for photographs that could not be decoded, whose reason is in `undecodable`.
+    pub measured: Vec<Option<Measured>>,
+    pub undecodable: Vec<Option<Error>>,
+    /// What decides the measurements of each photograph; all `None` where nothing is kept.
+    pub keys: Vec<Option<Key>>,
+    pub pairs: Vec<PairMatches>,
+    pub graph: StitchGraph,
+    pub graph_file: GraphFile,
+}
+
+/// What matching looks at, taken out of the measurements so that it is gone when matching is done.
+pub(crate) struct LookedAt {
+    pub features: Vec<Features>,
+    pub frames: Vec<WorkingFrame>,
+    pub usable: Vec<bool>,
+}
+
+impl Matched {
+    /// Measured photographs of which no pairs are known yet.
+    ///
+    /// # Errors
+    /// Of the measurements' errors the first that does not concern one photograph alone.
+    pub fn unmatched(set: PhotographSet, measurements: Measurements, graph_file: GraphFile) -> Result<Self> {
+        let (mut measured, mut undecodable) = (Vec::new(), Vec::new());
+        for outcome in measurements.photographs {
+            let (one, error) = match outcome {
+                Ok(one) => (Some(one), None),
+                Err(error) if concerns_one_photograph(&error) => (None, Some(error)),
+                Err(error) => return Err(error),
+            };
+            measured.push(one);
+            undecodable.push(error);
+        }
+        let graph = StitchGraph::new(set.images.len(), &[]);
+        Ok(Self { set, measured, undecodable, keys: measurements.keys, pairs: Vec::new(), graph, graph_file })
+    }
+
+    /// Takes the features out, to be matched.
+    pub fn take_features(&mut self) -> LookedAt {
+        let placeholder = WorkingFrame { width: 1.0, height: 1.0, working_from_full: 1.0 };
+        let frame = |one: &Option<Measured>| one.as_ref().map_or(placeholder, |one| one.frame);
+        let features = |one: &mut Option<Measured>| one.as_mut().map(|one| std::mem::take(&mut one.features));
+        LookedAt {
+            frames: self.measured.iter().map(frame).collect(),
+            usable: self.measured.iter().map(Option::is_some).collect(),
+            features: self.measured.iter_mut().map(|one| features(one).unwrap_or_default()).collect(),
+        }
+    }
+
+    /// What the geometry of the group `members` is found from.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the reference is no photograph's name.
+    pub fn component<'a>(&'a self, members: &[usize], inputs: &Inputs) -> Result<Component<'a>> {
+        let reference = self.reference_of(members, inputs)?;
+        let rotation_deg = self.graph_file.reference_rotation_deg.filter(|_| self.graph_file.reference == Some(reference));
+        let rotation = rotation_deg.unwrap_or(0.0).to_radians();
+        Ok(Component::new(members, reference, rotation, &self.set.images, &self.measured, &self.pairs))
+    }
+
+    /// What decides the measurements of the group `members`; `None` where that is not known.
+    pub fn key_of(&self, members: &[usize]) -> Option<KeyMaker> {
+        members.iter().try_fold(KeyMaker::new(), |maker, &member| Some(maker.key(self.keys[member].as_ref()?)))
+    }
+
+    /// The small copies of a group's photographs.
+    pub fn small_photographs(&self, component: &Component) -> Vec<SmallPhotograph<'_>> {
+        let small = |(&member, camera): (&usize, usize)| {
+            let measured = self.measured[member].as_ref()?;
+            Some(SmallPhotograph { thumbnail: &measured.thumbnail, frame: measured.thumbnail_frame, camera })
+        };
+        component.members.iter().zip(component.camera_groups()).filter_map(small).collect()
+    }
+
+    /// The reference of the group `members`: the one named, the graph's, or the photograph in its middle.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if no photograph has the name.
+    pub fn reference_of(&self, members: &[usize], inputs: &Inputs) -> Result<usize> {
+        let wished = match &inputs.reference {
+            Reference::Named(name) => Some(reference_named(&self.set.images, name)?),
+            Reference::Auto => self.graph_file.reference,
+        };
+        Ok(wished.filter(|wished| members.contains(wished)).unwrap_or_else(|| self.graph.central_photograph(members)))
+    }
+
+    /// The error when not one photograph could be decoded.
+    pub fn none_usable(&self) -> Error {
+        let undecodable = (0..self.set.images.len()).map(|index| {
+            let LeftOut { reason, hint, .. } = self.why_left_out(index, &[]);
+            (self.set.images[index].name.clone(), reason, hint)
+        });
+        none_usable(undecodable.chain(self.set.rejected.iter().cloned().map(reason_of_rejected)).collect())
+    }
+
+    /// Why a photograph is left out of the panorama at hand: it cannot be read, is in another one of those stitched, or in
+    /// none of them.
+    pub fn why_left_out(&self, index: usize, stitched: &[Vec<usize>]) -> LeftOut {
+        if let Some(error) = &self.undecodable[index] {
+            let (reason, hint) = match error {
+                Error::Input { reason, hint, .. } => (reason.clone(), hint.clone()),
+                other => (other.to_string(), "Check the file, or copy it again.".to_owned()),
+            };
+            return LeftOut { code: "picture-damaged", reason, hint };
+        }
+        if let Some(position) = stitched.iter().position(|members| members.contains(&index)) {
+            let reason = format!("it is in panorama {} of {}", position + 1, stitched.len());
+            return LeftOut { code: "other-panorama", reason, hint: String::new() };
+        }
+        let component = stitched.first().map_or(&[][..], Vec::as_slice);
+        explain(index, component, &self.pairs, &self.set.names())
+    }
+
+    /// The groups to be stitched: the largest, or all with at least two members; a single photograph is a group.
+    ///
+    /// # Errors
+    /// [`Error::Unsolvable`] if no two photographs overlap; [`Error::Input`] if none could be decoded, or the reference
+    /// overlaps no other photograph.
+    pub fn groups(&self, inputs: &Inputs, context: &StageContext) -> Result<Vec<Vec<usize>>> {
+        let decodable: Vec<usize> = (0..self.measured.len()).filter(|&index| self.measured[index].is_some()).collect();
+        match decodable.as_slice() {
+            [] => return Err(self.none_usable()),
+            [only] => {
+                context.report(Diagnostic::warning(
+                    "single-photograph",
+                    Subject::Photograph(*only),
+                    "there is only one photograph to use; it is written as it is",
+                    "Name at least two overlapping photographs, or a folder that holds them.",
+                ));
+                return Ok(vec![vec![*only]]);
+            }
+            _ => {}
+        }
+        let mut joined: Vec<Vec<usize>> =
+            self.graph.components.iter().filter(|component| component.len() > 1).cloned().collect();
+        if joined.is_empty() {
+            return Err(self.no_overlap());
+        }
+        if let Reference::Named(name) = &inputs.reference
+            && !inputs.all
+        {
+            // The panorama that holds the named reference is the one that is wanted.
+            let wanted = reference_named(&self.set.images, name)?;
+            let Some(position) = joined.iter().position(|component| component.contains(&wanted)) else {
+                return Err(Error::input(
+                    name,
+                    "it cannot be the reference because it overlaps no other photograph",
+                    "Choose another reference, or leave --reference out.",
+                ));
+            };
+            joined.swap(0, position);
+        }
+        if !inputs.all {
+            joined.truncate(1);
+        }
+        Ok(joined)
+    }
+
+    fn no_overlap(&self) -> Error {
+        let names = self.set.names();
+        let best = self.pairs.iter().max_by(|one, two| strength(one).total_cmp(&strength(two)));
+        let why = match best.filter(|pair| pair.putative > 0) {
+            Some(pair) => format!(
+                "no overlapping photographs found; the best pair is {} and {}: {}",
+                names[pair.a],
+                names[pair.b],
+                counts(pair)
+            ),
+            None => "no overlapping photographs found".to_owned(),
+        };
+        Error::unsolvable(
+            "matching",
+            format!("{} photographs", names.len()),
+            why,
+            "Photographs must share a third of their view, with detail in it; join pairs by hand in a --graph file.",
+        )
+    }
+
+    /// Refuses to leave anything out of the groups `stitched`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with the reason for each that would be.
+    pub fn require_all(&self, stitched: &[Vec<usize>]) -> Result<()> {
+        let PhotographSet { images, rejected, .. } = &self.set;
+        let used: usize = stitched.iter().map(Vec::len).sum();
+        let given = images.len() + rejected.len();
+        if used == given {
+            return Ok(());
+        }
+        let mut reasons: Vec<String> = (0..images.len())
+            .filter(|index| !stitched.iter().any(|component| component.contains(index)))
+            .map(|index| format!("{}: {}", images[index].name, self.why_left_out(index, stitched).reason))
+            .collect();
+        reasons.extend(rejected.iter().map(|one| format!("{}: {}", one.name, one.reason)));
+        Err(Error::input(
+            format!("{} of {given} photographs", given - used),
+            format!("they cannot be used although all are required: {}", several(&reasons)),
+            "Leave --require-all out to stitch the others.",
+        ))
+    }
+
+    /// Says what is in none of the groups `stitched`, and why.
+    pub fn report_left_out(&self, stitched: &[Vec<usize>], context: &StageContext) {
+        for index in 0..self.set.images.len() {
+            if stitched.iter().any(|component| component.contains(&index)) {
+                continue;
+            }
+            self.set.files.forget(index);
+            let LeftOut { code, reason, hint } = self.why_left_out(index, stitched);
+            context.report(Diagnostic::warning(code, Subject::Photograph(index), reason, hint));
+        }
+        for rejected in &self.set.rejected {
+            let subject = Subject::file(&rejected.name);
+            context.report(Diagnostic::warning(&rejected.code, subject, &rejected.reason, &rejected.hint));
+        }
+    }
+}

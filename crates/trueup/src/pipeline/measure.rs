@@ -1,0 +1,188 @@
+//! The measure phase: every photograph is decoded once, reduced, and measured.
+
+use std::ops::Range;
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+use trueup_core::diagnostics::Reported;
+use trueup_core::raster::Raster;
+use trueup_core::source::{PhotographSource, WorkingFrame};
+use trueup_core::{Error, Result, StageContext};
+use trueup_io::decode::FilePhotographs;
+use trueup_vision::features;
+use trueup_vision::lines;
+
+use super::measured::Measured;
+use super::photographs::PhotographSet;
+use crate::job::masks::{blacken, lines_outside, outside};
+use crate::memo::{Key, MEASURED, Memo};
+use crate::options::MeasureOptions;
+
+const STAGE: &str = "measuring";
+
+/// Pixels of the small copies that exposures are compared on: enough for the brightness of an overlap, and small enough to
+/// be kept for every photograph.
+pub(crate) const THUMBNAIL_PIXELS: f64 = 30_000.0;
+
+/// With room for so many photographs per thread, no group of them is waited for.
+const MANY_PER_THREAD: usize = 4;
+
+/// What the phase works on.
+#[derive(Debug)]
+pub(crate) struct MeasureInput<'a> {
+    pub set: &'a PhotographSet,
+    /// Where what earlier runs measured is found.
+    pub memo: Memo<'a>,
+    /// Whether the gray values are handed on, for a mesh that is refined by pixels.
+    pub keep_grays: bool,
+}
+
+/// What the phase makes of the photographs, in their order.
+#[derive(Debug, Default)]
+pub(crate) struct Measurements {
+    /// Each photograph's measurements, or why it could not be decoded.
+    pub photographs: Vec<Result<Measured>>,
+    /// What decides each of them; all `None` where nothing is kept.
+    pub keys: Vec<Option<Key>>,
+}
+
+/// One photograph to be measured.
+struct OnePhotograph<'a> {
+    files: &'a FilePhotographs,
+    index: usize,
+    keep_grays: bool,
+}
+
+/// What the seconds of interleaved stages are called.
+const DECODING: &str = "decoding";
+const FEATURES: &str = "features";
+const LINES: &str = "lines";
+
+/// Measures every photograph, as many in parallel as the memory bears, but for those that earlier runs measured. A photograph
+/// that cannot be decoded yields its error; the others go on.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub(crate) fn run(
+    input: &MeasureInput,
+    options: &MeasureOptions,
+    context: &StageContext,
+) -> Result<Reported<Measurements>> {
+    context.gather(|context| {
+        let MeasureInput { set, memo, keep_grays } = input;
+        let contents = match memo.disk {
+            Some(_) => context.time("source", || set.keys(context))?,
+            None => vec![None; set.images.len()],
+        };
+        let keys: Vec<Option<Key>> =
+            contents.into_iter().map(|content| memo.key(MEASURED, content, options)).collect();
+        let count = set.images.len();
+        context.progress().begin(STAGE, count as u64);
+        let start = Instant::now();
+        let measured_one = |index: usize| {
+            let one = OnePhotograph { files: &set.files, index, keep_grays: *keep_grays };
+            let measured = memo.run(MEASURED, keys[index].as_ref(), &one, options, measure, context);
+            context.progress().advance(STAGE, 1);
+            measured
+        };
+        // Threads that share a photograph's work may begin another one meanwhile: where memory counts, only groups limit
+        // them.
+        let mut measured: Vec<Result<Reported<Measured>>> = Vec::with_capacity(count);
+        for group in groups(count, set.at_once) {
+            measured.par_extend(group.into_par_iter().map(measured_one));
+        }
+        context.progress().finish(STAGE);
+        context.check_cancelled()?;
+        let busy = |stage: &'static str| {
+            let seconds = measured.iter().flatten().filter_map(|one| one.seconds.get(stage));
+            (stage, Duration::from_secs_f64(seconds.sum()))
+        };
+        context.share(start.elapsed(), &[busy(DECODING), busy(FEATURES), busy(LINES)]);
+        let photographs = measured
+            .into_iter()
+            .map(|one| {
+                one.map(|Reported { value, findings, .. }| {
+                    findings.into_iter().for_each(|finding| context.report(finding));
+                    value
+                })
+            })
+            .collect();
+        Ok(Measurements { photographs, keys })
+    })
+}
+
+fn measure(one: &OnePhotograph, options: &MeasureOptions, context: &StageContext) -> Result<Measured> {
+    context.check_cancelled()?;
+    let OnePhotograph { files, index, keep_grays } = *one;
+    let image = &files.images()[index];
+    let frame = WorkingFrame::new(image.width, image.height, options.working.pixels);
+    let picture = context.time(DECODING, || files.working(index, &frame, THUMBNAIL_PIXELS))?;
+    let mut features = context.time(FEATURES, || features::detect(&picture.gray, &options.features, context))?;
+    let mut lines = context.time(LINES, || lines::detect(&picture.gray, &options.lines, context))?;
+    let mut thumbnail = picture.thumbnail;
+    if let Some(ignored) = files.masks(index).ignored {
+        features = outside(&features, &ignored, &frame);
+        lines = lines_outside(lines, &ignored, &frame);
+        blacken(&mut thumbnail, &ignored, &picture.thumbnail_frame);
+    }
+    let gray = keep_grays.then(|| eight_bit(&picture.gray));
+    Ok(Measured { frame, features, lines, gray, thumbnail, thumbnail_frame: picture.thumbnail_frame })
+}
+
+/// Gray values rounded to eight bits.
+pub(crate) fn eight_bit(gray: &Raster<f32>) -> Raster<u8> {
+    let mut rounded = Raster::new(gray.width(), gray.height(), 1);
+    for (rounded, &value) in rounded.data_mut().iter_mut().zip(gray.data()) {
+        // The cast saturates.
+        *rounded = (value + 0.5) as u8;
+    }
+    rounded
+}
+
+/// A photograph's thumbnail.
+#[derive(Debug)]
+pub(crate) struct SmallCopy {
+    pub thumbnail: Raster<u8>,
+    pub frame: WorkingFrame,
+}
+
+/// The thumbnails of photographs that need not be measured, as many in parallel as the memory bears.
+///
+/// # Errors
+/// Those of decoding; [`Error::Cancelled`].
+pub(crate) fn thumbnails(
+    set: &PhotographSet,
+    options: &MeasureOptions,
+    context: &StageContext,
+) -> Result<Vec<SmallCopy>> {
+    let photographs = &set.files;
+    let thumbnail = |index: usize| {
+        context.check_cancelled()?;
+        let image = &photographs.images()[index];
+        let frame = WorkingFrame::new(image.width, image.height, options.working.pixels);
+        let picture = photographs.working(index, &frame, THUMBNAIL_PIXELS)?;
+        let mut thumbnail = picture.thumbnail;
+        if let Some(ignored) = photographs.masks(index).ignored {
+            blacken(&mut thumbnail, &ignored, &picture.thumbnail_frame);
+        }
+        Ok(SmallCopy { thumbnail, frame: picture.thumbnail_frame })
+    };
+    let count = photographs.images().len();
+    let mut thumbnails = Vec::with_capacity(count);
+    for group in groups(count, set.at_once) {
+        thumbnails.extend(group.into_par_iter().map(thumbnail).collect::<Result<Vec<_>>>()?);
+    }
+    Ok(thumbnails)
+}
+
+/// Photographs to be looked at together: all, if `at_once` leaves room for many per thread.
+fn groups(count: usize, at_once: usize) -> impl Iterator<Item = Range<usize>> {
+    let group = if at_once >= MANY_PER_THREAD * rayon::current_num_threads() { count } else { at_once };
+    let group = group.max(1);
+    (0..count).step_by(group).map(move |first| first..first.saturating_add(group).min(count))
+}
+
+/// Whether an error is about one photograph, so that the others can still be stitched.
+pub(crate) fn concerns_one_photograph(error: &Error) -> bool {
+    !matches!(error, Error::Cancelled | Error::Options(_))
+}

@@ -1,0 +1,105 @@
+//! What is known of a photograph after its pixels were looked at, and how that is kept between runs.
+
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use trueup_core::lines::LineSegment;
+use trueup_core::raster::Raster;
+use trueup_core::source::WorkingFrame;
+use trueup_vision::features::{DESCRIPTOR_LENGTH, FeaturePoint, Features};
+
+/// What is known of a photograph after its pixels were looked at.
+#[derive(Debug)]
+pub(crate) struct Measured {
+    pub frame: WorkingFrame,
+    pub features: Features,
+    /// In working pixels.
+    pub lines: Vec<LineSegment>,
+    /// Gray values at the working size, kept if the mesh is to be refined by pixels.
+    pub gray: Option<Raster<u8>>,
+    pub thumbnail: Raster<u8>,
+    pub thumbnail_frame: WorkingFrame,
+}
+
+impl Serialize for Measured {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        StoredMeasured::new(self).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Measured {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let stored = StoredMeasured::deserialize(deserializer)?;
+        stored.restored().ok_or_else(|| D::Error::custom("sizes that do not fit"))
+    }
+}
+
+/// A raster as it is kept.
+#[derive(Debug, Serialize, Deserialize)]
+struct StoredRaster {
+    width: usize,
+    height: usize,
+    channels: usize,
+    data: Vec<u8>,
+}
+
+impl StoredRaster {
+    fn new(raster: &Raster<u8>) -> Self {
+        let (width, height, channels) = (raster.width(), raster.height(), raster.channels());
+        Self { width, height, channels, data: raster.data().to_vec() }
+    }
+
+    fn restored(self) -> Option<Raster<u8>> {
+        Raster::from_data(self.width, self.height, self.channels, self.data).ok()
+    }
+}
+
+/// A [`Measured`] photograph as it is kept.
+#[derive(Debug, Serialize, Deserialize)]
+struct StoredMeasured {
+    frame: WorkingFrame,
+    points: Vec<FeaturePoint>,
+    descriptors: Vec<u8>,
+    descriptor_points: Vec<u32>,
+    lines: Vec<LineSegment>,
+    gray: Option<StoredRaster>,
+    thumbnail: StoredRaster,
+    thumbnail_frame: WorkingFrame,
+}
+
+impl StoredMeasured {
+    fn new(measured: &Measured) -> Self {
+        let Features { points, descriptors, descriptor_points } = &measured.features;
+        Self {
+            frame: measured.frame,
+            points: points.clone(),
+            descriptors: descriptors.concat(),
+            descriptor_points: descriptor_points.clone(),
+            lines: measured.lines.clone(),
+            gray: measured.gray.as_ref().map(StoredRaster::new),
+            thumbnail: StoredRaster::new(&measured.thumbnail),
+            thumbnail_frame: measured.thumbnail_frame,
+        }
+    }
+
+    fn restored(self) -> Option<Measured> {
+        let (descriptors, rest) = self.descriptors.as_chunks::<DESCRIPTOR_LENGTH>();
+        if !rest.is_empty() {
+            return None;
+        }
+        Some(Measured {
+            frame: self.frame,
+            features: Features {
+                points: self.points,
+                descriptors: descriptors.to_vec(),
+                descriptor_points: self.descriptor_points,
+            },
+            lines: self.lines,
+            gray: match self.gray {
+                Some(gray) => Some(gray.restored()?),
+                None => None,
+            },
+            thumbnail: self.thumbnail.restored()?,
+            thumbnail_frame: self.thumbnail_frame,
+        })
+    }
+}

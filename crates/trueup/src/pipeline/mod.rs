@@ -1,0 +1,378 @@
+//! The order of the work, whole, and nowhere else:
+//!
+//! photographs -> [measure] -> [matching] -> [align] -> [arrange] -> [compose] -> panorama
+//!
+//! A phase is a function of its input, its options and a context; what it told on the way comes beside its product.
+
+pub(crate) mod align;
+pub(crate) mod arrange;
+mod budget;
+pub(crate) mod compose;
+pub(crate) mod matched;
+pub(crate) mod matching;
+pub(crate) mod measure;
+pub(crate) mod measured;
+pub(crate) mod photographs;
+mod results;
+mod scratch;
+
+use std::path::Path;
+
+use trueup_align::vanishing::TriadOutcome;
+use trueup_compose::exposure::Corrections;
+use trueup_compose::fidelity::{self, Fidelity};
+use trueup_compose::render::{self, Panorama};
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result, StageContext};
+use trueup_io::color::PhotographColors;
+use trueup_io::encode::Metadata;
+
+use self::align::component::{Component, camera_groups};
+use self::align::{AlignInput, Geometry};
+use self::arrange::{ArrangeInput, Arrangement};
+use self::budget::Budget;
+use self::compose::{ComposeInput, LightInput, SmallPhotograph};
+use self::matched::Matched;
+use self::matching::MatchInput;
+use self::measure::MeasureInput;
+use self::photographs::PhotographSet;
+use crate::job::inputs::Inputs;
+use crate::job::masks::AllMasks;
+use crate::memo::{KeyMaker, Memo, PhotographCache};
+use crate::options::StitchOptions;
+use crate::project::fill::{GeometryRecord, fill_geometry, place, record_composition, unfilled};
+use crate::project::provenance;
+use crate::project::read::Recorded;
+use crate::project::record::Project;
+use crate::report::measures;
+
+pub use results::{Aligned, Alignment, MatchedPhotographs};
+
+/// Runs the phases with one set of options.
+#[derive(Debug)]
+pub struct Stitcher<'a> {
+    options: &'a StitchOptions,
+    context: StageContext<'a>,
+    cache: Option<&'a PhotographCache>,
+    output: Option<&'a Path>,
+}
+
+impl<'a> Stitcher<'a> {
+    /// A stitcher with these options, whose progress goes where that of `context` goes and which stops with it. Parallel work
+    /// runs on the current thread pool.
+    pub fn new(options: &'a StitchOptions, context: &StageContext<'a>) -> Self {
+        Self { options, context: context.seeded(options.matching.random.seed), cache: None, output: None }
+    }
+
+    /// The same stitcher, which finds results of earlier runs in `cache` and keeps its own there. They decide how long the
+    /// work takes, never what comes of it.
+    #[must_use]
+    pub fn with_cache(self, cache: Option<&'a PhotographCache>) -> Self {
+        Self { cache, ..self }
+    }
+
+    /// Says where composed panoramas will be written: scratch files go into the same folder, unless `resources.scratch` names
+    /// one, and leave room for them. Without, scratch files go where the system wants temporary files.
+    #[must_use]
+    pub fn writing_to(self, output: &'a Path) -> Self {
+        Self { output: Some(output), ..self }
+    }
+
+    /// The same stitcher for a panorama that will be written to `output`, see [`Self::writing_to`].
+    pub(crate) fn to_be_written<'b>(&'b self, output: &'b Path) -> Stitcher<'b>
+    where
+        'a: 'b,
+    {
+        let Self { options, cache, .. } = *self;
+        Stitcher { options, context: self.context.seeded(self.context.seed()), cache, output: Some(output) }
+    }
+
+    /// The options of all phases.
+    pub fn options(&self) -> &'a StitchOptions {
+        self.options
+    }
+
+    /// Finds, measures and matches the photographs and estimates the panoramas' geometry:
+    /// [`Stitcher::match_photographs`], then [`Stitcher::align_matched`].
+    ///
+    /// # Errors
+    /// Those of the two.
+    pub fn align(&self, inputs: &Inputs) -> Result<Aligned> {
+        self.align_matched(&self.match_photographs(inputs)?, inputs)
+    }
+
+    /// Finds, measures and matches the photographs. What comes of it can be aligned several times, with other references
+    /// or other options of the later phases.
+    ///
+    /// # Errors
+    /// [`Error::Options`]; [`Error::Input`] when no photograph can be read, or the graph or the reference does not fit the
+    /// photographs; [`Error::Limits`]; [`Error::Cancelled`].
+    pub fn match_photographs(&self, inputs: &Inputs) -> Result<MatchedPhotographs> {
+        self.options.validate()?;
+        let found = self.context.gather(|context| {
+            let memo = Memo { disk: self.cache, memory: None };
+            let set = PhotographSet::find(inputs, self.options, context)?;
+            let graph_file = inputs.graph_file(&set.names())?;
+            let keep_grays = align::needs_pixels(&self.options.align);
+            let input = MeasureInput { set: &set, memo, keep_grays };
+            let measurements = context.absorb(measure::run(&input, &self.options.measure, context)?);
+            let mut matched = Matched::unmatched(set, measurements, graph_file)?;
+            let looked_at = matched.take_features();
+            let input = MatchInput {
+                features: &looked_at.features,
+                frames: &looked_at.frames,
+                usable: &looked_at.usable,
+                wished: &matched.graph_file.edges,
+                keys: &matched.keys,
+                memo,
+            };
+            let matches = context.absorb(matching::run(&input, &self.options.matching, context)?);
+            matched.pairs = matches.pairs;
+            matched.graph = matches.graph;
+            self.report_cache(context);
+            Ok(matched)
+        })?;
+        let (matched, told) = found.split();
+        Ok(MatchedPhotographs { matched, told, memory: None })
+    }
+
+    /// Estimates the geometry of the panoramas that matched photographs make.
+    ///
+    /// Of `inputs`, the photographs and the graph are those that were matched; the reference, `all` and `require_all` are
+    /// heeded.
+    ///
+    /// # Errors
+    /// [`Error::Options`]; [`Error::Input`] when the reference does not fit the photographs, or `require_all` is not met;
+    /// [`Error::Unsolvable`] when no two photographs overlap; [`Error::Cancelled`].
+    pub fn align_matched(&self, set: &MatchedPhotographs, inputs: &Inputs) -> Result<Aligned> {
+        self.align_groups(set, inputs, None)
+    }
+
+    /// [`Self::align_matched`] with vanishing directions that are known already, in place of those that the photographs'
+    /// lines tell: `directions` holds one entry for each photograph of the largest group, as [`Alignment::directions`] has
+    /// them.
+    ///
+    /// # Errors
+    /// Those of [`Self::align_matched`]; [`Error::Input`] if there are more or fewer directions than photographs.
+    pub fn align_along(
+        &self,
+        set: &MatchedPhotographs,
+        inputs: &Inputs,
+        directions: &[TriadOutcome],
+    ) -> Result<Aligned> {
+        self.align_groups(set, &Inputs { all: false, ..inputs.clone() }, Some(directions))
+    }
+
+    fn align_groups(
+        &self,
+        set: &MatchedPhotographs,
+        inputs: &Inputs,
+        directions: Option<&[TriadOutcome]>,
+    ) -> Result<Aligned> {
+        self.options.validate()?;
+        let shared = self.context.gather(|context| {
+            let groups = set.matched.groups(inputs, context)?;
+            if inputs.require_all {
+                set.matched.require_all(&groups)?;
+            }
+            set.matched.report_left_out(&groups, context);
+            Ok(groups)
+        })?;
+        let (groups, told) = shared.split();
+        let align = |group: &Vec<usize>| {
+            let found = self.context.gather(|context| {
+                let alignment = self.align_group(group, &groups, set, inputs, directions, context)?;
+                self.report_cache(context);
+                Ok(alignment)
+            })?;
+            let (mut alignment, own) = found.split();
+            [set.told.clone(), told.clone(), own].into_iter().for_each(|told| alignment.record(told));
+            Ok(alignment)
+        };
+        Ok(Aligned { alignments: groups.iter().map(align).collect::<Result<_>>()? })
+    }
+
+    fn align_group(
+        &self,
+        members: &[usize],
+        groups: &[Vec<usize>],
+        set: &MatchedPhotographs,
+        inputs: &Inputs,
+        directions: Option<&[TriadOutcome]>,
+        context: &StageContext,
+    ) -> Result<Alignment> {
+        let (matched, photographs) = (&set.matched, &set.matched.set.files);
+        let component = matched.component(members, inputs)?;
+        let input = AlignInput {
+            component: &component,
+            photographs,
+            directions: known_directions(directions, members)?,
+            key: matched.key_of(members).map(|key: KeyMaker| key.part(&self.options.matching)),
+            memo: Memo { disk: self.cache, memory: set.memory.as_ref() },
+        };
+        let geometry: Option<Geometry> = match members.len() {
+            1 => None,
+            _ => {
+                let found = align::run(&input, &self.options.align, context)?;
+                Some(context.absorb(found.renumbered(|local| members[local])))
+            }
+        };
+        let input = ArrangeInput::of_geometry(place(&component, geometry.as_ref()), &component, geometry.as_ref());
+        let arrangement = context.absorb(arrange::run(input, &self.options.arrange, context)?);
+        let light = LightInput {
+            layout: &arrangement.plane,
+            small: matched.small_photographs(&component),
+            reference: component.reference,
+            photographs,
+        };
+        let corrections = context.absorb(compose::light(&light, &self.options.compose, context)?);
+        let mut project = unfilled(matched, self.options, members, groups);
+        let geometry = geometry.as_ref();
+        let found = GeometryRecord { component: &component, geometry, arrangement: &arrangement, corrections: &corrections };
+        fill_geometry(&mut project, &found);
+        project.color_space = photographs.colors().map(PhotographColors::name).unwrap_or_default();
+        project.measures = geometry.map(|geometry| {
+            context.time("measures", || measures::run(&component, geometry, &arrangement.plane, self.options))
+        });
+        let layout = arrangement.written;
+        let corrections = corrections.of_placed(&layout, |photograph| members.binary_search(&photograph).ok());
+        let directions = geometry.map(|geometry| geometry.triads.clone()).unwrap_or_default();
+        Ok(Alignment { project, layout, corrections, photographs: photographs.clone(), directions })
+    }
+
+    /// The geometry that `project` records, over `images` with their `masks`: those used in it, in its order, or others of
+    /// their sizes. The canvas is laid out anew if the options ask for another one, and the light evened out anew if they ask
+    /// for that.
+    ///
+    /// # Errors
+    /// [`Error::Options`]; [`Error::Input`] if the project was damaged; [`Error::NotApplicable`] if a projection is asked
+    /// for and the project has no cameras; those of the layout; [`Error::Limits`]; [`Error::Cancelled`].
+    pub(crate) fn recall(&self, project: &Project, images: Vec<SourceImage>, masks: AllMasks) -> Result<Alignment> {
+        self.options.validate()?;
+        let recalled = self.context.gather(|context| {
+            let Recorded { used, layout, corrections, reference } = Recorded::new(project)?;
+            let set = PhotographSet::open(images, Vec::new(), masks, self.options, context)?;
+            let arrangement = arrange::recall(layout, reference, project, &self.options.arrange, context)?;
+            let arrangement: Arrangement = context.absorb(arrangement);
+            let corrections = match self.options.compose.exposure == project.options.compose.exposure {
+                true => corrections,
+                false => self.light_anew(&set, &arrangement, reference, context)?,
+            };
+            let same_canvas = self.options.arrange.canvas == project.options.arrange.canvas;
+            let mut project =
+                Project { options: self.options.clone(), seconds: Default::default(), ..project.clone() };
+            record_composition(&mut project, &used, &set, &arrangement, &corrections);
+            project.color_space = set.files.colors().map(PhotographColors::name).unwrap_or_default();
+            if !same_canvas {
+                project.measures = None;
+            }
+            let layout = arrangement.written;
+            // Photographs are numbered by their place among those used.
+            let corrections = corrections.of_placed(&layout, Some);
+            Ok(Alignment { project, layout, corrections, photographs: set.files, directions: Vec::new() })
+        })?;
+        let (mut alignment, told) = recalled.split();
+        alignment.record(told);
+        Ok(alignment)
+    }
+
+    /// What evens out the light of photographs that were only decoded, each placed once.
+    fn light_anew(
+        &self,
+        set: &PhotographSet,
+        arrangement: &Arrangement,
+        reference: usize,
+        context: &StageContext,
+    ) -> Result<Corrections> {
+        let copies = measure::thumbnails(set, &self.options.measure, context)?;
+        let cameras = camera_groups(&set.images.iter().collect::<Vec<_>>());
+        let small = copies.iter().zip(cameras).map(|(copy, camera)| SmallPhotograph {
+            thumbnail: &copy.thumbnail,
+            frame: copy.frame,
+            camera,
+        });
+        let layout = &arrangement.plane;
+        let light = LightInput { layout, small: small.collect(), reference, photographs: &set.files };
+        Ok(context.absorb(compose::light(&light, &self.options.compose, context)?))
+    }
+
+    /// Renders an aligned panorama from the full-resolution photographs, within `resources.memory`. What was found on the way
+    /// and how long it took goes into the alignment's record.
+    ///
+    /// # Errors
+    /// Those of reading the photographs and of a scratch file; [`Error::Limits`] with the numbers, before any photograph is
+    /// read, if the canvas is too large for the memory or the disk; [`Error::Cancelled`].
+    pub fn compose(&self, alignment: &mut Alignment) -> Result<Panorama> {
+        let scratch = scratch::folder(&alignment.layout, self.options, self.output)?;
+        let budget = Budget::new(&self.options.run.resources);
+        let input = ComposeInput {
+            layout: &alignment.layout,
+            corrections: &alignment.corrections,
+            photographs: &alignment.photographs,
+            resources: budget.composing(alignment.photographs.kept_bytes(), &scratch),
+            fill: self.options.arrange.canvas.fill,
+        };
+        let composed = self.context.gather(|context| {
+            let composed = context.time("render", || compose::run(&input, &self.options.compose, context))?;
+            Ok(context.absorb(composed))
+        })?;
+        let (panorama, told) = composed.split();
+        alignment.record(told);
+        Ok(panorama)
+    }
+
+    /// What the panorama's file is to tell: its color profile, and of its photographs what the options let pass.
+    pub fn metadata(&self, alignment: &Alignment) -> Metadata {
+        provenance::metadata(&alignment.project, alignment.photographs.colors(), &self.options.compose.output)
+    }
+
+    /// Measures how true `panorama`, composed of `alignment`, is to its photographs: steps across its seams, and ghosts.
+    /// Renders every photograph alone on the canvas, nine bytes a pixel of each.
+    ///
+    /// # Errors
+    /// Those of reading the photographs; [`Error::Input`] if the two do not belong together; [`Error::Cancelled`].
+    pub fn fidelity(&self, alignment: &Alignment, panorama: &Panorama) -> Result<Fidelity> {
+        let layout = &alignment.layout;
+        let layers = (0..layout.placed.len())
+            .map(|position| {
+                self.context.check_cancelled()?;
+                let photographs = alignment.photographs.as_ref();
+                let options = &self.options.compose.render;
+                render::layer(layout, &alignment.corrections, position, photographs, options)
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let (size, around) = ([layout.width, layout.height], layout.period.is_some());
+        let shown = match panorama.seams() {
+            Some(seams) => seams.on_canvas(size),
+            None => fidelity::deepest(&layers, size, around)?,
+        };
+        fidelity::measure(panorama, &layers, &shown, around)
+    }
+
+    /// What the stitcher reports to beside its results: progress, and whether to stop.
+    pub(crate) fn context(&self) -> &StageContext<'a> {
+        &self.context
+    }
+
+    fn report_cache(&self, context: &StageContext) {
+        if let Some(cache) = self.cache {
+            cache.report(context);
+        }
+    }
+}
+
+/// Directions for the group `members`, if any are known.
+fn known_directions<'d>(
+    directions: Option<&'d [TriadOutcome]>,
+    members: &[usize],
+) -> Result<Option<&'d [TriadOutcome]>> {
+    match directions {
+        Some(known) if known.len() != members.len() => Err(Error::input(
+            "directions",
+            format!("{} of them for {} photographs", known.len(), members.len()),
+            "Give one for each photograph of the panorama.",
+        )),
+        known => Ok(known),
+    }
+}
+

@@ -1,0 +1,99 @@
+//! What the phases hand on.
+
+use std::sync::Arc;
+
+use trueup_align::vanishing::TriadOutcome;
+use trueup_compose::exposure::Corrections;
+use trueup_compose::layout::CanvasLayout;
+use trueup_core::diagnostics::Reported;
+use trueup_core::lines::LineSegment;
+use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
+use trueup_io::decode::FilePhotographs;
+
+use super::matched::Matched;
+use crate::memo::MemoryStore;
+use crate::project::record::Project;
+
+/// What [`Stitcher::align`](super::Stitcher::align) found: one alignment per group of
+/// photographs to be stitched, the largest first.
+#[derive(Debug)]
+pub struct Aligned {
+    /// At least one.
+    pub alignments: Vec<Alignment>,
+}
+
+/// Photographs that were found, measured and matched, ready to be aligned.
+#[derive(Debug)]
+pub struct MatchedPhotographs {
+    pub(super) matched: Matched,
+    /// What was told on the way.
+    pub(super) told: Reported<()>,
+    pub(super) memory: Option<MemoryStore>,
+}
+
+impl MatchedPhotographs {
+    /// Lets alignments share the cameras and overlaps that they have in common: for experiments that align the same
+    /// photographs many times. The seconds that a shared stage took when it ran are counted in every alignment.
+    #[must_use]
+    pub fn remembering(self) -> Self {
+        Self { memory: Some(MemoryStore::default()), ..self }
+    }
+
+    /// The photographs' files, in the order of [`Project::images`].
+    pub fn images(&self) -> &[SourceImage] {
+        &self.matched.set.images
+    }
+
+    /// The photographs' pixels, in the order of [`Project::images`].
+    pub fn photographs(&self) -> &(dyn PhotographSource + Sync) {
+        self.matched.set.files.as_ref()
+    }
+
+    /// The line segments of a photograph, in the pixels of its working frame; `None` if it could not be decoded.
+    pub fn lines_of(&self, photograph: usize) -> Option<(&[LineSegment], WorkingFrame)> {
+        let measured = self.matched.measured.get(photograph)?.as_ref()?;
+        Some((&measured.lines, measured.frame))
+    }
+}
+
+/// The geometry of one panorama, ready to be composed.
+#[derive(Debug)]
+pub struct Alignment {
+    /// The record so far; complete but for the seconds that composing and writing take.
+    pub project: Project,
+    pub(super) layout: CanvasLayout,
+    pub(super) corrections: Corrections,
+    pub(super) photographs: Arc<FilePhotographs>,
+    pub(super) directions: Vec<TriadOutcome>,
+}
+
+impl Alignment {
+    /// Where the photographs lie on the canvas.
+    pub(crate) fn layout(&self) -> &CanvasLayout {
+        &self.layout
+    }
+
+    /// Gain, color and vignetting of every photograph placed.
+    pub(crate) fn corrections(&self) -> &Corrections {
+        &self.corrections
+    }
+
+    /// The photographs, in the order of [`Project::images`].
+    pub(crate) fn photographs(&self) -> &FilePhotographs {
+        &self.photographs
+    }
+
+    /// The vanishing directions of the photographs used, in their order; none for a single photograph, and where the
+    /// geometry is a recorded one.
+    pub fn directions(&self) -> &[TriadOutcome] {
+        &self.directions
+    }
+
+    /// Adds what a later stage told to the record.
+    pub fn record(&mut self, told: Reported<()>) {
+        self.project.diagnostics.extend(told.findings);
+        for (stage, seconds) in told.seconds {
+            *self.project.seconds.entry(stage).or_default() += seconds;
+        }
+    }
+}

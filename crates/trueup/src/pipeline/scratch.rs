@@ -1,0 +1,25 @@
+//! Where what does not fit into memory goes while a panorama is composed.
+
+use std::path::{Path, PathBuf};
+
+use trueup_compose::layout::CanvasLayout;
+use trueup_core::Result;
+use trueup_io::encode;
+use trueup_io::scratch::{ScratchFolder, check_room};
+
+use crate::options::StitchOptions;
+
+/// Where the scratch file of a panorama on `layout` would go that is to be written to `output`, if that is known.
+///
+/// # Errors
+/// [`trueup_core::Error::Limits`] if there is no room for the panorama.
+pub(super) fn folder(layout: &CanvasLayout, options: &StitchOptions, output: Option<&Path>) -> Result<ScratchFolder> {
+    let named = Some(&options.run.resources.scratch).filter(|named| !named.is_empty()).map(PathBuf::from);
+    let Some(output) = output else {
+        return Ok(ScratchFolder::new(named.unwrap_or_else(std::env::temp_dir)));
+    };
+    let folder = output.parent().unwrap_or(Path::new(""));
+    let bytes = encode::expected_bytes(output, layout.width, layout.height, &options.compose.output);
+    check_room(folder, bytes, "the panorama")?;
+    Ok(ScratchFolder::new(named.unwrap_or_else(|| folder.to_owned())).beside(folder, bytes))
+}

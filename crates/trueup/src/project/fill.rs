@@ -1,0 +1,265 @@
+//! Fills the project: what is recorded of photographs, pairs and geometry.
+
+use trueup_compose::exposure::{Correction, Corrections, Response};
+use trueup_compose::layout::{CanvasLayout, Placed};
+use trueup_core::diagnostics::{Diagnostic, Subject};
+use trueup_core::geometry::{matrix_from_rows, rows_of};
+use trueup_core::mesh::GridMesh;
+
+use super::record::{
+    Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
+};
+use crate::options::{MethodForm, StitchOptions};
+use crate::pipeline::align::Geometry;
+use crate::pipeline::align::component::Component;
+use crate::pipeline::arrange::Arrangement;
+use crate::pipeline::matched::Matched;
+use crate::pipeline::photographs::PhotographSet;
+
+/// The record of all photographs and pairs, without geometry, for the panorama of `members`; `stitched` are the members of
+/// all panoramas.
+pub(crate) fn unfilled(
+    matched: &Matched,
+    options: &StitchOptions,
+    members: &[usize],
+    stitched: &[Vec<usize>],
+) -> Project {
+        let images = matched
+            .set
+            .images
+            .iter()
+            .enumerate()
+            .map(|(index, image)| {
+                let (reason, hint) = match members.contains(&index) {
+                    true => Default::default(),
+                    false => {
+                        let why = matched.why_left_out(index, stitched);
+                        (why.reason, why.hint)
+                    }
+                };
+                let component = matched.graph.components.iter().position(|component| component.contains(&index));
+                ImageRecord {
+                    width: image.width,
+                    height: image.height,
+                    orientation: image.orientation,
+                    component: component.filter(|_| matched.measured[index].is_some()),
+                    masks: matched.set.masks[index].clone(),
+                    ..left_out_record(image.path.display().to_string(), reason, hint)
+                }
+            })
+            .chain(matched.set.rejected.iter().map(|rejected| {
+                left_out_record(rejected.path.display().to_string(), rejected.reason.clone(), rejected.hint.clone())
+            }))
+            .collect();
+        let pairs = matched.pairs.iter().map(|pair| PairRecord {
+            a: pair.a,
+            b: pair.b,
+            matches: pair.putative,
+            inliers: pair.agreeing,
+            needed: pair.needed,
+            verdict: pair.verdict,
+        });
+        Project {
+            format: PROJECT_FORMAT.to_owned(),
+            version: PROJECT_VERSION,
+            method: trueup_core::options::OptionValue::display(&options.align.stitch.method),
+            options: options.clone(),
+            reference: String::new(),
+            images,
+            pairs: pairs.collect(),
+            manhattan: ManhattanRecord {
+                divergence: None,
+                threshold: options.align.similarity.max_divergence,
+                significance: None,
+                vertical_deviation_deg: None,
+                accepted: false,
+                pooled: false,
+                failed_clause: Some("a single photograph is left as it is".to_owned()),
+                dominant: None,
+                inliers: Vec::new(),
+            },
+            measures: None,
+            canvas: Canvas { width: 0, height: 0, full_turn: false },
+            color_space: String::new(),
+            response: Response::default(),
+            projection: None,
+            mesh_canvas: None,
+            seconds: std::collections::BTreeMap::new(),
+            diagnostics: Vec::new(),
+        }
+    }
+fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
+    ImageRecord {
+        path,
+        width: 0,
+        height: 0,
+        orientation: 0,
+        status: ImageStatus::LeftOut,
+        reason,
+        hint,
+        component: None,
+        focal_px: None,
+        rotation: None,
+        upright_rotation: None,
+        theta_deg: None,
+        scale: None,
+        gain: None,
+        correction: None,
+        masks: Vec::new(),
+        vanishing_points: None,
+        mesh: None,
+    }
+}
+
+/// The deformed grids over the full-resolution photographs; a single photograph stays as it is.
+pub(crate) fn place(component: &Component, geometry: Option<&Geometry>) -> Vec<Placed> {
+    (0..component.members.len())
+        .map(|k| {
+            let (width, height) = (component.images[k].width as f64, component.images[k].height as f64);
+            let mesh = match geometry {
+                Some(geometry) => GridMesh { width, height, ..geometry.mesh.meshes[k].clone() },
+                None => GridMesh::regular(width, height, width.max(height)),
+            };
+            Placed { photograph: component.members[k], mesh }
+        })
+        .collect()
+}
+
+/// What is found on the way from the geometry to the panorama, each time anew.
+const FOUND_IN_COMPOSING: [&str; 8] = [
+    "canvas-reduced",
+    "color-converted",
+    "color-profile-damaged",
+    "color-profile-ignored",
+    "grid-folded",
+    "photograph-replaced",
+    "projection-cut",
+    "projection-left-out",
+];
+
+/// Brings the record up to what is composed of the photographs of `set`, which stand at the positions `used`.
+pub(crate) fn record_composition(
+    project: &mut Project,
+    used: &[usize],
+    set: &PhotographSet,
+    arrangement: &Arrangement,
+    corrections: &Corrections,
+) {
+    record_canvas(project, arrangement);
+    project.response = corrections.response;
+    project.diagnostics.retain(|one| !FOUND_IN_COMPOSING.contains(&one.code.as_str()));
+    let mut renamed = Vec::new();
+    for (k, &position) in used.iter().enumerate() {
+        let record = &mut project.images[position];
+        let mesh = &arrangement.plane.placed[k].mesh;
+        record_appearance(record, mesh, arrangement.plane_shift, &corrections.photographs[k]);
+        let path = set.images[k].path.display().to_string();
+        if path != record.path {
+            project.diagnostics.push(Diagnostic::note(
+                "photograph-replaced",
+                Subject::Photograph(position),
+                format!("{path} is shown"),
+                "",
+            ));
+        }
+        record.masks.clone_from(&set.masks[k]);
+        renamed.push((std::mem::replace(&mut record.path, path.clone()), path));
+    }
+    for known in paths(project) {
+        if let Some((_, path)) = renamed.iter().find(|(old, _)| old == known) {
+            known.clone_from(path);
+        }
+    }
+}
+
+/// Everywhere that a project names photographs in use by their paths, but for their own records.
+fn paths(project: &mut Project) -> impl Iterator<Item = &mut String> {
+    let measures = project.measures.iter_mut().flat_map(|measures| {
+        let bent = measures.long_lines.iter_mut().filter_map(|lines| lines.longest_bent.as_mut());
+        measures.pictures.iter_mut().map(|one| &mut one.path).chain(bent.map(|bent| &mut bent.path))
+    });
+    std::iter::once(&mut project.reference).chain(&mut project.manhattan.inliers).chain(measures)
+}
+
+/// Where a photograph is shown and in which light.
+fn record_appearance(record: &mut ImageRecord, mesh: &GridMesh, shift: [f64; 2], correction: &Correction) {
+    record.gain = Some(correction.brightness());
+    record.correction = Some(*correction);
+    record.mesh = Some(MeshRecord {
+        rows: mesh.rows,
+        cols: mesh.columns,
+        source: (0..mesh.len()).map(|vertex| mesh.source(vertex).into()).collect(),
+        target: mesh.target.iter().map(|vertex| [vertex[0] - shift[0], vertex[1] - shift[1]]).collect(),
+    });
+}
+
+/// What the panorama is drawn on.
+fn record_canvas(project: &mut Project, arrangement: &Arrangement) {
+    let canvas = |layout: &CanvasLayout| Canvas {
+        width: layout.width,
+        height: layout.height,
+        full_turn: layout.period.is_some(),
+    };
+    project.canvas = canvas(&arrangement.written);
+    project.mesh_canvas = arrangement.projection.map(|_| canvas(&arrangement.plane));
+    project.projection = arrangement.projection;
+}
+
+/// What was found of a group of photographs.
+pub(crate) struct GeometryRecord<'a> {
+    pub component: &'a Component<'a>,
+    /// `None` for a single photograph.
+    pub geometry: Option<&'a Geometry>,
+    pub arrangement: &'a Arrangement,
+    /// In the order of the component.
+    pub corrections: &'a Corrections,
+}
+
+/// Fills in what was found of the photographs used.
+pub(crate) fn fill_geometry(project: &mut Project, found: &GeometryRecord) {
+    let GeometryRecord { component, geometry, arrangement, corrections } = *found;
+    record_canvas(project, arrangement);
+    project.response = corrections.response;
+    project.reference = component.images[component.reference].path.display().to_string();
+    let method = project.options.align.stitch.method;
+    let is_warp = matches!(method.form(), MethodForm::Warp(_));
+    for (k, &picture) in component.members.iter().enumerate() {
+        let record = &mut project.images[picture];
+        let mesh = &arrangement.plane.placed[k].mesh;
+        record.status = ImageStatus::Used;
+        record_appearance(record, mesh, arrangement.plane_shift, &corrections.photographs[k]);
+        let Some(geometry) = geometry else { continue };
+        let camera = &geometry.cameras.cameras[k];
+        let camera_from_level = camera.rotation() * geometry.prior.level_from_world().transpose();
+        record.focal_px = Some(camera.focal_px / component.frames[k].working_from_full);
+        record.rotation = Some(rows_of(&camera_from_level));
+        let upright = matrix_from_rows(&geometry.prior.camera_from_world[k]);
+        record.upright_rotation = Some(rows_of(&(upright * geometry.prior.level_from_world().transpose())));
+        // A warp model asks no prior; what straightening would want is not what was done.
+        if !is_warp {
+            record.theta_deg = Some(geometry.prior.theta[k].to_degrees());
+            record.scale = Some(geometry.prior.scale[k]);
+        }
+        record.vanishing_points = geometry.triads[k].triad().map(|triad| {
+            let matrix = triad.matrix();
+            std::array::from_fn(|direction| matrix.column(direction).into_owned().into())
+        });
+    }
+    if let Some(geometry) = geometry {
+        let guidance = &geometry.prior.guidance;
+        project.manhattan = ManhattanRecord {
+            divergence: guidance.divergence,
+            threshold: guidance.threshold,
+            significance: guidance.significance,
+            vertical_deviation_deg: guidance.vertical_deviation.map(f64::to_degrees),
+            accepted: guidance.used,
+            pooled: guidance.pooled,
+            failed_clause: match method.form() {
+                MethodForm::Mesh(_) => guidance.failed_clause.clone(),
+                MethodForm::Warp(_) => Some(format!("the method {} does not ask them", project.method)),
+            },
+            dominant: guidance.dominant,
+            inliers: guidance.inliers.iter().map(|&k| component.set.images[k].path.display().to_string()).collect(),
+        };
+    }
+}

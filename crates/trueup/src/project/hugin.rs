@@ -1,0 +1,183 @@
+//! The cameras of a panorama as a project of the Hugin stitcher.
+//!
+//! # Source
+//! The format: Hugin's own description of its project files (`doc/nona.txt` of panotools and the manual's page on `.pto`).
+//! Angles: yaw to the right, pitch upwards, roll clockwise, applied in the order roll, pitch, yaw.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::fmt::Write;
+
+use nalgebra::{Matrix3, Vector3};
+use trueup_compose::exposure::Correction;
+use trueup_core::geometry::{matrix_from_rows, wrap_angle};
+use trueup_core::{Error, Result};
+
+use super::record::{ImageRecord, Project};
+
+/// A camera's attitude in Hugin's angles, radians.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Attitude {
+    /// To the right.
+    yaw: f64,
+    /// Upwards.
+    pitch: f64,
+    /// Clockwise turn of the picture.
+    roll: f64,
+}
+
+impl Attitude {
+    /// Of a camera with this rotation from the levelled world (y down) to the camera. Straight up or down, where yaw and
+    /// roll are one, all of it is yaw.
+    fn of(camera_from_level: &Matrix3<f64>) -> Self {
+        let level_from_camera = camera_from_level.transpose();
+        let forward = level_from_camera.column(2);
+        // Roll from the levelled world's vertical, as long as the camera does not look along it.
+        const STEEP: f64 = 1e-9;
+        let (yaw, roll) = match forward.x.hypot(forward.z) > STEEP {
+            true => (forward.x.atan2(forward.z), level_from_camera[(1, 0)].atan2(level_from_camera[(1, 1)])),
+            false => ((-level_from_camera[(2, 0)]).atan2(level_from_camera[(0, 0)]), 0.0),
+        };
+        Self { yaw, pitch: (-forward.y).clamp(-1.0, 1.0).asin(), roll }
+    }
+}
+
+/// A panorama's cameras, exposures and vignetting as a Hugin project, whose panorama is the whole sphere in
+/// equirectangular projection at the pixel scale of the photographs' middles.
+///
+/// Images are named by the paths in the record and described as they are stored in their files: Hugin's renderer knows no
+/// EXIF orientation, which goes into the roll. What the mesh does beyond the cameras has no place in the format, nor have
+/// the matches, which the record does not hold: `cpfind` of Hugin finds such again.
+///
+/// # Errors
+/// [`Error::Input`] where the record has no cameras, or a photograph's orientation mirrors it.
+pub fn hugin_project(project: &Project) -> Result<String> {
+    let missing =
+        || Error::input("Hugin project", "the panorama has no cameras", "Stitch at least two overlapping photographs.");
+    let mut lines = String::new();
+    let mut focal_sum = 0.0;
+    for image in project.used_images() {
+        let (Some(rotation), Some(focal_px)) = (image.level_rotation(), image.focal_px) else { return Err(missing()) };
+        focal_sum += focal_px;
+        // Writing to a string cannot fail.
+        let _ = writeln!(lines, "{}", image_line(image, &matrix_from_rows(rotation), focal_px)?);
+    }
+    let count = project.used();
+    if count == 0 {
+        return Err(missing());
+    }
+    // A turn is 2 pi f pixels; an even number, so that the height is half of it.
+    let height = (PI * focal_sum / count as f64).round().max(1.0);
+    let header = format!(
+        "# hugin project file, written by trueup {}\np f2 w{} h{height} v360 E0 R0 n\"TIFF_m c:LZW r:CROP\"\nm i0\n",
+        env!("CARGO_PKG_VERSION"),
+        2.0 * height,
+    );
+    Ok(format!("{header}{lines}v\n"))
+}
+
+fn image_line(image: &ImageRecord, camera_from_level: &Matrix3<f64>, focal_px: f64) -> Result<String> {
+    let quarter_turns = match image.orientation {
+        0 | 1 => 0.0,
+        6 => 1.0,
+        3 => 2.0,
+        8 => 3.0,
+        _ => {
+            return Err(Error::input(
+                &image.path,
+                "its EXIF orientation mirrors it, which a Hugin project cannot say",
+                "Store it upright and stitch again.",
+            ));
+        }
+    };
+    let (width, height) = match image.orientation {
+        6 | 8 => (image.height, image.width),
+        _ => (image.width, image.height),
+    };
+    let Attitude { yaw, pitch, roll } = Attitude::of(camera_from_level);
+    let roll = wrap_angle(roll + quarter_turns * FRAC_PI_2);
+    let field_of_view = 2.0 * (0.5 * width as f64 / focal_px).atan();
+    let correction = image.correction.unwrap_or_else(|| Correction::uniform(image.gain.unwrap_or(1.0)));
+    let [red, green, blue] = correction.gain;
+    let [vb, vc, vd] = vignetting(&correction);
+    // Hugin divides by the white balance, ours are factors; exposure values count stops by which a picture is brightened.
+    Ok(format!(
+        "i w{width} h{height} f0 v{:.6} r{:.6} p{:.6} y{:.6} TrX0 TrY0 TrZ0 a0 b0 c0 d0 e0 g0 t0 Eev{:.6} Er{:.6} \
+         Eb{:.6} Ra0 Rb0 Rc0 Rd0 Re0 Va1 Vb{vb:.6} Vc{vc:.6} Vd{vd:.6} Vx0 Vy0 Vm5 n\"{}\"",
+        field_of_view.to_degrees(),
+        roll.to_degrees(),
+        pitch.to_degrees(),
+        yaw.to_degrees(),
+        green.log2(),
+        green / red,
+        green / blue,
+        image.path,
+    ))
+}
+
+/// Coefficients of r^2, r^4 and r^6 in Hugin's polynomial, by which it divides and whose constant is 1: fitted to the
+/// inverse of our factor over the picture by least squares.
+fn vignetting(correction: &Correction) -> [f64; 3] {
+    if correction.vignetting.iter().all(|&coefficient| coefficient == 0.0) {
+        return [0.0; 3];
+    }
+    const SAMPLES: usize = 64;
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for step in 0..=SAMPLES {
+        let r2 = step as f64 / SAMPLES as f64;
+        let powers = Vector3::new(r2, r2 * r2, r2 * r2 * r2);
+        normal += powers * powers.transpose();
+        right += powers * (1.0 / correction.at_radius(r2) - 1.0);
+    }
+    normal.try_inverse().map_or([0.0; 3], |inverse| (inverse * right).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z};
+
+    use super::*;
+
+    fn degrees(attitude: Attitude) -> [f64; 3] {
+        [attitude.yaw, attitude.pitch, attitude.roll].map(f64::to_degrees)
+    }
+
+    #[test]
+    fn angles_are_those_of_hand_computed_cameras() {
+        let close = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
+        // A level camera looking along x, to the right of z: its x is the world's -z, its z the world's x.
+        let right = Matrix3::new(0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
+        assert!(close(degrees(Attitude::of(&right)), [90.0, 0.0, 0.0]));
+        // Looking 30 degrees up: forward is (0, -1/2, sqrt(3)/2), the picture's down (0, sqrt(3)/2, 1/2).
+        let half_root = 0.75_f64.sqrt();
+        let up = Matrix3::new(1.0, 0.0, 0.0, 0.0, half_root, 0.5, 0.0, -0.5, half_root);
+        assert!(close(degrees(Attitude::of(&up)), [0.0, 30.0, 0.0]));
+        // Held a quarter turn anticlockwise: the world's down is the camera's right, and its picture is to be turned
+        // clockwise, which takes right to down.
+        let held = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+        assert!(close(degrees(Attitude::of(&held)), [0.0, 0.0, 90.0]));
+        // Straight up, the picture's top to the back.
+        let zenith = rotation_about_x(-FRAC_PI_2);
+        assert!((degrees(Attitude::of(&zenith))[1].abs() - 90.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn angles_put_the_camera_together_again() {
+        for (yaw, pitch, roll) in [(0.3, 0.2, -0.4), (-2.9, -1.2, 3.0), (1.6, 0.0, 0.01)] {
+            let level_from_camera = rotation_about_y(yaw) * rotation_about_x(pitch) * rotation_about_z(roll);
+            let found = Attitude::of(&level_from_camera.transpose());
+            let error = (found.yaw - yaw).abs() + (found.pitch - pitch).abs() + (found.roll - roll).abs();
+            assert!(error < 1e-12, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn vignetting_is_the_inverse_polynomial() {
+        let correction = Correction { gain: [1.0; 3], vignetting: [0.3, -0.1, 0.05] };
+        let [b, c, d] = vignetting(&correction);
+        for r2 in [0.1_f64, 0.5, 1.0] {
+            let dims = 1.0 + b * r2 + c * r2 * r2 + d * r2 * r2 * r2;
+            assert!((dims * (0.3 * r2 - 0.1 * r2 * r2 + 0.05 * r2 * r2 * r2).exp() - 1.0).abs() < 1e-3);
+        }
+        assert_eq!(vignetting(&Correction::uniform(2.0)), [0.0; 3]);
+    }
+}

@@ -1,0 +1,320 @@
+//! A panorama's geometry and photographs, found again from its project.
+
+use std::path::{Path, PathBuf};
+
+use trueup_compose::crop::Crop;
+use trueup_compose::exposure::{Correction, Corrections};
+use trueup_compose::layout::{CanvasLayout, Placed};
+use trueup_core::mesh::GridMesh;
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result, StageContext};
+use trueup_io::source::{self, RejectedSource, SourceOptions};
+
+use super::record::{ImageRecord, ImageStatus, MeshRecord, Project};
+
+/// What a project must be to be read again.
+const AS_WRITTEN: &str = "Give a project file as `trueup stitch --project` wrote it.";
+/// Vertices farther away than this, in panorama pixels, are no places any more: no file format is as wide.
+const FARTHEST_PX: f64 = 4_294_967_296.0;
+/// Vertices may lie this far beyond the canvas that is recorded with them, which is rounded to whole pixels.
+const ROUNDED_PX: f64 = 1.0;
+/// Largest distance of a grid's recorded sources from an even grid, relative to the photograph's longer side: what
+/// rounding leaves.
+const EVEN: f64 = 1e-6;
+
+/// What a project says of its panorama's geometry, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Recorded {
+    /// Positions in [`Project::images`] of the photographs in the panorama.
+    pub used: Vec<usize>,
+    /// The canvas; photographs are numbered by their place in `used`.
+    pub layout: CanvasLayout,
+    /// What evens out their light.
+    pub corrections: Corrections,
+    /// The reference's place in `used`.
+    pub reference: usize,
+}
+
+impl Recorded {
+    /// Reads the geometry of `project`, which may have been edited to anything.
+    ///
+    /// # Errors
+    /// [`Error::Options`]; [`Error::Input`] if grids, corrections, canvas or reference are missing or cannot be.
+    pub fn new(project: &Project) -> Result<Self> {
+        project.options.validate()?;
+        let used: Vec<usize> =
+            (0..project.images.len()).filter(|&at| project.images[at].status == ImageStatus::Used).collect();
+        let records: Vec<&ImageRecord> = project.used_images().collect();
+        if used.is_empty() {
+            return Err(Error::input("the project", "it uses no photographs", AS_WRITTEN));
+        }
+        let reference = records.iter().position(|record| record.path == project.reference).ok_or_else(|| {
+            Error::input(&project.reference, "it is the reference, but none of the photographs used", AS_WRITTEN)
+        })?;
+        let meshes = used_grids(&records)?;
+        let corrections = recorded_corrections(project, &records)?;
+        let canvas = project.grid_canvas();
+        let (width, height) = (canvas.width, canvas.height);
+        // Grids may lie beyond the ends of a full turn by less than a turn, and anywhere around what was cropped.
+        let turn = if canvas.full_turn { width as f64 } else { 0.0 };
+        let may_be_cropped = project.projection.is_none() && project.options.arrange.canvas.crop != Crop::None;
+        let is_stray = |mesh: &GridMesh| {
+            let (low, high) = mesh.bounds();
+            let is_aside = low.x < -ROUNDED_PX - turn || high.x > width as f64 + ROUNDED_PX + turn;
+            match may_be_cropped {
+                true => turn > 0.0 && is_aside,
+                false => is_aside || low.y < -ROUNDED_PX || high.y > height as f64 + ROUNDED_PX,
+            }
+        };
+        let pixels = width as f64 * height as f64;
+        let strays = meshes.iter().any(is_stray);
+        // No canvas reaches beyond all grids by more than a part of a pixel.
+        let reach =
+            |axis: usize| meshes.iter().map(|mesh| mesh.bounds().1[axis]).fold(0.0, f64::max).ceil() + ROUNDED_PX;
+        let empty = (!canvas.full_turn && width as f64 > reach(0)) || height as f64 > reach(1);
+        if pixels < 1.0 || pixels > project.options.arrange.canvas.max_pixels || strays || empty {
+            let reason = format!("the canvas of {width} x {height} px does not belong to the grids");
+            return Err(Error::input("the project", reason, AS_WRITTEN));
+        }
+        let placed = meshes.into_iter().enumerate().map(|(photograph, mesh)| Placed { photograph, mesh }).collect();
+        let period = canvas.full_turn.then_some(width);
+        let layout = CanvasLayout { width, height, canvas_from_target: 1.0, origin: [0.0; 2], placed, period };
+        Ok(Self { used, layout, corrections, reference })
+    }
+}
+
+/// The grids of used pictures over the original photographs.
+///
+/// # Errors
+/// [`Error::Input`] if one is missing or damaged.
+pub(crate) fn used_grids(records: &[&ImageRecord]) -> Result<Vec<GridMesh>> {
+    records.iter().map(|record| grid(record)).collect()
+}
+
+impl ImageRecord {
+    /// The grid of a photograph in use over the original photograph.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if it is missing or damaged.
+    pub fn grid(&self) -> Result<GridMesh> {
+        grid(self)
+    }
+}
+
+fn grid(record: &ImageRecord) -> Result<GridMesh> {
+    let damaged = |reason: String| Error::input(&record.path, reason, AS_WRITTEN);
+    let mesh = record.mesh.as_ref().ok_or_else(|| damaged("the project holds no grid of it".to_owned()))?;
+    if !is_whole(mesh, record.width, record.height) {
+        return Err(damaged(format!(
+            "its grid of {} x {} with {} vertices over {} x {} px is damaged",
+            mesh.rows,
+            mesh.cols,
+            mesh.target.len(),
+            record.width,
+            record.height
+        )));
+    }
+    let (width, height) = (record.width as f64, record.height as f64);
+    Ok(GridMesh { rows: mesh.rows, columns: mesh.cols, width, height, target: mesh.target.clone(), lines: None })
+}
+
+fn is_whole(mesh: &MeshRecord, width: usize, height: usize) -> bool {
+    let counted = mesh.rows >= 2
+        && mesh.cols >= 2
+        && mesh.rows.checked_mul(mesh.cols) == Some(mesh.target.len())
+        && mesh.source.len() == mesh.target.len()
+        && width.min(height) > 0;
+    if !counted || !mesh.target.iter().flatten().all(|coordinate| coordinate.abs() <= FARTHEST_PX) {
+        return false;
+    }
+    let (width, height) = (width as f64, height as f64);
+    let even = GridMesh { rows: mesh.rows, columns: mesh.cols, width, height, target: Vec::new(), lines: None };
+    let tolerance = EVEN * width.max(height);
+    let is_even = |(vertex, source): (usize, &[f64; 2])| {
+        let expected = even.source(vertex);
+        (0..2).all(|axis| (source[axis] - expected[axis]).abs() <= tolerance)
+    };
+    mesh.source.iter().enumerate().all(is_even)
+}
+
+/// What evens out the light of used pictures, the `records` of `project`; gains alone in files of programs that knew no
+/// more.
+///
+/// # Errors
+/// [`Error::Input`] if one is no positive factor on light.
+pub(crate) fn recorded_corrections(project: &Project, records: &[&ImageRecord]) -> Result<Corrections> {
+    let correction = |record: &&ImageRecord| {
+        let correction = record.correction.unwrap_or(Correction::uniform(record.gain.unwrap_or(1.0)));
+        let damaged = |_| Error::input(&record.path, "its recorded gains are no positive factors on light", AS_WRITTEN);
+        correction.check().map_err(damaged).map(|()| correction)
+    };
+    let photographs = records.iter().map(correction).collect::<Result<_>>()?;
+    Ok(Corrections { response: project.response, photographs })
+}
+
+/// The file of a recorded photograph, checked to be of its size: beside the project file as recorded, as recorded from
+/// the current folder, or beside the project file by its name alone.
+///
+/// # Errors
+/// [`Error::Input`] if there is none, it cannot be read or has another size; [`Error::Options`]; [`Error::Cancelled`].
+pub(crate) fn find_photograph(
+    record: &ImageRecord,
+    project_folder: &Path,
+    options: &SourceOptions,
+    context: &StageContext,
+) -> Result<SourceImage> {
+    let recorded = Path::new(&record.path);
+    let places = [project_folder.join(recorded), recorded.to_owned(), project_folder.join(record.file_name())];
+    let Some(path): Option<PathBuf> = places.into_iter().find(|path| path.is_file()) else {
+        return Err(Error::input(
+            &record.path,
+            "photograph not found, neither here nor beside the project file",
+            "Run the command in the folder that the stitch was made in.",
+        ));
+    };
+    let path = path.display().to_string();
+    let mut found = source::scan(std::slice::from_ref(&path), options, context)?;
+    let Some(image) = found.images.pop() else {
+        return Err(found.rejected.first().map_or_else(
+            || Error::input(&path, "it cannot be read", "Check the file and its permissions."),
+            RejectedSource::to_error,
+        ));
+    };
+    check_size(&image, record)?;
+    Ok(image)
+}
+
+/// Refuses a photograph of another size than the recorded one's.
+///
+/// # Errors
+/// [`Error::Input`].
+pub(crate) fn check_size(image: &SourceImage, record: &ImageRecord) -> Result<()> {
+    if (image.width, image.height) == (record.width, record.height) {
+        return Ok(());
+    }
+    Err(Error::input(
+        image.path.display(),
+        format!(
+            "it is {} x {} px, the project has it at {} x {} px",
+            image.width, image.height, record.width, record.height
+        ),
+        "Give back the photograph that was stitched.",
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use serde_json::{Value, json};
+    use trueup_compose::{layout, render};
+    use trueup_core::raster::{Photograph, Raster};
+    use trueup_core::source::PhotographSource;
+
+    use super::*;
+
+    /// Two photographs of 8 x 6 pixels side by side, as a project.
+    fn project() -> Value {
+        let image = |path: &str, left: f64| {
+            let even: Vec<[f64; 2]> = GridMesh::regular(8.0, 6.0, 4.0).target;
+            let target: Vec<[f64; 2]> = even.iter().map(|vertex| [vertex[0] + left, vertex[1]]).collect();
+            json!({
+                "path": path, "width": 8, "height": 6, "status": "used", "reason": "", "hint": "",
+                "gain": 1.1, "correction": {"gain": [1.1, 1.0, 0.9], "vignetting": [0.1, 0.0, 0.0]},
+                "mesh": {"rows": 3, "cols": 3, "source": even, "target": target}
+            })
+        };
+        json!({
+            "format": "trueup-project", "version": 1, "method": "vpg", "options": {}, "reference": "b.jpg",
+            "images": [image("a.jpg", 0.0), image("b.jpg", 5.5)], "pairs": [],
+            "manhattan": {"threshold": 0.1, "accepted": false, "inliers": []},
+            "canvas": {"width": 14, "height": 6}, "response": [0.1, 0.2, -0.1, 0.05], "seconds": {}, "diagnostics": []
+        })
+    }
+
+    fn read(project: &Value) -> Result<(Project, Recorded)> {
+        let project = Project::from_json(&project.to_string(), "p.json")?;
+        let recorded = Recorded::new(&project)?;
+        Ok((project, recorded))
+    }
+
+    /// Gray photographs of the size that is asked for.
+    struct Plain(Vec<[usize; 2]>);
+
+    impl PhotographSource for Plain {
+        fn photograph(&self, index: usize) -> Result<Photograph> {
+            let [width, height] = self.0[index];
+            Ok(Photograph::Eight(Raster::new(width, height, 1)))
+        }
+    }
+
+    #[test]
+    fn a_project_is_read_as_it_was_written() {
+        let (_, recorded) = read(&project()).expect("whole");
+        assert_eq!((recorded.used, recorded.reference), (vec![0, 1], 1));
+        assert_eq!((recorded.layout.width, recorded.layout.height), (14, 6));
+        assert_eq!(recorded.layout.placed[1].mesh.target[4], [9.5, 3.0]);
+        assert_eq!(recorded.corrections.photographs[0].gain, [1.1, 1.0, 0.9]);
+        assert_eq!(recorded.corrections.response.coefficients, [0.1, 0.2, -0.1, 0.05]);
+        let mut older = project();
+        older.as_object_mut().expect("an object").remove("response");
+        let (_, recorded) = read(&older).expect("whole");
+        assert!(recorded.corrections.response.is_plain());
+    }
+
+    /// Every place in a value, as a JSON pointer.
+    fn pointers(value: &Value, here: &str, all: &mut Vec<String>) {
+        all.push(here.to_owned());
+        match value {
+            Value::Object(fields) => {
+                fields.iter().for_each(|(name, value)| pointers(value, &format!("{here}/{name}"), all));
+            }
+            Value::Array(values) => {
+                values.iter().enumerate().for_each(|(at, value)| pointers(value, &format!("{here}/{at}"), all));
+            }
+            _ => {}
+        }
+    }
+
+    fn anything() -> impl Strategy<Value = Value> {
+        prop_oneof![
+            Just(Value::Null),
+            Just(json!([])),
+            Just(json!({})),
+            any::<bool>().prop_map(Value::from),
+            any::<i64>().prop_map(Value::from),
+            (0..20_i64).prop_map(Value::from),
+            any::<f64>().prop_map(Value::from),
+            (-20.0..20.0_f64).prop_map(Value::from),
+            prop_oneof!["used", "left_out", "a.jpg", ""].prop_map(Value::from),
+            Just(json!(u64::MAX)),
+        ]
+    }
+
+    proptest! {
+        /// Whatever is changed in a project, it is refused or composed, and nothing panics.
+        #[test]
+        fn no_change_of_a_project_panics(changes in prop::collection::vec((any::<prop::sample::Index>(), anything()), 1..3)) {
+            let mut changed = project();
+            for (place, value) in changes {
+                let mut all = Vec::new();
+                pointers(&changed, "", &mut all);
+                if let Some(old) = changed.pointer_mut(&all[place.index(all.len())]) {
+                    *old = value;
+                }
+            }
+            let Ok((project, recorded)) = read(&changed) else { return Ok(()) };
+            let sizes: Vec<[usize; 2]> =
+                recorded.used.iter().map(|&at| [project.images[at].width, project.images[at].height]).collect();
+            let canvas = recorded.layout.width.saturating_mul(recorded.layout.height);
+            if canvas > 10_000 || sizes.iter().any(|size| size[0].saturating_mul(size[1]) > 10_000) {
+                return Ok(());
+            }
+            let context = StageContext::default();
+            let options = &project.options;
+            let photographs = Plain(sizes);
+            let (layout, corrections) = (&recorded.layout, &recorded.corrections);
+            drop(render::run(layout, corrections, &photographs, &options.compose.render, &options.compose.seam, &context));
+            drop(layout::run(recorded.layout.placed, recorded.reference, &options.arrange.canvas, &context));
+        }
+    }
+}

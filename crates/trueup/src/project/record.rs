@@ -1,0 +1,269 @@
+//! The record of a stitch: what `--project` writes and other tools read. Documented in docs/project-file.md.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use trueup_compose::exposure::{Correction, Response};
+use trueup_core::diagnostics::Diagnostic;
+use trueup_core::matches::PairVerdict;
+use trueup_io::source::unique_names;
+
+use super::projection::ProjectionRecord;
+use crate::job::masks::MaskRecord;
+use crate::options::StitchOptions;
+use crate::report::measures::Measures;
+
+/// The `format` field of every project file.
+pub const PROJECT_FORMAT: &str = "trueup-project";
+/// The `version` field: raised when a field changes its meaning.
+pub const PROJECT_VERSION: u32 = 1;
+
+/// Whether a photograph is in the panorama.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ImageStatus {
+    /// It is part of the panorama.
+    Used,
+    /// It is not, for the reason stated.
+    LeftOut,
+}
+
+/// The deformed grid of one photograph, vertices row-major.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MeshRecord {
+    /// Vertex rows.
+    pub rows: usize,
+    /// Vertex columns.
+    pub cols: usize,
+    /// Vertices in pixels of the original photograph after orientation; the corner is (0, 0).
+    pub source: Vec<[f64; 2]>,
+    /// Vertices in pixels of the written panorama; the corner is (0, 0), and where the panorama was cropped they may lie
+    /// outside. With [`Project::projection`], in a plane of their own in which the mesh was solved.
+    pub target: Vec<[f64; 2]>,
+}
+
+/// What became of one photograph. The geometry of a left-out one is `None`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ImageRecord {
+    /// The file as it was given.
+    pub path: String,
+    /// Width after orientation; 0 if the file could not be read.
+    pub width: usize,
+    /// Height after orientation; 0 if the file could not be read.
+    pub height: usize,
+    /// EXIF orientation (1 to 8) that was applied to the stored pixels; 0 in files of programs that did not record it.
+    #[serde(default)]
+    pub orientation: u8,
+    /// Whether it is used.
+    pub status: ImageStatus,
+    /// Why it is left out; empty when used.
+    pub reason: String,
+    /// What the user can do about it; empty when used.
+    pub hint: String,
+    /// Group of overlapping photographs it belongs to, the largest first; `None` if it could not be read.
+    pub component: Option<usize>,
+    /// Focal length in pixels of the original photograph.
+    pub focal_px: Option<f64>,
+    /// Rows of the rotation from the levelled world (y down) to the camera.
+    pub rotation: Option<[[f64; 3]; 3]>,
+    /// The same as the photograph's own lines correct it, which projections are drawn by; `None` in files of programs that
+    /// knew no projections.
+    #[serde(default)]
+    pub upright_rotation: Option<[[f64; 3]; 3]>,
+    /// Clockwise rotation that the similarity prior wants, in degrees.
+    pub theta_deg: Option<f64>,
+    /// Scale that the similarity prior wants, relative to the others.
+    pub scale: Option<f64>,
+    /// Factor on linear light that evens out the exposure: the mean over the channels, in the photograph's middle.
+    pub gain: Option<f64>,
+    /// All that was done to its light; `None` in files of programs that knew gains only.
+    #[serde(default)]
+    pub correction: Option<Correction>,
+    /// The masks it was given.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub masks: Vec<MaskRecord>,
+    /// Three orthogonal vanishing directions in the camera frame, if found.
+    pub vanishing_points: Option<[[f64; 3]; 3]>,
+    /// The deformed grid.
+    pub mesh: Option<MeshRecord>,
+}
+
+/// The outcome of matching two photographs, by their positions in `images`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PairRecord {
+    /// Position of the first photograph.
+    pub a: usize,
+    /// Position of the second photograph.
+    pub b: usize,
+    /// Putative matches.
+    pub matches: usize,
+    /// Matches that agree on one homography.
+    pub inliers: usize,
+    /// How many had to agree.
+    pub needed: usize,
+    /// Whether the pair is joined, and why not.
+    pub verdict: PairVerdict,
+}
+
+/// How far the scene looked like a Manhattan world, and whether that guided the panorama.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ManhattanRecord {
+    /// Vanishing point divergence (0 for perfect agreement); `None` if there were no vanishing points.
+    pub divergence: Option<f64>,
+    /// Largest divergence that is accepted.
+    pub threshold: f64,
+    /// How far the best directions stand out when the lines of all photographs are searched together, in standard
+    /// deviations over all directions tried; `None` with too few lines.
+    #[serde(default)]
+    pub significance: Option<f64>,
+    /// Standard deviation of the vertical by asking different photographs, degrees; `None` where lines were not asked.
+    #[serde(default)]
+    pub vertical_deviation_deg: Option<f64>,
+    /// Whether vanishing points guided the panorama.
+    pub accepted: bool,
+    /// Whether the lines of all photographs together guided it, since the photographs' own vanishing points did not agree.
+    #[serde(default)]
+    pub pooled: bool,
+    /// The clause of the gate that failed, in words.
+    pub failed_clause: Option<String>,
+    /// Dominant directions as columns, in the levelled world.
+    pub dominant: Option<[[f64; 3]; 3]>,
+    /// Paths of the photographs whose vanishing points agree with the dominant directions.
+    pub inliers: Vec<String>,
+}
+
+/// Size of the written panorama.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Canvas {
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Whether it goes all the way round and its ends meet: columns are then meant modulo the width, and vertices may lie
+    /// beyond either end.
+    #[serde(default)]
+    pub full_turn: bool,
+}
+
+impl Canvas {
+    /// Columns after which the panorama repeats; `None` if it does not.
+    pub fn period(&self) -> Option<f64> {
+        self.full_turn.then_some(self.width as f64)
+    }
+}
+
+/// The record of one panorama.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Project {
+    /// [`PROJECT_FORMAT`].
+    pub format: String,
+    /// [`PROJECT_VERSION`].
+    pub version: u32,
+    /// The method, as in the options.
+    pub method: String,
+    /// Every option of every stage as used.
+    pub options: StitchOptions,
+    /// Path of the reference photograph.
+    pub reference: String,
+    /// Every photograph given, in the order given: used, left out, and unreadable.
+    pub images: Vec<ImageRecord>,
+    /// Every pair tried, sorted.
+    pub pairs: Vec<PairRecord>,
+    /// Vanishing-point guidance.
+    pub manhattan: ManhattanRecord,
+    /// How upright, straight and well aligned it is, by its own lines and matches; `None` for a single photograph, and in
+    /// files of programs that did not measure.
+    #[serde(default)]
+    pub measures: Option<Measures>,
+    /// Size of the panorama.
+    pub canvas: Canvas,
+    /// Name of the color space it was composed in; empty in files of programs that knew one only.
+    #[serde(default)]
+    pub color_space: String,
+    /// What the cameras' response adds to that space's transfer curve: all factors act on the light by it. Nothing in files
+    /// of programs that estimated none.
+    #[serde(default)]
+    pub response: Response,
+    /// How directions were drawn; `None` where the panorama is the mesh itself, and in files of programs that knew no
+    /// projections.
+    #[serde(default)]
+    pub projection: Option<ProjectionRecord>,
+    /// The canvas of the plane in which the grids lie, where that is not the panorama's: with a projection.
+    #[serde(default)]
+    pub mesh_canvas: Option<Canvas>,
+    /// Wall seconds per stage.
+    pub seconds: BTreeMap<String, f64>,
+    /// What was found on the way.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+impl ImageRecord {
+    /// Rows of the rotation from the levelled world to the camera, as the photograph's own lines correct it where that is
+    /// recorded.
+    pub(crate) fn level_rotation(&self) -> Option<&[[f64; 3]; 3]> {
+        self.upright_rotation.as_ref().or(self.rotation.as_ref())
+    }
+
+    /// The file's name without folders; paths written on another system are understood.
+    pub fn file_name(&self) -> &str {
+        self.path.rsplit(['/', '\\']).next().unwrap_or(&self.path)
+    }
+}
+
+impl Project {
+    /// The canvas that the grids of the photographs lie on.
+    pub fn grid_canvas(&self) -> Canvas {
+        self.mesh_canvas.unwrap_or(self.canvas)
+    }
+
+    /// The photographs in the panorama, in the order given.
+    pub fn used_images(&self) -> impl Iterator<Item = &ImageRecord> {
+        self.images.iter().filter(|image| image.status == ImageStatus::Used)
+    }
+
+    /// The names by which people know the photographs, in the order of [`Self::images`]: file names, with as much of their
+    /// folders as tells them apart.
+    pub fn photograph_names(&self) -> Vec<String> {
+        let paths: Vec<&Path> = self.images.iter().map(|image| Path::new(&image.path)).collect();
+        unique_names(&paths)
+    }
+
+    /// Number of photographs in the panorama.
+    pub fn used(&self) -> usize {
+        self.used_images().count()
+    }
+
+    /// The project as JSON text.
+    ///
+    /// # Errors
+    /// [`trueup_core::Error::Input`] if a number cannot be written (never for results of a stitch).
+    pub fn to_json(&self) -> trueup_core::Result<String> {
+        serde_json::to_string(self)
+            .map_err(|error| trueup_core::Error::input("project", error, "Report this as a defect."))
+    }
+
+    /// Reads a project file's text. `file` is its name, for messages.
+    ///
+    /// # Errors
+    /// [`trueup_core::Error::Input`] if it is no project, damaged, or of a later version.
+    pub fn from_json(text: &str, file: &str) -> trueup_core::Result<Self> {
+        let wrong = |reason: String| {
+            trueup_core::Error::input(file, reason, "Give a file that `trueup stitch --project` wrote.")
+        };
+        let mut value: serde_json::Value =
+            serde_json::from_str(text).map_err(|error| wrong(format!("not a project file ({error})")))?;
+        if value.get("format").and_then(serde_json::Value::as_str) != Some(PROJECT_FORMAT) {
+            return Err(wrong(format!("its format is not \"{PROJECT_FORMAT}\"")));
+        }
+        let version = value.get("version").and_then(serde_json::Value::as_u64);
+        if version != Some(u64::from(PROJECT_VERSION)) {
+            let found = version.map_or("unknown".to_owned(), |version| version.to_string());
+            return Err(wrong(format!("its version is {found}, this program reads version {PROJECT_VERSION}")));
+        }
+        if let Some(options) = value.get_mut("options") {
+            StitchOptions::update_recorded(options, file)?;
+        }
+        serde_json::from_value(value).map_err(|error| wrong(format!("the project is damaged ({error})")))
+    }
+}

@@ -1,0 +1,157 @@
+//! The photographs that a recorded panorama is composed of again.
+
+use std::path::Path;
+
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result, StageContext};
+use trueup_io::source::{self, RejectedSource, SourceOptions};
+
+use super::read::{check_size, find_photograph};
+use super::record::ImageRecord;
+use crate::report::several::several;
+
+/// The recorded photographs themselves, in the order of `records`.
+///
+/// # Errors
+/// [`Error::Input`] that names every one that is missing, unreadable or of another size; [`Error::Cancelled`].
+pub(crate) fn recorded_photographs(
+    records: &[&ImageRecord],
+    project_folder: &Path,
+    options: &SourceOptions,
+    context: &StageContext,
+) -> Result<Vec<SourceImage>> {
+    let found = records.iter().map(|record| find_photograph(record, project_folder, options, context));
+    all_of(found, "Give the folder that holds the photographs after --photos.")
+}
+
+/// Other photographs of the same shape from `folder`, in the order of `records`: by their file names, by these without
+/// extensions, or, if not one name is known and there are as many files as records, by the natural order of names.
+///
+/// # Errors
+/// [`Error::Input`] that names every photograph that has no replacement, or whose replacement has another size;
+/// [`Error::Cancelled`].
+pub(crate) fn other_photographs(
+    records: &[&ImageRecord],
+    folder: &Path,
+    options: &SourceOptions,
+    context: &StageContext,
+) -> Result<Vec<SourceImage>> {
+    let folder_text = folder.display().to_string();
+    let sources = source::scan(std::slice::from_ref(&folder_text), options, context)?;
+    if sources.images.is_empty() {
+        return Err(match sources.rejected.first() {
+            Some(rejected) => rejected.to_error(),
+            None => Error::input(folder_text, "it holds no photographs", "Give the folder that holds them."),
+        });
+    }
+    let names: Vec<&str> = records.iter().map(|record| record.file_name()).collect();
+    let files: Vec<String> = sources.images.iter().map(|image| file_name(&image.path)).collect();
+    let chosen = choose(&names, &files);
+    let found = records.iter().zip(chosen).map(|(record, choice)| {
+        let missing = |reason: String| Error::input(record.file_name(), reason, "");
+        let image = match choice {
+            Choice::File(position) => sources.images[position].clone(),
+            Choice::Several => return Err(missing(format!("several files in {folder_text} have its name"))),
+            Choice::None => return Err(missing(why_none(record, &folder_text, &sources.rejected))),
+        };
+        check_size(&image, record).map(|()| image)
+    });
+    all_of(found, "Give a folder with a photograph of the same name and size for each one of the panorama.")
+}
+
+/// What replaces a photograph.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Choice {
+    /// The file at this position.
+    File(usize),
+    /// More than one could.
+    Several,
+    /// No file.
+    None,
+}
+
+fn choose(names: &[&str], files: &[String]) -> Vec<Choice> {
+    let the_only = |fits: &dyn Fn(&str) -> bool| {
+        let mut fitting = (0..files.len()).filter(|&position| fits(&files[position]));
+        match (fitting.next(), fitting.next()) {
+            (None, _) => Choice::None,
+            (Some(position), None) => Choice::File(position),
+            (Some(_), Some(_)) => Choice::Several,
+        }
+    };
+    let by_name = |name: &&str| match the_only(&|file| file == *name) {
+        Choice::None => the_only(&|file| stem(file) == stem(name)),
+        choice => choice,
+    };
+    let chosen: Vec<Choice> = names.iter().map(by_name).collect();
+    if names.len() != files.len() || chosen.iter().any(|choice| *choice != Choice::None) {
+        return chosen;
+    }
+    let in_order = |names: &[&str]| -> Vec<usize> {
+        let mut order: Vec<usize> = (0..names.len()).collect();
+        order.sort_by(|&a, &b| source::natural_order(names[a].as_ref(), names[b].as_ref()));
+        order
+    };
+    let files: Vec<&str> = files.iter().map(String::as_str).collect();
+    let mut chosen = vec![Choice::None; names.len()];
+    for (name, file) in in_order(names).into_iter().zip(in_order(&files)) {
+        chosen[name] = Choice::File(file);
+    }
+    chosen
+}
+
+fn why_none(record: &ImageRecord, folder: &str, rejected: &[RejectedSource]) -> String {
+    let own = |one: &&RejectedSource| stem(&file_name(&one.path)) == stem(record.file_name());
+    match rejected.iter().find(own) {
+        Some(one) => format!("{} cannot be used: {}", one.path.display(), one.reason),
+        None => format!("no file in {folder} has its name"),
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn stem(name: &str) -> &str {
+    name.rsplit_once('.').map_or(name, |(stem, _)| stem)
+}
+
+/// All that were found, or one error for all that were not.
+fn all_of(found: impl Iterator<Item = Result<SourceImage>>, hint: &str) -> Result<Vec<SourceImage>> {
+    let (mut images, mut wrong) = (Vec::new(), Vec::new());
+    for one in found {
+        match one {
+            Ok(image) => images.push(image),
+            Err(Error::Input { subject, reason, .. }) => wrong.push((subject, reason)),
+            Err(other) => return Err(other),
+        }
+    }
+    match wrong.as_slice() {
+        [] => Ok(images),
+        [(subject, reason)] => Err(Error::input(subject, reason, hint)),
+        many => {
+            let reasons: Vec<String> = many.iter().map(|(subject, reason)| format!("{subject}: {reason}")).collect();
+            let subject = format!("{} of {} photographs", many.len(), many.len() + images.len());
+            Err(Error::input(subject, several(&reasons), hint))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chosen(names: &[&str], files: &[&str]) -> Vec<Choice> {
+        choose(names, &files.iter().map(|&file| file.to_owned()).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn names_come_before_names_without_extension_and_these_before_the_order() {
+        use Choice::{File, None, Several};
+        assert_eq!(chosen(&["b.jpg", "a.jpg"], &["a.jpg", "a.tif", "b.tif"]), [File(2), File(0)]);
+        assert_eq!(chosen(&["a.jpg"], &["a.png", "a.tif"]), [Several]);
+        assert_eq!(chosen(&["a.jpg", "b.jpg"], &["a.jpg", "x.jpg"]), [File(0), None]);
+        assert_eq!(chosen(&["p10.jpg", "p9.jpg"], &["q1.tif", "q2.tif"]), [File(1), File(0)]);
+        assert_eq!(chosen(&["p1.jpg", "p2.jpg"], &["q1.tif"]), [None, None]);
+    }
+}

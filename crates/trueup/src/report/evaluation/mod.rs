@@ -1,0 +1,209 @@
+//! How good a panorama is, against the exactly known truth of its photographs.
+
+mod pixels;
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use trueup_align::metrics::{
+    self, Outside, Uprightness, best_rotation, folded_cells, mean_relative_turn, rectangle_rotation, relative_turns,
+};
+use trueup_core::camera::Camera;
+use trueup_core::geometry::wrap_angle;
+use trueup_core::mesh::GridMesh;
+use trueup_core::truth::{ImageTruth, Truth};
+use trueup_core::{Error, Result};
+
+use crate::project::read::used_grids;
+use crate::project::record::{ImageRecord, Project};
+pub use pixels::{PixelEvaluation, compare_overlaps, evaluate_pixels, scale_up_to};
+
+/// The paper prints LD in hundredths.
+pub(crate) const HUNDREDTHS: f64 = 100.0;
+
+/// A panorama measured against the truth. Angles in degrees.
+///
+/// Measured are the pictures that are used in the project and named in the truth, in the order of the truth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Evaluation {
+    /// Pictures measured.
+    pub used: usize,
+    /// Pictures named in the truth.
+    pub given: usize,
+    /// Mean over the pictures of |angle of the picture's middle to upright|: absolute, no reference takes part.
+    pub upright_deg: f64,
+    /// The largest such angle.
+    pub upright_max_deg: f64,
+    /// As `upright_deg`, from the direction that the pictures share.
+    pub spread_deg: f64,
+    /// The paper's GDIC (equation 14), with the first picture as its reference, so that all methods share it.
+    pub gdic_deg: f64,
+    /// GDIC with the project's reference as its own; `None` if the truth does not name that picture.
+    pub gdic_reference_deg: Option<f64>,
+    /// GDIC with each picture's best-fitting similarity instead of its smallest rectangle: without the floor that strong
+    /// perspective gives to GDIC.
+    pub gdic_similarity_deg: f64,
+    /// Mean error of the prior's rotations, relative to the first picture: its quality before the mesh. `None` if the
+    /// project holds no rotations.
+    pub theta_error_deg: Option<f64>,
+    /// The largest such error.
+    pub theta_error_max_deg: Option<f64>,
+    /// The paper's local distortion LD (equations 12 and 13), times 100: the largest over the pictures. Judged are cells
+    /// whose center lies outside all other pictures.
+    pub ld: f64,
+    /// Mean over the pictures of the same.
+    pub ld_mean: f64,
+    /// As `ld`, of the cells whose four corners lie outside all other pictures, too: up to 7 % more.
+    pub ld_corners: f64,
+    /// Cells that are folded, in all pictures. LD leaves them out; figures with different counts do not compare.
+    pub folds: usize,
+    /// Root mean square distance in the panorama of the two places of what two pictures both show, in the pictures' own
+    /// pixels; `None` if no pictures overlap or they were taken from different places.
+    pub align_px: Option<f64>,
+    /// Each picture's own figures.
+    pub pictures: Vec<PictureEvaluation>,
+}
+
+/// One picture measured against the truth. Angles in degrees, positive clockwise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PictureEvaluation {
+    /// File name.
+    pub file: String,
+    /// By how much its middle is turned beyond upright.
+    pub upright_deg: f64,
+    /// By how much the prior's rotation is wrong, relative to the first picture.
+    pub theta_error_deg: Option<f64>,
+}
+
+/// A used picture with its truth and its grid.
+struct Known<'a> {
+    record: &'a ImageRecord,
+    truth: &'a ImageTruth,
+}
+
+/// Reads the truth of a set of pictures from a JSON file.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read; [`Error::Input`] if it is no truth, damaged, or impossible.
+pub fn read_truth(path: &Path) -> Result<Truth> {
+    let bytes = std::fs::read(path).map_err(|error| Error::io("reading", path, error))?;
+    let subject = path.display().to_string();
+    let truth: Truth = serde_json::from_slice(&bytes).map_err(|error| {
+        let reason = format!("not a truth file ({error})");
+        Error::input(&subject, reason, "Give the truth.json that was written together with the pictures.")
+    })?;
+    truth.check(&subject)?;
+    Ok(truth)
+}
+
+/// Measures a panorama against the truth. Pictures are matched by their file names.
+///
+/// # Errors
+/// [`Error::Input`] if the truth does not fit: it names none of the project's pictures, fewer than two of those used, or
+/// one of another size, or two of the project's pictures have one name; if the truth is impossible; if the project's grids
+/// are damaged.
+pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
+    truth.check(&subject(truth))?;
+    let known = match_pictures(project, truth)?;
+    let records: Vec<&ImageRecord> = known.iter().map(|one| one.record).collect();
+    let meshes = used_grids(&records)?;
+    let period = project.grid_canvas().period();
+    let gammas: Vec<f64> = known.iter().map(|one| one.truth.gamma_deg.to_radians()).collect();
+    let reference = known.iter().position(|one| one.record.path == project.reference);
+
+    let upright = Uprightness::against(&meshes, &gammas).ok_or_else(|| too_few(known.len()))?;
+    let rectangles: Vec<f64> = meshes.iter().map(rectangle_rotation).collect();
+    let similarities: Vec<f64> = meshes.iter().map(best_rotation).collect();
+    let turn = |rotations: &[f64], reference| mean_relative_turn(rotations, &gammas, reference).map(f64::to_degrees);
+    let thetas: Option<Vec<f64>> = records.iter().map(|record| Some(record.theta_deg?.to_radians())).collect();
+    let theta_errors = thetas.as_ref().and_then(|thetas| relative_turns(thetas, &gammas, 0));
+    let distortion = metrics::local_distortion(&meshes, Outside::Center, period);
+    let pictures = (0..known.len()).map(|k| PictureEvaluation {
+        file: known[k].truth.file.clone(),
+        upright_deg: upright.pictures[k].to_degrees(),
+        theta_error_deg: theta_errors.as_ref().map(|errors| errors[k].to_degrees()),
+    });
+    Ok(Evaluation {
+        used: known.len(),
+        given: truth.images.len(),
+        upright_deg: upright.mean.to_degrees(),
+        upright_max_deg: upright.largest.to_degrees(),
+        spread_deg: upright.spread.to_degrees(),
+        gdic_deg: turn(&rectangles, 0).ok_or_else(|| too_few(known.len()))?,
+        gdic_reference_deg: reference.and_then(|reference| turn(&rectangles, reference)),
+        gdic_similarity_deg: turn(&similarities, 0).ok_or_else(|| too_few(known.len()))?,
+        theta_error_deg: thetas.as_ref().and_then(|thetas| turn(thetas, 0)),
+        theta_error_max_deg: theta_errors.as_ref().map(|errors| largest(errors).to_degrees()),
+        ld: HUNDREDTHS * distortion.worst,
+        ld_mean: HUNDREDTHS * distortion.mean,
+        ld_corners: HUNDREDTHS * metrics::local_distortion(&meshes, Outside::CenterAndCorners, period).worst,
+        folds: meshes.iter().map(folded_cells).sum(),
+        align_px: alignment(&known, &meshes, period),
+        pictures: pictures.collect(),
+    })
+}
+
+fn subject(truth: &Truth) -> String {
+    format!("the truth of {}", truth.source)
+}
+
+fn largest(angles: &[f64]) -> f64 {
+    angles.iter().fold(0.0, |largest, &angle| largest.max(wrap_angle(angle).abs()))
+}
+
+/// The used pictures that the truth names, in its order.
+fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Known<'a>>> {
+    let used: Vec<&ImageRecord> = project.used_images().collect();
+    let mut known = Vec::new();
+    for one in &truth.images {
+        let mut named = used.iter().filter(|record| record.file_name() == one.file);
+        let Some(&record) = named.next() else { continue };
+        if named.next().is_some() {
+            return Err(Error::input(
+                &one.file,
+                "the project uses two pictures of this name, and a truth tells pictures apart by their names alone",
+                "Stitch pictures with different names.",
+            ));
+        }
+        if (record.width, record.height) != (one.width, one.height) {
+            let reason = format!(
+                "the project has it at {} x {} px, the truth at {} x {} px",
+                record.width, record.height, one.width, one.height
+            );
+            return Err(Error::input(&one.file, reason, "Give the truth of the very pictures that were stitched."));
+        }
+        known.push(Known { record, truth: one });
+    }
+    match known.len() {
+        0 => Err(Error::input(
+            subject(truth),
+            format!("it names none of the {} pictures that the project uses", used.len()),
+            "Give the truth of the pictures that were stitched; pictures are told apart by their file names.",
+        )),
+        1 => Err(too_few(1)),
+        _ => Ok(known),
+    }
+}
+
+fn too_few(count: usize) -> Error {
+    Error::input(
+        "the truth",
+        format!("of the pictures it names, the project uses {count}, and it takes two to compare"),
+        "Give a project of at least two pictures of the set.",
+    )
+}
+
+/// [`metrics::true_alignment`] where all pictures share one center of projection.
+fn alignment(known: &[Known], meshes: &[GridMesh], period: Option<f64>) -> Option<f64> {
+    if known.iter().any(|one| one.truth.center != known[0].truth.center) {
+        return None;
+    }
+    let camera = |one: &Known| {
+        let truth = one.truth;
+        Camera::new(truth.focal_px, truth.width as f64, truth.height as f64, &truth.camera_from_world())
+    };
+    let cameras: Vec<Camera> = known.iter().map(camera).collect();
+    metrics::true_alignment(meshes, &cameras, period)
+}

@@ -1,0 +1,135 @@
+//! Why a readable photograph is not in the panorama, in words a photographer can use.
+
+use trueup_core::Error;
+use trueup_core::matches::{PairMatches, PairVerdict};
+use trueup_io::source::RejectedSource;
+
+use super::several::several;
+
+/// Reason and hint for one photograph.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct LeftOut {
+    pub code: &'static str,
+    pub reason: String,
+    pub hint: String,
+}
+
+/// Why photograph `picture` is not joined to the stitched component `component`.
+///
+/// `names` are the photographs' names, `pairs` every pair tried.
+pub(crate) fn explain(picture: usize, component: &[usize], pairs: &[PairMatches], names: &[String]) -> LeftOut {
+    let touching = |pair: &&PairMatches| pair.a == picture || pair.b == picture;
+    if let Some(joined) = pairs.iter().filter(touching).find(|pair| pair.verdict.is_joined()) {
+        let neighbor = other(joined, picture);
+        return LeftOut {
+            code: "other-panorama",
+            reason: format!("it belongs to another panorama, with {}", names[neighbor]),
+            hint: "Use --all to stitch every group of overlapping photographs.".to_owned(),
+        };
+    }
+    let best = pairs
+        .iter()
+        .filter(touching)
+        .filter(|pair| component.is_empty() || component.contains(&other(pair, picture)))
+        .max_by(|one, two| strength(one).total_cmp(&strength(two)));
+    match best {
+        Some(pair) if pair.putative > 0 => LeftOut {
+            code: "no-overlap",
+            reason: format!("no overlap found: best neighbor {}, {}", names[other(pair, picture)], counts(pair)),
+            hint: hint(pair).to_owned(),
+        },
+        _ => LeftOut {
+            code: "no-overlap",
+            reason: "no overlap found: nothing in it was recognized elsewhere".to_owned(),
+            hint: "Leave it out if it belongs elsewhere; otherwise shoot again with more overlap and detail."
+                .to_owned(),
+        },
+    }
+}
+
+/// "9 of 24 matches agree (15 needed)".
+pub(crate) fn counts(pair: &PairMatches) -> String {
+    match pair.verdict {
+        PairVerdict::TooFewMatches => format!("only {} matching points", pair.putative),
+        PairVerdict::ImplausibleHomography => {
+            format!("{} of {} matches agree, but on an impossible view", pair.agreeing, pair.putative)
+        }
+        _ => format!("{} of {} matches agree ({} needed)", pair.agreeing, pair.putative, pair.needed),
+    }
+}
+
+/// How close a pair came to being joined.
+pub(crate) fn strength(pair: &PairMatches) -> f64 {
+    pair.confidence() + 1e-6 * pair.putative as f64
+}
+
+fn hint(pair: &PairMatches) -> &'static str {
+    match pair.verdict {
+        PairVerdict::ImplausibleHomography => {
+            "Repeated patterns mislead matching; shoot with more overlap, or join the pair in a --graph file."
+        }
+        _ => "Shoot one frame between them, or join the pair in a --graph file if they do overlap.",
+    }
+}
+
+fn other(pair: &PairMatches, picture: usize) -> usize {
+    if pair.a == picture { pair.b } else { pair.a }
+}
+
+/// Name, reason and hint of an input that cannot be used.
+pub(crate) fn reason_of_rejected(rejected: RejectedSource) -> (String, String, String) {
+    (rejected.name, rejected.reason, rejected.hint)
+}
+
+/// The error when none of the inputs, each with name, reason and hint, can be used.
+pub(crate) fn none_usable(inputs: Vec<(String, String, String)>) -> Error {
+    match inputs.as_slice() {
+        [(name, reason, hint)] => Error::input(name, reason, hint),
+        _ => {
+            let reasons: Vec<String> = inputs.iter().map(|(name, reason, _)| format!("{name}: {reason}")).collect();
+            Error::input(
+                format!("{} files", inputs.len()),
+                format!("none of them can be used: {}", several(&reasons)),
+                "Name at least two overlapping photographs, or a folder that holds them.",
+            )
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pair(a: usize, b: usize, agreeing: usize, verdict: PairVerdict) -> PairMatches {
+        PairMatches {
+            a,
+            b,
+            putative: 24,
+            in_overlap: 20,
+            agreeing,
+            needed: 15,
+            verdict,
+            b_from_a: None,
+            inliers: Vec::new(),
+        }
+    }
+
+    fn names() -> Vec<String> {
+        (0..4).map(|k| format!("{k}.jpg")).collect()
+    }
+
+    #[test]
+    fn the_best_neighbor_and_its_counts_are_named() {
+        let pairs = [pair(0, 2, 5, PairVerdict::TooFewInliers), pair(1, 2, 9, PairVerdict::TooFewInliers)];
+        let left_out = explain(2, &[0, 1], &pairs, &names());
+        assert_eq!(left_out.code, "no-overlap");
+        assert_eq!(left_out.reason, "no overlap found: best neighbor 1.jpg, 9 of 24 matches agree (15 needed)");
+    }
+
+    #[test]
+    fn members_of_another_panorama_are_told_so() {
+        let left_out = explain(3, &[0, 1], &[pair(2, 3, 40, PairVerdict::Joined)], &names());
+        assert_eq!(left_out.code, "other-panorama");
+        assert!(left_out.reason.contains("2.jpg"));
+    }
+}
