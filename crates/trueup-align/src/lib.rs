@@ -1,6 +1,5 @@
 //! Measurements to geometry: stitch graph, cameras, vanishing points, similarity prior and mesh.
 #![forbid(unsafe_code)]
-#![warn(unreachable_pub)]
 
 pub mod cameras;
 pub mod full_turn;

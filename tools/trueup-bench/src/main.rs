@@ -8,6 +8,7 @@ mod methods;
 mod paper;
 mod progress;
 mod quality;
+mod random_directions;
 mod report;
 mod results;
 mod roc;

@@ -13,7 +13,6 @@ mod interpretation;
 mod options;
 mod refine;
 mod search;
-mod spoil;
 mod triad;
 
 #[cfg(test)]
@@ -26,7 +25,6 @@ use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
 
 pub use options::VanishingOptions;
-pub use spoil::spoil;
 pub use triad::{MissingTriad, Triad, TriadOutcome};
 
 pub(crate) use interpretation::{FULL_WEIGHT_LENGTH_PX, InterpretationPlanes};

@@ -14,7 +14,5 @@ trueup_core::options! {
         /// Lower quality (fraction of the segments' weight that supports the triad) yields no triad. Raise it where
         /// organic scenes yield directions that are none; lower it where architecture is seen between much clutter.
         min_quality: f64 = 0.25, between(0.0, 1.0), "";
-        /// Share of the directions found that are replaced by random ones: for experiments on robustness.
-        outlier_share: f64 = 0.0, between(0.0, 1.0), "";
     }
 }
