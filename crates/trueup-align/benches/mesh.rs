@@ -1,8 +1,8 @@
-//! Solving the mesh of a row of pictures: 60 grids of 21 x 16 vertices are 40,320 unknowns.
+//! Solving the mesh of a row of photographs: 60 grids of 21 x 16 vertices are 40,320 unknowns.
 
 use divan::Bencher;
 use trueup_align::match_points::OverlapWarp;
-use trueup_align::mesh::{self, Base, MeshOptions};
+use trueup_align::mesh::{self, BaseMap, MeshInput, MeshOptions, Refinements};
 use trueup_core::StageContext;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::rotation_about_y;
@@ -17,7 +17,7 @@ fn main() {
     divan::main();
 }
 
-/// The grid of picture `from` in its neighbor, `direction` +1 or -1.
+/// The grid of photograph `from` in its neighbor, `direction` +1 or -1.
 fn warp(grid: &GridMesh, from: usize, direction: f64) -> OverlapWarp {
     let camera = |yaw: f64| Camera::new(700.0, WIDTH, HEIGHT, &rotation_about_y(yaw).transpose());
     let (here, there) = (camera(0.0), camera(direction * STEP));
@@ -32,11 +32,13 @@ fn warp(grid: &GridMesh, from: usize, direction: f64) -> OverlapWarp {
 }
 
 #[divan::bench(args = [10, 60])]
-fn solve(bencher: Bencher, pictures: usize) {
-    let grids = vec![GridMesh::regular(WIDTH, HEIGHT, 40.0); pictures];
+fn solve(bencher: Bencher, photographs: usize) {
+    let grids = vec![GridMesh::regular(WIDTH, HEIGHT, 40.0); photographs];
     let warps: Vec<OverlapWarp> =
-        (0..pictures - 1).flat_map(|k| [warp(&grids[k], k, 1.0), warp(&grids[k + 1], k + 1, -1.0)]).collect();
-    let bases: Vec<Base> = (0..pictures).map(|k| Base::similarity(1.0, 0.02 * (k as f64).sin())).collect();
+        (0..photographs - 1).flat_map(|k| [warp(&grids[k], k, 1.0), warp(&grids[k + 1], k + 1, -1.0)]).collect();
+    let bases: Vec<BaseMap> = (0..photographs).map(|k| BaseMap::similarity(1.0, 0.02 * (k as f64).sin())).collect();
     let options = MeshOptions::default();
-    bencher.bench(|| mesh::run(&grids, &warps, &bases, 0, &options, &StageContext::default()).expect("solvable"));
+    let refinements = Refinements::default();
+    let input = MeshInput { grids: &grids, warps: &warps, bases: &bases, reference: 0, refinements };
+    bencher.bench(|| mesh::run(&input, &options, &StageContext::default()).expect("solvable"));
 }

@@ -24,8 +24,7 @@ fn checked(args: ComposeArgs) -> Result<(ComposeJob, StitchOptions), Failure> {
     chosen::check_files(&args.files)?;
     let project = inspect::read(&args.recorded)?;
     project.options.validate()?;
-    let flags = chosen::picture_flags(&args.picture, &args.budget);
-    let options = chosen::options(project.options.clone(), &args.tuning, &flags)?;
+    let options = chosen::options(project.options.clone(), &args.tuning, &args.typed)?;
     let project_folder = args.recorded.parent().unwrap_or(Path::new("")).to_owned();
     let job = ComposeJob {
         project,

@@ -10,10 +10,10 @@ use crate::failure::Failure;
 use crate::inspect;
 use crate::output;
 use crate::progress;
-use crate::summary::{self, Page};
+use crate::summary::{self, LabeledLines};
 
 /// The pixel measures, or why there are none.
-type Pixels = Result<PixelEvaluation, String>;
+type PixelOutcome = Result<PixelEvaluation, String>;
 
 pub(crate) fn run(args: &EvaluateArgs) -> Result<(), Failure> {
     let project = inspect::read(&args.project)?;
@@ -48,7 +48,7 @@ fn against(project: &Project, project_file: &Path, truth_file: &Path) -> Result<
 }
 
 /// Photographs that are gone or cannot be compared leave the other measures as they are.
-fn pixels(project: &Project, project_file: &Path) -> Result<Pixels, Error> {
+fn pixels(project: &Project, project_file: &Path) -> Result<PixelOutcome, Error> {
     let folder = project_file.parent().unwrap_or(Path::new(""));
     let seed = project.options.stitch.seed;
     match progress::shown(false, seed, |context| trueup::evaluate_pixels(project, folder, context)) {
@@ -59,42 +59,42 @@ fn pixels(project: &Project, project_file: &Path) -> Result<Pixels, Error> {
     }
 }
 
-fn text(project: &Project, evaluation: Option<&Evaluation>, pixels: Option<&Pixels>) -> String {
-    let mut page = Page::default();
-    summary::measures(&mut page, project);
+fn text(project: &Project, evaluation: Option<&Evaluation>, pixels: Option<&PixelOutcome>) -> String {
+    let mut lines = LabeledLines::default();
+    summary::measures(&mut lines, project);
     match (&project.measures, project.used()) {
         (Some(_), _) => {}
-        (None, 1) => page.entry("measured", "nothing: it takes two photographs, and this panorama has one"),
-        (None, _) => page.entry("measured", "the project file holds no measures: stitch again with this program"),
+        (None, 1) => lines.entry("measured", "nothing: it takes two photographs, and this panorama has one"),
+        (None, _) => lines.entry("measured", "the project file holds no measures: stitch again with this program"),
     }
     if let Some(evaluation) = evaluation {
-        truth(&mut page, evaluation);
+        truth(&mut lines, evaluation);
     }
     match pixels {
         None => {}
-        Some(Err(why)) => page.entry("pixels", &format!("skipped: {why}")),
-        Some(Ok(found)) => compared(&mut page, found),
+        Some(Err(why)) => lines.entry("pixels", &format!("skipped: {why}")),
+        Some(Ok(found)) => compared(&mut lines, found),
     }
-    page.into_text()
+    lines.into_text()
 }
 
-fn truth(page: &mut Page, found: &Evaluation) {
-    page.entry("truth", &format!("{} of {} pictures measured", found.used, found.given));
+fn truth(lines: &mut LabeledLines, found: &Evaluation) {
+    lines.entry("truth", &format!("{} of {} pictures measured", found.used, found.given));
     let (mean, most, spread) = (found.upright_deg, found.upright_max_deg, found.spread_deg);
-    page.item("upright", &format!("{mean:.3} degrees off on average, {most:.3} at most; spread {spread:.3}"));
+    lines.item("upright", &format!("{mean:.3} degrees off on average, {most:.3} at most; spread {spread:.3}"));
     let by_reference = found
         .gdic_reference_deg
         .map_or(String::new(), |degrees| format!(", {degrees:.3} from the project's reference"));
     let (gdic, similarity) = (found.gdic_deg, found.gdic_similarity_deg);
-    page.item("GDIC", &format!("{gdic:.3} degrees from the first picture{by_reference}"));
-    page.item("GDIC-P", &format!("{similarity:.3} degrees, by similarities instead of rectangles"));
+    lines.item("GDIC", &format!("{gdic:.3} degrees from the first picture{by_reference}"));
+    lines.item("GDIC-P", &format!("{similarity:.3} degrees, by similarities instead of rectangles"));
     if let Some((mean, most)) = found.theta_error_deg.zip(found.theta_error_max_deg) {
-        page.item("theta", &format!("{mean:.3} degrees off on average, {most:.3} at most"));
+        lines.item("theta", &format!("{mean:.3} degrees off on average, {most:.3} at most"));
     }
     let (ld, mean, corners) = (found.ld, found.ld_mean, found.ld_corners);
-    page.item("LD", &format!("{ld:.3}e-2 at most, {mean:.3}e-2 on average; {corners:.3}e-2 by center and corners"));
-    page.item("folds", &format!("{} folded cells", found.folds));
-    page.item(
+    lines.item("LD", &format!("{ld:.3}e-2 at most, {mean:.3}e-2 on average; {corners:.3}e-2 by center and corners"));
+    lines.item("folds", &format!("{} folded cells", found.folds));
+    lines.item(
         "alignment",
         &match found.align_px {
             Some(pixels) => format!("{pixels:.3} px"),
@@ -103,18 +103,18 @@ fn truth(page: &mut Page, found: &Evaluation) {
     );
     for picture in &found.pictures {
         let theta = picture.theta_error_deg.map_or(String::new(), |degrees| format!(", theta {degrees:+.3}"));
-        page.item("", &format!("{}: {:+.3} degrees off upright{theta}", picture.file, picture.upright_deg));
+        lines.item("", &format!("{}: {:+.3} degrees off upright{theta}", picture.file, picture.upright_deg));
     }
 }
 
-fn compared(page: &mut Page, found: &PixelEvaluation) {
+fn compared(lines: &mut LabeledLines, found: &PixelEvaluation) {
     let (pairs, scale) = (found.pairs, found.scale);
-    page.entry("pixels", &format!("{} in {pairs} overlaps, at {scale:.3} of the panorama's size", found.pixels));
-    page.item("NCC", &format!("RMSE {:.4}, MSE {:.4}", found.ncc_rmse, found.ncc_mse));
-    page.item("gray", &format!("MSE {:.2}", found.intensity_mse));
+    lines.entry("pixels", &format!("{} in {pairs} overlaps, at {scale:.3} of the panorama's size", found.pixels));
+    lines.item("NCC", &format!("RMSE {:.4}, MSE {:.4}", found.ncc_rmse, found.ncc_mse));
+    lines.item("gray", &format!("MSE {:.2}", found.intensity_mse));
     let quality = [
         found.psnr_db.map(|decibels| format!("PSNR {decibels:.2} dB")),
         found.ssim.map(|similarity| format!("SSIM {similarity:.4}")),
     ];
-    page.item("", &quality.into_iter().flatten().collect::<Vec<_>>().join(", "));
+    lines.item("", &quality.into_iter().flatten().collect::<Vec<_>>().join(", "));
 }

@@ -14,27 +14,24 @@ mod option_list;
 mod output;
 mod progress;
 mod stitch;
+mod stopping;
 mod summary;
 mod words;
 
 use std::process::ExitCode;
-use std::sync::Arc;
 
 use clap::Parser;
 
-use trueup::{CancelToken, Error};
-
-use arguments::{Command, LowArgs};
-use failure::Failure;
+use arguments::{CommandLine, Task};
 
 fn main() -> ExitCode {
-    let outcome = match LowArgs::parse().command {
-        Command::Stitch(args) => stitch::run(*args),
-        Command::Compose(args) => compose::run(*args),
-        Command::Compare(args) => compare::run(*args),
-        Command::Inspect(args) => inspect::run(&args),
-        Command::Evaluate(args) => evaluate::run(&args),
-        Command::Options(args) => option_list::run(&args),
+    let outcome = match CommandLine::parse().task {
+        Task::Stitch(args) => stitch::run(*args),
+        Task::Compose(args) => compose::run(*args),
+        Task::Compare(args) => compare::run(*args),
+        Task::Inspect(args) => inspect::run(&args),
+        Task::Evaluate(args) => evaluate::run(&args),
+        Task::Options(args) => option_list::run(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -43,14 +40,4 @@ fn main() -> ExitCode {
             failure.exit_code()
         }
     }
-}
-
-/// A token that the first request to stop cancels; work that does not stop within a second is left, with nothing half
-/// written. The second Ctrl-C ends the program.
-fn cancel_token() -> Arc<CancelToken> {
-    let last_resort = || {
-        trueup::abandon_unfinished();
-        trueup_terminal::complain(&Failure::from(Error::Cancelled).to_string());
-    };
-    trueup_terminal::cancel_token("trueup", "", Some(last_resort))
 }

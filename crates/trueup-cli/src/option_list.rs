@@ -1,8 +1,8 @@
-//! `trueup options`: the reference of all options.
+//! `trueup options`: the reference of the options.
 
 use std::fmt::Write;
 
-use trueup::{Error, OptionDescription, StitchOptions};
+use trueup::{Error, OptionDescription, StitchOptions, Tier};
 
 use crate::arguments::OptionsArgs;
 use crate::failure::Failure;
@@ -29,12 +29,26 @@ pub(crate) fn run(args: &OptionsArgs) -> Result<(), Failure> {
         }
         rows.retain(|row| stage_of(row) == stage);
     }
+    let all = rows.len();
+    if !args.expert {
+        rows.retain(|row| row.tier == Tier::Basic);
+    }
     if args.json {
         let json = serde_json::to_string_pretty(&rows)
             .map_err(|error| Error::input("options", error, "Report this as a defect."))?;
         return output::print(&format!("{json}\n"));
     }
-    output::print(&text(&rows))
+    output::print(&format!("{}{}", text(&rows), experts_line(rows.len(), all - rows.len())))
+}
+
+/// The last line: how many options the list leaves to experts. Empty if it leaves none.
+fn experts_line(shown: usize, left: usize) -> String {
+    let gap = if shown == 0 { "" } else { "\n" };
+    match left {
+        0 => String::new(),
+        1 => format!("{gap}1 more option is for experts: add --expert.\n"),
+        _ => format!("{gap}{left} more options are for experts: add --expert.\n"),
+    }
 }
 
 /// One paragraph an option, a blank line between stages.
@@ -76,5 +90,12 @@ mod tests {
             assert!(listed.contains(&row.allowed), "{}", row.name);
         }
         assert!(listed.lines().all(|line| line.chars().count() <= WIDTH || !line.starts_with(INDENT)));
+    }
+
+    #[test]
+    fn the_last_line_counts_what_is_left_to_experts() {
+        assert_eq!(experts_line(40, 0), "");
+        assert_eq!(experts_line(40, 1), "\n1 more option is for experts: add --expert.\n");
+        assert_eq!(experts_line(0, 12), "12 more options are for experts: add --expert.\n");
     }
 }

@@ -5,12 +5,14 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use trueup::{Progress, StageContext};
 
+use crate::stopping::cancel_token;
+
 const TEMPLATE: &str = "{prefix:16} {bar:32} {pos:>6} of {len:<6} {elapsed}";
 
 /// What `work` comes to, with its progress on standard error, or with none of it if `quiet`, until the first request to
 /// stop. The bars are gone when it returns.
 pub(crate) fn shown<T>(quiet: bool, seed: u64, work: impl FnOnce(&StageContext) -> T) -> T {
-    let cancel = crate::cancel_token();
+    let cancel = cancel_token();
     let bars = Bars::new(quiet);
     let outcome = work(&StageContext::new(&bars, &cancel, seed));
     bars.clear();

@@ -25,14 +25,7 @@ struct CheckedStitch {
 impl CheckedStitch {
     fn new(args: StitchArgs) -> Result<Self, Failure> {
         let StitchArgs { photographs, files, geometry, .. } = args;
-        let mut flags = chosen::picture_flags(&args.picture, &args.budget);
-        flags.extend([
-            ("--method", "stitch.method", &args.method),
-            ("--align", "stitch.align", &args.align),
-            ("--structure", "stitch.structure", &args.structure),
-            ("--seed", "stitch.seed", &geometry.seed),
-        ]);
-        let options = chosen::options(StitchOptions::default(), &args.tuning, &flags)?;
+        let options = chosen::options(StitchOptions::default(), &args.tuning, &args.typed)?;
         chosen::check_files(&files)?;
         let inputs = Inputs {
             photographs,
@@ -61,12 +54,12 @@ mod tests {
     use clap::Parser;
 
     use super::*;
-    use crate::arguments::{Command, LowArgs};
+    use crate::arguments::{CommandLine, Task};
 
     fn checked(arguments: &[&str]) -> Result<CheckedStitch, Failure> {
         let all = ["trueup", "stitch", "a.jpg", "-o", "p.jpg"].iter().chain(arguments);
-        match LowArgs::try_parse_from(all).expect("arguments of the right form").command {
-            Command::Stitch(args) => CheckedStitch::new(*args),
+        match CommandLine::try_parse_from(all).expect("arguments of the right form").task {
+            Task::Stitch(args) => CheckedStitch::new(*args),
             other => panic!("{other:?}"),
         }
     }

@@ -172,9 +172,9 @@ fn a_bad_file_among_good_ones_is_left_out_with_its_reason() {
 fn impossible_focal_lengths_in_metadata_do_no_harm() {
     let desk = Desk::new();
     let [a, b, c, _] = pictures::street() else { panic!("four photographs") };
-    desk.put("zero.jpg", pictures::with_focal_length(a, (0, 0), 0));
-    desk.put("huge.jpg", pictures::with_focal_length(b, (u32::MAX, 1), u16::MAX));
-    desk.put("tiny.jpg", pictures::with_focal_length(c, (1, u32::MAX), 1));
+    desk.put("zero.jpg", pictures::with_focal_length(a, [0, 0], 0));
+    desk.put("huge.jpg", pictures::with_focal_length(b, [u32::MAX, 1], u16::MAX));
+    desk.put("tiny.jpg", pictures::with_focal_length(c, [1, u32::MAX], 1));
     let run = desk.stitch(&["zero.jpg", "huge.jpg", "tiny.jpg", "--project", "p.json"]);
     assert!(run.expect_success().contains("pictures  3 of 3 used"), "{}", run.stdout);
     for image in desk.json("p.json")["images"].as_array().expect("images") {

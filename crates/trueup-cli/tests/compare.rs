@@ -3,13 +3,13 @@
 use serde_json::{Value, json};
 
 use crate::pictures::{noise, street, street_desk, street_truth};
-use crate::run::{Desk, Run, finish, trueup};
+use crate::run::{Desk, FinishedRun, finish, trueup};
 
 /// Two entries that are made quickly.
 const QUICK: [&str; 6] =
     ["--methods", "vpg", "--entry", "levelled: similarity.prior=straightening", "--set", "compare.page_pixels=200000"];
 
-fn compare(desk: &Desk, arguments: &[&str]) -> Run {
+fn compare(desk: &Desk, arguments: &[&str]) -> FinishedRun {
     finish(trueup(desk.path(), &[&["compare", "a.jpg", "b.jpg", "c.jpg", "-o", "out"], arguments].concat()))
 }
 
@@ -38,8 +38,8 @@ fn every_method_is_made_or_says_why_not() {
     let desk = street_desk();
     desk.put("truth.json", street_truth());
     let before = desk.files();
-    let options = finish(trueup(desk.path(), &["options", "stitch", "--json"]));
-    let options: Value = serde_json::from_str(options.expect_success()).expect("JSON");
+    let options = finish(trueup(desk.path(), &["options", "--expert", "--json"]));
+    let options: Vec<Value> = serde_json::from_str(options.expect_success()).expect("JSON");
     let run = compare(&desk, &["--truth", "truth.json", "--set", "compare.page_pixels=200000"]);
     let printed = run.expect_success();
     assert!(printed.contains("page      out/index.html") && printed.contains("pictures  3 of 3 used"), "{printed}");
@@ -52,7 +52,8 @@ fn every_method_is_made_or_says_why_not() {
     assert_eq!(json!(files_in(&desk, "out")), record["files"], "the record names every file");
     let entries = record["entries"].as_array().expect("entries");
     // Names and meanings are those of the option, in its order.
-    let methods = options[0]["choices"].as_array().expect("methods");
+    let option = options.iter().find(|row| row["choices"][0]["name"] == "vpg").expect("the option of methods");
+    let methods = option["choices"].as_array().expect("methods");
     let told =
         |list: &[Value]| list.iter().map(|one| (one["name"].clone(), one["meaning"].clone())).collect::<Vec<_>>();
     assert_eq!(told(entries), told(methods));

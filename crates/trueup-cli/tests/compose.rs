@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::pictures::{HEIGHT, STREET_NAMES, WIDTH, jpeg, plain, street_desk, street_pixels};
-use crate::run::{Desk, Run, finish, trueup};
+use crate::run::{Desk, FinishedRun, finish, trueup};
 
 /// A folder with the street's photographs, their panorama `pano.jpg` and its project `pano.json`.
 fn stitched() -> Desk {
@@ -12,7 +12,7 @@ fn stitched() -> Desk {
     desk
 }
 
-fn compose(desk: &Desk, arguments: &[&str]) -> Run {
+fn compose(desk: &Desk, arguments: &[&str]) -> FinishedRun {
     finish(trueup(desk.path(), &[&["compose", "pano.json", "-o", "again.jpg"], arguments].concat()))
 }
 

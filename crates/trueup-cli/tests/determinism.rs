@@ -10,9 +10,12 @@ use crate::run::{Desk, finish, trueup};
 /// The panorama's bytes and the project without its timings.
 fn stitch(desk: &Desk, arguments: &[&str]) -> (Vec<u8>, Value) {
     desk.stitch(&[arguments, &["--project", "pano.json"]].concat()).expect_success();
-    let mut project = desk.json("pano.json");
-    project.as_object_mut().expect("an object").remove("seconds");
-    (desk.read("pano.jpg"), project)
+    (desk.read("pano.jpg"), without_seconds(desk.json("pano.json")))
+}
+
+fn without_seconds(mut project: Value) -> Value {
+    project.as_object_mut().expect("an object").remove("seconds").expect("seconds");
+    project
 }
 
 #[test]
@@ -51,28 +54,42 @@ fn the_order_of_the_photographs_hardly_matters() {
     };
     let in_order = rotations(&["a.jpg", "b.jpg", "c.jpg", "d.jpg"]);
     for order in [["d.jpg", "c.jpg", "b.jpg", "a.jpg"], ["c.jpg", "a.jpg", "d.jpg", "b.jpg"]] {
-        for (path, theta_deg) in rotations(&order) {
+        let rotations = rotations(&order);
+        assert_eq!(rotations.len(), order.len());
+        for (path, theta_deg) in rotations {
             let change = (theta_deg - in_order[&path]).abs();
             assert!(change < 0.2, "{path} turns by {change} degrees more in the order {order:?}");
         }
     }
 }
 
+/// Compared, so that photographs are measured and matched twice and not fourteen times.
 #[test]
 fn threads_change_no_byte_of_any_method() {
+    const METHODS: [&str; 7] = ["homography", "autostitch", "apap", "sphp", "sphp-free", "aanap", "quasi-homography"];
     let desk = street_desk();
-    for method in ["homography", "autostitch", "apap", "sphp", "sphp-free", "aanap", "quasi-homography"] {
-        let arguments = ["a.jpg", "b.jpg", "c.jpg", "--method", method];
-        let one_thread = stitch(&desk, &[&arguments[..], &["--threads", "1"]].concat());
-        let three = stitch(&desk, &[&arguments[..], &["--threads", "3"]].concat());
+    let panoramas = |threads: &str| -> Vec<(Vec<u8>, Value)> {
+        let methods = METHODS.join(",");
+        let arguments =
+            ["compare", "a.jpg", "b.jpg", "c.jpg", "-o", "out", "--methods", &methods, "--threads", threads];
+        finish(trueup(desk.path(), &[&arguments[..], &["--scale", "0.5"]].concat())).expect_success();
+        let made = METHODS.iter().map(|method| {
+            let project = without_seconds(desk.json(&format!("out/{method}.json")));
+            (desk.read(&format!("out/{method}.jpg")), project)
+        });
+        made.collect()
+    };
+    let (one_thread, three) = (panoramas("1"), panoramas("3"));
+    for (method, (one_thread, three)) in METHODS.iter().zip(one_thread.iter().zip(&three)) {
         assert!(one_thread.0 == three.0, "the panoramas differ by {method}");
         assert_eq!(one_thread.1, three.1, "the projects differ by {method}");
-        assert_eq!(one_thread.1["method"], method);
+        assert_eq!(one_thread.1["method"], *method);
         assert_eq!(one_thread.1["manhattan"]["accepted"], false, "{method} asks no vanishing points");
         assert!(one_thread.1["measures"]["reprojection"].is_object(), "{method} is measured");
-        let summary = finish(trueup(desk.path(), &["inspect", "pano.json", "--verbose"]));
+        let project = format!("out/{method}.json");
+        let summary = finish(trueup(desk.path(), &["inspect", &project, "--verbose"]));
         let asked = format!("the method {method} does not ask them");
         assert!(summary.expect_success().contains(&asked), "{}", summary.stdout);
-        finish(trueup(desk.path(), &["evaluate", "pano.json"])).expect_success();
+        finish(trueup(desk.path(), &["evaluate", &project])).expect_success();
     }
 }

@@ -1,5 +1,6 @@
 //! The table of bad inputs in docs/command-line.md holds what is really printed.
 
+use crate::full_turn::photographs;
 use crate::pictures::{claiming, noise, plain, put_street, street, street_truth};
 use crate::run::{Desk, finish, trueup};
 
@@ -38,14 +39,14 @@ const MISTAKES: &[Mistake] = &[
         what: "a method that cannot place them",
         arguments: &[
             "stitch",
-            "a.jpg",
-            "b.jpg",
+            "turn0.jpg",
+            "turn1.jpg",
+            "turn2.jpg",
+            "turn3.jpg",
             "-o",
             "pano.jpg",
             "--method",
             "homography",
-            "--set",
-            "warps.min_depth=0.9",
         ],
         up_to: Some("is not applicable"),
     },
@@ -121,6 +122,9 @@ fn desk() -> Desk {
     desk.put("white.jpg", plain(320, 240, 255));
     for seed in 1..4 {
         desk.put(&format!("noise{seed}.jpg"), noise(seed, 320, 240));
+    }
+    for (number, bytes) in photographs().iter().take(4).enumerate() {
+        desk.put(&format!("turn{number}.jpg"), bytes);
     }
     desk.put("graph.txt", "a.jpg -- q.jpg\n");
     desk.put("mine.toml", "[mash]\ncell_px = 30\n");

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::pictures::{street_desk, street_truth};
-use crate::run::{Desk, Run, finish, trueup};
+use crate::run::{Desk, FinishedRun, finish, trueup};
 
 /// A street stitched, with its truth beside it.
 fn stitched() -> Desk {
@@ -13,7 +13,7 @@ fn stitched() -> Desk {
     desk
 }
 
-fn evaluate(desk: &Desk, arguments: &[&str]) -> Run {
+fn evaluate(desk: &Desk, arguments: &[&str]) -> FinishedRun {
     finish(trueup(desk.path(), &[&["evaluate", "pano.json"], arguments].concat()))
 }
 

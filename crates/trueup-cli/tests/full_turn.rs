@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use image::{GrayImage, Luma};
-use trueup_scenes::{LightQuality, Quality, RigOptions, RoomStyle, Scene, SceneKind, SceneOptions, render, rig};
+use trueup_scenes::{LightQuality, LitScene, Quality, RigOptions, RoomStyle, SceneKind, SceneOptions, render, rig};
 
 use crate::pictures::jpeg;
 use crate::run::{Desk, finish, trueup};
@@ -13,11 +13,11 @@ const HEIGHT: usize = 270;
 const COUNT: usize = 10;
 
 /// Photographs of a room all the way round, as JPEG files.
-fn photographs() -> &'static [Vec<u8>] {
+pub fn photographs() -> &'static [Vec<u8>] {
     static FILES: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
     FILES.get_or_init(|| {
         let (kind, style, light) = (SceneKind::Room, RoomStyle::Library, LightQuality::Fast);
-        let scene = Scene::new(&SceneOptions { kind, style, seed: 103, light }).expect("a valid scene");
+        let scene = LitScene::new(&SceneOptions { kind, style, seed: 103, light }).expect("a valid scene");
         let options = RigOptions {
             pictures: COUNT,
             width: WIDTH,

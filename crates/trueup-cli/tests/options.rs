@@ -1,46 +1,71 @@
 //! `trueup options`, `--set`, `--config`, help.
 
-use crate::pictures::street_desk;
-use crate::run::{Desk, Run, finish, trueup};
+use serde_json::Value;
 
-fn run(arguments: &[&str]) -> Run {
+use crate::pictures::street_desk;
+use crate::run::{Desk, FinishedRun, finish, trueup};
+
+fn run(arguments: &[&str]) -> FinishedRun {
     finish(trueup(Desk::new().path(), arguments))
 }
 
+/// The rows of `trueup options --json` with these arguments.
+fn rows(arguments: &[&str]) -> Vec<Value> {
+    let json = run(&[&["options", "--json"], arguments].concat());
+    serde_json::from_str(json.expect_success()).expect("a JSON array")
+}
+
+fn field<'a>(row: &'a Value, name: &str) -> &'a str {
+    row[name].as_str().unwrap_or_else(|| panic!("{name} of {row}"))
+}
+
 #[test]
-fn the_list_has_every_option_as_text_and_as_json() {
-    let listed = run(&["options"]);
-    let json = run(&["options", "--json"]);
-    let rows: serde_json::Value = serde_json::from_str(json.expect_success()).expect("valid JSON");
-    let rows = rows.as_array().expect("an array");
+fn the_experts_list_has_every_option_as_text_and_as_json() {
+    let listed = run(&["options", "--expert"]);
+    let lines: Vec<&str> = listed.expect_success().lines().collect();
+    let rows = rows(&["--expert"]);
     assert!(rows.len() > 50, "{}", rows.len());
-    for row in rows {
-        let field = |name: &str| row[name].as_str().unwrap_or_else(|| panic!("{name} of {row}")).to_owned();
-        let line = format!("{} = {}", field("name"), field("default"));
-        assert!(listed.expect_success().lines().any(|listed| listed.starts_with(&line)), "{line}");
-        assert!(!field("meaning").is_empty() && !field("allowed").is_empty(), "{row}");
+    for row in &rows {
+        let line = format!("{} = {}", field(row, "name"), field(row, "default"));
+        assert!(lines.iter().any(|listed| listed.starts_with(&line)), "{line}");
+        assert!(!field(row, "meaning").is_empty() && !field(row, "allowed").is_empty(), "{row}");
     }
+    assert!(!listed.stdout.contains("--expert"), "nothing is left out");
+}
+
+#[test]
+fn the_list_has_the_basic_options_and_counts_the_others() {
+    let (all, basic) = (rows(&["--expert"]), rows(&[]));
+    let expected: Vec<&Value> = all.iter().filter(|row| field(row, "tier") == "basic").collect();
+    assert_eq!(basic.iter().collect::<Vec<_>>(), expected);
+    let listed = run(&["options"]);
+    let lines: Vec<&str> = listed.expect_success().lines().collect();
+    let named = |row: &Value| lines.iter().any(|line| line.starts_with(&format!("{} = ", field(row, "name"))));
+    for row in &all {
+        assert_eq!(named(row), field(row, "tier") == "basic", "{row}");
+    }
+    let last = format!("{} more options are for experts: add --expert.", all.len() - basic.len());
+    assert_eq!(lines.last(), Some(&last.as_str()));
 }
 
 #[test]
 fn one_stage_can_be_listed() {
-    let mesh = run(&["options", "mesh"]);
+    let mesh = run(&["options", "mesh", "--expert"]);
     assert!(mesh.expect_success().lines().any(|line| line.starts_with("mesh.cell_px = ")));
     assert!(!mesh.stdout.contains("canvas."));
-    run(&["options", "mash"]).expect_failure(2, &["there is no stage \"mash\"", "The stages are stitch, "]);
+    let names: Vec<Value> = rows(&["mesh", "--expert"]);
+    assert!(!names.is_empty() && names.iter().all(|row| field(row, "name").starts_with("mesh.")), "{names:?}");
+    run(&["options", "mash"]).expect_failure(2, &["there is no stage \"mash\"", "The stages are "]);
 }
 
 #[test]
 fn every_option_can_be_set_to_its_default_on_the_command_line() {
-    let json = run(&["options", "--json"]);
-    let rows: serde_json::Value = serde_json::from_str(json.expect_success()).expect("valid JSON");
+    let rows = rows(&["--expert"]);
     let set: Vec<String> = rows
-        .as_array()
-        .expect("an array")
         .iter()
         .flat_map(|row| {
-            let (name, default) = (row["name"].as_str().expect("a name"), row["default"].as_str().expect("a default"));
-            ["--set".to_owned(), format!("{name}={default}")]
+            let assignment = format!("{}={}", field(row, "name"), field(row, "default"));
+            ["--set".to_owned(), assignment]
         })
         .collect();
     let mut arguments = vec!["stitch", "missing.jpg", "-o", "p.jpg"];
@@ -138,6 +163,17 @@ fn help_and_version_are_given() {
     assert_eq!(run(&["--version"]).expect_success(), format!("trueup {}\n", env!("CARGO_PKG_VERSION")));
     for arguments in [&["--help"][..], &["stitch", "--help"]] {
         assert!(run(arguments).expect_success().contains("Examples:\n  trueup stitch "));
+    }
+    // What an option declares is the help of its flag: the first sentence with -h, all of it with --help.
+    let (short, long) = (run(&["stitch", "-h"]), run(&["stitch", "--help"]));
+    let methods = rows(&["--expert"]).into_iter().find(|row| row["choices"][0]["name"] == "vpg").expect("methods");
+    let choices = methods["choices"].as_array().expect("choices");
+    let first = field(&choices[0], "meaning").split(' ').next().expect("a word");
+    assert!(short.expect_success().contains("--method <METHOD>") && !short.stdout.contains(first), "{}", short.stdout);
+    assert!(long.expect_success().contains(first), "{}", long.stdout);
+    for choice in choices {
+        let name = field(choice, "name");
+        assert!(short.stdout.contains(name) && long.stdout.contains(&format!("- {name}:")), "{name}");
     }
     assert!(run(&["inspect", "--help"]).expect_success().contains("PROJECT.json"));
 }

@@ -5,50 +5,50 @@ use std::sync::OnceLock;
 
 use jpeg_encoder::{ColorType, Encoder};
 use trueup_scenes::{
-    LightQuality, PosedCamera, Quality, RigOptions, Scene, SceneKind, SceneOptions, render, rig, truth_of,
+    LightQuality, LitScene, PosedCamera, Quality, RigOptions, SceneKind, SceneOptions, render, rig, truth_of,
 };
 
 use crate::run::Desk;
 
 /// Size of the rendered photographs.
-pub const WIDTH: usize = 480;
+pub(crate) const WIDTH: usize = 480;
 /// Size of the rendered photographs.
-pub const HEIGHT: usize = 360;
+pub(crate) const HEIGHT: usize = 360;
 
 /// Four overlapping photographs of a street, from left to right, as JPEG files.
-pub fn street() -> &'static [Vec<u8>] {
+pub(crate) fn street() -> &'static [Vec<u8>] {
     static FILES: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
     FILES.get_or_init(|| street_pixels().iter().map(|rgb| jpeg(rgb, WIDTH, HEIGHT)).collect())
 }
 
 /// The RGB pixels of [`street`].
-pub fn street_pixels() -> &'static [Vec<u8>] {
+pub(crate) fn street_pixels() -> &'static [Vec<u8>] {
     static PIXELS: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
     PIXELS.get_or_init(|| photograph_scene(STREET.0, STREET.1, STREET_NAMES.len()))
 }
 
 /// Three overlapping photographs of a room, as JPEG files.
-pub fn room() -> &'static [Vec<u8>] {
+pub(crate) fn room() -> &'static [Vec<u8>] {
     static FILES: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
     FILES.get_or_init(|| photograph_scene(SceneKind::Room, 3, 3).iter().map(|rgb| jpeg(rgb, WIDTH, HEIGHT)).collect())
 }
 
 fn photograph_scene(kind: SceneKind, seed: u64, pictures: usize) -> Vec<Vec<u8>> {
-    let scene = Scene::new(&SceneOptions { kind, seed, light: LightQuality::Fast, ..SceneOptions::default() })
+    let scene = LitScene::new(&SceneOptions { kind, seed, light: LightQuality::Fast, ..SceneOptions::default() })
         .expect("a valid scene");
     let cameras = cameras(&scene, seed, pictures);
     cameras.iter().map(|camera| render(&scene, camera, Quality::Preview).data().to_vec()).collect()
 }
 
-fn cameras(scene: &Scene, seed: u64, pictures: usize) -> Vec<PosedCamera> {
+fn cameras(scene: &LitScene, seed: u64, pictures: usize) -> Vec<PosedCamera> {
     let options = RigOptions { seed, pictures, width: WIDTH, height: HEIGHT, ..RigOptions::default() };
     rig(&options, &scene.viewpoint()).expect("valid options")
 }
 
 /// The truth of the street's photographs, as JSON.
-pub fn street_truth() -> String {
+pub(crate) fn street_truth() -> String {
     let (kind, seed) = STREET;
-    let scene = Scene::new(&SceneOptions { kind, seed, light: LightQuality::Fast, ..SceneOptions::default() })
+    let scene = LitScene::new(&SceneOptions { kind, seed, light: LightQuality::Fast, ..SceneOptions::default() })
         .expect("a valid scene");
     let cameras = cameras(&scene, seed, STREET_NAMES.len());
     let images = cameras.iter().zip(STREET_NAMES).map(|(camera, name)| truth_of(camera, name.to_owned())).collect();
@@ -59,24 +59,24 @@ pub fn street_truth() -> String {
 const STREET: (SceneKind, u64) = (SceneKind::Street, 7);
 
 /// Puts the street's photographs into a folder, as `a.jpg`, `b.jpg`, `c.jpg`, `d.jpg`.
-pub fn put_street(desk: &Desk) {
+pub(crate) fn put_street(desk: &Desk) {
     for (name, bytes) in STREET_NAMES.iter().zip(street()) {
         desk.put(name, bytes);
     }
 }
 
 /// The names that [`put_street`] gives.
-pub const STREET_NAMES: [&str; 4] = ["a.jpg", "b.jpg", "c.jpg", "d.jpg"];
+pub(crate) const STREET_NAMES: [&str; 4] = ["a.jpg", "b.jpg", "c.jpg", "d.jpg"];
 
 /// A folder with the street's photographs.
-pub fn street_desk() -> Desk {
+pub(crate) fn street_desk() -> Desk {
     let desk = Desk::new();
     put_street(&desk);
     desk
 }
 
 /// RGB pixels as a JPEG file.
-pub fn jpeg(rgb: &[u8], width: usize, height: usize) -> Vec<u8> {
+pub(crate) fn jpeg(rgb: &[u8], width: usize, height: usize) -> Vec<u8> {
     let mut bytes = Vec::new();
     let side = |length: usize| u16::try_from(length).expect("a small picture");
     Encoder::new(&mut bytes, 95).encode(rgb, side(width), side(height), ColorType::Rgb).expect("encodable");
@@ -84,12 +84,12 @@ pub fn jpeg(rgb: &[u8], width: usize, height: usize) -> Vec<u8> {
 }
 
 /// A picture of one color.
-pub fn plain(width: usize, height: usize, value: u8) -> Vec<u8> {
+pub(crate) fn plain(width: usize, height: usize, value: u8) -> Vec<u8> {
     jpeg(&vec![value; width * height * 3], width, height)
 }
 
 /// A picture full of detail that is found in no picture of another seed: patches of random brightness in many sizes.
-pub fn noise(seed: u64, width: usize, height: usize) -> Vec<u8> {
+pub(crate) fn noise(seed: u64, width: usize, height: usize) -> Vec<u8> {
     let mut gray = vec![128.0_f64; width * height];
     for (octave, patch) in [64, 32, 16, 8, 4].into_iter().enumerate() {
         for y in 0..height {
@@ -112,7 +112,7 @@ fn scramble(seed: u64) -> f64 {
 }
 
 /// A JPEG file whose header claims another size.
-pub fn claiming(bytes: &[u8], width: u16, height: u16) -> Vec<u8> {
+pub(crate) fn claiming(bytes: &[u8], width: u16, height: u16) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     // Start of frame, baseline: FF C0, length (2), precision (1), height (2), width (2).
     let frame = bytes.windows(2).position(|pair| pair == [0xff, 0xc0]).expect("a baseline JPEG");
@@ -121,8 +121,8 @@ pub fn claiming(bytes: &[u8], width: u16, height: u16) -> Vec<u8> {
     bytes
 }
 
-/// A JPEG file with EXIF: the focal length in millimetres as a fraction, and its 35 mm equivalent.
-pub fn with_focal_length(bytes: &[u8], millimetres: (u32, u32), equivalent: u16) -> Vec<u8> {
+/// A JPEG file with EXIF: the focal length in millimeters as a fraction, and its 35 mm equivalent.
+pub(crate) fn with_focal_length(bytes: &[u8], millimeters: [u32; 2], equivalent: u16) -> Vec<u8> {
     const HEADER: [u8; 8] = *b"II\x2a\0\x08\0\0\0";
     let mut tiff = HEADER.to_vec();
     let entry = |tiff: &mut Vec<u8>, tag: u16, kind: u16, value: u32| {
@@ -140,8 +140,8 @@ pub fn with_focal_length(bytes: &[u8], millimetres: (u32, u32), equivalent: u16)
     entry(&mut tiff, 0x920a, 5, 56);
     entry(&mut tiff, 0xa405, 3, u32::from(equivalent));
     tiff.extend(0_u32.to_le_bytes());
-    tiff.extend(millimetres.0.to_le_bytes());
-    tiff.extend(millimetres.1.to_le_bytes());
+    tiff.extend(millimeters[0].to_le_bytes());
+    tiff.extend(millimeters[1].to_le_bytes());
 
     let length = u16::try_from(2 + 6 + tiff.len()).expect("short metadata");
     let segment = [&[0xff, 0xe1], &length.to_be_bytes()[..], b"Exif\0\0", &tiff].concat();
@@ -149,6 +149,6 @@ pub fn with_focal_length(bytes: &[u8], millimetres: (u32, u32), equivalent: u16)
 }
 
 /// Width and height of a PNG, TIFF or WebP file.
-pub fn picture_size(path: &Path) -> (u32, u32) {
+pub(crate) fn picture_size(path: &Path) -> (u32, u32) {
     image::image_dimensions(path).expect("a readable picture")
 }

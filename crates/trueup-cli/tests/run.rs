@@ -6,16 +6,16 @@ use std::process::Command;
 use tempfile::TempDir;
 
 /// What a run of the command left behind.
-pub struct Run {
+pub(crate) struct FinishedRun {
     pub status: i32,
     pub stdout: String,
     pub stderr: String,
 }
 
-impl Run {
+impl FinishedRun {
     /// Fails the test unless the run ended with `status` and standard error holds every one of `parts`.
     #[track_caller]
-    pub fn expect_failure(&self, status: i32, parts: &[&str]) {
+    pub(crate) fn expect_failure(&self, status: i32, parts: &[&str]) {
         assert_eq!(self.status, status, "stdout:\n{}stderr:\n{}", self.stdout, self.stderr);
         for part in parts {
             assert!(self.stderr.contains(part), "\"{part}\" is not in\n{}", self.stderr);
@@ -28,14 +28,14 @@ impl Run {
 
     /// Fails the test unless the run succeeded without a word on standard error; returns standard output.
     #[track_caller]
-    pub fn expect_success(&self) -> &str {
+    pub(crate) fn expect_success(&self) -> &str {
         assert_eq!((self.status, self.stderr.as_str()), (0, ""), "stdout:\n{}", self.stdout);
         &self.stdout
     }
 }
 
 /// The command, to be run in `folder` with these arguments.
-pub fn trueup(folder: &Path, arguments: &[&str]) -> Command {
+pub(crate) fn trueup(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_trueup"));
     command.current_dir(folder).args(arguments);
     command
@@ -43,9 +43,9 @@ pub fn trueup(folder: &Path, arguments: &[&str]) -> Command {
 
 /// Runs a command to its end.
 #[track_caller]
-pub fn finish(mut command: Command) -> Run {
+pub(crate) fn finish(mut command: Command) -> FinishedRun {
     let output = command.output().expect("the command starts");
-    Run {
+    FinishedRun {
         status: output.status.code().expect("the command ends by itself"),
         stdout: String::from_utf8(output.stdout).expect("UTF-8"),
         stderr: String::from_utf8(output.stderr).expect("UTF-8"),
@@ -53,35 +53,35 @@ pub fn finish(mut command: Command) -> Run {
 }
 
 /// A folder to run the command in; removed with everything in it.
-pub struct Desk(TempDir);
+pub(crate) struct Desk(TempDir);
 
 impl Desk {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(tempfile::tempdir().expect("a folder for the test"))
     }
 
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         self.0.path()
     }
 
-    pub fn join(&self, name: &str) -> PathBuf {
+    pub(crate) fn join(&self, name: &str) -> PathBuf {
         self.path().join(name)
     }
 
-    pub fn put(&self, name: &str, bytes: impl AsRef<[u8]>) {
+    pub(crate) fn put(&self, name: &str, bytes: impl AsRef<[u8]>) {
         std::fs::write(self.join(name), bytes).expect("written");
     }
 
-    pub fn read(&self, name: &str) -> Vec<u8> {
+    pub(crate) fn read(&self, name: &str) -> Vec<u8> {
         std::fs::read(self.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 
-    pub fn json(&self, name: &str) -> serde_json::Value {
+    pub(crate) fn json(&self, name: &str) -> serde_json::Value {
         serde_json::from_slice(&self.read(name)).expect("valid JSON")
     }
 
     /// Names of all files in the folder, sorted.
-    pub fn files(&self) -> Vec<String> {
+    pub(crate) fn files(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.path()).expect("readable");
         let mut names: Vec<String> =
             entries.map(|entry| entry.expect("readable").file_name().to_string_lossy().into_owned()).collect();
@@ -91,7 +91,7 @@ impl Desk {
 
     /// `trueup stitch ARGUMENTS -o pano.jpg`, at a small scale that keeps tests quick.
     #[track_caller]
-    pub fn stitch(&self, arguments: &[&str]) -> Run {
+    pub(crate) fn stitch(&self, arguments: &[&str]) -> FinishedRun {
         let all = [&["stitch", "-o", "pano.jpg", "--scale", "0.5"], arguments].concat();
         finish(trueup(self.path(), &all))
     }

@@ -12,9 +12,11 @@ mod evaluate;
 mod failures;
 mod formats;
 mod full_turn;
+mod likeness;
 mod masks;
 mod options;
 mod pictures;
+mod references;
 mod run;
 #[cfg(unix)]
 mod stopping;

@@ -1,7 +1,7 @@
 //! Lines and grids to be drawn over a panorama.
 
 use nalgebra::{Vector2, Vector3};
-use trueup_align::metrics::{LinedPicture, vertical_segments};
+use trueup_align::metrics::{VerticalLinesInput, vertical_segments};
 use trueup_core::Result;
 use trueup_core::lines::LineSegment;
 use trueup_core::mesh::GridMesh;
@@ -73,8 +73,9 @@ fn verticals(image: &ImageRecord, lines: &[LineSegment], frame: &WorkingFrame, o
     let Some(focal_px) = image.focal_px else { return Vec::new() };
     // Down is the levelled world's second axis; without a rotation, cameras are expected to be held level.
     let down = image.rotation.map_or(Vector3::y(), |rows| Vector3::new(rows[0][1], rows[1][1], rows[2][1]));
-    let picture = LinedPicture { lines, frame, focal_px: focal_px * frame.working_from_full, expected_down: down };
-    vertical_segments(&picture, &options.measures)
+    let picture =
+        VerticalLinesInput { lines, frame, focal_px: focal_px * frame.working_from_full, expected_down: down };
+    vertical_segments(&picture)
 }
 
 /// Positions of the longest segments, ascending.

@@ -88,7 +88,7 @@ const FIGURES: [ComparisonFigure; 23] = [
         "How far long straight lines stray from straight, in thousandths of their length."),
     figure!("bent_lines", "bent lines", "", 0, Lower, false, false,
         |c| Some(c.measures.as_ref()?.long_lines.as_ref()?.bent as f64),
-        "Long lines that stray by more than measures.bent_share of their length."),
+        "Long lines that stray by more than 0.003 of their length."),
     figure!("longest_bent", "longest bent line, off by", "%", 1, Lower, true, false,
         |c| {
             let lines = c.measures.as_ref()?.long_lines.as_ref()?;

@@ -1,126 +1,178 @@
-//! Which picture format a file holds, told by its first bytes, never by its name.
+//! What one declaration says of a file format; [`crate::formats`] has the declarations.
 
-use std::io::Read;
+use std::fmt;
+use std::fs::File;
+use std::io::{BufReader, Seek, Write};
 use std::path::Path;
 
-/// The formats that are read and written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum PictureFormat {
-    Jpeg,
-    Png,
-    Tiff,
-    WebP,
+use exif::{Field, Tag};
+use trueup_core::raster::{Photograph, RowSource};
+use trueup_core::source::SourceImage;
+use trueup_core::{Result, StageContext};
+
+use crate::encode::failure::WriteFailure;
+use crate::encode::metadata::Metadata;
+use crate::encode::options::{Depth, OutputOptions};
+use crate::metadata::exif_fields::ExifFields;
+
+/// One file format. Everything that depends on the format of a file asks its declaration.
+pub(crate) struct Format {
+    /// Its name, as people say it.
+    pub(crate) name: &'static str,
+    /// How the names of its files end, in lower case; the first is the one to propose.
+    pub(crate) extensions: &'static [&'static str],
+    /// Endings that are understood, too, but nowhere proposed.
+    pub(crate) rare_extensions: &'static [&'static str],
+    /// How photographs of this format are read; `None` if they are not.
+    pub(crate) reading: Option<Reading>,
+    /// How panoramas are written in this format; `None` if they are not.
+    pub(crate) writing: Option<Writing>,
 }
 
-/// What a panorama is written as.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum OutputFormat {
-    /// One file in a format that is read, too.
-    Picture(PictureFormat),
-    /// A folder of tiles and a file that describes it.
-    DeepZoom,
+/// A file that is read, from its first byte on.
+pub(crate) type Input = BufReader<File>;
+
+/// How a format is read. Nothing but `pixels` reads pixels.
+pub(crate) struct Reading {
+    /// Which pictures are read, for docs/formats.md.
+    #[cfg_attr(not(test), expect(dead_code, reason = "for the page of formats, which a test compares"))]
+    pub(crate) kinds: &'static str,
+    /// Whether a file that begins with these bytes, [`SIGNATURE_BYTES`] or all of a shorter file, is of this format.
+    pub(crate) has_signature: fn(&[u8]) -> bool,
+    /// What the header states of the pixels.
+    pub(crate) stored: fn(&mut Input) -> std::result::Result<StoredPixels, HeaderError>,
+    /// The ICC profile, if there is one that can be read.
+    pub(crate) icc: fn(&mut Input) -> Option<Vec<u8>>,
+    /// The EXIF fields that measurement uses. Damaged EXIF counts as absent.
+    pub(crate) exif: fn(&mut Input) -> Option<ExifFields>,
+    /// The fields of these tags, whole. Damaged ones count as absent.
+    pub(crate) whole_fields: fn(&mut Input, &[Tag]) -> Option<Vec<Field>>,
+    /// The pixels as they are stored, before orientation. Refuses what is damaged, incomplete, or no longer of the size that
+    /// was found when the photograph was examined.
+    pub(crate) pixels: fn(&SourceImage, Input) -> Result<Photograph>,
 }
 
-impl OutputFormat {
-    /// The format that the extension of `path` names, in any case.
-    pub(crate) fn of_extension(path: &Path) -> Option<Self> {
-        match lower_extension(path)?.as_str() {
-            "dzi" => Some(Self::DeepZoom),
-            _ => PictureFormat::of_extension(path).map(Self::Picture),
-        }
+/// How many bytes of a file's start [`Reading::has_signature`] sees.
+pub(crate) const SIGNATURE_BYTES: usize = 16;
+
+/// What a header states of the pixels, before orientation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct StoredPixels {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Bits of a sample; of the colors of a palette.
+    pub(crate) bits: u16,
+    /// Whether samples are floating point numbers.
+    pub(crate) is_float: bool,
+}
+
+/// Why a header gives no picture; the codec's words.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum HeaderError {
+    /// The header contradicts its format.
+    Damaged(String),
+    /// The picture is well formed, but of a kind that is not read.
+    Unsupported(String),
+}
+
+impl HeaderError {
+    /// A header that the codec cannot make sense of.
+    pub(crate) fn damaged(words: impl fmt::Display) -> Self {
+        Self::Damaged(words.to_string())
     }
 }
 
-/// How many bytes [`PictureFormat::of_content`] needs to see.
-const SIGNATURE_BYTES: usize = 16;
-
-/// What [`PictureFormat::of_content`] needs to see of a file, or all of a shorter one.
-pub(crate) fn read_start(file: &mut impl Read) -> std::io::Result<Vec<u8>> {
-    let mut start = Vec::with_capacity(SIGNATURE_BYTES);
-    file.take(SIGNATURE_BYTES as u64).read_to_end(&mut start)?;
-    Ok(start)
+/// How a format is written, and what it can hold.
+pub(crate) struct Writing {
+    /// The depths it has, [`Depth::Auto`] left out.
+    pub(crate) depths: &'static [Depth],
+    pub(crate) transparency: Transparency,
+    pub(crate) sides: SideLimit,
+    /// Whether files hold a color profile; where they do not, panoramas are converted to sRGB.
+    pub(crate) has_profile: bool,
+    /// Memory beside the canvas, for docs/formats.md.
+    #[cfg_attr(not(test), expect(dead_code, reason = "for the page of formats, which a test compares"))]
+    pub(crate) memory: &'static str,
+    /// Bytes that a pixel of a panorama of photographs takes: exact where nothing is compressed and nothing transparent,
+    /// else at the low end, so that what is refused would not have fitted.
+    pub(crate) bytes_per_pixel: fn(&OutputOptions) -> f64,
+    pub(crate) writer: Writer,
 }
 
-/// The supported formats, for messages.
-pub(crate) const SUPPORTED: &str = "JPEG, PNG, TIFF or WebP";
+/// Bytes a pixel of lossily compressed panoramas, see [`Writing::bytes_per_pixel`].
+pub(crate) const LOSSY_BYTES: f64 = 0.1;
+/// The same without loss, for every byte of a sample.
+pub(crate) const LOSSLESS_BYTES: f64 = 0.8;
 
-/// Name extensions of photographs in formats this program does not read. In a folder such files are named in a
-/// rejection, while files that are no photographs at all are passed over in silence.
-const FOREIGN_EXTENSIONS: [&str; 21] = [
-    "heic", "heif", "avif", "jxl", "jp2", "gif", "bmp", "exr", "hdr", "cr2", "cr3", "nef", "arw", "orf", "rw2", "raf",
-    "pef", "srw", "dng", "psd", "tga",
-];
+/// Whether a format has transparency.
+#[derive(Clone, Copy)]
+pub(crate) enum Transparency {
+    Never,
+    Always,
+    /// With some options.
+    With {
+        /// Whether it has it with these.
+        has: fn(&OutputOptions) -> bool,
+        /// In which case, for docs/formats.md.
+        #[cfg_attr(not(test), expect(dead_code, reason = "for the page of formats, which a test compares"))]
+        case: &'static str,
+        /// How the user gets it.
+        advice: &'static str,
+    },
+}
 
-impl PictureFormat {
-    /// The format whose signature `start`, the file's [`read_start`], carries.
-    ///
-    /// # Source
-    /// JPEG: ITU-T T.81 B.1.1.3 (SOI and the next marker). PNG: W3C PNG 5.2. TIFF 6.0 section 2 and BigTIFF.
-    /// WebP: RFC 9649 2.4.
-    pub(crate) fn of_content(start: &[u8]) -> Option<Self> {
-        let is_webp = start.starts_with(b"RIFF") && start.get(8..12) == Some(b"WEBP");
-        match start {
-            [0xff, 0xd8, 0xff, ..] => Some(Self::Jpeg),
-            [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Some(Self::Png),
-            [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => Some(Self::Tiff),
-            _ if is_webp => Some(Self::WebP),
-            _ => None,
-        }
+/// The longest side that a format can hold.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SideLimit {
+    /// In pixels.
+    pub(crate) largest: usize,
+    /// What to do about a longer one.
+    pub(crate) advice: &'static str,
+}
+
+/// A file that is written.
+pub(crate) trait Output: Write + Seek {}
+
+impl<W: Write + Seek> Output for W {}
+
+/// What makes the files of a panorama.
+#[derive(Clone, Copy)]
+pub(crate) enum Writer {
+    /// Writes one file, from its start.
+    File(
+        fn(
+            &mut dyn Output,
+            &dyn RowSource,
+            &Metadata,
+            &OutputOptions,
+            &StageContext<'_>,
+        ) -> std::result::Result<(), WriteFailure>,
+    ),
+    /// Makes several files and folders beside each other.
+    Files {
+        /// Writes them all; returns their bytes together.
+        write: fn(&Path, &dyn RowSource, &OutputOptions, &StageContext<'_>) -> Result<u64>,
+        /// Checks that they could be put in their places, and leaves nothing behind.
+        check_places: fn(&Path) -> Result<()>,
+    },
+}
+
+impl Format {
+    /// Whether the extension of `path` names this format, in any case.
+    pub(crate) fn names(&self, path: &Path) -> bool {
+        lower_extension(path).is_some_and(|found| {
+            self.extensions.iter().chain(self.rare_extensions).any(|extension| *extension == found)
+        })
     }
-
-    /// The format that the extension of `path` names, in any case.
-    pub(crate) fn of_extension(path: &Path) -> Option<Self> {
-        match lower_extension(path)?.as_str() {
-            "jpg" | "jpeg" | "jpe" | "jfif" => Some(Self::Jpeg),
-            "png" => Some(Self::Png),
-            "tif" | "tiff" => Some(Self::Tiff),
-            "webp" => Some(Self::WebP),
-            _ => None,
-        }
-    }
 }
 
-/// Whether the extension of `path` names a photograph in a format that is not read.
-pub(crate) fn has_foreign_extension(path: &Path) -> bool {
-    lower_extension(path).is_some_and(|extension| FOREIGN_EXTENSIONS.contains(&extension.as_str()))
-}
-
-fn lower_extension(path: &Path) -> Option<String> {
+/// The extension of `path` in lower case.
+pub(crate) fn lower_extension(path: &Path) -> Option<String> {
     Some(path.extension()?.to_str()?.to_ascii_lowercase())
 }
 
-/// What a file that is no supported picture seems to be, for messages; `None` when its first bytes tell nothing.
-pub(crate) fn describe_foreign_content(start: &[u8]) -> Option<&'static str> {
-    match start {
-        [b'G', b'I', b'F', b'8', ..] => Some("a GIF picture"),
-        [b'B', b'M', ..] => Some("a BMP picture"),
-        [b'8', b'B', b'P', b'S', ..] => Some("a Photoshop document"),
-        [b'%', b'P', b'D', b'F', ..] => Some("a PDF document"),
-        [0xff, 0x0a, ..] => Some("a JPEG XL picture"),
-        [_, _, _, _, b'f', b't', b'y', b'p', b'a', b'v', b'i', ..] => Some("an AVIF picture"),
-        [_, _, _, _, b'f', b't', b'y', b'p', b'h' | b'm', ..] => Some("a HEIC picture"),
-        [_, _, _, _, b'f', b't', b'y', b'p', ..] => Some("a video"),
-        _ => None,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn content_decides_not_the_name() {
-        assert_eq!(PictureFormat::of_content(b"\xff\xd8\xff\xe0rest"), Some(PictureFormat::Jpeg));
-        assert_eq!(PictureFormat::of_content(b"RIFF\x00\x00\x00\x00WEBPVP8 "), Some(PictureFormat::WebP));
-        assert_eq!(PictureFormat::of_content(b"RIFF\x00\x00\x00\x00WAVEfmt "), None);
-        assert_eq!(PictureFormat::of_content(b"MM\x00*"), Some(PictureFormat::Tiff));
-        assert_eq!(PictureFormat::of_content(b""), None);
-    }
-
-    #[test]
-    fn extensions_are_read_in_any_case() {
-        assert_eq!(PictureFormat::of_extension(Path::new("a/B.JpEg")), Some(PictureFormat::Jpeg));
-        assert_eq!(PictureFormat::of_extension(Path::new("a.txt")), None);
-        assert!(has_foreign_extension(Path::new("IMG_1.HEIC")));
+impl fmt::Debug for Format {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.name)
     }
 }

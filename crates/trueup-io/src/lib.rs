@@ -9,11 +9,13 @@
 //!
 //! Sizes are checked from the header before pixels are allocated, and no input makes these functions panic.
 #![forbid(unsafe_code)]
+#![warn(unreachable_pub)]
 
 pub mod color;
 pub mod decode;
 pub mod encode;
 mod format;
+mod formats;
 mod metadata;
 pub mod provenance;
 pub mod scratch;

@@ -8,7 +8,7 @@ use trueup_core::memory::bytes_in_words;
 use trueup_core::scratch::{ScratchFile, ScratchSpace};
 use trueup_core::{Error, Result};
 
-use crate::encode::takes_nothing;
+use crate::encode::pending::takes_nothing;
 
 /// A folder for scratch files. They have no name where the operating system allows, and are removed by it when the
 /// program ends, however it does.

@@ -5,7 +5,7 @@ use std::io;
 use signal_hook::consts::{SIGHUP, SIGTERM};
 use signal_hook::iterator::Signals;
 
-use crate::Request;
+use crate::request::StopRequest;
 
 /// What shells add to a signal's number for the exit status of the program that it ended.
 const STATUS_OF_SIGNALS: i32 = 128;
@@ -14,7 +14,7 @@ const STATUS_OF_SIGNALS: i32 = 128;
 ///
 /// # Errors
 /// Those of the operating system.
-pub(crate) fn catch(request: Request) -> io::Result<()> {
+pub(crate) fn catch(request: StopRequest) -> io::Result<()> {
     let mut signals = Signals::new([SIGTERM])?;
     if heeds_hangup() {
         signals.add_signal(SIGHUP)?;

@@ -18,11 +18,11 @@ by a request to terminate.";
 #[command(name = "trueup-bench", version, after_help = EXAMPLES, max_term_width = 110)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
-    pub command: Command,
+    pub command: BenchCommand,
 }
 
 #[derive(Debug, Subcommand)]
-pub(crate) enum Command {
+pub(crate) enum BenchCommand {
     /// Run the paper's experiments and our own, and write one report
     ///
     /// Writes report.md, report.html, a CSV file per table and every single result (rows.jsonl, rows.csv). What is stored there
@@ -53,7 +53,7 @@ pub(crate) struct PaperArguments {
     #[arg(long, value_name = "DIR")]
     pub panoramas: Option<PathBuf>,
 
-    /// Folder of folders that each hold pictures and their truth.json; may be repeated
+    /// Folder of folders that each hold photographs and their truth.json; may be repeated
     #[arg(long, value_name = "DIR")]
     pub truth_sets: Vec<PathBuf>,
 
@@ -85,7 +85,7 @@ pub(crate) struct QualityArguments {
     #[arg(long, value_name = "FILE.tsv")]
     pub manifest: Option<PathBuf>,
 
-    /// Folder of folders that each hold pictures and their truth.json; may be repeated
+    /// Folder of folders that each hold photographs and their truth.json; may be repeated
     #[arg(long, value_name = "DIR")]
     pub truth_sets: Vec<PathBuf>,
 

@@ -7,6 +7,7 @@ mod measure;
 mod methods;
 mod paper;
 mod progress;
+mod published_forms;
 mod quality;
 mod random_directions;
 mod report;
@@ -15,21 +16,21 @@ mod roc;
 mod runner;
 mod sets;
 mod statistics;
+mod stopping;
 mod store;
 mod trial;
 
 use std::process::ExitCode;
-use std::sync::Arc;
 
 use clap::Parser;
-use trueup::{CancelToken, Error};
+use trueup::Error;
 
-use arguments::{Arguments, Command};
+use arguments::{Arguments, BenchCommand};
 
 fn main() -> ExitCode {
     let outcome = match Arguments::parse().command {
-        Command::Paper(arguments) => paper::run(&arguments),
-        Command::Quality(arguments) => quality::run(&arguments),
+        BenchCommand::Paper(arguments) => paper::run(&arguments),
+        BenchCommand::Quality(arguments) => quality::run(&arguments),
     };
     match outcome {
         Ok(status) => status,
@@ -42,9 +43,4 @@ fn main() -> ExitCode {
             }
         }
     }
-}
-
-/// A token that the first request to stop cancels; the second ends the program.
-fn cancel_token() -> Arc<CancelToken> {
-    trueup_terminal::cancel_token("trueup-bench", "stopping; what is done is kept", None)
 }

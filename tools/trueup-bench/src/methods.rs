@@ -1,18 +1,27 @@
-//! The methods that are compared, each a name and the options that make it. A new method is one line.
+//! The methods that are compared, each a name and the options that make it.
+
+use crate::published_forms::{GSP_2D_PRIOR, GSP_3D_PRIOR, PUBLISHED_MESH, PUBLISHED_WARP_GRID};
 
 /// A method of stitching.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Method {
+pub(crate) struct ComparedMethod {
     /// Name in tables and files.
     pub name: &'static str,
     /// What it is.
     pub meaning: &'static str,
-    /// Departures from the default options.
-    pub overrides: &'static [&'static str],
+    /// Lists of departures from the default options, applied one after the other.
+    pub options: &'static [&'static [&'static str]],
     /// The paper's method it stands beside, if any.
     pub paper: Option<&'static str>,
     /// Where it is compared.
     pub family: Family,
+}
+
+impl ComparedMethod {
+    /// The departures from the default options, each `stage.option=value`.
+    pub(crate) fn overrides(&self) -> Vec<&'static str> {
+        self.options.concat()
+    }
 }
 
 /// Which tables a method belongs in.
@@ -46,141 +55,137 @@ pub(crate) const SPHP: &str = "sphp";
 pub(crate) const SPHP_FREE: &str = "sphp-free";
 pub(crate) const AANAP: &str = "aanap";
 
-/// Options of the mesh as published: one similarity per picture, moving DLT, undivided cells.
-pub(crate) const PUBLISHED_MESH: [&str; 3] =
-    ["mesh.base=similarity", "mesh.subdivision=1", "match_points.model=moving-dlt"];
-
 /// Every method that exists.
-pub(crate) const METHODS: [Method; 17] = [
-    Method {
+pub(crate) static METHODS: [ComparedMethod; 17] = [
+    ComparedMethod {
         name: VPG,
         meaning: "vanishing points, level sphere (the default)",
-        overrides: &[],
+        options: &[],
         paper: Some("VPG"),
         family: Family::Prior,
     },
-    Method {
+    ComparedMethod {
         name: GSP_2D,
         meaning: "global similarity prior in two dimensions, level sphere",
-        overrides: &["similarity.prior=gsp-2d"],
+        options: &[&GSP_2D_PRIOR],
         paper: Some("GSP-2D"),
         family: Family::Prior,
     },
-    Method {
+    ComparedMethod {
         name: GSP_3D,
         meaning: "global similarity prior in three dimensions, level sphere",
-        overrides: &["similarity.prior=gsp-3d"],
+        options: &[&GSP_3D_PRIOR],
         paper: Some("GSP-3D"),
         family: Family::Prior,
     },
-    Method {
+    ComparedMethod {
         name: LEVELLED,
         meaning: "what the default falls back to without vanishing points: cameras straightened with a prior on their pitch, \
                   level sphere",
-        overrides: &["similarity.prior=straightening"],
+        options: &[&["similarity.prior=straightening"]],
         paper: None,
         family: Family::Prior,
     },
-    Method {
+    ComparedMethod {
         name: VPG_PUBLISHED,
         meaning: "vanishing points, mesh as published",
-        overrides: &PUBLISHED_MESH,
+        options: &[&PUBLISHED_MESH],
         paper: Some("VPG"),
         family: Family::Prior,
     },
-    Method {
+    ComparedMethod {
         name: GSP_2D_PUBLISHED,
         meaning: "global similarity prior in two dimensions, mesh as published",
-        overrides: &["similarity.prior=gsp-2d", PUBLISHED_MESH[0], PUBLISHED_MESH[1], PUBLISHED_MESH[2]],
+        options: &[&GSP_2D_PRIOR, &PUBLISHED_MESH],
         paper: Some("GSP-2D"),
         family: Family::Prior,
     },
-    Method {
+    ComparedMethod {
         name: GSP_3D_PUBLISHED,
         meaning: "global similarity prior in three dimensions, mesh as published",
-        overrides: &["similarity.prior=gsp-3d", PUBLISHED_MESH[0], PUBLISHED_MESH[1], PUBLISHED_MESH[2]],
+        options: &[&GSP_3D_PRIOR, &PUBLISHED_MESH],
         paper: Some("GSP-3D"),
         family: Family::Prior,
     },
-    Method {
+    ComparedMethod {
         name: "vpg+lines",
         meaning: "the default, and matched lines drawn together and held straight",
-        overrides: &["stitch.align=lines"],
+        options: &[&["stitch.align=lines"]],
         paper: Some("VPG+DFW"),
         family: Family::Alignment,
     },
-    Method {
+    ComparedMethod {
         name: "vpg+photometric",
         meaning: "the default, and the pixels of overlaps drawn together",
-        overrides: &["stitch.align=photometric"],
+        options: &[&["stitch.align=photometric"]],
         paper: Some("VPG+GCPW"),
         family: Family::Alignment,
     },
-    Method {
+    ComparedMethod {
         name: "vpg+lines+photometric",
         meaning: "both",
-        overrides: &["stitch.align=lines+photometric"],
+        options: &[&["stitch.align=lines+photometric"]],
         paper: None,
         family: Family::Alignment,
     },
-    Method {
+    ComparedMethod {
         name: "homography",
-        meaning: "one homography per picture, onto the plane of the reference",
-        overrides: &["stitch.method=homography", "mesh.subdivision=1", "match_points.model=moving-dlt"],
+        meaning: "one homography per photograph, onto the plane of the reference",
+        options: &[&["stitch.method=homography"], &PUBLISHED_WARP_GRID],
         paper: None,
         family: Family::Warp,
     },
-    Method {
+    ComparedMethod {
         name: "quasi-homography",
         meaning: "homographies whose scale grows only linearly outside the overlaps",
-        overrides: &["stitch.method=quasi-homography", "mesh.subdivision=1", "match_points.model=moving-dlt"],
+        options: &[&["stitch.method=quasi-homography"], &PUBLISHED_WARP_GRID],
         paper: None,
         family: Family::Warp,
     },
-    Method {
+    ComparedMethod {
         name: APAP,
         meaning: "as-projective-as-possible: a homography for every grid vertex",
-        overrides: &["stitch.method=apap", "mesh.subdivision=1", "match_points.model=moving-dlt"],
+        options: &[&["stitch.method=apap"], &PUBLISHED_WARP_GRID],
         paper: Some("APAP"),
         family: Family::Warp,
     },
-    Method {
+    ComparedMethod {
         name: SPHP,
         meaning: "shape-preserving half-projective, its similarity upright",
-        overrides: &["stitch.method=sphp", "mesh.subdivision=1", "match_points.model=moving-dlt"],
+        options: &[&["stitch.method=sphp"], &PUBLISHED_WARP_GRID],
         paper: Some("SPHP"),
         family: Family::Warp,
     },
-    Method {
+    ComparedMethod {
         name: SPHP_FREE,
         meaning: "the same, its similarity free to turn",
-        overrides: &["stitch.method=sphp-free", "mesh.subdivision=1", "match_points.model=moving-dlt"],
+        options: &[&["stitch.method=sphp-free"], &PUBLISHED_WARP_GRID],
         paper: Some("SPHP*"),
         family: Family::Warp,
     },
-    Method {
+    ComparedMethod {
         name: AANAP,
         meaning: "adaptive as-natural-as-possible: homographies that turn into similarities",
-        overrides: &["stitch.method=aanap", "mesh.subdivision=1", "match_points.model=moving-dlt"],
+        options: &[&["stitch.method=aanap"], &PUBLISHED_WARP_GRID],
         paper: Some("AANAP"),
         family: Family::WideWarp,
     },
-    Method {
+    ComparedMethod {
         name: "autostitch",
         meaning: "straightened cameras on a sphere",
-        overrides: &["stitch.method=autostitch", "mesh.subdivision=1", "match_points.model=moving-dlt"],
+        options: &[&["stitch.method=autostitch"], &PUBLISHED_WARP_GRID],
         paper: None,
         family: Family::WideWarp,
     },
 ];
 
 /// The method of this name.
-pub(crate) fn method(name: &str) -> Option<&'static Method> {
+pub(crate) fn method(name: &str) -> Option<&'static ComparedMethod> {
     METHODS.iter().find(|method| method.name == name)
 }
 
 /// The methods of one family, in the order of [`METHODS`].
-pub(crate) fn methods_of(family: Family) -> impl Iterator<Item = &'static Method> + Clone {
+pub(crate) fn methods_of(family: Family) -> impl Iterator<Item = &'static ComparedMethod> + Clone {
     METHODS.iter().filter(move |method| method.family == family)
 }
 
@@ -192,7 +197,7 @@ mod tests {
     #[test]
     fn every_method_has_valid_options_and_a_name_of_its_own() {
         for (index, one) in METHODS.iter().enumerate() {
-            Trial::new("test", "set", one.name, one.overrides).options().expect(one.name);
+            Trial::new("test", "set", one.name, &one.overrides()).options().expect(one.name);
             assert!(METHODS[..index].iter().all(|other| other.name != one.name), "{}", one.name);
         }
         let named = [

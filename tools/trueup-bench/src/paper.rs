@@ -16,7 +16,8 @@ use crate::report::{self, overview};
 use crate::results::Results;
 use crate::runner::Runner;
 use crate::sets::Catalogue;
-use crate::store::Store;
+use crate::stopping;
+use crate::store::ResultStore;
 use crate::trial::{Row, Trial, fingerprint};
 
 /// Runs the experiments that were asked for.
@@ -39,8 +40,8 @@ pub(crate) fn run(arguments: &PaperArguments) -> Result<ExitCode> {
         false => Catalogue::full(arguments.panoramas.as_deref(), &arguments.truth_sets)?,
     };
     let version = program_version()?;
-    let store = Store::open(&arguments.out.join("rows.jsonl"), arguments.reuse.then_some(version.as_str()))?;
-    let cancel = crate::cancel_token();
+    let store = ResultStore::open(&arguments.out.join("rows.jsonl"), arguments.reuse.then_some(version.as_str()))?;
+    let cancel = stopping::cancel_token();
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = if arguments.jobs == 0 { cores } else { arguments.jobs };
     let threads = (cores / jobs).max(1);
@@ -131,8 +132,9 @@ fn write_rows(rows: &[Row], path: &Path) -> Result<()> {
     let mut text = csv::line(heads.into_iter().chain(measures.iter().copied()));
     let optional = |number: Option<usize>| number.map_or(String::new(), |number| number.to_string());
     for Row { key, measures: found, note } in rows {
-        let (seed, reference, pictures) = (key.seed.to_string(), optional(key.reference), optional(key.pictures));
-        let heads = [&key.experiment, &key.set, &key.variant, &seed, &reference, &pictures, note, &key.version];
+        let (seed, reference, photographs) =
+            (key.seed.to_string(), optional(key.reference), optional(key.photograph_count));
+        let heads = [&key.experiment, &key.set, &key.variant, &seed, &reference, &photographs, note, &key.version];
         let figures: Vec<String> =
             measures.iter().map(|name| found.get(*name).map_or(String::new(), f64::to_string)).collect();
         text.push_str(&csv::line(heads.into_iter().chain(&figures).map(String::as_str)));

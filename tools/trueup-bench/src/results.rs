@@ -18,7 +18,7 @@ impl Results<'_> {
         self.rows.iter().filter(move |row| row.key.experiment == experiment)
     }
 
-    /// A figure of one set under one variant: one value per seed, reference and number of pictures that gave one.
+    /// A figure of one set under one variant: one value per seed, reference and number of photographs that gave one.
     pub(crate) fn values(&self, experiment: &str, set: &str, variant: &str, measure: &str) -> Vec<f64> {
         self.of(experiment)
             .filter(|row| row.key.set == set && row.key.variant == variant)

@@ -11,7 +11,7 @@ use crate::measure;
 use crate::progress::Tracker;
 use crate::random_directions::with_random_directions;
 use crate::sets::{ReadySet, SetSpec, central};
-use crate::store::Store;
+use crate::store::ResultStore;
 use crate::trial::{Row, Trial};
 
 /// What every trial needs beside itself.
@@ -20,7 +20,7 @@ pub(crate) struct Runner<'a> {
     /// Folder of the sets that are made.
     pub data: PathBuf,
     /// Where results go.
-    pub store: &'a Store,
+    pub store: &'a ResultStore,
     /// Version and fingerprint of the program.
     pub version: String,
     /// Sets that are worked on at a time.
@@ -34,34 +34,39 @@ pub(crate) struct Runner<'a> {
 }
 
 /// The trials of one set.
-type Group<'t> = (&'t SetSpec, Vec<&'t Trial>);
+#[derive(Debug)]
+struct SetTrials<'t> {
+    set: &'t SetSpec,
+    trials: Vec<&'t Trial>,
+}
 
 impl Runner<'_> {
     /// Runs what is not stored yet and returns all rows in the order of the trials.
     ///
-    /// A trial whose photographs cannot be stitched has a row that says why, marked `refused` if another method could; sets that cannot be made or read end the run.
+    /// A trial whose photographs cannot be stitched has a row that says why, marked `refused` if another method could; sets
+    /// that cannot be made or read end the run.
     ///
     /// # Errors
     /// Those of making and reading sets, of options that cannot be, of writing; [`Error::Cancelled`].
     pub(crate) fn run(&self, sets: &[&SetSpec], trials: &[Trial]) -> Result<Vec<Row>> {
-        let mut groups: Vec<Group> = Vec::new();
+        let mut groups: Vec<SetTrials> = Vec::new();
         for set in sets {
             let members: Vec<&Trial> = trials.iter().filter(|trial| trial.set == set.name).collect();
-            if !members.is_empty() && !groups.iter().any(|(known, _)| known.name == set.name) {
-                groups.push((set, members));
+            if !members.is_empty() && !groups.iter().any(|known| known.set.name == set.name) {
+                groups.push(SetTrials { set, trials: members });
             }
         }
         let tracker = Tracker::new("trials", trials.len() as u64, self.quiet);
         // The largest sets first, so that none is left over for one worker at the end.
-        groups.sort_by_key(|(set, _)| set.pictures().unwrap_or(0));
+        groups.sort_by_key(|group| group.set.photograph_count().unwrap_or(0));
         let queue = Mutex::new(groups);
         let found: Mutex<BTreeMap<(String, usize), Row>> = Mutex::default();
         let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let work = || -> Result<()> {
             let pool = thread_pool(self.threads)?;
-            while let Some((set, members)) = next() {
+            while let Some(SetTrials { set, trials }) = next() {
                 tracker.working_on(&set.name);
-                let rows = pool.install(|| self.run_group(set, &members, &tracker))?;
+                let rows = pool.install(|| self.run_set(set, &trials, &tracker))?;
                 let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
                 found.extend(rows.into_iter().enumerate().map(|(index, row)| ((set.name.clone(), index), row)));
                 tracker.finished(&set.name);
@@ -88,14 +93,14 @@ impl Runner<'_> {
     }
 
     /// The rows of one set's trials, in their order.
-    fn run_group(&self, set: &SetSpec, trials: &[&Trial], tracker: &Tracker) -> Result<Vec<Row>> {
+    fn run_set(&self, set: &SetSpec, trials: &[&Trial], tracker: &Tracker) -> Result<Vec<Row>> {
         let context = StageContext::new(&Silent, self.cancel, 0);
         let ready = set.prepare(&self.data, &context)?;
-        let mut matched: Option<(MatchingOf, Result<MatchedPhotographs>)> = None;
+        let mut matched: Option<(MatchingKey, Result<MatchedPhotographs>)> = None;
         let mut rows = vec![None; trials.len()];
         // Trials that share their matches lie side by side, so that one matching is held at a time.
         let mut order: Vec<usize> = (0..trials.len()).collect();
-        order.sort_by_key(|&index| MatchingOf::new(trials[index]));
+        order.sort_by_key(|&index| MatchingKey::new(trials[index]));
         for index in order {
             context.check_cancelled()?;
             let trial = trials[index];
@@ -103,7 +108,7 @@ impl Runner<'_> {
             let row = match self.store.get(&key) {
                 Some(row) => row,
                 None => {
-                    let wanted = MatchingOf::new(trial);
+                    let wanted = MatchingKey::new(trial);
                     if matched.as_ref().is_none_or(|(known, _)| *known != wanted) {
                         // The old one goes before the new one is made: both together may be large.
                         drop(matched.take());
@@ -112,14 +117,14 @@ impl Runner<'_> {
                     }
                     let outcome = match &matched {
                         Some((_, Ok(photographs))) => self.align(&ready, photographs, trial),
-                        Some((_, Err(error))) => Err(again(error)),
+                        Some((_, Err(error))) => Err(repeated(error)),
                         None => Err(Error::Cancelled),
                     };
                     let (measures, note) = match outcome {
                         Ok(found) => found,
                         Err(error @ (Error::Cancelled | Error::Options(_))) => return Err(error),
-                        Err(error @ Error::NotApplicable { .. }) => (mark("refused"), error.to_string()),
-                        Err(error) => (mark("failed"), error.to_string()),
+                        Err(error @ Error::NotApplicable { .. }) => (outcome_alone("refused"), error.to_string()),
+                        Err(error) => (outcome_alone("failed"), error.to_string()),
                     };
                     let row = Row { key, measures, note };
                     self.store.add(row.clone())?;
@@ -167,20 +172,20 @@ impl Runner<'_> {
 
 /// What decides whether two trials can share their matches.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-struct MatchingOf {
-    pictures: Option<usize>,
+struct MatchingKey {
+    photograph_count: Option<usize>,
     central: bool,
     overrides: Vec<String>,
 }
 
-impl MatchingOf {
+impl MatchingKey {
     fn new(trial: &Trial) -> Self {
-        Self { pictures: trial.pictures, central: trial.central, overrides: trial.matching_overrides() }
+        Self { photograph_count: trial.photograph_count, central: trial.central, overrides: trial.matching_overrides() }
     }
 }
 
 fn inputs_of(ready: &ReadySet, trial: &Trial) -> Inputs {
-    let count = trial.pictures.unwrap_or(ready.photographs.len());
+    let count = trial.photograph_count.unwrap_or(ready.photographs.len());
     if let Some((middle, around)) = central(&ready.truth, count).filter(|_| trial.central) {
         let mut inputs = Inputs::new(around.iter().map(|&position| ready.photographs[position].clone()));
         inputs.reference = Reference::Named(ready.photographs[middle].clone());
@@ -194,12 +199,12 @@ fn inputs_of(ready: &ReadySet, trial: &Trial) -> Inputs {
 }
 
 /// In place of figures: what became of a run that has none.
-fn mark(name: &str) -> BTreeMap<String, f64> {
+fn outcome_alone(name: &str) -> BTreeMap<String, f64> {
     BTreeMap::from([(name.to_owned(), 1.0)])
 }
 
 /// The same error once more, for the next trial that shares the failed matching.
-fn again(error: &Error) -> Error {
+fn repeated(error: &Error) -> Error {
     match error {
         Error::Cancelled => Error::Cancelled,
         other => Error::input("matching", other.to_string().trim_end_matches('.'), ""),
@@ -242,7 +247,7 @@ mod tests {
             Trial { seed: 1, random_directions: 0.5, ..Trial::new("test", &set.name, "default", &[]) },
         ];
         let run = || {
-            let store = Store::open(&path, None).expect("opens");
+            let store = ResultStore::open(&path, None).expect("opens");
             let runner = Runner {
                 data: folder.path().join("data"),
                 store: &store,
@@ -262,7 +267,7 @@ mod tests {
         assert_eq!(run(), first);
         assert_eq!(std::fs::read_to_string(&path).expect("rows"), stored);
         cancel.cancel();
-        let store = Store::open(&path, None).expect("opens");
+        let store = ResultStore::open(&path, None).expect("opens");
         let runner = Runner {
             data: folder.path().join("data"),
             store: &store,

@@ -8,11 +8,11 @@ use std::sync::{Mutex, PoisonError};
 
 use trueup::{Error, Result};
 
-use crate::trial::{Key, Row};
+use crate::trial::{Row, TrialKey};
 
 /// The results known so far, and the file they are appended to. Shared by all workers.
 #[derive(Debug)]
-pub(crate) struct Store {
+pub(crate) struct ResultStore {
     path: PathBuf,
     state: Mutex<State>,
 }
@@ -20,10 +20,10 @@ pub(crate) struct Store {
 #[derive(Debug)]
 struct State {
     file: File,
-    rows: BTreeMap<Key, Row>,
+    rows: BTreeMap<TrialKey, Row>,
 }
 
-impl Store {
+impl ResultStore {
     /// Opens the file, which is made if need be, and reads what it holds. A last line that was cut off is dropped. With
     /// `adopting` a version, rows of every version count as that one's.
     ///
@@ -52,7 +52,7 @@ impl Store {
     }
 
     /// The stored result of this run, if there is one.
-    pub(crate) fn get(&self, key: &Key) -> Option<Row> {
+    pub(crate) fn get(&self, key: &TrialKey) -> Option<Row> {
         self.locked().rows.get(key).cloned()
     }
 
@@ -89,11 +89,11 @@ mod tests {
     fn what_was_stored_is_known_after_opening_again() {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("rows.jsonl");
-        let store = Store::open(&path, None).expect("opens");
+        let store = ResultStore::open(&path, None).expect("opens");
         assert_eq!(store.get(&row("01").key), None);
         store.add(row("01")).expect("writes");
         drop(store);
-        let again = Store::open(&path, None).expect("opens");
+        let again = ResultStore::open(&path, None).expect("opens");
         assert_eq!(again.get(&row("01").key), Some(row("01")));
         assert_eq!(again.get(&row("02").key), None);
     }
@@ -102,10 +102,10 @@ mod tests {
     fn rows_of_another_version_count_only_when_adopted() {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("rows.jsonl");
-        Store::open(&path, None).expect("opens").add(row("01")).expect("writes");
-        let key = Key { version: "2".to_owned(), ..row("01").key };
-        assert_eq!(Store::open(&path, None).expect("opens").get(&key), None);
-        let adopted = Store::open(&path, Some("2")).expect("opens").get(&key).expect("adopted");
+        ResultStore::open(&path, None).expect("opens").add(row("01")).expect("writes");
+        let key = TrialKey { version: "2".to_owned(), ..row("01").key };
+        assert_eq!(ResultStore::open(&path, None).expect("opens").get(&key), None);
+        let adopted = ResultStore::open(&path, Some("2")).expect("opens").get(&key).expect("adopted");
         assert_eq!(adopted.measures, row("01").measures);
     }
 
@@ -113,13 +113,13 @@ mod tests {
     fn a_line_that_was_cut_off_is_run_again_and_spoils_no_other() {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("rows.jsonl");
-        Store::open(&path, None).expect("opens").add(row("01")).expect("writes");
+        ResultStore::open(&path, None).expect("opens").add(row("01")).expect("writes");
         let whole = std::fs::read_to_string(&path).expect("text");
         std::fs::write(&path, format!("{whole}{}", &whole[..whole.len() / 2])).expect("writes");
-        let store = Store::open(&path, None).expect("opens");
+        let store = ResultStore::open(&path, None).expect("opens");
         store.add(row("02")).expect("writes");
         drop(store);
-        let again = Store::open(&path, None).expect("opens");
+        let again = ResultStore::open(&path, None).expect("opens");
         assert_eq!(again.get(&row("01").key), Some(row("01")));
         assert_eq!(again.get(&row("02").key), Some(row("02")));
     }

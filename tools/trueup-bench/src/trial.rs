@@ -24,7 +24,7 @@ pub(crate) struct Trial {
     /// Position of the reference photograph; `None` leaves it to the stitcher.
     pub reference: Option<usize>,
     /// Only so many photographs of the set; `None` for all.
-    pub pictures: Option<usize>,
+    pub photograph_count: Option<usize>,
     /// Whether these are the ones around the middle of the set, with the middle one for the reference, instead of the first.
     pub central: bool,
     /// Whether the photographs are also compared pixel by pixel.
@@ -42,7 +42,7 @@ impl Trial {
             random_directions: 0.0,
             seed: 0,
             reference: None,
-            pictures: None,
+            photograph_count: None,
             central: false,
             pixels: false,
         }
@@ -75,14 +75,14 @@ impl Trial {
     }
 
     /// What identifies the run. `set_fingerprint` stands for the set's content.
-    pub(crate) fn key(&self, set_fingerprint: &str, version: &str) -> Key {
-        Key {
+    pub(crate) fn key(&self, set_fingerprint: &str, version: &str) -> TrialKey {
+        TrialKey {
             experiment: self.experiment.to_owned(),
             set: self.set.clone(),
             variant: self.variant.clone(),
             seed: self.seed,
             reference: self.reference,
-            pictures: self.pictures,
+            photograph_count: self.photograph_count,
             inputs: fingerprint(&(&self.overrides, set_fingerprint, self.central, self.random_directions.to_bits())),
             version: version.to_owned(),
         }
@@ -91,7 +91,7 @@ impl Trial {
 
 /// What identifies a result: the same key, the same figures.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub(crate) struct Key {
+pub(crate) struct TrialKey {
     /// [`Trial::experiment`].
     pub experiment: String,
     /// [`Trial::set`].
@@ -102,8 +102,9 @@ pub(crate) struct Key {
     pub seed: u64,
     /// [`Trial::reference`].
     pub reference: Option<usize>,
-    /// [`Trial::pictures`].
-    pub pictures: Option<usize>,
+    /// [`Trial::photograph_count`], by the name it has in stored rows.
+    #[serde(rename = "pictures")]
+    pub photograph_count: Option<usize>,
     /// Fingerprint of the overrides and the set.
     pub inputs: String,
     /// Version and fingerprint of the program.
@@ -115,7 +116,7 @@ pub(crate) struct Key {
 pub(crate) struct Row {
     /// What was run.
     #[serde(flatten)]
-    pub key: Key,
+    pub key: TrialKey,
     /// The figures by name, units in the names. What could not be measured is absent.
     pub measures: BTreeMap<String, f64>,
     /// Why vanishing points were not believed, or what went wrong; often empty.
@@ -170,7 +171,7 @@ mod tests {
             trial.key("set", "2"),
             Trial { seed: 1, ..trial.clone() }.key("set", "1"),
             Trial { reference: Some(0), ..trial.clone() }.key("set", "1"),
-            Trial { pictures: Some(2), ..trial.clone() }.key("set", "1"),
+            Trial { photograph_count: Some(2), ..trial.clone() }.key("set", "1"),
             Trial { central: true, ..trial.clone() }.key("set", "1"),
             Trial { overrides: vec!["mesh.cell_px=21".to_owned()], ..trial }.key("set", "1"),
         ];

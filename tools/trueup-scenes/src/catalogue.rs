@@ -9,7 +9,7 @@ use trueup_core::{Error, Result, StageContext};
 
 use crate::render::Quality;
 use crate::rig::{RigOptions, rig};
-use crate::scene::{LightQuality, Scene, SceneOptions};
+use crate::scene::{LightQuality, LitScene, SceneOptions};
 use crate::set::{SetOutput, write_set};
 use crate::study::SetKind;
 
@@ -99,7 +99,7 @@ impl SetRequest {
             }
             _ => {}
         }
-        let scene = Scene::new(&record.scene)?;
+        let scene = LitScene::new(&record.scene)?;
         let cameras = rig(&record.rig, &scene.viewpoint())?;
         let source =
             format!("{} {}: {} {}", self.kind.display(), self.number, record.scene.kind.display(), record.scene.seed);
@@ -127,6 +127,7 @@ fn read_record(path: &Path) -> Option<SetRecord> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::unlit::UnlitScene;
     use crate::study::GATE_SETS;
 
     const ALL: [SetKind; 5] =
@@ -145,8 +146,9 @@ mod tests {
             let share = if kind.count() == GATE_SETS { 16 } else { 1 };
             for number in (1..=kind.count()).step_by(share) {
                 let (scene, options) = kind.set(number).expect("a set");
-                let scene = Scene::unlit(&scene).expect("valid options");
-                let cameras = rig(&options, &scene.viewpoint()).expect("valid options");
+                let scene = UnlitScene::new(&scene).expect("valid options");
+                let cameras = rig(&options, &scene.viewpoint).expect("valid options");
+                assert_eq!(cameras.len(), options.pictures, "{kind:?} {number}");
                 let nearest = cameras.iter().map(|posed| scene.clearance(posed.center)).fold(f64::INFINITY, f64::min);
                 assert!(nearest >= LEAST_M, "{kind:?} {number}: {nearest} m");
             }
@@ -188,6 +190,7 @@ mod tests {
     #[test]
     fn every_set_has_valid_options_and_4_to_72_pictures() {
         for kind in ALL {
+            assert!(kind.count() >= 4, "{kind:?}");
             assert!(kind.set(0).is_none() && kind.set(kind.count() + 1).is_none());
             for number in 1..=kind.count() {
                 let (scene, options) = kind.set(number).expect("a set");

@@ -1,12 +1,12 @@
 //! Pictures with exactly known cameras for examples, tests and experiments: rendered scenes, and views cut out of
 //! panoramas of real places ([`cut`]).
 //!
-//! A [`Scene`] (a room, a street, or open country) is built from a seed; [`rig`] places the cameras of a hand-held
+//! A [`LitScene`] (a room, a street, or open country) is built from a seed; [`rig`] places the cameras of a hand-held
 //! panorama in it; [`render`] takes the photographs and [`write_set`] stores them with their truth.
 //!
 //! ```
-//! use trueup_scenes::{LightQuality, Quality, RigOptions, Scene, SceneOptions, render, rig};
-//! let scene = Scene::new(&SceneOptions { light: LightQuality::Fast, ..SceneOptions::default() })?;
+//! use trueup_scenes::{LightQuality, Quality, RigOptions, LitScene, SceneOptions, render, rig};
+//! let scene = LitScene::new(&SceneOptions { light: LightQuality::Fast, ..SceneOptions::default() })?;
 //! let cameras = rig(&RigOptions { width: 32, height: 24, ..RigOptions::default() }, &scene.viewpoint())?;
 //! let picture = render(&scene, &cameras[0], Quality::Preview);
 //! assert_eq!((picture.width(), picture.height(), picture.channels()), (32, 24, 3));
@@ -25,6 +25,7 @@ mod dice;
 mod light;
 mod material;
 mod noise;
+mod portal;
 mod render;
 mod rig;
 mod scene;
@@ -34,10 +35,11 @@ mod solid;
 mod study;
 #[cfg(test)]
 mod tests;
+mod trace;
 
 pub use catalogue::{RECIPE, SetOutcome, SetRequest};
-pub use render::{Quality, depth_map, render};
+pub use render::{Quality, render};
 pub use rig::{PosedCamera, RigOptions, camera_from_world, rig};
-pub use scene::{LightQuality, RoomStyle, Scene, SceneKind, SceneOptions, Viewpoint};
-pub use set::{JPEG_QUALITY, SetOutput, truth_of, write_set};
-pub use study::{GATE_SETS, SetKind, example_set, gate_set, mixed_set, study_set, twin_set};
+pub use scene::{LightQuality, LitScene, RoomStyle, SceneKind, SceneOptions, Viewpoint};
+pub use set::{SetOutput, truth_of, write_set};
+pub use study::{SetKind, example_set};

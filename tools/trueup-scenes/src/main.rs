@@ -10,7 +10,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use commands::{CutArguments, LevelArguments, SpecsArguments, StudyArguments};
 use trueup_core::{Result, StageContext};
 use trueup_scenes::{
-    LightQuality, Quality, RigOptions, Scene, SceneKind, SceneOptions, SetOutput, example_set, rig, write_set,
+    LightQuality, LitScene, Quality, RigOptions, SceneKind, SceneOptions, SetOutput, example_set, rig, write_set,
 };
 
 /// Makes photographs with exactly known cameras: rendered, or cut out of panoramas.
@@ -169,7 +169,7 @@ fn run(command: &Command) -> Result<()> {
 fn write(out: &std::path::Path, scene: &SceneOptions, options: &RigOptions, quality: Quality) -> Result<()> {
     use trueup_core::options::OptionValue;
     let source = format!("{} {}", scene.kind.display(), scene.seed);
-    let scene = Scene::new(scene)?;
+    let scene = LitScene::new(scene)?;
     let cameras = rig(options, &scene.viewpoint())?;
     let output = SetOutput { quality, depth: false };
     write_set(out, &source, &scene, &cameras, output, &StageContext::default())?;

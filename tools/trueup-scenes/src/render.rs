@@ -7,10 +7,9 @@ use trueup_core::raster::Raster;
 use crate::bvh::Ray;
 use crate::color::{Rgb, encode, luminance};
 use crate::dice::{mix, unit_of};
-use crate::light::{SURFACE_OFFSET_M, tangents};
 use crate::rig::PosedCamera;
-use crate::scene::Scene;
-use crate::sky::SUN_RADIUS;
+use crate::scene::lit::LitScene;
+use crate::trace::{trace, trace_surface};
 
 trueup_core::choice! {
     /// How carefully a picture is rendered.
@@ -59,7 +58,7 @@ impl Quality {
 ///
 /// Bytes are the same for any number of threads on one build; the mathematics library (sine, power) may change a last
 /// digit from one platform to another.
-pub fn render(scene: &Scene, posed: &PosedCamera, quality: Quality) -> Raster<u8> {
+pub fn render(scene: &LitScene, posed: &PosedCamera, quality: Quality) -> Raster<u8> {
     let mut picture = Raster::new(posed.width, posed.height, 3);
     if posed.width == 0 || posed.height == 0 {
         return picture;
@@ -106,7 +105,7 @@ fn is_even(glances: &[Glance], x: usize, y: usize, width: usize, step: f64) -> b
 }
 
 /// Depth along the optical axis, metres, through every pixel's center; infinite where there is only sky.
-pub fn depth_map(scene: &Scene, posed: &PosedCamera) -> Raster<f32> {
+pub(crate) fn depth_map(scene: &LitScene, posed: &PosedCamera) -> Raster<f32> {
     let mut depths = Raster::new(posed.width, posed.height, 1);
     if posed.width == 0 || posed.height == 0 {
         return depths;
@@ -115,7 +114,7 @@ pub fn depth_map(scene: &Scene, posed: &PosedCamera) -> Raster<f32> {
     depths.data_mut().par_chunks_mut(posed.width).enumerate().for_each(|(y, row)| {
         for (x, depth) in row.iter_mut().enumerate() {
             let ray = Ray::new(eye.center, eye.direction(x as f64 + 0.5, y as f64 + 0.5));
-            let hit = scene.hierarchy.nearest(&ray, f64::INFINITY);
+            let hit = scene.unlit.hierarchy.nearest(&ray, f64::INFINITY);
             *depth = hit.map_or(f32::INFINITY, |(_, entry)| (entry.distance * ray.direction.dot(&eye.axis)) as f32);
         }
     });
@@ -142,7 +141,7 @@ impl Eye {
     }
 
     /// One sample through every pixel's center.
-    fn glances(&self, scene: &Scene, quality: Quality) -> Vec<Glance> {
+    fn glances(&self, scene: &LitScene, quality: Quality) -> Vec<Glance> {
         /// Textures are filtered to this share of a pixel: narrower than one sample's place would deserve, as sharp as
         /// what four samples show.
         const SHARPNESS: f64 = 0.7;
@@ -163,7 +162,7 @@ impl Eye {
     }
 
     /// Mean light over a pixel: a grid of samples, slightly turned so that all rows and columns differ.
-    fn pixel(&self, scene: &Scene, x: usize, y: usize, quality: Quality) -> Rgb {
+    fn pixel(&self, scene: &LitScene, x: usize, y: usize, quality: Quality) -> Rgb {
         let side = quality.side();
         let count = side * side;
         let angle = 1.0 / (self.posed.camera.focal_px * side as f64);
@@ -187,74 +186,6 @@ impl Eye {
         }
         sum / (count as f64 * scene.exposure)
     }
-}
-
-/// Radiance that arrives at `origin` from `direction`. `angle` is the sample's, in radians; `sun_at` a place on the
-/// sun's unit disc; `mirrors` how often the ray may still be mirrored.
-pub(crate) fn trace(
-    scene: &Scene,
-    origin: Vector3<f64>,
-    direction: Vector3<f64>,
-    angle: f64,
-    sun_at: [f64; 2],
-    mirrors: u32,
-) -> Rgb {
-    trace_surface(scene, origin, direction, angle, sun_at, mirrors).0
-}
-
-/// As [`trace`], with the body and face that was met as one number; 0 for the sky.
-fn trace_surface(
-    scene: &Scene,
-    origin: Vector3<f64>,
-    direction: Vector3<f64>,
-    angle: f64,
-    sun_at: [f64; 2],
-    mirrors: u32,
-) -> (Rgb, u64) {
-    const FACES: u64 = 6;
-    const MIN_COSINE: f64 = 0.08;
-    const GRAZING_GAIN: f64 = 8.0;
-    let ray = Ray::new(origin, direction);
-    let Some((index, entry)) = scene.hierarchy.nearest(&ray, f64::INFINITY) else {
-        return (scene.sky.radiance(direction, angle), 0);
-    };
-    let solid = &scene.solids[index];
-    let point = origin + direction * entry.distance;
-    let in_body = solid.to_body(point - solid.center);
-    let (chart, normal) = solid.chart(entry.face, in_body);
-    let normal = solid.to_world(normal);
-    let cosine = (-direction.dot(&normal)).max(MIN_COSINE);
-    // The pixel's footprint is an ellipse, longer by 1 / cosine one way: take the geometric mean.
-    let footprint = entry.distance * angle / cosine.sqrt();
-    let material = &scene.materials[solid.faces[entry.face]];
-    let albedo = material.albedo(&Scene::spot(solid, entry.face, in_body, chart, footprint));
-    let surface = point + normal * SURFACE_OFFSET_M;
-    let irradiance = scene.light.at(index, entry.face, chart) + sunlight(scene, surface, normal, sun_at);
-    let mut light = albedo.component_mul(&irradiance) / std::f64::consts::PI + material.colors[0] * material.emission;
-    if material.gloss > 0.0 && mirrors > 0 {
-        // Schlick's approximation; what is rough shines less at grazing angles than a mirror would.
-        let grazing = (GRAZING_GAIN * material.gloss).min(1.0);
-        let reflectance = material.gloss + (grazing - material.gloss) * (1.0 - cosine).powi(5);
-        let mirrored = direction - normal * (2.0 * direction.dot(&normal));
-        let seen = trace(scene, surface, mirrored, angle * 2.0, sun_at, mirrors - 1);
-        light = light * (1.0 - reflectance) + seen * reflectance;
-    }
-    (light, 1 + FACES * index as u64 + entry.face as u64)
-}
-
-/// Irradiance by the sun, looking at one place of its disc.
-fn sunlight(scene: &Scene, surface: Vector3<f64>, normal: Vector3<f64>, [s, t]: [f64; 2]) -> Rgb {
-    let Some(sun) = scene.sun else { return Rgb::zeros() };
-    let cosine = normal.dot(&sun.towards);
-    if cosine <= 0.0 {
-        return Rgb::zeros();
-    }
-    let (right, up) = tangents(sun.towards);
-    let towards = sun.towards + (right * s + up * t) * SUN_RADIUS;
-    if scene.hierarchy.blocked(&Ray::new(surface, towards), f64::INFINITY) {
-        return Rgb::zeros();
-    }
-    sun.irradiance * cosine
 }
 
 /// Exposure, vignetting, tone curve, noise and quantization of one pixel.

@@ -1,7 +1,6 @@
 //! Where a photographer stands and points the camera.
 
 use nalgebra::{Matrix3, Vector3};
-use serde::{Deserialize, Serialize};
 use trueup_core::Result;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::roll_from_down;
@@ -57,7 +56,7 @@ trueup_core::options! {
 }
 
 /// One photograph's exactly known camera.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PosedCamera {
     /// Focal length, principal point, rotation from world to camera.
     pub camera: Camera,

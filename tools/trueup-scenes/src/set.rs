@@ -10,10 +10,10 @@ use trueup_core::{Error, Result, StageContext};
 
 use crate::render::{Quality, depth_map, render};
 use crate::rig::PosedCamera;
-use crate::scene::Scene;
+use crate::scene::lit::LitScene;
 
 /// JPEG quality of the pictures written, of 100.
-pub const JPEG_QUALITY: u8 = 87;
+const JPEG_QUALITY: u8 = 87;
 
 /// The truth of a camera whose picture is stored as `file`.
 pub fn truth_of(posed: &PosedCamera, file: String) -> ImageTruth {
@@ -48,7 +48,7 @@ pub struct SetOutput {
 pub fn write_set(
     directory: &Path,
     source: &str,
-    scene: &Scene,
+    scene: &LitScene,
     cameras: &[PosedCamera],
     output: SetOutput,
     context: &StageContext,

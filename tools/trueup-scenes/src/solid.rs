@@ -2,11 +2,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::material::MaterialId;
+use crate::material::{MaterialId, Spot};
 
 /// What a [`Solid`] is in its own frame, stretched to its half extents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Shape {
+pub(crate) enum SolidShape {
     /// Faces 0..6: -x, +x, -y (top, as y points down), +y, -z, +z.
     Block,
     /// Axis along y. Face 0 is the side, 2 the top, 3 the bottom.
@@ -18,7 +18,7 @@ pub(crate) enum Shape {
 /// One convex body.
 #[derive(Debug, Clone)]
 pub(crate) struct Solid {
-    pub(crate) shape: Shape,
+    pub(crate) shape: SolidShape,
     /// In the world, metres.
     pub(crate) center: Vector3<f64>,
     /// Along the body's own axes, metres.
@@ -36,7 +36,7 @@ pub(crate) struct Solid {
 
 /// Where a ray enters a body.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Entry {
+pub(crate) struct RayEntry {
     /// Distance in units of the ray's direction.
     pub(crate) distance: f64,
     pub(crate) face: usize,
@@ -73,9 +73,9 @@ impl Solid {
     /// How many faces the shape uses, and which.
     pub(crate) fn used_faces(&self) -> &'static [usize] {
         match self.shape {
-            Shape::Block => &[0, 1, 2, 3, 4, 5],
-            Shape::Cylinder => &[0, 2, 3],
-            Shape::Ellipsoid => &[0],
+            SolidShape::Block => &[0, 1, 2, 3, 4, 5],
+            SolidShape::Cylinder => &[0, 2, 3],
+            SolidShape::Ellipsoid => &[0],
         }
     }
 
@@ -83,9 +83,9 @@ impl Solid {
     pub(crate) fn contains(&self, point: Vector3<f64>) -> bool {
         let unit = self.to_body(point - self.center).component_div(&self.half);
         match self.shape {
-            Shape::Block => unit.amax() < 1.0,
-            Shape::Cylinder => unit.y.abs() < 1.0 && unit.x * unit.x + unit.z * unit.z < 1.0,
-            Shape::Ellipsoid => unit.norm_squared() < 1.0,
+            SolidShape::Block => unit.amax() < 1.0,
+            SolidShape::Cylinder => unit.y.abs() < 1.0 && unit.x * unit.x + unit.z * unit.z < 1.0,
+            SolidShape::Ellipsoid => unit.norm_squared() < 1.0,
         }
     }
 
@@ -93,8 +93,8 @@ impl Solid {
     pub(crate) fn face_size(&self, face: usize) -> [f64; 2] {
         let half = self.half;
         match self.shape {
-            Shape::Cylinder if face == 0 => [std::f64::consts::PI * (half.x + half.z), 2.0 * half.y],
-            Shape::Ellipsoid => [std::f64::consts::PI * (half.x + half.z), std::f64::consts::PI * half.y],
+            SolidShape::Cylinder if face == 0 => [std::f64::consts::PI * (half.x + half.z), 2.0 * half.y],
+            SolidShape::Ellipsoid => [std::f64::consts::PI * (half.x + half.z), std::f64::consts::PI * half.y],
             _ => {
                 let (_, _, s_axis, _, t_axis) = FACES[face.min(5)];
                 [2.0 * half[s_axis], 2.0 * half[t_axis]]
@@ -106,12 +106,12 @@ impl Solid {
     pub(crate) fn at_chart(&self, face: usize, s: f64, t: f64) -> (Vector3<f64>, Vector3<f64>) {
         use std::f64::consts::{PI, TAU};
         match self.shape {
-            Shape::Cylinder if face == 0 => {
+            SolidShape::Cylinder if face == 0 => {
                 let (sine, cosine) = (TAU * s).sin_cos();
                 let unit = Vector3::new(sine, 2.0 * t - 1.0, cosine);
                 (unit.component_mul(&self.half), self.round_normal(Vector3::new(sine, 0.0, cosine)))
             }
-            Shape::Ellipsoid => {
+            SolidShape::Ellipsoid => {
                 let ((sine, cosine), (up, level)) = ((TAU * s).sin_cos(), (PI * (t - 0.5)).sin_cos());
                 let unit = Vector3::new(sine * level, up, cosine * level);
                 (unit.component_mul(&self.half), self.round_normal(unit))
@@ -133,12 +133,12 @@ impl Solid {
         use std::f64::consts::{PI, TAU};
         let unit = point.component_div(&self.half);
         match self.shape {
-            Shape::Cylinder if face == 0 => {
+            SolidShape::Cylinder if face == 0 => {
                 let turn = unit.x.atan2(unit.z) / TAU;
                 let normal = self.round_normal(Vector3::new(unit.x, 0.0, unit.z));
                 ([turn.rem_euclid(1.0), (unit.y + 1.0) / 2.0], normal)
             }
-            Shape::Ellipsoid => {
+            SolidShape::Ellipsoid => {
                 let turn = unit.x.atan2(unit.z) / TAU;
                 let height = unit.y.clamp(-1.0, 1.0).asin() / PI + 0.5;
                 ([turn.rem_euclid(1.0), height], self.round_normal(unit))
@@ -150,6 +150,23 @@ impl Solid {
                 ([(s_sign * unit[s_axis] + 1.0) / 2.0, (unit[t_axis] + 1.0) / 2.0], normal)
             }
         }
+    }
+
+    /// The coordinates of a place on a face, for its pattern. `point` is in the body's frame.
+    pub(crate) fn spot(&self, face: usize, point: Vector3<f64>, unit: [f64; 2], footprint: f64) -> Spot {
+        let size = self.face_size(face);
+        let texture = point + self.texture_center;
+        let flat = self.shape == SolidShape::Block || face != 0;
+        let (across, down) = match face {
+            _ if !flat => (unit[0] * size[0], texture.y),
+            0 => (-texture.z, texture.y),
+            1 => (texture.z, texture.y),
+            4 => (texture.x, texture.y),
+            5 => (-texture.x, texture.y),
+            _ => (texture.x, texture.z),
+        };
+        let grain = self.half.imax();
+        Spot { point: texture, across, down, unit, size, grain, footprint, seed: self.seed }
     }
 
     /// The normal of a stretched round shape: the unit shape's normal by the inverse stretch.
@@ -165,7 +182,7 @@ pub(crate) fn enter_aligned(
     direction: Vector3<f64>,
     inverse: Vector3<f64>,
     half: Vector3<f64>,
-) -> Option<Entry> {
+) -> Option<RayEntry> {
     let (mut near, mut far, mut face) = (f64::NEG_INFINITY, f64::INFINITY, 0);
     for axis in 0..3 {
         if direction[axis] == 0.0 {
@@ -185,18 +202,18 @@ pub(crate) fn enter_aligned(
             far = leave;
         }
     }
-    (near <= far && near.is_finite()).then_some(Entry { distance: near, face })
+    (near <= far && near.is_finite()).then_some(RayEntry { distance: near, face })
 }
 
 /// Where a ray enters a cylinder or an ellipsoid about the origin; `inverse_half` is one over each half extent.
 pub(crate) fn enter_round(
-    shape: Shape,
+    shape: SolidShape,
     origin: Vector3<f64>,
     direction: Vector3<f64>,
     inverse_half: Vector3<f64>,
-) -> Option<Entry> {
+) -> Option<RayEntry> {
     let (origin, direction) = (origin.component_mul(&inverse_half), direction.component_mul(&inverse_half));
-    if shape == Shape::Cylinder { enter_cylinder(origin, direction) } else { enter_ball(origin, direction) }
+    if shape == SolidShape::Cylinder { enter_cylinder(origin, direction) } else { enter_ball(origin, direction) }
 }
 
 /// The smaller root of the unit circle or sphere; `None` if missed.
@@ -205,12 +222,12 @@ fn near_root(a: f64, half_b: f64, c: f64) -> Option<f64> {
     (discriminant >= 0.0 && a > 0.0).then(|| (-half_b - discriminant.sqrt()) / a)
 }
 
-fn enter_ball(origin: Vector3<f64>, direction: Vector3<f64>) -> Option<Entry> {
+fn enter_ball(origin: Vector3<f64>, direction: Vector3<f64>) -> Option<RayEntry> {
     let distance = near_root(direction.norm_squared(), origin.dot(&direction), origin.norm_squared() - 1.0)?;
-    Some(Entry { distance, face: 0 })
+    Some(RayEntry { distance, face: 0 })
 }
 
-fn enter_cylinder(origin: Vector3<f64>, direction: Vector3<f64>) -> Option<Entry> {
+fn enter_cylinder(origin: Vector3<f64>, direction: Vector3<f64>) -> Option<RayEntry> {
     let (o, d) = (origin, direction);
     let side = near_root(d.x * d.x + d.z * d.z, o.x * d.x + o.z * d.z, o.x * o.x + o.z * o.z - 1.0)
         .filter(|&distance| (o.y + distance * d.y).abs() <= 1.0);
@@ -219,7 +236,7 @@ fn enter_cylinder(origin: Vector3<f64>, direction: Vector3<f64>) -> Option<Entry
     let (x, z) = (o.x + cap * d.x, o.z + cap * d.z);
     let cap = (d.y != 0.0 && x * x + z * z <= 1.0).then_some(cap);
     match (side, cap) {
-        (_, Some(distance)) if side.is_none_or(|side| side < distance) => Some(Entry { distance, face }),
-        (side, _) => side.map(|distance| Entry { distance, face: 0 }),
+        (_, Some(distance)) if side.is_none_or(|side| side < distance) => Some(RayEntry { distance, face }),
+        (side, _) => side.map(|distance| RayEntry { distance, face: 0 }),
     }
 }

@@ -22,7 +22,7 @@ trueup_core::choice! {
 }
 
 /// Sets of each kind for statistics of the gate.
-pub const GATE_SETS: usize = 65;
+pub(crate) const GATE_SETS: usize = 65;
 
 impl SetKind {
     /// How many sets there are; they are numbered from 1.
@@ -70,7 +70,7 @@ pub fn example_set() -> (SceneOptions, RigOptions) {
 /// # Departures
 /// The paper's own sets are not public. These differ in what its sets were chosen to differ in: number of pictures and
 /// rows, pitch, full turns, focal lengths, parallax.
-pub fn study_set(number: usize) -> Option<(SceneOptions, RigOptions)> {
+pub(crate) fn study_set(number: usize) -> Option<(SceneOptions, RigOptions)> {
     let rig = study_rig(number)?;
     let styles = [
         RoomStyle::Living,
@@ -111,7 +111,7 @@ fn study_rig(number: usize) -> Option<RigOptions> {
 
 /// The twin 1 to 12 of a study set: the same cameras where no direction is preferred, odd numbers among blocks at
 /// random turns, even ones in the open country; `None` for other numbers.
-pub fn twin_set(number: usize) -> Option<(SceneOptions, RigOptions)> {
+fn twin_set(number: usize) -> Option<(SceneOptions, RigOptions)> {
     let rig = study_rig(number)?;
     let kind = if number % 2 == 1 { SceneKind::Boxes } else { SceneKind::Nature };
     let scene =
@@ -121,7 +121,7 @@ pub fn twin_set(number: usize) -> Option<(SceneOptions, RigOptions)> {
 
 /// Mixed set 1 to 4, with one vertical and horizontals at free angles: two rooms, two squares; `None` for other
 /// numbers.
-pub fn mixed_set(number: usize) -> Option<(SceneOptions, RigOptions)> {
+fn mixed_set(number: usize) -> Option<(SceneOptions, RigOptions)> {
     let base = RigOptions { width: 1024, height: 768, roll_sd_deg: 6.0, ..RigOptions::default() };
     let (kind, style, rig) = match number {
         1 => (SceneKind::TurnedRoom, RoomStyle::Living, RigOptions { pictures: 8, ..base }),
@@ -142,7 +142,7 @@ pub fn mixed_set(number: usize) -> Option<(SceneOptions, RigOptions)> {
 
 /// Set 1 to [`GATE_SETS`] for statistics of the gate: 4 to 8 small pictures of rooms and streets (`manhattan`), or of
 /// blocks at random turns and open country; `None` for other numbers.
-pub fn gate_set(manhattan: bool, number: usize) -> Option<(SceneOptions, RigOptions)> {
+fn gate_set(manhattan: bool, number: usize) -> Option<(SceneOptions, RigOptions)> {
     const STREAM: u64 = 0x4741_5445;
     if number == 0 || number > GATE_SETS {
         return None;

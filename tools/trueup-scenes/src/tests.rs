@@ -4,16 +4,40 @@ use std::sync::OnceLock;
 
 use trueup_core::StageContext;
 
+use crate::bvh::Hierarchy;
+use crate::material::{Pattern, SurfaceMaterial};
+use crate::render::depth_map;
+use crate::scene::unlit::UnlitScene;
+use crate::solid::{Solid, SolidShape};
+use crate::study::study_set;
 use crate::*;
 
-fn scene(kind: SceneKind) -> Scene {
+fn scene(kind: SceneKind) -> LitScene {
     let options = SceneOptions { kind, light: LightQuality::Fast, ..SceneOptions::default() };
-    Scene::new(&options).expect("valid options")
+    LitScene::new(&options).expect("valid options")
 }
 
-fn room() -> &'static Scene {
-    static ROOM: OnceLock<Scene> = OnceLock::new();
+fn room() -> &'static LitScene {
+    static ROOM: OnceLock<LitScene> = OnceLock::new();
     ROOM.get_or_init(|| scene(SceneKind::Room))
+}
+
+/// The room with a small self-luminous ball in it: a target whose picture can be found exactly.
+fn room_with_marker(center: [f64; 3], radius_m: f64) -> LitScene {
+    let mut scene = room().clone();
+    let UnlitScene { solids, materials, hierarchy, .. } = &mut scene.unlit;
+    materials.push(SurfaceMaterial::new(Pattern::Paint, 1.0, [0xff_0000; 3]).emitting(1e3));
+    solids.push(Solid {
+        shape: SolidShape::Ellipsoid,
+        center: nalgebra::Vector3::from(center),
+        half: nalgebra::Vector3::repeat(radius_m),
+        world_from_body: None,
+        faces: [materials.len() - 1; 6],
+        texture_center: nalgebra::Vector3::zeros(),
+        seed: 0,
+    });
+    *hierarchy = Hierarchy::new(solids);
+    scene
 }
 
 fn small_rig(translation_fraction: f64) -> Vec<PosedCamera> {
@@ -63,8 +87,7 @@ fn a_marker_shows_where_the_camera_projects_it() {
     let projected = posed.project(marker).expect("in front");
     assert!((projected[0] - pixel_x).abs() < 1e-9 && (projected[1] - pixel_y).abs() < 1e-9);
 
-    let mut marked = room().clone();
-    marked.add_marker(marker, 0.01);
+    let marked = room_with_marker(marker, 0.01);
     let before = render(room(), &posed, Quality::Standard);
     let after = render(&marked, &posed, Quality::Standard);
     let (mut sum, mut x_sum, mut y_sum) = (0.0, 0.0, 0.0);
@@ -126,11 +149,10 @@ fn depth_agrees_with_parallel_projection() {
     let depths = depth_map(room(), &posed);
     assert!(depths.data().iter().all(|&depth| depth > 0.1));
     // A marker nearer than everything else takes the place of what was there.
-    let mut marked = room().clone();
     let pixel = nalgebra::Vector2::new(48.5, 36.5);
     let direction = posed.camera.world_direction(pixel);
     let center = nalgebra::Vector3::from(posed.center) + direction * 0.5;
-    marked.add_marker(center.into(), 0.1);
+    let marked = room_with_marker(center.into(), 0.1);
     let along = direction.dot(&(posed.camera.rotation().transpose() * nalgebra::Vector3::z()));
     let expected = 0.4 * along;
     assert!((f64::from(depth_map(&marked, &posed).pixel(48, 36)[0]) - expected).abs() < 1e-5);
@@ -202,7 +224,7 @@ fn adaptive_sampling_comes_close_to_many_samples() {
 /// Bodies stand upright at five different turns at least, where a quarter turn counts as none.
 #[test]
 fn a_turned_room_keeps_its_vertical_and_gives_up_its_horizontals() {
-    let scene = Scene::unlit(&SceneOptions { kind: SceneKind::TurnedRoom, ..SceneOptions::default() });
+    let scene = UnlitScene::new(&SceneOptions { kind: SceneKind::TurnedRoom, ..SceneOptions::default() });
     let scene = scene.expect("valid options");
     let mut quarter_turns = std::collections::BTreeSet::new();
     for rotation in scene.solids.iter().filter_map(|solid| solid.world_from_body) {

@@ -1,8 +1,8 @@
-//! Where the vertices of one picture's grid appear in another: the data of the alignment energy.
+//! Where the vertices of one photograph's grid appear in another: the data of the alignment energy.
 //!
 //! # Source
-//! Chen and Chuang, "Natural image stitching with the global similarity prior" (2016), section 3.1: grid vertices carried
-//! by local homographies replace the feature matches, because they cover the overlap uniformly.
+//! Chen and Chuang, "Natural image stitching with the global similarity prior" (2016), section 3.1: grid vertices
+//! carried by local homographies replace the feature matches, because they cover the overlap uniformly.
 
 mod moving_dlt;
 mod residual;
@@ -17,22 +17,22 @@ use trueup_core::source::WorkingFrame;
 use trueup_core::{Result, StageContext};
 
 pub use moving_dlt::MovingDlt;
-use residual::CameraResidual;
+use residual::{CameraResidual, MAX_DEVIATION};
 
-/// The vertices of picture `from`'s grid carried into picture `to` (working pixels).
+/// The vertices of photograph `from`'s grid carried into photograph `to` (working pixels).
 #[derive(Debug, Clone, PartialEq)]
 pub struct OverlapWarp {
-    /// Index of the picture whose grid it is.
+    /// Index of the photograph whose grid it is.
     pub from: usize,
-    /// Index of the picture it is carried into.
+    /// Index of the photograph it is carried into.
     pub to: usize,
     /// For every vertex of `from`'s grid, row-major: its place in `to`, or `None` outside the overlap.
     pub vertices: Vec<Option<[f64; 2]>>,
 }
 
 impl OverlapWarp {
-    /// Where a pixel of picture `from` is in `to`, by the vertices of `grid` around it: interpolated, or at the overlap's
-    /// border moved like the nearest vertex that is carried. `None` outside the overlap.
+    /// Where a pixel of photograph `from` is in `to`, by the vertices of `grid` around it: interpolated, or at the
+    /// overlap's border moved like the nearest vertex that is carried. `None` outside the overlap.
     pub fn at(&self, grid: &GridMesh, point: Vector2<f64>) -> Option<Vector2<f64>> {
         let (corners, shares) = grid.bilinear(point);
         let places = corners.map(|corner| self.vertices.get(corner).copied().flatten().map(Vector2::from));
@@ -49,7 +49,7 @@ impl OverlapWarp {
 }
 
 trueup_core::choice! {
-    /// How a grid vertex is carried into another picture.
+    /// How a grid vertex is carried into another photograph.
     pub enum TransferModel {
         /// The cameras' transfer, corrected by the matches' local deviation from it.
         CameraResidual = "camera-residual",
@@ -59,24 +59,17 @@ trueup_core::choice! {
 }
 
 trueup_core::options! {
-    /// How the overlap of two pictures is sampled.
+    /// How the overlap of two photographs is sampled.
     pub struct MatchPointOptions("match_points") {
-        /// How a grid vertex is carried into another picture.
+        /// How a grid vertex is carried into another photograph. Choose the moving DLT to compare with published
+        /// results, or for photographs whose cameras do more than turn.
         model: TransferModel = TransferModel::CameraResidual, Allowed::Any, "";
-        /// Distance over which the influence of a match on a vertex falls to 1/e.
-        decay_px: f64 = 72.25, between(1.0, 10000.0), "working px";
-        /// Smallest weight of a match in the moving DLT; it keeps vertices far from all matches determined.
-        weight_floor: f64 = 0.0015, between(0.0, 1.0), "";
-        /// Strength, in matches, with which the correction is drawn towards none.
-        shrinkage: f64 = 0.5, between(0.0, 1000.0), "matches";
-        /// Largest distance from the global homography's place, relative to the diagonal.
-        max_deviation: f64 = 0.1, between(0.001, 10.0), "diagonals";
     }
 }
 
-/// Carries the grid of each picture of every pair into the other: two warps a pair, a to b first.
+/// Carries the grid of each photograph of every pair into the other: two warps a pair, a to b first.
 ///
-/// `grids` are the undeformed grids of the pictures. Needs the pairs' inliers and homographies.
+/// `grids` are the undeformed grids of the photographs. Needs the pairs' inliers and homographies.
 ///
 /// # Errors
 /// [`trueup_core::Error::Cancelled`].
@@ -98,8 +91,9 @@ pub fn run(
             let points_b: Vec<Vector2<f64>> = pair.inliers.iter().map(|one| Vector2::from(one.in_b)).collect();
             let b_from_a = pair.b_from_a.as_ref().map(Homography::from_rows);
             let a_from_b = b_from_a.and_then(|homography| homography.inverse());
+            let model = options.model;
             let direction = |from: usize, to: usize, source: &[_], target: &[_], global: Option<Homography>| {
-                let transfer = Transfer { from: &cameras[from], to: &cameras[to], source, target, global, options };
+                let transfer = Transfer { from: &cameras[from], to: &cameras[to], source, target, global, model };
                 let vertices = transfer.carry(&grids[from], &frames[to]);
                 OverlapWarp { from, to, vertices }
             };
@@ -122,28 +116,28 @@ struct Transfer<'a> {
     source: &'a [Vector2<f64>],
     target: &'a [Vector2<f64>],
     global: Option<Homography>,
-    options: &'a MatchPointOptions,
+    model: TransferModel,
 }
 
 impl Transfer<'_> {
     fn carry(&self, grid: &GridMesh, frame: &WorkingFrame) -> Vec<Option<[f64; 2]>> {
         let inside = |place: Vector2<f64>| frame.contains(place.x, place.y).then_some([place.x, place.y]);
-        match self.options.model {
+        match self.model {
             TransferModel::CameraResidual => {
-                let model = CameraResidual::new(self.from, self.to, self.source, self.target, self.options);
+                let model = CameraResidual::new(self.from, self.to, self.source, self.target);
                 (0..grid.len()).map(|vertex| model.at(grid.source(vertex)).and_then(inside)).collect()
             }
             TransferModel::MovingDlt => {
                 let Some(global) = self.global else { return vec![None; grid.len()] };
                 let Some(model) = MovingDlt::new(self.source, self.target) else { return vec![None; grid.len()] };
-                let limit = self.options.max_deviation * frame.diagonal();
+                let limit = MAX_DEVIATION * frame.diagonal();
                 let place = |vertex: Vector2<f64>| {
                     let expected = global.apply(vertex);
                     // Vertices that the global homography sees far outside need no local one.
                     let near = (-limit..=frame.width + limit).contains(&expected.x)
                         && (-limit..=frame.height + limit).contains(&expected.y)
                         && global.denominator(vertex) > 0.0;
-                    let local = near.then(|| model.at(vertex, self.options)).flatten().unwrap_or(global);
+                    let local = near.then(|| model.at(vertex)).flatten().unwrap_or(global);
                     let place = local.apply(vertex);
                     ((place - expected).norm() <= limit && near).then_some(place)
                 };
@@ -198,7 +192,7 @@ mod tests {
         let (frames, cameras, pair) = example();
         let grids = vec![GridMesh::regular(800.0, 600.0, 40.0); 2];
         for model in [TransferModel::CameraResidual, TransferModel::MovingDlt] {
-            let options = MatchPointOptions { model, ..MatchPointOptions::default() };
+            let options = MatchPointOptions { model };
             let context = StageContext::default();
             let warps =
                 run(&frames, &grids, &cameras, std::slice::from_ref(&pair), &options, &context).expect("not cancelled");
@@ -206,10 +200,10 @@ mod tests {
             for warp in &warps {
                 let carried = warp.vertices.iter().flatten().count();
                 assert!(carried > 100, "{model:?}: only {carried} vertices in the overlap");
-                for (vertex, place) in warp.vertices.iter().enumerate() {
-                    let Some(place) = place else { continue };
+                let placed = warp.vertices.iter().enumerate().filter_map(|(vertex, place)| Some((vertex, (*place)?)));
+                for (vertex, place) in placed {
                     let truth = cameras[warp.from].transfer(&cameras[warp.to], grids[0].source(vertex));
-                    let error = (truth.expect("in front") - Vector2::from(*place)).norm();
+                    let error = (truth.expect("in front") - Vector2::from(place)).norm();
                     assert!(error < 1e-5, "{model:?}: vertex {vertex} is off by {error} px");
                 }
             }
@@ -227,8 +221,10 @@ mod tests {
         let options = MatchPointOptions::default();
         let context = StageContext::default();
         let warps = run(&frames, &grids, &cameras, &[pair], &options, &context).expect("not cancelled");
-        for (vertex, place) in warps[0].vertices.iter().enumerate() {
-            let Some(place) = place else { continue };
+        let carried: Vec<(usize, [f64; 2])> =
+            warps[0].vertices.iter().enumerate().filter_map(|(vertex, place)| Some((vertex, (*place)?))).collect();
+        assert!(carried.len() > 100, "only {} vertices in the overlap", carried.len());
+        for (vertex, place) in carried {
             let truth = cameras[0].transfer(&cameras[1], grids[0].source(vertex)).expect("in front");
             assert!((place[0] - truth.x - 6.0).abs() < 1.0, "{} of 6 px", place[0] - truth.x);
         }

@@ -3,7 +3,10 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2};
 use trueup_core::geometry::{Homography, Normalization};
 
-use super::MatchPointOptions;
+/// Distance over which the influence of a match on a vertex falls to 1/e, working px: the published 8.5 squared.
+pub(super) const DECAY_PX: f64 = 72.25;
+/// Smallest weight of a match; it keeps vertices far from all matches determined.
+const WEIGHT_FLOOR: f64 = 0.0015;
 
 /// Matches prepared for fitting many local homographies.
 ///
@@ -53,14 +56,17 @@ impl MovingDlt {
     }
 
     /// The homography around `vertex` (source pixels); `None` where it is not determined.
-    pub fn at(&self, vertex: Vector2<f64>, options: &MatchPointOptions) -> Option<Homography> {
-        self.solve(|position| (-(position - vertex).norm() / options.decay_px).exp().max(options.weight_floor))
+    pub(super) fn at(&self, vertex: Vector2<f64>) -> Option<Homography> {
+        self.solve(|position| (-(position - vertex).norm() / DECAY_PX).exp().max(WEIGHT_FLOOR))
     }
 
     /// The homography for any weights of the match positions.
     pub fn solve(&self, weight: impl Fn(Vector2<f64>) -> f64) -> Option<Homography> {
+        /// Most steps of the inverse iteration; two or three settle it.
         const ITERATIONS: usize = 8;
+        /// Change of direction, 1 - cosine, below which it has settled.
         const SETTLED: f64 = 1e-12;
+        /// What is added to the diagonal, as a share of the trace: exact matches make the matrix singular.
         const RELATIVE_SHIFT: f64 = 1e-12;
         let mut normal = self.normal_matrix(weight);
         let shift = normal.trace() * RELATIVE_SHIFT;
@@ -142,9 +148,8 @@ mod tests {
     fn local_weights_are_the_weighted_dlt() {
         let (source, target) = noisy_matches();
         let vertex = Vector2::new(100.0, 300.0);
-        let options = MatchPointOptions::default();
         let weights: Vec<f64> = source.iter().map(|p| (-(p - vertex).norm() / 72.25_f64).exp().max(0.0015)).collect();
-        let moving = MovingDlt::new(&source, &target).and_then(|dlt| dlt.at(vertex, &options)).expect("regular");
+        let moving = MovingDlt::new(&source, &target).and_then(|dlt| dlt.at(vertex)).expect("regular");
         let weighted = Homography::fit(&source, &target, Some(&weights)).expect("regular");
         assert!((moving.apply(vertex) - weighted.apply(vertex)).norm() < 1e-5);
     }

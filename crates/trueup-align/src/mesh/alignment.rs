@@ -1,30 +1,32 @@
-//! The alignment energy E_a: match points of overlapping pictures fall on each other.
+//! The alignment energy E_a: match points of overlapping photographs fall on each other.
 
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
-use super::{Base, Closure, NormalEquations};
+use super::base::BaseMap;
+use super::closure::Closure;
+use super::normal_equations::{GridSum, NormalEquations};
 use crate::match_points::OverlapWarp;
 
-/// A grid vertex of one picture and its place in another.
+/// A grid vertex of one photograph and its place in another.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MatchPoint {
-    /// The picture whose vertex it is.
-    pub from: usize,
+struct MatchPoint {
+    /// The photograph whose vertex it is.
+    from: usize,
     /// The vertex.
-    pub vertex: usize,
-    /// The other picture.
-    pub to: usize,
+    vertex: usize,
+    /// The other photograph.
+    to: usize,
     /// The place in it, in working pixels.
-    pub place: [f64; 2],
-    /// How far the other picture's base is, at that place, from its bilinear interpolation.
-    pub sag: [f64; 2],
+    place: [f64; 2],
+    /// How far the other photograph's base is, at that place, from its bilinear interpolation.
+    sag: [f64; 2],
     /// Turns by which the vertex lies to the right of the place: 0 but across the cut of a full turn.
-    pub turns: f64,
+    turns: f64,
 }
 
 impl MatchPoint {
-    /// From where the other picture has it to where its own has it, in the deformed `meshes`.
+    /// From where the other photograph has it to where its own has it, in the deformed `meshes`.
     fn distance(&self, meshes: &[GridMesh]) -> Vector2<f64> {
         let vertex = Vector2::from(meshes[self.from].target[self.vertex]);
         vertex - meshes[self.to].warp(Vector2::from(self.place)) - Vector2::from(self.sag)
@@ -39,13 +41,18 @@ impl MatchPoint {
 /// phi is bilinear in the deviation from the base, not in the vertices themselves; with a base that is a similarity the
 /// two are the same. Otherwise the bilinear chords of two curved grids would pull on each other.
 #[derive(Debug, Clone)]
-pub struct AlignmentEnergy {
+pub(super) struct AlignmentEnergy {
     points: Vec<MatchPoint>,
 }
 
 impl AlignmentEnergy {
     /// The match points of all warps. `places` are the bases' places of the grids' vertices.
-    pub fn new(grids: &[GridMesh], warps: &[OverlapWarp], bases: &[Base], places: &[Vec<Vector2<f64>>]) -> Self {
+    pub(super) fn new(
+        grids: &[GridMesh],
+        warps: &[OverlapWarp],
+        bases: &[BaseMap],
+        places: &[Vec<Vector2<f64>>],
+    ) -> Self {
         let within = Closure { warps, turns: &[], expected: 0.0 };
         let mut energy = Self { points: Vec::new() };
         energy.join(&within, grids, bases, places);
@@ -53,7 +60,13 @@ impl AlignmentEnergy {
     }
 
     /// Takes in the match points of `closure`.
-    pub fn join(&mut self, closure: &Closure, grids: &[GridMesh], bases: &[Base], places: &[Vec<Vector2<f64>>]) {
+    pub(super) fn join(
+        &mut self,
+        closure: &Closure,
+        grids: &[GridMesh],
+        bases: &[BaseMap],
+        places: &[Vec<Vector2<f64>>],
+    ) {
         let turns = closure.turns.iter().copied().chain(std::iter::repeat(0.0));
         let points = closure.warps.iter().zip(turns).flat_map(|(warp, turns)| {
             warp.vertices.iter().take(grids[warp.from].len()).enumerate().filter_map(move |(vertex, place)| {
@@ -67,29 +80,32 @@ impl AlignmentEnergy {
         self.points.extend(points);
     }
 
-    /// For every match point across the cut of a full turn, the way from its place at the left end to that at the right.
+    /// For every match point across the cut of a full turn, the way from its place at the left end to that at the
+    /// right.
     pub(super) fn apart(&self, meshes: &[GridMesh]) -> Vec<Vector2<f64>> {
         let across = self.points.iter().filter(|point| point.turns != 0.0);
         across.map(|point| point.distance(meshes) * point.turns).collect()
     }
 
     /// Adds the energy, each match point weighted by `weight` squared.
-    pub fn add(&self, weight: f64, equations: &mut NormalEquations, grids: &[GridMesh]) {
+    pub(super) fn add(&self, weight: f64, equations: &mut NormalEquations, grids: &[GridMesh]) {
         for point in &self.points {
             let (corners, shares) = grids[point.to].bilinear(Vector2::from(point.place));
             let to: [(usize, f64); 4] = std::array::from_fn(|k| (corners[k], -shares[k]));
             let value = Vector2::from(point.sag);
             let from = [(point.vertex, 1.0)];
-            equations.add_between((point.from, &from), (point.to, &to), value, weight * weight);
+            let sums =
+                [GridSum { photograph: point.from, members: &from }, GridSum { photograph: point.to, members: &to }];
+            equations.add_between(&sums, value, weight * weight);
             if point.turns != 0.0 {
-                equations.add_period([(point.from, &from), (point.to, &to)], point.turns, value.x, weight * weight);
+                equations.add_period(&sums, point.turns, value.x, weight * weight);
             }
         }
     }
 
-    /// For every picture and grid cell (row-major), whether a match point lies in it: a vertex carried elsewhere counts
-    /// for the cell to its lower right.
-    pub fn overlap_cells(&self, grids: &[GridMesh]) -> Vec<Vec<bool>> {
+    /// For every photograph and grid cell (row-major), whether a match point lies in it: a vertex carried elsewhere
+    /// counts for the cell to its lower right.
+    pub(super) fn overlap_cells(&self, grids: &[GridMesh]) -> Vec<Vec<bool>> {
         let mut cells: Vec<Vec<bool>> =
             grids.iter().map(|grid| vec![false; (grid.rows - 1) * (grid.columns - 1)]).collect();
         for point in &self.points {
@@ -103,7 +119,7 @@ impl AlignmentEnergy {
 
     /// Root mean square distance of the two places of a match point in the deformed `meshes`, across a full turn's cut
     /// modulo `period`; 0 without match points.
-    pub fn rms(&self, meshes: &[GridMesh], period: Option<f64>) -> f64 {
+    pub(super) fn rms(&self, meshes: &[GridMesh], period: Option<f64>) -> f64 {
         let turn = Vector2::new(period.unwrap_or(0.0), 0.0);
         let squares = self.points.iter().map(|point| (point.distance(meshes) - turn * point.turns).norm_squared());
         (squares.sum::<f64>() / self.points.len().max(1) as f64).sqrt()

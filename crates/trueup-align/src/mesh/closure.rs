@@ -1,4 +1,4 @@
-//! What closes a full turn: overlaps whose pictures, laid flat, lie a whole turn apart.
+//! What closes a full turn: overlaps whose photographs, laid flat, lie a whole turn apart.
 
 use nalgebra::Vector2;
 
@@ -22,14 +22,14 @@ impl Closure<'_> {
     /// Why the ends of a panorama that was laid out without the closure cannot be the same place; `None` if they can.
     ///
     /// `apart` holds, for every match point, the way from where the left end has it to where the right end has it. What
-    /// the ends are off is spread over the whole turn when it is closed; more than that takes up comes of wrong matches or
-    /// cameras.
+    /// the ends are off is spread over the whole turn when it is closed; more than that takes up comes of wrong matches
+    /// or cameras.
     pub(super) fn contradiction(&self, apart: &[Vector2<f64>]) -> Option<String> {
         /// Largest difference in height of the ends, and largest spread of what the match points say, as shares of the
         /// period: a slope of 1.7 degrees.
         const MOST_OFF: f64 = 0.03;
-        /// Largest difference of the period from that by the cameras, as its share. Focal lengths may be off by a tenth and
-        /// more although all matches agree on the period.
+        /// Largest difference of the period from that by the cameras, as its share. Focal lengths may be off by a tenth
+        /// and more although all matches agree on the period.
         const MOST_STRETCH: f64 = 0.25;
         let Some(x) = median(apart.iter().map(|one| one.x)) else {
             return Some("no point of their overlap was carried across".to_owned());
@@ -70,11 +70,11 @@ mod tests {
     use super::super::*;
     use super::*;
 
-    const PICTURES: usize = 10;
+    const PHOTOGRAPHS: usize = 10;
     const FOCAL_PX: f64 = 400.0;
 
-    /// A ring of level pictures 36 degrees apart, with all match points; those across the cut, between the last and the
-    /// first, apart, with their turns.
+    /// A ring of level photographs 36 degrees apart, with all match points; those across the cut, between the last and
+    /// the first, apart, with their turns.
     struct Ring {
         cameras: Vec<Camera>,
         grids: Vec<GridMesh>,
@@ -85,11 +85,11 @@ mod tests {
 
     impl Ring {
         fn new() -> Self {
-            let step = TAU / PICTURES as f64;
+            let step = TAU / PHOTOGRAPHS as f64;
             let camera =
                 |k: usize| Camera::new(FOCAL_PX, 400.0, 300.0, &rotation_about_y((k as f64 - 4.5) * step).transpose());
-            let cameras: Vec<Camera> = (0..PICTURES).map(camera).collect();
-            let grids = vec![GridMesh::regular(400.0, 300.0, 50.0); PICTURES];
+            let cameras: Vec<Camera> = (0..PHOTOGRAPHS).map(camera).collect();
+            let grids = vec![GridMesh::regular(400.0, 300.0, 50.0); PHOTOGRAPHS];
             let carried = |from: usize, to: usize| OverlapWarp {
                 from,
                 to,
@@ -101,26 +101,30 @@ mod tests {
                     .collect(),
             };
             let neighbors = |k: usize| [carried(k, k + 1), carried(k + 1, k)];
-            let within = (0..PICTURES - 1).flat_map(neighbors).collect();
-            let across = vec![carried(PICTURES - 1, 0), carried(0, PICTURES - 1)];
+            let within = (0..PHOTOGRAPHS - 1).flat_map(neighbors).collect();
+            let across = vec![carried(PHOTOGRAPHS - 1, 0), carried(0, PHOTOGRAPHS - 1)];
             Self { cameras, grids, within, across, turns: vec![1.0, -1.0] }
         }
 
         /// The mesh on the sphere of cameras whose focal length is `share` of the true one.
         fn deformed(&self, share: f64, expected: f64, context: &StageContext) -> WarpedMesh {
             let options = MeshOptions::default();
-            let bases: Vec<Base> = self
+            let bases: Vec<BaseMap> = self
                 .cameras
                 .iter()
                 .zip(&self.grids)
                 .map(|(camera, grid)| {
                     let wrong = Camera { focal_px: share * camera.focal_px, ..*camera };
-                    Base::on_level_sphere(&wrong, grid, FOCAL_PX * share, &options)
+                    BaseMap::on_level_sphere(&wrong, grid, FOCAL_PX * share, &options)
                 })
                 .collect();
             let closure = Closure { warps: &self.across, turns: &self.turns, expected };
             let refinements = Refinements { closure: Some(closure), ..Refinements::default() };
-            run_refined(&self.grids, &self.within, &bases, 0, &options, &refinements, context).expect("solvable")
+            run(&self.input(&bases, refinements), &options, context).expect("solvable")
+        }
+
+        fn input<'a>(&'a self, bases: &'a [BaseMap], refinements: Refinements<'a>) -> MeshInput<'a> {
+            MeshInput { grids: &self.grids, warps: &self.within, bases, reference: 0, refinements }
         }
     }
 
@@ -153,7 +157,7 @@ mod tests {
             let across = apart(&ring.across[0]);
             let mean = across.iter().sum::<f64>() / across.len() as f64;
             assert!(across.len() > 4 && mean < 1.5 * warped.alignment_rms + 0.1, "{mean} {}", warped.alignment_rms);
-            // All pictures alike: none bears more of the misfit than the others.
+            // All photographs alike: none bears more of the misfit than the others.
             let width = |mesh: &GridMesh| mesh.bounds().1.x - mesh.bounds().0.x;
             let widths: Vec<f64> = warped.meshes.iter().map(width).collect();
             let (low, high) = widths.iter().fold((f64::MAX, 0.0_f64), |(low, high), &w| (low.min(w), high.max(w)));
@@ -172,13 +176,14 @@ mod tests {
         assert!(found[0].message.contains("67 %"), "{}", found[0].message);
         // As without any closure.
         let options = MeshOptions::default();
-        let bases: Vec<Base> = ring
+        let bases: Vec<BaseMap> = ring
             .cameras
             .iter()
             .zip(&ring.grids)
-            .map(|(camera, grid)| Base::on_level_sphere(camera, grid, FOCAL_PX, &options))
+            .map(|(camera, grid)| BaseMap::on_level_sphere(camera, grid, FOCAL_PX, &options))
             .collect();
-        assert_eq!(open, run(&ring.grids, &ring.within, &bases, 0, &options, &context).expect("solvable"));
+        let plain = run(&ring.input(&bases, Refinements::default()), &options, &context).expect("solvable");
+        assert_eq!(open, plain);
         let closure = Closure { warps: &[], turns: &[], expected: 100.0 };
         let lifted = vec![Vector2::new(100.0, 5.0); 9];
         assert!(closure.contradiction(&lifted).expect("too high").contains("5.0 %"));

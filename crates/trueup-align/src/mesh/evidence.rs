@@ -1,13 +1,14 @@
 //! How far overlaps are apart beyond the noise of what says so.
 //!
 //! The plain mesh meets overlaps to a tenth of a pixel where the photographs were taken from one point, better than any
-//! single match or cell of pixels says. Drawn to each of them it would follow their noise. Noise differs from neighbor to
-//! neighbor; a true misalignment is common to them. The product of neighbors' distances is therefore, on the mean, the
-//! square of the true one, and evidence weighs by it, as the prior variance of what is estimated says in a Wiener filter.
+//! single match or cell of pixels says. Drawn to each of them it would follow their noise. Noise differs from neighbor
+//! to neighbor; a true misalignment is common to them. The product of neighbors' distances is therefore, on the mean,
+//! the square of the true one, and evidence weighs by it, as the prior variance of what is estimated says in a Wiener
+//! filter.
 
 use nalgebra::{Matrix2, Vector2};
 
-/// One match, seen in the first picture of a pair.
+/// One match, seen in the first photograph of a pair.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Evidence {
     /// Where, in working pixels.
@@ -38,8 +39,8 @@ pub(super) fn common_squares(evidence: &[Evidence]) -> Vec<f64> {
     const NEIGHBORS: usize = 12;
     /// Products with which a neighborhood is drawn to the mean of all.
     const DRAWN: f64 = 24.0;
-    let mut overall = [0.0; 2];
-    let around: Vec<[f64; 2]> = evidence
+    let mut overall = CommonSum::default();
+    let around: Vec<CommonSum> = evidence
         .iter()
         .map(|one| {
             let mut near: Vec<(f64, &Evidence)> = evidence
@@ -53,33 +54,48 @@ pub(super) fn common_squares(evidence: &[Evidence]) -> Vec<f64> {
             }
             // The selection leaves no order, and sums depend on theirs.
             near.sort_by(|one, other| one.0.total_cmp(&other.0));
-            let mut sum = [0.0; 2];
+            let mut sum = CommonSum::default();
             for (k, (_, one)) in near.iter().enumerate() {
                 for (_, other) in &near[..k] {
                     if (other.place - one.place).norm_squared() >= NEAREST_PX.powi(2) {
-                        sum[0] += one.gap.dot(&other.gap);
-                        sum[1] += (one.known * other.known).trace();
+                        sum.products += one.gap.dot(&other.gap);
+                        sum.units += (one.known * other.known).trace();
                     }
                 }
             }
-            overall = [overall[0] + sum[0], overall[1] + sum[1]];
+            overall.products += sum.products;
+            overall.units += sum.units;
             sum
         })
         .collect();
-    if overall[1] == 0.0 {
+    if overall.units == 0.0 {
         return evidence.iter().map(Evidence::beyond_noise).collect();
     }
-    let mean = quotient(overall);
-    around.into_iter().map(|[products, units]| quotient([products + DRAWN * mean, units + DRAWN])).collect()
+    let mean = overall.mean_square();
+    around
+        .into_iter()
+        .map(|sum| CommonSum { products: sum.products + DRAWN * mean, units: sum.units + DRAWN }.mean_square())
+        .collect()
 }
 
-/// The mean square that sums of products and of what they would be for a misalignment of 1 px come to; not negative.
-pub(super) fn quotient([products, units]: [f64; 2]) -> f64 {
-    if units > 0.0 { (products / units).max(0.0) } else { 0.0 }
+/// What neighbors say alike, summed.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct CommonSum {
+    /// Of the products of neighbors' distances.
+    pub products: f64,
+    /// Of what they would be for a misalignment of 1 px.
+    pub units: f64,
 }
 
-/// The share of its weight that evidence has where the misalignment has a mean square of `common` per axis, and would have
-/// its whole weight from `full_px` on.
+impl CommonSum {
+    /// The mean square that the sums come to; not negative.
+    pub(super) fn mean_square(self) -> f64 {
+        if self.units > 0.0 { (self.products / self.units).max(0.0) } else { 0.0 }
+    }
+}
+
+/// The share of its weight that evidence has where the misalignment has a mean square of `common` per axis, and would
+/// have its whole weight from `full_px` on.
 pub(super) fn share(common: f64, full_px: f64) -> f64 {
     (common / (full_px * full_px)).min(1.0)
 }

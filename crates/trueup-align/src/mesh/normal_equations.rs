@@ -1,42 +1,31 @@
-//! Normal equations of the mesh: assembled block by block, solved by sparse Cholesky.
+//! Normal equations of the mesh, assembled block by block.
 
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
 use super::complex::conjugate_product;
-use super::solver::MeshSolver;
 
 /// Largest distance, in grid steps along an axis, of two vertices that one energy row couples.
 const REACH: usize = 3;
+/// Vertices within that distance along an axis.
 const SPAN: usize = 2 * REACH + 1;
 /// Couplings of a vertex with itself and with vertices before it in row-major order.
 const SLOTS: usize = (REACH + 1) * SPAN;
 
 /// Coefficient of a vertex in a residual, as the complex factor c + i s acting on x + i y: the rotation-scaling
 /// [[c, -s], [s, c]]. All energies of the grid are linear in this sense.
-pub type Coefficient = Vector2<f64>;
+pub(super) type Coefficient = Vector2<f64>;
 
 /// A 2 x 2 block [[a, b], [c, d]] of the normal matrix, row-major.
 type Block = [f64; 4];
-
-/// What [`NormalEquations::solve`] finds.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MeshSolution {
-    /// x and y of every vertex in turn.
-    pub coordinates: Vec<f64>,
-    /// The length of a full turn, where equations ask for it.
-    pub period: Option<f64>,
-    /// |A^T A x - A^T b| / |A^T b|.
-    pub relative_gradient: f64,
-}
 
 /// A^T A and A^T b of a least-squares problem in the vertices of several grids.
 ///
 /// Unknown 2 v is the x and 2 v + 1 the y coordinate of vertex v, vertices numbered through all grids, row-major in
 /// each. Couplings of near vertices of a grid live in tables; those farther apart, or between grids, in a list.
 #[derive(Debug, Clone)]
-pub struct NormalEquations {
+pub(super) struct NormalEquations {
     /// First vertex of every grid, and the total at the end.
     first: Vec<usize>,
     columns: Vec<usize>,
@@ -45,8 +34,8 @@ pub struct NormalEquations {
     between: Vec<(u32, u32, Block)>,
     /// Whether `between` holds couplings inside a grid, so that its order is not that of the columns.
     far_inside: bool,
-    pub(super) right: Vec<f64>,
-    pub(super) border: Option<Border>,
+    pub right: Vec<f64>,
+    pub border: Option<Border>,
 }
 
 /// The last row and column of the normal equations: those of one more unknown, the length of a full turn, that couples
@@ -63,7 +52,7 @@ pub(super) struct Border {
 
 /// A symmetric 2 x 2 matrix [[xx, xy], [xy, yy]] that weighs a residual of the plane.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Metric {
+pub(super) struct Metric {
     /// Weight of the square of x.
     pub xx: f64,
     /// Weight of the product of x and y.
@@ -74,12 +63,12 @@ pub struct Metric {
 
 impl Metric {
     /// All directions alike.
-    pub fn isotropic(weight: f64) -> Self {
+    pub(super) fn isotropic(weight: f64) -> Self {
         Self { xx: weight, xy: 0.0, yy: weight }
     }
 
     /// Only what goes along `direction`: weight (direction . residual)^2.
-    pub fn along(direction: Vector2<f64>, weight: f64) -> Self {
+    pub(super) fn along(direction: Vector2<f64>, weight: f64) -> Self {
         Self {
             xx: weight * direction.x * direction.x,
             xy: weight * direction.x * direction.y,
@@ -88,7 +77,7 @@ impl Metric {
     }
 
     /// The matrix times a vector.
-    pub fn apply(&self, value: Vector2<f64>) -> Vector2<f64> {
+    pub(super) fn apply(&self, value: Vector2<f64>) -> Vector2<f64> {
         Vector2::new(self.xx * value.x + self.xy * value.y, self.xy * value.x + self.yy * value.y)
     }
 
@@ -97,20 +86,29 @@ impl Metric {
     }
 }
 
-/// A vertex by its grid and its index there, with its share in a sum.
+/// A vertex by its grid and its index there, with its weight in a sum.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Share {
+pub(super) struct WeightedVertex {
     /// The grid.
-    pub picture: usize,
+    pub photograph: usize,
     /// The vertex.
     pub vertex: usize,
     /// The factor.
-    pub share: f64,
+    pub weight: f64,
+}
+
+/// A sum over vertices of one grid.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct GridSum<'a> {
+    /// The grid.
+    pub photograph: usize,
+    /// Vertices with their weights; each occurs once.
+    pub members: &'a [(usize, f64)],
 }
 
 impl NormalEquations {
     /// Empty equations for the vertices of `grids`.
-    pub fn new(grids: &[GridMesh]) -> Self {
+    pub(super) fn new(grids: &[GridMesh]) -> Self {
         let mut first = vec![0];
         for grid in grids {
             first.push(first[first.len() - 1] + grid.len());
@@ -128,13 +126,13 @@ impl NormalEquations {
     }
 
     /// Number of scalar unknowns, without the length of a full turn.
-    pub fn unknowns(&self) -> usize {
+    pub(super) fn unknowns(&self) -> usize {
         self.right.len()
     }
 
-    /// Adds |sum_m coefficient_m v_m - value|^2 for vertices `members` of grid `picture`, each of which occurs once.
-    pub fn add_inside(&mut self, picture: usize, members: &[(usize, Coefficient)], value: Vector2<f64>) {
-        let first = self.first[picture];
+    /// Adds |sum_m coefficient_m v_m - value|^2 for vertices `members` of grid `photograph`, each of which occurs once.
+    pub(super) fn add_inside(&mut self, photograph: usize, members: &[(usize, Coefficient)], value: Vector2<f64>) {
+        let first = self.first[photograph];
         for &(m, factor_m) in members {
             let gradient = conjugate_product(factor_m, value);
             self.right[2 * (first + m)] += gradient.x;
@@ -142,38 +140,32 @@ impl NormalEquations {
             for &(n, factor_n) in members {
                 if n <= m {
                     let product = conjugate_product(factor_m, factor_n);
-                    self.add_block_inside(picture, m, n, [product.x, -product.y, product.y, product.x]);
+                    self.add_block_inside(photograph, m, n, [product.x, -product.y, product.y, product.x]);
                 }
             }
         }
     }
 
-    /// Adds squared_weight |sum_m weight_m v_m - value|^2 for vertices of two different grids with real weights; the first `(picture, vertex)`
-    /// list and the second must belong to one grid each.
-    pub fn add_between(
-        &mut self,
-        first: (usize, &[(usize, f64)]),
-        second: (usize, &[(usize, f64)]),
-        value: Vector2<f64>,
-        squared_weight: f64,
-    ) {
-        for (picture, members) in [first, second] {
+    /// Adds squared_weight |sum_m weight_m v_m - value|^2, the sum over both of `sums`, which are of different grids.
+    pub(super) fn add_between(&mut self, sums: &[GridSum; 2], value: Vector2<f64>, squared_weight: f64) {
+        for &GridSum { photograph, members } in sums {
             for &(m, weight_m) in members {
-                let unknown = 2 * (self.first[picture] + m);
+                let unknown = 2 * (self.first[photograph] + m);
                 self.right[unknown] += squared_weight * weight_m * value.x;
                 self.right[unknown + 1] += squared_weight * weight_m * value.y;
                 for &(n, weight_n) in members {
                     if n <= m {
                         let product = squared_weight * weight_m * weight_n;
-                        self.add_block_inside(picture, m, n, [product, 0.0, 0.0, product]);
+                        self.add_block_inside(photograph, m, n, [product, 0.0, 0.0, product]);
                     }
                 }
             }
         }
-        for &(m, weight_m) in first.1 {
-            for &(n, weight_n) in second.1 {
+        let [first, second] = sums;
+        for &(m, weight_m) in first.members {
+            for &(n, weight_n) in second.members {
                 let product = squared_weight * weight_m * weight_n;
-                let (one, other) = (self.first[first.0] + m, self.first[second.0] + n);
+                let (one, other) = (self.first[first.photograph] + m, self.first[second.photograph] + n);
                 let block = [product, 0.0, 0.0, product];
                 self.between.push((one.max(other) as u32, one.min(other) as u32, block));
             }
@@ -182,43 +174,44 @@ impl NormalEquations {
 
     /// Makes the length of a full turn, P, an unknown and adds what it contributes to
     /// squared_weight |sum_m weight_m v_m - (turns P, 0) - value|^2 beyond the same without P (see
-    /// [`Self::add_between`]): each of `parts` is a picture with its vertices and their weights.
-    pub fn add_period(&mut self, parts: [(usize, &[(usize, f64)]); 2], turns: f64, value: f64, squared_weight: f64) {
+    /// [`Self::add_between`]).
+    pub(super) fn add_period(&mut self, sums: &[GridSum; 2], turns: f64, value: f64, squared_weight: f64) {
         let unknowns = self.unknowns();
         let border = self.border.get_or_insert_with(|| Border { couplings: vec![0.0; unknowns], own: 0.0, right: 0.0 });
-        for (picture, members) in parts {
+        for &GridSum { photograph, members } in sums {
             for &(m, weight) in members {
-                border.couplings[2 * (self.first[picture] + m)] -= squared_weight * turns * weight;
+                border.couplings[2 * (self.first[photograph] + m)] -= squared_weight * turns * weight;
             }
         }
         border.own += squared_weight * turns * turns;
         border.right -= squared_weight * turns * value;
     }
 
-    /// Adds weight |v - source place|^2 for the first vertex of grid `picture`, whose source is (0, 0).
-    pub fn anchor(&mut self, picture: usize, weight: f64) {
-        self.add_block_inside(picture, 0, 0, [weight, 0.0, 0.0, weight]);
+    /// Adds weight |v - source place|^2 for the first vertex of grid `photograph`, whose source is (0, 0).
+    pub(super) fn anchor(&mut self, photograph: usize, weight: f64) {
+        self.add_block_inside(photograph, 0, 0, [weight, 0.0, 0.0, weight]);
     }
 
-    /// Adds |sum_m share_m v_m - value|^2, weighed by `metric`, for any vertices; a vertex may occur more than once.
-    pub fn add_sum(&mut self, members: &[Share], metric: Metric, value: Vector2<f64>) {
+    /// Adds |sum_m weight_m v_m - value|^2, weighed by `metric`, for any vertices; a vertex may occur more than once.
+    pub(super) fn add_sum(&mut self, members: &[WeightedVertex], metric: Metric, value: Vector2<f64>) {
         let pull = metric.apply(value);
         for (position, one) in members.iter().enumerate() {
-            self.add_right(one.picture, one.vertex, pull * one.share);
+            self.add_right(one.photograph, one.vertex, pull * one.weight);
             for (earlier, other) in members[..=position].iter().enumerate() {
-                self.add_coupling(one, other, earlier == position, metric.block(one.share * other.share));
+                self.add_coupling(one, other, earlier == position, metric.block(one.weight * other.weight));
             }
         }
     }
 
-    /// Adds the normal equations of several residuals over the same `members` at once: `metrics` holds the lower triangle,
-    /// row by row, of the members' couplings, `right` the right side of each. The members' shares do not count.
+    /// Adds the normal equations of several residuals over the same `members` at once: `metrics` holds the lower
+    /// triangle, row by row, of the members' couplings, `right` the right side of each. The members' weights do not
+    /// count.
     ///
     /// Slices that are too short leave the rest out.
-    pub fn add_summed(&mut self, members: &[Share], metrics: &[Metric], right: &[Vector2<f64>]) {
+    pub(super) fn add_summed(&mut self, members: &[WeightedVertex], metrics: &[Metric], right: &[Vector2<f64>]) {
         let mut metrics = metrics.iter();
         for (position, (one, &pull)) in members.iter().zip(right).enumerate() {
-            self.add_right(one.picture, one.vertex, pull);
+            self.add_right(one.photograph, one.vertex, pull);
             for (earlier, other) in members[..=position].iter().enumerate() {
                 let Some(metric) = metrics.next() else { return };
                 self.add_coupling(one, other, earlier == position, metric.block(1.0));
@@ -226,37 +219,32 @@ impl NormalEquations {
         }
     }
 
-    fn add_right(&mut self, picture: usize, vertex: usize, pull: Vector2<f64>) {
-        let unknown = 2 * (self.first[picture] + vertex);
+    fn add_right(&mut self, photograph: usize, vertex: usize, pull: Vector2<f64>) {
+        let unknown = 2 * (self.first[photograph] + vertex);
         self.right[unknown] += pull.x;
         self.right[unknown + 1] += pull.y;
     }
 
-    /// Adds a symmetric block for an unordered pair of members. Two different members that are the same vertex couple in
-    /// both orders.
-    fn add_coupling(&mut self, one: &Share, other: &Share, same_member: bool, block: Block) {
-        if one.picture != other.picture {
-            let (m, n) = (self.first[one.picture] + one.vertex, self.first[other.picture] + other.vertex);
+    /// Adds a symmetric block for an unordered pair of members. Two different members that are the same vertex couple
+    /// in both orders.
+    fn add_coupling(&mut self, one: &WeightedVertex, other: &WeightedVertex, same_member: bool, block: Block) {
+        if one.photograph != other.photograph {
+            let (m, n) = (self.first[one.photograph] + one.vertex, self.first[other.photograph] + other.vertex);
             self.between.push((m.max(n) as u32, m.min(n) as u32, block));
             return;
         }
         let (low, high) = (one.vertex.min(other.vertex), one.vertex.max(other.vertex));
         let times = if low == high && !same_member { 2.0 } else { 1.0 };
-        self.add_block_inside(one.picture, high, low, block.map(|entry| times * entry));
-    }
-
-    /// The least-squares solution; `None` if the matrix is not positive definite.
-    pub fn solve(&self) -> Option<MeshSolution> {
-        MeshSolver::default().solve(self)
+        self.add_block_inside(one.photograph, high, low, block.map(|entry| times * entry));
     }
 
     /// The grids with the solution as their targets.
-    pub fn meshes(&self, grids: &[GridMesh], solution: &[f64]) -> Vec<GridMesh> {
+    pub(super) fn meshes(&self, grids: &[GridMesh], solution: &[f64]) -> Vec<GridMesh> {
         grids
             .iter()
             .enumerate()
-            .map(|(picture, grid)| {
-                let first = self.first[picture];
+            .map(|(photograph, grid)| {
+                let first = self.first[photograph];
                 let target = (first..first + grid.len()).map(|v| [solution[2 * v], solution[2 * v + 1]]).collect();
                 GridMesh { target, ..grid.clone() }
             })
@@ -264,30 +252,30 @@ impl NormalEquations {
     }
 
     /// Adds a block for vertices m >= n of a grid: to the table if they are near each other, else to the list.
-    fn add_block_inside(&mut self, picture: usize, m: usize, n: usize, block: Block) {
-        let columns = self.columns[picture];
+    fn add_block_inside(&mut self, photograph: usize, m: usize, n: usize, block: Block) {
+        let columns = self.columns[photograph];
         let (m_row, m_column) = (m / columns, m % columns);
         let (n_row, n_column) = (n / columns, n % columns);
         if m_row - n_row > REACH || m_column.abs_diff(n_column) > REACH {
-            let first = self.first[picture];
+            let first = self.first[photograph];
             self.between.push(((first + m) as u32, (first + n) as u32, block));
             self.far_inside = true;
             return;
         }
         let slot = (m_row - n_row) * SPAN + (m_column + REACH - n_column);
-        let entry = &mut self.inside[self.first[picture] + m][slot];
+        let entry = &mut self.inside[self.first[photograph] + m][slot];
         for (sum, value) in entry.iter_mut().zip(block) {
             *sum += value;
         }
     }
 
-    /// All blocks (row vertex >= column vertex), sorted by column, then row; couplings between grids merged in the order
-    /// in which they were added.
+    /// All blocks (row vertex >= column vertex), sorted by column, then row; couplings between grids merged in the
+    /// order in which they were added.
     fn blocks(&self) -> Vec<(u32, u32, Block)> {
         let mut blocks = Vec::with_capacity(self.inside.len() * SLOTS / 2 + self.between.len());
-        for (picture, &columns) in self.columns.iter().enumerate() {
-            let first = self.first[picture];
-            for vertex in first..self.first[picture + 1] {
+        for (photograph, &columns) in self.columns.iter().enumerate() {
+            let first = self.first[photograph];
+            for vertex in first..self.first[photograph + 1] {
                 for (slot, block) in self.inside[vertex].iter().enumerate() {
                     if *block != [0.0; 4] {
                         let back = (slot / SPAN) * columns + slot % SPAN;

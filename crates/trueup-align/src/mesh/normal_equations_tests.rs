@@ -5,26 +5,22 @@ use proptest::prelude::*;
 use super::*;
 
 /// Sums over near and far vertices of one grid and another, one vertex twice.
-fn sums() -> Vec<(Vec<Share>, Metric, Vector2<f64>)> {
-    let share = |picture, vertex, share| Share { picture, vertex, share };
+fn sums() -> Vec<(Vec<WeightedVertex>, Metric, Vector2<f64>)> {
+    let of = |photograph, vertex, weight| WeightedVertex { photograph, vertex, weight };
     let along = Metric::along(Vector2::new(0.6, 0.8), 3.0);
     vec![
-        (vec![share(0, 0, 1.0), share(0, 1, -0.5), share(0, 41, -0.5)], Metric::isotropic(2.0), Vector2::new(1.0, 2.0)),
-        (
-            vec![share(0, 5, 0.7), share(1, 3, -0.4), share(1, 40, 0.3), share(0, 5, 0.2)],
-            along,
-            Vector2::new(-3.0, 1.0),
-        ),
-        (vec![share(1, 9, 1.0)], Metric { xx: 2.0, xy: 0.5, yy: 1.0 }, Vector2::new(0.0, 4.0)),
+        (vec![of(0, 0, 1.0), of(0, 1, -0.5), of(0, 41, -0.5)], Metric::isotropic(2.0), Vector2::new(1.0, 2.0)),
+        (vec![of(0, 5, 0.7), of(1, 3, -0.4), of(1, 40, 0.3), of(0, 5, 0.2)], along, Vector2::new(-3.0, 1.0)),
+        (vec![of(1, 9, 1.0)], Metric { xx: 2.0, xy: 0.5, yy: 1.0 }, Vector2::new(0.0, 4.0)),
     ]
 }
 
 fn energy(at: &[f64]) -> f64 {
     let vertices = at.len() / 4;
-    let sum_of = |members: &[Share]| {
+    let sum_of = |members: &[WeightedVertex]| {
         members.iter().fold(Vector2::zeros(), |sum, one| {
-            let vertex = one.picture * vertices + one.vertex;
-            sum + Vector2::new(at[2 * vertex], at[2 * vertex + 1]) * one.share
+            let vertex = one.photograph * vertices + one.vertex;
+            sum + Vector2::new(at[2 * vertex], at[2 * vertex + 1]) * one.weight
         })
     };
     sums()
@@ -46,9 +42,9 @@ proptest! {
             equations.add_sum(&members, metric, value);
         }
         // Every vertex needs a block of its own.
-        for picture in 0..2 {
+        for photograph in 0..2 {
             for vertex in 0..grids[0].len() {
-                equations.add_inside(picture, &[(vertex, Vector2::zeros())], Vector2::zeros());
+                equations.add_inside(photograph, &[(vertex, Vector2::zeros())], Vector2::zeros());
             }
         }
         let unknowns = equations.unknowns();

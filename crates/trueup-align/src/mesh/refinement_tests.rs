@@ -12,10 +12,10 @@ use crate::match_points::OverlapWarp;
 
 const WIDTH: usize = 320;
 const HEIGHT: usize = 240;
-/// The second picture starts this far to the right of the first.
+/// The second photograph starts this far to the right of the first.
 const SHIFT: f64 = 100.0;
 
-/// Where the second picture shows what the first has at a pixel: shifted, and pushed aside smoothly by up to 3 px.
+/// Where the second photograph shows what the first has at a pixel: shifted, and pushed aside smoothly by up to 3 px.
 fn second_from_first(point: Vector2<f64>) -> Vector2<f64> {
     let bump = (-((point - Vector2::new(210.0, 120.0)).norm() / 60.0).powi(2)).exp();
     point - Vector2::new(SHIFT, 0.0) + Vector2::new(3.0, -2.0) * bump
@@ -27,8 +27,8 @@ fn scene(point: Vector2<f64>) -> f64 {
     waves.iter().map(|&(x, y, phase)| 22.0 * (x * point.x + y * point.y + phase).sin()).sum::<f64>() + 125.0
 }
 
-/// The first picture, and the second by solving its map at every pixel, darker and with less contrast.
-fn pictures() -> [Raster<u8>; 2] {
+/// The first photograph, and the second by solving its map at every pixel, darker and with less contrast.
+fn photographs() -> [Raster<u8>; 2] {
     let mut pair = [Raster::new(WIDTH, HEIGHT, 1), Raster::new(WIDTH, HEIGHT, 1)];
     for y in 0..HEIGHT {
         for x in 0..WIDTH {
@@ -60,17 +60,17 @@ fn shifted() -> (Vec<GridMesh>, Vec<OverlapWarp>) {
     (grids, warps)
 }
 
-fn bases() -> [Base; 2] {
-    [Base::similarity(1.0, 0.0), Base::similarity(1.0, 0.0)]
+fn bases() -> [BaseMap; 2] {
+    [BaseMap::similarity(1.0, 0.0), BaseMap::similarity(1.0, 0.0)]
 }
 
 fn refined(refinements: &Refinements) -> WarpedMesh {
     let (grids, warps) = shifted();
-    run_refined(&grids, &warps, &bases(), 0, &MeshOptions::default(), refinements, &StageContext::default())
-        .expect("solvable")
+    let input = MeshInput { grids: &grids, warps: &warps, bases: &bases(), reference: 0, refinements: *refinements };
+    run(&input, &MeshOptions::default(), &StageContext::default()).expect("solvable")
 }
 
-/// Root mean square distance in the panorama of what both pictures truly show, away from the overlap's border.
+/// Root mean square distance in the panorama of what both photographs truly show, away from the overlap's border.
 fn true_distance(meshes: &[GridMesh]) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for k in 0..400 {
@@ -82,15 +82,15 @@ fn true_distance(meshes: &[GridMesh]) -> f64 {
     (sum / count).sqrt()
 }
 
-fn pyramids() -> Vec<Pyramid> {
-    pictures().iter().map(|gray| Pyramid::new(gray, 3)).collect()
+fn pyramids() -> Vec<GrayPyramid> {
+    photographs().iter().map(|gray| GrayPyramid::new(gray)).collect()
 }
 
 #[test]
 fn pixels_bring_a_pair_together_in_spite_of_gain_and_bias() {
     let pyramids = pyramids();
     // The match points hold on to the wrong place: pixels must outweigh them.
-    let options = PhotometricOptions { weight: 0.1, ..PhotometricOptions::default() };
+    let options = PhotometricOptions { weight: 0.1 };
     let photometric = Some(PhotometricInput { pyramids: &pyramids, options: &options });
     let before = true_distance(&refined(&Refinements::default()).meshes);
     let warped = refined(&Refinements { photometric, outline_weight: 1.0, ..Refinements::default() });
@@ -118,8 +118,7 @@ fn pixels_align_alike_on_any_number_of_threads() {
 
 #[test]
 fn without_refinements_the_plain_mesh_is_left_as_it_is() {
-    let (grids, warps) = shifted();
-    let plain = run(&grids, &warps, &bases(), 0, &MeshOptions::default(), &StageContext::default()).expect("solvable");
+    let plain = refined(&Refinements::default());
     assert_eq!(refined(&Refinements { outline_weight: 7.0, ..Refinements::default() }), plain);
 }
 
@@ -130,7 +129,7 @@ fn segment(start: [f64; 2], end: [f64; 2]) -> LineSegment {
 /// An edge that runs 3 px beside its match, which the match points do not know of.
 #[test]
 fn matched_lines_are_drawn_onto_each_other() {
-    let options = LineAlignmentOptions { robust_px: 10.0, ..LineAlignmentOptions::default() };
+    let options = LineAlignmentOptions::default();
     let (in_a, in_b) = (segment([200.0, 30.0], [200.0, 210.0]), segment([103.0, 30.0], [103.0, 210.0]));
     let matched = [PairLines { a: 0, b: 1, lines: vec![[in_a, in_b]] }];
     let input = LineAlignmentInput { matched: &matched, points: &[], options: &options };
@@ -157,13 +156,14 @@ fn a_bent_line_is_pulled_straight() {
     }
     let lines = vec![vec![segment([200.0, 10.0], [200.0, 230.0])], Vec::new()];
     let bend = |refinements: &Refinements| {
-        let warped =
-            run_refined(&grids, &warps, &bases(), 0, &MeshOptions::default(), refinements, &StageContext::default());
+        let bases = bases();
+        let input = MeshInput { grids: &grids, warps: &warps, bases: &bases, reference: 0, refinements: *refinements };
+        let warped = run(&input, &MeshOptions::default(), &StageContext::default());
         let mesh = &warped.expect("solvable").meshes[0];
         crate::metrics::Straightness::of(&lines[0][0], mesh, 3.0).expect("a line").rms_px
     };
     let plain = bend(&Refinements::default());
-    let structure = StructureOptions { weight: 100.0, ..StructureOptions::default() };
+    let structure = StructureOptions { weight: 100.0 };
     let structure = Some(StructureInput { chains: &lines, options: &structure });
     let strict = LineAlignmentOptions { straightness: 100.0, ..LineAlignmentOptions::default() };
     let straight = Some(StraightInput { lines: &lines, options: &strict });
@@ -177,23 +177,23 @@ fn a_bent_line_is_pulled_straight() {
 }
 
 #[test]
-fn lists_must_have_an_entry_per_picture() {
+fn lists_must_have_an_entry_per_photograph() {
     let (grids, warps) = shifted();
     let (pyramids, options) = (pyramids(), PhotometricOptions::default());
     let photometric = Some(PhotometricInput { pyramids: &pyramids[..1], options: &options });
     let refinements = Refinements { photometric, ..Refinements::default() };
-    let context = StageContext::default();
-    let error = run_refined(&grids, &warps, &bases(), 0, &MeshOptions::default(), &refinements, &context);
-    assert!(error.expect_err("too few").to_string().contains("1 are given for 2 pictures"));
+    let input = MeshInput { grids: &grids, warps: &warps, bases: &bases(), reference: 0, refinements };
+    let error = run(&input, &MeshOptions::default(), &StageContext::default());
+    assert!(error.expect_err("too few").to_string().contains("1 are given for 2 photographs"));
 }
 
-/// The gradient of the matched-line term against differences of its energy, written down anew: a line of the first picture
-/// and one of the second, which is turned and shifted, normals and feet kept as they are.
+/// The gradient of the matched-line term against differences of its energy, written down anew: a line of the first
+/// photograph and one of the second, which is turned and shifted, normals and feet kept as they are.
 #[test]
 fn the_matched_lines_equations_are_the_gradient_of_their_energy() {
     const ANGLE: f64 = 0.1;
     const STEP: f64 = 1e-3;
-    let options = LineAlignmentOptions { weight: 7.0, spacing_px: 60.0, ..LineAlignmentOptions::default() };
+    let options = LineAlignmentOptions { weight: 7.0, ..LineAlignmentOptions::default() };
     let (in_a, in_b) = (segment([200.0, 40.0], [196.0, 170.0]), segment([103.0, 10.0], [103.0, 230.0]));
     let along = Vector2::new(-ANGLE.sin(), ANGLE.cos());
     let (normal, shift) = (Vector2::new(along.y, -along.x), Vector2::new(99.0, -8.0));
@@ -202,9 +202,9 @@ fn the_matched_lines_equations_are_the_gradient_of_their_energy() {
     let mut meshes = grids.clone();
     meshes[1].target = (0..grids[1].len()).map(|vertex| turned(grids[1].source(vertex)).into()).collect();
 
-    // 130 px in steps of at most 60 px, rounded down: samples at 0, 1/2 and 1.
-    let samples: Vec<[Vector2<f64>; 2]> = [0.0, 0.5, 1.0]
-        .iter()
+    // 130 px in steps of 20 px, rounded down: samples at 0, 1/6 ... 1.
+    let samples: Vec<[Vector2<f64>; 2]> = (0..=6)
+        .map(|k| f64::from(k) / 6.0)
         .map(|share| {
             let p = Vector2::new(200.0 - 4.0 * share, 40.0 + 130.0 * share);
             let start = turned(Vector2::new(103.0, 0.0));
@@ -222,15 +222,15 @@ fn the_matched_lines_equations_are_the_gradient_of_their_energy() {
     let matched = [PairLines { a: 0, b: 1, lines: vec![[in_a, in_b]] }];
     let input = LineAlignmentInput { matched: &matched, points: &[], options: &options };
     let places: Vec<Vec<Vector2<f64>>> = bases().iter().zip(&grids).map(|(base, grid)| base.places(grid)).collect();
-    let present = line_alignment::Present { solved: &meshes, fine: &meshes, places: &places };
-    let mut equations = NormalEquations::new(&grids);
+    let current = current_grids::CurrentGrids { solved: &meshes, fine: &meshes, places: &places };
+    let mut equations = normal_equations::NormalEquations::new(&grids);
     // Every vertex needs a block of its own; the energy below has the same part.
-    for picture in 0..2 {
+    for photograph in 0..2 {
         for vertex in 0..grids[0].len() {
-            equations.add_inside(picture, &[(vertex, Vector2::new(1.0, 0.0))], Vector2::zeros());
+            equations.add_inside(photograph, &[(vertex, Vector2::new(1.0, 0.0))], Vector2::zeros());
         }
     }
-    input.add(&mut equations, &present, &input.whole_shares(), 2.0);
+    input.add(&mut equations, &current, &input.whole_shares(), 2.0);
     let matrix = equations.matrix().expect("every vertex has a block");
     let x: Vec<f64> = meshes.iter().flat_map(|mesh| mesh.target.iter().flatten().copied()).collect();
     let mut gradient: Vec<f64> = equations.right.iter().zip(&x).map(|(right, x)| -2.0 * (right + x)).collect();
@@ -244,10 +244,10 @@ fn the_matched_lines_equations_are_the_gradient_of_their_energy() {
     }
     let mut largest: f64 = 0.0;
     for (unknown, gradient) in gradient.iter().enumerate() {
-        let (picture, vertex) = (unknown / (2 * grids[0].len()), unknown / 2 % grids[0].len());
+        let (photograph, vertex) = (unknown / (2 * grids[0].len()), unknown / 2 % grids[0].len());
         let moved = |by: f64| {
             let mut moved = meshes.clone();
-            moved[picture].target[vertex][unknown % 2] += by;
+            moved[photograph].target[vertex][unknown % 2] += by;
             energy(&moved)
         };
         let expected = (moved(STEP) - moved(-STEP)) / (2.0 * STEP);
@@ -257,9 +257,9 @@ fn the_matched_lines_equations_are_the_gradient_of_their_energy() {
     assert!(largest > 1.0, "the energy hardly depends on the vertices: {largest}");
 }
 
-/// Two pictures that already meet stay as they are, however noisy their pixels.
+/// Two photographs that already meet stay as they are, however noisy their pixels.
 #[test]
-fn noise_moves_nothing_where_pictures_already_meet() {
+fn noise_moves_nothing_where_photographs_already_meet() {
     let (grids, warps) = shifted();
     let noisy = |first_x: f64, salt: usize| {
         let mut gray = Raster::new(WIDTH, HEIGHT, 1);
@@ -274,21 +274,34 @@ fn noise_moves_nothing_where_pictures_already_meet() {
         }
         gray
     };
-    let pyramids: Vec<Pyramid> =
-        [noisy(0.0, 0), noisy(SHIFT, 77_777)].iter().map(|gray| Pyramid::new(gray, 3)).collect();
-    let moved = |full_px: f64| {
-        let options = PhotometricOptions { full_px, ..PhotometricOptions::default() };
-        let photometric = Some(PhotometricInput { pyramids: &pyramids, options: &options });
-        let refinements = Refinements { photometric, outline_weight: 1.0, ..Refinements::default() };
-        let context = StageContext::default();
-        let warped = run_refined(&grids, &warps, &bases(), 0, &MeshOptions::default(), &refinements, &context);
+    let pyramids: Vec<GrayPyramid> =
+        [noisy(0.0, 0), noisy(SHIFT, 77_777)].iter().map(|gray| GrayPyramid::new(gray)).collect();
+    let options = PhotometricOptions::default();
+    let photometric = PhotometricInput { pyramids: &pyramids, options: &options };
+    let apart = |meshes: &[GridMesh]| {
         let points = (0..100).map(|k| Vector2::new(120.0 + f64::from(k % 10) * 18.0, 20.0 + f64::from(k / 10) * 20.0));
-        let meshes = warped.expect("solvable").meshes;
         let square: f64 =
             points.map(|p| (meshes[0].warp(p) - meshes[1].warp(p - Vector2::new(SHIFT, 0.0))).norm_squared()).sum();
         (square / 100.0).sqrt()
     };
-    // With the smallest allowed value any misalignment counts fully, as without the test of what is common.
-    let (believed, tested) = (moved(0.001), moved(PhotometricOptions::default().full_px));
+    let tested =
+        refined(&Refinements { photometric: Some(photometric), outline_weight: 1.0, ..Refinements::default() });
+    let (tested, believed) = (apart(&tested.meshes), apart(&aligned_believing_all(&grids, &warps, &photometric)));
     assert!(tested < 0.1 && tested < 0.3 * believed, "{tested} px, {believed} px if all of it is believed");
+}
+
+/// The plain mesh, its outlines held with weight 1, aligned by pixels of which all that they say is believed.
+fn aligned_believing_all(grids: &[GridMesh], warps: &[OverlapWarp], input: &PhotometricInput) -> Vec<GridMesh> {
+    let bases = bases();
+    let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(grids).map(|(base, grid)| base.places(grid)).collect();
+    let alignment = AlignmentEnergy::new(grids, warps, &bases, &places);
+    let (options, context) = (MeshOptions::default(), StageContext::default());
+    let mesh_input = MeshInput { grids, warps, bases: &bases, reference: 0, refinements: Refinements::default() };
+    let problem = MeshProblem::new(&mesh_input, &places, &alignment, &options, &context);
+    let (mut solver, mut equations) = (solver::MeshSolver::default(), problem.equations());
+    let plain = problem.solve(&mut solver, &equations).expect("solvable");
+    problem.hold_outlines(&mut equations, &plain.meshes, 1.0);
+    let whole = rounds::PixelAlignment { input, shares: &[1.0], straight: None };
+    let aligned = problem.align_pixels(&mut solver, &equations, &whole, plain).expect("solvable");
+    problem.delivered(&aligned.meshes)
 }

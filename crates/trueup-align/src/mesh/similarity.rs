@@ -5,18 +5,22 @@ use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
 use super::complex::product;
+use super::normal_equations::{Coefficient, NormalEquations};
+use super::options::MeshOptions;
 
-use super::normal_equations::Coefficient;
-use super::{MeshOptions, NormalEquations, PUBLISHED_CELL_PX};
+/// The cell size that the published weights belong to.
+pub(super) const PUBLISHED_CELL_PX: f64 = 40.0;
+/// Growth of the prior's weight with the distance from the overlap, per diagonal of the photograph; as published.
+pub(super) const PRIOR_SLOPE: f64 = 20.0;
 
-/// E_l and E_g of one picture, both relative to a base grid: with a base that is a similarity of the picture they are the
-/// published energies.
+/// E_l and E_g of one photograph, both relative to a base grid: with a base that is a similarity of the photograph they
+/// are the published energies.
 ///
 /// For an edge from a to b the neighborhood is the 4-neighbors of a and of b without a. The similarity c + i s that
 /// maps the undeformed differences from a to the deformed ones best is linear in the vertices:
 /// sum_m conj(d_m) (v_m - v_a) / sum |d_m|^2 with complex numbers for points of the plane.
 #[derive(Debug)]
-pub struct SimilarityEnergy<'a> {
+pub(super) struct SimilarityEnergy<'a> {
     grid: &'a GridMesh,
     base: &'a [Vector2<f64>],
     local_weight: f64,
@@ -25,13 +29,20 @@ pub struct SimilarityEnergy<'a> {
 }
 
 impl<'a> SimilarityEnergy<'a> {
-    /// `base` holds a place for every vertex of `grid`, up to translation: the shape without cost. `overlap` tells for every cell whether match points lie in it: the prior's weight grows with the distance to the
-    /// nearest such cell.
+    /// `base` holds a place for every vertex of `grid`, up to translation: the shape without cost. `overlap` tells for
+    /// every cell whether match points lie in it: the prior's weight grows with the distance to the nearest such cell,
+    /// by `prior_slope` per diagonal (see [`PRIOR_SLOPE`]).
     ///
     /// # Departures
     /// The distance is the exact one to the nearest cell with match points; the published code propagates it from cell
     /// to cell, which can miss the nearest.
-    pub fn new(grid: &'a GridMesh, base: &'a [Vector2<f64>], overlap: &[bool], options: &MeshOptions) -> Self {
+    pub(super) fn new(
+        grid: &'a GridMesh,
+        base: &'a [Vector2<f64>],
+        overlap: &[bool],
+        options: &MeshOptions,
+        prior_slope: f64,
+    ) -> Self {
         let columns = grid.columns - 1;
         let center = |cell: usize| {
             Vector2::new(
@@ -47,25 +58,25 @@ impl<'a> SimilarityEnergy<'a> {
             .map(|cell| {
                 let here = center(cell);
                 let nearest = bearing.iter().map(|other| (other - here).norm()).min_by(f64::total_cmp);
-                unit * (options.prior_weight + options.prior_slope * nearest.unwrap_or(0.0) / diagonal)
+                unit * (options.prior_weight + prior_slope * nearest.unwrap_or(0.0) / diagonal)
             })
             .collect();
         Self { grid, base, local_weight: options.local_weight, cell_weights }
     }
 
-    /// Adds both energies for every edge of the grid of `picture`.
-    pub fn add(&self, picture: usize, equations: &mut NormalEquations) {
+    /// Adds both energies for every edge of the grid of `photograph`.
+    pub(super) fn add(&self, photograph: usize, equations: &mut NormalEquations) {
         let (rows, columns) = (self.grid.rows, self.grid.columns);
         for row in 0..rows {
             for column in 0..columns {
                 let a = row * columns + column;
                 if column + 1 < columns {
                     let weight = self.mean_weight(row.checked_sub(1), Some(row), Some(column), Some(column));
-                    self.add_edge(picture, a, a + 1, weight, equations);
+                    self.add_edge(photograph, a, a + 1, weight, equations);
                 }
                 if row + 1 < rows {
                     let weight = self.mean_weight(Some(row), Some(row), column.checked_sub(1), Some(column));
-                    self.add_edge(picture, a, a + columns, weight, equations);
+                    self.add_edge(photograph, a, a + columns, weight, equations);
                 }
             }
         }
@@ -93,7 +104,7 @@ impl<'a> SimilarityEnergy<'a> {
         }
     }
 
-    fn add_edge(&self, picture: usize, a: usize, b: usize, weight: f64, equations: &mut NormalEquations) {
+    fn add_edge(&self, photograph: usize, a: usize, b: usize, weight: f64, equations: &mut NormalEquations) {
         let neighborhood = self.neighborhood(a, b);
         let origin = self.grid.source(a);
         let difference = |m: usize| self.grid.source(m) - origin;
@@ -121,11 +132,11 @@ impl<'a> SimilarityEnergy<'a> {
                 (m, coefficient * self.local_weight)
             })
             .collect();
-        equations.add_inside(picture, &local, self.of_base(&local));
+        equations.add_inside(photograph, &local, self.of_base(&local));
         for (_, factor) in &mut similarity {
             *factor *= weight;
         }
-        equations.add_inside(picture, &similarity, self.of_base(&similarity));
+        equations.add_inside(photograph, &similarity, self.of_base(&similarity));
     }
 
     /// What a combination of vertices amounts to on the base.

@@ -4,28 +4,39 @@ use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 
-use super::normal_equations::{MeshSolution, NormalEquations};
+use super::normal_equations::NormalEquations;
 
-/// Solves normal equations of the same grids again and again: the symbolic factorization is made anew only when vertices
-/// couple that never coupled before.
+/// What [`MeshSolver::solve`] finds.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct MeshSolution {
+    /// x and y of every vertex in turn.
+    pub coordinates: Vec<f64>,
+    /// The length of a full turn, where equations ask for it.
+    pub period: Option<f64>,
+    /// |A^T A x - A^T b| / |A^T b|.
+    pub relative_gradient: f64,
+}
+
+/// Solves normal equations of the same grids again and again: the symbolic factorization is made anew only when
+/// vertices couple that never coupled before.
 #[derive(Debug, Default)]
-pub struct MeshSolver {
-    known: Option<Known>,
+pub(super) struct MeshSolver {
+    order: Option<EliminationOrder>,
 }
 
 /// All couplings met so far and the order in which they are eliminated.
 #[derive(Debug)]
-struct Known {
+struct EliminationOrder {
     pattern: SymbolicSparseColMat<usize>,
     symbolic: SymbolicLlt<usize>,
 }
 
 impl MeshSolver {
     /// The least-squares solution; `None` if the matrix is not positive definite.
-    pub fn solve(&mut self, equations: &NormalEquations) -> Option<MeshSolution> {
+    pub(super) fn solve(&mut self, equations: &NormalEquations) -> Option<MeshSolution> {
         let matrix = self.in_known_pattern(equations.matrix()?)?;
-        let known = self.known.as_ref()?;
-        let factor = Llt::try_new_with_symbolic(known.symbolic.clone(), matrix.as_ref(), faer::Side::Lower).ok()?;
+        let order = self.order.as_ref()?;
+        let factor = Llt::try_new_with_symbolic(order.symbolic.clone(), matrix.as_ref(), faer::Side::Lower).ok()?;
         let column = |values: &[f64]| faer::Mat::from_fn(values.len(), 1, |row, _| values[row]);
         let right = column(&equations.right);
         let Some(border) = &equations.border else {
@@ -71,15 +82,15 @@ impl MeshSolver {
 
     /// The matrix with explicit zeros where earlier ones had couplings; new couplings are remembered.
     fn in_known_pattern(&mut self, matrix: SparseColMat<usize, f64>) -> Option<SparseColMat<usize, f64>> {
-        let matrix = match &self.known {
+        let matrix = match &self.order {
             Some(known) if known.pattern.ncols() == matrix.ncols() => widened(&matrix, &known.pattern),
             _ => matrix,
         };
         let pattern = matrix.symbolic();
-        let is_known = self.known.as_ref().is_some_and(|known| known.pattern.row_idx() == pattern.row_idx());
+        let is_known = self.order.as_ref().is_some_and(|known| known.pattern.row_idx() == pattern.row_idx());
         if !is_known {
             let symbolic = SymbolicLlt::try_new(pattern, faer::Side::Lower).ok()?;
-            self.known = Some(Known { pattern: pattern.to_owned().ok()?, symbolic });
+            self.order = Some(EliminationOrder { pattern: pattern.to_owned().ok()?, symbolic });
         }
         Some(matrix)
     }

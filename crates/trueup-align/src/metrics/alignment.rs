@@ -1,4 +1,4 @@
-//! How well the pictures meet where the true cameras say that they show the same.
+//! How well the photographs meet where the true cameras say that they show the same.
 
 use nalgebra::Vector2;
 use trueup_core::camera::Camera;
@@ -7,28 +7,28 @@ use trueup_core::mesh::GridMesh;
 
 use super::outline::Outline;
 
-/// Points sampled across a picture.
+/// Points sampled across a photograph.
 const ACROSS: usize = 40;
-/// Points sampled down a picture.
+/// Points sampled down a photograph.
 const DOWN: usize = 30;
 /// Distance from the border of the first and last of them, pixels.
 const MARGIN_PX: f64 = 2.0;
-/// Distance from the border of the other picture beyond which a point counts as seen there: left and above, right and
-/// below, pixels.
+/// Distance from the border of the other photograph beyond which a point counts as seen there: left and above, right
+/// and below, pixels.
 const SEEN_PX: [f64; 2] = [1.0, 2.0];
 /// Overlaps with fewer sampled points are passed over.
 const MIN_POINTS: usize = 20;
 /// An open full turn is cut somewhere: points this share of the panorama's width apart lie at the cut and are no error.
 const CUT_SHARE: f64 = 0.25;
 
-/// Root mean square distance in the panorama between the two places of what two pictures both show, over all overlapping
-/// pairs, divided by the pictures' mean scale: in their own pixels. `None` if no two pictures overlap or the lists differ
-/// in length.
+/// Root mean square distance in the panorama between the two places of what two photographs both show, over all
+/// overlapping pairs, divided by the photographs' mean scale: in their own pixels. `None` if no two photographs overlap
+/// or the lists differ in length.
 ///
 /// On a full turn whose ends meet, distances are taken modulo its `period`.
 ///
-/// `cameras` are the true ones, of one common center, in the pixels of the grids' pictures. 40 x 30 points are carried
-/// from each picture to all later ones.
+/// `cameras` are the true ones, of one common center, in the pixels of the grids' photographs. 40 x 30 points are
+/// carried from each photograph to all later ones.
 pub fn true_alignment(meshes: &[GridMesh], cameras: &[Camera], period: Option<f64>) -> Option<f64> {
     if meshes.len() != cameras.len() {
         return None;
@@ -80,7 +80,7 @@ mod tests {
 
     use super::*;
 
-    /// Two cameras 20 degrees apart, each picture carried to the level cylinder of radius 1000 px: exact but for the
+    /// Two cameras 20 degrees apart, each photograph carried to the level cylinder of radius 1000 px: exact but for the
     /// bilinear interpolation in cells of 4 px.
     fn panned() -> (Vec<GridMesh>, Vec<Camera>) {
         let cameras =
@@ -97,14 +97,14 @@ mod tests {
     }
 
     #[test]
-    fn pictures_that_meet_have_no_error_and_a_shift_counts_in_their_own_pixels() {
+    fn photographs_that_meet_have_no_error_and_a_shift_counts_in_their_own_pixels() {
         let (mut meshes, cameras) = panned();
         let exact = true_alignment(&meshes, &cameras, None).expect("an overlap");
         assert!(exact < 0.01, "{exact}");
         for vertex in &mut meshes[1].target {
             vertex[1] += 3.0;
         }
-        // The cylinder doubles the pixel scale at the middle of a picture and less elsewhere.
+        // The cylinder doubles the pixel scale at the middle of a photograph and less elsewhere.
         let scale = (Outline::new(&meshes[0]).area() / (400.0 * 300.0)).sqrt();
         let shifted = true_alignment(&meshes, &cameras, None).expect("an overlap");
         assert!((shifted - 3.0 / scale).abs() < 0.01, "{shifted}");

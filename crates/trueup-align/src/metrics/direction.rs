@@ -1,15 +1,9 @@
-//! Global direction inconsistency (GDIC): how differently the pictures are turned from what their cameras say.
+//! Global direction inconsistency (GDIC): how differently the photographs are turned from what their cameras say.
 
 use geo::{ConvexHull, MultiPoint};
-use nalgebra::{Matrix3, Vector2, Vector3};
-use trueup_core::geometry::{roll_from_down, wrap_angle};
+use nalgebra::Vector2;
+use trueup_core::geometry::wrap_angle;
 use trueup_core::mesh::GridMesh;
-
-/// gamma_i: the angle in the picture between its downward axis and the world's vertical, radians; the clockwise turn that
-/// stands the picture upright. `camera_from_world` must belong to a level world (y down).
-pub fn vertical_angle(camera_from_world: &Matrix3<f64>) -> f64 {
-    roll_from_down(&(camera_from_world * Vector3::y()))
-}
 
 /// Clockwise rotation of the similarity that maps a grid best onto its target, radians.
 pub fn best_rotation(mesh: &GridMesh) -> f64 {
@@ -26,7 +20,7 @@ pub fn best_rotation(mesh: &GridMesh) -> f64 {
     cross.atan2(dot)
 }
 
-/// kappa_i: rotation of the smallest rectangle around a deformed picture, radians.
+/// kappa_i: rotation of the smallest rectangle around a deformed photograph, radians.
 ///
 /// # Departures
 /// A rectangle's rotation is defined up to quarter turns; the one nearest to [`best_rotation`] is meant.
@@ -54,12 +48,13 @@ pub fn rectangle_rotation(mesh: &GridMesh) -> f64 {
     smallest.1 + FRAC_PI_2 * ((expected - smallest.1) / FRAC_PI_2).round()
 }
 
-/// By how much each picture is turned differently from `reference` than its true angle says, radians in [-pi, pi):
-/// (rotation_i - rotation_r) - (gamma_i - gamma_r). `None` with fewer than two pictures or without the reference.
+/// By how much each photograph is turned differently from `reference` than its true angle says, radians in [-pi, pi):
+/// (rotation_i - rotation_r) - (gamma_i - gamma_r). `None` with fewer than two photographs or without the reference.
 ///
 /// With [`rectangle_rotation`]s these are the terms of the paper's GDIC, with [`best_rotation`]s those of its variant
 /// without the rectangle, and with the prior's own angles the error of the prior before the mesh. `gammas` are the true
-/// [`vertical_angle`]s.
+/// angles gamma_i in the photographs between their downward axes and the world's vertical, radians: the clockwise turns
+/// that stand them upright.
 pub fn relative_turns(rotations: &[f64], gammas: &[f64], reference: usize) -> Option<Vec<f64>> {
     if rotations.len() < 2 || rotations.len() != gammas.len() || reference >= rotations.len() {
         return None;
@@ -68,28 +63,21 @@ pub fn relative_turns(rotations: &[f64], gammas: &[f64], reference: usize) -> Op
     Some((0..rotations.len()).map(|k| wrap_angle(deviation(k) - deviation(reference))).collect())
 }
 
-/// Mean of |[`relative_turns`]| over the pictures but `reference`, radians; `None` where those are.
+/// The paper's GDIC, of [`rectangle_rotation`]s: mean of |[`relative_turns`]| over the photographs but `reference`,
+/// radians; `None` where those are.
 ///
 /// # Source
-/// VPG equation 14, with `rotations` from [`rectangle_rotation`].
+/// VPG equation 14.
 pub fn mean_relative_turn(rotations: &[f64], gammas: &[f64], reference: usize) -> Option<f64> {
     let turns = relative_turns(rotations, gammas, reference)?;
     let sum: f64 = turns.iter().map(|turn| turn.abs()).sum();
     Some(sum / (turns.len() - 1) as f64)
 }
 
-/// The paper's GDIC: [`mean_relative_turn`] of the [`rectangle_rotation`]s.
-pub fn global_direction_inconsistency(meshes: &[GridMesh], gammas: &[f64], reference: usize) -> Option<f64> {
-    let rotations: Vec<f64> = meshes.iter().map(rectangle_rotation).collect();
-    mean_relative_turn(&rotations, gammas, reference)
-}
-
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-    use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z};
-
     use super::*;
+    use proptest::prelude::*;
 
     fn turned(angle: f64) -> GridMesh {
         let mut mesh = GridMesh::regular(400.0, 300.0, 40.0);
@@ -101,34 +89,30 @@ mod tests {
         mesh
     }
 
-    /// Yaw 35, pitch -12, roll 17 degrees: the vertical stands at 17 degrees (numeric check 1 of the specification).
-    #[test]
-    fn the_vertical_angle_is_the_roll() {
-        let world_from_camera = rotation_about_y(35.0_f64.to_radians())
-            * rotation_about_x(-12.0_f64.to_radians())
-            * rotation_about_z(17.0_f64.to_radians());
-        assert!((vertical_angle(&world_from_camera.transpose()).to_degrees() - 17.0).abs() < 1e-9);
+    fn global_direction_inconsistency(meshes: &[GridMesh], gammas: &[f64], reference: usize) -> Option<f64> {
+        let rotations: Vec<f64> = meshes.iter().map(rectangle_rotation).collect();
+        mean_relative_turn(&rotations, gammas, reference)
     }
 
     #[test]
-    fn too_few_pictures_have_no_figure() {
+    fn too_few_photographs_have_no_figure() {
         assert!(global_direction_inconsistency(&[turned(0.1)], &[0.1], 0).is_none());
         assert!(global_direction_inconsistency(&[turned(0.1), turned(0.2)], &[0.1], 0).is_none());
     }
 
     #[test]
-    fn one_picture_off_by_two_degrees_shows() {
+    fn one_photograph_off_by_two_degrees_shows() {
         let off = 2.0_f64.to_radians();
         let meshes = [turned(0.1), turned(0.3 + off), turned(-0.2)];
-        let figure = global_direction_inconsistency(&meshes, &[0.1, 0.3, -0.2], 0).expect("three pictures");
+        let figure = global_direction_inconsistency(&meshes, &[0.1, 0.3, -0.2], 0).expect("three photographs");
         assert!((figure - off / 2.0).abs() < 1e-9);
     }
 
     proptest! {
-        /// A6: pictures turned by their true angles have no inconsistency.
+        /// A6: photographs turned by their true angles have no inconsistency.
         #[test]
         fn true_turns_have_none(a in -3.1..3.1_f64, b in -3.1..3.1_f64) {
-            let figure = global_direction_inconsistency(&[turned(a), turned(b)], &[a, b], 1).expect("two pictures");
+            let figure = global_direction_inconsistency(&[turned(a), turned(b)], &[a, b], 1).expect("two photographs");
             prop_assert!(figure < 1e-9);
         }
     }

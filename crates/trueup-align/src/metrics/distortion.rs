@@ -10,36 +10,36 @@ const SAMPLES: usize = 16;
 /// Change of area below which a cell counts as collapsed.
 const COLLAPSED: f64 = 1e-6;
 
-/// When a cell counts as lying outside a picture.
+/// When a cell counts as lying outside a photograph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outside {
     /// Its center does.
     Center,
-    /// Its center and its four corners do: fewer cells at the border of overlaps, where grids are stretched least. LD is
-    /// larger by 0 to 7 % on panoramas of one row.
+    /// Its center and its four corners do: fewer cells at the border of overlaps, where grids are stretched least. LD
+    /// is larger by 0 to 7 % on panoramas of one row.
     CenterAndCorners,
 }
 
 /// The local distortion of a panorama.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LocalDistortion {
-    /// Largest over the pictures; the paper's LD (printed times 100). 0 if no picture has a cell to judge.
+    /// Largest over the photographs; the paper's LD (printed times 100). 0 if no photograph has a cell to judge.
     pub worst: f64,
-    /// Mean over the pictures that have cells to judge.
+    /// Mean over the photographs that have cells to judge.
     pub mean: f64,
-    /// Mean coefficient of variation of every picture's cells outside all others; `None` without such cells.
-    pub pictures: Vec<Option<f64>>,
+    /// Mean coefficient of variation of every photograph's cells outside all others; `None` without such cells.
+    pub photographs: Vec<Option<f64>>,
     /// Cells outside all others that could not be judged: turned over, crossed or collapsed. Figures with different
     /// counts do not compare.
     pub folds: usize,
 }
 
-/// The local distortion of pictures deformed by `meshes`.
+/// The local distortion of photographs deformed by `meshes`.
 ///
-/// In every cell that lies outside all other pictures, the area's change under the homography through its four corners is
-/// sampled at evenly spaced points, one a pixel but at most 16 x 16; its standard deviation over its mean is the cell's
-/// distortion. Similarities and affine maps have none. The figure grows with the size of the cells: compare grids of equal
-/// cells only.
+/// In every cell that lies outside all other photographs, the area's change under the homography through its four
+/// corners is sampled at evenly spaced points, one a pixel but at most 16 x 16; its standard deviation over its mean is
+/// the cell's distortion. Similarities and affine maps have none. The figure grows with the size of the cells: compare
+/// grids of equal cells only.
 ///
 /// On a full turn whose ends meet, places that differ by its `period` are the same.
 ///
@@ -51,11 +51,11 @@ pub struct LocalDistortion {
 pub fn local_distortion(meshes: &[GridMesh], outside: Outside, period: Option<f64>) -> LocalDistortion {
     let outlines: Vec<Outline> = meshes.iter().map(Outline::new).collect();
     let mut folds = 0;
-    let mut pictures = Vec::with_capacity(meshes.len());
+    let mut photographs = Vec::with_capacity(meshes.len());
     for (k, mesh) in meshes.iter().enumerate() {
         let is_in = |other: usize, point: Vector2<f64>| match period {
             None => outlines[other].contains(point),
-            // Pictures begin in one turn and end in the next at the latest.
+            // Photographs begin in one turn and end in the next at the latest.
             Some(period) => {
                 [-1.0, 0.0, 1.0].iter().any(|turns| outlines[other].contains(point + Vector2::new(turns * period, 0.0)))
             }
@@ -79,13 +79,13 @@ pub fn local_distortion(meshes: &[GridMesh], outside: Outside, period: Option<f6
                 None => folds += 1,
             }
         }
-        pictures.push((count > 0).then(|| sum / count as f64));
+        photographs.push((count > 0).then(|| sum / count as f64));
     }
-    let judged: Vec<f64> = pictures.iter().flatten().copied().collect();
+    let judged: Vec<f64> = photographs.iter().flatten().copied().collect();
     LocalDistortion {
         worst: judged.iter().copied().fold(0.0, f64::max),
         mean: judged.iter().sum::<f64>() / judged.len().max(1) as f64,
-        pictures,
+        photographs,
         folds,
     }
 }
@@ -93,8 +93,8 @@ pub fn local_distortion(meshes: &[GridMesh], outside: Outside, period: Option<f6
 /// Standard deviation over mean of the area's change in a cell; `None` for a degenerate one.
 ///
 /// The homography from the cell divides by w = 1 + g u + h v, u and v from 0 to 1 along its sides, and changes areas in
-/// proportion to w^-3 (Heckbert, Fundamentals of Texture Mapping and Image Warping, 1989, section 2.2.3): g and h are all
-/// it takes.
+/// proportion to w^-3 (Heckbert, Fundamentals of Texture Mapping and Image Warping, 1989, section 2.2.3): g and h are
+/// all it takes.
 fn cell_distortion(mesh: &GridMesh, cell: [usize; 4]) -> Option<f64> {
     if !is_sound(mesh, cell) {
         return None;
@@ -140,8 +140,8 @@ mod tests {
         mesh
     }
 
-    /// One cell of 16 x 16 px under w = 1 - x / 100: det J = det H / w^3. Standard deviation over mean of (1 - x / 100)^-3
-    /// at x = 0.5, 1.5 ... 15.5, computed apart: 0.196748261 / 1.303776091.
+    /// One cell of 16 x 16 px under w = 1 - x / 100: det J = det H / w^3. Standard deviation over mean of (1 - x /
+    /// 100)^-3 at x = 0.5, 1.5 ... 15.5, computed apart: 0.196748261 / 1.303776091.
     #[test]
     fn a_known_perspective_has_its_known_distortion() {
         let mut mesh = GridMesh::regular(16.0, 16.0, 16.0);
@@ -156,16 +156,16 @@ mod tests {
     fn covered_cells_are_not_judged_and_turned_ones_are_counted() {
         let whole = mapped(|p| p);
         let hidden = mapped(|p| p * 0.5 + Vector2::new(50.0, 50.0));
-        assert_eq!(local_distortion(&[hidden, whole.clone()], Outside::Center, None).pictures[0], None);
+        assert_eq!(local_distortion(&[hidden, whole.clone()], Outside::Center, None).photographs[0], None);
         let mut folded = whole;
         folded.target[12] = [390.0, 290.0];
         assert!(local_distortion(&[folded], Outside::Center, None).folds > 0);
     }
 
-    /// Two pictures of 100 x 100 px overlap by 14 px: of ten columns of cells, the ninth has its center outside the other
-    /// picture and two corners inside.
+    /// Two photographs of 100 x 100 px overlap by 14 px: of ten columns of cells, the ninth has its center outside the
+    /// other photograph and two corners inside.
     #[test]
-    fn the_corners_rule_leaves_out_cells_that_the_other_picture_cuts() {
+    fn the_corners_rule_leaves_out_cells_that_the_other_photograph_cuts() {
         let bent = |p: Vector2<f64>| Vector2::new(p.x + 1e-3 * p.x * p.x, p.y + 1e-4 * p.x * p.x * p.y);
         let mut left = GridMesh::regular(100.0, 100.0, 10.0);
         left.target = (0..left.len()).map(|vertex| bent(left.source(vertex)).into()).collect();
@@ -174,8 +174,8 @@ mod tests {
             vertex[0] += bent(Vector2::new(86.0, 0.0)).x;
         }
         let meshes = [left, right];
-        let strict = local_distortion(&meshes, Outside::CenterAndCorners, None).pictures[0].expect("cells");
-        let loose = local_distortion(&meshes, Outside::Center, None).pictures[0].expect("cells");
+        let strict = local_distortion(&meshes, Outside::CenterAndCorners, None).photographs[0].expect("cells");
+        let loose = local_distortion(&meshes, Outside::Center, None).photographs[0].expect("cells");
         assert!(loose > strict, "the distortion grows to the right: {loose} {strict}");
     }
 

@@ -33,7 +33,7 @@ pub fn folded_cells(mesh: &GridMesh) -> usize {
     cells(mesh).filter(|&cell| !is_sound(mesh, cell)).count()
 }
 
-/// The deformed border of a picture, a closed polygon, ready to be asked for many points.
+/// The deformed border of a photograph, a closed polygon, ready to be asked for many points.
 #[derive(Debug)]
 pub(super) struct Outline {
     ring: Vec<Vector2<f64>>,
@@ -44,7 +44,7 @@ pub(super) struct Outline {
 }
 
 impl Outline {
-    pub fn new(mesh: &GridMesh) -> Self {
+    pub(super) fn new(mesh: &GridMesh) -> Self {
         let (rows, columns) = (mesh.rows, mesh.columns);
         let top = 0..columns;
         let right = (1..rows).map(|row| row * columns + columns - 1);
@@ -74,7 +74,7 @@ impl Outline {
     }
 
     /// Whether a point lies inside, by the even-odd rule.
-    pub fn contains(&self, point: Vector2<f64>) -> bool {
+    pub(super) fn contains(&self, point: Vector2<f64>) -> bool {
         let beyond = |axis: usize| !(self.low[axis]..=self.high[axis]).contains(&point[axis]);
         if beyond(0) || beyond(1) {
             return false;
@@ -88,7 +88,7 @@ impl Outline {
     }
 
     /// The area inside, by the shoelace formula, at least 0.
-    pub fn area(&self) -> f64 {
+    pub(super) fn area(&self) -> f64 {
         let twice: f64 = (0..self.ring.len()).map(|edge| self.edge(edge)).map(|(from, to)| from.perp(&to)).sum();
         0.5 * twice.abs()
     }
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_area_of_a_sheared_picture_is_its_own() {
+    fn the_area_of_a_sheared_photograph_is_its_own() {
         let mut mesh = GridMesh::regular(40.0, 30.0, 10.0);
         for vertex in &mut mesh.target {
             vertex[0] += 3.0 * vertex[1] - 500.0;

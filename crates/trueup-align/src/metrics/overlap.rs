@@ -1,28 +1,16 @@
-//! How alike two pictures look where both lie on the panorama.
+//! How alike two photographs look where both lie on the panorama.
 
 use trueup_core::raster::Raster;
 
+use super::overlap_pixels::{OverlapPixels, WHITE, eroded};
 use super::similarity_index;
 
-/// Highest gray value.
-pub(super) const WHITE: f64 = 255.0;
 /// Side of the windows whose correlation is taken, pixels.
 const WINDOW: usize = 3;
 /// Standard deviation of the gray values below which a window has no texture to correlate.
 const FLAT: f64 = 1.0;
 
-/// Two pictures on one grid of pixels.
-#[derive(Debug, Clone, Copy)]
-pub struct Overlap<'a> {
-    /// Gray values of the first, 0 to 255, one channel.
-    pub a: &'a Raster<f32>,
-    /// Gray values of the second, of the same size.
-    pub b: &'a Raster<f32>,
-    /// Whether a pixel is covered by both, of the same size.
-    pub covered: &'a Raster<bool>,
-}
-
-/// How alike two pictures look in their overlap.
+/// How alike two photographs look in their overlap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OverlapMeasures {
     /// |Omega|: pixels that both cover, without those at the overlap's border.
@@ -40,11 +28,12 @@ pub struct OverlapMeasures {
     pub ssim: Option<f64>,
 }
 
-impl Overlap<'_> {
+impl OverlapPixels<'_> {
     /// Measures the overlap. `None` if the sizes differ, if there is no overlap, or if there is no texture in it.
     ///
-    /// Windows that are flat in both pictures are passed over; one that is flat in one of them only counts as uncorrelated.
-    /// For PSNR and SSIM both pictures are first brought to the geometric mean of their mean gray values.
+    /// Windows that are flat in both photographs are passed over; one that is flat in one of them only counts as
+    /// uncorrelated. For PSNR and SSIM both photographs are first brought to the geometric mean of their mean gray
+    /// values.
     ///
     /// # Source
     /// Seam-guided and direct alignment papers for the NCC measure; Wang, Bovik, Sheikh, Simoncelli, Image Quality
@@ -66,7 +55,7 @@ impl Overlap<'_> {
         Some(OverlapMeasures { pixels, ncc_rmse: ncc_mse.sqrt(), ncc_mse, intensity_mse, psnr_db, ssim })
     }
 
-    /// Factors that bring both pictures to the geometric mean of their mean gray values; 1 if one is black.
+    /// Factors that bring both photographs to the geometric mean of their mean gray values; 1 if one is black.
     fn gains(&self, inside: &Raster<bool>) -> [f64; 2] {
         let sum = |gray: &Raster<f32>| -> f64 {
             gray.data().iter().zip(inside.data()).filter(|&(_, &inside)| inside).map(|(&gray, _)| f64::from(gray)).sum()
@@ -116,35 +105,6 @@ fn centered(window: &[f64; WINDOW * WINDOW]) -> Option<[f64; WINDOW * WINDOW]> {
     let mean = window.iter().sum::<f64>() / count;
     let norm = window.iter().map(|value| (value - mean).powi(2)).sum::<f64>().sqrt();
     (norm >= FLAT * count.sqrt()).then(|| window.map(|value| (value - mean) / norm))
-}
-
-/// The pixels whose square neighborhood up to `radius` pixels away is covered; none at the raster's border.
-pub(super) fn eroded(covered: &Raster<bool>, radius: usize) -> Raster<bool> {
-    let (width, height) = (covered.width(), covered.height());
-    let along_rows = all_within(width, height, radius, |x, y| covered.pixel(x, y)[0]);
-    let along_columns = all_within(height, width, radius, |y, x| along_rows[y * width + x]);
-    let mut eroded = Raster::new(width, height, 1);
-    for y in 0..height {
-        for (x, inside) in eroded.row_mut(y).iter_mut().enumerate() {
-            *inside = along_columns[x * height + y];
-        }
-    }
-    eroded
-}
-
-/// For each of `lines` lines of `length` values, whether all within `radius` of it along the line hold; line after line.
-fn all_within(length: usize, lines: usize, radius: usize, holds: impl Fn(usize, usize) -> bool) -> Vec<bool> {
-    let mut all = vec![false; length * lines];
-    for line in 0..lines {
-        let mut run = 0;
-        for end in 0..length {
-            run = if holds(end, line) { run + 1 } else { 0 };
-            if run > 2 * radius {
-                all[line * length + end - radius] = true;
-            }
-        }
-    }
-    all
 }
 
 /// The means of several overlaps' measures, weighted by their pixels; `None` without any.

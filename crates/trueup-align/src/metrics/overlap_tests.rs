@@ -27,7 +27,7 @@ fn a_known_pair_has_its_known_figures() {
     let a = gray(pattern);
     let b = gray(|x, y| 0.8 * pattern(x, y) + ((x * 13 + y * 29) % 97) as f32);
     let covered = covered(|x, _| x >= 2);
-    let found = Overlap { a: &a, b: &b, covered: &covered }.measure().expect("an overlap");
+    let found = OverlapPixels { a: &a, b: &b, covered: &covered }.measure().expect("an overlap");
     assert_eq!(found.pixels, 224);
     near(found.ncc_mse, 0.023957805);
     near(found.ncc_rmse, 0.023957805_f64.sqrt());
@@ -40,7 +40,7 @@ fn a_known_pair_has_its_known_figures() {
 #[test]
 fn brightness_counts_in_the_intensities_alone() {
     let (a, b) = (gray(pattern), gray(|x, y| 0.5 * pattern(x, y)));
-    let found = Overlap { a: &a, b: &b, covered: &covered(|_, _| true) }.measure().expect("an overlap");
+    let found = OverlapPixels { a: &a, b: &b, covered: &covered(|_, _| true) }.measure().expect("an overlap");
     assert!(found.ncc_mse < 1e-12);
     assert!(found.intensity_mse > 1000.0);
     assert!((found.ssim.expect("windows fit") - 1.0).abs() < 1e-9);
@@ -51,17 +51,17 @@ fn brightness_counts_in_the_intensities_alone() {
 fn flat_windows_are_passed_over_and_half_flat_ones_uncorrelated() {
     let (flat, busy) = (gray(|_, _| 90.0), gray(pattern));
     let all = covered(|_, _| true);
-    assert_eq!(Overlap { a: &flat, b: &flat, covered: &all }.measure(), None);
-    let half = Overlap { a: &flat, b: &busy, covered: &all }.measure().expect("texture in one");
+    assert_eq!(OverlapPixels { a: &flat, b: &flat, covered: &all }.measure(), None);
+    let half = OverlapPixels { a: &flat, b: &busy, covered: &all }.measure().expect("texture in one");
     near(half.ncc_mse, 1.0);
 }
 
 #[test]
 fn no_overlap_or_sizes_that_differ_have_no_figures() {
     let a = gray(pattern);
-    assert_eq!(Overlap { a: &a, b: &a, covered: &covered(|_, _| false) }.measure(), None);
+    assert_eq!(OverlapPixels { a: &a, b: &a, covered: &covered(|_, _| false) }.measure(), None);
     let small = Raster::new(3, 3, 1);
-    assert_eq!(Overlap { a: &a, b: &small, covered: &covered(|_, _| true) }.measure(), None);
+    assert_eq!(OverlapPixels { a: &a, b: &small, covered: &covered(|_, _| true) }.measure(), None);
 }
 
 #[test]

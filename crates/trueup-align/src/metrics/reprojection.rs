@@ -5,7 +5,7 @@ use trueup_core::geometry::wrap_length;
 use trueup_core::matches::PointMatch;
 use trueup_core::mesh::GridMesh;
 
-/// Distances of matched points in the panorama, in the pictures' own pixels.
+/// Distances of matched points in the panorama, in the photographs' own pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reprojection {
     /// Matches measured.
@@ -18,20 +18,20 @@ pub struct Reprojection {
     pub percentile_95_px: f64,
 }
 
-/// The matches of one pair of pictures, in the pixels that the grids lie over.
+/// The matches of one pair of photographs, in the pixels that the grids lie over.
 #[derive(Debug, Clone)]
 pub struct MatchedPair<'a> {
-    /// The first picture's grid.
+    /// The first photograph's grid.
     pub a: &'a GridMesh,
-    /// The second picture's grid.
+    /// The second photograph's grid.
     pub b: &'a GridMesh,
     /// The matches.
     pub matches: Vec<PointMatch>,
 }
 
-/// Measures how far apart matched points land, each distance divided by the local scale there, the root mean square of the
-/// two pictures' own. `None` without a match that lies in unfolded places of both. On a full turn whose ends meet, distances
-/// are taken modulo its `period`.
+/// Measures how far apart matched points land, each distance divided by the local scale there, the root mean square of
+/// the two photographs' own. `None` without a match that lies in unfolded places of both. On a full turn whose ends
+/// meet, distances are taken modulo its `period`.
 pub fn reprojection(pairs: &[MatchedPair], period: Option<f64>) -> Option<Reprojection> {
     let mut distances: Vec<f64> = pairs
         .iter()
@@ -62,7 +62,7 @@ pub fn reprojection(pairs: &[MatchedPair], period: Option<f64>) -> Option<Reproj
 /// The share of the distances below the percentile, by its nearest rank.
 const PERCENTILE: f64 = 0.95;
 
-/// How much the grid magnifies areas at a point of the picture; NaN where it is folded.
+/// How much the grid magnifies areas at a point of the photograph; NaN where it is folded.
 fn squared_scale(mesh: &GridMesh, point: Vector2<f64>) -> f64 {
     let area = mesh.derivative(point).determinant();
     if area > 0.0 { area } else { f64::NAN }
@@ -72,9 +72,9 @@ fn squared_scale(mesh: &GridMesh, point: Vector2<f64>) -> f64 {
 mod tests {
     use super::*;
 
-    /// Grids of twice the pictures' size, the second shifted by what the match is off.
+    /// Grids of twice the photographs' size, the second shifted by what the match is off.
     #[test]
-    fn distances_are_in_the_pictures_own_pixels() {
+    fn distances_are_in_the_photographs_own_pixels() {
         let mut a = GridMesh::regular(100.0, 100.0, 10.0);
         for vertex in &mut a.target {
             *vertex = [2.0 * vertex[0], 2.0 * vertex[1]];

@@ -1,8 +1,8 @@
-//! SSIM: structural similarity of two pictures.
+//! SSIM: structural similarity of two photographs.
 
 use trueup_core::raster::Raster;
 
-use super::overlap::{Overlap, WHITE, eroded};
+use super::overlap_pixels::{OverlapPixels, WHITE, eroded};
 
 /// Radius of the window: 11 x 11 pixels.
 const RADIUS: usize = 5;
@@ -14,7 +14,7 @@ const C2: f64 = (0.03 * WHITE) * (0.03 * WHITE);
 
 /// Mean structural similarity over the windows that lie wholly in the overlap, the gray values multiplied by `gains`;
 /// `None` without such a window.
-pub(super) fn mean(overlap: &Overlap, gains: [f64; 2]) -> Option<f64> {
+pub(super) fn mean(overlap: &OverlapPixels, gains: [f64; 2]) -> Option<f64> {
     let (width, height) = (overlap.covered.width(), overlap.covered.height());
     let inside = eroded(overlap.covered, RADIUS);
     if !inside.data().contains(&true) {

@@ -1,8 +1,18 @@
-//! Whether lines that are straight in a picture stay straight in the panorama.
+//! Whether lines that are straight in a photograph stay straight in the panorama.
 
 use nalgebra::{Matrix2, Vector2};
 use trueup_core::lines::LineSegment;
 use trueup_core::mesh::GridMesh;
+
+/// Shortest line whose straightness is judged, as a share of the photograph's diagonal: shorter ones hardly show a
+/// bend.
+pub const LONG_LINE_DIAGONAL: f64 = 0.1;
+/// Distance of the points of a line that are carried to the panorama, working pixels.
+pub const LINE_STEP_PX: f64 = 3.0;
+/// A line that strays from straight by more than this share of its length is bent: 3 px in 1000.
+const BENT_SHARE: f64 = 0.003;
+/// Most steps along a line.
+const MAX_STEPS: usize = 10_000;
 
 /// How straight a line is in the panorama. Panorama pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,10 +27,10 @@ pub struct Straightness {
 
 impl Straightness {
     /// Carries a segment to the panorama point by point, `step_px` apart at most and at least three, and measures their
-    /// distances from the straight line that fits them best (total least squares). `None` if that is no line: no length,
-    /// or not finite.
+    /// distances from the straight line that fits them best (total least squares). `None` if that is no line: no
+    /// length, or not finite.
     ///
-    /// `mesh` lies over the picture that the segment's pixels are of.
+    /// `mesh` lies over the photograph that the segment's pixels are of.
     pub fn of(line: &LineSegment, mesh: &GridMesh, step_px: f64) -> Option<Self> {
         let (start, end) = (Vector2::from(line.start), Vector2::from(line.end));
         // The cast saturates, and a length that is not finite or a step of 0 is refused below.
@@ -46,10 +56,12 @@ impl Straightness {
     pub fn bend(&self) -> f64 {
         self.largest_px / self.length_px
     }
-}
 
-/// Most steps along a line.
-const MAX_STEPS: usize = 10_000;
+    /// Whether the line strays from straight by more than 0.003 of its length.
+    pub fn is_bent(&self) -> bool {
+        self.bend() > BENT_SHARE
+    }
+}
 
 #[cfg(test)]
 mod tests {
@@ -73,8 +85,8 @@ mod tests {
         assert!(straight.largest_px < 1e-9 && straight.rms_px < 1e-9);
     }
 
-    /// y = a x^2 over 0 to L about its best line: a (t^2 - L^2 / 12), t from the middle; largest a L^2 / 6 at the ends, RMS
-    /// a L^2 / sqrt(180). a = 1e-4, L = 300: 1.5 and 0.67082 px, for points close together.
+    /// y = a x^2 over 0 to L about its best line: a (t^2 - L^2 / 12), t from the middle; largest a L^2 / 6 at the ends,
+    /// RMS a L^2 / sqrt(180). a = 1e-4, L = 300: 1.5 and 0.67082 px, for points close together.
     #[test]
     fn a_parabola_has_its_known_bend() {
         let mesh = mapped(|p| Vector2::new(p.x, 1e-4 * p.x * p.x));
@@ -82,6 +94,9 @@ mod tests {
         assert!((bent.largest_px - 1.5).abs() < 0.01, "{}", bent.largest_px);
         assert!((bent.rms_px - 0.67082).abs() < 0.01, "{}", bent.rms_px);
         assert!((bent.bend() - 1.5 / 300.0_f64.hypot(9.0)).abs() < 1e-4);
+        assert!(bent.is_bent());
+        let hardly = mapped(|p| Vector2::new(p.x, 5e-5 * p.x * p.x));
+        assert!(!Straightness::of(&line(300.0), &hardly, 0.5).expect("a line").is_bent());
     }
 
     #[test]

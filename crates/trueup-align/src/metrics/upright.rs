@@ -1,12 +1,13 @@
-//! How far the pictures stand from upright, against the truth.
+//! How far the photographs stand from upright, against the truth.
 
 use trueup_core::geometry::{circular_mean, roll_from_down, wrap_angle};
 use trueup_core::mesh::GridMesh;
 
 use super::outline::target;
 
-/// Clockwise rotation of a picture's middle, radians: of the line between the vertices above and below its middle one.
-pub fn center_rotation(mesh: &GridMesh) -> f64 {
+/// Clockwise rotation of a photograph's middle, radians: of the line between the vertices above and below its middle
+/// one.
+fn center_rotation(mesh: &GridMesh) -> f64 {
     let (row, column) = (mesh.rows / 2, mesh.columns / 2);
     let (above, below) = (row.saturating_sub(1), (row + 1).min(mesh.rows - 1));
     let along = target(mesh, below * mesh.columns + column) - target(mesh, above * mesh.columns + column);
@@ -14,33 +15,34 @@ pub fn center_rotation(mesh: &GridMesh) -> f64 {
     wrap_angle(-roll_from_down(&along.push(0.0)))
 }
 
-/// Signed angles of pictures to upright, in radians, and what they come to.
+/// Signed angles of photographs to upright, in radians, and what they come to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Uprightness {
-    /// By how much each picture is turned too far clockwise, in [-pi, pi).
-    pub pictures: Vec<f64>,
+    /// By how much each photograph is turned too far clockwise, in [-pi, pi).
+    pub photographs: Vec<f64>,
     /// Mean of the absolute values.
     pub mean: f64,
     /// Largest absolute value.
     pub largest: f64,
-    /// Mean of the absolute differences from the pictures' common direction: 0 if all lean alike.
+    /// Mean of the absolute differences from the photographs' common direction: 0 if all lean alike.
     pub spread: f64,
 }
 
 impl Uprightness {
     /// Sums up angles to upright; `None` without any.
-    pub fn of(pictures: Vec<f64>) -> Option<Self> {
-        let count = pictures.len() as f64;
+    pub fn of(photographs: Vec<f64>) -> Option<Self> {
+        let count = photographs.len() as f64;
         // Angles that cancel out have no common direction; the spread is then about 0.
-        let common = circular_mean(pictures.iter().map(|&angle| (angle, 1.0))).unwrap_or(0.0);
-        let mean_of = |angle: &dyn Fn(&f64) -> f64| pictures.iter().map(|one| angle(one).abs()).sum::<f64>() / count;
+        let common = circular_mean(photographs.iter().map(|&angle| (angle, 1.0))).unwrap_or(0.0);
+        let mean_of = |angle: &dyn Fn(&f64) -> f64| photographs.iter().map(|one| angle(one).abs()).sum::<f64>() / count;
         let (mean, spread) = (mean_of(&|&one| one), mean_of(&|&one| wrap_angle(one - common)));
-        let largest = pictures.iter().fold(0.0, |largest: f64, angle| largest.max(angle.abs()));
-        (!pictures.is_empty()).then_some(Self { pictures, mean, largest, spread })
+        let largest = photographs.iter().fold(0.0, |largest: f64, angle| largest.max(angle.abs()));
+        (!photographs.is_empty()).then_some(Self { photographs, mean, largest, spread })
     }
 
-    /// How far pictures whose true [`super::vertical_angle`]s are `gammas` stand from upright in the middle; `None` without
-    /// pictures, or if the lists differ in length.
+    /// How far photographs whose verticals truly stand at `gammas` (radians, the clockwise turns that stand them
+    /// upright) are from upright in the middle; `None` without
+    /// photographs, or if the lists differ in length.
     pub fn against(meshes: &[GridMesh], gammas: &[f64]) -> Option<Self> {
         let off = |(mesh, gamma): (&GridMesh, &f64)| wrap_angle(center_rotation(mesh) - gamma);
         if meshes.len() != gammas.len() {
@@ -63,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turned_picture_has_its_turn() {
+    fn a_turned_photograph_has_its_turn() {
         for angle in [-3.0, -0.4, 0.0, 0.7, 2.9] {
             assert!((center_rotation(&turned(angle)) - angle).abs() < 1e-12);
         }
@@ -75,14 +77,14 @@ mod tests {
         let gammas = [0.1, -0.2, 0.3];
         let off = [1.0_f64, 2.0, 6.0].map(f64::to_radians);
         let meshes: Vec<GridMesh> = gammas.iter().zip(off).map(|(gamma, off)| turned(gamma + off)).collect();
-        let uprightness = Uprightness::against(&meshes, &gammas).expect("three pictures");
+        let uprightness = Uprightness::against(&meshes, &gammas).expect("three photographs");
         assert!((uprightness.mean.to_degrees() - 3.0).abs() < 1e-9);
         assert!((uprightness.largest.to_degrees() - 6.0).abs() < 1e-9);
         assert!((uprightness.spread.to_degrees() - 2.0).abs() < 2e-3);
     }
 
     #[test]
-    fn no_pictures_have_no_figure() {
+    fn no_photographs_have_no_figure() {
         assert!(Uprightness::of(Vec::new()).is_none());
         assert!(Uprightness::against(&[turned(0.0)], &[]).is_none());
     }

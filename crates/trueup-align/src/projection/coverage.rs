@@ -5,11 +5,11 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Vector2, Vector3};
 use trueup_core::geometry::wrap_angle;
 
-use super::Shot;
+use super::photograph::PosedPhotograph;
 
 /// The directions that photographs cover, in the level world.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Coverage {
+pub(super) struct SphereCoverage {
     /// Longitude of the middle of what is covered, radians to the right of straight ahead; 0 for a full turn.
     pub middle: f64,
     /// Longitudes covered, radians; a turn where there is no gap.
@@ -25,20 +25,21 @@ const STEPS: usize = 720;
 /// Samples along each side of a photograph.
 const SAMPLES: usize = 9;
 
-impl Coverage {
-    pub(super) fn of(shots: &[Shot]) -> Self {
+impl SphereCoverage {
+    pub(super) fn of(photographs: &[PosedPhotograph]) -> Self {
         let mut covered = [false; STEPS];
         let mut latitudes = [f64::INFINITY, f64::NEG_INFINITY];
         let mut forward = Vector3::zeros();
-        for shot in shots {
-            let directions: Vec<Vector3<f64>> = samples(shot).map(|pixel| shot.camera.world_direction(pixel)).collect();
-            let ahead = shot.camera.rotation().row(2).transpose();
-            forward += ahead / shots.len() as f64;
+        for photograph in photographs {
+            let directions: Vec<Vector3<f64>> =
+                samples(photograph).map(|pixel| photograph.camera.world_direction(pixel)).collect();
+            let ahead = photograph.camera.rotation().row(2).transpose();
+            forward += ahead / photographs.len() as f64;
             for direction in &directions {
                 let latitude = direction.y.asin();
                 latitudes = [latitudes[0].min(latitude), latitudes[1].max(latitude)];
             }
-            let poles = [-1.0, 1.0].map(|down| shows(shot, Vector3::new(0.0, down, 0.0)));
+            let poles = [-1.0, 1.0].map(|down| shows(photograph, Vector3::new(0.0, down, 0.0)));
             for (pole, latitude) in poles.iter().zip([-PI / 2.0, PI / 2.0]) {
                 if *pole {
                     latitudes = [latitudes[0].min(latitude), latitudes[1].max(latitude)];
@@ -77,25 +78,27 @@ impl Coverage {
 }
 
 /// Pixels spread over a photograph, its border included.
-fn samples(shot: &Shot) -> impl Iterator<Item = Vector2<f64>> {
-    let size = Vector2::new(shot.mesh.width, shot.mesh.height);
+fn samples(photograph: &PosedPhotograph) -> impl Iterator<Item = Vector2<f64>> {
+    let size = Vector2::new(photograph.mesh.width, photograph.mesh.height);
     let share = |index: usize| index as f64 / (SAMPLES - 1) as f64;
     (0..SAMPLES * SAMPLES)
         .map(move |index| size.component_mul(&Vector2::new(share(index % SAMPLES), share(index / SAMPLES))))
 }
 
 /// The largest angle from the horizon that a photograph reaches, radians.
-pub(super) fn steepest(shot: &Shot) -> f64 {
-    if [-1.0, 1.0].iter().any(|&down| shows(shot, Vector3::new(0.0, down, 0.0))) {
+pub(super) fn steepest(photograph: &PosedPhotograph) -> f64 {
+    if [-1.0, 1.0].iter().any(|&down| shows(photograph, Vector3::new(0.0, down, 0.0))) {
         return PI / 2.0;
     }
-    samples(shot).map(|pixel| shot.camera.world_direction(pixel).y.asin().abs()).fold(0.0, f64::max)
+    samples(photograph).map(|pixel| photograph.camera.world_direction(pixel).y.asin().abs()).fold(0.0, f64::max)
 }
 
 /// Whether a photograph shows a direction of the level world.
-pub(super) fn shows(shot: &Shot, direction: Vector3<f64>) -> bool {
-    let pixel = shot.camera.project(shot.camera.rotation() * direction);
-    pixel.is_some_and(|pixel| (0.0..=shot.mesh.width).contains(&pixel.x) && (0.0..=shot.mesh.height).contains(&pixel.y))
+pub(super) fn shows(photograph: &PosedPhotograph, direction: Vector3<f64>) -> bool {
+    let pixel = photograph.camera.project(photograph.camera.rotation() * direction);
+    pixel.is_some_and(|pixel| {
+        (0.0..=photograph.mesh.width).contains(&pixel.x) && (0.0..=photograph.mesh.height).contains(&pixel.y)
+    })
 }
 
 /// First step and length of the widest run of uncovered steps around the turn.
@@ -121,9 +124,9 @@ pub(super) mod tests {
     use super::*;
 
     /// A photograph of 800 x 600 pixels and focal length 700 (59.5 x 46.4 degrees).
-    pub(in super::super) fn shot(yaw_deg: f64, pitch_deg: f64) -> Shot {
+    pub(in super::super) fn photograph(yaw_deg: f64, pitch_deg: f64) -> PosedPhotograph {
         let level_from_camera = rotation_about_y(yaw_deg.to_radians()) * rotation_about_x(pitch_deg.to_radians());
-        Shot {
+        PosedPhotograph {
             camera: Camera::new(700.0, 800.0, 600.0, &level_from_camera.transpose()),
             mesh: GridMesh::regular(800.0, 600.0, 20.0),
         }
@@ -131,8 +134,8 @@ pub(super) mod tests {
 
     #[test]
     fn a_row_is_as_wide_as_its_steps_and_one_photograph() {
-        let row: Vec<Shot> = [150.0, 180.0, 210.0].map(|yaw| shot(yaw, 0.0)).to_vec();
-        let coverage = Coverage::of(&row);
+        let row: Vec<PosedPhotograph> = [150.0, 180.0, 210.0].map(|yaw| photograph(yaw, 0.0)).to_vec();
+        let coverage = SphereCoverage::of(&row);
         let own = 2.0 * (400_f64 / 700.0).atan();
         assert!((coverage.span - own - 60_f64.to_radians()).abs() < 0.02, "{coverage:?}");
         assert!(wrap_angle(coverage.middle - PI).abs() < 0.01);
@@ -142,10 +145,10 @@ pub(super) mod tests {
 
     #[test]
     fn a_turn_has_no_gap_and_a_pole_is_all_round() {
-        let turn: Vec<Shot> = (0..8).map(|k| shot(45.0 * f64::from(k), 0.0)).collect();
-        assert!(Coverage::of(&turn).is_full_turn() && Coverage::of(&turn).steepest() < 0.5);
-        assert!(!Coverage::of(&turn[..7]).is_full_turn());
-        let sky = Coverage::of(&[shot(0.0, 80.0)]);
+        let turn: Vec<PosedPhotograph> = (0..8).map(|k| photograph(45.0 * f64::from(k), 0.0)).collect();
+        assert!(SphereCoverage::of(&turn).is_full_turn() && SphereCoverage::of(&turn).steepest() < 0.5);
+        assert!(!SphereCoverage::of(&turn[..7]).is_full_turn());
+        let sky = SphereCoverage::of(&[photograph(0.0, 80.0)]);
         assert!(sky.is_full_turn() && sky.latitudes[0] == -PI / 2.0);
     }
 }

@@ -41,8 +41,8 @@ impl FlatKind {
         matches!(self, Self::Equirectangular | Self::Cylindrical | Self::Mercator)
     }
 
-    /// Half of the horizontal and of the vertical angle (radians) up to which the projection is shown unless asked for more:
-    /// what lies farther is stretched to more than about three times the middle's size.
+    /// Half of the horizontal and of the vertical angle (radians) up to which the projection is shown unless asked for
+    /// more: what lies farther is stretched to more than about three times the middle's size.
     pub fn comfortable(self) -> [f64; 2] {
         let degrees = match self {
             Self::Equirectangular => [180.0, 90.0],
@@ -67,12 +67,12 @@ impl FlatKind {
     }
 }
 
-/// A map between the viewer's directions (x right, y down, z forward) and a plane (x right, y down) whose unit is one radian at
-/// the middle.
+/// A map between the viewer's directions (x right, y down, z forward) and a plane (x right, y down) whose unit is one
+/// radian at the middle.
 ///
 /// # Source
-/// J. P. Snyder, "Map projections: a working manual" (1987), chapters 7, 12, 21, 22; T. K. Sharpless, B. Postle and D. M.
-/// German, "Pannini: a new projection for rendering wide angle perspective images" (2010), equations 1 to 3.
+/// J. P. Snyder, "Map projections: a working manual" (1987), chapters 7, 12, 21, 22; T. K. Sharpless, B. Postle and D.
+/// M. German, "Pannini: a new projection for rendering wide angle perspective images" (2010), equations 1 to 3.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Flat {
     /// Which projection.
@@ -187,8 +187,8 @@ mod tests {
         Vector3::new(latitude.cos() * longitude.sin(), latitude.sin(), latitude.cos() * longitude.cos())
     }
 
-    /// Longitude 60, latitude 45 degrees: by the formulas of the sources with tan 45 = 1, sin 60 = sqrt(3)/2, and Snyder's
-    /// table 9 for Mercator (y at 45 degrees: 0.88137).
+    /// Longitude 60, latitude 45 degrees: by the formulas of the sources with tan 45 = 1, sin 60 = sqrt(3)/2, and
+    /// Snyder's table 9 for Mercator (y at 45 degrees: 0.88137).
     #[test]
     fn places_agree_with_the_sources() {
         let third = PI / 3.0;

@@ -8,78 +8,90 @@ use trueup_core::geometry::wrap_angle;
 use trueup_core::mesh::{GridLines, GridMesh};
 
 use super::coverage::shows;
-use super::{Meeting, Shot, View};
+use super::parallax::ParallaxShift;
+use super::photograph::PosedPhotograph;
+use super::view::ProjectionView;
 
 /// What the grids are made for.
 #[derive(Debug, Clone, Copy)]
 pub struct Placement<'a> {
     /// Where the viewer looks.
-    pub view: &'a View,
+    pub view: &'a ProjectionView,
     /// Canvas pixels per unit of the plane; grids are as fine as these pixels want.
     pub canvas_from_plane: f64,
     /// Whether the canvas closes on itself, so that what leaves it on the right enters it on the left.
     pub closed: bool,
 }
 
-/// A grid of one photograph on the plane. A photograph may have several: on both sides of a turn's cut, or in sectors around
-/// a pole; none where it shows nothing in the view.
+/// A grid of one photograph on the plane. A photograph may have several: on both sides of a turn's cut, or in sectors
+/// around a pole; none where it shows nothing in the view.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlacedGrid {
     /// Index of the photograph.
-    pub shot: usize,
+    pub photograph: usize,
     /// Targets on the plane; NaN where the photograph looks out of the view.
     pub mesh: GridMesh,
 }
 
-/// Largest distance of a bilinear cell from the true map, in canvas pixels or photograph pixels, whichever is kinder: where the
-/// canvas is stretched, detail is the photograph's. Half of it for each axis.
+/// Largest distance of a bilinear cell from the true map, in canvas pixels or photograph pixels, whichever is kinder:
+/// where the canvas is stretched, detail is the photograph's. Half of it for each axis.
 const LARGEST_SAG_PX: f64 = 0.3;
 /// Radians beyond the view's end that are drawn: whole cells lie across its border then.
 const MARGIN: f64 = 0.09;
 
 /// Places every photograph's grid.
 ///
-/// `meetings` holds for every photograph what [`super::meeting`] found.
-pub fn place(shots: &[Shot], meetings: &[Meeting], placement: &Placement<'_>) -> Vec<PlacedGrid> {
-    let drawings: Vec<Vec<GridMesh>> =
-        shots.par_iter().zip(meetings).map(|(shot, meeting)| Drawing::new(shot, meeting, placement).grids()).collect();
+/// `shifts` holds for every photograph what [`super::parallax_shifts`] found.
+pub fn place(photographs: &[PosedPhotograph], shifts: &[ParallaxShift], placement: &Placement<'_>) -> Vec<PlacedGrid> {
+    let drawings: Vec<Vec<GridMesh>> = photographs
+        .par_iter()
+        .zip(shifts)
+        .map(|(photograph, shift)| Drawing::new(photograph, shift, placement).grids())
+        .collect();
     drawings
         .into_iter()
         .enumerate()
-        .flat_map(|(shot, grids)| grids.into_iter().map(move |mesh| PlacedGrid { shot, mesh }))
+        .flat_map(|(photograph, grids)| grids.into_iter().map(move |mesh| PlacedGrid { photograph, mesh }))
         .collect()
 }
 
 /// One photograph on the plane.
 struct Drawing<'a> {
-    shot: &'a Shot,
-    meeting: &'a Meeting,
+    photograph: &'a PosedPhotograph,
+    shift: &'a ParallaxShift,
     placement: &'a Placement<'a>,
     view_from_camera: Matrix3<f64>,
     /// Largest |x| and |y| of the plane that are drawn.
     reach: Vector2<f64>,
 }
 
+/// A pixel of the photograph and its place on the plane, if the view comes near it.
+#[derive(Clone, Copy)]
+struct DrawnVertex {
+    pixel: Vector2<f64>,
+    place: Option<Vector2<f64>>,
+}
+
 impl<'a> Drawing<'a> {
-    fn new(shot: &'a Shot, meeting: &'a Meeting, placement: &'a Placement<'a>) -> Self {
+    fn new(photograph: &'a PosedPhotograph, shift: &'a ParallaxShift, placement: &'a Placement<'a>) -> Self {
         let view = placement.view;
-        let cell = shot.mesh.cell_width().max(shot.mesh.cell_height()) / shot.camera.focal_px;
+        let cell = photograph.mesh.cell_width().max(photograph.mesh.cell_height()) / photograph.camera.focal_px;
         let margin = MARGIN.max(3.0 * cell);
         let reach = view.flat.reach(view.half.map(|half| half + margin));
         Self {
-            shot,
-            meeting,
+            photograph,
+            shift,
             placement,
-            view_from_camera: view.view_from_level() * shot.camera.rotation().transpose(),
+            view_from_camera: view.view_from_level() * photograph.camera.rotation().transpose(),
             reach,
         }
     }
 
     /// The viewer's direction of a pixel.
     fn direction(&self, pixel: Vector2<f64>) -> Vector3<f64> {
-        let (corners, shares) = self.shot.mesh.bilinear(pixel);
-        let aside = (0..4).fold(Vector2::zeros(), |sum, k| sum + self.meeting.aside[corners[k]] * shares[k]);
-        self.view_from_camera * self.shot.camera.bearing(pixel + aside)
+        let (corners, shares) = self.photograph.mesh.bilinear(pixel);
+        let aside = (0..4).fold(Vector2::zeros(), |sum, k| sum + self.shift.aside[corners[k]] * shares[k]);
+        self.view_from_camera * self.photograph.camera.bearing(pixel + aside)
     }
 
     /// The place of a pixel, if the view comes near it.
@@ -90,7 +102,7 @@ impl<'a> Drawing<'a> {
     }
 
     fn pixel(&self, lines: &GridLines, row: usize, column: usize) -> Vector2<f64> {
-        Vector2::new(lines.columns[column] * self.shot.mesh.width, lines.rows[row] * self.shot.mesh.height)
+        Vector2::new(lines.columns[column] * self.photograph.mesh.width, lines.rows[row] * self.photograph.mesh.height)
     }
 
     fn places(&self, lines: &GridLines) -> Vec<Option<Vector2<f64>>> {
@@ -100,13 +112,14 @@ impl<'a> Drawing<'a> {
             .collect()
     }
 
-    /// How far the middle of two places is from the place of the pixel between, in pixels; `None` where there is nothing to see.
-    fn sag(&self, from: (Vector2<f64>, Option<Vector2<f64>>), to: (Vector2<f64>, Option<Vector2<f64>>)) -> Option<f64> {
+    /// How far the middle of two vertices' places is from the place of the pixel between, in pixels; `None` where there
+    /// is nothing to see.
+    fn sag(&self, from: DrawnVertex, to: DrawnVertex) -> Option<f64> {
         /// A cell that is wider on the turn goes round a pole.
         const WIDEST: f64 = PI / 2.0;
         let flat = &self.placement.view.flat;
-        let pixel = (from.0 + to.0) / 2.0;
-        let (start, mut end, mut true_place) = (from.1?, to.1?, self.place(pixel)?);
+        let pixel = (from.pixel + to.pixel) / 2.0;
+        let (start, mut end, mut true_place) = (from.place?, to.place?, self.place(pixel)?);
         if flat.kind.turns() {
             end.x = start.x + wrap_angle(end.x - start.x);
             true_place.x = start.x + wrap_angle(true_place.x - start.x);
@@ -116,9 +129,9 @@ impl<'a> Drawing<'a> {
         }
         let middle = (start + end) / 2.0;
         let on_canvas = (middle - true_place).norm() * self.placement.canvas_from_plane;
-        let in_photograph = flat
-            .direction(middle)
-            .map_or(f64::INFINITY, |direction| direction.angle(&self.direction(pixel)) * self.shot.camera.focal_px);
+        let in_photograph = flat.direction(middle).map_or(f64::INFINITY, |direction| {
+            direction.angle(&self.direction(pixel)) * self.photograph.camera.focal_px
+        });
         Some(on_canvas.min(in_photograph))
     }
 
@@ -127,17 +140,21 @@ impl<'a> Drawing<'a> {
         /// Rounds of division, each by up to [`PIECES`]: four of them take a cell of 100 pixels below one.
         const ROUNDS: usize = 10;
         let mut lines = self
-            .shot
+            .photograph
             .mesh
             .lines
             .clone()
-            .unwrap_or_else(|| GridLines::even(self.shot.mesh.columns, self.shot.mesh.rows));
-        // What is smaller than this share of a pixel is not seen, not even at a pole, half a pixel from the first row's centers.
-        let smallest = 0.125 * (self.shot.camera.focal_px / self.placement.canvas_from_plane).max(1.0);
+            .unwrap_or_else(|| GridLines::even(self.photograph.mesh.columns, self.photograph.mesh.rows));
+        // What is smaller than this share of a pixel is not seen, not even at a pole, half a pixel from the first row's
+        // centers.
+        let smallest = 0.125 * (self.photograph.camera.focal_px / self.placement.canvas_from_plane).max(1.0);
         for _ in 0..ROUNDS {
             let places = self.places(&lines);
             let (rows, columns) = (lines.rows.len(), lines.columns.len());
-            let vertex = |row: usize, column: usize| (self.pixel(&lines, row, column), places[row * columns + column]);
+            let vertex = |row: usize, column: usize| DrawnVertex {
+                pixel: self.pixel(&lines, row, column),
+                place: places[row * columns + column],
+            };
             let worst = |sags: &mut dyn Iterator<Item = Option<f64>>| sags.flatten().fold(0.0, f64::max);
             let across: Vec<f64> = (0..columns - 1)
                 .map(|column| worst(&mut (0..rows).map(|row| self.sag(vertex(row, column), vertex(row, column + 1)))))
@@ -148,8 +165,8 @@ impl<'a> Drawing<'a> {
                 })
                 .collect();
             let finer = GridLines {
-                columns: divided(&lines.columns, &across, smallest / self.shot.mesh.width),
-                rows: divided(&lines.rows, &down, smallest / self.shot.mesh.height),
+                columns: divided(&lines.columns, &across, smallest / self.photograph.mesh.width),
+                rows: divided(&lines.rows, &down, smallest / self.photograph.mesh.height),
             };
             if finer == lines {
                 break;
@@ -165,8 +182,8 @@ impl<'a> Drawing<'a> {
         let grid = |target: Vec<[f64; 2]>| GridMesh {
             rows: lines.rows.len(),
             columns: lines.columns.len(),
-            width: self.shot.mesh.width,
-            height: self.shot.mesh.height,
+            width: self.photograph.mesh.width,
+            height: self.photograph.mesh.height,
             target,
             lines: Some(lines.clone()),
         };
@@ -202,15 +219,15 @@ impl<'a> Drawing<'a> {
         grids
     }
 
-    /// The longitudes around which the photograph is unrolled, and how far to both sides: its own middle, or four directions
-    /// around a pole that it shows or all but shows. Sectors overlap by a quarter turn, so that each cell narrower than
-    /// that is whole in one of them.
+    /// The longitudes around which the photograph is unrolled, and how far to both sides: its own middle, or four
+    /// directions around a pole that it shows or all but shows. Sectors overlap by a quarter turn, so that each cell
+    /// narrower than that is whole in one of them.
     fn sectors(&self, places: &[Option<Vector2<f64>>]) -> Vec<(f64, f64)> {
         /// Radians to one side of its middle above which a photograph may as well go round.
         const HALF_ROUND: f64 = 0.8 * PI;
         let level_pole = |down: f64| {
             let pole = self.placement.view.view_from_level().transpose() * Vector3::new(0.0, down, 0.0);
-            shows(self.shot, pole)
+            shows(self.photograph, pole)
         };
         let ahead = self.view_from_camera.column(2);
         let center = ahead.x.atan2(ahead.z);
@@ -241,34 +258,43 @@ fn divided(lines: &[f64], sags: &[f64], shortest: f64) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::coverage::tests::shot;
-    use super::super::{Flat, FlatKind};
+    use super::super::coverage::tests::photograph;
+    use super::super::flat::{Flat, FlatKind};
     use super::*;
 
-    fn view(kind: FlatKind) -> View {
+    fn view(kind: FlatKind) -> ProjectionView {
         let half = kind.comfortable();
-        View { flat: Flat { kind, panini_distance: 1.0 }, yaw: 0.0, pitch: 0.0, roll: 0.0, half, closed: false }
+        ProjectionView {
+            flat: Flat { kind, panini_distance: 1.0 },
+            yaw: 0.0,
+            pitch: 0.0,
+            roll: 0.0,
+            half,
+            closed: false,
+        }
     }
 
-    fn placed(shots: &[Shot], view: &View, closed: bool) -> Vec<PlacedGrid> {
-        let meetings: Vec<Meeting> =
-            shots.iter().map(|shot| Meeting { aside: vec![Vector2::zeros(); shot.mesh.len()] }).collect();
-        place(shots, &meetings, &Placement { view, canvas_from_plane: 700.0, closed })
+    fn placed(photographs: &[PosedPhotograph], view: &ProjectionView, closed: bool) -> Vec<PlacedGrid> {
+        let shifts: Vec<ParallaxShift> = photographs
+            .iter()
+            .map(|photograph| ParallaxShift { aside: vec![Vector2::zeros(); photograph.mesh.len()] })
+            .collect();
+        place(photographs, &shifts, &Placement { view, canvas_from_plane: 700.0, closed })
     }
 
-    /// Anywhere in a cell, the bilinear place is within the limit of the true one; the error counts on the sphere where the
-    /// plane is stretched.
+    /// Anywhere in a cell, the bilinear place is within the limit of the true one; the error counts on the sphere where
+    /// the plane is stretched.
     #[test]
     fn cells_follow_the_projection() {
         for kind in FlatKind::ALL {
-            let (view, shot) = (view(kind), shot(35.0, 20.0));
-            let mesh = placed(std::slice::from_ref(&shot), &view, false).remove(0).mesh;
+            let (view, photograph) = (view(kind), photograph(35.0, 20.0));
+            let mesh = placed(std::slice::from_ref(&photograph), &view, false).remove(0).mesh;
             let mut checked = 0;
             for k in 0..4000 {
                 let share = [0.618_033_99, 0.754_877_67].map(|step| (step * f64::from(k)).fract());
                 let pixel = Vector2::new(share[0] * 800.0, share[1] * 600.0);
                 let place = mesh.warp(pixel);
-                let true_direction = view.view_from_level() * shot.camera.world_direction(pixel);
+                let true_direction = view.view_from_level() * photograph.camera.world_direction(pixel);
                 let Some(true_place) = view.flat.place(true_direction).filter(|_| !place.x.is_nan()) else { continue };
                 let direction = view.flat.direction(place).expect("on the plane");
                 let error = ((place - true_place).norm() * 700.0).min(direction.angle(&true_direction) * 700.0);
@@ -282,7 +308,7 @@ mod tests {
     /// A photograph of the zenith covers every direction above 50 degrees, up to the pole but for half a pixel.
     #[test]
     fn a_photograph_of_a_pole_leaves_no_hole() {
-        let (view, sky) = (view(FlatKind::Equirectangular), shot(10.0, 87.0));
+        let (view, sky) = (view(FlatKind::Equirectangular), photograph(10.0, 87.0));
         let grids = placed(&[sky], &view, false);
         assert!(grids.len() >= 4);
         for k in 0..360 {
@@ -306,18 +332,18 @@ mod tests {
     #[test]
     fn a_photograph_across_the_cut_lies_on_both_sides() {
         let view = view(FlatKind::Cylindrical);
-        let grids = placed(&[shot(175.0, 0.0), shot(0.0, 0.0)], &view, false);
-        assert_eq!(grids.iter().map(|grid| grid.shot).collect::<Vec<_>>(), [0, 0, 1]);
+        let grids = placed(&[photograph(175.0, 0.0), photograph(0.0, 0.0)], &view, false);
+        assert_eq!(grids.iter().map(|grid| grid.photograph).collect::<Vec<_>>(), [0, 0, 1]);
         let left = |k: usize| grids[k].mesh.bounds().0.x;
         assert!((left(0) - left(1) - TAU).abs() < 1e-9);
-        assert_eq!(placed(&[shot(175.0, 0.0)], &view, true).len(), 1);
+        assert_eq!(placed(&[photograph(175.0, 0.0)], &view, true).len(), 1);
     }
 
     #[test]
     fn what_lies_behind_a_plane_is_not_there() {
         let view = view(FlatKind::Perspective);
-        assert!(placed(&[shot(150.0, 0.0)], &view, false).is_empty());
-        let half = placed(&[shot(60.0, 0.0)], &view, false).remove(0).mesh;
+        assert!(placed(&[photograph(150.0, 0.0)], &view, false).is_empty());
+        let half = placed(&[photograph(60.0, 0.0)], &view, false).remove(0).mesh;
         let whole = half.whole_cells().count();
         assert!(whole > 100 && whole < (half.rows - 1) * (half.columns - 1), "{whole}");
     }

@@ -3,14 +3,15 @@
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z, wrap_angle};
-use trueup_core::options::{InvalidOption, OptionValue};
 
-use super::coverage::Coverage;
-use super::{Flat, FlatKind, Projection, ProjectionOptions, Shot};
+use super::coverage::SphereCoverage;
+use super::flat::{Flat, FlatKind};
+use super::options::{Projection, ProjectionOptions};
+use super::photograph::PosedPhotograph;
 
 /// A projection, where it looks, and how far it is shown. Angles in radians.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct View {
+pub struct ProjectionView {
     /// The projection.
     pub flat: Flat,
     /// Turn to the right from straight ahead in the level world.
@@ -25,24 +26,28 @@ pub struct View {
     pub closed: bool,
 }
 
-/// Mean pitch in radians (40 degrees) from which photographs that look one way are shown looking there: drawn upright, they would be
-/// stretched beyond recognition. The mesh's sphere is tilted from there, too.
+/// Mean pitch in radians (40 degrees) from which photographs that look one way are shown looking there: drawn upright,
+/// they would be stretched beyond recognition. The mesh's sphere is tilted from there, too.
 const STEEP: f64 = 0.7;
 /// Length of the mean viewing direction below which the photographs look all round and have no such pitch.
 const ONE_WAY: f64 = 0.5;
 
-impl View {
+impl ProjectionView {
     /// The view that the options ask for.
     ///
-    /// `dominant`: the scene's directions in the level world (columns), if lines guided the panorama. With
-    /// [`ProjectionOptions::facing`], the viewer faces the horizontal one that is nearest to the photographs' middle (up to 45 degrees
-    /// aside): always for full turns, whose middle is arbitrary, and for planes where nothing more is cut off by it; a
-    /// cylinder looks the same wherever its middle is.
-    pub fn choose(shots: &[Shot], dominant: Option<&Matrix3<f64>>, options: &ProjectionOptions) -> Self {
-        let coverage = Coverage::of(shots);
+    /// `dominant`: the scene's directions in the level world (columns), if lines guided the panorama. The viewer faces
+    /// the horizontal one that is nearest to the photographs' middle (up to 45 degrees aside): always for full turns,
+    /// whose middle is arbitrary, and for planes where nothing more is cut off by it; a cylinder looks the same
+    /// wherever its middle is.
+    pub fn choose(
+        photographs: &[PosedPhotograph],
+        dominant: Option<&Matrix3<f64>>,
+        options: &ProjectionOptions,
+    ) -> Self {
+        let coverage = SphereCoverage::of(photographs);
         let kind = flat_kind(&coverage, options);
         let flat = Flat { kind, panini_distance: options.panini_distance };
-        let facade = dominant.filter(|_| options.facing).and_then(|dominant| nearest_facade(dominant, coverage.middle));
+        let facade = dominant.and_then(|dominant| nearest_facade(dominant, coverage.middle));
         let far = |yaw: f64| 0.5 * coverage.span + wrap_angle(yaw - coverage.middle).abs();
         let straight = match facade {
             Some(facade) if coverage.is_full_turn() || (!kind.turns() && far(facade) <= kind.comfortable()[0]) => {
@@ -84,11 +89,11 @@ fn nearest_facade(dominant: &Matrix3<f64>, middle: f64) -> Option<f64> {
 
 /// The projection asked for, or the one that suits.
 ///
-/// A plane is what one wide lens would have drawn, and people are used to its stretching up to about 100 degrees. Panini's
-/// keeps verticals and the lines into the depth straight up to about 180; beyond, the far sides grow too large, while a cylinder
-/// stays even, up to where nobody sees it as one view any more. Full turns belong to viewers of spherical panoramas, and
-/// what reaches more than 45 degrees up or down (several rows) is stretched by all of these.
-fn flat_kind(coverage: &Coverage, options: &ProjectionOptions) -> FlatKind {
+/// A plane is what one wide lens would have drawn, and people are used to its stretching up to about 100 degrees.
+/// Panini's keeps verticals and the lines into the depth straight up to about 180; beyond, the far sides grow too
+/// large, while a cylinder stays even, up to where nobody sees it as one view any more. Full turns belong to viewers of
+/// spherical panoramas, and what reaches more than 45 degrees up or down (several rows) is stretched by all of these.
+fn flat_kind(coverage: &SphereCoverage, options: &ProjectionOptions) -> FlatKind {
     /// Degrees across.
     const PERSPECTIVE: f64 = 100.0;
     const PANINI: f64 = 180.0;
@@ -116,40 +121,20 @@ fn flat_kind(coverage: &Coverage, options: &ProjectionOptions) -> FlatKind {
     }
 }
 
-impl ProjectionOptions {
-    /// What no single option's range can say: a field of view beyond what the projection can draw.
-    pub fn beyond_the_projection(&self) -> Vec<InvalidOption> {
-        let kind = match self.kind {
-            Projection::Perspective => FlatKind::Perspective,
-            Projection::Panini => FlatKind::Panini,
-            Projection::Stereographic => FlatKind::Stereographic,
-            _ => return Vec::new(),
-        };
-        let largest = 2.0 * kind.largest_half_width().to_degrees();
-        let wrong = self.fov > largest;
-        let named = InvalidOption {
-            name: "projection.fov".to_owned(),
-            value: self.fov.display(),
-            allowed: format!("0 to {largest:.0} for projection.kind = {}", kind.name()),
-        };
-        if wrong { vec![named] } else { Vec::new() }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
 
-    use super::super::coverage::tests::shot;
+    use super::super::coverage::tests::photograph;
     use super::*;
 
-    fn row(count: u32, pitch_deg: f64) -> Vec<Shot> {
-        (0..count).map(|k| shot(30.0 * (f64::from(k) - 0.5 * f64::from(count - 1)), pitch_deg)).collect()
+    fn row(count: u32, pitch_deg: f64) -> Vec<PosedPhotograph> {
+        (0..count).map(|k| photograph(30.0 * (f64::from(k) - 0.5 * f64::from(count - 1)), pitch_deg)).collect()
     }
 
-    fn kind(shots: &[Shot]) -> FlatKind {
+    fn kind(photographs: &[PosedPhotograph]) -> FlatKind {
         let options = ProjectionOptions { kind: Projection::Auto, ..ProjectionOptions::default() };
-        View::choose(shots, None, &options).flat.kind
+        ProjectionView::choose(photographs, None, &options).flat.kind
     }
 
     #[test]
@@ -161,21 +146,20 @@ mod tests {
         assert_eq!(kind(&[row(2, 0.0), row(2, 35.0)].concat()), FlatKind::Equirectangular);
     }
 
-    /// Facades at 20 and 110 degrees: a narrow panorama faces the nearer one, a wide plane keeps to its middle, since its far
-    /// side would be cut.
+    /// Facades at 20 and 110 degrees: a narrow panorama faces the nearer one, a wide plane keeps to its middle, since
+    /// its far side would be cut.
     #[test]
     fn the_viewer_faces_the_nearest_facade() {
         let dominant = rotation_about_y(20_f64.to_radians());
-        let faced = |shots: &[Shot], kind: Projection| {
+        let faced = |photographs: &[PosedPhotograph], kind: Projection| {
             let options = ProjectionOptions { kind, ..ProjectionOptions::default() };
-            View::choose(shots, Some(&dominant), &options).yaw.to_degrees()
+            ProjectionView::choose(photographs, Some(&dominant), &options).yaw.to_degrees()
         };
         assert!((faced(&row(1, 0.0), Projection::Perspective) - 20.0).abs() < 1e-6);
         assert!(faced(&row(3, 0.0), Projection::Perspective).abs() < 0.5);
         assert!(faced(&row(3, 0.0), Projection::Cylindrical).abs() < 0.5);
         assert!((faced(&row(12, 0.0), Projection::Equirectangular) - 20.0).abs() < 1e-6);
-        let about = ProjectionOptions { facing: false, ..ProjectionOptions::default() };
-        assert!(View::choose(&row(1, 0.0), Some(&dominant), &about).yaw.abs() < 0.01);
+        assert!(ProjectionView::choose(&row(1, 0.0), None, &ProjectionOptions::default()).yaw.abs() < 0.01);
     }
 
     /// Yaw turns right, pitch up, roll clockwise: the direction to the right, above, and at the viewer's right hand.
@@ -189,7 +173,7 @@ mod tests {
             ..ProjectionOptions::default()
         };
         let seen = |options: ProjectionOptions, direction: Vector3<f64>| {
-            View::choose(&row(1, 0.0), None, &options).view_from_level() * direction
+            ProjectionView::choose(&row(1, 0.0), None, &options).view_from_level() * direction
         };
         let right = Vector3::new(0.5, 0.0, 0.75_f64.sqrt());
         assert!((seen(options(30.0, 0.0, 0.0), right) - Vector3::z()).norm() < 1e-2);
@@ -202,19 +186,8 @@ mod tests {
     #[test]
     fn photographs_of_a_ceiling_are_looked_up_at() {
         let options = ProjectionOptions { kind: Projection::Perspective, ..ProjectionOptions::default() };
-        let view = View::choose(&[shot(0.0, 80.0), shot(10.0, 80.0)], None, &options);
+        let view = ProjectionView::choose(&[photograph(0.0, 80.0), photograph(10.0, 80.0)], None, &options);
         assert!((view.pitch.to_degrees() - 80.0).abs() < 0.5, "{view:?}");
-        assert!(View::choose(&row(2, 30.0), None, &options).pitch == 0.0);
-    }
-
-    #[test]
-    fn a_field_of_view_beyond_the_projection_is_named() {
-        let wide = ProjectionOptions { kind: Projection::Perspective, fov: 200.0, ..ProjectionOptions::default() };
-        let named = wide.beyond_the_projection();
-        assert_eq!(
-            named[0].to_string(),
-            "invalid projection.fov = 200 (allowed: 0 to 160 for projection.kind = perspective)"
-        );
-        assert!(ProjectionOptions { fov: 360.0, ..ProjectionOptions::default() }.beyond_the_projection().is_empty());
+        assert!(ProjectionView::choose(&row(2, 30.0), None, &options).pitch == 0.0);
     }
 }

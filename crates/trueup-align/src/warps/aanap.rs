@@ -1,5 +1,5 @@
-//! Adaptive as-natural-as-possible warps (AANAP): a local homography in the overlap that turns into a similarity away from
-//! it.
+//! Adaptive as-natural-as-possible warps (AANAP): a local homography in the overlap that turns into a similarity away
+//! from it.
 
 use nalgebra::{Matrix3, Vector2};
 use rand::Rng;
@@ -9,44 +9,46 @@ use trueup_core::geometry::{Homography, Normalization};
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
-use super::apap::Kernel;
+use super::deformed::deformed;
+use super::distance_kernel::DistanceKernel;
 use super::homography::undetermined;
+use super::input::{STAGE, WarpInput};
 use super::limits::corners;
+use super::options::WarpOptions;
 use super::placement::{Anchored, Step, one_after_another};
-use super::{STAGE, WarpInput, WarpOptions, deformed};
 use crate::match_points::MovingDlt;
 
-/// Places the pictures one after the other, each between its local homography and a similarity.
+/// Places the photographs one after the other, each between its local homography and a similarity.
 ///
 /// # Source
-/// Lin et al., "Adaptive as-natural-as-possible image stitching" (2015), sections 3.1 to 3.3: linearized homography with
-/// Student-t weights, the similarity of least rotation among the planes of the matches, and the smooth change from one to
-/// the other, in which the reference takes part.
+/// Lin et al., "Adaptive as-natural-as-possible image stitching" (2015), sections 3.1 to 3.3: linearized homography
+/// with Student-t weights, the similarity of least rotation among the planes of the matches, and the smooth change from
+/// one to the other, in which the reference takes part.
 ///
 /// # Departures
-/// The published method is for two pictures. Here each further one is fitted to the places that its matches have in the
-/// panorama by then, and moves what is placed already in the same way; `warps.adapt_reference` turns that off.
+/// The published method is for two photographs. Here each further one is fitted to the places that its matches have in
+/// the panorama by then, and moves what is placed already in the same way; `warps.adapt_reference` turns that off.
 pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &StageContext<'_>) -> Result<Vec<GridMesh>> {
     one_after_another(input, context, |step, data, placed| {
-        let mut generator = context.generator(STAGE, input.seeds[step.picture]);
-        let join = Join::new(input, step, data, placed, options, &mut generator)
-            .ok_or_else(|| undetermined(input, step.picture))?;
+        let mut generator = context.generator(STAGE, input.seeds[step.photograph]);
+        let join =
+            Join::new(input, step, data, placed, &mut generator).ok_or_else(|| undetermined(input, step.photograph))?;
         if options.adapt_reference {
             for mesh in placed.iter_mut() {
                 *mesh = mesh.take().map(|mesh| join.adapted(mesh));
             }
         }
-        Ok(deformed(&input.grids[step.picture], |point| join.place(point)))
+        Ok(deformed(&input.grids[step.photograph], |point| join.place(point)))
     })
 }
 
-/// How one picture joins those placed.
+/// How one photograph joins those placed.
 #[derive(Debug)]
 struct Join {
-    /// The picture under its local homographies, linearized away from the overlap.
+    /// The photograph under its local homographies, linearized away from the overlap.
     local: GridMesh,
     global: Homography,
-    picture_from_global: Homography,
+    photograph_from_global: Homography,
     similarity: Matrix3<f64>,
     /// Where in the panorama the similarity starts, and the way to where it is reached.
     start: Vector2<f64>,
@@ -59,17 +61,16 @@ impl Join {
         step: Step,
         data: &Anchored,
         placed: &[Option<GridMesh>],
-        options: &WarpOptions,
         generator: &mut impl Rng,
     ) -> Option<Self> {
-        let grid = &input.grids[step.picture];
+        let grid = &input.grids[step.photograph];
         let dlt = MovingDlt::new(&data.points, &data.places)?;
         let global = dlt.solve(|_| 1.0)?;
-        let fields = LocalHomographies::new(&dlt, &data.points, grid, options)?;
+        let fields = LocalHomographies::new(&dlt, &data.points, grid)?;
         let target: Vec<[f64; 2]> =
             (0..grid.len()).into_par_iter().map(|vertex| fields.place(grid.source(vertex)).into()).collect();
         let local = GridMesh { target, ..grid.clone() };
-        let similarity = global_similarity(data, options, generator)?;
+        let similarity = global_similarity(data, generator)?;
         let parent = placed[step.parent].as_ref()?;
         let center = |mesh: &GridMesh| mesh.warp(Vector2::new(mesh.width / 2.0, mesh.height / 2.0));
         let from = center(parent);
@@ -77,9 +78,9 @@ impl Join {
         let along = corners(grid.width, grid.height).map(|corner| axis.dot(&(local.warp(corner) - from)));
         let low = along.iter().copied().fold(f64::INFINITY, f64::min);
         let high = along.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let picture_from_global = global.inverse()?;
+        let photograph_from_global = global.inverse()?;
         let way = axis * (high - low);
-        Some(Self { local, global, picture_from_global, similarity, start: from + axis * low, way })
+        Some(Self { local, global, photograph_from_global, similarity, start: from + axis * low, way })
     }
 
     /// Share of the similarity at a place that the local homographies mean.
@@ -87,14 +88,14 @@ impl Join {
         ((place - self.start).dot(&self.way) / self.way.norm_squared()).clamp(0.0, 1.0)
     }
 
-    /// Where a point of the picture goes.
+    /// Where a point of the photograph goes.
     fn place(&self, point: Vector2<f64>) -> Vector2<f64> {
         let place = self.local.warp(point);
         let share = self.share(place);
         Homography(self.similarity).apply(point) * share + place * (1.0 - share)
     }
 
-    /// A placed picture, moved as the new one is.
+    /// A placed photograph, moved as the new one is.
     fn adapted(&self, mesh: GridMesh) -> GridMesh {
         let target = mesh.target.iter().map(|&place| self.moved(place.into()).into()).collect();
         GridMesh { target, ..mesh }
@@ -108,15 +109,15 @@ impl Join {
         Homography(self.similarity).apply(self.point_at(place)) * share + place * (1.0 - share)
     }
 
-    /// The point of the picture, or of its plane beyond its border, that the local homographies carry to a place.
+    /// The point of the photograph, or of its plane beyond its border, that the local homographies carry to a place.
     fn point_at(&self, place: Vector2<f64>) -> Vector2<f64> {
         /// The local deviation from the global homography changes slowly: a few rounds reach rounding.
         const ROUNDS: usize = 6;
-        let mut point = self.picture_from_global.apply(place);
+        let mut point = self.photograph_from_global.apply(place);
         for _ in 0..ROUNDS {
             let inside = Vector2::new(point.x.clamp(0.0, self.local.width), point.y.clamp(0.0, self.local.height));
             let deviation = self.local.warp(inside) - self.global.apply(inside);
-            point = self.picture_from_global.apply(place - deviation);
+            point = self.photograph_from_global.apply(place - deviation);
         }
         point
     }
@@ -125,32 +126,22 @@ impl Join {
 /// Local homographies inside the rectangle around the matches, their linearization outside.
 struct LocalHomographies<'a> {
     dlt: &'a MovingDlt,
-    decay: f64,
     low: Vector2<f64>,
     high: Vector2<f64>,
     anchors: Vec<(Vector2<f64>, Homography)>,
     /// Unit of the distances from anchors.
     unit: f64,
-    freedom: f64,
 }
 
 impl<'a> LocalHomographies<'a> {
-    fn new(dlt: &'a MovingDlt, points: &[Vector2<f64>], grid: &GridMesh, options: &WarpOptions) -> Option<Self> {
+    fn new(dlt: &'a MovingDlt, points: &[Vector2<f64>], grid: &GridMesh) -> Option<Self> {
         /// Anchors on each side of the rectangle.
         const ANCHORS_PER_SIDE: usize = 20;
-        /// Unit of the distances from anchors, in diagonals of the picture.
+        /// Unit of the distances from anchors, in diagonals of the photograph.
         const UNIT: f64 = 0.1;
         let low = points.iter().copied().reduce(|a, b| a.inf(&b))?;
         let high = points.iter().copied().reduce(|a, b| a.sup(&b))?;
-        let mut local = Self {
-            dlt,
-            decay: options.aanap_decay_px,
-            low,
-            high,
-            anchors: Vec::new(),
-            unit: UNIT * grid.width.hypot(grid.height),
-            freedom: options.aanap_freedom,
-        };
+        let mut local = Self { dlt, low, high, anchors: Vec::new(), unit: UNIT * grid.width.hypot(grid.height) };
         let corners = [low, Vector2::new(high.x, low.y), high, Vector2::new(low.x, high.y)];
         let places: Vec<Vector2<f64>> = (0..4 * ANCHORS_PER_SIDE)
             .map(|k| {
@@ -164,7 +155,9 @@ impl<'a> LocalHomographies<'a> {
     }
 
     fn homography(&self, point: Vector2<f64>) -> Option<Homography> {
-        let weight = |position: Vector2<f64>| Kernel::Code.weight((position - point).norm(), self.decay);
+        /// Distance over which the weight of a match falls to 1/e, working px: the published 12.5 squared.
+        const DECAY_PX: f64 = 156.25;
+        let weight = |position: Vector2<f64>| DistanceKernel::Code.weight((position - point).norm(), DECAY_PX);
         // Far from all matches the weights only differ by a factor; the nearest match's is the scale.
         self.dlt.solve(weight).or_else(|| self.dlt.solve(|_| 1.0))
     }
@@ -188,11 +181,13 @@ impl<'a> LocalHomographies<'a> {
 
     /// Mean of the local homographies' tangents at the anchors, by Student's t of the distance.
     fn linearized(&self, point: Vector2<f64>) -> Vector2<f64> {
+        /// Degrees of freedom of Student's t, as published.
+        const FREEDOM: f64 = 5.0;
         let (mut sum, mut total) = (Vector2::zeros(), 0.0);
         for (anchor, homography) in &self.anchors {
             let offset = point - anchor;
             let squared = offset.norm_squared() / (self.unit * self.unit);
-            let weight = (1.0 + squared / self.freedom).powf(-0.5 * (self.freedom + 1.0));
+            let weight = (1.0 + squared / FREEDOM).powf(-0.5 * (FREEDOM + 1.0));
             sum += (homography.apply(*anchor) + homography.jacobian(*anchor) * offset) * weight;
             total += weight;
         }
@@ -201,13 +196,15 @@ impl<'a> LocalHomographies<'a> {
 }
 
 /// The similarity of least rotation among those of the planes that the matches lie on.
-fn global_similarity(data: &Anchored, options: &WarpOptions, generator: &mut impl Rng) -> Option<Matrix3<f64>> {
-    let (from, to) = (Normalization::of(&data.points)?, Normalization::of(&data.places)?);
+fn global_similarity(data: &Anchored, generator: &mut impl Rng) -> Option<Matrix3<f64>> {
+    /// Matches that make a plane, as published.
+    const PLANE_MATCHES: usize = 50;
+    let normalized = Normalized::of(data)?;
     let mut left: Vec<usize> = (0..data.points.len()).collect();
     let mut candidates: Vec<Matrix3<f64>> = Vec::new();
     loop {
-        let plane = largest_plane(data, &left, (&from, &to), options.aanap_plane_tolerance, generator);
-        let large = plane.len() >= options.aanap_plane_matches;
+        let plane = largest_plane(&normalized, &left, generator);
+        let large = plane.len() >= PLANE_MATCHES;
         // Without any large plane the largest one has to do.
         if large || (candidates.is_empty() && plane.len() >= 4) {
             candidates.extend(fitted_similarity(data, &plane));
@@ -224,14 +221,28 @@ fn global_similarity(data: &Anchored, options: &WarpOptions, generator: &mut imp
     candidates.into_iter().reduce(|best, next| if turn(&next) < turn(&best) { next } else { best })
 }
 
+/// Matches whose points and places are centered, and 1.4 from their center on average.
+struct Normalized {
+    points: Vec<Vector2<f64>>,
+    places: Vec<Vector2<f64>>,
+}
+
+impl Normalized {
+    /// `None` if all points or all places coincide.
+    fn of(data: &Anchored) -> Option<Self> {
+        let applied = |points: &[Vector2<f64>]| -> Option<Vec<Vector2<f64>>> {
+            let normalization = Normalization::of(points)?;
+            Some(points.iter().map(|&point| normalization.apply(point)).collect())
+        };
+        Some(Self { points: applied(&data.points)?, places: applied(&data.places)? })
+    }
+}
+
 /// The largest set of the matches `left` that one homography explains, ascending; by RANSAC.
-fn largest_plane(
-    data: &Anchored,
-    left: &[usize],
-    (from, to): (&Normalization, &Normalization),
-    tolerance: f64,
-    generator: &mut impl Rng,
-) -> Vec<usize> {
+fn largest_plane(data: &Normalized, left: &[usize], generator: &mut impl Rng) -> Vec<usize> {
+    /// Largest distance of a match from a plane's homography, in units in which matches are 1.4 from their center on
+    /// average; as published.
+    const TOLERANCE: f64 = 0.01;
     /// Most samples of four matches: one of them is all on a plane of 1 in 4 matches with 86 %, of 1 in 3 with 99.8 %.
     const MOST_SAMPLES: f64 = 500.0;
     const SAMPLE_SIZE: usize = 4;
@@ -246,16 +257,13 @@ fn largest_plane(
     while taken < needed {
         taken += 1.0;
         let chosen = sample(generator, left.len(), SAMPLE_SIZE);
-        let of = |points: &[Vector2<f64>], by: &Normalization| -> [Vector2<f64>; SAMPLE_SIZE] {
-            std::array::from_fn(|k| by.apply(points[left[chosen.index(k)]]))
+        let of = |points: &[Vector2<f64>]| -> [Vector2<f64>; SAMPLE_SIZE] {
+            std::array::from_fn(|k| points[left[chosen.index(k)]])
         };
-        let Some(plane) = Homography::from_four_points(&of(&data.points, from), &of(&data.places, to)) else {
+        let Some(plane) = Homography::from_four_points(&of(&data.points), &of(&data.places)) else {
             continue;
         };
-        let agrees = |&index: &usize| {
-            let place = plane.apply(from.apply(data.points[index]));
-            (place - to.apply(data.places[index])).norm() <= tolerance
-        };
+        let agrees = |&index: &usize| (plane.apply(data.points[index]) - data.places[index]).norm() <= TOLERANCE;
         let agreeing: Vec<usize> = left.iter().copied().filter(agrees).collect();
         if agreeing.len() > best.len() {
             best = agreeing;
@@ -286,34 +294,37 @@ fn fitted_similarity(data: &Anchored, chosen: &[usize]) -> Option<Matrix3<f64>> 
 
 #[cfg(test)]
 mod tests {
-    use super::super::WarpModel;
+    use super::super::model::WarpModel;
     use super::super::tests::{Example, HEIGHT, WIDTH, matched, misalignment};
     use super::*;
     use crate::warps::placement::anchored;
 
-    fn joined(example: &Example, options: &WarpOptions) -> Join {
+    fn joined(example: &Example) -> Join {
         let input = example.input();
         let placed = vec![Some(example.grids[0].clone()), None];
         let data = anchored(&input, 1, &placed);
         let mut generator = StageContext::default().generator(STAGE, 0);
-        Join::new(&input, Step { picture: 1, parent: 0 }, &data, &placed, options, &mut generator).expect("regular")
+        Join::new(&input, Step { photograph: 1, parent: 0 }, &data, &placed, &mut generator).expect("regular")
     }
 
     #[test]
     fn it_is_the_homography_at_the_overlap_and_the_similarity_far_from_it() {
         let example = Example::panned(&[0.0, 28.0], 0);
-        let join = joined(&example, &WarpOptions::default());
+        let join = joined(&example);
         let truth = |point| example.cameras[1].transfer(&example.cameras[0], point).expect("in front");
         for y in [150.0, 300.0, 450.0] {
             // Inside the matches the local map is the homography, up to the bilinear cells.
             let point = Vector2::new(200.0, y);
             assert!((join.local.warp(point) - truth(point)).norm() < 0.3);
-            // At the far border the similarity has taken over.
-            let far = Vector2::new(WIDTH, y);
-            if join.share(join.local.warp(far)) == 1.0 {
-                assert!((join.place(far) - Homography(join.similarity).apply(far)).norm() < 1e-9);
-            }
         }
+        // At the farthest corner the similarity has taken over.
+        let farthest = [0.0, HEIGHT]
+            .map(|y| Vector2::new(WIDTH, y))
+            .into_iter()
+            .max_by(|one, other| join.share(join.local.warp(*one)).total_cmp(&join.share(join.local.warp(*other))));
+        let farthest = farthest.expect("two corners");
+        assert!((join.share(join.local.warp(farthest)) - 1.0).abs() < 1e-12);
+        assert!((join.place(farthest) - Homography(join.similarity).apply(farthest)).norm() < 1e-9);
         let far = Vector2::new(WIDTH, 0.0);
         assert!(join.share(join.local.warp(far)) > 0.99, "a corner ends the change");
         // The nearest corner is where the change begins.
@@ -343,7 +354,7 @@ mod tests {
         let cameras = Example::panned(&[0.0, 28.0], 0).cameras;
         let example = Example::with_pairs(cameras, vec![matched(0, 1, turned)], 0);
         let placed = example.place(WarpModel::Aanap).expect("a pair");
-        // Homography and similarity are the same map, so the whole picture follows it and the reference stays.
+        // Homography and similarity are the same map, so the whole photograph follows it and the reference stays.
         for vertex in 0..example.grids[1].len() {
             let back = turned(Vector2::from(placed.meshes[1].target[vertex])).expect("total");
             assert!((back - example.grids[1].source(vertex)).norm() < 1e-3);
@@ -353,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_in_a_row_are_all_placed() {
+    fn photographs_in_a_row_are_all_placed() {
         let example = Example::panned(&[-56.0, -28.0, 0.0, 28.0, 56.0], 2);
         let placed = example.place(WarpModel::Aanap).expect("a row");
         assert!(misalignment(&example, &placed.meshes) < 12.0, "{}", misalignment(&example, &placed.meshes));

@@ -5,52 +5,54 @@ use rayon::prelude::*;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
+use super::distance_kernel::DistanceKernel;
 use super::homography::undetermined;
-use super::limits::{depth_at, refuse, with_depth};
+use super::input::WarpInput;
+use super::limits::{MIN_DEPTH, depth_at, refuse, with_depth};
+use super::model::WarpModel;
+use super::options::WarpOptions;
 use super::placement::one_after_another;
-use super::{WarpInput, WarpModel, WarpOptions};
 use crate::match_points::MovingDlt;
 
-trueup_core::choice! {
-    /// How the weight of a match falls with its distance from a vertex.
-    pub enum Kernel {
-        /// exp(-distance / decay), as in the authors' program.
-        Code = "code",
-        /// exp(-(distance / decay)^2), as in the paper.
-        Paper = "paper",
-    }
-}
-
-impl Kernel {
-    /// The weight at a distance, both lengths in the same unit.
-    pub(super) fn weight(self, distance: f64, decay: f64) -> f64 {
-        match self {
-            Self::Code => (-distance / decay).exp(),
-            Self::Paper => (-(distance / decay).powi(2)).exp(),
-        }
-    }
-}
-
-/// Places the pictures one after the other: each vertex goes where the homography goes that fits the matches around it
-/// best.
+/// Places the photographs one after the other: each vertex goes where the homography goes that fits the matches around
+/// it best.
 ///
 /// # Source
 /// Zaragoza et al., "As-projective-as-possible image stitching with moving DLT" (2013), equations 9 to 13.
 ///
 /// # Departures
-/// The published method is for two pictures. Here each further one is fitted to the places that its matches have in the
-/// panorama by then, as deformed as these are.
+/// The published method is for two photographs. Here each further one is fitted to the places that its matches have in
+/// the panorama by then, as deformed as these are.
 pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &StageContext<'_>) -> Result<Vec<GridMesh>> {
+    let weighting = Weighting { kernel: options.apap_kernel, decay_px: options.apap_decay_px, floor: WEIGHT_FLOOR };
+    place_weighted(input, weighting, context)
+}
+
+/// Smallest weight of a match; it keeps vertices far from all matches determined.
+const WEIGHT_FLOOR: f64 = 0.0015;
+
+/// How the weight of a match falls with its distance from a vertex.
+#[derive(Debug, Clone, Copy)]
+struct Weighting {
+    kernel: DistanceKernel,
+    /// Where it has fallen to 1/e, working pixels.
+    decay_px: f64,
+    /// Smallest weight; 1 makes all weights equal, which is one homography.
+    floor: f64,
+}
+
+/// As [`place`], with any weights.
+fn place_weighted(input: &WarpInput<'_>, weighting: Weighting, context: &StageContext<'_>) -> Result<Vec<GridMesh>> {
     one_after_another(input, context, |step, data, _| {
-        let dlt = MovingDlt::new(&data.points, &data.places).ok_or_else(|| undetermined(input, step.picture))?;
-        let grid = &input.grids[step.picture];
+        let dlt = MovingDlt::new(&data.points, &data.places).ok_or_else(|| undetermined(input, step.photograph))?;
+        let grid = &input.grids[step.photograph];
         let target: Vec<Option<[f64; 2]>> = (0..grid.len())
             .into_par_iter()
-            .map(|vertex| at(&dlt, grid.source(vertex), input, step.picture, options).map(Into::into))
+            .map(|vertex| at(&dlt, grid.source(vertex), input, step.photograph, weighting).map(Into::into))
             .collect();
         let whole: Option<Vec<[f64; 2]>> = target.into_iter().collect();
         let target = whole.ok_or_else(|| {
-            refuse(WarpModel::Apap, input, step.picture, "does not lie in front of the panorama's plane")
+            refuse(WarpModel::Apap, input, step.photograph, "does not lie in front of the panorama's plane")
         })?;
         Ok(GridMesh { target, ..grid.clone() })
     })
@@ -61,15 +63,15 @@ fn at(
     dlt: &MovingDlt,
     point: Vector2<f64>,
     input: &WarpInput<'_>,
-    picture: usize,
-    options: &WarpOptions,
+    photograph: usize,
+    weighting: Weighting,
 ) -> Option<Vector2<f64>> {
-    let (kernel, decay) = (options.apap_kernel, options.apap_decay_px);
+    let Weighting { kernel, decay_px, floor } = weighting;
     let local = dlt
-        .solve(|position| kernel.weight((position - point).norm(), decay).max(options.apap_weight_floor))
+        .solve(|position| kernel.weight((position - point).norm(), decay_px).max(floor))
         .or_else(|| dlt.solve(|_| 1.0))?;
-    let local = with_depth(&local, input.cameras[picture].focal_px, input.cameras[input.reference].focal_px)?;
-    (depth_at(&local, &input.cameras[picture], point) > options.min_depth).then(|| local.apply(point))
+    let local = with_depth(&local, input.cameras[photograph].focal_px, input.cameras[input.reference].focal_px)?;
+    (depth_at(&local, &input.cameras[photograph], point) > MIN_DEPTH).then(|| local.apply(point))
 }
 
 #[cfg(test)]
@@ -85,8 +87,8 @@ mod tests {
             one.in_b[0] += (k as f64 * 0.7).sin();
             one.in_b[1] += (k as f64 * 0.3).cos();
         }
-        let options = WarpOptions { apap_weight_floor: 1.0, ..WarpOptions::default() };
-        let placed = example.place_with(WarpModel::Apap, &options).expect("a pair");
+        let weighting = Weighting { kernel: DistanceKernel::Code, decay_px: 72.25, floor: 1.0 };
+        let placed = place_weighted(&example.input(), weighting, &StageContext::default()).expect("a pair");
         let points = |of: fn(&trueup_core::matches::PointMatch) -> [f64; 2]| -> Vec<Vector2<f64>> {
             example.pairs[0].inliers.iter().map(|one| Vector2::from(of(one))).collect()
         };
@@ -94,7 +96,7 @@ mod tests {
         let plain = plain.expect("regular");
         for vertex in 0..example.grids[1].len() {
             let expected = plain.apply(example.grids[1].source(vertex));
-            assert!((Vector2::from(placed.meshes[1].target[vertex]) - expected).norm() < 1e-4);
+            assert!((Vector2::from(placed[1].target[vertex]) - expected).norm() < 1e-4);
         }
     }
 
@@ -106,7 +108,7 @@ mod tests {
             one.in_b[0] += 8.0 / (1.0 + (-(one.in_b[1] - 300.0) / 60.0).exp());
         }
         let homography = example.place(WarpModel::Homography).expect("a pair");
-        for kernel in [Kernel::Code, Kernel::Paper] {
+        for kernel in [DistanceKernel::Code, DistanceKernel::Paper] {
             let options = WarpOptions { apap_kernel: kernel, ..WarpOptions::default() };
             let placed = example.place_with(WarpModel::Apap, &options).expect("a pair");
             assert_eq!(placed.folds, 0);

@@ -1,4 +1,4 @@
-//! The pictures on a sphere, a cylinder or a plane around straightened cameras, as AutoStitch has them.
+//! The photographs on a sphere, a cylinder or a plane around straightened cameras, as AutoStitch has them.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,26 +7,17 @@ use trueup_core::geometry::wrap_angle;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Error, Result};
 
-use super::limits::refuse;
-use super::{WarpInput, WarpModel, WarpOptions};
+use super::input::WarpInput;
+use super::limits::{MIN_DEPTH, refuse};
+use super::model::WarpModel;
+use super::options::{AutostitchSurface, WarpOptions};
 use crate::mesh::divided;
 
-trueup_core::choice! {
-    /// The surface that the method autostitch projects onto.
-    pub enum Projection {
-        /// Longitude and latitude: any field of view but the poles.
-        Spherical = "spherical",
-        /// Longitude and height: verticals stay straight, heights grow towards the poles.
-        Cylindrical = "cylindrical",
-        /// The plane ahead: all lines stay straight; less than half a turn.
-        Plane = "plane",
-    }
-}
-
-/// Places every picture by its camera alone.
+/// Places every photograph by its camera alone.
 ///
-/// The longitude origin is the sum of the viewing directions. A picture that straddles the cut opposite to it stays whole,
-/// on its center's side; where the pictures go all the way round, the cut is the one that the overlaps were cut at.
+/// The longitude origin is the sum of the viewing directions. A photograph that straddles the cut opposite to it stays
+/// whole, on its center's side; where the photographs go all the way round, the cut is the one that the overlaps were
+/// cut at.
 ///
 /// # Source
 /// Brown and Lowe, "Automatic panoramic image stitching using invariant features" (2007), sections 4 and 5; Szeliski,
@@ -34,44 +25,46 @@ trueup_core::choice! {
 pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions) -> Result<Vec<GridMesh>> {
     let origin = input.cut_yaw.map_or(0.0, |cut| cut + PI);
     let radius = input.cameras[input.reference].focal_px;
-    (0..input.grids.len()).map(|picture| View { input, options, picture, origin, radius }.place()).collect()
+    (0..input.grids.len()).map(|photograph| OnSurface { input, options, photograph, origin, radius }.place()).collect()
 }
 
-/// Length of a full turn in panorama units, where the pictures go all the way round a sphere or a cylinder and stay level.
+/// Length of a full turn in panorama units, where the photographs go all the way round a sphere or a cylinder and stay
+/// level.
 pub(super) fn period(model: WarpModel, input: &WarpInput<'_>, options: &WarpOptions) -> Option<f64> {
-    let unrolled = model == WarpModel::Autostitch && options.projection != Projection::Plane;
+    let unrolled = model == WarpModel::Autostitch && options.surface != AutostitchSurface::Plane;
     (unrolled && input.cut_yaw.is_some() && input.turn == 0.0).then(|| TAU * input.cameras[input.reference].focal_px)
 }
 
-struct View<'a> {
+/// One photograph on the surface.
+struct OnSurface<'a> {
     input: &'a WarpInput<'a>,
     options: &'a WarpOptions,
-    picture: usize,
+    photograph: usize,
     /// Longitude that the panorama's middle looks in, radians.
     origin: f64,
     /// Panorama units per radian.
     radius: f64,
 }
 
-impl View<'_> {
+impl OnSurface<'_> {
     fn place(&self) -> Result<GridMesh> {
-        match self.options.projection {
-            Projection::Plane => self.on_plane(),
-            Projection::Spherical | Projection::Cylindrical => self.unrolled(),
+        match self.options.surface {
+            AutostitchSurface::Plane => self.on_plane(),
+            AutostitchSurface::Spherical | AutostitchSurface::Cylindrical => self.unrolled(),
         }
     }
 
     /// The direction of a pixel in the level world, unit length.
     fn direction(&self, pixel: Vector2<f64>) -> Vector3<f64> {
-        self.input.level_from_world * self.input.cameras[self.picture].world_direction(pixel)
+        self.input.level_from_world * self.input.cameras[self.photograph].world_direction(pixel)
     }
 
     fn on_plane(&self) -> Result<GridMesh> {
         let ahead: Matrix3<f64> = trueup_core::geometry::rotation_about_y(self.origin).transpose();
-        let grid = &self.input.grids[self.picture];
+        let grid = &self.input.grids[self.photograph];
         let place = |vertex: usize| {
             let direction = ahead * self.direction(grid.source(vertex));
-            (direction.z > self.options.min_depth)
+            (direction.z > MIN_DEPTH)
                 .then(|| [self.radius * direction.x / direction.z, self.radius * direction.y / direction.z])
         };
         let target: Option<Vec<[f64; 2]>> = (0..grid.len()).map(place).collect();
@@ -86,7 +79,7 @@ impl View<'_> {
         const FINEST: usize = 16;
         let mut factor = 1;
         loop {
-            let grid = divided(&self.input.grids[self.picture], factor);
+            let grid = divided(&self.input.grids[self.photograph], factor);
             let directions: Vec<Vector3<f64>> = (0..grid.len()).map(|k| self.direction(grid.source(k))).collect();
             let longitudes = self.longitudes(&grid, &directions)?;
             if factor < FINEST && longest_step(&grid, &longitudes) > LONGEST_STEP {
@@ -103,14 +96,14 @@ impl View<'_> {
     /// Latitude, or height on the cylinder; `None` at the cylinder's poles.
     fn height(&self, direction: &Vector3<f64>) -> Option<f64> {
         let level = direction.x.hypot(direction.z);
-        match self.options.projection {
-            Projection::Cylindrical => (level > self.options.min_depth).then(|| direction.y / level),
+        match self.options.surface {
+            AutostitchSurface::Cylindrical => (level > MIN_DEPTH).then(|| direction.y / level),
             _ => Some(direction.y.atan2(level)),
         }
     }
 
-    /// Longitudes of all vertices from the origin, without a jump: along the middle row from its middle, then up and down
-    /// every column.
+    /// Longitudes of all vertices from the origin, without a jump: along the middle row from its middle, then up and
+    /// down every column.
     fn longitudes(&self, grid: &GridMesh, directions: &[Vector3<f64>]) -> Result<Vec<f64>> {
         let wrapped = |vertex: usize| directions[vertex].x.atan2(directions[vertex].z) - self.origin;
         let mut longitudes = vec![0.0; grid.len()];
@@ -143,12 +136,12 @@ impl View<'_> {
     }
 
     fn refuse(&self, reason: &str) -> Error {
-        let frame = &self.input.frames[self.picture];
+        let frame = &self.input.frames[self.photograph];
         let axis = self.direction(Vector2::new(frame.width / 2.0, frame.height / 2.0));
         let pitch = -axis.y.asin().to_degrees();
         let reason =
             format!("{reason} (it looks {:.0} degrees {})", pitch.abs(), if pitch < 0.0 { "down" } else { "up" });
-        refuse(WarpModel::Autostitch, self.input, self.picture, &reason)
+        refuse(WarpModel::Autostitch, self.input, self.photograph, &reason)
     }
 }
 
@@ -173,27 +166,29 @@ mod tests {
     use super::super::tests::{Example, HEIGHT, WIDTH, misalignment};
     use super::*;
 
-    fn with(projection: Projection) -> WarpOptions {
-        WarpOptions { projection, ..WarpOptions::default() }
+    fn with(surface: AutostitchSurface) -> WarpOptions {
+        WarpOptions { surface, ..WarpOptions::default() }
     }
 
     #[test]
-    fn every_projection_places_a_picture_where_its_camera_looks() {
+    fn every_surface_places_a_photograph_where_its_camera_looks() {
         let example = Example::panned(&[-20.0, 20.0], 0);
         let yaw = 20_f64.to_radians();
-        for (projection, expected) in
-            [(Projection::Spherical, yaw), (Projection::Cylindrical, yaw), (Projection::Plane, yaw.tan())]
-        {
-            let placed = example.place_with(WarpModel::Autostitch, &with(projection)).expect("a pair");
+        for (surface, expected) in [
+            (AutostitchSurface::Spherical, yaw),
+            (AutostitchSurface::Cylindrical, yaw),
+            (AutostitchSurface::Plane, yaw.tan()),
+        ] {
+            let placed = example.place_with(WarpModel::Autostitch, &with(surface)).expect("a pair");
             assert_eq!(placed.folds, 0);
             assert!(misalignment(&example, &placed.meshes) < 0.5);
             let center = placed.meshes[1].warp(Vector2::new(WIDTH / 2.0, HEIGHT / 2.0));
-            assert!((center - Vector2::new(700.0 * expected, 0.0)).norm() < 0.2, "{projection:?}: {center}");
+            assert!((center - Vector2::new(700.0 * expected, 0.0)).norm() < 0.2, "{surface:?}: {center}");
         }
     }
 
     #[test]
-    fn a_full_turn_is_as_wide_as_a_turn_and_its_straddling_picture_stays_whole() {
+    fn a_full_turn_is_as_wide_as_a_turn_and_its_straddling_photograph_stays_whole() {
         let yaws: Vec<f64> = (0..15).map(|k| f64::from(k) * 24.0).collect();
         let mut example = Example::panned(&yaws, 0);
         example.pairs.clear();
@@ -202,14 +197,14 @@ mod tests {
         let widths = placed.meshes.iter().map(|mesh| mesh.bounds()).map(|(low, high)| high.x - low.x);
         let own = 2.0 * 700.0 * (400_f64 / 700.0).atan();
         assert!(widths.clone().all(|width| (width - own).abs() < 1.0), "{:?}", widths.collect::<Vec<_>>());
-        // Fourteen steps of 24 degrees and one picture's own width.
+        // Fourteen steps of 24 degrees and one photograph's own width.
         let low = placed.meshes.iter().map(|mesh| mesh.bounds().0.x).fold(f64::INFINITY, f64::min);
         let high = placed.meshes.iter().map(|mesh| mesh.bounds().1.x).fold(f64::NEG_INFINITY, f64::max);
         assert!((high - low - own - 700.0 * 336_f64.to_radians()).abs() < 1.0);
     }
 
     #[test]
-    fn a_picture_near_a_pole_is_placed_and_one_that_covers_it_is_refused() {
+    fn a_photograph_near_a_pole_is_placed_and_one_that_covers_it_is_refused() {
         let looking_up = |pitch_deg: f64| {
             let world_from_camera = rotation_about_y(0.3) * rotation_about_x(pitch_deg.to_radians());
             let level = Camera::new(700.0, WIDTH, HEIGHT, &rotation_about_y(0.3).transpose());

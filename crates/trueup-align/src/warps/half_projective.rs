@@ -1,4 +1,4 @@
-//! SPHP for any number of pictures: which pair the warp is made of, and where its lines lie.
+//! SPHP for any number of photographs: which pair the warp is made of, and where its lines lie.
 
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use rayon::prelude::*;
@@ -6,39 +6,43 @@ use trueup_core::geometry::Homography;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
+use super::deformed::deformed;
 use super::homography::onto;
-use super::limits::{farthest_angle, least_depth, refuse};
+use super::input::WarpInput;
+use super::limits::{MIN_DEPTH, farthest_angle, least_depth, refuse};
+use super::model::WarpModel;
+use super::options::WarpOptions;
 use super::sphp::SphpWarp;
-use super::{WarpInput, WarpModel, WarpOptions, deformed};
 use crate::stitch_graph::StitchGraph;
 
-/// Offsets of the first line that are tried, in working pixels of a picture whose longer side is [`PUBLISHED_SIDE_PX`].
-const FIRST_OFFSETS: (f64, f64) = (-300.0, 600.0);
+/// Offsets of the first line that are tried, in working pixels of a photograph whose longer side is
+/// [`PUBLISHED_SIDE_PX`].
+const FIRST_OFFSETS: [f64; 2] = [-300.0, 600.0];
 /// Offsets of the second line.
-const SECOND_OFFSETS: (f64, f64) = (-300.0, 200.0);
+const SECOND_OFFSETS: [f64; 2] = [-300.0, 200.0];
 /// Step of both.
 const OFFSET_STEP: f64 = 10.0;
 /// Least distance of the lines.
 const LEAST_GAP: f64 = 120.0;
-/// The longer side of pictures that these lengths belong to.
+/// The longer side of photographs that these lengths belong to.
 const PUBLISHED_SIDE_PX: f64 = 800.0;
 /// Distance of the points at which the distortion is sampled, working pixels.
 const SAMPLE_STEP_PX: f64 = 40.0;
 
-/// Places all pictures by one half-projective warp.
+/// Places all photographs by one half-projective warp.
 ///
-/// The panorama lies on the plane of a picture `tar` where the warp is a homography, and follows the picture `ref` where
-/// it is a similarity; tried are the two pictures farthest apart in the graph and the reference with the one farthest from
-/// it, in both roles, and all pairs of lines on a raster. The least distorted one is taken: that with the smallest sum of
-/// squared distances of the Jacobians from each picture's best similarity.
+/// The panorama lies on the plane of a photograph `tar` where the warp is a homography, and follows the photograph
+/// `ref` where it is a similarity; tried are the two photographs farthest apart in the graph and the reference with the
+/// one farthest from it, in both roles, and all pairs of lines on a raster. The least distorted one is taken: that with
+/// the smallest sum of squared distances of the Jacobians from each photograph's best similarity.
 ///
 /// # Source
-/// Chang, Sato and Chuang, "Shape-preserving half-projective warps for image stitching" (2014), sections 3 and 4; ranges
-/// and step of the lines as in the authors' program.
+/// Chang, Sato and Chuang, "Shape-preserving half-projective warps for image stitching" (2014), sections 3 and 4;
+/// ranges and step of the lines as in the authors' program.
 ///
 /// # Departures
-/// Jacobians are sampled every 40 px instead of at every pixel. For more than two pictures the paper leaves the choice of
-/// the pair to the user.
+/// Jacobians are sampled every 40 px instead of at every pixel. For more than two photographs the paper leaves the
+/// choice of the pair to the user.
 pub(super) fn place(
     model: WarpModel,
     input: &WarpInput<'_>,
@@ -60,7 +64,7 @@ pub(super) fn place(
             .unwrap_or(input.reference);
         return Err(refuse(model, input, widest, "cannot be laid on one plane with the others"));
     };
-    Ok((0..input.grids.len()).map(|picture| plan.mesh(input, picture)).collect())
+    Ok((0..input.grids.len()).map(|photograph| plan.mesh(input, photograph)).collect())
 }
 
 /// The pairs (ref, tar) to be tried.
@@ -80,7 +84,7 @@ fn roles(input: &WarpInput<'_>) -> Vec<(usize, usize)> {
     roles
 }
 
-/// Steps between all pictures along overlaps.
+/// Steps between all photographs along overlaps.
 fn hop_distances(input: &WarpInput<'_>) -> Vec<Vec<usize>> {
     let count = input.grids.len();
     let graph = StitchGraph::new(count, input.pairs);
@@ -98,16 +102,16 @@ fn hop_distances(input: &WarpInput<'_>) -> Vec<Vec<usize>> {
                     }
                 }
             }
-            // Pictures that are not connected are never the farthest.
+            // Photographs that are not connected are never the farthest.
             distance.into_iter().map(|steps| if steps == usize::MAX { 0 } else { steps }).collect()
         })
         .collect()
 }
 
-/// A warp of all pictures.
+/// A warp of all photographs.
 #[derive(Debug)]
 struct Plan {
-    /// For each picture the homography into the plane of `ref`, its center the origin.
+    /// For each photograph the homography into the plane of `ref`, its center the origin.
     onto_ref: Vec<Homography>,
     warp: Warp,
 }
@@ -119,7 +123,7 @@ enum Warp {
     Affine(Homography),
 }
 
-/// A place of a picture in the plane of `ref`, and the derivative there.
+/// A place of a photograph in the plane of `ref`, and the derivative there.
 struct Sample {
     place: Vector2<f64>,
     derivative: Matrix2<f64>,
@@ -136,7 +140,7 @@ impl Plan {
     ) -> Result<Option<(f64, Self)>> {
         let onto_source = onto(input, source, options.pair_homographies)?;
         let in_front = (0..onto_source.len())
-            .all(|picture| least_depth(&onto_source[picture], input, picture) > options.min_depth);
+            .all(|photograph| least_depth(&onto_source[photograph], input, photograph) > MIN_DEPTH);
         if !in_front {
             return Ok(None);
         }
@@ -147,12 +151,12 @@ impl Plan {
         let onto_ref: Vec<Homography> = onto_source.iter().map(|homography| to_center.after(homography)).collect();
         let target_from_ref = onto(input, target, options.pair_homographies)?[source].after(&from_center);
         let scale = target_from_ref.0[(2, 2)];
-        if scale <= options.min_depth {
+        if scale <= MIN_DEPTH {
             return Ok(None);
         }
         let target_from_ref = Homography(target_from_ref.0 / scale);
         let samples: Vec<Vec<Sample>> =
-            (0..onto_ref.len()).map(|picture| sampled(input, picture, &onto_ref[picture])).collect();
+            (0..onto_ref.len()).map(|photograph| sampled(input, photograph, &onto_ref[photograph])).collect();
         let centers = input
             .frames
             .iter()
@@ -166,19 +170,19 @@ impl Plan {
             }
             Some(direction) => {
                 let along: Vec<f64> = centers.map(|center| direction.dot(&center)).collect();
-                let start = (
+                let start = [
                     along.iter().copied().fold(f64::INFINITY, f64::min),
                     along.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-                );
+                ];
                 least_distorted(&target_from_ref, start, unit, zero_rotation, &samples)
             }
         };
         Ok(found.map(|(cost, warp)| (cost, Self { onto_ref, warp })))
     }
 
-    fn mesh(&self, input: &WarpInput<'_>, picture: usize) -> GridMesh {
-        deformed(&input.grids[picture], |point| {
-            let place = self.onto_ref[picture].apply(point);
+    fn mesh(&self, input: &WarpInput<'_>, photograph: usize) -> GridMesh {
+        deformed(&input.grids[photograph], |point| {
+            let place = self.onto_ref[photograph].apply(point);
             match &self.warp {
                 Warp::Halves(warp) => warp.apply(place),
                 Warp::Affine(homography) => homography.apply(place),
@@ -187,8 +191,8 @@ impl Plan {
     }
 }
 
-fn sampled(input: &WarpInput<'_>, picture: usize, onto_ref: &Homography) -> Vec<Sample> {
-    let frame = &input.frames[picture];
+fn sampled(input: &WarpInput<'_>, photograph: usize, onto_ref: &Homography) -> Vec<Sample> {
+    let frame = &input.frames[photograph];
     let grid = GridMesh::regular(frame.width, frame.height, SAMPLE_STEP_PX);
     let sample = |point| Sample { place: onto_ref.apply(point), derivative: onto_ref.jacobian(point) };
     (0..grid.len()).map(|vertex| sample(grid.source(vertex))).collect()
@@ -197,21 +201,21 @@ fn sampled(input: &WarpInput<'_>, picture: usize, onto_ref: &Homography) -> Vec<
 /// Tries all pairs of lines around `start`; `unit` is the scale of the published lengths.
 fn least_distorted(
     homography: &Homography,
-    start: (f64, f64),
+    start: [f64; 2],
     unit: f64,
     zero_rotation: bool,
     samples: &[Vec<Sample>],
 ) -> Option<(f64, Warp)> {
-    let offsets = |(low, high): (f64, f64)| {
+    let offsets = |[low, high]: [f64; 2]| {
         let steps = ((high - low) / OFFSET_STEP).round() as usize;
         (0..=steps).map(move |step| (low + OFFSET_STEP * step as f64) * unit)
     };
-    let firsts: Vec<f64> = offsets(FIRST_OFFSETS).map(|offset| start.0 + offset).collect();
+    let firsts: Vec<f64> = offsets(FIRST_OFFSETS).map(|offset| start[0] + offset).collect();
     let candidates: Vec<Option<(f64, SphpWarp)>> = firsts
         .into_par_iter()
         .map(|first| {
             let mut best: Option<(f64, SphpWarp)> = None;
-            for second in offsets(SECOND_OFFSETS).map(|offset| start.1 + offset) {
+            for second in offsets(SECOND_OFFSETS).map(|offset| start[1] + offset) {
                 if second - first < LEAST_GAP * unit {
                     continue;
                 }
@@ -234,25 +238,26 @@ fn least_distorted(
     least.map(|(cost, warp)| (cost, Warp::Halves(Box::new(warp))))
 }
 
-/// Sum over the pictures of the squared distances of the derivatives from the picture's best similarity; `None` where the
-/// warp has no derivative.
+/// Sum over the photographs of the squared distances of the derivatives from the photograph's best similarity; `None`
+/// where the warp has no derivative.
 fn distortion(samples: &[Vec<Sample>], jacobian: impl Fn(Vector2<f64>) -> Option<Matrix2<f64>>) -> Option<f64> {
     let mut cost = 0.0;
-    for of_picture in samples {
+    for of_photograph in samples {
         let (mut squares, mut turn) = (0.0, Vector2::zeros());
-        for sample in of_picture {
+        for sample in of_photograph {
             let whole = jacobian(sample.place)? * sample.derivative;
             squares += whole.norm_squared();
             turn += Vector2::new(whole[(0, 0)] + whole[(1, 1)], whole[(1, 0)] - whole[(0, 1)]);
         }
         // The best similarity is (alpha, beta) = turn / 2n; what it explains is 2 n (alpha^2 + beta^2).
-        cost += squares - turn.norm_squared() / (2.0 * of_picture.len() as f64);
+        cost += squares - turn.norm_squared() / (2.0 * of_photograph.len() as f64);
     }
     cost.is_finite().then_some(cost)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::limits::{LIMITS, Limits};
     use super::super::tests::{Example, HEIGHT, WIDTH, misalignment};
     use super::*;
 
@@ -261,13 +266,13 @@ mod tests {
     #[test]
     fn rows_meet_without_a_fold_and_are_less_distorted_than_by_homographies() {
         let example = Example::panned(&[-25.0, 0.0, 25.0], 1);
-        let options = WarpOptions { max_area_ratio: 1e6, ..WarpOptions::default() };
+        let wide = Limits { max_area_ratio: 1e6, ..LIMITS };
         for model in MODELS {
             let placed = example.place(model).expect("a narrow set");
             assert_eq!(placed.folds, 0);
             assert!(misalignment(&example, &placed.meshes) < 1.0, "{}", misalignment(&example, &placed.meshes));
-            // On the plane of an end picture the other end would be huge.
-            let plain = Example::panned(&[-25.0, 0.0, 25.0], 0).place_with(WarpModel::Homography, &options);
+            // On the plane of an end photograph the other end would be huge.
+            let plain = Example::panned(&[-25.0, 0.0, 25.0], 0).place_within(WarpModel::Homography, &wide);
             let width = |mesh: &GridMesh| mesh.bounds().1.x - mesh.bounds().0.x;
             let plain = plain.expect("below 90 degrees");
             let widest = |meshes: &[GridMesh]| meshes.iter().map(width).fold(0.0, f64::max);
@@ -275,9 +280,9 @@ mod tests {
         }
     }
 
-    /// Value and derivative of the whole map of a picture have no jump anywhere.
+    /// Value and derivative of the whole map of a photograph have no jump anywhere.
     #[test]
-    fn the_whole_map_of_a_picture_is_smooth() {
+    fn the_whole_map_of_a_photograph_is_smooth() {
         let example = Example::panned(&[-25.0, 0.0, 25.0], 1);
         let input = example.input();
         for zero_rotation in [true, false] {
@@ -285,15 +290,15 @@ mod tests {
                 .expect("connected")
                 .expect("a narrow set");
             let Warp::Halves(warp) = &plan.warp else { panic!("a pan is projective") };
-            let whole = |picture: usize, point: Vector2<f64>| warp.apply(plan.onto_ref[picture].apply(point));
-            for picture in 0..3 {
+            let whole = |photograph: usize, point: Vector2<f64>| warp.apply(plan.onto_ref[photograph].apply(point));
+            for photograph in 0..3 {
                 let step = 0.5;
                 let mut earlier: Option<Vector2<f64>> = None;
                 for k in 0..(WIDTH / step) as usize {
-                    let at = |k: usize| whole(picture, Vector2::new(k as f64 * step, HEIGHT / 3.0));
+                    let at = |k: usize| whole(photograph, Vector2::new(k as f64 * step, HEIGHT / 3.0));
                     let slope = (at(k + 1) - at(k)) / step;
                     let change = earlier.map_or(0.0, |earlier| (slope - earlier).norm());
-                    assert!(change < 0.02, "picture {picture} at {k}: {change}");
+                    assert!(change < 0.02, "photograph {photograph} at {k}: {change}");
                     earlier = Some(slope);
                 }
             }
@@ -301,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn zero_rotation_leaves_a_picture_upright() {
+    fn zero_rotation_leaves_a_photograph_upright() {
         let example = Example::panned(&[0.0, 20.0], 0);
         let input = example.input();
         let (_, plan) =

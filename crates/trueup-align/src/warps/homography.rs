@@ -1,4 +1,4 @@
-//! One homography per picture, onto the plane of the reference.
+//! One homography per photograph, onto the plane of the reference.
 
 use nalgebra::{Matrix3, Vector2};
 use trueup_core::camera::Camera;
@@ -6,27 +6,30 @@ use trueup_core::geometry::Homography;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Error, Result};
 
-use super::limits::{farthest_angle, least_depth, refuse, with_depth};
-use super::{HomographySource, STAGE, WarpInput, WarpModel, WarpOptions, deformed};
+use super::deformed::deformed;
+use super::input::{STAGE, WarpInput};
+use super::limits::{MIN_DEPTH, farthest_angle, least_depth, refuse, with_depth};
+use super::model::WarpModel;
+use super::options::{HomographySource, WarpOptions};
 use crate::stitch_graph::StitchGraph;
 
-/// Places every picture by its homography onto the reference's plane.
+/// Places every photograph by its homography onto the reference's plane.
 ///
 /// # Source
 /// Szeliski, "Image alignment and stitching: a tutorial" (2006), sections 2.1 and 6.1.
 pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions) -> Result<Vec<GridMesh>> {
     let homographies = onto(input, input.reference, options.homographies)?;
-    let behind = |picture: &usize| least_depth(&homographies[*picture], input, *picture) <= options.min_depth;
+    let behind = |photograph: &usize| least_depth(&homographies[*photograph], input, *photograph) <= MIN_DEPTH;
     let widest = (0..homographies.len())
         .filter(behind)
         .max_by(|&a, &b| farthest_angle(input, a).total_cmp(&farthest_angle(input, b)));
-    if let Some(picture) = widest {
-        return Err(refuse(WarpModel::Homography, input, picture, "does not lie in front of the panorama's plane"));
+    if let Some(photograph) = widest {
+        return Err(refuse(WarpModel::Homography, input, photograph, "does not lie in front of the panorama's plane"));
     }
     Ok(homographies.iter().zip(input.grids).map(|(h, grid)| deformed(grid, |point| h.apply(point))).collect())
 }
 
-/// For every picture the homography onto the plane of picture `target`, its denominator the depth.
+/// For every photograph the homography onto the plane of photograph `target`, its denominator the depth.
 pub(super) fn onto(input: &WarpInput<'_>, target: usize, source: HomographySource) -> Result<Vec<Homography>> {
     match source {
         HomographySource::Cameras => {
@@ -37,7 +40,7 @@ pub(super) fn onto(input: &WarpInput<'_>, target: usize, source: HomographySourc
     }
 }
 
-/// `K_to R_to R_from^T K_from^-1`: where the picture of one camera appears in that of the other, both at one place.
+/// `K_to R_to R_from^T K_from^-1`: where the photograph of one camera appears in that of the other, both at one place.
 fn between(from: &Camera, to: &Camera) -> Homography {
     let intrinsic = |camera: &Camera| {
         let ([x, y], f) = (camera.principal_point, camera.focal_px);
@@ -64,11 +67,11 @@ fn chained(input: &WarpInput<'_>, target: usize) -> Result<Vec<Homography>> {
     onto_target
         .into_iter()
         .enumerate()
-        .map(|(picture, found)| found.ok_or_else(|| undetermined(input, picture)))
+        .map(|(photograph, found)| found.ok_or_else(|| undetermined(input, photograph)))
         .collect()
 }
 
-/// The homography from picture `from` to picture `to` by their matches, its denominator the depth.
+/// The homography from photograph `from` to photograph `to` by their matches, its denominator the depth.
 fn of_pair(input: &WarpInput<'_>, from: usize, to: usize) -> Result<Homography> {
     let pair = input.pairs.iter().find(|pair| (pair.a, pair.b) == (from.min(to), from.max(to)));
     let b_from_a = pair.and_then(|pair| match &pair.b_from_a {
@@ -86,7 +89,7 @@ fn of_pair(input: &WarpInput<'_>, from: usize, to: usize) -> Result<Homography> 
         .ok_or_else(|| undetermined(input, from))
 }
 
-/// The homography from one picture to a neighbor, its denominator the depth.
+/// The homography from one photograph to a neighbor, its denominator the depth.
 pub(super) fn of_pair_or_cameras(
     input: &WarpInput<'_>,
     from: usize,
@@ -99,11 +102,11 @@ pub(super) fn of_pair_or_cameras(
     }
 }
 
-/// The error for a picture whose matches are too few or degenerate.
-pub(super) fn undetermined(input: &WarpInput<'_>, picture: usize) -> Error {
+/// The error for a photograph whose matches are too few or degenerate.
+pub(super) fn undetermined(input: &WarpInput<'_>, photograph: usize) -> Error {
     Error::unsolvable(
         STAGE,
-        &input.names[picture],
+        &input.names[photograph],
         "its matches determine no homography",
         "Leave this photograph out, or choose another method.",
     )

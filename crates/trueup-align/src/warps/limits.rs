@@ -1,4 +1,4 @@
-//! What a warp model refuses: pictures that it cannot place without tearing, folding or blowing them up.
+//! What a warp model refuses: photographs that it cannot place without tearing, folding or blowing them up.
 
 use nalgebra::Vector2;
 use trueup_core::camera::Camera;
@@ -7,18 +7,38 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::options::OptionValue;
 use trueup_core::{Error, Result};
 
-use super::{WarpInput, WarpModel, WarpOptions};
+use super::input::WarpInput;
+use super::model::WarpModel;
 use crate::mesh::count_folds;
+
+/// Depth, relative to the distance, below which a viewing direction counts as beside or behind the panorama's plane:
+/// 88.9 degrees off its axis.
+pub(super) const MIN_DEPTH: f64 = 0.02;
+
+/// How far photographs may be deformed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits {
+    /// Farthest that a photograph may reach from the reference's center, in diagonals of the reference.
+    pub max_reach: f64,
+    /// Largest area of a photograph in the panorama, in areas of the reference.
+    pub max_area_ratio: f64,
+    /// Largest share of a photograph's grid that may be folded.
+    pub max_folded_share: f64,
+}
+
+/// Beyond these a panorama is of no use: a photograph near the plane's horizon would be most of it.
+pub(super) const LIMITS: Limits = Limits { max_reach: 20.0, max_area_ratio: 25.0, max_folded_share: 0.02 };
 
 /// What a user can do about a field of view that is too wide.
 const TOO_WIDE: &str = "Use the method vpg or autostitch, or stitch fewer photographs.";
 /// What a user can do where the sphere does not help either.
 const TOO_STEEP: &str = "Use the method vpg, or leave this photograph out.";
 
-/// The refusal of a set by a model. `reason` says which picture and why; the angle that the picture reaches is added.
-pub(super) fn refuse(model: WarpModel, input: &WarpInput<'_>, picture: usize, reason: &str) -> Error {
-    let angle = farthest_angle(input, picture).to_degrees();
-    let (name, reference) = (&input.names[picture], &input.names[input.reference]);
+/// The refusal of a set by a model. `reason` says which photograph and why; the angle that the photograph reaches is
+/// added.
+pub(super) fn refuse(model: WarpModel, input: &WarpInput<'_>, photograph: usize, reason: &str) -> Error {
+    let angle = farthest_angle(input, photograph).to_degrees();
+    let (name, reference) = (&input.names[photograph], &input.names[input.reference]);
     Error::not_applicable(
         model.display(),
         format!("{name} {reason}; it reaches {angle:.0} degrees from the axis of {reference}"),
@@ -26,22 +46,22 @@ pub(super) fn refuse(model: WarpModel, input: &WarpInput<'_>, picture: usize, re
     )
 }
 
-/// The largest angle in radians between the reference's axis and a direction that a picture's border sees.
-pub(super) fn farthest_angle(input: &WarpInput<'_>, picture: usize) -> f64 {
+/// The largest angle in radians between the reference's axis and a direction that a photograph's border sees.
+pub(super) fn farthest_angle(input: &WarpInput<'_>, photograph: usize) -> f64 {
     let axis = input.cameras[input.reference].rotation().row(2).transpose();
-    let frame = &input.frames[picture];
+    let frame = &input.frames[photograph];
     corners(frame.width, frame.height)
         .into_iter()
-        .map(|corner| input.cameras[picture].world_direction(corner).angle(&axis))
+        .map(|corner| input.cameras[photograph].world_direction(corner).angle(&axis))
         .fold(0.0, f64::max)
 }
 
-/// The corners of a picture, clockwise from the top left.
+/// The corners of a photograph, clockwise from the top left.
 pub(super) fn corners(width: f64, height: f64) -> [Vector2<f64>; 4] {
     [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)].map(|(x, y)| Vector2::new(x, y))
 }
 
-/// The homography scaled so that its denominator is the depth of a viewing direction of unit depth in the picture:
+/// The homography scaled so that its denominator is the depth of a viewing direction of unit depth in the photograph:
 /// what it is for `K_to R K_from^-1` with a rotation R. `None` if it mirrors or is singular.
 ///
 /// For other homographies (parallax) the determinant defines the same scale.
@@ -51,11 +71,11 @@ pub(super) fn with_depth(homography: &Homography, focal_from: f64, focal_to: f64
     scaled.iter().all(|entry| entry.is_finite()).then_some(Homography(scaled))
 }
 
-/// The smallest depth over a picture's corners, relative to the distance along the viewing direction.
+/// The smallest depth over a photograph's corners, relative to the distance along the viewing direction.
 ///
-/// `homography` as of [`with_depth`]. Where no corner is behind the plane, no point of the picture is.
-pub(super) fn least_depth(homography: &Homography, input: &WarpInput<'_>, picture: usize) -> f64 {
-    let (frame, camera) = (&input.frames[picture], &input.cameras[picture]);
+/// `homography` as of [`with_depth`]. Where no corner is behind the plane, no point of the photograph is.
+pub(super) fn least_depth(homography: &Homography, input: &WarpInput<'_>, photograph: usize) -> f64 {
+    let (frame, camera) = (&input.frames[photograph], &input.cameras[photograph]);
     corners(frame.width, frame.height)
         .into_iter()
         .map(|corner| depth_at(homography, camera, corner))
@@ -71,53 +91,50 @@ pub(super) fn depth_at(homography: &Homography, camera: &Camera, point: Vector2<
 pub(super) fn check_depth_in_overlap(
     model: WarpModel,
     input: &WarpInput<'_>,
-    picture: usize,
+    photograph: usize,
     homography: &Homography,
     overlap: &[Vector2<f64>],
-    options: &WarpOptions,
 ) -> Result<()> {
-    let camera = &input.cameras[picture];
-    match overlap.iter().all(|&point| depth_at(homography, camera, point) > options.min_depth) {
+    let camera = &input.cameras[photograph];
+    match overlap.iter().all(|&point| depth_at(homography, camera, point) > MIN_DEPTH) {
         true => Ok(()),
-        false => Err(refuse(model, input, picture, "has matches that do not lie in front of its neighbor")),
+        false => Err(refuse(model, input, photograph, "has matches that do not lie in front of its neighbor")),
     }
 }
 
-/// Refuses placed pictures that are not finite, too far away, too large or folded.
-pub(super) fn check(model: WarpModel, input: &WarpInput<'_>, meshes: &[GridMesh], options: &WarpOptions) -> Result<()> {
+/// Refuses placed photographs that are not finite, too far away, too large or folded.
+pub(super) fn check(model: WarpModel, input: &WarpInput<'_>, meshes: &[GridMesh], limits: &Limits) -> Result<()> {
     let anchor = &meshes[input.reference];
     let center = anchor.warp(Vector2::new(anchor.width / 2.0, anchor.height / 2.0));
     let area = target_area(anchor);
     // The reference's own scale in the panorama.
     let scale = (area / (anchor.width * anchor.height)).sqrt();
-    let reach = options.max_reach * anchor.width.hypot(anchor.height) * scale;
-    for (picture, mesh) in meshes.iter().enumerate() {
+    let reach = limits.max_reach * anchor.width.hypot(anchor.height) * scale;
+    for (photograph, mesh) in meshes.iter().enumerate() {
         let finite = mesh.target.iter().flatten().all(|coordinate| coordinate.is_finite());
         if !finite {
-            return Err(refuse(model, input, picture, "cannot be placed"));
+            return Err(refuse(model, input, photograph, "cannot be placed"));
         }
         let farthest = mesh.target.iter().map(|&vertex| (Vector2::from(vertex) - center).norm()).fold(0.0, f64::max);
         if farthest > reach {
             let reason = format!(
-                "would lie {:.0} diagonals of the reference away (warps.max_reach allows {})",
-                farthest / reach * options.max_reach,
-                options.max_reach
+                "would lie {:.0} diagonals of the reference away ({} are allowed)",
+                farthest / reach * limits.max_reach,
+                limits.max_reach
             );
-            return Err(refuse(model, input, picture, &reason));
+            return Err(refuse(model, input, photograph, &reason));
         }
         let growth = target_area(mesh) / area;
-        if growth.is_nan() || growth > options.max_area_ratio {
-            let reason = format!(
-                "would be {growth:.0} times as large as the reference (warps.max_area_ratio allows {})",
-                options.max_area_ratio
-            );
-            return Err(refuse(model, input, picture, &reason));
+        if growth.is_nan() || growth > limits.max_area_ratio {
+            let reason =
+                format!("would be {growth:.0} times as large as the reference ({} are allowed)", limits.max_area_ratio);
+            return Err(refuse(model, input, photograph, &reason));
         }
         let triangles = 2 * (mesh.rows - 1) * (mesh.columns - 1);
         let folded = count_folds(mesh);
-        if folded as f64 > options.max_folded_share * triangles as f64 {
+        if folded as f64 > limits.max_folded_share * triangles as f64 {
             let percent = 100.0 * folded as f64 / triangles as f64;
-            return Err(refuse(model, input, picture, &format!("would be folded over {percent:.0} % of it")));
+            return Err(refuse(model, input, photograph, &format!("would be folded over {percent:.0} % of it")));
         }
     }
     Ok(())

@@ -1,9 +1,9 @@
 //! Options of the warp models.
 
-use super::{Kernel, Projection};
+use super::distance_kernel::DistanceKernel;
 
 trueup_core::choice! {
-    /// Where the homographies between pictures come from.
+    /// Where the homographies between photographs come from.
     pub enum HomographySource {
         /// From the cameras: they agree all the way round, and know of no parallax.
         Cameras = "cameras",
@@ -12,40 +12,38 @@ trueup_core::choice! {
     }
 }
 
+trueup_core::choice! {
+    /// The surface that the method autostitch projects onto.
+    pub enum AutostitchSurface {
+        /// Longitude and latitude: any field of view but the poles.
+        Spherical = "spherical",
+        /// Longitude and height: verticals stay straight, heights grow towards the poles.
+        Cylindrical = "cylindrical",
+        /// The plane ahead: all lines stay straight; less than half a turn.
+        Plane = "plane",
+    }
+}
+
 trueup_core::options! {
-    /// How the methods that are warp models place the pictures.
+    /// How the methods that are warp models place the photographs.
     pub struct WarpOptions("warps") {
-        /// Where the homographies of the method homography come from.
+        /// Where the homographies of the method homography come from. Choose the pairs where the photographs were taken
+        /// from different places.
         homographies: HomographySource = HomographySource::Cameras, Allowed::Any, "";
-        /// Where those of the methods sphp, sphp-free and quasi-homography come from.
+        /// Where those of the methods sphp, sphp-free and quasi-homography come from. Choose the cameras where the
+        /// pairs' own homographies do not agree.
         pair_homographies: HomographySource = HomographySource::Pairs, Allowed::Any, "";
-        /// The surface that the method autostitch projects onto.
-        projection: Projection = Projection::Spherical, Allowed::Any, "";
-        /// How the weight of a match falls with its distance from a vertex in the method apap.
-        apap_kernel: Kernel = Kernel::Code, Allowed::Any, "";
-        /// Distance over which that weight falls to 1/e; 72.25 is the published 8.5 squared.
+        /// The surface that the method autostitch projects onto. Choose the plane for narrow views with straight lines,
+        /// the cylinder for verticals that stay straight.
+        surface: AutostitchSurface = AutostitchSurface::Spherical, Allowed::Any, "";
+        /// How the weight of a match falls with its distance from a vertex in the method apap. Change it to compare
+        /// with results made by the paper's formula.
+        apap_kernel: DistanceKernel = DistanceKernel::Code, Allowed::Any, "";
+        /// Distance over which that weight falls to 1/e; 72.25 is the published 8.5 squared. Lower it where overlaps
+        /// still show double, raise it where they are bent.
         apap_decay_px: f64 = 72.25, between(1.0, 10000.0), "working px";
-        /// Smallest such weight; 1 makes all weights equal, which is one homography.
-        apap_weight_floor: f64 = 0.0015, between(0.0, 1.0), "";
-        /// The same distance in the method aanap; 156.25 is the published 12.5 squared.
-        aanap_decay_px: f64 = 156.25, between(1.0, 10000.0), "working px";
-        /// Degrees of freedom of Student's t by which anchors are weighed in the linearized homography of aanap.
-        aanap_freedom: f64 = 5.0, between(0.1, 1000.0), "";
-        /// Largest distance of a match from a plane's homography in aanap's search for the similarity, in units in which
-        /// matches are 1.4 from their center on average.
-        aanap_plane_tolerance: f64 = 0.01, between(1e-5, 1.0), "";
-        /// Matches that make a plane in that search.
-        aanap_plane_matches: usize = 50, between(4.0, 1e6), "matches";
-        /// Whether aanap moves the pictures that are placed already along with the one that joins them.
+        /// Whether the method aanap moves the photographs that are placed already along with the one that joins them.
+        /// Turn it off to keep the reference as it was taken, at the price of ghosts.
         adapt_reference: bool = true, Allowed::Any, "";
-        /// Depth, relative to the distance, below which a viewing direction counts as beside or behind the panorama's
-        /// plane; 0.02 is 88.9 degrees off its axis.
-        min_depth: f64 = 0.02, between(1e-6, 0.9), "";
-        /// Farthest that a picture may reach from the reference's center.
-        max_reach: f64 = 20.0, between(1.0, 1e6), "reference diagonals";
-        /// Largest area of a picture in the panorama.
-        max_area_ratio: f64 = 25.0, between(1.0, 1e6), "reference areas";
-        /// Largest share of a picture's grid that may be folded.
-        max_folded_share: f64 = 0.02, between(0.0, 1.0), "";
     }
 }

@@ -1,36 +1,36 @@
-//! The order in which pictures join a panorama, and where their matches lie in it by then.
+//! The order in which photographs join a panorama, and where their matches lie in it by then.
 
 use nalgebra::Vector2;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
-use super::WarpInput;
 use super::homography::undetermined;
+use super::input::WarpInput;
 
-/// A picture that joins those already placed.
+/// A photograph that joins those already placed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Step {
-    /// The picture.
-    pub picture: usize,
-    /// The placed picture that it shares most matches with.
+    /// The photograph.
+    pub photograph: usize,
+    /// The placed photograph that it shares most matches with.
     pub parent: usize,
 }
 
-/// Points of a picture and where the placed pictures that see them too have them in the panorama.
+/// Points of a photograph and where the placed photographs that see them too have them in the panorama.
 #[derive(Debug, Default)]
 pub(super) struct Anchored {
-    /// In the picture, working pixels.
+    /// In the photograph, working pixels.
     pub points: Vec<Vector2<f64>>,
     /// In the panorama.
     pub places: Vec<Vector2<f64>>,
 }
 
-/// The pictures in the order in which they join the reference: always the one that shares most matches with those placed,
-/// ties by index.
+/// The photographs in the order in which they join the reference: always the one that shares most matches with those
+/// placed, ties by index.
 ///
 /// # Errors
-/// [`trueup_core::Error::Unsolvable`] if a picture shares no match with the others.
+/// [`trueup_core::Error::Unsolvable`] if a photograph shares no match with the others.
 pub(super) fn order(input: &WarpInput<'_>) -> Result<Vec<Step>> {
     let count = input.grids.len();
     let mut placed = vec![false; count];
@@ -38,19 +38,19 @@ pub(super) fn order(input: &WarpInput<'_>) -> Result<Vec<Step>> {
     let mut steps = Vec::with_capacity(count - 1);
     while steps.len() + 1 < count {
         let next = (0..count)
-            .filter(|&picture| !placed[picture])
-            .max_by_key(|&picture| (shared_with(input, picture, &placed).0, usize::MAX - picture));
-        let Some(picture) = next else { break };
-        let (matches, parent) = shared_with(input, picture, &placed);
-        let parent = parent.filter(|_| matches > 0).ok_or_else(|| undetermined(input, picture))?;
-        placed[picture] = true;
-        steps.push(Step { picture, parent });
+            .filter(|&photograph| !placed[photograph])
+            .max_by_key(|&photograph| (shared_with(input, photograph, &placed).0, usize::MAX - photograph));
+        let Some(photograph) = next else { break };
+        let (matches, parent) = shared_with(input, photograph, &placed);
+        let parent = parent.filter(|_| matches > 0).ok_or_else(|| undetermined(input, photograph))?;
+        placed[photograph] = true;
+        steps.push(Step { photograph, parent });
     }
     Ok(steps)
 }
 
-/// Places the pictures in [`order`], the reference undeformed: `join` makes the grid of each further one from its matches
-/// with those placed, which it may move.
+/// Places the photographs in [`order`], the reference undeformed: `join` makes the grid of each further one from its
+/// matches with those placed, which it may move.
 ///
 /// # Errors
 /// Those of [`order`] and of `join`; [`trueup_core::Error::Cancelled`].
@@ -63,16 +63,20 @@ pub(super) fn one_after_another(
     placed[input.reference] = Some(input.grids[input.reference].clone());
     for step in order(input)? {
         context.check_cancelled()?;
-        let data = anchored(input, step.picture, &placed);
-        placed[step.picture] = Some(join(step, &data, &mut placed)?);
+        let data = anchored(input, step.photograph, &placed);
+        placed[step.photograph] = Some(join(step, &data, &mut placed)?);
     }
-    placed.into_iter().enumerate().map(|(picture, mesh)| mesh.ok_or_else(|| undetermined(input, picture))).collect()
+    placed
+        .into_iter()
+        .enumerate()
+        .map(|(photograph, mesh)| mesh.ok_or_else(|| undetermined(input, photograph)))
+        .collect()
 }
 
-/// Matches of a picture with all placed ones, and the one among those that has most.
-fn shared_with(input: &WarpInput<'_>, picture: usize, placed: &[bool]) -> (usize, Option<usize>) {
+/// Matches of a photograph with all placed ones, and the one among those that has most.
+fn shared_with(input: &WarpInput<'_>, photograph: usize, placed: &[bool]) -> (usize, Option<usize>) {
     let (mut sum, mut most, mut parent) = (0, 0, None);
-    for (pair, other) in pairs_of(input, picture).filter(|&(_, other)| placed[other]) {
+    for (pair, other) in pairs_of(input, photograph).filter(|&(_, other)| placed[other]) {
         let matches = pair.inliers.len();
         sum += matches;
         if matches > most {
@@ -82,19 +86,19 @@ fn shared_with(input: &WarpInput<'_>, picture: usize, placed: &[bool]) -> (usize
     (sum, parent)
 }
 
-/// The pairs of a picture, each with the other picture.
-fn pairs_of<'a>(input: &WarpInput<'a>, picture: usize) -> impl Iterator<Item = (&'a PairMatches, usize)> {
-    let pairs = input.pairs.iter().filter(move |pair| pair.a == picture || pair.b == picture);
-    pairs.map(move |pair| (pair, if pair.a == picture { pair.b } else { pair.a }))
+/// The pairs of a photograph, each with the other photograph.
+fn pairs_of<'a>(input: &WarpInput<'a>, photograph: usize) -> impl Iterator<Item = (&'a PairMatches, usize)> {
+    let pairs = input.pairs.iter().filter(move |pair| pair.a == photograph || pair.b == photograph);
+    pairs.map(move |pair| (pair, if pair.a == photograph { pair.b } else { pair.a }))
 }
 
-/// The matches of a picture with the placed ones, at their places in the panorama.
-pub(super) fn anchored(input: &WarpInput<'_>, picture: usize, placed: &[Option<GridMesh>]) -> Anchored {
+/// The matches of a photograph with the placed ones, at their places in the panorama.
+pub(super) fn anchored(input: &WarpInput<'_>, photograph: usize, placed: &[Option<GridMesh>]) -> Anchored {
     let mut anchored = Anchored::default();
-    for (pair, other) in pairs_of(input, picture) {
+    for (pair, other) in pairs_of(input, photograph) {
         let Some(mesh) = &placed[other] else { continue };
         for one in &pair.inliers {
-            let (here, there) = if pair.a == picture { (one.in_a, one.in_b) } else { (one.in_b, one.in_a) };
+            let (here, there) = if pair.a == photograph { (one.in_a, one.in_b) } else { (one.in_b, one.in_a) };
             anchored.points.push(here.into());
             anchored.places.push(mesh.warp(there.into()));
         }

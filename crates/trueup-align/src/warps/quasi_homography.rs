@@ -5,30 +5,33 @@ use trueup_core::geometry::Homography;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
+use super::deformed::deformed;
 use super::homography::{of_pair_or_cameras, undetermined};
+use super::input::WarpInput;
 use super::limits::check_depth_in_overlap;
-use super::{WarpInput, WarpModel, WarpOptions, deformed};
+use super::model::WarpModel;
+use super::options::WarpOptions;
 use crate::stitch_graph::StitchGraph;
 
 /// A homography up to a line, and beyond it the map that keeps the homography's lines but not its growing scale.
 ///
-/// Let u be the direction in the picture in which the homography's denominator falls, and v the direction across. Lines
-/// of constant u become parallel lines, lines of constant v a pencil: a point's place is where its two lines meet. Along
-/// every line of the pencil the parallels stand at the same coordinate xi(u) = (a u + b) / (d - c u). Up to the line
-/// u = `partition` the map is the homography; beyond, xi continues by its tangent, and the parallels of u are drawn where
-/// xi says while the pencil stays: the point moves to H(u', v) with xi(u') = xi(partition) + xi'(partition) (u -
-/// partition). Straight lines of constant v stay straight, scale across grows linearly instead of hyperbolically, and no
-/// point reaches the horizon. The map and its derivative are continuous across the line.
+/// Let u be the direction in the photograph in which the homography's denominator falls, and v the direction across.
+/// Lines of constant u become parallel lines, lines of constant v a pencil: a point's place is where its two lines
+/// meet. Along every line of the pencil the parallels stand at the same coordinate xi(u) = (a u + b) / (d - c u). Up to
+/// the line u = `partition` the map is the homography; beyond, xi continues by its tangent, and the parallels of u are
+/// drawn where xi says while the pencil stays: the point moves to H(u', v) with xi(u') = xi(partition) + xi'(partition)
+/// (u - partition). Straight lines of constant v stay straight, scale across grows linearly instead of hyperbolically,
+/// and no point reaches the horizon. The map and its derivative are continuous across the line.
 ///
 /// # Source
 /// Li, Xu and Wang, "Quasi-homography warps in image stitching" (2018): slope preservation and scale linearization.
 ///
 /// # Departures
-/// The published system of equations is in the picture's own axes, where both families of lines converge; along the
+/// The published system of equations is in the photograph's own axes, where both families of lines converge; along the
 /// direction in which the denominator falls it has the closed form above. The partition line ends the overlap in that
 /// direction instead of being a column.
 #[derive(Debug, Clone)]
-pub struct QuasiHomography {
+struct QuasiHomography {
     homography: Homography,
     /// `None` for affine maps, which grow nowhere.
     beyond: Option<Beyond>,
@@ -47,7 +50,7 @@ impl QuasiHomography {
     /// The warp of a homography that is left as it is up to the farthest of `kept` in the direction of its growth.
     ///
     /// `None` if one of these points is behind the homography's plane, or if it is singular.
-    pub fn new(homography: &Homography, kept: &[Vector2<f64>]) -> Option<Self> {
+    fn new(homography: &Homography, kept: &[Vector2<f64>]) -> Option<Self> {
         /// Change of the denominator per pixel, relative to the denominator, below which a map is affine.
         const AFFINE: f64 = 1e-9;
         if kept.iter().any(|&point| homography.denominator(point) <= 0.0) {
@@ -71,19 +74,13 @@ impl QuasiHomography {
     }
 
     /// Where a point goes.
-    pub fn apply(&self, point: Vector2<f64>) -> Vector2<f64> {
+    fn apply(&self, point: Vector2<f64>) -> Vector2<f64> {
         let Some(beyond) = &self.beyond else { return self.homography.apply(point) };
         let u = beyond.direction.dot(&point);
         if u <= beyond.partition {
             return self.homography.apply(point);
         }
         self.homography.apply(point + beyond.direction * (beyond.drawn_back(u) - u))
-    }
-
-    /// Direction of growth in the picture, unit length, and the coordinate along it where the homography ends; `None` for
-    /// affine maps.
-    pub fn partition(&self) -> Option<(Vector2<f64>, f64)> {
-        self.beyond.map(|beyond| (beyond.direction, beyond.partition))
     }
 }
 
@@ -97,46 +94,46 @@ impl Beyond {
     }
 }
 
-/// Places every picture relative to its neighbor in the tree of the strongest overlaps that leads to the reference.
+/// Places every photograph relative to its neighbor in the tree of the strongest overlaps that leads to the reference.
 ///
 /// # Departures
-/// The published warp is for two pictures. Here the warp of a picture onto its neighbor's plane is followed by the
-/// neighbor's own warp, which is defined beyond its border too; overlaps that are not in the tree meet only nearly.
+/// The published warp is for two photographs. Here the warp of a photograph onto its neighbor's plane is followed by
+/// the neighbor's own warp, which is defined beyond its border too; overlaps that are not in the tree meet only nearly.
 pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &StageContext<'_>) -> Result<Vec<GridMesh>> {
     context.check_cancelled()?;
     let model = WarpModel::QuasiHomography;
     let count = input.grids.len();
     let all: Vec<usize> = (0..count).collect();
-    // For each picture the warps to the reference, its own first.
+    // For each photograph the warps to the reference, its own first.
     let mut chains: Vec<Option<Vec<QuasiHomography>>> = vec![None; count];
     chains[input.reference] = Some(Vec::new());
     for step in StitchGraph::new(count, input.pairs).spanning_tree(&all, input.reference) {
-        let (picture, parent) = (step.child, step.parent);
+        let (photograph, parent) = (step.child, step.parent);
         let Some(onward) = chains[parent].clone() else { continue };
-        let homography = of_pair_or_cameras(input, picture, parent, options.pair_homographies)?;
-        let overlap = overlap(input, picture, parent, &homography);
-        check_depth_in_overlap(model, input, picture, &homography, &overlap, options)?;
-        let own = QuasiHomography::new(&homography, &overlap).ok_or_else(|| undetermined(input, picture))?;
-        chains[picture] = Some(std::iter::once(own).chain(onward).collect());
+        let homography = of_pair_or_cameras(input, photograph, parent, options.pair_homographies)?;
+        let overlap = overlap(input, photograph, parent, &homography);
+        check_depth_in_overlap(model, input, photograph, &homography, &overlap)?;
+        let own = QuasiHomography::new(&homography, &overlap).ok_or_else(|| undetermined(input, photograph))?;
+        chains[photograph] = Some(std::iter::once(own).chain(onward).collect());
     }
     (0..count)
-        .map(|picture| {
-            let chain = chains[picture].as_ref().ok_or_else(|| undetermined(input, picture))?;
-            Ok(deformed(&input.grids[picture], |point| chain.iter().fold(point, |place, warp| warp.apply(place))))
+        .map(|photograph| {
+            let chain = chains[photograph].as_ref().ok_or_else(|| undetermined(input, photograph))?;
+            Ok(deformed(&input.grids[photograph], |point| chain.iter().fold(point, |place, warp| warp.apply(place))))
         })
         .collect()
 }
 
-/// The vertices of a picture that a homography carries into another, and its matches with that one.
-fn overlap(input: &WarpInput<'_>, picture: usize, parent: usize, homography: &Homography) -> Vec<Vector2<f64>> {
-    let (grid, frame) = (&input.grids[picture], &input.frames[parent]);
+/// The vertices of a photograph that a homography carries into another, and its matches with that one.
+fn overlap(input: &WarpInput<'_>, photograph: usize, parent: usize, homography: &Homography) -> Vec<Vector2<f64>> {
+    let (grid, frame) = (&input.grids[photograph], &input.frames[parent]);
     let inside = |point: &Vector2<f64>| {
         let place = homography.0 * Vector3::new(point.x, point.y, 1.0);
         place.z > 0.0 && frame.contains(place.x / place.z, place.y / place.z)
     };
-    let pair = input.pairs.iter().find(|pair| (pair.a, pair.b) == (picture.min(parent), picture.max(parent)));
+    let pair = input.pairs.iter().find(|pair| (pair.a, pair.b) == (photograph.min(parent), photograph.max(parent)));
     let matches = pair.into_iter().flat_map(|pair| &pair.inliers);
-    let matched = matches.map(|one| Vector2::from(if picture < parent { one.in_a } else { one.in_b }));
+    let matched = matches.map(|one| Vector2::from(if photograph < parent { one.in_a } else { one.in_b }));
     (0..grid.len()).map(|vertex| grid.source(vertex)).filter(inside).chain(matched).collect()
 }
 
@@ -145,6 +142,7 @@ mod tests {
     use nalgebra::Matrix3;
     use proptest::prelude::*;
 
+    use super::super::limits::{LIMITS, Limits};
     use super::super::tests::{Example, misalignment};
     use super::*;
 
@@ -157,11 +155,12 @@ mod tests {
     }
 
     proptest! {
-        /// Inside it is the homography; beyond, a line of constant v keeps its image and is walked at even steps across.
+        /// Inside it is the homography; beyond, a line of constant v keeps its image and is walked at even steps
+        /// across.
         #[test]
         fn inside_it_is_the_homography_and_beyond_its_lines_at_linear_scale(v in -300.0..300.0_f64, far in 1.0..2000.0_f64) {
             let (warp, homography) = (example(), homography());
-            let (direction, partition) = warp.partition().expect("projective");
+            let Beyond { direction, partition, .. } = warp.beyond.expect("projective");
             let across = Vector2::new(-direction.y, direction.x);
             let at = |u: f64| direction * u + across * v;
             prop_assert!((warp.apply(at(partition - far)) - homography.apply(at(partition - far))).norm() < 1e-9);
@@ -176,7 +175,7 @@ mod tests {
         #[test]
         fn value_and_derivative_are_continuous_across_the_line(v in -300.0..300.0_f64) {
             let warp = example();
-            let (direction, partition) = warp.partition().expect("projective");
+            let Beyond { direction, partition, .. } = warp.beyond.expect("projective");
             let across = Vector2::new(-direction.y, direction.x);
             let at = |u: f64| warp.apply(direction * u + across * v);
             let (near, step) = (1e-9, 1e-3);
@@ -197,11 +196,11 @@ mod tests {
     }
 
     #[test]
-    fn pictures_in_a_row_meet_and_stay_smaller_than_by_homographies() {
+    fn photographs_in_a_row_meet_and_stay_smaller_than_by_homographies() {
         let example = Example::panned(&[-56.0, -28.0, 0.0, 28.0, 56.0], 2);
         let quasi = example.place(WarpModel::QuasiHomography).expect("a row");
-        let options = WarpOptions { max_area_ratio: 1e6, max_reach: 1e6, ..WarpOptions::default() };
-        let plain = example.place_with(WarpModel::Homography, &options).expect("below 90 degrees");
+        let wide = Limits { max_area_ratio: 1e6, max_reach: 1e6, ..LIMITS };
+        let plain = example.place_within(WarpModel::Homography, &wide).expect("below 90 degrees");
         assert_eq!(quasi.folds, 0);
         assert!(misalignment(&example, &quasi.meshes) < 1.5, "{}", misalignment(&example, &quasi.meshes));
         let width = |mesh: &GridMesh| mesh.bounds().1.x - mesh.bounds().0.x;

@@ -1,5 +1,5 @@
-//! The shape-preserving half-projective warp (SPHP): a homography on one side, a similarity on the other, and a quadratic
-//! or cubic transition between.
+//! The shape-preserving half-projective warp (SPHP): a homography on one side, a similarity on the other, and a
+//! quadratic or cubic transition between.
 
 use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector4};
 use trueup_core::geometry::Homography;
@@ -7,16 +7,17 @@ use trueup_core::geometry::Homography;
 /// A homography that turns into a similarity across the lines u = `first` and u = `second`, u being the direction in
 /// which the homography's denominator falls.
 ///
-/// Coordinates have their origin at the picture's center. The map and its derivative are continuous across both lines.
+/// Coordinates have their origin at the photograph's center. The map and its derivative are continuous across both
+/// lines.
 ///
 /// # Source
 /// Chang, Sato and Chuang, "Shape-preserving half-projective warps for image stitching" (2014), section 3; the
 /// zero-rotation variant as in the authors' program.
 #[derive(Debug, Clone)]
-pub struct SphpWarp {
+pub(super) struct SphpWarp {
     homography: Homography,
     /// Cosine and sine of the direction of u.
-    direction: (f64, f64),
+    direction: [f64; 2],
     first: f64,
     second: f64,
     /// X = a(u) v + b(u), Y = e(u) v + f(u); coefficients of 1, u, u^2, u^3.
@@ -29,11 +30,11 @@ pub struct SphpWarp {
 
 impl SphpWarp {
     /// The warp of a homography with h33 = 1 between the lines u = `first` and u = `second` (pixels). With
-    /// `zero_rotation` the similarity keeps pictures upright.
+    /// `zero_rotation` the similarity keeps photographs upright.
     ///
     /// `None` if the homography is affine (it has no direction u and needs no warp), if a line crosses the horizon
     /// 1 = c u, or if `second` is not larger than `first`.
-    pub fn new(homography: &Homography, first: f64, second: f64, zero_rotation: bool) -> Option<Self> {
+    pub(super) fn new(homography: &Homography, first: f64, second: f64, zero_rotation: bool) -> Option<Self> {
         let h = homography.0 / homography.0[(2, 2)];
         let c = h[(2, 0)].hypot(h[(2, 1)]);
         let w = 1.0 - c * first;
@@ -70,20 +71,20 @@ impl SphpWarp {
         let similarity =
             Matrix3::new(scale_cosine, -scale_sine, shift.0, scale_sine, scale_cosine, shift.1, 0.0, 0.0, 1.0)
                 * Matrix3::new(cosine, sine, 0.0, -sine, cosine, 0.0, 0.0, 0.0, 1.0);
-        Some(Self { homography: Homography(h), direction: (cosine, sine), first, second, a, b, e, f, similarity })
+        Some(Self { homography: Homography(h), direction: [cosine, sine], first, second, a, b, e, f, similarity })
     }
 
     /// The direction u of a homography with h33 = 1: that in which its denominator falls, unit length. `None` if it is
     /// affine.
-    pub fn growth(homography: &Homography) -> Option<Vector2<f64>> {
+    pub(super) fn growth(homography: &Homography) -> Option<Vector2<f64>> {
         const AFFINE: f64 = 1e-8;
         let h = homography.0 / homography.0[(2, 2)];
         Vector2::new(-h[(2, 0)], -h[(2, 1)]).try_normalize(AFFINE)
     }
 
     /// The derivative of [`Self::apply`] at a point.
-    pub fn jacobian(&self, point: Vector2<f64>) -> Matrix2<f64> {
-        let (cosine, sine) = self.direction;
+    pub(super) fn jacobian(&self, point: Vector2<f64>) -> Matrix2<f64> {
+        let [cosine, sine] = self.direction;
         let (u, v) = (cosine * point.x + sine * point.y, -sine * point.x + cosine * point.y);
         if u <= self.first {
             self.homography.jacobian(point)
@@ -102,8 +103,8 @@ impl SphpWarp {
     }
 
     /// Where a point goes.
-    pub fn apply(&self, point: Vector2<f64>) -> Vector2<f64> {
-        let (cosine, sine) = self.direction;
+    pub(super) fn apply(&self, point: Vector2<f64>) -> Vector2<f64> {
+        let [cosine, sine] = self.direction;
         let (u, v) = (cosine * point.x + sine * point.y, -sine * point.x + cosine * point.y);
         if u <= self.first {
             self.homography.apply(point)
@@ -118,13 +119,9 @@ impl SphpWarp {
     }
 
     /// Clockwise rotation of the similarity side, radians.
-    pub fn similarity_rotation(&self) -> f64 {
+    #[cfg(test)]
+    pub(super) fn similarity_rotation(&self) -> f64 {
         self.similarity[(1, 0)].atan2(self.similarity[(0, 0)])
-    }
-
-    /// Direction of u, from the homography side to the similarity side, unit length.
-    pub fn direction(&self) -> Vector2<f64> {
-        Vector2::new(self.direction.0, self.direction.1)
     }
 }
 
@@ -169,7 +166,8 @@ mod tests {
     fn the_warp_is_smooth_across_both_lines() {
         for zero_rotation in [false, true] {
             let warp = example(zero_rotation);
-            let (along, across) = (warp.direction(), Vector2::new(-warp.direction().y, warp.direction().x));
+            let along = Vector2::from(warp.direction);
+            let across = Vector2::new(-along.y, along.x);
             for line in [-60.0, 220.0] {
                 for v in [-200.0, 0.0, 150.0] {
                     let at = |u: f64| warp.apply(along * u + across * v);

@@ -1,17 +1,21 @@
-//! Pictures with exactly known cameras, and what holds for every model.
+//! Photographs with exactly known cameras, and what holds for every model.
 
+use nalgebra::Matrix3;
+use trueup_core::Error;
+use trueup_core::camera::Camera;
 use trueup_core::geometry::rotation_about_y;
-use trueup_core::matches::{PairVerdict, PointMatch};
+use trueup_core::matches::{PairMatches, PairVerdict, PointMatch};
+use trueup_core::source::WorkingFrame;
 
 use super::*;
 
-/// Width of the test pictures.
+/// Width of the test photographs.
 pub(super) const WIDTH: f64 = 800.0;
-/// Height of the test pictures.
+/// Height of the test photographs.
 pub(super) const HEIGHT: f64 = 600.0;
 const FOCAL_PX: f64 = 700.0;
 
-/// A set of pictures with matches by their cameras.
+/// A set of photographs with matches by their cameras.
 pub(super) struct Example {
     pub cameras: Vec<Camera>,
     pub frames: Vec<WorkingFrame>,
@@ -24,18 +28,18 @@ pub(super) struct Example {
 
 impl Example {
     /// Cameras panned to these yaws in degrees; neighbors in the list overlap.
-    pub fn panned(yaws_deg: &[f64], reference: usize) -> Self {
+    pub(super) fn panned(yaws_deg: &[f64], reference: usize) -> Self {
         let turned = |yaw: &f64| Camera::new(FOCAL_PX, WIDTH, HEIGHT, &rotation_about_y(yaw.to_radians()).transpose());
         Self::new(yaws_deg.iter().map(turned).collect(), reference)
     }
 
-    pub fn new(cameras: Vec<Camera>, reference: usize) -> Self {
+    pub(super) fn new(cameras: Vec<Camera>, reference: usize) -> Self {
         let carry = |a: usize, b: usize, point| cameras[a].transfer(&cameras[b], point);
         let pairs = (1..cameras.len()).map(|b| matched(b - 1, b, |point| carry(b - 1, b, point))).collect();
         Self::with_pairs(cameras, pairs, reference)
     }
 
-    pub fn with_pairs(cameras: Vec<Camera>, pairs: Vec<PairMatches>, reference: usize) -> Self {
+    pub(super) fn with_pairs(cameras: Vec<Camera>, pairs: Vec<PairMatches>, reference: usize) -> Self {
         let count = cameras.len();
         Self {
             cameras,
@@ -48,8 +52,8 @@ impl Example {
         }
     }
 
-    /// The same pictures and matches counted from the other end.
-    pub fn reversed(&self) -> Self {
+    /// The same photographs and matches counted from the other end.
+    pub(super) fn reversed(&self) -> Self {
         let last = self.cameras.len() - 1;
         let swapped = |one: &PointMatch| PointMatch { in_a: one.in_b, in_b: one.in_a };
         let turned = |pair: &PairMatches| PairMatches {
@@ -65,7 +69,7 @@ impl Example {
         reversed
     }
 
-    pub fn input(&self) -> WarpInput<'_> {
+    pub(super) fn input(&self) -> WarpInput<'_> {
         WarpInput {
             cameras: &self.cameras,
             frames: &self.frames,
@@ -82,16 +86,21 @@ impl Example {
         }
     }
 
-    pub fn place(&self, model: WarpModel) -> Result<WarpedMesh> {
+    pub(super) fn place(&self, model: WarpModel) -> Result<WarpedMesh> {
         self.place_with(model, &WarpOptions::default())
     }
 
-    pub fn place_with(&self, model: WarpModel, options: &WarpOptions) -> Result<WarpedMesh> {
+    /// With other limits than those that a user meets.
+    pub(super) fn place_within(&self, model: WarpModel, limits: &Limits) -> Result<WarpedMesh> {
+        run_within(model, &self.input(), &WarpOptions::default(), limits, &StageContext::default())
+    }
+
+    pub(super) fn place_with(&self, model: WarpModel, options: &WarpOptions) -> Result<WarpedMesh> {
         run(model, &self.input(), options, &StageContext::default())
     }
 }
 
-/// Matches spread over the part of picture a that `b_from_a` carries into picture b.
+/// Matches spread over the part of photograph a that `b_from_a` carries into photograph b.
 pub(super) fn matched(a: usize, b: usize, b_from_a: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>) -> PairMatches {
     let frame = WorkingFrame { width: WIDTH, height: HEIGHT, working_from_full: 1.0 };
     let inliers: Vec<PointMatch> = (0..1500)
@@ -140,7 +149,7 @@ fn homographies_meet_and_leave_the_reference_in_place() {
             let apart = Vector2::from(placed.meshes[1].target[vertex]) - example.grids[1].source(vertex);
             assert!(apart.norm() < 1e-9);
         }
-        // The center of the picture panned by 25 degrees lies at f tan 25.
+        // The center of the photograph panned by 25 degrees lies at f tan 25.
         let center = placed.meshes[2].warp(Vector2::new(WIDTH / 2.0, HEIGHT / 2.0));
         let expected = WIDTH / 2.0 + FOCAL_PX * 25_f64.to_radians().tan();
         assert!((center.x - expected).abs() < 0.1 && (center.y - HEIGHT / 2.0).abs() < 0.1, "{center}");
@@ -152,11 +161,11 @@ fn too_wide_a_field_of_view_is_refused_with_its_angle() {
     let example = Example::panned(&[0.0, 30.0, 60.0, 90.0], 0);
     for homographies in [HomographySource::Cameras, HomographySource::Pairs] {
         let options = WarpOptions { homographies, ..WarpOptions::default() };
-        let error = example.place_with(WarpModel::Homography, &options).expect_err("a picture at 90 degrees");
+        let error = example.place_with(WarpModel::Homography, &options).expect_err("a photograph at 90 degrees");
         assert!(matches!(error, Error::NotApplicable { .. }), "{error}");
         let message = error.to_string();
         assert!(message.contains("method homography") && message.contains("3.jpg"), "{message}");
-        // 90 degrees and half the picture's width, atan(400 / 700) = 29.7 degrees, lowered by the corner's height:
+        // 90 degrees and half the photograph's width, atan(400 / 700) = 29.7 degrees, lowered by the corner's height:
         // acos(-sin 29.7 cos 20.4) = 117.7 degrees.
         assert!(message.contains("reaches 118 degrees from the axis of 0.jpg"), "{message}");
     }
@@ -215,21 +224,21 @@ fn models_on_one_plane_refuse_a_half_turn_with_its_angle_and_others_place_it() {
 }
 
 #[test]
-fn pictures_that_grow_or_reach_beyond_the_limits_are_refused_by_every_model() {
+fn photographs_that_grow_or_reach_beyond_the_limits_are_refused_by_every_model() {
     let example = Example::panned(&[0.0, 25.0, 50.0], 0);
     for model in MODELS {
-        let near = WarpOptions { max_reach: 1.0, ..WarpOptions::default() };
-        let error = example.place_with(model, &near).expect_err("reaches 1.5 diagonals").to_string();
+        let near = Limits { max_reach: 1.0, ..LIMITS };
+        let error = example.place_within(model, &near).expect_err("reaches 1.5 diagonals").to_string();
         assert!(error.contains("diagonals of the reference away") && error.contains("degrees"), "{model:?}: {error}");
     }
-    // Pair by pair the quasi-homography grows too: eight pictures to one side are too many.
+    // Pair by pair the quasi-homography grows too: eight photographs to one side are too many.
     let long = Example::panned(&(0..9).map(|k| f64::from(k) * 28.0).collect::<Vec<_>>(), 0);
     let error = long.place(WarpModel::QuasiHomography).expect_err("224 degrees from the reference").to_string();
     assert!(error.contains("times as large as the reference") || error.contains("diagonals"), "{error}");
 }
 
 #[test]
-fn threads_change_no_vertex_and_the_order_of_the_pictures_hardly_any() {
+fn threads_change_no_vertex_and_the_order_of_the_photographs_hardly_any() {
     let example = Example::panned(&[-20.0, 0.0, 28.0], 1);
     let reversed = example.reversed();
     for model in MODELS {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 
+use super::option_flags::TypedOptions;
 use super::shared::{GeometryArgs, MaskArgs, TuningArgs};
 
 const EXAMPLES: &str = "\
@@ -30,7 +31,7 @@ pub(crate) struct CompareArgs {
     #[arg(short, long, value_name = "DIR", required_unless_present = "tally", help_heading = "Output")]
     pub output: Option<PathBuf>,
 
-    /// The methods to compare; without it, all (`trueup options stitch` names them)
+    /// The methods to compare; without it, all (`trueup stitch --help` names them)
     #[arg(long, value_name = "METHOD,...", value_delimiter = ',', help_heading = "What is compared")]
     pub methods: Vec<String>,
 
@@ -46,23 +47,14 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', help_heading = "What is compared")]
     pub rank: Option<Vec<String>>,
 
-    /// Size of the panoramas, relative to the reference photograph's pixels; without it, one that suits a page (compare.scale)
-    #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Output")]
-    pub scale: Option<String>,
-
-    /// The panoramas' format (compare.format)
-    #[arg(long, value_name = "FORMAT", help_heading = "Output")]
-    pub format: Option<String>,
-
-    /// JPEG quality (output.jpeg_quality)
-    #[arg(long, value_name = "Q", allow_hyphen_values = true, help_heading = "Output")]
-    pub quality: Option<String>,
-
     #[command(flatten)]
     pub geometry: GeometryArgs,
 
     #[command(flatten)]
     pub masks: MaskArgs,
+
+    #[command(flatten)]
+    pub typed: TypedOptions,
 
     #[command(flatten)]
     pub tuning: TuningArgs,

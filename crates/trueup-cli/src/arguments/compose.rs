@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::shared::{BudgetArgs, FileArgs, MaskArgs, MessageArgs, PictureArgs, TuningArgs};
+use super::option_flags::TypedOptions;
+use super::shared::{FileArgs, MaskArgs, MessageArgs, TuningArgs};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -29,9 +30,6 @@ pub(crate) struct ComposeArgs {
     #[command(flatten)]
     pub files: FileArgs,
 
-    #[command(flatten)]
-    pub picture: PictureArgs,
-
     /// The folder of the photographs, if they moved, or of others of the same names and sizes
     #[arg(long, value_name = "DIR", help_heading = "Photographs")]
     pub photos: Option<PathBuf>,
@@ -40,10 +38,10 @@ pub(crate) struct ComposeArgs {
     pub masks: MaskArgs,
 
     #[command(flatten)]
-    pub tuning: TuningArgs,
+    pub typed: TypedOptions,
 
     #[command(flatten)]
-    pub budget: BudgetArgs,
+    pub tuning: TuningArgs,
 
     #[command(flatten)]
     pub messages: MessageArgs,

@@ -2,6 +2,7 @@
 
 mod compare;
 mod compose;
+mod option_flags;
 mod shared;
 mod stitch;
 
@@ -11,7 +12,8 @@ use clap::{Args, Parser, Subcommand};
 
 pub(crate) use compare::CompareArgs;
 pub(crate) use compose::ComposeArgs;
-pub(crate) use shared::{BudgetArgs, FileArgs, MaskArgs, PictureArgs, TuningArgs};
+pub(crate) use option_flags::TypedOptions;
+pub(crate) use shared::{FileArgs, MaskArgs, TuningArgs};
 pub(crate) use stitch::StitchArgs;
 
 const EXAMPLES: &str = "\
@@ -22,18 +24,19 @@ Examples:
   trueup inspect pano.json --verbose
   trueup evaluate pano.json --truth truth.json
   trueup compare holiday/ -o holiday-compared
-  trueup options mesh";
+  trueup options --expert";
 
 /// Panoramas that stand upright: photographs in, a natural panorama out, and the reasons why it looks as it does.
 #[derive(Debug, Parser)]
 #[command(name = "trueup", version, after_help = EXAMPLES, max_term_width = 110)]
-pub(crate) struct LowArgs {
+pub(crate) struct CommandLine {
     #[command(subcommand)]
-    pub command: Command,
+    pub task: Task,
 }
 
+/// What the command is asked to do.
 #[derive(Debug, Subcommand)]
-pub(crate) enum Command {
+pub(crate) enum Task {
     /// Stitch photographs into a panorama
     ///
     /// Finds out by itself which photographs overlap. Those that belong elsewhere are left out, and the summary says why.
@@ -51,7 +54,9 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
     /// Print every measure of a panorama: its own, against the truth, and of the pixels where photographs overlap
     Evaluate(EvaluateArgs),
-    /// List every option of every stage: default, range, unit, meaning
+    /// List the options: default, range, unit, meaning
+    ///
+    /// Those that people have a reason to change for a panorama of their own; with --expert, those of the methods as well.
     Options(OptionsArgs),
 }
 
@@ -91,7 +96,11 @@ pub(crate) struct OptionsArgs {
     #[arg(value_name = "STAGE")]
     pub stage: Option<String>,
 
-    /// As a JSON array of {name, default, allowed, unit, meaning}
+    /// Also the options for experts: of the methods' own numbers, for unusual photographs and for experiments
+    #[arg(long)]
+    pub expert: bool,
+
+    /// As a JSON array of {name, default, allowed, unit, meaning, tier, choices}
     #[arg(long)]
     pub json: bool,
 }
@@ -104,6 +113,6 @@ mod tests {
 
     #[test]
     fn the_command_is_well_formed() {
-        LowArgs::command().debug_assert();
+        CommandLine::command().debug_assert();
     }
 }

@@ -31,56 +31,6 @@ pub(crate) struct FileArgs {
     pub seams: Option<PathBuf>,
 }
 
-/// What the panorama looks like.
-#[derive(Debug, Args)]
-pub(crate) struct PictureArgs {
-    /// Size of the panorama: 1 keeps the pixel scale of the reference photograph (canvas.scale)
-    #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Output")]
-    pub scale: Option<String>,
-
-    /// JPEG quality (output.jpeg_quality)
-    #[arg(long, value_name = "Q", allow_hyphen_values = true, help_heading = "Output")]
-    pub quality: Option<String>,
-
-    /// Bits of a sample: auto, 8, 16 or float (output.depth)
-    #[arg(long, value_name = "DEPTH", help_heading = "Output")]
-    pub depth: Option<String>,
-
-    /// What the panorama is drawn on: mesh, auto, equirectangular, cylindrical, perspective, mercator, panini or
-    /// stereographic (projection.kind)
-    #[arg(long, value_name = "PROJECTION", help_heading = "View")]
-    pub projection: Option<String>,
-
-    /// Turn the viewer right, degrees; with a projection other than mesh, as the next three (projection.yaw)
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
-    pub yaw: Option<String>,
-
-    /// Turn the viewer up, degrees (projection.pitch)
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
-    pub pitch: Option<String>,
-
-    /// Turn the viewer clockwise, degrees (projection.roll)
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
-    pub roll: Option<String>,
-
-    /// Horizontal field of view, degrees; without it, what is there as far as the projection carries (projection.fov)
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = "View")]
-    pub fov: Option<String>,
-
-    /// What is kept: none (all), rectangle (the largest without holes) or auto (that, if it keeps most) (canvas.crop)
-    #[arg(long, value_name = "CROP", help_heading = "View")]
-    pub crop: Option<String>,
-
-    /// Fill gaps up to so wide, in shares of a photograph's side, with a smooth surface: 0.1 for ragged borders (canvas.fill)
-    #[arg(long, value_name = "SHARE", allow_hyphen_values = true, help_heading = "View")]
-    pub fill: Option<String>,
-
-    /// What shows where no photograph is: auto (transparent where the format can, else black), transparent, black, gray,
-    /// white, '#rrggbb' or '#rgb' (quoted: shells take # for a comment) (output.background)
-    #[arg(long, value_name = "COLOR", help_heading = "View")]
-    pub background: Option<String>,
-}
-
 /// How the geometry is found where none is recorded.
 #[derive(Debug, Args)]
 pub(crate) struct GeometryArgs {
@@ -99,10 +49,6 @@ pub(crate) struct GeometryArgs {
     /// Keep what is found in the photographs in this folder, so that later runs need not find it again
     #[arg(long, value_name = "DIR", help_heading = "Photographs")]
     pub cache: Option<PathBuf>,
-
-    /// Every random choice derives from this number (stitch.seed)
-    #[arg(long, value_name = "N", allow_hyphen_values = true, help_heading = "Tuning")]
-    pub seed: Option<String>,
 }
 
 /// Pictures that say what of a photograph is to be seen.
@@ -138,18 +84,6 @@ pub(crate) struct TuningArgs {
         help_heading = "Tuning"
     )]
     pub threads: Option<u16>,
-}
-
-/// What the work may take.
-#[derive(Debug, Args)]
-pub(crate) struct BudgetArgs {
-    /// Memory that the work may take, such as 2GB or 512MB; auto is a quarter of the machine's (stitch.memory)
-    #[arg(long, value_name = "AMOUNT", help_heading = "Tuning")]
-    pub memory: Option<String>,
-
-    /// Folder for the scratch file of a panorama that does not fit in memory, instead of the output's (stitch.scratch)
-    #[arg(long, value_name = "DIR", help_heading = "Tuning")]
-    pub scratch: Option<String>,
 }
 
 /// What is printed.

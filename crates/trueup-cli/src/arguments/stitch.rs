@@ -3,7 +3,8 @@
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 
-use super::shared::{BudgetArgs, FileArgs, GeometryArgs, MaskArgs, MessageArgs, PictureArgs, TuningArgs};
+use super::option_flags::TypedOptions;
+use super::shared::{FileArgs, GeometryArgs, MaskArgs, MessageArgs, TuningArgs};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -30,9 +31,6 @@ pub(crate) struct StitchArgs {
     #[command(flatten)]
     pub files: FileArgs,
 
-    #[command(flatten)]
-    pub picture: PictureArgs,
-
     /// Stitch every group of overlapping photographs, not only the largest; several panoramas are numbered
     #[arg(long, help_heading = "Photographs")]
     pub all: bool,
@@ -43,23 +41,11 @@ pub(crate) struct StitchArgs {
     #[command(flatten)]
     pub masks: MaskArgs,
 
-    /// How the panorama's shape is found (stitch.method; `trueup options stitch` names the methods)
-    #[arg(long, value_name = "METHOD", help_heading = "Tuning")]
-    pub method: Option<String>,
-
-    /// What draws overlapping photographs together: points, lines, photometric or lines+photometric (stitch.align)
-    #[arg(long, value_name = "ALIGN", help_heading = "Tuning")]
-    pub align: Option<String>,
-
-    /// What is kept of the photographs' structure: none or lines (stitch.structure)
-    #[arg(long, value_name = "STRUCTURE", help_heading = "Tuning")]
-    pub structure: Option<String>,
+    #[command(flatten)]
+    pub typed: TypedOptions,
 
     #[command(flatten)]
     pub tuning: TuningArgs,
-
-    #[command(flatten)]
-    pub budget: BudgetArgs,
 
     #[command(flatten)]
     pub messages: MessageArgs,

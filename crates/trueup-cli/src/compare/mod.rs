@@ -46,13 +46,7 @@ fn sum_up(args: &CompareArgs) -> Result<(), Failure> {
 
 /// Arguments that make sense: what the library needs.
 fn checked(args: CompareArgs) -> Result<(CompareJob, StitchOptions), Failure> {
-    let flags = [
-        ("--scale", "compare.scale", &args.scale),
-        ("--format", "compare.format", &args.format),
-        ("--quality", "output.jpeg_quality", &args.quality),
-        ("--seed", "stitch.seed", &args.geometry.seed),
-    ];
-    let options = chosen::options(StitchOptions::default(), &args.tuning, &flags)?;
+    let options = chosen::options(StitchOptions::default(), &args.tuning, &args.typed)?;
     let entries = entries(&args.methods, &args.entry, &options)?;
     let inputs = Inputs {
         photographs: args.photographs,

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use trueup::{ImageRecord, ImageStatus, PairRecord, Project};
 
-use super::Page;
+use super::labeled_lines::LabeledLines;
 
 /// What was found of each photograph that is used.
-pub(super) fn pictures(page: &mut Page, project: &Project, names: &[String]) {
+pub(super) fn pictures(lines: &mut LabeledLines, project: &Project, names: &[String]) {
     for (image, name) in project.images.iter().zip(names) {
         if image.status == ImageStatus::Used {
-            page.item("used", &format!("{name}: {}", geometry(image)));
+            lines.item("used", &format!("{name}: {}", geometry(image)));
         }
     }
 }
@@ -27,13 +27,13 @@ fn geometry(image: &ImageRecord) -> String {
 }
 
 /// The verdict on every pair that was tried.
-pub(super) fn pairs(page: &mut Page, project: &Project, names: &[String]) {
+pub(super) fn pairs(lines: &mut LabeledLines, project: &Project, names: &[String]) {
     let joined = project.pairs.iter().filter(|pair| pair.verdict.is_joined()).count();
-    page.entry("pairs", &format!("{joined} joined of {} tried", project.pairs.len()));
+    lines.entry("pairs", &format!("{joined} joined of {} tried", project.pairs.len()));
     let name = |index: usize| names.get(index).map_or("?", String::as_str);
     for pair in &project.pairs {
         let counts = format!("{} of {} matches agree ({} needed)", pair.inliers, pair.matches, pair.needed);
-        page.item("", &format!("{} - {}: {}, {counts}", name(pair.a), name(pair.b), verdict(pair)));
+        lines.item("", &format!("{} - {}: {}, {counts}", name(pair.a), name(pair.b), verdict(pair)));
     }
 }
 
@@ -44,9 +44,9 @@ fn verdict(pair: &PairRecord) -> String {
 }
 
 /// A line per stage.
-pub(super) fn seconds(page: &mut Page, seconds: &BTreeMap<String, f64>) {
-    page.entry("time", &format!("{:.3} s", seconds.values().sum::<f64>()));
+pub(super) fn seconds(lines: &mut LabeledLines, seconds: &BTreeMap<String, f64>) {
+    lines.entry("time", &format!("{:.3} s", seconds.values().sum::<f64>()));
     for (stage, seconds) in seconds {
-        page.item("", &format!("{seconds:>8.3} s  {stage}"));
+        lines.item("", &format!("{seconds:>8.3} s  {stage}"));
     }
 }

@@ -2,18 +2,19 @@
 
 use trueup::{Measures, PictureMeasures, Project};
 
-use super::{Page, name_of};
+use super::labeled_lines::LabeledLines;
+use super::names::name_of;
 
 /// Uncertain pictures named before the rest are counted.
 const NAMED: usize = 4;
 
 /// One or two lines: how upright, how well aligned, how straight.
-pub(crate) fn short(page: &mut Page, project: &Project, names: &[String]) {
+pub(crate) fn short(lines: &mut LabeledLines, project: &Project, names: &[String]) {
     let Some(measures) = &project.measures else { return };
-    page.entry("measured", &upright(measures, project, names));
+    lines.entry("measured", &upright(measures, project, names));
     let rest: Vec<String> = [alignment(measures), bent_line(measures, project, names)].into_iter().flatten().collect();
     if !rest.is_empty() {
-        page.entry("", &rest.join("; "));
+        lines.entry("", &rest.join("; "));
     }
 }
 
@@ -71,19 +72,19 @@ fn bent_line(measures: &Measures, project: &Project, names: &[String]) -> Option
 }
 
 /// The figures that the short form leaves out, and a line per picture.
-pub(super) fn table(page: &mut Page, project: &Project, names: &[String]) {
+pub(super) fn table(lines: &mut LabeledLines, project: &Project, names: &[String]) {
     let Some(measures) = &project.measures else { return };
     if let Some(degrees) = measures.estimated_gdic_deg {
-        page.item("GDIC", &format!("{degrees:.2} degrees, estimated from the pictures' own vertical lines"));
+        lines.item("GDIC", &format!("{degrees:.2} degrees, estimated from the pictures' own vertical lines"));
     }
     let (ld, mean, folds) = (measures.ld, measures.ld_mean, measures.folds);
-    page.item("LD", &format!("{ld:.3}e-2 at most, {mean:.3}e-2 on average; {folds} folded cells"));
-    if let Some(lines) = &measures.long_lines {
-        let bend = 1000.0 * lines.mean_bend;
-        page.item("lines", &format!("{} of {} long lines bent; {bend:.2} in 1000 off", lines.bent, lines.lines));
+    lines.item("LD", &format!("{ld:.3}e-2 at most, {mean:.3}e-2 on average; {folds} folded cells"));
+    if let Some(long) = &measures.long_lines {
+        let bend = 1000.0 * long.mean_bend;
+        lines.item("lines", &format!("{} of {} long lines bent; {bend:.2} in 1000 off", long.bent, long.lines));
     }
     for picture in &measures.pictures {
-        page.item("", &format!("{}: {}", name_of(&picture.path, project, names), lean(picture)));
+        lines.item("", &format!("{}: {}", name_of(&picture.path, project, names), lean(picture)));
     }
 }
 

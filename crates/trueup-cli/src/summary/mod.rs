@@ -1,17 +1,22 @@
 //! The summary of a panorama, printed after a stitch and by `trueup inspect`.
 
 mod details;
+mod labeled_lines;
 mod measures;
+mod names;
 #[cfg(test)]
 mod tests;
 
 use std::collections::BTreeMap;
-use std::fmt::Write;
 use std::path::Path;
 
-use trueup::{Diagnostic, ImageRecord, ImageStatus, Project, Severity, Written};
+use trueup::{Diagnostic, ImageStatus, Project, Severity, Written};
 
 use crate::words::file_size;
+
+use names::names;
+
+pub(crate) use labeled_lines::LabeledLines;
 
 /// Where a panorama was written; a project file does not say.
 #[derive(Debug, Clone, Copy)]
@@ -27,25 +32,25 @@ const WORTH_NAMING_SECONDS: f64 = 0.05;
 /// What was made of which photographs, and why. `verbose` adds every pair, picture, note and stage. Without a panorama's
 /// file, the measures are given for each picture.
 pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool) -> String {
-    let mut page = Page::default();
-    panorama(&mut page, project, file);
+    let mut lines = LabeledLines::default();
+    panorama(&mut lines, project, file);
     let names = names(&project.images);
-    pictures(&mut page, project, &names);
+    pictures(&mut lines, project, &names);
     if verbose {
-        details::pictures(&mut page, project, &names);
-        details::pairs(&mut page, project, &names);
+        details::pictures(&mut lines, project, &names);
+        details::pairs(&mut lines, project, &names);
     }
-    page.entry("upright", &upright(project));
-    measures::short(&mut page, project, &names);
+    lines.entry("upright", &upright(project));
+    measures::short(&mut lines, project, &names);
     if verbose || file.is_none() {
-        measures::table(&mut page, project, &names);
+        measures::table(&mut lines, project, &names);
     }
-    findings(&mut page, project, verbose);
+    findings(&mut lines, project, verbose);
     match verbose {
-        true => details::seconds(&mut page, &project.seconds),
-        false => page.entry("time", &seconds_in_short(&project.seconds)),
+        true => details::seconds(&mut lines, &project.seconds),
+        false => lines.entry("time", &seconds_in_short(&project.seconds)),
     }
-    page.into_text()
+    lines.into_text()
 }
 
 /// The summaries of panoramas that were written, with a blank line between them.
@@ -59,77 +64,37 @@ pub(crate) fn of_written(written: &[Written], verbose: bool) -> String {
 }
 
 /// The measures that the project file holds, all of them.
-pub(crate) fn measures(page: &mut Page, project: &Project) {
+pub(crate) fn measures(lines: &mut LabeledLines, project: &Project) {
     let names = names(&project.images);
-    measures::short(page, project, &names);
-    measures::table(page, project, &names);
+    measures::short(lines, project, &names);
+    measures::table(lines, project, &names);
 }
 
-/// Lines of a label and a text; texts stand below each other.
-#[derive(Debug, Default)]
-pub(crate) struct Page(String);
-
-impl Page {
-    pub(crate) fn into_text(self) -> String {
-        self.0
-    }
-
-    pub(crate) fn entry(&mut self, label: &str, text: &str) {
-        let _ = writeln!(self.0, "{label:<9} {text}");
-    }
-
-    /// A line that belongs to the entry above, with its own label.
-    pub(crate) fn item(&mut self, label: &str, text: &str) {
-        let _ = writeln!(self.0, "  {label:<9} {text}");
-    }
-}
-
-/// The file name of each photograph; the whole path where names collide.
-fn names(images: &[ImageRecord]) -> Vec<String> {
-    let short = |image: &ImageRecord| match Path::new(&image.path).file_name() {
-        Some(name) => name.to_string_lossy().into_owned(),
-        None => image.path.clone(),
-    };
-    let mut count: BTreeMap<String, usize> = BTreeMap::new();
-    for image in images {
-        *count.entry(short(image)).or_default() += 1;
-    }
-    images
-        .iter()
-        .map(|image| Some(short(image)).filter(|name| count[name] == 1).unwrap_or(image.path.clone()))
-        .collect()
-}
-
-/// The name that stands for a photograph's path.
-fn name_of<'a>(path: &'a str, project: &Project, names: &'a [String]) -> &'a str {
-    project.images.iter().position(|image| image.path == path).map_or(path, |index| &names[index])
-}
-
-fn panorama(page: &mut Page, project: &Project, file: Option<&PanoramaFile>) {
+fn panorama(lines: &mut LabeledLines, project: &Project, file: Option<&PanoramaFile>) {
     let mut size = format!("{} x {} px", project.canvas.width, project.canvas.height);
     if project.canvas.full_turn {
         size.push_str(", a full turn: the ends meet");
     }
     let Some(file) = file else {
-        page.entry("panorama", &size);
+        lines.entry("panorama", &size);
         return;
     };
-    page.entry("panorama", &format!("{}  {size}, {}", file.panorama.display(), file_size(file.bytes)));
+    lines.entry("panorama", &format!("{}  {size}, {}", file.panorama.display(), file_size(file.bytes)));
     if let Some(path) = file.project {
-        page.entry("project", &path.display().to_string());
+        lines.entry("project", &path.display().to_string());
     }
 }
 
 /// How many were used, and each one left out with its reason and what to do about it.
-fn pictures(page: &mut Page, project: &Project, names: &[String]) {
+fn pictures(lines: &mut LabeledLines, project: &Project, names: &[String]) {
     let reference = project.images.iter().position(|image| image.path == project.reference);
     let reference = reference.map_or(String::new(), |index| format!("; the reference is {}", names[index]));
-    page.entry("pictures", &format!("{} of {} used{reference}", project.used(), project.images.len()));
+    lines.entry("pictures", &format!("{} of {} used{reference}", project.used(), project.images.len()));
     for (image, name) in project.images.iter().zip(names) {
         if image.status == ImageStatus::LeftOut {
-            page.item("left out", &format!("{name}: {}", image.reason));
+            lines.item("left out", &format!("{name}: {}", image.reason));
             if !image.hint.is_empty() {
-                page.item("", &image.hint);
+                lines.item("", &image.hint);
             }
         }
     }
@@ -162,7 +127,7 @@ fn upright(project: &Project) -> String {
 }
 
 /// Warnings, and with `verbose` notes, that are not told elsewhere.
-fn findings(page: &mut Page, project: &Project, verbose: bool) {
+fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool) {
     let names = project.photograph_names();
     for diagnostic in &project.diagnostics {
         let label = match diagnostic.severity {
@@ -172,9 +137,9 @@ fn findings(page: &mut Page, project: &Project, verbose: bool) {
         if (diagnostic.severity == Severity::Note && !verbose) || tells_of_left_out(diagnostic, project) {
             continue;
         }
-        page.entry(label, &format!("{}: {}", diagnostic.subject.named(&names), diagnostic.message));
+        lines.entry(label, &format!("{}: {}", diagnostic.subject.named(&names), diagnostic.message));
         if !diagnostic.hint.is_empty() {
-            page.entry("", &diagnostic.hint);
+            lines.entry("", &diagnostic.hint);
         }
     }
 }

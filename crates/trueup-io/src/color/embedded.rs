@@ -1,20 +1,10 @@
 //! What a file says of its colors, without decoding its pixels.
 
-use std::fs::File;
-use std::io::{BufReader, Seek};
+use std::io::Seek;
 use std::path::Path;
 
-use image::{ImageDecoder, ImageFormat, ImageReader};
-use tiff::decoder::Decoder as TiffDecoder;
-use tiff::tags::Tag as TiffTag;
-use zune_jpeg::JpegDecoder;
-
-use crate::decode::jpeg_options;
-use crate::format::{PictureFormat, read_start};
-use crate::metadata::{ExifFields, read_exif};
-
-/// Memory that reading a header may take, in bytes: profiles may be compressed.
-const HEADER_BYTES: u64 = 64 << 20;
+use crate::metadata::exif_fields::ExifFields;
+use crate::metadata::header::open;
 
 /// EXIF's ColorSpace for Adobe RGB, as some cameras write it though no standard has it.
 const EXIF_ADOBE_RGB: u32 = 2;
@@ -39,39 +29,14 @@ pub(crate) fn read(path: &Path) -> Embedded {
 }
 
 fn try_read(path: &Path) -> Option<Embedded> {
-    let mut file = File::open(path).ok()?;
-    let format = PictureFormat::of_content(&read_start(&mut file).ok()?)?;
-    let mut reader = BufReader::new(file);
-    reader.rewind().ok()?;
-    let icc = read_icc(&mut reader, format).filter(|icc| !icc.is_empty());
+    let (mut input, format) = open(path)?;
+    let icc = (format.icc)(&mut input).filter(|icc| !icc.is_empty());
     if icc.is_some() {
         return Some(Embedded { icc, is_adobe_rgb: false });
     }
-    reader.rewind().ok()?;
-    let exif = read_exif(&mut reader, format).unwrap_or_default();
+    input.rewind().ok()?;
+    let exif = (format.exif)(&mut input).unwrap_or_default();
     Some(Embedded { icc: None, is_adobe_rgb: names_adobe_rgb(&exif) })
-}
-
-fn read_icc(reader: &mut BufReader<File>, format: PictureFormat) -> Option<Vec<u8>> {
-    let format = match format {
-        PictureFormat::Jpeg => {
-            let mut decoder = JpegDecoder::new_with_options(reader, jpeg_options());
-            decoder.decode_headers().ok()?;
-            return decoder.icc_profile();
-        }
-        PictureFormat::Png => ImageFormat::Png,
-        PictureFormat::Tiff => {
-            // The picture decoder would measure the profile by the memory that the pixels take.
-            let profile = TiffDecoder::new(reader).ok()?.find_tag(TiffTag::IccProfile).ok().flatten()?;
-            return profile.into_u8_vec().ok();
-        }
-        PictureFormat::WebP => ImageFormat::WebP,
-    };
-    let mut picture = ImageReader::with_format(reader, format);
-    let mut limits = image::Limits::default();
-    limits.max_alloc = Some(HEADER_BYTES);
-    picture.limits(limits);
-    picture.into_decoder().ok()?.icc_profile().ok().flatten()
 }
 
 fn names_adobe_rgb(exif: &ExifFields) -> bool {

@@ -9,13 +9,12 @@
 
 mod convert;
 mod embedded;
-mod icc;
+pub(crate) mod icc;
 mod rows;
 mod survey;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use icc::is_srgb;
 pub use icc::srgb_profile;
 pub(crate) use rows::InSrgb;
 pub use survey::PhotographColors;

@@ -25,8 +25,10 @@ pub struct PhotographColors {
 
 /// What the samples of one photograph mean.
 struct Meaning {
-    /// The profile of RGB samples, and the space if a panorama can be composed in it.
-    rgb: (Arc<moxcms::ColorProfile>, Option<RgbSpace>),
+    /// The profile of RGB samples.
+    profile: Arc<moxcms::ColorProfile>,
+    /// The space of that profile, if a panorama can be composed in it.
+    space: Option<RgbSpace>,
     /// The curve of gray samples.
     gray: TransferCurve,
     name: String,
@@ -34,7 +36,7 @@ struct Meaning {
 
 impl Meaning {
     fn of_space(space: RgbSpace) -> Self {
-        Self { name: space.name(), gray: space.curve.clone(), rgb: (space.profile.clone(), Some(space)) }
+        Self { name: space.name(), gray: space.curve.clone(), profile: space.profile.clone(), space: Some(space) }
     }
 }
 
@@ -52,7 +54,7 @@ impl PhotographColors {
         let (meanings, findings): (Vec<_>, Vec<_>) = read.into_iter().unzip();
         findings.into_iter().flatten().for_each(|finding| context.report(finding));
         let mut space: Option<&RgbSpace> = None;
-        for candidate in meanings.iter().filter_map(|meaning| meaning.rgb.1.as_ref()) {
+        for candidate in meanings.iter().filter_map(|meaning| meaning.space.as_ref()) {
             let wider = |space: &RgbSpace| candidate.gamut_area() > (1.0 + SAME_AREA) * space.gamut_area();
             if space.is_none_or(wider) {
                 space = Some(candidate);
@@ -110,10 +112,10 @@ fn meaning(number: usize, image: &SourceImage) -> (Meaning, Option<Diagnostic>) 
         Understood::Space(space) => (Meaning::of_space(space), None),
         Understood::Tables(profile) => {
             let name = description(&profile);
-            (Meaning { rgb: (profile, None), gray: TransferCurve::SRGB, name }, None)
+            (Meaning { profile, space: None, gray: TransferCurve::SRGB, name }, None)
         }
         // Gray samples say nothing of a gamut, and colors in the same file say nothing of themselves.
-        Understood::Gray(gray) => (Meaning { rgb: (RgbSpace::srgb().profile, None), gray, ..srgb() }, None),
+        Understood::Gray(gray) => (Meaning { space: None, gray, ..srgb() }, None),
         Understood::Foreign(kind) => {
             let finding = Diagnostic::note(
                 "color-profile-ignored",
@@ -137,12 +139,12 @@ fn meaning(number: usize, image: &SourceImage) -> (Meaning, Option<Diagnostic>) 
 
 fn conversion(meaning: &Meaning, space: &RgbSpace) -> Option<Conversion> {
     let srgb = RgbSpace::srgb();
-    let is_there = match &meaning.rgb.1 {
+    let is_there = match &meaning.space {
         Some(own) => own.is_same(space),
         // Colors beside a gray profile are sRGB; tables always have to be followed.
-        None => Arc::ptr_eq(&meaning.rgb.0, &srgb.profile) && srgb.is_same(space),
+        None => Arc::ptr_eq(&meaning.profile, &srgb.profile) && srgb.is_same(space),
     };
-    let rgb = (!is_there).then(|| meaning.rgb.0.clone());
+    let rgb = (!is_there).then(|| meaning.profile.clone());
     let gray = (!meaning.gray.is_same(&space.curve)).then(|| meaning.gray.clone());
     (rgb.is_some() || gray.is_some()).then(|| Conversion {
         rgb,

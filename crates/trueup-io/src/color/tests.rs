@@ -3,7 +3,6 @@
 
 use std::path::PathBuf;
 
-use image::{DynamicImage, ImageBuffer, ImageEncoder, Rgb};
 use moxcms::ColorProfile;
 use tempfile::TempDir;
 use trueup_core::color::TransferCurve;
@@ -11,9 +10,11 @@ use trueup_core::raster::{Photograph, RowSource};
 use trueup_core::source::{PhotographSource, SourceImage};
 use trueup_core::{Result, StageContext};
 
+use super::icc::is_srgb;
 use super::*;
 use crate::decode::FilePhotographs;
 use crate::encode::{Metadata, OutputOptions, OutputProfile, write};
+use crate::formats::specimens::Specimen;
 use crate::source::{SourceOptions, scan};
 
 /// The sample color of all tests.
@@ -31,14 +32,10 @@ fn adobe_rgb() -> Vec<u8> {
 /// A photograph of one color in a PNG, with a profile.
 fn png(folder: &TempDir, name: &str, icc: Option<Vec<u8>>) -> PathBuf {
     let path = folder.path().join(name);
-    let mut encoder = image::codecs::png::PngEncoder::new(std::fs::File::create(&path).expect("a file"));
-    if let Some(icc) = icc {
-        encoder.set_icc_profile(icc).expect("PNG holds profiles");
-    }
     // The name makes them different files: the first pixel is none of the tests'.
     let first = name.bytes().fold(0, u8::wrapping_add);
-    let pixels = ImageBuffer::from_fn(SIDE, SIDE, |x, y| if x + y == 0 { Rgb([first, 0, 0]) } else { Rgb(COLOR) });
-    DynamicImage::from(pixels).write_with_encoder(encoder).expect("written");
+    let pixels = Specimen::eight(SIDE, SIDE, |x, y| if x + y == 0 { [first, 0, 0] } else { COLOR });
+    std::fs::write(&path, pixels.png(icc)).expect("written");
     path
 }
 
@@ -192,11 +189,8 @@ fn damaged_and_foreign_profiles_are_told_and_passed_over() {
 fn gray_photographs_keep_their_light() {
     let folder = TempDir::new().expect("a folder");
     let path = folder.path().join("gray.png");
-    let mut encoder = image::codecs::png::PngEncoder::new(std::fs::File::create(&path).expect("a file"));
     let icc = ColorProfile::new_gray_with_gamma(1.8).encode().expect("a profile");
-    encoder.set_icc_profile(icc).expect("PNG holds profiles");
-    let gray = image::GrayImage::from_pixel(SIDE, SIDE, image::Luma([100]));
-    DynamicImage::from(gray).write_with_encoder(encoder).expect("written");
+    std::fs::write(&path, Specimen::eight(SIDE, SIDE, |_, _| [100]).png(Some(icc))).expect("written");
     let (photographs, colors, _) = survey(&[path]);
     assert!(colors.is_srgb());
     let Photograph::Sixteen(raster) = photographs.photograph(0).expect("decodes") else { panic!("8 bits") };

@@ -9,7 +9,8 @@ use trueup_core::raster::Photograph;
 use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
 use trueup_core::{Error, Result};
 
-use super::{WorkingPicture, photograph, reduce_photograph};
+use super::photograph::photograph;
+use super::working::{WorkingPicture, reduce_photograph};
 use crate::color::PhotographColors;
 
 /// Photographs in files. What [`working`](Self::working) decodes is kept, within a budget of bytes, until

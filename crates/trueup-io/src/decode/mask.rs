@@ -7,7 +7,8 @@ use trueup_core::raster::{LUMA, Photograph, Raster};
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 
-use super::{orientation, photograph};
+use super::orientation;
+use super::photograph::photograph;
 use crate::source::{self, RejectedSource, SourceOptions};
 
 /// The share of white from which on a pixel of a mask counts as white, and the opacity from which on it counts as opaque.
@@ -23,8 +24,7 @@ const HALF: f32 = 0.5;
 pub fn mask(file: &Path, image: &SourceImage, options: &SourceOptions, context: &StageContext) -> Result<Mask> {
     let path = file.display().to_string();
     // A mask may be smaller than any photograph worth stitching; its size is that of one.
-    let any_size = SourceOptions { min_side_px: 1, ..options.clone() };
-    let mut found = source::scan(std::slice::from_ref(&path), &any_size, context)?;
+    let mut found = source::scan_any_size(std::slice::from_ref(&path), options, context)?;
     let Some(picture) = found.images.pop().filter(|_| found.images.is_empty()) else {
         return Err(found.rejected.first().map_or_else(
             || Error::input(&path, "it is no single picture", "Give one picture as a mask."),

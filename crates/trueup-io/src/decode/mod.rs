@@ -1,140 +1,15 @@
 //! Pixels from files: whole photographs, and the reduced pictures that measurement works on.
 
-mod codecs;
 mod files;
-mod jpeg_scans;
 mod mask;
 mod orientation;
+mod photograph;
 mod reduce;
 #[cfg(test)]
 mod tests;
-mod tiff_kinds;
+mod working;
 
-use trueup_core::raster::{LUMA, Photograph, Raster};
-use trueup_core::source::{SourceImage, WorkingFrame};
-use trueup_core::{Error, Result};
-
-pub(crate) use codecs::jpeg_options;
 pub use files::FilePhotographs;
 pub use mask::mask;
-pub(crate) use tiff_kinds::{Kind as TiffKind, inspect as inspect_tiff};
-
-/// A photograph reduced to the sizes that measurement works on.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WorkingPicture {
-    /// Rec. 601 luma of the encoded values, 0 to 255, one channel: the whole pixels inside the working frame.
-    pub gray: Raster<f32>,
-    /// A small RGB picture for comparing colors and for reports: the whole pixels inside `thumbnail_frame`.
-    pub thumbnail: Raster<u8>,
-    /// Size and scale of the thumbnail; its corner is the photograph's corner, like that of the working frame.
-    pub thumbnail_frame: WorkingFrame,
-}
-
-/// Decodes a photograph in full size, upright.
-///
-/// Gray stays one channel; gray with alpha becomes RGBA; palettes, CMYK and one-bit pictures become RGB or gray;
-/// 16 bits a sample stay 16; floating point is taken for linear light, 1 for white, and becomes 16 bits of sRGB, what is
-/// brighter than white becoming white.
-///
-/// # Errors
-/// [`Error::Io`] if the file cannot be read, [`Error::Input`] if its pixels are damaged or incomplete (no missing part
-/// is tolerated), of an unsupported kind, or no longer of the size that was found when it was examined.
-pub fn photograph(image: &SourceImage) -> Result<Photograph> {
-    Ok(match codecs::decode_stored(image)? {
-        Photograph::Eight(raster) => Photograph::Eight(orientation::upright(raster, image.orientation)),
-        Photograph::Sixteen(raster) => Photograph::Sixteen(orientation::upright(raster, image.orientation)),
-    })
-}
-
-/// Bits of a sample in a photograph's file: 8 or 16, for floating point 16, 32 or 64.
-///
-/// # Errors
-/// [`Error::Io`] if the file cannot be read, [`Error::Input`] if its header no longer can.
-pub fn sample_bits(image: &SourceImage) -> Result<u16> {
-    let file = std::fs::File::open(&image.path).map_err(|error| Error::io("reading", &image.path, error))?;
-    crate::metadata::sample_bits(&file).ok_or_else(|| {
-        Error::input(
-            &image.name,
-            "its header can no longer be read",
-            "Do not change photographs while they are stitched; start again.",
-        )
-    })
-}
-
-/// Decodes a photograph and reduces it to the working frame and to a thumbnail of at most `thumbnail_max_area` pixels.
-///
-/// # Errors
-/// As [`photograph`]; [`Error::Input`] if `frame` is not a frame of this photograph.
-pub fn working(image: &SourceImage, frame: &WorkingFrame, thumbnail_max_area: f64) -> Result<WorkingPicture> {
-    reduce_photograph(&photograph(image)?, &image.name, frame, thumbnail_max_area)
-}
-
-/// Reduces a decoded photograph by exact area averaging: every working pixel is the mean of the full pixels under it,
-/// each weighted by the area it covers, so that `working = working_from_full * full` holds without any shift.
-/// Transparent parts count as black. Where nothing is to be reduced, the values are those of the photograph.
-///
-/// # Errors
-/// [`Error::Input`] if `frame` is not a frame of a picture of this size.
-pub fn reduce_photograph(
-    photograph: &Photograph,
-    name: &str,
-    frame: &WorkingFrame,
-    thumbnail_max_area: f64,
-) -> Result<WorkingPicture> {
-    let (width, height) = (photograph.width(), photograph.height());
-    let scale = frame.working_from_full;
-    let fits = |working: f64, full: usize| (working - full as f64 * scale).abs() <= 0.5;
-    if !(scale > 0.0 && scale <= 1.0 && fits(frame.width, width) && fits(frame.height, height)) {
-        return Err(Error::input(
-            name,
-            format!("it has {width} x {height} px, which does not belong to a working frame of {frame:?}"),
-            "Make the frame from the photograph's own size.",
-        ));
-    }
-    let colors = average_to_frame(photograph, frame);
-    // A thumbnail of no area would have no scale; one pixel is the least.
-    let thumbnail_frame = WorkingFrame::new(width, height, thumbnail_max_area.max(1.0));
-    let thumbnail = if thumbnail_frame.working_from_full <= scale {
-        // The mean of means weighted by area: the photograph need not be walked again.
-        let (width, height) = whole_size(&thumbnail_frame);
-        reduce::area_average(&colors, thumbnail_frame.working_from_full / scale, width, height)
-    } else {
-        average_to_frame(photograph, &thumbnail_frame)
-    };
-    Ok(WorkingPicture { gray: luma(colors)?, thumbnail: rgb8(&thumbnail)?, thumbnail_frame })
-}
-
-fn average_to_frame(photograph: &Photograph, frame: &WorkingFrame) -> Raster<f32> {
-    let (width, height) = whole_size(frame);
-    match photograph {
-        Photograph::Eight(raster) => reduce::area_average(raster, frame.working_from_full, width, height),
-        Photograph::Sixteen(raster) => reduce::area_average(raster, frame.working_from_full, width, height),
-    }
-}
-
-/// The whole pixels inside a frame.
-fn whole_size(frame: &WorkingFrame) -> (usize, usize) {
-    (reduce::whole_pixels(frame.width), reduce::whole_pixels(frame.height))
-}
-
-/// The luma of a gray or RGB picture.
-fn luma(colors: Raster<f32>) -> Result<Raster<f32>> {
-    if colors.channels() == 1 {
-        return Ok(colors);
-    }
-    let (pixels, _) = colors.data().as_chunks::<3>();
-    let gray = pixels.iter().map(|[r, g, b]| LUMA[0] * r + LUMA[1] * g + LUMA[2] * b).collect();
-    Raster::from_data(colors.width(), colors.height(), 1, gray)
-}
-
-/// A gray or RGB picture as rounded 8-bit RGB.
-fn rgb8(colors: &Raster<f32>) -> Result<Raster<u8>> {
-    // The addition rounds; the conversion truncates and saturates.
-    let rounded = |value: f32| (value + 0.5) as u8;
-    let data = if colors.channels() == 1 {
-        colors.data().iter().flat_map(|&gray| [rounded(gray); 3]).collect()
-    } else {
-        colors.data().iter().map(|&value| rounded(value)).collect()
-    };
-    Raster::from_data(colors.width(), colors.height(), 3, data)
-}
+pub use photograph::{photograph, sample_bits};
+pub use working::{WorkingPicture, reduce_photograph, working};

@@ -5,22 +5,22 @@ use trueup_core::raster::Raster;
 /// Whole pixels are counted inside a real length this much too short, so that 799.9999999 is 800.
 const ROUNDING_PX: f64 = 1e-6;
 
-/// A sample of a photograph.
-pub(crate) trait Sample: Copy + Default + Into<f32> {
+/// A sample of a picture that is reduced.
+pub(crate) trait ReducedSample: Copy + Default + Into<f32> {
     /// The factor that brings a sample to the range 0 to 255.
     const TO_255: f32;
 }
 
-impl Sample for u8 {
+impl ReducedSample for u8 {
     const TO_255: f32 = 1.0;
 }
 
-impl Sample for u16 {
+impl ReducedSample for u16 {
     const TO_255: f32 = 1.0 / 257.0;
 }
 
 /// A sample of a picture that was reduced before.
-impl Sample for f32 {
+impl ReducedSample for f32 {
     const TO_255: f32 = 1.0;
 }
 
@@ -81,7 +81,12 @@ fn spans(length: usize, scale: f64, target_length: usize) -> Vec<Span> {
 ///
 /// Columns are averaged first, whole rows at a time: that runs through memory in order and in vector registers, and
 /// leaves the rows, which do not, with the few rows that remain.
-pub(crate) fn area_average<T: Sample>(source: &Raster<T>, scale: f64, width: usize, height: usize) -> Raster<f32> {
+pub(crate) fn area_average<T: ReducedSample>(
+    source: &Raster<T>,
+    scale: f64,
+    width: usize,
+    height: usize,
+) -> Raster<f32> {
     let channels = if source.channels() == 1 { 1 } else { 3 };
     if source.width() == 0 || source.height() == 0 {
         return Raster::new(0, 0, channels);
@@ -110,17 +115,17 @@ pub(crate) fn area_average<T: Sample>(source: &Raster<T>, scale: f64, width: usi
     target
 }
 
-fn is_opaque<T: Sample>(rgba: &[T]) -> bool {
+fn is_opaque<T: ReducedSample>(rgba: &[T]) -> bool {
     rgba.as_chunks::<4>().0.iter().all(|&[_, _, _, alpha]| alpha.into() * T::TO_255 >= 255.0)
 }
 
-fn add_row<T: Sample>(row: &[T], weight: f32, sums: &mut [f32]) {
+fn add_row<T: ReducedSample>(row: &[T], weight: f32, sums: &mut [f32]) {
     for (sum, &sample) in sums.iter_mut().zip(row) {
         *sum += weight * sample.into();
     }
 }
 
-fn add_row_with_alpha<T: Sample>(row: &[T], weight: f32, sums: &mut [f32]) {
+fn add_row_with_alpha<T: ReducedSample>(row: &[T], weight: f32, sums: &mut [f32]) {
     // Full alpha times this is 1.
     let alpha_to_unit = T::TO_255 / 255.0;
     for (sum, &[r, g, b, alpha]) in sums.as_chunks_mut::<4>().0.iter_mut().zip(row.as_chunks::<4>().0) {
@@ -154,7 +159,7 @@ mod tests {
 
     use super::*;
 
-    fn to_frame<T: Sample>(source: &Raster<T>, frame: &WorkingFrame) -> Raster<f32> {
+    fn to_frame<T: ReducedSample>(source: &Raster<T>, frame: &WorkingFrame) -> Raster<f32> {
         area_average(source, frame.working_from_full, whole_pixels(frame.width), whole_pixels(frame.height))
     }
 

@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use image::{DynamicImage, GrayAlphaImage, GrayImage, ImageBuffer, ImageFormat, Luma, LumaA, Rgb, Rgb32FImage, Rgba};
 use tempfile::TempDir;
-use trueup_core::StageContext;
-use trueup_core::source::PhotographSource;
+use trueup_core::raster::Photograph;
+use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
+use trueup_core::{Error, StageContext};
 
 use super::*;
+use crate::formats::specimens::{Container, Specimen};
 use crate::source::{SourceOptions, scan};
 
 const WIDTH: u32 = 45;
@@ -24,12 +25,6 @@ fn write(folder: &TempDir, name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-fn encode(picture: &DynamicImage, format: ImageFormat) -> Vec<u8> {
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, format).expect("encoding to memory");
-    bytes.into_inner()
-}
-
 fn examine(path: PathBuf) -> SourceImage {
     let inputs = [path.display().to_string()];
     let mut sources = scan(&inputs, &SourceOptions::default(), &StageContext::default()).expect("a scan");
@@ -37,33 +32,35 @@ fn examine(path: PathBuf) -> SourceImage {
     sources.images.remove(0)
 }
 
-fn rgb8() -> DynamicImage {
-    ImageBuffer::from_fn(WIDTH, HEIGHT, |x, y| Rgb([value(x, y, 0), value(x, y, 1), value(x, y, 2)])).into()
+fn rgb8() -> Specimen {
+    rgb8_of(WIDTH, HEIGHT)
 }
 
-fn rgb16() -> DynamicImage {
-    let wide = |x, y, c| u16::from(value(x, y, c)) * 257 + 3 * (x % 2) as u16;
-    ImageBuffer::from_fn(WIDTH, HEIGHT, |x, y| Rgb([wide(x, y, 0), wide(x, y, 1), wide(x, y, 2)])).into()
+fn rgb8_of(width: u32, height: u32) -> Specimen {
+    Specimen::eight(width, height, |x, y| [0, 1, 2].map(|c| value(x, y, c)))
+}
+
+fn rgb16() -> Specimen {
+    Specimen::sixteen(WIDTH, HEIGHT, |x, y| [0, 1, 2].map(|c| u16::from(value(x, y, c)) * 257 + 3 * (x % 2) as u16))
 }
 
 /// Channels and depth of what comes out, and whether a sample pixel has the expected values.
 #[test]
 fn every_kind_of_pixel_keeps_its_depth() {
     let folder = TempDir::new().expect("a temporary folder");
-    let gray: DynamicImage = GrayImage::from_fn(WIDTH, HEIGHT, |x, y| Luma([value(x, y, 0)])).into();
-    let gray_alpha: DynamicImage = GrayAlphaImage::from_fn(WIDTH, HEIGHT, |x, y| LumaA([value(x, y, 0), 77])).into();
-    let rgba: DynamicImage =
-        ImageBuffer::from_fn(WIDTH, HEIGHT, |x, y| Rgba([value(x, y, 0), value(x, y, 1), value(x, y, 2), 99])).into();
+    let gray = Specimen::eight(WIDTH, HEIGHT, |x, y| [value(x, y, 0)]);
+    let gray_alpha = Specimen::eight(WIDTH, HEIGHT, |x, y| [value(x, y, 0), 77]);
+    let rgba = Specimen::eight(WIDTH, HEIGHT, |x, y| [value(x, y, 0), value(x, y, 1), value(x, y, 2), 99]);
     let (v0, v1, v2) = (value(11, 5, 0), value(11, 5, 1), value(11, 5, 2));
-    let eight: [(&DynamicImage, &[ImageFormat], Vec<u8>); 4] = [
-        (&gray, &[ImageFormat::Png, ImageFormat::Tiff], vec![v0]),
-        (&gray_alpha, &[ImageFormat::Png], vec![v0, v0, v0, 77]),
-        (&rgb8(), &[ImageFormat::Png, ImageFormat::Tiff, ImageFormat::WebP], vec![v0, v1, v2]),
-        (&rgba, &[ImageFormat::Png, ImageFormat::Tiff, ImageFormat::WebP], vec![v0, v1, v2, 99]),
+    let eight: [(&Specimen, &[Container], Vec<u8>); 4] = [
+        (&gray, &[Container::Png, Container::Tiff], vec![v0]),
+        (&gray_alpha, &[Container::Png], vec![v0, v0, v0, 77]),
+        (&rgb8(), &[Container::Png, Container::Tiff, Container::WebP], vec![v0, v1, v2]),
+        (&rgba, &[Container::Png, Container::Tiff, Container::WebP], vec![v0, v1, v2, 99]),
     ];
     for (picture, formats, pixel) in eight {
         for &format in formats {
-            let image = examine(write(&folder, "picture", &encode(picture, format)));
+            let image = examine(write(&folder, "picture", &picture.file(format)));
             let Photograph::Eight(raster) = photograph(&image).expect("a photograph") else {
                 panic!("{format:?}: 16 bit")
             };
@@ -71,8 +68,8 @@ fn every_kind_of_pixel_keeps_its_depth() {
             assert_eq!(raster.pixel(11, 5), pixel, "{format:?}");
         }
     }
-    for format in [ImageFormat::Png, ImageFormat::Tiff] {
-        let image = examine(write(&folder, "picture", &encode(&rgb16(), format)));
+    for format in [Container::Png, Container::Tiff] {
+        let image = examine(write(&folder, "picture", &rgb16().file(format)));
         let Photograph::Sixteen(raster) = photograph(&image).expect("a photograph") else {
             panic!("{format:?}: 8 bit")
         };
@@ -83,8 +80,8 @@ fn every_kind_of_pixel_keeps_its_depth() {
 #[test]
 fn floating_point_is_linear_light() {
     let folder = TempDir::new().expect("a temporary folder");
-    let picture: DynamicImage = Rgb32FImage::from_fn(WIDTH, HEIGHT, |_, _| Rgb([0.5, -1.0, 7.0])).into();
-    let image = examine(write(&folder, "float.tif", &encode(&picture, ImageFormat::Tiff)));
+    let picture = Specimen::float(WIDTH, HEIGHT, |_, _| [0.5, -1.0, 7.0]);
+    let image = examine(write(&folder, "float.tif", &picture.file(Container::Tiff)));
     let Photograph::Sixteen(raster) = photograph(&image).expect("a photograph") else { panic!("8 bit") };
     // IEC 61966-2-1: 1.055 * 0.5^(1 / 2.4) - 0.055 = 0.735357, of 65535.
     assert_eq!(raster.pixel(0, 0), [48_192, 0, 65_535]);
@@ -131,7 +128,13 @@ fn every_kind_of_jpeg_is_decoded_but_none_that_is_cut_off() {
             let bytes = jpeg(color, progressive);
             let path = write(&folder, "picture.jpg", &bytes);
             let image = examine(path);
-            assert_eq!(photograph(&image).expect("a photograph").channels(), channels, "{color:?} {progressive}");
+            let decoded = photograph(&image).expect("a photograph");
+            assert_eq!(decoded.channels(), channels, "{color:?} {progressive}");
+            if let (Luma | Rgb, Photograph::Eight(raster)) = (color, &decoded) {
+                for (c, level) in raster.pixel(20, 20).iter().enumerate() {
+                    assert!(level.abs_diff(60 + 30 * c as u8) <= 8, "{color:?} {progressive}: {level} of channel {c}");
+                }
+            }
             // Anywhere in the file, and just before its end.
             for cut in (16..bytes.len()).step_by(101).chain(bytes.len() - 4..bytes.len()) {
                 write(&folder, "picture.jpg", &bytes[..cut]);
@@ -171,15 +174,17 @@ fn jpegs_with_a_scan_per_component_and_reduced_color_are_decoded() {
 fn data_after_the_end_of_a_jpeg_are_ignored() {
     let folder = TempDir::new().expect("a temporary folder");
     let mut bytes = jpeg(jpeg_encoder::ColorType::Rgb, false);
+    let without = photograph(&examine(write(&folder, "picture.jpg", &bytes))).expect("a photograph");
+    assert_eq!((without.width(), without.height(), without.channels()), (64, 48, 3));
     bytes.extend_from_slice(b"maker's data");
-    assert!(photograph(&examine(write(&folder, "picture.jpg", &bytes))).is_ok());
+    assert_eq!(photograph(&examine(write(&folder, "picture.jpg", &bytes))).expect("a photograph"), without);
 }
 
 #[test]
 fn cut_pngs_tiffs_and_webps_are_refused() {
     let folder = TempDir::new().expect("a temporary folder");
-    for format in [ImageFormat::Png, ImageFormat::Tiff, ImageFormat::WebP] {
-        let bytes = encode(&rgb8(), format);
+    for format in Container::ALL {
+        let bytes = rgb8().file(format);
         let image = examine(write(&folder, "picture", &bytes));
         write(&folder, "picture", &bytes[..bytes.len() / 2]);
         assert!(matches!(photograph(&image), Err(Error::Input { .. })), "{format:?}");
@@ -189,8 +194,8 @@ fn cut_pngs_tiffs_and_webps_are_refused() {
 #[test]
 fn files_that_change_after_the_scan_are_refused() {
     let folder = TempDir::new().expect("a temporary folder");
-    let image = examine(write(&folder, "picture", &encode(&rgb8(), ImageFormat::Png)));
-    write(&folder, "picture", &encode(&rgb8().crop_imm(0, 0, 20, 20), ImageFormat::Png));
+    let image = examine(write(&folder, "picture", &rgb8().file(Container::Png)));
+    write(&folder, "picture", &rgb8_of(20, 20).file(Container::Png));
     assert!(photograph(&image).expect_err("another size").to_string().contains("examined"));
     std::fs::remove_file(&image.path).expect("our own file");
     assert!(matches!(photograph(&image), Err(Error::Io { .. })));
@@ -199,7 +204,7 @@ fn files_that_change_after_the_scan_are_refused() {
 #[test]
 fn working_pictures_have_the_size_of_their_frames() {
     let folder = TempDir::new().expect("a temporary folder");
-    let image = examine(write(&folder, "picture", &encode(&rgb8(), ImageFormat::Png)));
+    let image = examine(write(&folder, "picture", &rgb8().file(Container::Png)));
     let frame = WorkingFrame::new(image.width, image.height, 500.0);
     let picture = working(&image, &frame, 100.0).expect("a working picture");
     assert_eq!((picture.gray.width(), picture.gray.height()), (frame.width as usize, frame.height as usize));
@@ -214,8 +219,8 @@ fn working_pictures_have_the_size_of_their_frames() {
 #[test]
 fn luma_is_that_of_the_standard_and_depths_agree() {
     let folder = TempDir::new().expect("a temporary folder");
-    let eight = examine(write(&folder, "eight", &encode(&rgb8(), ImageFormat::Png)));
-    let sixteen = examine(write(&folder, "sixteen", &encode(&rgb16(), ImageFormat::Png)));
+    let eight = examine(write(&folder, "eight", &rgb8().file(Container::Png)));
+    let sixteen = examine(write(&folder, "sixteen", &rgb16().file(Container::Png)));
     let frame = WorkingFrame::new(eight.width, eight.height, 1e9);
     let a = working(&eight, &frame, 1e9).expect("a working picture");
     let b = working(&sixteen, &frame, 1e9).expect("a working picture");
@@ -231,8 +236,8 @@ fn luma_is_that_of_the_standard_and_depths_agree() {
 fn the_cache_changes_nothing_but_the_work() {
     let folder = TempDir::new().expect("a temporary folder");
     let images = vec![
-        examine(write(&folder, "a.png", &encode(&rgb8(), ImageFormat::Png))),
-        examine(write(&folder, "b.png", &encode(&rgb16(), ImageFormat::Png))),
+        examine(write(&folder, "a.png", &rgb8().file(Container::Png))),
+        examine(write(&folder, "b.png", &rgb16().file(Container::Png))),
     ];
     let frame = WorkingFrame::new(images[0].width, images[0].height, 300.0);
     let first_size = (WIDTH * HEIGHT * 3) as usize;
@@ -244,8 +249,9 @@ fn the_cache_changes_nothing_but_the_work() {
         }
         // The first photograph fits wherever there is a budget, and is then there without its file.
         let away = folder.path().join("away");
+        let whole = photograph(&images[0]).expect("decoded");
         std::fs::rename(&images[0].path, &away).expect("our own file");
-        assert_eq!(files.photograph(0).is_ok(), budget > 0);
+        assert_eq!(files.photograph(0).ok(), (budget > 0).then_some(whole));
         assert!(files.photograph(0).is_err());
         std::fs::rename(&away, &images[0].path).expect("our own file");
         for (index, image) in images.iter().enumerate() {

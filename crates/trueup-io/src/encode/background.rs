@@ -6,8 +6,6 @@ use std::str::FromStr;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use trueup_core::options::{ChoiceDescription, OptionValue};
 
-use super::Alpha;
-
 /// What shows where no photograph is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Background {
@@ -37,15 +35,6 @@ impl Background {
         match self {
             Self::Auto | Self::Transparent => [0; 3],
             Self::Color(levels) => levels,
-        }
-    }
-
-    /// Whether a picture that may be transparent is written with transparency, in a format that can.
-    pub(super) fn keeps(self, alpha: Alpha) -> bool {
-        match alpha {
-            Alpha::Keep => true,
-            Alpha::Drop => false,
-            Alpha::Auto => !matches!(self, Self::Color(_)),
         }
     }
 }
@@ -154,12 +143,5 @@ mod tests {
     fn every_choice_is_described() {
         let described: Vec<&str> = Background::described_choices().iter().map(|choice| choice.name).collect();
         assert_eq!(described, Background::choices());
-    }
-
-    #[test]
-    fn a_color_leaves_nothing_transparent_unless_alpha_is_wanted() {
-        assert!(Background::Auto.keeps(Alpha::Auto) && Background::Transparent.keeps(Alpha::Auto));
-        assert!(!Background::WHITE.keeps(Alpha::Auto) && Background::WHITE.keeps(Alpha::Keep));
-        assert!(!Background::Auto.keeps(Alpha::Drop));
     }
 }

@@ -7,6 +7,7 @@ use ::tiff::decoder::Decoder;
 use ::tiff::tags::Tag;
 use tempfile::TempDir;
 
+use super::failure::WriteFailure;
 use super::format_tests::{Fine, pages, sixteen};
 use super::tests::FullDisk;
 use super::*;
@@ -78,14 +79,14 @@ fn layers_are_pages_with_a_place() {
     assert!(check_layers_place(&folder.path().join("a.png")).is_err());
     let options = OutputOptions::default();
     for room in [0, 100, 5_000] {
-        let failed = tiff::write_pages(
+        let failed = layers::write_pages(
             &mut FullDisk { position: 0, room },
             &TwoLayers,
             &Metadata::default(),
             &options,
             &StageContext::default(),
         );
-        assert!(matches!(failed, Err(Failure::Io(_))), "{failed:?}");
+        assert!(matches!(failed, Err(WriteFailure::Io(_))), "{failed:?}");
     }
 }
 
@@ -144,6 +145,6 @@ fn labels_are_the_samples() {
         &OutputOptions::default(),
         &StageContext::default(),
     );
-    assert!(matches!(failed, Err(Failure::Io(_))));
+    assert!(matches!(failed, Err(WriteFailure::Io(_))));
     assert!(check_labels_place(&folder.path().join("a.tif")).is_err());
 }

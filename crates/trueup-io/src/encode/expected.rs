@@ -2,30 +2,14 @@
 
 use std::path::Path;
 
-use super::{DeepZoomFormat, OutputOptions, TiffCompression};
-use crate::format::{OutputFormat, PictureFormat};
-
-/// Bytes a pixel of compressed panoramas of photographs, at the low end: what is refused would not have fitted.
-const LOSSY: f64 = 0.1;
-/// The same without loss, for every byte of a sample.
-const LOSSLESS: f64 = 0.8;
-/// Channels of a pixel without transparency.
-const COLORS: f64 = 3.0;
+use super::options::OutputOptions;
+use crate::formats;
 
 /// Bytes that a panorama of `width` x `height` pixels will take in `path`, a file or the files of a Deep Zoom pyramid: exact
 /// where nothing is compressed and nothing transparent, else at the low end of what photographs take. 0 for formats that are
 /// not written.
 pub fn expected_bytes(path: &Path, width: usize, height: usize, options: &OutputOptions) -> u64 {
-    let sample_bytes = f64::from(options.depth.sample_bytes());
-    let bytes_per_pixel = match OutputFormat::of_extension(path) {
-        None => 0.0,
-        Some(OutputFormat::DeepZoom) if options.dzi_format == DeepZoomFormat::Png => LOSSLESS,
-        Some(OutputFormat::DeepZoom | OutputFormat::Picture(PictureFormat::Jpeg)) => LOSSY,
-        Some(OutputFormat::Picture(PictureFormat::Tiff)) if options.tiff_compression == TiffCompression::None => {
-            COLORS * sample_bytes
-        }
-        Some(OutputFormat::Picture(_)) => LOSSLESS * sample_bytes,
-    };
+    let bytes_per_pixel = formats::writing_of(path).map_or(0.0, |writing| (writing.bytes_per_pixel)(options));
     // The cast saturates.
     (width as f64 * height as f64 * bytes_per_pixel) as u64
 }
@@ -33,7 +17,7 @@ pub fn expected_bytes(path: &Path, width: usize, height: usize, options: &Output
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::encode::Depth;
+    use crate::encode::{Depth, TiffCompression};
 
     #[test]
     fn what_is_not_compressed_is_exact_and_the_rest_smaller() {

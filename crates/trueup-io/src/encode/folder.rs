@@ -6,7 +6,7 @@ use tempfile::TempDir;
 use trueup_core::{Error, Result};
 
 use super::pending::{PART, PREFIX, allow_umask, require_folder, takes_nothing};
-use super::unfinished::{Entry, UNFINISHED};
+use super::unfinished::{UNFINISHED, UnfinishedEntry};
 
 /// Permissions that any new folder asks for.
 const NEW_FOLDER: u32 = 0o777;
@@ -17,7 +17,7 @@ pub struct PendingFolder {
     temporary: TempDir,
     target: PathBuf,
     /// After the folder, which is gone before it leaves the list.
-    entry: Entry<'static>,
+    entry: UnfinishedEntry<'static>,
 }
 
 impl PendingFolder {

@@ -7,6 +7,7 @@ use ::tiff::decoder::{Decoder, DecodingResult};
 use ::tiff::tags::Tag;
 use tempfile::TempDir;
 
+use super::samples::OutputSample;
 use super::tests::{Gradient, files_in, read};
 use super::*;
 

@@ -7,22 +7,19 @@ use png::{BitDepth, ColorType, Encoder};
 use trueup_core::options::StageOptions;
 use trueup_core::{Error, Result, StageContext};
 
-use super::codecs::{from_png, png_compression};
-use super::pending::PendingFile;
-use super::{Failure, OutputOptions, check_place, check_sides, largest_side};
-use crate::format::{OutputFormat, PictureFormat};
+use super::destination::check_sides;
+use super::failure::WriteFailure;
+use super::options::OutputOptions;
+use super::pending::{PendingFile, check_place};
+use super::strips::{BUFFER_BYTES, STRIP_ROWS};
+use crate::format::Output;
+use crate::formats::png::{PNG, SIDES, compression, failure};
 
 /// The value where no photograph is; the first photograph has 1.
 pub const NOTHING: u16 = 0;
 
 /// Most photographs that a palette has room for beside [`NOTHING`].
 const PALETTE: usize = 255;
-
-/// Bytes collected before the operating system is called.
-const BUFFER_BYTES: usize = 1 << 20;
-
-/// Rows between two looks at whether the work is cancelled.
-const ROWS: usize = 64;
 
 /// Labels to be written, row by row.
 pub trait LabelMap {
@@ -42,7 +39,7 @@ pub trait LabelMap {
 /// # Errors
 /// As [`write_labels`].
 pub fn check_labels_place(path: &Path) -> Result<()> {
-    if PictureFormat::of_extension(path) == Some(PictureFormat::Png) {
+    if PNG.names(path) {
         return check_place(path);
     }
     Err(Error::Unsupported {
@@ -63,7 +60,7 @@ pub fn write_labels(path: &Path, map: &dyn LabelMap, options: &OutputOptions, co
     options.check()?;
     check_labels_place(path)?;
     let [width, height] = map.size();
-    check_sides(path, largest_side(OutputFormat::Picture(PictureFormat::Png)), width, height)?;
+    check_sides(path, SIDES, width, height)?;
     let mut pending = PendingFile::create(path)?;
     write_map(pending.file(), map, options, context).map_err(|failure| failure.at(path))?;
     context.check_cancelled()?;
@@ -71,15 +68,15 @@ pub fn write_labels(path: &Path, map: &dyn LabelMap, options: &OutputOptions, co
 }
 
 pub(super) fn write_map(
-    file: &mut impl Write,
+    file: &mut dyn Output,
     map: &dyn LabelMap,
     options: &OutputOptions,
-    context: &StageContext,
-) -> std::result::Result<(), Failure> {
+    context: &StageContext<'_>,
+) -> std::result::Result<(), WriteFailure> {
     let names = map.names();
     let [width, height] = map.size();
     let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
-    let mut encoder = Encoder::new(&mut output, width as u32, height as u32);
+    let mut encoder = Encoder::new(&mut output as &mut dyn Write, width as u32, height as u32);
     let indexed = names.len() <= PALETTE;
     if indexed {
         encoder.set_color(ColorType::Indexed);
@@ -91,15 +88,15 @@ pub(super) fn write_map(
         encoder.set_color(ColorType::Grayscale);
         encoder.set_depth(BitDepth::Sixteen);
     }
-    encoder.set_compression(png_compression(options));
+    encoder.set_compression(compression(options));
     for (index, name) in names.into_iter().enumerate() {
-        encoder.add_itxt_chunk(format!("Photograph {}", index + 1), name).map_err(from_png)?;
+        encoder.add_itxt_chunk(format!("Photograph {}", index + 1), name).map_err(failure)?;
     }
-    let mut writer = encoder.write_header().map_err(from_png)?;
-    let mut stream = writer.stream_writer_with_size(BUFFER_BYTES).map_err(from_png)?;
+    let mut writer = encoder.write_header().map_err(failure)?;
+    let mut stream = writer.stream_writer_with_size(BUFFER_BYTES).map_err(failure)?;
     let (mut row, mut bytes) = (Vec::new(), Vec::new());
     for y in 0..height {
-        if y % ROWS == 0 {
+        if y % STRIP_ROWS == 0 {
             context.check_cancelled()?;
         }
         map.row(y, &mut row)?;
@@ -110,8 +107,8 @@ pub(super) fn write_map(
         }
         stream.write_all(&bytes)?;
     }
-    stream.finish().map_err(from_png)?;
-    writer.finish().map_err(from_png)?;
+    stream.finish().map_err(failure)?;
+    writer.finish().map_err(failure)?;
     output.flush()?;
     Ok(())
 }

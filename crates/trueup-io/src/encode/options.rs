@@ -1,10 +1,6 @@
 //! The options of written panoramas.
 
-use std::path::Path;
-
-use crate::format::{OutputFormat, PictureFormat};
-
-use super::Background;
+use super::background::Background;
 
 trueup_core::choice! {
     /// How finely JPEG stores color, relative to brightness.
@@ -132,9 +128,68 @@ trueup_core::choice! {
     }
 }
 
+trueup_core::options! {
+    /// How panoramas are written. The format follows from the file's extension; WebP is always lossless.
+    pub struct OutputOptions("output") {
+        /// Bits of a sample; JPEG, WebP and Deep Zoom have 8. Choose 16 or float when the panorama is to be edited further,
+        /// 8 when 16-bit photographs are to make a small file.
+        depth: Depth = Depth::Auto, Allowed::Any, "", basic;
+        /// Whether PNG, TIFF, WebP and Deep Zoom in PNG have transparency. Drop it for programs that show it wrongly, keep it
+        /// when what a chosen background covers must still be told apart.
+        alpha: Alpha = Alpha::Auto, Allowed::Any, "", basic;
+        /// JPEG quality on the usual scale of the Independent JPEG Group. Raise it for prints, lower it where the file is too
+        /// large to send.
+        jpeg_quality: u8 = 92, between(1.0, 100.0), "", basic;
+        /// How finely JPEG stores color. Choose 4:4:4 when red or blue lettering and edges look frayed.
+        jpeg_subsampling: ChromaSubsampling = ChromaSubsampling::Quarter, Allowed::Any, "";
+        /// How hard PNG compression tries. Raise it for files that are kept or sent often; writing takes longer.
+        png_compression: PngCompression = PngCompression::Fast, Allowed::Any, "";
+        /// How TIFF strips and tiles are compressed. Choose none for programs that do not read deflate, or for speed.
+        tiff_compression: TiffCompression = TiffCompression::Deflate, Allowed::Any, "", basic;
+        /// How the pixels of a TIFF are cut up. Choose strips for programs that read no tiles, tiles for viewers of smaller
+        /// panoramas that read only what they show.
+        tiff_layout: TiffLayout = TiffLayout::Auto, Allowed::Any, "";
+        /// Whether tiled TIFFs have smaller copies (overviews, pyramid) for viewers, as pages of their own. Switch it off for
+        /// programs that take every page for a picture.
+        tiff_overviews: bool = true, Allowed::Any, "";
+        /// Whether a TIFF is a BigTIFF. Choose always for programs that expect it of every file.
+        tiff_big: BigTiff = BigTiff::Auto, Allowed::Any, "";
+        /// Side of Deep Zoom tiles, without what overlaps. Raise it for fewer files, where a server is slow to answer.
+        dzi_tile_px: usize = 254, between(16.0, 8192.0), "px";
+        /// By how much Deep Zoom tiles reach into their neighbors. Set it to what the viewer expects; 0 if it shows tiles side
+        /// by side, more if seams show between tiles.
+        dzi_overlap_px: usize = 1, between(0.0, 8.0), "px";
+        /// Format of Deep Zoom tiles. Choose png where they must be lossless or transparent.
+        dzi_format: DeepZoomFormat = DeepZoomFormat::Jpeg, Allowed::Any, "";
+        /// How large the pages of a file of layers are. Choose cropped for programs that heed the place of a page (GIMP,
+        /// Hugin, enblend): they then need less memory.
+        layer_extent: LayerExtent = LayerExtent::Canvas, Allowed::Any, "";
+        /// What shows where no photograph is. A color is laid under the panorama in every format, unless alpha is kept: choose
+        /// one to match the page or print that the panorama is put on.
+        background: Background = Background::Auto, Allowed::Any, "", basic;
+        /// Which color space panoramas are written in; Deep Zoom tiles and floating point samples are in sRGB's. Choose srgb
+        /// for places that ignore profiles.
+        profile: OutputProfile = OutputProfile::Keep, Allowed::Any, "";
+        /// What panoramas tell of their photographs, in EXIF and XMP. Choose no-location or none before publishing what
+        /// should not tell where or with what it was taken.
+        metadata: MetadataKept = MetadataKept::Keep, Allowed::Any, "", basic;
+    }
+}
+
+impl Alpha {
+    /// Whether a picture that may be transparent is written with transparency, in a format that can.
+    pub(super) fn keeps(self, background: Background) -> bool {
+        match self {
+            Self::Keep => true,
+            Self::Drop => false,
+            Self::Auto => !matches!(background, Background::Color(_)),
+        }
+    }
+}
+
 impl Depth {
     /// Bytes of a sample; [`Depth::Auto`] is taken for 8 bits.
-    pub(super) fn sample_bytes(self) -> u8 {
+    pub(crate) fn sample_bytes(self) -> u8 {
         match self {
             Self::Auto | Self::Eight => 1,
             Self::Sixteen => 2,
@@ -143,58 +198,14 @@ impl Depth {
     }
 }
 
-trueup_core::options! {
-    /// How panoramas are written. The format follows from the file's extension; WebP is always lossless.
-    pub struct OutputOptions("output") {
-        /// Bits of a sample. JPEG, WebP and Deep Zoom have 8.
-        depth: Depth = Depth::Auto, Allowed::Any, "";
-        /// Whether PNG, TIFF, WebP and Deep Zoom in PNG have transparency.
-        alpha: Alpha = Alpha::Auto, Allowed::Any, "";
-        /// JPEG quality on the usual scale of the Independent JPEG Group.
-        jpeg_quality: u8 = 92, between(1.0, 100.0), "";
-        /// How finely JPEG stores color.
-        jpeg_subsampling: ChromaSubsampling = ChromaSubsampling::Quarter, Allowed::Any, "";
-        /// How hard PNG compression tries.
-        png_compression: PngCompression = PngCompression::Fast, Allowed::Any, "";
-        /// How TIFF strips and tiles are compressed.
-        tiff_compression: TiffCompression = TiffCompression::Deflate, Allowed::Any, "";
-        /// How the pixels of a TIFF are cut up.
-        tiff_layout: TiffLayout = TiffLayout::Auto, Allowed::Any, "";
-        /// Whether tiled TIFFs have smaller copies (overviews, pyramid) for viewers, as pages of their own.
-        tiff_overviews: bool = true, Allowed::Any, "";
-        /// Whether a TIFF is a BigTIFF.
-        tiff_big: BigTiff = BigTiff::Auto, Allowed::Any, "";
-        /// Side of Deep Zoom tiles, without what overlaps.
-        dzi_tile_px: usize = 254, between(16.0, 8192.0), "px";
-        /// By how much Deep Zoom tiles reach into their neighbors.
-        dzi_overlap_px: usize = 1, between(0.0, 8.0), "px";
-        /// Format of Deep Zoom tiles.
-        dzi_format: DeepZoomFormat = DeepZoomFormat::Jpeg, Allowed::Any, "";
-        /// How large the pages of a file of layers are.
-        layer_extent: LayerExtent = LayerExtent::Canvas, Allowed::Any, "";
-        /// What shows where no photograph is. A color is laid under the panorama in every format, unless alpha is kept.
-        background: Background = Background::Auto, Allowed::Any, "";
-        /// Which color space panoramas are written in. Deep Zoom tiles and floating point samples are in sRGB's.
-        profile: OutputProfile = OutputProfile::Keep, Allowed::Any, "";
-        /// What panoramas tell of their photographs, in EXIF and XMP.
-        metadata: MetadataKept = MetadataKept::Keep, Allowed::Any, "";
-    }
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-impl OutputOptions {
-    /// These options with the depth decided: [`Depth::Auto`] becomes 16 where `photograph_bits`, the most bits a sample of
-    /// the photographs has, is above 8 and the format of `path` can hold it, else 8.
-    pub fn with_depth_for(&self, path: &Path, photograph_bits: u16) -> Self {
-        let deep = photograph_bits > 8
-            && matches!(
-                OutputFormat::of_extension(path),
-                Some(OutputFormat::Picture(PictureFormat::Png | PictureFormat::Tiff))
-            );
-        let depth = match self.depth {
-            Depth::Auto if deep => Depth::Sixteen,
-            Depth::Auto => Depth::Eight,
-            chosen => chosen,
-        };
-        Self { depth, ..self.clone() }
+    #[test]
+    fn a_color_leaves_nothing_transparent_unless_alpha_is_wanted() {
+        assert!(Alpha::Auto.keeps(Background::Auto) && Alpha::Auto.keeps(Background::Transparent));
+        assert!(!Alpha::Auto.keeps(Background::WHITE) && Alpha::Keep.keeps(Background::WHITE));
+        assert!(!Alpha::Drop.keeps(Background::Auto));
     }
 }

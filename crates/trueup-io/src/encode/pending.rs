@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 use trueup_core::{Error, Result};
 
-use super::unfinished::{Entry, UNFINISHED};
+use super::unfinished::{UNFINISHED, UnfinishedEntry};
 
 /// How temporary names begin, and how those of what is not yet complete end.
 pub(super) const PREFIX: &str = ".trueup-";
@@ -21,7 +21,7 @@ pub(crate) struct PendingFile {
     temporary: NamedTempFile,
     target: PathBuf,
     /// After the file, which is gone before it leaves the list.
-    _entry: Entry<'static>,
+    _entry: UnfinishedEntry<'static>,
 }
 
 impl PendingFile {
@@ -71,8 +71,17 @@ impl PendingFile {
     }
 }
 
+/// Checks that a file of any kind could be written to `path`: the folder exists and takes files, and `path` is no folder
+/// itself. Nothing is left behind.
+///
+/// # Errors
+/// [`Error::Input`] if the folder does not exist or takes no files, [`Error::Io`] if the operating system refuses.
+pub fn check_place(path: &Path) -> Result<()> {
+    PendingFile::create(path).map(drop)
+}
+
 /// Refuses a folder where a file is to be.
-pub(super) fn refuse_folder(path: &Path) -> Result<()> {
+pub(crate) fn refuse_folder(path: &Path) -> Result<()> {
     match path.is_dir() {
         true => Err(Error::input(path.display(), "it is a folder", "Give the name of a file in it.")),
         false => Ok(()),

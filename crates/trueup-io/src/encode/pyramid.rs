@@ -4,29 +4,26 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::Failure;
-use super::samples::Sample;
-
-/// Samples of an RGBA pixel.
-const RGBA: usize = 4;
+use super::failure::WriteFailure;
+use super::samples::{OutputSample, RGBA};
 
 /// How every level is cut into tiles.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Tiling {
+pub(crate) struct Tiling {
     /// Side of a tile without overlap, in pixels.
-    pub(super) side: usize,
+    pub(crate) side: usize,
     /// Pixels by which a tile reaches into its neighbors.
-    pub(super) overlap: usize,
+    pub(crate) overlap: usize,
 }
 
 impl Tiling {
     /// Number of tiles along `length` pixels.
-    pub(super) fn count(self, length: usize) -> usize {
+    pub(crate) fn count(self, length: usize) -> usize {
         length.div_ceil(self.side)
     }
 
     /// The pixels of tile `index` along `length` pixels.
-    pub(super) fn span(self, index: usize, length: usize) -> Range<usize> {
+    pub(crate) fn span(self, index: usize, length: usize) -> Range<usize> {
         let start = (index * self.side).saturating_sub(self.overlap);
         start..((index + 1) * self.side + self.overlap).min(length)
     }
@@ -34,7 +31,7 @@ impl Tiling {
 
 /// Sizes (width, height) of a picture and its copies, each half the one before, rounded up; the last is the first that
 /// `is_last` accepts, or of one pixel.
-pub(super) fn level_sizes(width: usize, height: usize, is_last: impl Fn(usize, usize) -> bool) -> Vec<[usize; 2]> {
+pub(crate) fn level_sizes(width: usize, height: usize, is_last: impl Fn(usize, usize) -> bool) -> Vec<[usize; 2]> {
     let mut sizes = vec![[width, height]];
     let mut last = [width, height];
     while !is_last(last[0], last[1]) && last != [1, 1] {
@@ -45,20 +42,20 @@ pub(super) fn level_sizes(width: usize, height: usize, is_last: impl Fn(usize, u
 }
 
 /// Rows of a level that make up one row of tiles.
-pub(super) struct TileRow<'a, S> {
+pub(crate) struct TileRow<'a, S> {
     /// 0 for the picture itself, 1 for the copy of half its size, and so on.
-    pub(super) level: usize,
+    pub(crate) level: usize,
     /// Which row of tiles of the level.
-    pub(super) index: usize,
+    pub(crate) index: usize,
     /// Width of the level in pixels.
-    pub(super) width: usize,
+    pub(crate) width: usize,
     /// The rows, RGBA.
-    pub(super) rows: &'a [S],
+    pub(crate) rows: &'a [S],
 }
 
-impl<'a, S: Sample> TileRow<'a, S> {
+impl<'a, S: OutputSample> TileRow<'a, S> {
     /// The pixels of `columns`, row by row.
-    pub(super) fn columns(&self, columns: Range<usize>) -> impl Iterator<Item = &'a [S]> + use<'a, S> {
+    pub(crate) fn columns(&self, columns: Range<usize>) -> impl Iterator<Item = &'a [S]> + use<'a, S> {
         let (first, last) = (columns.start * RGBA, columns.end * RGBA);
         self.rows.chunks_exact(self.width * RGBA).map(move |row| &row[first..last])
     }
@@ -69,7 +66,7 @@ impl<'a, S: Sample> TileRow<'a, S> {
 ///
 /// A pixel of a copy is the mean of the four under it, weighted by alpha: of encoded values, as programs that make such
 /// pyramids do; linear light would brighten fine patterns as a camera does, but differs visibly in these only.
-pub(super) struct Pyramid<S> {
+pub(crate) struct TilePyramid<S> {
     tiling: Tiling,
     levels: Vec<Level<S>>,
 }
@@ -86,20 +83,20 @@ struct Level<S> {
     halved: usize,
 }
 
-impl<S: Sample> Pyramid<S> {
+impl<S: OutputSample> TilePyramid<S> {
     /// Levels of the given sizes, each half the one before.
-    pub(super) fn new(sizes: &[[usize; 2]], tiling: Tiling) -> Self {
+    pub(crate) fn new(sizes: &[[usize; 2]], tiling: Tiling) -> Self {
         let level =
             |&[width, height]: &[usize; 2]| Level { width, height, rows: Vec::new(), first: 0, next: 0, halved: 0 };
         Self { tiling, levels: sizes.iter().map(level).collect() }
     }
 
     /// Takes the next whole rows of the picture.
-    pub(super) fn push(
+    pub(crate) fn push(
         &mut self,
         rows: &[S],
-        emit: &mut dyn FnMut(TileRow<'_, S>) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+        emit: &mut dyn FnMut(TileRow<'_, S>) -> Result<(), WriteFailure>,
+    ) -> Result<(), WriteFailure> {
         let mut halves: Vec<S>;
         let mut rows = rows;
         for index in 0..self.levels.len() {
@@ -118,7 +115,7 @@ impl<S: Sample> Pyramid<S> {
     }
 }
 
-impl<S: Sample> Level<S> {
+impl<S: OutputSample> Level<S> {
     /// Number of rows that were taken so far.
     fn end(&self) -> usize {
         self.first + self.rows.len() / (self.width * RGBA)
@@ -128,8 +125,8 @@ impl<S: Sample> Level<S> {
         &mut self,
         level: usize,
         tiling: Tiling,
-        emit: &mut dyn FnMut(TileRow<'_, S>) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+        emit: &mut dyn FnMut(TileRow<'_, S>) -> Result<(), WriteFailure>,
+    ) -> Result<(), WriteFailure> {
         while self.next < tiling.count(self.height) && tiling.span(self.next, self.height).end <= self.end() {
             let span = tiling.span(self.next, self.height);
             let row = self.width * RGBA;
@@ -188,7 +185,7 @@ mod tests {
             let tiling = Tiling { side, overlap };
             let mut levels: Vec<Vec<u8>> = sizes.iter().map(|&[w, h]| vec![7; w * h * RGBA]).collect();
             let mut next = vec![0; sizes.len()];
-            let mut pyramid = Pyramid::<u8>::new(&sizes, tiling);
+            let mut pyramid = TilePyramid::<u8>::new(&sizes, tiling);
             for rows in picture.chunks(step * width * RGBA) {
                 pyramid
                     .push(rows, &mut |tiles| {

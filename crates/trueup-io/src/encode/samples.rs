@@ -4,15 +4,13 @@ use trueup_core::Result;
 use trueup_core::color::TransferCurve;
 use trueup_core::raster::RowSource;
 
-use super::Background;
+use super::background::Background;
+
+/// Samples of an RGBA pixel.
+pub(crate) const RGBA: usize = 4;
 
 /// A sample of a picture that is written. Pixels are RGBA with straight alpha.
-pub(super) trait Sample: Copy + Default + PartialEq + Send + Sync + 'static {
-    /// Bits in the file.
-    const BITS: u16;
-    /// Whether samples are floating point numbers.
-    const IS_FLOAT: bool;
-
+pub(crate) trait OutputSample: Copy + Default + PartialEq + Send + Sync + 'static {
     /// Row `y` of a picture, `4 * width` samples.
     fn row(picture: &dyn RowSource, y: usize, row: &mut [Self]) -> Result<()>;
 
@@ -34,10 +32,7 @@ pub(super) trait Sample: Copy + Default + PartialEq + Send + Sync + 'static {
 
 macro_rules! whole_sample {
     ($type:ty, $wide:ty, $row:ident) => {
-        impl Sample for $type {
-            const BITS: u16 = <$type>::BITS as u16;
-            const IS_FLOAT: bool = false;
-
+        impl OutputSample for $type {
             fn row(picture: &dyn RowSource, y: usize, row: &mut [Self]) -> Result<()> {
                 picture.$row(y, row)
             }
@@ -89,10 +84,7 @@ whole_sample!(u8, u32, rgba8_row);
 whole_sample!(u16, u64, rgba16_row);
 
 /// Linear light.
-impl Sample for f32 {
-    const BITS: u16 = 32;
-    const IS_FLOAT: bool = true;
-
+impl OutputSample for f32 {
     fn row(picture: &dyn RowSource, y: usize, row: &mut [Self]) -> Result<()> {
         picture.linear_row(y, row)
     }
@@ -134,7 +126,7 @@ impl Sample for f32 {
 }
 
 /// A row of RGBA as it is written: with `channels` 4 as it is, with 3 laid over the background. Replaces `out`.
-pub(super) fn flattened<S: Sample>(rgba: &[S], channels: usize, background: [S; 3], out: &mut Vec<S>) {
+pub(crate) fn flattened<S: OutputSample>(rgba: &[S], channels: usize, background: [S; 3], out: &mut Vec<S>) {
     out.clear();
     match channels {
         4 => out.extend_from_slice(rgba),

@@ -4,7 +4,10 @@ use tempfile::TempDir;
 use trueup_core::context::{CancelToken, Silent};
 use trueup_core::raster::{Photograph, Raster};
 
+use super::failure::WriteFailure;
 use super::*;
+use crate::format::Output;
+use crate::formats;
 use crate::source::{SourceOptions, scan};
 
 /// A smooth picture with a transparent left half.
@@ -275,18 +278,22 @@ fn a_full_disk_is_an_error_in_every_format() {
     let tiled = OutputOptions { tiff_layout: TiffLayout::Tiles256, ..OutputOptions::default() };
     let metadata = Metadata::default();
     for room in [0, 10, 300, 700] {
-        let disk = || FullDisk { position: 0, room };
         let large = Gradient { width: 600, height: 600 };
-        let results = [
-            jpeg::write(&mut disk(), &picture, &metadata, &options, &context),
-            codecs::write_png(&mut disk(), &picture, &metadata, &options, &context),
-            tiff::write(&mut disk(), &picture, &metadata, &options, &context),
-            tiff::write(&mut disk(), &picture, &metadata, &tiled, &context),
-            codecs::write_webp(&mut disk(), &large, &metadata, &options, &context),
+        let cases = [
+            ("a.jpg", &picture, &options),
+            ("a.png", &picture, &options),
+            ("a.tif", &picture, &options),
+            ("a.tif", &picture, &tiled),
+            ("a.webp", &large, &options),
         ];
-        for (index, result) in results.into_iter().enumerate() {
-            let Err(Failure::Io(error)) = result else { panic!("format {index}, room {room}: {result:?}") };
-            let message = Failure::Io(error).at(Path::new("a.jpg")).to_string();
+        for (name, picture, options) in cases {
+            let Some(Writer::File(write)) = formats::writing_of(Path::new(name)).map(|writing| writing.writer) else {
+                panic!("{name} is no single file")
+            };
+            let disk: &mut dyn Output = &mut FullDisk { position: 0, room };
+            let result = write(disk, picture, &metadata, options, &context);
+            let Err(WriteFailure::Io(error)) = result else { panic!("{name}, room {room}: {result:?}") };
+            let message = WriteFailure::Io(error).at(Path::new("a.jpg")).to_string();
             assert!(message.starts_with("writing a.jpg"), "{message}");
         }
     }

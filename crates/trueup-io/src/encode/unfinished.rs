@@ -38,7 +38,11 @@ impl Unfinished {
     ///
     /// # Errors
     /// Those of `make`; [`Error::Cancelled`] if all was abandoned.
-    pub(super) fn begin<T>(&self, make: impl FnOnce() -> Result<T>, path: fn(&T) -> &Path) -> Result<(T, Entry<'_>)> {
+    pub(super) fn begin<T>(
+        &self,
+        make: impl FnOnce() -> Result<T>,
+        path: fn(&T) -> &Path,
+    ) -> Result<(T, UnfinishedEntry<'_>)> {
         let mut list = self.list();
         if list.abandoned {
             return Err(Error::Cancelled);
@@ -46,7 +50,7 @@ impl Unfinished {
         let made = make()?;
         let path = path(&made).to_owned();
         list.paths.push(path.clone());
-        Ok((made, Entry { unfinished: self, path }))
+        Ok((made, UnfinishedEntry { unfinished: self, path }))
     }
 
     /// Gives something its name by `finish`, which nothing interrupts.
@@ -75,12 +79,12 @@ impl Unfinished {
 
 /// A place in the list, left when this is dropped.
 #[derive(Debug)]
-pub(super) struct Entry<'a> {
+pub(super) struct UnfinishedEntry<'a> {
     unfinished: &'a Unfinished,
     path: PathBuf,
 }
 
-impl Drop for Entry<'_> {
+impl Drop for UnfinishedEntry<'_> {
     fn drop(&mut self) {
         let paths = &mut self.unfinished.list().paths;
         if let Some(position) = paths.iter().position(|path| *path == self.path) {

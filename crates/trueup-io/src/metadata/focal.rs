@@ -2,7 +2,7 @@
 
 use trueup_core::source::{FocalPrior, FocalSource};
 
-use super::ExifFields;
+use super::exif_fields::ExifFields;
 
 /// Diagonal of the 36 x 24 mm film frame, which "35 mm equivalent" refers to (CIPA DCG-001).
 const FILM_DIAGONAL_MM: f64 = 43.266_615;

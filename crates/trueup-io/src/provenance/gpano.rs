@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 
-use super::Subject;
+use super::description::PanoramaDescription;
 use super::taken::Moment;
 
 /// What the packet says beside the geometry.
@@ -23,11 +23,15 @@ pub(super) struct Facts {
 }
 
 /// The packet; `None` where there is nothing to say. A frame that does not hold the panorama says nothing.
-pub(super) fn packet(subject: &Subject<'_>, frame: Option<&SphericalFrame>, facts: &Facts) -> Option<String> {
-    let frame = frame.filter(|frame| frame.holds(subject.width, subject.height));
+pub(super) fn packet(
+    panorama: &PanoramaDescription<'_>,
+    frame: Option<&SphericalFrame>,
+    facts: &Facts,
+) -> Option<String> {
+    let frame = frame.filter(|frame| frame.holds(panorama.width, panorama.height));
     let mut properties: Vec<(&str, String)> = Vec::new();
     if let Some(frame) = frame {
-        properties.extend(geometry(subject, frame, facts.world_heading_deg));
+        properties.extend(geometry(panorama, frame, facts.world_heading_deg));
     }
     if facts.photographs > 0 {
         properties.push(("SourcePhotosCount", facts.photographs.to_string()));
@@ -59,7 +63,7 @@ const TAIL: &str = "  </rdf:Description>
 <?xpacket end=\"r\"?>";
 
 fn geometry(
-    subject: &Subject<'_>,
+    panorama: &PanoramaDescription<'_>,
     frame: &SphericalFrame,
     world_heading_deg: Option<f64>,
 ) -> Vec<(&'static str, String)> {
@@ -72,18 +76,18 @@ fn geometry(
         ("UsePanoramaViewer", "True".to_owned()),
         ("FullPanoWidthPixels", frame.full_width.to_string()),
         ("FullPanoHeightPixels", frame.full_height.to_string()),
-        ("CroppedAreaImageWidthPixels", subject.width.to_string()),
-        ("CroppedAreaImageHeightPixels", subject.height.to_string()),
+        ("CroppedAreaImageWidthPixels", panorama.width.to_string()),
+        ("CroppedAreaImageHeightPixels", panorama.height.to_string()),
         ("CroppedAreaLeftPixels", frame.left.to_string()),
         ("CroppedAreaTopPixels", frame.top.to_string()),
-        ("PosePitchDegrees", format!("{:.1}", subject.pose_deg[0] + 0.0)),
-        ("PoseRollDegrees", format!("{:.1}", subject.pose_deg[1] + 0.0)),
+        ("PosePitchDegrees", format!("{:.1}", panorama.pose_deg[0] + 0.0)),
+        ("PoseRollDegrees", format!("{:.1}", panorama.pose_deg[1] + 0.0)),
     ];
     if let Some(heading) = world_heading_deg {
         let middle = heading + frame.middle_yaw.to_degrees();
         properties.push(("PoseHeadingDegrees", format!("{:.1}", below_full_turn(middle, 10.0))));
         // The middle of what is there, not of the whole.
-        let from_middle = frame.left as f64 + 0.5 * subject.width as f64 - 0.5 * frame.full_width as f64;
+        let from_middle = frame.left as f64 + 0.5 * panorama.width as f64 - 0.5 * frame.full_width as f64;
         let shown = middle + from_middle / frame.full_width as f64 * 360.0;
         properties.push(("InitialViewHeadingDegrees", format!("{:.0}", below_full_turn(shown, 1.0))));
     }

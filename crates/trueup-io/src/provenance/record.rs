@@ -5,8 +5,9 @@ use std::io::Cursor;
 use exif::experimental::Writer;
 use exif::{Field, In, Rational, Tag, Value};
 
+use super::description::{PanoramaDescription, SOFTWARE};
+use super::fields::is_of_place;
 use super::taken::Moment;
-use super::{SOFTWARE, Subject, is_of_place};
 
 /// What is kept of the reference photograph as it stands: who made it, and with what.
 ///
@@ -85,7 +86,7 @@ const UNCALIBRATED: u16 = 0xffff;
 /// The panorama's own fields, and what is kept of the photographs': `reference` and `place` are the fields of those that
 /// tell of the camera and the place.
 pub(super) fn fields(
-    subject: &Subject<'_>,
+    panorama: &PanoramaDescription<'_>,
     reference: &[Field],
     place: &[Field],
     earliest: Option<&Moment>,
@@ -100,8 +101,8 @@ pub(super) fn fields(
     add(Tag::Software, ascii(SOFTWARE));
     add(Tag::Orientation, Value::Short(vec![1]));
     add(Tag::ExifVersion, Value::Undefined(VERSION.to_vec(), 0));
-    add(Tag::ColorSpace, Value::Short(vec![if subject.is_srgb { SRGB } else { UNCALIBRATED }]));
-    for (tag, size) in [(Tag::PixelXDimension, subject.width), (Tag::PixelYDimension, subject.height)] {
+    add(Tag::ColorSpace, Value::Short(vec![if panorama.is_srgb { SRGB } else { UNCALIBRATED }]));
+    for (tag, size) in [(Tag::PixelXDimension, panorama.width), (Tag::PixelYDimension, panorama.height)] {
         add(tag, Value::Long(vec![u32::try_from(size).unwrap_or(u32::MAX)]));
     }
     // Fields that every EXIF block has: without a meaning for a picture on a screen, the number is the usual one.

@@ -2,7 +2,7 @@
 
 use exif::{Field, Tag};
 
-use super::text;
+use super::fields::text;
 
 /// A moment as EXIF has it: local time, and what is known beyond it.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,11 +3,11 @@
 use std::io::{BufReader, Cursor};
 use std::path::PathBuf;
 
-use exif::{Exif, Rational};
+use exif::{Context, Exif, In, Rational};
 use tempfile::TempDir;
 use trueup_core::StageContext;
 use trueup_core::raster::RowSource;
-use trueup_core::spherical::SphericalProjection;
+use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 
 use super::*;
 use crate::encode::{OutputOptions, write};
@@ -100,8 +100,8 @@ const FRAME: SphericalFrame = SphericalFrame {
     middle_yaw: 0.0,
 };
 
-fn subject<'a>(photographs: &'a [&'a Path], yaws: &'a [Option<f64>]) -> Subject<'a> {
-    Subject {
+fn panorama<'a>(photographs: &'a [&'a Path], yaws: &'a [Option<f64>]) -> PanoramaDescription<'a> {
+    PanoramaDescription {
         photographs,
         reference: 1,
         yaws,
@@ -136,7 +136,7 @@ fn the_camera_is_kept_and_what_no_longer_holds_is_not() {
         photograph(&folder, "c.tif", &camera("10:00:01", false)),
     ];
     let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-    let told = describe(&subject(&paths, &[None; 3]), MetadataKept::Keep);
+    let told = describe(&panorama(&paths, &[None; 3]), MetadataKept::Keep);
     let exif = parse(told.exif.expect("EXIF"));
     for (tag, expected) in [
         (Tag::Make, "\"Maker\""),
@@ -173,27 +173,27 @@ fn the_place_and_all_of_it_can_be_kept_back() {
     let folder = TempDir::new().expect("a folder");
     let path = photograph(&folder, "a.jpg", &camera("10:00:05", true));
     let paths = [path.as_path(); 2];
-    let subject = subject(&paths, &[Some(0.0), Some(0.0)]);
-    let told = describe(&subject, MetadataKept::NoLocation);
+    let panorama = panorama(&paths, &[Some(0.0), Some(0.0)]);
+    let told = describe(&panorama, MetadataKept::NoLocation);
     let exif = parse(told.exif.expect("EXIF"));
     assert!(exif.fields().all(|field| field.tag.context() != Context::Gps));
     assert_eq!(shown(&exif, Tag::Model).as_deref(), Some("\"Model 7\""));
     let xmp = told.xmp.expect("XMP");
     assert_eq!((element(&xmp, "PoseHeadingDegrees"), element(&xmp, "SourcePhotosCount")), (None, Some("2")));
 
-    let told = describe(&subject, MetadataKept::None);
+    let told = describe(&panorama, MetadataKept::None);
     let xmp = told.xmp.expect("the geometry that viewers need");
     assert_eq!(told.exif, None);
     assert_eq!((element(&xmp, "FirstPhotoDate"), element(&xmp, "StitchingSoftware")), (None, None));
     assert_eq!(element(&xmp, "ProjectionType"), Some("equirectangular"));
-    let flat = Subject { spherical: None, ..subject };
+    let flat = PanoramaDescription { spherical: None, ..panorama };
     assert_eq!(describe(&flat, MetadataKept::None), Metadata::default());
     assert_eq!(element(&describe(&flat, MetadataKept::Keep).xmp.expect("XMP"), "ProjectionType"), None);
 }
 
 #[test]
 fn the_crop_adds_up() {
-    let xmp = gpano::packet(&subject(&[], &[]), Some(&FRAME), &gpano::Facts::default()).expect("XMP");
+    let xmp = gpano::packet(&panorama(&[], &[]), Some(&FRAME), &gpano::Facts::default()).expect("XMP");
     let number = |name: &str| element(&xmp, name).and_then(|text| text.parse::<usize>().ok()).expect("a number");
     assert_eq!(number("FullPanoWidthPixels"), 2 * number("FullPanoHeightPixels"));
     assert!(number("CroppedAreaLeftPixels") + number("CroppedAreaImageWidthPixels") <= number("FullPanoWidthPixels"));
@@ -203,11 +203,11 @@ fn the_crop_adds_up() {
     assert_eq!(element(&xmp, "UsePanoramaViewer"), Some("True"));
     let pose = |xmp: &str| ["PosePitchDegrees", "PoseRollDegrees"].map(|name| element(xmp, name).map(str::to_owned));
     assert_eq!(pose(&xmp), [Some("0.0".to_owned()), Some("0.0".to_owned())]);
-    let tilted = Subject { pose_deg: [12.34, -5.0], ..subject(&[], &[]) };
+    let tilted = PanoramaDescription { pose_deg: [12.34, -5.0], ..panorama(&[], &[]) };
     let xmp = gpano::packet(&tilted, Some(&FRAME), &gpano::Facts::default()).expect("XMP");
     assert_eq!(pose(&xmp), [Some("12.3".to_owned()), Some("-5.0".to_owned())]);
     let outside = SphericalFrame { left: 5000, ..FRAME };
-    assert_eq!(gpano::packet(&subject(&[], &[]), Some(&outside), &gpano::Facts::default()), None);
+    assert_eq!(gpano::packet(&panorama(&[], &[]), Some(&outside), &gpano::Facts::default()), None);
 }
 
 #[test]
@@ -218,8 +218,8 @@ fn the_compass_says_where_the_middle_looks() {
     // Both looked to 320 degrees; one was 10 degrees right of the world's z axis, one 10 degrees left: z is at 320.
     let yaws = [Some(10_f64.to_radians()), Some((-10_f64).to_radians())];
     let frame = SphericalFrame { middle_yaw: 60_f64.to_radians(), ..FRAME };
-    let subject = Subject { spherical: Some(frame), ..subject(&paths, &yaws) };
-    let xmp = describe(&subject, MetadataKept::Keep).xmp.expect("XMP");
+    let panorama = PanoramaDescription { spherical: Some(frame), ..panorama(&paths, &yaws) };
+    let xmp = describe(&panorama, MetadataKept::Keep).xmp.expect("XMP");
     assert_eq!(element(&xmp, "PoseHeadingDegrees"), Some("20.0"));
     // The crop's middle is column 3000 of 8000, an eighth of a turn left of the whole's.
     assert_eq!(element(&xmp, "InitialViewHeadingDegrees"), Some("335"));
@@ -230,7 +230,7 @@ fn every_format_gives_the_metadata_back() {
     let folder = TempDir::new().expect("a folder");
     let source = photograph(&folder, "source.jpg", &camera("10:00:05", true));
     let paths = [source.as_path(); 2];
-    let metadata = describe(&subject(&paths, &[None; 2]), MetadataKept::Keep);
+    let metadata = describe(&panorama(&paths, &[None; 2]), MetadataKept::Keep);
     let expected = parse(metadata.exif.clone().expect("EXIF"));
     for name in ["p.jpg", "p.png", "p.tif", "p.webp"] {
         let path = folder.path().join(name);
@@ -238,7 +238,7 @@ fn every_format_gives_the_metadata_back() {
         let bytes = std::fs::read(&path).expect("readable");
         let found = exif::Reader::new().read_from_container(&mut BufReader::new(Cursor::new(&bytes))).expect(name);
         for field in expected.fields() {
-            if name == "p.tif" && crate::encode::OF_JPEG.contains(&field.tag) {
+            if name == "p.tif" && crate::formats::tiff::metadata::OF_JPEG.contains(&field.tag) {
                 continue;
             }
             let found = found.get_field(field.tag, In::PRIMARY).unwrap_or_else(|| panic!("{name}: {}", field.tag));
@@ -258,7 +258,7 @@ fn absurd_exif_is_left_out() {
     let path = photograph(&folder, "a.png", &fields);
     let nothing = folder.path().join("none.jpg");
     let paths = [nothing.as_path(), path.as_path()];
-    let told = describe(&subject(&paths, &[None; 2]), MetadataKept::Keep);
+    let told = describe(&panorama(&paths, &[None; 2]), MetadataKept::Keep);
     let block = told.exif.expect("EXIF");
     assert!(block.len() < 4000, "{}", block.len());
     let exif = parse(block);

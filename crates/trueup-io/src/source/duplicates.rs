@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use super::Rejection;
+use super::rejection::Rejection;
 
 /// The files accepted so far.
 #[derive(Debug, Default)]

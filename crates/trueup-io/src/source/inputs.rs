@@ -3,9 +3,9 @@
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
-use crate::format::{PictureFormat, SUPPORTED, has_foreign_extension};
+use crate::formats::{names_photograph, readable_names};
 
-use super::Rejection;
+use super::rejection::Rejection;
 
 /// A file to look into, or an input that already failed.
 #[derive(Debug, Clone)]
@@ -61,7 +61,7 @@ fn expand_folder(folder: PathBuf) -> Vec<Candidate> {
     if candidates.is_empty() {
         let rejection = Rejection::new(
             "folder-without-pictures",
-            format!("the folder holds no {SUPPORTED} files"),
+            format!("the folder holds no {} files", readable_names()),
             "Folders inside it are not searched; give the folder that holds the photographs.",
         );
         return vec![Candidate::Rejected(folder, rejection)];
@@ -84,7 +84,7 @@ fn expand_pattern(pattern: &str) -> Vec<Candidate> {
     };
     let candidates = photographs_in_natural_order(matches.filter_map(Result::ok));
     if candidates.is_empty() {
-        let reason = format!("no {SUPPORTED} file matches the pattern");
+        let reason = format!("no {} file matches the pattern", readable_names());
         return reject(
             "pattern-without-match",
             reason,
@@ -96,8 +96,7 @@ fn expand_pattern(pattern: &str) -> Vec<Candidate> {
 
 /// Keeps what by its name is a photograph, sorted so that "2.jpg" comes before "10.jpg".
 fn photographs_in_natural_order(paths: impl Iterator<Item = PathBuf>) -> Vec<Candidate> {
-    let is_photograph = |path: &PathBuf| PictureFormat::of_extension(path).is_some() || has_foreign_extension(path);
-    let mut paths: Vec<PathBuf> = paths.filter(is_photograph).collect();
+    let mut paths: Vec<PathBuf> = paths.filter(|path| names_photograph(path)).collect();
     paths.sort_by(|a, b| natural_order(a, b));
     paths.into_iter().map(Candidate::File).collect()
 }

@@ -3,10 +3,12 @@
 mod duplicates;
 mod inputs;
 mod names;
+mod opened;
+mod options;
+mod rejection;
 #[cfg(test)]
 mod tests;
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -15,41 +17,20 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 
-use crate::format::{self, PictureFormat, SUPPORTED};
-use crate::metadata::{Header, HeaderError, TagVerdict, judge_orientation, read_header};
+use crate::metadata::header::Header;
+use crate::metadata::orientation::{TagVerdict, judge_orientation};
 
 use duplicates::Accepted;
 use inputs::Candidate;
+use opened::{OpenedPicture, open_candidate};
+use rejection::Rejection;
 
 pub use inputs::natural_order;
 pub use names::unique_names;
+pub use options::{OrientationTrust, SourceOptions};
 
-/// The largest file that is opened. Files are read into memory to be decoded; no photograph is this large.
-const MAX_FILE_BYTES: u64 = 4 << 30;
-
-trueup_core::choice! {
-    /// When the EXIF orientation tag is applied.
-    pub enum OrientationTrust {
-        /// Unless the stored size shows that the pixels were turned already.
-        Auto = "auto",
-        /// Whenever the tag is present.
-        Always = "always",
-        /// Pixels are taken as they are stored.
-        Never = "never",
-    }
-}
-
-trueup_core::options! {
-    /// Which files are accepted as photographs.
-    pub struct SourceOptions("source") {
-        /// Largest photograph that is accepted; larger ones are rejected by their header, before memory is taken.
-        max_megapixels: f64 = 300.0, between(0.001, 10_000.0), "megapixels";
-        /// Shortest side a photograph must have to be worth stitching.
-        min_side_px: usize = 16, between(1.0, 65_535.0), "px";
-        /// When the EXIF orientation tag is applied.
-        trust_orientation: OrientationTrust = OrientationTrust::Auto, Allowed::Any, "";
-    }
-}
+/// Shortest side in pixels that a photograph must have: the features and lines of smaller ones connect nothing.
+const MIN_SIDE_PX: usize = 16;
 
 /// What [`scan`] found.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -84,20 +65,6 @@ impl RejectedSource {
     }
 }
 
-/// A reason for rejection, before it is tied to a file.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Rejection {
-    pub(crate) code: &'static str,
-    pub(crate) reason: String,
-    pub(crate) hint: String,
-}
-
-impl Rejection {
-    pub(crate) fn new(code: &'static str, reason: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self { code, reason: reason.into(), hint: hint.into() }
-    }
-}
-
 /// Finds the photographs that `inputs` name and reads their headers.
 ///
 /// An input is a file, a folder (its pictures, not those of folders inside it, hidden files left out) or a pattern with
@@ -111,6 +78,20 @@ impl Rejection {
 /// # Errors
 /// [`Error::Options`] for options out of range, [`Error::Cancelled`]. Never for what is in the files.
 pub fn scan(inputs: &[String], options: &SourceOptions, context: &StageContext) -> Result<Sources> {
+    scan_from_side(MIN_SIDE_PX, inputs, options, context)
+}
+
+/// [`scan`] that accepts pictures of any size from a pixel on.
+pub(crate) fn scan_any_size(inputs: &[String], options: &SourceOptions, context: &StageContext<'_>) -> Result<Sources> {
+    scan_from_side(1, inputs, options, context)
+}
+
+fn scan_from_side(
+    min_side_px: usize,
+    inputs: &[String],
+    options: &SourceOptions,
+    context: &StageContext<'_>,
+) -> Result<Sources> {
     options.check()?;
     let candidates = inputs::expand(inputs);
     let paths: Vec<&Path> = candidates.iter().map(Candidate::path).collect();
@@ -123,7 +104,9 @@ pub fn scan(inputs: &[String], options: &SourceOptions, context: &StageContext) 
         context.check_cancelled()?;
         let path = candidate.path().to_owned();
         let number = sources.images.len();
-        match examine(candidate, &name, number, options, &mut accepted, context) {
+        let examined = open_candidate(candidate, options, min_side_px)
+            .and_then(|opened| examine(opened, &name, number, options, &mut accepted, context));
+        match examined {
             Ok(image) => sources.images.push(image),
             Err(Rejection { code, reason, hint }) => {
                 sources.rejected.push(RejectedSource { path, name, code: code.to_owned(), reason, hint });
@@ -144,35 +127,18 @@ pub fn files(inputs: &[String]) -> Vec<PathBuf> {
     inputs::expand(inputs).into_iter().filter_map(file).collect()
 }
 
-/// Decides over one candidate, which is to be photograph `number`.
+/// Decides over one picture, which is to be photograph `number`.
 fn examine(
-    candidate: Candidate,
+    opened: OpenedPicture,
     name: &str,
     number: usize,
     options: &SourceOptions,
     accepted: &mut Accepted,
-    context: &StageContext,
+    context: &StageContext<'_>,
 ) -> std::result::Result<SourceImage, Rejection> {
-    let path = match candidate {
-        Candidate::Rejected(_, rejection) => return Err(rejection),
-        Candidate::File(path) => path,
-    };
-    let (mut file, length) = open(&path)?;
-    let format = recognize(&mut file, length)?;
-    let header = read_header(&file, format).map_err(|error| match error {
-        HeaderError::Damaged(words) => Rejection::new(
-            "picture-damaged",
-            format!("its header cannot be read ({words})"),
-            "Export it again or leave it out.",
-        ),
-        HeaderError::Unsupported(words) => Rejection::new(
-            "format-unsupported",
-            format!("it is of a kind that is not read ({words})"),
-            "Export it as gray or RGB with 8 or 16 bits a sample.",
-        ),
-    })?;
-    check_size(&header, options)?;
-    if header.is_float {
+    let OpenedPicture { path, length, header } = opened;
+    let stored = header.stored;
+    if stored.is_float {
         context.report(Diagnostic::note(
             "floating-point",
             Subject::Photograph(number),
@@ -184,7 +150,7 @@ fn examine(
 
     let tag = header.exif.orientation;
     let verdict = match options.trust_orientation {
-        OrientationTrust::Auto => judge_orientation(tag, header.stored_width, header.stored_height),
+        OrientationTrust::Auto => judge_orientation(tag, stored.width, stored.height),
         OrientationTrust::Always => TagVerdict::Applied(tag.and_then(|tag| u8::try_from(tag).ok()).unwrap_or(1)),
         OrientationTrust::Never => TagVerdict::Applied(1),
     };
@@ -197,8 +163,8 @@ fn examine(
         }
     };
     let (width, height) = match orientation {
-        5..=8 => (header.stored_height, header.stored_width),
-        _ => (header.stored_width, header.stored_height),
+        5..=8 => (stored.height, stored.width),
+        _ => (stored.width, stored.height),
     };
     let focal_prior = header.focal_prior();
     let camera_model = header.exif.camera_model();
@@ -213,89 +179,8 @@ fn stale_tag_note(number: usize, header: &Header) -> Diagnostic {
         format!(
             "the EXIF orientation tag ({tag}, a quarter turn) was not applied: the pixels are stored upright already, \
              {} x {}",
-            header.stored_width, header.stored_height
+            header.stored.width, header.stored.height
         ),
         "If the photograph now lies on its side, set source.trust_orientation to always.",
     )
-}
-
-/// Opens a file; tells its length in bytes.
-fn open(path: &Path) -> std::result::Result<(File, u64), Rejection> {
-    let unreadable = |error: std::io::Error| {
-        Rejection::new("file-unreadable", format!("it cannot be read ({error})"), "Check the file and its permissions.")
-    };
-    // Looked at before it is opened: opening a named pipe would wait for its writer.
-    let metadata = std::fs::metadata(path).map_err(unreadable)?;
-    if metadata.is_dir() {
-        return Err(Rejection::new(
-            "folder-not-file",
-            "it is a folder, not a picture",
-            "Give the folder itself to use the pictures in it.",
-        ));
-    }
-    if !metadata.is_file() {
-        return Err(Rejection::new("file-unreadable", "it is not a regular file", "Give a picture file."));
-    }
-    let length = metadata.len();
-    if length > MAX_FILE_BYTES {
-        let gibibytes = length as f64 / (1_u64 << 30) as f64;
-        return Err(Rejection::new(
-            "picture-too-large",
-            format!("the file has {gibibytes:.1} GiB, at most {} are read", MAX_FILE_BYTES >> 30),
-            "Export a smaller copy of it.",
-        ));
-    }
-    Ok((File::open(path).map_err(unreadable)?, length))
-}
-
-/// Tells the format by the file's first bytes.
-fn recognize(file: &mut File, length: u64) -> std::result::Result<PictureFormat, Rejection> {
-    if length == 0 {
-        return Err(Rejection::new(
-            "file-empty",
-            "the file is empty (0 bytes)",
-            "Copy it again from the camera or leave it out.",
-        ));
-    }
-    let start = format::read_start(file).map_err(|error| {
-        Rejection::new("file-unreadable", format!("it cannot be read ({error})"), "Check the file and its permissions.")
-    })?;
-    if let Some(format) = PictureFormat::of_content(&start) {
-        return Ok(format);
-    }
-    Err(match format::describe_foreign_content(&start) {
-        Some(what) => Rejection::new(
-            "format-unsupported",
-            format!("it is {what}, a format that is not read"),
-            format!("Convert it to {SUPPORTED}."),
-        ),
-        None => Rejection::new(
-            "not-a-picture",
-            format!("its content is not a {SUPPORTED} picture, whatever its name says"),
-            format!("Give photographs in {SUPPORTED}."),
-        ),
-    })
-}
-
-fn check_size(header: &Header, options: &SourceOptions) -> std::result::Result<(), Rejection> {
-    let (width, height) = (header.stored_width, header.stored_height);
-    let megapixels = width as f64 * height as f64 / 1e6;
-    if megapixels > options.max_megapixels {
-        return Err(Rejection::new(
-            "picture-too-large",
-            format!(
-                "{width} x {height} px are {megapixels:.0} megapixels, at most {} are accepted",
-                options.max_megapixels
-            ),
-            "Export a smaller copy, or raise source.max_megapixels if the picture is truly this large.",
-        ));
-    }
-    if width.min(height) < options.min_side_px {
-        return Err(Rejection::new(
-            "picture-too-small",
-            format!("{width} x {height} px are too few to stitch, each side needs {}", options.min_side_px),
-            "Give the photograph in its original size.",
-        ));
-    }
-    Ok(())
 }

@@ -3,7 +3,7 @@
 //! Works from what a stitch has at hand as from what its project records: grids in any plane and levelled cameras.
 
 use nalgebra::Matrix3;
-use trueup_align::projection::{self, Placement, Projection, Shot, View};
+use trueup_align::projection::{self, Placement, PosedPhotograph, Projection, ProjectionView};
 use trueup_compose::crop::{self, Crop, Rectangle};
 use trueup_compose::layout::{self, CanvasLayout, CanvasOptions, Frame, Placed};
 use trueup_core::camera::Camera;
@@ -158,12 +158,12 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
         let (written, plane_shift) = framed(plane.clone(), options);
         return Ok(Arrangement { plane, plane_shift, written, projection: None });
     };
-    let shots: Vec<Shot> = cameras
+    let shots: Vec<PosedPhotograph> = cameras
         .iter()
         .zip(&plane.placed)
-        .map(|(camera, placed)| Shot { camera: *camera, mesh: placed.mesh.clone() })
+        .map(|(camera, placed)| PosedPhotograph { camera: *camera, mesh: placed.mesh.clone() })
         .collect();
-    let view = View::choose(&shots, dominant.as_ref(), &options.projection);
+    let view = ProjectionView::choose(&shots, dominant.as_ref(), &options.projection);
     let drawn = draw(&shots, &plane, &view, reference, options, context)?;
     let (written, _) = framed(drawn, options);
     report_cut(&plane, &written, &view, options, context);
@@ -173,22 +173,22 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
 
 /// The photographs on the view's canvas.
 fn draw(
-    shots: &[Shot],
+    shots: &[PosedPhotograph],
     plane: &CanvasLayout,
-    view: &View,
+    view: &ProjectionView,
     reference: usize,
     options: &ArrangeOptions,
     context: &StageContext,
 ) -> Result<CanvasLayout> {
     let max_parallax = options.projection.max_parallax_deg.to_radians();
-    let meetings = projection::meeting(shots, plane.period.map(|period| period as f64), max_parallax);
+    let shifts = projection::parallax_shifts(shots, plane.period.map(|period| period as f64), max_parallax);
     context.check_cancelled()?;
     // The reference keeps its own pixels in the middle of the projection.
     let canvas_from_plane = options.canvas.scale * shots[reference].camera.focal_px;
     let placement = Placement { view, canvas_from_plane, closed: view.closed };
-    let placed = projection::place(shots, &meetings, &placement)
+    let placed = projection::place(shots, &shifts, &placement)
         .into_iter()
-        .map(|grid| Placed { photograph: plane.placed[grid.shot].photograph, mesh: grid.mesh })
+        .map(|grid| Placed { photograph: plane.placed[grid.photograph].photograph, mesh: grid.mesh })
         .collect();
     context.check_cancelled()?;
     let reach = view.flat.reach(view.half);
@@ -215,7 +215,7 @@ fn framed(layout: CanvasLayout, options: &ArrangeOptions) -> (CanvasLayout, [f64
 fn report_cut(
     plane: &CanvasLayout,
     written: &CanvasLayout,
-    view: &View,
+    view: &ProjectionView,
     options: &ArrangeOptions,
     context: &StageContext,
 ) {

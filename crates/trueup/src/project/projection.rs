@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use serde::{Deserialize, Serialize};
-use trueup_align::projection::{FlatKind, View};
+use trueup_align::projection::{FlatKind, ProjectionView};
 use trueup_compose::layout::CanvasLayout;
 use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 
@@ -32,7 +32,7 @@ pub struct ProjectionRecord {
 
 impl ProjectionRecord {
     /// How `view` is drawn on the canvas `written`.
-    pub(crate) fn new(view: &View, written: &CanvasLayout) -> Self {
+    pub(crate) fn new(view: &ProjectionView, written: &CanvasLayout) -> Self {
         let px_per_radian = written.canvas_from_target;
         Self {
             kind: view.flat.kind,
@@ -48,7 +48,7 @@ impl ProjectionRecord {
 }
 
 /// Where a canvas lies on the whole sphere, in whole pixels.
-fn sphere(view: &View, written: &CanvasLayout) -> Option<SphericalFrame> {
+fn sphere(view: &ProjectionView, written: &CanvasLayout) -> Option<SphericalFrame> {
     let scale = written.canvas_from_target;
     let [x, y] = written.origin;
     // Rounding may put the last column a pixel beyond the whole.
@@ -81,9 +81,9 @@ mod tests {
 
     use super::*;
 
-    fn view(kind: FlatKind) -> View {
+    fn view(kind: FlatKind) -> ProjectionView {
         let flat = Flat { kind, panini_distance: 1.0 };
-        View { flat, yaw: 0.25, pitch: 0.0, roll: 0.0, half: kind.comfortable(), closed: false }
+        ProjectionView { flat, yaw: 0.25, pitch: 0.0, roll: 0.0, half: kind.comfortable(), closed: false }
     }
 
     fn canvas(width: usize, height: usize, origin: [f64; 2]) -> CanvasLayout {

@@ -5,7 +5,7 @@ use std::path::Path;
 use trueup_core::geometry::matrix_from_rows;
 use trueup_io::color::PhotographColors;
 use trueup_io::encode::{Metadata, OutputOptions, OutputProfile};
-use trueup_io::provenance::{self, Subject};
+use trueup_io::provenance::{self, PanoramaDescription};
 
 use super::record::{ImageRecord, Project};
 
@@ -14,7 +14,7 @@ pub(crate) fn metadata(project: &Project, colors: Option<&PhotographColors>, opt
     let used: Vec<&ImageRecord> = project.used_images().collect();
     let paths: Vec<&Path> = used.iter().map(|image| Path::new(&image.path)).collect();
     let yaws: Vec<Option<f64>> = used.iter().map(|image| yaw(image)).collect();
-    let subject = Subject {
+    let subject = PanoramaDescription {
         photographs: &paths,
         reference: used.iter().position(|image| image.path == project.reference).unwrap_or(0),
         yaws: &yaws,

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_align::metrics::{
-    self, LinedPicture, MatchedPair, MeasureOptions, Outside, Straightness, Uprightness, VerticalLines, folded_cells,
+    self, MatchedPair, Outside, Straightness, Uprightness, VerticalLines, VerticalLinesInput, folded_cells,
     mean_relative_turn, rectangle_rotation,
 };
 use trueup_compose::layout::CanvasLayout;
@@ -68,7 +68,7 @@ pub struct LongLines {
     pub lines: usize,
     /// Mean over the lines of their root mean square distance from straight, as a share of their length.
     pub mean_bend: f64,
-    /// Lines that stray from straight by more than `measures.bent_share` of their length.
+    /// Lines that stray from straight by more than 0.003 of their length.
     pub bent: usize,
     /// The longest of those.
     pub longest_bent: Option<BentLine>,
@@ -119,13 +119,13 @@ pub(crate) fn run(
         .collect();
     let verticals = vertical_lines(component, geometry, &working, options);
     let certain: Vec<Option<VerticalLines>> =
-        verticals.iter().map(|found| found.filter(|found| found.is_certain(&options.measures))).collect();
+        verticals.iter().map(|found| found.filter(|found| found.is_certain())).collect();
     let distortion = metrics::local_distortion(&working, Outside::Center, period);
     Measures {
         upright: upright(&certain),
         estimated_gdic_deg: estimated_inconsistency(&certain, &working, component.reference),
         reprojection: reprojection(component, geometry, &meshes, period),
-        long_lines: long_lines(component, &working, &options.measures),
+        long_lines: long_lines(component, &working),
         ld: HUNDREDTHS * distortion.worst,
         ld_mean: HUNDREDTHS * distortion.mean,
         folds: working.iter().map(folded_cells).sum(),
@@ -153,13 +153,13 @@ fn vertical_lines(
         .into_par_iter()
         .map(|k| {
             let camera = &geometry.cameras.cameras[k];
-            let picture = LinedPicture {
+            let picture = VerticalLinesInput {
                 lines: &component.lines[k],
                 frame: &component.frames[k],
                 focal_px: camera.focal_px,
                 expected_down: camera.rotation() * down,
             };
-            metrics::vertical_lines(&picture, &working[k], &options.align.vanishing, &options.measures)
+            metrics::vertical_lines(&picture, &working[k])
         })
         .collect()
 }
@@ -211,16 +211,15 @@ fn reprojection(
     })
 }
 
-fn long_lines(component: &Component, working: &[GridMesh], options: &MeasureOptions) -> Option<LongLines> {
+fn long_lines(component: &Component, working: &[GridMesh]) -> Option<LongLines> {
     let measured: Vec<(usize, Straightness)> = (0..working.len())
         .flat_map(|k| {
-            let shortest = options.long_line_diagonal * component.frames[k].diagonal();
+            let shortest = metrics::LONG_LINE_DIAGONAL * component.frames[k].diagonal();
             let long = component.lines[k].iter().filter(move |line| line.length() >= shortest);
-            long.filter_map(move |line| Some((k, Straightness::of(line, &working[k], options.line_step_px)?)))
+            long.filter_map(move |line| Some((k, Straightness::of(line, &working[k], metrics::LINE_STEP_PX)?)))
         })
         .collect();
-    let bent: Vec<&(usize, Straightness)> =
-        measured.iter().filter(|(_, line)| line.bend() > options.bent_share).collect();
+    let bent: Vec<&(usize, Straightness)> = measured.iter().filter(|(_, line)| line.is_bent()).collect();
     let longest = bent.iter().max_by(|one, two| one.1.length_px.total_cmp(&two.1.length_px));
     let mean = measured.iter().map(|(_, line)| line.rms_px / line.length_px).sum::<f64>() / measured.len() as f64;
     (!measured.is_empty()).then(|| LongLines {

@@ -2,7 +2,7 @@
 
 use trueup::Result;
 
-use crate::methods::PUBLISHED_MESH;
+use crate::published_forms::{DIVERGENCE_GATE, OWN_VANISHING_POINTS, PUBLISHED_MESH, RELATIVE_TWIST};
 use crate::report::document::{Block, Section, Table, number};
 use crate::results::Results;
 use crate::sets::Catalogue;
@@ -20,10 +20,7 @@ struct Ablation {
 
 const ABLATIONS: [Ablation; 16] = [
     Ablation { name: "nothing changed", overrides: &[] },
-    Ablation {
-        name: "beta: twist of the relative rotation, as published",
-        overrides: &["similarity.beta_mode=relative"],
-    },
+    Ablation { name: "beta: twist of the relative rotation, as published", overrides: &RELATIVE_TWIST },
     Ablation { name: "lambda 0 (no relative rolls)", overrides: &["similarity.relative_weight=0"] },
     Ablation { name: "lambda 1", overrides: &["similarity.relative_weight=1"] },
     Ablation { name: "lambda 100", overrides: &["similarity.relative_weight=100"] },
@@ -33,19 +30,15 @@ const ABLATIONS: [Ablation; 16] = [
     Ablation { name: "tau 0.48 (28.4 deg)", overrides: &["similarity.rejection=0.48"] },
     Ablation { name: "tau infinite (no rejection)", overrides: &["similarity.rejection=1e9"] },
     Ablation { name: "no path voting", overrides: &["similarity.path_voting=false"] },
-    Ablation { name: "gate: divergence alone", overrides: &["similarity.gate=paper"] },
+    Ablation { name: "gate: divergence alone", overrides: &DIVERGENCE_GATE },
     Ablation { name: "vanishing points: no guided search", overrides: &["similarity.guided_redetection=false"] },
     Ablation { name: "vanishing points: no joint refinement", overrides: &["similarity.joint_refinement=false"] },
-    Ablation {
-        name: "vanishing points: each picture by itself",
-        overrides: &["similarity.guided_redetection=false", "similarity.joint_refinement=false"],
-    },
+    Ablation { name: "vanishing points: each picture by itself", overrides: &OWN_VANISHING_POINTS },
     Ablation { name: "vanishing points: a third of the draws", overrides: &["vanishing.draws=35"] },
 ];
 
 /// What the changes are made to.
-const BASES: [(&str, &[&str]); 2] =
-    [("default", &[]), ("published", &["similarity.guided_redetection=false", "similarity.joint_refinement=false"])];
+const BASES: [(&str, &[&str]); 2] = [("default", &[]), ("published", &OWN_VANISHING_POINTS)];
 
 const NOISE_SHARES: [f64; 2] = [0.0, 0.1];
 /// Seeds under noise.
@@ -81,12 +74,12 @@ pub(crate) fn section(results: &Results) -> Section {
     let mut section = Section::new(NAME, "Ablations");
     section.say(
         "One part changed at a time, on the study's sets, without noise and with every tenth vanishing direction replaced. The \
-         default finds and refines the directions of all pictures together, which hides much of what the paper's parts do; the \
-         published form takes each picture's own and keeps one similarity per picture.",
+         default finds and refines the directions of all photographs together, which hides much of what the paper's parts do; the \
+         published form takes each photograph's own and keeps one similarity per photograph.",
     );
     for (base, _) in BASES {
         let caption =
-            format!("Changes to the {base} form. Means over the study's sets; worst: the worst picture of any set.");
+            format!("Changes to the {base} form. Means over the study's sets; worst: the worst photograph of any set.");
         let columns = [
             "change",
             "theta error deg",

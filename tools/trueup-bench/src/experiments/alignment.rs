@@ -2,7 +2,7 @@
 
 use trueup::Result;
 
-use crate::methods::{Family, Method, VPG, methods_of};
+use crate::methods::{ComparedMethod, Family, VPG, methods_of};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::Results;
 use crate::sets::{Catalogue, SetSpec};
@@ -13,14 +13,14 @@ use crate::trial::Trial;
 pub(crate) const NAME: &str = "alignment";
 
 /// Larger sets are left out: their pixels take minutes to compare and say the same.
-const MAX_PICTURES: usize = 16;
+const MAX_PHOTOGRAPHS: usize = 16;
 
 /// Every method on the study's sets of moderate size and on the given ones, with their pixels compared.
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let mut trials = Vec::new();
     for set in catalogue.study.iter().chain(&catalogue.given) {
-        if set.pictures()? <= MAX_PICTURES {
-            let of_method = |one: &Method| Trial::new(NAME, &set.name, one.name, one.overrides);
+        if set.photograph_count()? <= MAX_PHOTOGRAPHS {
+            let of_method = |one: &ComparedMethod| Trial::new(NAME, &set.name, one.name, &one.overrides());
             trials.extend(methods().map(|one| Trial { pixels: true, ..of_method(one) }));
         }
     }
@@ -28,7 +28,7 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
 }
 
 /// The methods of the tables: each prior, and what bends the mesh further.
-fn methods() -> impl Iterator<Item = &'static Method> {
+fn methods() -> impl Iterator<Item = &'static ComparedMethod> {
     methods_of(Family::Prior).chain(methods_of(Family::Alignment))
 }
 
@@ -39,7 +39,7 @@ const MAX_COST_DEG: f64 = 0.2;
 pub(crate) fn claims(results: &Results) -> Vec<Claim> {
     let sets = &results.catalogue.study;
     let value = |name, measure| mean(&results.values_of_all(NAME, sets, name, measure));
-    let of_method = |one: &Method| {
+    let of_method = |one: &ComparedMethod| {
         let error = value(one.name, "ncc_mse").zip(value(VPG, "ncc_mse"));
         let gdic = value(one.name, "gdic_deg").zip(value(VPG, "gdic_deg"));
         let verdict =
@@ -73,10 +73,10 @@ pub(crate) fn section(results: &Results) -> Section {
          points, source pixels.",
     );
     section.blocks.extend(claims(results).into_iter().map(Block::Claim));
-    let caption = format!("Means over the study's sets of at most {MAX_PICTURES} photographs.");
+    let caption = format!("Means over the study's sets of at most {MAX_PHOTOGRAPHS} photographs.");
     section.blocks.push(Block::Table(table(results, &results.catalogue.study, "t7-alignment", &caption)));
     if !results.catalogue.given.is_empty() {
-        let caption = format!("Means over the given sets of at most {MAX_PICTURES} photographs.");
+        let caption = format!("Means over the given sets of at most {MAX_PHOTOGRAPHS} photographs.");
         section.blocks.push(Block::Table(table(results, &results.catalogue.given, "t7-given", &caption)));
     }
     section

@@ -2,7 +2,7 @@
 
 use trueup::Result;
 
-use crate::report::charts::{Chart, Mark, Series};
+use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Section, Table, number};
 use crate::results::{Results, short_name};
 use crate::sets::{Catalogue, SetSpec};
@@ -64,7 +64,7 @@ pub(crate) fn section(results: &Results) -> Section {
     section.blocks.push(Block::Table(table));
     let series = VARIANTS.map(|(variant, _)| {
         let points = factors.iter().filter_map(|factor| Some((*factor, value(variant, *factor, "theta_error_deg")?)));
-        Series::plain(variant, Mark::Line, points)
+        Series::plain(variant, SeriesMark::Line, points)
     });
     let chart = Chart::new("claimed / true focal length", "theta error, degrees", series.into());
     section.draw("Error of the prior's turn when metadata lie.", chart.svg());

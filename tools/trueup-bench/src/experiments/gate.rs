@@ -3,7 +3,8 @@
 use trueup::{Result, StitchOptions};
 
 use super::paper_figures::{MANHATTAN_DIVERGENCES, OTHER_DIVERGENCES, THRESHOLD};
-use crate::report::charts::{Chart, Mark, Series};
+use crate::published_forms::DIVERGENCE_GATE;
+use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::Results;
 use crate::roc::{self, RocPoint};
@@ -33,7 +34,7 @@ fn families(catalogue: &Catalogue) -> Vec<(&'static str, &[SetSpec])> {
 
 /// Both gates on every set of the gate experiment, the default one on the larger sets.
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
-    let variants: [(&str, &[&str]); 2] = [(FULL, &[]), (PAPER, &["similarity.gate=paper"])];
+    let variants: [(&str, &[&str]); 2] = [(FULL, &[]), (PAPER, &DIVERGENCE_GATE)];
     let each = |set: &SetSpec| variants.map(|(name, overrides)| Trial::new(NAME, &set.name, name, overrides));
     let families = families(catalogue).into_iter().flat_map(|(_, sets)| sets);
     let default = families.map(|set| Trial::new(NAME, &set.name, FULL, &[]));
@@ -98,15 +99,15 @@ pub(crate) fn claims(results: &Results) -> Vec<Claim> {
 pub(crate) fn section(results: &Results) -> Section {
     let mut section = Section::new(NAME, "T5: the gate");
     section.say(
-        "The divergence says how badly the pictures' vanishing points fit one Manhattan world. The paper believes them up to 0.10 \
-         and shows 65 Manhattan scenes and 65 others. Ours are small rendered sets. The full gate asks further: how many pictures \
+        "The divergence says how badly the photographs' vanishing points fit one Manhattan world. The paper believes them up to 0.10 \
+         and shows 65 Manhattan scenes and 65 others. Ours are small rendered sets. The full gate asks further: how many photographs \
          agree, and whether the vertical is where straightened cameras put it. Where it refuses, the vertical alone may still guide.",
     );
     section.blocks.extend(claims(results).into_iter().map(Block::Claim));
     let (manhattan, other) = (class(results, true, PAPER), class(results, false, PAPER));
     section.blocks.extend([counts(results), divergences(results), larger_sets(results)].map(Block::Table));
     section.draw(
-        "Divergence of every set; the last bin holds sets whose pictures show no vanishing points at all.",
+        "Divergence of every set; the last bin holds sets whose photographs show no vanishing points at all.",
         histogram(&manhattan, &other),
     );
     let Some(curve) = roc::curve(&manhattan.divergences, &other.divergences) else {
@@ -250,7 +251,11 @@ fn histogram(manhattan: &Class, other: &Class) -> String {
             };
             counts[bin] += 1;
         }
-        Series::plain(name, Mark::Bars, counts.into_iter().enumerate().map(|(bin, count)| (bin as f64, count as f64)))
+        Series::plain(
+            name,
+            SeriesMark::Bars,
+            counts.into_iter().enumerate().map(|(bin, count)| (bin as f64, count as f64)),
+        )
     });
     let mut chart = Chart::new("divergence, from", "sets", series.into()).with_categories(names);
     chart.rules.push((THRESHOLD / BIN - 0.5, "paper's threshold".to_owned()));
@@ -260,7 +265,7 @@ fn histogram(manhattan: &Class, other: &Class) -> String {
 fn roc_chart(results: &Results, curve: &[RocPoint]) -> String {
     let line = Series::plain(
         "divergence alone, every threshold",
-        Mark::Curve,
+        SeriesMark::Curve,
         curve.iter().map(|point| (100.0 * point.false_rate, 100.0 * point.true_rate)),
     );
     let rates = class(results, false, FULL).rate().zip(class(results, true, FULL).rate());
@@ -268,7 +273,7 @@ fn roc_chart(results: &Results, curve: &[RocPoint]) -> String {
     let mut chart = Chart::new(
         "others accepted, %",
         "Manhattan accepted, %",
-        vec![line, Series::plain("full gate (default)", Mark::Dots, gate)],
+        vec![line, Series::plain("full gate (default)", SeriesMark::Dots, gate)],
     );
     (chart.x_range, chart.y_max) = (Some((-2.0, 100.0)), Some(100.0));
     chart.svg()

@@ -18,12 +18,13 @@ pub(super) struct GridRow {
 }
 
 impl GridRow {
-    /// The mean of a measure over the seeds, with its deviation where there are several values.
+    /// The mean of a measure of a variant over the seeds, with its deviation where there are several values.
     pub(super) fn measured(
         results: &Results,
         experiment: &str,
         sets: &[SetSpec],
-        (label, variant, measure): (&str, &str, &str),
+        variant: &str,
+        measure: &str,
     ) -> Self {
         let per_set: Vec<_> =
             sets.iter().map(|set| summary(&results.values(experiment, &set.name, variant, measure))).collect();
@@ -34,7 +35,12 @@ impl GridRow {
             found => number(found.map(|found| found.mean), 2),
         });
         let means: Vec<f64> = per_set.iter().flatten().map(|found| found.mean).collect();
-        Self { label: label.to_owned(), cells: cells.collect(), mean: mean(&means), from_paper: false }
+        Self { label: variant.to_owned(), cells: cells.collect(), mean: mean(&means), from_paper: false }
+    }
+
+    /// The same row under another name than its variant's.
+    pub(super) fn labeled(self, label: &str) -> Self {
+        Self { label: label.to_owned(), ..self }
     }
 
     /// Cells made elsewhere, and their mean.

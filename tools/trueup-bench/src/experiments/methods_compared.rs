@@ -5,9 +5,10 @@ use trueup::Result;
 use super::grid::{GridRow, id_of, table};
 use super::paper_figures::NATURAL;
 use crate::methods::{
-    AANAP, Family, GSP_2D, GSP_2D_PUBLISHED, GSP_3D, GSP_3D_PUBLISHED, METHODS, VPG, VPG_PUBLISHED, methods_of,
+    AANAP, ComparedMethod, Family, GSP_2D, GSP_2D_PUBLISHED, GSP_3D, GSP_3D_PUBLISHED, METHODS, VPG, VPG_PUBLISHED,
+    methods_of,
 };
-use crate::report::charts::{Chart, Mark, Series};
+use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::{Results, short_name};
 use crate::sets::{Catalogue, SetSpec};
@@ -41,13 +42,14 @@ const CONTESTS: [Contest; 2] = [
 /// Every method with a prior on every set of the study and every given one.
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let sets = catalogue.study.iter().chain(&catalogue.given);
-    let of_set =
-        |set: &SetSpec| methods().map(|one| Trial::new(NAME, &set.name, one.name, one.overrides)).collect::<Vec<_>>();
+    let of_set = |set: &SetSpec| {
+        methods().map(|one| Trial::new(NAME, &set.name, one.name, &one.overrides())).collect::<Vec<_>>()
+    };
     Ok(sets.flat_map(of_set).collect())
 }
 
 /// The methods of the tables.
-fn methods() -> impl Iterator<Item = &'static crate::methods::Method> + Clone {
+fn methods() -> impl Iterator<Item = &'static ComparedMethod> + Clone {
     methods_of(Family::Prior).chain(methods_of(Family::WideWarp))
 }
 
@@ -149,15 +151,15 @@ pub(crate) fn section(results: &Results) -> Section {
     section.draw("Direction inconsistency of every method on the study's sets.", gdic_chart(results, sets));
     section.say(
         "GDIC contains the deviation of the smallest rectangle around a perspective grid, half a degree or so even for a \
-         perfectly turned picture. The table below is free of it: the error of the turn that the prior wants, before any mesh, \
-         and how far what stands vertical in the pictures deviates from the panorama's vertical.",
+         perfectly turned photograph. The table below is free of it: the error of the turn that the prior wants, before any mesh, \
+         and how far what stands vertical in the photographs deviates from the panorama's vertical.",
     );
     for (measure, title) in [
         (
             "theta_error_deg",
-            "Error of the prior's turn relative to the reference (theta error), degrees, mean over the pictures",
+            "Error of the prior's turn relative to the reference (theta error), degrees, mean over the photographs",
         ),
-        ("upright_deg", "Deviation from upright in the panorama, degrees, mean over the pictures"),
+        ("upright_deg", "Deviation from upright in the panorama, degrees, mean over the photographs"),
         (
             "align_px",
             "Alignment: distance in source pixels between the two places of one point, where all photographs were taken from one place",
@@ -184,15 +186,15 @@ fn list_of_methods() -> Table {
         "The methods that exist, and the options that make them.",
         ["method", "what it is", "stands beside the paper's", "options"],
     );
-    for one in METHODS {
-        let options: Vec<String> = one.overrides.iter().map(|option| format!("`{option}`")).collect();
+    for one in &METHODS {
+        let options: Vec<String> = one.overrides().iter().map(|option| format!("`{option}`")).collect();
         list.push([one.name, one.meaning, one.paper.unwrap_or("none"), &options.join(" ")]);
     }
     list
 }
 
 fn ours(results: &Results, sets: &[SetSpec], measure: &str) -> Vec<GridRow> {
-    methods().map(|one| GridRow::measured(results, NAME, sets, (one.name, one.name, measure))).collect()
+    methods().map(|one| GridRow::measured(results, NAME, sets, one.name, measure)).collect()
 }
 
 fn gdic_chart(results: &Results, sets: &[SetSpec]) -> String {
@@ -200,7 +202,7 @@ fn gdic_chart(results: &Results, sets: &[SetSpec]) -> String {
         let points = sets.iter().enumerate().filter_map(|(index, set)| {
             Some((index as f64, *results.values(NAME, &set.name, one.name, "gdic_deg").first()?))
         });
-        Series::plain(one.name, Mark::Bars, points)
+        Series::plain(one.name, SeriesMark::Bars, points)
     });
     Chart::new("set", "GDIC, degrees", series.collect())
         .with_categories(sets.iter().map(|set| short_name(&set.name)))

@@ -2,7 +2,7 @@
 
 pub(crate) mod ablations;
 pub(crate) mod alignment;
-pub(crate) mod few_pictures;
+pub(crate) mod few_photographs;
 pub(crate) mod focal_error;
 pub(crate) mod gate;
 mod grid;
@@ -76,9 +76,9 @@ pub(crate) const EXPERIMENTS: [Experiment; 10] = [
         claims: no_claims,
     },
     Experiment {
-        name: few_pictures::NAME,
-        trials: few_pictures::trials,
-        section: few_pictures::section,
+        name: few_photographs::NAME,
+        trials: few_photographs::trials,
+        section: few_photographs::section,
         claims: no_claims,
     },
     Experiment {

@@ -1,9 +1,10 @@
-//! Cameras that look up: where the published relative roll and one similarity per picture fail.
+//! Cameras that look up: where the published relative roll and one similarity per photograph fail.
 
 use trueup::Result;
 
-use crate::methods::{Family, LEVELLED, PUBLISHED_MESH, VPG, VPG_PUBLISHED, method, methods_of};
-use crate::report::charts::{Chart, Mark, Series};
+use crate::methods::{Family, LEVELLED, VPG, VPG_PUBLISHED, method, methods_of};
+use crate::published_forms::{OWN_VANISHING_POINTS, PUBLISHED_MESH, RELATIVE_TWIST};
+use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Section, Table, number};
 use crate::results::Results;
 use crate::sets::{Catalogue, SetSpec};
@@ -16,10 +17,9 @@ pub(crate) const NAME: &str = "pitch-sweep";
 const TWIST: &str = "vpg-published, published beta";
 
 fn variants() -> Vec<(&'static str, Vec<&'static str>)> {
-    let of_methods = methods_of(Family::Prior).map(|one| (one.name, one.overrides.to_vec()));
-    let twist =
-        ["similarity.beta_mode=relative", "similarity.joint_refinement=false", "similarity.guided_redetection=false"];
-    of_methods.chain([(TWIST, [&PUBLISHED_MESH[..], &twist].concat())]).collect()
+    let of_methods = methods_of(Family::Prior).map(|one| (one.name, one.overrides()));
+    let twist = [&PUBLISHED_MESH[..], &RELATIVE_TWIST, &OWN_VANISHING_POINTS].concat();
+    of_methods.chain([(TWIST, twist)]).collect()
 }
 
 /// Every method with a prior at every pitch.
@@ -36,7 +36,7 @@ pub(crate) fn section(results: &Results) -> Section {
     section.say(
         "Rows of seven photographs whose cameras look up by the stated angle, rooms and streets. Two level cameras that look up \
          have a relative rotation with a twist of its own: taken for a roll, as published, it bends the row. One similarity per \
-         picture cannot follow verticals that converge.",
+         photograph cannot follow verticals that converge.",
     );
     let mut pitches: Vec<f64> = results.catalogue.pitch.iter().map(|one| one.pitch_deg).collect();
     pitches.sort_by(f64::total_cmp);
@@ -67,7 +67,7 @@ pub(crate) fn section(results: &Results) -> Section {
     let drawn = [VPG, VPG_PUBLISHED, TWIST, LEVELLED];
     let series = drawn.map(|name| {
         let points = pitches.iter().filter_map(|pitch| Some((*pitch, value(name, *pitch, "upright_deg")?)));
-        Series::plain(name, Mark::Line, points)
+        Series::plain(name, SeriesMark::Line, points)
     });
     debug_assert!(drawn.iter().all(|name| *name == TWIST || method(name).is_some()));
     let chart = Chart::new("pitch of the cameras, degrees", "deviation from upright, degrees", series.into());

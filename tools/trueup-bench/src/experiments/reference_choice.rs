@@ -1,9 +1,9 @@
-//! T4: every picture in turn as the reference.
+//! T4: every photograph in turn as the reference.
 
 use trueup::Result;
 
 use crate::methods::{Family, GSP_2D, GSP_3D, VPG, methods_of};
-use crate::report::charts::{Chart, Mark, Series};
+use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::{Results, short_name};
 use crate::sets::{Catalogue, SetSpec};
@@ -24,9 +24,9 @@ fn sets(catalogue: &Catalogue) -> impl Iterator<Item = &SetSpec> {
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let mut trials = Vec::new();
     for set in sets(catalogue) {
-        for reference in 0..set.pictures()? {
+        for reference in 0..set.photograph_count()? {
             for one in methods_of(Family::Prior) {
-                let trial = Trial::new(NAME, &set.name, one.name, one.overrides);
+                let trial = Trial::new(NAME, &set.name, one.name, &one.overrides());
                 trials.push(Trial { reference: Some(reference), ..trial });
             }
         }
@@ -75,7 +75,8 @@ pub(crate) fn claims(results: &Results) -> Vec<Claim> {
             holds: two.map(|widest| widest > FLAT_DEG && higher == means.len()),
             evidence: format!(
                 "GSP-2D's GDIC differs by up to {} degrees, and by more than {FLAT_DEG} on {varying} of {} sets (where every \
-                 overlap lets its pictures stand as they are, it leaves them so whatever the reference), GSP-3D's by up to {}; the mean over the references is higher with \
+                 overlap lets its photographs stand as they are, it leaves them so whatever the reference), GSP-3D's by up to \
+                 {}; the mean over the references is higher with \
                  GSP-3D than with VPG on {higher} of {} sets.",
                 number(two, 3),
                 means.len(),
@@ -113,7 +114,7 @@ pub(crate) fn section(results: &Results) -> Section {
     section.blocks.push(Block::Table(table));
     for set in sets(results.catalogue) {
         let lines = methods_of(Family::Prior)
-            .map(|one| Series::plain(one.name, Mark::Line, by_reference(results, set, one.name)));
+            .map(|one| Series::plain(one.name, SeriesMark::Line, by_reference(results, set, one.name)));
         let chart = Chart::new("reference photograph", "GDIC, degrees", lines.collect());
         section.draw(&format!("Set {}: GDIC for every reference.", short_name(&set.name)), chart.svg());
     }

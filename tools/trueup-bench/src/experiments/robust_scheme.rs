@@ -4,8 +4,8 @@ use trueup::Result;
 
 use super::grid::{GridRow, table};
 use super::paper_figures::NOISE;
-use crate::methods::PUBLISHED_MESH;
-use crate::report::charts::{Chart, Mark, Point, Series};
+use crate::published_forms::PUBLISHED_MESH;
+use crate::report::charts::{Chart, Point, Series, SeriesMark};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::{Results, short_name};
 use crate::sets::{Catalogue, SetSpec};
@@ -52,7 +52,7 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let study = catalogue.study.iter().map(|set| (set, catalogue.seeds));
     let given = catalogue.given.iter().map(|set| (set, catalogue.seeds.min(SEEDS_OF_GIVEN_SETS)));
     for (set, seeds) in study.chain(given) {
-        let seeds = if set.pictures()? > MANY_PICTURES { seeds.min(SEEDS_OF_LARGE_SETS) } else { seeds };
+        let seeds = if set.photograph_count()? > MANY_PICTURES { seeds.min(SEEDS_OF_LARGE_SETS) } else { seeds };
         for share in NOISE_SHARES {
             for (name, overrides) in schemes {
                 for seed in 0..seeds {
@@ -134,7 +134,7 @@ pub(crate) fn section(results: &Results) -> Section {
 
 fn grid_rows(results: &Results, sets: &[SetSpec], share: f64, measure: &str) -> Vec<GridRow> {
     [WITHOUT, WITH, DEFAULT]
-        .map(|scheme| GridRow::measured(results, NAME, sets, (scheme, &variant(scheme, share), measure)))
+        .map(|scheme| GridRow::measured(results, NAME, sets, &variant(scheme, share), measure).labeled(scheme))
         .into()
 }
 
@@ -166,7 +166,7 @@ fn bars(results: &Results, sets: &[SetSpec], share: f64, measure: &str, label: &
             let found = summary(&results.values(NAME, &set.name, &variant(scheme, share), measure))?;
             Some(Point { x: index as f64, y: found.mean, deviation: found.deviation })
         });
-        Series { name: scheme.to_owned(), mark: Mark::Bars, points: points.collect() }
+        Series { name: scheme.to_owned(), mark: SeriesMark::Bars, points: points.collect() }
     });
     Chart::new("set", label, series.into()).with_categories(sets.iter().map(|set| short_name(&set.name))).svg()
 }

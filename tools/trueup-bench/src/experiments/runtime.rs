@@ -18,7 +18,8 @@ use crate::trial::{Row, Trial};
 pub(crate) const NAME: &str = "runtime";
 
 /// With vanishing points and without, on the same mesh.
-const PAIRS: [(&str, &str); 2] = [(VPG, GSP_3D), (VPG_PUBLISHED, GSP_3D_PUBLISHED)];
+const PAIRS: [MethodPair; 2] =
+    [MethodPair { with: VPG, without: GSP_3D }, MethodPair { with: VPG_PUBLISHED, without: GSP_3D_PUBLISHED }];
 /// The stages between matches and panorama, and all of them from the photographs' files on.
 const TOTALS: [(&str, &str); 2] = [(TOTAL, "whole"), (GEOMETRY, "geometry")];
 const TOTAL: &str = "total";
@@ -34,6 +35,20 @@ const THREADS: [(usize, &str); 2] = [(1, "one thread"), (0, "a thread per core")
 /// Each run is repeated and the fastest counts: everything else on a machine only adds time.
 const REPEATS: usize = 3;
 
+/// A method with vanishing points and the one without that it is compared with, by name.
+#[derive(Debug, Clone, Copy)]
+struct MethodPair {
+    with: &'static str,
+    without: &'static str,
+}
+
+/// What the two methods of a pair take, seconds.
+#[derive(Debug, Clone, Copy)]
+struct PairSeconds {
+    with: f64,
+    without: f64,
+}
+
 fn variant(method: &str, threads: &str) -> String {
     format!("{method}, {threads}")
 }
@@ -43,8 +58,8 @@ fn trials(catalogue: &Catalogue) -> Vec<(Trial, usize)> {
     let mut trials = Vec::new();
     for set in &catalogue.study {
         for (threads, words) in THREADS {
-            for one in PAIRS.iter().flat_map(|(ours, other)| [ours, other]).filter_map(|name| method(name)) {
-                trials.push((Trial::new(NAME, &set.name, &variant(one.name, words), one.overrides), threads));
+            for one in PAIRS.iter().flat_map(|pair| [pair.with, pair.without]).filter_map(method) {
+                trials.push((Trial::new(NAME, &set.name, &variant(one.name, words), &one.overrides()), threads));
             }
         }
     }
@@ -120,25 +135,25 @@ fn fastest(
 }
 
 /// Seconds with vanishing points and without, of every set that has both.
-fn seconds(results: &Results, (ours, other): (&str, &str), threads: &str, total: &str) -> Vec<(String, f64, f64)> {
+fn seconds(results: &Results, pair: MethodPair, threads: &str, total: &str) -> Vec<(String, PairSeconds)> {
     let of_set = |set: &crate::sets::SetSpec| {
         let value = |method| results.values(NAME, &set.name, &variant(method, threads), total).first().copied();
-        Some((short_name(&set.name).to_owned(), value(ours)?, value(other)?))
+        let seconds = PairSeconds { with: value(pair.with)?, without: value(pair.without)? };
+        Some((short_name(&set.name).to_owned(), seconds))
     };
     results.catalogue.study.iter().filter_map(of_set).collect()
 }
 
 /// Means over the sets of [`seconds`].
-fn mean_seconds(results: &Results, pair: (&str, &str), threads: &str, total: &str) -> Option<(f64, f64)> {
-    let (with, without): (Vec<f64>, Vec<f64>) =
-        seconds(results, pair, threads, total).into_iter().map(|(_, with, without)| (with, without)).unzip();
-    mean(&with).zip(mean(&without))
+fn mean_seconds(results: &Results, pair: MethodPair, threads: &str, total: &str) -> Option<PairSeconds> {
+    let of_sets = seconds(results, pair, threads, total);
+    let mean_of = |side: fn(&PairSeconds) -> f64| mean(&of_sets.iter().map(|(_, both)| side(both)).collect::<Vec<_>>());
+    Some(PairSeconds { with: mean_of(|both| both.with)?, without: mean_of(|both| both.without)? })
 }
 
 /// VPG costs little more than GSP.
 pub(crate) fn claims(results: &Results) -> Vec<Claim> {
-    let ratio =
-        |pair, threads, total| mean_seconds(results, pair, threads, total).map(|(with, without)| with / without);
+    let ratio = |pair, threads, total| mean_seconds(results, pair, threads, total).map(|both| both.with / both.without);
     let all = |total| -> Vec<f64> {
         PAIRS.iter().flat_map(|pair| THREADS.iter().filter_map(move |(_, words)| ratio(*pair, words, total))).collect()
     };
@@ -177,36 +192,50 @@ pub(crate) fn section(results: &Results) -> Section {
     let mut means = Table::new("t6-means", "Means over the sets.", columns);
     let mut each = Table::new("t6-sets", "Every set.", columns);
     for pair in PAIRS {
-        let methods = format!("{} / {}", pair.0, pair.1);
+        let methods = format!("{} / {}", pair.with, pair.without);
         for (total, what) in TOTALS {
             for (_, threads) in THREADS {
-                for (set, with, without) in seconds(results, pair, threads, total) {
-                    each.push(cells(&set, [&methods, what, threads], (with, without)));
+                let row = TimingRow { methods: &methods, what, threads };
+                for (set, both) in seconds(results, pair, threads, total) {
+                    each.push(row.cells(&set, both));
                 }
                 if let Some(both) = mean_seconds(results, pair, threads, total) {
-                    means.push(cells("mean", [&methods, what, threads], both));
+                    means.push(row.cells("mean", both));
                 }
             }
         }
     }
     for paper in SECONDS {
         let methods = format!("VPG / GSP (AANAP {:.2} s)", paper.aanap);
-        means.push_paper(cells(&format!("paper: {}", paper.sets), [&methods, "whole", ""], (paper.vpg, paper.gsp)));
+        let row = TimingRow { methods: &methods, what: "whole", threads: "" };
+        let both = PairSeconds { with: paper.vpg, without: paper.gsp };
+        means.push_paper(row.cells(&format!("paper: {}", paper.sets), both));
     }
     section.blocks.extend([means, stages(results), each].map(Block::Table));
     section
 }
 
-fn cells(set: &str, [methods, what, threads]: [&str; 3], (with, without): (f64, f64)) -> [String; 7] {
-    [
-        set.to_owned(),
-        methods.to_owned(),
-        what.to_owned(),
-        threads.to_owned(),
-        format!("{with:.2}"),
-        format!("{without:.2}"),
-        format!("{:.3}", with / without),
-    ]
+/// What a row of seconds is about, beside its set.
+#[derive(Debug, Clone, Copy)]
+struct TimingRow<'a> {
+    methods: &'a str,
+    what: &'a str,
+    threads: &'a str,
+}
+
+impl TimingRow<'_> {
+    /// The row's cells for a set.
+    fn cells(&self, set: &str, seconds: PairSeconds) -> [String; 7] {
+        [
+            set.to_owned(),
+            self.methods.to_owned(),
+            self.what.to_owned(),
+            self.threads.to_owned(),
+            format!("{:.2}", seconds.with),
+            format!("{:.2}", seconds.without),
+            format!("{:.3}", seconds.with / seconds.without),
+        ]
+    }
 }
 
 /// Mean seconds per stage with one thread.

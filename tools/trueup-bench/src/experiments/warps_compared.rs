@@ -4,7 +4,7 @@ use trueup::Result;
 
 use super::grid::{GridRow, id_of, table};
 use super::paper_figures::WARPS;
-use crate::methods::{APAP, Family, Method, SPHP, SPHP_FREE, VPG, VPG_PUBLISHED, methods_of};
+use crate::methods::{APAP, ComparedMethod, Family, SPHP, SPHP_FREE, VPG, VPG_PUBLISHED, methods_of};
 use crate::report::document::{Block, Claim, Section, number};
 use crate::results::{Results, short_name};
 use crate::sets::{Catalogue, SetSpec};
@@ -28,17 +28,17 @@ fn sets(catalogue: &Catalogue) -> Vec<SetSpec> {
 }
 
 /// The methods without a prior.
-fn warps() -> impl Iterator<Item = &'static Method> {
+fn warps() -> impl Iterator<Item = &'static ComparedMethod> {
     methods_of(Family::Warp).chain(methods_of(Family::WideWarp))
 }
 
 /// The methods of the tables.
-fn methods() -> impl Iterator<Item = &'static Method> {
+fn methods() -> impl Iterator<Item = &'static ComparedMethod> {
     methods_of(Family::Prior).chain(warps())
 }
 
 /// Whether a method is run on every size of a set, not only the largest: the warps, and what they are compared with.
-fn on_every_size(one: &Method) -> bool {
+fn on_every_size(one: &ComparedMethod) -> bool {
     one.family != Family::Prior || [VPG, VPG_PUBLISHED].contains(&one.name)
 }
 
@@ -46,12 +46,12 @@ fn on_every_size(one: &Method) -> bool {
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let mut trials = Vec::new();
     for set in sets(catalogue) {
-        let largest = set.pictures()?.min(LARGEST);
+        let largest = set.photograph_count()?.min(LARGEST);
         for one in methods() {
             let smallest = if on_every_size(one) { SMALLEST.min(largest) } else { largest };
-            for pictures in smallest..=largest {
-                let trial = Trial::new(NAME, &set.name, one.name, one.overrides);
-                trials.push(Trial { pictures: Some(pictures), central: true, ..trial });
+            for photographs in smallest..=largest {
+                let trial = Trial::new(NAME, &set.name, one.name, &one.overrides());
+                trials.push(Trial { photograph_count: Some(photographs), central: true, ..trial });
             }
         }
     }
@@ -59,40 +59,40 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
 }
 
 /// The result of a method on so many photographs of a set.
-fn row<'a>(results: &'a Results, set: &SetSpec, method: &str, pictures: usize) -> Option<&'a Row> {
-    results
-        .of(NAME)
-        .find(|row| row.key.set == set.name && row.key.variant == method && row.key.pictures == Some(pictures))
+fn row<'a>(results: &'a Results, set: &SetSpec, method: &str, photographs: usize) -> Option<&'a Row> {
+    results.of(NAME).find(|row| {
+        row.key.set == set.name && row.key.variant == method && row.key.photograph_count == Some(photographs)
+    })
 }
 
 /// The sizes that were tried, the largest first.
 fn sizes(results: &Results, set: &SetSpec, method: &str) -> Vec<usize> {
     let rows = results.of(NAME).filter(|row| row.key.set == set.name && row.key.variant == method);
-    let mut sizes: Vec<usize> = rows.filter_map(|row| row.key.pictures).collect();
+    let mut sizes: Vec<usize> = rows.filter_map(|row| row.key.photograph_count).collect();
     sizes.sort_unstable_by(|a, b| b.cmp(a));
     sizes
 }
 
 /// The result on the largest number of photographs that the method makes a panorama of.
 fn largest<'a>(results: &'a Results, set: &SetSpec, method: &str) -> Option<(usize, &'a Row)> {
-    sizes(results, set, method).into_iter().find_map(|pictures| {
-        let row = row(results, set, method, pictures)?;
-        row.measure("gdic_deg").map(|_| (pictures, row))
+    sizes(results, set, method).into_iter().find_map(|photographs| {
+        let row = row(results, set, method, photographs)?;
+        row.measure("gdic_deg").map(|_| (photographs, row))
     })
 }
 
 /// GDIC of a warp and of VPG, in that order, on the same photographs, for every set that the warp does.
-fn same_pictures(results: &Results, warp: &str, ours: &str) -> Vec<(f64, f64)> {
+fn same_photographs(results: &Results, warp: &str, ours: &str) -> Vec<(f64, f64)> {
     let of_set = |set: &SetSpec| {
-        let (pictures, found) = largest(results, set, warp)?;
-        Some((found.measure("gdic_deg")?, row(results, set, ours, pictures)?.measure("gdic_deg")?))
+        let (photographs, found) = largest(results, set, warp)?;
+        Some((found.measure("gdic_deg")?, row(results, set, ours, photographs)?.measure("gdic_deg")?))
     };
     sets(results.catalogue).iter().filter_map(of_set).collect()
 }
 
 /// Mean GDIC of a warp, that of VPG on the same photographs, and the number of sets.
 fn compared(results: &Results, warp: &str) -> Option<(f64, f64, usize)> {
-    let (theirs, ours): (Vec<f64>, Vec<f64>) = same_pictures(results, warp, VPG_PUBLISHED).into_iter().unzip();
+    let (theirs, ours): (Vec<f64>, Vec<f64>) = same_photographs(results, warp, VPG_PUBLISHED).into_iter().unzip();
     Some((mean(&theirs)?, mean(&ours)?, ours.len()))
 }
 
@@ -150,17 +150,17 @@ pub(crate) fn section(results: &Results) -> Section {
 }
 
 /// A method's figures on the largest number of photographs each.
-fn grid_row(results: &Results, sets: &[SetSpec], one: &Method, measure: &str) -> GridRow {
+fn grid_row(results: &Results, sets: &[SetSpec], one: &ComparedMethod, measure: &str) -> GridRow {
     let mut values = Vec::new();
     let cells = sets.iter().map(|set| {
         let most = sizes(results, set, one.name).into_iter().max();
         match largest(results, set, one.name) {
             None if most.is_some() => "n/a".to_owned(),
             None => number(None, 2),
-            Some((pictures, row)) => {
+            Some((photographs, row)) => {
                 values.extend(row.measure(measure));
                 let figure = number(row.measure(measure), 2);
-                if Some(pictures) == most { figure } else { format!("{figure} ({pictures})") }
+                if Some(photographs) == most { figure } else { format!("{figure} ({photographs})") }
             }
         }
     });
@@ -173,10 +173,10 @@ fn refusals(results: &Results, sets: &[SetSpec]) -> Vec<String> {
     let mut points = Vec::new();
     for one in warps() {
         for set in sets {
-            let done = largest(results, set, one.name).map(|(pictures, _)| pictures);
+            let done = largest(results, set, one.name).map(|(photographs, _)| photographs);
             let next = sizes(results, set, one.name).into_iter().rfind(|size| done.is_none_or(|done| *size > done));
             let Some(row) = next.and_then(|size| row(results, set, one.name, size)) else { continue };
-            let (name, size) = (short_name(&set.name), row.key.pictures.unwrap_or(0));
+            let (name, size) = (short_name(&set.name), row.key.photograph_count.unwrap_or(0));
             points.push(format!("`{}` on {size} photographs of {name}: {}", one.name, row.note));
         }
     }
@@ -190,27 +190,27 @@ mod tests {
     use super::*;
     use crate::methods::method;
 
-    fn result(variant: &str, pictures: usize, outcome: (&str, f64)) -> Row {
-        let trial = Trial { pictures: Some(pictures), ..Trial::new(NAME, "study/05", variant, &[]) };
-        let note = if outcome.0 == "refused" { "too wide".to_owned() } else { String::new() };
-        Row { key: trial.key("set", "1"), measures: BTreeMap::from([(outcome.0.to_owned(), outcome.1)]), note }
+    fn result(variant: &str, photographs: usize, measure: &str, value: f64) -> Row {
+        let trial = Trial { photograph_count: Some(photographs), ..Trial::new(NAME, "study/05", variant, &[]) };
+        let note = if measure == "refused" { "too wide".to_owned() } else { String::new() };
+        Row { key: trial.key("set", "1"), measures: BTreeMap::from([(measure.to_owned(), value)]), note }
     }
 
     #[test]
     fn the_largest_reduction_counts_and_refusals_are_stated() {
         let catalogue = Catalogue::full(None, &[]).expect("no folders");
         let rows = vec![
-            result("homography", 5, ("refused", 1.0)),
-            result("homography", 3, ("gdic_deg", 6.0)),
-            result("homography", 4, ("gdic_deg", 8.0)),
-            result(VPG_PUBLISHED, 4, ("gdic_deg", 1.0)),
-            result(VPG_PUBLISHED, 5, ("gdic_deg", 2.0)),
-            result("apap", 5, ("refused", 1.0)),
+            result("homography", 5, "refused", 1.0),
+            result("homography", 3, "gdic_deg", 6.0),
+            result("homography", 4, "gdic_deg", 8.0),
+            result(VPG_PUBLISHED, 4, "gdic_deg", 1.0),
+            result(VPG_PUBLISHED, 5, "gdic_deg", 2.0),
+            result("apap", 5, "refused", 1.0),
         ];
         let results = Results { catalogue: &catalogue, rows };
         let set = &catalogue.study[4];
-        assert_eq!(largest(&results, set, "homography").map(|(pictures, _)| pictures), Some(4));
-        assert_eq!(same_pictures(&results, "homography", VPG_PUBLISHED), [(8.0, 1.0)]);
+        assert_eq!(largest(&results, set, "homography").map(|(photographs, _)| photographs), Some(4));
+        assert_eq!(same_photographs(&results, "homography", VPG_PUBLISHED), [(8.0, 1.0)]);
         let expected = ["`homography` on 5 photographs of 05: too wide", "`apap` on 5 photographs of 05: too wide"];
         assert_eq!(refusals(&results, std::slice::from_ref(set)), expected);
         let one = method(APAP).expect("a method");

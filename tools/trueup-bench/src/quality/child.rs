@@ -12,7 +12,7 @@ use super::discover::StitchSet;
 
 /// What became of a set's process.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Measured {
+pub(super) struct MeasuredStitch {
     /// The record it wrote; `None` if it failed.
     pub project: Option<PathBuf>,
     /// The first line of its complaint, if it failed.
@@ -36,7 +36,7 @@ pub(super) fn measure(
     scratch: &Path,
     index: usize,
     cancel: &CancelToken,
-) -> Result<Measured> {
+) -> Result<MeasuredStitch> {
     let (panorama, project) = (scratch.join("panorama.jpg"), scratch.join(format!("{index}.json")));
     let complaints = scratch.join("complaints.txt");
     let stderr = File::create(&complaints).map_err(|error| Error::io("writing", &complaints, error))?;
@@ -72,7 +72,7 @@ pub(super) fn measure(
     let complaint = fs::read_to_string(&complaints).unwrap_or_default();
     let first = complaint.lines().next().unwrap_or("it ended without a word");
     let _ = fs::remove_file(&panorama);
-    Ok(Measured {
+    Ok(MeasuredStitch {
         project: written.then_some(project),
         complaint: if written { String::new() } else { first.trim_start_matches("trueup: error: ").to_owned() },
         seconds,

@@ -13,7 +13,8 @@ use trueup::{CancelToken, Error, Result, check_place};
 
 use crate::arguments::QualityArguments;
 use crate::progress::Tracker;
-use child::{Measured, measure};
+use crate::stopping;
+use child::{MeasuredStitch, measure};
 use discover::{StitchSet, find_sets};
 use row::{QualityRow, read_rows, write_rows};
 
@@ -22,7 +23,7 @@ use row::{QualityRow, read_rows, write_rows};
 /// # Errors
 /// Those of finding the sets and the command, of writing; [`Error::Cancelled`]. A set that cannot be stitched is a row.
 pub(crate) fn run(arguments: &QualityArguments) -> Result<ExitCode> {
-    let cancel = crate::cancel_token();
+    let cancel = stopping::cancel_token();
     let command = find_command(arguments.trueup.as_deref())?;
     let csv_path = arguments.out.with_extension("csv");
     page::check(&arguments.out)?;
@@ -60,7 +61,7 @@ fn measure_all(
     scratch: &Path,
     cancel: &CancelToken,
     quiet: bool,
-) -> Result<Vec<Measured>> {
+) -> Result<Vec<MeasuredStitch>> {
     let tracker = Tracker::new("sets", sets.len() as u64, quiet);
     let mut measured = Vec::new();
     for (index, set) in sets.iter().enumerate() {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use trueup::{Error, Evaluation, Measures, Project, Result, write_atomically};
 
-use super::child::Measured;
+use super::child::MeasuredStitch;
 use super::discover::{Part, StitchSet};
 use crate::report::csv;
 use crate::sets::read_truth;
@@ -23,7 +23,7 @@ pub(super) struct QualityRow {
     pub used: usize,
     /// Photographs in the folder.
     pub given: usize,
-    /// `yes`, `all lines` (of all pictures together), `vertical only`, `no`, or `-` without a panorama.
+    /// `yes`, `all lines` (of all photographs together), `vertical only`, `no`, or `-` without a panorama.
     pub guided: String,
     /// Vanishing point divergence.
     pub divergence: Option<f64>,
@@ -100,12 +100,12 @@ impl QualityRow {
     ///
     /// # Errors
     /// Those of reading the record and the truth.
-    pub(super) fn new(set: &StitchSet, measured: &Measured) -> Result<Self> {
+    pub(super) fn new(set: &StitchSet, measured: &MeasuredStitch) -> Result<Self> {
         let mut row = Self {
             seconds: Some(measured.seconds),
             peak_mb: Some(measured.peak_bytes as f64 / BYTES_PER_MB),
             note: measured.complaint.clone(),
-            given: pictures_in(&set.folder)?,
+            given: photographs_in(&set.folder)?,
             ..Self::empty(set.part, &set.name, &set.kind)
         };
         let Some(path) = &measured.project else { return Ok(row) };
@@ -209,14 +209,14 @@ fn guided(project: &Project) -> &'static str {
 }
 
 /// Files in a folder that look like photographs, for sets that could not be stitched.
-fn pictures_in(folder: &Path) -> Result<usize> {
+fn photographs_in(folder: &Path) -> Result<usize> {
     const EXTENSIONS: [&str; 6] = ["jpg", "jpeg", "png", "tif", "tiff", "webp"];
     let entries = fs::read_dir(folder).map_err(|error| Error::io("reading the folder", folder, error))?;
-    let is_picture = |path: &Path| {
+    let is_photograph = |path: &Path| {
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         EXTENSIONS.contains(&extension.as_str())
     };
-    Ok(entries.filter_map(std::result::Result::ok).filter(|entry| is_picture(&entry.path())).count())
+    Ok(entries.filter_map(std::result::Result::ok).filter(|entry| is_photograph(&entry.path())).count())
 }
 
 /// Writes rows as CSV.

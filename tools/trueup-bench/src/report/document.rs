@@ -30,7 +30,7 @@ pub(crate) enum Block {
     /// Figures.
     Table(Table),
     /// A drawing; Markdown shows its caption alone, for the same figures stand in a table.
-    Figure(Figure),
+    Drawing(ReportDrawing),
     /// A claim and whether it holds.
     Claim(Claim),
     /// Something that was not run, and why.
@@ -61,7 +61,7 @@ pub(crate) struct TableRow {
 
 /// A drawing with its words.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Figure {
+pub(crate) struct ReportDrawing {
     /// What it shows.
     pub caption: String,
     /// The drawing.
@@ -116,7 +116,7 @@ impl Section {
 
     /// Adds a drawing.
     pub(crate) fn draw(&mut self, caption: &str, svg: String) {
-        self.blocks.push(Block::Figure(Figure { caption: caption.to_owned(), svg }));
+        self.blocks.push(Block::Drawing(ReportDrawing { caption: caption.to_owned(), svg }));
     }
 }
 

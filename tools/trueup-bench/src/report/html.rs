@@ -39,8 +39,8 @@ fn block_text(block: &Block) -> String {
             format!("<ul>\n{points}</ul>\n")
         }
         Block::Table(table) => table_text(table),
-        Block::Figure(figure) => {
-            format!("<figure>\n{}\n<figcaption>{}</figcaption>\n</figure>\n", figure.svg, inline(&figure.caption))
+        Block::Drawing(drawing) => {
+            format!("<figure>\n{}\n<figcaption>{}</figcaption>\n</figure>\n", drawing.svg, inline(&drawing.caption))
         }
         Block::Claim(claim) => {
             let class = match claim.holds {

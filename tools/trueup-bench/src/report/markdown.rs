@@ -22,7 +22,7 @@ fn block_text(block: &Block) -> String {
         Block::Paragraph(words) => format!("{words}\n"),
         Block::List(points) => points.iter().map(|point| format!("- {point}\n")).collect(),
         Block::Table(table) => table_text(table),
-        Block::Figure(figure) => format!("*{}* (drawn in report.html)\n", figure.caption),
+        Block::Drawing(drawing) => format!("*{}* (drawn in report.html)\n", drawing.caption),
         Block::Claim(claim) => format!("> **{}** {} {}\n", verdict(claim), claim.text, claim.evidence),
         Block::Skipped(reason) => format!("*skipped: {reason}*\n"),
     }

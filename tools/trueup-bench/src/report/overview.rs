@@ -32,7 +32,8 @@ pub(crate) fn measures() -> Section {
         "**LD**, local distortion, x 1e-2: how unevenly the cells of a photograph's grid are stretched where nothing overlaps, the \
          mean per photograph, the worst photograph of a set (equations 12 and 13). It grows with the size of the cells: a method \
          with finer cells has a lower LD for the same shape.",
-        "**align**, source pixels: root mean square distance in the panorama between the two places of one point of the scene; known where all photographs were taken from one place.",
+        "**align**, source pixels: root mean square distance in the panorama between the two places of one point of the scene; known \
+         where all photographs were taken from one place.",
         "**divergence**: how badly the photographs' vanishing points fit one Manhattan world (equation 15); 0 is perfect.",
         "**guided**: the share of runs in which the gate believed the vanishing points.",
     ];

@@ -2,10 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use trueup::{Error, Result};
+use trueup::{Error, Result, StageContext};
+use trueup_scenes::cut::find_panoramas;
 use trueup_scenes::{LightQuality, Quality, RigOptions, SceneKind, SceneOptions, SetKind};
 
-use super::{Recipe, SetSpec, from_panorama, truth_folders};
+use super::from_panorama;
+use super::ready::truth_folders;
+use super::spec::{Recipe, SetSource, SetSpec};
 
 /// The sets of a run, by what they are for.
 #[derive(Debug, Default)]
@@ -24,7 +27,7 @@ pub(crate) struct Catalogue {
     pub pitch: Vec<PitchSet>,
     /// Sets of the study whose metadata are wrong.
     pub focal: Vec<FocalSet>,
-    /// Short names of the study's sets that every picture in turn is the reference of.
+    /// Short names of the study's sets that every photograph in turn is the reference of.
     pub reference_sets: Vec<&'static str>,
     /// Number of seeds of the noise on vanishing directions.
     pub seeds: u64,
@@ -174,7 +177,7 @@ fn focal_sets(study: &[SetSpec]) -> Vec<FocalSet> {
 
 /// The sets cut from panoramas and those inside the given folders, named after theirs.
 fn given_sets(panoramas: Option<&Path>, parents: &[PathBuf]) -> Result<Vec<SetSpec>> {
-    let mut sets: Vec<SetSpec> = panoramas.map_or_else(|| Ok(Vec::new()), from_panorama::sets)?;
+    let mut sets: Vec<SetSpec> = panoramas.map_or_else(|| Ok(Vec::new()), cut_sets)?;
     for parent in parents {
         for folder in truth_folders(parent)? {
             let name = format!("given/{}", name_of(&folder));
@@ -188,6 +191,25 @@ fn given_sets(panoramas: Option<&Path>, parents: &[PathBuf]) -> Result<Vec<SetSp
     Ok(sets)
 }
 
+/// The sets of a folder's panoramas.
+///
+/// # Errors
+/// Those of [`find_panoramas`].
+fn cut_sets(folder: &Path) -> Result<Vec<SetSpec>> {
+    let found = find_panoramas(&[folder.display().to_string()], &StageContext::default())?;
+    let each = |path: &Path| {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let source = path.to_owned();
+        from_panorama::KINDS.map(|(kind, _)| SetSpec {
+            name: format!("given/{stem}-{kind}"),
+            content: format!("{kind} cut from {stem}"),
+            manhattan: None,
+            source: SetSource::Cut(source.clone(), kind),
+        })
+    };
+    Ok(found.iter().flat_map(|image| each(&image.path)).collect())
+}
+
 fn name_of(folder: &Path) -> String {
     folder.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
@@ -196,11 +218,19 @@ fn name_of(folder: &Path) -> String {
 mod tests {
     use super::*;
 
+    /// Writes a panorama of one middle gray.
+    fn write_gray_png(path: &Path, width: u32, height: u32) {
+        let file = std::fs::File::create(path).expect("a file");
+        let mut writer = png::Encoder::new(file, width, height).write_header().expect("a header");
+        writer.write_image_data(&vec![128; (width * height) as usize]).expect("written");
+    }
+
     #[test]
     fn every_set_has_a_name_of_its_own() {
         for catalogue in [Catalogue::full(None, &[]).expect("no folders"), Catalogue::quick()] {
             let mut names: Vec<&str> = catalogue.all().iter().map(|set| set.name.as_str()).collect();
             let count = names.len();
+            assert!(count > 12, "{count} sets");
             names.sort_unstable();
             names.dedup();
             assert_eq!(names.len(), count);
@@ -212,5 +242,26 @@ mod tests {
         let catalogue = Catalogue::full(None, &[]).expect("no folders");
         let manhattan = catalogue.gate.iter().filter(|set| set.manhattan == Some(true)).count();
         assert_eq!((catalogue.study.len(), catalogue.gate.len(), manhattan), (12, 130, 65));
+    }
+    #[test]
+    fn views_are_counted_as_they_are_cut_and_are_not_cut_again() {
+        let folder = tempfile::tempdir().expect("folder");
+        let panoramas = folder.path().join("panoramas");
+        std::fs::create_dir(&panoramas).expect("folder");
+        write_gray_png(&panoramas.join("gray.png"), 256, 128);
+        let (data, context) = (folder.path().join("data"), StageContext::default());
+        let sets = cut_sets(&panoramas).expect("panoramas");
+        assert_eq!(sets.len(), from_panorama::KINDS.len());
+        for set in sets {
+            let ready = set.prepare(&data, &context).expect("cut");
+            assert!(!ready.photographs.is_empty(), "{}", set.name);
+            assert_eq!(ready.photographs.len(), set.photograph_count().expect("count"), "{}", set.name);
+            // What is there is taken as it is.
+            std::fs::remove_file(&ready.photographs[0]).expect("removed");
+            let again = set.prepare(&data, &context).expect("there");
+            assert_eq!(again.truth, ready.truth);
+            assert_ne!(again.fingerprint, ready.fingerprint);
+            assert!(!Path::new(&ready.photographs[0]).exists());
+        }
     }
 }

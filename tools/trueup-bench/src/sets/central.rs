@@ -31,8 +31,8 @@ mod tests {
     use super::*;
 
     /// Cameras that look this many degrees to the right and up.
-    fn looking(directions_deg: &[(f64, f64)]) -> Truth {
-        let image = |(yaw, pitch): &(f64, f64)| {
+    fn looking(directions_deg: &[[f64; 2]]) -> Truth {
+        let image = |[yaw, pitch]: &[f64; 2]| {
             let ((s, c), (up, level)) = (yaw.to_radians().sin_cos(), pitch.to_radians().sin_cos());
             serde_json::json!({
                 "file": "a.jpg", "width": 640, "height": 480, "focal_px": 500.0, "gamma_deg": 0.0,
@@ -45,7 +45,7 @@ mod tests {
 
     #[test]
     fn the_nearest_photographs_lie_around_the_middle_one() {
-        let truth = looking(&[(0.0, 0.0), (70.0, 0.0), (20.0, 0.0), (45.0, 0.0), (100.0, 0.0)]);
+        let truth = looking(&[[0.0, 0.0], [70.0, 0.0], [20.0, 0.0], [45.0, 0.0], [100.0, 0.0]]);
         assert_eq!(central(&truth, 1), Some((3, vec![3])));
         assert_eq!(central(&truth, 3), Some((3, vec![1, 2, 3])));
         assert_eq!(central(&truth, 9), Some((3, vec![0, 1, 2, 3, 4])));
@@ -55,9 +55,9 @@ mod tests {
     #[test]
     fn a_full_turn_of_three_rows_is_not_reduced_to_its_pole() {
         let around = (0..12).map(|step| 30.0 * f64::from(step));
-        let rows: Vec<(f64, f64)> =
-            [50.0, 5.0, -40.0].iter().flat_map(|up| around.clone().map(|yaw| (yaw, *up))).collect();
-        let (middle, nearest) = central(&looking(&rows), 3).expect("pictures");
+        let rows: Vec<[f64; 2]> =
+            [50.0, 5.0, -40.0].iter().flat_map(|up| around.clone().map(|yaw| [yaw, *up])).collect();
+        let (middle, nearest) = central(&looking(&rows), 3).expect("photographs");
         assert!((12..24).contains(&middle) && nearest.contains(&middle));
     }
 }

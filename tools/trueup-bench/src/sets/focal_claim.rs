@@ -5,15 +5,15 @@ use std::path::Path;
 
 use trueup::{Error, Result};
 
-use super::{ReadySet, TRUTH_FILE};
+use super::ready::{ReadySet, TRUTH_FILE};
 
-/// Copies a set into `folder`; its pictures' EXIF claim `factor` times their true focal length.
+/// Copies a set into `folder`; its photographs' EXIF claim `factor` times their true focal length.
 pub(super) fn write(original: &ReadySet, factor: f64, folder: &Path) -> Result<()> {
     for (photograph, truth) in original.photographs.iter().zip(&original.truth.images) {
         let source = Path::new(photograph);
         let bytes = fs::read(source).map_err(|error| Error::io("reading", source, error))?;
         let claimed =
-            with_exif(&bytes, &focal_exif(factor * truth.focal_px, (truth.width, truth.height))).ok_or_else(|| {
+            with_exif(&bytes, &focal_exif(factor * truth.focal_px, truth.width, truth.height)).ok_or_else(|| {
                 Error::input(photograph, "it is no JPEG file", "Give the set as JPEG files, or leave --sets out.")
             })?;
         let target = folder.join(&truth.file);
@@ -37,9 +37,9 @@ fn with_exif(jpeg: &[u8], exif: &[u8]) -> Option<Vec<u8>> {
 
 const EXIF_HEADER: &[u8] = b"Exif\0\0";
 
-/// The TIFF structure of an EXIF block (EXIF 3.0, section 4.6): the focal length on a sensor 36 mm wide, the picture's size,
+/// The TIFF structure of an EXIF block (EXIF 3.0, section 4.6): the focal length on a sensor 36 mm wide, the photograph's size,
 /// the sensor's resolution.
-fn focal_exif(focal_px: f64, (width, height): (usize, usize)) -> Vec<u8> {
+fn focal_exif(focal_px: f64, width: usize, height: usize) -> Vec<u8> {
     const SENSOR_MM: f64 = 36.0;
     /// Denominator of the rationals: numbers to a ten-thousandth.
     const DENOMINATOR: u32 = 10_000;
@@ -81,18 +81,19 @@ fn focal_exif(focal_px: f64, (width, height): (usize, usize)) -> Vec<u8> {
 mod tests {
     use super::*;
     use trueup::StageContext;
-    use trueup_scenes::{LightQuality, Quality, RigOptions, Scene, SceneOptions, SetOutput, rig, write_set};
+    use trueup_scenes::{LightQuality, LitScene, Quality, RigOptions, SceneOptions, SetOutput, rig, write_set};
 
     #[test]
     fn the_stitcher_believes_the_claim() {
         let folder = tempfile::tempdir().expect("folder");
-        let scene = Scene::new(&SceneOptions { light: LightQuality::Fast, ..SceneOptions::default() }).expect("scene");
+        let scene =
+            LitScene::new(&SceneOptions { light: LightQuality::Fast, ..SceneOptions::default() }).expect("scene");
         let options = RigOptions { pictures: 1, width: 160, height: 120, ..RigOptions::default() };
         let cameras = rig(&options, &scene.viewpoint()).expect("cameras");
         let context = StageContext::default();
         let output = SetOutput { quality: Quality::Preview, depth: false };
         write_set(&folder.path().join("true"), "test", &scene, &cameras, output, &context).expect("set");
-        let original = super::super::ready(&folder.path().join("true")).expect("truth");
+        let original = super::super::ready::ready(&folder.path().join("true")).expect("truth");
         let claimed = folder.path().join("claimed");
         fs::create_dir(&claimed).expect("folder");
         write(&original, 1.1, &claimed).expect("copy");

@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use super::Node;
+use super::node::Node;
 use crate::solid::Solid;
 
 /// Bodies a leaf holds at most.

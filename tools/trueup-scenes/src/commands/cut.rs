@@ -7,7 +7,7 @@ use trueup_core::{Result, StageContext};
 use trueup_scenes::cut::{CutSpec, Panorama360, cut_set, measure_level};
 
 use super::level::Trust;
-use super::{describe, print_findings};
+use super::words::{describe, print_findings};
 
 #[derive(Debug, Args)]
 pub(crate) struct CutArguments {

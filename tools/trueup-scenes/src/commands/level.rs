@@ -6,7 +6,7 @@ use trueup_core::truth::Level;
 use trueup_core::{Error, Result, StageContext};
 use trueup_scenes::cut::{LevelOptions, Panorama360, find_panoramas, measure_level};
 
-use super::describe;
+use super::words::describe;
 
 /// When a measured vertical is believed. Options left out keep the library's defaults.
 #[derive(Debug, Args)]

@@ -8,8 +8,8 @@ use clap::Args;
 use trueup_core::{Error, Result, StageContext};
 use trueup_scenes::cut::{Panorama360, SpecKind, SpecOptions, find_panoramas, make_spec, measure_level};
 
-use super::describe;
 use super::level::Trust;
+use super::words::describe;
 
 /// Options left out keep the library's defaults.
 #[derive(Debug, Args)]

@@ -17,7 +17,7 @@ use crate::set::{jpeg, write_truth};
 use super::level::{LevelOptions, measure_level};
 use super::panorama::Panorama360;
 use super::spec::{CutSpec, ViewSpec, world_from_panorama};
-use super::view::{View, to_bytes};
+use super::view::{PinholeView, to_bytes};
 
 /// The name of the work in progress reports.
 const STAGE: &str = "cutting";
@@ -71,7 +71,7 @@ pub fn cut_set(panorama: &Panorama360, spec: &CutSpec, directory: &Path, context
 
 fn take(
     panorama: &Panorama360,
-    view: &View,
+    view: &PinholeView,
     spec: &ViewSpec,
     index: usize,
     context: &StageContext,

@@ -9,15 +9,14 @@ use trueup_core::geometry::exp_rotation;
 use trueup_core::truth::{Level, LevelOrigin};
 use trueup_core::{Error, Result};
 
-use crate::camera_from_world;
-use crate::rig::focal_px;
+use crate::rig::{camera_from_world, focal_px};
 
-use super::view::View;
+use super::view::PinholeView;
 
 /// Largest width and height of a view, as of a rendered picture; pixels.
 const MAX_SIDE_PX: usize = 16_384;
 /// Smallest and largest horizontal field of view, degrees.
-const HFOV_DEG: (f64, f64) = (5.0, 150.0);
+const HFOV_DEG: [f64; 2] = [5.0, 150.0];
 /// Largest gain.
 const MAX_GAIN: f64 = 16.0;
 /// Largest deviation of noise, gray levels of 255.
@@ -169,11 +168,11 @@ impl CutSpec {
     }
 
     fn wrong_view(&self, view: &ViewSpec) -> Option<String> {
-        let outside = |value: f64, (min, max): (f64, f64)| !(min..=max).contains(&value);
+        let outside = |value: f64, [min, max]: [f64; 2]| !(min..=max).contains(&value);
         let (width, height) = self.size(view);
-        let (narrowest, widest) = HFOV_DEG;
+        let [narrowest, widest] = HFOV_DEG;
         let turns = [("yaw", view.yaw, MAX_TURN_DEG), ("pitch", view.pitch, 90.0), ("roll", view.roll, MAX_TURN_DEG)];
-        if let Some((name, value, limit)) = turns.into_iter().find(|&(_, value, limit)| outside(value, (-limit, limit)))
+        if let Some((name, value, limit)) = turns.into_iter().find(|&(_, value, limit)| outside(value, [-limit, limit]))
         {
             return Some(format!("{name} is {value}, but must be from -{limit} to {limit} degrees"));
         }
@@ -183,10 +182,10 @@ impl CutSpec {
         if !(1..=MAX_SIDE_PX).contains(&width) || !(1..=MAX_SIDE_PX).contains(&height) {
             return Some(format!("the size is {width} x {height}, but each side must have 1 to {MAX_SIDE_PX} px"));
         }
-        if outside(view.gain, (f64::MIN_POSITIVE, MAX_GAIN)) {
+        if outside(view.gain, [f64::MIN_POSITIVE, MAX_GAIN]) {
             return Some(format!("gain is {}, but must be above 0 and at most {MAX_GAIN}", view.gain));
         }
-        if outside(view.noise, (0.0, MAX_NOISE)) {
+        if outside(view.noise, [0.0, MAX_NOISE]) {
             return Some(format!("noise is {}, but must be from 0 to {MAX_NOISE}", view.noise));
         }
         None
@@ -201,10 +200,10 @@ impl CutSpec {
     }
 
     /// The pinhole camera of a view, in the panorama's frame.
-    pub(super) fn camera_of(&self, view: &ViewSpec) -> View {
+    pub(super) fn camera_of(&self, view: &ViewSpec) -> PinholeView {
         let (width, height) = self.size(view);
         let rotation = camera_from_world(view.yaw, view.pitch, view.roll);
-        View::new(width, height, focal_px(width, self.hfov_deg(view)), &rotation)
+        PinholeView::new(width, height, focal_px(width, self.hfov_deg(view)), &rotation)
     }
 }
 

@@ -294,7 +294,9 @@ fn kinds_have_the_geometry_they_claim() {
     assert_eq!(aims(&make("few", &still)), [(30.0, 0.0), (56.0, 0.0), (82.0, 0.0)]);
     // Longer sets extend shorter ones, and elevations share their draws.
     assert_eq!(make("few5", &options).views[..2], make("few2", &options).views);
-    for (low, high) in make("pitch0", &options).views.iter().zip(&make("pitch40", &options).views) {
+    let [level_row, lifted_row] = ["pitch0", "pitch40"].map(|word| make(word, &options).views);
+    assert_eq!((level_row.len(), lifted_row.len()), (6, 6));
+    for (low, high) in level_row.iter().zip(&lifted_row) {
         assert!((high.pitch - low.pitch - 40.0).abs() < 2e-3 && (low.yaw, low.roll) == (high.yaw, high.roll));
     }
     assert_eq!(SpecKind::of_word("pitch").expect("a sweep").len(), 4);

@@ -10,7 +10,7 @@ use super::panorama::Panorama360;
 
 /// A pinhole camera at the panorama's center.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct View {
+pub(super) struct PinholeView {
     /// Focal length and rotation, from the panorama's frame to the camera's.
     pub camera: Camera,
     /// Width, pixels.
@@ -19,7 +19,7 @@ pub(super) struct View {
     pub height: usize,
 }
 
-impl View {
+impl PinholeView {
     pub(super) fn new(width: usize, height: usize, focal_px: f64, camera_from_panorama: &Matrix3<f64>) -> Self {
         Self { camera: Camera::new(focal_px, width as f64, height as f64, camera_from_panorama), width, height }
     }

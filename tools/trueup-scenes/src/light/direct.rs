@@ -1,12 +1,13 @@
 //! Light straight from the portals and the sun.
 
-use super::{Place, Portal, SURFACE_OFFSET_M};
-use crate::bvh::Ray;
+use super::grid_point::GridPoint;
+use crate::bvh::{Ray, SURFACE_OFFSET_M};
 use crate::color::Rgb;
-use crate::scene::Scene;
+use crate::portal::Portal;
+use crate::scene::unlit::UnlitScene;
 
 /// Irradiance from the portals, and from the sun.
-pub(super) fn direct_light(scene: &Scene, place: &Place, samples: usize) -> (Rgb, Rgb) {
+pub(super) fn direct_light(scene: &UnlitScene, place: &GridPoint, samples: usize) -> (Rgb, Rgb) {
     if place.buried {
         return (Rgb::zeros(), Rgb::zeros());
     }
@@ -19,7 +20,7 @@ pub(super) fn direct_light(scene: &Scene, place: &Place, samples: usize) -> (Rgb
     (portals, sun)
 }
 
-fn portal_light(scene: &Scene, place: &Place, portal: &Portal, samples: usize) -> Rgb {
+fn portal_light(scene: &UnlitScene, place: &GridPoint, portal: &Portal, samples: usize) -> Rgb {
     const SKY_BLUR: f64 = 0.1;
     /// Windows give more light than they show, so that room and view fit into one exposure.
     const WINDOW_GAIN: f64 = 3.5;

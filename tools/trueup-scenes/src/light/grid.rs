@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::MAX_GRID;
+/// More grid points than this along one side of a face are not worth their time.
+const MAX_GRID: usize = 320;
 
 /// Grid points along a side of this length: two at least, and one in the middle of what is not tiny.
 pub(super) fn grid_points(size_m: f64, spacing_m: f64) -> usize {

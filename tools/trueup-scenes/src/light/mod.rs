@@ -6,37 +6,22 @@
 
 mod direct;
 mod grid;
+mod grid_point;
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
-use crate::bvh::Ray;
+use crate::bvh::{Ray, SURFACE_OFFSET_M};
 use crate::color::Rgb;
 use crate::dice::{mix, unit_of};
-use crate::scene::Scene;
+use crate::scene::unlit::UnlitScene;
 use crate::solid::Solid;
 use direct::direct_light;
 use grid::{binomial, grid_points, spread};
-use rayon::prelude::*;
-/// Distance by which rays start off a surface, metres.
-pub(crate) const SURFACE_OFFSET_M: f64 = 1e-4;
+use grid_point::{GridPoint, importance};
 
 /// Grid points keep this distance from a face's border, metres: right in a corner everything is dark.
 const BORDER_M: f64 = 0.015;
-
-/// More grid points than this along one side of a face are not worth their time.
-const MAX_GRID: usize = 320;
-
-/// A rectangle that gives light: a window's opening or a lamp.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Portal {
-    pub(crate) corner: Vector3<f64>,
-    pub(crate) side_s: Vector3<f64>,
-    pub(crate) side_t: Vector3<f64>,
-    /// Unit vector into the scene.
-    pub(crate) normal: Vector3<f64>,
-    /// Radiance of a lamp; `None` for an opening to the sky.
-    pub(crate) radiance: Option<Rgb>,
-}
 
 /// How finely light is worked out.
 #[derive(Debug, Clone, Copy)]
@@ -66,15 +51,6 @@ pub(crate) struct LightField {
     values: Vec<Vector3<f32>>,
 }
 
-/// One grid point in the world.
-struct Place {
-    point: Vector3<f64>,
-    normal: Vector3<f64>,
-    buried: bool,
-    /// Which of the patterns of directions it deserves, 0 the densest: what is far off or turned away matters less.
-    pattern: usize,
-}
-
 /// By how much the patterns of directions are thinned for places that matter less.
 const THINNING: [usize; 3] = [1, 3, 8];
 
@@ -92,7 +68,7 @@ impl LightField {
     }
 
     /// Works the light of a scene out.
-    pub(crate) fn gather(scene: &Scene, detail: &LightDetail) -> Self {
+    pub(crate) fn gather(scene: &UnlitScene, detail: &LightDetail) -> Self {
         let mut field = Self::laid_out(&scene.solids, detail);
         let places = field.places(scene);
         let direct: Vec<(Rgb, Rgb)> =
@@ -134,9 +110,9 @@ impl LightField {
         field
     }
 
-    fn places(&self, scene: &Scene) -> Vec<Place> {
+    fn places(&self, scene: &UnlitScene) -> Vec<GridPoint> {
         let mut places = Vec::with_capacity(self.values.len());
-        let eye = Vector3::from(scene.viewpoint().eye);
+        let eye = Vector3::from(scene.viewpoint.eye);
         for (solid, grids) in scene.solids.iter().zip(&self.grids) {
             for (face, grid) in grids.iter().enumerate() {
                 let Some(grid) = grid else { continue };
@@ -149,7 +125,7 @@ impl LightField {
                         let normal = solid.to_world(normal);
                         let point = solid.center + solid.to_world(point) + normal * (10.0 * SURFACE_OFFSET_M);
                         let buried = scene.hierarchy.covers(&scene.solids, point);
-                        places.push(Place { point, normal, buried, pattern: importance(point, normal, eye) });
+                        places.push(GridPoint { point, normal, buried, pattern: importance(point, normal, eye) });
                     }
                 }
             }
@@ -158,7 +134,7 @@ impl LightField {
     }
 
     /// Stores values; points buried in other bodies take the mean of their neighbors, so that no dark rim shows.
-    fn fill(&mut self, places: &[Place], values: impl Iterator<Item = Rgb>) {
+    fn fill(&mut self, places: &[GridPoint], values: impl Iterator<Item = Rgb>) {
         for (stored, value) in self.values.iter_mut().zip(values) {
             *stored = value.map(|channel| channel as f32);
         }
@@ -198,8 +174,8 @@ impl LightField {
     /// Light that other surfaces return, and under the open sky the sky's.
     fn bounced(
         &self,
-        scene: &Scene,
-        place: &Place,
+        scene: &UnlitScene,
+        place: &GridPoint,
         index: usize,
         pattern: &[Vector3<f64>],
         albedo: &[[Rgb; 6]],
@@ -229,17 +205,8 @@ impl LightField {
     }
 }
 
-/// The pattern a place deserves: nobody sees what is turned away, nor much of what is far off.
-fn importance(point: Vector3<f64>, normal: Vector3<f64>, eye: Vector3<f64>) -> usize {
-    /// The camera wanders about the eye by this much at most, metres.
-    const WANDER_M: f64 = 1.0;
-    const FAR_M: f64 = 22.0;
-    let to_eye = eye - point;
-    if normal.dot(&to_eye) < -WANDER_M { 2 } else { usize::from(to_eye.norm() > FAR_M) }
-}
-
 /// The mean albedo of every face, for the light it returns.
-fn mean_albedo(scene: &Scene) -> Vec<[Rgb; 6]> {
+fn mean_albedo(scene: &UnlitScene) -> Vec<[Rgb; 6]> {
     const SIDE: usize = 4;
     let solid_albedo = |solid: &Solid| {
         let mut means = [Rgb::zeros(); 6];
@@ -249,7 +216,7 @@ fn mean_albedo(scene: &Scene) -> Vec<[Rgb; 6]> {
                     let (s, t) = (((k % SIDE) as f64 + 0.5) / SIDE as f64, ((k / SIDE) as f64 + 0.5) / SIDE as f64);
                     let (point, _) = solid.at_chart(face, s, t);
                     let blur = 0.5 * solid.half.amin().min(0.05);
-                    scene.materials[solid.faces[face]].albedo(&Scene::spot(solid, face, point, [s, t], blur))
+                    scene.materials[solid.faces[face]].albedo(&solid.spot(face, point, [s, t], blur))
                 })
                 .sum();
             means[face] = sum / (SIDE * SIDE) as f64;

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::interior::specks;
-use super::{Material, Spot};
+use super::surface::{Spot, SurfaceMaterial};
 use crate::color::{Rgb, mix, srgb};
 use crate::noise::{band, edge, fractal_noise, lattice, lerp, pulse};
 
@@ -13,7 +13,7 @@ fn streaks(spot: &Spot, salt: u32) -> f64 {
     fractal_noise(drawn, 0.5, 5, 0.65, spot.footprint, salt).max(0.0)
 }
 
-pub(super) fn brick(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn brick(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let height = material.scale_m;
     let (length, joint) = (3.2 * height, 0.16 * height);
     let row = (spot.down / height).floor();
@@ -30,7 +30,7 @@ pub(super) fn brick(material: &Material, spot: &Spot) -> Rgb {
     wall * (1.0 + 0.1 * spot.noise(2.5, 4, 0.5, 103) - 0.25 * streaks(spot, 104))
 }
 
-pub(super) fn stucco(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn stucco(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let blotch = spot.noise(1.8, 6, 0.6, 111);
     let grit = spot.noise(0.05, 4, 0.8, 112);
     let crack = fractal_noise(spot.point, 0.9, 5, 0.6, spot.footprint, 113);
@@ -41,7 +41,7 @@ pub(super) fn stucco(material: &Material, spot: &Spot) -> Rgb {
     material.colors[0] * shade
 }
 
-pub(super) fn ashlar(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn ashlar(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let height = material.scale_m;
     let length = 2.1 * height;
     let row = (spot.down / height).floor();
@@ -58,7 +58,7 @@ pub(super) fn ashlar(material: &Material, spot: &Spot) -> Rgb {
     stone * (1.0 - 0.6 * groove + 0.12 * bevel - 0.2 * streaks(spot, 125))
 }
 
-pub(super) fn asphalt(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn asphalt(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let aggregate = spot.noise(0.016, 3, 0.9, 131);
     let patches = spot.noise(3.0, 5, 0.55, 132);
     let crack = fractal_noise(spot.point, 1.5, 6, 0.6, spot.footprint, 133);
@@ -72,7 +72,7 @@ pub(super) fn asphalt(material: &Material, spot: &Spot) -> Rgb {
     surface * if repaired { 0.72 } else { 1.0 }
 }
 
-pub(super) fn paving(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn paving(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let size = material.scale_m;
     let row = (spot.point.z / size).floor();
     let shifted = spot.point.x + 0.5 * size * row.rem_euclid(2.0);
@@ -86,7 +86,7 @@ pub(super) fn paving(material: &Material, spot: &Spot) -> Rgb {
 }
 
 /// What a window shows by day: mostly dark, here a curtain, there a blind; the sky in it comes by reflection.
-pub(super) fn pane(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn pane(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let [x, y] = spot.unit;
     let soft = spot.footprint / spot.size[0].max(0.1);
     let depth = 0.6 + 0.4 * spot.noise(0.7, 3, 0.5, 151);
@@ -107,7 +107,7 @@ pub(super) fn pane(material: &Material, spot: &Spot) -> Rgb {
     }
 }
 
-pub(super) fn louvres(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn louvres(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let [width, height] = spot.size;
     let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);
     let rim = x.min(width - x).min(y).min(height - y);
@@ -117,14 +117,14 @@ pub(super) fn louvres(material: &Material, spot: &Spot) -> Rgb {
     paint * (1.0 - 0.55 * inside * slat)
 }
 
-pub(super) fn foliage(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn foliage(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let leaves = spot.noise(0.09, 3, 0.8, 171);
     let clumps = spot.noise(0.7, 3, 0.6, 172);
     let shade = (0.55 + 0.55 * leaves + 0.35 * clumps).clamp(0.08, 1.4);
     mix(material.colors[0], material.colors[1], (0.5 + leaves).clamp(0.0, 1.0)) * shade
 }
 
-pub(super) fn grass(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn grass(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let patches = spot.noise(material.scale_m, 4, 0.6, 191);
     let tufts = spot.noise(0.45, 4, 0.75, 192);
     let blades = spot.noise(0.06, 4, 0.85, 193);
@@ -135,7 +135,7 @@ pub(super) fn grass(material: &Material, spot: &Spot) -> Rgb {
     mix(meadow, material.colors[2], 0.8 * bloom * flowers)
 }
 
-pub(super) fn rock(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn rock(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let scale = material.scale_m;
     let layers =
         fractal_noise(spot.point.component_mul(&Vector3::new(0.3, 1.6, 0.3)), scale, 5, 0.6, spot.footprint, 181);

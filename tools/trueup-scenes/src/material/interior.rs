@@ -2,11 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::{Material, Spot};
+use super::surface::{Spot, SurfaceMaterial};
 use crate::color::{Rgb, mix, srgb};
 use crate::noise::{band, edge, fractal_noise, lattice, lerp, pulse};
 
-pub(super) fn plaster(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn plaster(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let blotch = spot.noise(0.7, 2, 0.7, 11);
     // Brushed on by hand: clouds as wide as the brush.
     let limewash = spot.noise(0.2, 3, 0.75, 18);
@@ -112,7 +112,7 @@ fn knot(along: f64, across: f64, footprint: f64, seed: u32) -> (f64, f64) {
     (visible * (1.0 - edge(distance, radius, footprint.max(0.3 * radius))), visible * swell)
 }
 
-pub(super) fn planks(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn planks(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let (width, length) = (material.scale_m, 9.0 * material.scale_m);
     let column = (spot.point.x / width).floor();
     let shift = length * lattice(column as i64, 0, 0, 41);
@@ -130,7 +130,7 @@ pub(super) fn planks(material: &Material, spot: &Spot) -> Rgb {
     color * (1.0 - 0.75 * joint) * (1.0 - 0.45 * worn) * (1.0 + 0.15 * wear)
 }
 
-pub(super) fn tiles(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn tiles(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let size = material.scale_m;
     let (column, row) = ((spot.across / size).floor(), (spot.down / size).floor());
     let own = lattice(column as i64, row as i64, 0, 51);
@@ -148,7 +148,7 @@ pub(super) fn tiles(material: &Material, spot: &Spot) -> Rgb {
     mix(stone, material.colors[2] * (1.0 + 0.2 * grain), grout)
 }
 
-pub(super) fn fabric(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn fabric(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let thread = material.scale_m;
     let warp = pulse(spot.across, 0.5 * thread, thread, spot.footprint);
     let weft = pulse(spot.down, 0.5 * thread, thread, spot.footprint);
@@ -158,7 +158,7 @@ pub(super) fn fabric(material: &Material, spot: &Spot) -> Rgb {
     color * (0.86 + 0.2 * (warp + weft - 2.0 * warp * weft) + 0.14 * noise + 0.08 * spot.noise(0.4, 3, 0.5, 72))
 }
 
-pub(super) fn paint(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn paint(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let dirt = spot.noise(0.3, 5, 0.6, 91);
     let fine = spot.noise(0.006, 2, 0.8, 92);
     let scratch = specks(spot, 0.15, 0.004, 93);
@@ -166,7 +166,7 @@ pub(super) fn paint(material: &Material, spot: &Spot) -> Rgb {
 }
 
 /// Carpet tiles, every other one turned.
-pub(super) fn carpet(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn carpet(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let size = material.scale_m;
     let (x, z) = (spot.point.x, spot.point.z);
     let (column, row) = ((x / size).floor(), (z / size).floor());
@@ -183,7 +183,7 @@ pub(super) fn carpet(material: &Material, spot: &Spot) -> Rgb {
 }
 
 /// Mineral panels in a metal grid, each with its own stains.
-pub(super) fn ceiling_panels(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn ceiling_panels(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let size = material.scale_m;
     let (x, z) = (spot.point.x, spot.point.z);
     let own = lattice((x / size).floor() as i64, (z / size).floor() as i64, 0, 311);

@@ -4,14 +4,14 @@
 use nalgebra::Vector3;
 
 use super::interior::specks;
-use super::{Material, Spot};
+use super::surface::{Spot, SurfaceMaterial};
 use crate::color::{Rgb, by_hue, mix};
 use crate::noise::{band, edge, lattice, lerp, pulse, value_noise};
 
 /// Height of a motif's cell as a multiple of its width.
 const CELL_ASPECT: f64 = 1.6;
 
-pub(super) fn wallpaper(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn wallpaper(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let width = material.scale_m;
     let stripe = pulse(spot.across, width, 2.0 * width, spot.footprint);
     let mut color = mix(material.colors[0], material.colors[1], stripe);
@@ -28,7 +28,7 @@ pub(super) fn wallpaper(material: &Material, spot: &Spot) -> Rgb {
     color * (1.0 + 0.07 * paper + 0.06 * age)
 }
 
-pub(super) fn curtain(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn curtain(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let fold = material.scale_m;
     let sway = 0.25 * fold * value_noise(Vector3::new(spot.across / fold, spot.down * 0.8, 0.0), 81);
     let phase = (spot.across + sway) / fold * std::f64::consts::TAU;
@@ -115,7 +115,7 @@ fn drawn([x, y]: [f64; 2], soft: f64, chance: &dyn Fn(i64) -> f64) -> Sprig {
     Sprig { green, blossom, eye, hue: chance(9) }
 }
 
-pub(super) fn rug(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn rug(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let [width, height] = spot.size;
     let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);
     let rim = x.min(width - x).min(y).min(height - y);
@@ -153,12 +153,12 @@ pub(super) fn rug(material: &Material, spot: &Spot) -> Rgb {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::Pattern;
+    use crate::material::surface::Pattern;
 
     /// Gray levels of one cell of wallpaper, `column` and `row` cells away.
     fn cell(column: f64, row: f64) -> Vec<f64> {
         const WIDTH: f64 = 0.25;
-        let material = Material::new(Pattern::Wallpaper, WIDTH, [0xf0_f0f0, 0xf0_f0f0, 0x20_2020]);
+        let material = SurfaceMaterial::new(Pattern::Wallpaper, WIDTH, [0xf0_f0f0, 0xf0_f0f0, 0x20_2020]);
         let spot = |k: u32| {
             let (x, y) = (f64::from(k % 24) / 24.0, f64::from(k / 24) / 36.0);
             let (across, down) = (WIDTH * (column + x), WIDTH * CELL_ASPECT * (row + y));

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::{Material, Spot, ornament};
+use super::ornament;
+use super::surface::{Spot, SurfaceMaterial};
 use crate::color::{Rgb, by_hue, luminance, mix, srgb};
 use crate::noise::{band, edge, fractal_noise, lattice, lerp, pulse};
 
@@ -86,7 +87,7 @@ fn word([x, y]: [f64; 2], [width, height]: [f64; 2], spot: &Spot) -> f64 {
         .map_or(0.0, |&byte| letter(usize::from(byte - b'A'), cell.fract(), (y - top) / size))
 }
 
-pub(super) fn sign(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn sign(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let [width, height] = spot.size;
     let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);
     let rim = x.min(width - x).min(y).min(height - y);
@@ -95,7 +96,7 @@ pub(super) fn sign(material: &Material, spot: &Spot) -> Rgb {
     mix(base, material.colors[1], word([x, y], spot.size, spot).max(border))
 }
 
-pub(super) fn page(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn page(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let [width, height] = spot.size;
     let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);
     let margin = 0.08 * width;
@@ -116,7 +117,7 @@ pub(super) fn page(material: &Material, spot: &Spot) -> Rgb {
 }
 
 /// A board somebody wrote and drew on.
-pub(super) fn writing(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn writing(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let [width, height] = spot.size;
     let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);
     let soft = spot.footprint;
@@ -138,7 +139,7 @@ pub(super) fn writing(material: &Material, spot: &Spot) -> Rgb {
     color
 }
 
-pub(super) fn spine(material: &Material, spot: &Spot) -> Rgb {
+pub(super) fn spine(material: &SurfaceMaterial, spot: &Spot) -> Rgb {
     let [width, height] = spot.size;
     let (x, y) = (spot.unit[0] * width, spot.unit[1] * height);
     let chance = |k| spot.chance(k);

@@ -5,7 +5,7 @@ use trueup_core::geometry::exp_rotation;
 
 use super::builder::Builder;
 use crate::color::srgb;
-use crate::material::{Material, MaterialId, Pattern};
+use crate::material::{MaterialId, Pattern, SurfaceMaterial};
 use crate::sky::Sun;
 
 /// Blocks of many materials hanging in the air round the eye, over rolling ground.
@@ -18,7 +18,7 @@ pub(super) fn build(seed: u64) -> Builder {
     /// Half the diameter of a block as a share of its distance.
     const SIZES: [f64; 2] = [0.035, 0.13];
     let mut builder = Builder::new(seed, 5);
-    let turf = builder.material(Material::new(Pattern::Grass, 2.5, [0x4c_5c2c, 0x8c_8450, 0xd8_d0b0]));
+    let turf = builder.material(SurfaceMaterial::new(Pattern::Grass, 2.5, [0x4c_5c2c, 0x8c_8450, 0xd8_d0b0]));
     builder.block([Vector3::new(-150.0, 0.0, -150.0), Vector3::new(150.0, 1.0, 150.0)], turf);
     for _ in 0..30 {
         let (distance, turn) = (builder.dice.range(14.0, 60.0), builder.dice.range(0.0, std::f64::consts::TAU));
@@ -57,18 +57,18 @@ fn random_axis(builder: &mut Builder) -> Vector3<f64> {
 
 fn materials(builder: &mut Builder) -> Vec<MaterialId> {
     [
-        Material::new(Pattern::Rock, 0.8, [0x8a_8072, 0x9a_9a5c, 0]),
-        Material::new(Pattern::Rock, 0.5, [0xa0_6848, 0x70_5040, 0]),
-        Material::new(Pattern::Rock, 0.6, [0x5a_6a78, 0x88_94a0, 0]),
-        Material::new(Pattern::Rock, 0.3, [0xb8_a468, 0x8a_6a30, 0]),
-        Material::new(Pattern::Plaster, 1.0, [0xd8_c0a4; 3]),
-        Material::new(Pattern::Plaster, 1.0, [0x90_a8a0; 3]),
-        Material::new(Pattern::Stucco, 1.0, [0xb8_7a60; 3]),
-        Material::new(Pattern::Foliage, 1.0, [0x2a_4a1e, 0x7a_9a40, 0]),
-        Material::new(Pattern::Foliage, 1.0, [0x6a_4a1e, 0xc0_9a40, 0]),
-        Material::new(Pattern::Asphalt, 1.0, [0x8a_8884; 3]),
-        Material::new(Pattern::Wood, 1.0, [0xa8_7848; 3]),
-        Material::new(Pattern::Picture, 1.0, [0xff_ffff; 3]),
+        SurfaceMaterial::new(Pattern::Rock, 0.8, [0x8a_8072, 0x9a_9a5c, 0]),
+        SurfaceMaterial::new(Pattern::Rock, 0.5, [0xa0_6848, 0x70_5040, 0]),
+        SurfaceMaterial::new(Pattern::Rock, 0.6, [0x5a_6a78, 0x88_94a0, 0]),
+        SurfaceMaterial::new(Pattern::Rock, 0.3, [0xb8_a468, 0x8a_6a30, 0]),
+        SurfaceMaterial::new(Pattern::Plaster, 1.0, [0xd8_c0a4; 3]),
+        SurfaceMaterial::new(Pattern::Plaster, 1.0, [0x90_a8a0; 3]),
+        SurfaceMaterial::new(Pattern::Stucco, 1.0, [0xb8_7a60; 3]),
+        SurfaceMaterial::new(Pattern::Foliage, 1.0, [0x2a_4a1e, 0x7a_9a40, 0]),
+        SurfaceMaterial::new(Pattern::Foliage, 1.0, [0x6a_4a1e, 0xc0_9a40, 0]),
+        SurfaceMaterial::new(Pattern::Asphalt, 1.0, [0x8a_8884; 3]),
+        SurfaceMaterial::new(Pattern::Wood, 1.0, [0xa8_7848; 3]),
+        SurfaceMaterial::new(Pattern::Picture, 1.0, [0xff_ffff; 3]),
     ]
     .map(|material| builder.material(material))
     .to_vec()

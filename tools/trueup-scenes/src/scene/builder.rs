@@ -4,16 +4,16 @@ use nalgebra::Vector3;
 use trueup_core::geometry::rotation_about_y;
 
 use crate::dice::Dice;
-use crate::light::Portal;
-use crate::material::{Material, MaterialId};
+use crate::material::{MaterialId, SurfaceMaterial};
+use crate::portal::Portal;
 use crate::sky::{Sky, Sun};
-use crate::solid::{Shape, Solid};
+use crate::solid::{Solid, SolidShape};
 
 /// A scene under construction. The y axis points down: heights are negative.
 #[derive(Debug)]
 pub(crate) struct Builder {
     pub(crate) solids: Vec<Solid>,
-    pub(crate) materials: Vec<Material>,
+    pub(crate) materials: Vec<SurfaceMaterial>,
     pub(crate) portals: Vec<Portal>,
     pub(crate) sky: Sky,
     pub(crate) sun: Option<Sun>,
@@ -38,12 +38,18 @@ impl Builder {
         }
     }
 
-    pub(crate) fn material(&mut self, material: Material) -> MaterialId {
+    pub(crate) fn material(&mut self, material: SurfaceMaterial) -> MaterialId {
         self.materials.push(material);
         self.materials.len() - 1
     }
 
-    fn push(&mut self, shape: Shape, center: Vector3<f64>, half: Vector3<f64>, material: MaterialId) -> &mut Solid {
+    fn push(
+        &mut self,
+        shape: SolidShape,
+        center: Vector3<f64>,
+        half: Vector3<f64>,
+        material: MaterialId,
+    ) -> &mut Solid {
         const THINNEST_M: f64 = 1e-3;
         let solid = Solid {
             shape,
@@ -61,7 +67,7 @@ impl Builder {
 
     /// A block between two corners whose texture is fixed to the world, so that it runs on into its neighbors'.
     pub(crate) fn block(&mut self, [a, b]: [Vector3<f64>; 2], material: MaterialId) -> &mut Solid {
-        self.push(Shape::Block, (a + b) / 2.0, ((b - a) / 2.0).abs(), material)
+        self.push(SolidShape::Block, (a + b) / 2.0, ((b - a) / 2.0).abs(), material)
     }
 
     /// A block between two corners with a texture of its own.
@@ -80,7 +86,7 @@ impl Builder {
         yaw: f64,
         material: MaterialId,
     ) -> &mut Solid {
-        let solid = self.push(Shape::Block, center, half, material);
+        let solid = self.push(SolidShape::Block, center, half, material);
         solid.world_from_body = Some(rotation_about_y(yaw));
         solid
     }
@@ -94,27 +100,27 @@ impl Builder {
         material: MaterialId,
     ) -> &mut Solid {
         let center = foot - Vector3::new(0.0, height / 2.0, 0.0);
-        self.push(Shape::Cylinder, center, Vector3::new(radius, height / 2.0, radius), material)
+        self.push(SolidShape::Cylinder, center, Vector3::new(radius, height / 2.0, radius), material)
     }
 
     /// An ellipsoid.
     pub(crate) fn ellipsoid(&mut self, center: Vector3<f64>, half: Vector3<f64>, material: MaterialId) -> &mut Solid {
-        self.push(Shape::Ellipsoid, center, half, material)
+        self.push(SolidShape::Ellipsoid, center, half, material)
     }
 
     /// Where the scene stands now, for [`Builder::turn_since`].
-    pub(crate) fn mark(&self) -> Mark {
-        Mark { solids: self.solids.len(), portals: self.portals.len() }
+    pub(crate) fn checkpoint(&self) -> BuilderCheckpoint {
+        BuilderCheckpoint { solids: self.solids.len(), portals: self.portals.len() }
     }
 
-    /// Turns all that was added since the mark about the vertical through `pivot` by `yaw` radians, from z towards x.
-    pub(crate) fn turn_since(&mut self, mark: Mark, pivot: Vector3<f64>, yaw: f64) {
+    /// Turns all that was added since the checkpoint about the vertical through `pivot` by `yaw` radians, from z towards x.
+    pub(crate) fn turn_since(&mut self, before: BuilderCheckpoint, pivot: Vector3<f64>, yaw: f64) {
         let rotation = rotation_about_y(yaw);
-        for solid in &mut self.solids[mark.solids..] {
+        for solid in &mut self.solids[before.solids..] {
             solid.center = pivot + rotation * (solid.center - pivot);
             solid.world_from_body = Some(solid.world_from_body.map_or(rotation, |own| rotation * own));
         }
-        for portal in &mut self.portals[mark.portals..] {
+        for portal in &mut self.portals[before.portals..] {
             portal.corner = pivot + rotation * (portal.corner - pivot);
             for vector in [&mut portal.side_s, &mut portal.side_t, &mut portal.normal] {
                 *vector = rotation * *vector;
@@ -125,7 +131,7 @@ impl Builder {
 
 /// How much of a scene there was at some moment.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Mark {
+pub(crate) struct BuilderCheckpoint {
     solids: usize,
     portals: usize,
 }
@@ -136,16 +142,16 @@ mod tests {
     use crate::material::Pattern;
 
     /// A block 2 m ahead (z) of the pivot at (1, 0, 1), turned by 90 degrees from z towards x, lies 2 m to its right
-    /// (x); what was there before the mark stays.
+    /// (x); what was there before the checkpoint stays.
     #[test]
-    fn what_was_added_since_the_mark_turns_about_the_pivot() {
+    fn what_was_added_since_the_checkpoint_turns_about_the_pivot() {
         let mut builder = Builder::new(1, 0);
-        let paint = builder.material(Material::new(Pattern::Paint, 1.0, [0xff_ffff; 3]));
+        let paint = builder.material(SurfaceMaterial::new(Pattern::Paint, 1.0, [0xff_ffff; 3]));
         let block = [Vector3::new(0.9, -1.0, 2.9), Vector3::new(1.1, 0.0, 3.1)];
         builder.block(block, paint);
-        let mark = builder.mark();
+        let checkpoint = builder.checkpoint();
         builder.block(block, paint);
-        builder.turn_since(mark, Vector3::new(1.0, 0.0, 1.0), std::f64::consts::FRAC_PI_2);
+        builder.turn_since(checkpoint, Vector3::new(1.0, 0.0, 1.0), std::f64::consts::FRAC_PI_2);
         assert!((builder.solids[0].center - Vector3::new(1.0, -0.5, 3.0)).norm() < 1e-12);
         assert!((builder.solids[1].center - Vector3::new(3.0, -0.5, 1.0)).norm() < 1e-12);
         assert!(builder.solids[1].contains(Vector3::new(3.05, -0.9, 1.05)));

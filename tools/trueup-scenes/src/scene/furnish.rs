@@ -1,7 +1,7 @@
 //! Setting furniture along a wall.
 
 use super::builder::Builder;
-use super::furniture::{self, Finish};
+use super::furniture::{self, RoomMaterials};
 use super::style::Feature;
 use super::wall::{Opening, Wall};
 use crate::material::MaterialId;
@@ -13,7 +13,7 @@ pub(super) fn furnish(
     features: &[Feature],
     height: f64,
     surface: MaterialId,
-    finish: &Finish,
+    finish: &RoomMaterials,
 ) {
     const CORNER: f64 = 0.75;
     const GAP: f64 = 0.45;
@@ -71,7 +71,7 @@ pub(super) fn furnish(
 }
 
 /// Hangs a picture between two features if they leave room for one.
-fn fill_gap(builder: &mut Builder, wall: &Wall, [from, to]: [f64; 2], beside: [Feature; 2], finish: &Finish) {
+fn fill_gap(builder: &mut Builder, wall: &Wall, [from, to]: [f64; 2], beside: [Feature; 2], finish: &RoomMaterials) {
     const CLEARANCE: f64 = 0.15;
     const CURTAIN: f64 = 0.5;
     let reach = beside.map(|feature| if feature == Feature::Window { CURTAIN } else { CLEARANCE });
@@ -84,7 +84,7 @@ fn fill_gap(builder: &mut Builder, wall: &Wall, [from, to]: [f64; 2], beside: [F
 }
 
 /// Skirting board, broken at doors, and a cornice.
-fn skirting(builder: &mut Builder, wall: &Wall, doors: &[Opening], height: f64, finish: &Finish) {
+fn skirting(builder: &mut Builder, wall: &Wall, doors: &[Opening], height: f64, finish: &RoomMaterials) {
     let mut from = 0.0;
     for door in doors {
         builder.piece(wall.span([from, door.left - 0.09], [0.0, 0.11], [0.0, 0.018]), finish.white_paint);

@@ -2,26 +2,27 @@
 
 mod boxes;
 mod builder;
+mod exposure;
 mod furnish;
 mod furniture;
+pub(crate) mod lit;
 mod nature;
 mod room;
 mod street;
 mod style;
+pub(crate) mod unlit;
 mod viewpoint;
 mod wall;
 
-use nalgebra::Vector3;
 use trueup_core::Result;
 use trueup_core::options::StageOptions;
 
 use crate::bvh::Hierarchy;
-use crate::light::{LightDetail, LightField, Portal};
-use crate::material::{Material, Spot};
-use crate::sky::{Sky, Sun};
-use crate::solid::{Shape, Solid};
+use crate::light::{LightDetail, LightField};
+pub use lit::LitScene;
 pub use style::RoomStyle;
-pub use viewpoint::Viewpoint;
+use unlit::UnlitScene;
+pub use unlit::Viewpoint;
 
 trueup_core::choice! {
     /// What is built.
@@ -67,33 +68,23 @@ trueup_core::options! {
     }
 }
 
-/// A scene ready to be photographed. Its Manhattan directions, where it has them, are the axes of the world.
-#[derive(Debug, Clone)]
-pub struct Scene {
-    pub(crate) solids: Vec<Solid>,
-    pub(crate) materials: Vec<Material>,
-    pub(crate) hierarchy: Hierarchy,
-    pub(crate) portals: Vec<Portal>,
-    pub(crate) sky: Sky,
-    pub(crate) sun: Option<Sun>,
-    pub(crate) light: LightField,
-    pub(crate) exposure: f64,
-    viewpoint: Viewpoint,
-}
-
-impl Scene {
+impl LitScene {
     /// Builds and lights a scene. The same options give the same scene for any number of threads.
     ///
     /// # Errors
     /// [`trueup_core::Error::Options`] listing every option outside its range.
     pub fn new(options: &SceneOptions) -> Result<Self> {
-        let mut scene = Self::unlit(options)?;
-        scene.illuminate(options.light);
+        let unlit = UnlitScene::new(options)?;
+        let light = LightField::gather(&unlit, &light_detail(options.light, unlit.is_outdoors()));
+        let mut scene = Self { unlit, light, exposure: 1.0 };
+        scene.exposure = exposure::measure(&scene);
         Ok(scene)
     }
+}
 
+impl UnlitScene {
     /// Builds a scene in the dark: bodies and viewpoint only.
-    pub(crate) fn unlit(options: &SceneOptions) -> Result<Self> {
+    pub(crate) fn new(options: &SceneOptions) -> Result<Self> {
         options.check()?;
         let builder = match options.kind {
             SceneKind::Room => room::build(options.seed, options.style),
@@ -110,75 +101,27 @@ impl Scene {
             portals: builder.portals,
             sky: builder.sky,
             sun: builder.sun,
-            light: LightField::default(),
-            exposure: 1.0,
             viewpoint: Viewpoint { eye: builder.eye.into(), yaw_deg: builder.yaw_deg, depth_m: 1.0 },
         };
         scene.step_clear();
         scene.measure_depth();
         Ok(scene)
     }
+}
 
-    /// From where, and in which direction first, the scene is meant to be photographed.
-    pub fn viewpoint(&self) -> Viewpoint {
-        self.viewpoint
-    }
-
-    /// Adds a small self-luminous ball to the scene: a target whose picture can be found exactly.
-    pub fn add_marker(&mut self, center: [f64; 3], radius_m: f64) {
-        let material = Material::new(crate::material::Pattern::Paint, 1.0, [0xff_0000; 3]).emitting(1e3);
-        self.materials.push(material);
-        self.solids.push(Solid {
-            shape: Shape::Ellipsoid,
-            center: Vector3::from(center),
-            half: Vector3::repeat(radius_m),
-            world_from_body: None,
-            faces: [self.materials.len() - 1; 6],
-            texture_center: Vector3::zeros(),
-            seed: 0,
-        });
-        self.hierarchy = Hierarchy::new(&self.solids);
-    }
-
-    /// Works the light out, and the exposure that suits it.
-    fn illuminate(&mut self, quality: LightQuality) {
-        let light = |spacing_m, directions, least_directions, portal_samples| LightDetail {
-            spacing_m,
-            directions,
-            least_directions,
-            portal_samples,
-        };
-        let detail = match (quality, self.is_outdoors()) {
-            (LightQuality::Fast, false) => light(0.4, 24, 8, 2),
-            (LightQuality::Fast, true) => light(3.0, 16, 4, 1),
-            (LightQuality::Standard, false) => light(0.12, 64, 8, 3),
-            (LightQuality::Standard, true) => light(0.9, 32, 8, 1),
-            (LightQuality::Fine, false) => light(0.08, 128, 8, 4),
-            (LightQuality::Fine, true) => light(0.6, 64, 8, 1),
-        };
-        self.light = LightField::gather(self, &detail);
-        self.measure_exposure();
-    }
-
-    /// Whether the sky lights the scene from all sides rather than through windows.
-    fn is_outdoors(&self) -> bool {
-        self.portals.is_empty()
-    }
-
-    /// The coordinates of a place on a face, for its pattern. `point` is in the body's frame.
-    pub(crate) fn spot(solid: &Solid, face: usize, point: Vector3<f64>, unit: [f64; 2], footprint: f64) -> Spot {
-        let size = solid.face_size(face);
-        let texture = point + solid.texture_center;
-        let flat = solid.shape == Shape::Block || face != 0;
-        let (across, down) = match face {
-            _ if !flat => (unit[0] * size[0], texture.y),
-            0 => (-texture.z, texture.y),
-            1 => (texture.z, texture.y),
-            4 => (texture.x, texture.y),
-            5 => (-texture.x, texture.y),
-            _ => (texture.x, texture.z),
-        };
-        let grain = solid.half.imax();
-        Spot { point: texture, across, down, unit, size, grain, footprint, seed: solid.seed }
+fn light_detail(quality: LightQuality, outdoors: bool) -> LightDetail {
+    let light = |spacing_m, directions, least_directions, portal_samples| LightDetail {
+        spacing_m,
+        directions,
+        least_directions,
+        portal_samples,
+    };
+    match (quality, outdoors) {
+        (LightQuality::Fast, false) => light(0.4, 24, 8, 2),
+        (LightQuality::Fast, true) => light(3.0, 16, 4, 1),
+        (LightQuality::Standard, false) => light(0.12, 64, 8, 3),
+        (LightQuality::Standard, true) => light(0.9, 32, 8, 1),
+        (LightQuality::Fine, false) => light(0.08, 128, 8, 4),
+        (LightQuality::Fine, true) => light(0.6, 64, 8, 1),
     }
 }

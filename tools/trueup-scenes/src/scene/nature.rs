@@ -5,18 +5,18 @@ use trueup_core::geometry::exp_rotation;
 
 use super::builder::Builder;
 use crate::color::srgb;
-use crate::material::{Material, Pattern};
+use crate::material::{Pattern, SurfaceMaterial};
 use crate::sky::Sun;
 
 /// Boulders, scree and trees around a clearing.
 pub(super) fn build(seed: u64) -> Builder {
     let mut builder = Builder::new(seed, 3);
     let rocks = [[0x8a_8072, 0x9a_9a5c, 0], [0x6e_6a68, 0x8a_7a50, 0], [0xa0_8468, 0x70_7848, 0]]
-        .map(|colors| builder.material(Material::new(Pattern::Rock, 1.2, colors)));
-    let bark = builder.material(Material::new(Pattern::Rock, 0.3, [0x5a_4a3a, 0x5a_6040, 0]));
+        .map(|colors| builder.material(SurfaceMaterial::new(Pattern::Rock, 1.2, colors)));
+    let bark = builder.material(SurfaceMaterial::new(Pattern::Rock, 0.3, [0x5a_4a3a, 0x5a_6040, 0]));
     let leaves = [[0x2a_4a1e, 0x7a_9a40, 0], [0x3a_5228, 0x9a_a04a, 0]]
-        .map(|colors| builder.material(Material::new(Pattern::Foliage, 1.0, colors)));
-    let turf = builder.material(Material::new(Pattern::Grass, 2.5, [0x4c_5c2c, 0x8c_8450, 0xd8_d0b0]));
+        .map(|colors| builder.material(SurfaceMaterial::new(Pattern::Foliage, 1.0, colors)));
+    let turf = builder.material(SurfaceMaterial::new(Pattern::Grass, 2.5, [0x4c_5c2c, 0x8c_8450, 0xd8_d0b0]));
     builder.block([Vector3::new(-150.0, 0.0, -150.0), Vector3::new(150.0, 1.0, 150.0)], turf);
     // Humps hide the plane's own horizon.
     for _ in 0..40 {

@@ -5,12 +5,12 @@ use trueup_core::geometry::rotation_about_y;
 
 use super::builder::Builder;
 use super::furnish::furnish;
-use super::furniture::{self, Finish};
+use super::furniture::{self, RoomMaterials};
 use super::style::{Middle, RoomStyle};
 use super::wall::Wall;
 use crate::color::srgb;
-use crate::light::Portal;
-use crate::material::{Material, MaterialId, Pattern};
+use crate::material::{MaterialId, Pattern, SurfaceMaterial};
+use crate::portal::Portal;
 use crate::sky::Sun;
 
 /// Builds a room with right angles around the eye.
@@ -19,7 +19,7 @@ pub(super) fn build(seed: u64, style: RoomStyle) -> Builder {
     let [widths, lengths, heights] = style.extents();
     let (width, length) = (builder.dice.range(widths[0], widths[1]), builder.dice.range(lengths[0], lengths[1]));
     let height = builder.dice.range(heights[0], heights[1]);
-    let finish = Finish::new(&mut builder);
+    let finish = RoomMaterials::new(&mut builder);
     let (x, z) = (width / 2.0, length / 2.0);
     let corner = |x: f64, z: f64| Vector3::new(x, 0.0, z);
     let walls = [
@@ -58,7 +58,7 @@ pub(super) fn build_turned(seed: u64, style: RoomStyle) -> Builder {
     const SLAB_STEP_M: f64 = 2e-4;
     let mut builder = Builder::new(seed, 4);
     let height = builder.dice.range(style.extents()[2][0], style.extents()[2][1]);
-    let finish = Finish::new(&mut builder);
+    let finish = RoomMaterials::new(&mut builder);
     let [floor, ceiling] = [style.floor(&mut builder), style.ceiling(&mut builder)];
     let [floor, ceiling] = [floor, ceiling].map(|material| builder.material(material));
     let count = 5 + builder.dice.index(2);
@@ -80,7 +80,7 @@ pub(super) fn build_turned(seed: u64, style: RoomStyle) -> Builder {
         let to = (right_distance - distance * right.1) / right.0 + OVERLAP_M;
         let corner = Vector3::new(from, 0.0, distance);
         let wall = Wall { corner, along: Vector3::x(), out: -Vector3::z(), length: to - from };
-        let mark = builder.mark();
+        let checkpoint = builder.checkpoint();
         furnish(&mut builder, &wall, style.walls()[k % 4], height, coverings[k % 2], &finish);
         // Floor and ceiling are laid from every wall to the middle, each a trace nearer than the last.
         let trace = SLAB_STEP_M * k as f64;
@@ -88,9 +88,9 @@ pub(super) fn build_turned(seed: u64, style: RoomStyle) -> Builder {
         builder.block([Vector3::new(from, -trace, near), Vector3::new(to, SLAB_THICK_M, far)], floor);
         let (under, over) = (trace - height, -height - SLAB_THICK_M);
         builder.block([Vector3::new(from, over, near), Vector3::new(to, under, far)], ceiling);
-        builder.turn_since(mark, Vector3::zeros(), turn);
+        builder.turn_since(checkpoint, Vector3::zeros(), turn);
     }
-    let (mark, turn) = (builder.mark(), builder.dice.range(0.0, std::f64::consts::TAU));
+    let (checkpoint, turn) = (builder.checkpoint(), builder.dice.range(0.0, std::f64::consts::TAU));
     middle(&mut builder, style, [NEAREST_M, NEAREST_M], height, &finish);
     ceiling_lamps(
         &mut builder,
@@ -100,7 +100,7 @@ pub(super) fn build_turned(seed: u64, style: RoomStyle) -> Builder {
         &finish,
     );
     let pivot = Vector3::new(0.0, 0.0, 0.4);
-    builder.turn_since(mark, pivot, turn);
+    builder.turn_since(checkpoint, pivot, turn);
     let place = rotation_about_y(turn) * Vector3::new(0.0, 0.0, -0.45 * NEAREST_M);
     builder.eye = Vector3::new(place.x, -1.55, place.z);
     builder.yaw_deg = turn.to_degrees();
@@ -115,7 +115,7 @@ fn daylight(builder: &mut Builder) {
 }
 
 /// What stands in the middle of a room.
-fn middle(builder: &mut Builder, style: RoomStyle, [x, z]: [f64; 2], height: f64, finish: &Finish) {
+fn middle(builder: &mut Builder, style: RoomStyle, [x, z]: [f64; 2], height: f64, finish: &RoomMaterials) {
     let at = Vector3::new(builder.dice.range(-0.3, 0.3), 0.0, 0.2 * z);
     match style.middle() {
         Middle::Sculptures => furniture::sculptures(builder, [x, z], finish),
@@ -129,7 +129,7 @@ fn middle(builder: &mut Builder, style: RoomStyle, [x, z]: [f64; 2], height: f64
 }
 
 /// Floor, ceiling with beams or lamps.
-fn shell(builder: &mut Builder, [x, z]: [f64; 2], height: f64, style: RoomStyle, finish: &Finish) {
+fn shell(builder: &mut Builder, [x, z]: [f64; 2], height: f64, style: RoomStyle, finish: &RoomMaterials) {
     const THICK: f64 = 0.25;
     let floor = style.floor(builder);
     let floor = builder.material(floor);
@@ -153,13 +153,19 @@ fn shell(builder: &mut Builder, [x, z]: [f64; 2], height: f64, style: RoomStyle,
 }
 
 /// A grid of flat lamps under the ceiling.
-fn ceiling_lamps(builder: &mut Builder, [x, z]: [f64; 2], height: f64, [rows, columns]: [usize; 2], finish: &Finish) {
+fn ceiling_lamps(
+    builder: &mut Builder,
+    [x, z]: [f64; 2],
+    height: f64,
+    [rows, columns]: [usize; 2],
+    finish: &RoomMaterials,
+) {
     const HALF_M: [f64; 2] = [0.16, 0.6];
     const RADIANCE: f64 = 4.0;
     if rows * columns == 0 {
         return;
     }
-    let glowing = builder.material(Material::new(Pattern::Paint, 1.0, [0xff_f4e0; 3]).emitting(2.0));
+    let glowing = builder.material(SurfaceMaterial::new(Pattern::Paint, 1.0, [0xff_f4e0; 3]).emitting(2.0));
     for row in 0..rows {
         for column in 0..columns {
             let at = |k: usize, count: usize, reach: f64| reach * ((2 * k + 1) as f64 / count as f64 - 1.0);
@@ -184,5 +190,5 @@ fn rug_material(builder: &mut Builder) -> MaterialId {
     let rugs =
         [[0x8a_2e28, 0xe0_cc9c, 0x2a_3a58], [0x2e_4a66, 0xdc_d0b0, 0x8a_4a30], [0x5a_5a3c, 0xe4_d8b8, 0x7a_2c28]];
     let colors = rugs[builder.dice.index(rugs.len())];
-    builder.material(Material::new(Pattern::Rug, 1.0, colors))
+    builder.material(SurfaceMaterial::new(Pattern::Rug, 1.0, colors))
 }

@@ -1,7 +1,7 @@
 //! What rooms are for: what stands along their walls, what they are made of, how large they are.
 
 use super::builder::Builder;
-use crate::material::{Material, MaterialId, Pattern};
+use crate::material::{MaterialId, Pattern, SurfaceMaterial};
 
 trueup_core::choice! {
     /// What a room is for.
@@ -161,11 +161,11 @@ impl RoomStyle {
         }
     }
 
-    pub(super) fn floor(self, builder: &mut Builder) -> Material {
+    pub(super) fn floor(self, builder: &mut Builder) -> SurfaceMaterial {
         let timbers = [0xa8_7848, 0xc0_9464, 0x8a_5a34];
         let timber = timbers[builder.dice.index(timbers.len())];
-        let stone = Material::new(Pattern::Tiles, 0.4, [0xc8_bca8, 0x9a_8878, 0x6a_645c]).glossy(0.04);
-        let planks = |width| Material::new(Pattern::Planks, width, [timber; 3]).glossy(0.04);
+        let stone = SurfaceMaterial::new(Pattern::Tiles, 0.4, [0xc8_bca8, 0x9a_8878, 0x6a_645c]).glossy(0.04);
+        let planks = |width| SurfaceMaterial::new(Pattern::Planks, width, [timber; 3]).glossy(0.04);
         match self {
             Self::Living => {
                 if builder.dice.chance(0.7) {
@@ -177,22 +177,22 @@ impl RoomStyle {
             Self::Office => {
                 let tints = [[0x5a_6470, 0x70_7a84], [0x6a_6458, 0x80_786a], [0x4c_5c5a, 0x66_7470]];
                 let [a, b] = tints[builder.dice.index(tints.len())];
-                Material::new(Pattern::Carpet, 0.5, [a, b, 0x30_3438])
+                SurfaceMaterial::new(Pattern::Carpet, 0.5, [a, b, 0x30_3438])
             }
             Self::Kitchen => {
                 let tints = [[0xd8_d4c8, 0x3a_3c3e], [0xb8_6848, 0xc8_8058], [0xc4_ccc8, 0x8a_9a98]];
                 let [a, b] = tints[builder.dice.index(tints.len())];
-                Material::new(Pattern::Tiles, 0.3, [a, b, 0x8a_8680]).glossy(0.05)
+                SurfaceMaterial::new(Pattern::Tiles, 0.3, [a, b, 0x8a_8680]).glossy(0.05)
             }
-            Self::Library => Material::new(Pattern::Planks, 0.12, [0x7a_4c2c; 3]).glossy(0.05),
+            Self::Library => SurfaceMaterial::new(Pattern::Planks, 0.12, [0x7a_4c2c; 3]).glossy(0.05),
             Self::Gallery => planks(0.22),
-            Self::Workshop => Material::new(Pattern::Asphalt, 1.0, [0x9a_9690; 3]),
+            Self::Workshop => SurfaceMaterial::new(Pattern::Asphalt, 1.0, [0x9a_9690; 3]),
         }
     }
 
-    pub(super) fn ceiling(self, builder: &mut Builder) -> Material {
-        let plaster = Material::new(Pattern::Plaster, 1.0, [0xf2_efe8; 3]);
-        let boards = Material::new(Pattern::Planks, 0.14, [0xe6_d8bc; 3]);
+    pub(super) fn ceiling(self, builder: &mut Builder) -> SurfaceMaterial {
+        let plaster = SurfaceMaterial::new(Pattern::Plaster, 1.0, [0xf2_efe8; 3]);
+        let boards = SurfaceMaterial::new(Pattern::Planks, 0.14, [0xe6_d8bc; 3]);
         match self {
             Self::Living => {
                 if builder.dice.chance(0.5) {
@@ -201,10 +201,10 @@ impl RoomStyle {
                     plaster
                 }
             }
-            Self::Office => Material::new(Pattern::CeilingPanels, 0.6, [0xe6_e6e2, 0xb0_b0ac, 0]),
+            Self::Office => SurfaceMaterial::new(Pattern::CeilingPanels, 0.6, [0xe6_e6e2, 0xb0_b0ac, 0]),
             Self::Kitchen | Self::Gallery => plaster,
-            Self::Library => Material::new(Pattern::Planks, 0.16, [0xa8_8050; 3]),
-            Self::Workshop => Material::new(Pattern::Planks, 0.2, [0xb8_a480; 3]),
+            Self::Library => SurfaceMaterial::new(Pattern::Planks, 0.16, [0xa8_8050; 3]),
+            Self::Workshop => SurfaceMaterial::new(Pattern::Planks, 0.2, [0xb8_a480; 3]),
         }
     }
 
@@ -212,14 +212,14 @@ impl RoomStyle {
         let papers =
             [[0xe8_e0c8, 0xdc_d0b0, 0x6a_6034], [0xd0_dcd8, 0xc0_d0cc, 0x2e_5654], [0xe6_d2ca, 0xd8_beb4, 0x7a_3c38]];
         let plasters = [0xe6_dcc8, 0xc4_ccc4, 0xd8_c0a4, 0xb8_c4d0];
-        let brick = Material::new(Pattern::Brick, 0.075, [0xa8_6248, 0xc4_b8a6, 0xc8_906c]);
+        let brick = SurfaceMaterial::new(Pattern::Brick, 0.075, [0xa8_6248, 0xc4_b8a6, 0xc8_906c]);
         let kind = builder.dice.unit();
         let plaster = |builder: &mut Builder| {
-            Material::new(Pattern::Plaster, 1.0, [plasters[builder.dice.index(plasters.len())]; 3])
+            SurfaceMaterial::new(Pattern::Plaster, 1.0, [plasters[builder.dice.index(plasters.len())]; 3])
         };
         let paper = |builder: &mut Builder| {
             let width = builder.dice.range(0.22, 0.28);
-            Material::new(Pattern::Wallpaper, width, papers[builder.dice.index(papers.len())])
+            SurfaceMaterial::new(Pattern::Wallpaper, width, papers[builder.dice.index(papers.len())])
         };
         let material = match self {
             Self::Living if kind < 0.5 => paper(builder),
@@ -228,10 +228,10 @@ impl RoomStyle {
             Self::Kitchen if kind < 0.5 => {
                 let tints = [[0xdc_e4e0, 0xe8_ece6], [0xe4_d8b8, 0xec_e4cc], [0xa8_c4c8, 0xc0_d4d4]];
                 let [a, b] = tints[builder.dice.index(tints.len())];
-                Material::new(Pattern::Tiles, 0.15, [a, b, 0xa8_a49c]).glossy(0.04)
+                SurfaceMaterial::new(Pattern::Tiles, 0.15, [a, b, 0xa8_a49c]).glossy(0.04)
             }
             Self::Workshop if kind < 0.8 => brick,
-            Self::Gallery => Material::new(Pattern::Plaster, 1.0, [0xee_ece4; 3]),
+            Self::Gallery => SurfaceMaterial::new(Pattern::Plaster, 1.0, [0xee_ece4; 3]),
             _ => plaster(builder),
         };
         builder.material(material)

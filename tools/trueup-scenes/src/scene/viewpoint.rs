@@ -1,25 +1,13 @@
-//! Where a photographer stands: clear of furniture, and how far and how bright all round is.
+//! Where a photographer stands: clear of furniture, and how far all round is.
 
 use nalgebra::Vector3;
 
-use super::Scene;
+use super::unlit::UnlitScene;
 use crate::bvh::Ray;
-use crate::color::luminance;
 
-/// A place from which a scene can be photographed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Viewpoint {
-    /// The photographer's eye in the world, metres; y points down and the floor is at y = 0.
-    pub eye: [f64; 3],
-    /// The direction first looked at: turn about the vertical from world z towards world x, degrees.
-    pub yaw_deg: f64,
-    /// Median distance of what is seen at eye level all round, metres.
-    pub depth_m: f64,
-}
-
-impl Scene {
+impl UnlitScene {
     /// Distance from a point to the nearest surface, metres, over directions spread evenly; 0 inside a body.
-    pub fn clearance(&self, point: [f64; 3]) -> f64 {
+    pub(crate) fn clearance(&self, point: [f64; 3]) -> f64 {
         const DIRECTIONS: usize = 400;
         let point = Vector3::from(point);
         if self.hierarchy.covers(&self.solids, point) {
@@ -74,30 +62,10 @@ impl Scene {
         depths.sort_by(f64::total_cmp);
         self.viewpoint.depth_m = depths.get(depths.len() / 2).copied().unwrap_or(ENDLESS_M);
     }
-
-    /// Measures the brightness round the eye, as a photographer would before a panorama.
-    pub(super) fn measure_exposure(&mut self) {
-        const ELEVATIONS: [f64; 5] = [-0.35, -0.15, 0.0, 0.15, 0.35];
-        const MIDDLE_GRAY_INDOORS: f64 = 0.2;
-        /// Lower, as the sky is much brighter than the rest.
-        const MIDDLE_GRAY_OUTDOORS: f64 = 0.15;
-        /// Angle over which brightness is measured, radians.
-        const ANGLE: f64 = 0.02;
-        let eye = Vector3::from(self.viewpoint.eye);
-        let (mut logarithms, mut count) = (0.0, 0.0);
-        for direction in ELEVATIONS.into_iter().flat_map(round_about) {
-            // Without soft sun and without mirrors.
-            let light = crate::render::trace(self, eye, direction, ANGLE, [0.0, 0.0], 0);
-            logarithms += luminance(light).max(1e-3).ln();
-            count += 1.0;
-        }
-        let gray = if self.is_outdoors() { MIDDLE_GRAY_OUTDOORS } else { MIDDLE_GRAY_INDOORS };
-        self.exposure = gray / (logarithms / count).exp();
-    }
 }
 
 /// Unit vectors all round at one elevation (its tangent; negative is up).
-fn round_about(elevation: f64) -> impl Iterator<Item = Vector3<f64>> {
+pub(super) fn round_about(elevation: f64) -> impl Iterator<Item = Vector3<f64>> {
     const TURNS: usize = 96;
     (0..TURNS).map(move |turn| {
         let (sine, cosine) = (turn as f64 / TURNS as f64 * std::f64::consts::TAU).sin_cos();

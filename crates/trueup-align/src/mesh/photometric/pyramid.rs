@@ -1,15 +1,18 @@
-//! Blurred and reduced copies of a picture, in which photometric alignment looks first coarsely, then finely.
+//! Blurred and reduced copies of a photograph, in which photometric alignment looks first coarsely, then finely.
 
 use nalgebra::Vector2;
 use trueup_core::raster::Raster;
 
-/// A picture's gray values at several sizes, the finest first, each half as large as the one before and blurred by a
+/// Sizes at which photographs are aligned one after the other, the smallest first.
+pub(in crate::mesh) const LEVELS: usize = 3;
+
+/// A photograph's gray values at several sizes, the finest first, each half as large as the one before and blurred by a
 /// binomial of standard deviation one of its own pixels.
 ///
-/// Eight bits a pixel: rounding adds 0.3 gray levels, well below any photograph's noise, and 72 pictures of the usual
-/// working size take 46 MB.
+/// Eight bits a pixel: rounding adds 0.3 gray levels, well below any photograph's noise, and 72 photographs of the
+/// usual working size take 46 MB.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Pyramid {
+pub struct GrayPyramid {
     levels: Vec<Raster<u8>>,
 }
 
@@ -20,13 +23,13 @@ pub(super) struct Gray {
     pub slope: Vector2<f64>,
 }
 
-impl Pyramid {
-    /// Of gray values 0 to 255, one channel; at least one level, none smaller than needed for a gradient.
-    pub fn new(gray: &Raster<u8>, levels: usize) -> Self {
+impl GrayPyramid {
+    /// Of gray values 0 to 255, one channel; one to three levels, none smaller than needed for a gradient.
+    pub fn new(gray: &Raster<u8>) -> Self {
         /// Smallest side of a level, pixels.
         const SMALLEST: usize = 16;
         let mut pyramid = vec![blurred(gray)];
-        while pyramid.len() < levels {
+        while pyramid.len() < LEVELS {
             let finer = &pyramid[pyramid.len() - 1];
             if finer.width().min(finer.height()) < 2 * SMALLEST {
                 break;
@@ -36,13 +39,8 @@ impl Pyramid {
         Self { levels: pyramid }
     }
 
-    /// Number of levels.
-    pub fn levels(&self) -> usize {
-        self.levels.len()
-    }
-
-    /// The gray value at a place in working pixels, in a level (0 the finest; the coarsest there is if there are fewer);
-    /// `None` within two of the level's pixels of the border.
+    /// The gray value at a place in working pixels, in a level (0 the finest; the coarsest there is if there are
+    /// fewer); `None` within two of the level's pixels of the border.
     pub(super) fn at(&self, level: usize, point: Vector2<f64>) -> Option<Gray> {
         let level = level.min(self.levels.len() - 1);
         let gray = &self.levels[level];
@@ -125,8 +123,8 @@ mod tests {
                 *value = (x + y) as u8;
             }
         }
-        let pyramid = Pyramid::new(&gray, 3);
-        assert_eq!(pyramid.levels(), 3);
+        let pyramid = GrayPyramid::new(&gray);
+        assert_eq!(pyramid.levels.len(), 3);
         for level in 0..3 {
             let gray = pyramid.at(level, Vector2::new(50.25, 40.5)).expect("inside");
             // The pixel center (c + 0.5) holds c: the ramp is x + y - 1.

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use trueup_align::cameras::Cameras;
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points::OverlapWarp;
-use trueup_align::mesh::{self, Refinements, WarpedMesh};
+use trueup_align::mesh::{self, MeshInput, Refinements, WarpedMesh};
 use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityPrior};
 use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::TriadOutcome;
@@ -181,7 +181,8 @@ impl Deformation<'_> {
         // What is turned as a whole does not go round along the panorama's rows.
         let closure = closure.filter(|_| component.reference_rotation == 0.0);
         let refinements = Refinements { closure, ..sources.refinements(component, self.pairs, options) };
-        mesh::run_refined(self.grids, self.warps, &bases, component.reference, &options.mesh, &refinements, context)
+        let (grids, warps, reference) = (self.grids, self.warps, component.reference);
+        mesh::run(&MeshInput { grids, warps, bases: &bases, reference, refinements }, &options.mesh, context)
     }
 
     fn by_warp(&self, model: WarpModel, options: &AlignOptions, context: &StageContext) -> Result<WarpedMesh> {

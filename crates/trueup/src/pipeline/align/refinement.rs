@@ -4,7 +4,9 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 use trueup_align::match_points::OverlapWarp;
-use trueup_align::mesh::{LineAlignmentInput, PhotometricInput, Pyramid, Refinements, StraightInput, StructureInput};
+use trueup_align::mesh::{
+    GrayPyramid, LineAlignmentInput, PhotometricInput, Refinements, StraightInput, StructureInput,
+};
 use trueup_core::lines::{LineSegment, PairLines};
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
@@ -26,7 +28,7 @@ pub(crate) fn needs_pixels(options: &AlignOptions) -> bool {
 /// What the refinements that the options ask for are made from.
 #[derive(Debug, Default)]
 pub(super) struct RefinementSources {
-    pyramids: Vec<Pyramid>,
+    pyramids: Vec<GrayPyramid>,
     matched: Vec<PairLines>,
     chains: Vec<Vec<LineSegment>>,
 }
@@ -79,7 +81,7 @@ impl RefinementSources {
                 .collect::<Result<_>>()?;
         }
         if options.stitch.align.uses_pixels() {
-            sources.pyramids = grays.par_iter().map(|gray| Pyramid::new(gray, options.photometric.levels)).collect();
+            sources.pyramids = grays.par_iter().map(|gray| GrayPyramid::new(gray)).collect();
         }
         Ok(sources)
     }

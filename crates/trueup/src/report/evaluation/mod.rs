@@ -122,7 +122,7 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     let distortion = metrics::local_distortion(&meshes, Outside::Center, period);
     let pictures = (0..known.len()).map(|k| PictureEvaluation {
         file: known[k].truth.file.clone(),
-        upright_deg: upright.pictures[k].to_degrees(),
+        upright_deg: upright.photographs[k].to_degrees(),
         theta_error_deg: theta_errors.as_ref().map(|errors| errors[k].to_degrees()),
     });
     Ok(Evaluation {

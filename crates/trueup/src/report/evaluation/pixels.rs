@@ -4,7 +4,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use trueup_align::metrics::{Overlap, OverlapMeasures, mean_over_overlaps};
+use trueup_align::metrics::{OverlapMeasures, OverlapPixels, mean_over_overlaps};
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_compose::render::{self, Layer};
 use trueup_core::mesh::GridMesh;
@@ -207,7 +207,7 @@ fn compare(a: &Layer, b: &Layer, period: Option<usize>) -> Option<OverlapMeasure
         *covered &= other;
     }
     let (gray_a, gray_b) = (cut(&a.gray, of_a, width, height), cut(&b.gray, of_b, width, height));
-    Overlap { a: &gray_a, b: &gray_b, covered: &covered }.measure()
+    OverlapPixels { a: &gray_a, b: &gray_b, covered: &covered }.measure()
 }
 
 /// A box of a raster of one channel.

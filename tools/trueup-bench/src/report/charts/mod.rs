@@ -19,7 +19,7 @@ const BOTTOM: f64 = 56.0;
 
 /// How a series is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Mark {
+pub(crate) enum SeriesMark {
     /// Bars from zero, side by side with those of the other series.
     Bars,
     /// A line with a dot at every point.
@@ -47,7 +47,7 @@ pub(crate) struct Series {
     /// Name in the legend.
     pub name: String,
     /// How it is drawn.
-    pub mark: Mark,
+    pub mark: SeriesMark,
     /// The points, in drawing order. Points without a finite place are left out.
     pub points: Vec<Point>,
 }
@@ -73,7 +73,7 @@ pub(crate) struct Chart {
 
 impl Series {
     /// A series without deviations.
-    pub(crate) fn plain(name: &str, mark: Mark, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+    pub(crate) fn plain(name: &str, mark: SeriesMark, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let points = points.into_iter().map(|(x, y)| Point { x, y, deviation: 0.0 }).collect();
         Self { name: name.to_owned(), mark, points }
     }
@@ -182,11 +182,11 @@ impl Chart {
         /// Share of a category's width that its bars take together.
         const FILLED: f64 = 0.8;
         let color = COLORS[index % COLORS.len()];
-        let bars = self.series.iter().filter(|other| other.mark == Mark::Bars).count().max(1) as f64;
-        let rank = self.series[..index].iter().filter(|other| other.mark == Mark::Bars).count() as f64;
+        let bars = self.series.iter().filter(|other| other.mark == SeriesMark::Bars).count().max(1) as f64;
+        let rank = self.series[..index].iter().filter(|other| other.mark == SeriesMark::Bars).count() as f64;
         let step = FILLED * (x.place(1.0) - x.place(0.0)) / bars;
         let points: Vec<&Point> = series.points.iter().filter(|point| drawable(point)).collect();
-        if matches!(series.mark, Mark::Line | Mark::Curve) {
+        if matches!(series.mark, SeriesMark::Line | SeriesMark::Curve) {
             let path: Vec<String> =
                 points.iter().map(|point| format!("{:.1},{:.1}", x.place(point.x), y.place(point.y))).collect();
             let path = path.join(" ");
@@ -196,7 +196,7 @@ impl Chart {
             let mut at = x.place(point.x);
             let top = y.place(point.y);
             match series.mark {
-                Mark::Bars => {
+                SeriesMark::Bars => {
                     let left = at + (rank - bars / 2.0) * step;
                     let height = y.place(0.0) - top;
                     at = left + step / 2.0;
@@ -206,8 +206,8 @@ impl Chart {
                          fill=\"{color}\" stroke=\"#fff\" stroke-width=\"0.6\"/>"
                     );
                 }
-                Mark::Curve => {}
-                Mark::Line | Mark::Dots => {
+                SeriesMark::Curve => {}
+                SeriesMark::Line | SeriesMark::Dots => {
                     let _ = writeln!(svg, "<circle cx=\"{at:.1}\" cy=\"{top:.1}\" r=\"3.2\" fill=\"{color}\"/>");
                 }
             }
@@ -253,8 +253,8 @@ mod tests {
             "set",
             "deg",
             vec![
-                Series::plain("a", Mark::Bars, [(0.0, 1.0), (1.0, 2.0)]),
-                Series::plain("b", Mark::Bars, [(0.0, 2.0), (1.0, f64::NAN)]),
+                Series::plain("a", SeriesMark::Bars, [(0.0, 1.0), (1.0, 2.0)]),
+                Series::plain("b", SeriesMark::Bars, [(0.0, 2.0), (1.0, f64::NAN)]),
             ],
         )
         .with_categories(["01", "02"]);

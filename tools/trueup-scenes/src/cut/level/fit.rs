@@ -4,8 +4,8 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 use crate::light::tangents;
 
-use super::LevelOptions;
 use super::lines::UprightLine;
+use super::options::LevelOptions;
 
 /// Iterations after which the refinement stops in any case.
 const MAX_ITERATIONS: usize = 50;

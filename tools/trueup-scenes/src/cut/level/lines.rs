@@ -9,12 +9,11 @@ use trueup_core::{Result, StageContext};
 use trueup_io::decode::reduce_photograph;
 use trueup_vision::lines::{LineOptions, detect_keeping_frame};
 
-use crate::camera_from_world;
 use crate::cut::panorama::Panorama360;
-use crate::cut::view::{View, to_bytes};
-use crate::rig::focal_px;
+use crate::cut::view::{PinholeView, to_bytes};
+use crate::rig::{camera_from_world, focal_px};
 
-use super::LevelOptions;
+use super::options::LevelOptions;
 
 /// The name of the work in progress reports.
 const STAGE: &str = "measuring the level";
@@ -55,7 +54,7 @@ pub(super) fn upright_lines(
 }
 
 /// Views all around, row after row, at the panorama's resolution where the options allow it.
-fn views(panorama: &Panorama360, options: &LevelOptions) -> Vec<View> {
+fn views(panorama: &Panorama360, options: &LevelOptions) -> Vec<PinholeView> {
     const FULL_TURN_DEG: f64 = 360.0;
     let panorama_side = 2.0 * panorama.pixels_per_radian() * (options.view_deg.to_radians() / 2.0).tan();
     let side = (panorama_side.round() as usize).clamp(1, options.max_view_px);
@@ -68,12 +67,12 @@ fn views(panorama: &Panorama360, options: &LevelOptions) -> Vec<View> {
             (options.row_step_deg * (row as f64 - middle)).clamp(-90.0, 90.0),
         )
     });
-    angles.map(|(yaw, pitch)| View::new(side, side, focal_px, &camera_from_world(yaw, pitch, 0.0))).collect()
+    angles.map(|(yaw, pitch)| PinholeView::new(side, side, focal_px, &camera_from_world(yaw, pitch, 0.0))).collect()
 }
 
 fn lines_of_view(
     panorama: &Panorama360,
-    views: &[View],
+    views: &[PinholeView],
     index: usize,
     options: &LevelOptions,
     context: &StageContext,
@@ -98,15 +97,15 @@ fn lines_of_view(
 
 /// The unit normal of a segment's plane in the panorama's frame and the segment's length in radians; `None` where
 /// another view sees its middle closer to its own.
-fn plane_of(segment: &LineSegment, views: &[View], index: usize) -> Option<(Vector3<f64>, f64)> {
+fn plane_of(segment: &LineSegment, views: &[PinholeView], index: usize) -> Option<(Vector3<f64>, f64)> {
     let camera = &views[index].camera;
     let (start, end) =
         (camera.world_direction(Vector2::from(segment.start)), camera.world_direction(Vector2::from(segment.end)));
     let middle = start + end;
-    let closeness = |view: &View| (view.camera.rotation() * middle).z;
+    let closeness = |view: &PinholeView| (view.camera.rotation() * middle).z;
     let here = closeness(&views[index]);
     // Of views at the same distance the first keeps the line.
-    let elsewhere = |(other, view): (usize, &View)| {
+    let elsewhere = |(other, view): (usize, &PinholeView)| {
         let there = closeness(view);
         there > here || (there == here && other < index)
     };

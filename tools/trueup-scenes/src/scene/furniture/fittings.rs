@@ -2,24 +2,27 @@
 
 use nalgebra::Vector3;
 
-use super::{Finish, chair, frame, picture};
+use super::materials::RoomMaterials;
+use super::pictures::{frame, picture};
+use super::tables::chair;
 use crate::color::srgb;
-use crate::light::Portal;
-use crate::material::{Material, MaterialId, Pattern};
+use crate::material::{MaterialId, Pattern, SurfaceMaterial};
+use crate::portal::Portal;
 use crate::scene::builder::Builder;
 use crate::scene::wall::{Opening, Wall};
 
 /// Base units under a worktop, sink and hob, a tiled wall, wall units and things that stand about.
-pub(in crate::scene) fn worktop(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &Finish) {
+pub(in crate::scene) fn worktop(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &RoomMaterials) {
     const DEPTH: f64 = 0.6;
     const TOP: f64 = 0.9;
     let right = left + width;
     let fronts = [0x5a_7468, 0xd8_d0bc, 0x8a_5a3a, 0x3c_4c60];
     let color = fronts[builder.dice.index(fronts.len())];
     let pattern = if color == 0x8a_5a3a { Pattern::Wood } else { Pattern::Paint };
-    let front = builder.material(Material::new(pattern, 1.0, [color; 3]).glossy(0.02));
-    let stone = builder.material(Material::new(Pattern::Rock, 0.05, [0x6a_6662, 0x84_807a, 0]).glossy(0.04));
-    let tile = builder.material(Material::new(Pattern::Tiles, 0.1, [0xe8_e2d0, 0x5a_8aa0, 0xb0_aca0]).glossy(0.06));
+    let front = builder.material(SurfaceMaterial::new(pattern, 1.0, [color; 3]).glossy(0.02));
+    let stone = builder.material(SurfaceMaterial::new(Pattern::Rock, 0.05, [0x6a_6662, 0x84_807a, 0]).glossy(0.04));
+    let tile =
+        builder.material(SurfaceMaterial::new(Pattern::Tiles, 0.1, [0xe8_e2d0, 0x5a_8aa0, 0xb0_aca0]).glossy(0.06));
     builder.piece(wall.span([left, right], [0.1, TOP - 0.04], [0.0, DEPTH - 0.02]), finish.dark_timber);
     builder.piece(wall.span([left, right], [0.0, 0.1], [0.0, DEPTH - 0.08]), finish.iron);
     builder.piece(wall.span([left - 0.01, right + 0.01], [TOP - 0.04, TOP], [0.0, DEPTH + 0.02]), stone);
@@ -67,7 +70,7 @@ fn unit(
     depth: f64,
     drawers: bool,
     front: MaterialId,
-    finish: &Finish,
+    finish: &RoomMaterials,
 ) {
     const GAP: f64 = 0.004;
     let rows = if drawers { 3 } else { 1 };
@@ -86,7 +89,13 @@ fn unit(
 }
 
 /// A refrigerator with notes on its door.
-pub(in crate::scene) fn refrigerator(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &Finish) {
+pub(in crate::scene) fn refrigerator(
+    builder: &mut Builder,
+    wall: &Wall,
+    left: f64,
+    width: f64,
+    finish: &RoomMaterials,
+) {
     const DEPTH: f64 = 0.64;
     let (right, height) = (left + width, builder.dice.range(1.75, 1.95));
     builder.piece(wall.span([left, right], [0.03, height], [0.03, DEPTH - 0.05]), finish.white_paint);
@@ -107,10 +116,11 @@ pub(in crate::scene) fn refrigerator(builder: &mut Builder, wall: &Wall, left: f
 }
 
 /// A white board with writing and notes, and a low shelf of papers below.
-pub(in crate::scene) fn white_board(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &Finish) {
+pub(in crate::scene) fn white_board(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &RoomMaterials) {
     let right = left + width;
     let board = Opening { left, right, foot: 0.95, head: 2.05 };
-    let ink = builder.material(Material::new(Pattern::Writing, 0.05, [0xf0_f0ec, 0x20_3070, 0x90_2020]).glossy(0.02));
+    let ink =
+        builder.material(SurfaceMaterial::new(Pattern::Writing, 0.05, [0xf0_f0ec, 0x20_3070, 0x90_2020]).glossy(0.02));
     builder.piece(wall.span([left, right], [board.foot, board.head], [0.0, 0.012]), ink);
     frame(builder, wall, board, 0.025, [0.0, 0.025], finish.metal);
     builder.piece(wall.span([left + 0.2, right - 0.2], [0.93, 0.95], [0.0, 0.08]), finish.metal);
@@ -130,12 +140,12 @@ pub(in crate::scene) fn white_board(builder: &mut Builder, wall: &Wall, left: f6
 }
 
 /// Steel cabinets with labelled doors, boxes on top.
-pub(in crate::scene) fn lockers(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &Finish) {
+pub(in crate::scene) fn lockers(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &RoomMaterials) {
     const DEPTH: f64 = 0.45;
     let (height, columns) = (builder.dice.range(1.5, 1.95), 3);
     let tints = [0x7a_8890, 0x8a_8c80, 0x5c_6c60, 0xa0_8c74];
     let tint = tints[builder.dice.index(tints.len())];
-    let steel = builder.material(Material::new(Pattern::Paint, 1.0, [tint; 3]).glossy(0.03));
+    let steel = builder.material(SurfaceMaterial::new(Pattern::Paint, 1.0, [tint; 3]).glossy(0.03));
     builder.piece(wall.span([left, left + width], [0.06, height], [0.0, DEPTH - 0.02]), finish.iron);
     let rows = 2 + builder.dice.index(3);
     for column in 0..columns {
@@ -162,7 +172,7 @@ pub(in crate::scene) fn lockers(builder: &mut Builder, wall: &Wall, left: f64, w
 }
 
 /// One large painting, its label, and a lamp above it.
-pub(in crate::scene) fn painting(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &Finish) {
+pub(in crate::scene) fn painting(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &RoomMaterials) {
     let middle = left + width / 2.0;
     let size = [width * builder.dice.range(0.7, 1.0), builder.dice.range(0.8, 1.35)];
     picture(builder, wall, middle, 1.62, size, finish);
@@ -181,9 +191,9 @@ pub(in crate::scene) fn painting(builder: &mut Builder, wall: &Wall, left: f64, 
 }
 
 /// Benches to sit on and sculptures on stands.
-pub(in crate::scene) fn sculptures(builder: &mut Builder, [x, z]: [f64; 2], finish: &Finish) {
-    let marble = builder.material(Material::new(Pattern::Rock, 0.4, [0xd8_d4cc, 0xb8_b0a8, 0]).glossy(0.03));
-    let bronze = builder.material(Material::new(Pattern::Rock, 0.15, [0x6a_5438, 0x4a_7060, 0]).glossy(0.05));
+pub(in crate::scene) fn sculptures(builder: &mut Builder, [x, z]: [f64; 2], finish: &RoomMaterials) {
+    let marble = builder.material(SurfaceMaterial::new(Pattern::Rock, 0.4, [0xd8_d4cc, 0xb8_b0a8, 0]).glossy(0.03));
+    let bronze = builder.material(SurfaceMaterial::new(Pattern::Rock, 0.15, [0x6a_5438, 0x4a_7060, 0]).glossy(0.05));
     let corner = |x: f64, up: f64, z: f64| Vector3::new(x, -up, z);
     for at in [-0.1 * z, 0.35 * z] {
         builder.piece([corner(-0.8, 0.4, at), corner(0.8, 0.46, at + 0.45)], finish.timber);
@@ -215,7 +225,7 @@ pub(in crate::scene) fn sculptures(builder: &mut Builder, [x, z]: [f64; 2], fini
 }
 
 /// A bench with a vice, drawers and clutter, and a board of tools above.
-pub(in crate::scene) fn workbench(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &Finish) {
+pub(in crate::scene) fn workbench(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &RoomMaterials) {
     const TOP: f64 = 0.88;
     const DEPTH: f64 = 0.65;
     let right = left + width;

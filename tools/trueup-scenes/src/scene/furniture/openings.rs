@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::{Finish, frame};
-use crate::light::Portal;
+use super::materials::RoomMaterials;
+use super::pictures::frame;
+use crate::portal::Portal;
 use crate::scene::builder::Builder;
 use crate::scene::wall::{Opening, Wall};
 
@@ -13,7 +14,7 @@ pub(in crate::scene) fn window_opening(left: f64, width: f64) -> Opening {
 }
 
 /// Window with bars, sill, curtains and radiator; the sky's light comes in through it.
-pub(in crate::scene) fn window(builder: &mut Builder, wall: &Wall, at: Opening, finish: &Finish) {
+pub(in crate::scene) fn window(builder: &mut Builder, wall: &Wall, at: Opening, finish: &RoomMaterials) {
     let Opening { left, right, foot, head } = at;
     frame(builder, wall, at, 0.06, [-0.16, -0.09], finish.white_paint);
     let middle = (left + right) / 2.0;
@@ -52,7 +53,7 @@ pub(in crate::scene) fn door_opening(left: f64) -> Opening {
 }
 
 /// A closed door with panels, architrave and handle, and a light switch beside it.
-pub(in crate::scene) fn door(builder: &mut Builder, wall: &Wall, at: Opening, finish: &Finish) {
+pub(in crate::scene) fn door(builder: &mut Builder, wall: &Wall, at: Opening, finish: &RoomMaterials) {
     let Opening { left, right, head, .. } = at;
     let around = Opening { left: left - 0.09, right: right + 0.09, foot: 0.0, head: head + 0.09 };
     frame(builder, wall, around, 0.09, [0.0, 0.025], finish.white_paint);

@@ -2,12 +2,14 @@
 
 use nalgebra::Vector3;
 
-use super::{Finish, picture, table_lamp};
+use super::living::table_lamp;
+use super::materials::RoomMaterials;
+use super::pictures::picture;
 use crate::scene::builder::Builder;
 use crate::scene::wall::Wall;
 
 /// A bookcase full of books, a vase here and there.
-pub(in crate::scene) fn bookcase(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &Finish) {
+pub(in crate::scene) fn bookcase(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &RoomMaterials) {
     const SIDE: f64 = 0.025;
     let (height, depth, right) = (builder.dice.range(1.9, 2.25), 0.3, left + width);
     builder.piece(wall.span([left, left + SIDE], [0.0, height], [0.0, depth]), finish.timber);
@@ -26,7 +28,7 @@ pub(in crate::scene) fn bookcase(builder: &mut Builder, wall: &Wall, left: f64, 
 }
 
 /// One row of books between `sides`, from the board at `room[0]` to the one at `room[1]`.
-fn shelf_row(builder: &mut Builder, wall: &Wall, sides: [f64; 2], room: [f64; 2], finish: &Finish) {
+fn shelf_row(builder: &mut Builder, wall: &Wall, sides: [f64; 2], room: [f64; 2], finish: &RoomMaterials) {
     let (mut at, clear) = (sides[0] + 0.005, room[1] - room[0]);
     while at < sides[1] - 0.06 {
         if builder.dice.chance(0.06) {
@@ -56,7 +58,7 @@ fn shelf_row(builder: &mut Builder, wall: &Wall, sides: [f64; 2], room: [f64; 2]
 }
 
 /// A low cabinet with doors, things on top, and a picture above.
-pub(in crate::scene) fn cabinet(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &Finish) {
+pub(in crate::scene) fn cabinet(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &RoomMaterials) {
     let (height, depth) = (0.8, 0.42);
     builder.piece(wall.span([left, left + width], [0.1, height - 0.03], [0.0, depth - 0.02]), finish.dark_timber);
     builder.piece(

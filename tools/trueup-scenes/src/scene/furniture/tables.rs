@@ -2,14 +2,16 @@
 
 use nalgebra::Vector3;
 
-use super::{Finish, frame, table_lamp};
+use super::living::table_lamp;
+use super::materials::RoomMaterials;
+use super::pictures::frame;
 use crate::color::srgb;
-use crate::light::Portal;
+use crate::portal::Portal;
 use crate::scene::builder::Builder;
 use crate::scene::wall::{Opening, Wall};
 
 /// A desk with drawers, a screen, papers, a chair, and a notice board above.
-pub(in crate::scene) fn desk(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &Finish) {
+pub(in crate::scene) fn desk(builder: &mut Builder, wall: &Wall, left: f64, width: f64, finish: &RoomMaterials) {
     let (right, height, depth) = (left + width, 0.74, 0.66);
     builder.piece(wall.span([left, right], [height - 0.035, height], [0.0, depth]), finish.timber);
     builder.piece(wall.span([left + 0.02, left + 0.44], [0.06, height - 0.035], [0.02, depth - 0.04]), finish.timber);
@@ -47,7 +49,7 @@ pub(in crate::scene) fn desk(builder: &mut Builder, wall: &Wall, left: f64, widt
 }
 
 /// A plain chair.
-pub(super) fn chair(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
+pub(super) fn chair(builder: &mut Builder, foot: Vector3<f64>, finish: &RoomMaterials) {
     let yaw = builder.dice.range(-0.5, 0.5);
     let rotation = trueup_core::geometry::rotation_about_y(yaw);
     let mut part = |x: f64, up: f64, z: f64, half: [f64; 3], material| {
@@ -67,7 +69,7 @@ pub(super) fn chair(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) 
 }
 
 /// A dining table with chairs, a bowl, and a lamp hanging above.
-pub(in crate::scene) fn table(builder: &mut Builder, foot: Vector3<f64>, ceiling: f64, finish: &Finish) {
+pub(in crate::scene) fn table(builder: &mut Builder, foot: Vector3<f64>, ceiling: f64, finish: &RoomMaterials) {
     let corner = |x: f64, up: f64, z: f64| foot + Vector3::new(x, -up, z);
     builder.piece([corner(-0.75, 0.71, -0.45), corner(0.75, 0.75, 0.45)], finish.timber);
     builder.piece([corner(-0.68, 0.63, -0.38), corner(0.68, 0.71, 0.38)], finish.dark_timber);

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::{Finish, KERB};
-use crate::material::{Material, MaterialId, Pattern};
+use super::shared::{KERB, StreetMaterials};
+use crate::material::{MaterialId, Pattern, SurfaceMaterial};
 use crate::scene::builder::Builder;
 use crate::scene::wall::{Opening, Wall};
 
@@ -12,15 +12,15 @@ fn house_surface(builder: &mut Builder) -> MaterialId {
         [[0x9a_5238, 0xb8_ac9c, 0x7a_4030], [0xb0_8458, 0xc4_b8a4, 0x96_6c48], [0x84_4434, 0xa0_9488, 0x5c_3428]];
     let stuccos = [0xdc_c8a0, 0xd0_a888, 0xb8_c0b0, 0xe4_dccc, 0xc8_9c80, 0xa8_b4bc];
     let material = match builder.dice.index(5) {
-        0 | 1 => Material::new(Pattern::Brick, 0.075, bricks[builder.dice.index(bricks.len())]),
-        2 => Material::new(Pattern::Ashlar, 0.36, [0xc0_b49c; 3]),
-        _ => Material::new(Pattern::Stucco, 1.0, [stuccos[builder.dice.index(stuccos.len())]; 3]),
+        0 | 1 => SurfaceMaterial::new(Pattern::Brick, 0.075, bricks[builder.dice.index(bricks.len())]),
+        2 => SurfaceMaterial::new(Pattern::Ashlar, 0.36, [0xc0_b49c; 3]),
+        _ => SurfaceMaterial::new(Pattern::Stucco, 1.0, [stuccos[builder.dice.index(stuccos.len())]; 3]),
     };
     builder.material(material)
 }
 
 /// One house: shops or a door below, rows of windows above, string courses, a cornice, chimneys.
-pub(super) fn house(builder: &mut Builder, wall: &Wall, bays: usize, floors: usize, finish: &Finish) {
+pub(super) fn house(builder: &mut Builder, wall: &Wall, bays: usize, floors: usize, finish: &StreetMaterials) {
     const GROUND: f64 = 3.7;
     let storey = builder.dice.range(2.9, 3.4);
     let (surface, height) = (house_surface(builder), GROUND + storey * floors as f64 + 0.5);
@@ -30,7 +30,7 @@ pub(super) fn house(builder: &mut Builder, wall: &Wall, bays: usize, floors: usi
     let louvres = builder.dice.chance(0.45).then(|| {
         let colors = [0x3a_5a48, 0x4a_5c70, 0x7a_3c30, 0x8a_8478];
         let color = colors[builder.dice.index(colors.len())];
-        builder.material(Material::new(Pattern::Louvres, 0.05, [color; 3]))
+        builder.material(SurfaceMaterial::new(Pattern::Louvres, 0.05, [color; 3]))
     });
     let (mut upper, mut lower) = (Vec::new(), Vec::new());
     for column in 0..bays {
@@ -77,7 +77,7 @@ pub(super) fn house(builder: &mut Builder, wall: &Wall, bays: usize, floors: usi
 }
 
 /// Frame, cross bars and pane set back in an opening.
-fn glazing(builder: &mut Builder, wall: &Wall, at: Opening, bars: usize, finish: &Finish) {
+fn glazing(builder: &mut Builder, wall: &Wall, at: Opening, bars: usize, finish: &StreetMaterials) {
     let Opening { left, right, foot, head } = at;
     let paint = finish.window_paint;
     builder.piece(wall.span([left, right], [foot, head], [-0.3, -0.22]), finish.pane);
@@ -94,7 +94,7 @@ fn glazing(builder: &mut Builder, wall: &Wall, at: Opening, bars: usize, finish:
     builder.piece(wall.span([left, right], [transom - 0.025, transom + 0.025], out), paint);
 }
 
-fn window(builder: &mut Builder, wall: &Wall, at: Opening, louvres: Option<MaterialId>, finish: &Finish) {
+fn window(builder: &mut Builder, wall: &Wall, at: Opening, louvres: Option<MaterialId>, finish: &StreetMaterials) {
     glazing(builder, wall, at, 1, finish);
     let Opening { left, right, foot, head } = at;
     builder.piece(wall.span([left - 0.12, right + 0.12], [foot - 0.1, foot], [-0.1, 0.12]), finish.trim);
@@ -107,7 +107,7 @@ fn window(builder: &mut Builder, wall: &Wall, at: Opening, louvres: Option<Mater
     }
 }
 
-fn balcony(builder: &mut Builder, wall: &Wall, at: Opening, finish: &Finish) {
+fn balcony(builder: &mut Builder, wall: &Wall, at: Opening, finish: &StreetMaterials) {
     const DEPTH: f64 = 0.75;
     let (left, right, floor) = (at.left - 0.35, at.right + 0.35, at.foot - 0.35);
     builder.piece(wall.span([left, right], [floor - 0.14, floor], [0.0, DEPTH]), finish.trim);
@@ -135,7 +135,7 @@ fn balcony(builder: &mut Builder, wall: &Wall, at: Opening, finish: &Finish) {
     }
 }
 
-fn ground_floor(builder: &mut Builder, wall: &Wall, at: Opening, entrance: bool, finish: &Finish) {
+fn ground_floor(builder: &mut Builder, wall: &Wall, at: Opening, entrance: bool, finish: &StreetMaterials) {
     let Opening { left, right, foot, head } = at;
     if !entrance {
         glazing(builder, wall, at, 2, finish);
@@ -162,7 +162,7 @@ fn ground_floor(builder: &mut Builder, wall: &Wall, at: Opening, entrance: bool,
 fn awning(builder: &mut Builder, wall: &Wall, at: Opening) {
     let cloths = [[0xb8_3830, 0xe8_e0d0], [0x2e_6a50, 0xe8_e0d0], [0x34_5890, 0xe8_e0d0]];
     let [stripe, ground] = cloths[builder.dice.index(cloths.len())];
-    let cloth = builder.material(Material::new(Pattern::Curtain, 0.24, [stripe, ground, 0]));
+    let cloth = builder.material(SurfaceMaterial::new(Pattern::Curtain, 0.24, [stripe, ground, 0]));
     let out = Vector3::new(0.0, 0.35, 0.0) + wall.out;
     let rise = out.normalize();
     let normal = wall.along.cross(&rise);
@@ -172,10 +172,10 @@ fn awning(builder: &mut Builder, wall: &Wall, at: Opening) {
     builder.turned(center, half, 0.0, cloth).world_from_body = Some(rotation);
 }
 
-fn shop_sign(builder: &mut Builder, wall: &Wall, ground: f64, finish: &Finish) {
+fn shop_sign(builder: &mut Builder, wall: &Wall, ground: f64, finish: &StreetMaterials) {
     let boards = [[0x2a_4a3a, 0xe8_d8a0], [0x7a_2420, 0xf0_e4c8], [0x24_3450, 0xe8_e4d8], [0xe4_dcc4, 0x30_2c28]];
     let [board, ink] = boards[builder.dice.index(boards.len())];
-    let sign = builder.material(Material::new(Pattern::Sign, 1.0, [board, ink, 0]));
+    let sign = builder.material(SurfaceMaterial::new(Pattern::Sign, 1.0, [board, ink, 0]));
     let (left, width) = (0.08 * wall.length, builder.dice.range(0.35, 0.6) * wall.length);
     builder.piece(wall.span([left, left + width], [ground - 0.85, ground - 0.1], [0.0, 0.1]), sign);
     // A sign that hangs across the pavement.

@@ -3,12 +3,12 @@
 use nalgebra::Vector3;
 use trueup_core::geometry::exp_rotation;
 
-use super::{Finish, KERB, REACH, ROAD};
-use crate::material::{Material, Pattern};
+use super::shared::{KERB, REACH, ROAD, StreetMaterials};
+use crate::material::{Pattern, SurfaceMaterial};
 use crate::scene::builder::Builder;
 
 /// Lamps, trees, bollards, posts and parked cars along one side.
-pub(super) fn pavement(builder: &mut Builder, side: f64, finish: &Finish) {
+pub(super) fn pavement(builder: &mut Builder, side: f64, finish: &StreetMaterials) {
     let mut z = -REACH + 4.0;
     let mut k = 0;
     while z < REACH - 4.0 {
@@ -29,7 +29,7 @@ pub(super) fn pavement(builder: &mut Builder, side: f64, finish: &Finish) {
     }
 }
 
-pub(super) fn street_lamp(builder: &mut Builder, foot: Vector3<f64>, side: f64, finish: &Finish) {
+pub(super) fn street_lamp(builder: &mut Builder, foot: Vector3<f64>, side: f64, finish: &StreetMaterials) {
     builder.cylinder(foot, 0.14, 0.5, finish.iron);
     builder.cylinder(foot, 0.06, 5.2, finish.iron);
     let top = foot - Vector3::new(0.0, 5.2, 0.0);
@@ -38,7 +38,7 @@ pub(super) fn street_lamp(builder: &mut Builder, foot: Vector3<f64>, side: f64, 
     builder.piece([head - Vector3::new(0.3, 0.06, 0.12), head + Vector3::new(0.3, 0.06, 0.12)], finish.window_paint);
 }
 
-pub(super) fn tree(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
+pub(super) fn tree(builder: &mut Builder, foot: Vector3<f64>, finish: &StreetMaterials) {
     let height = builder.dice.range(2.6, 3.4);
     builder.cylinder(foot, 0.11, height, finish.timber);
     let crown = foot - Vector3::new(0.0, height + 0.6, 0.0);
@@ -52,10 +52,10 @@ pub(super) fn tree(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
     }
 }
 
-pub(super) fn traffic_sign(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
+pub(super) fn traffic_sign(builder: &mut Builder, foot: Vector3<f64>, finish: &StreetMaterials) {
     let colors = [[0x2a_4c9a, 0xf0_f0f0], [0xf0_eee8, 0xa0_2420], [0xe8_c840, 0x20_2020]];
     let [board, ink] = colors[builder.dice.index(colors.len())];
-    let plate = builder.material(Material::new(Pattern::Sign, 1.0, [board, ink, 0]).glossy(0.03));
+    let plate = builder.material(SurfaceMaterial::new(Pattern::Sign, 1.0, [board, ink, 0]).glossy(0.03));
     builder.cylinder(foot, 0.035, 2.7, finish.iron);
     let top = foot - Vector3::new(0.0, 2.6, 0.0);
     builder.piece([top + Vector3::new(-0.35, 0.0, -0.05), top + Vector3::new(0.35, 0.5, -0.04)], plate);
@@ -63,10 +63,10 @@ pub(super) fn traffic_sign(builder: &mut Builder, foot: Vector3<f64>, finish: &F
 }
 
 /// A parked car: body, cabin, windows, lights, wheels.
-pub(super) fn car(builder: &mut Builder, foot: Vector3<f64>, finish: &Finish) {
+pub(super) fn car(builder: &mut Builder, foot: Vector3<f64>, finish: &StreetMaterials) {
     let colors = [0x8a_1f1c, 0x24_3a5c, 0xc8_c8c4, 0x2a_2c2e, 0x4a_5c48, 0xd8_d0b8];
     let color = colors[builder.dice.index(colors.len())];
-    let paint = builder.material(Material::new(Pattern::Paint, 1.0, [color; 3]).glossy(0.08));
+    let paint = builder.material(SurfaceMaterial::new(Pattern::Paint, 1.0, [color; 3]).glossy(0.08));
     let mut part = |low: [f64; 3], high: [f64; 3], material| {
         let corner = |[x, up, z]: [f64; 3]| foot + Vector3::new(x, -up, z);
         builder.piece([corner(low), corner(high)], material);

@@ -5,9 +5,9 @@ use trueup_core::geometry::rotation_about_y;
 
 use super::house::house;
 use super::pavement::{car, street_lamp, traffic_sign, tree};
-use super::{Finish, KERB};
+use super::shared::{KERB, StreetMaterials};
 use crate::color::srgb;
-use crate::material::{Material, Pattern};
+use crate::material::{Pattern, SurfaceMaterial};
 use crate::scene::builder::Builder;
 use crate::scene::wall::Wall;
 use crate::sky::Sun;
@@ -20,8 +20,8 @@ pub(in crate::scene) fn build(seed: u64) -> Builder {
     /// Houses are turned against the ring by up to this, radians.
     const TURN: f64 = 0.7;
     let mut builder = Builder::new(seed, 6);
-    let finish = super::finish(&mut builder);
-    let cobbles = builder.material(Material::new(Pattern::Paving, 0.22, [0x98_9088; 3]));
+    let finish = StreetMaterials::new(&mut builder);
+    let cobbles = builder.material(SurfaceMaterial::new(Pattern::Paving, 0.22, [0x98_9088; 3]));
     let far = 90.0;
     builder.block([Vector3::new(-far, 0.0, -far), Vector3::new(far, 1.0, far)], cobbles);
     for (count, distances) in RINGS {
@@ -36,20 +36,20 @@ pub(in crate::scene) fn build(seed: u64) -> Builder {
                 out: -Vector3::z(),
                 length: width,
             };
-            let mark = builder.mark();
+            let checkpoint = builder.checkpoint();
             house(&mut builder, &wall, (width / 2.6).floor().max(2.0) as usize, floors, &finish);
             let own = builder.dice.range(-TURN, TURN);
-            builder.turn_since(mark, Vector3::new(0.0, 0.0, distance), own);
-            builder.turn_since(mark, Vector3::zeros(), turn);
+            builder.turn_since(checkpoint, Vector3::new(0.0, 0.0, distance), own);
+            builder.turn_since(checkpoint, Vector3::zeros(), turn);
         }
     }
     for k in 0..16 {
         let turn = TAU * (f64::from(k) + builder.dice.range(-0.3, 0.3)) / 16.0;
         let distance = builder.dice.range(4.5, 8.0);
         let foot = rotation_about_y(turn) * Vector3::new(0.0, 0.0, distance);
-        let (mark, own) = (builder.mark(), builder.dice.range(0.0, TAU));
+        let (checkpoint, own) = (builder.checkpoint(), builder.dice.range(0.0, TAU));
         thing(&mut builder, k, foot, &finish);
-        builder.turn_since(mark, foot, own);
+        builder.turn_since(checkpoint, foot, own);
     }
     builder.eye = Vector3::new(0.0, -1.6, 0.0);
     let towards = Vector3::new(0.5, -0.75, -0.43).normalize();
@@ -57,7 +57,7 @@ pub(in crate::scene) fn build(seed: u64) -> Builder {
     builder
 }
 
-fn thing(builder: &mut Builder, k: i32, foot: Vector3<f64>, finish: &Finish) {
+fn thing(builder: &mut Builder, k: i32, foot: Vector3<f64>, finish: &StreetMaterials) {
     match k % 8 {
         0 | 4 => street_lamp(builder, foot, 1.0, finish),
         1 | 5 => tree(builder, foot, finish),

@@ -1,0 +1,222 @@
+//! Parallax: how far photographs give way so that overlaps meet.
+//!
+//! Cameras that only turn leave a residual in every overlap where the photographer moved. The solved mesh has aligned
+//! the overlaps as well as it could; which pixel of one photograph meets which pixel of another is read off it, and
+//! both are drawn in the same direction: a mean of the directions in which their cameras see the place. Each photograph
+//! weighs as deep as the place lies in it, so that nothing moves where a photograph is alone, nothing jumps where
+//! another one ends, and directions that need no correction get none. The mesh's own shape, its plane and its drift
+//! over long rows are forgotten by this; only what it knows of overlaps remains, so that any mesh will do, of whatever
+//! method.
+//!
+//! Near the poles the mesh knows nothing: photographs that look there cannot be unrolled, and pull at their neighbors.
+//! They are drawn as their cameras see.
+//!
+//! # Source
+//! H.-Y. Shum and R. Szeliski, "Construction and refinement of panoramic mosaics with global and local alignment"
+//! (2000), section 5: local alignment ("deghosting") towards the mean ray; here the correspondences are the mesh's, and
+//! the weights make the field continuous.
+
+use nalgebra::{Vector2, Vector3};
+use rayon::prelude::*;
+
+use super::coverage::steepest;
+use super::photograph::PosedPhotograph;
+
+/// By how many of its own pixels each vertex of a photograph's grid looks aside, row-major.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ParallaxShift {
+    /// One for each vertex; bilinear between.
+    pub aside: Vec<Vector2<f64>>,
+}
+
+/// What the overlaps ask of every photograph.
+///
+/// * `period`: the turn of the mesh's plane, if it closes on itself.
+/// * `max_parallax`: the largest angle in radians between where a camera sees a place and where it is drawn; from half
+///   of it on, corrections fade, since a mesh that has to contradict its cameras more than that is torn itself.
+pub fn parallax_shifts(photographs: &[PosedPhotograph], period: Option<f64>, max_parallax: f64) -> Vec<ParallaxShift> {
+    let trusts: Vec<f64> = photographs.iter().map(|photograph| trust(steepest(photograph))).collect();
+    let bounds: Vec<_> = photographs.iter().map(|photograph| photograph.mesh.bounds()).collect();
+    (0..photographs.len())
+        .into_par_iter()
+        .map(|k| {
+            let photograph = &photographs[k];
+            let aside = (0..photograph.mesh.len()).map(|vertex| {
+                let pixel = photograph.mesh.source(vertex);
+                let direction = photograph.camera.world_direction(pixel);
+                let own = Sight { direction, weight: depth(photograph, pixel), trust: trusts[k] };
+                let place = Vector2::from(photograph.mesh.target[vertex]);
+                let others = (0..photographs.len()).filter(|&other| other != k).filter_map(|other| {
+                    let seen = sight(&photographs[other], &bounds[other], place, &own.direction, period)?;
+                    Some(Sight { trust: trusts[other], ..seen })
+                });
+                let drawn = common_direction(own, others, max_parallax);
+                let back = photograph.camera.project(photograph.camera.rotation() * drawn);
+                back.map_or(Vector2::zeros(), |back| back - pixel)
+            });
+            ParallaxShift { aside: aside.collect() }
+        })
+        .collect()
+}
+
+/// The direction in which a photograph sees a place, and how much it counts.
+#[derive(Debug, Clone, Copy)]
+struct Sight {
+    direction: Vector3<f64>,
+    weight: f64,
+    /// How far its mesh is believed, 0 to 1.
+    trust: f64,
+}
+
+/// How far the mesh of a photograph is believed that reaches this far from the horizon (radians). The mesh's sphere is
+/// unrolled up to 70 degrees, and what lies beyond pulls at its neighbors.
+fn trust(steepest: f64) -> f64 {
+    const WHOLE_DEG: f64 = 55.0;
+    const NONE_DEG: f64 = 65.0;
+    ((NONE_DEG - steepest.to_degrees()) / (NONE_DEG - WHOLE_DEG)).clamp(0.0, 1.0)
+}
+
+/// How another photograph sees the `place` that is expected in `direction`; `None` if it does not show it.
+fn sight(
+    other: &PosedPhotograph,
+    bounds: &(Vector2<f64>, Vector2<f64>),
+    place: Vector2<f64>,
+    direction: &Vector3<f64>,
+    period: Option<f64>,
+) -> Option<Sight> {
+    /// How far outside of the other photograph the camera may expect the place for a look at the mesh, as a share of
+    /// its size.
+    const ASIDE: f64 = 0.25;
+    let expected = other.camera.project(other.camera.rotation() * direction)?;
+    let size = Vector2::new(other.mesh.width, other.mesh.height);
+    let near = |axis: usize| expected[axis] > -ASIDE * size[axis] && expected[axis] < (1.0 + ASIDE) * size[axis];
+    if !(near(0) && near(1)) {
+        return None;
+    }
+    let mut place = place;
+    if let Some(period) = period {
+        place.x += period * ((other.mesh.warp(expected).x - place.x) / period).round();
+    }
+    let (low, high) = bounds;
+    if (0..2).any(|axis| place[axis] < low[axis] || place[axis] > high[axis]) {
+        return None;
+    }
+    let pixel = other.mesh.source_of(place, expected)?;
+    let inside = (0..2).all(|axis| (0.0..=size[axis]).contains(&pixel[axis]));
+    inside.then(|| Sight { direction: other.camera.world_direction(pixel), weight: depth(other, pixel), trust: 1.0 })
+}
+
+/// 1 in the middle of a photograph, 0 on its border.
+fn depth(photograph: &PosedPhotograph, pixel: Vector2<f64>) -> f64 {
+    let along = |position: f64, length: f64| (2.0 * position.min(length - position) / length).max(0.0);
+    along(pixel.x, photograph.mesh.width) * along(pixel.y, photograph.mesh.height)
+}
+
+/// Where a place is drawn: the mean of all sights, faded towards the own one as they contradict each other. All
+/// photographs that see the place come to the same mean and the same fading.
+fn common_direction(own: Sight, others: impl Iterator<Item = Sight>, max_parallax: f64) -> Vector3<f64> {
+    let sights: Vec<Sight> = std::iter::once(own).chain(others).collect();
+    let sum: Vector3<f64> = sights.iter().map(|sight| sight.direction * sight.weight).sum();
+    let Some(mean) = sum.try_normalize(f64::MIN_POSITIVE).filter(|_| sights.len() > 1) else { return own.direction };
+    let counted = sights.iter().filter(|sight| sight.weight > 0.0);
+    let farthest = counted.map(|sight| sight.direction.angle(&mean)).fold(own.direction.angle(&mean), f64::max);
+    let kept = (2.0 - 2.0 * farthest / max_parallax.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    let smooth = kept * kept * (3.0 - 2.0 * kept);
+    let weights: f64 = sights.iter().map(|sight| sight.weight).sum();
+    let trust = sights.iter().map(|sight| sight.weight * sight.trust).sum::<f64>() / weights;
+    own.direction.lerp(&mean, smooth * trust).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::camera::Camera;
+    use trueup_core::geometry::rotation_about_y;
+    use trueup_core::mesh::GridMesh;
+
+    use super::*;
+
+    /// Two photographs 30 degrees apart on an unrolled sphere of 700 pixels a radian. What the second one's mesh says
+    /// is moved by `moved` panorama pixels against its camera.
+    fn pair(moved: [f64; 2]) -> Vec<PosedPhotograph> {
+        let photograph = |yaw: f64, moved: [f64; 2]| {
+            let level_from_camera = rotation_about_y(yaw);
+            let camera = Camera::new(700.0, 800.0, 600.0, &level_from_camera.transpose());
+            let mut mesh = GridMesh::regular(800.0, 600.0, 20.0);
+            let own = Camera::new(700.0, 800.0, 600.0, &nalgebra::Matrix3::identity());
+            for vertex in 0..mesh.len() {
+                let ray = own.world_direction(mesh.source(vertex));
+                let place = Vector2::new(yaw + ray.x.atan2(ray.z), ray.y.asin()) * 700.0;
+                mesh.target[vertex] = (place + Vector2::from(moved)).into();
+            }
+            PosedPhotograph { camera, mesh }
+        };
+        vec![photograph(0.0, [0.0; 2]), photograph(30_f64.to_radians(), moved)]
+    }
+
+    /// The direction a photograph draws a pixel in.
+    fn drawn(photographs: &[PosedPhotograph], shifts: &[ParallaxShift], k: usize, pixel: Vector2<f64>) -> Vector3<f64> {
+        let (corners, shares) = photographs[k].mesh.bilinear(pixel);
+        let aside = (0..4).fold(Vector2::zeros(), |sum, one| sum + shifts[k].aside[corners[one]] * shares[one]);
+        photographs[k].camera.world_direction(pixel + aside)
+    }
+
+    #[test]
+    fn what_agrees_stays() {
+        let photographs = pair([0.0; 2]);
+        let shifts = parallax_shifts(&photographs, None, 0.03);
+        assert_eq!(shifts.len(), 2);
+        for (shift, photograph) in shifts.iter().zip(&photographs) {
+            assert_eq!(shift.aside.len(), photograph.mesh.len());
+            let largest = shift.aside.iter().map(Vector2::norm).fold(0.0, f64::max);
+            assert!(largest < 0.15, "the grid's own sag, not {largest}");
+        }
+    }
+
+    /// Pixels that the mesh puts at the same place are drawn in the same direction; where a photograph is alone it
+    /// stays.
+    #[test]
+    fn overlaps_meet_and_the_rest_stays() {
+        let photographs = pair([4.0, -3.0]);
+        let shifts = parallax_shifts(&photographs, None, 0.03);
+        for pixel in [[450.0, 300.0], [600.0, 200.0], [700.0, 450.0]].map(Vector2::from) {
+            let start = photographs[0].camera.transfer(&photographs[1].camera, pixel).expect("in front");
+            let same = photographs[1].mesh.source_of(photographs[0].mesh.warp(pixel), start).expect("overlapping");
+            let before =
+                photographs[0].camera.world_direction(pixel).angle(&photographs[1].camera.world_direction(same))
+                    * 700.0;
+            assert!((before - 5.0).abs() < 0.3, "{before}");
+            let apart = drawn(&photographs, &shifts, 0, pixel).angle(&drawn(&photographs, &shifts, 1, same)) * 700.0;
+            assert!(apart < 0.1, "{apart} px at {pixel}");
+        }
+        let alone = drawn(&photographs, &shifts, 0, Vector2::new(100.0, 300.0));
+        assert!(alone.angle(&photographs[0].camera.world_direction(Vector2::new(100.0, 300.0))) < 1e-12);
+    }
+
+    /// A mesh that contradicts its cameras by 50 pixels (4 degrees) is not believed.
+    #[test]
+    fn contradictions_are_left_to_the_cameras() {
+        let photographs = pair([50.0, 0.0]);
+        let shifts = parallax_shifts(&photographs, None, 0.03);
+        assert_eq!(shifts.len(), 2);
+        for (shift, photograph) in shifts.iter().zip(&photographs) {
+            assert_eq!(shift.aside.len(), photograph.mesh.len());
+            assert!(shift.aside.iter().all(|aside| aside.norm() < 1e-6));
+        }
+    }
+
+    /// The same pair with the second mesh a turn farther.
+    #[test]
+    fn overlaps_meet_across_the_turn() {
+        let near = parallax_shifts(&pair([4.0, -3.0]), None, 0.03);
+        let period = std::f64::consts::TAU * 700.0;
+        let far = parallax_shifts(&pair([4.0 + period, -3.0]), Some(period), 0.03);
+        assert_eq!((near.len(), far.len()), (2, 2));
+        let moved = near.iter().flat_map(|shift| &shift.aside).map(Vector2::norm).fold(0.0, f64::max);
+        assert!(moved > 1.0, "the overlap asks for {moved} px only");
+        for (near, far) in near.iter().zip(&far) {
+            assert_eq!(near.aside.len(), far.aside.len());
+            let largest = near.aside.iter().zip(&far.aside).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            assert!(largest < 1e-2, "{largest}");
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! How photographs are called.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use trueup::{ImageRecord, Project};
+
+/// The file name of each photograph; the whole path where names collide.
+pub(super) fn names(images: &[ImageRecord]) -> Vec<String> {
+    let short = |image: &ImageRecord| match Path::new(&image.path).file_name() {
+        Some(name) => name.to_string_lossy().into_owned(),
+        None => image.path.clone(),
+    };
+    let mut count: BTreeMap<String, usize> = BTreeMap::new();
+    for image in images {
+        *count.entry(short(image)).or_default() += 1;
+    }
+    images
+        .iter()
+        .map(|image| Some(short(image)).filter(|name| count[name] == 1).unwrap_or(image.path.clone()))
+        .collect()
+}
+
+/// The name that stands for a photograph's path.
+pub(super) fn name_of<'a>(path: &'a str, project: &Project, names: &'a [String]) -> &'a str {
+    project.images.iter().position(|image| image.path == path).map_or(path, |index| &names[index])
+}

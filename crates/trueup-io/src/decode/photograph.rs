@@ -1,0 +1,54 @@
+//! Whole photographs.
+
+use std::fs::File;
+use std::io::BufReader;
+
+use trueup_core::raster::Photograph;
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result};
+
+use super::orientation::upright;
+use crate::formats;
+use crate::metadata::header;
+
+/// Decodes a photograph in full size, upright.
+///
+/// Gray stays one channel; gray with alpha becomes RGBA; palettes, CMYK and one-bit pictures become RGB or gray;
+/// 16 bits a sample stay 16; floating point is taken for linear light, 1 for white, and becomes 16 bits of sRGB, what is
+/// brighter than white becoming white.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read, [`Error::Input`] if its pixels are damaged or incomplete (no missing part
+/// is tolerated), of an unsupported kind, or no longer of the size that was found when it was examined.
+pub fn photograph(image: &SourceImage) -> Result<Photograph> {
+    Ok(match stored(image)? {
+        Photograph::Eight(raster) => Photograph::Eight(upright(raster, image.orientation)),
+        Photograph::Sixteen(raster) => Photograph::Sixteen(upright(raster, image.orientation)),
+    })
+}
+
+/// Bits of a sample in a photograph's file: 8 or 16, for floating point 16, 32 or 64.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read, [`Error::Input`] if its header no longer can.
+pub fn sample_bits(image: &SourceImage) -> Result<u16> {
+    let file = File::open(&image.path).map_err(|error| Error::io("reading", &image.path, error))?;
+    header::sample_bits(file).ok_or_else(|| {
+        Error::input(
+            &image.name,
+            "its header can no longer be read",
+            "Do not change photographs while they are stitched; start again.",
+        )
+    })
+}
+
+/// Decodes the pixels as they are stored, before orientation.
+fn stored(image: &SourceImage) -> Result<Photograph> {
+    let reading = |error| Error::io("reading", &image.path, error);
+    let mut input = BufReader::new(File::open(&image.path).map_err(reading)?);
+    let format = formats::recognize(&mut input).map_err(reading)?.ok_or_else(|| {
+        let reason = format!("it is not a {} picture", formats::readable_names());
+        Error::input(&image.name, reason, "Give the photograph again.")
+    })?;
+    (format.pixels)(image, input)
+}

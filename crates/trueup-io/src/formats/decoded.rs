@@ -1,0 +1,78 @@
+//! What readers of pixels share: limits, refusals, and the way from samples to a photograph.
+
+use trueup_core::raster::{Photograph, Raster};
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result};
+
+/// Memory a decoder may take beside its pixels, in bytes.
+const DECODER_SLACK_BYTES: u64 = 64 << 20;
+
+/// Most bytes a pixel takes in memory while it is decoded: four 32-bit samples.
+pub(crate) const MAX_PIXEL_BYTES: u64 = 16;
+
+/// Memory that reading a header may take, in bytes: profiles may be compressed.
+pub(crate) const HEADER_BYTES: usize = 64 << 20;
+
+/// Most bytes a decoder may take for this picture.
+pub(crate) fn decoding_limit(image: &SourceImage) -> u64 {
+    let pixels = (image.width as u64).saturating_mul(image.height as u64);
+    pixels.saturating_mul(MAX_PIXEL_BYTES).saturating_add(DECODER_SLACK_BYTES)
+}
+
+/// Samples of a picture.
+///
+/// # Errors
+/// [`Error::Input`] if they are more than a program can address.
+pub(crate) fn sample_count(image: &SourceImage, width: usize, height: usize, channels: usize) -> Result<usize> {
+    let samples = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(channels));
+    samples.ok_or_else(|| damaged(image, "it is larger than memory can be"))
+}
+
+/// A photograph of 8-bit samples: gray, gray with alpha (which becomes RGBA), RGB or RGBA.
+pub(crate) fn eight(width: usize, height: usize, channels: usize, samples: Vec<u8>) -> Result<Photograph> {
+    match channels {
+        2 => Ok(Photograph::Eight(Raster::from_data(width, height, 4, spread_gray_alpha(&samples))?)),
+        _ => Ok(Photograph::Eight(Raster::from_data(width, height, channels, samples)?)),
+    }
+}
+
+/// The same of 16-bit samples.
+pub(crate) fn sixteen(width: usize, height: usize, channels: usize, samples: Vec<u16>) -> Result<Photograph> {
+    match channels {
+        2 => Ok(Photograph::Sixteen(Raster::from_data(width, height, 4, spread_gray_alpha(&samples))?)),
+        _ => Ok(Photograph::Sixteen(Raster::from_data(width, height, channels, samples)?)),
+    }
+}
+
+fn spread_gray_alpha<T: Copy>(samples: &[T]) -> Vec<T> {
+    samples.as_chunks::<2>().0.iter().flat_map(|&[gray, alpha]| [gray, gray, gray, alpha]).collect()
+}
+
+/// The memory limit was judged by the size found when the file was examined, so it must still have that size.
+pub(crate) fn check_unchanged(image: &SourceImage, stored_width: usize, stored_height: usize) -> Result<()> {
+    let expected = match image.orientation {
+        5..=8 => (image.height, image.width),
+        _ => (image.width, image.height),
+    };
+    if (stored_width, stored_height) == expected {
+        return Ok(());
+    }
+    Err(Error::input(
+        &image.name,
+        format!(
+            "it now has {stored_width} x {stored_height} stored pixels, but {} x {} when it was examined",
+            expected.0, expected.1
+        ),
+        "Do not change photographs while they are stitched; start again.",
+    ))
+}
+
+pub(crate) fn damaged(image: &SourceImage, words: impl ToString) -> Error {
+    let words = words.to_string();
+    let reason = format!("its pixels cannot be decoded ({})", words.trim().trim_end_matches('.'));
+    Error::input(
+        &image.name,
+        reason,
+        "The file is damaged, cut off or of an unusual kind; export it again or leave it out.",
+    )
+}

@@ -1,0 +1,38 @@
+//! JPEG.
+
+mod read;
+mod scans;
+mod segments;
+pub(super) mod write;
+
+use crate::encode::options::Depth;
+use crate::format::{Format, LOSSY_BYTES, Reading, SideLimit, Transparency, Writer, Writing};
+use crate::metadata::block;
+
+/// The declaration.
+///
+/// # Source
+/// Signature: ITU-T T.81 B.1.1.3 (the start marker and the next). Sides: 16 bits, B.2.2.
+pub(crate) static JPEG: Format = Format {
+    name: "JPEG",
+    extensions: &["jpg", "jpeg"],
+    rare_extensions: &["jpe", "jfif"],
+    reading: Some(Reading {
+        kinds: "baseline and progressive, gray and color",
+        has_signature: |start| start.starts_with(&[0xff, 0xd8, 0xff]),
+        stored: read::stored,
+        icc: read::icc,
+        exif: block::read_exif,
+        whole_fields: block::read_fields,
+        pixels: read::pixels,
+    }),
+    writing: Some(Writing {
+        depths: &[Depth::Eight],
+        transparency: Transparency::Never,
+        sides: SideLimit { largest: 65_535, advice: "Write .tif, .dzi or .png instead, or a smaller panorama." },
+        has_profile: true,
+        memory: "a few strips of 48 rows",
+        bytes_per_pixel: |_| LOSSY_BYTES,
+        writer: Writer::File(write::write),
+    }),
+};

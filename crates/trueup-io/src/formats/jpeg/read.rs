@@ -1,0 +1,109 @@
+//! Photographs in JPEG.
+
+use std::io::Read;
+
+use trueup_core::raster::{Photograph, Raster};
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result};
+use zune_core::bytestream::ZCursor;
+use zune_core::colorspace::ColorSpace;
+use zune_core::options::DecoderOptions;
+use zune_jpeg::JpegDecoder;
+
+use super::scans::has_separate_subsampled_scans;
+use crate::format::{HeaderError, Input, StoredPixels};
+use crate::formats::decoded::{MAX_PIXEL_BYTES, check_unchanged, damaged};
+
+/// Largest width and height a JPEG can state (ITU-T T.81 table B.2).
+const JPEG_MAX_SIDE: usize = 65_535;
+
+/// Strict decoding: a file that is damaged is refused, never filled up with gray.
+fn options() -> DecoderOptions {
+    DecoderOptions::default().set_strict_mode(true).set_max_width(JPEG_MAX_SIDE).set_max_height(JPEG_MAX_SIDE)
+}
+
+/// What the header states of the pixels.
+pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
+    let mut decoder = JpegDecoder::new_with_options(input, options());
+    decoder.decode_headers().map_err(|error| HeaderError::Damaged(format!("{error:?}")))?;
+    let (width, height) = decoder.dimensions().ok_or_else(|| HeaderError::damaged("no frame header"))?;
+    Ok(StoredPixels { width, height, bits: 8, is_float: false })
+}
+
+/// The ICC profile.
+pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
+    let mut decoder = JpegDecoder::new_with_options(input, options());
+    decoder.decode_headers().ok()?;
+    decoder.icc_profile()
+}
+
+/// Decodes the pixels as they are stored.
+pub(super) fn pixels(image: &SourceImage, mut input: Input) -> Result<Photograph> {
+    let mut bytes = Vec::new();
+    input.read_to_end(&mut bytes).map_err(|error| Error::io("reading", &image.path, error))?;
+    decode(image, &bytes)
+}
+
+fn decode(image: &SourceImage, bytes: &[u8]) -> Result<Photograph> {
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options());
+    decoder.decode_headers().map_err(|error| damaged(image, format!("{error:?}")))?;
+    let (width, height) = decoder.dimensions().ok_or_else(|| damaged(image, "no frame header"))?;
+    check_unchanged(image, width, height)?;
+    if !has_end_of_image(bytes) {
+        return Err(Error::input(
+            &image.name,
+            "the picture is cut off: the JPEG ends before its end-of-image marker",
+            "Copy it again from the camera or leave it out.",
+        ));
+    }
+    if has_separate_subsampled_scans(bytes) {
+        return decode_separate_scans(image, bytes, width, height);
+    }
+    let (space, channels) = match decoder.input_colorspace() {
+        Some(ColorSpace::Luma) => (ColorSpace::Luma, 1),
+        _ => (ColorSpace::RGB, 3),
+    };
+    decoder.set_options(options().jpeg_set_out_colorspace(space));
+    let pixels = decoder.decode().map_err(|error| damaged(image, format!("{error:?}")))?;
+    Ok(Photograph::Eight(Raster::from_data(width, height, channels, pixels)?))
+}
+
+/// Decodes a sequential JPEG that stores each component in a scan of its own and some at a lower resolution.
+///
+/// # Departures
+/// zune-jpeg 0.5.15 turns these into stripes without an error (its issue 422), so that another decoder reads them.
+fn decode_separate_scans(image: &SourceImage, bytes: &[u8], width: usize, height: usize) -> Result<Photograph> {
+    let mut decoder = jpeg_decoder::Decoder::new(bytes);
+    decoder.set_max_decoding_buffer_size(width.saturating_mul(height).saturating_mul(MAX_PIXEL_BYTES as usize));
+    let pixels = decoder.decode().map_err(|error| damaged(image, error))?;
+    match decoder.info().map(|info| info.pixel_format) {
+        Some(jpeg_decoder::PixelFormat::RGB24) => Ok(Photograph::Eight(Raster::from_data(width, height, 3, pixels)?)),
+        _ => Err(Error::input(&image.name, "its kind of pixels is not read", "Export it as an RGB JPEG.")),
+    }
+}
+
+/// Whether an end-of-image marker follows the first scan header. The thumbnail's own marker lies before that, in EXIF;
+/// within a scan every 0xff of the data is followed by 0 or by a restart marker; and further pictures or maker data may
+/// follow the end.
+///
+/// # Source
+/// ITU-T T.81 B.1.1.2 to B.1.1.5.
+fn has_end_of_image(bytes: &[u8]) -> bool {
+    const START_OF_SCAN: u8 = 0xda;
+    const END_OF_IMAGE: u8 = 0xd9;
+    let mut rest = bytes.get(2..).unwrap_or_default();
+    while let [0xff, marker, after @ ..] = rest {
+        match *marker {
+            START_OF_SCAN => return after.windows(2).any(|pair| pair == [0xff, END_OF_IMAGE]),
+            // Fill bytes may precede a marker; these markers stand alone.
+            0xff => rest = &rest[1..],
+            0x01 | 0xd0..=0xd8 => rest = after,
+            _ => {
+                let [high, low, ..] = after else { return false };
+                rest = after.get(usize::from(u16::from_be_bytes([*high, *low]))..).unwrap_or_default();
+            }
+        }
+    }
+    // Bytes between segments that are no markers: the decoder judges them.
+    bytes.windows(2).any(|pair| pair == [0xff, END_OF_IMAGE])
+}

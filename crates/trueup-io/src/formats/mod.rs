@@ -1,0 +1,92 @@
+//! The table of file formats, and what can be asked of all of them.
+//!
+//! A format is a file here with its declaration, its reader and its writer, and a row in [`FORMATS`]; `docs/formats.md` has
+//! a row for it in each of its tables, which a test compares with the declarations.
+
+pub(crate) mod decoded;
+mod deep_zoom;
+mod foreign;
+mod jpeg;
+pub(crate) mod png;
+#[cfg(test)]
+pub(crate) mod specimens;
+#[cfg(test)]
+mod tests;
+pub(crate) mod tiff;
+mod webp;
+
+use std::io::{Read, Seek};
+use std::path::Path;
+
+use crate::format::{Format, Input, Reading, SIGNATURE_BYTES, Writing};
+
+pub(crate) use foreign::{describe_foreign_content, has_foreign_extension};
+
+/// All formats, in the order in which messages and pages name them.
+pub(crate) static FORMATS: [&Format; 5] = [&jpeg::JPEG, &png::PNG, &tiff::TIFF, &webp::WEBP, &deep_zoom::DEEP_ZOOM];
+
+/// The formats that are read.
+fn readable() -> impl Iterator<Item = (&'static Format, &'static Reading)> {
+    FORMATS.iter().filter_map(|format| Some((*format, format.reading.as_ref()?)))
+}
+
+/// The formats that are written.
+pub(crate) fn writable() -> impl Iterator<Item = (&'static Format, &'static Writing)> {
+    FORMATS.iter().filter_map(|format| Some((*format, format.writing.as_ref()?)))
+}
+
+/// How to read a file that begins with `start`: the content tells, never the name.
+pub(crate) fn reading_of(start: &[u8]) -> Option<&'static Reading> {
+    readable().map(|(_, reading)| reading).find(|reading| (reading.has_signature)(start))
+}
+
+/// How to read `input`, which is left at its first byte; `None` if it is of no format that is read.
+///
+/// # Errors
+/// If the file cannot be read.
+pub(crate) fn recognize(input: &mut Input) -> std::io::Result<Option<&'static Reading>> {
+    let start = read_start(input)?;
+    input.rewind()?;
+    Ok(reading_of(&start))
+}
+
+/// What [`reading_of`] needs to see of a file, or all of a shorter one.
+pub(crate) fn read_start(file: &mut impl Read) -> std::io::Result<Vec<u8>> {
+    let mut start = Vec::with_capacity(SIGNATURE_BYTES);
+    file.take(SIGNATURE_BYTES as u64).read_to_end(&mut start)?;
+    Ok(start)
+}
+
+/// How to write what the extension of `path` names, in any case.
+pub(crate) fn writing_of(path: &Path) -> Option<&'static Writing> {
+    writable().find(|(format, _)| format.names(path)).map(|(_, writing)| writing)
+}
+
+/// Whether the extension of `path` names a photograph, in a format that is read or in another.
+pub(crate) fn names_photograph(path: &Path) -> bool {
+    readable().any(|(format, _)| format.names(path)) || has_foreign_extension(path)
+}
+
+/// The formats that are read, for messages: "JPEG, PNG, TIFF or WebP".
+pub(crate) fn readable_names() -> String {
+    alternatives(readable().map(|(format, _)| format.name.to_owned()))
+}
+
+/// The extensions to propose of the formats that `which` accepts, for messages: ".png or .tif".
+pub(crate) fn extensions(which: impl Fn(&Writing) -> bool) -> String {
+    alternatives(
+        writable().filter(|(_, writing)| which(writing)).map(|(format, _)| format!(".{}", format.extensions[0])),
+    )
+}
+
+/// All extensions of files that are written, for messages.
+pub(crate) fn all_extensions() -> String {
+    alternatives(writable().flat_map(|(format, _)| format.extensions).map(|extension| format!(".{extension}")))
+}
+
+/// "a, b or c".
+fn alternatives(names: impl Iterator<Item = String>) -> String {
+    let mut names: Vec<String> = names.collect();
+    let last = names.pop().unwrap_or_default();
+    if names.is_empty() { last } else { format!("{} or {last}", names.join(", ")) }
+}

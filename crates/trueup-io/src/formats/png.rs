@@ -1,0 +1,168 @@
+//! PNG.
+
+use std::io::{BufWriter, Write};
+
+use png::text_metadata::ITXtChunk;
+use png::{
+    BitDepth, ColorType, Compression, Decoder, DecodingError, Encoder, EncodingError, Info, Limits,
+    SrgbRenderingIntent, Transformations,
+};
+use trueup_core::raster::{Photograph, RowSource};
+use trueup_core::source::SourceImage;
+use trueup_core::{Result, StageContext};
+
+use super::decoded::{HEADER_BYTES, check_unchanged, damaged, decoding_limit, eight, sample_count, sixteen};
+use crate::encode::failure::WriteFailure;
+use crate::encode::metadata::Metadata;
+use crate::encode::options::{Depth, OutputOptions, PngCompression};
+use crate::encode::samples::{OutputSample, RGBA, flattened};
+use crate::encode::strips::{BUFFER_BYTES, STRIP_ROWS, channels_of, for_each_strip};
+use crate::format::{
+    Format, HeaderError, Input, LOSSLESS_BYTES, Output, Reading, SideLimit, StoredPixels, Transparency, Writer, Writing,
+};
+use crate::metadata::block;
+
+/// The declaration.
+///
+/// # Source
+/// Signature: W3C PNG 5.2. Sides: 31 bits, 11.2.1.
+pub(crate) static PNG: Format = Format {
+    name: "PNG",
+    extensions: &["png"],
+    rare_extensions: &[],
+    reading: Some(Reading {
+        kinds: "1 to 16 bits, gray, color, palettes, with or without alpha",
+        has_signature: |start| start.starts_with(b"\x89PNG\r\n\x1a\n"),
+        stored,
+        icc,
+        exif: block::read_exif,
+        whole_fields: block::read_fields,
+        pixels,
+    }),
+    writing: Some(Writing {
+        depths: &[Depth::Eight, Depth::Sixteen],
+        transparency: Transparency::Always,
+        sides: SIDES,
+        has_profile: true,
+        memory: "64 rows",
+        bytes_per_pixel: |options| LOSSLESS_BYTES * f64::from(options.depth.sample_bytes()),
+        writer: Writer::File(write),
+    }),
+};
+
+/// The longest side of a PNG.
+pub(crate) const SIDES: SideLimit = SideLimit { largest: (1 << 31) - 1, advice: "Write a smaller panorama." };
+
+/// Keyword of the text chunk that holds XMP (XMP specification part 3, section 1.1.5).
+const XMP_KEYWORD: &str = "XML:com.adobe.xmp";
+
+/// A decoder that takes at most so many bytes beside the pixels and hands them out with 8 or 16 bits a sample, palettes as
+/// RGB.
+fn decoder(input: &mut Input, bytes: usize) -> std::result::Result<png::Reader<&mut Input>, DecodingError> {
+    let mut decoder = Decoder::new_with_limits(input, Limits { bytes });
+    decoder.set_ignore_text_chunk(false);
+    decoder.set_transformations(Transformations::EXPAND);
+    decoder.read_info()
+}
+
+fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
+    // Sizes are judged by the caller, whose limit is an option.
+    let reader = decoder(input, usize::MAX).map_err(HeaderError::damaged)?;
+    let bits = if reader.output_color_type().1 == BitDepth::Sixteen { 16 } else { 8 };
+    let (width, height) = reader.info().size();
+    Ok(StoredPixels { width: width as usize, height: height as usize, bits, is_float: false })
+}
+
+fn icc(input: &mut Input) -> Option<Vec<u8>> {
+    decoder(input, HEADER_BYTES).ok()?.info().icc_profile.as_ref().map(|icc| icc.to_vec())
+}
+
+fn pixels(image: &SourceImage, mut input: Input) -> Result<Photograph> {
+    let failed = |error: DecodingError| damaged(image, error);
+    let limit = usize::try_from(decoding_limit(image)).unwrap_or(usize::MAX);
+    let mut reader = decoder(&mut input, limit).map_err(failed)?;
+    let (width, height) = reader.info().size();
+    let (width, height) = (width as usize, height as usize);
+    check_unchanged(image, width, height)?;
+    let (color, depth) = reader.output_color_type();
+    let channels = color.samples();
+    let count = sample_count(image, width, height, channels)?;
+    if depth != BitDepth::Sixteen {
+        let mut samples = vec![0; count];
+        reader.next_frame(&mut samples).map_err(failed)?;
+        return eight(width, height, channels, samples);
+    }
+    let mut samples = vec![0_u16; count];
+    reader.next_frame(bytemuck::cast_slice_mut(&mut samples)).map_err(failed)?;
+    samples.iter_mut().for_each(|sample| *sample = u16::from_be(*sample));
+    sixteen(width, height, channels, samples)
+}
+
+/// Writes a PNG of 8 or 16 bits.
+pub(super) fn write(
+    file: &mut dyn Output,
+    picture: &dyn RowSource,
+    metadata: &Metadata,
+    options: &OutputOptions,
+    context: &StageContext<'_>,
+) -> std::result::Result<(), WriteFailure> {
+    let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
+    let channels = channels_of(picture, options);
+    let info = info(metadata, picture.width() as u32, picture.height() as u32);
+    let mut encoder = Encoder::with_info(&mut output as &mut dyn Write, info).map_err(failure)?;
+    encoder.set_color(if channels == RGBA { ColorType::Rgba } else { ColorType::Rgb });
+    let sixteen = options.depth == Depth::Sixteen;
+    encoder.set_depth(if sixteen { BitDepth::Sixteen } else { BitDepth::Eight });
+    if metadata.icc.is_none() {
+        encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+    }
+    encoder.set_compression(compression(options));
+    let mut writer = encoder.write_header().map_err(failure)?;
+    let mut stream = writer.stream_writer_with_size(BUFFER_BYTES).map_err(failure)?;
+    if sixteen {
+        let mut samples = Vec::new();
+        for_each_strip::<u16>(picture, STRIP_ROWS, context, &mut |strip| {
+            flattened(strip, channels, u16::of(options.background), &mut samples);
+            let bytes: Vec<u8> = samples.iter().flat_map(|sample| sample.to_be_bytes()).collect();
+            Ok(stream.write_all(&bytes)?)
+        })?;
+    } else {
+        let mut samples = Vec::new();
+        for_each_strip::<u8>(picture, STRIP_ROWS, context, &mut |strip| {
+            flattened(strip, channels, u8::of(options.background), &mut samples);
+            Ok(stream.write_all(&samples)?)
+        })?;
+    }
+    stream.finish().map_err(failure)?;
+    writer.finish().map_err(failure)?;
+    output.flush()?;
+    Ok(())
+}
+
+/// The headers; without a profile, the caller marks the picture as sRGB.
+fn info(metadata: &Metadata, width: u32, height: u32) -> Info<'_> {
+    let mut info = Info::with_size(width, height);
+    info.icc_profile = metadata.icc.as_ref().map(|icc| icc.into());
+    info.exif_metadata = metadata.exif.as_ref().map(|exif| exif.into());
+    if let Some(xmp) = &metadata.xmp {
+        info.utf8_text.push(ITXtChunk::new(XMP_KEYWORD, xmp.as_str()));
+    }
+    info
+}
+
+/// How hard a PNG is compressed.
+pub(crate) fn compression(options: &OutputOptions) -> Compression {
+    match options.png_compression {
+        PngCompression::Fast => Compression::Fast,
+        PngCompression::Balanced => Compression::Balanced,
+        PngCompression::High => Compression::High,
+    }
+}
+
+/// Why a PNG could not be written.
+pub(crate) fn failure(error: EncodingError) -> WriteFailure {
+    match error {
+        EncodingError::IoError(error) => WriteFailure::Io(error),
+        other => WriteFailure::Io(std::io::Error::other(other)),
+    }
+}

@@ -1,0 +1,99 @@
+//! Photographs in TIFF.
+
+use std::io::{Read, Seek};
+
+use exif::{Field, Tag as ExifTag};
+use tiff::TiffError;
+use tiff::decoder::Decoder;
+use tiff::tags::Tag;
+use trueup_core::raster::Photograph;
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result};
+
+use super::convert::{encoded, rgb_of_cmyk, rgb_of_ycbcr, unpacked};
+use super::page::{FirstPage, PixelKind};
+use super::palette;
+use super::samples::{Samples, TiffInput, not_as_stated, open};
+use crate::format::{HeaderError, Input, StoredPixels};
+use crate::formats::decoded::{check_unchanged, damaged, eight, sixteen};
+use crate::metadata::exif_fields::ExifFields;
+use crate::metadata::tiff_fields;
+
+/// Tag of the coefficients of luma.
+const YCBCR_COEFFICIENTS: Tag = Tag::Unknown(529);
+
+pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
+    let page = Decoder::new(input as &mut dyn TiffInput).and_then(|mut decoder| FirstPage::of(&mut decoder));
+    let FirstPage { width, height, bits, kind } = page.map_err(|error| match error {
+        TiffError::UnsupportedError(unsupported) => HeaderError::Unsupported(unsupported.to_string()),
+        other => HeaderError::damaged(other),
+    })?;
+    Ok(StoredPixels { width, height, bits, is_float: matches!(kind, PixelKind::Float(_)) })
+}
+
+pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
+    let profile = Decoder::new(input as &mut dyn TiffInput).ok()?.find_tag(Tag::IccProfile).ok().flatten()?;
+    profile.into_u8_vec().ok()
+}
+
+/// The EXIF library would read the whole file, pixels and all.
+pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
+    ExifFields::from_tiff(&mut Decoder::new(input as &mut dyn TiffInput).ok()?)
+}
+
+pub(super) fn whole_fields(input: &mut Input, wanted: &[ExifTag]) -> Option<Vec<Field>> {
+    tiff_fields::read(&mut Decoder::new(input as &mut dyn TiffInput).ok()?, wanted)
+}
+
+/// Decodes the first page.
+pub(super) fn pixels(image: &SourceImage, mut input: Input) -> Result<Photograph> {
+    let reading = |error| Error::io("reading", &image.path, error);
+    let page = Decoder::new(&mut input as &mut dyn TiffInput).and_then(|mut decoder| FirstPage::of(&mut decoder));
+    let page = page.map_err(|error| damaged(image, error))?;
+    input.rewind().map_err(reading)?;
+    let FirstPage { width, height, .. } = page;
+    check_unchanged(image, width, height)?;
+    if let PixelKind::Palette(bits) = page.kind {
+        let mut bytes = Vec::new();
+        input.read_to_end(&mut bytes).map_err(reading)?;
+        return palette::decode(image, bytes, page, bits);
+    }
+    if page.kind == PixelKind::Wide {
+        return Err(Error::input(
+            &image.name,
+            "its kind of pixels is not read",
+            "Export it with 8 or 16 bits a sample.",
+        ));
+    }
+    let mut decoder = open(image, &mut input)?;
+    let samples = Samples::read(image, &mut decoder, page)?;
+    match (page.kind, samples) {
+        (PixelKind::Plain(channels), Samples::Eight(samples)) if samples.len() == width * height * channels => {
+            eight(width, height, channels, samples)
+        }
+        (PixelKind::Plain(channels), Samples::Sixteen(samples)) if samples.len() == width * height * channels => {
+            sixteen(width, height, channels, samples)
+        }
+        (PixelKind::Bitmap, Samples::Eight(packed)) => {
+            eight(width, height, 1, unpacked(&packed, width, 1).map(|bit| bit * u8::MAX).collect())
+        }
+        (PixelKind::Cmyk, Samples::Eight(samples)) => {
+            eight(width, height, 3, rgb_of_cmyk(&samples, u8::MAX.into(), |value| value as u8))
+        }
+        (PixelKind::Cmyk, Samples::Sixteen(samples)) => {
+            sixteen(width, height, 3, rgb_of_cmyk(&samples, u16::MAX.into(), |value| value as u16))
+        }
+        (PixelKind::Float(channels), Samples::Float(samples)) => {
+            sixteen(width, height, channels, encoded(&samples, channels))
+        }
+        (PixelKind::SmallGray(bits), Samples::Eight(packed)) => {
+            let step = u8::MAX / ((1 << bits) - 1);
+            eight(width, height, 1, unpacked(&packed, width, bits).map(|level| level * step).collect())
+        }
+        (PixelKind::YCbCr, Samples::Eight(samples)) => {
+            let coefficients = decoder.get_tag_f32_vec(YCBCR_COEFFICIENTS).ok();
+            eight(width, height, 3, rgb_of_ycbcr(&samples, coefficients.as_deref()))
+        }
+        _ => Err(not_as_stated(image)),
+    }
+}

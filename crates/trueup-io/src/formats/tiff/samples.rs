@@ -1,0 +1,76 @@
+//! All samples of a TIFF's first page.
+
+use std::io::{Read, Seek};
+
+use tiff::decoder::{Decoder, DecodingResult, Limits};
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result};
+
+use super::page::{FirstPage, PixelKind};
+use crate::formats::decoded::{damaged, decoding_limit};
+
+/// What a decoder reads from.
+pub(super) trait TiffInput: Read + Seek {}
+
+impl<R: Read + Seek> TiffInput for R {}
+
+/// A decoder that takes no more memory than the picture needs.
+pub(super) fn open<'a>(image: &SourceImage, input: &'a mut dyn TiffInput) -> Result<Decoder<&'a mut dyn TiffInput>> {
+    let bytes = usize::try_from(decoding_limit(image)).unwrap_or(usize::MAX);
+    let mut limits = Limits::default();
+    limits.decoding_buffer_size = bytes;
+    limits.intermediate_buffer_size = bytes;
+    Ok(Decoder::new(input).map_err(|error| damaged(image, error))?.with_limits(limits))
+}
+
+/// All samples of a picture, channels interleaved; bits below 8 packed.
+pub(super) enum Samples {
+    Eight(Vec<u8>),
+    Sixteen(Vec<u16>),
+    Float(Vec<f32>),
+}
+
+impl Samples {
+    /// Reads them.
+    ///
+    /// # Errors
+    /// If they are damaged, incomplete or of a kind that no page has.
+    pub(super) fn read(
+        image: &SourceImage,
+        decoder: &mut Decoder<&mut dyn TiffInput>,
+        page: FirstPage,
+    ) -> Result<Self> {
+        let mut buffer = DecodingResult::U8(Vec::new());
+        let layout = decoder.read_image_to_buffer(&mut buffer).map_err(|error| damaged(image, error))?;
+        let pixels = page.width * page.height;
+        let planes = layout.planes;
+        if planes > 1 && page.kind == PixelKind::Cmyk {
+            return Err(damaged(image, "CMYK in planes is not read"));
+        }
+        Ok(match buffer {
+            DecodingResult::U8(samples) => Self::Eight(interleaved(samples, pixels, planes)),
+            DecodingResult::U16(samples) => Self::Sixteen(interleaved(samples, pixels, planes)),
+            DecodingResult::F16(samples) => {
+                Self::Float(interleaved(samples.into_iter().map(f32::from).collect(), pixels, planes))
+            }
+            DecodingResult::F32(samples) => Self::Float(interleaved(samples, pixels, planes)),
+            DecodingResult::F64(samples) => {
+                Self::Float(interleaved(samples.into_iter().map(|value| value as f32).collect(), pixels, planes))
+            }
+            _ => return Err(not_as_stated(image)),
+        })
+    }
+}
+
+/// Planes of one channel each, one after the other, as pixels.
+fn interleaved<T: Copy>(samples: Vec<T>, pixels: usize, planes: usize) -> Vec<T> {
+    if planes < 2 || samples.len() < planes * pixels {
+        return samples;
+    }
+    (0..pixels).flat_map(|at| (0..planes).map(move |plane| plane * pixels + at)).map(|at| samples[at]).collect()
+}
+
+/// The samples are of another kind or number than the header says.
+pub(super) fn not_as_stated(image: &SourceImage) -> Error {
+    damaged(image, "its samples are not what its header says")
+}

@@ -1,0 +1,132 @@
+//! Candidates looked into: a file, its format, its header and its size.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use super::inputs::Candidate;
+use super::options::SourceOptions;
+use super::rejection::Rejection;
+use crate::format::{HeaderError, Reading};
+use crate::formats;
+use crate::metadata::header::{Header, read_header};
+
+/// The largest file that is opened. Files are read into memory to be decoded; no photograph is this large.
+const MAX_FILE_BYTES: u64 = 4 << 30;
+
+/// A candidate whose header was read, and whose size is accepted.
+pub(super) struct OpenedPicture {
+    pub(super) path: PathBuf,
+    /// Bytes of the file.
+    pub(super) length: u64,
+    pub(super) header: Header,
+}
+
+/// Reads a candidate's header.
+pub(super) fn open_candidate(
+    candidate: Candidate,
+    options: &SourceOptions,
+    min_side_px: usize,
+) -> Result<OpenedPicture, Rejection> {
+    let path = match candidate {
+        Candidate::Rejected(_, rejection) => return Err(rejection),
+        Candidate::File(path) => path,
+    };
+    let (mut file, length) = open(&path)?;
+    let format = recognize(&mut file, length)?;
+    let header = read_header(file, format).map_err(|error| match error {
+        HeaderError::Damaged(words) => Rejection::new(
+            "picture-damaged",
+            format!("its header cannot be read ({words})"),
+            "Export it again or leave it out.",
+        ),
+        HeaderError::Unsupported(words) => Rejection::new(
+            "format-unsupported",
+            format!("it is of a kind that is not read ({words})"),
+            "Export it as gray or RGB with 8 or 16 bits a sample.",
+        ),
+    })?;
+    check_size(&header, options, min_side_px)?;
+    Ok(OpenedPicture { path, length, header })
+}
+
+/// Opens a file; tells its length in bytes.
+fn open(path: &Path) -> Result<(File, u64), Rejection> {
+    let unreadable = |error: std::io::Error| {
+        Rejection::new("file-unreadable", format!("it cannot be read ({error})"), "Check the file and its permissions.")
+    };
+    // Looked at before it is opened: opening a named pipe would wait for its writer.
+    let metadata = std::fs::metadata(path).map_err(unreadable)?;
+    if metadata.is_dir() {
+        return Err(Rejection::new(
+            "folder-not-file",
+            "it is a folder, not a picture",
+            "Give the folder itself to use the pictures in it.",
+        ));
+    }
+    if !metadata.is_file() {
+        return Err(Rejection::new("file-unreadable", "it is not a regular file", "Give a picture file."));
+    }
+    let length = metadata.len();
+    if length > MAX_FILE_BYTES {
+        let gibibytes = length as f64 / (1_u64 << 30) as f64;
+        return Err(Rejection::new(
+            "picture-too-large",
+            format!("the file has {gibibytes:.1} GiB, at most {} are read", MAX_FILE_BYTES >> 30),
+            "Export a smaller copy of it.",
+        ));
+    }
+    Ok((File::open(path).map_err(unreadable)?, length))
+}
+
+/// Tells the format by the file's first bytes.
+fn recognize(file: &mut File, length: u64) -> Result<&'static Reading, Rejection> {
+    if length == 0 {
+        return Err(Rejection::new(
+            "file-empty",
+            "the file is empty (0 bytes)",
+            "Copy it again from the camera or leave it out.",
+        ));
+    }
+    let start = formats::read_start(file).map_err(|error| {
+        Rejection::new("file-unreadable", format!("it cannot be read ({error})"), "Check the file and its permissions.")
+    })?;
+    if let Some(format) = formats::reading_of(&start) {
+        return Ok(format);
+    }
+    let readable = formats::readable_names();
+    Err(match formats::describe_foreign_content(&start) {
+        Some(what) => Rejection::new(
+            "format-unsupported",
+            format!("it is {what}, a format that is not read"),
+            format!("Convert it to {readable}."),
+        ),
+        None => Rejection::new(
+            "not-a-picture",
+            format!("its content is not a {readable} picture, whatever its name says"),
+            format!("Give photographs in {readable}."),
+        ),
+    })
+}
+
+fn check_size(header: &Header, options: &SourceOptions, min_side_px: usize) -> Result<(), Rejection> {
+    let (width, height) = (header.stored.width, header.stored.height);
+    let megapixels = width as f64 * height as f64 / 1e6;
+    if megapixels > options.max_megapixels {
+        return Err(Rejection::new(
+            "picture-too-large",
+            format!(
+                "{width} x {height} px are {megapixels:.0} megapixels, at most {} are accepted",
+                options.max_megapixels
+            ),
+            "Export a smaller copy, or raise source.max_megapixels if the picture is truly this large.",
+        ));
+    }
+    if width.min(height) < min_side_px {
+        return Err(Rejection::new(
+            "picture-too-small",
+            format!("{width} x {height} px are too few to stitch, each side needs {min_side_px}"),
+            "Give the photograph in its original size.",
+        ));
+    }
+    Ok(())
+}

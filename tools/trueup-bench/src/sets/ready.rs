@@ -1,0 +1,60 @@
+//! Sets that lie on disk: photographs and what is true of them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use trueup::{Error, Result, Truth};
+
+/// Name of the file that holds what is true of a set.
+pub(crate) const TRUTH_FILE: &str = "truth.json";
+
+/// A set that lies on disk.
+#[derive(Debug, Clone)]
+pub(crate) struct ReadySet {
+    /// Its photographs' paths, in order.
+    pub photographs: Vec<String>,
+    /// What is true of them.
+    pub truth: Truth,
+    /// Stands for its content.
+    pub fingerprint: String,
+}
+
+/// The set in a folder.
+///
+/// # Errors
+/// Those of [`read_truth`].
+pub(super) fn ready(folder: &Path) -> Result<ReadySet> {
+    let (truth, text) = read_truth(folder)?;
+    let paths: Vec<PathBuf> = truth.images.iter().map(|image| folder.join(&image.file)).collect();
+    // Photographs that were made anew from the same truth differ in their size.
+    let size = |path: &PathBuf| fs::metadata(path).map_or(0, |found| found.len());
+    let sizes: Vec<u64> = paths.iter().map(size).collect();
+    let photographs = paths.iter().map(|path| path.display().to_string()).collect();
+    Ok(ReadySet { photographs, truth, fingerprint: crate::trial::fingerprint(&(text, sizes)) })
+}
+
+/// A folder's truth and the text it was read from.
+pub(crate) fn read_truth(folder: &Path) -> Result<(Truth, String)> {
+    let path = folder.join(TRUTH_FILE);
+    let text = fs::read_to_string(&path).map_err(|error| Error::io("reading", &path, error))?;
+    let hint = "Give the truth.json that was written together with the photographs.";
+    let truth: Truth = serde_json::from_str(&text).map_err(|error| Error::input(path.display(), error, hint))?;
+    truth.check(&path.display().to_string())?;
+    Ok((truth, text))
+}
+
+/// The folders inside `parent` that hold a `truth.json`, by name.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read; [`Error::Input`] if none holds one.
+pub(crate) fn truth_folders(parent: &Path) -> Result<Vec<PathBuf>> {
+    let entries = fs::read_dir(parent).map_err(|error| Error::io("reading the folder", parent, error))?;
+    let mut folders: Vec<PathBuf> =
+        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.join(TRUTH_FILE).is_file()).collect();
+    folders.sort();
+    if folders.is_empty() {
+        let hint = "Name a folder whose folders each hold photographs and their truth.json.";
+        return Err(Error::input(parent.display(), "no folder in it holds a truth.json", hint));
+    }
+    Ok(folders)
+}
