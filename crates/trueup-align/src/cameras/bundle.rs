@@ -50,7 +50,7 @@ impl Parameters {
     }
 }
 
-/// Which unknown scales which picture's focal length; `None` holds it fixed.
+/// Which unknown scales which photograph's focal length; `None` holds it fixed.
 pub(super) struct FocalModel {
     pub parameter_of: Vec<Option<usize>>,
     pub parameters: usize,
@@ -66,14 +66,14 @@ impl FocalModel {
         Self { parameter_of, parameters: groups.len() }
     }
 
-    /// One unknown per picture.
-    pub(super) fn per_picture(pictures: usize) -> Self {
-        Self { parameter_of: (0..pictures).map(Some).collect(), parameters: pictures }
+    /// One unknown per photograph.
+    pub(super) fn per_photograph(photographs: usize) -> Self {
+        Self { parameter_of: (0..photographs).map(Some).collect(), parameters: photographs }
     }
 
     /// No unknowns: focal lengths stay as they are.
-    pub(super) fn fixed(pictures: usize) -> Self {
-        Self { parameter_of: vec![None; pictures], parameters: 0 }
+    pub(super) fn fixed(photographs: usize) -> Self {
+        Self { parameter_of: vec![None; photographs], parameters: 0 }
     }
 }
 
@@ -132,8 +132,8 @@ impl BundleAdjustment<'_> {
         Ok(parameters)
     }
 
-    /// Whether the solution can be used: finite, and no focal length at the short end of its range. (At the long end the
-    /// pictures are merely close to affine, which is harmless.)
+    /// Whether the solution can be used: finite, and no focal length at the short end of its range. (At the long end
+    /// the photographs are merely close to affine, which is harmless.)
     pub(super) fn is_sound(&self, parameters: &Parameters) -> bool {
         parameters.rotations.iter().all(|rotation| rotation.iter().all(|entry| entry.is_finite()))
             && parameters.focal_px.iter().zip(self.priors).all(|(&focal_px, prior)| {
@@ -145,11 +145,11 @@ impl BundleAdjustment<'_> {
         3 * self.priors.len() + model.parameters
     }
 
-    /// Columns of a pair's local unknowns in the global system; `None` is held fixed. The reference picture's rotation
-    /// is fixed: it is the gauge.
+    /// Columns of a pair's local unknowns in the global system; `None` is held fixed. The reference photograph's
+    /// rotation is fixed: it is the gauge.
     fn columns(&self, pair: &PairObservations, model: &FocalModel) -> [Option<usize>; LOCAL] {
-        let rotation = |picture: usize, axis: usize| (picture != self.reference).then_some(3 * picture + axis);
-        let focal = |picture: usize| model.parameter_of[picture].map(|k| 3 * self.priors.len() + k);
+        let rotation = |photograph: usize, axis: usize| (photograph != self.reference).then_some(3 * photograph + axis);
+        let focal = |photograph: usize| model.parameter_of[photograph].map(|k| 3 * self.priors.len() + k);
         std::array::from_fn(|local| match local {
             0..3 => rotation(pair.a, local),
             3..6 => rotation(pair.b, local - 3),
@@ -158,7 +158,7 @@ impl BundleAdjustment<'_> {
         })
     }
 
-    /// Pull of the focal lengths towards their start values: (ln f - ln f0) / sd, one per picture with a free one.
+    /// Pull of the focal lengths towards their start values: (ln f - ln f0) / sd, one per photograph with a free one.
     fn focal_prior(&self, parameters: &Parameters, model: &FocalModel) -> Vec<(usize, f64, f64)> {
         (0..self.priors.len())
             .filter_map(|k| {
@@ -245,7 +245,7 @@ fn pair_cost(cameras: &[Camera], pair: &PairObservations, huber_px: f64) -> f64 
     let (a, b) = (&cameras[pair.a], &cameras[pair.b]);
     let b_from_a = b.rotation() * a.rotation().transpose();
     let a_from_b = b_from_a.transpose();
-    // A match behind a camera costs as much as one a picture away: it must not look free.
+    // A match behind a camera costs as much as one a photograph away: it must not look free.
     let behind = huber(b.principal_point[0].hypot(b.principal_point[1]) * 2.0, huber_px).0;
     let one_way = |from: &Camera, to: &Camera, turn: &Matrix3<f64>, source: [f64; 2], target: [f64; 2]| {
         to.project(turn * from.bearing(Vector2::from(source)))
@@ -352,7 +352,7 @@ mod tests {
             reference: 0,
             known_focal_sd: 0.1,
         };
-        let model = FocalModel::per_picture(2);
+        let model = FocalModel::per_photograph(2);
         let at = Parameters {
             focal_px: vec![510.0, 505.0],
             rotations: vec![Matrix3::identity(), exp_rotation(&Vector3::new(0.05, -0.35, 0.1))],

@@ -141,10 +141,7 @@ fn standard_error(leans: &[Lean], mean: f64, strips: usize) -> Option<f64> {
 }
 
 /// The direction that the segments' planes share, near the expected one, down in the camera's frame.
-fn vertical_direction(
-    planes: &InterpretationPlanes,
-    expected: &Vector3<f64>,
-) -> Option<Vector3<f64>> {
+fn vertical_direction(planes: &InterpretationPlanes, expected: &Vector3<f64>) -> Option<Vector3<f64>> {
     /// Scale of the robust loss at the beginning of the search, about where the cameras expect the vertical, degrees.
     const FIRST_SCALE_DEG: f64 = 8.0;
     /// Scale of the robust loss at its end: about how well plumb lines agree, degrees.

@@ -1,4 +1,4 @@
-//! What the deformation of an overlap says of the turn between two pictures: a range and a best value per edge.
+//! What the deformation of an overlap says of the turn between two photographs: a range and a best value per edge.
 
 use std::f64::consts::{PI, TAU};
 
@@ -68,7 +68,7 @@ impl TurnRange {
 /// What the overlap of a joined pair says of the turn theta_b - theta_a.
 #[derive(Debug, Clone)]
 pub(super) struct OverlapTurns {
-    /// The turns at which one grid edge of the overlap would be parallel to its image in the other picture.
+    /// The turns at which one grid edge of the overlap would be parallel to its image in the other photograph.
     candidates: Vec<f64>,
     /// The range of the candidates; `None` without a warped overlap.
     pub range: Option<TurnRange>,
@@ -89,11 +89,12 @@ impl OverlapTurns {
     }
 }
 
-/// The turns of all edges, weighed: that of `rolls` (of straightened cameras) where the overlap allows it, otherwise the
-/// turn of least line distortion with a weight far smaller.
+/// The turns of all edges, weighed: that of `rolls` (of straightened cameras) where the overlap allows it, otherwise
+/// the turn of least line distortion with a weight far smaller.
 ///
 /// # Source
-/// GSP's three-dimensional prior (Chen and Chuang, Natural Image Stitching with the Global Similarity Prior, section 4).
+/// GSP's three-dimensional prior (Chen and Chuang, Natural Image Stitching with the Global Similarity Prior, section
+/// 4).
 pub(super) fn allowed_turns(input: &PriorInput<'_>, rolls: &[f64]) -> Vec<TurnTerm> {
     input.edges.par_iter().map(|edge| allowed_turn(input, edge, rolls)).collect()
 }
@@ -110,7 +111,8 @@ fn allowed_turn(input: &PriorInput<'_>, edge: &PairMatches, rolls: &[f64]) -> Tu
     }
 }
 
-/// The turns theta_j - theta_i at which a grid edge of the overlap would be parallel to its image in the other picture.
+/// The turns theta_j - theta_i at which a grid edge of the overlap would be parallel to its image in the other
+/// photograph.
 fn overlap_turns(input: &PriorInput<'_>, i: usize, j: usize) -> Vec<f64> {
     let mut turns = Vec::new();
     for warp in input.overlaps {
@@ -142,8 +144,8 @@ fn edge_turns<'a>(grid: &'a GridMesh, warp: &'a OverlapWarp) -> impl Iterator<It
     })
 }
 
-/// The turn of least line distortion: the mean by which segments turn on their way into the other picture, weighed by
-/// length, width and warped length. `None` without a usable segment.
+/// The turn of least line distortion: the mean by which segments turn on their way into the other photograph, weighed
+/// by length, width and warped length. `None` without a usable segment.
 ///
 /// # Departures
 /// Segments are carried by the pair's global homography instead of a moving one: the mean over a whole overlap changes
@@ -171,7 +173,7 @@ fn least_line_distortion(input: &PriorInput<'_>, edge: &PairMatches) -> Option<f
     circular_mean(turns)
 }
 
-/// Whether the segment between two points shares a point with the picture (Liang and Barsky's clipping).
+/// Whether the segment between two points shares a point with the photograph (Liang and Barsky's clipping).
 pub(super) fn crosses(frame: &WorkingFrame, start: Vector2<f64>, end: Vector2<f64>) -> bool {
     let along = end - start;
     // The part of the segment, from 0 to 1, that lies inside every side so far.

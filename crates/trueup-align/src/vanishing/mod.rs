@@ -110,7 +110,7 @@ fn judge(
     })
 }
 
-/// The column whose picture-plane direction is within 45 degrees of the vertical and that is closest to the y axis.
+/// The column whose photograph-plane direction is within 45 degrees of the vertical and that is closest to the y axis.
 fn nearest_to_vertical(triad: &Matrix3<f64>) -> Option<usize> {
     (0..3)
         .filter(|&column| triad[(1, column)].abs() > triad[(0, column)].abs())
