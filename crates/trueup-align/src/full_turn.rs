@@ -53,31 +53,36 @@ pub fn find_cut(cameras: &[Camera], edges: &[GraphEdge], level_from_world: &Matr
     }
     let mut directions: Vec<f64> = yaws.clone();
     directions.sort_by(f64::total_cmp);
-    let candidates = (0..directions.len()).map(|k| {
+    let middles = (0..directions.len()).map(|k| {
         let next = directions.get(k + 1).copied().unwrap_or(directions[0] + TAU);
         wrap_angle(0.5 * (directions[k] + next))
     });
-    let mut best: Option<(bool, usize, f64)> = None;
-    for yaw in candidates {
+    let candidates = middles.map(|yaw| {
         let severed = severed_by(yaw, &yaws, edges);
-        let weight: usize = severed.iter().map(|edge| edge.weight).sum();
-        let torn = !stays_connected(cameras.len(), edges, &severed);
-        let better = best.is_none_or(|(best_torn, best_weight, _)| (torn, weight) < (best_torn, best_weight));
-        if better {
-            best = Some((torn, weight, yaw));
-        }
-    }
-    best.map(|(torn, _, yaw)| {
-        let severed: Vec<(usize, usize)> = severed_by(yaw, &yaws, edges).iter().map(|edge| (edge.a, edge.b)).collect();
-        // A photograph that looks at a pole lies beside every direction; its overlaps say nothing of the turn.
-        let turns_round = |&(a, b): &(usize, usize)| {
-            [a, b].iter().all(|&photograph| is_moderate(viewing_direction(&cameras[photograph], level_from_world)))
-        };
-        let turns = |(a, b): (usize, usize)| (from_cut(yaw, yaws[a]) - from_cut(yaw, yaws[b])).signum();
-        let closing = severed.iter().filter(|pair| !torn && turns_round(pair));
-        let closing = closing.map(|&(a, b)| ClosingPair { a, b, turns: turns((a, b)) }).collect();
-        FullTurnCut { yaw, severed, closing }
-    })
+        let weight = severed.iter().map(|edge| edge.weight).sum();
+        CutCandidate { yaw, torn: !stays_connected(cameras.len(), edges, &severed), weight }
+    });
+    // Of equals the first.
+    let CutCandidate { yaw, torn, .. } = candidates.min_by_key(|candidate| (candidate.torn, candidate.weight))?;
+    let severed = severed_by(yaw, &yaws, edges);
+    // A photograph that looks at a pole lies beside every direction; its overlaps say nothing of the turn.
+    let turns_round = |edge: &&&GraphEdge| {
+        [edge.a, edge.b].iter().all(|&k| is_moderate(viewing_direction(&cameras[k], level_from_world)))
+    };
+    let turns = |edge: &GraphEdge| (from_cut(yaw, yaws[edge.a]) - from_cut(yaw, yaws[edge.b])).signum();
+    let closing = severed.iter().filter(|_| !torn).filter(turns_round);
+    let closing = closing.map(|edge| ClosingPair { a: edge.a, b: edge.b, turns: turns(edge) }).collect();
+    Some(FullTurnCut { yaw, severed: severed.iter().map(|edge| (edge.a, edge.b)).collect(), closing })
+}
+
+/// A direction that a full turn might be cut through.
+#[derive(Debug, Clone, Copy)]
+struct CutCandidate {
+    yaw: f64,
+    /// Whether the photographs fall apart without the overlaps that it severs.
+    torn: bool,
+    /// Matches in all overlaps that it severs.
+    weight: usize,
 }
 
 /// Whether the overlaps lead all the way round: the photographs cannot be laid flat without cutting some.

@@ -10,6 +10,7 @@ mod contradictions;
 mod focal;
 mod observations;
 mod options;
+mod pair_cost;
 mod prior;
 mod refinement;
 mod rotations;
