@@ -15,37 +15,37 @@ use crate::stitch_graph::{GraphEdge, StitchGraph};
 pub struct FullTurnCut {
     /// Direction of the cut in the levelled world, radians from its forward axis towards the right.
     pub yaw: f64,
-    /// Overlapping pairs (a < b) across the cut, sorted: laid flat, their pictures lie a whole turn apart.
+    /// Overlapping pairs (a < b) across the cut, sorted: laid flat, their photographs lie a whole turn apart.
     pub severed: Vec<(usize, usize)>,
-    /// Those of them that can close the turn; empty if the pictures do not hold together without them.
+    /// Those of them that can close the turn; empty if the photographs do not hold together without them.
     pub closing: Vec<ClosingPair>,
 }
 
 /// An overlap across the cut.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ClosingPair {
-    /// First picture.
+    /// First photograph.
     pub a: usize,
-    /// Second picture, greater than the first.
+    /// Second photograph, greater than the first.
     pub b: usize,
-    /// Turns by which the first picture's part of the overlap lies to the right of the second's: 1 or -1.
+    /// Turns by which the first photograph's part of the overlap lies to the right of the second's: 1 or -1.
     pub turns: f64,
 }
 
 impl FullTurnCut {
-    /// Turns by which the part of an overlap in picture `from` lies to the right of that in picture `to`; `None` if the
-    /// two do not close the turn.
+    /// Turns by which the part of an overlap in photograph `from` lies to the right of that in photograph `to`; `None`
+    /// if the two do not close the turn.
     pub fn turns(&self, from: usize, to: usize) -> Option<f64> {
         let pair = self.closing.iter().find(|pair| (pair.a, pair.b) == (from.min(to), from.max(to)))?;
         Some(if from < to { pair.turns } else { -pair.turns })
     }
 }
 
-/// Decides whether the pictures go all the way round, and if so where to cut: through the direction that the weakest
+/// Decides whether the photographs go all the way round, and if so where to cut: through the direction that the weakest
 /// overlaps cross.
 ///
 /// `level_from_world` levels the world (y down). `edges` are the joined pairs of the component. Returns `None` when the
-/// pictures lie flat without tearing: then every overlap can take part.
+/// photographs lie flat without tearing: then every overlap can take part.
 pub fn find_cut(cameras: &[Camera], edges: &[GraphEdge], level_from_world: &Matrix3<f64>) -> Option<FullTurnCut> {
     let yaws: Vec<f64> = cameras.iter().map(|camera| viewing_yaw(camera, level_from_world)).collect();
     if lies_flat(&yaws, edges) {
@@ -53,34 +53,39 @@ pub fn find_cut(cameras: &[Camera], edges: &[GraphEdge], level_from_world: &Matr
     }
     let mut directions: Vec<f64> = yaws.clone();
     directions.sort_by(f64::total_cmp);
-    let candidates = (0..directions.len()).map(|k| {
+    let middles = (0..directions.len()).map(|k| {
         let next = directions.get(k + 1).copied().unwrap_or(directions[0] + TAU);
         wrap_angle(0.5 * (directions[k] + next))
     });
-    let mut best: Option<(bool, usize, f64)> = None;
-    for yaw in candidates {
+    let candidates = middles.map(|yaw| {
         let severed = severed_by(yaw, &yaws, edges);
-        let weight: usize = severed.iter().map(|edge| edge.weight).sum();
-        let torn = !stays_connected(cameras.len(), edges, &severed);
-        let better = best.is_none_or(|(best_torn, best_weight, _)| (torn, weight) < (best_torn, best_weight));
-        if better {
-            best = Some((torn, weight, yaw));
-        }
-    }
-    best.map(|(torn, _, yaw)| {
-        let severed: Vec<(usize, usize)> = severed_by(yaw, &yaws, edges).iter().map(|edge| (edge.a, edge.b)).collect();
-        // A picture that looks at a pole lies beside every direction; its overlaps say nothing of the turn.
-        let turns_round = |&(a, b): &(usize, usize)| {
-            [a, b].iter().all(|&picture| is_moderate(viewing_direction(&cameras[picture], level_from_world)))
-        };
-        let turns = |(a, b): (usize, usize)| (from_cut(yaw, yaws[a]) - from_cut(yaw, yaws[b])).signum();
-        let closing = severed.iter().filter(|pair| !torn && turns_round(pair));
-        let closing = closing.map(|&(a, b)| ClosingPair { a, b, turns: turns((a, b)) }).collect();
-        FullTurnCut { yaw, severed, closing }
-    })
+        let weight = severed.iter().map(|edge| edge.weight).sum();
+        CutCandidate { yaw, torn: !stays_connected(cameras.len(), edges, &severed), weight }
+    });
+    // Of equals the first.
+    let CutCandidate { yaw, torn, .. } = candidates.min_by_key(|candidate| (candidate.torn, candidate.weight))?;
+    let severed = severed_by(yaw, &yaws, edges);
+    // A photograph that looks at a pole lies beside every direction; its overlaps say nothing of the turn.
+    let turns_round = |edge: &&&GraphEdge| {
+        [edge.a, edge.b].iter().all(|&k| is_moderate(viewing_direction(&cameras[k], level_from_world)))
+    };
+    let turns = |edge: &GraphEdge| (from_cut(yaw, yaws[edge.a]) - from_cut(yaw, yaws[edge.b])).signum();
+    let closing = severed.iter().filter(|_| !torn).filter(turns_round);
+    let closing = closing.map(|edge| ClosingPair { a: edge.a, b: edge.b, turns: turns(edge) }).collect();
+    Some(FullTurnCut { yaw, severed: severed.iter().map(|edge| (edge.a, edge.b)).collect(), closing })
 }
 
-/// Whether the overlaps lead all the way round: the pictures cannot be laid flat without cutting some.
+/// A direction that a full turn might be cut through.
+#[derive(Debug, Clone, Copy)]
+struct CutCandidate {
+    yaw: f64,
+    /// Whether the photographs fall apart without the overlaps that it severs.
+    torn: bool,
+    /// Matches in all overlaps that it severs.
+    weight: usize,
+}
+
+/// Whether the overlaps lead all the way round: the photographs cannot be laid flat without cutting some.
 pub(crate) fn goes_round(cameras: &[Camera], edges: &[GraphEdge], level_from_world: &Matrix3<f64>) -> bool {
     let yaws: Vec<f64> = cameras.iter().map(|camera| viewing_yaw(camera, level_from_world)).collect();
     !lies_flat(&yaws, edges)
@@ -102,7 +107,7 @@ fn from_cut(cut: f64, yaw: f64) -> f64 {
     (yaw - cut).rem_euclid(TAU)
 }
 
-/// Whether going the short way along every edge gives each picture one consistent direction.
+/// Whether going the short way along every edge gives each photograph one consistent direction.
 fn lies_flat(yaws: &[f64], edges: &[GraphEdge]) -> bool {
     let mut unwrapped: Vec<Option<f64>> = vec![None; yaws.len()];
     for start in 0..yaws.len() {
@@ -135,9 +140,9 @@ fn severed_by<'a>(cut: f64, yaws: &[f64], edges: &'a [GraphEdge]) -> Vec<&'a Gra
     edges.iter().filter(|edge| (from_cut(cut, yaws[edge.a]) - from_cut(cut, yaws[edge.b])).abs() > PI).collect()
 }
 
-fn stays_connected(pictures: usize, edges: &[GraphEdge], severed: &[&GraphEdge]) -> bool {
+fn stays_connected(photographs: usize, edges: &[GraphEdge], severed: &[&GraphEdge]) -> bool {
     let kept = edges.iter().filter(|edge| !severed.contains(edge));
-    let graph = StitchGraph::from_edges(pictures, kept.copied().collect());
+    let graph = StitchGraph::from_edges(photographs, kept.copied().collect());
     graph.components.len() == 1
 }
 
@@ -151,11 +156,12 @@ mod tests {
         degrees.map(|yaw| Camera::new(600.0, 800.0, 600.0, &rotation_about_y(yaw.to_radians()).transpose())).collect()
     }
 
-    fn chain(pictures: usize, closed: bool, weak: usize) -> Vec<GraphEdge> {
-        let mut edges: Vec<GraphEdge> =
-            (0..pictures - 1).map(|k| GraphEdge { a: k, b: k + 1, weight: if k == weak { 20 } else { 100 } }).collect();
+    fn chain(photographs: usize, closed: bool, weak: usize) -> Vec<GraphEdge> {
+        let mut edges: Vec<GraphEdge> = (0..photographs - 1)
+            .map(|k| GraphEdge { a: k, b: k + 1, weight: if k == weak { 20 } else { 100 } })
+            .collect();
         if closed {
-            edges.push(GraphEdge { a: 0, b: pictures - 1, weight: 90 });
+            edges.push(GraphEdge { a: 0, b: photographs - 1, weight: 90 });
         }
         edges
     }
@@ -172,7 +178,7 @@ mod tests {
         let cameras = row((0..15).map(|k| f64::from(k) * 24.0));
         let cut = find_cut(&cameras, &chain(15, true, 3), &Matrix3::identity()).expect("a full turn");
         assert_eq!(cut.severed, [(3, 4)]);
-        // Picture 3 lies at the right end, picture 4 at the left.
+        // Photograph 3 lies at the right end, photograph 4 at the left.
         assert_eq!(cut.closing, [ClosingPair { a: 3, b: 4, turns: 1.0 }]);
         assert_eq!((cut.turns(3, 4), cut.turns(4, 3), cut.turns(0, 1)), (Some(1.0), Some(-1.0), None));
         assert!((cut.yaw.to_degrees() - 3.5 * 24.0).abs() < 1e-9);
@@ -181,7 +187,7 @@ mod tests {
     fn what_tears_the_turn_and_what_looks_at_a_pole_does_not_close_it() {
         let cameras = row((0..15).map(|k| f64::from(k) * 24.0));
         let mut edges = chain(15, true, 3);
-        // Picture 2 hangs on by its overlap with 15, which looks straight up from the same direction.
+        // Photograph 2 hangs on by its overlap with 15, which looks straight up from the same direction.
         let mut with_zenith = cameras;
         let up = rotation_about_y(60_f64.to_radians()) * rotation_about_x(90_f64.to_radians());
         with_zenith.push(Camera::new(600.0, 800.0, 600.0, &up.transpose()));
@@ -191,7 +197,7 @@ mod tests {
         let cut = find_cut(&with_zenith, &edges, &Matrix3::identity()).expect("a full turn");
         assert!(cut.severed.len() > 1, "{:?}", cut.severed);
         assert!(cut.closing.iter().all(|pair| pair.b < 15) && cut.closing.len() == 1, "{:?}", cut.closing);
-        // Two pictures that overlap on both sides: the turn hangs on one of the overlaps wherever it is cut.
+        // Two photographs that overlap on both sides: the turn hangs on one of the overlaps wherever it is cut.
         let three = row([0.0, 120.0, 240.0].into_iter());
         let edges = [(0, 1), (1, 2), (0, 2)].map(|(a, b)| GraphEdge { a, b, weight: 50 });
         let cut = find_cut(&three, &edges, &Matrix3::identity()).expect("a full turn");

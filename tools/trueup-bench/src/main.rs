@@ -9,6 +9,7 @@ mod paper;
 mod progress;
 mod published_forms;
 mod quality;
+mod random_directions;
 mod report;
 mod results;
 mod roc;

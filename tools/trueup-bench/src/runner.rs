@@ -9,6 +9,7 @@ use trueup::{CancelToken, Error, Inputs, MatchedPhotographs, Reference, Result, 
 
 use crate::measure;
 use crate::progress::Tracker;
+use crate::random_directions::with_random_directions;
 use crate::sets::{ReadySet, SetSpec, central};
 use crate::store::ResultStore;
 use crate::trial::{Row, Trial};
@@ -152,8 +153,13 @@ impl Runner<'_> {
         trial: &Trial,
     ) -> Result<(BTreeMap<String, f64>, String)> {
         let options = trial.options()?;
-        let context = StageContext::new(&Silent, self.cancel);
-        let aligned = Stitcher::new(&options, &context).align_matched(photographs, &inputs_of(ready, trial))?;
+        let context = StageContext::new(&Silent, self.cancel).seeded(trial.seed);
+        let (stitcher, inputs) = (Stitcher::new(&options, &context), inputs_of(ready, trial));
+        let mut aligned = stitcher.align_matched(photographs, &inputs)?;
+        if let Some(found) = aligned.alignments.first().filter(|_| trial.random_directions > 0.0) {
+            let directions = with_random_directions(found.directions(), trial.random_directions, &context);
+            aligned = stitcher.align_along(photographs, &inputs, &directions)?;
+        }
         let first = aligned.alignments.into_iter().next();
         let project = first.ok_or_else(|| Error::input(&trial.set, "nothing was aligned", "Look at the set."))?.project;
         let mut figures = measure::figures(&project, &ready.truth)?;
@@ -238,7 +244,7 @@ mod tests {
         let trials = [
             Trial::new("test", &set.name, "default", &[]),
             Trial::new("test", &set.name, "small working copy", &["stitch.working_pixels=50000"]),
-            Trial { seed: 1, ..Trial::new("test", &set.name, "default", &[]) },
+            Trial { seed: 1, random_directions: 0.5, ..Trial::new("test", &set.name, "default", &[]) },
         ];
         let run = || {
             let store = ResultStore::open(&path, None).expect("opens");
@@ -257,7 +263,7 @@ mod tests {
         assert_eq!(stored.lines().count(), 3);
         let order: Vec<(&str, u64)> = first.iter().map(|row| (row.key.variant.as_str(), row.key.seed)).collect();
         assert_eq!(order, [("default", 0), ("small working copy", 0), ("default", 1)]);
-        assert_eq!(first[0].measure("used"), Some(2.0), "{first:?}");
+        assert_eq!((first[0].measure("used"), first[2].measure("used")), (Some(2.0), Some(2.0)), "{first:?}");
         assert_eq!(run(), first);
         assert_eq!(std::fs::read_to_string(&path).expect("rows"), stored);
         cancel.cancel();

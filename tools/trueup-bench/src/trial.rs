@@ -17,6 +17,8 @@ pub(crate) struct Trial {
     pub variant: String,
     /// Departures from the default options, each `stage.option=value`.
     pub overrides: Vec<String>,
+    /// Share of the vanishing directions that are replaced by random ones, 0 to 1.
+    pub random_directions: f64,
     /// Seed of everything after matching.
     pub seed: u64,
     /// Position of the reference photograph; `None` leaves it to the stitcher.
@@ -37,6 +39,7 @@ impl Trial {
             set: set.to_owned(),
             variant: variant.to_owned(),
             overrides: overrides.iter().map(|one| (*one).to_owned()).collect(),
+            random_directions: 0.0,
             seed: 0,
             reference: None,
             photograph_count: None,
@@ -80,7 +83,7 @@ impl Trial {
             seed: self.seed,
             reference: self.reference,
             photograph_count: self.photograph_count,
-            inputs: fingerprint(&(&self.overrides, set_fingerprint, self.central)),
+            inputs: fingerprint(&(&self.overrides, set_fingerprint, self.central, self.random_directions.to_bits())),
             version: version.to_owned(),
         }
     }

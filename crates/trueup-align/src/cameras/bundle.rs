@@ -8,13 +8,14 @@
 //! The unknown of a focal length is its logarithm, so that steps are relative and the sign is safe.
 
 use faer::linalg::solvers::Solve;
-use nalgebra::{Matrix2x3, Matrix3, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use trueup_core::camera::Camera;
-use trueup_core::geometry::{cross_matrix, exp_rotation, nearest_rotation};
+use trueup_core::geometry::{exp_rotation, nearest_rotation};
 use trueup_core::{Result, StageContext};
 
 use super::observations::{Observations, PairObservations};
+use super::pair_cost::{LOCAL, PairTerm, pair_cost};
 use super::prior::CameraPrior;
 
 /// Most iterations of one pass; it settles long before, unless the data contradict themselves.
@@ -31,11 +32,6 @@ const ESTIMATED_FOCAL_SD: f64 = 0.3;
 /// A focal length within this factor of the shortest believed one was stopped there.
 const STOPPED_SHORT: f64 = 1.001;
 
-/// Unknowns of one pair: rotation of a, rotation of b, log focal length of a, of b.
-const LOCAL: usize = 8;
-type LocalMatrix = SMatrix<f64, LOCAL, LOCAL>;
-type LocalVector = SVector<f64, LOCAL>;
-
 /// The state being refined.
 #[derive(Debug, Clone)]
 pub(super) struct Parameters {
@@ -50,7 +46,7 @@ impl Parameters {
     }
 }
 
-/// Which unknown scales which picture's focal length; `None` holds it fixed.
+/// Which unknown scales which photograph's focal length; `None` holds it fixed.
 pub(super) struct FocalModel {
     pub parameter_of: Vec<Option<usize>>,
     pub parameters: usize,
@@ -66,14 +62,14 @@ impl FocalModel {
         Self { parameter_of, parameters: groups.len() }
     }
 
-    /// One unknown per picture.
-    pub(super) fn per_picture(pictures: usize) -> Self {
-        Self { parameter_of: (0..pictures).map(Some).collect(), parameters: pictures }
+    /// One unknown per photograph.
+    pub(super) fn per_photograph(photographs: usize) -> Self {
+        Self { parameter_of: (0..photographs).map(Some).collect(), parameters: photographs }
     }
 
     /// No unknowns: focal lengths stay as they are.
-    pub(super) fn fixed(pictures: usize) -> Self {
-        Self { parameter_of: vec![None; pictures], parameters: 0 }
+    pub(super) fn fixed(photographs: usize) -> Self {
+        Self { parameter_of: vec![None; photographs], parameters: 0 }
     }
 }
 
@@ -87,12 +83,6 @@ pub(super) struct BundleAdjustment<'a> {
     pub reference: usize,
     /// Standard deviation, relative, of a start focal length that comes from metadata.
     pub known_focal_sd: f64,
-}
-
-/// The quadratic model of one pair's cost.
-struct PairTerm {
-    normal: LocalMatrix,
-    gradient: LocalVector,
 }
 
 impl BundleAdjustment<'_> {
@@ -132,8 +122,8 @@ impl BundleAdjustment<'_> {
         Ok(parameters)
     }
 
-    /// Whether the solution can be used: finite, and no focal length at the short end of its range. (At the long end the
-    /// pictures are merely close to affine, which is harmless.)
+    /// Whether the solution can be used: finite, and no focal length at the short end of its range. (At the long end
+    /// the photographs are merely close to affine, which is harmless.)
     pub(super) fn is_sound(&self, parameters: &Parameters) -> bool {
         parameters.rotations.iter().all(|rotation| rotation.iter().all(|entry| entry.is_finite()))
             && parameters.focal_px.iter().zip(self.priors).all(|(&focal_px, prior)| {
@@ -145,11 +135,11 @@ impl BundleAdjustment<'_> {
         3 * self.priors.len() + model.parameters
     }
 
-    /// Columns of a pair's local unknowns in the global system; `None` is held fixed. The reference picture's rotation
-    /// is fixed: it is the gauge.
+    /// Columns of a pair's local unknowns in the global system; `None` is held fixed. The reference photograph's
+    /// rotation is fixed: it is the gauge.
     fn columns(&self, pair: &PairObservations, model: &FocalModel) -> [Option<usize>; LOCAL] {
-        let rotation = |picture: usize, axis: usize| (picture != self.reference).then_some(3 * picture + axis);
-        let focal = |picture: usize| model.parameter_of[picture].map(|k| 3 * self.priors.len() + k);
+        let rotation = |photograph: usize, axis: usize| (photograph != self.reference).then_some(3 * photograph + axis);
+        let focal = |photograph: usize| model.parameter_of[photograph].map(|k| 3 * self.priors.len() + k);
         std::array::from_fn(|local| match local {
             0..3 => rotation(pair.a, local),
             3..6 => rotation(pair.b, local - 3),
@@ -158,7 +148,7 @@ impl BundleAdjustment<'_> {
         })
     }
 
-    /// Pull of the focal lengths towards their start values: (ln f - ln f0) / sd, one per picture with a free one.
+    /// Pull of the focal lengths towards their start values: (ln f - ln f0) / sd, one per photograph with a free one.
     fn focal_prior(&self, parameters: &Parameters, model: &FocalModel) -> Vec<(usize, f64, f64)> {
         (0..self.priors.len())
             .filter_map(|k| {
@@ -189,7 +179,7 @@ impl BundleAdjustment<'_> {
         let mut normal = faer::Mat::<f64>::zeros(unknowns, unknowns);
         let mut gradient = faer::Mat::<f64>::zeros(unknowns, 1);
         let terms: Vec<PairTerm> =
-            self.observations.pairs.par_iter().map(|pair| pair_term(&cameras, pair, huber_px)).collect();
+            self.observations.pairs.par_iter().map(|pair| PairTerm::new(&cameras, pair, huber_px)).collect();
         for (pair, term) in self.observations.pairs.iter().zip(&terms) {
             let columns = self.columns(pair, model);
             for (local_row, row) in columns.iter().enumerate() {
@@ -236,97 +226,6 @@ fn solve_damped(normal: &faer::Mat<f64>, gradient: &faer::Mat<f64>, damping: f64
     (0..step.nrows()).all(|k| step[(k, 0)].is_finite()).then_some(step)
 }
 
-/// Huber's loss, quadratic up to the limit: rho and the weight rho'(e)/(2 e).
-fn huber(error: f64, limit: f64) -> (f64, f64) {
-    if error <= limit { (error * error, 1.0) } else { (limit * (2.0 * error - limit), limit / error) }
-}
-
-fn pair_cost(cameras: &[Camera], pair: &PairObservations, huber_px: f64) -> f64 {
-    let (a, b) = (&cameras[pair.a], &cameras[pair.b]);
-    let b_from_a = b.rotation() * a.rotation().transpose();
-    let a_from_b = b_from_a.transpose();
-    // A match behind a camera costs as much as one a picture away: it must not look free.
-    let behind = huber(b.principal_point[0].hypot(b.principal_point[1]) * 2.0, huber_px).0;
-    let one_way = |from: &Camera, to: &Camera, turn: &Matrix3<f64>, source: [f64; 2], target: [f64; 2]| {
-        to.project(turn * from.bearing(Vector2::from(source)))
-            .map_or(behind, |place| huber((Vector2::from(target) - place).norm(), huber_px).0)
-    };
-    pair.matches
-        .iter()
-        .map(|m| one_way(a, b, &b_from_a, m.in_a, m.in_b) + one_way(b, a, &a_from_b, m.in_b, m.in_a))
-        .sum()
-}
-
-fn pair_term(cameras: &[Camera], pair: &PairObservations, huber_px: f64) -> PairTerm {
-    let (a, b) = (&cameras[pair.a], &cameras[pair.b]);
-    let b_from_a = b.rotation() * a.rotation().transpose();
-    let a_from_b = b_from_a.transpose();
-    let mut term = PairTerm { normal: LocalMatrix::zeros(), gradient: LocalVector::zeros() };
-    let there = Transfer {
-        from: a,
-        to: b,
-        to_from_from: &b_from_a,
-        columns: TransferColumns { from_rotation: 0, to_rotation: 3, from_focal: 6, to_focal: 7 },
-    };
-    let back = Transfer {
-        from: b,
-        to: a,
-        to_from_from: &a_from_b,
-        columns: TransferColumns { from_rotation: 3, to_rotation: 0, from_focal: 7, to_focal: 6 },
-    };
-    for one in &pair.matches {
-        there.accumulate(&mut term, one.in_a, one.in_b, huber_px);
-        back.accumulate(&mut term, one.in_b, one.in_a, huber_px);
-    }
-    term
-}
-
-/// Where a transfer's unknowns are among the eight of its pair; rotations take three columns.
-struct TransferColumns {
-    from_rotation: usize,
-    to_rotation: usize,
-    from_focal: usize,
-    to_focal: usize,
-}
-
-/// One direction of a pair: points of `from` are carried into `to`.
-struct Transfer<'a> {
-    from: &'a Camera,
-    to: &'a Camera,
-    /// Rotation from the frame of `from` to that of `to`.
-    to_from_from: &'a Matrix3<f64>,
-    columns: TransferColumns,
-}
-
-impl Transfer<'_> {
-    /// Adds the linearized residual of a match of `source` with `target`.
-    fn accumulate(&self, term: &mut PairTerm, source: [f64; 2], target: [f64; 2], huber_px: f64) {
-        let Self { from, to, to_from_from, columns } = self;
-        let bearing = from.bearing(Vector2::from(source));
-        let arrived = *to_from_from * bearing;
-        let Some(place) = to.project(arrived) else { return };
-        let residual = Vector2::from(target) - place;
-        let weight = huber(residual.norm(), huber_px).1;
-
-        let (inverse_depth, focal_px) = (1.0 / arrived.z, to.focal_px);
-        let projection = Matrix2x3::new(1.0, 0.0, -arrived.x * inverse_depth, 0.0, 1.0, -arrived.y * inverse_depth)
-            * (focal_px * inverse_depth);
-        // residual = target - projection(arrived), hence the minus signs.
-        let by_to_rotation = projection * cross_matrix(&arrived);
-        let by_from_rotation = -(projection * *to_from_from * cross_matrix(&bearing));
-        let by_from_focal = projection * *to_from_from * Vector3::new(bearing.x, bearing.y, 0.0);
-        let by_to_focal = -(place - Vector2::from(to.principal_point));
-
-        let mut jacobian = SMatrix::<f64, 2, LOCAL>::zeros();
-        jacobian.fixed_columns_mut::<3>(columns.from_rotation).copy_from(&by_from_rotation);
-        jacobian.fixed_columns_mut::<3>(columns.to_rotation).copy_from(&by_to_rotation);
-        jacobian.column_mut(columns.from_focal).copy_from(&by_from_focal);
-        jacobian.column_mut(columns.to_focal).copy_from(&by_to_focal);
-        term.normal += jacobian.transpose() * jacobian * weight;
-        term.gradient += jacobian.transpose() * residual * weight;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use trueup_core::matches::PointMatch;
@@ -352,7 +251,7 @@ mod tests {
             reference: 0,
             known_focal_sd: 0.1,
         };
-        let model = FocalModel::per_picture(2);
+        let model = FocalModel::per_photograph(2);
         let at = Parameters {
             focal_px: vec![510.0, 505.0],
             rotations: vec![Matrix3::identity(), exp_rotation(&Vector3::new(0.05, -0.35, 0.1))],

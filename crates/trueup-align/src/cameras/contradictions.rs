@@ -11,8 +11,8 @@ const KEPT_WHERE_CLOSING: f64 = 2.0;
 
 /// Pairs (ascending positions) whose residual is above `max_rms_px`, worst first as long as the rest stays connected.
 ///
-/// Where that would open a full turn, pairs that close it are kept unless they are far too bad: what they contradict by is
-/// then mostly what the turn tells of the focal length, which no other pair tells as well.
+/// Where that would open a full turn, pairs that close it are kept unless they are far too bad: what they contradict by
+/// is then mostly what the turn tells of the focal length, which no other pair tells as well.
 pub(super) fn contradicting_pairs(
     cameras: &[Camera],
     pairs: &[PairMatches],

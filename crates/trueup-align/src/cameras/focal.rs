@@ -83,8 +83,8 @@ fn better_root(first: Quotient, second: Quotient) -> Option<f64> {
 
 /// A focal length for every photograph: from metadata where there is any, else from the photographs.
 ///
-/// Photographs without metadata get a common value (relative to their diagonal), found by trying a range of values and the
-/// homographies' own estimates and keeping the one under which rotations explain the matches best.
+/// Photographs without metadata get a common value (relative to their diagonal), found by trying a range of values and
+/// the homographies' own estimates and keeping the one under which rotations explain the matches best.
 pub(super) fn initial_focal_lengths(
     priors: &[CameraPrior],
     pairs: &[&PairMatches],

@@ -1,15 +1,16 @@
 //! Focal lengths and rotations of the photographs of one component: the paper's R_i.
 //!
-//! Start values come from metadata, from the pair homographies and from a search over a common focal length
-//! (`focal`); rotations from the spanning tree and from averaging over all edges (`rotations`); both are refined
-//! together by bundle adjustment (`bundle`), from coarse to fine (`refinement`); pairs that then contradict the others are
-//! set aside (`contradictions`).
+//! Start values come from metadata, from the pair homographies and from a search over a common focal length (`focal`);
+//! rotations from the spanning tree and from averaging over all edges (`rotations`); both are refined together by
+//! bundle adjustment (`bundle`), from coarse to fine (`refinement`); pairs that then contradict the others are set
+//! aside (`contradictions`).
 
 mod bundle;
 mod contradictions;
 mod focal;
 mod observations;
 mod options;
+mod pair_cost;
 mod prior;
 mod refinement;
 mod rotations;
@@ -43,9 +44,9 @@ pub struct CameraInput<'a> {
 /// The cameras of one component.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Cameras {
-    /// One camera per picture, in working pixels; the reference picture's rotation is the identity.
+    /// One camera per photograph, in working pixels; the reference photograph's rotation is the identity.
     pub cameras: Vec<Camera>,
-    /// Whether every picture has a focal length of its own.
+    /// Whether every photograph has a focal length of its own.
     pub per_picture_focal: bool,
     /// Root mean square residual of each pair in working pixels, in the order of the pairs given.
     pub pair_rms_px: Vec<f64>,
@@ -55,12 +56,12 @@ pub struct Cameras {
 
 /// Finds the cameras of the photographs that the pairs connect.
 ///
-/// Everything is solved relative to the central photograph and turned in the end, so that the shape does not depend on the
-/// reference: a solution that starts from another photograph may end in another local minimum where parallax leaves
+/// Everything is solved relative to the central photograph and turned in the end, so that the shape does not depend on
+/// the reference: a solution that starts from another photograph may end in another local minimum where parallax leaves
 /// several.
 ///
-/// A focal length that metadata or photographs get wrong never ends the run: non-finite or absurd results are replaced by a
-/// solution with the focal lengths fixed to their median, and a diagnostic says so.
+/// A focal length that metadata or photographs get wrong never ends the run: non-finite or absurd results are replaced
+/// by a solution with the focal lengths fixed to their median, and a diagnostic says so.
 ///
 /// # Errors
 /// [`trueup_core::Error::Cancelled`].
@@ -69,9 +70,9 @@ pub struct Cameras {
 /// Brown and Lowe, "Automatic panoramic image stitching using invariant features" (2007), section 4.
 ///
 /// # Departures
-/// Pictures are not added one at a time: averaging the relative rotations over all edges first gives a start from which
-/// all cameras can be refined together, at a fraction of the cost. Focal lengths are shared within a camera unless the
-/// data contradict it, which keeps short rows from drifting.
+/// Photographs are not added one at a time: averaging the relative rotations over all edges first gives a start from
+/// which all cameras can be refined together, at a fraction of the cost. Focal lengths are shared within a camera
+/// unless the data contradict it, which keeps short rows from drifting.
 pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageContext) -> Result<Cameras> {
     let CameraInput { priors, pairs, reference } = *input;
     let everything: Vec<usize> = (0..priors.len()).collect();

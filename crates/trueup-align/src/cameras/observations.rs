@@ -44,7 +44,7 @@ impl Observations {
     }
 }
 
-/// At most `limit` matches, taken in turns from the cells of a grid over picture a, in their given order.
+/// At most `limit` matches, taken in turns from the cells of a grid over photograph a, in their given order.
 fn spread_evenly(matches: &[PointMatch], prior: &CameraPrior, limit: usize) -> Vec<PointMatch> {
     if matches.len() <= limit {
         return matches.to_vec();

@@ -12,8 +12,8 @@ use super::prior::CameraPrior;
 const COARSE_HUBER_PX: f64 = 20.0;
 /// The same in the final pass, working pixels: a few times the error of a match.
 const FINE_HUBER_PX: f64 = 2.0;
-/// Relative spread of separately estimated focal lengths above which [`FocalSharing::Auto`] lets every photograph have its
-/// own.
+/// Relative spread of separately estimated focal lengths above which [`FocalSharing::Auto`] lets every photograph have
+/// its own.
 const ZOOM_SPREAD: f64 = 0.03;
 
 /// What to refine: the photographs, what was observed of them and which of them the others turn about.
@@ -55,7 +55,7 @@ pub(super) fn refine(
     };
     // Start values that already differ (metadata of a zoom) keep their ratios inside a shared model.
     let shared = FocalModel::shared(priors);
-    let own = FocalModel::per_picture(priors.len());
+    let own = FocalModel::per_photograph(priors.len());
     let mut per_picture_focal = options.focal_sharing == FocalSharing::PerPicture;
     let first_model = if per_picture_focal { &own } else { &shared };
 
@@ -87,7 +87,7 @@ fn with_common_focal(problem: &BundleAdjustment<'_>, start: &Parameters, context
 }
 
 /// The largest robust spread, within a group, of the ratio of free to shared focal lengths: half the range between the
-/// quartile-like order statistics, which one runaway picture cannot move.
+/// quartile-like order statistics, which one runaway photograph cannot move.
 fn focal_spread(shared: &FocalModel, shared_focal: &[f64], free_focal: &[f64]) -> f64 {
     let mut spread: f64 = 0.0;
     for group in 0..shared.parameters {

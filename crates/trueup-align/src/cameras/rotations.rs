@@ -63,7 +63,7 @@ pub(super) fn average(
     const SETTLED: f64 = 1e-6;
     /// Errors below this (radians) are noise and are averaged plainly.
     const NOISE: f64 = 2e-3;
-    let count = graph.pictures;
+    let count = graph.photographs;
     let mut neighbors: Vec<Vec<(usize, Matrix3<f64>, f64)>> = vec![Vec::new(); count];
     for (pair, rotation) in pairs.iter().zip(relative) {
         let weight = pair.agreeing as f64;

@@ -1,9 +1,9 @@
-//! What the segments of a picture say against its camera: turns of single cameras.
+//! What the segments of a photograph say against its camera: turns of single cameras.
 //!
-//! With parallax the matches of an overlap turn cameras by a fraction of a degree, a little differently at every overlap.
-//! The vertical and horizontal segments of a picture feel no parallax. Once the scene's frame is known, every camera is
-//! turned so that its own segments point to the frame's directions, as far as its overlaps allow: both are weighed by
-//! what they leave uncertain.
+//! With parallax the matches of an overlap turn cameras by a fraction of a degree, a little differently at every
+//! overlap. The vertical and horizontal segments of a photograph feel no parallax. Once the scene's frame is known,
+//! every camera is turned so that its own segments point to the frame's directions, as far as its overlaps allow: both
+//! are weighed by what they leave uncertain.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 use trueup_core::camera::Camera;
@@ -12,8 +12,9 @@ use trueup_core::matches::PairMatches;
 
 use super::joint::{AxisWeights, LineVote, scales};
 
-/// Where there is parallax, a relative rotation absorbs most of it: the mean of the reciprocal depths of an overlap, which
-/// acts like a rotation about the picture's axes, is several times their spread, which is what remains to be seen.
+/// Where there is parallax, a relative rotation absorbs most of it: the mean of the reciprocal depths of an overlap,
+/// which acts like a rotation about the photograph's axes, is several times their spread, which is what remains to be
+/// seen.
 const ABSORBED_ACROSS: f64 = 4.0;
 /// The same for the rotation about the viewing direction, which parallax resembles less.
 const ABSORBED_ALONG: f64 = 1.5;
@@ -66,7 +67,7 @@ struct Variance {
     parallax: f64,
 }
 
-/// The deviations of an overlap's matches from the cameras, summed per region of the first picture.
+/// The deviations of an overlap's matches from the cameras, summed per region of the first photograph.
 struct Deviations {
     /// Number and sum of the deviations of every region.
     regions: Vec<(usize, Vector2<f64>)>,
@@ -75,7 +76,7 @@ struct Deviations {
 }
 
 impl Deviations {
-    /// Regions along each side of a picture.
+    /// Regions along each side of a photograph.
     const REGIONS: usize = 8;
 
     fn of(a: &Camera, b: &Camera, edge: &PairMatches) -> Self {
@@ -118,9 +119,9 @@ impl Deviations {
 /// directions in it.
 ///
 /// Minimizes sum over segments of weight (Geman-McClure) (residual / [`LINE_ERROR_PX`])^2 plus sum over overlaps of
-/// (w_i - w_j)^T information (w_i - w_j) over turns w_i in the common frame that sum to zero, by reweighted Gauss-Newton
-/// steps from a coarse to a fine scale of the loss. A turn of all cameras together is not sought: `frame` is the segments'
-/// own choice for these.
+/// (w_i - w_j)^T information (w_i - w_j) over turns w_i in the common frame that sum to zero, by reweighted
+/// Gauss-Newton steps from a coarse to a fine scale of the loss. A turn of all cameras together is not sought: `frame`
+/// is the segments' own choice for these.
 pub(super) fn corrected_rotations(
     rotations: &[Matrix3<f64>],
     certainties: &[RelativeCertainty],
@@ -208,8 +209,8 @@ mod tests {
     }
 
     /// By hand: regions that deviate by 2 px to alternating sides have a variance of 4 square pixels and no noise;
-    /// matches that deviate by 2 px to alternating sides inside every region have 128 x 4 square pixels on 64 degrees of
-    /// freedom, 8, over 128 matches.
+    /// matches that deviate by 2 px to alternating sides inside every region have 128 x 4 square pixels on 64 degrees
+    /// of freedom, 8, over 128 matches.
     #[test]
     fn regions_show_parallax_and_their_insides_show_noise() {
         let camera = still();
@@ -258,7 +259,7 @@ mod tests {
         assert!(given > 0.5 && corrected < 0.2, "{corrected} and {given} degrees");
     }
 
-    /// All segments of one picture are turned by half a degree against what its overlaps know for certain.
+    /// All segments of one photograph are turned by half a degree against what its overlaps know for certain.
     #[test]
     fn segments_do_not_turn_cameras_that_overlaps_are_sure_of() {
         let mut scene = sweep(0.0);

@@ -1,4 +1,4 @@
-//! The scene's dominant directions: the frame that most pictures' vanishing directions agree on.
+//! The scene's dominant directions: the frame that most photographs' vanishing directions agree on.
 
 use nalgebra::{Matrix3, Vector3};
 use rand::Rng;
@@ -7,9 +7,9 @@ use trueup_core::geometry::{exp_rotation, nearest_rotation};
 
 use super::signed_permutation::{match_triad, triad_residual};
 
-/// Largest |cosine| of two directions of different pictures that count as orthogonal: sin 10 degrees.
+/// Largest |cosine| of two directions of different photographs that count as orthogonal: sin 10 degrees.
 const ORTHOGONAL: f64 = 0.173_648_177_666_930_33;
-/// Two directions of one picture whose cross product is shorter than this are no pair.
+/// Two directions of one photograph whose cross product is shorter than this are no pair.
 const MIN_CROSS: f64 = 0.5;
 /// Hypotheses, by cost, that are refined.
 const REFINED: usize = 20;
@@ -20,26 +20,26 @@ const MAX_CROSS_PAIRS: usize = 2000;
 /// Step in radians below which the refinement has converged.
 const CONVERGED: f64 = 1e-9;
 
-/// The dominant frame and how well each picture fits.
+/// The dominant frame and how well each photograph fits.
 #[derive(Debug, Clone)]
 pub(super) struct Dominant {
     /// Columns are the dominant directions in the common frame; a rotation.
     pub frame: Matrix3<f64>,
-    /// Per picture the sum of squared distances of its matched directions; `None` without a triad.
+    /// Per photograph the sum of squared distances of its matched directions; `None` without a triad.
     pub residuals: Vec<Option<f64>>,
 }
 
 /// The frame of least truncated cost sum_i min(r_i, `cut`); `None` without any triad.
 ///
-/// `triads`: per picture the directions as columns in one common frame. At most
+/// `triads`: per photograph the directions as columns in one common frame. At most
 /// [`MAX_CROSS_PAIRS`] hypotheses that join directions of two photographs are tried beside three per photograph.
 ///
 /// # Source
 /// The paper's eq. 3 and 4.
 ///
 /// # Departures
-/// The cost is truncated at the rejection threshold: the plain sum is moved by outliers, by 2 to 6 degrees with 10 to 60
-/// per cent of them. Order and sign of the directions are free ([`match_triad`]).
+/// The cost is truncated at the rejection threshold: the plain sum is moved by outliers, by 2 to 6 degrees with 10 to
+/// 60 per cent of them. Order and sign of the directions are free ([`match_triad`]).
 pub(super) fn dominant_frame(triads: &[Option<Matrix3<f64>>], cut: f64, generator: &mut impl Rng) -> Option<Dominant> {
     let present: Vec<Matrix3<f64>> = triads.iter().flatten().copied().collect();
     let mut ranked: Vec<(f64, Matrix3<f64>)> = Vec::new();
@@ -65,8 +65,8 @@ pub(super) fn dominant_frame(triads: &[Option<Matrix3<f64>>], cut: f64, generato
 fn hypotheses(present: &[Matrix3<f64>], generator: &mut impl Rng) -> Vec<Matrix3<f64>> {
     let direction = |index: usize| -> Vector3<f64> { present[index / 3].column(index % 3).into_owned() };
     let mut pairs: Vec<(usize, usize)> = Vec::with_capacity(3 * present.len() + MAX_CROSS_PAIRS);
-    for picture in 0..present.len() {
-        pairs.extend([(0, 1), (1, 2), (2, 0)].map(|(a, b)| (3 * picture + a, 3 * picture + b)));
+    for photograph in 0..present.len() {
+        pairs.extend([(0, 1), (1, 2), (2, 0)].map(|(a, b)| (3 * photograph + a, 3 * photograph + b)));
     }
     let mut across = Vec::new();
     for a in 0..3 * present.len() {
@@ -104,7 +104,7 @@ fn cost(frame: &Matrix3<f64>, present: &[Matrix3<f64>], cut: f64) -> f64 {
     present.iter().map(|triad| triad_residual(frame, triad).min(cut)).sum()
 }
 
-/// Least squares over the pictures whose residual is at most `cut`, re-assigned in every step.
+/// Least squares over the photographs whose residual is at most `cut`, re-assigned in every step.
 ///
 /// # Source
 /// The Gauss-Newton step of eq. 4 for a right perturbation D exp([d]x): d = 1/(2n) sum_i sum_k e_k x (D^T b_k).

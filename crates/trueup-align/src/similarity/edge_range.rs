@@ -1,4 +1,4 @@
-//! What the deformation of an overlap says of the turn between two pictures: a range and a best value per edge.
+//! What the deformation of an overlap says of the turn between two photographs: a range and a best value per edge.
 
 use std::f64::consts::{PI, TAU};
 
@@ -33,7 +33,7 @@ pub(super) struct TurnRange {
 
 impl TurnRange {
     /// The shortest arc that holds all of `turns`; `None` without any.
-    pub fn around(turns: &[f64]) -> Option<Self> {
+    pub(super) fn around(turns: &[f64]) -> Option<Self> {
         let mut sorted: Vec<f64> = turns.iter().copied().filter(|turn| turn.is_finite()).map(wrap_angle).collect();
         sorted.sort_by(f64::total_cmp);
         let (&first, &last) = (sorted.first()?, sorted.last()?);
@@ -48,19 +48,19 @@ impl TurnRange {
     }
 
     /// Whether the range holds `turn`.
-    pub fn contains(&self, turn: f64) -> bool {
+    pub(super) fn contains(&self, turn: f64) -> bool {
         /// Slack for turns that were computed on two ways, radians.
         const ROUNDING: f64 = 1e-9;
         self.contains_within(turn, ROUNDING)
     }
 
     /// The range of the turns the other way.
-    pub fn reversed(&self) -> Self {
+    pub(super) fn reversed(&self) -> Self {
         Self { start: -self.start - self.extent, extent: self.extent }
     }
 
     /// Whether the range, longer by `slack` (radians) at both ends, holds `turn`.
-    pub fn contains_within(&self, turn: f64, slack: f64) -> bool {
+    pub(super) fn contains_within(&self, turn: f64, slack: f64) -> bool {
         self.extent >= PI || (turn - self.start + slack).rem_euclid(TAU) <= self.extent + 2.0 * slack
     }
 }
@@ -68,7 +68,7 @@ impl TurnRange {
 /// What the overlap of a joined pair says of the turn theta_b - theta_a.
 #[derive(Debug, Clone)]
 pub(super) struct OverlapTurns {
-    /// The turns at which one grid edge of the overlap would be parallel to its image in the other picture.
+    /// The turns at which one grid edge of the overlap would be parallel to its image in the other photograph.
     candidates: Vec<f64>,
     /// The range of the candidates; `None` without a warped overlap.
     pub range: Option<TurnRange>,
@@ -76,7 +76,7 @@ pub(super) struct OverlapTurns {
 
 impl OverlapTurns {
     /// Asks the grid edges of both directions.
-    pub fn of(input: &PriorInput<'_>, edge: &PairMatches) -> Self {
+    pub(super) fn of(input: &PriorInput<'_>, edge: &PairMatches) -> Self {
         let candidates = overlap_turns(input, edge.a, edge.b);
         let range = TurnRange::around(&candidates);
         Self { candidates, range }
@@ -84,16 +84,17 @@ impl OverlapTurns {
 
     /// The turn of least line distortion, or the middle candidate where no segment crosses the overlap; `None` without
     /// either.
-    pub fn best(&self, input: &PriorInput<'_>, edge: &PairMatches) -> Option<f64> {
+    pub(super) fn best(&self, input: &PriorInput<'_>, edge: &PairMatches) -> Option<f64> {
         least_line_distortion(input, edge).or_else(|| circular_median(&self.candidates))
     }
 }
 
-/// The turns of all edges, weighed: that of `rolls` (of straightened cameras) where the overlap allows it, otherwise the
-/// turn of least line distortion with a weight far smaller.
+/// The turns of all edges, weighed: that of `rolls` (of straightened cameras) where the overlap allows it, otherwise
+/// the turn of least line distortion with a weight far smaller.
 ///
 /// # Source
-/// GSP's three-dimensional prior (Chen and Chuang, Natural Image Stitching with the Global Similarity Prior, section 4).
+/// GSP's three-dimensional prior (Chen and Chuang, Natural Image Stitching with the Global Similarity Prior, section
+/// 4).
 pub(super) fn allowed_turns(input: &PriorInput<'_>, rolls: &[f64]) -> Vec<TurnTerm> {
     input.edges.par_iter().map(|edge| allowed_turn(input, edge, rolls)).collect()
 }
@@ -110,7 +111,8 @@ fn allowed_turn(input: &PriorInput<'_>, edge: &PairMatches, rolls: &[f64]) -> Tu
     }
 }
 
-/// The turns theta_j - theta_i at which a grid edge of the overlap would be parallel to its image in the other picture.
+/// The turns theta_j - theta_i at which a grid edge of the overlap would be parallel to its image in the other
+/// photograph.
 fn overlap_turns(input: &PriorInput<'_>, i: usize, j: usize) -> Vec<f64> {
     let mut turns = Vec::new();
     for warp in input.overlaps {
@@ -142,8 +144,8 @@ fn edge_turns<'a>(grid: &'a GridMesh, warp: &'a OverlapWarp) -> impl Iterator<It
     })
 }
 
-/// The turn of least line distortion: the mean by which segments turn on their way into the other picture, weighed by
-/// length, width and warped length. `None` without a usable segment.
+/// The turn of least line distortion: the mean by which segments turn on their way into the other photograph, weighed
+/// by length, width and warped length. `None` without a usable segment.
 ///
 /// # Departures
 /// Segments are carried by the pair's global homography instead of a moving one: the mean over a whole overlap changes
@@ -171,7 +173,7 @@ fn least_line_distortion(input: &PriorInput<'_>, edge: &PairMatches) -> Option<f
     circular_mean(turns)
 }
 
-/// Whether the segment between two points shares a point with the picture (Liang and Barsky's clipping).
+/// Whether the segment between two points shares a point with the photograph (Liang and Barsky's clipping).
 pub(super) fn crosses(frame: &WorkingFrame, start: Vector2<f64>, end: Vector2<f64>) -> bool {
     let along = end - start;
     // The part of the segment, from 0 to 1, that lies inside every side so far.

@@ -1,9 +1,9 @@
-//! The frame that the segments of all pictures vote for together, and whether the vote could be chance.
+//! The frame that the segments of all photographs vote for together, and whether the vote could be chance.
 //!
-//! A picture with a handful of segments has no triad of its own, or a wrong one; seen through the cameras, the segments
-//! of all pictures are one set on one sphere. Every level or tilted frame near the cameras' own vertical is scored on
-//! them. Where the scene has dominant directions, one frame stands out from all the others; where it has none, the best
-//! is a little better than the rest.
+//! A photograph with a handful of segments has no triad of its own, or a wrong one; seen through the cameras, the
+//! segments of all photographs are one set on one sphere. Every level or tilted frame near the cameras' own vertical is
+//! scored on them. Where the scene has dominant directions, one frame stands out from all the others; where it has
+//! none, the best is a little better than the rest.
 
 use std::f64::consts::FRAC_PI_2;
 

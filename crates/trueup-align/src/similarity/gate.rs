@@ -5,9 +5,9 @@ use super::options::{GateMode, SimilarityOptions};
 /// What the gate judges.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GateEvidence {
-    /// Number of pictures, those without a triad included.
-    pub pictures: usize,
-    /// Pictures whose triad fits the dominant frame.
+    /// Number of photographs, those without a triad included.
+    pub photographs: usize,
+    /// Photographs whose triad fits the dominant frame.
     pub inliers: usize,
     /// The divergence epsilon.
     pub divergence: f64,
@@ -20,9 +20,9 @@ pub(super) struct GateEvidence {
 }
 
 /// Largest number of photographs among which unrelated directions can agree by chance.
-const VERY_FEW_PICTURES: usize = 3;
+const VERY_FEW_PHOTOGRAPHS: usize = 3;
 /// Largest number of photographs that counts as few.
-const FEW_PICTURES: usize = 6;
+const FEW_PHOTOGRAPHS: usize = 6;
 /// Least share of agreeing photographs with few of them ...
 const MIN_INLIER_SHARE_FEW: f64 = 0.6;
 /// ... and with more.
@@ -35,19 +35,19 @@ pub(super) const MAX_STRAIGHTENING_ANGLE_DEG: f64 = 20.0;
 /// Largest median roll of the agreeing photographs, degrees.
 const MAX_MEDIAN_ROLL_DEG: f64 = 45.0;
 
-/// The largest divergence that is believed with this many pictures.
+/// The largest divergence that is believed with this many photographs.
 ///
 /// # Departures
-/// The paper has one threshold. Two or three unrelated triads meet within it once in ten times; the chance falls with the
-/// cube of the angle they must meet within, so that very few pictures have to agree more closely.
-pub(super) fn allowed_divergence(pictures: usize, options: &SimilarityOptions) -> f64 {
+/// The paper has one threshold. Two or three unrelated triads meet within it once in ten times; the chance falls with
+/// the cube of the angle they must meet within, so that very few photographs have to agree more closely.
+pub(super) fn allowed_divergence(photographs: usize, options: &SimilarityOptions) -> f64 {
     match options.gate {
-        GateMode::Full if pictures <= VERY_FEW_PICTURES => options.max_divergence.min(options.max_divergence_few),
+        GateMode::Full if photographs <= VERY_FEW_PHOTOGRAPHS => options.max_divergence.min(options.max_divergence_few),
         _ => options.max_divergence,
     }
 }
 
-/// The divergence of the vanishing directions: the mean residual of the inliers over their share of the pictures.
+/// The divergence of the vanishing directions: the mean residual of the inliers over their share of the photographs.
 ///
 /// Infinite without inliers.
 ///
@@ -55,36 +55,36 @@ pub(super) fn allowed_divergence(pictures: usize, options: &SimilarityOptions) -
 /// The paper's eq. 15.
 ///
 /// # Departures
-/// The paper does not say what its sum is divided by; the mean per picture alone puts its threshold 0.10 between scenes
-/// with and without dominant directions.
-pub(super) fn divergence(inlier_residuals: &[f64], pictures: usize) -> f64 {
+/// The paper does not say what its sum is divided by; the mean per photograph alone puts its threshold 0.10 between
+/// scenes with and without dominant directions.
+pub(super) fn divergence(inlier_residuals: &[f64], photographs: usize) -> f64 {
     if inlier_residuals.is_empty() {
         return f64::INFINITY;
     }
     let count = inlier_residuals.len() as f64;
-    let share = count / pictures as f64;
+    let share = count / photographs as f64;
     inlier_residuals.iter().sum::<f64>() / count / share
 }
 
 /// The first clause that fails, in words; `None` if the guidance is accepted.
 ///
 /// # Departures
-/// The paper has clause (a) alone, which cannot tell with few pictures: one picture always fits its own triad.
+/// The paper has clause (a) alone, which cannot tell with few photographs: one photograph always fits its own triad.
 /// [`GateMode::Paper`] keeps to it.
 pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions) -> Option<String> {
-    let GateEvidence { pictures, inliers, divergence, straightening_angle, significance, median_roll } = *evidence;
+    let GateEvidence { photographs, inliers, divergence, straightening_angle, significance, median_roll } = *evidence;
     // Not-a-number fails.
-    let allowed = allowed_divergence(pictures, options);
+    let allowed = allowed_divergence(photographs, options);
     if divergence.is_nan() || divergence > allowed {
         return Some(format!("the vanishing directions diverge by {divergence:.3} ({allowed:.3} allowed)"));
     }
     if options.gate == GateMode::Paper {
         return None;
     }
-    let share = if pictures <= FEW_PICTURES { MIN_INLIER_SHARE_FEW } else { MIN_INLIER_SHARE };
-    let needed = ((share * pictures as f64).ceil() as usize).max(2);
+    let share = if photographs <= FEW_PHOTOGRAPHS { MIN_INLIER_SHARE_FEW } else { MIN_INLIER_SHARE };
+    let needed = ((share * photographs as f64).ceil() as usize).max(2);
     if inliers < needed {
-        return Some(format!("{inliers} of {pictures} pictures agree on the dominant directions ({needed} needed)"));
+        return Some(format!("{inliers} of {photographs} pictures agree on the dominant directions ({needed} needed)"));
     }
     let needed = CONFIRMING_SIGNIFICANCE;
     if let Some(significance) = significance.filter(|&significance| significance < needed) {

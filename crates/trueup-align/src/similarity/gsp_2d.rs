@@ -1,4 +1,4 @@
-//! The global similarity prior in two dimensions: pictures that their overlaps let be upright are.
+//! The global similarity prior in two dimensions: photographs that their overlaps let be upright are.
 
 use std::collections::VecDeque;
 
@@ -12,7 +12,7 @@ use super::weighted_solve::{DataTerm, TurnTerm, solve_unit_vectors};
 
 /// How far outside its range a turn still passes for allowed, radians: 1.5 degrees.
 const SLACK: f64 = 1.5 * std::f64::consts::PI / 180.0;
-/// Residual weight that ties the reference and the pictures that are upright.
+/// Residual weight that ties the reference and the photographs that are upright.
 const HARD_WEIGHT: f64 = 1e4;
 /// Residual weight of the turn of least line distortion.
 const TURN_WEIGHT: f64 = 1.0;
@@ -27,20 +27,20 @@ struct Neighbor {
     best: f64,
 }
 
-/// What the walk decided of a picture.
+/// What the walk decided of a photograph.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Decided {
     theta: f64,
-    /// Whether the picture is held where it is: the reference, and pictures that may be upright.
+    /// Whether the photograph is held where it is: the reference, and photographs that may be upright.
     held: bool,
 }
 
 /// The turns of the published prior; `down` is the vertical that straightening finds, which the turns do not depend on.
 ///
-/// The reference stands as the user wants it. A walk from there leaves every picture unturned whose overlap with a
+/// The reference stands as the user wants it. A walk from there leaves every photograph unturned whose overlap with a
 /// decided one allows that, and turns the others by least line distortion; a least squares then holds the reference and
-/// the unturned pictures and takes the turns of least line distortion along all edges. The result depends on the reference
-/// by construction.
+/// the unturned photographs and takes the turns of least line distortion along all edges. The result depends on the
+/// reference by construction.
 ///
 /// # Source
 /// Chen and Chuang, Natural Image Stitching with the Global Similarity Prior (2016), section 4 (the 2D method).
@@ -76,21 +76,21 @@ pub(super) fn upright(input: &PriorInput<'_>, down: Vector3<f64>) -> Upright {
     let turns: Vec<TurnTerm> = turns.into_iter().map(|(_, term)| term).collect();
     let theta = match solve_unit_vectors(decided.len(), &hard, &turns) {
         Some(vectors) => vectors.iter().map(|[u, v]| v.atan2(*u)).collect::<Vec<f64>>(),
-        // Some picture is joined to none.
+        // Some photograph is joined to none.
         None => decided.iter().map(|one| one.theta).collect(),
     };
-    // The reference took the user's turn already; the common last step adds it to every picture.
+    // The reference took the user's turn already; the common last step adds it to every photograph.
     let rotations = input.cameras.iter().map(trueup_core::camera::Camera::rotation).collect();
     Upright { down, theta: theta.iter().map(|theta| theta - input.turn).collect(), rotations }
 }
 
-/// Decides the pictures one after the other, from the reference outwards: those that may be upright first. Pictures that
-/// cannot be reached stay as they are.
+/// Decides the photographs one after the other, from the reference outwards: those that may be upright first.
+/// Photographs that cannot be reached stay as they are.
 fn walk(neighbors: &[Vec<Neighbor>], reference: usize, reference_theta: f64) -> Vec<Decided> {
     let mut decided: Vec<Option<Decided>> = vec![None; neighbors.len()];
     let mut visited = vec![false; neighbors.len()];
     decided[reference] = Some(Decided { theta: reference_theta, held: true });
-    // A picture and the turn it takes unless it is upright by the time it is reached.
+    // A photograph and the turn it takes unless it is upright by the time it is reached.
     let mut queue = VecDeque::from([(reference, reference_theta)]);
     while let Some((here, otherwise)) = queue.pop_front() {
         if std::mem::replace(&mut visited[here], true) {

@@ -14,13 +14,14 @@ const REFERENCE_WEIGHT: f64 = 1e4;
 ///
 /// The reference keeps its roll. Every edge asks for the difference of the rolls with residual weight 10 if its overlap
 /// allows that turn, and for the turn of least line distortion with weight 1 if not. Where all overlaps agree with the
-/// cameras every picture keeps its roll, whatever the reference; otherwise the reference decides which pictures give way.
+/// cameras every photograph keeps its roll, whatever the reference; otherwise the reference decides which photographs
+/// give way.
 ///
 /// # Source
 /// Chen and Chuang, Natural Image Stitching with the Global Similarity Prior (2016), section 4 (the 3D method).
 ///
 /// # Departures
-/// The turn that the user wants is added to all pictures afterwards. See `edge_range` for how the turn of least line
+/// The turn that the user wants is added to all photographs afterwards. See `edge_range` for how the turn of least line
 /// distortion is measured.
 pub(super) fn upright(input: &PriorInput<'_>, rotations: &[Matrix3<f64>], down: Vector3<f64>) -> Upright {
     let rolls = rolls(&down, rotations);
@@ -29,7 +30,7 @@ pub(super) fn upright(input: &PriorInput<'_>, rotations: &[Matrix3<f64>], down: 
     let anchor = DataTerm { index, angle: rolls[index], weight: REFERENCE_WEIGHT * REFERENCE_WEIGHT };
     let theta = match solve_unit_vectors(rolls.len(), &[anchor], &turns) {
         Some(vectors) => vectors.iter().map(|[u, v]| v.atan2(*u)).collect(),
-        // Some picture is joined to none.
+        // Some photograph is joined to none.
         None => rolls,
     };
     Upright { down, theta, rotations: rotations.to_vec() }

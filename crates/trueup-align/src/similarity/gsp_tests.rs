@@ -28,8 +28,8 @@ fn edge(a: usize, b: usize, [low, high]: [f64; 2], best: f64) -> Edge {
     Edge { a, b, low, high, best }
 }
 
-/// Level cameras that look 30 degrees further each, so that straightening finds rolls of zero, joined by edges whose turns
-/// are given.
+/// Level cameras that look 30 degrees further each, so that straightening finds rolls of zero, joined by edges whose
+/// turns are given.
 struct Graph {
     cameras: Vec<Camera>,
     triads: Vec<TriadOutcome>,
@@ -84,7 +84,7 @@ impl Graph {
     }
 }
 
-/// A pair whose homography turns everything by minus the best turn about the picture's center.
+/// A pair whose homography turns everything by minus the best turn about the photograph's center.
 fn pair(edge: &Edge) -> PairMatches {
     let (sine, cosine) = (-edge.best.to_radians()).sin_cos();
     let (x, y) = (SIZE.0 / 2.0, SIZE.1 / 2.0);
@@ -126,10 +126,10 @@ fn the_graphs_of_these_tests_have_the_turns_they_state() {
     assert!((turns.best(&input, &graph.edges[0]).expect("a segment").to_degrees() - 4.0).abs() < 1e-9);
 }
 
-/// Triangle: edge 0 - 1 allows 4 to 8 degrees and wants 6, so it takes 6 with weight 1; the others hold 0 with weight 100.
-/// As complex numbers, e = exp(6i deg): minimize |e z0 - z1|^2 + 100 |z1 - z2|^2 + 100 |z0 - z2|^2.
-/// z0 = 1 gives z1 = (e + 50) / 51, z2 = (e + 101) / 102; z2 = 1 gives z1 = (e + 101) / 102, z0 = (conj(e) + 101) / 102.
-/// arg(e + 50) = atan(0.10452846 / 50.99452190) = 0.11744460 degrees, arg(e + 101) = 0.05871921 degrees.
+/// Triangle: edge 0 - 1 allows 4 to 8 degrees and wants 6, so it takes 6 with weight 1; the others hold 0 with weight
+/// 100. As complex numbers, e = exp(6i deg): minimize |e z0 - z1|^2 + 100 |z1 - z2|^2 + 100 |z0 - z2|^2. z0 = 1 gives
+/// z1 = (e + 50) / 51, z2 = (e + 101) / 102; z2 = 1 gives z1 = (e + 101) / 102, z0 = (conj(e) + 101) / 102. arg(e + 50)
+/// = atan(0.10452846 / 50.99452190) = 0.11744460 degrees, arg(e + 101) = 0.05871921 degrees.
 #[test]
 fn gsp_3d_spreads_a_contradiction_from_the_reference() {
     let graph =
@@ -174,16 +174,16 @@ fn gsp_3d_does_not_depend_on_the_reference_where_overlaps_agree_with_the_cameras
 /// From 0: 1 may be upright, 2 may be within the slack of 1.5 degrees, 3 may not and takes the turn of its lines.
 /// From 3: none of the others may, each takes its edge's turn backwards: -3, -3 - 2, -3 - 2 - 1.
 #[test]
-fn gsp_2d_leaves_pictures_upright_where_the_overlaps_let_it_and_depends_on_the_reference() {
+fn gsp_2d_leaves_photographs_upright_where_the_overlaps_let_it_and_depends_on_the_reference() {
     let graph =
         Graph::new(4, &[edge(0, 1, [-1.0, 3.0], 1.0), edge(1, 2, [1.4, 4.0], 2.0), edge(2, 3, [1.6, 5.0], 3.0)]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp2d, 0), &[0.0, 0.0, 0.0, 3.0]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp2d, 3), &[-6.0, -5.0, -3.0, 0.0]);
 }
 
-/// Picture 1 cannot be upright as seen from 0 but can as seen from 2, which is asked before 1 takes its lines' turn.
+/// Photograph 1 cannot be upright as seen from 0 but can as seen from 2, which is asked before 1 takes its lines' turn.
 #[test]
-fn gsp_2d_asks_upright_pictures_first() {
+fn gsp_2d_asks_upright_photographs_first() {
     let graph =
         Graph::new(3, &[edge(0, 1, [8.0, 12.0], 10.0), edge(0, 2, [-1.0, 1.0], 0.5), edge(1, 2, [-2.0, 2.0], 1.0)]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp2d, 0), &[0.0, 0.0, 0.0]);
@@ -225,7 +225,7 @@ fn scales_are_the_inverse_focal_lengths_of_mean_one() {
 }
 
 #[test]
-fn pictures_that_are_joined_to_none_keep_their_rolls() {
+fn photographs_that_are_joined_to_none_keep_their_rolls() {
     let graph = Graph::new(3, &[edge(0, 1, [4.0, 8.0], 6.0)]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp3d, 0), &[0.0, 0.0, 0.0]);
     assert_close(&graph.theta_deg(PriorMethod::Gsp2d, 0), &[0.0, 6.0, 0.0]);

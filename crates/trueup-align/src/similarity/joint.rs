@@ -1,7 +1,7 @@
-//! Joint refinement: the segments of all pictures vote once for one frame.
+//! Joint refinement: the segments of all photographs vote once for one frame.
 //!
-//! A picture's own triad rests on a few dozen segments; a panorama has thousands. Once the dominant frame is known to
-//! a degree or two, every segment that fits one of its directions refines it, through the cameras, all at once.
+//! A photograph's own triad rests on a few dozen segments; a panorama has thousands. Once the dominant frame is known
+//! to a degree or two, every segment that fits one of its directions refines it, through the cameras, all at once.
 //!
 //! The residual is measured where the segment was: the distance in pixels of its ends from the line that joins its
 //! midpoint to the vanishing point. With moment c = P x Q (ends P, Q), midpoint m and direction v in the camera frame,
@@ -25,7 +25,7 @@ const ITERATIONS_PER_SCALE: usize = 4;
 const SHRINK: f64 = 0.7;
 /// Damping in px^2 per rad^2 and segment: keeps an axis without segments where it is.
 const DAMPING: f64 = 1e-6;
-/// Most groups that pictures are left out in to learn how sure the refinement is.
+/// Most groups that photographs are left out in to learn how sure the refinement is.
 const MAX_GROUPS: usize = 8;
 /// A deviation estimated from k groups is too small for Student's t by about this over k - 1 (one standard deviation).
 const FEW_GROUPS: f64 = 0.66;
@@ -65,14 +65,14 @@ struct NearestAxis {
     reach: f64,
 }
 
-/// The usable segments of all pictures with their cameras.
+/// The usable segments of all photographs with their cameras.
 #[derive(Debug)]
 pub(super) struct LineVote {
-    pictures: Vec<PictureLines>,
+    photographs: Vec<PhotographLines>,
 }
 
 #[derive(Debug)]
-struct PictureLines {
+struct PhotographLines {
     rotation: Matrix3<f64>,
     focal_px: f64,
     planes: InterpretationPlanes,
@@ -85,64 +85,65 @@ pub(super) struct Support {
     pub score: f64,
     /// Number of segments within the tolerance.
     pub lines: usize,
-    /// Number of pictures with at least three of them.
-    pub pictures: usize,
+    /// Number of photographs with at least three of them.
+    pub photographs: usize,
 }
 
 impl LineVote {
-    /// `rotations` and `planes` per picture; `focals` in the pixels of the planes.
-    pub fn new(rotations: &[Matrix3<f64>], focals: &[f64], planes: Vec<InterpretationPlanes>) -> Self {
-        let pictures = rotations
+    /// `rotations` and `planes` per photograph; `focals` in the pixels of the planes.
+    pub(super) fn new(rotations: &[Matrix3<f64>], focals: &[f64], planes: Vec<InterpretationPlanes>) -> Self {
+        let photographs = rotations
             .iter()
             .zip(focals)
             .zip(planes)
-            .map(|((&rotation, &focal_px), planes)| PictureLines { rotation, focal_px, planes })
+            .map(|((&rotation, &focal_px), planes)| PhotographLines { rotation, focal_px, planes })
             .collect();
-        Self { pictures }
+        Self { photographs }
     }
 
-    /// The usable segments of picture `index`.
-    pub fn planes(&self, index: usize) -> &InterpretationPlanes {
-        &self.pictures[index].planes
+    /// The usable segments of photograph `index`.
+    pub(super) fn planes(&self, index: usize) -> &InterpretationPlanes {
+        &self.photographs[index].planes
     }
 
-    /// Normals in the common frame and weights of about `most` segments, the longest of every picture.
-    pub fn longest(&self, most: usize) -> Vec<(Vector3<f64>, f64)> {
-        let of_each = most.div_ceil(self.pictures.len().max(1));
-        let of_picture = |picture: &PictureLines| -> Vec<(Vector3<f64>, f64)> {
-            let normals = picture.planes.normals.iter().take(of_each);
+    /// Normals in the common frame and weights of about `most` segments, the longest of every photograph.
+    pub(super) fn longest(&self, most: usize) -> Vec<(Vector3<f64>, f64)> {
+        let of_each = most.div_ceil(self.photographs.len().max(1));
+        let of_photograph = |photograph: &PhotographLines| -> Vec<(Vector3<f64>, f64)> {
+            let normals = photograph.planes.normals.iter().take(of_each);
             normals
-                .zip(&picture.planes.weights)
-                .map(|(normal, &weight)| (picture.rotation.tr_mul(normal), weight))
+                .zip(&photograph.planes.weights)
+                .map(|(normal, &weight)| (photograph.rotation.tr_mul(normal), weight))
                 .collect()
         };
-        self.pictures.iter().flat_map(of_picture).collect()
+        self.photographs.iter().flat_map(of_photograph).collect()
     }
 
     /// The sum of the segments' weights.
-    pub fn total_weight(&self) -> f64 {
-        self.pictures.iter().map(|picture| picture.planes.total_weight).sum()
+    pub(super) fn total_weight(&self) -> f64 {
+        self.photographs.iter().map(|photograph| photograph.planes.total_weight).sum()
     }
 
     /// Refines a frame (columns are directions in the common frame) over SO(3); `axis_weights` multiply the weights of
     /// the segments of each axis.
-    pub fn refine_frame(&self, start: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {
+    pub(super) fn refine_frame(&self, start: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {
         self.refine_frame_without(None, start, axis_weights, scales())
     }
 
     fn mean_weight(&self) -> f64 {
-        let segments: usize = self.pictures.iter().map(|picture| picture.planes.len()).sum();
+        let segments: usize = self.photographs.iter().map(|photograph| photograph.planes.len()).sum();
         self.total_weight() / segments.max(1) as f64
     }
 
-    /// Standard deviation in radians, by a delete-a-group jackknife over the pictures, of each axis (a column) of a frame
-    /// that [`Self::refine_frame`] found: how much it depends on which pictures are asked. Infinite for a single picture.
+    /// Standard deviation in radians, by a delete-a-group jackknife over the photographs, of each axis (a column) of a
+    /// frame that [`Self::refine_frame`] found: how much it depends on which photographs are asked. Infinite for a
+    /// single photograph.
     ///
     /// # Source
-    /// Efron and Tibshirani, An Introduction to the Bootstrap, chapter 11. Pictures, not segments, are left out, because
-    /// the segments of one picture err together.
-    pub fn axis_deviations(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> [f64; 3] {
-        let groups = self.pictures.len().min(MAX_GROUPS);
+    /// Efron and Tibshirani, An Introduction to the Bootstrap, chapter 11. Photographs, not segments, are left out,
+    /// because the segments of one photograph err together.
+    pub(super) fn axis_deviations(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> [f64; 3] {
+        let groups = self.photographs.len().min(MAX_GROUPS);
         if groups < 2 {
             return [f64::INFINITY; 3];
         }
@@ -187,10 +188,10 @@ impl LineVote {
         frame
     }
 
-    /// Normal matrix and gradient, in px^2 per rad^2 and px^2 per rad, of the squared residuals of picture `index` under a
-    /// small turn in the common frame, for the camera `rotation` in place of the picture's own. Segments weigh 1 on
-    /// average, times the robust loss of `scale` pixels and their axis' weight.
-    pub fn turn_equations(
+    /// Normal matrix and gradient, in px^2 per rad^2 and px^2 per rad, of the squared residuals of photograph `index`
+    /// under a small turn in the common frame, for the camera `rotation` in place of the photograph's own. Segments
+    /// weigh 1 on average, times the robust loss of `scale` pixels and their axis' weight.
+    pub(super) fn turn_equations(
         &self,
         index: usize,
         rotation: &Matrix3<f64>,
@@ -199,9 +200,9 @@ impl LineVote {
         scale: f64,
     ) -> (Matrix3<f64>, Vector3<f64>) {
         let (mut matrix, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
-        let picture = &self.pictures[index];
+        let photograph = &self.photographs[index];
         let mean = self.mean_weight();
-        picture.for_each_supporter(rotation, frame, 3, scale, |one| {
+        photograph.for_each_supporter(rotation, frame, 3, scale, |one| {
             let jacobian = frame.column(one.axis).cross(&one.moment) / one.reach;
             let weight = one.weight * axis_weights[one.axis] / mean;
             matrix += jacobian * jacobian.transpose() * weight;
@@ -211,7 +212,7 @@ impl LineVote {
     }
 
     /// Refines one direction of the common frame alone, over the sphere.
-    pub fn refine_direction(&self, start: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn refine_direction(&self, start: &Vector3<f64>) -> Vector3<f64> {
         let mut direction = *start;
         for scale in scales() {
             for _ in 0..ITERATIONS_PER_SCALE {
@@ -237,7 +238,8 @@ impl LineVote {
         direction
     }
 
-    /// Calls `visit` for every segment of the photographs `asked` that supports one of the first `axes_used` axes of `frame`.
+    /// Calls `visit` for every segment of the photographs `asked` that supports one of the first `axes_used` axes of
+    /// `frame`.
     fn for_each_supporter(
         &self,
         frame: &Matrix3<f64>,
@@ -246,27 +248,27 @@ impl LineVote {
         asked: impl Fn(usize) -> bool,
         mut visit: impl FnMut(Supporter),
     ) {
-        for (index, picture) in self.pictures.iter().enumerate() {
+        for (index, photograph) in self.photographs.iter().enumerate() {
             if asked(index) {
-                picture.for_each_supporter(&picture.rotation, frame, axes_used, scale, &mut visit);
+                photograph.for_each_supporter(&photograph.rotation, frame, axes_used, scale, &mut visit);
             }
         }
     }
 
     /// How strongly the segments support `direction`.
-    pub fn support(&self, direction: &Vector3<f64>, tolerance: f64) -> Support {
-        let mut total = Support { score: 0.0, lines: 0, pictures: 0 };
-        for picture in &self.pictures {
-            let (score, lines) = picture.support(&(picture.rotation * direction), tolerance);
+    pub(super) fn support(&self, direction: &Vector3<f64>, tolerance: f64) -> Support {
+        let mut total = Support { score: 0.0, lines: 0, photographs: 0 };
+        for photograph in &self.photographs {
+            let (score, lines) = photograph.support(&(photograph.rotation * direction), tolerance);
             total.score += score;
             total.lines += lines;
-            total.pictures += usize::from(lines >= 3);
+            total.photographs += usize::from(lines >= 3);
         }
         total
     }
 }
 
-impl PictureLines {
+impl PhotographLines {
     /// The axis (of the first `axes_used`) with the smallest residual, not weighed by the loss.
     fn nearest_axis(&self, axes: &Matrix3<f64>, axes_used: usize, line: usize) -> Option<NearestAxis> {
         let mut best: Option<NearestAxis> = None;
@@ -281,7 +283,7 @@ impl PictureLines {
         best
     }
 
-    /// [`LineVote::for_each_supporter`] of one picture, for a camera of this rotation.
+    /// [`LineVote::for_each_supporter`] of one photograph, for a camera of this rotation.
     fn for_each_supporter(
         &self,
         rotation: &Matrix3<f64>,

@@ -56,12 +56,13 @@ const REFUSED_HINT: &str =
 
 /// Finds the similarity prior of a connected set of photographs.
 ///
-/// The world frame of the cameras is arbitrary and does not affect the result. The reference affects the published global
-/// similarity priors alone.
+/// The world frame of the cameras is arbitrary and does not affect the result. The reference affects the published
+/// global similarity priors alone.
 ///
 /// # Errors
-/// [`Error::Unsolvable`] if there are no photographs, the lists differ in length, an edge or the reference names a photograph
-/// that does not exist, a camera is not finite, or overlaps come without a usable grid; [`Error::Cancelled`].
+/// [`Error::Unsolvable`] if there are no photographs, the lists differ in length, an edge or the reference names a
+/// photograph that does not exist, a camera is not finite, or overlaps come without a usable grid;
+/// [`Error::Cancelled`].
 ///
 /// # Source
 /// The paper's sections on the vanishing point guided prior; see the modules for equations and departures.
@@ -110,9 +111,9 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
 /// Straightened cameras.
 ///
 /// # Departures
-/// The paper falls back to the global similarity prior, which corrects turns that an overlap contradicts. Level photographs
-/// that look up are twisted against each other although neither is rolled; that correction rolls them by the twist, which
-/// adds up along a row. Their place on the level sphere has the twist already.
+/// The paper falls back to the global similarity prior, which corrects turns that an overlap contradicts. Level
+/// photographs that look up are twisted against each other although neither is rolled; that correction rolls them by
+/// the twist, which adds up along a row. Their place on the level sphere has the twist already.
 fn fallback(rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> Upright {
     Upright { down: *down, theta: rolls(down, rotations), rotations: rotations.to_vec() }
 }

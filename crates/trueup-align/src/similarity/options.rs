@@ -7,8 +7,8 @@ trueup_core::choice! {
         VanishingPoints = "vpg",
         /// Straightening.
         Straightening = "straightening",
-        /// The global similarity prior in two dimensions, as published: the reference is upright, and so is every picture
-        /// that its overlaps let be.
+        /// The global similarity prior in two dimensions, as published: the reference is upright, and so is every
+        /// photograph that its overlaps let be.
         Gsp2d = "gsp-2d",
         /// The global similarity prior in three dimensions, as published: cameras straightened without a prior on their
         /// pitch, corrected by overlaps from the reference outwards.
@@ -17,7 +17,7 @@ trueup_core::choice! {
 }
 
 trueup_core::choice! {
-    /// Where the relative roll of two pictures comes from.
+    /// Where the relative roll of two photographs comes from.
     pub enum BetaMode {
         /// The difference of the rolls that the dominant vertical means for each camera.
         World = "world",
@@ -29,7 +29,7 @@ trueup_core::choice! {
 trueup_core::choice! {
     /// Which conditions accept the dominant directions.
     pub enum GateMode {
-        /// Divergence, number of agreeing pictures, straightening and roll.
+        /// Divergence, number of agreeing photographs, straightening and roll.
         Full = "full",
         /// The divergence alone, as published.
         Paper = "paper",
@@ -41,40 +41,41 @@ trueup_core::options! {
     pub struct SimilarityOptions("similarity") {
         /// The prior. Change it to compare with the published methods, or to `straightening` where lines mislead.
         prior: PriorMethod = PriorMethod::VanishingPoints, Allowed::Any, "";
-        /// Sum of squared distances of a photograph's directions from the dominant ones up to which it agrees with them;
-        /// 0.24 is a misorientation of 19.9 degrees. Lower it where wrong directions take part, raise it where right ones
-        /// are left out.
+        /// Sum of squared distances of a photograph's directions from the dominant ones up to which it agrees with
+        /// them; 0.24 is a misorientation of 19.9 degrees. Lower it where wrong directions take part, raise it where
+        /// right ones are left out.
         rejection: f64 = 0.24, between(1e-6, 1e9), "";
         /// Where relative rolls come from. `relative` to compare with the published form.
         beta_mode: BetaMode = BetaMode::World, Allowed::Any, "";
-        /// Weight of the relative rolls against the photographs' own. Raise it where single photographs lean against their
-        /// neighbors, lower it where one wrong pair turns a whole row.
+        /// Weight of the relative rolls against the photographs' own. Raise it where single photographs lean against
+        /// their neighbors, lower it where one wrong pair turns a whole row.
         relative_weight: f64 = 10.0, between(0.0, 1e6), "";
-        /// Whether photographs vote along paths on how much a photograph's own roll weighs; otherwise all weigh the same.
-        /// Turn it off to see what the vote does.
+        /// Whether photographs vote along paths on how much a photograph's own roll weighs; otherwise all weigh the
+        /// same. Turn it off to see what the vote does.
         path_voting: bool = true, Allowed::Any, "";
-        /// Which conditions accept the dominant directions. `paper` to compare with the published gate, which accepts far
-        /// more.
+        /// Which conditions accept the dominant directions. `paper` to compare with the published gate, which accepts
+        /// far more.
         gate: GateMode = GateMode::Full, Allowed::Any, "";
         /// Largest divergence of the vanishing directions. Raise it where lines are right and refused, lower it where
         /// directions that are none guide the panorama.
         max_divergence: f64 = 0.10, between(0.0, 1e3), "";
         /// The same with three photographs or fewer, which agree by chance more easily.
         max_divergence_few: f64 = 0.02, between(0.0, 1e3), "";
-        /// Whether photographs that disagree are searched again near the dominant directions. Turn it off to keep to the
-        /// published method.
+        /// Whether photographs that disagree are searched again near the dominant directions. Turn it off to keep to
+        /// the published method.
         guided_redetection: bool = true, Allowed::Any, "";
         /// Whether the segments of all photographs refine the dominant directions together. Turn it off to keep to the
         /// published method.
         joint_refinement: bool = true, Allowed::Any, "";
-        /// Whether each camera is turned so that its own segments point to the common directions, as far as its overlaps
-        /// allow. Turn it off where the cameras are known better than the lines, from a calibrated rig.
+        /// Whether each camera is turned so that its own segments point to the common directions, as far as its
+        /// overlaps allow. Turn it off where the cameras are known better than the lines, from a calibrated rig.
         camera_correction: bool = true, Allowed::Any, "";
-        /// Whether the segments of all photographs are searched together for one frame: to confirm the directions that the
-        /// photographs agree on, and in their place where they do not agree. Turn it off to keep to the published method.
+        /// Whether the segments of all photographs are searched together for one frame: to confirm the directions that
+        /// the photographs agree on, and in their place where they do not agree. Turn it off to keep to the published
+        /// method.
         pooled_search: bool = true, Allowed::Any, "";
-        /// Whether a vertical alone may guide where the horizontal directions do not agree. Turn it off where what looks
-        /// vertical is not, as leaning trees or masts.
+        /// Whether a vertical alone may guide where the horizontal directions do not agree. Turn it off where what
+        /// looks vertical is not, as leaning trees or masts.
         vertical_only: bool = true, Allowed::Any, "";
         /// How much straightening expects photographs to look level: variance of the roll over that of the pitch among
         /// photographers. Raise it if a panorama without buildings leans, lower it for photographs taken steeply up or

@@ -1,4 +1,4 @@
-//! Path voting: how far neighbors up to a few edges away confirm a picture's own roll.
+//! Path voting: how far neighbors up to a few edges away confirm a photograph's own roll.
 
 use trueup_core::geometry::wrap_angle;
 

@@ -1,4 +1,4 @@
-//! Tests of what the segments of all pictures say together.
+//! Tests of what the segments of all photographs say together.
 
 use trueup_core::camera::Camera;
 use trueup_core::geometry::rotation_about_z;
@@ -14,7 +14,7 @@ fn max(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, f64::max)
 }
 
-/// Eight pictures of 60 segments each, none with vanishing directions of its own.
+/// Eight photographs of 60 segments each, none with vanishing directions of its own.
 fn without_triads(per_direction: usize, clutter: usize) -> SyntheticScene {
     let mut scene = with_lines(SyntheticScene::new(Sweep::default(), World::Random, 0.0, 12), clutter, 0.5);
     scene.triads = vec![missing(); scene.triads.len()];
@@ -28,7 +28,7 @@ fn without_triads(per_direction: usize, clutter: usize) -> SyntheticScene {
 }
 
 #[test]
-fn the_segments_of_all_pictures_guide_where_no_picture_has_directions() {
+fn the_segments_of_all_photographs_guide_where_no_photograph_has_directions() {
     let scene = without_triads(6, 30);
     let prior = scene.prior(&SimilarityOptions::default());
     assert!(prior.guidance.used && prior.guidance.pooled && !prior.guidance.vertical_only);
@@ -48,7 +48,7 @@ fn clutter_stands_out_nowhere() {
 }
 
 #[test]
-fn pictures_that_contradict_each_other_leave_the_vertical_uncertain() {
+fn photographs_that_contradict_each_other_leave_the_vertical_uncertain() {
     let mut scene = with_lines(SyntheticScene::new(Sweep::default(), World::Random, 0.0, 11), 0, 0.3);
     let deviation = |scene: &SyntheticScene| {
         let planes = |k: usize| {

@@ -10,13 +10,14 @@ use trueup_core::geometry::matrix_from_rows;
 pub struct Guidance {
     /// Whether lines guide the prior; otherwise straightening does.
     pub used: bool,
-    /// Whether the frame guides that the segments of all photographs together stand for, since the photographs' own directions
-    /// did not agree.
+    /// Whether the frame guides that the segments of all photographs together stand for, since the photographs' own
+    /// directions did not agree.
     pub pooled: bool,
     /// How far the best frame of the pooled search stands out, in standard deviations over all frames tried; `None`
     /// without enough segments.
     pub significance: Option<f64>,
-    /// Standard deviation of the vertical in radians, by a jackknife over the photographs; `None` where it was not asked for.
+    /// Standard deviation of the vertical in radians, by a jackknife over the photographs; `None` where it was not
+    /// asked for.
     pub vertical_deviation: Option<f64>,
     /// Whether the vertical alone guides, since the gate refused the dominant directions.
     pub vertical_only: bool,
@@ -37,8 +38,8 @@ pub struct Guidance {
     pub residuals: Vec<Option<f64>>,
     /// Per photograph the weight psi_i of its own roll; 0 for photographs without one.
     pub weights: Vec<f64>,
-    /// Score of the strongest rival of the vertical over the vertical's own, from the segments of all photographs; `None`
-    /// where the dominant directions were accepted and where there are no segments.
+    /// Score of the strongest rival of the vertical over the vertical's own, from the segments of all photographs;
+    /// `None` where the dominant directions were accepted and where there are no segments.
     pub vertical_rivalry: Option<f64>,
     /// Share of the segments' weight that supports the vertical; `None` as above.
     pub vertical_share: Option<f64>,
@@ -78,8 +79,8 @@ pub struct SimilarityPrior {
     pub guidance: Guidance,
     /// Rows of the rotation that takes the cameras' world to a level one: y down, the mean viewing direction above z.
     pub level_from_world: [[f64; 3]; 3],
-    /// Per photograph the rows of the rotation from the cameras' world to the camera as its own segments correct it; the
-    /// rotation given where nothing does.
+    /// Per photograph the rows of the rotation from the cameras' world to the camera as its own segments correct it;
+    /// the rotation given where nothing does.
     pub camera_from_world: Vec<[[f64; 3]; 3]>,
     /// Roll rho_i in radians of each of these cameras in the level world: the turn that stands it upright.
     pub roll: Vec<f64>,

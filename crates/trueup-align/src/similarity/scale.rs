@@ -1,4 +1,4 @@
-//! Relative scales of the pictures from the extent of their matches.
+//! Relative scales of the photographs from the extent of their matches.
 
 use geo::{ConvexHull, Coord, Euclidean, Length, LineString, MultiPoint, Point};
 use nalgebra::{DMatrix, DVector};
@@ -11,7 +11,7 @@ const WEAK_WEIGHT: f64 = 0.1;
 /// Scales outside are not believed.
 const BELIEVABLE: std::ops::RangeInclusive<f64> = 0.2..=5.0;
 
-/// One scale per picture, of mean 1: what makes matched regions the same size.
+/// One scale per photograph, of mean 1: what makes matched regions the same size.
 ///
 /// Falls back to the inverse focal lengths (of mean 1) when the hulls yield a scale outside 0.2 to 5.
 ///
@@ -19,7 +19,7 @@ const BELIEVABLE: std::ops::RangeInclusive<f64> = 0.2..=5.0;
 /// The paper's eq. 10 and 11: eta_ij = perimeter of the hull in i over that in j.
 ///
 /// # Departures
-/// The printed constraint eta_ij s_j = s_i scales the wrong way round: a picture in which the matches span more must
+/// The printed constraint eta_ij s_j = s_i scales the wrong way round: a photograph in which the matches span more must
 /// shrink, s_j = eta_ij s_i. Rows are divided by sqrt(eta_ij), so that the order of a pair does not matter.
 pub(super) fn scales(edges: &[PairMatches], focals: &[f64]) -> Vec<f64> {
     let count = focals.len();
@@ -35,7 +35,7 @@ pub(super) fn scales(edges: &[PairMatches], focals: &[f64]) -> Vec<f64> {
 ///
 /// # Departures
 /// Divided by their mean, as all priors' scales are: the reference does not matter, and the mesh has the working
-/// pictures' size.
+/// photographs' size.
 pub(super) fn focal_scales(focals: &[f64]) -> Vec<f64> {
     let inverse: f64 = focals.iter().map(|focal| 1.0 / focal).sum();
     let mean = inverse / focals.len() as f64;
@@ -63,7 +63,7 @@ fn hull_scales(edges: &[PairMatches], count: usize) -> Option<Vec<f64>> {
     Some(solution.iter().take(count).copied().collect())
 }
 
-/// Perimeter of the hull of the matches in picture a over that in picture b; `None` if either is too small.
+/// Perimeter of the hull of the matches in photograph a over that in photograph b; `None` if either is too small.
 fn perimeter_ratio(edge: &PairMatches) -> Option<f64> {
     let in_a = hull_perimeter(edge.inliers.iter().map(|point| point.in_a))?;
     let in_b = hull_perimeter(edge.inliers.iter().map(|point| point.in_b))?;

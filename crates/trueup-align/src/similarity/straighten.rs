@@ -5,7 +5,7 @@ use trueup_core::camera::Camera;
 
 use crate::vanishing::orthonormal_complement;
 
-/// Second eigenvalue of the mean moment of the x axes below which the pictures do not fix a vertical.
+/// Second eigenvalue of the mean moment of the x axes below which the photographs do not fix a vertical.
 const CONDITIONED: f64 = 0.05;
 
 /// The vertical that the cameras' x axes span a plane orthogonal to.
@@ -36,7 +36,7 @@ pub(super) struct CameraVertical<'a> {
 /// eigenvalue of sum x_i x_i^T.
 ///
 /// # Departures
-/// With parallel x axes (one picture, a tiny pan, a vertical sweep) that eigenvector is arbitrary; the mean of the y
+/// With parallel x axes (one photograph, a tiny pan, a vertical sweep) that eigenvector is arbitrary; the mean of the y
 /// axes, made orthogonal to the mean x axis, takes its place.
 pub(super) fn straighten(rotations: &[Matrix3<f64>]) -> Straightened {
     let x_axes = || rotations.iter().map(|rotation| rotation.row(0).transpose());
@@ -83,7 +83,7 @@ pub(super) fn straighten_with_pitch(rotations: &[Matrix3<f64>], pitch_prior: f64
 /// OpenCV's wave correction chooses x so that the cameras' x axes point to positive x; with `down` signed by the y axes
 /// the mean viewing direction does the same without a case distinction.
 pub(super) fn level_from_world(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> Matrix3<f64> {
-    /// Viewing directions that cancel out (a full circle) leave the yaw to the first picture.
+    /// Viewing directions that cancel out (a full circle) leave the yaw to the first photograph.
     const CANCELLED: f64 = 1e-6;
     let ahead: Vector3<f64> = rotations.iter().map(|rotation| rotation.row(2).transpose()).sum();
     let horizontal = |direction: Vector3<f64>| direction - down * direction.dot(down);

@@ -25,7 +25,7 @@ pub(crate) fn noise_rotation(sd_deg: f64, generator: &mut impl Rng) -> Matrix3<f
     exp_rotation(&Vector3::from_fn(|_, _| normal(generator) * sd_deg.to_radians()))
 }
 
-/// How cameras are placed: `rows` sweeps of `count` pictures in all.
+/// How cameras are placed: `rows` sweeps of `count` photographs in all.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sweep {
     pub count: usize,
@@ -55,12 +55,12 @@ pub(crate) struct SyntheticScene {
     pub edges: Vec<PairMatches>,
 }
 
-/// What the pictures' vanishing directions are.
+/// What the photographs' vanishing directions are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum World {
-    /// One frame, but for a share of pictures with a random triad.
+    /// One frame, but for a share of photographs with a random triad.
     Manhattan { noise_deg: f64, bad_share: f64 },
-    /// A random triad in every picture.
+    /// A random triad in every photograph.
     Random,
 }
 
@@ -68,7 +68,7 @@ pub(crate) const SIZE: (f64, f64) = (800.0, 600.0);
 pub(crate) const FOCAL_PX: f64 = 700.0;
 
 impl SyntheticScene {
-    pub fn new(sweep: Sweep, world: World, camera_noise_deg: f64, seed: u64) -> Self {
+    pub(crate) fn new(sweep: Sweep, world: World, camera_noise_deg: f64, seed: u64) -> Self {
         let mut generator = StageContext::default().generator("synthetic", seed);
         let (roll, world_from_camera, edges) = sweep.place(&mut generator);
         let gauge = random_rotation(&mut generator);
@@ -94,7 +94,7 @@ impl SyntheticScene {
     }
 
     /// What the prior is made from, without overlaps.
-    pub fn input<'a>(&'a self, vanishing: &'a VanishingOptions) -> PriorInput<'a> {
+    pub(crate) fn input<'a>(&'a self, vanishing: &'a VanishingOptions) -> PriorInput<'a> {
         PriorInput {
             cameras: &self.cameras,
             triads: &self.triads,
@@ -109,12 +109,12 @@ impl SyntheticScene {
         }
     }
 
-    pub fn prior(&self, options: &SimilarityOptions) -> SimilarityPrior {
+    pub(crate) fn prior(&self, options: &SimilarityOptions) -> SimilarityPrior {
         run(&self.input(&VanishingOptions::default()), options, &StageContext::default()).expect("a well-formed scene")
     }
 
-    /// Per picture |theta - roll| in degrees.
-    pub fn errors_deg(&self, prior: &SimilarityPrior) -> Vec<f64> {
+    /// Per photograph |theta - roll| in degrees.
+    pub(crate) fn errors_deg(&self, prior: &SimilarityPrior) -> Vec<f64> {
         let error = |(theta, roll): (&f64, &f64)| trueup_core::geometry::wrap_angle(theta - roll).abs().to_degrees();
         assert_eq!(prior.theta.len(), self.roll.len());
         prior.theta.iter().zip(&self.roll).map(error).collect()
@@ -187,9 +187,9 @@ fn shuffled(matrix: &Matrix3<f64>, generator: &mut impl Rng) -> Matrix3<f64> {
     Matrix3::from_columns(&columns)
 }
 
-/// Segments of a camera's picture: `per_direction` along each axis of the world, `clutter` in any direction, ends moved
-/// by normal noise.
-pub(crate) fn picture_lines(
+/// Segments of a camera's photograph: `per_direction` along each axis of the world, `clutter` in any direction, ends
+/// moved by normal noise.
+pub(crate) fn photograph_lines(
     camera_from_world: &Matrix3<f64>,
     per_direction: usize,
     clutter: usize,
@@ -225,7 +225,7 @@ pub(crate) fn picture_lines(
     segments
 }
 
-/// A segment between points given from the picture's center.
+/// A segment between points given from the photograph's center.
 fn segment(start: [f64; 2], end: [f64; 2]) -> LineSegment {
     let place = |point: [f64; 2]| [point[0] + SIZE.0 / 2.0, point[1] + SIZE.1 / 2.0];
     LineSegment { start: place(start), end: place(end), width_px: 2.0, significance: 10.0 }

@@ -7,7 +7,7 @@ use trueup_core::geometry::{
 };
 use trueup_core::matches::{PairMatches, PointMatch};
 
-use super::synthetic::{Sweep, SyntheticScene, World, joined, noise_rotation, picture_lines};
+use super::synthetic::{Sweep, SyntheticScene, World, joined, noise_rotation, photograph_lines};
 use super::*;
 use crate::match_points::OverlapWarp;
 use crate::vanishing::{TriadOutcome, VanishingOptions};
@@ -221,7 +221,7 @@ fn straightening_is_wave_correction() {
 }
 
 #[test]
-fn one_picture_and_parallel_pictures_have_a_finite_prior() {
+fn one_photograph_and_parallel_photographs_have_a_finite_prior() {
     for count in [1, 2] {
         let sweep = Sweep { count, yaw_step_deg: 0.0, ..Sweep::default() };
         let mut scene = SyntheticScene::new(sweep, World::Random, 0.0, 9);
@@ -261,13 +261,13 @@ fn malformed_input_is_an_error() {
     assert!(run(&empty, &options, &StageContext::default()).is_err());
 }
 
-/// Segments for every picture of a scene; the true cameras draw them.
+/// Segments for every photograph of a scene; the true cameras draw them.
 pub(super) fn with_lines(mut scene: SyntheticScene, clutter: usize, noise_px: f64) -> SyntheticScene {
     let mut generator = StageContext::default().generator("lines", 0);
     scene.lines = scene
         .world_from_camera
         .iter()
-        .map(|rotation| picture_lines(&rotation.transpose(), 20, clutter, noise_px, &mut generator))
+        .map(|rotation| photograph_lines(&rotation.transpose(), 20, clutter, noise_px, &mut generator))
         .collect();
     scene
 }
@@ -348,7 +348,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
     #[test]
-    fn a_rolled_picture_rolls_its_prior(turn in -0.5..0.5_f64, seed in 0_u64..100) {
+    fn a_rolled_photograph_rolls_its_prior(turn in -0.5..0.5_f64, seed in 0_u64..100) {
         let world = World::Manhattan { noise_deg: 0.5, bad_share: 0.0 };
         let scene = SyntheticScene::new(Sweep::default(), world, 0.1, seed);
         let mut rolled = scene.clone();
@@ -368,7 +368,7 @@ proptest! {
     }
 
     #[test]
-    fn permuted_pictures_permute_the_prior(shift in 1_usize..8, seed in 0_u64..100) {
+    fn permuted_photographs_permute_the_prior(shift in 1_usize..8, seed in 0_u64..100) {
         let world = World::Manhattan { noise_deg: 0.5, bad_share: 0.0 };
         let scene = SyntheticScene::new(Sweep::default(), world, 0.1, seed);
         let mut permuted = scene.clone();

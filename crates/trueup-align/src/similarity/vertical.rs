@@ -1,4 +1,4 @@
-//! Which dominant direction is the vertical, and what roll a vertical means for a picture.
+//! Which dominant direction is the vertical, and what roll a vertical means for a photograph.
 
 use nalgebra::{Matrix3, Vector3};
 use trueup_core::geometry::roll_from_down;
@@ -36,7 +36,7 @@ pub(super) fn vertical_of(frame: &Matrix3<f64>, rotations: &[Matrix3<f64>]) -> V
 }
 
 /// The roll of a camera that sees "down" in direction `down` of its own frame: atan2(g_x, g_y), positive when the
-/// picture must be turned clockwise to stand upright. `None` if the camera looks within 15 degrees of straight up or
+/// photograph must be turned clockwise to stand upright. `None` if the camera looks within 15 degrees of straight up or
 /// down.
 pub(super) fn roll_of(down: &Vector3<f64>) -> Option<f64> {
     (down.x.hypot(down.y) >= MIN_SINE * down.norm()).then(|| roll_from_down(down))

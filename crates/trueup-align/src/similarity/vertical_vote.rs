@@ -1,4 +1,4 @@
-//! A vertical from the segments of all pictures alone, where the horizontal directions do not agree.
+//! A vertical from the segments of all photographs alone, where the horizontal directions do not agree.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -40,7 +40,7 @@ impl VerticalPeak {
         let needed = MIN_PHOTOGRAPHS * photographs as f64;
         self.rivalry <= MAX_RIVALRY
             && self.share(total_weight) >= MIN_SHARE
-            && self.support.pictures as f64 >= needed.max(2.0)
+            && self.support.photographs as f64 >= needed.max(2.0)
     }
 }
 

@@ -26,11 +26,11 @@ use crate::vanishing::{InterpretationPlanes, RefinedTriad};
 const REDETECTION_SHARE: f64 = 0.9;
 /// Farthest that the joint refinement may move the vertical, in tolerances of a segment's vote.
 const MAX_REFINEMENT_TOLERANCES: f64 = 2.0;
-/// Root mean square misorientation of the photographs' directions that is detection noise, degrees; beyond, the horizontal
-/// directions lose weight in the joint refinement.
+/// Root mean square misorientation of the photographs' directions that is detection noise, degrees; beyond, the
+/// horizontal directions lose weight in the joint refinement.
 const ORDINARY_MISORIENTATION_DEG: f64 = 1.0;
-/// Largest standard deviation of the vertical, by asking different photographs, degrees: straightening is wrong by 1 to 2
-/// degrees. Measured: chosen on the 130 sets of the gate's experiment and on real sets.
+/// Largest standard deviation of the vertical, by asking different photographs, degrees: straightening is wrong by 1 to
+/// 2 degrees. Measured: chosen on the 130 sets of the gate's experiment and on real sets.
 const MAX_VERTICAL_DEVIATION_DEG: f64 = 1.5;
 /// The same for the pooled search in place of directions that the photographs agree on, degrees.
 const MAX_POOLED_DEVIATION_DEG: f64 = 1.0;
@@ -46,8 +46,8 @@ struct SceneDirections<'a> {
     vote: LineVote,
 }
 
-/// Finds the vertical and the turns that the lines mean, if they are believed. The gate compares with what straightening
-/// finds of the `cameras`; near their level the vertical is sought where the gate refuses.
+/// Finds the vertical and the turns that the lines mean, if they are believed. The gate compares with what
+/// straightening finds of the `cameras`; near their level the vertical is sought where the gate refuses.
 pub(super) fn guide(
     input: &PriorInput<'_>,
     cameras: &CameraVertical<'_>,
@@ -144,17 +144,17 @@ impl<'a> SceneDirections<'a> {
             self.own_rolls(&dominant.frame, &down, &inliers).into_iter().flatten().map(f64::abs).collect();
         magnitudes.sort_by(f64::total_cmp);
         let residuals: Vec<f64> = inliers.iter().filter_map(|&index| dominant.residuals[index]).collect();
-        let pictures = self.rotations.len();
+        let photographs = self.rotations.len();
         let evidence = GateEvidence {
-            pictures,
+            photographs,
             inliers: inliers.len(),
-            divergence: divergence(&residuals, pictures),
+            divergence: divergence(&residuals, photographs),
             straightening_angle: self.straightening_angle(&down),
             significance: guidance.significance,
             median_roll: magnitudes.get(magnitudes.len() / 2).copied().unwrap_or(f64::INFINITY),
         };
         guidance.divergence = Some(evidence.divergence).filter(|divergence| divergence.is_finite());
-        guidance.inlier_ratio = inliers.len() as f64 / pictures as f64;
+        guidance.inlier_ratio = inliers.len() as f64 / photographs as f64;
         guidance.residuals.clone_from(&dominant.residuals);
         guidance.inliers = inliers;
         failed_clause(&evidence, self.options)
@@ -208,8 +208,8 @@ impl<'a> SceneDirections<'a> {
         Some(self.solve(&down, &own, rotations, guidance))
     }
 
-    /// Whether the vertical of a frame that all segments voted for hardly depends on which photographs are asked; says why
-    /// not as the failed clause.
+    /// Whether the vertical of a frame that all segments voted for hardly depends on which photographs are asked; says
+    /// why not as the failed clause.
     fn is_certain(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights, guidance: &mut Guidance) -> bool {
         let down = vertical_of(frame, self.rotations);
         let deviation = self.vote.axis_deviations(frame, axis_weights)[frame.tr_mul(&down).iamax()];
@@ -297,7 +297,8 @@ impl<'a> SceneDirections<'a> {
         }
     }
 
-    /// The turns that stand every photograph upright as far as the others agree; `rotations` are those that lines correct.
+    /// The turns that stand every photograph upright as far as the others agree; `rotations` are those that lines
+    /// correct.
     fn solve(
         &self,
         down: &Vector3<f64>,

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// A data term: weight (psi_i) and angle (alpha_i) of picture `index`.
+/// A data term: weight (psi_i) and angle (alpha_i) of photograph `index`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DataTerm {
     pub index: usize,

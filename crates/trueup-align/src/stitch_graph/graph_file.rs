@@ -2,11 +2,11 @@
 //!
 //! Two notations are read, line by line; `#` starts a comment:
 //!
-//! * `NAME -- NAME` or `INDEX -- INDEX`: the two pictures overlap. Names are file names, indices count from 0 in the
-//!   order in which the pictures were given.
+//! * `NAME -- NAME` or `INDEX -- INDEX`: the two photographs overlap. Names are file names, indices count from 0 in the
+//!   order in which the photographs were given.
 //! * `{key | value | comment}` as in the graph files of the GSP data sets: `matching_graph_image_edges-I` lists the
-//!   neighbors of picture I, `center_image_index` names the reference, `center_image_rotation_angle` its rotation in
-//!   degrees; `images_count` must fit the pictures given.
+//!   neighbors of photograph I, `center_image_index` names the reference, `center_image_rotation_angle` its rotation in
+//!   degrees; `images_count` must fit the photographs given.
 
 use trueup_core::{Error, Result};
 
@@ -15,17 +15,17 @@ use trueup_core::{Error, Result};
 pub struct GraphFile {
     /// Overlapping pairs (a < b), sorted, each once.
     pub edges: Vec<(usize, usize)>,
-    /// The reference picture, if stated.
+    /// The reference photograph, if stated.
     pub reference: Option<usize>,
-    /// The rotation of the reference picture in degrees, clockwise, if stated.
+    /// The rotation of the reference photograph in degrees, clockwise, if stated.
     pub reference_rotation_deg: Option<f64>,
 }
 
-/// Reads a graph for pictures called `names`, in the order given. `file` is the file's name, for messages.
+/// Reads a graph for photographs called `names`, in the order given. `file` is the file's name, for messages.
 ///
 /// # Errors
-/// [`Error::Input`] with the line number for unknown pictures, unreadable lines, a wrong picture count, a picture
-/// joined to itself, or a file without any pair.
+/// [`Error::Input`] with the line number for unknown photographs, unreadable lines, a wrong photograph count, a
+/// photograph joined to itself, or a file without any pair.
 pub fn parse_graph_file(text: &str, names: &[String], file: &str) -> Result<GraphFile> {
     let mut graph = GraphFile::default();
     for (number, line) in text.lines().enumerate() {
@@ -55,7 +55,7 @@ pub fn parse_graph_file(text: &str, names: &[String], file: &str) -> Result<Grap
 
 fn pair_line(line: &str, names: &[String]) -> std::result::Result<(usize, usize), String> {
     let (first, second) = line.split_once("--").ok_or_else(|| format!("\"{line}\" is not a pair"))?;
-    ordered(picture(first, names)?, picture(second, names)?)
+    ordered(photograph(first, names)?, photograph(second, names)?)
 }
 
 fn keyed_line(fields: &str, names: &[String], graph: &mut GraphFile) -> std::result::Result<(), String> {
@@ -83,7 +83,7 @@ fn keyed_line(fields: &str, names: &[String], graph: &mut GraphFile) -> std::res
     Ok(())
 }
 
-fn picture(text: &str, names: &[String]) -> std::result::Result<usize, String> {
+fn photograph(text: &str, names: &[String]) -> std::result::Result<usize, String> {
     let text = text.trim().trim_matches('"');
     match names.iter().position(|name| name == text) {
         Some(found) => Ok(found),

@@ -1,4 +1,4 @@
-//! Which pictures overlap: the paper's graph G with edges J, its components and its spanning tree.
+//! Which photographs overlap: the paper's graph G with edges J, its components and its spanning tree.
 
 mod graph_file;
 
@@ -11,12 +11,12 @@ use trueup_core::matches::PairMatches;
 
 pub use graph_file::{GraphFile, parse_graph_file};
 
-/// Two overlapping pictures.
+/// Two overlapping photographs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GraphEdge {
-    /// Index of the first picture.
+    /// Index of the first photograph.
     pub a: usize,
-    /// Index of the second picture, larger than `a`.
+    /// Index of the second photograph, larger than `a`.
     pub b: usize,
     /// Number of matches that agree with the pair's global homography.
     pub weight: usize,
@@ -32,37 +32,37 @@ impl GraphEdge {
 /// Overlapping photographs as a graph.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StitchGraph {
-    /// Number of pictures, joined or not.
-    pub pictures: usize,
+    /// Number of photographs, joined or not.
+    pub photographs: usize,
     /// The joined pairs, sorted by (a, b).
     pub edges: Vec<GraphEdge>,
-    /// Connected pictures, each list ascending; the largest component first, ties by the sum of the weights.
-    /// A picture without an edge is a component of its own.
+    /// Connected photographs, each list ascending; the largest component first, ties by the sum of the weights.
+    /// A photograph without an edge is a component of its own.
     pub components: Vec<Vec<usize>>,
 }
 
 /// A step of a spanning tree: `child` is placed relative to `parent`, which comes earlier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TreeStep {
-    /// A picture that is already placed.
+    /// A photograph that is already placed.
     pub parent: usize,
-    /// The picture that is placed next.
+    /// The photograph that is placed next.
     pub child: usize,
 }
 
 impl StitchGraph {
-    /// The graph of the joined pairs among `pictures` pictures.
-    pub fn new(pictures: usize, pairs: &[PairMatches]) -> Self {
+    /// The graph of the joined pairs among `photographs` photographs.
+    pub fn new(photographs: usize, pairs: &[PairMatches]) -> Self {
         let mut edges: Vec<GraphEdge> =
             pairs.iter().filter(|pair| pair.verdict.is_joined()).map(GraphEdge::of).collect();
         edges.sort_by_key(|edge| (edge.a, edge.b));
-        Self::from_edges(pictures, edges)
+        Self::from_edges(photographs, edges)
     }
 
     /// The graph of given edges, sorted by (a, b).
-    pub fn from_edges(pictures: usize, edges: Vec<GraphEdge>) -> Self {
-        let components = components(pictures, &edges);
-        Self { pictures, edges, components }
+    pub fn from_edges(photographs: usize, edges: Vec<GraphEdge>) -> Self {
+        let components = components(photographs, &edges);
+        Self { photographs, edges, components }
     }
 
     /// The edges inside a component.
@@ -74,15 +74,15 @@ impl StitchGraph {
     ///
     /// The order is deterministic: children by falling weight, then by index.
     pub fn spanning_tree(&self, component: &[usize], root: usize) -> Vec<TreeStep> {
-        let mut graph = UnGraph::<(), i64>::with_capacity(self.pictures, self.edges.len());
-        for _ in 0..self.pictures {
+        let mut graph = UnGraph::<(), i64>::with_capacity(self.photographs, self.edges.len());
+        for _ in 0..self.photographs {
             graph.add_node(());
         }
         for edge in self.edges_of(component) {
             // petgraph minimizes: the heaviest edges must come first.
             graph.add_edge(NodeIndex::new(edge.a), NodeIndex::new(edge.b), -(edge.weight as i64));
         }
-        let mut neighbors: Vec<Vec<(i64, usize)>> = vec![Vec::new(); self.pictures];
+        let mut neighbors: Vec<Vec<(i64, usize)>> = vec![Vec::new(); self.photographs];
         for element in min_spanning_tree(&graph) {
             if let Element::Edge { source, target, weight } = element {
                 neighbors[source].push((weight, target));
@@ -93,7 +93,7 @@ impl StitchGraph {
             list.sort_unstable();
         }
         let mut steps = Vec::with_capacity(component.len().saturating_sub(1));
-        let mut placed = vec![false; self.pictures];
+        let mut placed = vec![false; self.photographs];
         let mut queue = std::collections::VecDeque::from([root]);
         placed[root] = true;
         while let Some(parent) = queue.pop_front() {
@@ -107,42 +107,44 @@ impl StitchGraph {
         steps
     }
 
-    /// The picture in the middle of the component: the spanning tree's node with the fewest steps to the farthest one,
-    /// ties by the larger sum of edge weights, then by the smaller index.
+    /// The photograph in the middle of the component: the spanning tree's node with the fewest steps to the farthest
+    /// one, ties by the larger sum of edge weights, then by the smaller index.
     pub fn central_photograph(&self, component: &[usize]) -> usize {
         let root = component.first().copied().unwrap_or(0);
         let tree = self.spanning_tree(component, root);
-        let mut neighbors: Vec<Vec<usize>> = vec![Vec::new(); self.pictures];
+        let mut neighbors: Vec<Vec<usize>> = vec![Vec::new(); self.photographs];
         for step in &tree {
             neighbors[step.parent].push(step.child);
             neighbors[step.child].push(step.parent);
         }
-        let weight = |picture: usize| -> usize {
-            self.edges.iter().filter(|edge| edge.a == picture || edge.b == picture).map(|edge| edge.weight).sum()
+        let weight = |photograph: usize| -> usize {
+            self.edges.iter().filter(|edge| edge.a == photograph || edge.b == photograph).map(|edge| edge.weight).sum()
         };
         component
             .iter()
             .copied()
-            .min_by_key(|&picture| (eccentricity(&neighbors, picture), usize::MAX - weight(picture), picture))
+            .min_by_key(|&photograph| {
+                (eccentricity(&neighbors, photograph), usize::MAX - weight(photograph), photograph)
+            })
             .unwrap_or(root)
     }
 }
 
-fn components(pictures: usize, edges: &[GraphEdge]) -> Vec<Vec<usize>> {
-    let mut union = UnionFind::new(pictures);
+fn components(photographs: usize, edges: &[GraphEdge]) -> Vec<Vec<usize>> {
+    let mut union = UnionFind::new(photographs);
     for edge in edges {
         union.union(edge.a, edge.b);
     }
     let labels = union.into_labeling();
-    let mut members: Vec<Vec<usize>> = vec![Vec::new(); pictures];
-    let mut weights = vec![0_usize; pictures];
-    for (picture, &label) in labels.iter().enumerate() {
-        members[label].push(picture);
+    let mut members: Vec<Vec<usize>> = vec![Vec::new(); photographs];
+    let mut weights = vec![0_usize; photographs];
+    for (photograph, &label) in labels.iter().enumerate() {
+        members[label].push(photograph);
     }
     for edge in edges {
         weights[labels[edge.a]] += edge.weight;
     }
-    let mut order: Vec<usize> = (0..pictures).filter(|&label| !members[label].is_empty()).collect();
+    let mut order: Vec<usize> = (0..photographs).filter(|&label| !members[label].is_empty()).collect();
     order.sort_by_key(|&label| {
         (usize::MAX - members[label].len(), usize::MAX - weights[label], members[label].first().copied())
     });

@@ -13,7 +13,6 @@ mod interpretation;
 mod options;
 mod refine;
 mod search;
-mod spoil;
 mod triad;
 
 #[cfg(test)]
@@ -26,7 +25,6 @@ use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
 
 pub use options::VanishingOptions;
-pub use spoil::spoil;
 pub use triad::{MissingTriad, Triad, TriadOutcome};
 
 pub(crate) use interpretation::{FULL_WEIGHT_LENGTH_PX, InterpretationPlanes};
@@ -112,7 +110,7 @@ fn judge(
     })
 }
 
-/// The column whose picture-plane direction is within 45 degrees of the vertical and that is closest to the y axis.
+/// The column whose photograph-plane direction is within 45 degrees of the vertical and that is closest to the y axis.
 fn nearest_to_vertical(triad: &Matrix3<f64>) -> Option<usize> {
     (0..3)
         .filter(|&column| triad[(1, column)].abs() > triad[(0, column)].abs())

@@ -6,15 +6,13 @@ trueup_core::options! {
         /// Pairs of segments drawn as hypotheses of a first direction: 106 find a triad with probability 0.9999 if half
         /// of the segments belong to it. Raise it where clutter hides the directions; time grows with it.
         draws: usize = 106, between(1.0, 1e5), "";
-        /// Largest angle between a direction and a segment's interpretation plane for the segment to support it. Raise it
-        /// for lenses whose distortion bends lines; lower it where several directions lie close together.
+        /// Largest angle between a direction and a segment's interpretation plane for the segment to support it. Raise
+        /// it for lenses whose distortion bends lines; lower it where several directions lie close together.
         tolerance_deg: f64 = 3.0, between(0.1, 30.0), "degrees";
         /// Fewer segments yield no triad. Raise it where photographs with little structure mislead the others.
         min_lines: usize = 10, between(3.0, 1e5), "segments";
         /// Lower quality (fraction of the segments' weight that supports the triad) yields no triad. Raise it where
         /// organic scenes yield directions that are none; lower it where architecture is seen between much clutter.
         min_quality: f64 = 0.25, between(0.0, 1.0), "";
-        /// Share of the directions found that are replaced by random ones: for experiments on robustness.
-        outlier_share: f64 = 0.0, between(0.0, 1.0), "";
     }
 }

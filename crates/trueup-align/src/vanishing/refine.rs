@@ -36,7 +36,8 @@ impl RefinedTriad {
     /// Refines `start` on all segments.
     ///
     /// # Source
-    /// Gauss-Newton for the right perturbation V exp([d]x) of r = n . v_k: dr/dd = e_k x (V^T n); Geman-McClure weights.
+    /// Gauss-Newton for the right perturbation V exp([d]x) of r = n . v_k: dr/dd = e_k x (V^T n); Geman-McClure
+    /// weights.
     pub(crate) fn refine(start: &Matrix3<f64>, planes: &InterpretationPlanes, options: &VanishingOptions) -> Self {
         let mut triad = nearest_rotation(start);
         let tolerance = options.tolerance_deg.to_radians().sin();

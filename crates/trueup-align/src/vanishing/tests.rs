@@ -3,7 +3,7 @@ use trueup_core::StageContext;
 use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z, wrap_angle};
 
 use super::*;
-use crate::similarity::synthetic::{FOCAL_PX, SIZE, normal, picture_lines};
+use crate::similarity::synthetic::{FOCAL_PX, SIZE, normal, photograph_lines};
 
 fn frame() -> WorkingFrame {
     WorkingFrame { width: SIZE.0, height: SIZE.1, working_from_full: 1.0 }
@@ -19,7 +19,7 @@ fn roll_errors(noise_px: f64, clutter: usize, focal_error: f64) -> Vec<f64> {
         let yaw = (15.0 + 60.0 * generator.random::<f64>()).to_radians();
         let pitch = (8.0 * normal(&mut generator)).to_radians();
         let camera_from_world = (rotation_about_y(yaw) * rotation_about_x(pitch) * rotation_about_z(roll)).transpose();
-        let lines = picture_lines(&camera_from_world, 20, clutter, noise_px, &mut generator);
+        let lines = photograph_lines(&camera_from_world, 20, clutter, noise_px, &mut generator);
         let options = VanishingOptions::default();
         let outcome = detect_triad(&lines, FOCAL_PX * focal_error, &frame(), &options, &mut generator);
         let triad = outcome.triad().unwrap_or_else(|| panic!("{outcome:?}"));

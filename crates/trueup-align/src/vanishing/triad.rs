@@ -18,8 +18,8 @@ pub struct Triad {
     pub clusters: Vec<Option<u8>>,
     /// Covariance of the rotation vector d, in radians squared, for the perturbation `V exp([d]x)` of the matrix V.
     pub covariance: [[f64; 3]; 3],
-    /// Standard deviation in radians of the roll that the direction closest to the picture's vertical predicts; `None`
-    /// if none is within 45 degrees of the picture plane's vertical.
+    /// Standard deviation in radians of the roll that the direction closest to the photograph's vertical predicts;
+    /// `None` if none is within 45 degrees of the picture plane's vertical.
     pub roll_sd: Option<f64>,
 }
 

@@ -56,12 +56,11 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
             let mesh: &[&str] = if base == "published" { &PUBLISHED_MESH } else { &[] };
             for ablation in &ABLATIONS {
                 for share in NOISE_SHARES {
-                    let noise = format!("vanishing.outlier_share={share}");
-                    let overrides = [mesh, base_overrides, ablation.overrides, &[noise.as_str()]].concat();
+                    let overrides = [mesh, base_overrides, ablation.overrides].concat();
                     let seeds = if share > 0.0 { SEEDS.min(catalogue.seeds) } else { 1 };
                     for seed in 0..seeds {
                         let trial = Trial::new(NAME, &set.name, &variant(base, ablation, share), &overrides);
-                        trials.push(Trial { seed, ..trial });
+                        trials.push(Trial { seed, random_directions: share, ..trial });
                     }
                 }
             }

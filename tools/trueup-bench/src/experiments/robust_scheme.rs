@@ -54,11 +54,10 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     for (set, seeds) in study.chain(given) {
         let seeds = if set.photograph_count()? > MANY_PICTURES { seeds.min(SEEDS_OF_LARGE_SETS) } else { seeds };
         for share in NOISE_SHARES {
-            let noise = format!("vanishing.outlier_share={share}");
             for (name, overrides) in schemes {
-                let overrides = [overrides, &[noise.as_str()]].concat();
                 for seed in 0..seeds {
-                    trials.push(Trial { seed, ..Trial::new(NAME, &set.name, &variant(name, share), &overrides) });
+                    let trial = Trial::new(NAME, &set.name, &variant(name, share), overrides);
+                    trials.push(Trial { seed, random_directions: share, ..trial });
                 }
             }
         }
