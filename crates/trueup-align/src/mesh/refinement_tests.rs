@@ -83,7 +83,7 @@ fn true_distance(meshes: &[GridMesh]) -> f64 {
 }
 
 fn pyramids() -> Vec<GrayPyramid> {
-    photographs().iter().map(|gray| GrayPyramid::new(gray)).collect()
+    photographs().iter().map(GrayPyramid::new).collect()
 }
 
 #[test]
@@ -274,8 +274,7 @@ fn noise_moves_nothing_where_photographs_already_meet() {
         }
         gray
     };
-    let pyramids: Vec<GrayPyramid> =
-        [noisy(0.0, 0), noisy(SHIFT, 77_777)].iter().map(|gray| GrayPyramid::new(gray)).collect();
+    let pyramids: Vec<GrayPyramid> = [noisy(0.0, 0), noisy(SHIFT, 77_777)].iter().map(GrayPyramid::new).collect();
     let options = PhotometricOptions::default();
     let photometric = PhotometricInput { pyramids: &pyramids, options: &options };
     let apart = |meshes: &[GridMesh]| {
