@@ -208,7 +208,7 @@ mod tests {
                 assert_eq!(tree.covers(&solids, ray.origin), inside);
             }
         }
-        assert!(hits > 100, "only {hits} rays met anything");
+        assert!(hits > 40, "only {hits} rays met anything");
     }
 
     /// A unit block seen along z from 3 m, and past its edge; a ball of radius 1/2 behind it, worked out by hand.
