@@ -135,19 +135,20 @@ pub(crate) trait Output: Write + Seek {}
 
 impl<W: Write + Seek> Output for W {}
 
+/// Writes a panorama, with what is to be told of it, into an empty file.
+pub(crate) type FileWriter = fn(
+    &mut dyn Output,
+    &dyn RowSource,
+    &Metadata,
+    &OutputOptions,
+    &StageContext<'_>,
+) -> std::result::Result<(), WriteFailure>;
+
 /// What makes the files of a panorama.
 #[derive(Clone, Copy)]
 pub(crate) enum Writer {
     /// Writes one file, from its start.
-    File(
-        fn(
-            &mut dyn Output,
-            &dyn RowSource,
-            &Metadata,
-            &OutputOptions,
-            &StageContext<'_>,
-        ) -> std::result::Result<(), WriteFailure>,
-    ),
+    File(FileWriter),
     /// Makes several files and folders beside each other.
     Files {
         /// Writes them all; returns their bytes together.

@@ -9,7 +9,6 @@
 //!
 //! Sizes are checked from the header before pixels are allocated, and no input makes these functions panic.
 #![forbid(unsafe_code)]
-#![warn(unreachable_pub)]
 
 pub mod color;
 pub mod decode;

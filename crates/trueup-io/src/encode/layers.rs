@@ -100,9 +100,8 @@ pub(super) fn write_pages(
     context.progress().begin(OutputOptions::STAGE, set.count() as u64);
     let form = PageForm::of_layers(options);
     // Pages as large as the panorama take room for the layers alone: empty tiles are stored once.
-    let mut pages = TiffPages::begin(&mut output, form.is_big(set.pixels(), options))?;
-    write_each(&mut pages, set, metadata, options, form, context)?;
-    drop(pages);
+    let is_big = form.is_big(set.pixels(), options);
+    write_each(&mut TiffPages::begin(&mut output, is_big)?, set, metadata, options, form, context)?;
     output.flush()?;
     context.progress().finish(OutputOptions::STAGE);
     Ok(())

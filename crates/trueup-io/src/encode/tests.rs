@@ -160,7 +160,8 @@ fn one_pixel_is_a_picture_and_none_is_not() {
     for name in ["a.jpg", "a.png", "a.tif", "a.webp"] {
         let path = folder.path().join(name);
         write_default(&path, &Gradient { width: 1, height: 1 }).expect("written");
-        assert!(write_default(&path, &Gradient { width: 0, height: 5 }).is_err());
+        let empty = write_default(&path, &Gradient { width: 0, height: 5 }).expect_err("nothing to write").to_string();
+        assert!(empty.contains("the panorama is empty"), "{empty}");
     }
 }
 

@@ -19,7 +19,7 @@ pub(crate) fn decoding_limit(image: &SourceImage) -> u64 {
     pixels.saturating_mul(MAX_PIXEL_BYTES).saturating_add(DECODER_SLACK_BYTES)
 }
 
-/// Samples of a picture.
+/// How many samples a picture of this size has.
 ///
 /// # Errors
 /// [`Error::Input`] if they are more than a program can address.
@@ -67,6 +67,7 @@ pub(crate) fn check_unchanged(image: &SourceImage, stored_width: usize, stored_h
     ))
 }
 
+/// Pixels that the codec, in its own words, cannot make sense of.
 pub(crate) fn damaged(image: &SourceImage, words: impl ToString) -> Error {
     let words = words.to_string();
     let reason = format!("its pixels cannot be decoded ({})", words.trim().trim_end_matches('.'));

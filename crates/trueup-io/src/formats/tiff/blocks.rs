@@ -122,12 +122,13 @@ fn strips_of<S: OutputSample>(
     // As many strips at a time as can be compressed side by side.
     let batch_rows = STRIP_ROWS * rayon::current_num_threads();
     for_each_strip::<S>(picture, batch_rows, context, &mut |batch| {
-        let strips = batch.par_chunks(STRIP_ROWS * row).map(|strip| {
-            let rows = strip.len() / row;
-            coded(strip.chunks_exact(row), [picture.width(), rows], form)
-        });
-        for strip in strips.collect::<std::io::Result<Vec<_>>>()? {
-            stored.add(sink.write_block(&strip)?);
+        let strips: Vec<&[S]> = batch.chunks(STRIP_ROWS * row).collect();
+        let coded = make_all(strips.len(), &|index| {
+            let rows = strips[index].len() / row;
+            coded(strips[index].chunks_exact(row), [picture.width(), rows], form).map(Some)
+        })?;
+        for strip in coded.iter().flatten() {
+            stored.add(sink.write_block(strip)?);
         }
         Ok(())
     })?;
@@ -151,8 +152,8 @@ fn tiles_of<S: OutputSample>(
         pyramid.push(rows, &mut |tiles| {
             for some in columns[..tiling.count(tiles.width)].chunks(TILES_PER_THREAD * rayon::current_num_threads()) {
                 context.check_cancelled()?;
-                let made = some.par_iter().map(|&column| tile(&tiles, column, tiling, form));
-                for tile in made.collect::<std::io::Result<Vec<_>>>()? {
+                let made = make_all(some.len(), &|index| tile(&tiles, some[index], tiling, form))?;
+                for tile in made {
                     let block = match (tile, empty) {
                         (Some(tile), _) => sink.write_block(&tile)?,
                         (None, Some(block)) => block,
@@ -169,6 +170,14 @@ fn tiles_of<S: OutputSample>(
         })
     })?;
     Ok(stored)
+}
+
+/// Makes `count` blocks side by side, in their order.
+fn make_all(
+    count: usize,
+    make: &(dyn Fn(usize) -> std::io::Result<Option<Vec<u8>>> + Sync),
+) -> std::io::Result<Vec<Option<Vec<u8>>>> {
+    (0..count).into_par_iter().map(make).collect()
 }
 
 /// One tile, coded; `None` if it is wholly transparent.

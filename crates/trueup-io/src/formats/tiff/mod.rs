@@ -3,14 +3,13 @@
 mod blocks;
 mod convert;
 mod directory;
-#[cfg(test)]
-#[path = "kinds_tests.rs"]
-mod kinds_tests;
 pub(crate) mod metadata;
 mod page;
 mod palette;
 mod read;
 mod samples;
+#[cfg(test)]
+mod tests;
 pub(crate) mod write;
 
 use crate::encode::options::{Depth, TiffCompression};

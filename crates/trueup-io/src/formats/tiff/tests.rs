@@ -5,9 +5,9 @@ use std::io::Cursor;
 use tempfile::TempDir;
 use tiff::encoder::{TiffEncoder, TiffValue};
 use tiff::tags::Tag;
-use trueup_core::StageContext;
 use trueup_core::raster::Photograph;
 use trueup_core::source::SourceImage;
+use trueup_core::{Error, StageContext};
 
 use crate::decode::{photograph, sample_bits};
 use crate::source::{SourceOptions, scan};
@@ -190,12 +190,11 @@ fn damaged_files_of_these_kinds_are_refused() {
     let form = Form { photometric: 3, bits: &[8], palette: Some(&palette), ..Form::default() };
     let whole = tiff(&form, &[&[7_u8; SIDE * SIDE][..]]);
     let folder = TempDir::new().expect("a temporary folder");
-    let mut headers = 0;
+    let image = examined(&folder, &whole).expect("accepted");
+    photograph(&image).expect("decoded");
+    // The directory lies behind the pixels: cut files are found out when they are decoded after they were examined.
     for length in (0..whole.len()).step_by(7) {
-        if let Ok(image) = examined(&folder, &whole[..length]) {
-            headers += 1;
-            assert!(photograph(&image).is_err(), "cut to {length} of {}", whole.len());
-        }
+        std::fs::write(&image.path, &whole[..length]).expect("our own file");
+        assert!(matches!(photograph(&image), Err(Error::Input { .. })), "cut to {length} of {}", whole.len());
     }
-    assert!(headers > 0, "a cut behind the header");
 }
