@@ -6,8 +6,7 @@ use crate::pictures::{noise, street, street_desk, street_truth};
 use crate::run::{Desk, FinishedRun, finish, trueup};
 
 /// Two entries that are made quickly.
-const QUICK: [&str; 6] =
-    ["--methods", "vpg", "--entry", "levelled: similarity.prior=straightening", "--set", "compare.page_pixels=200000"];
+const QUICK: [&str; 6] = ["--methods", "vpg", "--entry", "levelled: stitch.method=straightening", "--scale", "0.3"];
 
 fn compare(desk: &Desk, arguments: &[&str]) -> FinishedRun {
     finish(trueup(desk.path(), &[&["compare", "a.jpg", "b.jpg", "c.jpg", "-o", "out"], arguments].concat()))

@@ -82,7 +82,7 @@ pub(crate) static METHODS: [ComparedMethod; 17] = [
         name: LEVELLED,
         meaning: "what the default falls back to without vanishing points: cameras straightened with a prior on their pitch, \
                   level sphere",
-        options: &[&["similarity.prior=straightening"]],
+        options: &[&["stitch.method=straightening"]],
         paper: None,
         family: Family::Prior,
     },

@@ -10,10 +10,10 @@ pub(crate) const PUBLISHED_MESH: [&str; 3] =
 pub(crate) const PUBLISHED_WARP_GRID: [&str; 2] = ["mesh.subdivision=1", "match_points.model=moving-dlt"];
 
 /// The prior of GSP in two dimensions.
-pub(crate) const GSP_2D_PRIOR: [&str; 1] = ["similarity.prior=gsp-2d"];
+pub(crate) const GSP_2D_PRIOR: [&str; 1] = ["stitch.method=gsp-2d"];
 
 /// The prior of GSP in three dimensions.
-pub(crate) const GSP_3D_PRIOR: [&str; 1] = ["similarity.prior=gsp-3d"];
+pub(crate) const GSP_3D_PRIOR: [&str; 1] = ["stitch.method=gsp-3d"];
 
 /// VPG's gate as published: the divergence alone decides.
 pub(crate) const DIVERGENCE_GATE: [&str; 1] = ["similarity.gate=paper"];

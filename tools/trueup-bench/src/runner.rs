@@ -243,7 +243,7 @@ mod tests {
         let set = small_set();
         let trials = [
             Trial::new("test", &set.name, "default", &[]),
-            Trial::new("test", &set.name, "small working copy", &["stitch.working_pixels=50000"]),
+            Trial::new("test", &set.name, "small working copy", &["working.pixels=50000"]),
             Trial { seed: 1, random_directions: 0.5, ..Trial::new("test", &set.name, "default", &[]) },
         ];
         let run = || {

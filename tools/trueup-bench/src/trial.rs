@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use serde::{Deserialize, Serialize};
-use trueup::{Result, StitchOptions};
+use trueup::{Phase, Result, StitchOptions};
 
 /// What is to be run.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +54,7 @@ impl Trial {
     /// Those of an override that does not exist or is out of range.
     pub(crate) fn options(&self) -> Result<StitchOptions> {
         let mut options = StitchOptions::default();
-        options.stitch.seed = self.seed;
+        options.matching.random.seed = self.seed;
         for assignment in &self.overrides {
             options.set(assignment)?;
         }
@@ -64,12 +64,10 @@ impl Trial {
 
     /// The overrides that change what is measured and matched; the others act on what was matched already.
     pub(crate) fn matching_overrides(&self) -> Vec<String> {
-        const STAGES: [&str; 6] = ["stitch", "source", "features", "lines", "pairing", "matching"];
-        /// Options of the whole run that decide what is made of the matches.
-        const LATER: [&str; 3] = ["stitch.method=", "stitch.align=", "stitch.structure="];
+        let tables = StitchOptions::tables();
         let concerns = |assignment: &&String| {
-            STAGES.iter().any(|stage| assignment.starts_with(&format!("{stage}.")))
-                && !LATER.iter().any(|option| assignment.starts_with(option))
+            let named = |table: &&(&str, Option<Phase>)| assignment.starts_with(&format!("{}.", table.0));
+            tables.iter().find(named).and_then(|(_, phase)| *phase).is_some_and(|phase| phase <= Phase::Match)
         };
         self.overrides.iter().filter(concerns).cloned().collect()
     }
@@ -145,7 +143,7 @@ mod tests {
     fn overrides_reach_the_options_and_wrong_ones_are_named() {
         let trial = Trial { seed: 7, ..Trial::new("test", "01", "loose", &["similarity.rejection=0.5"]) };
         let options = trial.options().expect("valid");
-        assert_eq!((options.similarity.rejection, options.stitch.seed), (0.5, 7));
+        assert_eq!((options.align.similarity.rejection, options.matching.random.seed), (0.5, 7));
         let wrong = Trial::new("test", "01", "wrong", &["similarity.rejektion=1"]);
         assert!(wrong.options().expect_err("no such option").to_string().contains("similarity.rejektion"));
     }
@@ -156,9 +154,9 @@ mod tests {
             "test",
             "01",
             "mixed",
-            &["mesh.cell_px=20", "matching.ratio=0.7", "lines.scale=1", "stitch.align=points"],
+            &["mesh.cell_px=20", "matching.max_distance_ratio=0.7", "lines.min_length_px=30", "stitch.align=points"],
         );
-        assert_eq!(trial.matching_overrides(), ["matching.ratio=0.7", "lines.scale=1"]);
+        assert_eq!(trial.matching_overrides(), ["matching.max_distance_ratio=0.7", "lines.min_length_px=30"]);
     }
 
     #[test]

@@ -7,13 +7,15 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result};
 
-use super::options::SimilarityOptions;
+use super::options::{PriorMethod, SimilarityOptions};
 use crate::match_points::OverlapWarp;
 use crate::vanishing::{TriadOutcome, VanishingOptions};
 
 /// What the prior is made from. Photographs are counted 0..N; all lists but `edges` and `overlaps` have N entries.
 #[derive(Debug, Clone, Copy)]
 pub struct PriorInput<'a> {
+    /// Which prior is wanted.
+    pub method: PriorMethod,
     /// Cameras in working pixels, in any common world frame.
     pub cameras: &'a [Camera],
     /// Each photograph's vanishing directions.

@@ -74,7 +74,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     let straightened = straighten::straighten(&rotations);
     let level = straighten::straighten_with_pitch(&rotations, options.pitch_prior);
     let unguided = || Guidance::none(input.cameras.len(), gate::allowed_divergence(input.cameras.len(), options));
-    let (guidance, upright) = match options.prior {
+    let (guidance, upright) = match input.method {
         PriorMethod::VanishingPoints => {
             let vertical = CameraVertical { rotations: &rotations, straightened, level };
             vpg::guide(input, &vertical, options, context)?
@@ -97,7 +97,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     guidance.dominant = guidance.dominant.map(|world| rows_of(&(level_from_world * matrix_from_rows(&world))));
     Ok(SimilarityPrior {
         theta: upright.theta.iter().map(|theta| wrap_angle(theta + input.turn)).collect(),
-        scale: match options.prior {
+        scale: match input.method {
             PriorMethod::Gsp2d | PriorMethod::Gsp3d => scale::focal_scales(&focals),
             PriorMethod::VanishingPoints | PriorMethod::Straightening => scale::scales(input.edges, &focals),
         },

@@ -1,19 +1,18 @@
 //! What a user can choose about the similarity prior.
 
-trueup_core::choice! {
-    /// Where the turns and scales come from.
-    pub enum PriorMethod {
-        /// Vanishing points, straightening where they are not believed.
-        VanishingPoints = "vpg",
-        /// Straightening.
-        Straightening = "straightening",
-        /// The global similarity prior in two dimensions, as published: the reference is upright, and so is every
-        /// photograph that its overlaps let be.
-        Gsp2d = "gsp-2d",
-        /// The global similarity prior in three dimensions, as published: cameras straightened without a prior on their
-        /// pitch, corrected by overlaps from the reference outwards.
-        Gsp3d = "gsp-3d",
-    }
+/// Where the turns and scales come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PriorMethod {
+    /// Vanishing points, straightening where they are not believed.
+    VanishingPoints,
+    /// Straightening.
+    Straightening,
+    /// The global similarity prior in two dimensions, as published: the reference is upright, and so is every photograph
+    /// that its overlaps let be.
+    Gsp2d,
+    /// The global similarity prior in three dimensions, as published: cameras straightened without a prior on their pitch,
+    /// corrected by overlaps from the reference outwards.
+    Gsp3d,
 }
 
 trueup_core::choice! {
@@ -39,8 +38,6 @@ trueup_core::choice! {
 trueup_core::options! {
     /// How the similarity prior is found.
     pub struct SimilarityOptions("similarity") {
-        /// The prior. Change it to compare with the published methods, or to `straightening` where lines mislead.
-        prior: PriorMethod = PriorMethod::VanishingPoints, Allowed::Any, "";
         /// Sum of squared distances of a photograph's directions from the dominant ones up to which it agrees with
         /// them; 0.24 is a misorientation of 19.9 degrees. Lower it where wrong directions take part, raise it where
         /// right ones are left out.

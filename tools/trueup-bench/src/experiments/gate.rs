@@ -135,7 +135,7 @@ pub(crate) fn section(results: &Results) -> Section {
     rule("the paper's", Some(THRESHOLD), at(THRESHOLD));
     rule("best on our sets", best.map(|best| best.threshold), best);
     let [yes, wrongly] = [true, false].map(|kind| percent(class(results, kind, FULL).rate()));
-    let default = StitchOptions::default().similarity.max_divergence;
+    let default = StitchOptions::default().align.similarity.max_divergence;
     table.push(["full gate (default)".to_owned(), number(Some(default), 3), yes, wrongly]);
     section.blocks.push(Block::Table(table));
     section.say(format!(

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use trueup::{Error, Inputs, MatchedPhotographs, PriorMethod, Result, Silent, StageContext, Stitcher};
+use trueup::{Error, Inputs, MatchedPhotographs, Method, Result, Silent, StageContext, Stitcher};
 
 use super::paper_figures::SECONDS;
 use crate::methods::{GSP_3D, GSP_3D_PUBLISHED, VPG, VPG_PUBLISHED, method};
@@ -115,7 +115,7 @@ fn fastest(
     trial: &Trial,
 ) -> Result<BTreeMap<String, f64>> {
     let mut best: Option<BTreeMap<String, f64>> = None;
-    let heeds_directions = trial.options()?.similarity.prior == PriorMethod::VanishingPoints;
+    let heeds_directions = trial.options()?.align.stitch.method == Method::Vpg;
     for _ in 0..REPEATS {
         let aligned = stitcher.align_matched(photographs, inputs)?;
         let first = aligned.alignments.into_iter().next();

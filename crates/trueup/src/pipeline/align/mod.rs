@@ -13,7 +13,7 @@ use trueup_align::cameras::Cameras;
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points::OverlapWarp;
 use trueup_align::mesh::{self, MeshInput, Refinements, WarpedMesh};
-use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityOptions, SimilarityPrior};
+use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityPrior};
 use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::TriadOutcome;
 use trueup_align::warps::{self, WarpInput, WarpModel};
@@ -138,11 +138,12 @@ fn find_prior(
     options: &AlignOptions,
     context: &StageContext,
 ) -> Result<SimilarityPrior> {
-    let prior = match options.stitch.method.form() {
+    let method = match options.stitch.method.form() {
         MethodForm::Mesh(prior) => prior,
         MethodForm::Warp(_) => PriorMethod::Straightening,
     };
     let input = PriorInput {
+        method,
         cameras: &overlaps.cameras.cameras,
         triads,
         lines: &component.lines,
@@ -154,7 +155,7 @@ fn find_prior(
         turn: component.reference_rotation,
         reference: component.reference,
     };
-    similarity::run(&input, &SimilarityOptions { prior, ..options.similarity.clone() }, context)
+    similarity::run(&input, &options.similarity, context)
 }
 
 /// What the grids are deformed by.
