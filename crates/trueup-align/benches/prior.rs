@@ -83,6 +83,7 @@ fn prior(bencher: divan::Bencher<'_, '_>, count: usize) {
         .collect();
     let frames = vec![FRAME; count];
     let input = PriorInput {
+        method: trueup_align::similarity::PriorMethod::VanishingPoints,
         cameras: &cameras,
         triads: &triads,
         lines: &lines,

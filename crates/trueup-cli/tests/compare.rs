@@ -39,7 +39,7 @@ fn every_method_is_made_or_says_why_not() {
     let before = desk.files();
     let options = finish(trueup(desk.path(), &["options", "--expert", "--json"]));
     let options: Vec<Value> = serde_json::from_str(options.expect_success()).expect("JSON");
-    let run = compare(&desk, &["--truth", "truth.json", "--set", "compare.page_pixels=200000"]);
+    let run = compare(&desk, &["--truth", "truth.json", "--scale", "0.3"]);
     let printed = run.expect_success();
     assert!(printed.contains("page      out/index.html") && printed.contains("pictures  3 of 3 used"), "{printed}");
     let mut expected = before;

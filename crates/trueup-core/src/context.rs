@@ -109,6 +109,11 @@ impl<'a> StageContext<'a> {
         Self { seed, ..Self::new(self.progress, self.cancel) }
     }
 
+    /// The number from which every random choice derives.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
     /// A generator for one subject of one stage (an image's or a pair's index), so that results depend neither on the
     /// order of the work nor on the number of threads.
     pub fn generator(&self, stage: &str, subject: u64) -> ChaCha8Rng {

@@ -2,10 +2,8 @@
 //!
 //! Sets are folders of photographs: the repository's example, and those named in `TRUEUP_BENCH_SETS`, separated by `:`.
 
-use std::path::PathBuf;
-
 use divan::Bencher;
-use trueup::{Inputs, StageContext, StitchJob, StitchOptions};
+use trueup::{Inputs, Outputs, StageContext, StitchJob, StitchOptions};
 
 fn main() {
     divan::main();
@@ -20,16 +18,7 @@ fn sets() -> Vec<String> {
 #[divan::bench(args = sets(), sample_count = 5, sample_size = 1)]
 fn stitch(bencher: Bencher, set: &str) {
     let output = std::env::temp_dir().join("trueup-bench.jpg");
-    let job = StitchJob {
-        inputs: Inputs::new([set]),
-        output: PathBuf::from(&output),
-        project: None,
-        cache: None,
-        hugin_project: None,
-        layers: None,
-        seams: None,
-        threads: 0,
-    };
+    let job = StitchJob { inputs: Inputs::new([set]), outputs: Outputs::new(&output), cache: None, threads: 0 };
     let options = StitchOptions::default();
     bencher.bench_local(|| job.run(&options, &StageContext::default()).expect("a set that stitches"));
     // Nothing depends on the file; it may already be gone.

@@ -39,8 +39,8 @@ fn measure(folder: &str, mut options: StitchOptions) -> Result<(), trueup::Error
         options.set(&format!("exposure.anchor={anchor}"))?;
         options.set(&format!("render.blend={blend}"))?;
         let stitcher = Stitcher::new(&options, &context);
-        let aligned = stitcher.align_matched(&matched, &inputs)?;
-        let Some(alignment) = aligned.alignments.first() else { return Ok(()) };
+        let mut aligned = stitcher.align_matched(&matched, &inputs)?;
+        let Some(alignment) = aligned.alignments.first_mut() else { return Ok(()) };
         let start = std::time::Instant::now();
         let panorama = stitcher.compose(alignment)?;
         let seconds = start.elapsed().as_secs_f64();
