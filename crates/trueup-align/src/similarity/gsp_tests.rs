@@ -59,6 +59,7 @@ impl Graph {
 
     fn input<'a>(&'a self, vanishing: &'a VanishingOptions, reference: usize) -> PriorInput<'a> {
         PriorInput {
+            method: PriorMethod::Gsp2d,
             cameras: &self.cameras,
             triads: &self.triads,
             lines: &self.lines,
@@ -74,9 +75,8 @@ impl Graph {
 
     fn prior(&self, prior: PriorMethod, reference: usize, turn_deg: f64) -> SimilarityPrior {
         let vanishing = VanishingOptions::default();
-        let input = PriorInput { turn: turn_deg.to_radians(), ..self.input(&vanishing, reference) };
-        let options = SimilarityOptions { prior, ..SimilarityOptions::default() };
-        run(&input, &options, &StageContext::default()).expect("a well-formed graph")
+        let input = PriorInput { method: prior, turn: turn_deg.to_radians(), ..self.input(&vanishing, reference) };
+        run(&input, &SimilarityOptions::default(), &StageContext::default()).expect("a well-formed graph")
     }
 
     fn theta_deg(&self, prior: PriorMethod, reference: usize) -> Vec<f64> {
@@ -155,11 +155,11 @@ fn gsp_3d_does_not_depend_on_the_reference_where_overlaps_agree_with_the_cameras
         .iter()
         .flat_map(|edge| [overlap(&scene, edge.a, edge.b), overlap(&scene, edge.b, edge.a)])
         .collect();
-    let options = SimilarityOptions { prior: PriorMethod::Gsp3d, ..SimilarityOptions::default() };
     let prior = |reference| {
         let vanishing = VanishingOptions::default();
-        let input = PriorInput { overlaps: &overlaps, reference, ..scene.input(&vanishing) };
-        run(&input, &options, &StageContext::default()).expect("a well-formed scene")
+        let method = PriorMethod::Gsp3d;
+        let input = PriorInput { method, overlaps: &overlaps, reference, ..scene.input(&vanishing) };
+        run(&input, &SimilarityOptions::default(), &StageContext::default()).expect("a well-formed scene")
     };
     let rotations: Vec<Matrix3<f64>> = scene.cameras.iter().map(Camera::rotation).collect();
     let straightened = rolls(&straighten::straighten(&rotations).down, &rotations);

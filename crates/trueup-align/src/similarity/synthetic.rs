@@ -11,7 +11,7 @@ use trueup_core::lines::LineSegment;
 use trueup_core::matches::{PairMatches, PairVerdict, PointMatch};
 use trueup_core::source::WorkingFrame;
 
-use super::{PriorInput, SimilarityOptions, SimilarityPrior, run};
+use super::{PriorInput, PriorMethod, SimilarityOptions, SimilarityPrior, run};
 use crate::vanishing::{Triad, TriadOutcome, VanishingOptions};
 
 /// A normally distributed number (Box and Muller).
@@ -96,6 +96,7 @@ impl SyntheticScene {
     /// What the prior is made from, without overlaps.
     pub(crate) fn input<'a>(&'a self, vanishing: &'a VanishingOptions) -> PriorInput<'a> {
         PriorInput {
+            method: PriorMethod::VanishingPoints,
             cameras: &self.cameras,
             triads: &self.triads,
             lines: &self.lines,

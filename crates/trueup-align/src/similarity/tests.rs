@@ -329,9 +329,9 @@ fn the_fallback_does_not_roll_steep_rows() {
     let scene = SyntheticScene::new(sweep, CLEAN, 0.0, 21);
     let overlaps = [overlap(&scene, 0, 1), overlap(&scene, 1, 0)];
     let vanishing = VanishingOptions::default();
-    let input = PriorInput { overlaps: &overlaps, ..scene.input(&vanishing) };
-    let options = SimilarityOptions { prior: PriorMethod::Straightening, ..SimilarityOptions::default() };
-    let prior = run(&input, &options, &StageContext::default()).expect("a well-formed scene");
+    let method = PriorMethod::Straightening;
+    let input = PriorInput { method, overlaps: &overlaps, ..scene.input(&vanishing) };
+    let prior = run(&input, &SimilarityOptions::default(), &StageContext::default()).expect("a well-formed scene");
     for (theta, roll) in prior.theta.iter().zip(&prior.roll) {
         assert!((theta - roll).abs() < 1e-12);
     }
