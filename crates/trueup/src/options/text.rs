@@ -88,6 +88,7 @@ impl StitchOptions {
                 let value = values.remove(&option).unwrap_or_default();
                 match retired {
                     Retired::Renamed(new) => renamed.push((new, value)),
+                    Retired::Flag(_) => {}
                     Retired::Fixed(_) if toml::Value::try_from(&value).is_ok_and(|value| retired.is_now(&value)) => {}
                     Retired::Fixed(_) => {
                         let reason = format!("it is of an earlier version: {}", retired.reason(&name));
