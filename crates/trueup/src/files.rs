@@ -108,15 +108,15 @@ pub(crate) fn render_and_write(stitcher: &Stitcher<'_>, mut alignment: Alignment
     let Outputs { panorama: output, project: project_file, hugin_project: pto, layers, seams } = outputs;
     let (options, context) = (stitcher.options(), stitcher.context());
     let start = Instant::now();
-    let panorama = Stitcher::new(options, context).writing_to(&output).compose(&alignment)?;
+    let rendered = Stitcher::new(options, context).writing_to(&output).compose(&alignment)?;
     alignment.record_seconds("render", start.elapsed());
     let start = Instant::now();
     let output_options = stitcher.output_options(&alignment, &output)?;
-    let bytes = encode::write(&output, &panorama, &stitcher.metadata(&alignment), &output_options, context)?;
+    let bytes = encode::write(&output, &rendered.panorama, &stitcher.metadata(&alignment), &output_options, context)?;
     if let Some(path) = &seams {
-        stitcher.write_seams(&alignment, &panorama, path)?;
+        stitcher.write_seams(&alignment, &rendered, path)?;
     }
-    drop(panorama);
+    drop(rendered);
     if let Some(path) = &layers {
         stitcher.write_layers(&alignment, path)?;
     }

@@ -12,7 +12,7 @@
 //! let stitcher = Stitcher::new(&options, &context);
 //! let inputs = Inputs::new(["holiday/"]);
 //! for alignment in stitcher.align(&inputs)?.alignments {
-//!     let panorama = stitcher.compose(&alignment)?;
+//!     let panorama = stitcher.compose(&alignment)?.panorama;
 //!     let metadata = stitcher.metadata(&alignment);
 //!     trueup::write_picture("pano.jpg".as_ref(), &panorama, &metadata, &options.output, &context)?;
 //! }
@@ -70,7 +70,7 @@ pub use stitcher::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;
-pub use trueup_compose::render::Panorama;
+pub use trueup_compose::render::{Panorama, Rendered};
 pub use trueup_core::context::{CancelToken, Progress, Silent};
 pub use trueup_core::diagnostics::{Diagnostic, Severity};
 pub use trueup_core::options::{InvalidOption, OptionDescription};

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use trueup_compose::render::Blend;
 use trueup_core::{Error, Result};
 use trueup_io::encode;
 use trueup_io::scratch::check_scratch;
@@ -29,7 +28,7 @@ impl Outputs {
         }
         if let Some(seams) = &self.seams {
             encode::check_labels_place(seams)?;
-            if !matches!(options.render.blend, Blend::MultiBand | Blend::None) {
+            if !options.render.blend.has_seams() {
                 return Err(no_seams());
             }
         }

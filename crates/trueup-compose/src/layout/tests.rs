@@ -1,5 +1,7 @@
 use std::borrow::Cow;
 
+use trueup_core::mesh::GridMesh;
+
 use super::*;
 
 fn placed(scale: f64, shift: [f64; 2]) -> Placed {

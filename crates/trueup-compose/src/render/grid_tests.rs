@@ -3,10 +3,10 @@
 use nalgebra::Vector2;
 use proptest::prelude::*;
 
-use super::test_pictures::moved;
 use crate::deformed_grid::DeformedGrid;
 use crate::layout::Placed;
 use crate::simd::{Positions, invert_row};
+use crate::test_pictures::moved;
 
 /// A moved photograph, every vertex of its mesh moved a little more.
 fn jittered(jitter: &[f64]) -> Placed {

@@ -1,6 +1,7 @@
 use trueup_core::raster::{Photograph, Raster};
 
 use super::*;
+use crate::kernel::Bicubic;
 
 fn positions(points: &[(f64, f64)]) -> Positions {
     let mut positions = Positions::default();
@@ -14,7 +15,7 @@ fn positions(points: &[(f64, f64)]) -> Positions {
     positions
 }
 
-fn sample<K: Kernel>(photograph: &Photograph, stretch: [f64; 2], points: &[(f64, f64)]) -> Vec<[f32; 4]> {
+fn sample<K: InterpolationKernel>(photograph: &Photograph, stretch: [f64; 2], points: &[(f64, f64)]) -> Vec<[f32; 4]> {
     let mut out = vec![[0.0; 4]; points.len()];
     interpolate::<K>(photograph, &positions(points), stretch, &mut out, &mut Vec::new());
     out

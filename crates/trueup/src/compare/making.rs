@@ -79,7 +79,7 @@ impl Common<'_> {
 
         let file = format!("{stem}.{}", self.options.compare.format.display());
         let start = Instant::now();
-        let panorama = stitcher.compose(&alignment)?;
+        let panorama = stitcher.compose(&alignment)?.panorama;
         alignment.record_seconds("render", start.elapsed());
         let start = Instant::now();
         let options = &alignment.project.options.output;

@@ -6,7 +6,7 @@ use trueup_compose::crop::Coverage;
 use trueup_compose::fidelity::{self, Fidelity};
 use trueup_compose::gaps::Gaps;
 use trueup_compose::layout::CanvasLayout;
-use trueup_compose::render::{self, Panorama};
+use trueup_compose::render::{self, RenderInput, Rendered};
 use trueup_core::Result;
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_io::encode::{self, Metadata};
@@ -15,6 +15,13 @@ use trueup_io::scratch::{ScratchFolder, check_room};
 use super::{Alignment, Stitcher};
 use crate::budget::Budget;
 use crate::provenance;
+
+impl Alignment {
+    /// What the panorama is rendered from.
+    pub(crate) fn render_input(&self) -> RenderInput<'_> {
+        RenderInput { layout: &self.layout, corrections: &self.corrections, photographs: self.photographs.as_ref() }
+    }
+}
 
 impl<'a> Stitcher<'a> {
     /// Says where composed panoramas will be written: scratch files go into the same folder, unless `stitch.scratch` names
@@ -32,23 +39,22 @@ impl<'a> Stitcher<'a> {
     ///
     /// [`Error::Cancelled`]: trueup_core::Error::Cancelled
     /// [`Error::Limits`]: trueup_core::Error::Limits
-    pub fn compose(&self, alignment: &Alignment) -> Result<Panorama> {
+    pub fn compose(&self, alignment: &Alignment) -> Result<Rendered> {
         let layout = &alignment.layout;
         let scratch = self.scratch(layout)?;
-        let mut panorama = render::run_within(
+        let mut rendered = render::run(
+            &alignment.render_input(),
             &Budget::new(self.options).composing(alignment.photographs.kept_bytes(), &scratch),
-            layout,
-            &alignment.corrections,
-            alignment.photographs.as_ref(),
-            (&self.options.render, &self.options.seam),
+            &self.options.render,
+            &self.options.seam,
             self.context,
         )?;
         if self.options.canvas.fill > 0.0 {
             let gaps = Gaps::find(layout, Coverage::of(layout), self.options.canvas.fill);
-            let filled = panorama.fill(&gaps, self.context)?;
+            let filled = rendered.panorama.fill(&gaps, self.context)?;
             self.report_filled(filled, layout);
         }
-        Ok(panorama)
+        Ok(rendered)
     }
 
     /// Says how much of a panorama no photograph shows.
@@ -79,7 +85,7 @@ impl<'a> Stitcher<'a> {
         provenance::metadata(&alignment.project, alignment.photographs.colors(), &self.options.output)
     }
 
-    /// Measures how true `panorama`, composed of `alignment`, is to its photographs: steps across its seams, and ghosts.
+    /// Measures how true what was `rendered`, composed of `alignment`, is to its photographs: steps across its seams, and ghosts.
     /// Renders every photograph alone on the canvas, nine bytes a pixel of each.
     ///
     /// # Errors
@@ -87,20 +93,19 @@ impl<'a> Stitcher<'a> {
     ///
     /// [`Error::Cancelled`]: trueup_core::Error::Cancelled
     /// [`Error::Input`]: trueup_core::Error::Input
-    pub fn fidelity(&self, alignment: &Alignment, panorama: &Panorama) -> Result<Fidelity> {
+    pub fn fidelity(&self, alignment: &Alignment, rendered: &Rendered) -> Result<Fidelity> {
         let layout = &alignment.layout;
         let layers = (0..layout.placed.len())
             .map(|position| {
                 self.context.check_cancelled()?;
-                let photographs = alignment.photographs.as_ref();
-                render::layer(layout, &alignment.corrections, position, photographs, &self.options.render)
+                render::layer(&alignment.render_input(), position, &self.options.render)
             })
             .collect::<Result<Vec<_>>>()?;
         let (size, around) = ([layout.width, layout.height], layout.period.is_some());
-        let shown = match panorama.seams() {
+        let shown = match &rendered.seams {
             Some(seams) => seams.on_canvas(size),
             None => fidelity::deepest(&layers, size, around)?,
         };
-        fidelity::measure(panorama, &layers, &shown, around)
+        fidelity::measure(&rendered.panorama, &layers, &shown, around)
     }
 }

@@ -229,7 +229,8 @@ impl<'a> Stitcher<'a> {
         let curve = photographs.transfer_curve();
         let thumbnails: Vec<Thumbnail> =
             thumbnails.map(|(raster, frame, camera)| Thumbnail { raster, curve: &curve, frame, camera }).collect();
-        Ok(exposure::run(layout, &thumbnails, reference, &self.options.exposure, self.context)?.corrections)
+        let input = exposure::ExposureInput { layout, thumbnails: &thumbnails, reference };
+        Ok(exposure::run(&input, &self.options.exposure, self.context)?.corrections)
     }
 
     fn report_left_out(&self, photograph: usize, left_out: &LeftOut) {

@@ -71,11 +71,6 @@ impl Alignment {
         &self.layout
     }
 
-    /// Gain, color and vignetting of every photograph placed.
-    pub(crate) fn corrections(&self) -> &Corrections {
-        &self.corrections
-    }
-
     /// The photographs, in the order of [`Project::images`].
     pub(crate) fn photographs(&self) -> &FilePhotographs {
         &self.photographs
