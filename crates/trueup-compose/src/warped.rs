@@ -45,7 +45,7 @@ pub(crate) struct WarpedPhotograph<'a> {
     grid: DeformedGrid,
     feather: Feather,
     light: LightTable,
-    unwanted: Option<IgnoredPart>,
+    ignored: Option<IgnoredPart>,
 }
 
 /// Working memory of one task.
@@ -90,12 +90,12 @@ impl<'a> WarpedPhotograph<'a> {
         }
         let feather = Feather::new(grid.size, FEATHER_EXPONENT);
         let light = LightTable::new(light, grid.size);
-        Self { photograph, grid, feather, light, unwanted: None }
+        Self { photograph, grid, feather, light, ignored: None }
     }
 
     /// The same without what is not to be seen of it.
-    pub(crate) fn without(self, unwanted: Option<IgnoredPart>) -> Self {
-        Self { unwanted, ..self }
+    pub(crate) fn without(self, ignored: Option<IgnoredPart>) -> Self {
+        Self { ignored, ..self }
     }
 
     /// The grid, in the pixels of [`Self::photograph`].
@@ -234,9 +234,9 @@ impl<'a> WarpedPhotograph<'a> {
             }
             Interpolation::Bicubic => interpolate::<Bicubic>(&self.photograph, positions, stretch, samples, at_border),
         }
-        if let Some(unwanted) = &self.unwanted {
+        if let Some(ignored) = &self.ignored {
             for (index, (x, sample)) in run.columns.clone().zip(samples).enumerate() {
-                if unwanted.hides(positions.place(index), self.grid.size, [x, y]) {
+                if ignored.hides(positions.place(index), self.grid.size, [x, y]) {
                     sample[3] = 0.0;
                 }
             }

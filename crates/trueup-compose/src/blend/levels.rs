@@ -1,12 +1,7 @@
 //! The levels that are blended as a whole.
 
-use trueup_core::Result;
-
-use super::coarse::CoarseBlend;
-use super::shown::ShownWhere;
 use crate::layout::{CanvasLayout, unit_of_turn};
-use crate::pyramid::{PyramidPlane, first_level};
-use crate::small_views::CoarseLevels;
+use crate::pyramid::first_level;
 
 /// Which levels of a canvas are blended as a whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,20 +32,3 @@ fn levels_above(layout: &CanvasLayout, first_level: u32, transition: f64) -> u32
 
 /// 2^(3 + 12) pixels are wider than any photograph.
 const MOST_LEVELS: u32 = 12;
-
-/// The coarse levels, blended.
-pub(super) struct BlendedLevels {
-    /// The blended level `first_level`.
-    pub(super) blended: PyramidPlane<[f32; 4]>,
-    /// The same level of every photograph.
-    pub(super) own: CoarseLevels,
-}
-
-impl BlendedLevels {
-    /// Blends what the photographs show `shown` where.
-    pub(super) fn new(mut own: CoarseLevels, shown: ShownWhere<'_>, levels: WholeLevels) -> Result<Self> {
-        let blended = CoarseBlend { own: &own, shown, levels }.blend()?;
-        own.level_all();
-        Ok(Self { blended, own })
-    }
-}

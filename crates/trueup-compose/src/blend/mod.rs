@@ -31,11 +31,10 @@ use crate::seam::Seams;
 use crate::small_views::{CoarseLevels, DecodedPhotographs};
 use crate::store::{PixelStore, RootPixel};
 use crate::warped::{Resampling, SamplingMemory};
-use levels::BlendedLevels;
 use loaded::{LoadedPhotographs, PhotographLoader};
 use shown::ShownWhere;
 use tile::BlendTile;
-use work::{BlendWork, TILES_AT_ONCE};
+use work::{BlendWork, BlendedLevels, TILES_AT_ONCE};
 
 pub(crate) use levels::WholeLevels;
 pub(crate) use needs::needed_bytes;

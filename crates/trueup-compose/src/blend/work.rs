@@ -1,15 +1,36 @@
-//! What all tiles need.
+//! What all tiles need: options, labels, and the coarse levels, blended.
 
 use std::sync::Arc;
 
+use trueup_core::Result;
 use trueup_core::mask::Mask;
 
-use super::levels::BlendedLevels;
+use super::coarse::CoarseBlend;
+use super::levels::WholeLevels;
 use super::shown::ShownWhere;
+use crate::pyramid::PyramidPlane;
+use crate::small_views::CoarseLevels;
 use crate::warped::Resampling;
 
 /// Tiles for each thread that are finished before they are put on the canvas.
 pub(super) const TILES_AT_ONCE: usize = 16;
+
+/// The coarse levels, blended.
+pub(super) struct BlendedLevels {
+    /// The blended level `first_level`.
+    pub(super) blended: PyramidPlane<[f32; 4]>,
+    /// The same level of every photograph.
+    pub(super) own: CoarseLevels,
+}
+
+impl BlendedLevels {
+    /// Blends what the photographs show `shown` where.
+    pub(super) fn new(mut own: CoarseLevels, shown: ShownWhere<'_>, levels: WholeLevels) -> Result<Self> {
+        let blended = CoarseBlend { own: &own, shown, levels }.blend()?;
+        own.level_all();
+        Ok(Self { blended, own })
+    }
+}
 
 /// What all tiles need.
 pub(super) struct BlendWork<'a> {

@@ -117,6 +117,7 @@ fn lights(seed: u64) -> Vec<Light> {
 
 /// The largest errors of the gains, and of what is left of the vignetting halfway to the corners and there.
 fn errors(lights: &[Light], found: &Corrections) -> [f64; 2] {
+    assert_eq!(found.photographs.len(), lights.len());
     let mut errors = [0.0_f64; 2];
     for (light, correction) in lights.iter().zip(&found.photographs) {
         for channel in 0..3 {

@@ -154,6 +154,7 @@ fn gain_color_and_vignetting_are_recovered_together() {
         }
     }
     let exposure = estimate(&shifts, &rasters, &ExposureOptions::default());
+    assert_eq!(exposure.corrections.photographs.len(), shifts.len());
     let truth = |k: usize, c: usize| lights[0] * casts[0][c] / (lights[k] * casts[k][c]);
     for (k, correction) in exposure.corrections.photographs.iter().enumerate() {
         for c in 0..3 {

@@ -110,6 +110,7 @@ fn finer_canvases_ask_the_same_labels() {
     let seams = find(&[view(0..50, 0..20, texture), view(30..80, 0..20, texture)], [80, 20], &SeamOptions::default());
     let mut row = Vec::new();
     seams.row(40, &(0..320), [320, 80], &mut row);
+    assert_eq!(row.len(), 320);
     for (x, label) in row.iter().enumerate() {
         // A seam may move by less than a pixel of the small canvas.
         let near = [x.saturating_sub(4), x, (x + 4).min(319)].map(|x| seams.labels()[10 * 80 + x / 4]);
