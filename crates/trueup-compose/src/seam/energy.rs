@@ -135,7 +135,7 @@ impl<'a> SeamEnergy<'a> {
     /// The differences at both pixels, of colors, gradients and shading: Kwatra and others, "Graphcut textures", SIGGRAPH
     /// 2003, equation 1, with the gradients added instead of divided by: a division draws seams into textured parts,
     /// which in photographs taken from different places fit worst.
-    pub(super) fn seam_cost(&self, p: (usize, usize), a: usize, q: (usize, usize), b: usize) -> i32 {
+    pub(super) fn seam_cost(&self, p: [usize; 2], a: usize, q: [usize; 2], b: usize) -> i32 {
         if a == b {
             return 0;
         }
@@ -144,14 +144,14 @@ impl<'a> SeamEnergy<'a> {
 
     /// Cost of a seam between neighboring pixels from the sum of the differences at both.
     #[inline]
-    pub(super) fn cost_of(&self, p: (usize, usize), q: (usize, usize), difference: i32) -> i32 {
-        let (at_p, at_q) = (self.moving[p.1 * self.width + p.0], self.moving[q.1 * self.width + q.0]);
+    pub(super) fn cost_of(&self, p: [usize; 2], q: [usize; 2], difference: i32) -> i32 {
+        let (at_p, at_q) = (self.moving[p[1] * self.width + p[0]], self.moving[q[1] * self.width + q[0]]);
         let through = if at_p != 0 && at_p == at_q { self.moving_cost } else { 0 };
         self.length + difference + through
     }
 
     /// How differently two photographs show a canvas pixel.
-    pub(super) fn difference(&self, a: usize, b: usize, (x, y): (usize, usize)) -> i32 {
+    pub(super) fn difference(&self, a: usize, b: usize, [x, y]: [usize; 2]) -> i32 {
         let index = |label: usize| self.views[label].index_around(x, y, self.turn);
         let (Some(i), Some(j)) = (index(a), index(b)) else { return UNSEEN };
         let (first, second) = (self.views[a].pixels[i], self.views[b].pixels[j]);

@@ -26,6 +26,13 @@ struct Taking<'a> {
     window: Window<'a>,
 }
 
+impl Taking<'_> {
+    /// Whether the box goes all the way round a cylinder.
+    fn all_round(&self) -> bool {
+        self.energy.turn > 0 && self.window.columns.len() == self.energy.turn
+    }
+}
+
 /// See [`Expansions::change`].
 const FIXED: i32 = -1;
 
@@ -60,66 +67,19 @@ impl Expansions {
         window: Window<'_>,
         free: &dyn Fn(usize) -> bool,
     ) -> bool {
-        let Window { columns, rows } = window;
         let taking = Taking { energy, label, window };
-        let (width, height) = (columns.len(), rows.len());
-        let all_round = energy.turn > 0 && width == energy.turn;
-        self.change.clear();
-        self.change.resize(width * height, FIXED);
-        let mut nodes = 0;
-        for y in rows.clone() {
-            for x in columns.clone().skip(usize::from(all_round)) {
-                let place = (y - rows.start) * width + x - columns.start;
-                let x = energy.column(x);
-                let at = y * energy.width + x;
-                let old = labels[at];
-                if old != NOBODY && usize::from(old) != label && free(at) && energy.allowed(label, x, y) {
-                    self.change[place] = energy.difference(usize::from(old), label, (x, y));
-                    nodes += 1;
-                }
-            }
-        }
-        if nodes == 0 {
+        if !self.find_nodes(&taking, labels, free) {
             return false;
         }
-        self.flow.reset(width, height);
-        for (v, y) in rows.clone().enumerate() {
-            for (u, x) in columns.clone().enumerate() {
-                if self.change[v * width + u] != FIXED {
-                    let x = energy.column(x);
-                    let old = usize::from(labels[y * energy.width + x]);
-                    let change = energy.data_cost(label, x, y) - energy.data_cost(old, x, y);
-                    self.flow.add_sink_side_cost(self.flow.node(u, v), change);
-                }
-            }
-        }
-        for y in rows.clone() {
-            for x in columns.clone() {
-                for (direction, other) in [(RIGHT, (x + 1, y)), (DOWN, (x, y + 1))] {
-                    if (other.0 < energy.width || energy.turn > 0) && other.1 < energy.height {
-                        self.join(&taking, labels, [(x, y), other], direction);
-                    }
-                }
-            }
-        }
-        // Neighbors left of and above the box.
-        for x in columns.clone() {
-            if rows.start > 0 {
-                self.join(&taking, labels, [(x, rows.start - 1), (x, rows.start)], DOWN);
-            }
-        }
-        for y in rows.clone() {
-            if columns.start > 0 && !all_round {
-                self.join(&taking, labels, [(columns.start - 1, y), (columns.start, y)], RIGHT);
-            } else if energy.turn > 0 && !all_round {
-                self.join(&taking, labels, [(energy.turn - 1, y), (0, y)], RIGHT);
-            }
-        }
+        self.flow.reset(window.columns.len(), window.rows.len());
+        self.add_data_costs(&taking, labels);
+        self.add_seam_costs(&taking, labels);
         self.flow.solve();
+        let Window { columns, rows } = window;
         let mut changed = false;
         for (v, y) in rows.clone().enumerate() {
             for (u, x) in columns.clone().enumerate() {
-                if self.change[v * width + u] != FIXED && self.flow.on_sink_side(self.flow.node(u, v)) {
+                if self.change[v * columns.len() + u] != FIXED && self.flow.on_sink_side(self.flow.node(u, v)) {
                     labels[y * energy.width + energy.column(x)] = label as Label;
                     changed = true;
                 }
@@ -128,10 +88,74 @@ impl Expansions {
         changed
     }
 
-    /// Adds the cost of a seam between neighboring pixels p and q. A node on the sink's side takes the new label.
-    fn join(&mut self, taking: &Taking<'_>, labels: &[Label], [p, q]: [(usize, usize); 2], direction: usize) {
+    /// Finds the pixels that take part: those that are `free` and that the photograph may take. Returns whether there are any.
+    fn find_nodes(&mut self, taking: &Taking<'_>, labels: &[Label], free: &dyn Fn(usize) -> bool) -> bool {
         let &Taking { energy, label, window: Window { columns, rows } } = taking;
-        let node = |(x, y): (usize, usize)| {
+        let width = columns.len();
+        self.change.clear();
+        self.change.resize(width * rows.len(), FIXED);
+        let mut any = false;
+        for y in rows.clone() {
+            for x in columns.clone().skip(usize::from(taking.all_round())) {
+                let place = (y - rows.start) * width + x - columns.start;
+                let x = energy.column(x);
+                let at = y * energy.width + x;
+                let old = labels[at];
+                if old != NOBODY && usize::from(old) != label && free(at) && energy.allowed(label, x, y) {
+                    self.change[place] = energy.difference(usize::from(old), label, [x, y]);
+                    any = true;
+                }
+            }
+        }
+        any
+    }
+
+    /// Adds what the pixels that take part cost themselves.
+    fn add_data_costs(&mut self, taking: &Taking<'_>, labels: &[Label]) {
+        let &Taking { energy, label, window: Window { columns, rows } } = taking;
+        for (v, y) in rows.clone().enumerate() {
+            for (u, x) in columns.clone().enumerate() {
+                if self.change[v * columns.len() + u] != FIXED {
+                    let x = energy.column(x);
+                    let old = usize::from(labels[y * energy.width + x]);
+                    let change = energy.data_cost(label, x, y) - energy.data_cost(old, x, y);
+                    self.flow.add_sink_side_cost(self.flow.node(u, v), change);
+                }
+            }
+        }
+    }
+
+    /// Adds what seams cost within the box and along its border.
+    fn add_seam_costs(&mut self, taking: &Taking<'_>, labels: &[Label]) {
+        let &Taking { energy, window: Window { columns, rows }, .. } = taking;
+        for y in rows.clone() {
+            for x in columns.clone() {
+                for (direction, other) in [(RIGHT, [x + 1, y]), (DOWN, [x, y + 1])] {
+                    if (other[0] < energy.width || energy.turn > 0) && other[1] < energy.height {
+                        self.join(taking, labels, [[x, y], other], direction);
+                    }
+                }
+            }
+        }
+        // Neighbors left of and above the box.
+        for x in columns.clone() {
+            if rows.start > 0 {
+                self.join(taking, labels, [[x, rows.start - 1], [x, rows.start]], DOWN);
+            }
+        }
+        for y in rows.clone() {
+            if columns.start > 0 && !taking.all_round() {
+                self.join(taking, labels, [[columns.start - 1, y], [columns.start, y]], RIGHT);
+            } else if energy.turn > 0 && !taking.all_round() {
+                self.join(taking, labels, [[energy.turn - 1, y], [0, y]], RIGHT);
+            }
+        }
+    }
+
+    /// Adds the cost of a seam between neighboring pixels p and q. A node on the sink's side takes the new label.
+    fn join(&mut self, taking: &Taking<'_>, labels: &[Label], [p, q]: [[usize; 2]; 2], direction: usize) {
+        let &Taking { energy, label, window: Window { columns, rows } } = taking;
+        let node = |[x, y]: [usize; 2]| {
             if !(columns.contains(&x) && rows.contains(&y)) {
                 return None;
             }
@@ -143,8 +167,8 @@ impl Expansions {
         if node_p.is_none() && node_q.is_none() {
             return;
         }
-        let [p, q] = [p, q].map(|(x, y)| (energy.column(x), y));
-        let old = |(x, y): (usize, usize)| labels[y * energy.width + x];
+        let [p, q] = [p, q].map(|[x, y]| [energy.column(x), y]);
+        let old = |[x, y]: [usize; 2]| labels[y * energy.width + x];
         let (a, b) = (old(p), old(q));
         if a == NOBODY || b == NOBODY {
             return;
