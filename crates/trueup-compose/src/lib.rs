@@ -11,7 +11,6 @@
 //! * [`fidelity`]: how true a panorama is to its photographs.
 //!
 //! A photograph's samples are resampled exactly once, straight to the canvas.
-#![warn(unreachable_pub)]
 
 pub mod crop;
 pub mod exposure;
