@@ -101,8 +101,11 @@ fn composition(layout: &CanvasLayout, options: &RenderOptions) -> Composition {
 
 /// The levels that are blended as a whole, if any.
 fn whole_levels(layout: &CanvasLayout, options: &RenderOptions) -> Option<WholeLevels> {
-    let bands = composition(layout, options) == Composition::AlongSeams(Transition::Bands);
-    (bands && layout.placed.len() > 1).then(|| WholeLevels::of(layout, options.transition))
+    let bands = match composition(layout, options) {
+        Composition::AlongSeams(Transition::Bands) => layout.placed.len() > 1,
+        Composition::AlongSeams(Transition::Cut) | Composition::Averaged(_) => false,
+    };
+    bands.then(|| WholeLevels::of(layout, options.transition))
 }
 
 /// The canvas on which the photographs of a layout are made small and blended.
