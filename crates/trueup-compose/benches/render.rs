@@ -6,7 +6,7 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use trueup_compose::exposure::Correction;
 use trueup_compose::layout::{CanvasLayout, CanvasOptions, Placed, run as lay_out};
-use trueup_compose::render::{Blend, Interpolation, Panorama, RenderOptions, run as render};
+use trueup_compose::render::{Blend, Interpolation, Panorama, RenderInput, RenderOptions, Resources, run as render};
 use trueup_compose::seam::SeamOptions;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::{Photograph, Raster, RowSource};
@@ -51,7 +51,9 @@ fn layout(scale: f64) -> CanvasLayout {
 
 fn compose(layout: &CanvasLayout, photographs: &Memory, options: &RenderOptions) -> Result<Panorama> {
     let corrections = vec![Correction::uniform(0.9), Correction::uniform(1.1)].into();
-    render(layout, &corrections, photographs, options, &SeamOptions::default(), &StageContext::default())
+    let input = RenderInput { layout, corrections: &corrections, photographs };
+    let (seams, context) = (SeamOptions::default(), StageContext::default());
+    Ok(render(&input, &Resources::unlimited(), options, &seams, &context)?.panorama)
 }
 
 fn bench_render(bencher: Bencher, scale: f64, threads: usize, options: RenderOptions) {

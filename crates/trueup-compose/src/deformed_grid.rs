@@ -53,7 +53,7 @@ pub(crate) struct DeformedGrid {
 
 /// A stretch of one canvas row covered by one cell.
 #[derive(Debug, Clone)]
-pub(crate) struct Run {
+pub(crate) struct CellRun {
     /// Index of the cell.
     pub(crate) cell: usize,
     /// Columns of the canvas.
@@ -150,7 +150,7 @@ impl DeformedGrid {
 
     /// The runs of canvas row `y` in order of columns, from `candidates` (see [`Self::cells_in_rows`]). No column is in
     /// two runs. `owner` is scratch space.
-    pub(crate) fn runs(&self, y: usize, candidates: &[u32], owner: &mut Vec<u32>, runs: &mut Vec<Run>) {
+    pub(crate) fn runs(&self, y: usize, candidates: &[u32], owner: &mut Vec<u32>, runs: &mut Vec<CellRun>) {
         self.runs_within(y, &self.columns, candidates, owner, runs);
     }
 
@@ -161,7 +161,7 @@ impl DeformedGrid {
         columns: &Range<usize>,
         candidates: &[u32],
         owner: &mut Vec<u32>,
-        runs: &mut Vec<Run>,
+        runs: &mut Vec<CellRun>,
     ) {
         let start = columns.start;
         owner.clear();
@@ -184,7 +184,7 @@ impl DeformedGrid {
         for same in owner.chunk_by(|left, right| left == right) {
             if same[0] != NO_CELL {
                 let columns = start + column..start + column + same.len();
-                runs.push(Run { cell: same[0] as usize, columns });
+                runs.push(CellRun { cell: same[0] as usize, columns });
             }
             column += same.len();
         }
@@ -229,7 +229,7 @@ impl DeformedGrid {
         if columns.is_empty() || rows.is_empty() {
             return;
         }
-        let (mut candidates, mut owner, mut runs) = (Vec::new(), Vec::new(), Vec::<Run>::new());
+        let (mut candidates, mut owner, mut runs) = (Vec::new(), Vec::new(), Vec::<CellRun>::new());
         let mut positions = Positions::default();
         self.cells_in_window(&columns, &rows, &mut candidates);
         for y in rows {

@@ -1,6 +1,6 @@
 //! The parts of a canvas that no photograph covers: which of them are small.
 
-use crate::crop::Coverage;
+use crate::coverage::Coverage;
 use crate::distance::border_distances;
 use crate::layout::CanvasLayout;
 

@@ -1,15 +1,16 @@
-//! Geometry and pixels to the panorama: canvas, exposure, warp and blend.
+//! Geometry and pixels to the panorama: canvas, exposure, small views, seams, blend.
 //!
-//! The stages, one module each:
+//! The stages, one module each, in their order:
 //!
-//! * [`layout`]: deformed grids in any common unit to one canvas in pixels;
+//! * [`layout`]: deformed grids in any common unit to one canvas in pixels; [`crop`]: what of it is kept;
 //! * [`exposure`]: reduced photographs to gain, color cast and vignetting of each;
-//! * [`render`]: full-resolution photographs, layout and corrections to a [`render::Panorama`], along the seams that
-//!   [`seam`] finds;
+//! * [`small_views`]: every photograph read once and made small;
+//! * [`seam`]: small views to the seams along which the photographs agree;
+//! * [`render`]: the order of these and, along the seams, full-resolution photographs to a [`render::Panorama`];
 //! * [`gaps`]: what no photograph covers, and what of that is small enough to be filled;
 //! * [`fidelity`]: how true a panorama is to its photographs.
 //!
-//! Every photograph is resampled exactly once, from its own samples straight to the canvas.
+//! A photograph's samples are resampled exactly once, straight to the canvas.
 
 pub mod crop;
 pub mod exposure;
@@ -18,13 +19,26 @@ pub mod gaps;
 pub mod layout;
 pub mod render;
 pub mod seam;
+pub mod small_views;
 
 mod blend;
+mod coverage;
 mod deformed_grid;
 mod distance;
+mod ignored;
+mod kernel;
+mod label;
+mod light;
+mod memory_plan;
+mod pyramid;
+mod render_options;
 mod sampling;
 #[allow(unsafe_code)] // Vector instructions chosen at run time; every other module is safe code.
 mod simd;
+mod store;
+#[cfg(test)]
+mod test_pictures;
 mod transfer_curve;
-mod unwanted;
+mod warped;
 mod weights;
+mod window;

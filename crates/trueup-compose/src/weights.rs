@@ -13,6 +13,19 @@ pub(crate) const EDGE_WEIGHT: f32 = 1.0 / 1_048_576.0;
 /// A share of the pixel closer to 1 than this counts as whole.
 pub(crate) const WHOLE: f32 = 1.0 - 1e-3;
 
+/// How photographs count beside each other where they are averaged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Weighting {
+    /// Each by its [`Feather`].
+    Feathered,
+    /// All the same.
+    Equal,
+}
+
+/// Power of the feather weight. Higher values let the photograph that lies deepest prevail, which shortens the transition
+/// and with it ghosts; 1 blends over the whole overlap.
+pub(crate) const FEATHER_EXPONENT: f64 = 3.0;
+
 /// The feather of one photograph: a product of a profile along x and one along y, both 1 at the middle and 0 at the
 /// borders.
 ///

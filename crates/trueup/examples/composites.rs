@@ -42,9 +42,9 @@ fn measure(folder: &str, mut options: StitchOptions) -> Result<(), trueup::Error
         let mut aligned = stitcher.align_matched(&matched, &inputs)?;
         let Some(alignment) = aligned.alignments.first_mut() else { return Ok(()) };
         let start = std::time::Instant::now();
-        let panorama = stitcher.compose(alignment)?;
+        let rendered = stitcher.compose(alignment)?;
         let seconds = start.elapsed().as_secs_f64();
-        let found = stitcher.fidelity(alignment, &panorama)?;
+        let found = stitcher.fidelity(alignment, &rendered)?;
         println!(
             "{folder}\t{model}\t{blend}\t{}\t{:.3}\t{:.3}\t{}\t{:.3}\t{:.3}\t{:.3}\t{:.4}\t{seconds:.2}",
             found.line_px,

@@ -12,7 +12,7 @@
 //! let stitcher = Stitcher::new(&options, &context);
 //! let inputs = Inputs::new(["holiday/"]);
 //! for mut alignment in stitcher.align(&inputs)?.alignments {
-//!     let panorama = stitcher.compose(&mut alignment)?;
+//!     let panorama = stitcher.compose(&mut alignment)?.panorama;
 //!     let metadata = stitcher.metadata(&alignment);
 //!     trueup::write_picture("pano.jpg".as_ref(), &panorama, &metadata, &options.compose.output, &context)?;
 //! }
@@ -48,7 +48,7 @@ pub use report::measures::{BentLine, LongLines, Measures, PictureMeasures, Repro
 pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;
-pub use trueup_compose::render::Panorama;
+pub use trueup_compose::render::{Panorama, Rendered};
 pub use trueup_core::context::{CancelToken, Progress, Silent};
 pub use trueup_core::diagnostics::{Diagnostic, Reported, Severity, Subject};
 pub use trueup_core::options::{InvalidOption, OptionDescription, Tier};

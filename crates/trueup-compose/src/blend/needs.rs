@@ -1,13 +1,12 @@
 //! How much memory blending takes, before there is anything to blend.
 
-use trueup_core::Result;
-
-use super::coarse::first_level;
-use super::unrolled::Unrolled;
-use super::{Finished, TILES_AT_ONCE, bases, levels_above, tile, tile_side, views};
-use crate::layout::CanvasLayout;
-use crate::render::{Blend, RenderOptions};
-use crate::seam::SeamOptions;
+use super::levels::WholeLevels;
+use super::work::TILES_AT_ONCE;
+use crate::layout::Unrolled;
+use crate::memory_plan::WorkBytes;
+use crate::pyramid::{first_level, mask_margin, tile_side};
+use crate::small_views::{RIM, SAMPLE_BYTES, small_size};
+use crate::store::{Pixel, RootPixel};
 
 /// Bytes of the search for seams per pixel of all small pictures: pixels at all levels, gradients, depths.
 const SEARCH_VIEW: f64 = 4.0 * 4.0 / 3.0 + 4.0 + 1.0;
@@ -21,20 +20,15 @@ const COARSE_COPIES: f64 = 8.0;
 /// A tile's photograph, sums, masks and interpolated levels, in pictures of the tile with its margin.
 const TILE_COPIES: f64 = 8.0;
 
-/// Bytes that blending takes beside canvas and photographs; bytes of the photographs' own coarse levels.
-pub(crate) fn needed_bytes(
-    layout: &CanvasLayout,
-    options: &RenderOptions,
-    seam_options: &SeamOptions,
-) -> Result<(usize, usize)> {
-    let cut = options.blend == Blend::None;
+/// Bytes that the photographs of `unrolled` take to be made small, cut along seams and, if there are any coarse `levels`,
+/// blended.
+pub(crate) fn needed_bytes(unrolled: &Unrolled<'_>, levels: Option<WholeLevels>) -> WorkBytes {
+    let layout = unrolled.original_layout();
     let several = layout.placed.len() > 1;
     let first_level = first_level([layout.width, layout.height]);
-    let levels = if cut || !several { None } else { Some(levels_above(layout, options)) };
-    let unrolled = Unrolled::new(layout, first_level, levels)?;
     let canvas = unrolled.canvas();
     let threads = rayon::current_num_threads().max(1) as f64;
-    let sample = bases::SAMPLE_BYTES as f64;
+    let sample = SAMPLE_BYTES as f64;
     // Every photograph's box on the canvas, at a scale and with so many pixels on all sides.
     let boxes = |scale: f64, rim: f64| {
         unrolled.placed().iter().map(move |placed| {
@@ -47,23 +41,22 @@ pub(crate) fn needed_bytes(
         })
     };
     let largest = |areas: &[f64]| areas.iter().copied().fold(0.0, f64::max);
-    let small = crate::seam::small_size([layout.width, layout.height], layout.period.is_some(), seam_options)
-        .map(|length| length as f64);
+    let small = small_size([layout.width, layout.height], layout.period.is_some()).map(|length| length as f64);
     let views: Vec<f64> = boxes(small[0] / layout.width as f64, 1.0).collect();
     let searching =
         SEARCH_VIEW * views.iter().sum::<f64>() + SEARCH_CANVAS * small[0] * small[1] + SEARCH_CUT * largest(&views);
     // The grown box at the sampled level has two of its samples for each of the first.
-    let bases: Vec<f64> = boxes(f64::from(1 << first_level).recip(), views::RIM as f64).collect();
+    let own_levels: Vec<f64> = boxes(f64::from(1 << first_level).recip(), RIM as f64).collect();
     let whole: f64 = canvas.iter().map(|&length| length.div_ceil(1 << first_level) as f64).product();
     // The level cut along the seams, sums at all levels and what one of them is interpolated to, beside some photographs'
     // own levels.
-    let coarse = sample * (whole * (1.0 + 4.0 / 3.0 + 1.0) + threads * COARSE_COPIES * largest(&bases));
-    let side = (tile_side(first_level) + 2 * tile::mask_margin(first_level)) as f64;
-    let finished = (TILES_AT_ONCE * size_of::<Finished>()) as f64 * (tile_side(first_level) as f64).powi(2);
+    let coarse = sample * (whole * (1.0 + 4.0 / 3.0 + 1.0) + threads * COARSE_COPIES * largest(&own_levels));
+    let side = (tile_side(first_level) + 2 * mask_margin(first_level)) as f64;
+    let finished = (TILES_AT_ONCE * RootPixel::BYTES) as f64 * (tile_side(first_level) as f64).powi(2);
     let tiles = sample * whole + threads * (sample * TILE_COPIES * side * side + finished);
-    let coarse = if cut || !several { 0.0 } else { coarse };
+    let coarse = if levels.is_none() { 0.0 } else { coarse };
     let working = if several { searching.max(coarse).max(tiles) } else { tiles - sample * whole };
-    let bases = if cut || !several { 0.0 } else { sample * bases.iter().sum::<f64>() };
+    let own_levels = if levels.is_none() { 0.0 } else { sample * own_levels.iter().sum::<f64>() };
     // The casts saturate.
-    Ok((working as usize, bases as usize))
+    WorkBytes { pixel_bytes: RootPixel::BYTES, working: working as usize, coarse_levels: own_levels as usize, band: 0 }
 }

@@ -6,9 +6,10 @@ use rayon::prelude::*;
 use trueup_core::memory::bytes_in_words;
 use trueup_core::{Error, Result};
 
-use super::tile::Tile;
-use super::{Work, tile, tile_side};
-use crate::seam::Label;
+use super::tile::BlendTile;
+use super::work::BlendWork;
+use crate::label::Label;
+use crate::pyramid::tile_side;
 
 /// Canvas pixels across a strip: enough tiles for all threads, few enough photographs.
 const STRIP: usize = 512;
@@ -16,7 +17,7 @@ const STRIP: usize = 512;
 /// Tiles that are finished one after the other, and the photographs they are made of.
 #[derive(Debug)]
 pub(super) struct Batch {
-    pub(super) tiles: Vec<Tile>,
+    pub(super) tiles: Vec<BlendTile>,
     pub(super) shown: Vec<Label>,
 }
 
@@ -25,17 +26,17 @@ pub(super) struct Batch {
 ///
 /// # Errors
 /// [`Error::Limits`] if a single tile is made of more.
-pub(super) fn batches(work: &Work<'_>, bytes: &[usize], room: usize) -> Result<Vec<Batch>> {
-    let [width, height] = work.unrolled.finished();
+pub(super) fn batches(work: &BlendWork<'_>, bytes: &[usize], room: usize) -> Result<Vec<Batch>> {
+    let [width, height] = work.shown.unrolled.finished();
     let side = tile_side(work.first_level);
     let cut = |first: usize, length: usize| -> Vec<Range<usize>> {
         let end = first + length;
         (first..end).step_by(side).map(|start| start..(start + side).min(end)).collect()
     };
-    let (columns, rows) = (cut(work.unrolled.lead(), width), cut(0, height));
-    let tiles: Vec<Tile> = (0..rows.len() * columns.len())
+    let (columns, rows) = (cut(work.shown.unrolled.lead(), width), cut(0, height));
+    let tiles: Vec<BlendTile> = (0..rows.len() * columns.len())
         .into_par_iter()
-        .map(|at| tile(work, columns[at % columns.len()].clone(), rows[at / columns.len()].clone()))
+        .map(|at| BlendTile::new(work, columns[at % columns.len()].clone(), rows[at / columns.len()].clone()))
         .collect();
     let along_x = strips(columns.len(), rows.len(), side, |along, across| across * columns.len() + along);
     let along_y = strips(rows.len(), columns.len(), side, |along, across| along * columns.len() + across);
@@ -64,7 +65,7 @@ fn strips(along: usize, across: usize, side: usize, index: impl Fn(usize, usize)
 }
 
 /// The most bytes of photographs that are in memory at once if each stays from the first strip that shows it to the last.
-fn most_alive(strips: &[Vec<usize>], tiles: &[Tile], bytes: &[usize]) -> usize {
+fn most_alive(strips: &[Vec<usize>], tiles: &[BlendTile], bytes: &[usize]) -> usize {
     let mut spans: Vec<Option<[usize; 2]>> = vec![None; bytes.len()];
     for (index, strip) in strips.iter().enumerate() {
         for &label in strip.iter().flat_map(|&at| &tiles[at].shown) {
@@ -83,7 +84,7 @@ fn most_alive(strips: &[Vec<usize>], tiles: &[Tile], bytes: &[usize]) -> usize {
 }
 
 /// Adds the tiles of a strip in as few batches as the room allows.
-fn split(strip: &[usize], tiles: &[Tile], bytes: &[usize], room: usize, batches: &mut Vec<Batch>) -> Result<()> {
+fn split(strip: &[usize], tiles: &[BlendTile], bytes: &[usize], room: usize, batches: &mut Vec<Batch>) -> Result<()> {
     let mut batch = Batch { tiles: Vec::new(), shown: Vec::new() };
     for tile in strip.iter().map(|&at| &tiles[at]) {
         let own: Vec<Label> = tile.shown.iter().copied().filter(|&label| usize::from(label) < bytes.len()).collect();

@@ -1,17 +1,22 @@
-use proptest::prelude::*;
 use std::borrow::Cow;
+use std::ops::Range;
+
+use proptest::prelude::*;
 use trueup_core::color::TransferCurve;
 use trueup_core::mesh::GridMesh;
-
 use trueup_core::raster::{Photograph, Raster};
 
 use super::*;
-use crate::exposure::Corrections;
-use crate::layout::Placed;
-use crate::render::prepared::Prepared;
-use crate::render::test_pictures::Memory;
-use crate::render::{Blend, Resources, run as render};
-use crate::seam::Label;
+use crate::label::Label;
+use crate::layout::{CanvasLayout, Placed};
+use crate::light::{Corrections, PhotographLight};
+use crate::memory_plan::MemoryNeeds;
+use crate::render::test_rendering::{compose, roots};
+use crate::render::{Blend, Interpolation, RenderOptions, Resources};
+use crate::seam::{self, SeamInput, SeamOptions};
+use crate::small_views::{self, SmallViewsInput};
+use crate::test_pictures::Memory;
+use crate::warped::WarpedPhotograph;
 
 const WIDTH: usize = 150;
 const HEIGHT: usize = 110;
@@ -45,16 +50,10 @@ fn layout(lefts: &[usize]) -> CanvasLayout {
     CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, origin: [0.0; 2], placed, period: None }
 }
 
-fn composed(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Vec<Finished> {
-    let corrections = vec![Correction::default(); pictures.len()];
-    let seam_options = SeamOptions::default();
-    let context = StageContext::default();
-    let cut = options.blend == Blend::None;
-    let memory = Memory(pictures);
-    let plan = Plan::new(layout, &memory, options, &seam_options, &Resources::unlimited()).expect("no limit");
-    let blended = run(layout, &corrections, &memory, (options, &seam_options), (cut, &plan), &context);
-    let Store::Memory { pixels, .. } = blended.expect("renders").pixels else { panic!("there is no limit") };
-    pixels
+fn composed(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Vec<RootPixel> {
+    let corrections = Corrections::plain(pictures.len());
+    let panorama = compose(layout, &corrections, &Memory(pictures), options, &StageContext::default());
+    roots(&panorama.expect("renders"))
 }
 
 fn root_of(level: u8) -> u16 {
@@ -118,7 +117,10 @@ fn a_sky_beside_the_border_of_a_dark_photograph_stays_bright() {
     // Wide transitions, whose samples are as large as what lies above the roof.
     let options = RenderOptions { transition: 0.5, ..RenderOptions::default() };
     let pixels = composed(&layout, vec![of(0), of(ROOF)], &options);
-    for (at, pixel) in pixels.iter().enumerate().filter(|(_, pixel)| pixel[3] == 65535) {
+    let covered = || pixels.iter().enumerate().filter(|(_, pixel)| pixel[3] == 65535);
+    // Two photographs of which less than half overlaps.
+    assert!(covered().count() > 3 * WIDTH * HEIGHT / 2, "{}", covered().count());
+    for (at, pixel) in covered() {
         let (x, y) = (at % layout.width, at / layout.width);
         // Within two samples of the first level that is blended as a whole, both photographs' own contours count.
         if y.abs_diff(ROOF) > 16 {
@@ -145,50 +147,58 @@ fn no_border_of_the_panorama_is_darker_than_its_photographs() {
 }
 
 /// Everything that tiles need, of photographs that differ in brightness.
-fn with_work<T>(lefts: &[usize], first_level: u32, test: impl FnOnce(&Work<'_>, &[Option<Prepared<'_>>]) -> T) -> T {
+fn with_work<T>(
+    lefts: &[usize],
+    first_level: u32,
+    test: impl FnOnce(&BlendWork<'_>, &[Option<WarpedPhotograph<'_>>]) -> T,
+) -> T {
     let layout = layout(lefts);
     let pictures: Vec<Photograph> = (0..lefts.len())
         .map(|index| picture(lefts[index], |level| (usize::from(level) * (10 + index) / 12) as u8))
         .collect();
     let corrections = vec![Correction::default(); lefts.len()];
-    let (options, seam_options) = (RenderOptions::default(), SeamOptions::default());
     let context = StageContext::default();
     let memory = Memory(pictures.clone());
-    let plan = Plan::new(&layout, &memory, &options, &seam_options, &Resources::unlimited()).expect("no limit");
-    let unrolled = Unrolled::new(&layout, first_level, Some(2)).expect("few");
-    let small =
-        views::make(&unrolled, &corrections, &memory, (&options, &seam_options), (Some(first_level), &plan), &context);
-    let small = small.expect("small");
-    let seams = seam::run(small.views, small.size, false, &seam_options, &context).expect("seams");
+    let levels = WholeLevels { first_level, above: 2 };
+    let unrolled = Unrolled::new(&layout, first_level, Some(levels.above)).expect("few");
+    let needs = MemoryNeeds::new(&layout, &memory, needed_bytes(&unrolled, Some(levels)));
+    let plan = MemoryPlan::new(&needs, &Resources::unlimited()).expect("no limit");
+    let input = SmallViewsInput {
+        unrolled: &unrolled,
+        corrections: &corrections,
+        photographs: &memory,
+        first_level: Some(first_level),
+        plan: &plan,
+    };
+    let small = small_views::run(&input, &context).expect("small");
+    let input = SeamInput { views: &small.views, size: small.size, around: false };
+    let seams = seam::run(&input, &SeamOptions::default(), &context).expect("seams");
+    let shown = ShownWhere { unrolled: &unrolled, seams: &seams };
     let canvas = [layout.width, layout.height];
-    let levels = Some(Levels::new(small.bases, &seams, &unrolled, (first_level, 2)).expect("in memory"));
+    let levels = Some(BlendedLevels::new(small.coarse_levels, shown, levels).expect("in memory"));
     let ignored = vec![None; unrolled.placed().len()];
-    let work = Work { options: &options, seams: &seams, unrolled: &unrolled, first_level, levels, ignored };
-    let prepared: Vec<Option<Prepared<'_>>> = pictures
+    let resampling = Resampling::of(Interpolation::Bicubic);
+    let work = BlendWork { resampling, shown, first_level, levels, ignored };
+    let light = PhotographLight { curve: &TransferCurve::SRGB, correction: &Correction::default() };
+    let warped: Vec<Option<WarpedPhotograph<'_>>> = pictures
         .into_iter()
         .zip(&layout.placed)
         .map(|(photograph, placed)| {
-            Some(Prepared::new(
-                Cow::Owned(photograph),
-                &placed.mesh,
-                canvas,
-                (&TransferCurve::SRGB, &Correction::default()),
-                &options,
-            ))
+            Some(WarpedPhotograph::new(Cow::Owned(photograph), &placed.mesh, canvas, light, &resampling))
         })
         .collect();
-    test(&work, &prepared)
+    test(&work, &warped)
 }
 
 fn blended(
-    work: &Work<'_>,
-    pictures: &[Option<Prepared<'_>>],
+    work: &BlendWork<'_>,
+    pictures: &[Option<WarpedPhotograph<'_>>],
     columns: Range<usize>,
     rows: Range<usize>,
-) -> Vec<Finished> {
-    let shown: Vec<(Label, &Prepared<'_>)> =
+) -> Vec<RootPixel> {
+    let shown: Vec<(Label, &WarpedPhotograph<'_>)> =
         pictures.iter().enumerate().filter_map(|(label, picture)| Some((label as Label, picture.as_ref()?))).collect();
-    Tile { columns, rows, shown: Vec::new() }.blended(work, &shown, &mut Scratch::default())
+    BlendTile { columns, rows, shown: Vec::new() }.blended(work, &shown, &mut SamplingMemory::default())
 }
 
 #[test]
@@ -198,9 +208,12 @@ fn tiles_of_any_size_give_the_same_bits_as_the_whole() {
     }
 }
 
-fn assert_that_tiles_give_the_whole(work: &Work<'_>, pictures: &[Option<Prepared<'_>>]) {
-    let [width, height] = work.unrolled.canvas();
+fn assert_that_tiles_give_the_whole(work: &BlendWork<'_>, pictures: &[Option<WarpedPhotograph<'_>>]) {
+    let [width, height] = work.shown.unrolled.canvas();
     let whole = blended(work, pictures, 0..width, 0..height);
+    // There is something to be compared: all of it is covered, and no two of its rows are alike.
+    assert!(whole.len() == width * height && whole.iter().all(|pixel| pixel[3] == u16::MAX));
+    assert!(whole.chunks_exact(width).collect::<Vec<_>>().windows(2).all(|rows| rows[0] != rows[1]));
     for side in [2, 5, 8, 16].map(|samples| samples << work.first_level) {
         for top in (0..height).step_by(side) {
             for left in (0..width).step_by(side) {
@@ -229,10 +242,10 @@ fn the_level_that_is_blended_as_a_whole_follows_from_the_canvas() {
 fn a_tile_of_one_photograph_is_what_blending_would_give() {
     with_work(&[0, 60, 130], 3, |work, pictures| {
         let mut compared = 0;
-        for left in (0..work.unrolled.canvas()[0] - 24).step_by(8) {
-            let tile = tile(work, left..left + 24, 40..64);
+        for left in (0..work.shown.unrolled.canvas()[0] - 24).step_by(8) {
+            let tile = BlendTile::new(work, left..left + 24, 40..64);
             if tile.shown.len() == 1 {
-                let fast = tile.finish(work, pictures, &mut Scratch::default());
+                let fast = tile.finish(work, pictures, &mut SamplingMemory::default());
                 let full = blended(work, pictures, tile.columns.clone(), tile.rows.clone());
                 for (fast, full) in fast.iter().flatten().zip(full.iter().flatten()) {
                     assert!(fast.abs_diff(*full) <= 1, "{fast} {full} at {left}");
@@ -276,11 +289,16 @@ fn composed_in_any_way(layout: &CanvasLayout, blend: Blend) -> Vec<[f32; 4]> {
 
 fn composed_around(layout: &CanvasLayout, options: &RenderOptions) -> Vec<[f32; 4]> {
     let corrections = Corrections::plain(RING.len());
-    let (seams, context) = (SeamOptions::default(), StageContext::default());
-    let panorama = render(layout, &corrections, &Memory(ring_pictures()), options, &seams, &context).expect("renders");
+    let context = StageContext::default();
+    let panorama = compose(layout, &corrections, &Memory(ring_pictures()), options, &context).expect("renders");
     // Square roots of light, as the eye sees steps.
     let root = |at: usize| panorama.linear_pixel(at % AROUND, at / AROUND).expect("in memory").map(f32::sqrt);
     (0..AROUND * HEIGHT).map(root).collect()
+}
+
+/// Whether there is anything to be seen: most pixels differ from those beside them.
+fn varies(pixels: &[[f32; 4]]) -> bool {
+    pixels.windows(2).filter(|pair| pair[0] != pair[1]).count() > pixels.len() / 2
 }
 
 /// Wherever a cylinder is cut open, the panorama is the same: to rounding if the samples of all levels fall on the same
@@ -289,6 +307,7 @@ fn composed_around(layout: &CanvasLayout, options: &RenderOptions) -> Vec<[f32; 
 fn a_cylinder_may_be_cut_open_anywhere() {
     for blend in [Blend::MultiBand, Blend::None, Blend::Feather, Blend::Average] {
         let still = composed_in_any_way(&ring(0), blend);
+        assert!(still.iter().all(|pixel| pixel[3] == 1.0) && varies(&still), "{blend:?}");
         for (by, tolerance) in [(64, 1e-4), (320, 1e-4), (150, 0.012)] {
             // The search for seams sees pixels of twice the size on canvases of half, a quarter and an eighth.
             let tolerance = if by == 150 && blend != Blend::MultiBand { 1e-4 } else { tolerance };
@@ -310,10 +329,11 @@ fn all_levels_of_a_turn_repeat() {
     let period = ring(0).period.expect("a turn");
     for (transition, levels) in [(0.1, 0), (0.25, 2), (0.5, 3), (1.0, 4)] {
         let options = RenderOptions { transition, ..RenderOptions::default() };
-        assert_eq!(levels_above(&ring(0), &options), levels);
+        assert_eq!(WholeLevels::of(&ring(0), transition), WholeLevels { first_level: 3, above: levels });
         let coarsest = 8 << levels;
         assert!(period.is_multiple_of(coarsest));
         let still = composed_around(&ring(0), &options);
+        assert!(still.iter().all(|pixel| pixel[3] == 1.0) && varies(&still), "{transition}");
         for by in [128, 256] {
             let moved = composed_around(&ring(by), &options);
             for (at, still) in still.iter().enumerate() {
@@ -326,7 +346,7 @@ fn all_levels_of_a_turn_repeat() {
     }
     // Of 376 columns a turn has a whole number of samples of 8; none that are wider are blended.
     let odd = CanvasLayout { width: 376, period: Some(376), ..ring(0) };
-    assert_eq!(levels_above(&odd, &RenderOptions { transition: 1.0, ..RenderOptions::default() }), 0);
+    assert_eq!(WholeLevels::of(&odd, 1.0).above, 0);
 }
 
 #[test]
@@ -356,7 +376,9 @@ fn threads_change_no_bit_of_a_cylinder() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
         pool.install(|| [Blend::MultiBand, Blend::Feather].map(|blend| composed_in_any_way(&ring(0), blend)))
     };
-    assert_eq!(of_threads(1), of_threads(3));
+    let single = of_threads(1);
+    assert!(single.iter().all(|pixels| pixels.iter().all(|pixel| pixel[3] == 1.0) && varies(pixels)));
+    assert_eq!(single, of_threads(3));
 }
 
 proptest! {
@@ -372,7 +394,7 @@ proptest! {
         let corrections = Corrections::plain(lefts.len());
         let context = StageContext::default();
         let options = RenderOptions::default();
-        let panorama = render(&layout, &corrections, &Memory(pictures), &options, &SeamOptions::default(), &context);
+        let panorama = compose(&layout, &corrections, &Memory(pictures), &options, &context);
         let panorama = panorama.expect("renders");
         let used = &levels[..lefts.len()];
         let linear = |level: u8| crate::transfer_curve::Linearize::of(&TransferCurve::SRGB).linear(f32::from(level));

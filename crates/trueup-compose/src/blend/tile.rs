@@ -4,61 +4,51 @@ use std::ops::Range;
 
 use trueup_core::mask::Mask;
 
-use super::bases::Base;
-use super::pyramid::{Plane, add_detail, collapse, color, level_shares};
-use super::{Finished, Work};
-use crate::render::prepared::{Prepared, Scratch, Window};
-use crate::seam::{Label, NOBODY};
-use crate::unwanted::in_mask;
-
-/// Canvas pixels beside a tile that its fine levels are made of, a multiple of 2^first_level.
-///
-/// Interpolating wants one sample beside the tile at every level, and reducing two of the finer level beside the middles of
-/// those that it makes: m samples of a level take 2 m + 2 of the one below. One at the coarsest of the fine levels, the
-/// last below `first_level`, becomes 3 2^(first_level - 1) - 2 pixels.
-pub(crate) const fn margin(first_level: u32) -> usize {
-    2 << first_level
-}
-
-/// The same for the masks, which are reduced once more: 3 2^first_level - 2 pixels.
-pub(super) const fn mask_margin(first_level: u32) -> usize {
-    3 << first_level
-}
+use super::work::BlendWork;
+use crate::ignored::in_mask;
+use crate::label::{Label, NOBODY};
+use crate::pyramid::{PyramidPlane, add_detail, collapse, color, level_shares, mask_margin, tile_margin};
+use crate::small_views::CoarseLevel;
+use crate::store::RootPixel;
+use crate::warped::{SamplingMemory, WarpedPhotograph};
+use crate::window::Window;
 
 /// A box with so many pixels more on all sides, cut at the canvas.
-fn grown([columns, rows]: [&Range<usize>; 2], margin: usize, work: &Work<'_>) -> (Range<usize>, Range<usize>) {
+fn grown([columns, rows]: [&Range<usize>; 2], margin: usize, work: &BlendWork<'_>) -> (Range<usize>, Range<usize>) {
     let grown =
         |range: &Range<usize>, length: usize| range.start.saturating_sub(margin)..(range.end + margin).min(length);
-    let [width, height] = work.unrolled.canvas();
+    let [width, height] = work.shown.unrolled.canvas();
     (grown(columns, width), grown(rows, height))
 }
 
 /// A part of the canvas; `columns` and `rows` start at multiples of 2^first_level.
 #[derive(Debug, Clone)]
-pub(super) struct Tile {
+pub(super) struct BlendTile {
     pub(super) columns: Range<usize>,
     pub(super) rows: Range<usize>,
     /// The placements of photographs it is made of.
     pub(super) shown: Vec<Label>,
 }
 
-impl Tile {
+impl BlendTile {
+    /// The tile of these columns and rows.
+    pub(super) fn new(work: &BlendWork<'_>, columns: Range<usize>, rows: Range<usize>) -> Self {
+        let (wide, high) = Self::with_margin(&columns, &rows, work);
+        Self { shown: work.shown.shown_in(&wide, &high), columns, rows }
+    }
+
     /// What of the canvas decides which photographs a tile is made of: the tile and as much as its masks reach.
-    pub(super) fn with_margin(
-        columns: &Range<usize>,
-        rows: &Range<usize>,
-        work: &Work<'_>,
-    ) -> (Range<usize>, Range<usize>) {
+    fn with_margin(columns: &Range<usize>, rows: &Range<usize>, work: &BlendWork<'_>) -> (Range<usize>, Range<usize>) {
         grown([columns, rows], mask_margin(work.first_level), work)
     }
 
     /// The finished pixels, row by row.
     pub(super) fn finish(
         &self,
-        work: &Work<'_>,
-        pictures: &[Option<Prepared<'_>>],
-        scratch: &mut Scratch,
-    ) -> Vec<Finished> {
+        work: &BlendWork<'_>,
+        pictures: &[Option<WarpedPhotograph<'_>>],
+        scratch: &mut SamplingMemory,
+    ) -> Vec<RootPixel> {
         let picture = |label: &Label| pictures.get(usize::from(*label)).and_then(Option::as_ref);
         match self.shown.as_slice() {
             [] => vec![[0; 4]; self.columns.len() * self.rows.len()],
@@ -82,26 +72,37 @@ impl Tile {
     }
 
     /// A tile that shows one photograph: its fine levels are that photograph's, its coarse ones may not be.
-    fn of_one(&self, work: &Work<'_>, picture: &Prepared<'_>, label: usize, scratch: &mut Scratch) -> Vec<Finished> {
+    fn of_one(
+        &self,
+        work: &BlendWork<'_>,
+        picture: &WarpedPhotograph<'_>,
+        label: usize,
+        scratch: &mut SamplingMemory,
+    ) -> Vec<RootPixel> {
         let mut pixels = vec![[0.0; 4]; self.columns.len() * self.rows.len()];
-        picture.sample(self.window(&self.columns, &self.rows), &mut pixels, work.options, scratch);
+        picture.sample(self.window(&self.columns, &self.rows), &mut pixels, &work.resampling, scratch);
         let offset = work
             .levels
             .as_ref()
-            .and_then(|levels| self.offset(&levels.blended, levels.bases.at(label), work.first_level));
+            .and_then(|levels| self.offset(&levels.blended, levels.own.at(label), work.first_level));
         let offsets = offset.iter().flat_map(|plane| &plane.texels).map(|texel| color(*texel).unwrap_or_default());
         let offsets = offsets.chain(std::iter::repeat([0.0; 3]));
         pixels.iter().zip(offsets).map(|(pixel, offset)| finished(*pixel, offset)).collect()
     }
 
     /// What the coarse levels change of a photograph, on the pixels of the tile; `None` if nothing.
-    fn offset(&self, blended: &Plane<[f32; 4]>, base: &Base, first_level: u32) -> Option<Plane<[f32; 4]>> {
+    fn offset(
+        &self,
+        blended: &PyramidPlane<[f32; 4]>,
+        base: &CoarseLevel,
+        first_level: u32,
+    ) -> Option<PyramidPlane<[f32; 4]>> {
         let reach = |range: &Range<usize>, length: usize| {
             (range.start >> first_level).saturating_sub(2)..(((range.end - 1) >> first_level) + 3).min(length)
         };
         let columns = reach(&self.columns, blended.columns.end);
         let rows = reach(&self.rows, blended.rows.end);
-        let mut plane = Plane::new(columns.clone(), rows.clone());
+        let mut plane = PyramidPlane::new(columns.clone(), rows.clone());
         let mut any = false;
         for y in rows.clone().filter(|y| base.plane.rows.contains(y)) {
             let (own, all) = (base.plane.row(y), blended.row(y));
@@ -135,20 +136,25 @@ impl Tile {
     }
 
     /// Every pixel from the photograph that the seams give it to.
-    fn cut(&self, work: &Work<'_>, shown: &[(Label, &Prepared<'_>)], scratch: &mut Scratch) -> Vec<Finished> {
+    fn cut(
+        &self,
+        work: &BlendWork<'_>,
+        shown: &[(Label, &WarpedPhotograph<'_>)],
+        scratch: &mut SamplingMemory,
+    ) -> Vec<RootPixel> {
         let width = self.columns.len();
         let mut out = vec![[0; 4]; width * self.rows.len()];
         let mut taken = vec![0.0_f32; out.len()];
         let mut labels = Vec::new();
         for (label, picture) in shown {
             let mut pixels = vec![[0.0; 4]; out.len()];
-            picture.sample(self.window(&self.columns, &self.rows), &mut pixels, work.options, scratch);
+            picture.sample(self.window(&self.columns, &self.rows), &mut pixels, &work.resampling, scratch);
             for (row, y) in self.rows.clone().enumerate() {
-                work.unrolled.labels(work.seams, (y, &self.columns), 1, &mut labels);
+                work.shown.labels(y, &self.columns, 1, &mut labels);
                 for (x, own) in labels.iter().enumerate() {
                     let at = row * width + x;
                     // Where the owner covers nothing, whoever covers most.
-                    let claim = pixels[at][3] * if *own == work.unrolled.label(*label) { 2.0 } else { 1.0 };
+                    let claim = pixels[at][3] * if *own == work.shown.label(*label) { 2.0 } else { 1.0 };
                     if claim > taken[at] {
                         taken[at] = claim;
                         out[at] = finished(pixels[at], [0.0; 3]);
@@ -162,19 +168,19 @@ impl Tile {
     /// The fine levels of several photographs blended, on top of the blended coarse ones.
     pub(super) fn blended(
         &self,
-        work: &Work<'_>,
-        shown: &[(Label, &Prepared<'_>)],
-        scratch: &mut Scratch,
-    ) -> Vec<Finished> {
+        work: &BlendWork<'_>,
+        shown: &[(Label, &WarpedPhotograph<'_>)],
+        scratch: &mut SamplingMemory,
+    ) -> Vec<RootPixel> {
         let Some(levels) = &work.levels else { return Vec::new() };
-        let (columns, rows) = grown([&self.columns, &self.rows], margin(work.first_level), work);
+        let (columns, rows) = grown([&self.columns, &self.rows], tile_margin(work.first_level), work);
         let mut opacity = vec![0.0_f32; self.columns.len() * self.rows.len()];
-        let mut sums: Vec<Plane<[f32; 4]>> = Vec::new();
+        let mut sums: Vec<PyramidPlane<[f32; 4]>> = Vec::new();
         let (mask_columns, mask_rows) = Self::with_margin(&self.columns, &self.rows, work);
         let masks = self.masks(work, shown, &mask_columns, &mask_rows);
         for ((label, picture), mask) in shown.iter().zip(masks) {
-            let mut plane = Plane::new(columns.clone(), rows.clone());
-            picture.sample(self.window(&columns, &rows), &mut plane.texels, work.options, scratch);
+            let mut plane = PyramidPlane::new(columns.clone(), rows.clone());
+            picture.sample(self.window(&columns, &rows), &mut plane.texels, &work.resampling, scratch);
             for texel in &mut plane.texels {
                 let [r, g, b, share] = *texel;
                 *texel = [r * share, g * share, b * share, share];
@@ -186,11 +192,11 @@ impl Tile {
             hide_ignored(&mut plane, &weights, picture, work.ignored[usize::from(*label)].as_deref());
             for level in 0..work.first_level {
                 if sums.len() <= level as usize {
-                    sums.push(Plane::new(plane.columns.clone(), plane.rows.clone()));
+                    sums.push(PyramidPlane::new(plane.columns.clone(), plane.rows.clone()));
                 }
                 let last = level + 1 == work.first_level;
-                let reduced = if last { Plane::default() } else { plane.reduced() };
-                let coarser = if last { &levels.bases.at(usize::from(*label)).plane } else { &reduced };
+                let reduced = if last { PyramidPlane::default() } else { plane.reduced() };
+                let coarser = if last { &levels.own.at(usize::from(*label)).plane } else { &reduced };
                 mask = mask.reduced();
                 if level > 0 {
                     weights = mask.expanded(&plane.columns, &plane.rows);
@@ -201,7 +207,7 @@ impl Tile {
                 }
             }
         }
-        let mut blended: Option<Plane<[f32; 4]>> = None;
+        let mut blended: Option<PyramidPlane<[f32; 4]>> = None;
         while let Some(mut sum) = sums.pop() {
             collapse(&mut sum, Some(blended.as_ref().unwrap_or(&levels.blended)));
             blended = Some(sum);
@@ -221,17 +227,18 @@ impl Tile {
     /// Where each photograph is shown, 0 or 1.
     fn masks(
         &self,
-        work: &Work<'_>,
-        shown: &[(Label, &Prepared<'_>)],
+        work: &BlendWork<'_>,
+        shown: &[(Label, &WarpedPhotograph<'_>)],
         columns: &Range<usize>,
         rows: &Range<usize>,
-    ) -> Vec<Plane<f32>> {
-        let mut masks: Vec<Plane<f32>> = shown.iter().map(|_| Plane::new(columns.clone(), rows.clone())).collect();
+    ) -> Vec<PyramidPlane<f32>> {
+        let mut masks: Vec<PyramidPlane<f32>> =
+            shown.iter().map(|_| PyramidPlane::new(columns.clone(), rows.clone())).collect();
         let mut labels = Vec::new();
         for y in rows.clone() {
-            work.unrolled.labels(work.seams, (y, columns), 1, &mut labels);
+            work.shown.labels(y, columns, 1, &mut labels);
             for (mask, (placement, _)) in masks.iter_mut().zip(shown) {
-                let label = work.unrolled.label(*placement);
+                let label = work.shown.label(*placement);
                 for (weight, own) in mask.row_mut(y).iter_mut().zip(&labels) {
                     *weight = if *own == label && *own != NOBODY { 1.0 } else { 0.0 };
                 }
@@ -240,7 +247,7 @@ impl Tile {
         masks
     }
 
-    fn add_opacity(&self, plane: &Plane<[f32; 4]>, opacity: &mut [f32]) {
+    fn add_opacity(&self, plane: &PyramidPlane<[f32; 4]>, opacity: &mut [f32]) {
         let shift = self.columns.start - plane.columns.start;
         for (y, opacity) in self.rows.clone().zip(opacity.chunks_exact_mut(self.columns.len())) {
             for (opacity, texel) in opacity.iter_mut().zip(&plane.row(y)[shift..]) {
@@ -252,7 +259,12 @@ impl Tile {
 
 /// Takes from a photograph's `plane` what its photographer ignores and another photograph is shown for, so that nothing
 /// of it reaches over the seam.
-fn hide_ignored(plane: &mut Plane<[f32; 4]>, shown: &Plane<f32>, picture: &Prepared<'_>, ignored: Option<&Mask>) {
+fn hide_ignored(
+    plane: &mut PyramidPlane<[f32; 4]>,
+    shown: &PyramidPlane<f32>,
+    picture: &WarpedPhotograph<'_>,
+    ignored: Option<&Mask>,
+) {
     let Some(ignored) = ignored else { return };
     let (columns, rows) = (plane.columns.clone(), plane.rows.clone());
     picture.grid().each_place(&columns, &rows, |[x, y], place, _| {
@@ -267,7 +279,7 @@ fn hide_ignored(plane: &mut Plane<[f32; 4]>, shown: &Plane<f32>, picture: &Prepa
 const NO_CHANGE: f32 = 1e-6;
 
 /// A pixel of the panorama from the square root of linear light and the share covered.
-fn finished([r, g, b, share]: [f32; 4], offset: [f32; 3]) -> Finished {
+fn finished([r, g, b, share]: [f32; 4], offset: [f32; 3]) -> RootPixel {
     // The casts saturate; NaN becomes 0.
     let whole = |value: f32| (value * 65535.0 + 0.5) as u16;
     [whole(r + offset[0]), whole(g + offset[1]), whole(b + offset[2]), whole(share)]

@@ -1,28 +1,15 @@
 //! Cropping: the part of the canvas that becomes the panorama.
 
-mod coverage;
 #[cfg(test)]
 mod tests;
 
 use nalgebra::Vector2;
 
 use crate::gaps::Gaps;
-use crate::layout::{self, CanvasLayout, CanvasOptions, Placed};
+use crate::layout::{CanvasLayout, CanvasOptions, Placed, reaches_into};
 
-pub use coverage::{Coverage, Rectangle};
-
-trueup_core::choice! {
-    /// What of the canvas is kept.
-    pub enum Crop {
-        /// All that any photograph covers; what none covers is transparent or background.
-        None = "none",
-        /// The largest rectangle without holes if it keeps most of the picture (canvas.min_kept), otherwise all: no head is lost
-        /// for a straight border.
-        Auto = "auto",
-        /// The largest rectangle without holes, however much it costs.
-        Rectangle = "rectangle",
-    }
-}
+pub use crate::coverage::{Coverage, Rectangle};
+pub use crate::layout::Crop;
 
 /// The rectangle of the canvas that is to be kept; `None` for all of it. Of a full turn, rows alone are cut.
 ///
@@ -68,5 +55,5 @@ pub fn cropped(layout: CanvasLayout, rectangle: &Rectangle) -> CanvasLayout {
 /// Whether a photograph reaches into a canvas of `size` pixels.
 fn shows(placed: &Placed, around: bool, size: [usize; 2]) -> bool {
     let end = Vector2::new(size[0] as f64, size[1] as f64);
-    layout::shows(&placed.mesh, around, Vector2::zeros(), end)
+    reaches_into(&placed.mesh, around, Vector2::zeros(), end)
 }

@@ -9,13 +9,29 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use trueup_core::color::TransferCurve;
 
-use super::correction::VIGNETTING_TERMS;
-use super::overlap::Observed;
-use super::response::{RESPONSE_TERMS, Response};
+use super::measured::PairExposure;
+use super::options::{ExposureModel, ExposureOptions};
+use super::overlap::{Observed, PAIR_DEVIATION};
 use super::robust::{magnitude, mean, weights_of};
 use super::samples::Shared;
-use super::solve::Solution;
-use super::{ExposureModel, ExposureOptions, PairExposure};
+use super::solution::Solution;
+use crate::light::{RESPONSE_TERMS, Response, VIGNETTING_TERMS};
+
+/// How far gains are expected to lie from 1, as a standard deviation of their natural logarithm. Lower keeps long rows of
+/// photographs from drifting in brightness, higher follows the measured ratios.
+const GAIN_DEVIATION: f64 = 2.0;
+
+/// How far a channel's gain is expected to lie from the mean of the channels, as a standard deviation of natural
+/// logarithms. Lower keeps long rows of photographs from drifting in color.
+const CAST_DEVIATION: f64 = 0.2;
+
+/// How strong vignetting is expected to be, as a standard deviation of every coefficient of its natural logarithm. Lower
+/// trusts that the lenses are good, higher follows the overlaps.
+const VIGNETTING_DEVIATION: f64 = 0.6;
+
+/// How far the response is expected to lie from the color profile's curve, as a standard deviation of every coefficient of
+/// its natural logarithm.
+const RESPONSE_DEVIATION: f64 = 0.5;
 
 /// Neighboring samples see the same things; an overlap is worth about this share of its samples.
 const INDEPENDENT: f64 = 0.01;
@@ -24,7 +40,7 @@ const INDEPENDENT: f64 = 0.01;
 const POWER_DEVIATION: f64 = 1e-3;
 
 /// All overlaps, and what is unknown.
-pub(super) struct Problem<'a> {
+pub(super) struct LightEquations<'a> {
     pub(super) count: usize,
     /// Coefficients per lens.
     pub(super) terms: usize,
@@ -41,7 +57,7 @@ fn powers(r2: f32) -> [f64; VIGNETTING_TERMS] {
     [r2, r2 * r2, r2 * r2 * r2]
 }
 
-impl<'a> Problem<'a> {
+impl<'a> LightEquations<'a> {
     /// For as many photographs as `cameras` has entries.
     pub(super) fn new(cameras: &[usize], observed: &'a [Observed], options: &'a ExposureOptions) -> Self {
         let count = cameras.len();
@@ -69,7 +85,7 @@ struct Share {
     right: [f64; MOST],
 }
 
-impl Problem<'_> {
+impl LightEquations<'_> {
     /// Which unknowns the samples of an overlap have; [`Self::row`] tells their factors.
     fn unknowns_of(&self, pair: &PairExposure) -> Vec<usize> {
         let mut lenses = vec![self.lens_of[pair.first], self.lens_of[pair.second]];
@@ -103,7 +119,7 @@ impl Problem<'_> {
     /// Weight of one sample of an overlap before residuals are known.
     pub(super) fn share(&self, one: &Observed) -> f64 {
         let from_samples = one.pair.deviation.powi(2) / (INDEPENDENT * one.pair.samples as f64);
-        1.0 / (self.options.pair_deviation.powi(2) + from_samples) / one.samples.len() as f64
+        1.0 / (PAIR_DEVIATION.powi(2) + from_samples) / one.samples.len() as f64
     }
 
     pub(super) fn weigh_by_medians(&self, weights: &mut [Vec<f64>]) {
@@ -182,9 +198,9 @@ impl Problem<'_> {
         }
         for index in 0..unknowns {
             let deviation = match index {
-                _ if index < self.count => self.options.gain_deviation,
-                _ if index < self.unknowns => self.options.vignetting_deviation,
-                _ => self.options.response_deviation,
+                _ if index < self.count => GAIN_DEVIATION,
+                _ if index < self.unknowns => VIGNETTING_DEVIATION,
+                _ => RESPONSE_DEVIATION,
             };
             normal[(index, index)] += deviation.powi(-2);
         }
@@ -242,7 +258,7 @@ impl Problem<'_> {
             }
         }
         for index in 0..self.count {
-            normal[(index, index)] += self.options.cast_deviation.powi(-2);
+            normal[(index, index)] += CAST_DEVIATION.powi(-2);
         }
         match normal.cholesky() {
             Some(solver) => right.map(|right| solver.solve(&right)),

@@ -4,13 +4,13 @@ use rayon::prelude::*;
 use trueup_core::Result;
 use trueup_core::color::TransferCurve;
 
-use super::equations::Problem;
+use super::equations::LightEquations;
 use super::overlap::Observed;
 use super::predicted::Predicted;
-use super::response::RESPONSE_TERMS;
 use super::robust::mean;
 use super::samples::Shared;
-use super::solve::{Differences, Solution};
+use super::solution::{Differences, Solution};
+use crate::light::RESPONSE_TERMS;
 
 /// Straight lines through the response's functions against the logarithm of light.
 #[derive(Default)]
@@ -55,7 +55,7 @@ impl Line {
     }
 }
 
-impl Problem<'_> {
+impl LightEquations<'_> {
     /// By how much the functions of the response differ in every sample, by what the solution says the photographs show.
     pub(super) fn predict(&self, solution: &mut Solution, profile: &TransferCurve) -> Result<()> {
         let predicted = Predicted::new(profile, &solution.response)?;

@@ -2,8 +2,15 @@
 
 use trueup_core::color::TransferCurve;
 
+use super::measured::PairExposure;
 use super::samples::Shared;
-use super::{ExposureOptions, PairExposure};
+
+/// Fewest samples two photographs must share to be compared.
+const MIN_SHARED: usize = 20;
+
+/// Uncertainty of a pair's measured ratio, from vignetting and misalignment, as a standard deviation of its natural
+/// logarithm; the spread of the samples adds to it.
+pub(super) const PAIR_DEVIATION: f64 = 0.02;
 
 /// An overlap and its samples.
 pub(super) struct Observed {
@@ -16,10 +23,10 @@ pub(super) struct Observed {
 }
 
 impl Observed {
-    /// `deviation` is the uncertainty that samples have beside their noise.
-    fn new(pair: PairExposure, channel_medians: [f32; 3], samples: Vec<Shared>, deviation: f64) -> Self {
+    fn new(pair: PairExposure, channel_medians: [f32; 3], samples: Vec<Shared>) -> Self {
+        // The uncertainty that samples have beside their noise, and that.
         let variance =
-            |sample: &Shared| deviation.powi(2) + sample.variances.iter().copied().map(f64::from).sum::<f64>();
+            |sample: &Shared| PAIR_DEVIATION.powi(2) + sample.variances.iter().copied().map(f64::from).sum::<f64>();
         let mut certainties: Vec<f64> = samples.iter().map(|sample| variance(sample).recip()).collect();
         let mean = certainties.iter().sum::<f64>() / certainties.len().max(1) as f64;
         certainties.iter_mut().for_each(|certainty| *certainty /= mean);
@@ -32,9 +39,8 @@ pub(super) fn compare(
     mut samples: Vec<Shared>,
     [first, second]: [usize; 2],
     curve: &TransferCurve,
-    options: &ExposureOptions,
 ) -> Option<Observed> {
-    if samples.len() < options.min_shared.max(1) {
+    if samples.len() < MIN_SHARED {
         return None;
     }
     let channel_medians = std::array::from_fn(|channel| {
@@ -57,7 +63,7 @@ pub(super) fn compare(
         (index - 1).is_multiple_of(step)
     });
     let samples: Vec<Shared> = samples.into_iter().map(|sample| sample.with_variances(curve)).collect();
-    Some(Observed::new(pair, channel_medians, samples, options.pair_deviation))
+    Some(Observed::new(pair, channel_medians, samples))
 }
 
 /// Ratio of the standard deviation to the median absolute deviation of a normal distribution.

@@ -8,7 +8,7 @@
 use trueup_core::Result;
 use trueup_core::color::TransferCurve;
 
-use super::response::{RESPONSE_TERMS, Response};
+use crate::light::{RESPONSE_TERMS, Response};
 
 /// Steps between the darkest light and white; the functions change by less than a hundredth between two of them.
 const STEPS: usize = 1024;

@@ -1,6 +1,9 @@
 //! Known light, found again: pictures of a scene are made with gains, casts, vignetting, noise and a response that are known.
 
+use trueup_core::color::TransferCurve;
 use trueup_core::mesh::GridMesh;
+use trueup_core::raster::Raster;
+use trueup_core::source::WorkingFrame;
 
 use super::*;
 use crate::layout::Placed;
@@ -92,7 +95,8 @@ fn found(lights: &[Light], encoded: impl Fn(f64) -> f64, seed: u64, options: &Ex
     let frame = WorkingFrame::new(WIDTH, HEIGHT, 480_000.0);
     let thumbnail = |raster| Thumbnail { raster, curve: &TransferCurve::SRGB, frame, camera: 0 };
     let thumbnails: Vec<Thumbnail> = rasters.iter().map(thumbnail).collect();
-    run(&layout(), &thumbnails, 0, options, &StageContext::default()).expect("estimates").corrections
+    let input = ExposureInput { layout: &layout(), thumbnails: &thumbnails, reference: 0 };
+    run(&input, options, &StageContext::default()).expect("estimates").corrections
 }
 
 /// Gains relative to the first photograph from 1/4 to 4, casts of up to 10 % and vignetting, different for every seed.
@@ -113,6 +117,7 @@ fn lights(seed: u64) -> Vec<Light> {
 
 /// The largest errors of the gains, and of what is left of the vignetting halfway to the corners and there.
 fn errors(lights: &[Light], found: &Corrections) -> [f64; 2] {
+    assert_eq!(found.photographs.len(), lights.len());
     let mut errors = [0.0_f64; 2];
     for (light, correction) in lights.iter().zip(&found.photographs) {
         for channel in 0..3 {

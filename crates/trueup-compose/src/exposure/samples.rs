@@ -5,8 +5,8 @@ use std::ops::{Range, RangeInclusive};
 use trueup_core::color::TransferCurve;
 use trueup_core::raster::Raster;
 
-use super::{ExposureOptions, Thumbnail};
-use crate::deformed_grid::{DeformedGrid, Run};
+use super::measured::Thumbnail;
+use crate::deformed_grid::{CellRun, DeformedGrid};
 use crate::layout::{Placed, TURNS};
 use crate::simd::{Positions, invert_row};
 use crate::transfer_curve::Linearize;
@@ -32,6 +32,9 @@ pub(super) struct Shared {
 
 /// Standard deviation of a sample's encoded value by noise, rounding and compression: 1.5 of 255 levels.
 const NOISE: f64 = 1.5 / 255.0;
+
+/// 8-bit levels that still tell brightness: darker ones are mostly noise, brighter ones may be clipped.
+const TELLING: RangeInclusive<u8> = 4..=251;
 
 /// Least variance, where a curve stands still: noise of a hundredth of a percent.
 const LEAST_VARIANCE: f32 = 1e-8;
@@ -72,7 +75,6 @@ impl Patch {
         scale: f64,
         [width, height]: [usize; 2],
         period: Option<usize>,
-        options: &ExposureOptions,
     ) -> Self {
         let placed = placed.in_first_turn(period);
         let width = width * if period.is_some() { TURNS } else { 1 };
@@ -82,14 +84,14 @@ impl Patch {
         let footprint = footprints.get(footprints.len() / 2).copied().unwrap_or(1.0);
         let block = (footprint * thumbnail.frame.working_from_full).round().max(1.0) as usize;
         let linearize = Linearize::of(thumbnail.curve);
-        let light = block_means(thumbnail.raster, &linearize, block, options.darkest..=options.brightest);
+        let light = block_means(thumbnail.raster, &linearize, block, TELLING);
         let from_full = thumbnail.frame.working_from_full / block as f64;
         let half = grid.size.map(|length| 0.5 * length);
         let corner = half[0] * half[0] + half[1] * half[1];
 
         let mut samples = vec![[f32::NAN; 4]; grid.rows.len() * grid.columns.len()];
         let all: Vec<u32> = (0..grid.cells.len() as u32).collect();
-        let (mut owner, mut runs, mut positions) = (Vec::new(), Vec::<Run>::new(), Positions::default());
+        let (mut owner, mut runs, mut positions) = (Vec::new(), Vec::<CellRun>::new(), Positions::default());
         for y in grid.rows.clone() {
             grid.runs(y, &all, &mut owner, &mut runs);
             let row = &mut samples[(y - grid.rows.start) * grid.columns.len()..][..grid.columns.len()];

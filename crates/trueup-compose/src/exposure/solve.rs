@@ -1,33 +1,38 @@
 //! The robust least-squares problem over all overlaps: its repetitions, and what comes of them.
 
-use nalgebra::DVector;
 use trueup_core::color::TransferCurve;
 use trueup_core::{Result, StageContext};
 
-use super::correction::{Correction, Corrections};
-use super::equations::Problem;
+use super::equations::LightEquations;
+use super::options::{ExposureModel, ExposureOptions, GainAnchor};
 use super::overlap::Observed;
-use super::response::{RESPONSE_TERMS, Response};
 use super::robust::LEAST_DEVIATION;
-use super::samples::Shared;
-use super::{ExposureModel, ExposureOptions, GainAnchor};
+use super::solution::Solution;
+use crate::light::{Correction, Corrections, Response};
 
 /// Repetitions of the weighted solution; the weights of real overlaps stand still after six.
 const REPETITIONS: usize = 8;
 
-/// The corrections of as many photographs as `cameras` has entries; with a response beside the curve `profile`, if given.
-pub(super) fn solve(
-    cameras: &[usize],
-    observed: &[Observed],
-    (reference, profile): (usize, Option<&TransferCurve>),
-    options: &ExposureOptions,
-    context: &StageContext,
-) -> Result<Corrections> {
+/// What the overlaps say, and of whom.
+#[derive(Clone, Copy)]
+pub(super) struct SolveInput<'a> {
+    /// The camera of each photograph.
+    pub(super) cameras: &'a [usize],
+    pub(super) observed: &'a [Observed],
+    /// Position of the reference.
+    pub(super) reference: usize,
+    /// The curve beside which a response is estimated; `None` for none.
+    pub(super) profile: Option<&'a TransferCurve>,
+}
+
+/// The corrections of all photographs.
+pub(super) fn solve(input: &SolveInput<'_>, options: &ExposureOptions, context: &StageContext) -> Result<Corrections> {
+    let &SolveInput { cameras, observed, reference, profile } = input;
     let count = cameras.len();
-    let problem = Problem::new(cameras, observed, options);
+    let problem = LightEquations::new(cameras, observed, options);
     let mut weights: Vec<Vec<f64>> = observed.iter().map(|one| vec![1.0; one.samples.len()]).collect();
     problem.weigh_by_medians(&mut weights);
-    let mut solution = Solution::new(&problem);
+    let mut solution = Solution::new(problem.unknowns, count, observed);
     for repetition in 0..REPETITIONS {
         context.check_cancelled()?;
         if repetition > 0 {
@@ -61,57 +66,12 @@ pub(super) fn solve(
     let limits = [options.max_gain, options.max_gain.recip()];
     let at_limit = |correction: &Correction| correction.gain.iter().any(|gain| limits.contains(gain));
     if !corrections.response.is_plain() && corrections.photographs.iter().any(at_limit) {
-        return solve(cameras, observed, (reference, None), options, context);
+        return solve(&SolveInput { profile: None, ..*input }, options, context);
     }
     Ok(corrections)
 }
 
-/// What is known of all unknowns.
-pub(super) struct Solution {
-    /// Logarithms of gains, then coefficients lens by lens.
-    pub(super) brightness: DVector<f64>,
-    /// What red, green and blue differ from the brightness, as logarithms of gains.
-    pub(super) casts: [DVector<f64>; 3],
-    pub(super) response: Response,
-    /// For each overlap and sample, by how much the functions of the response differ; none are 0.
-    pub(super) answers: Vec<Vec<Differences>>,
-    /// Slopes of the response's functions against the logarithm of light, over all samples.
-    pub(super) slopes: [f64; RESPONSE_TERMS],
-}
-
-/// f(first) - f(second) of the response's functions f, by channel.
-pub(super) type Differences = [[f32; RESPONSE_TERMS]; 3];
-
-impl Solution {
-    fn new(problem: &Problem<'_>) -> Self {
-        let samples = problem.observed.iter().map(|one| one.samples.len());
-        Self {
-            brightness: DVector::zeros(problem.unknowns),
-            casts: [(); 3].map(|()| DVector::zeros(problem.count)),
-            response: Response::default(),
-            answers: samples.map(|count| vec![[[0.0; RESPONSE_TERMS]; 3]; count]).collect(),
-            slopes: [0.0; RESPONSE_TERMS],
-        }
-    }
-
-    /// The samples of an overlap with what the response adds to ln(first / second) of each channel.
-    pub(super) fn ratios<'a>(
-        &'a self,
-        index: usize,
-        one: &'a Observed,
-    ) -> impl Iterator<Item = (&'a Shared, [f64; 3])> {
-        one.samples.iter().zip(&self.answers[index]).map(|(sample, answers)| {
-            let ratio = sample.log_ratio();
-            let added = |channel: usize| -> f64 {
-                let terms = self.response.coefficients.iter().zip(answers[channel]);
-                terms.map(|(coefficient, differs)| coefficient * f64::from(differs)).sum()
-            };
-            (sample, std::array::from_fn(|channel| f64::from(ratio[channel]) + added(channel)))
-        })
-    }
-}
-
-impl Problem<'_> {
+impl LightEquations<'_> {
     /// Gains relative to the anchor, within the limits, the vignetting of each photograph's lens, and the response.
     fn corrections(&self, solution: &Solution, reference: usize) -> Corrections {
         let mut compared = vec![false; self.count];

@@ -1,4 +1,7 @@
+use trueup_core::color::TransferCurve;
 use trueup_core::mesh::GridMesh;
+use trueup_core::raster::Raster;
+use trueup_core::source::WorkingFrame;
 
 use super::*;
 use crate::layout::Placed;
@@ -41,11 +44,15 @@ fn layout(shifts: &[f64]) -> CanvasLayout {
     CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, origin: [0.0; 2], placed, period: None }
 }
 
+fn estimate_of(layout: &CanvasLayout, thumbnails: &[Thumbnail<'_>], options: &ExposureOptions) -> Result<Exposure> {
+    run(&ExposureInput { layout, thumbnails, reference: 0 }, options, &StageContext::default())
+}
+
 fn estimate(shifts: &[f64], rasters: &[Raster<u8>], options: &ExposureOptions) -> Exposure {
     let frame = WorkingFrame::new(WIDTH, HEIGHT, 480_000.0);
     let thumbnails: Vec<Thumbnail> =
         rasters.iter().map(|raster| Thumbnail { raster, curve: &TransferCurve::SRGB, frame, camera: 0 }).collect();
-    run(&layout(shifts), &thumbnails, 0, options, &StageContext::default()).expect("estimates")
+    estimate_of(&layout(shifts), &thumbnails, options).expect("estimates")
 }
 
 fn gains(exposure: &Exposure) -> Vec<f64> {
@@ -82,13 +89,13 @@ fn overlaps_across_the_ends_of_a_full_turn_count() {
         let order = if swapped { [1, 0] } else { [0, 1] };
         let layout = CanvasLayout { width: AROUND, period: Some(AROUND), ..layout(&shifts) };
         let thumbnails = order.map(|k| thumbnails[k]);
-        let found = run(&layout, &thumbnails, 0, &options, &StageContext::default()).expect("estimates");
+        let found = estimate_of(&layout, &thumbnails, &options).expect("estimates");
         assert_eq!(found.pairs.len(), 1, "{shifts:?}");
         let gains = gains(&found);
         let expected = if swapped { 0.7 } else { 1.0 / 0.7 };
         assert!((gains[1] / gains[0] - expected).abs() < 0.03, "{shifts:?}: {gains:?}");
     }
-    let alone = run(&flat, &thumbnails, 0, &options, &StageContext::default()).expect("estimates");
+    let alone = estimate_of(&flat, &thumbnails, &options).expect("estimates");
     assert!(alone.pairs.is_empty());
 }
 
@@ -103,7 +110,7 @@ fn a_full_turn_is_corrected_alike_wherever_it_is_cut_open() {
     let cut_at = |cut: f64| {
         let around = |shift: usize| (shift as f64 - cut).rem_euclid(AROUND as f64) - 0.25 * WIDTH as f64;
         let layout = CanvasLayout { width: AROUND, period: Some(AROUND), ..layout(&shifts.map(around)) };
-        run(&layout, &thumbnails, 0, &ExposureOptions::default(), &StageContext::default()).expect("estimates")
+        estimate_of(&layout, &thumbnails, &ExposureOptions::default()).expect("estimates")
     };
     let whole = cut_at(0.0);
     assert_eq!(whole.pairs.len(), 3);
@@ -147,6 +154,7 @@ fn gain_color_and_vignetting_are_recovered_together() {
         }
     }
     let exposure = estimate(&shifts, &rasters, &ExposureOptions::default());
+    assert_eq!(exposure.corrections.photographs.len(), shifts.len());
     let truth = |k: usize, c: usize| lights[0] * casts[0][c] / (lights[k] * casts[k][c]);
     for (k, correction) in exposure.corrections.photographs.iter().enumerate() {
         for c in 0..3 {
@@ -239,7 +247,6 @@ fn gains_stay_within_their_limit_and_black_says_nothing() {
 #[test]
 fn input_that_does_not_fit_is_refused() {
     let options = ExposureOptions::default();
-    let context = StageContext::default();
-    let none = run(&layout(&[0.0, 9.0]), &[], 0, &options, &context);
+    let none = estimate_of(&layout(&[0.0, 9.0]), &[], &options);
     assert!(matches!(none, Err(Error::Input { .. })));
 }

@@ -1,6 +1,9 @@
 //! Ghosts and blur: how far a panorama's gradients are from those of the photographs it may show.
 
-use super::{GHOST_LEVEL, Measured, level};
+use super::measured::{MeasuredPanorama, level};
+
+/// Gradient distance from which on a ghost is seen, gray levels a pixel.
+pub const GHOST_LEVEL: f64 = 8.0;
 
 /// Distances of gradients over all overlaps.
 #[derive(Default)]
@@ -21,7 +24,7 @@ impl Ghosts {
     }
 }
 
-impl Measured<'_> {
+impl MeasuredPanorama<'_> {
     pub(super) fn ghosts(&self) -> Ghosts {
         let mut ghosts = Ghosts::default();
         let (width, height) = (self.gray.width(), self.gray.height());

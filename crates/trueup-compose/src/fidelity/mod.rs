@@ -5,13 +5,16 @@
 //! a mean of photographs that do not fit shows the contours of both, each at half its strength, and is far from either.
 
 mod ghosts;
+mod measured;
 mod steps;
 
 use trueup_core::raster::{LUMA, Raster, RowSource};
 use trueup_core::{Error, Result};
 
-use crate::distance::border_distances;
 use crate::render::Layer;
+use measured::{MeasuredPanorama, depths, fits};
+
+pub use ghosts::GHOST_LEVEL;
 
 /// How true a panorama is to its photographs; gray levels from 0 to 255 of encoded luma.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -37,9 +40,6 @@ pub struct Fidelity {
     /// Share of the overlaps where that distance is above [`GHOST_LEVEL`].
     pub ghost_share: f64,
 }
-
-/// Gradient distance from which on a ghost is seen, gray levels a pixel.
-pub const GHOST_LEVEL: f64 = 8.0;
 
 /// Measures `panorama` against `layers`, its photographs on the same canvas; `shown` is the position of the photograph
 /// that each canvas pixel shows, or shows most, row by row.
@@ -71,7 +71,8 @@ pub fn measure(panorama: &dyn RowSource, layers: &[Layer], shown: &[u16], around
     }
     let gray = luma(panorama)?;
     let depths: Vec<Vec<u32>> = layers.iter().map(depths).collect();
-    let measured = Measured { gray: &gray, layers, depths: &depths, shown, turn: if around { width } else { 0 } };
+    let measured =
+        MeasuredPanorama { gray: &gray, layers, depths: &depths, shown, turn: if around { width } else { 0 } };
     let steps = measured.steps();
     let overlaps = measured.overlap_steps();
     let ghosts = measured.ghosts();
@@ -131,40 +132,6 @@ fn luma(panorama: &dyn RowSource) -> Result<Raster<f32>> {
         }
     }
     Ok(gray)
-}
-
-struct Measured<'a> {
-    gray: &'a Raster<f32>,
-    layers: &'a [Layer],
-    /// Distances to the border of every layer's pixels, in thirds of a pixel.
-    depths: &'a [Vec<u32>],
-    shown: &'a [u16],
-    /// Columns of a turn on a cylinder, its width; 0 on a plane.
-    turn: usize,
-}
-
-fn depths(layer: &Layer) -> Vec<u32> {
-    border_distances(layer.covered.data(), layer.covered.width())
-}
-
-/// Whether a layer lies on a canvas of this size, or `around` a cylinder of it.
-fn fits(layer: &Layer, [width, height]: [usize; 2], around: bool) -> bool {
-    let in_one_turn = layer.left <= width && layer.gray.width() <= width;
-    (layer.left + layer.gray.width() <= width || around && in_one_turn) && layer.top + layer.gray.height() <= height
-}
-
-/// Index of a canvas pixel within a layer, if it lies in its box, on a cylinder of `turn` columns or with 0 on a plane.
-fn index(layer: &Layer, x: usize, y: usize, turn: usize) -> Option<usize> {
-    let x = if x < layer.left { x + turn } else { x };
-    let (column, row) = (x.checked_sub(layer.left)?, y.checked_sub(layer.top)?);
-    let inside = column < layer.gray.width() && row < layer.gray.height();
-    inside.then(|| row * layer.gray.width() + column)
-}
-
-/// The level of a photograph at a canvas pixel, if it covers it.
-fn level(layer: &Layer, x: usize, y: usize, turn: usize) -> Option<f64> {
-    let at = index(layer, x, y, turn)?;
-    layer.covered.data()[at].then(|| f64::from(layer.gray.data()[at]))
 }
 
 #[cfg(test)]

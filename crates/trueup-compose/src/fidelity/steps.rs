@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Measured, index, level};
+use super::measured::{MeasuredPanorama, index, level};
 
 /// Half width, in pixels, of the means whose difference is the step across a line: a step is seen over several pixels.
 const STEP_REACH: usize = 8;
@@ -59,7 +59,7 @@ struct Place {
     down: bool,
 }
 
-impl Measured<'_> {
+impl MeasuredPanorama<'_> {
     pub(super) fn steps(&self) -> LineSteps {
         let (width, height) = (self.gray.width(), self.gray.height());
         let [mut seams, mut wrap, mut columns] = [Stretches::default(), Stretches::default(), Stretches::default()];

@@ -1,9 +1,11 @@
 //! Which grids a canvas can be laid out from.
 
 use trueup_core::mesh::GridLines;
+use trueup_core::options::StageOptions;
 use trueup_core::{Error, Result};
 
-use super::{Placed, STAGE};
+use super::canvas::Placed;
+use super::options::CanvasOptions;
 
 /// Refuses grids no later step could walk.
 pub(crate) fn check_mesh(placed: &Placed) -> Result<()> {
@@ -50,7 +52,7 @@ pub(crate) fn check_mesh(placed: &Placed) -> Result<()> {
     });
     if infinite || mesh.whole_cells().next().is_none() {
         return Err(Error::unsolvable(
-            STAGE,
+            CanvasOptions::STAGE,
             subject(),
             if infinite { "its grid has vertices that are not finite" } else { "its grid has no cell that is whole" },
             "Leave this photograph out, or choose another method or projection.",

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use super::{CanvasLayout, Placed};
+use super::canvas::{CanvasLayout, Placed};
 
 /// Samples that a turn has at least at the coarsest level that repeats exactly. Twice as many would change the scale by half
 /// as much, at most a 128th instead of a 64th, and leave too narrow transitions where few photographs make up a turn.

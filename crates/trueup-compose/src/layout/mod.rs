@@ -1,78 +1,30 @@
 //! The canvas: deformed grids in any common unit become grids in canvas pixels.
 
+mod canvas;
 mod checked;
 mod cylinder;
+mod options;
 mod size;
 #[cfg(test)]
 mod tests;
+mod unrolled;
 
 use nalgebra::Vector2;
-use serde::{Deserialize, Serialize};
 use trueup_core::diagnostics::{Diagnostic, Subject};
-use trueup_core::mesh::GridMesh;
 use trueup_core::options::StageOptions;
 use trueup_core::{Error, Result, StageContext};
 
-use crate::crop::Crop;
 use size::{canvas_size, most_pixels, scale_within};
 
+pub(crate) use canvas::reaches_into;
+pub use canvas::{CanvasLayout, Placed};
 pub(crate) use checked::check_mesh;
 pub(crate) use cylinder::{TURNS, columns_around, unit_of_turn};
+pub use options::{CanvasOptions, Crop};
 pub use size::median_cell_scale;
+pub(crate) use unrolled::Unrolled;
 
 const STAGE: &str = CanvasOptions::STAGE;
-
-trueup_core::options! {
-    /// How large the panorama becomes.
-    pub struct CanvasOptions("canvas") {
-        /// Size of the panorama relative to the reference photograph's own pixels: 1 keeps every detail the reference
-        /// has, 0.25 makes a quick preview.
-        scale: f64 = 1.0, between(1e-4, 16.0), "";
-        /// Largest number of canvas pixels. A larger canvas is reduced evenly to fit, and a diagnostic says so. What memory
-        /// and disk hold is checked besides.
-        max_pixels: f64 = 1e12, between(1.0, 1e12), "px";
-        /// Canvas pixels for each pixel of the photographs (as large as the scale makes them) above which a canvas of more
-        /// than 400 million pixels is reduced evenly: a shape that runs away is not worth its time.
-        max_growth: f64 = 8.0, between(1.0, 1e6), "";
-        /// What of the canvas is kept.
-        crop: Crop = Crop::None, Allowed::Any, "";
-        /// Share of the covered pixels that the largest rectangle must keep for `crop = auto` to crop to it.
-        min_kept: f64 = 0.75, between(0.0, 1.0), "";
-        /// Gaps between and beside the photographs of up to twice this width, as a share of a photograph's side, are filled with
-        /// a smooth surface over their borders' colors: small ones in an even sky or wall are not noticed. 0 fills nothing.
-        fill: f64 = 0.0, between(0.0, 1.0), "";
-    }
-}
-
-/// A photograph and the deformed grid that carries it to the panorama.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Placed {
-    /// Index of the photograph in the [`trueup_core::source::PhotographSource`].
-    pub photograph: usize,
-    /// Grid over the full-resolution photograph: width and height are its pixels.
-    pub mesh: GridMesh,
-}
-
-/// The canvas and where every photograph lies on it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CanvasLayout {
-    /// Width of the canvas in pixels, at least 1.
-    pub width: usize,
-    /// Height of the canvas in pixels, at least 1.
-    pub height: usize,
-    /// Canvas pixels per unit of the targets that were given.
-    pub canvas_from_target: f64,
-    /// What lies at the canvas's corner (0, 0), in the unit of the targets that were given.
-    #[serde(default)]
-    pub origin: [f64; 2],
-    /// The photographs used, in the order given; targets are canvas pixels and may lie outside the canvas.
-    pub placed: Vec<Placed>,
-    /// The canvas is a cylinder of that many columns, its width: what lies beyond one end is seen at the other. A multiple
-    /// of the largest power of two (at least 8) that it holds 32 times, so that all levels of a blend repeat exactly; with
-    /// others its ends may show a faint step.
-    #[serde(default)]
-    pub period: Option<usize>,
-}
 
 /// Lays the grids on one canvas: shifted by the smallest vertex, scaled so that the photograph `placed[reference]`
 /// keeps its pixel scale times [`CanvasOptions::scale`].
@@ -183,7 +135,7 @@ fn fitted(
             // All of a turn is shown.
             high.x = low.x + period;
         }
-        placed.retain(|item| shows(&item.mesh, frame.period.is_some(), low, high));
+        placed.retain(|item| reaches_into(&item.mesh, frame.period.is_some(), low, high));
     }
     let extent = high - low;
     if placed.is_empty() || !extent.max().is_finite() || extent.min() < 0.0 {
@@ -223,30 +175,6 @@ fn fitted(
     let (width, height) = (width as usize, height as usize);
     let (origin, period) = (low.into(), frame.period.map(|_| width));
     Ok(CanvasLayout { width, height, canvas_from_target, origin, placed, period })
-}
-
-impl CanvasLayout {
-    /// The smaller side of a photograph on the canvas, pixels: the median over those placed; 1 if there is none.
-    pub(crate) fn photograph_side(&self) -> f64 {
-        let side = |placed: &Placed| {
-            let (low, high) = placed.mesh.bounds();
-            (high - low).min()
-        };
-        let mut sides: Vec<f64> = self.placed.iter().map(side).collect();
-        sides.sort_by(f64::total_cmp);
-        sides.get(sides.len() / 2).copied().unwrap_or(1.0)
-    }
-}
-
-/// Whether a whole cell of the grid reaches into the box; on a cylinder, into its rows.
-pub(crate) fn shows(mesh: &GridMesh, around: bool, low: Vector2<f64>, high: Vector2<f64>) -> bool {
-    mesh.whole_cells().any(|corners| {
-        let corners = corners.map(|vertex| mesh.target[vertex]);
-        (usize::from(around)..2).all(|axis| {
-            corners.iter().any(|corner| corner[axis] > low[axis])
-                && corners.iter().any(|corner| corner[axis] < high[axis])
-        })
-    })
 }
 
 fn bounds(placed: &[Placed]) -> (Vector2<f64>, Vector2<f64>) {

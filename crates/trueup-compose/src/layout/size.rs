@@ -3,8 +3,9 @@
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
+use super::canvas::Placed;
 use super::cylinder::unit_of_turn;
-use super::{CanvasOptions, Placed};
+use super::options::CanvasOptions;
 
 /// Target pixels per source pixel: median over the cells of the square root of target area per source area.
 pub fn median_cell_scale(mesh: &GridMesh) -> f64 {

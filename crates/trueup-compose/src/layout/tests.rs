@@ -1,5 +1,7 @@
 use std::borrow::Cow;
 
+use trueup_core::mesh::GridMesh;
+
 use super::*;
 
 fn placed(scale: f64, shift: [f64; 2]) -> Placed {
@@ -112,6 +114,7 @@ fn a_canvas_that_runs_away_is_reduced() {
     assert!(layout.width * layout.height <= 400_000_000);
     assert_eq!(context.findings()[0].code, "canvas-reduced");
     // One of them enlarged to 1.2 billion pixels is what was asked for.
+    let context = StageContext::default();
     let large = CanvasOptions { scale: 16.0, ..options };
     let mut photograph = placed(1.0, [0.0, 0.0]);
     (photograph.mesh.width, photograph.mesh.height) = (4000.0, 3000.0);

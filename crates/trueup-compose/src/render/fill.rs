@@ -6,11 +6,10 @@ use rayon::prelude::*;
 use trueup_core::raster::RowSource;
 use trueup_core::{Result, StageContext};
 
-use super::panorama::{Panorama, Pixels, linear_of_sum};
-use super::store::{Pixel, Store};
-use crate::blend::pyramid::{Plane, color};
-use crate::blend::{first_level, tile_margin, tile_side};
+use super::panorama::{Panorama, PanoramaPixels, linear_of_sum};
 use crate::gaps::Gaps;
+use crate::pyramid::{PyramidPlane, color, first_level, tile_margin, tile_side};
+use crate::store::{Pixel, PixelStore, RootPixel, SumPixel};
 
 /// A pixel whose color can be looked at and set.
 trait Shade: Pixel {
@@ -20,7 +19,7 @@ trait Shade: Pixel {
     fn of_root(root: [f32; 3]) -> Self;
 }
 
-impl Shade for [u16; 4] {
+impl Shade for RootPixel {
     fn root(self) -> [f32; 4] {
         self.map(|value| f32::from(value) / f32::from(u16::MAX))
     }
@@ -31,7 +30,7 @@ impl Shade for [u16; 4] {
     }
 }
 
-impl Shade for [f32; 4] {
+impl Shade for SumPixel {
     fn root(self) -> [f32; 4] {
         let [r, g, b, share] = linear_of_sum(self);
         [r.max(0.0).sqrt(), g.max(0.0).sqrt(), b.max(0.0).sqrt(), share]
@@ -54,8 +53,8 @@ impl Panorama {
     pub fn fill(&mut self, gaps: &Gaps, context: &StageContext) -> Result<usize> {
         let size = [self.width(), self.height()];
         match &mut self.pixels {
-            Pixels::Sums(sums) => fill(sums, size, gaps, context),
-            Pixels::Roots(roots) => fill(roots, size, gaps, context),
+            PanoramaPixels::Sums(sums) => fill(sums, size, gaps, context),
+            PanoramaPixels::Roots(roots) => fill(roots, size, gaps, context),
         }
     }
 }
@@ -63,7 +62,7 @@ impl Panorama {
 /// Tiles that are finished before they are put on the canvas; a number of threads must not show in the panorama.
 const TILES_AT_ONCE: usize = 64;
 
-fn fill<P: Shade>(store: &mut Store<P>, size: [usize; 2], gaps: &Gaps, context: &StageContext) -> Result<usize> {
+fn fill<P: Shade>(store: &mut PixelStore<P>, size: [usize; 2], gaps: &Gaps, context: &StageContext) -> Result<usize> {
     let canvas = Canvas::new(size, gaps);
     let (wanted, sources) = canvas.tiles();
     if wanted.is_empty() {
@@ -88,7 +87,7 @@ fn fill<P: Shade>(store: &mut Store<P>, size: [usize; 2], gaps: &Gaps, context: 
 
 /// A part of the canvas, which begins `lead` columns before the panorama does.
 #[derive(Debug, Clone)]
-struct Tile {
+struct FillTile {
     columns: Range<usize>,
     rows: Range<usize>,
 }
@@ -119,7 +118,7 @@ impl<'a> Canvas<'a> {
     }
 
     /// The tiles of the panorama at and beside gaps, and all whose colors these may need.
-    fn tiles(&self) -> (Vec<Tile>, Vec<Tile>) {
+    fn tiles(&self) -> (Vec<FillTile>, Vec<FillTile>) {
         let side = tile_side(self.first_level);
         let end = self.lead + self.width;
         let across = (end + self.lead).div_ceil(side);
@@ -127,9 +126,9 @@ impl<'a> Canvas<'a> {
         let tile = |at: usize| {
             let (left, top) = (at % across * side, at / across * side);
             let right = (left + side).min(end + self.lead);
-            Tile { columns: left..right, rows: top..(top + side).min(self.height) }
+            FillTile { columns: left..right, rows: top..(top + side).min(self.height) }
         };
-        let has_gap = |tile: &Tile| {
+        let has_gap = |tile: &FillTile| {
             let mut pixels = tile.rows.clone().flat_map(|y| tile.columns.clone().map(move |x| (self.column(x), y)));
             pixels.any(|(x, y)| !self.gaps.is_covered(x, y) && self.gaps.is_small(x, y))
         };
@@ -141,21 +140,21 @@ impl<'a> Canvas<'a> {
             (row.saturating_sub(reach)..(row + reach + 1).min(down))
                 .any(|row| gap[row * across..][columns.clone()].contains(&true))
         };
-        let sources: Vec<Tile> = (0..across * down).filter(|&at| near(at)).map(tile).collect();
+        let sources: Vec<FillTile> = (0..across * down).filter(|&at| near(at)).map(tile).collect();
         // Borders that a photograph covers by less than a pixel's rounding lie beside gaps, too.
         let inside = sources.iter().filter(|tile| (self.lead..end).contains(&tile.columns.start)).cloned();
-        let cut = |tile: Tile| Tile { columns: tile.columns.start..tile.columns.end.min(end), rows: tile.rows };
+        let cut = |tile: FillTile| FillTile { columns: tile.columns.start..tile.columns.end.min(end), rows: tile.rows };
         let wanted = inside.map(cut).collect();
         (wanted, sources)
     }
 
     /// Colors times the share covered of a tile with its margin; nothing where the gaps are.
-    fn known<P: Shade>(&self, store: &Store<P>, tile: &Tile) -> Result<Plane<[f32; 4]>> {
+    fn known<P: Shade>(&self, store: &PixelStore<P>, tile: &FillTile) -> Result<PyramidPlane<[f32; 4]>> {
         let margin = tile_margin(self.first_level);
         let columns =
             tile.columns.start.saturating_sub(margin)..(tile.columns.end + margin).min(self.width + 2 * self.lead);
         let rows = tile.rows.start.saturating_sub(margin)..(tile.rows.end + margin).min(self.height);
-        let mut plane = Plane::new(columns.clone(), rows.clone());
+        let mut plane = PyramidPlane::new(columns.clone(), rows.clone());
         let mut first = columns.start;
         while first < columns.end {
             let start = self.column(first);
@@ -178,15 +177,15 @@ impl<'a> Canvas<'a> {
     /// The surface at the first level and so much of the panorama as gaps need.
     fn coarse_surface<P: Shade>(
         &self,
-        store: &Store<P>,
-        sources: &[Tile],
+        store: &PixelStore<P>,
+        sources: &[FillTile],
         context: &StageContext,
-    ) -> Result<Plane<[f32; 4]>> {
+    ) -> Result<PyramidPlane<[f32; 4]>> {
         let samples = |length: usize| 0..length.div_ceil(1 << self.first_level);
-        let mut known = Plane::new(samples(self.width + 2 * self.lead), samples(self.height));
+        let mut known = PyramidPlane::new(samples(self.width + 2 * self.lead), samples(self.height));
         for tiles in sources.chunks(TILES_AT_ONCE) {
             context.check_cancelled()?;
-            let reduced: Vec<Plane<[f32; 4]>> = tiles
+            let reduced: Vec<PyramidPlane<[f32; 4]>> = tiles
                 .par_iter()
                 .map(|tile| {
                     let plane = self.known(store, tile)?;
@@ -211,10 +210,15 @@ impl<'a> Canvas<'a> {
     }
 
     /// A tile's pixels with its gaps filled, and how many that were.
-    fn finished<P: Shade>(&self, store: &Store<P>, tile: &Tile, surface: &Plane<[f32; 4]>) -> Result<(usize, Vec<P>)> {
+    fn finished<P: Shade>(
+        &self,
+        store: &PixelStore<P>,
+        tile: &FillTile,
+        surface: &PyramidPlane<[f32; 4]>,
+    ) -> Result<(usize, Vec<P>)> {
         let mut levels = vec![self.known(store, tile)?];
         for _ in 1..self.first_level {
-            levels.extend(levels.last().map(Plane::reduced));
+            levels.extend(levels.last().map(PyramidPlane::reduced));
         }
         let surface = pulled(levels, Some(surface));
         let columns = tile.columns.start - self.lead..tile.columns.end - self.lead;
@@ -243,8 +247,8 @@ impl<'a> Canvas<'a> {
 const SATURATION: f32 = 16.0;
 
 /// The finest of `levels` with what it lacks from the coarser ones, the coarsest from `coarser`.
-fn pulled(mut levels: Vec<Plane<[f32; 4]>>, coarser: Option<&Plane<[f32; 4]>>) -> Plane<[f32; 4]> {
-    let mut whole: Option<Plane<[f32; 4]>> = None;
+fn pulled(mut levels: Vec<PyramidPlane<[f32; 4]>>, coarser: Option<&PyramidPlane<[f32; 4]>>) -> PyramidPlane<[f32; 4]> {
+    let mut whole: Option<PyramidPlane<[f32; 4]>> = None;
     while let Some(mut level) = levels.pop() {
         if let Some(coarser) = whole.as_ref().or(coarser) {
             let smooth = coarser.expanded(&level.columns, &level.rows);

@@ -7,14 +7,19 @@ use trueup_core::Result;
 use trueup_core::raster::{LUMA, Raster, RowSource};
 use trueup_core::source::PhotographSource;
 
-use super::answering::Answering;
-use super::prepared::{Prepared, Scratch, Window, check_photograph};
-use super::{BAND_ROWS, RenderOptions, check};
+use super::checked::check;
+use super::input::RenderInput;
 use crate::deformed_grid::DeformedGrid;
-use crate::exposure::Corrections;
 use crate::layout::{CanvasLayout, TURNS, columns_around};
+use crate::light::{ByResponse, PhotographLight};
+use crate::render_options::RenderOptions;
 use crate::transfer_curve::Encoding;
+use crate::warped::{Resampling, SamplingMemory, WarpedPhotograph, check_photograph};
 use crate::weights::WHOLE;
+use crate::window::Window;
+
+/// Rows of a layer that are sampled at once; its cells are found once for all of them.
+const BAND_ROWS: usize = 16;
 
 /// What one photograph shows of the canvas: its bounding box there. On a cylinder it may run past the width into the next
 /// turn, but does not meet itself.
@@ -30,19 +35,14 @@ pub struct Layer {
     pub covered: Raster<bool>,
 }
 
-/// Renders photograph `layout.placed[position]` alone, corrected, as [`super::run`] would.
+/// Renders the photograph at `layout.placed[position]` alone, corrected, as [`super::run`] would.
 ///
 /// # Errors
 /// Those of [`super::run`], and [`trueup_core::Error::Input`] if there is no such position.
-pub fn layer(
-    layout: &CanvasLayout,
-    corrections: &Corrections,
-    position: usize,
-    photographs: &dyn PhotographSource,
-    options: &RenderOptions,
-) -> Result<Layer> {
-    let (prepared, encoding) = alone(layout, corrections, position, photographs, options)?;
-    let (all, rows) = (prepared.columns(), prepared.rows());
+pub fn layer(input: &RenderInput<'_>, position: usize, options: &RenderOptions) -> Result<Layer> {
+    let (warped, encoding) = alone(input, position, options)?;
+    let layout = input.layout;
+    let (all, rows) = (warped.columns(), warped.rows());
     let columns = all.start..all.end.min(all.start + layout.period.unwrap_or(all.len()));
     let (on_canvas, turned) = columns_around(columns.clone(), layout.period);
     let (width, height) = (columns.len(), rows.len());
@@ -53,12 +53,13 @@ pub fn layer(
         covered: Raster::new(width, height, 1),
     };
     let encode = encoding.linear;
-    let mut scratch = Scratch::default();
+    let resampling = Resampling::of(options.interpolation);
+    let mut memory = SamplingMemory::default();
     let mut samples = Vec::new();
     for first in rows.clone().step_by(BAND_ROWS) {
         let band = first..(first + BAND_ROWS).min(rows.end);
         samples.resize(width * band.len(), [0.0; 4]);
-        prepared.sample(Window { columns: &columns, rows: &band }, &mut samples, options, &mut scratch);
+        warped.sample(Window { columns: &columns, rows: &band }, &mut samples, &resampling, &mut memory);
         for (y, samples) in band.zip(samples.chunks_exact(width.max(1))) {
             let gray = layer.gray.row_mut(y - rows.start);
             let covered = layer.covered.row_mut(y - rows.start);
@@ -79,13 +80,12 @@ pub fn layer(
 
 /// Photograph `layout.placed[position]` alone, and how it is written.
 fn alone(
-    layout: &CanvasLayout,
-    corrections: &Corrections,
+    input: &RenderInput<'_>,
     position: usize,
-    photographs: &dyn PhotographSource,
     options: &RenderOptions,
-) -> Result<(Prepared<'static>, Encoding)> {
-    check(layout, corrections, options)?;
+) -> Result<(WarpedPhotograph<'static>, Encoding)> {
+    check(input, options)?;
+    let &RenderInput { layout, corrections, photographs } = input;
     let Some(placed) = layout.placed.get(position) else {
         return Err(trueup_core::Error::input(
             "canvas",
@@ -95,11 +95,13 @@ fn alone(
     };
     let photograph = photographs.photograph(placed.photograph)?;
     check_photograph(placed, &photograph)?;
-    let photographs = Answering::new(photographs, &corrections.response)?;
+    let photographs = ByResponse::new(photographs, &corrections.response)?;
     let curve = photographs.transfer_curve();
-    let light = (&curve, &corrections.photographs[position]);
+    let light = PhotographLight { curve: &curve, correction: &corrections.photographs[position] };
     let mesh = &placed.in_first_turn(layout.period).mesh;
-    Ok((Prepared::new(Cow::Owned(photograph), mesh, unrolled_size(layout), light, options), photographs.encoding()))
+    let (size, resampling) = (unrolled_size(layout), Resampling::of(options.interpolation));
+    let warped = WarpedPhotograph::new(Cow::Owned(photograph), mesh, size, light, &resampling);
+    Ok((warped, photographs.encoding()))
 }
 
 /// The canvas, on a cylinder with the turns that a photograph may reach into.
@@ -123,9 +125,9 @@ pub struct LayerRows {
     width: usize,
     /// Width of the canvas.
     turn: usize,
-    prepared: Prepared<'static>,
+    warped: WarpedPhotograph<'static>,
     encoding: Encoding,
-    options: RenderOptions,
+    resampling: Resampling,
 }
 
 impl std::fmt::Debug for LayerRows {
@@ -139,15 +141,10 @@ impl std::fmt::Debug for LayerRows {
 ///
 /// # Errors
 /// Those of [`layer`].
-pub fn layer_rows(
-    layout: &CanvasLayout,
-    corrections: &Corrections,
-    position: usize,
-    photographs: &dyn PhotographSource,
-    options: &RenderOptions,
-) -> Result<Option<LayerRows>> {
-    let (prepared, encoding) = alone(layout, corrections, position, photographs, options)?;
-    let (columns, rows) = (prepared.columns(), prepared.rows());
+pub fn layer_rows(input: &RenderInput<'_>, position: usize, options: &RenderOptions) -> Result<Option<LayerRows>> {
+    let (warped, encoding) = alone(input, position, options)?;
+    let layout = input.layout;
+    let (columns, rows) = (warped.columns(), warped.rows());
     if columns.is_empty() || rows.is_empty() {
         return Ok(None);
     }
@@ -157,9 +154,9 @@ pub fn layer_rows(
         top: rows.start,
         width: on_canvas.len(),
         turn: layout.width,
-        prepared,
+        warped,
         encoding,
-        options: options.clone(),
+        resampling: Resampling::of(options.interpolation),
     }))
 }
 
@@ -175,11 +172,11 @@ pub fn layer_size(layout: &CanvasLayout, position: usize) -> [usize; 2] {
 impl LayerRows {
     /// Row `y` of the box: roots of linear light, and the share that is covered.
     fn samples(&self, y: usize) -> Vec<[f32; 4]> {
-        let columns = self.prepared.columns();
+        let columns = self.warped.columns();
         let rows = self.top + y..self.top + y + 1;
         let mut samples = vec![[0.0; 4]; columns.len()];
         let window = Window { columns: &columns, rows: &rows };
-        self.prepared.sample(window, &mut samples, &self.options, &mut Scratch::default());
+        self.warped.sample(window, &mut samples, &self.resampling, &mut SamplingMemory::default());
         // Across the ends of a cylinder, what runs past the last column goes on in the first.
         let mut row = vec![[0.0; 4]; self.width];
         for (x, sample) in columns.zip(samples) {
@@ -214,7 +211,7 @@ impl RowSource for LayerRows {
     }
 
     fn height(&self) -> usize {
-        self.prepared.rows().len()
+        self.warped.rows().len()
     }
 
     fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {

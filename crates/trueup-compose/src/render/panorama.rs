@@ -3,8 +3,7 @@
 use trueup_core::Result;
 use trueup_core::raster::RowSource;
 
-use super::store::Store;
-use crate::seam::Seams;
+use crate::store::{PixelStore, RootPixel, SumPixel};
 use crate::transfer_curve::Encoding;
 use crate::weights::alpha;
 
@@ -13,37 +12,26 @@ use crate::weights::alpha;
 pub struct Panorama {
     width: usize,
     height: usize,
-    pub(super) pixels: Pixels,
-    seams: Option<Seams>,
+    pub(super) pixels: PanoramaPixels,
     encoding: Encoding,
 }
 
 /// What a panorama holds.
 #[derive(Debug)]
-pub(super) enum Pixels {
+pub(super) enum PanoramaPixels {
     /// Sums over the photographs of weight * (red, green, blue) in linear light, and of the weights.
-    Sums(Store<[f32; 4]>),
+    Sums(PixelStore<SumPixel>),
     /// Square roots of linear light and alpha; 65535 is 1. Fine enough for 16 bits of the usual curves.
-    Roots(Store<[u16; 4]>),
+    Roots(PixelStore<RootPixel>),
 }
 
 impl Panorama {
-    pub(super) fn from_sums([width, height]: [usize; 2], sums: Store<[f32; 4]>, encoding: Encoding) -> Self {
-        Self { width, height, pixels: Pixels::Sums(sums), seams: None, encoding }
+    pub(super) fn from_sums([width, height]: [usize; 2], sums: PixelStore<SumPixel>, encoding: Encoding) -> Self {
+        Self { width, height, pixels: PanoramaPixels::Sums(sums), encoding }
     }
 
-    pub(super) fn from_roots(
-        [width, height]: [usize; 2],
-        roots: Store<[u16; 4]>,
-        seams: Seams,
-        encoding: Encoding,
-    ) -> Self {
-        Self { width, height, pixels: Pixels::Roots(roots), seams: Some(seams), encoding }
-    }
-
-    /// The seams it was made with; `None` where photographs were averaged.
-    pub fn seams(&self) -> Option<&Seams> {
-        self.seams.as_ref()
+    pub(super) fn from_roots([width, height]: [usize; 2], roots: PixelStore<RootPixel>, encoding: Encoding) -> Self {
+        Self { width, height, pixels: PanoramaPixels::Roots(roots), encoding }
     }
 
     /// Linear light (red, green, blue; 1 is white, more is possible) and alpha (0 to 1) of pixel (x, y); all 0 where no
@@ -53,8 +41,8 @@ impl Panorama {
     /// [`trueup_core::Error::Io`] if a scratch file cannot be read.
     pub fn linear_pixel(&self, x: usize, y: usize) -> Result<[f32; 4]> {
         Ok(self.profile_light(match &self.pixels {
-            Pixels::Sums(sums) => linear_of_sum(sums.pixel(x, y)?),
-            Pixels::Roots(roots) => linear_of_root(roots.pixel(x, y)?),
+            PanoramaPixels::Sums(sums) => linear_of_sum(sums.pixel(x, y)?),
+            PanoramaPixels::Roots(roots) => linear_of_root(roots.pixel(x, y)?),
         }))
     }
 
@@ -65,11 +53,11 @@ impl Panorama {
     }
 }
 
-pub(super) fn linear_of_sum([r, g, b, sum]: [f32; 4]) -> [f32; 4] {
+pub(super) fn linear_of_sum([r, g, b, sum]: SumPixel) -> [f32; 4] {
     if sum > 0.0 { [r / sum, g / sum, b / sum, alpha(sum)] } else { [0.0; 4] }
 }
 
-fn linear_of_root(root: [u16; 4]) -> [f32; 4] {
+fn linear_of_root(root: RootPixel) -> [f32; 4] {
     let [r, g, b, opacity] = root.map(|value| f32::from(value) / 65535.0);
     [r * r, g * g, b * b, opacity]
 }
@@ -85,14 +73,14 @@ impl RowSource for Panorama {
 
     fn is_opaque(&self) -> bool {
         match &self.pixels {
-            Pixels::Sums(sums) => sums.is_opaque(),
-            Pixels::Roots(roots) => roots.is_opaque(),
+            PanoramaPixels::Sums(sums) => sums.is_opaque(),
+            PanoramaPixels::Roots(roots) => roots.is_opaque(),
         }
     }
 
     fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
         match &self.pixels {
-            Pixels::Sums(sums) => {
+            PanoramaPixels::Sums(sums) => {
                 let encode = &self.encoding.linear;
                 for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(sums.row(y)?.iter()) {
                     let opacity = (alpha(sum) * 255.0 + 0.5) as u8;
@@ -101,7 +89,7 @@ impl RowSource for Panorama {
                     pixel.copy_from_slice(&levels);
                 }
             }
-            Pixels::Roots(roots) => {
+            PanoramaPixels::Roots(roots) => {
                 let encode = &self.encoding.roots;
                 for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(roots.row(y)?.iter()) {
                     let opacity = ((u32::from(opacity) * 255 + 32767) / 65535) as u8;
@@ -116,7 +104,7 @@ impl RowSource for Panorama {
 
     fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
         match &self.pixels {
-            Pixels::Sums(sums) => {
+            PanoramaPixels::Sums(sums) => {
                 let encode = self.encoding.linear16();
                 for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(sums.row(y)?.iter()) {
                     let opacity = (alpha(sum) * 65535.0 + 0.5) as u16;
@@ -125,7 +113,7 @@ impl RowSource for Panorama {
                     pixel.copy_from_slice(&levels);
                 }
             }
-            Pixels::Roots(roots) => {
+            PanoramaPixels::Roots(roots) => {
                 let encode = self.encoding.roots16();
                 for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(roots.row(y)?.iter()) {
                     let level = |root: u16| if opacity > 0 { encode.level(root) } else { 0 };
@@ -139,11 +127,11 @@ impl RowSource for Panorama {
     fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()> {
         let out = row.chunks_exact_mut(4);
         match &self.pixels {
-            Pixels::Sums(sums) => {
+            PanoramaPixels::Sums(sums) => {
                 out.zip(sums.row(y)?.iter())
                     .for_each(|(out, &sum)| out.copy_from_slice(&self.profile_light(linear_of_sum(sum))));
             }
-            Pixels::Roots(roots) => {
+            PanoramaPixels::Roots(roots) => {
                 out.zip(roots.row(y)?.iter())
                     .for_each(|(out, &root)| out.copy_from_slice(&self.profile_light(linear_of_root(root))));
             }

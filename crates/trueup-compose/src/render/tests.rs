@@ -1,12 +1,15 @@
 //! Photographs composed without a limit on memory.
 
 use nalgebra::Vector2;
+use trueup_core::Error;
 use trueup_core::raster::{Photograph, Raster};
 
-use super::panorama::Pixels;
-use super::test_pictures::{Memory, bits, canvas, compose, gradient, linear, moved, noise, render, rows};
+use super::panorama::PanoramaPixels;
+use super::test_rendering::{bits, compose, linear, render, rows};
 use super::*;
 use crate::layout::{self, CanvasOptions};
+use crate::light::{Correction, Corrections};
+use crate::test_pictures::{Memory, canvas, gradient, moved, noise};
 
 #[test]
 fn an_undeformed_grid_returns_the_photograph() {
@@ -140,7 +143,7 @@ fn folds_are_counted_and_every_pixel_is_hit_once() {
     let options = RenderOptions { blend: Blend::Average, ..RenderOptions::default() };
     let photographs = Memory(vec![gradient(60, 60, |_, _| 90.0)]);
     let panorama = compose(&layout, &Corrections::plain(1), &photographs, &options, &context).expect("renders");
-    let Pixels::Sums(sums) = &panorama.pixels else { panic!("a mean") };
+    let PanoramaPixels::Sums(sums) = &panorama.pixels else { panic!("a mean") };
     assert!((0..60).all(|y| sums.row(y).expect("in memory").iter().all(|sum| sum[3] <= 1.0)));
     let diagnostics = context.findings();
     assert_eq!(diagnostics[0].code, "grid-folded");
@@ -182,7 +185,7 @@ fn photographs_of_another_size_are_refused() {
 fn an_empty_layout_is_transparent() {
     let layout = canvas(70, 30, vec![]);
     let panorama = render(&layout, vec![], &RenderOptions::default());
-    assert!(matches!(panorama.pixels, Pixels::Sums(_)), "nothing to seek seams between");
+    assert!(matches!(panorama.pixels, PanoramaPixels::Sums(_)), "nothing to seek seams between");
     assert!(rows(&panorama).iter().all(|&byte| byte == 0));
 }
 

@@ -2,12 +2,17 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use trueup_core::Error;
 use trueup_core::raster::RowSource;
+use trueup_core::source::PhotographSource;
 
-use super::test_pictures::{Memory, RamDisk, bits, canvas, moved, noise, rows};
+use super::test_rendering::{bits, rows};
 use super::*;
-use crate::crop::Coverage;
+use crate::coverage::Coverage;
 use crate::gaps::Gaps;
+use crate::layout::CanvasLayout;
+use crate::light::{Correction, Corrections};
+use crate::test_pictures::{Memory, RamDisk, canvas, moved, noise};
 
 /// Counts how often photographs are decoded.
 struct Counting(Memory, AtomicUsize);
@@ -39,16 +44,16 @@ fn scene() -> (CanvasLayout, Corrections, Counting) {
     (canvas(1670, 460, placed), corrections.into(), Counting(Memory(pictures.collect()), AtomicUsize::new(0)))
 }
 
-fn composed(blend: Blend, memory: usize, disk: &RamDisk, threads: usize) -> Result<(Panorama, usize)> {
+fn composed(blend: Blend, memory: usize, disk: &RamDisk, threads: usize) -> Result<(Rendered, usize)> {
     let (layout, corrections, photographs) = scene();
     let resources = Resources { memory, ceiling: usize::MAX, scratch: disk };
     let options = RenderOptions { blend, ..RenderOptions::default() };
     let seams = SeamOptions::default();
     let context = StageContext::default();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-    let panorama =
-        pool.install(|| run_within(&resources, &layout, &corrections, &photographs, (&options, &seams), &context))?;
-    Ok((panorama, photographs.1.load(Ordering::Relaxed)))
+    let input = RenderInput { layout: &layout, corrections: &corrections, photographs: &photographs };
+    let rendered = pool.install(|| run(&input, &resources, &options, &seams, &context))?;
+    Ok((rendered, photographs.1.load(Ordering::Relaxed)))
 }
 
 #[test]
@@ -57,17 +62,18 @@ fn the_budget_does_not_show_in_the_panorama() {
         let disk = RamDisk::default();
         let (free, decoded) = composed(blend, usize::MAX, &disk, 3).expect("no limit");
         assert_eq!((disk.length(), decoded), (0, COUNT));
-        let (free_bits, free_rows) = (bits(&free), rows(&free));
+        let (free_bits, free_rows) = (bits(&free.panorama), rows(&free.panorama));
+        assert_eq!(free.seams.is_some(), blend.has_seams(), "{blend:?}");
         for threads in [1, 3] {
             let disk = RamDisk::default();
             let (tight, decoded) = composed(blend, 1, &disk, threads).expect("the least");
             assert!(disk.length() >= 1670 * 460 * 8, "{blend:?}: the canvas is in the file");
             assert!(decoded > COUNT, "{blend:?}: photographs are decoded again");
-            assert!(bits(&tight) == free_bits, "{blend:?}, {threads} threads");
-            assert!(rows(&tight) == free_rows, "{blend:?}, {threads} threads");
-            assert_eq!(tight.seams(), free.seams());
-            let (mut tight, mut free) =
-                (tight, composed(blend, usize::MAX, &RamDisk::default(), 3).expect("no limit").0);
+            assert!(bits(&tight.panorama) == free_bits, "{blend:?}, {threads} threads");
+            assert!(rows(&tight.panorama) == free_rows, "{blend:?}, {threads} threads");
+            assert_eq!(tight.seams, free.seams);
+            let again = composed(blend, usize::MAX, &RamDisk::default(), 3).expect("no limit").0;
+            let (mut tight, mut free) = (tight.panorama, again.panorama);
             assert!(!tight.is_opaque() && !free.is_opaque());
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
             let filled = pool.install(|| fill(&mut tight));
@@ -92,8 +98,9 @@ fn gaps_take_up_the_colors_beside_them() {
     let source = Memory(vec![trueup_core::raster::Photograph::Eight(raster)]);
     let layout = canvas(300, 320, vec![moved(0, 300.0, 200.0, |p| [p.x, p.y + 20.0])]);
     let (options, seams, context) = (RenderOptions::default(), SeamOptions::default(), StageContext::default());
-    let mut panorama =
-        run(&layout, &Corrections::plain(1), &source, &options, &seams, &context).expect("one photograph");
+    let input = RenderInput { layout: &layout, corrections: &Corrections::plain(1), photographs: &source };
+    let rendered = run(&input, &Resources::unlimited(), &options, &seams, &context).expect("one photograph");
+    let mut panorama = rendered.panorama;
     let before = rows(&panorama);
     let gaps = Gaps::find(&layout, Coverage::of(&layout), 0.1);
     assert_eq!(panorama.fill(&gaps, &context).expect("in memory"), 300 * 20);
@@ -116,7 +123,7 @@ fn gaps_take_up_the_colors_beside_them() {
 fn a_full_disk_stops_the_work_with_a_reason() {
     for blend in [Blend::MultiBand, Blend::None, Blend::Feather] {
         for room in [0, 1_000_000, 5_000_000] {
-            let disk = RamDisk { room, ..RamDisk::default() };
+            let disk = RamDisk::of_room(room);
             let Err(error) = composed(blend, 1, &disk, 2) else { panic!("{blend:?} in {room} bytes") };
             assert!(matches!(error, Error::Io { .. }), "{error}");
         }

@@ -1,15 +1,14 @@
 //! Interpolation of photographs at real positions, in their own encoding, on the scale of 0 to 255.
 
-mod kernel;
 mod reduce;
 
-pub(crate) use kernel::{Bicubic, Bilinear, Kernel};
 pub(crate) use reduce::reduce_by_two;
 
 use std::marker::PhantomData;
 
 use trueup_core::raster::{Photograph, Raster};
 
+use crate::kernel::{Bilinear, InterpolationKernel};
 use crate::simd::{Positions, Rgb8, VectorLoop, interpolate_rgb8, with_vector_instructions};
 
 /// Taps of a widened kernel per axis, at most: a kernel of radius 2 widened 15 times has 60.
@@ -46,7 +45,7 @@ impl Sample for u16 {
 /// Positions outside see the nearest sample. `stretch` is how much wider than a sample the kernel is, along x and y: 1 to
 /// interpolate, more to average where the photograph is reduced. Colors next to transparent samples are weighted by
 /// alpha, so that what lies under a mask does not show. `at_border` is scratch space.
-pub(crate) fn interpolate<K: Kernel>(
+pub(crate) fn interpolate<K: InterpolationKernel>(
     photograph: &Photograph,
     positions: &Positions,
     stretch: [f64; 2],
@@ -67,7 +66,7 @@ pub(crate) fn interpolate<K: Kernel>(
     }
 }
 
-fn interpolate_depth<K: Kernel, T: Sample>(
+fn interpolate_depth<K: InterpolationKernel, T: Sample>(
     raster: &Raster<T>,
     positions: &Positions,
     stretch: [f64; 2],
@@ -80,7 +79,7 @@ fn interpolate_depth<K: Kernel, T: Sample>(
     }
 }
 
-fn interpolate_channels<K: Kernel, T: Sample, const C: usize>(
+fn interpolate_channels<K: InterpolationKernel, T: Sample, const C: usize>(
     raster: &Raster<T>,
     positions: &Positions,
     stretch: [f64; 2],
@@ -104,7 +103,7 @@ struct Averages<'a, K, T, const C: usize> {
     kernel: PhantomData<K>,
 }
 
-impl<K: Kernel, T: Sample, const C: usize> VectorLoop for Averages<'_, K, T, C> {
+impl<K: InterpolationKernel, T: Sample, const C: usize> VectorLoop for Averages<'_, K, T, C> {
     #[inline(always)]
     fn run(self) {
         let mut workspace = Workspace { wx: [0.0; MAX_TAPS], wy: [0.0; MAX_TAPS], columns: [0.0; 3 * MAX_TAPS] };
@@ -134,7 +133,7 @@ fn pixel<T: Sample, const C: usize>(row: &[T], column: usize) -> [f32; 4] {
 }
 
 /// The 4 x 4 samples around a position, weighted in the order the vector form has: along the columns first.
-fn interpolate_one<K: Kernel, T: Sample, const C: usize>(
+fn interpolate_one<K: InterpolationKernel, T: Sample, const C: usize>(
     raster: &Raster<T>,
     positions: &Positions,
     index: usize,
@@ -183,7 +182,7 @@ struct Workspace {
 
 /// A mean over a kernel `stretch` times as wide as the interpolating one.
 #[inline(always)]
-fn average_one<K: Kernel, T: Sample, const C: usize>(
+fn average_one<K: InterpolationKernel, T: Sample, const C: usize>(
     raster: &Raster<T>,
     positions: &Positions,
     index: usize,
@@ -241,7 +240,7 @@ fn average_inside<T: Sample, const C: usize>(
 
 /// First sample and normalized weights of a kernel widened by `stretch` around `position` (0 at the first sample).
 #[inline(always)]
-fn widened_taps<K: Kernel>(position: f64, stretch: f64, taps: &mut [f32; MAX_TAPS]) -> (i64, &[f32]) {
+fn widened_taps<K: InterpolationKernel>(position: f64, stretch: f64, taps: &mut [f32; MAX_TAPS]) -> (i64, &[f32]) {
     let stretch = stretch.clamp(1.0, MAX_STRETCH);
     let radius = K::RADIUS * stretch;
     let first = (position - radius).ceil();

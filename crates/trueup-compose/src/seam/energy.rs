@@ -2,15 +2,24 @@
 
 use rayon::prelude::*;
 
-use super::SeamOptions;
+use super::options::SeamOptions;
 use super::shading::{FRACTION, slopes};
-use super::view::{CLIPPED, IGNORED, KEPT, PARTLY, View, ViewPixel, WHOLLY, luma};
+use crate::small_views::{CLIPPED, IGNORED, KEPT, PARTLY, SmallPixel, SmallView, WHOLLY, luma};
+
+/// Cost of a seam for its length alone, gray levels of difference. Higher makes seams shorter.
+const LENGTH: f64 = 2.0;
+
+/// Weight of the difference of gradients beside that of colors. Higher keeps seams from crossing contours that do not meet.
+const GRADIENT_WEIGHT: f64 = 1.0;
+
+/// Cost of showing a photograph where its highlights are clipped and another one's are not, gray levels per pixel.
+const CLIPPED_COST: f64 = 1.5;
 
 /// Costs are whole numbers; one gray level of 255 is this many.
 pub(super) const UNIT: i32 = 16;
 
 /// Cost of a pixel that the user does not want so: no seam that saves it is too long.
-const UNWANTED: i32 = 1 << 16;
+const AGAINST_WISHES: i32 = 1 << 16;
 
 /// Difference taken for a pixel that only one of the two photographs shows: no less than any other, since at the border of
 /// a photograph there is no room to blend.
@@ -20,12 +29,12 @@ const UNSEEN: i32 = MAX_DIFFERENCE;
 const MAX_DIFFERENCE: i32 = 128 * UNIT;
 
 /// One level of the pyramid of small canvases: the photographs, and what is derived from them.
-pub(super) struct Scene<'a> {
+pub(super) struct SeamEnergy<'a> {
     pub(super) width: usize,
     pub(super) height: usize,
     /// Columns of a turn on a cylinder, its width; 0 on a plane.
     pub(super) turn: usize,
-    pub(super) views: &'a [View],
+    pub(super) views: &'a [SmallView],
     /// Horizontal and vertical differences of the luma, for every pixel of every view.
     gradients: Vec<Vec<[i16; 2]>>,
     /// Slopes of the shading, for every pixel of every view; empty if they do not count.
@@ -50,9 +59,9 @@ const ANY_UNCLIPPED: u8 = 2;
 /// Someone is to be kept there.
 const ANY_KEPT: u8 = 4;
 
-impl<'a> Scene<'a> {
+impl<'a> SeamEnergy<'a> {
     pub(super) fn new(
-        views: &'a [View],
+        views: &'a [SmallView],
         [width, height]: [usize; 2],
         turn: usize,
         moving: &'a [u32],
@@ -78,15 +87,15 @@ impl<'a> Scene<'a> {
             turn,
             views,
             gradients: views.par_iter().map(gradients).collect(),
-            slopes: if options.shading_weight > 0.0 { slopes(views, options.shading_reach) } else { Vec::new() },
-            depths: views.par_iter().map(View::depths).collect(),
+            slopes: if options.shading_weight > 0.0 { slopes(views) } else { Vec::new() },
+            depths: views.par_iter().map(SmallView::depths).collect(),
             anyone,
             moving,
-            length: in_units(options.length),
-            gradient_weight: in_units(options.gradient_weight),
+            length: in_units(LENGTH),
+            gradient_weight: in_units(GRADIENT_WEIGHT),
             shading_weight: in_units(options.shading_weight),
             depth_weight: in_units(options.depth_weight),
-            clipped_cost: in_units(options.clipped_cost),
+            clipped_cost: in_units(CLIPPED_COST),
             moving_cost: in_units(options.moving_cost),
         }
     }
@@ -117,8 +126,8 @@ impl<'a> Scene<'a> {
         if flags & CLIPPED != 0 && anyone & ANY_UNCLIPPED != 0 {
             cost += self.clipped_cost;
         }
-        let unwanted = flags & IGNORED != 0 || anyone & ANY_KEPT != 0 && flags & KEPT == 0;
-        cost + if unwanted { UNWANTED } else { 0 }
+        let against_wishes = flags & IGNORED != 0 || anyone & ANY_KEPT != 0 && flags & KEPT == 0;
+        cost + if against_wishes { AGAINST_WISHES } else { 0 }
     }
 
     /// Cost of a seam between neighboring canvas pixels, `a` shown at `p` and `b` at `q`; 0 for equal labels.
@@ -126,7 +135,7 @@ impl<'a> Scene<'a> {
     /// The differences at both pixels, of colors, gradients and shading: Kwatra and others, "Graphcut textures", SIGGRAPH
     /// 2003, equation 1, with the gradients added instead of divided by: a division draws seams into textured parts,
     /// which in photographs taken from different places fit worst.
-    pub(super) fn seam_cost(&self, p: (usize, usize), a: usize, q: (usize, usize), b: usize) -> i32 {
+    pub(super) fn seam_cost(&self, p: [usize; 2], a: usize, q: [usize; 2], b: usize) -> i32 {
         if a == b {
             return 0;
         }
@@ -135,14 +144,14 @@ impl<'a> Scene<'a> {
 
     /// Cost of a seam between neighboring pixels from the sum of the differences at both.
     #[inline]
-    pub(super) fn cost_of(&self, p: (usize, usize), q: (usize, usize), difference: i32) -> i32 {
-        let (at_p, at_q) = (self.moving[p.1 * self.width + p.0], self.moving[q.1 * self.width + q.0]);
+    pub(super) fn cost_of(&self, p: [usize; 2], q: [usize; 2], difference: i32) -> i32 {
+        let (at_p, at_q) = (self.moving[p[1] * self.width + p[0]], self.moving[q[1] * self.width + q[0]]);
         let through = if at_p != 0 && at_p == at_q { self.moving_cost } else { 0 };
         self.length + difference + through
     }
 
     /// How differently two photographs show a canvas pixel.
-    pub(super) fn difference(&self, a: usize, b: usize, (x, y): (usize, usize)) -> i32 {
+    pub(super) fn difference(&self, a: usize, b: usize, [x, y]: [usize; 2]) -> i32 {
         let index = |label: usize| self.views[label].index_around(x, y, self.turn);
         let (Some(i), Some(j)) = (index(a), index(b)) else { return UNSEEN };
         let (first, second) = (self.views[a].pixels[i], self.views[b].pixels[j]);
@@ -168,9 +177,9 @@ fn in_units(levels: f64) -> i32 {
 }
 
 /// Central differences of the luma over covered pixels; one-sided or zero at the border.
-fn gradients(view: &View) -> Vec<[i16; 2]> {
+fn gradients(view: &SmallView) -> Vec<[i16; 2]> {
     let (width, height) = (view.columns.len(), view.rows.len());
-    let or_none = |pixel: &ViewPixel| if pixel[3] & PARTLY == 0 { -1 } else { (luma(pixel) >> 8) as i16 };
+    let or_none = |pixel: &SmallPixel| if pixel[3] & PARTLY == 0 { -1 } else { (luma(pixel) >> 8) as i16 };
     let luma: Vec<i16> = view.pixels.iter().map(or_none).collect();
     let mut out = vec![[0; 2]; width * height];
     for (index, out) in out.iter_mut().enumerate() {

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use super::moving::neighbors;
-use super::view::{PARTLY, View, WHOLLY};
-use super::{Label, NOBODY};
+use super::neighbors::neighbors;
+use crate::label::{Label, NOBODY};
+use crate::small_views::{PARTLY, SmallView, WHOLLY};
 
 /// Which photograph the panorama shows where.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,9 +19,9 @@ pub struct Seams {
 }
 
 impl Seams {
-    pub(super) fn new(labels: Vec<Label>, views: Vec<View>, [width, height]: [usize; 2], turn: usize) -> Self {
+    pub(super) fn new(labels: Vec<Label>, views: &[SmallView], [width, height]: [usize; 2], turn: usize) -> Self {
         let mut whole = vec![false; labels.len()];
-        for view in &views {
+        for view in views {
             for (index, pixel) in view.pixels.iter().enumerate() {
                 if pixel[3] & WHOLLY != 0 {
                     whole[place(view, index, width)] = true;
@@ -125,13 +125,7 @@ impl Seams {
 
     /// Labels of the points `columns` of row `y` of a cylinder of `full` points (around, down), of which the first lies
     /// `lead` points left of the first turn.
-    pub(crate) fn row_around(
-        &self,
-        y: usize,
-        columns: &Range<usize>,
-        (lead, full): (f64, [f64; 2]),
-        out: &mut Vec<Label>,
-    ) {
+    pub(crate) fn row_around(&self, y: usize, columns: &Range<usize>, lead: f64, full: [f64; 2], out: &mut Vec<Label>) {
         let (across, down) = (self.width as f64 / full[0], self.height as f64 / full[1]);
         out.clear();
         let v = (y as f64 + 0.5) * down;
@@ -209,7 +203,7 @@ impl Seams {
     }
 }
 
-fn place(view: &View, index: usize, width: usize) -> usize {
+fn place(view: &SmallView, index: usize, width: usize) -> usize {
     let columns = view.columns.len();
     let x = view.columns.start + index % columns;
     (view.rows.start + index / columns) * width + if x < width { x } else { x - width }

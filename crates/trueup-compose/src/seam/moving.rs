@@ -2,8 +2,14 @@
 
 use std::collections::VecDeque;
 
-use super::SeamOptions;
-use super::view::{View, WHOLLY};
+use super::neighbors::neighbors;
+use crate::small_views::{SmallView, WHOLLY};
+
+/// Difference, in gray levels, from which on photographs are taken to show different things.
+const MOVING_HIGH: f64 = 32.0;
+
+/// Difference, in gray levels, down to which such a thing extends.
+const MOVING_LOW: f64 = 14.0;
 
 /// Numbers the connected parts of the canvas where photographs differ; 0 where they do not.
 ///
@@ -11,24 +17,19 @@ use super::view::{View, WHOLLY};
 /// a pixel or two says nothing. Parts grow from strong differences into weak ones that touch them (hysteresis).
 ///
 /// `turn` is the width of a canvas that is a cylinder, 0 on a plane.
-pub(super) fn moving_things(
-    views: &[View],
-    [width, height]: [usize; 2],
-    turn: usize,
-    options: &SeamOptions,
-) -> Vec<u32> {
+pub(super) fn moving_things(views: &[SmallView], [width, height]: [usize; 2], turn: usize) -> Vec<u32> {
     let mut difference = vec![0_u8; width * height];
     for y in 0..height {
         // Photographs whose box meets the row; neighbors in their order are compared.
-        let met: Vec<&View> = views.iter().filter(|view| view.rows.contains(&y)).collect();
+        let met: Vec<&SmallView> = views.iter().filter(|view| view.rows.contains(&y)).collect();
         for x in 0..width {
-            let mut last: Option<&View> = None;
+            let mut last: Option<&SmallView> = None;
             for &view in &met {
                 if view.flags(x, y, turn) & WHOLLY == 0 {
                     continue;
                 }
                 if let Some(last) = last {
-                    let level = unlike(last, view, (x, y), turn).min(unlike(view, last, (x, y), turn));
+                    let level = unlike(last, view, [x, y], turn).min(unlike(view, last, [x, y], turn));
                     let place = &mut difference[y * width + x];
                     *place = level.max(*place);
                 }
@@ -36,11 +37,11 @@ pub(super) fn moving_things(
             }
         }
     }
-    label_parts(&difference, [width, height], turn, options.moving_low, options.moving_high)
+    label_parts(&difference, [width, height], turn)
 }
 
 /// Smallest difference of `a` at (x, y) from `b` at that pixel and its eight neighbors, mean of the channels.
-fn unlike(a: &View, b: &View, (x, y): (usize, usize), turn: usize) -> u8 {
+fn unlike(a: &SmallView, b: &SmallView, [x, y]: [usize; 2], turn: usize) -> u8 {
     let Some(at) = a.index_around(x, y, turn) else { return 0 };
     let color = a.pixels[at];
     let mut least = u16::MAX;
@@ -57,20 +58,12 @@ fn unlike(a: &View, b: &View, (x, y): (usize, usize), turn: usize) -> u8 {
     if least == u16::MAX { 0 } else { (least / 3) as u8 }
 }
 
-/// A column and those beside it, of `width` columns; on a cylinder of `turn` columns both are there.
-pub(super) fn neighbors(x: usize, width: usize, turn: usize) -> impl Iterator<Item = usize> {
-    let around = move |x: usize| if turn > 0 { x % turn } else { x };
-    let first = if turn > 0 { x + turn - 1 } else { x.saturating_sub(1) };
-    let end = if turn > 0 { x + turn + 2 } else { (x + 2).min(width) };
-    (first..end).map(around)
-}
-
-fn label_parts(difference: &[u8], [width, height]: [usize; 2], turn: usize, low: f64, high: f64) -> Vec<u32> {
+fn label_parts(difference: &[u8], [width, height]: [usize; 2], turn: usize) -> Vec<u32> {
     let mut number = vec![0_u32; width * height];
     let mut parts = 0;
     let mut open = VecDeque::new();
     for start in 0..difference.len() {
-        if number[start] != 0 || f64::from(difference[start]) < high {
+        if number[start] != 0 || f64::from(difference[start]) < MOVING_HIGH {
             continue;
         }
         parts += 1;
@@ -81,7 +74,7 @@ fn label_parts(difference: &[u8], [width, height]: [usize; 2], turn: usize, low:
             for v in y.saturating_sub(1)..(y + 2).min(height) {
                 for u in neighbors(x, width, turn) {
                     let next = v * width + u;
-                    if number[next] == 0 && f64::from(difference[next]) >= low {
+                    if number[next] == 0 && f64::from(difference[next]) >= MOVING_LOW {
                         number[next] = parts;
                         open.push_back(next);
                     }
@@ -94,8 +87,8 @@ fn label_parts(difference: &[u8], [width, height]: [usize; 2], turn: usize, low:
 
 #[cfg(test)]
 mod tests {
-    use super::super::view::PARTLY;
     use super::*;
+    use crate::small_views::PARTLY;
 
     #[test]
     fn a_thing_in_one_photograph_is_one_part_and_a_shift_is_none() {
@@ -108,10 +101,9 @@ mod tests {
                     [level, level, level, PARTLY | WHOLLY]
                 })
                 .collect();
-            View { columns: 0..30, rows: 0..20, pixels }
+            SmallView { columns: 0..30, rows: 0..20, pixels }
         };
-        let options = SeamOptions::default();
-        let found = moving_things(&[view(0, false), view(1, true)], [30, 20], 0, &options);
+        let found = moving_things(&[view(0, false), view(1, true)], [30, 20], 0);
         for (index, &number) in found.iter().enumerate() {
             let (x, y) = (index % 30, index / 30);
             let inside = (10..16).contains(&x) && (5..12).contains(&y);
@@ -119,8 +111,6 @@ mod tests {
             assert!(inside || number == 0, "({x}, {y})");
             assert!(!core || number == 1, "({x}, {y})");
         }
-        assert!(
-            moving_things(&[view(0, false), view(1, false)], [30, 20], 0, &options).iter().all(|&number| number == 0)
-        );
+        assert!(moving_things(&[view(0, false), view(1, false)], [30, 20], 0).iter().all(|&number| number == 0));
     }
 }

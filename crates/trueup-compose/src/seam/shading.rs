@@ -2,23 +2,26 @@
 
 use rayon::prelude::*;
 
-use super::view::{View, WHOLLY, luma};
+use crate::small_views::{SmallView, WHOLLY, luma};
 
 /// Parts of a gray level in which slopes are counted.
 pub(super) const FRACTION: i32 = 64;
 
+/// Pixels of the seams' canvas over which shading is averaged to either side; half of it across.
+const SHADING_REACH: usize = 4;
+
 /// For every pixel of every view, across and down: the mean brightness on one side minus that on the other, in
 /// [`FRACTION`]s of a gray level; 0 where one side shows nothing.
 ///
-/// The sides are `reach / 2` pixels deep, at least one, and reach `reach` pixels to either side along the line between
+/// The sides are half of [`SHADING_REACH`] pixels deep and reach that many pixels to either side along the line between
 /// them. Where two photographs differ in this, a panorama cannot go over from one to the other without a slope that
 /// neither shows, however wide the transition: it is what the eye takes for a seam in skies and on walls, while differences
 /// of single pixels have both signs along a seam and mean little there.
-pub(super) fn slopes(views: &[View], reach: usize) -> Vec<Vec<[i16; 2]>> {
-    views.par_iter().map(|view| slopes_of(view, reach)).collect()
+pub(super) fn slopes(views: &[SmallView]) -> Vec<Vec<[i16; 2]>> {
+    views.par_iter().map(|view| slopes_of(view, SHADING_REACH)).collect()
 }
 
-fn slopes_of(view: &View, reach: usize) -> Vec<[i16; 2]> {
+fn slopes_of(view: &SmallView, reach: usize) -> Vec<[i16; 2]> {
     let (width, height) = (view.columns.len(), view.rows.len());
     let sums = Sums::new(view);
     let deep = (reach / 2).max(1);
@@ -55,7 +58,7 @@ struct Sums {
 }
 
 impl Sums {
-    fn new(view: &View) -> Self {
+    fn new(view: &SmallView) -> Self {
         let corners = view.columns.len() + 1;
         let mut sums = vec![[0_u32; 2]; corners * (view.rows.len() + 1)];
         for (y, row) in view.pixels.chunks_exact(view.columns.len().max(1)).enumerate() {
@@ -87,23 +90,23 @@ impl Sums {
 
 #[cfg(test)]
 mod tests {
-    use super::super::view::PARTLY;
     use super::*;
+    use crate::small_views::PARTLY;
 
-    fn view(level: impl Fn(usize, usize) -> u8, covered: impl Fn(usize, usize) -> bool) -> View {
+    fn view(level: impl Fn(usize, usize) -> u8, covered: impl Fn(usize, usize) -> bool) -> SmallView {
         let pixel = |index: usize| {
             let (x, y) = (index % 40, index / 40);
             let level = level(x, y);
             [level, level, level, if covered(x, y) { PARTLY | WHOLLY } else { 0 }]
         };
-        View { columns: 3..43, rows: 5..35, pixels: (0..40 * 30).map(pixel).collect() }
+        SmallView { columns: 3..43, rows: 5..35, pixels: (0..40 * 30).map(pixel).collect() }
     }
 
     #[test]
     fn a_ramp_has_the_slope_between_the_middles_of_both_sides() {
         // Three levels a column, two a row. Sides of two pixels: their middles lie three pixels apart.
         let ramp = view(|x, y| (3 * x + 2 * y) as u8, |_, _| true);
-        let slopes = slopes(&[ramp], 4);
+        let slopes = slopes(&[ramp]);
         assert_eq!(slopes[0][15 * 40 + 20], [9 * FRACTION as i16, 6 * FRACTION as i16]);
         // Beside the border the side that is left counts: one pixel, its middle two and a half away.
         assert_eq!(slopes[0][15 * 40 + 1], [15 * FRACTION as i16 / 2, 6 * FRACTION as i16]);
@@ -113,8 +116,8 @@ mod tests {
     #[test]
     fn texture_is_no_slope_and_what_is_not_covered_takes_no_part() {
         let stripes = view(|x, _| if x % 2 == 0 { 90 } else { 110 }, |_, _| true);
-        assert!(slopes(&[stripes], 4)[0].iter().skip(15 * 40 + 5).take(30).all(|slope| *slope == [0, 0]));
+        assert!(slopes(&[stripes])[0].iter().skip(15 * 40 + 5).take(30).all(|slope| *slope == [0, 0]));
         let half = view(|x, _| if x < 20 { 100 } else { 0 }, |x, _| x < 20);
-        assert!(slopes(&[half], 4)[0].iter().all(|slope| *slope == [0, 0]));
+        assert!(slopes(&[half])[0].iter().all(|slope| *slope == [0, 0]));
     }
 }

@@ -3,11 +3,12 @@ use std::ops::Range;
 use proptest::prelude::*;
 
 use super::*;
+use crate::small_views::{CLIPPED, IGNORED, KEPT, PARTLY, WHOLLY};
 
 const WHOLE: u8 = PARTLY | WHOLLY;
 
 /// A view of the box, gray, by level.
-fn view(columns: Range<usize>, rows: Range<usize>, level: impl Fn(usize, usize) -> u8) -> View {
+fn view(columns: Range<usize>, rows: Range<usize>, level: impl Fn(usize, usize) -> u8) -> SmallView {
     let pixels = rows
         .clone()
         .flat_map(|y| columns.clone().map(move |x| (x, y)))
@@ -16,11 +17,18 @@ fn view(columns: Range<usize>, rows: Range<usize>, level: impl Fn(usize, usize) 
             [level, level, level, WHOLE]
         })
         .collect();
-    View { columns, rows, pixels }
+    SmallView { columns, rows, pixels }
 }
 
-fn find(views: Vec<View>, size: [usize; 2], options: &SeamOptions) -> Seams {
-    run(views, size, false, options, &StageContext::default()).expect("views on a canvas")
+fn find(views: &[SmallView], size: [usize; 2], options: &SeamOptions) -> Seams {
+    let input = SeamInput { views, size, around: false };
+    run(&input, options, &StageContext::default()).expect("views on a canvas")
+}
+
+/// The seams as they are found from a canvas of so many pixels on.
+fn find_from(coarse_pixels: f64, views: &[SmallView], size: [usize; 2], around: bool) -> Seams {
+    let input = SeamInput { views, size, around };
+    coarse_to_fine(&input, coarse_pixels, &SeamOptions::default(), &StageContext::default()).expect("views on a canvas")
 }
 
 fn texture(x: usize, y: usize) -> u8 {
@@ -35,8 +43,7 @@ fn a_thing_that_moved_is_shown_whole_or_not_at_all() {
         let first = view(0..120, 0..100, |x, y| if inside(x, y) { 220 } else { texture(x, y) });
         let second = view(40..160, 0..100, texture);
         for coarse_pixels in [1e6, 4_000.0] {
-            let options = SeamOptions { coarse_pixels, ..SeamOptions::default() };
-            let seams = find(vec![first.clone(), second.clone()], [160, 100], &options);
+            let seams = find_from(coarse_pixels, &[first.clone(), second.clone()], [160, 100], false);
             let labels: Vec<Label> = (0..16_000)
                 .filter(|at| inside(at % 160, at / 160) && at % 160 >= 40 && at % 160 < 120)
                 .map(|at| seams.labels()[at])
@@ -61,8 +68,8 @@ fn seams_keep_away_from_slopes_of_shading() {
     };
     let rows_within = |shading_weight: f64| {
         let options = SeamOptions { shading_weight, ..SeamOptions::default() };
-        let views = vec![view(0..120, 0..60, |_, _| 120), view(40..160, 0..60, level)];
-        let seams = find(views, [160, 60], &options);
+        let views = [view(0..120, 0..60, |_, _| 120), view(40..160, 0..60, level)];
+        let seams = find(&views, [160, 60], &options);
         (0..60).filter(|y| slope.contains(&(0..160).find(|x| seams.labels()[y * 160 + x] == 1).unwrap_or(0))).count()
     };
     assert_eq!(rows_within(0.0), 60);
@@ -71,14 +78,14 @@ fn seams_keep_away_from_slopes_of_shading() {
 
 #[test]
 fn clipped_parts_are_shown_by_who_is_not_clipped() {
-    let first = view(0..100, 0..60, |_, y| if y < 20 { 255 } else { 100 });
-    let second = view(20..120, 0..60, |_, y| if y < 20 { 235 } else { 100 });
+    let first = view(0..100, 0..60, |_, y| if y < 40 { 255 } else { 100 });
+    let second = view(20..120, 0..60, |_, y| if y < 40 { 235 } else { 100 });
     let mut clipped = first;
     for pixel in clipped.pixels.iter_mut().filter(|pixel| pixel[0] == 255) {
         pixel[3] |= CLIPPED;
     }
-    let options = SeamOptions { clipped_cost: 8.0, ..SeamOptions::default() };
-    let seams = find(vec![clipped, second], [120, 60], &options);
+    let options = SeamOptions { depth_weight: 0.4, ..SeamOptions::default() };
+    let seams = find(&[clipped, second], [120, 60], &options);
     assert!((30..100).all(|x| seams.labels()[5 * 120 + x] == 1));
 }
 
@@ -91,7 +98,7 @@ fn wishes_of_the_user_are_obeyed() {
         for at in 0..4000 {
             first.pixels[at][3] = if inside(at) { WHOLE | flag } else { WHOLE };
         }
-        let seams = find(vec![first.clone(), second.clone()], [120, 40], &SeamOptions::default());
+        let seams = find(&[first.clone(), second.clone()], [120, 40], &SeamOptions::default());
         for at in (0..4000).filter(|&at| inside(at)) {
             assert_eq!(seams.labels()[at / 100 * 120 + at % 100], label);
         }
@@ -100,10 +107,10 @@ fn wishes_of_the_user_are_obeyed() {
 
 #[test]
 fn finer_canvases_ask_the_same_labels() {
-    let seams =
-        find(vec![view(0..50, 0..20, texture), view(30..80, 0..20, texture)], [80, 20], &SeamOptions::default());
+    let seams = find(&[view(0..50, 0..20, texture), view(30..80, 0..20, texture)], [80, 20], &SeamOptions::default());
     let mut row = Vec::new();
     seams.row(40, &(0..320), [320, 80], &mut row);
+    assert_eq!(row.len(), 320);
     for (x, label) in row.iter().enumerate() {
         // A seam may move by less than a pixel of the small canvas.
         let near = [x.saturating_sub(4), x, (x + 4).min(319)].map(|x| seams.labels()[10 * 80 + x / 4]);
@@ -117,18 +124,17 @@ fn finer_canvases_ask_the_same_labels() {
 fn views_outside_the_canvas_are_refused() {
     let context = StageContext::default();
     let options = SeamOptions::default();
-    assert!(run(vec![view(0..9, 0..9, texture)], [8, 9], false, &options, &context).is_err());
-    assert!(
-        run(vec![View { pixels: vec![], ..view(0..9, 0..9, texture) }], [9, 9], false, &options, &context).is_err()
-    );
-    assert!(run(vec![], [0, 9], false, &options, &context).is_err());
-    let empty = run(vec![], [3, 2], false, &options, &context).expect("an empty canvas");
+    let find = |views: &[SmallView], size| run(&SeamInput { views, size, around: false }, &options, &context);
+    assert!(find(&[view(0..9, 0..9, texture)], [8, 9]).is_err());
+    assert!(find(&[SmallView { pixels: vec![], ..view(0..9, 0..9, texture) }], [9, 9]).is_err());
+    assert!(find(&[], [0, 9]).is_err());
+    let empty = find(&[], [3, 2]).expect("an empty canvas");
     assert!(empty.labels().iter().all(|&label| label == NOBODY));
 }
 
 /// Views of a scene that repeats after `around` columns, on that cylinder; each begins at a column and has a width. All
 /// columns are moved to the right by `by`.
-fn ring(around: usize, boxes: &[(usize, usize)], by: usize) -> Vec<View> {
+fn ring(around: usize, boxes: &[(usize, usize)], by: usize) -> Vec<SmallView> {
     let level = move |x: usize, y: usize, index: usize| {
         let thing = index == 0 && (4..14).contains(&x) && (10..24).contains(&y);
         if thing { 230 } else { 60 + (x * 7 + y * 13 + index * 3) % 41 }
@@ -147,11 +153,7 @@ fn the_seams_of_a_cylinder_have_no_end() {
     let boxes = [(100, 50), (20, 60), (60, 60), (8, 20)];
     // On the coarse canvas alone at any column; over two halvings at multiples of four.
     for (coarse_pixels, steps) in [(1e6, vec![1, 7, 20, 64, 119]), (1_000.0, vec![4, 20, 64, 116])] {
-        let options = SeamOptions { coarse_pixels, ..SeamOptions::default() };
-        let find = |by| {
-            let context = StageContext::default();
-            run(ring(120, &boxes, by), [120, 40], true, &options, &context).expect("views on a cylinder")
-        };
+        let find = |by| find_from(coarse_pixels, &ring(120, &boxes, by), [120, 40], true);
         let still = find(0);
         assert!(still.labels().iter().all(|&label| label != NOBODY));
         for by in steps {
@@ -163,8 +165,8 @@ fn the_seams_of_a_cylinder_have_no_end() {
             // Between pixels, too: at four times the size, half a pixel from the ends.
             let (mut here, mut there) = (Vec::new(), Vec::new());
             for y in 0..160 {
-                still.row_around(y, &(0..480), (0.0, [480.0, 160.0]), &mut here);
-                moved.row_around(y, &(4 * by..480 + 4 * by), (0.0, [480.0, 160.0]), &mut there);
+                still.row_around(y, &(0..480), 0.0, [480.0, 160.0], &mut here);
+                moved.row_around(y, &(4 * by..480 + 4 * by), 0.0, [480.0, 160.0], &mut there);
                 assert_eq!(here, there, "{y} by {by}");
             }
             let shown = |seams: &Seams, from: usize| seams.shown_in(&(from..from + 60), &(0..160), [480, 160]);
@@ -185,7 +187,7 @@ fn a_view_may_go_all_the_way_round() {
         let inside = (4..36).contains(&(at % 40)) && (4..16).contains(&(at / 40));
         pixel[3] |= if inside { KEPT } else { 0 };
     }
-    let seams = run(views, [64, 40], true, &SeamOptions::default(), &StageContext::default()).expect("a cylinder");
+    let seams = find_from(COARSE_PIXELS, &views, [64, 40], true);
     assert!((0..64).all(|x| seams.labels()[35 * 64 + x] == 0));
     let kept = |x: usize| !(22..54).contains(&x);
     // The first column of a view that goes all round is the one that it cannot take back.
@@ -201,13 +203,12 @@ proptest! {
         boxes in prop::collection::vec((0..50_usize, 0..30_usize, 8..40_usize, 8..30_usize), 1..6),
         coarse_pixels in prop::sample::select(vec![1_000.0, 1e6]),
     ) {
-        let views: Vec<View> = boxes
+        let views: Vec<SmallView> = boxes
             .iter()
             .enumerate()
             .map(|(index, &(x, y, w, h))| view(x..(x + w).min(64), y..(y + h).min(48), |x, y| (x * 3 + y * 5 + index * 40) as u8))
             .collect();
-        let options = SeamOptions { coarse_pixels, ..SeamOptions::default() };
-        let seams = find(views.clone(), [64, 48], &options);
+        let seams = find_from(coarse_pixels, &views, [64, 48], false);
         for y in 0..48 {
             for x in 0..64 {
                 let covering = views.iter().filter(|view| view.flags(x, y, 0) != 0).count();

@@ -1,7 +1,7 @@
 //! Samples of 8-bit RGB pictures between their pixels.
 
-use super::Positions;
-use crate::sampling::Kernel;
+use super::positions::Positions;
+use crate::kernel::InterpolationKernel;
 
 /// An 8-bit RGB picture as the interpolation sees it.
 #[derive(Debug, Clone, Copy)]
@@ -24,7 +24,7 @@ impl Rgb8<'_> {
 /// Interpolates 8-bit RGB at every position, on the scale of 0 to 255 and not yet clamped; the fourth value is 255.
 ///
 /// Returns nothing for positions too near the border for a whole window: their indices go to `at_border`.
-pub(crate) fn interpolate_rgb8<K: Kernel>(
+pub(crate) fn interpolate_rgb8<K: InterpolationKernel>(
     picture: Rgb8<'_>,
     positions: &Positions,
     out: &mut [[f32; 4]],
@@ -39,7 +39,7 @@ pub(crate) fn interpolate_rgb8<K: Kernel>(
     interpolate_rgb8_portable::<K>(picture, positions, out, at_border);
 }
 
-fn interpolate_rgb8_portable<K: Kernel>(
+fn interpolate_rgb8_portable<K: InterpolationKernel>(
     picture: Rgb8<'_>,
     positions: &Positions,
     out: &mut [[f32; 4]],
@@ -77,10 +77,10 @@ mod x86 {
     };
 
     use super::{Positions, Rgb8};
-    use crate::sampling::Kernel;
+    use crate::kernel::InterpolationKernel;
 
     #[target_feature(enable = "avx2")]
-    pub(super) fn interpolate_rgb8<K: Kernel>(
+    pub(super) fn interpolate_rgb8<K: InterpolationKernel>(
         picture: Rgb8<'_>,
         positions: &Positions,
         out: &mut [[f32; 4]],

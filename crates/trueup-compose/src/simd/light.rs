@@ -1,17 +1,8 @@
 //! From samples of a photograph to corrected linear light.
 
-use super::Positions;
-use crate::exposure::{LightTable, exposed};
-use crate::weights::{Feather, weight};
-
-/// How a weighted sample joins what a canvas pixel already holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Combine {
-    /// Feather weights, added.
-    Feathered,
-    /// Equal weights, added.
-    Equal,
-}
+use super::positions::Positions;
+use crate::light::{LightTable, exposed};
+use crate::weights::{Feather, Weighting, weight};
 
 /// What one photograph brings to [`accumulate`].
 #[derive(Debug, Clone, Copy)]
@@ -21,7 +12,7 @@ pub(crate) struct Contribution<'a> {
     pub(crate) light: &'a LightTable,
     /// Size of a canvas pixel in photograph pixels where the photograph's border may cut canvas pixels.
     pub(crate) border_footprint: Option<[f32; 2]>,
-    pub(crate) combine: Combine,
+    pub(crate) weighting: Weighting,
 }
 
 /// Linearizes `samples` (red, green, blue, alpha from 0 to 255), weighs them and joins them to the canvas pixels `sums`.
@@ -47,7 +38,7 @@ fn accumulate_portable(
     sums: &mut [[f32; 4]],
 ) {
     const PER_LEVEL: f32 = 1.0 / 255.0;
-    let Contribution { feather, light, border_footprint, combine } = contribution;
+    let Contribution { feather, light, border_footprint, weighting } = contribution;
     let (gain, varies) = (light.gain, light.varies());
     let linearize = light.linearize.as_ref();
     let length = sums.len();
@@ -63,7 +54,10 @@ fn accumulate_portable(
             let position = [column as f32 + 0.5 + fraction_x, row as f32 + 0.5 + fraction_y];
             share *= feather.coverage(position, footprint);
         }
-        let inside = if combine == Combine::Equal { 1.0 } else { feather.at(column, row, fraction_x, fraction_y) };
+        let inside = match weighting {
+            Weighting::Equal => 1.0,
+            Weighting::Feathered => feather.at(column, row, fraction_x, fraction_y),
+        };
         let weight = weight(share, inside);
         let lift = if varies { light.at(column as f32 + 0.5 + fraction_x, row as f32 + 0.5 + fraction_y) } else { 1.0 };
         let light = |level: f32, gain: f32| exposed(linearize.linear(level), gain * lift);

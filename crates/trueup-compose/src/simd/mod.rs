@@ -8,7 +8,7 @@ mod light;
 mod positions;
 
 pub(crate) use interpolation::{Rgb8, interpolate_rgb8};
-pub(crate) use light::{Combine, Contribution, Development, accumulate, develop};
+pub(crate) use light::{Contribution, Development, accumulate, develop};
 pub(crate) use positions::{InverseBilinear, Positions, invert_row};
 
 /// A loop to be compiled for the processor's vector instructions. `run` must be `#[inline(always)]` (a closure is not).

@@ -4,7 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use trueup_core::color::TransferCurve;
 
-use super::table_of;
+use super::by_curve::table_of;
 
 /// Steps of [`Encode16`]. Against the square root of linear light sRGB's curve bends by at most 25.8 (twice its slope near
 /// black, 12.92), so that the chord between entries is off by 25.8 / 8 / 4095^2 = 2e-7: an 80th of a 16-bit step. Where

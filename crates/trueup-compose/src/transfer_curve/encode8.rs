@@ -4,7 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use trueup_core::color::TransferCurve;
 
-use super::table_of;
+use super::by_curve::table_of;
 
 /// 8-bit levels from linear light, exact to rounding.
 #[derive(Debug)]

@@ -4,7 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use trueup_core::color::TransferCurve;
 
-use super::table_of;
+use super::by_curve::table_of;
 
 /// Table steps between two 8-bit levels. The curve between two entries is replaced by its chord, which is off by less
 /// than 4e-8 of full scale, a 400th of a 16-bit step; where a curve has a kink, by a fifth of a step.

@@ -3,22 +3,18 @@
 //! The tables of sRGB's curve are made once; those of another curve when they are asked for, which takes less than a
 //! millisecond.
 
+mod by_curve;
 mod encode16;
 mod encode8;
 mod linearize;
 
-use std::sync::{Arc, LazyLock, OnceLock};
+use std::sync::{Arc, OnceLock};
 
 use trueup_core::color::TransferCurve;
 
 pub(crate) use encode8::{Encode, EncodeRoots};
 pub(crate) use encode16::{Encode16, EncodeRoots16};
 pub(crate) use linearize::Linearize;
-
-/// The table of a curve: sRGB's own if it is that, else a new one.
-fn table_of<T>(curve: &TransferCurve, srgb: &LazyLock<Arc<T>>, new: impl Fn(&TransferCurve) -> T) -> Arc<T> {
-    if *curve == TransferCurve::SRGB { (**srgb).clone() } else { Arc::new(new(curve)) }
-}
 
 /// How a finished picture is written: its curve, and that curve's tables.
 #[derive(Debug, Clone)]

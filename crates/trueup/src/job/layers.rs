@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use trueup_compose::render::{self, Panorama};
+use trueup_compose::render::{self, Rendered};
 use trueup_compose::seam::{NOBODY, Seams};
 use trueup_core::{Error, Result};
 use trueup_io::decode;
@@ -50,13 +50,13 @@ impl Stitcher<'_> {
         encode::write_layers(path, &layers, &self.metadata(alignment), &options, self.context())
     }
 
-    /// Writes which photograph `panorama`, composed of `alignment`, shows at every pixel to a PNG; returns its length in
+    /// Writes which photograph what was `rendered`, composed of `alignment`, shows at every pixel to a PNG; returns its length in
     /// bytes.
     ///
     /// # Errors
     /// [`Error::Unsupported`] if photographs were averaged; those of [`encode::write_labels`].
-    pub fn write_seams(&self, alignment: &Alignment, panorama: &Panorama, path: &Path) -> Result<u64> {
-        let seams = panorama.seams().ok_or_else(no_seams)?;
+    pub fn write_seams(&self, alignment: &Alignment, rendered: &Rendered, path: &Path) -> Result<u64> {
+        let seams = rendered.seams.as_ref().ok_or_else(no_seams)?;
         let labels = Labels { alignment, seams };
         encode::write_labels(path, &labels, &self.options().compose.output, self.context())
     }
@@ -98,9 +98,8 @@ impl LayerSet for Layers<'_> {
 
     fn open(&self, index: usize) -> Result<LayerPage<'_>> {
         let position = self.shown[index];
-        let (layout, corrections) = (self.alignment.layout(), self.alignment.corrections());
         let options = &self.stitcher.options().compose.render;
-        let rows = render::layer_rows(layout, corrections, position, self.alignment.photographs(), options)?;
+        let rows = render::layer_rows(&self.alignment.render_input(), position, options)?;
         let name = self.alignment.name(position);
         let rows = rows.ok_or_else(|| Error::input(&name, "it lies outside the panorama", "Leave it out."))?;
         Ok(LayerPage { name, corner: [rows.left, rows.top], rows: Box::new(rows) })

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use trueup_compose::render::{Blend, Panorama};
+use trueup_compose::render::Rendered;
 use trueup_core::Result;
 use trueup_io::encode;
 
@@ -16,7 +16,7 @@ use crate::project::record::Project;
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Writer {
     /// The panorama, while it is at hand.
-    Panorama(fn(&Stitcher, &Alignment, &Panorama, &Path) -> Result<()>),
+    Panorama(fn(&Stitcher, &Alignment, &Rendered, &Path) -> Result<()>),
     /// The aligned photographs, when the panorama is written.
     Photographs(fn(&Stitcher, &Alignment, &Path) -> Result<()>),
     /// The record, when all else is written: its text.
@@ -80,9 +80,9 @@ side_outputs! {
     Seams("seams", "FILE.png")
         checked by |path, options| {
             encode::check_labels_place(path)?;
-            if matches!(options.compose.render.blend, Blend::MultiBand | Blend::None) { Ok(()) } else { Err(no_seams()) }
+            if options.compose.render.blend.has_seams() { Ok(()) } else { Err(no_seams()) }
         },
-        written by Writer::Panorama(|stitcher, alignment, panorama, path| {
-            stitcher.write_seams(alignment, panorama, path).map(drop)
+        written by Writer::Panorama(|stitcher, alignment, rendered, path| {
+            stitcher.write_seams(alignment, rendered, path).map(drop)
         });
 }

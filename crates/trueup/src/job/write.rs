@@ -28,18 +28,18 @@ impl Outputs {
     /// Those of [`Stitcher::compose`] and of writing; [`trueup_core::Error::Input`] if a file is one of the photographs.
     pub fn write(&self, stitcher: &Stitcher, mut alignment: Alignment) -> Result<Written> {
         self.refuse_inputs(alignment.project.images.iter().map(|image| Path::new(&image.path)), [])?;
-        let panorama = stitcher.to_be_written(&self.panorama).compose(&mut alignment)?;
+        let rendered = stitcher.to_be_written(&self.panorama).compose(&mut alignment)?;
         let written = stitcher.context().gather(|context| {
             context.time("output", || {
                 let options = stitcher.output_options(&alignment, &self.panorama)?;
                 let metadata = stitcher.metadata(&alignment);
-                let bytes = encode::write(&self.panorama, &panorama, &metadata, &options, context)?;
+                let bytes = encode::write(&self.panorama, &rendered.panorama, &metadata, &options, context)?;
                 for (kind, path) in &self.beside {
                     if let Writer::Panorama(write) = kind.writer() {
-                        write(stitcher, &alignment, &panorama, path)?;
+                        write(stitcher, &alignment, &rendered, path)?;
                     }
                 }
-                drop(panorama);
+                drop(rendered);
                 for (kind, path) in &self.beside {
                     if let Writer::Photographs(write) = kind.writer() {
                         write(stitcher, &alignment, path)?;

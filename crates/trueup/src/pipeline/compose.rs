@@ -1,10 +1,10 @@
 //! The compose phase: light, then seams and the panorama, from the full-resolution photographs.
 
 use trueup_compose::crop::Coverage;
-use trueup_compose::exposure::{self, Corrections, Thumbnail};
+use trueup_compose::exposure::{self, Corrections, ExposureInput, Thumbnail};
 use trueup_compose::gaps::Gaps;
 use trueup_compose::layout::CanvasLayout;
-use trueup_compose::render::{self, Panorama, Resources};
+use trueup_compose::render::{self, RenderInput, Rendered, Resources};
 use trueup_core::diagnostics::{Diagnostic, Reported, Subject};
 use trueup_core::raster::Raster;
 use trueup_core::source::{PhotographSource, WorkingFrame};
@@ -48,19 +48,16 @@ pub(crate) fn light(
         .iter()
         .map(|one| Thumbnail { raster: one.thumbnail, curve: &curve, frame: one.frame, camera: one.camera })
         .collect();
+    let light = ExposureInput { layout: input.layout, thumbnails: &thumbnails, reference: input.reference };
     context.gather(|context| {
-        context.time("exposure", || {
-            Ok(exposure::run(input.layout, &thumbnails, input.reference, &options.exposure, context)?.corrections)
-        })
+        context.time("exposure", || Ok(exposure::run(&light, &options.exposure, context)?.corrections))
     })
 }
 
 /// What composing works on.
 pub(crate) struct ComposeInput<'a> {
-    pub layout: &'a CanvasLayout,
-    /// For every place on the layout.
-    pub corrections: &'a Corrections,
-    pub photographs: &'a FilePhotographs,
+    /// Photographs, their places and their light.
+    pub render: RenderInput<'a>,
     /// What it may take of the machine.
     pub resources: Resources<'a>,
     /// Largest gap that is filled, `canvas.fill`.
@@ -76,17 +73,16 @@ pub(crate) fn run(
     input: &ComposeInput,
     options: &ComposeOptions,
     context: &StageContext,
-) -> Result<Reported<Panorama>> {
-    let ComposeInput { layout, corrections, photographs, resources, fill } = input;
+) -> Result<Reported<Rendered>> {
+    let ComposeInput { render: photographs, resources, fill } = input;
     context.gather(|context| {
-        let parts = (&options.render, &options.seam);
-        let mut panorama = render::run_within(resources, layout, corrections, *photographs, parts, context)?;
+        let mut rendered = render::run(photographs, resources, &options.render, &options.seam, context)?;
         if *fill > 0.0 {
-            let gaps = Gaps::find(layout, Coverage::of(layout), *fill);
-            let filled = panorama.fill(&gaps, context)?;
-            report_filled(filled, layout, context);
+            let gaps = Gaps::find(photographs.layout, Coverage::of(photographs.layout), *fill);
+            let filled = rendered.panorama.fill(&gaps, context)?;
+            report_filled(filled, photographs.layout, context);
         }
-        Ok(panorama)
+        Ok(rendered)
     })
 }
 

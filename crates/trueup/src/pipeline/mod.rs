@@ -21,7 +21,7 @@ use std::path::Path;
 use trueup_align::vanishing::TriadOutcome;
 use trueup_compose::exposure::Corrections;
 use trueup_compose::fidelity::{self, Fidelity};
-use trueup_compose::render::{self, Panorama};
+use trueup_compose::render::{self, Rendered};
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::color::PhotographColors;
@@ -301,13 +301,11 @@ impl<'a> Stitcher<'a> {
     /// # Errors
     /// Those of reading the photographs and of a scratch file; [`Error::Limits`] with the numbers, before any photograph is
     /// read, if the canvas is too large for the memory or the disk; [`Error::Cancelled`].
-    pub fn compose(&self, alignment: &mut Alignment) -> Result<Panorama> {
+    pub fn compose(&self, alignment: &mut Alignment) -> Result<Rendered> {
         let scratch = scratch::folder(&alignment.layout, self.options, self.output)?;
         let budget = Budget::new(&self.options.run.resources);
         let input = ComposeInput {
-            layout: &alignment.layout,
-            corrections: &alignment.corrections,
-            photographs: &alignment.photographs,
+            render: alignment.render_input(),
             resources: budget.composing(alignment.photographs.kept_bytes(), &scratch),
             fill: self.options.arrange.canvas.fill,
         };
@@ -315,9 +313,9 @@ impl<'a> Stitcher<'a> {
             let composed = context.time("render", || compose::run(&input, &self.options.compose, context))?;
             Ok(context.absorb(composed))
         })?;
-        let (panorama, told) = composed.split();
+        let (rendered, told) = composed.split();
         alignment.record(told);
-        Ok(panorama)
+        Ok(rendered)
     }
 
     /// What the panorama's file is to tell: its color profile, and of its photographs what the options let pass.
@@ -325,27 +323,25 @@ impl<'a> Stitcher<'a> {
         provenance::metadata(&alignment.project, alignment.photographs.colors(), &self.options.compose.output)
     }
 
-    /// Measures how true `panorama`, composed of `alignment`, is to its photographs: steps across its seams, and ghosts.
+    /// Measures how true what was `rendered` of `alignment` is to its photographs: steps across its seams, and ghosts.
     /// Renders every photograph alone on the canvas, nine bytes a pixel of each.
     ///
     /// # Errors
     /// Those of reading the photographs; [`Error::Input`] if the two do not belong together; [`Error::Cancelled`].
-    pub fn fidelity(&self, alignment: &Alignment, panorama: &Panorama) -> Result<Fidelity> {
+    pub fn fidelity(&self, alignment: &Alignment, rendered: &Rendered) -> Result<Fidelity> {
         let layout = &alignment.layout;
         let layers = (0..layout.placed.len())
             .map(|position| {
                 self.context.check_cancelled()?;
-                let photographs = alignment.photographs.as_ref();
-                let options = &self.options.compose.render;
-                render::layer(layout, &alignment.corrections, position, photographs, options)
+                render::layer(&alignment.render_input(), position, &self.options.compose.render)
             })
             .collect::<Result<Vec<_>>>()?;
         let (size, around) = ([layout.width, layout.height], layout.period.is_some());
-        let shown = match panorama.seams() {
+        let shown = match &rendered.seams {
             Some(seams) => seams.on_canvas(size),
             None => fidelity::deepest(&layers, size, around)?,
         };
-        fidelity::measure(panorama, &layers, &shown, around)
+        fidelity::measure(&rendered.panorama, &layers, &shown, around)
     }
 
     /// What the stitcher reports to beside its results: progress, and whether to stop.

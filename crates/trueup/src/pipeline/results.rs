@@ -5,6 +5,7 @@ use std::sync::Arc;
 use trueup_align::vanishing::TriadOutcome;
 use trueup_compose::exposure::Corrections;
 use trueup_compose::layout::CanvasLayout;
+use trueup_compose::render::RenderInput;
 use trueup_core::diagnostics::Reported;
 use trueup_core::lines::LineSegment;
 use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
@@ -68,14 +69,14 @@ pub struct Alignment {
 }
 
 impl Alignment {
+    /// What its panorama is rendered from.
+    pub(crate) fn render_input(&self) -> RenderInput<'_> {
+        RenderInput { layout: &self.layout, corrections: &self.corrections, photographs: self.photographs.as_ref() }
+    }
+
     /// Where the photographs lie on the canvas.
     pub(crate) fn layout(&self) -> &CanvasLayout {
         &self.layout
-    }
-
-    /// Gain, color and vignetting of every photograph placed.
-    pub(crate) fn corrections(&self) -> &Corrections {
-        &self.corrections
     }
 
     /// The photographs, in the order of [`Project::images`].

@@ -313,7 +313,9 @@ mod tests {
             let options = &project.options;
             let photographs = Plain(sizes);
             let (layout, corrections) = (&recorded.layout, &recorded.corrections);
-            drop(render::run(layout, corrections, &photographs, &options.compose.render, &options.compose.seam, &context));
+            let input = render::RenderInput { layout, corrections, photographs: &photographs };
+            let resources = render::Resources::unlimited();
+            drop(render::run(&input, &resources, &options.compose.render, &options.compose.seam, &context));
             drop(layout::run(recorded.layout.placed, recorded.reference, &options.arrange.canvas, &context));
         }
     }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_align::metrics::{OverlapMeasures, OverlapPixels, mean_over_overlaps};
 use trueup_compose::layout::{CanvasLayout, Placed};
-use trueup_compose::render::{self, Layer};
+use trueup_compose::render::{self, Layer, RenderInput};
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
 use trueup_core::source::{PhotographSource, SourceImage};
@@ -96,12 +96,13 @@ pub fn compare_overlaps(
     let layout = layout(used_grids(&records)?, positions, (scale, project.grid_canvas()));
     let corrections = recorded_corrections(project, &records)?;
 
+    let input = RenderInput { layout: &layout, corrections: &corrections, photographs };
     context.progress().begin(STAGE, records.len() as u64);
     let layers: Vec<Layer> = (0..records.len())
         .into_par_iter()
         .map(|position| {
             context.check_cancelled()?;
-            let layer = render::layer(&layout, &corrections, position, photographs, &project.options.compose.render)?;
+            let layer = render::layer(&input, position, &project.options.compose.render)?;
             context.progress().advance(STAGE, 1);
             Ok(layer)
         })

@@ -59,7 +59,7 @@ impl Response {
 
     /// The nearest response in its direction that rises: weakened until a stop of the profile's light is at least a quarter
     /// of a stop everywhere.
-    pub(super) fn rising(self, profile: &TransferCurve) -> Self {
+    pub(crate) fn rising(self, profile: &TransferCurve) -> Self {
         let mut share = 1.0_f64;
         let place = |step: usize| step as f64 / CHECKED as f64;
         let mut below = (profile.linear(place(1)), self.log_factor(place(1)));
@@ -87,7 +87,7 @@ impl Response {
     ///
     /// # Errors
     /// As [`Self::curve`].
-    pub(super) fn curve_of(&self, profile: &TransferCurve, steps: usize) -> Result<TransferCurve> {
+    pub(crate) fn curve_of(&self, profile: &TransferCurve, steps: usize) -> Result<TransferCurve> {
         if self.is_plain() {
             return Ok(profile.clone());
         }

@@ -10,41 +10,41 @@ use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 
 use super::order::Batch;
-use super::unrolled::Unrolled;
-use crate::exposure::Correction;
-use crate::render::RenderOptions;
-use crate::render::prepared::{Prepared, check_photograph};
-use crate::seam::Label;
+use crate::label::Label;
+use crate::layout::Unrolled;
+use crate::light::{Correction, PhotographLight};
+use crate::render_options::RenderOptions;
+use crate::warped::{Resampling, WarpedPhotograph, check_photograph};
 
 /// What photographs are made ready from.
 #[derive(Clone, Copy)]
-pub(super) struct Supply<'a> {
+pub(super) struct PhotographLoader<'a> {
     pub(super) unrolled: &'a Unrolled<'a>,
     pub(super) curve: &'a TransferCurve,
     pub(super) corrections: &'a [Correction],
     pub(super) photographs: &'a dyn PhotographSource,
-    pub(super) options: &'a RenderOptions,
+    pub(super) resampling: Resampling,
     pub(super) context: &'a StageContext<'a>,
 }
 
 /// Photographs in memory, within a number of bytes. Since the order of the work is known, the one that is wanted last makes
 /// room for others (Belady, IBM Systems Journal 5(2), 1966): no other choice decodes fewer files.
-pub(super) struct Shelf<'a> {
-    supply: Supply<'a>,
+pub(super) struct LoadedPhotographs<'a> {
+    loader: PhotographLoader<'a>,
     room: usize,
     at_a_time: usize,
     /// Decoded, as the first pass left them.
     kept: Vec<Option<Photograph>>,
-    pictures: Vec<Option<Prepared<'a>>>,
+    warped: Vec<Option<WarpedPhotograph<'a>>>,
     /// For every photograph, the batches that show it.
     uses: Vec<Vec<usize>>,
     /// Whether progress was reported for a photograph.
     counted: Vec<bool>,
 }
 
-impl<'a> Shelf<'a> {
+impl<'a> LoadedPhotographs<'a> {
     pub(super) fn new(
-        supply: Supply<'a>,
+        loader: PhotographLoader<'a>,
         kept: Vec<Option<Photograph>>,
         batches: &[Batch],
         room: usize,
@@ -58,36 +58,36 @@ impl<'a> Shelf<'a> {
             }
         }
         Self {
-            supply,
+            loader,
             room,
             at_a_time,
             kept,
-            pictures: (0..count).map(|_| None).collect(),
+            warped: (0..count).map(|_| None).collect(),
             uses,
             counted: vec![false; count],
         }
     }
 
     /// The photographs that are ready, by label.
-    pub(super) fn pictures(&self) -> &[Option<Prepared<'a>>] {
-        &self.pictures
+    pub(super) fn warped(&self) -> &[Option<WarpedPhotograph<'a>>] {
+        &self.warped
     }
 
     /// Makes ready what batch number `index` shows; `bytes` are the photographs' sizes. Others may go.
     pub(super) fn prepare(&mut self, index: usize, batch: &Batch, bytes: &[usize]) -> Result<()> {
         let wanted: Vec<usize> = batch.shown.iter().map(|&label: &Label| usize::from(label)).collect();
-        let missing: Vec<usize> = wanted.iter().copied().filter(|&at| self.pictures[at].is_none()).collect();
+        let missing: Vec<usize> = wanted.iter().copied().filter(|&at| self.warped[at].is_none()).collect();
         let coming: usize = missing.iter().filter(|&&at| self.kept[at].is_none()).map(|&at| bytes[at]).sum();
         self.make_room(index, &wanted, coming);
         for group in missing.chunks(self.at_a_time.max(1)) {
             let ready: Vec<(usize, Option<Photograph>)> = group.iter().map(|&at| (at, self.kept[at].take())).collect();
-            let supply = self.supply;
-            let loaded: Vec<(usize, Prepared<'a>)> =
-                ready.into_par_iter().map(|(at, kept)| Ok((at, supply.ready(at, kept)?))).collect::<Result<_>>()?;
+            let loader = self.loader;
+            let loaded: Vec<(usize, WarpedPhotograph<'a>)> =
+                ready.into_par_iter().map(|(at, kept)| Ok((at, loader.ready(at, kept)?))).collect::<Result<_>>()?;
             for (at, prepared) in loaded {
-                self.pictures[at] = Some(prepared);
+                self.warped[at] = Some(prepared);
                 if !std::mem::replace(&mut self.counted[at], true) {
-                    supply.context.progress().advance(RenderOptions::STAGE, 1);
+                    loader.context.progress().advance(RenderOptions::STAGE, 1);
                 }
             }
         }
@@ -110,19 +110,19 @@ impl<'a> Shelf<'a> {
                 break;
             }
             self.kept[at] = None;
-            self.pictures[at] = None;
+            self.warped[at] = None;
         }
     }
 
     fn held_bytes(&self) -> usize {
         let kept: usize = self.kept.iter().flatten().map(Photograph::bytes).sum();
-        kept + self.pictures.iter().flatten().map(|picture| picture.photograph().0.bytes()).sum::<usize>()
+        kept + self.warped.iter().flatten().map(|picture| picture.photograph().0.bytes()).sum::<usize>()
     }
 }
 
-impl<'a> Supply<'a> {
+impl<'a> PhotographLoader<'a> {
     /// Photograph `at`, decoded unless it was kept.
-    fn ready(&self, at: usize, kept: Option<Photograph>) -> Result<Prepared<'a>> {
+    fn ready(&self, at: usize, kept: Option<Photograph>) -> Result<WarpedPhotograph<'a>> {
         self.context.check_cancelled()?;
         let placed = &self.unrolled.placed()[at];
         let photograph = match kept {
@@ -131,12 +131,8 @@ impl<'a> Supply<'a> {
         };
         check_photograph(placed, &photograph)?;
         let correction = &self.corrections[self.unrolled.original(at)];
-        Ok(Prepared::new(
-            Cow::Owned(photograph),
-            &placed.mesh,
-            self.unrolled.canvas(),
-            (self.curve, correction),
-            self.options,
-        ))
+        let light = PhotographLight { curve: self.curve, correction };
+        let (photograph, size) = (Cow::Owned(photograph), self.unrolled.canvas());
+        Ok(WarpedPhotograph::new(photograph, &placed.mesh, size, light, &self.resampling))
     }
 }

@@ -1,17 +1,4 @@
-//! Levels of pyramids whose pictures do not cover every sample.
-//!
-//! Sample i of level l sits on pixel 2^l i of the canvas, whatever part of the canvas a plane holds: two planes that both
-//! hold what a sample is made of give it the same bits.
-//!
-//! # Source
-//! Burt, Adelson, "A multiresolution spline with application to image mosaics", ACM TOG 2(4), 1983; kernel 1 4 6 4 1.
-//!
-//! # Departures
-//! But for the finest and the widest, bands are weighted by masks of the next coarser level: what differs between two
-//! photographs goes over within the width of its own contours instead of half of it, and shows less of a step.
-//!
-//! Samples carry the share that is covered, colors are multiplied by it, and sums are divided by the sum of the shares
-//! (normalized convolution: Knutsson, Westin, CVPR 1993), so that what lies beside a picture never bleeds into it.
+//! A part of one level, reduced and interpolated.
 
 use std::ops::Range;
 
@@ -42,13 +29,13 @@ impl Texel for [f32; 4] {
 
 /// A part of one level; all outside is zero. Four channels are three of color times the share, and the share.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Plane<T> {
+pub(crate) struct PyramidPlane<T> {
     pub(crate) columns: Range<usize>,
     pub(crate) rows: Range<usize>,
     pub(crate) texels: Vec<T>,
 }
 
-impl<T: Texel> Plane<T> {
+impl<T: Texel> PyramidPlane<T> {
     /// Zeros.
     pub(crate) fn new(columns: Range<usize>, rows: Range<usize>) -> Self {
         let texels = vec![T::default(); columns.len() * rows.len()];
@@ -84,7 +71,7 @@ impl<T: Texel> Plane<T> {
     }
 
     /// The part `columns` x `rows`, all of which the plane holds.
-    pub(super) fn part(&self, columns: &Range<usize>, rows: &Range<usize>) -> Self {
+    pub(crate) fn part(&self, columns: &Range<usize>, rows: &Range<usize>) -> Self {
         let mut part = Self::new(columns.clone(), rows.clone());
         let first = columns.start - self.columns.start;
         for y in rows.clone() {
@@ -186,6 +173,9 @@ fn two<T: Texel>(a: T, b: T) -> T {
 /// A smaller share of a sample, a 64th of a step of 16 bits, is none: its color would be made of rounding.
 pub(crate) const LEAST_SHARE: f32 = 1.0 / (1 << 22) as f32;
 
+/// Share of samples that are there only so that others have something to be compared with.
+pub(crate) const NEXT_TO_NOTHING: f32 = 1e-3;
+
 /// Color divided by the share; `None` where nothing is covered.
 #[inline(always)]
 pub(crate) fn color(texel: [f32; 4]) -> Option<[f32; 3]> {
@@ -195,14 +185,8 @@ pub(crate) fn color(texel: [f32; 4]) -> Option<[f32; 3]> {
     })
 }
 
-/// A weighted sum divided by its weight; `None` without any.
-#[inline(always)]
-fn mean([r, g, b, weight]: [f32; 4]) -> Option<[f32; 3]> {
-    (weight > 0.0).then(|| [r / weight, g / weight, b / weight])
-}
-
 /// Makes every sample that is covered at all count the same when it is interpolated.
-pub(crate) fn level_shares(plane: &mut Plane<[f32; 4]>) {
+pub(crate) fn level_shares(plane: &mut PyramidPlane<[f32; 4]>) {
     for texel in &mut plane.texels {
         *texel = match color(*texel) {
             Some([r, g, b]) => [r, g, b, 1.0],
@@ -211,80 +195,12 @@ pub(crate) fn level_shares(plane: &mut Plane<[f32; 4]>) {
     }
 }
 
-/// Adds to `sum` the level's detail of one picture, `level` minus its interpolated coarser level, weighted by `mask` and by
-/// the share covered (its fourth power).
-pub(crate) fn add_detail(
-    sum: &mut Plane<[f32; 4]>,
-    level: &Plane<[f32; 4]>,
-    coarser: &Plane<[f32; 4]>,
-    mask: &Plane<f32>,
-) {
-    // What is added back is interpolated with even shares, too.
-    let mut coarser = coarser.clone();
-    level_shares(&mut coarser);
-    let smooth = coarser.expanded(&level.columns, &level.rows);
-    for_each_weighted(sum, level, mask, |index, own| match color(smooth.texels[index]) {
-        Some(base) => [own[0] - base[0], own[1] - base[1], own[2] - base[2]],
-        None => [0.0; 3],
-    });
-}
-
-/// Adds to `sum` one picture at the coarsest level.
-pub(crate) fn add_base(sum: &mut Plane<[f32; 4]>, level: &Plane<[f32; 4]>, mask: &Plane<f32>) {
-    for_each_weighted(sum, level, mask, |_, own| own);
-}
-
-/// A picture that covers a place counts this much there even where its mask is zero: it shows where no other does.
-const LEAST_WEIGHT: f32 = 1e-6;
-
-/// Smallest share that weights tell apart; their products stay far from where numbers lose digits.
-const LEAST_TRUST: f32 = 1e-3;
-
-#[inline(always)]
-fn for_each_weighted(
-    sum: &mut Plane<[f32; 4]>,
-    level: &Plane<[f32; 4]>,
-    mask: &Plane<f32>,
-    value: impl Fn(usize, [f32; 3]) -> [f32; 3],
-) {
-    debug_assert_eq!((&level.columns, &level.rows), (&mask.columns, &mask.rows));
-    let width = level.columns.len();
-    for y in level.rows.clone() {
-        let start = (y - level.rows.start) * width;
-        let (own, mask) = (level.row(y), mask.row(y));
-        let shift = level.columns.start - sum.columns.start;
-        let sums = &mut sum.row_mut(y)[shift..shift + width];
-        for (x, (sum, (own, mask))) in sums.iter_mut().zip(own.iter().zip(mask)).enumerate() {
-            if let Some(own_color) = color(*own) {
-                // Where a picture ends, its samples are means of one side only: they soon count nothing beside others.
-                let share = own[3].max(LEAST_TRUST);
-                let weight = (mask + LEAST_WEIGHT) * (share * share) * (share * share);
-                let [r, g, b] = value(start + x, own_color);
-                *sum = sum.plus([r, g, b, 1.0], weight);
-            }
-        }
-    }
-}
-
-/// Turns weighted sums into the blended level: their mean, on top of what the coarser blended level interpolates to. The
-/// fourth channel becomes 1 where there is something.
-pub(crate) fn collapse(sum: &mut Plane<[f32; 4]>, coarser: Option<&Plane<[f32; 4]>>) {
-    let smooth = coarser.map(|coarser| coarser.expanded(&sum.columns, &sum.rows));
-    for (index, texel) in sum.texels.iter_mut().enumerate() {
-        let base = smooth.as_ref().map_or(Some([0.0; 3]), |smooth| color(smooth.texels[index]));
-        *texel = match (mean(*texel), base) {
-            (Some(detail), Some(base)) => [detail[0] + base[0], detail[1] + base[1], detail[2] + base[2], 1.0],
-            _ => [0.0; 4],
-        };
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn plane(width: usize, height: usize, value: impl Fn(usize, usize) -> [f32; 4]) -> Plane<[f32; 4]> {
-        let mut plane = Plane::new(0..width, 0..height);
+    fn plane(width: usize, height: usize, value: impl Fn(usize, usize) -> [f32; 4]) -> PyramidPlane<[f32; 4]> {
+        let mut plane = PyramidPlane::new(0..width, 0..height);
         for y in 0..height {
             for (x, texel) in plane.row_mut(y).iter_mut().enumerate() {
                 *texel = value(x, y);
@@ -312,7 +228,7 @@ mod tests {
     fn parts_give_the_same_bits_as_the_whole() {
         let source = plane(64, 48, |x, y| [(x * 7 % 13) as f32 * 0.07, y as f32 * 0.013, 0.4, 1.0]);
         let whole = source.reduced();
-        let mut part = Plane::new(16..40, 8..32);
+        let mut part = PyramidPlane::new(16..40, 8..32);
         for y in 8..32 {
             part.row_mut(y).copy_from_slice(&source.row(y)[16..40]);
         }

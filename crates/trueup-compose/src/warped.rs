@@ -3,62 +3,82 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use trueup_core::color::TransferCurve;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Photograph;
 use trueup_core::{Error, Result};
 
-use super::{Blend, Interpolation, RenderOptions};
-use crate::deformed_grid::{Cell, DeformedGrid, Run};
-use crate::exposure::{Correction, LightTable};
+use crate::deformed_grid::{Cell, CellRun, DeformedGrid};
+use crate::ignored::IgnoredPart;
+use crate::kernel::{Bicubic, Bilinear};
 use crate::layout::Placed;
-use crate::sampling::{Bicubic, Bilinear, MAX_STRETCH, interpolate, reduce_by_two};
-use crate::simd::{Combine, Contribution, Development, Positions, accumulate, develop, invert_row};
-use crate::unwanted::Unwanted;
-use crate::weights::Feather;
+use crate::light::{LightTable, PhotographLight};
+use crate::render_options::Interpolation;
+use crate::sampling::{MAX_STRETCH, interpolate, reduce_by_two};
+use crate::simd::{Contribution, Development, Positions, accumulate, develop, invert_row};
+use crate::weights::{FEATHER_EXPONENT, Feather, Weighting};
+use crate::window::Window;
+
+/// Photograph pixels per canvas pixel above which a photograph is averaged instead of interpolated. Lower is softer, higher
+/// lets fine patterns shimmer.
+const MINIFICATION_THRESHOLD: f64 = 1.25;
+
+/// How a photograph is read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Resampling {
+    pub(crate) interpolation: Interpolation,
+    /// Photograph pixels per canvas pixel above which the photograph is averaged instead of interpolated.
+    pub(crate) minification_threshold: f64,
+}
+
+impl Resampling {
+    /// For what is looked at.
+    pub(crate) fn of(interpolation: Interpolation) -> Self {
+        Self { interpolation, minification_threshold: MINIFICATION_THRESHOLD }
+    }
+}
 
 /// A decoded photograph with its grid, feather and correction.
-pub(crate) struct Prepared<'a> {
+pub(crate) struct WarpedPhotograph<'a> {
     /// Reduced by two as often as the canvas allows.
     photograph: Cow<'a, Photograph>,
     /// In the reduced photograph's pixels.
     grid: DeformedGrid,
     feather: Feather,
     light: LightTable,
-    unwanted: Option<Unwanted>,
+    ignored: Option<IgnoredPart>,
 }
 
 /// Working memory of one task.
 #[derive(Default)]
-pub(crate) struct Scratch {
+pub(crate) struct SamplingMemory {
     candidates: Vec<u32>,
     owner: Vec<u32>,
-    runs: Vec<Run>,
+    runs: Vec<CellRun>,
     positions: Positions,
     samples: Vec<[f32; 4]>,
     at_border: Vec<usize>,
 }
 
-/// A part of the canvas.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Window<'a> {
-    pub(crate) columns: &'a Range<usize>,
-    pub(crate) rows: &'a Range<usize>,
+/// How a photograph joins a mean of several.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Averaging {
+    pub(crate) resampling: Resampling,
+    pub(crate) weighting: Weighting,
 }
 
-impl<'a> Prepared<'a> {
+impl<'a> WarpedPhotograph<'a> {
     /// A photograph on a canvas of `size` pixels (width, height), where `mesh` puts it; the two fit together, see
-    /// [`check_photograph`]. Its samples become light by the transfer curve and the correction `light`.
+    /// [`check_photograph`]. It is halved as often as `resampling` allows.
     pub(crate) fn new(
         mut photograph: Cow<'a, Photograph>,
         mesh: &GridMesh,
         size: [usize; 2],
-        light: (&TransferCurve, &Correction),
-        options: &RenderOptions,
+        light: PhotographLight<'_>,
+        resampling: &Resampling,
     ) -> Self {
         let grid_of = |mesh: &GridMesh| DeformedGrid::new(mesh, 1.0, true, size[0], size[1]);
         let mut grid = grid_of(mesh);
-        let halvings = halvings_before_sampling(&grid, options.minification_threshold);
+        let halvings = halvings_before_sampling(&grid, resampling.minification_threshold);
         if halvings > 0 {
             for _ in 0..halvings {
                 photograph = Cow::Owned(reduce_by_two(&photograph));
@@ -68,14 +88,14 @@ impl<'a> Prepared<'a> {
             mesh.height /= f64::from(1_u32 << halvings);
             grid = grid_of(&mesh);
         }
-        let feather = Feather::new(grid.size, options.feather_exponent);
-        let light = LightTable::new(light.0, light.1, grid.size);
-        Self { photograph, grid, feather, light, unwanted: None }
+        let feather = Feather::new(grid.size, FEATHER_EXPONENT);
+        let light = LightTable::new(light, grid.size);
+        Self { photograph, grid, feather, light, ignored: None }
     }
 
     /// The same without what is not to be seen of it.
-    pub(crate) fn without(self, unwanted: Option<Unwanted>) -> Self {
-        Self { unwanted, ..self }
+    pub(crate) fn without(self, ignored: Option<IgnoredPart>) -> Self {
+        Self { ignored, ..self }
     }
 
     /// The grid, in the pixels of [`Self::photograph`].
@@ -104,8 +124,8 @@ impl<'a> Prepared<'a> {
         rows: &Range<usize>,
         sums: &mut [[f32; 4]],
         width: usize,
-        options: &RenderOptions,
-        scratch: &mut Scratch,
+        averaging: &Averaging,
+        scratch: &mut SamplingMemory,
     ) {
         let covered = rows.start.max(self.grid.rows.start)..rows.end.min(self.grid.rows.end);
         if covered.is_empty() {
@@ -117,22 +137,29 @@ impl<'a> Prepared<'a> {
             self.grid.runs(y, &scratch.candidates, &mut scratch.owner, &mut scratch.runs);
             for index in 0..scratch.runs.len() {
                 let run = scratch.runs[index].clone();
-                self.add_run(y, &run, &mut sums[run.columns.clone()], options, scratch);
+                self.add_run(y, &run, &mut sums[run.columns.clone()], averaging, scratch);
             }
         }
     }
 
     /// Samples one run and adds it to its canvas pixels.
-    fn add_run(&self, y: usize, run: &Run, sums: &mut [[f32; 4]], options: &RenderOptions, scratch: &mut Scratch) {
+    fn add_run(
+        &self,
+        y: usize,
+        run: &CellRun,
+        sums: &mut [[f32; 4]],
+        averaging: &Averaging,
+        scratch: &mut SamplingMemory,
+    ) {
         let cell = &self.grid.cells[run.cell];
-        let Scratch { positions, samples, at_border, .. } = scratch;
+        let SamplingMemory { positions, samples, at_border, .. } = scratch;
         samples.resize(run.columns.len(), [0.0; 4]);
-        self.interpolate_run(y, run, options, positions, samples, at_border);
+        self.interpolate_run(y, run, &averaging.resampling, positions, samples, at_border);
         let contribution = Contribution {
             feather: &self.feather,
             light: &self.light,
             border_footprint: cell.near_border.then(|| cell.footprint.map(|pixels| pixels as f32)),
-            combine: if options.blend == Blend::Average { Combine::Equal } else { Combine::Feathered },
+            weighting: averaging.weighting,
         };
         accumulate(contribution, positions, samples, sums);
     }
@@ -143,10 +170,10 @@ impl<'a> Prepared<'a> {
         &self,
         window: Window<'_>,
         out: &mut [[f32; 4]],
-        options: &RenderOptions,
-        scratch: &mut Scratch,
+        resampling: &Resampling,
+        scratch: &mut SamplingMemory,
     ) {
-        self.sample_with(window, out, options, scratch, |_, _| {});
+        self.sample_with(window, out, resampling, scratch, |_, _| {});
     }
 
     /// [`Self::sample`], which shows `look` the photograph's own values (0 to 255) before they are developed, with their
@@ -155,8 +182,8 @@ impl<'a> Prepared<'a> {
         &self,
         window: Window<'_>,
         out: &mut [[f32; 4]],
-        options: &RenderOptions,
-        scratch: &mut Scratch,
+        resampling: &Resampling,
+        scratch: &mut SamplingMemory,
         mut look: impl FnMut(usize, &[[f32; 4]]),
     ) {
         let width = window.columns.len();
@@ -166,7 +193,7 @@ impl<'a> Prepared<'a> {
         if columns.is_empty() || rows.is_empty() {
             return;
         }
-        let Scratch { candidates, owner, runs, positions, at_border, .. } = scratch;
+        let SamplingMemory { candidates, owner, runs, positions, at_border, .. } = scratch;
         self.grid.cells_in_window(&columns, &rows, candidates);
         for y in rows {
             self.grid.runs_within(y, &columns, candidates, owner, runs);
@@ -174,7 +201,7 @@ impl<'a> Prepared<'a> {
             for run in &*runs {
                 let first = start + run.columns.start - window.columns.start;
                 let samples = &mut out[first..first + run.columns.len()];
-                self.interpolate_run(y, run, options, positions, samples, at_border);
+                self.interpolate_run(y, run, resampling, positions, samples, at_border);
                 look(first, samples);
                 let cell = &self.grid.cells[run.cell];
                 let development = Development {
@@ -191,8 +218,8 @@ impl<'a> Prepared<'a> {
     fn interpolate_run(
         &self,
         y: usize,
-        run: &Run,
-        options: &RenderOptions,
+        run: &CellRun,
+        resampling: &Resampling,
         positions: &mut Positions,
         samples: &mut [[f32; 4]],
         at_border: &mut Vec<usize>,
@@ -200,16 +227,16 @@ impl<'a> Prepared<'a> {
         let cell = &self.grid.cells[run.cell];
         positions.resize(run.columns.len());
         invert_row(&cell.inverse_along_row(y), run.columns.start, positions);
-        let stretch = cell.footprint.map(|pixels| (pixels / options.minification_threshold).clamp(1.0, MAX_STRETCH));
-        match options.interpolation {
+        let stretch = cell.footprint.map(|pixels| (pixels / resampling.minification_threshold).clamp(1.0, MAX_STRETCH));
+        match resampling.interpolation {
             Interpolation::Bilinear => {
                 interpolate::<Bilinear>(&self.photograph, positions, stretch, samples, at_border)
             }
             Interpolation::Bicubic => interpolate::<Bicubic>(&self.photograph, positions, stretch, samples, at_border),
         }
-        if let Some(unwanted) = &self.unwanted {
+        if let Some(ignored) = &self.ignored {
             for (index, (x, sample)) in run.columns.clone().zip(samples).enumerate() {
-                if unwanted.hides(positions.place(index), self.grid.size, [x, y]) {
+                if ignored.hides(positions.place(index), self.grid.size, [x, y]) {
                     sample[3] = 0.0;
                 }
             }

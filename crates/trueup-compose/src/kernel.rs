@@ -3,7 +3,7 @@
 use trueup_core::interpolation::cubic_convolution_taps;
 
 /// A separable, even interpolation kernel over at most four samples.
-pub(crate) trait Kernel {
+pub(crate) trait InterpolationKernel {
     /// Half its width in samples.
     const RADIUS: f64;
 
@@ -18,7 +18,7 @@ pub(crate) trait Kernel {
 #[derive(Debug)]
 pub(crate) struct Bilinear;
 
-impl Kernel for Bilinear {
+impl InterpolationKernel for Bilinear {
     const RADIUS: f64 = 1.0;
 
     fn at(distance: f32) -> f32 {
@@ -38,7 +38,7 @@ impl Kernel for Bilinear {
 #[derive(Debug)]
 pub(crate) struct Bicubic;
 
-impl Kernel for Bicubic {
+impl InterpolationKernel for Bicubic {
     const RADIUS: f64 = 2.0;
 
     #[inline(always)]
@@ -63,7 +63,7 @@ impl Kernel for Bicubic {
 mod tests {
     use super::*;
 
-    fn check_taps_follow_the_kernel<K: Kernel>() {
+    fn check_taps_follow_the_kernel<K: InterpolationKernel>() {
         for step in 0..=16 {
             let fraction = step as f32 / 16.0;
             let taps = K::taps(fraction);

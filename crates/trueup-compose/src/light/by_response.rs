@@ -6,31 +6,31 @@ use trueup_core::mask::Masks;
 use trueup_core::raster::Photograph;
 use trueup_core::source::PhotographSource;
 
-use crate::exposure::Response;
+use super::response::Response;
 use crate::transfer_curve::Encoding;
 
 /// The same photographs with the corrected curve in place of their color profile's: all that reads samples or writes the
 /// panorama takes it from here, so that what is shown as it was taken keeps its samples.
-pub(super) struct Answering<'a> {
+pub(crate) struct ByResponse<'a> {
     photographs: &'a dyn PhotographSource,
     curve: TransferCurve,
 }
 
-impl<'a> Answering<'a> {
+impl<'a> ByResponse<'a> {
     /// # Errors
     /// Those of [`Response::curve`].
-    pub(super) fn new(photographs: &'a dyn PhotographSource, response: &Response) -> Result<Self> {
+    pub(crate) fn new(photographs: &'a dyn PhotographSource, response: &Response) -> Result<Self> {
         let curve = response.curve(&photographs.transfer_curve())?;
         Ok(Self { photographs, curve })
     }
 
     /// How what is composed of them is written.
-    pub(super) fn encoding(&self) -> Encoding {
+    pub(crate) fn encoding(&self) -> Encoding {
         Encoding::new(self.curve.clone()).of_profile(&self.photographs.transfer_curve())
     }
 }
 
-impl PhotographSource for Answering<'_> {
+impl PhotographSource for ByResponse<'_> {
     fn photograph(&self, index: usize) -> Result<Photograph> {
         self.photographs.photograph(index)
     }

@@ -11,13 +11,13 @@ use crate::layout::CanvasLayout;
 
 /// Where some photograph covers the canvas with a part that is not ignored, on a small canvas.
 #[derive(Debug)]
-pub(crate) struct Covered {
+pub(crate) struct ShownElsewhere {
     width: usize,
     height: usize,
     wholly: Vec<bool>,
 }
 
-impl Covered {
+impl ShownElsewhere {
     /// Looks at all photographs of `layout` on a canvas of `size` pixels; `None` if none of them has ignored parts.
     pub(crate) fn find(layout: &CanvasLayout, photographs: &dyn PhotographSource, size: [usize; 2]) -> Option<Self> {
         let masks: Vec<Masks> = layout.placed.iter().map(|placed| photographs.masks(placed.photograph)).collect();
@@ -64,16 +64,16 @@ const ROWS: usize = 16;
 
 /// What of one photograph is not to be seen on a canvas.
 #[derive(Debug, Clone)]
-pub(crate) struct Unwanted {
+pub(crate) struct IgnoredPart {
     ignored: Arc<Mask>,
-    covered: Arc<Covered>,
+    covered: Arc<ShownElsewhere>,
     /// Shares of the canvas per pixel.
     share_per_px: [f64; 2],
 }
 
-impl Unwanted {
+impl IgnoredPart {
     /// The parts ignored by `masks`, where `covered`, on a canvas of `size` pixels; `None` without any.
-    pub(crate) fn new(masks: &Masks, covered: Option<&Arc<Covered>>, size: [usize; 2]) -> Option<Self> {
+    pub(crate) fn new(masks: &Masks, covered: Option<&Arc<ShownElsewhere>>, size: [usize; 2]) -> Option<Self> {
         let share_per_px = size.map(|length| 1.0 / length as f64);
         Some(Self { ignored: masks.ignored.clone()?, covered: covered?.clone(), share_per_px })
     }

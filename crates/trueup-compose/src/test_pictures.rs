@@ -1,13 +1,15 @@
-//! What the tests of composing share: photographs in memory, scratch files in memory, layouts and readings.
+//! What the tests of composing share: photographs in memory, scratch files in memory, layouts.
+
+use std::sync::Arc;
 
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
-use trueup_core::raster::{Photograph, Raster, RowSource};
+use trueup_core::raster::{Photograph, Raster};
 use trueup_core::scratch::{ScratchFile, ScratchSpace};
+use trueup_core::source::PhotographSource;
+use trueup_core::{Error, Result};
 
-use super::panorama::Pixels;
-use super::*;
-use crate::layout::Placed;
+use crate::layout::{CanvasLayout, Placed};
 
 /// Photographs in memory.
 pub(crate) struct Memory(pub(crate) Vec<Photograph>);
@@ -21,8 +23,8 @@ impl PhotographSource for Memory {
 /// A scratch file in memory that takes at most so many bytes.
 #[derive(Debug)]
 pub(crate) struct RamDisk {
-    pub(crate) room: u64,
-    pub(super) bytes: Arc<std::sync::Mutex<Vec<u8>>>,
+    room: u64,
+    bytes: Arc<std::sync::Mutex<Vec<u8>>>,
 }
 
 impl Default for RamDisk {
@@ -32,6 +34,11 @@ impl Default for RamDisk {
 }
 
 impl RamDisk {
+    /// An empty one with so much room.
+    pub(crate) fn of_room(room: u64) -> Self {
+        Self { room, ..Self::default() }
+    }
+
     /// The most that was written.
     pub(crate) fn length(&self) -> usize {
         self.bytes.lock().expect("no writer failed").len()
@@ -64,19 +71,19 @@ impl ScratchFile for RamDisk {
     }
 }
 
-pub(super) fn noise(width: usize, height: usize, channels: usize) -> Raster<u8> {
+pub(crate) fn noise(width: usize, height: usize, channels: usize) -> Raster<u8> {
     let data = (0..width * height * channels).map(|i| ((i * 2_654_435_761) >> 13) as u8).collect();
     Raster::from_data(width, height, channels, data).expect("as many samples")
 }
 
-pub(super) fn gradient(width: usize, height: usize, level: impl Fn(f64, f64) -> f64) -> Photograph {
+pub(crate) fn gradient(width: usize, height: usize, level: impl Fn(f64, f64) -> f64) -> Photograph {
     let data = (0..width * height)
         .flat_map(|i| [level((i % width) as f64 + 0.5, (i / width) as f64 + 0.5).round() as u8; 3])
         .collect();
     Photograph::Eight(Raster::from_data(width, height, 3, data).expect("as many samples"))
 }
 
-pub(super) fn moved(photograph: usize, width: f64, height: f64, move_to: impl Fn(Vector2<f64>) -> [f64; 2]) -> Placed {
+pub(crate) fn moved(photograph: usize, width: f64, height: f64, move_to: impl Fn(Vector2<f64>) -> [f64; 2]) -> Placed {
     let mut mesh = GridMesh::regular(width, height, 20.0);
     for vertex in &mut mesh.target {
         *vertex = move_to(Vector2::from(*vertex));
@@ -84,45 +91,6 @@ pub(super) fn moved(photograph: usize, width: f64, height: f64, move_to: impl Fn
     Placed { photograph, mesh }
 }
 
-pub(super) fn canvas(width: usize, height: usize, placed: Vec<Placed>) -> CanvasLayout {
+pub(crate) fn canvas(width: usize, height: usize, placed: Vec<Placed>) -> CanvasLayout {
     CanvasLayout { width, height, canvas_from_target: 1.0, origin: [0.0; 2], placed, period: None }
-}
-
-pub(super) fn render(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Panorama {
-    let corrections = Corrections::plain(layout.placed.len());
-    compose(layout, &corrections, &Memory(pictures), options, &StageContext::default()).expect("renders")
-}
-
-pub(super) fn compose(
-    layout: &CanvasLayout,
-    corrections: &Corrections,
-    photographs: &Memory,
-    options: &RenderOptions,
-    context: &StageContext,
-) -> Result<Panorama> {
-    run(layout, corrections, photographs, options, &SeamOptions::default(), context)
-}
-
-pub(super) fn linear(panorama: &Panorama, x: usize, y: usize) -> [f32; 4] {
-    panorama.linear_pixel(x, y).expect("pixels in memory")
-}
-
-/// Everything a panorama holds, exactly.
-pub(super) fn bits(panorama: &Panorama) -> Vec<[u32; 4]> {
-    (0..panorama.height())
-        .flat_map(|y| match &panorama.pixels {
-            Pixels::Sums(sums) => {
-                sums.row(y).expect("a row").iter().map(|sum| sum.map(f32::to_bits)).collect::<Vec<_>>()
-            }
-            Pixels::Roots(roots) => roots.row(y).expect("a row").iter().map(|root| root.map(u32::from)).collect(),
-        })
-        .collect()
-}
-
-pub(super) fn rows(panorama: &Panorama) -> Vec<u8> {
-    let mut bytes = vec![0; panorama.width() * panorama.height() * 4];
-    for (y, row) in bytes.chunks_exact_mut(panorama.width() * 4).enumerate() {
-        panorama.rgba8_row(y, row).expect("rows in memory");
-    }
-    bytes
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::distance::border_distances;
 
-/// What is known of one pixel of a [`View`] beside its color.
+/// What is known of one pixel of a [`SmallView`] beside its color.
 ///
 /// The photograph covers it in part.
 pub const PARTLY: u8 = 1;
@@ -18,26 +18,26 @@ pub const IGNORED: u8 = 8;
 pub const KEPT: u8 = 16;
 
 /// One pixel of a view: red, green and blue (square root of linear light, 255 is white) and flags.
-pub type ViewPixel = [u8; 4];
+pub type SmallPixel = [u8; 4];
 
 /// Brightness of a pixel in 256ths of a level: Rec. 601 luma.
-pub(super) fn luma(pixel: &ViewPixel) -> u32 {
+pub(crate) fn luma(pixel: &SmallPixel) -> u32 {
     77 * u32::from(pixel[0]) + 150 * u32::from(pixel[1]) + 29 * u32::from(pixel[2])
 }
 
 /// A photograph on a small canvas: the box it lies in.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct View {
+pub struct SmallView {
     /// Columns of the small canvas; on a cylinder they may run past its width into the next turn, but not meet
     /// themselves.
     pub columns: Range<usize>,
     /// Rows of the small canvas.
     pub rows: Range<usize>,
     /// Row-major pixels of the box.
-    pub pixels: Vec<ViewPixel>,
+    pub pixels: Vec<SmallPixel>,
 }
 
-impl View {
+impl SmallView {
     /// Index of the canvas pixel (x, y), if it is in the box.
     #[inline]
     pub(crate) fn index(&self, x: usize, y: usize) -> Option<usize> {
@@ -47,18 +47,18 @@ impl View {
 
     /// The same on a cylinder of `turn` columns, or with 0 on a plane.
     #[inline]
-    pub(super) fn index_around(&self, x: usize, y: usize, turn: usize) -> Option<usize> {
+    pub(crate) fn index_around(&self, x: usize, y: usize, turn: usize) -> Option<usize> {
         self.index(if self.columns.contains(&x) { x } else { x + turn }, y)
     }
 
     /// Flags of the canvas pixel (x, y); 0 outside. `turn` as for [`Self::index_around`].
     #[inline]
-    pub(super) fn flags(&self, x: usize, y: usize, turn: usize) -> u8 {
+    pub(crate) fn flags(&self, x: usize, y: usize, turn: usize) -> u8 {
         self.index_around(x, y, turn).map_or(0, |index| self.pixels[index][3])
     }
 
     /// Whether the boxes of two views meet or touch on a cylinder of `turn` columns, or with 0 on a plane.
-    pub(super) fn meets(&self, other: &Self, turn: usize) -> bool {
+    pub(crate) fn meets(&self, other: &Self, turn: usize) -> bool {
         let meet = |a: &Range<usize>, b: &Range<usize>, by: usize| a.start <= b.end + by && b.start + by <= a.end;
         let (mine, others) = (&self.columns, &other.columns);
         meet(&self.rows, &other.rows, 0)
@@ -66,7 +66,7 @@ impl View {
     }
 
     /// The view on a canvas of half the size: means of 2 x 2 pixels over those that are covered.
-    pub(super) fn halved(&self) -> Self {
+    pub(crate) fn halved(&self) -> Self {
         let half = |range: &Range<usize>| range.start / 2..range.end.div_ceil(2);
         let (columns, rows) = (half(&self.columns), half(&self.rows));
         let mut pixels = Vec::with_capacity(columns.len() * rows.len());
@@ -78,7 +78,7 @@ impl View {
         Self { columns, rows, pixels }
     }
 
-    fn mean_of_four(&self, x: usize, y: usize) -> ViewPixel {
+    fn mean_of_four(&self, x: usize, y: usize) -> SmallPixel {
         let (mut sum, mut count, mut any, mut all) = ([0_u16; 3], 0, 0, u8::MAX);
         for (x, y) in [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)] {
             let pixel = self.index(x, y).map_or([0; 4], |index| self.pixels[index]);
@@ -97,7 +97,7 @@ impl View {
     }
 
     /// Distance of every pixel to the border of what is covered wholly, relative to the largest, 0 to 255.
-    pub(super) fn depths(&self) -> Vec<u8> {
+    pub(crate) fn depths(&self) -> Vec<u8> {
         let covered: Vec<bool> = self.pixels.iter().map(|pixel| pixel[3] & WHOLLY != 0).collect();
         let distance = border_distances(&covered, self.columns.len());
         let largest = distance.iter().copied().max().unwrap_or(0).max(1);
@@ -113,18 +113,18 @@ mod tests {
     fn halving_keeps_to_what_is_covered() {
         let whole = PARTLY | WHOLLY;
         let pixels = vec![[10, 0, 0, whole], [20, 0, 0, whole | CLIPPED], [30, 9, 9, PARTLY], [99, 99, 99, 0]];
-        let view = View { columns: 2..4, rows: 6..8, pixels };
+        let view = SmallView { columns: 2..4, rows: 6..8, pixels };
         let half = view.halved();
         assert_eq!((half.columns, half.rows), (1..2, 3..4));
         assert_eq!(half.pixels, [[20, 3, 3, PARTLY | CLIPPED]]);
         // An odd start shares its pixel with what is outside.
-        let half = View { columns: 1..2, rows: 0..2, pixels: vec![[8, 8, 8, whole]; 2] }.halved();
+        let half = SmallView { columns: 1..2, rows: 0..2, pixels: vec![[8, 8, 8, whole]; 2] }.halved();
         assert_eq!(half.pixels, [[8, 8, 8, PARTLY]]);
     }
 
     #[test]
     fn depth_grows_towards_the_middle() {
-        let view = View { columns: 0..5, rows: 0..5, pixels: vec![[0, 0, 0, PARTLY | WHOLLY]; 25] };
+        let view = SmallView { columns: 0..5, rows: 0..5, pixels: vec![[0, 0, 0, PARTLY | WHOLLY]; 25] };
         let depths = view.depths();
         assert_eq!((depths[0], depths[6], depths[12]), (85, 170, 255));
     }

@@ -1,0 +1,11 @@
+//! What photographs' samples stand for: their cameras' response, and the factors that even out their light.
+
+mod by_response;
+mod correction;
+mod response;
+mod table;
+
+pub(crate) use by_response::ByResponse;
+pub use correction::{Correction, Corrections, VIGNETTING_TERMS};
+pub use response::{RESPONSE_TERMS, Response};
+pub(crate) use table::{LightTable, PhotographLight, exposed};

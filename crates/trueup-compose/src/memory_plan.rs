@@ -1,0 +1,202 @@
+//! What composing may take, and how it divides that. The division decides what is held, kept or read again, never what
+//! comes out.
+
+use std::sync::Arc;
+
+use trueup_core::memory::bytes_in_words;
+use trueup_core::scratch::{NoScratch, ScratchFile, ScratchSpace};
+use trueup_core::source::PhotographSource;
+use trueup_core::{Error, Result};
+
+use crate::layout::{CanvasLayout, Placed};
+use crate::store::{CanvasBlocks, Pixel, PixelStore, SumPixel};
+
+/// What composing may take.
+#[derive(Clone, Copy)]
+pub struct Resources<'a> {
+    /// Bytes of memory for the photographs, the canvas and all that is made on the way.
+    pub memory: usize,
+    /// Bytes that may be taken where `memory` is too little to compose at all; `memory` itself if that is the user's word.
+    pub ceiling: usize,
+    /// Where the canvas goes if it does not fit.
+    pub scratch: &'a dyn ScratchSpace,
+}
+
+impl std::fmt::Debug for Resources<'_> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { memory, ceiling, .. } = self;
+        formatter.debug_struct("Resources").field("memory", memory).field("ceiling", ceiling).finish_non_exhaustive()
+    }
+}
+
+impl Resources<'static> {
+    /// Everything is held in memory, however much that is.
+    pub fn unlimited() -> Self {
+        Self { memory: usize::MAX, ceiling: usize::MAX, scratch: &NoScratch }
+    }
+}
+
+/// Where something begins that goes to the scratch file.
+#[derive(Debug, Clone)]
+pub(crate) struct SpillPlace {
+    pub(crate) file: Arc<dyn ScratchFile>,
+    /// Bytes of the file before it.
+    pub(crate) offset: u64,
+}
+
+/// The division.
+#[derive(Debug)]
+pub(crate) struct MemoryPlan {
+    /// Where the canvas is to be kept, if not in memory.
+    file: Option<Arc<dyn ScratchFile>>,
+    /// Where coarse levels of the photographs are to be kept, if not in memory: the rest of the file from there on.
+    pub(crate) coarse_levels: Option<SpillPlace>,
+    /// Bytes of decoded photographs that may be held beside those that are being decoded.
+    pub(crate) photographs: usize,
+    /// Photographs decoded at once.
+    pub(crate) at_a_time: usize,
+    /// Bytes of the canvas that may be summed up at once, where photographs are averaged.
+    sums: usize,
+}
+
+/// Bytes of a pixel of a photograph that was not decoded yet: 8 bits, four channels.
+const UNKNOWN_PIXEL_BYTES: usize = 4;
+
+/// A photograph on its way into memory takes this many times its size: what the decoder holds beside its pixels, its copy
+/// when it is turned upright, and its reduced copies.
+const DECODING: usize = 2;
+
+/// So many photographs are wanted at once at one place: the four at the corners of a grid.
+const AT_ONE_PLACE: usize = 4;
+
+impl MemoryPlan {
+    /// Divides `resources` for one canvas; opens the scratch file if there is to be one.
+    ///
+    /// # Errors
+    /// [`Error::Limits`] with the numbers if there is too little memory or too little room on the disk.
+    pub(crate) fn new(needs: &MemoryNeeds, resources: &Resources<'_>) -> Result<Self> {
+        let least = needs.least();
+        if least > resources.ceiling {
+            return Err(needs.refusal(resources.ceiling));
+        }
+        let work = &needs.work;
+        let memory = resources.memory.max(least);
+        // Half of what is left may be canvas.
+        let left = memory - least;
+        let in_memory = needs.canvas() <= left / 2;
+        let left = left - if in_memory { needs.canvas() } else { 0 };
+        // The photographs' own coarse levels are smaller than the photographs, which are to be had again, too.
+        let hold_levels = work.coarse_levels <= left / 4;
+        let left = left - if hold_levels { work.coarse_levels } else { 0 };
+        let threads = rayon::current_num_threads().max(1);
+        let one = DECODING * needs.largest;
+        // A quarter of the rest for further photographs at once; the first is counted in what is needed at least.
+        let more = (left / 4).checked_div(one).unwrap_or(threads).min(threads - 1);
+        let left = left - more * one;
+        let sums = if in_memory { usize::MAX } else { (work.band + left) / 2 };
+        let [width, height] = needs.size;
+        let canvas_bytes = (width as u64 * height as u64) * work.pixel_bytes as u64;
+        let on_disk = if in_memory { 0 } else { canvas_bytes };
+        let total = on_disk + if hold_levels { 0 } else { work.coarse_levels as u64 };
+        let file: Option<Arc<dyn ScratchFile>> =
+            if total > 0 { Some(Arc::from(resources.scratch.create(total)?)) } else { None };
+        let place = file.clone().map(|file| SpillPlace { file, offset: on_disk });
+        Ok(Self {
+            coarse_levels: place.filter(|_| !hold_levels),
+            file: file.filter(|_| !in_memory),
+            photographs: needs.at_one_place.saturating_add(left),
+            at_a_time: 1 + more,
+            sums,
+        })
+    }
+
+    /// Zeros, in blocks of `side` if in a file.
+    pub(crate) fn store<P: Pixel>(&self, size: [usize; 2], side: [usize; 2]) -> PixelStore<P> {
+        match &self.file {
+            None => PixelStore::in_memory(size),
+            Some(file) => PixelStore::Scratch(CanvasBlocks::new(file.clone(), 0, size, side)),
+        }
+    }
+
+    /// Rows of a canvas of `width` columns that may be summed up at once, a multiple of `step`.
+    pub(crate) fn sum_rows(&self, width: usize, step: usize) -> usize {
+        (self.sums / (width * SumPixel::BYTES).max(1) / step).max(1).saturating_mul(step)
+    }
+
+    /// Whether the canvas is in a file.
+    pub(crate) fn on_disk(&self) -> bool {
+        self.file.is_some()
+    }
+}
+
+fn photograph_bytes(placed: &Placed, source: &dyn PhotographSource) -> usize {
+    // The cast saturates.
+    let pixels = (placed.mesh.width * placed.mesh.height) as usize;
+    source.bytes(placed.photograph).unwrap_or(pixels.saturating_mul(UNKNOWN_PIXEL_BYTES))
+}
+
+/// Bytes that a way of composing takes beside the photographs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct WorkBytes {
+    /// Of a pixel of the canvas.
+    pub(crate) pixel_bytes: usize,
+    /// Small views, search of the seams, coarse levels, tiles: whichever of them takes the most.
+    pub(crate) working: usize,
+    /// The photographs' own coarse levels.
+    pub(crate) coarse_levels: usize,
+    /// Of the rows of the canvas that are summed up at once, at least.
+    pub(crate) band: usize,
+}
+
+/// Bytes that composing takes.
+#[derive(Debug)]
+pub(crate) struct MemoryNeeds {
+    /// Width and height of the canvas.
+    size: [usize; 2],
+    work: WorkBytes,
+    /// Of the largest photograph.
+    largest: usize,
+    /// Of the largest photographs, as many as may be wanted at one place.
+    at_one_place: usize,
+}
+
+impl MemoryNeeds {
+    /// For the photographs of `layout`, composed in a way that takes `work`.
+    pub(crate) fn new(layout: &CanvasLayout, source: &dyn PhotographSource, work: WorkBytes) -> Self {
+        let mut bytes: Vec<usize> = layout.placed.iter().map(|placed| photograph_bytes(placed, source)).collect();
+        bytes.sort_unstable_by(|a, b| b.cmp(a));
+        let largest = bytes.first().copied().unwrap_or(0);
+        let at_one_place = bytes.iter().take(AT_ONE_PLACE).sum();
+        Self { size: [layout.width, layout.height], work, largest, at_one_place }
+    }
+
+    /// Of the whole canvas.
+    fn canvas(&self) -> usize {
+        self.size[0].saturating_mul(self.size[1]).saturating_mul(self.work.pixel_bytes)
+    }
+
+    /// With the canvas and the photographs' own levels on disk, and one photograph decoded at a time.
+    pub(crate) fn least(&self) -> usize {
+        [self.work.working, self.work.band, self.at_one_place, DECODING * self.largest]
+            .iter()
+            .fold(0, |sum, &one| sum.saturating_add(one))
+    }
+
+    fn refusal(&self, allowed: usize) -> Error {
+        let photographs = self.at_one_place.saturating_add(DECODING * self.largest);
+        let words = |bytes: usize| bytes_in_words(bytes as u64);
+        let [width, height] = self.size;
+        Error::Limits {
+            subject: format!("composing {width} x {height} px"),
+            needed: format!(
+                "at least {} of memory ({} for photographs of up to {}, {} for seams and blending)",
+                words(self.least()),
+                words(photographs),
+                words(self.largest),
+                words(self.least() - photographs)
+            ),
+            allowed: words(allowed),
+            hint: "Raise --memory (stitch.memory) by the difference, or make a smaller panorama (--scale).".to_owned(),
+        }
+    }
+}

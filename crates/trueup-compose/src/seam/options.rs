@@ -1,0 +1,17 @@
+//! What the user decides about seams.
+
+trueup_core::options! {
+    /// Where one photograph ends and the next begins.
+    pub struct SeamOptions("seam") {
+        /// Cost of showing a photograph at its border instead of in its middle, per pixel of the canvas. Raise it to move seams
+        /// towards the middle of overlaps, where photographs blur towards their borders; lower it if seams run through things
+        /// that they could go round.
+        depth_weight: f64 = 2.5, between(0.0, 100.0), "level";
+        /// Further cost of a seam through a thing that moved. Raise it if people or cars are cut in half.
+        moving_cost: f64 = 60.0, between(0.0, 1000.0), "level";
+        /// Weight of the difference of shading beside that of colors: of how the brightness changes over a few pixels, averaged
+        /// along a line. Higher keeps seams from where only a step could join the photographs: raise it if steps are seen in skies
+        /// and on walls, lower it if seams go through contours to avoid these.
+        shading_weight: f64 = 3.0, between(0.0, 100.0), "";
+    }
+}

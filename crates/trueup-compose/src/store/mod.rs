@@ -1,0 +1,138 @@
+//! Where the canvas is kept: in memory, or in a scratch file.
+
+mod blocks;
+mod pixel;
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use rayon::prelude::*;
+use trueup_core::Result;
+
+pub(crate) use blocks::CanvasBlocks;
+pub(crate) use pixel::{Pixel, RootPixel, SumPixel, read_pixels, to_bytes};
+
+/// A canvas, row-major in memory.
+#[derive(Debug)]
+pub(crate) enum PixelStore<P> {
+    Memory { width: usize, pixels: Vec<P> },
+    Scratch(CanvasBlocks<P>),
+}
+
+impl<P: Pixel> PixelStore<P> {
+    /// Zeros in memory.
+    pub(crate) fn in_memory([width, height]: [usize; 2]) -> Self {
+        Self::of_pixels(width, vec![P::default(); width * height])
+    }
+
+    /// Row-major pixels.
+    pub(crate) fn of_pixels(width: usize, pixels: Vec<P>) -> Self {
+        Self::Memory { width, pixels }
+    }
+
+    /// Sets the block `columns` x `rows`; in a scratch file, one of its blocks.
+    pub(crate) fn put(&mut self, columns: &Range<usize>, rows: &Range<usize>, block: &[P]) -> Result<()> {
+        match self {
+            Self::Memory { width, pixels } => {
+                for (y, row) in rows.clone().zip(block.chunks_exact(columns.len().max(1))) {
+                    pixels[y * *width..][columns.clone()].copy_from_slice(row);
+                }
+                Ok(())
+            }
+            Self::Scratch(blocks) => blocks.put(columns, rows, block),
+        }
+    }
+
+    /// The block `columns` x `rows`, row by row.
+    pub(crate) fn window(&self, columns: &Range<usize>, rows: &Range<usize>) -> Result<Vec<P>> {
+        let mut window = Vec::with_capacity(columns.len() * rows.len());
+        for y in rows.clone() {
+            match self {
+                Self::Memory { width, pixels } => window.extend_from_slice(&pixels[y * width..][columns.clone()]),
+                Self::Scratch(blocks) => blocks.stretch(columns, y, &mut window)?,
+            }
+        }
+        Ok(window)
+    }
+
+    /// Sets pixels of row `y` that were put before.
+    pub(crate) fn set(&mut self, columns: &Range<usize>, y: usize, row: &[P]) -> Result<()> {
+        match self {
+            Self::Memory { width, pixels } => {
+                pixels[y * *width..][columns.clone()].copy_from_slice(row);
+                Ok(())
+            }
+            Self::Scratch(blocks) => blocks.set(columns, y, row),
+        }
+    }
+
+    /// Row `y`.
+    pub(crate) fn row(&self, y: usize) -> Result<Cow<'_, [P]>> {
+        match self {
+            Self::Memory { width, pixels } => Ok(Cow::Borrowed(&pixels[y * width..][..*width])),
+            Self::Scratch(blocks) => blocks.row(y).map(Cow::Owned),
+        }
+    }
+
+    /// Whether no pixel lets anything show through.
+    pub(crate) fn is_opaque(&self) -> bool {
+        match self {
+            Self::Memory { pixels, .. } => pixels.par_iter().all(P::is_opaque),
+            Self::Scratch(blocks) => blocks.is_opaque(),
+        }
+    }
+
+    /// Pixel (x, y).
+    pub(crate) fn pixel(&self, x: usize, y: usize) -> Result<P> {
+        match self {
+            Self::Memory { width, pixels } => Ok(pixels[y * width + x]),
+            Self::Scratch(blocks) => blocks.pixel(x, y),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use trueup_core::scratch::ScratchFile;
+
+    use super::*;
+    use crate::test_pictures::RamDisk;
+
+    #[test]
+    fn a_canvas_in_a_file_is_the_canvas() {
+        for size in [[1, 1], [7, 300], [301, 65], [64, 64]] {
+            for side in [[16, 16], [64, 32], [size[0], 16]] {
+                let pixel = |x: usize, y: usize| [x as u16, y as u16, (x * 7 + y * 13) as u16, u16::MAX];
+                let offset = 24;
+                let file: Arc<dyn ScratchFile> = Arc::new(RamDisk::default());
+                let mut store = PixelStore::Scratch(CanvasBlocks::new(file, offset, size, side));
+                for top in (0..size[1]).step_by(side[1]) {
+                    for left in (0..size[0]).step_by(side[0]) {
+                        let (columns, rows) = (left..(left + side[0]).min(size[0]), top..(top + side[1]).min(size[1]));
+                        let block: Vec<[u16; 4]> =
+                            rows.clone().flat_map(|y| columns.clone().map(move |x| pixel(x, y))).collect();
+                        store.put(&columns, &rows, &block).expect("room");
+                    }
+                }
+                (0..size[1]).into_par_iter().for_each(|y| {
+                    let row = store.row(y).expect("written");
+                    assert!(row.iter().enumerate().all(|(x, got)| *got == pixel(x, y)), "{size:?} {side:?} row {y}");
+                });
+                let last = [size[0] - 1, size[1] - 1];
+                assert_eq!(store.pixel(last[0], last[1]).expect("written"), pixel(last[0], last[1]));
+            }
+        }
+    }
+
+    #[test]
+    fn floating_point_keeps_its_bits() {
+        let pixels = [[0.1_f32, -0.0, f32::MIN_POSITIVE, 3e38], [f32::INFINITY, 1.0, 1e-45, 7.0]];
+        let back: Vec<[f32; 4]> = to_bytes(&pixels).chunks_exact(16).map(Pixel::read).collect();
+        assert_eq!(
+            back.as_flattened().iter().map(|one| one.to_bits()).collect::<Vec<_>>(),
+            pixels.as_flattened().iter().map(|one| one.to_bits()).collect::<Vec<_>>()
+        );
+    }
+}
