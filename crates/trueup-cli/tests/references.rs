@@ -47,7 +47,7 @@ impl Choice {
     }
 
     fn methods() -> Self {
-        Self::with("gsp-2d")
+        Self::with("autostitch")
     }
 
     fn projections() -> Self {
