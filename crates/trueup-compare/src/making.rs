@@ -39,7 +39,7 @@ pub(super) struct Made {
 
 impl Common<'_> {
     /// Makes one entry's panorama, or finds out why it cannot be made.
-    pub fn make(&self, entry: &ComparisonEntry, stem: &str, inputs: &Inputs) -> Result<Made> {
+    pub(crate) fn make(&self, entry: &ComparisonEntry, stem: &str, inputs: &Inputs) -> Result<Made> {
         let options = entry.options(self.options)?;
         let mut made = Made { compared: Compared::of(entry), drawing: Drawing::default(), project: None, error: None };
         let stitcher = Stitcher::new(&options, self.context);

@@ -122,7 +122,7 @@ pub const fn tier_of(basic: &[&str]) -> Tier {
 /// One row of the option reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OptionDescription {
-    /// Stage and option, `stage.option`.
+    /// Stage and option, `table.option`.
     pub name: String,
     /// The default as the user would write it.
     pub default: String,
@@ -141,7 +141,7 @@ pub struct OptionDescription {
 /// An option whose value is outside its allowed range.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InvalidOption {
-    /// Stage and option, `stage.option`.
+    /// Stage and option, `table.option`.
     pub name: String,
     /// The value given.
     pub value: String,
@@ -157,7 +157,7 @@ impl fmt::Display for InvalidOption {
 
 /// A stage's options, declared by [`options!`](crate::options!).
 pub trait StageOptions: Default {
-    /// The stage's name, the first half of `stage.option`.
+    /// The stage's name, the first half of `table.option`.
     const STAGE: &'static str;
 
     /// The options outside their ranges; empty when all is well.
@@ -225,6 +225,7 @@ macro_rules! options {
         }
     ) => {
         $(#[doc = $struct_doc])*
+        #[allow(unreachable_pub)]
         #[derive(Debug, Clone, PartialEq, ::serde::Serialize, ::serde::Deserialize)]
         #[serde(deny_unknown_fields, default)]
         pub struct $name {
@@ -296,11 +297,13 @@ macro_rules! choice {
         }
     ) => {
         $(#[doc = $enum_doc])*
+        #[allow(unreachable_pub)]
         #[derive(Debug, Clone, Copy, PartialEq, Eq, ::serde::Serialize, ::serde::Deserialize)]
         pub enum $name {
             $( $(#[doc = $doc])* #[serde(rename = $text)] $variant, )*
         }
 
+        #[allow(unreachable_pub)]
         impl $name {
             /// The names of the alternatives, in their order.
             #[allow(dead_code)]
