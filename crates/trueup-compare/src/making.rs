@@ -8,11 +8,11 @@ use trueup_core::options::OptionValue;
 use trueup_core::truth::Truth;
 use trueup_core::{Error, Result, StageContext};
 
+use super::compared::{Compared, PanoramaRecord, Refusal};
 use super::drawing::{self, Drawing};
 use super::entry::ComparisonEntry;
 use super::format::PanoramaFormat;
 use super::overlaps;
-use super::record::{Compared, PanoramaRecord, Refusal};
 
 /// Progress over the entries is reported as this.
 pub(super) const STAGE: &str = "panoramas";

@@ -4,11 +4,10 @@
 //! (unknown fields denied), its validation and the rows of the option reference. Fronts (command line, bindings, pages)
 //! read those; none holds a default of its own.
 
-use std::fmt;
-
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+pub use crate::invalid_option::InvalidOption;
 
 /// The values an option may take.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -136,23 +135,6 @@ pub struct OptionDescription {
     pub tier: Tier,
     /// The alternatives of a choice with their meanings; empty for other options.
     pub choices: Vec<ChoiceDescription>,
-}
-
-/// An option whose value is outside its allowed range.
-#[derive(Debug, Clone, PartialEq)]
-pub struct InvalidOption {
-    /// Stage and option, `table.option`.
-    pub name: String,
-    /// The value given.
-    pub value: String,
-    /// The allowed values in words.
-    pub allowed: String,
-}
-
-impl fmt::Display for InvalidOption {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "invalid {} = {} (allowed: {})", self.name, self.value, self.allowed)
-    }
 }
 
 /// A stage's options, declared by [`options!`](crate::options!).
