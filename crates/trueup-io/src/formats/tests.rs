@@ -41,10 +41,10 @@ fn messages_name_every_format() {
     assert_eq!(alternatives(["a", "b", "c"].map(str::to_owned).into_iter()), "a, b or c");
     let names = |words: &str, one: &str| words.replace(" or ", ", ").split(", ").any(|word| word == one);
     for (format, _) in readable() {
-        assert!(names(&readable_names(), format.name), "{format:?}");
+        assert!(names(&readable_formats(), format.name), "{format:?}");
     }
     for (format, _) in writable() {
-        let all = all_extensions();
+        let all = written_extensions();
         assert!(format.extensions.iter().all(|extension| names(&all, &format!(".{extension}"))), "{format:?}");
     }
     let deep = extensions(|writing| writing.depths.contains(&Depth::Sixteen));
