@@ -6,15 +6,18 @@ use crate::run::{Desk, finish, trueup};
 
 const PAGE: &str = include_str!("../../../docs/command-line.md");
 
-/// A way to go wrong, and the end of the part of the message that does not depend on counts of matches.
+/// What in a row of the page stands for anything: for what depends on counts of matches, and for lists that grow with what
+/// there is.
+const LEFT_OPEN: &str = " ...";
+
+/// A way to go wrong.
 struct Mistake {
     what: &'static str,
     arguments: &'static [&'static str],
-    up_to: Option<&'static str>,
 }
 
 const fn mistake(what: &'static str, arguments: &'static [&'static str]) -> Mistake {
-    Mistake { what, arguments, up_to: None }
+    Mistake { what, arguments }
 }
 
 const MISTAKES: &[Mistake] = &[
@@ -30,31 +33,15 @@ const MISTAKES: &[Mistake] = &[
     mistake("several files, none usable", &["stitch", "text.jpg", "empty.jpg", "-o", "pano.jpg"]),
     mistake("too little memory", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--memory", "100MB"]),
     mistake("black pictures", &["stitch", "black.jpg", "white.jpg", "-o", "pano.jpg"]),
-    Mistake {
-        what: "unrelated pictures",
-        arguments: &["stitch", "noise1.jpg", "noise2.jpg", "noise3.jpg", "-o", "pano.jpg"],
-        up_to: Some("the best pair is"),
-    },
-    Mistake {
-        what: "a method that cannot place them",
-        arguments: &[
-            "stitch",
-            "turn0.jpg",
-            "turn1.jpg",
-            "turn2.jpg",
-            "turn3.jpg",
-            "-o",
-            "pano.jpg",
-            "--method",
-            "homography",
-        ],
-        up_to: Some("is not applicable"),
-    },
-    Mistake {
-        what: "`--require-all`, one unrelated",
-        arguments: &["stitch", "a.jpg", "b.jpg", "noise1.jpg", "-o", "pano.jpg", "--require-all"],
-        up_to: Some("noise1.jpg: no overlap found"),
-    },
+    mistake("unrelated pictures", &["stitch", "noise1.jpg", "noise2.jpg", "noise3.jpg", "-o", "pano.jpg"]),
+    mistake(
+        "a method that cannot place them",
+        &["stitch", "turn0.jpg", "turn1.jpg", "turn2.jpg", "turn3.jpg", "-o", "pano.jpg", "--method", "homography"],
+    ),
+    mistake(
+        "`--require-all`, one unrelated",
+        &["stitch", "a.jpg", "b.jpg", "noise1.jpg", "-o", "pano.jpg", "--require-all"],
+    ),
     mistake("`--graph` with an unknown name", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--graph", "graph.txt"]),
     mistake("`--graph` without a file", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--graph", "none.txt"]),
     mistake("unknown `--reference`", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--reference", "q.jpg"]),
@@ -143,24 +130,33 @@ fn desk() -> Desk {
     desk
 }
 
+/// Whether a row of the page says what is printed.
+fn says(row: &str, printed: &str) -> bool {
+    let Some((start, rest)) = row.split_once(LEFT_OPEN) else { return row == printed };
+    let Some(mut printed) = printed.strip_prefix(start) else { return false };
+    let mut parts: Vec<&str> = rest.split(LEFT_OPEN).collect();
+    let end = parts.pop().unwrap_or_default();
+    for part in parts {
+        let Some((_, after)) = printed.split_once(part) else { return false };
+        printed = after;
+    }
+    printed.ends_with(end)
+}
+
 #[test]
 fn the_table_of_bad_inputs_is_what_is_printed() {
     let desk = desk();
     let files = desk.files();
     let mut missing = Vec::new();
-    for Mistake { what, arguments, up_to } in MISTAKES {
+    for Mistake { what, arguments } in MISTAKES {
         let run = finish(trueup(desk.path(), arguments));
         assert_eq!(run.stdout, "", "{what}");
         let mut lines = run.stderr.lines();
         let message = lines.next().and_then(|line| line.strip_prefix("trueup: error: ")).expect("an error");
         let hint = lines.next().map_or("", |line| line.strip_prefix("trueup: hint: ").expect("a hint"));
         assert_eq!(lines.next(), None, "{what}: {}", run.stderr);
-        let message = match up_to.map(|end| message.split_once(end).expect("the known part of the message")) {
-            Some((start, _)) => format!("{start}{} ...", up_to.unwrap_or_default()),
-            None => message.to_owned(),
-        };
         let row = format!("| {what} | {message} | {hint} | {} |", run.status);
-        if !PAGE.contains(&row) {
+        if !PAGE.lines().any(|line| says(line, &row)) {
             missing.push(row);
         }
     }

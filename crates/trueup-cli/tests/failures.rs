@@ -18,8 +18,9 @@ fn a_text_in_disguise() {
     stitch_alone("text.jpg", "Dear diary").expect_failure(
         1,
         &[
-            "trueup: error: text.jpg: its content is not a JPEG, PNG, TIFF or WebP picture, whatever its name says\n",
-            "trueup: hint: Give photographs in JPEG, PNG, TIFF or WebP.\n",
+            "trueup: error: text.jpg: its content is not a JPEG, ",
+            " picture, whatever its name says\n",
+            "trueup: hint: Give photographs in JPEG, ",
         ],
     );
 }
@@ -56,8 +57,8 @@ fn missing_files_folders_and_patterns() {
     desk.put("empty/notes.txt", "no picture");
     desk.stitch(&[""]).expect_failure(2, &["a value is required for '<PHOTOS>...'"]);
     desk.stitch(&["none.jpg"]).expect_failure(1, &["none.jpg: there is no such file or folder"]);
-    desk.stitch(&["empty"]).expect_failure(1, &["empty: the folder holds no JPEG, PNG, TIFF or WebP files"]);
-    desk.stitch(&["none*.jpg"]).expect_failure(1, &["none*.jpg: no JPEG, PNG, TIFF or WebP file matches the pattern"]);
+    desk.stitch(&["empty"]).expect_failure(1, &["empty: the folder holds no JPEG, ", " files\n"]);
+    desk.stitch(&["none*.jpg"]).expect_failure(1, &["none*.jpg: no JPEG, ", " file matches the pattern\n"]);
     let both = desk.stitch(&["none.jpg", "empty"]);
     both.expect_failure(1, &["none.jpg: there is no such file", "empty: the folder holds no"]);
 }

@@ -58,4 +58,6 @@ pub use trueup_core::truth::{ImageTruth, Truth};
 pub use trueup_core::{Error, Result, StageContext};
 pub use trueup_io::encode::{
     Metadata, OutputOptions, abandon_unfinished, check_place, write as write_picture, write_atomically,
+    written_extensions,
 };
+pub use trueup_io::source::readable_formats;

@@ -294,7 +294,7 @@ fn fitted_similarity(data: &Anchored, chosen: &[usize]) -> Option<Matrix3<f64>> 
 
 #[cfg(test)]
 mod tests {
-    use super::super::model::WarpModel;
+    use super::super::WarpModel;
     use super::super::tests::{Example, HEIGHT, WIDTH, matched, misalignment};
     use super::*;
     use crate::warps::placement::anchored;

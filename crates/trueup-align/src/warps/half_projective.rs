@@ -6,11 +6,11 @@ use trueup_core::geometry::Homography;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
+use super::WarpModel;
 use super::deformed::deformed;
 use super::homography::onto;
 use super::input::WarpInput;
 use super::limits::{MIN_DEPTH, farthest_angle, least_depth, refuse};
-use super::model::WarpModel;
 use super::options::WarpOptions;
 use super::sphp::SphpWarp;
 use crate::stitch_graph::StitchGraph;

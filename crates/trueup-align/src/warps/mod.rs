@@ -1,8 +1,9 @@
 //! Warp models: methods that place the photographs by closed formulas instead of the mesh energies.
 //!
-//! One file a model. All start from the same matches, cameras and grids and yield the same [`WarpedMesh`] as the mesh
-//! energies do, so that renderer and measures are shared. A set of photographs that a model cannot place is refused
-//! with [`trueup_core::Error::NotApplicable`]: what cannot lie on one plane is not torn or blown up instead.
+//! A model is a file, an alternative of [`WarpModel`] and its arm in `run_within`. All start from the same matches, cameras
+//! and grids and yield the same [`WarpedMesh`] as the mesh energies do, so that renderer and measures are shared. A set of
+//! photographs that a model cannot place is refused with [`trueup_core::Error::NotApplicable`]: what cannot lie on one plane
+//! is not torn or blown up instead.
 
 mod aanap;
 mod apap;
@@ -13,7 +14,6 @@ mod half_projective;
 mod homography;
 mod input;
 mod limits;
-mod model;
 mod options;
 mod placement;
 mod quasi_homography;
@@ -28,8 +28,27 @@ use crate::mesh::{WarpedMesh, count_folds};
 pub use distance_kernel::DistanceKernel;
 pub use input::WarpInput;
 use limits::{LIMITS, Limits};
-pub use model::WarpModel;
 pub use options::{AutostitchSurface, HomographySource, WarpOptions};
+
+trueup_core::choice! {
+    /// A method that is a warp model.
+    pub enum WarpModel {
+        /// One homography per photograph, onto the plane of the reference.
+        Homography = "homography",
+        /// Straightened cameras on a sphere, a cylinder or a plane.
+        Autostitch = "autostitch",
+        /// As-projective-as-possible: moving DLT.
+        Apap = "apap",
+        /// Shape-preserving half-projective, its similarity upright.
+        Sphp = "sphp",
+        /// Shape-preserving half-projective, its similarity free to turn.
+        SphpFree = "sphp-free",
+        /// Adaptive as-natural-as-possible.
+        Aanap = "aanap",
+        /// Homographies of linear scale outside the overlaps.
+        QuasiHomography = "quasi-homography",
+    }
+}
 
 /// Places the photographs by a warp model.
 ///

@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 
 use super::option_flags::TypedOptions;
-use super::shared::{GeometryArgs, MaskArgs, TuningArgs};
+use super::shared::{GeometryArgs, MaskArgs, TuningArgs, photographs_help};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -23,8 +23,8 @@ The folder appears when it is complete. An older comparison of that name is repl
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct CompareArgs {
-    /// Files, folders (their pictures, not those of folders inside) or glob patterns; JPEG, PNG, TIFF, WebP
-    #[arg(value_name = "PHOTOS", required_unless_present = "tally", value_parser = NonEmptyStringValueParser::new())]
+    /// What the photographs are named by.
+    #[arg(value_name = "PHOTOS", help = photographs_help(), required_unless_present = "tally", value_parser = NonEmptyStringValueParser::new())]
     pub photographs: Vec<String>,
 
     /// The folder to write

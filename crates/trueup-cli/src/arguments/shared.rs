@@ -9,11 +9,21 @@ use super::side_outputs::SideOutputArgs;
 /// More threads than this are a typing mistake, and starting them would hang the machine.
 const MAX_THREADS: i64 = 1024;
 
+/// The help on photographs.
+pub(crate) fn photographs_help() -> String {
+    let formats = trueup::readable_formats();
+    format!("Files, folders (their pictures, not those of folders inside) or glob patterns; {formats}")
+}
+
+fn panorama_help() -> String {
+    format!("The panorama; {} chooses the format", trueup::written_extensions())
+}
+
 /// What is written.
 #[derive(Debug, Args)]
 pub(crate) struct FileArgs {
-    /// The panorama; .jpg, .png, .tif, .webp or .dzi (Deep Zoom) chooses the format
-    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    /// The panorama's file.
+    #[arg(short, long, value_name = "FILE", help = panorama_help(), help_heading = "Output")]
     pub output: PathBuf,
 
     #[command(flatten)]

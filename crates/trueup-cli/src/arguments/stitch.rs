@@ -4,7 +4,7 @@ use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
 
 use super::option_flags::TypedOptions;
-use super::shared::{FileArgs, GeometryArgs, MaskArgs, MessageArgs, TuningArgs};
+use super::shared::{FileArgs, GeometryArgs, MaskArgs, MessageArgs, TuningArgs, photographs_help};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -24,8 +24,8 @@ once.";
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct StitchArgs {
-    /// Files, folders (their pictures, not those of folders inside) or glob patterns; JPEG, PNG, TIFF, WebP
-    #[arg(value_name = "PHOTOS", required = true, value_parser = NonEmptyStringValueParser::new())]
+    /// What the photographs are named by.
+    #[arg(value_name = "PHOTOS", help = photographs_help(), required = true, value_parser = NonEmptyStringValueParser::new())]
     pub photographs: Vec<String>,
 
     #[command(flatten)]

@@ -47,7 +47,7 @@ fn stored(image: &SourceImage) -> Result<Photograph> {
     let reading = |error| Error::io("reading", &image.path, error);
     let mut input = BufReader::new(File::open(&image.path).map_err(reading)?);
     let format = formats::recognize(&mut input).map_err(reading)?.ok_or_else(|| {
-        let reason = format!("it is not a {} picture", formats::readable_names());
+        let reason = format!("it is not a {} picture", formats::readable_formats());
         Error::input(&image.name, reason, "Give the photograph again.")
     })?;
     (format.pixels)(image, input)

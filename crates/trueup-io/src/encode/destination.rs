@@ -17,7 +17,7 @@ pub(super) fn writing_to(path: &Path, options: &OutputOptions) -> Result<&'stati
             Some(extension) => format!("writing {} as .{}", path.display(), extension.to_string_lossy()),
             None => format!("writing {} without an extension", path.display()),
         };
-        Error::Unsupported { what, hint: format!("End the name in {}.", formats::all_extensions()) }
+        Error::Unsupported { what, hint: format!("End the name in {}.", formats::written_extensions()) }
     })?;
     check_depth(path, writing, options)?;
     check_background(path, writing, options)?;

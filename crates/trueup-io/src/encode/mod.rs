@@ -35,6 +35,7 @@ use crate::format::Writer;
 use destination::{check_sides, writing_to};
 use pending::PendingFile;
 
+pub use crate::formats::written_extensions;
 pub use background::Background;
 pub use expected::expected_bytes;
 pub use folder::PendingFolder;

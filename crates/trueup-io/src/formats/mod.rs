@@ -68,7 +68,7 @@ pub(crate) fn names_photograph(path: &Path) -> bool {
 }
 
 /// The formats that are read, for messages: "JPEG, PNG, TIFF or WebP".
-pub(crate) fn readable_names() -> String {
+pub fn readable_formats() -> String {
     alternatives(readable().map(|(format, _)| format.name.to_owned()))
 }
 
@@ -79,8 +79,8 @@ pub(crate) fn extensions(which: impl Fn(&Writing) -> bool) -> String {
     )
 }
 
-/// All extensions of files that are written, for messages.
-pub(crate) fn all_extensions() -> String {
+/// All extensions of files that are written, for messages: ".jpg, .png or .tif".
+pub fn written_extensions() -> String {
     alternatives(writable().flat_map(|(format, _)| format.extensions).map(|extension| format!(".{extension}")))
 }
 

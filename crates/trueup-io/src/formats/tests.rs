@@ -38,10 +38,17 @@ fn extensions_are_read_in_any_case() {
 
 #[test]
 fn messages_name_every_format() {
-    assert_eq!(readable_names(), "JPEG, PNG, TIFF or WebP");
-    assert_eq!(all_extensions(), ".jpg, .jpeg, .png, .tif, .tiff, .webp or .dzi");
-    assert_eq!(extensions(|writing| writing.depths.contains(&Depth::Sixteen)), ".png or .tif");
-    assert_eq!(extensions(|writing| writing.depths.contains(&Depth::Float)), ".tif");
+    assert_eq!(alternatives(["a", "b", "c"].map(str::to_owned).into_iter()), "a, b or c");
+    let names = |words: &str, one: &str| words.replace(" or ", ", ").split(", ").any(|word| word == one);
+    for (format, _) in readable() {
+        assert!(names(&readable_formats(), format.name), "{format:?}");
+    }
+    for (format, _) in writable() {
+        let all = written_extensions();
+        assert!(format.extensions.iter().all(|extension| names(&all, &format!(".{extension}"))), "{format:?}");
+    }
+    let deep = extensions(|writing| writing.depths.contains(&Depth::Sixteen));
+    assert!(names(&deep, ".png") && names(&deep, ".tif") && !names(&deep, ".jpg"), "{deep}");
 }
 
 /// No ending and no signature belongs to two formats.

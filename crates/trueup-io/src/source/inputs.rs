@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
-use crate::formats::{names_photograph, readable_names};
+use crate::formats::{names_photograph, readable_formats};
 
 use super::rejection::Rejection;
 
@@ -61,7 +61,7 @@ fn expand_folder(folder: PathBuf) -> Vec<Candidate> {
     if candidates.is_empty() {
         let rejection = Rejection::new(
             "folder-without-pictures",
-            format!("the folder holds no {} files", readable_names()),
+            format!("the folder holds no {} files", readable_formats()),
             "Folders inside it are not searched; give the folder that holds the photographs.",
         );
         return vec![Candidate::Rejected(folder, rejection)];
@@ -84,7 +84,7 @@ fn expand_pattern(pattern: &str) -> Vec<Candidate> {
     };
     let candidates = photographs_in_natural_order(matches.filter_map(Result::ok));
     if candidates.is_empty() {
-        let reason = format!("no {} file matches the pattern", readable_names());
+        let reason = format!("no {} file matches the pattern", readable_formats());
         return reject(
             "pattern-without-match",
             reason,

@@ -93,7 +93,7 @@ fn recognize(file: &mut File, length: u64) -> Result<&'static Reading, Rejection
     if let Some(format) = formats::reading_of(&start) {
         return Ok(format);
     }
-    let readable = formats::readable_names();
+    let readable = formats::readable_formats();
     Err(match formats::describe_foreign_content(&start) {
         Some(what) => Rejection::new(
             "format-unsupported",
