@@ -19,15 +19,15 @@ const CHOICE_INDENT: usize = INDENT.len() + 2 + CHOICE_WIDTH;
 
 pub(crate) fn run(args: &OptionsArgs) -> Result<(), Failure> {
     let mut rows = StitchOptions::describe();
-    if let Some(stage) = &args.stage {
-        let stages: Vec<&str> = StitchOptions::tables().into_iter().map(|(table, _)| table).collect();
-        if !stages.contains(&stage.as_str()) {
+    if let Some(table) = &args.table {
+        let tables: Vec<&str> = StitchOptions::tables().into_iter().map(|(table, _)| table).collect();
+        if !tables.contains(&table.as_str()) {
             return Err(Failure::usage(
-                format!("there is no stage \"{stage}\""),
-                format!("The stages are {}.", stages.join(", ")),
+                format!("there is no table \"{table}\""),
+                format!("The tables are {}.", tables.join(", ")),
             ));
         }
-        rows.retain(|row| stage_of(row) == stage);
+        rows.retain(|row| table_of(row) == table);
     }
     let all = rows.len();
     if !args.expert {
@@ -51,11 +51,11 @@ fn experts_line(shown: usize, left: usize) -> String {
     }
 }
 
-/// One paragraph an option, a blank line between stages.
+/// One paragraph an option, a blank line between tables.
 fn text(rows: &[OptionDescription]) -> String {
     let mut text = String::new();
     for (position, row) in rows.iter().enumerate() {
-        if position > 0 && stage_of(row) != stage_of(&rows[position - 1]) {
+        if position > 0 && table_of(row) != table_of(&rows[position - 1]) {
             text.push('\n');
         }
         let unit = if row.unit.is_empty() { String::new() } else { format!(" {}", row.unit) };
@@ -73,8 +73,8 @@ fn text(rows: &[OptionDescription]) -> String {
     text
 }
 
-fn stage_of(row: &OptionDescription) -> &str {
-    row.name.split_once('.').map_or(row.name.as_str(), |(stage, _)| stage)
+fn table_of(row: &OptionDescription) -> &str {
+    row.name.split_once('.').map_or(row.name.as_str(), |(table, _)| table)
 }
 
 #[cfg(test)]

@@ -91,10 +91,10 @@ fn other_options_of_composing_are_heeded_and_others_refused() {
     let again = finish(trueup(desk.path(), &["compose", "small.json", "-o", "third.jpg"]));
     again.expect_success();
     assert!(desk.read("again.jpg") == desk.read("third.jpg"));
-    compose(&desk, &["--set", "mesh.cell_px=30", "--set", "stitch.seed=5"]).expect_failure(
+    compose(&desk, &["--set", "mesh.cell_px=30", "--set", "random.seed=5"]).expect_failure(
         2,
         &[
-            "composing a recorded panorama with another stitch.seed, mesh.cell_px is not supported",
+            "composing a recorded panorama with another random.seed, mesh.cell_px is not supported",
             "stitch the photographs",
         ],
     );
@@ -123,7 +123,7 @@ fn photographs_are_found_where_they_moved_and_others_shown_in_their_place() {
         desk.put(&format!("gray/{name}"), plain(480, 360, level));
     }
     let verbose = compose(&desk, &["--photos", "gray", "--verbose"]);
-    assert!(verbose.expect_success().contains("b.jpg: gray/b.jpeg is shown"), "{}", verbose.stdout);
+    assert!(verbose.expect_success().contains("b.jpeg: it is shown in place of b.jpg"), "{}", verbose.stdout);
     desk.put("gray/d.jpg", plain(481, 360, 93));
     std::fs::remove_file(desk.join("gray/a.jpg")).expect("removed");
     compose(&desk, &["--photos", "gray"]).expect_failure(

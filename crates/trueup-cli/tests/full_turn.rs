@@ -13,7 +13,7 @@ const HEIGHT: usize = 270;
 const COUNT: usize = 10;
 
 /// Photographs of a room all the way round, as JPEG files.
-pub fn photographs() -> &'static [Vec<u8>] {
+pub(crate) fn photographs() -> &'static [Vec<u8>] {
     static FILES: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
     FILES.get_or_init(|| {
         let (kind, style, light) = (SceneKind::Room, RoomStyle::Library, LightQuality::Fast);

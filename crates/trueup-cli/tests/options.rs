@@ -55,7 +55,7 @@ fn one_stage_can_be_listed() {
     assert!(!mesh.stdout.contains("canvas."));
     let names: Vec<Value> = rows(&["mesh", "--expert"]);
     assert!(!names.is_empty() && names.iter().all(|row| field(row, "name").starts_with("mesh.")), "{names:?}");
-    run(&["options", "mash"]).expect_failure(2, &["there is no stage \"mash\"", "The stages are "]);
+    run(&["options", "mash"]).expect_failure(2, &["there is no table \"mash\"", "The tables are "]);
 }
 
 #[test]
@@ -79,14 +79,14 @@ fn the_file_the_set_and_the_flags_overrule_each_other_in_this_order() {
     let desk = street_desk();
     desk.put(
         "c.toml",
-        "[canvas]\nscale = 0.3\n[stitch]\nseed = 3\n[output]\njpeg_quality = 50\n[mesh]\ncell_px = 60\n",
+        "[canvas]\nscale = 0.3\n[random]\nseed = 3\n[output]\njpeg_quality = 50\n[mesh]\ncell_px = 60\n",
     );
     let arguments = ["stitch", "a.jpg", "b.jpg", "-o", "p.jpg", "--project", "p.json", "--config", "c.toml"];
-    let overrules = ["--set", "stitch.seed=4", "--set", "canvas.scale=0.2", "--scale", "0.25"];
+    let overrules = ["--set", "random.seed=4", "--set", "canvas.scale=0.2", "--scale", "0.25"];
     finish(trueup(desk.path(), &[&arguments[..], &overrules].concat())).expect_success();
     let options = desk.json("p.json")["options"].clone();
     assert_eq!(options["canvas"]["scale"], 0.25);
-    assert_eq!(options["stitch"]["seed"], 4);
+    assert_eq!(options["random"]["seed"], 4);
     assert_eq!(options["output"]["jpeg_quality"], 50);
     assert_eq!(options["mesh"]["cell_px"], 60.0);
 }
@@ -126,7 +126,7 @@ fn a_configuration_that_cannot_be_used_says_why() {
     let desk = Desk::new();
     for (text, reason) in [
         ("[mesh\n", "c.toml: "),
-        ("[mash]\ncell_px = 3\n", "c.toml: there is no stage \"mash\""),
+        ("[mash]\ncell_px = 3\n", "c.toml: there is no table \"mash\""),
         ("[mesh]\ncell = 3\n", "c.toml: there is no option \"mesh.cell\""),
         ("[mesh]\ncell_px = \"wide\"\n", "c.toml: "),
         ("[mesh]\ncell_px = -3.0\n", "invalid mesh.cell_px = -3 (allowed: "),

@@ -31,7 +31,7 @@ fn photographs() -> Vec<String> {
 
 /// An option that is a choice.
 struct Choice {
-    /// `stage.option`.
+    /// `table.option`.
     option: String,
     alternatives: Vec<&'static str>,
 }

@@ -30,7 +30,7 @@ fn stopped_by(script: &str, signals: &[&str]) -> (Option<i32>, String) {
     }
     let mut command = Command::new("sh");
     command.current_dir(desk.path()).args(["-c", script, "sh", env!("CARGO_BIN_EXE_trueup"), "stitch"]);
-    command.args(PHOTOGRAPHS).args(["-o", "pano.jpg", "--set", "stitch.working_pixels=4e6", "--threads", "1"]);
+    command.args(PHOTOGRAPHS).args(["-o", "pano.jpg", "--set", "working.pixels=4e6", "--threads", "1"]);
     let mut child = command.stderr(Stdio::piped()).spawn().expect("the command starts");
     std::thread::sleep(Duration::from_millis(400));
     for signal in signals {

@@ -14,7 +14,7 @@ pub struct ComparisonEntry {
     pub name: String,
     /// What it is, in one sentence.
     pub meaning: String,
-    /// Departures, each `stage.option=value`.
+    /// Departures, each `table.option=value`.
     pub overrides: Vec<String>,
 }
 
@@ -41,13 +41,13 @@ impl ComparisonEntry {
         })
     }
 
-    /// Reads `NAME: stage.option=value, stage.option=value`.
+    /// Reads `NAME: table.option=value, table.option=value`.
     ///
     /// # Errors
     /// [`Error::Input`] if the name or the options are missing. Whether there are such options is found by
     /// [`Self::options`].
     pub fn parse(text: &str) -> Result<Self> {
-        let wrong = |reason: &str| Error::input(text, reason, "Write NAME: stage.option=value, stage.option=value.");
+        let wrong = |reason: &str| Error::input(text, reason, "Write NAME: table.option=value, table.option=value.");
         let (name, overrides) = text.split_once(':').ok_or_else(|| wrong("there is no \":\" after a name"))?;
         let name = name.trim();
         let overrides: Vec<String> =

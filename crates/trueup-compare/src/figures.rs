@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::record::Compared;
+use super::compared::Compared;
 
 /// Which of two values of a figure is better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -11,12 +11,13 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::encode::{self, PendingFolder};
 use trueup_io::source;
 
+use super::compared::Compared;
 use super::drawing::Drawing;
 use super::entry::ComparisonEntry;
 use super::format::PanoramaFormat;
 use super::making::{Common, all_refused};
 use super::place::{RECORD, check_replaceable, file_stems, refuse_photographs};
-use super::record::{COMPARISON_FORMAT, COMPARISON_VERSION, Compared, ComparedPhotograph, Comparison};
+use super::record::{COMPARISON_FORMAT, COMPARISON_VERSION, ComparedPhotograph, Comparison};
 use super::{figures, making, overlaps, ranking};
 
 /// Without a scale, the photographs are reduced so that they have about this many pixels together. Their overlaps make the

@@ -2,6 +2,7 @@
 
 #![forbid(unsafe_code)]
 
+mod compared;
 mod drawing;
 mod entry;
 mod figures;
@@ -14,15 +15,14 @@ mod ranking;
 mod record;
 mod tally;
 
+pub use compared::{Compared, PanoramaRecord, Refusal};
 pub use drawing::{Drawing, PhotographGrid, Polyline};
 pub use entry::ComparisonEntry;
 pub use figures::{Better, ComparisonFigure};
 pub use format::PanoramaFormat;
 pub use job::{CompareJob, ComparisonPage};
 pub use ranking::{MAX_RANKED, RankedPanorama, Ranking};
-pub use record::{
-    COMPARISON_FORMAT, COMPARISON_VERSION, Compared, ComparedPhotograph, Comparison, PanoramaRecord, Refusal,
-};
+pub use record::{COMPARISON_FORMAT, COMPARISON_VERSION, ComparedPhotograph, Comparison};
 pub use tally::{
     MethodScore, RANKING_FORMAT, RANKING_VERSION, RankingAnswer, RankingResults, Tally, read_rankings, tally,
 };

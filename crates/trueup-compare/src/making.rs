@@ -8,11 +8,11 @@ use trueup_core::options::OptionValue;
 use trueup_core::truth::Truth;
 use trueup_core::{Error, Result, StageContext};
 
+use super::compared::{Compared, PanoramaRecord, Refusal};
 use super::drawing::{self, Drawing};
 use super::entry::ComparisonEntry;
 use super::format::PanoramaFormat;
 use super::overlaps;
-use super::record::{Compared, PanoramaRecord, Refusal};
 
 /// Progress over the entries is reported as this.
 pub(super) const STAGE: &str = "panoramas";
@@ -39,7 +39,7 @@ pub(super) struct Made {
 
 impl Common<'_> {
     /// Makes one entry's panorama, or finds out why it cannot be made.
-    pub fn make(&self, entry: &ComparisonEntry, stem: &str, inputs: &Inputs) -> Result<Made> {
+    pub(crate) fn make(&self, entry: &ComparisonEntry, stem: &str, inputs: &Inputs) -> Result<Made> {
         let options = entry.options(self.options)?;
         let mut made = Made { compared: Compared::of(entry), drawing: Drawing::default(), project: None, error: None };
         let stitcher = Stitcher::new(&options, self.context);

@@ -4,9 +4,9 @@ use rand::seq::SliceRandom;
 use serde::Serialize;
 use trueup_core::{Error, Result, StageContext};
 
+use super::compared::Compared;
 use super::entry::ComparisonEntry;
 use super::format::PanoramaFormat;
-use super::record::Compared;
 use trueup_core::options::OptionValue;
 
 /// Most panoramas in a ranking: as many as scores from 5 to 2.

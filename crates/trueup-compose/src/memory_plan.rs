@@ -196,7 +196,8 @@ impl MemoryNeeds {
                 words(self.least() - photographs)
             ),
             allowed: words(allowed),
-            hint: "Raise --memory (stitch.memory) by the difference, or make a smaller panorama (--scale).".to_owned(),
+            hint: "Raise --memory (resources.memory) by the difference, or make a smaller panorama (--scale)."
+                .to_owned(),
         }
     }
 }

@@ -220,7 +220,13 @@ mod tests {
         let context = StageContext::default();
         let note = |code: &str| Diagnostic::note(code, Subject::stage("test"), "", "");
         context.report(note("first"));
-        let part = |code: &'static str| context.gather(|nested| Ok(nested.report(note(code)))).expect("a part");
+        let part = |code: &'static str| {
+            let told = context.gather(|nested| {
+                nested.report(note(code));
+                Ok(())
+            });
+            told.expect("a part")
+        };
         let (second, third) = (part("second"), part("third"));
         assert_eq!(context.findings().len(), 1, "nested findings stay where they were gathered");
         context.absorb(third);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::options::InvalidOption;
+use crate::invalid_option::InvalidOption;
 
 /// The result of every fallible function in trueup's libraries.
 pub type Result<T> = std::result::Result<T, Error>;

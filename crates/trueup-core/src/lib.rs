@@ -22,6 +22,7 @@ pub mod diagnostics;
 pub mod error;
 pub mod geometry;
 pub mod interpolation;
+mod invalid_option;
 pub mod lines;
 pub mod mask;
 pub mod matches;

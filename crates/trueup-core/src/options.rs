@@ -4,11 +4,10 @@
 //! (unknown fields denied), its validation and the rows of the option reference. Fronts (command line, bindings, pages)
 //! read those; none holds a default of its own.
 
-use std::fmt;
-
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+pub use crate::invalid_option::InvalidOption;
 
 /// The values an option may take.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,7 +121,7 @@ pub const fn tier_of(basic: &[&str]) -> Tier {
 /// One row of the option reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OptionDescription {
-    /// Stage and option, `stage.option`.
+    /// Stage and option, `table.option`.
     pub name: String,
     /// The default as the user would write it.
     pub default: String,
@@ -138,26 +137,9 @@ pub struct OptionDescription {
     pub choices: Vec<ChoiceDescription>,
 }
 
-/// An option whose value is outside its allowed range.
-#[derive(Debug, Clone, PartialEq)]
-pub struct InvalidOption {
-    /// Stage and option, `stage.option`.
-    pub name: String,
-    /// The value given.
-    pub value: String,
-    /// The allowed values in words.
-    pub allowed: String,
-}
-
-impl fmt::Display for InvalidOption {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "invalid {} = {} (allowed: {})", self.name, self.value, self.allowed)
-    }
-}
-
 /// A stage's options, declared by [`options!`](crate::options!).
 pub trait StageOptions: Default {
-    /// The stage's name, the first half of `stage.option`.
+    /// The stage's name, the first half of `table.option`.
     const STAGE: &'static str;
 
     /// The options outside their ranges; empty when all is well.
@@ -225,6 +207,7 @@ macro_rules! options {
         }
     ) => {
         $(#[doc = $struct_doc])*
+        #[allow(unreachable_pub)]
         #[derive(Debug, Clone, PartialEq, ::serde::Serialize, ::serde::Deserialize)]
         #[serde(deny_unknown_fields, default)]
         pub struct $name {
@@ -296,11 +279,13 @@ macro_rules! choice {
         }
     ) => {
         $(#[doc = $enum_doc])*
+        #[allow(unreachable_pub)]
         #[derive(Debug, Clone, Copy, PartialEq, Eq, ::serde::Serialize, ::serde::Deserialize)]
         pub enum $name {
             $( $(#[doc = $doc])* #[serde(rename = $text)] $variant, )*
         }
 
+        #[allow(unreachable_pub)]
         impl $name {
             /// The names of the alternatives, in their order.
             #[allow(dead_code)]

@@ -18,7 +18,7 @@ pub(crate) struct ComparedMethod {
 }
 
 impl ComparedMethod {
-    /// The departures from the default options, each `stage.option=value`.
+    /// The departures from the default options, each `table.option=value`.
     pub(crate) fn overrides(&self) -> Vec<&'static str> {
         self.options.concat()
     }

@@ -1,4 +1,4 @@
-//! Lists of options that make what was published out of the product's default. Each entry is `stage.option=value`.
+//! Lists of options that make what was published out of the product's default. Each entry is `table.option=value`.
 //!
 //! What the experiment on the robust scheme holds open beside these stands with its noise, in `robust_scheme`.
 

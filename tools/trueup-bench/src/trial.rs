@@ -15,7 +15,7 @@ pub(crate) struct Trial {
     pub set: String,
     /// Name of the options in the experiment's tables.
     pub variant: String,
-    /// Departures from the default options, each `stage.option=value`.
+    /// Departures from the default options, each `table.option=value`.
     pub overrides: Vec<String>,
     /// Share of the vanishing directions that are replaced by random ones, 0 to 1.
     pub random_directions: f64,

@@ -10,7 +10,7 @@ use nalgebra::{Matrix2, Vector2};
 
 /// One match, seen in the first photograph of a pair.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Evidence {
+pub(super) struct OverlapGap {
     /// Where, in working pixels.
     pub place: Vector2<f64>,
     /// Distance in the panorama of what should meet.
@@ -19,7 +19,7 @@ pub(super) struct Evidence {
     pub known: Matrix2<f64>,
 }
 
-impl Evidence {
+impl OverlapGap {
     /// What a match says of the square, per axis, that has no neighbor to confirm it.
     fn beyond_noise(&self) -> f64 {
         /// Standard deviation of a match per axis that is not exceeded by much: matches are found to half of it.
@@ -30,7 +30,7 @@ impl Evidence {
 
 /// Square, per axis, of the misalignment that neighbors have in common, around every piece of evidence. Where
 /// none has a neighbor, what exceeds the usual noise.
-pub(super) fn common_squares(evidence: &[Evidence]) -> Vec<f64> {
+pub(super) fn common_squares(evidence: &[OverlapGap]) -> Vec<f64> {
     /// Closer matches share their pixels and so their noise.
     const NEAREST_PX: f64 = 8.0;
     /// Two cells of the usual grid: what is common over less, a grid cannot follow.
@@ -43,7 +43,7 @@ pub(super) fn common_squares(evidence: &[Evidence]) -> Vec<f64> {
     let around: Vec<CommonSum> = evidence
         .iter()
         .map(|one| {
-            let mut near: Vec<(f64, &Evidence)> = evidence
+            let mut near: Vec<(f64, &OverlapGap)> = evidence
                 .iter()
                 .map(|other| ((other.place - one.place).norm_squared(), other))
                 .filter(|(square, _)| *square <= FARTHEST_PX.powi(2))
@@ -69,7 +69,7 @@ pub(super) fn common_squares(evidence: &[Evidence]) -> Vec<f64> {
         })
         .collect();
     if overall.units == 0.0 {
-        return evidence.iter().map(Evidence::beyond_noise).collect();
+        return evidence.iter().map(OverlapGap::beyond_noise).collect();
     }
     let mean = overall.mean_square();
     around
@@ -112,7 +112,7 @@ mod tests {
     }
 
     /// Points and lines on a lattice of 10 px, misaligned by `true_gap` and noise of standard deviation 0.5.
-    fn lattice(true_gap: Vector2<f64>) -> Vec<Evidence> {
+    fn lattice(true_gap: Vector2<f64>) -> Vec<OverlapGap> {
         (0..900_u64)
             .map(|k| {
                 let angle = std::f64::consts::TAU * noise(3 * k);
@@ -120,7 +120,7 @@ mod tests {
                 let known = if k % 3 == 0 { normal * normal.transpose() } else { Matrix2::identity() };
                 let error = Vector2::new(noise(3 * k + 1), noise(3 * k + 2)) * (0.5 * 12.0_f64.sqrt());
                 let place = Vector2::new((k % 30) as f64, (k / 30) as f64) * 10.0;
-                Evidence { place, gap: known * (true_gap + error), known }
+                OverlapGap { place, gap: known * (true_gap + error), known }
             })
             .collect()
     }
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(common_squares(&[]), [0.0; 0]);
         let lonely = |gap: f64| {
             let known = Matrix2::from_diagonal(&Vector2::new(1.0, 0.0));
-            common_squares(&[Evidence { place: Vector2::zeros(), gap: Vector2::new(gap, 0.0), known }])[0]
+            common_squares(&[OverlapGap { place: Vector2::zeros(), gap: Vector2::new(gap, 0.0), known }])[0]
         };
         assert_eq!([lonely(0.9), lonely(-2.0)], [0.0, 3.0]);
         assert_eq!(share(0.0, 1.0), 0.0);

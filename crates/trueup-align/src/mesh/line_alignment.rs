@@ -18,7 +18,7 @@ use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 
 use super::current_grids::{CurrentGrids, PhotographPixel, PixelPair};
-use super::evidence::{self, Evidence};
+use super::evidence::{self, OverlapGap};
 use super::normal_equations::{Metric, NormalEquations};
 use super::straight_line::{DeviationTerm, StraightLine};
 
@@ -102,7 +102,7 @@ impl LineAlignmentInput<'_> {
         let found: Vec<Vec<(Match, f64)>> = pairs
             .par_iter()
             .map(|&(a, b)| {
-                let (which, evidence): (Vec<Match>, Vec<Evidence>) = self.evidence(a, b, grids).into_iter().unzip();
+                let (which, evidence): (Vec<Match>, Vec<OverlapGap>) = self.evidence(a, b, grids).into_iter().unzip();
                 let common = evidence::common_squares(&evidence);
                 let shares = common.into_iter().map(|common| evidence::share(common, FULL_PX));
                 which.into_iter().zip(shares).collect()
@@ -132,12 +132,12 @@ impl LineAlignmentInput<'_> {
 
     /// What the matched points and lines of a pair say; distances beyond the robust one count as that. Lines whose
     /// middles do not meet say nothing.
-    fn evidence(&self, a: usize, b: usize, grids: &CurrentGrids) -> Vec<(Match, Evidence)> {
+    fn evidence(&self, a: usize, b: usize, grids: &CurrentGrids) -> Vec<(Match, OverlapGap)> {
         let points = self.points.iter().enumerate().filter(|(_, points)| (points.a, points.b) == (a, b));
         let points = points.flat_map(|(list, points)| chosen(points).map(move |chosen| (list, chosen)));
         let points = points.map(|(list, (k, [p, q]))| {
             let gap = grids.gap(PhotographPixel { photograph: a, at: p }, PhotographPixel { photograph: b, at: q });
-            let evidence = Evidence { place: p, gap: gap * shortening(gap.norm()), known: Matrix2::identity() };
+            let evidence = OverlapGap { place: p, gap: gap * shortening(gap.norm()), known: Matrix2::identity() };
             (Match::Point(list, k), evidence)
         });
         let lines = self.matched.iter().enumerate().filter(|(_, lines)| (lines.a, lines.b) == (a, b));
@@ -149,7 +149,7 @@ impl LineAlignmentInput<'_> {
                 (PhotographPixel { photograph: a, at: middle }, PhotographPixel { photograph: b, at: foot });
             let gap = grids.gap(one, other).dot(&normal);
             let gap = normal * (gap * shortening(gap.abs()));
-            Some((Match::Line(list, k), Evidence { place: middle, gap, known: normal * normal.transpose() }))
+            Some((Match::Line(list, k), OverlapGap { place: middle, gap, known: normal * normal.transpose() }))
         });
         points.chain(lines).collect()
     }

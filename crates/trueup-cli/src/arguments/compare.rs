@@ -36,7 +36,7 @@ pub(crate) struct CompareArgs {
     pub methods: Vec<String>,
 
     /// A panorama with options of its own beside the methods; may be repeated
-    #[arg(long, value_name = "NAME: STAGE.OPTION=VALUE, ...", help_heading = "What is compared")]
+    #[arg(long, value_name = "NAME: TABLE.OPTION=VALUE, ...", help_heading = "What is compared")]
     pub entry: Vec<String>,
 
     /// What is exactly known of the photographs, to measure against

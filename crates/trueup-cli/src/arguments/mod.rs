@@ -93,9 +93,9 @@ pub(crate) struct EvaluateArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct OptionsArgs {
-    /// Only the options of this stage
-    #[arg(value_name = "STAGE")]
-    pub stage: Option<String>,
+    /// Only the options of this table
+    #[arg(value_name = "TABLE")]
+    pub table: Option<String>,
 
     /// Also the options for experts: of the methods' own numbers, for unusual photographs and for experiments
     #[arg(long)]

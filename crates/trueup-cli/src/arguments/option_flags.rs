@@ -43,7 +43,7 @@ pub(crate) const OPTION_FLAGS: &[OptionFlag] = &[
 pub(crate) struct OptionFlag {
     /// The flag without its dashes.
     flag: &'static str,
-    /// The option it sets, `stage.option`.
+    /// The option it sets, `table.option`.
     pub(crate) option: &'static str,
     heading: &'static str,
     /// The subcommands that take it.
@@ -128,7 +128,7 @@ fn is_number(option: &OptionDescription) -> bool {
     option.choices.is_empty() && option.default.parse::<f64>().is_ok()
 }
 
-/// A text up to its first full stop, and what follows. A stop within a word, as in `stage.option`, ends no sentence.
+/// A text up to its first full stop, and what follows. A stop within a word, as in `table.option`, ends no sentence.
 fn first_sentence(text: &str) -> (&str, &str) {
     match text.find(". ") {
         Some(stop) => (&text[..=stop], text[stop + 1..].trim_start()),
@@ -259,7 +259,7 @@ mod tests {
 
     #[test]
     fn names_with_a_stop_in_them_end_no_sentence() {
-        assert_eq!(first_sentence("Of stage.option. More."), ("Of stage.option.", "More."));
+        assert_eq!(first_sentence("Of table.option. More."), ("Of table.option.", "More."));
         assert_eq!(first_sentence("One sentence."), ("One sentence.", ""));
     }
 }

@@ -53,14 +53,14 @@ pub(crate) struct MaskArgs {
     pub keep: Vec<String>,
 }
 
-/// Options of every stage, and how the work is done.
+/// Options of every phase, and how the work is done.
 #[derive(Debug, Args)]
 pub(crate) struct TuningArgs {
-    /// Set any option of any stage that runs; may be repeated
-    #[arg(long, value_name = "STAGE.OPTION=VALUE", allow_hyphen_values = true, help_heading = "Tuning")]
+    /// Set any option; may be repeated
+    #[arg(long, value_name = "TABLE.OPTION=VALUE", allow_hyphen_values = true, help_heading = "Tuning")]
     pub set: Vec<String>,
 
-    /// Read options from a TOML file with a table per stage
+    /// Read options from a TOML file
     #[arg(long, value_name = "FILE.toml", help_heading = "Tuning")]
     pub config: Option<PathBuf>,
 

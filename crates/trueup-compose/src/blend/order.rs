@@ -114,6 +114,6 @@ fn too_many(count: usize, needed: usize, room: usize) -> Error {
         subject: format!("{count} photographs that meet at one place"),
         needed: format!("{} of memory for them", words(needed)),
         allowed: words(room),
-        hint: format!("Raise --memory (stitch.memory) by {}.", words(needed - room)),
+        hint: format!("Raise --memory (resources.memory) by {}.", words(needed - room)),
     }
 }

@@ -60,7 +60,7 @@ impl AllMasks {
     ///
     /// # Errors
     /// [`Error::Input`] if a photograph is not there or a mask cannot be read or has another size; [`Error::Cancelled`].
-    pub fn read(
+    pub(crate) fn read(
         files: &[MaskFile],
         images: &[SourceImage],
         options: &SourceOptions,
@@ -80,7 +80,7 @@ impl AllMasks {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn recall(
+    pub(crate) fn recall(
         &mut self,
         recorded: &[&[MaskRecord]],
         images: &[SourceImage],

@@ -14,7 +14,7 @@ use crate::project::record::Project;
 
 /// What a file beside the panorama is written from.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Writer {
+pub(super) enum SideOutputWriter {
     /// The panorama, while it is at hand.
     Panorama(fn(&Stitcher, &Alignment, &Rendered, &Path) -> Result<()>),
     /// The aligned photographs, when the panorama is written.
@@ -56,7 +56,7 @@ macro_rules! side_outputs {
                 check(path, options)
             }
 
-            pub(super) fn writer(self) -> Writer {
+            pub(super) fn writer(self) -> SideOutputWriter {
                 match self { $(Self::$variant => $writer,)* }
             }
         }
@@ -67,22 +67,22 @@ side_outputs! {
     /// Write the panorama's record (geometry, pairs, reasons, timings) as JSON
     Project("project", "FILE.json")
         checked by |path, _| encode::check_place(path),
-        written by Writer::Record(Project::to_json);
+        written by SideOutputWriter::Record(Project::to_json);
     /// Write the cameras as a project of the Hugin stitcher
     HuginProject("pto", "FILE.pto")
         checked by |path, _| encode::check_place(path),
-        written by Writer::Record(hugin_project);
+        written by SideOutputWriter::Record(hugin_project);
     /// Write the photographs as layers, aligned and corrected, one to a page (output.layer_extent)
     Layers("layers", "FILE.tif")
         checked by |path, _| encode::check_layers_place(path),
-        written by Writer::Photographs(|stitcher, alignment, path| stitcher.write_layers(alignment, path).map(drop));
+        written by SideOutputWriter::Photographs(|stitcher, alignment, path| stitcher.write_layers(alignment, path).map(drop));
     /// Write which photograph is shown where
     Seams("seams", "FILE.png")
         checked by |path, options| {
             encode::check_labels_place(path)?;
             if options.compose.render.blend.has_seams() { Ok(()) } else { Err(no_seams()) }
         },
-        written by Writer::Panorama(|stitcher, alignment, rendered, path| {
+        written by SideOutputWriter::Panorama(|stitcher, alignment, rendered, path| {
             stitcher.write_seams(alignment, rendered, path).map(drop)
         });
 }

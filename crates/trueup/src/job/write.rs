@@ -6,7 +6,7 @@ use trueup_core::Result;
 use trueup_io::encode;
 
 use super::outputs::Outputs;
-use super::side_outputs::{SideOutput, Writer};
+use super::side_outputs::{SideOutput, SideOutputWriter};
 use crate::pipeline::{Alignment, Stitcher};
 use crate::project::record::Project;
 
@@ -35,13 +35,13 @@ impl Outputs {
                 let metadata = stitcher.metadata(&alignment);
                 let bytes = encode::write(&self.panorama, &rendered.panorama, &metadata, &options, context)?;
                 for (kind, path) in &self.beside {
-                    if let Writer::Panorama(write) = kind.writer() {
+                    if let SideOutputWriter::Panorama(write) = kind.writer() {
                         write(stitcher, &alignment, &rendered, path)?;
                     }
                 }
                 drop(rendered);
                 for (kind, path) in &self.beside {
-                    if let Writer::Photographs(write) = kind.writer() {
+                    if let SideOutputWriter::Photographs(write) = kind.writer() {
                         write(stitcher, &alignment, path)?;
                     }
                 }
@@ -52,7 +52,7 @@ impl Outputs {
         alignment.record(told);
         let project = alignment.project;
         for (kind, path) in &self.beside {
-            if let Writer::Record(text) = kind.writer() {
+            if let SideOutputWriter::Record(text) = kind.writer() {
                 encode::write_atomically(path, text(&project)?.as_bytes())?;
             }
         }

@@ -13,7 +13,7 @@ pub(crate) struct Key([u8; blake3::OUT_LEN]);
 
 impl Key {
     /// Whether `text` is a key as it is written.
-    pub fn is_written(text: &str) -> bool {
+    pub(crate) fn is_written(text: &str) -> bool {
         blake3::Hash::from_hex(text).is_ok()
     }
 }
@@ -30,24 +30,24 @@ pub(crate) struct KeyMaker(blake3::Hasher);
 
 impl KeyMaker {
     /// Of a result of this program.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(blake3::Hasher::new()).bytes(PROGRAM.as_bytes())
     }
 
     /// Bytes, told apart from those before and after.
-    pub fn bytes(mut self, bytes: &[u8]) -> Self {
+    pub(crate) fn bytes(mut self, bytes: &[u8]) -> Self {
         self.0.update(&(bytes.len() as u64).to_le_bytes());
         self.0.update(bytes);
         self
     }
 
     /// Another key.
-    pub fn key(self, key: &Key) -> Self {
+    pub(crate) fn key(self, key: &Key) -> Self {
         self.bytes(&key.0)
     }
 
     /// Anything that can be written down: options, and what stages hand on.
-    pub fn part<T: Serialize + ?Sized>(self, part: &T) -> Self {
+    pub(crate) fn part<T: Serialize + ?Sized>(self, part: &T) -> Self {
         match rmp_serde::to_vec_named(part) {
             Ok(written) => self.bytes(&written),
             // Nothing that is written here can fail; were it so, the key would be nobody else's.
@@ -56,12 +56,12 @@ impl KeyMaker {
     }
 
     /// The content of a file.
-    pub fn file(mut self, file: std::fs::File) -> std::io::Result<Self> {
+    pub(crate) fn file(mut self, file: std::fs::File) -> std::io::Result<Self> {
         self.0.update_reader(file)?;
         Ok(self)
     }
 
-    pub fn finish(self) -> Key {
+    pub(crate) fn finish(self) -> Key {
         Key(*self.0.finalize().as_bytes())
     }
 }

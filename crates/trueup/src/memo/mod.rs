@@ -34,18 +34,18 @@ pub(crate) struct Memo<'a> {
 impl Memo<'_> {
     /// The key of a result of this kind, made from `input` by `options`; `None` where nothing is kept on the disk, or the
     /// input cannot be known again.
-    pub fn key(&self, kind: Kind, input: Option<KeyMaker>, options: &impl Serialize) -> Option<Key> {
+    pub(crate) fn key(&self, kind: Kind, input: Option<KeyMaker>, options: &impl Serialize) -> Option<Key> {
         self.disk?;
         Some(input?.part(&kind.0).part(options).finish())
     }
 
     /// The result of this key, if it is kept on the disk.
-    pub fn load<T: DeserializeOwned>(&self, kind: Kind, key: Option<&Key>) -> Option<T> {
+    pub(crate) fn load<T: DeserializeOwned>(&self, kind: Kind, key: Option<&Key>) -> Option<T> {
         self.disk?.load(kind, key?)
     }
 
     /// Keeps a result on the disk.
-    pub fn store<T: Serialize>(&self, kind: Kind, key: Option<&Key>, result: &T) {
+    pub(crate) fn store<T: Serialize>(&self, kind: Kind, key: Option<&Key>, result: &T) {
         if let (Some(disk), Some(key)) = (self.disk, key) {
             disk.store(kind, key, result);
         }
@@ -56,7 +56,7 @@ impl Memo<'_> {
     ///
     /// # Errors
     /// Those of `work`.
-    pub fn run<I: ?Sized, O: ?Sized, T: Serialize + DeserializeOwned>(
+    pub(crate) fn run<I: ?Sized, O: ?Sized, T: Serialize + DeserializeOwned>(
         &self,
         kind: Kind,
         key: Option<&Key>,
@@ -80,7 +80,7 @@ impl Memo<'_> {
     ///
     /// # Errors
     /// Those of `work`.
-    pub fn run_in_memory<I: ?Sized, O: Serialize + ?Sized, T: Clone + Send + Sync + 'static>(
+    pub(crate) fn run_in_memory<I: ?Sized, O: Serialize + ?Sized, T: Clone + Send + Sync + 'static>(
         &self,
         kind: Kind,
         from: &impl Serialize,

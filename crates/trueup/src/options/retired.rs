@@ -13,12 +13,12 @@ pub(super) enum Retired {
 
 impl Retired {
     /// What became of the option `name`, `table.option`; `None` if it never was one.
-    pub fn of(name: &str) -> Option<Self> {
+    pub(super) fn of(name: &str) -> Option<Self> {
         RETIRED.binary_search_by(|(old, _)| (*old).cmp(name)).ok().map(|found| RETIRED[found].1)
     }
 
     /// What to tell who sets the option `name`.
-    pub fn reason(self, name: &str) -> String {
+    pub(super) fn reason(self, name: &str) -> String {
         match self {
             Self::Renamed(new) => format!("\"{name}\" is now \"{new}\""),
             Self::Fixed("") => format!("\"{name}\" is no option any more"),
@@ -28,7 +28,7 @@ impl Retired {
     }
 
     /// Whether `value`, as a file of an earlier version has it, is what holds now.
-    pub fn is_now(self, value: &toml::Value) -> bool {
+    pub(super) fn is_now(self, value: &toml::Value) -> bool {
         let Self::Fixed(now) = self else { return false };
         let now = now.split_whitespace().next().unwrap_or_default();
         match value {

@@ -34,7 +34,7 @@ impl StitchOptions {
         Ok(())
     }
 
-    /// Sets one option from text, as in `stage.option=value`.
+    /// Sets one option from text, as in `table.option=value`.
     ///
     /// # Errors
     /// [`Error::Input`] if there is no such option or the value is of the wrong type.

@@ -49,7 +49,7 @@ pub(crate) struct Arrangement {
 
 impl ArrangeInput {
     /// What a stitch knows of a group of photographs.
-    pub fn of_geometry(placed: Vec<Placed>, component: &Component, geometry: Option<&Geometry>) -> Self {
+    pub(crate) fn of_geometry(placed: Vec<Placed>, component: &Component, geometry: Option<&Geometry>) -> Self {
         let cameras = geometry.map(|geometry| {
             let level_from_world = geometry.prior.level_from_world();
             let corrected = geometry.prior.corrected_cameras(&geometry.cameras.cameras);
@@ -68,7 +68,7 @@ impl ArrangeInput {
 
     /// What a project knows of the photographs used, whose grids are `placed` in its order: composing from the record starts
     /// here.
-    pub fn of_project(placed: Vec<Placed>, reference: usize, project: &Project) -> Self {
+    pub(crate) fn of_project(placed: Vec<Placed>, reference: usize, project: &Project) -> Self {
         let camera = |(record, placed): (&ImageRecord, &Placed)| {
             let camera_from_level = record.upright_rotation.or(record.rotation)?;
             let mesh = &placed.mesh;

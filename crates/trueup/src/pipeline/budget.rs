@@ -40,7 +40,7 @@ pub(crate) struct Budget {
 
 impl Budget {
     /// What the options allow on this machine.
-    pub fn new(options: &ResourceOptions) -> Self {
+    pub(super) fn new(options: &ResourceOptions) -> Self {
         match options.memory {
             MemoryBudget::Bytes(bytes) => {
                 let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
@@ -58,7 +58,7 @@ impl Budget {
     ///
     /// # Errors
     /// [`Error::Limits`] with the numbers if the largest is too large to be measured alone.
-    pub fn measuring(&self, images: &[SourceImage], working_pixels: f64) -> Result<Measuring> {
+    pub(super) fn measuring(&self, images: &[SourceImage], working_pixels: f64) -> Result<Measuring> {
         let bytes = |image: &SourceImage| image.width.saturating_mul(image.height).saturating_mul(PIXEL_BYTES);
         let Some(largest) = images.iter().max_by_key(|image| bytes(image)) else {
             return Ok(Measuring { at_once: usize::MAX, kept_bytes: 0 });
@@ -83,7 +83,7 @@ impl Budget {
     }
 
     /// What composing may take while `kept` bytes of photographs are held elsewhere.
-    pub fn composing<'a>(&self, kept: usize, scratch: &'a dyn ScratchSpace) -> Resources<'a> {
+    pub(super) fn composing<'a>(&self, kept: usize, scratch: &'a dyn ScratchSpace) -> Resources<'a> {
         let left = |bytes: usize| bytes.saturating_sub(PROGRAM_BYTES).saturating_sub(kept);
         Resources { memory: left(self.memory), ceiling: left(self.ceiling), scratch }
     }

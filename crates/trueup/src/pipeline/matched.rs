@@ -44,7 +44,7 @@ impl Matched {
     ///
     /// # Errors
     /// Of the measurements' errors the first that does not concern one photograph alone.
-    pub fn unmatched(set: PhotographSet, measurements: Measurements, graph_file: GraphFile) -> Result<Self> {
+    pub(crate) fn unmatched(set: PhotographSet, measurements: Measurements, graph_file: GraphFile) -> Result<Self> {
         let (mut measured, mut undecodable) = (Vec::new(), Vec::new());
         for outcome in measurements.photographs {
             let (one, error) = match outcome {
@@ -60,7 +60,7 @@ impl Matched {
     }
 
     /// Takes the features out, to be matched.
-    pub fn take_features(&mut self) -> LookedAt {
+    pub(crate) fn take_features(&mut self) -> LookedAt {
         let placeholder = WorkingFrame { width: 1.0, height: 1.0, working_from_full: 1.0 };
         let frame = |one: &Option<Measured>| one.as_ref().map_or(placeholder, |one| one.frame);
         let features = |one: &mut Option<Measured>| one.as_mut().map(|one| std::mem::take(&mut one.features));
@@ -75,7 +75,7 @@ impl Matched {
     ///
     /// # Errors
     /// [`Error::Input`] if the reference is no photograph's name.
-    pub fn component<'a>(&'a self, members: &[usize], inputs: &Inputs) -> Result<Component<'a>> {
+    pub(crate) fn component<'a>(&'a self, members: &[usize], inputs: &Inputs) -> Result<Component<'a>> {
         let reference = self.reference_of(members, inputs)?;
         let rotation_deg =
             self.graph_file.reference_rotation_deg.filter(|_| self.graph_file.reference == Some(reference));
@@ -84,12 +84,12 @@ impl Matched {
     }
 
     /// What decides the measurements of the group `members`; `None` where that is not known.
-    pub fn key_of(&self, members: &[usize]) -> Option<KeyMaker> {
+    pub(crate) fn key_of(&self, members: &[usize]) -> Option<KeyMaker> {
         members.iter().try_fold(KeyMaker::new(), |maker, &member| Some(maker.key(self.keys[member].as_ref()?)))
     }
 
     /// The small copies of a group's photographs.
-    pub fn small_photographs(&self, component: &Component) -> Vec<SmallPhotograph<'_>> {
+    pub(crate) fn small_photographs(&self, component: &Component) -> Vec<SmallPhotograph<'_>> {
         let small = |(&member, camera): (&usize, usize)| {
             let measured = self.measured[member].as_ref()?;
             Some(SmallPhotograph { thumbnail: &measured.thumbnail, frame: measured.thumbnail_frame, camera })
@@ -101,7 +101,7 @@ impl Matched {
     ///
     /// # Errors
     /// [`Error::Input`] if no photograph has the name.
-    pub fn reference_of(&self, members: &[usize], inputs: &Inputs) -> Result<usize> {
+    pub(crate) fn reference_of(&self, members: &[usize], inputs: &Inputs) -> Result<usize> {
         let wished = match &inputs.reference {
             Reference::Named(name) => Some(reference_named(&self.set.images, name)?),
             Reference::Auto => self.graph_file.reference,
@@ -110,7 +110,7 @@ impl Matched {
     }
 
     /// The error when not one photograph could be decoded.
-    pub fn none_usable(&self) -> Error {
+    pub(crate) fn none_usable(&self) -> Error {
         let undecodable = (0..self.set.images.len()).map(|index| {
             let LeftOut { reason, hint, .. } = self.why_left_out(index, &[]);
             (self.set.images[index].name.clone(), reason, hint)
@@ -120,7 +120,7 @@ impl Matched {
 
     /// Why a photograph is left out of the panorama at hand: it cannot be read, is in another one of those stitched, or in
     /// none of them.
-    pub fn why_left_out(&self, index: usize, stitched: &[Vec<usize>]) -> LeftOut {
+    pub(crate) fn why_left_out(&self, index: usize, stitched: &[Vec<usize>]) -> LeftOut {
         if let Some(error) = &self.undecodable[index] {
             let (reason, hint) = match error {
                 Error::Input { reason, hint, .. } => (reason.clone(), hint.clone()),
@@ -141,7 +141,7 @@ impl Matched {
     /// # Errors
     /// [`Error::Unsolvable`] if no two photographs overlap; [`Error::Input`] if none could be decoded, or the reference
     /// overlaps no other photograph.
-    pub fn groups(&self, inputs: &Inputs, context: &StageContext) -> Result<Vec<Vec<usize>>> {
+    pub(crate) fn groups(&self, inputs: &Inputs, context: &StageContext) -> Result<Vec<Vec<usize>>> {
         let decodable: Vec<usize> = (0..self.measured.len()).filter(|&index| self.measured[index].is_some()).collect();
         match decodable.as_slice() {
             [] => return Err(self.none_usable()),
@@ -205,7 +205,7 @@ impl Matched {
     ///
     /// # Errors
     /// [`Error::Input`] with the reason for each that would be.
-    pub fn require_all(&self, stitched: &[Vec<usize>]) -> Result<()> {
+    pub(crate) fn require_all(&self, stitched: &[Vec<usize>]) -> Result<()> {
         let PhotographSet { images, rejected, .. } = &self.set;
         let used: usize = stitched.iter().map(Vec::len).sum();
         let given = images.len() + rejected.len();
@@ -225,7 +225,7 @@ impl Matched {
     }
 
     /// Says what is in none of the groups `stitched`, and why.
-    pub fn report_left_out(&self, stitched: &[Vec<usize>], context: &StageContext) {
+    pub(crate) fn report_left_out(&self, stitched: &[Vec<usize>], context: &StageContext) {
         for index in 0..self.set.images.len() {
             if stitched.iter().any(|component| component.contains(&index)) {
                 continue;

@@ -12,6 +12,8 @@ pub(crate) mod matched;
 pub(crate) mod matching;
 pub(crate) mod measure;
 pub(crate) mod measured;
+#[cfg(test)]
+mod phases_tests;
 pub(crate) mod photographs;
 mod results;
 mod scratch;

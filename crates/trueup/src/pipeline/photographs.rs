@@ -39,7 +39,7 @@ impl PhotographSet {
     /// # Errors
     /// [`Error::Input`] if there is no photograph, or the reference or a mask fits none; [`Error::Limits`];
     /// [`Error::Cancelled`].
-    pub fn find(inputs: &Inputs, options: &StitchOptions, context: &StageContext) -> Result<Self> {
+    pub(crate) fn find(inputs: &Inputs, options: &StitchOptions, context: &StageContext) -> Result<Self> {
         let accepted = &options.measure.source;
         let Sources { images, rejected } =
             context.time("source", || source::scan(&inputs.photographs, accepted, context))?;
@@ -57,7 +57,7 @@ impl PhotographSet {
     ///
     /// # Errors
     /// [`Error::Limits`] if one is too large for the memory.
-    pub fn open(
+    pub(crate) fn open(
         images: Vec<SourceImage>,
         rejected: Vec<RejectedSource>,
         masks: AllMasks,
@@ -72,7 +72,7 @@ impl PhotographSet {
     }
 
     /// The names by which people know the photographs.
-    pub fn names(&self) -> Vec<String> {
+    pub(crate) fn names(&self) -> Vec<String> {
         self.images.iter().map(|image| image.name.clone()).collect()
     }
 
@@ -81,7 +81,7 @@ impl PhotographSet {
     ///
     /// # Errors
     /// [`Error::Cancelled`].
-    pub fn keys(&self, context: &StageContext) -> Result<Vec<Option<KeyMaker>>> {
+    pub(crate) fn keys(&self, context: &StageContext) -> Result<Vec<Option<KeyMaker>>> {
         let color_space = self.files.colors().map(|colors| (colors.name(), colors.icc().map(<[u8]>::to_vec)));
         let key = |index: usize| -> Result<Option<KeyMaker>> {
             context.check_cancelled()?;

@@ -158,7 +158,7 @@ pub(crate) fn record_composition(
             project.diagnostics.push(Diagnostic::note(
                 "photograph-replaced",
                 Subject::Photograph(position),
-                format!("{path} is shown"),
+                format!("it is shown in place of {}", record.path),
                 "",
             ));
         }

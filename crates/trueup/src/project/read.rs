@@ -40,7 +40,7 @@ impl Recorded {
     ///
     /// # Errors
     /// [`Error::Options`]; [`Error::Input`] if grids, corrections, canvas or reference are missing or cannot be.
-    pub fn new(project: &Project) -> Result<Self> {
+    pub(crate) fn new(project: &Project) -> Result<Self> {
         project.options.validate()?;
         let used: Vec<usize> =
             (0..project.images.len()).filter(|&at| project.images[at].status == ImageStatus::Used).collect();

@@ -179,7 +179,7 @@ pub struct Project {
     /// Size of the panorama.
     pub canvas: Canvas,
     /// Name of the color space it was composed in; empty in files of programs that knew one only.
-    #[serde(default)]
+    #[serde(default, alias = "colour_space")]
     pub color_space: String,
     /// What the cameras' response adds to that space's transfer curve: all factors act on the light by it. Nothing in files
     /// of programs that estimated none.

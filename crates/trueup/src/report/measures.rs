@@ -10,9 +10,11 @@ use trueup_compose::layout::CanvasLayout;
 use trueup_core::matches::PointMatch;
 use trueup_core::mesh::GridMesh;
 
-use super::evaluation::HUNDREDTHS;
 use crate::pipeline::align::Geometry;
 use crate::pipeline::align::component::Component;
+
+/// The paper prints LD in hundredths.
+pub(crate) const HUNDREDTHS: f64 = 100.0;
 
 /// Measures of a panorama that need no truth. Angles in degrees, positive clockwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

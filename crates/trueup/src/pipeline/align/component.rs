@@ -28,7 +28,7 @@ pub(crate) struct Component<'a> {
 
 impl<'a> Component<'a> {
     /// Cuts a component out of the measured photographs; pairs are renumbered to local indices.
-    pub fn new(
+    pub(crate) fn new(
         members: &[usize],
         reference: usize,
         reference_rotation: f64,

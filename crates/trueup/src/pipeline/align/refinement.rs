@@ -39,7 +39,7 @@ impl RefinementSources {
     ///
     /// # Errors
     /// Those of decoding; [`trueup_core::Error::Cancelled`].
-    pub fn new(
+    pub(super) fn new(
         component: &Component,
         grids: &[GridMesh],
         warps: &[OverlapWarp],
@@ -87,7 +87,7 @@ impl RefinementSources {
     }
 
     /// The refinements that the options ask for. `met` are the pairs whose overlaps are to coincide.
-    pub fn refinements<'a>(
+    pub(super) fn refinements<'a>(
         &'a self,
         component: &'a Component,
         met: &'a [PairMatches],

@@ -17,7 +17,7 @@ pub(super) struct Turn {
 }
 
 impl Turn {
-    pub fn new(cut: &FullTurnCut, warps: &[OverlapWarp]) -> Self {
+    pub(super) fn new(cut: &FullTurnCut, warps: &[OverlapWarp]) -> Self {
         let is_within =
             |warp: &&OverlapWarp| cut.severed.binary_search(&(warp.from.min(warp.to), warp.from.max(warp.to))).is_err();
         let across = warps.iter().filter_map(|warp| Some((warp.clone(), cut.turns(warp.from, warp.to)?)));
@@ -26,7 +26,7 @@ impl Turn {
     }
 
     /// What closes the turn, whose length is `expected` by the cameras.
-    pub fn closure(&self, expected: f64) -> Option<Closure<'_>> {
+    pub(super) fn closure(&self, expected: f64) -> Option<Closure<'_>> {
         (!self.across.is_empty()).then(|| Closure { warps: &self.across, turns: &self.turns, expected })
     }
 }

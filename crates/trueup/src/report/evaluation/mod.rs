@@ -16,12 +16,10 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::truth::{ImageTruth, Truth};
 use trueup_core::{Error, Result};
 
+use super::measures::HUNDREDTHS;
 use crate::project::read::used_grids;
 use crate::project::record::{ImageRecord, Project};
 pub use pixels::{PixelEvaluation, compare_overlaps, evaluate_pixels, scale_up_to};
-
-/// The paper prints LD in hundredths.
-pub(crate) const HUNDREDTHS: f64 = 100.0;
 
 /// A panorama measured against the truth. Angles in degrees.
 ///

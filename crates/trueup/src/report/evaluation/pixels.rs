@@ -93,7 +93,7 @@ pub fn compare_overlaps(
     context: &StageContext,
 ) -> Result<PixelEvaluation> {
     let records: Vec<&ImageRecord> = project.used_images().collect();
-    let layout = layout(used_grids(&records)?, positions, (scale, project.grid_canvas()));
+    let layout = layout(used_grids(&records)?, positions, project.grid_canvas(), scale);
     let corrections = recorded_corrections(project, &records)?;
 
     let input = RenderInput { layout: &layout, corrections: &corrections, photographs };
@@ -162,8 +162,8 @@ fn bounds(meshes: &[GridMesh]) -> (nalgebra::Vector2<f64>, nalgebra::Vector2<f64
     all.reduce(|all, one| (all.0.inf(&one.0), all.1.sup(&one.1))).unwrap_or_default()
 }
 
-/// The grids of the photographs at `positions` on a canvas of this scale.
-fn layout(meshes: Vec<GridMesh>, positions: &[usize], (scale, panorama): (f64, Canvas)) -> CanvasLayout {
+/// The grids of the photographs at `positions` on a canvas of this scale, relative to the panorama's.
+fn layout(meshes: Vec<GridMesh>, positions: &[usize], panorama: Canvas, scale: f64) -> CanvasLayout {
     let (low, high) = bounds(&meshes);
     let period = panorama.full_turn.then(|| (panorama.width as f64 * scale).round().max(1.0));
     // A turn is a whole number of pixels.
