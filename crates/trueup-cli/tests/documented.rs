@@ -59,7 +59,7 @@ const MISTAKES: &[Mistake] = &[
     mistake("option of the wrong kind", &["stitch", "a.jpg", "-o", "pano.jpg", "--seed", "soon"]),
     mistake("unknown option", &["stitch", "a.jpg", "-o", "pano.jpg", "--set", "mesh.cell=3"]),
     mistake("no configuration file", &["stitch", "a.jpg", "-o", "pano.jpg", "--config", "none.toml"]),
-    mistake("unknown stage in it", &["stitch", "a.jpg", "-o", "pano.jpg", "--config", "mine.toml"]),
+    mistake("unknown table in it", &["stitch", "a.jpg", "-o", "pano.jpg", "--config", "mine.toml"]),
     mistake("unknown method to compare", &["compare", "a.jpg", "b.jpg", "-o", "out", "--methods", "magic"]),
     mistake("entry without a name", &["compare", "a.jpg", "b.jpg", "-o", "out", "--entry", "mesh.cell_px=20"]),
     mistake(
