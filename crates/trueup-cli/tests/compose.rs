@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::pictures::{HEIGHT, STREET_NAMES, WIDTH, jpeg, plain, street_desk, street_pixels};
+use crate::pictures::{HEIGHT, STREET_NAMES, WIDTH, jpeg, noise, plain, street_desk, street_pixels};
 use crate::run::{Desk, FinishedRun, finish, trueup};
 
 /// A folder with the street's photographs, their panorama `pano.jpg` and its project `pano.json`.
@@ -54,6 +54,24 @@ fn a_response_is_recorded() {
     compose(&desk, &["--set", "exposure.response=false", "--project", "again.json"]).expect_success();
     assert!(desk.read("pano.jpg") != desk.read("again.jpg"));
     assert_eq!(desk.json("again.json")["response"], json!([0.0, 0.0, 0.0, 0.0]));
+}
+
+/// Photographs left out of the panorama keep their numbers: a finding names the one that it is about.
+#[test]
+fn findings_of_composing_name_the_photographs_they_are_about() {
+    let desk = street_desk();
+    desk.put("0.jpg", noise(1, 320, 240));
+    desk.stitch(&[&["0.jpg"][..], &STREET_NAMES, &["--project", "pano.json"]].concat()).expect_success();
+    compose(&desk, &["--projection", "perspective", "--fov", "5", "--project", "again.json"]).expect_success();
+    let project = desk.json("again.json");
+    let of_view = |finding: &&Value| finding["code"] == "projection-left-out";
+    let findings: Vec<&Value> = project["diagnostics"].as_array().expect("findings").iter().filter(of_view).collect();
+    assert!(!findings.is_empty(), "nothing lies outside of five degrees: {}", project["diagnostics"]);
+    for finding in findings {
+        let photograph = finding["subject"]["photograph"].as_u64().expect("a number");
+        assert_eq!(project["images"][photograph as usize]["status"], "used", "{finding}");
+    }
+    assert_eq!(project["images"][0]["status"], "left_out");
 }
 
 /// Composing with a view gives what stitching with it does, from projects of the same view, of none, and cropped.

@@ -78,7 +78,7 @@ fn checked(args: CompareArgs) -> Result<(CompareJob, StitchOptions), Failure> {
     Ok((job, options))
 }
 
-/// The panoramas' format that was typed, or that of most photographs.
+/// The panoramas' format that was typed; JPEG without one.
 fn format(typed: Option<&str>) -> Result<PanoramaFormat, Failure> {
     let Some(typed) = typed else { return Ok(PanoramaFormat::Jpeg) };
     PanoramaFormat::named(typed).ok_or_else(|| {

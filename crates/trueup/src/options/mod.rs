@@ -231,7 +231,7 @@ phases! {
 impl StitchOptions {
     /// The tables that composing a recorded panorama takes options from, in words.
     pub fn composing_tables() -> String {
-        let composing = Self::tables().into_iter().filter(|(_, phase)| !is_geometry(*phase));
+        let composing = Self::tables().into_iter().filter(|(table, phase)| !is_geometry(table, *phase));
         composing.map(|(table, _)| table).collect::<Vec<_>>().join(", ")
     }
 
@@ -265,7 +265,7 @@ impl StitchOptions {
     pub fn differing_geometry(&self, recorded: &Self) -> Result<Vec<String>> {
         let (own, recorded) = (self.to_table()?, recorded.to_table()?);
         let mut differing = Vec::new();
-        for (stage, _) in Self::tables().into_iter().filter(|(_, phase)| is_geometry(*phase)) {
+        for (stage, _) in Self::tables().into_iter().filter(|(table, phase)| is_geometry(table, *phase)) {
             let table =
                 |table: &toml::Table| table.get(stage).and_then(toml::Value::as_table).cloned().unwrap_or_default();
             let recorded = table(&recorded);
@@ -276,9 +276,10 @@ impl StitchOptions {
     }
 }
 
-/// Whether options of this phase take part in the geometry.
-fn is_geometry(phase: Option<Phase>) -> bool {
-    phase.is_some_and(|phase| phase <= Phase::Align)
+/// Whether the options of a table of this phase take part in the geometry. Files are found and judged anew whenever a
+/// panorama is composed.
+fn is_geometry(table: &str, phase: Option<Phase>) -> bool {
+    table != SourceOptions::STAGE && phase.is_some_and(|phase| phase <= Phase::Align)
 }
 
 #[cfg(test)]

@@ -239,7 +239,8 @@ impl<'a> Stitcher<'a> {
         let layout = arrangement.written;
         let corrections = corrections.of_placed(&layout, |photograph| members.binary_search(&photograph).ok());
         let directions = geometry.map(|geometry| geometry.triads.clone()).unwrap_or_default();
-        Ok(Alignment { project, layout, corrections, photographs: photographs.clone(), directions })
+        let photographs = photographs.clone();
+        Ok(Alignment { project, layout, corrections, photographs, directions, positions: None })
     }
 
     /// The geometry that `project` records, over `images` with their `masks`: those used in it, in its order, or others of
@@ -270,7 +271,8 @@ impl<'a> Stitcher<'a> {
             let layout = arrangement.written;
             // Photographs are numbered by their place among those used.
             let corrections = corrections.of_placed(&layout, Some);
-            Ok(Alignment { project, layout, corrections, photographs: set.files, directions: Vec::new() })
+            let (photographs, directions) = (set.files, Vec::new());
+            Ok(Alignment { project, layout, corrections, photographs, directions, positions: Some(used) })
         })?;
         let (mut alignment, told) = recalled.split();
         alignment.record(told);

@@ -66,6 +66,8 @@ pub struct Alignment {
     pub(super) corrections: Corrections,
     pub(super) photographs: Arc<FilePhotographs>,
     pub(super) directions: Vec<TriadOutcome>,
+    /// Positions in [`Project::images`] of the photographs that the layout numbers, where these numbers are others.
+    pub(super) positions: Option<Vec<usize>>,
 }
 
 impl Alignment {
@@ -90,8 +92,12 @@ impl Alignment {
         &self.directions
     }
 
-    /// Adds what a later stage told to the record.
-    pub fn record(&mut self, told: Reported<()>) {
+    /// Adds what a later stage told, of photographs as the layout numbers them, to the record.
+    pub(crate) fn record(&mut self, told: Reported<()>) {
+        let told = match &self.positions {
+            Some(positions) => told.renumbered(|number| positions.get(number).copied().unwrap_or(number)),
+            None => told,
+        };
         self.project.diagnostics.extend(told.findings);
         for (stage, seconds) in told.seconds {
             *self.project.seconds.entry(stage).or_default() += seconds;

@@ -126,11 +126,12 @@ pub(crate) fn place(component: &Component, geometry: Option<&Geometry>) -> Vec<P
 }
 
 /// What is found on the way from the geometry to the panorama, each time anew.
-const FOUND_IN_COMPOSING: [&str; 8] = [
+const FOUND_IN_COMPOSING: [&str; 9] = [
     "canvas-reduced",
     "color-converted",
     "color-profile-damaged",
     "color-profile-ignored",
+    "gaps-filled",
     "grid-folded",
     "photograph-replaced",
     "projection-cut",
