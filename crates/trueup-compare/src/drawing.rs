@@ -36,7 +36,7 @@ pub struct PhotographGrid {
 /// Steps along a segment, in the photograph's working pixels: a bend of the grid's cells, which are about as large, shows.
 const STEP_PX: f64 = 20.0;
 
-/// Line segments drawn over each photograph, the longest first: more make the picture unreadable.
+/// Line segments drawn over each photograph, the longest first: more make the photograph unreadable.
 const DRAWN_LINES: usize = 150;
 /// Grid lines drawn over each photograph in either direction, its borders among them: as many as can be followed by eye.
 const DRAWN_GRID_LINES: usize = 13;

@@ -29,6 +29,27 @@ const MAX_PIXELS: f64 = 24e6;
 const SCALES: std::ops::RangeInclusive<f64> = 0.001..=16.0;
 
 /// What to compare, and where to put it.
+///
+/// ```
+/// use trueup::{Inputs, StageContext, StitchOptions};
+/// use trueup_compare::{CompareJob, ComparisonEntry, PanoramaFormat};
+/// # let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
+/// # let desk = tempfile::tempdir()?;
+/// let job = CompareJob {
+///     inputs: Inputs::new([room]),
+///     entries: vec![ComparisonEntry::method("vpg")?, ComparisonEntry::method("autostitch")?],
+///     truth: None,
+///     ranked: None,
+///     scale: Some(0.1),
+///     format: PanoramaFormat::Jpeg,
+///     output: desk.path().join("compared"),
+///     cache: None,
+///     threads: 0,
+/// };
+/// let compared = job.run(&StitchOptions::default(), &StageContext::default(), &|_, _| Ok(Vec::new()))?;
+/// assert!(compared.entries.iter().all(|entry| entry.panorama.is_some()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct CompareJob {
     /// The photographs. Of several groups that do not overlap, the largest is compared, whatever [`Inputs::all`] says.

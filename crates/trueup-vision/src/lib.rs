@@ -1,7 +1,7 @@
 #![warn(unreachable_pub)]
 //! Pixels to measurements: SIFT features, matching, pairing and line segments.
 //!
-//! Positions are in the pixels of the picture given (working pixels in the pipeline), corner at (0, 0), the center of
+//! Positions are in the pixels of the photograph given (working pixels in the pipeline), corner at (0, 0), the center of
 //! the first pixel at (0.5, 0.5).
 
 pub mod features;

@@ -41,10 +41,10 @@ pub use project::{
     Project, ProjectionRecord, hugin_project,
 };
 pub use report::evaluation::{
-    Evaluation, PictureEvaluation, PixelEvaluation, compare_overlaps, evaluate, evaluate_pixels, read_truth,
+    Evaluation, PhotographEvaluation, PixelEvaluation, compare_overlaps, evaluate, evaluate_pixels, read_truth,
     scale_up_to,
 };
-pub use report::measures::{BentLine, LongLines, Measures, PictureMeasures, ReprojectionMeasures, UprightMeasures};
+pub use report::measures::{BentLine, LongLines, Measures, PhotographMeasures, ReprojectionMeasures, UprightMeasures};
 pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;

@@ -60,9 +60,9 @@ const REFUSED_HINT: &str =
 /// global similarity priors alone.
 ///
 /// # Errors
-/// [`Error::Unsolvable`] if there are no photographs, the lists differ in length, an edge or the reference names a
+/// [`trueup_core::Error::Unsolvable`] if there are no photographs, the lists differ in length, an edge or the reference names a
 /// photograph that does not exist, a camera is not finite, or overlaps come without a usable grid;
-/// [`Error::Cancelled`].
+/// [`trueup_core::Error::Cancelled`].
 ///
 /// # Source
 /// The paper's sections on the vanishing point guided prior; see the modules for equations and departures.

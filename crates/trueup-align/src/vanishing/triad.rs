@@ -19,7 +19,7 @@ pub struct Triad {
     /// Covariance of the rotation vector d, in radians squared, for the perturbation `V exp([d]x)` of the matrix V.
     pub covariance: [[f64; 3]; 3],
     /// Standard deviation in radians of the roll that the direction closest to the photograph's vertical predicts;
-    /// `None` if none is within 45 degrees of the picture plane's vertical.
+    /// `None` if none is within 45 degrees of the photograph plane's vertical.
     pub roll_sd: Option<f64>,
 }
 

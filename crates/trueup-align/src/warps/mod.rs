@@ -53,8 +53,8 @@ trueup_core::choice! {
 /// Places the photographs by a warp model.
 ///
 /// # Errors
-/// [`Error::Options`]; [`Error::Unsolvable`] for lists of different lengths; [`Error::NotApplicable`] if the model
-/// cannot place these photographs, with the angle they reach; [`Error::Cancelled`].
+/// [`trueup_core::Error::Options`]; [`trueup_core::Error::Unsolvable`] for lists of different lengths; [`trueup_core::Error::NotApplicable`] if the model
+/// cannot place these photographs, with the angle they reach; [`trueup_core::Error::Cancelled`].
 pub fn run(
     model: WarpModel,
     input: &WarpInput<'_>,

@@ -1,6 +1,6 @@
 //! What the panorama's own lines and matches say of it.
 
-use trueup::{Measures, PictureMeasures, Project};
+use trueup::{Measures, PhotographMeasures, Project};
 
 use super::labeled_lines::LabeledLines;
 use super::names::name_of;
@@ -89,7 +89,7 @@ pub(super) fn table(lines: &mut LabeledLines, project: &Project, names: &[String
 }
 
 /// "leans by 0.21 degrees (+- 0.05, 34 vertical lines)"
-fn lean(picture: &PictureMeasures) -> String {
+fn lean(picture: &PhotographMeasures) -> String {
     let lines = match picture.vertical_lines {
         0 => "no vertical lines".to_owned(),
         1 => "1 vertical line".to_owned(),

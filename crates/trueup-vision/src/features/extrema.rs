@@ -11,7 +11,7 @@ use super::simd::{InstructionSet, Lanes, MAX_LANES, VectorKernel};
 /// Largest ratio of the two principal curvatures of a point; above it, it lies on an edge (Lowe 2004, section 4.1).
 const MAX_CURVATURE_RATIO: f64 = 10.0;
 
-/// Responses below this many gray levels are rounding errors of a flat picture.
+/// Responses below this many gray levels are rounding errors of a flat photograph.
 const ROUNDING_NOISE: f32 = 1e-3;
 
 /// A sample may fall this much short of the peak threshold, because the interpolated peak is higher.

@@ -30,7 +30,7 @@ use simd::InstructionSet;
 /// A photograph with fewer points than this is searched again, doubled: finer detail for four times the work.
 const SPARSE_POINTS: usize = 1000;
 
-/// Most pixels of a picture that is searched, the doubled picture's own where it is doubled.
+/// Most pixels of a photograph that is searched, the doubled photograph's own where it is doubled.
 const MAX_PIXELS: usize = 1 << 28;
 
 /// Points described by one task.
@@ -41,12 +41,12 @@ const NEIGHBOR_ROWS: usize = 16;
 
 /// Finds and describes the features of a photograph.
 ///
-/// `image` has one channel of 0 to 255. A picture too small or too flat has no features; one in which few are found is
+/// `image` has one channel of 0 to 255. A photograph too small or too flat has no features; one in which few are found is
 /// searched again at double size. The result is the same for any number of threads and every vector width; only the
 /// system's sine and cosine may differ between machines, in the last bit.
 ///
 /// # Errors
-/// [`Error::Options`] for options out of range, [`Error::Input`] for a picture of several channels,
+/// [`Error::Options`] for options out of range, [`Error::Input`] for a photograph of several channels,
 /// [`Error::Limits`] for one too large, [`Error::Cancelled`].
 ///
 /// # Source
@@ -60,7 +60,7 @@ pub fn detect(image: &Raster<f32>, options: &FeatureOptions, context: &StageCont
     detect_at(SearchSize::Doubled, image, options, instructions, context)
 }
 
-/// Whether the doubled picture is within the limit.
+/// Whether the doubled photograph is within the limit.
 fn may_double(image: &Raster<f32>) -> bool {
     image.width().saturating_mul(image.height()) <= MAX_PIXELS / 4
 }

@@ -13,7 +13,7 @@ pub(super) struct Grid {
     pub(super) angle: f64,
 }
 
-/// Gray values at `N` x `N` grid points, by bilinear interpolation. Outside the picture its edge is continued.
+/// Gray values at `N` x `N` grid points, by bilinear interpolation. Outside the photograph its edge is continued.
 #[inline(always)]
 pub(super) fn sample<const N: usize>(plane: &BlurredPlane, grid: &Grid) -> [[f32; N]; N] {
     // The last sample is left to the one before it, with a weight of nearly one.

@@ -1,4 +1,4 @@
-//! The Gaussian scale space: octaves of ever more blurred copies of the picture.
+//! The Gaussian scale space: octaves of ever more blurred copies of the photograph.
 
 use rayon::prelude::*;
 use trueup_core::raster::Raster;
@@ -27,14 +27,14 @@ const BAND_ROWS: usize = 32;
 /// Columns blurred together, so that all rows a kernel touches stay in the first-level cache.
 const STRIP_COLUMNS: usize = 256;
 
-/// One blurred copy of the picture, rows padded for vector loads.
+/// One blurred copy of the photograph, rows padded for vector loads.
 #[derive(Debug, Clone, Default)]
 pub(super) struct BlurredPlane {
     /// Samples in a row.
     pub(super) width: usize,
     /// Rows.
     pub(super) height: usize,
-    /// Distance of two rows in `data`; what lies between is arbitrary but finite where the picture is.
+    /// Distance of two rows in `data`; what lies between is arbitrary but finite where the photograph is.
     pub(super) stride: usize,
     /// `height * stride` samples and a padding of [`MAX_LANES`] + 1.
     pub(super) data: Vec<f32>,
@@ -63,7 +63,7 @@ impl BlurredPlane {
 /// The copies of one octave.
 #[derive(Debug)]
 pub(super) struct Octave {
-    /// Distance of two samples, in the picture's pixels: a power of two.
+    /// Distance of two samples, in the photograph's pixels: a power of two.
     pub(super) step_px: f64,
     /// [`LEVELS_PER_OCTAVE`] + 3 planes; plane s has blur [`BASE_SIGMA`] 2^(s / [`LEVELS_PER_OCTAVE`]) samples.
     pub(super) planes: Vec<BlurredPlane>,
@@ -78,13 +78,13 @@ pub(super) enum SearchSize {
     Doubled,
 }
 
-/// Builds all octaves of a picture of one channel.
+/// Builds all octaves of a photograph of one channel.
 ///
 /// # Source
 /// Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004, section 3.
 ///
 /// # Departures
-/// The doubled picture takes the samples between two pixels by cubic interpolation (Lowe: linear), which keeps more
+/// The doubled photograph takes the samples between two pixels by cubic interpolation (Lowe: linear), which keeps more
 /// of the fine detail. Kernels are cut at three standard deviations, and their width corrected so that the variance
 /// is exact.
 pub(super) fn build(
@@ -182,7 +182,7 @@ fn halved(source: &BlurredPlane) -> BlurredPlane {
     target
 }
 
-/// Convolves with a Gaussian of standard deviation `sigma` samples; the picture's edge is continued outwards.
+/// Convolves with a Gaussian of standard deviation `sigma` samples; the photograph's edge is continued outwards.
 fn blurred(source: &BlurredPlane, sigma: f64, instructions: InstructionSet) -> BlurredPlane {
     let taps = gaussian_taps(sigma);
     let mut target = BlurredPlane::new(source.width, source.height);

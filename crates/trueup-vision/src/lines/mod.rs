@@ -1,8 +1,8 @@
 //! Straight line segments: our own LSD (Line Segment Detector) with a sub-pixel refinement of their directions.
 //!
-//! The steps, a file each: `gradient` reduces the picture and finds level-line directions, `region` grows connected
+//! The steps, a file each: `gradient` reduces the photograph and finds level-line directions, `region` grows connected
 //! pixels of one direction, `rectangle` fits and improves rectangles, `significance` counts false alarms,
-//! `refine` fits the segment again to sub-pixel edge points of the picture itself, `tidy` drops frame artifacts,
+//! `refine` fits the segment again to sub-pixel edge points of the photograph itself, `tidy` drops frame artifacts,
 //! sorts and, for those who ask, merges.
 //!
 //! # Source
@@ -16,7 +16,7 @@
 //! * The rectangle keeps both of its sides apart from its axis, and the segment stays on the axis through the center
 //!   of mass when one side is cut away; the papers move the axis to the middle of what remains.
 //! * Tolerances of regrown regions never exceed the first one.
-//! * The border of the picture is mirrored at the edge of its outermost pixels.
+//! * The border of the photograph is mirrored at the edge of its outermost pixels.
 
 use rayon::prelude::*;
 use trueup_core::lines::LineSegment;
@@ -49,7 +49,7 @@ trueup_core::options! {
     }
 }
 
-/// Smallest -log10 of the number of false alarms a segment may have: one false segment a picture (IPOL, section 2.7).
+/// Smallest -log10 of the number of false alarms a segment may have: one false segment a photograph (IPOL, section 2.7).
 const MIN_SIGNIFICANCE: f64 = 0.0;
 
 /// Segments shorter than this are not refined, in pixels: too few edge points.
@@ -58,7 +58,7 @@ const MIN_REFINED_LENGTH_PX: f64 = 12.0;
 /// At most this many segments are returned, the longest.
 const MAX_SEGMENTS: usize = 100_000;
 
-/// Most pixels of a picture: positions in the gradient field are 32-bit.
+/// Most pixels of a photograph: positions in the gradient field are 32-bit.
 const MAX_PIXELS: usize = 1 << 31;
 
 /// Seeds between two looks at the cancel token.

@@ -1,7 +1,7 @@
-//! Fits segments again to sub-pixel edge points of the unreduced picture.
+//! Fits segments again to sub-pixel edge points of the unreduced photograph.
 //!
 //! A rectangle's axis comes from whole pixels of a region whose outline is ragged, so that its direction is off by more
-//! than the picture's pixels force it to be. Here an edge point is measured on each pixel row (or column, for flat
+//! than the photograph's pixels force it to be. Here an edge point is measured on each pixel row (or column, for flat
 //! segments) that the segment crosses, from the pixels as they are, without interpolation between them, and a line is
 //! fitted robustly.
 
@@ -55,7 +55,7 @@ const MIN_POINTS: usize = 6;
 /// A fit that moves an end by more than this, in pixels, has followed another edge and is not used.
 const MAX_SHIFT_PX: f64 = 2.0;
 
-/// Measures edge points in a picture.
+/// Measures edge points in a photograph.
 #[derive(Debug)]
 pub(super) struct EdgeProfiles<'a> {
     image: &'a Raster<f32>,
@@ -245,7 +245,7 @@ impl Scan<'_> {
     }
 }
 
-/// A row or a column of the picture.
+/// A row or a column of the photograph.
 struct Profile<'a> {
     samples: &'a [f32],
     start: usize,
@@ -311,7 +311,7 @@ fn weighted_line(points: &[EdgePoint], fit: &Fit, cutoff: f64) -> Option<Fit> {
 mod tests {
     use super::*;
 
-    /// Edges straight down a picture, so that every row sees the same phase: `blur_px` wide, of any sub-pixel position.
+    /// Edges straight down a photograph, so that every row sees the same phase: `blur_px` wide, of any sub-pixel position.
     fn position_error(blur_px: f64, phase: f64) -> f64 {
         const SUBSAMPLES: usize = 200;
         let edge = 12.0 + phase;

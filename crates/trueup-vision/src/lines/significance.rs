@@ -14,7 +14,7 @@ const TAIL_TOLERANCE: f64 = 1e-3;
 /// The number of false alarms (NFA) of rectangles in a field of given size.
 #[derive(Debug)]
 pub(super) struct FalseAlarms {
-    /// log10 of the number of rectangles, times precisions, that a picture of this size has.
+    /// log10 of the number of rectangles, times precisions, that a photograph of this size has.
     log10_tests: f64,
     /// ln n! for small n.
     ln_factorials: Vec<f64>,

@@ -19,7 +19,7 @@ fn coverage(distance: f64, a: f64, b: f64) -> f64 {
     (ramp(distance + sum) - ramp(distance + difference) - ramp(distance - difference) + ramp(distance - sum)) / (a * b)
 }
 
-/// A picture dark on one side and bright on the side of the normal of the line through `point`.
+/// A photograph dark on one side and bright on the side of the normal of the line through `point`.
 fn half_plane(size: usize, point: [f64; 2], normal_angle: f64) -> Raster<f32> {
     let (b, a) = normal_angle.sin_cos();
     let samples = (0..size * size).map(|index| {
@@ -39,7 +39,7 @@ fn noise(width: usize, height: usize, sigma: f64) -> Raster<f32> {
     Raster::from_data(width, height, 1, samples.collect()).expect("sizes agree")
 }
 
-/// Overlapping tilted steps: a picture with many segments.
+/// Overlapping tilted steps: a photograph with many segments.
 fn steps(size: usize) -> Raster<f32> {
     let mut picture = noise(size, size, 2.0);
     for index in 0..12 {
@@ -142,7 +142,7 @@ fn refinement_makes_noisy_directions_better() {
 
 #[test]
 fn noise_has_hardly_any_segments() {
-    // One false alarm a picture is what a significance of 0 stands for.
+    // One false alarm a photograph is what a significance of 0 stands for.
     let picture = noise(300, 200, 30.0);
     let segments = found(&picture);
     assert!(segments.len() <= 3, "{} segments", segments.len());
@@ -248,7 +248,7 @@ fn an_interrupted_edge_is_merged_if_asked_to() {
     assert!(distance.abs() < 0.1 && turn.abs() < 0.1, "{distance} px, {turn} deg");
 }
 
-/// The picture turned by a quarter: what was at (x, y) is at (height - y, x).
+/// The photograph turned by a quarter: what was at (x, y) is at (height - y, x).
 fn quarter_turn(image: &Raster<f32>) -> Raster<f32> {
     let mut turned = Raster::new(image.height(), image.width(), 1);
     for y in 0..image.height() {
@@ -271,7 +271,7 @@ proptest! {
         prop_assert!(distance.abs() < 0.05 && turn.abs() < 0.03, "{} px, {} deg", distance, turn);
     }
 
-    /// A picture turned by a quarter has its segments turned, up to the order in which equal pixels are visited.
+    /// A photograph turned by a quarter has its segments turned, up to the order in which equal pixels are visited.
     #[test]
     fn a_quarter_turn_turns_the_segments(angle in 0.0..std::f64::consts::TAU, x in 30.0..50.0) {
         let image = half_plane(80, [x, 40.0], angle);
@@ -286,7 +286,7 @@ proptest! {
         }
     }
 
-    /// Nothing in a picture makes the detector fail.
+    /// Nothing in a photograph makes the detector fail.
     #[test]
     fn any_small_picture_is_survived(width in 1_usize..24, height in 1_usize..24, seed in any::<u64>()) {
         let mut generator = StageContext::default().generator("any", seed);

@@ -102,7 +102,7 @@ mod tests {
         WorkingFrame::new(800, 600, 480_000.0)
     }
 
-    /// Pictures of horizontal field of view `view_deg`, the second turned right by `turn_deg`.
+    /// Photographs of horizontal field of view `view_deg`, the second turned right by `turn_deg`.
     fn turned(view_deg: f64, turn_deg: f64) -> Homography {
         let focal = 400.0 / (view_deg / 2.0).to_radians().tan();
         let k = Matrix3::new(focal, 0.0, 400.0, 0.0, focal, 300.0, 0.0, 0.0, 1.0);

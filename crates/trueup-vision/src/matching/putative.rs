@@ -6,7 +6,7 @@ use super::options::MatchingOptions;
 use super::search::{Nearest, Neighbor};
 use crate::features::Features;
 
-/// Matches whose end points are nearer than this in both pictures are one match.
+/// Matches whose end points are nearer than this in both photographs are one match.
 const DUPLICATE_PX: f64 = 0.5;
 
 /// How far from the nearest point the second-nearest must lie in the photograph, in working pixels; nearer ones are the
@@ -35,7 +35,7 @@ pub struct PutativeMatch {
 /// The putative matches of two photographs, in the order of the points of a.
 ///
 /// A point's distance to another is the smallest over their descriptors. A match is kept if its point of b is nearest
-/// to that of a, and the reverse; if the nearest point of b that lies farther than [`SECOND_SEPARATION_PX`] from it is farther away by the factor 1 / `max_distance_ratio`; and if its distance does not stand out of the pair's.
+/// to that of a, and the reverse; if the nearest point of b that lies farther than `SECOND_SEPARATION_PX` from it is farther away by the factor 1 / `max_distance_ratio`; and if its distance does not stand out of the pair's.
 /// Of duplicates, which share both places, the nearest is kept.
 ///
 /// # Source

@@ -16,6 +16,31 @@ use crate::project::record::{ImageRecord, Project};
 use crate::project::replace::{other_photographs, recorded_photographs};
 
 /// Which recorded panorama to compose, of which photographs, and where to put it.
+///
+/// ```
+/// use trueup::{ComposeJob, Inputs, Outputs, StageContext, StitchJob, StitchOptions};
+/// # let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
+/// # let desk = tempfile::tempdir()?;
+/// # let context = StageContext::default();
+/// # let mut options = StitchOptions::default();
+/// # options.set("canvas.scale=0.1")?;
+/// # let outputs = Outputs::new(desk.path().join("room.jpg"));
+/// # let job = StitchJob { inputs: Inputs::new([room]), outputs, cache: None, threads: 0 };
+/// let project = job.run(&options, &context)?.remove(0).project;
+/// // The same geometry on another projection: nothing is measured, matched or aligned again.
+/// let mut options = project.options.clone();
+/// options.set("projection.kind=equirectangular")?;
+/// let job = ComposeJob {
+///     project,
+///     project_folder: desk.path().to_owned(),
+///     photographs: None,
+///     masks: Vec::new(),
+///     outputs: Outputs::new(desk.path().join("round.png")),
+///     threads: 0,
+/// };
+/// assert!(job.run(&options, &context)?.project.projection.is_some());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct ComposeJob {
     /// The record of a stitch.

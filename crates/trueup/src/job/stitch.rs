@@ -14,6 +14,20 @@ use crate::options::StitchOptions;
 use crate::pipeline::Stitcher;
 
 /// What to stitch and where to put it.
+///
+/// ```
+/// use trueup::{Inputs, Outputs, SideOutput, StageContext, StitchJob, StitchOptions};
+/// # let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
+/// # let desk = tempfile::tempdir()?;
+/// let mut options = StitchOptions::default();
+/// options.set("canvas.scale=0.1")?;
+/// let outputs = Outputs::new(desk.path().join("room.jpg")).with(SideOutput::Project, desk.path().join("room.json"));
+/// let job = StitchJob { inputs: Inputs::new([room]), outputs, cache: None, threads: 0 };
+/// let written = job.run(&options, &StageContext::default())?;
+/// assert_eq!(written[0].project.used(), 5);
+/// assert!(desk.path().join("room.jpg").is_file() && desk.path().join("room.json").is_file());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StitchJob {
     /// The photographs.

@@ -107,7 +107,18 @@ macro_rules! phases {
             }
         )*
 
-        /// The options of every phase. Serialized as one table per stage; unknown tables and fields are denied.
+        /// The options of every phase. Serialized as tables side by side; unknown tables and fields are denied.
+        ///
+        /// ```
+        /// use trueup::{Method, StitchOptions};
+        /// let mut options = StitchOptions::default();
+        /// options.set("stitch.method=apap")?;
+        /// options.merge_toml("[output]\njpeg_quality = 80", "mine.toml")?;
+        /// assert_eq!((options.align.stitch.method, options.compose.output.jpeg_quality), (Method::Apap, 80));
+        /// let refused = options.set("stitch.seed=3").unwrap_err().to_string();
+        /// assert!(refused.contains("is now \"random.seed\""), "{refused}");
+        /// # Ok::<(), trueup::Error>(())
+        /// ```
         #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
         #[serde(from = "Tables", into = "Tables")]
         pub struct StitchOptions {

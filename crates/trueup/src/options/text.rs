@@ -136,7 +136,7 @@ fn in_words(value: &toml::Value) -> &'static str {
     }
 }
 
-/// TOML's errors span lines with a picture of the text; the reason is what users need.
+/// TOML's errors span lines with a photograph of the text; the reason is what users need.
 fn first_line(error: &toml::de::Error) -> String {
     error.message().lines().next().unwrap_or_default().to_owned()
 }

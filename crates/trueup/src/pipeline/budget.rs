@@ -19,7 +19,7 @@ const AUTOMATIC_SHARE: u64 = 4;
 /// Where the machine does not say how much memory it has, it is taken to have so much.
 const ASSUMED_MACHINE: u64 = 8_000_000_000;
 
-/// Bytes that finding features takes per working pixel: the levels of the scale space of a picture of twice the size.
+/// Bytes that finding features takes per working pixel: the levels of the scale space of a photograph of twice the size.
 const FEATURE_BYTES: f64 = 240.0;
 
 /// Bytes of a photograph's pixel that was not decoded yet.

@@ -51,6 +51,19 @@ use crate::report::measures;
 pub use results::{Aligned, Alignment, MatchedPhotographs};
 
 /// Runs the phases with one set of options.
+///
+/// ```
+/// use trueup::{Inputs, RowSource, StageContext, StitchOptions, Stitcher};
+/// # let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
+/// let mut options = StitchOptions::default();
+/// options.set("canvas.scale=0.1")?;
+/// let stitcher = Stitcher::new(&options, &StageContext::default());
+/// let mut alignment = stitcher.align(&Inputs::new([room]))?.alignments.remove(0);
+/// let rendered = stitcher.compose(&mut alignment)?;
+/// assert_eq!(rendered.panorama.width(), alignment.project.canvas.width);
+/// assert!(alignment.project.manhattan.accepted, "guided by vanishing points");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Stitcher<'a> {
     options: &'a StitchOptions,

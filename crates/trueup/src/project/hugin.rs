@@ -21,7 +21,7 @@ struct Attitude {
     yaw: f64,
     /// Upwards.
     pitch: f64,
-    /// Clockwise turn of the picture.
+    /// Clockwise turn of the photograph.
     roll: f64,
 }
 
@@ -99,7 +99,7 @@ fn image_line(image: &ImageRecord, camera_from_level: &Matrix3<f64>, focal_px: f
     let correction = image.correction.unwrap_or_else(|| Correction::uniform(image.gain.unwrap_or(1.0)));
     let [red, green, blue] = correction.gain;
     let [vb, vc, vd] = vignetting(&correction);
-    // Hugin divides by the white balance, ours are factors; exposure values count stops by which a picture is brightened.
+    // Hugin divides by the white balance, ours are factors; exposure values count stops by which a photograph is brightened.
     Ok(format!(
         "i w{width} h{height} f0 v{:.6} r{:.6} p{:.6} y{:.6} TrX0 TrY0 TrZ0 a0 b0 c0 d0 e0 g0 t0 Eev{:.6} Er{:.6} \
          Eb{:.6} Ra0 Rb0 Rc0 Rd0 Re0 Va1 Vb{vb:.6} Vc{vc:.6} Vd{vd:.6} Vx0 Vy0 Vm5 n\"{}\"",
@@ -115,7 +115,7 @@ fn image_line(image: &ImageRecord, camera_from_level: &Matrix3<f64>, focal_px: f
 }
 
 /// Coefficients of r^2, r^4 and r^6 in Hugin's polynomial, by which it divides and whose constant is 1: fitted to the
-/// inverse of our factor over the picture by least squares.
+/// inverse of our factor over the photograph by least squares.
 fn vignetting(correction: &Correction) -> [f64; 3] {
     if correction.vignetting.iter().all(|&coefficient| coefficient == 0.0) {
         return [0.0; 3];
@@ -147,15 +147,15 @@ mod tests {
         // A level camera looking along x, to the right of z: its x is the world's -z, its z the world's x.
         let right = Matrix3::new(0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
         assert!(close(degrees(Attitude::of(&right)), [90.0, 0.0, 0.0]));
-        // Looking 30 degrees up: forward is (0, -1/2, sqrt(3)/2), the picture's down (0, sqrt(3)/2, 1/2).
+        // Looking 30 degrees up: forward is (0, -1/2, sqrt(3)/2), the photograph's down (0, sqrt(3)/2, 1/2).
         let half_root = 0.75_f64.sqrt();
         let up = Matrix3::new(1.0, 0.0, 0.0, 0.0, half_root, 0.5, 0.0, -0.5, half_root);
         assert!(close(degrees(Attitude::of(&up)), [0.0, 30.0, 0.0]));
-        // Held a quarter turn anticlockwise: the world's down is the camera's right, and its picture is to be turned
+        // Held a quarter turn anticlockwise: the world's down is the camera's right, and its photograph is to be turned
         // clockwise, which takes right to down.
         let held = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
         assert!(close(degrees(Attitude::of(&held)), [0.0, 0.0, 90.0]));
-        // Straight up, the picture's top to the back.
+        // Straight up, the photograph's top to the back.
         let zenith = rotation_about_x(-FRAC_PI_2);
         assert!((degrees(Attitude::of(&zenith))[1].abs() - 90.0).abs() < 1e-6);
     }

@@ -83,7 +83,7 @@ impl Recorded {
     }
 }
 
-/// The grids of used pictures over the original photographs.
+/// The grids of used photographs over the original photographs.
 ///
 /// # Errors
 /// [`Error::Input`] if one is missing or damaged.
@@ -137,7 +137,7 @@ fn is_whole(mesh: &MeshRecord, width: usize, height: usize) -> bool {
     mesh.source.iter().enumerate().all(is_even)
 }
 
-/// What evens out the light of used pictures, the `records` of `project`; gains alone in files of programs that knew no
+/// What evens out the light of used photographs, the `records` of `project`; gains alone in files of programs that knew no
 /// more.
 ///
 /// # Errors

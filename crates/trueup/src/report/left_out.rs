@@ -14,7 +14,7 @@ pub(crate) struct LeftOut {
     pub hint: String,
 }
 
-/// Why photograph `picture` is not joined to the stitched component `component`.
+/// Why photograph `photograph` is not joined to the stitched component `component`.
 ///
 /// `names` are the photographs' names, `pairs` every pair tried.
 pub(crate) fn explain(picture: usize, component: &[usize], pairs: &[PairMatches], names: &[String]) -> LeftOut {

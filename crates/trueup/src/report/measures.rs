@@ -19,33 +19,33 @@ pub(crate) const HUNDREDTHS: f64 = 100.0;
 /// Measures of a panorama that need no truth. Angles in degrees, positive clockwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Measures {
-    /// Directions of the vertical lines; `None` if no picture has enough of them.
+    /// Directions of the vertical lines; `None` if no photograph has enough of them.
     pub upright: Option<UprightMeasures>,
-    /// Estimate of the paper's GDIC: each picture's true direction is taken from its own vertical lines' vanishing
-    /// direction. Over the pictures that are certain; `None` with fewer than two.
+    /// Estimate of the paper's GDIC: each photograph's true direction is taken from its own vertical lines' vanishing
+    /// direction. Over the photographs that are certain; `None` with fewer than two.
     pub estimated_gdic_deg: Option<f64>,
     /// How far apart matched points land; `None` without matches.
     pub reprojection: Option<ReprojectionMeasures>,
     /// How straight long lines are; `None` without long lines.
     pub long_lines: Option<LongLines>,
-    /// The paper's local distortion LD, times 100: the largest over the pictures.
+    /// The paper's local distortion LD, times 100: the largest over the photographs.
     pub ld: f64,
-    /// Mean over the pictures of the same.
+    /// Mean over the photographs of the same.
     pub ld_mean: f64,
-    /// Cells that are folded, in all pictures.
+    /// Cells that are folded, in all photographs.
     pub folds: usize,
-    /// Each picture's own figures, in the order of the photographs used.
-    pub pictures: Vec<PictureMeasures>,
+    /// Each photograph's own figures, in the order of the photographs used.
+    pub pictures: Vec<PhotographMeasures>,
 }
 
-/// Directions of the vertical lines in the panorama, over the pictures that have enough of them.
+/// Directions of the vertical lines in the panorama, over the photographs that have enough of them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct UprightMeasures {
-    /// Mean over the pictures of |mean lean of the picture's vertical lines|.
+    /// Mean over the photographs of |mean lean of the photograph's vertical lines|.
     pub mean_deg: f64,
     /// The largest such lean.
     pub max_deg: f64,
-    /// Pictures that are certain.
+    /// Photographs that are certain.
     pub measured: usize,
 }
 
@@ -86,9 +86,9 @@ pub struct BentLine {
     pub off_px: f64,
 }
 
-/// What a picture's vertical lines say of it.
+/// What a photograph's vertical lines say of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PictureMeasures {
+pub struct PhotographMeasures {
     /// Path of the photograph.
     pub path: String,
     /// Vertical lines found.
@@ -126,7 +126,7 @@ pub(crate) fn run(component: &Component, geometry: &Geometry, layout: &CanvasLay
         ld_mean: HUNDREDTHS * distortion.mean,
         folds: working.iter().map(folded_cells).sum(),
         pictures: (0..working.len())
-            .map(|k| PictureMeasures {
+            .map(|k| PhotographMeasures {
                 path: component.images[k].path.display().to_string(),
                 vertical_lines: verticals[k].map_or(0, |found| found.lines),
                 lean_deg: verticals[k].map(|found| found.lean.to_degrees()),
@@ -162,7 +162,7 @@ fn upright(certain: &[Option<VerticalLines>]) -> Option<UprightMeasures> {
     Some(UprightMeasures { mean_deg: all.mean.to_degrees(), max_deg: all.largest.to_degrees(), measured })
 }
 
-/// GDIC over the pictures that are certain, with the reference among them or else the first.
+/// GDIC over the photographs that are certain, with the reference among them or else the first.
 fn estimated_inconsistency(certain: &[Option<VerticalLines>], meshes: &[GridMesh], reference: usize) -> Option<f64> {
     let known: Vec<(usize, f64)> =
         certain.iter().enumerate().filter_map(|(k, found)| Some((k, found.as_ref()?.gamma))).collect();

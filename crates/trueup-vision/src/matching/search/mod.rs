@@ -4,13 +4,13 @@
 //!
 //! Squared distances are whole numbers, |a|^2 + |b|^2 - 2ab, at most 128 * 255^2 < 2^23. A distance and a 9-bit number
 //! therefore fit one 32-bit key, and the minimum of keys is the nearest neighbor with the smaller number winning ties.
-//! One pass over all products keeps, for every row (a descriptor of the first picture), the two smallest keys of each
+//! One pass over all products keeps, for every row (a descriptor of the first photograph), the two smallest keys of each
 //! of 16 interleaved lanes of columns, and for every column the smallest key over the rows.
 //!
 //! # Exactness
 //!
 //! The nearest neighbors of rows and columns are exact. What else is asked of a row is the nearest column that is
-//! not *excluded* (too close in the picture to the nearest one). In a lane, the smallest key that is not excluded
+//! not *excluded* (too close in the photograph to the nearest one). In a lane, the smallest key that is not excluded
 //! answers; only where both keys of a lane are excluded is the lane searched again, column by column. So the second
 //! neighbor is exact too: see [`Nearest::nearest_allowed`].
 

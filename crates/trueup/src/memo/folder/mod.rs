@@ -51,6 +51,19 @@ pub struct CacheUse {
 
 /// A folder of results of earlier runs.
 ///
+/// ```
+/// use trueup::{Inputs, PhotographCache, StageContext, StitchOptions, Stitcher};
+/// # let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
+/// # let desk = tempfile::tempdir()?;
+/// let (options, context) = (StitchOptions::default(), StageContext::default());
+/// for found in [0, 1] {
+///     let cache = PhotographCache::open(desk.path(), 1e9)?;
+///     Stitcher::new(&options, &context).with_cache(Some(&cache)).align(&Inputs::new([room]))?;
+///     assert_eq!(cache.uses()["geometry"].found, found);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// Entries that are damaged or unreadable are made again; a folder that no longer takes entries stops no work. When the
 /// cache is dropped, the entries that were not used for the longest time are removed until the folder is no larger than
 /// `max_bytes`.

@@ -23,65 +23,65 @@ pub use pixels::{PixelEvaluation, compare_overlaps, evaluate_pixels, scale_up_to
 
 /// A panorama measured against the truth. Angles in degrees.
 ///
-/// Measured are the pictures that are used in the project and named in the truth, in the order of the truth.
+/// Measured are the photographs that are used in the project and named in the truth, in the order of the truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
-    /// Pictures measured.
+    /// Photographs measured.
     pub used: usize,
-    /// Pictures named in the truth.
+    /// Photographs named in the truth.
     pub given: usize,
-    /// Mean over the pictures of |angle of the picture's middle to upright|: absolute, no reference takes part.
+    /// Mean over the photographs of |angle of the photograph's middle to upright|: absolute, no reference takes part.
     pub upright_deg: f64,
     /// The largest such angle.
     pub upright_max_deg: f64,
-    /// As `upright_deg`, from the direction that the pictures share.
+    /// As `upright_deg`, from the direction that the photographs share.
     pub spread_deg: f64,
-    /// The paper's GDIC (equation 14), with the first picture as its reference, so that all methods share it.
+    /// The paper's GDIC (equation 14), with the first photograph as its reference, so that all methods share it.
     pub gdic_deg: f64,
-    /// GDIC with the project's reference as its own; `None` if the truth does not name that picture.
+    /// GDIC with the project's reference as its own; `None` if the truth does not name that photograph.
     pub gdic_reference_deg: Option<f64>,
-    /// GDIC with each picture's best-fitting similarity instead of its smallest rectangle: without the floor that strong
+    /// GDIC with each photograph's best-fitting similarity instead of its smallest rectangle: without the floor that strong
     /// perspective gives to GDIC.
     pub gdic_similarity_deg: f64,
-    /// Mean error of the prior's rotations, relative to the first picture: its quality before the mesh. `None` if the
+    /// Mean error of the prior's rotations, relative to the first photograph: its quality before the mesh. `None` if the
     /// project holds no rotations.
     pub theta_error_deg: Option<f64>,
     /// The largest such error.
     pub theta_error_max_deg: Option<f64>,
-    /// The paper's local distortion LD (equations 12 and 13), times 100: the largest over the pictures. Judged are cells
-    /// whose center lies outside all other pictures.
+    /// The paper's local distortion LD (equations 12 and 13), times 100: the largest over the photographs. Judged are cells
+    /// whose center lies outside all other photographs.
     pub ld: f64,
-    /// Mean over the pictures of the same.
+    /// Mean over the photographs of the same.
     pub ld_mean: f64,
-    /// As `ld`, of the cells whose four corners lie outside all other pictures, too: up to 7 % more.
+    /// As `ld`, of the cells whose four corners lie outside all other photographs, too: up to 7 % more.
     pub ld_corners: f64,
-    /// Cells that are folded, in all pictures. LD leaves them out; figures with different counts do not compare.
+    /// Cells that are folded, in all photographs. LD leaves them out; figures with different counts do not compare.
     pub folds: usize,
-    /// Root mean square distance in the panorama of the two places of what two pictures both show, in the pictures' own
-    /// pixels; `None` if no pictures overlap or they were taken from different places.
+    /// Root mean square distance in the panorama of the two places of what two photographs both show, in the photographs' own
+    /// pixels; `None` if no photographs overlap or they were taken from different places.
     pub align_px: Option<f64>,
-    /// Each picture's own figures.
-    pub pictures: Vec<PictureEvaluation>,
+    /// Each photograph's own figures.
+    pub pictures: Vec<PhotographEvaluation>,
 }
 
-/// One picture measured against the truth. Angles in degrees, positive clockwise.
+/// One photograph measured against the truth. Angles in degrees, positive clockwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PictureEvaluation {
+pub struct PhotographEvaluation {
     /// File name.
     pub file: String,
     /// By how much its middle is turned beyond upright.
     pub upright_deg: f64,
-    /// By how much the prior's rotation is wrong, relative to the first picture.
+    /// By how much the prior's rotation is wrong, relative to the first photograph.
     pub theta_error_deg: Option<f64>,
 }
 
-/// A used picture with its truth and its grid.
+/// A used photograph with its truth and its grid.
 struct Known<'a> {
     record: &'a ImageRecord,
     truth: &'a ImageTruth,
 }
 
-/// Reads the truth of a set of pictures from a JSON file.
+/// Reads the truth of a set of photographs from a JSON file.
 ///
 /// # Errors
 /// [`Error::Io`] if it cannot be read; [`Error::Input`] if it is no truth, damaged, or impossible.
@@ -96,11 +96,22 @@ pub fn read_truth(path: &Path) -> Result<Truth> {
     Ok(truth)
 }
 
-/// Measures a panorama against the truth. Pictures are matched by their file names.
+/// Measures a panorama against the truth. Photographs are matched by their file names.
+///
+/// ```
+/// use trueup::{Inputs, StageContext, StitchOptions, Stitcher, evaluate, read_truth};
+/// # let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
+/// let truth = read_truth(&std::path::Path::new(room).join("truth.json"))?;
+/// let (options, context) = (StitchOptions::default(), StageContext::default());
+/// let aligned = Stitcher::new(&options, &context).align(&Inputs::new([room]))?;
+/// let evaluation = evaluate(&aligned.alignments[0].project, &truth)?;
+/// assert!(evaluation.used == 5 && evaluation.upright_deg < 0.5, "{} degrees", evaluation.upright_deg);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
-/// [`Error::Input`] if the truth does not fit: it names none of the project's pictures, fewer than two of those used, or
-/// one of another size, or two of the project's pictures have one name; if the truth is impossible; if the project's grids
+/// [`Error::Input`] if the truth does not fit: it names none of the project's photographs, fewer than two of those used, or
+/// one of another size, or two of the project's photographs have one name; if the truth is impossible; if the project's grids
 /// are damaged.
 pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     truth.check(&subject(truth))?;
@@ -118,7 +129,7 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     let thetas: Option<Vec<f64>> = records.iter().map(|record| Some(record.theta_deg?.to_radians())).collect();
     let theta_errors = thetas.as_ref().and_then(|thetas| relative_turns(thetas, &gammas, 0));
     let distortion = metrics::local_distortion(&meshes, Outside::Center, period);
-    let pictures = (0..known.len()).map(|k| PictureEvaluation {
+    let pictures = (0..known.len()).map(|k| PhotographEvaluation {
         file: known[k].truth.file.clone(),
         upright_deg: upright.photographs[k].to_degrees(),
         theta_error_deg: theta_errors.as_ref().map(|errors| errors[k].to_degrees()),
@@ -151,7 +162,7 @@ fn largest(angles: &[f64]) -> f64 {
     angles.iter().fold(0.0, |largest, &angle| largest.max(wrap_angle(angle).abs()))
 }
 
-/// The used pictures that the truth names, in its order.
+/// The used photographs that the truth names, in its order.
 fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Known<'a>>> {
     let used: Vec<&ImageRecord> = project.used_images().collect();
     let mut known = Vec::new();
@@ -193,7 +204,7 @@ fn too_few(count: usize) -> Error {
     )
 }
 
-/// [`metrics::true_alignment`] where all pictures share one center of projection.
+/// [`metrics::true_alignment`] where all photographs share one center of projection.
 fn alignment(known: &[Known], meshes: &[GridMesh], period: Option<f64>) -> Option<f64> {
     if known.iter().any(|one| one.truth.center != known[0].truth.center) {
         return None;

@@ -1,6 +1,6 @@
 use super::*;
 
-/// Two pictures of 40 x 30 px whose middles are turned by these angles in degrees, on grids of one cell.
+/// Two photographs of 40 x 30 px whose middles are turned by these angles in degrees, on grids of one cell.
 fn project(turns: [f64; 2]) -> Project {
     let image = |name: &str, turn: f64| {
         let (sine, cosine) = turn.to_radians().sin_cos();
