@@ -90,7 +90,7 @@ pub fn read_truth(path: &Path) -> Result<Truth> {
     let subject = path.display().to_string();
     let truth: Truth = serde_json::from_slice(&bytes).map_err(|error| {
         let reason = format!("not a truth file ({error})");
-        Error::input(&subject, reason, "Give the truth.json that was written together with the pictures.")
+        Error::input(&subject, reason, "Give the truth.json that was written together with the photographs.")
     })?;
     truth.check(&subject)?;
     Ok(truth)
