@@ -84,7 +84,9 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
     let share = if photographs <= FEW_PHOTOGRAPHS { MIN_INLIER_SHARE_FEW } else { MIN_INLIER_SHARE };
     let needed = ((share * photographs as f64).ceil() as usize).max(2);
     if inliers < needed {
-        return Some(format!("{inliers} of {photographs} photographs agree on the dominant directions ({needed} needed)"));
+        return Some(format!(
+            "{inliers} of {photographs} photographs agree on the dominant directions ({needed} needed)"
+        ));
     }
     let needed = CONFIRMING_SIGNIFICANCE;
     if let Some(significance) = significance.filter(|&significance| significance < needed) {

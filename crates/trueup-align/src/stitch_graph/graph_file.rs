@@ -94,7 +94,9 @@ fn photograph(text: &str, names: &[String]) -> std::result::Result<usize, String
 fn index(text: &str, names: &[String]) -> std::result::Result<usize, String> {
     match text.trim().parse::<usize>() {
         Ok(value) if value < names.len() => Ok(value),
-        _ => Err(format!("\"{}\" is not a photograph's index from 0 to {}", text.trim(), names.len().saturating_sub(1))),
+        _ => {
+            Err(format!("\"{}\" is not a photograph's index from 0 to {}", text.trim(), names.len().saturating_sub(1)))
+        }
     }
 }
 
