@@ -35,11 +35,20 @@ const REPEATS: usize = 3;
 /// Factors on the weights of the segments of each axis (column) of a frame.
 pub(super) type AxisWeights = [f64; 3];
 
-/// Photographs that are not asked: those whose position is `group` modulo `groups`.
+/// A segment: its photograph and its place among the usable ones there.
 #[derive(Debug, Clone, Copy)]
-struct LeftOut {
-    group: usize,
-    groups: usize,
+struct SegmentPlace {
+    photograph: usize,
+    line: usize,
+}
+
+/// A refinement of a frame over its turns.
+#[derive(Debug, Clone, Copy)]
+struct Refinement<'a> {
+    start: &'a Matrix3<f64>,
+    /// Axes that segments may support: the first so many columns.
+    axes_used: usize,
+    axis_weights: &'a AxisWeights,
 }
 
 /// A segment that supports an axis of a frame.
@@ -127,7 +136,7 @@ impl LineVote {
     /// Refines a frame (columns are directions in the common frame) over SO(3); `axis_weights` multiply the weights of
     /// the segments of each axis.
     pub(super) fn refine_frame(&self, start: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {
-        self.refine_frame_without(None, start, axis_weights, scales())
+        self.refine(Refinement { start, axes_used: 3, axis_weights }, scales(), |_| true)
     }
 
     fn mean_weight(&self) -> f64 {
@@ -150,7 +159,10 @@ impl LineVote {
         let last = || std::iter::repeat_n(END_SCALE_PX, REPEATS);
         let frames: Vec<Matrix3<f64>> = (0..groups)
             .into_par_iter()
-            .map(|group| self.refine_frame_without(Some(LeftOut { group, groups }), frame, axis_weights, last()))
+            .map(|group| {
+                let refinement = Refinement { start: frame, axes_used: 3, axis_weights };
+                self.refine(refinement, last(), |one| one.photograph % groups != group)
+            })
             .collect();
         std::array::from_fn(|axis| {
             let mean: Vector3<f64> =
@@ -161,20 +173,19 @@ impl LineVote {
         })
     }
 
-    /// [`Self::refine_frame`] over given scales of the loss, by all photographs but those left out.
-    fn refine_frame_without(
+    /// Refines a frame over given scales of the loss, by the segments `asked`.
+    fn refine(
         &self,
-        left_out: Option<LeftOut>,
-        start: &Matrix3<f64>,
-        axis_weights: &AxisWeights,
+        refinement: Refinement<'_>,
         scales: impl Iterator<Item = f64>,
+        asked: impl Fn(SegmentPlace) -> bool,
     ) -> Matrix3<f64> {
-        let asked = |index: usize| left_out.is_none_or(|LeftOut { group, groups }| index % groups != group);
+        let Refinement { start, axes_used, axis_weights } = refinement;
         let mut frame = *start;
         for scale in scales {
             for _ in 0..ITERATIONS_PER_SCALE {
                 let (mut matrix, mut gradient) = (Matrix3::identity() * DAMPING, Vector3::zeros());
-                self.for_each_supporter(&frame, 3, scale, asked, |one| {
+                self.for_each_supporter(&frame, axes_used, scale, &asked, |one| {
                     let jacobian = Vector3::ith(one.axis, 1.0).cross(&frame.tr_mul(&one.moment)) / one.reach;
                     let weight = one.weight * axis_weights[one.axis];
                     matrix += jacobian * jacobian.transpose() * weight;
@@ -186,6 +197,61 @@ impl LineVote {
             }
         }
         frame
+    }
+
+    /// The frame whose first column alone is refined: the direction that segments near it point to.
+    pub(super) fn refine_first_axis(&self, start: &Matrix3<f64>) -> Matrix3<f64> {
+        self.refine(Refinement { start, axes_used: 1, axis_weights: &[1.0; 3] }, scales(), |_| true)
+    }
+
+    /// The frames that come out when the segments of one sector of the scene at a time are not asked, whatever
+    /// photographs show them; a sector is as many radians of longitude about `frame`'s column `vertical`. Only sectors
+    /// with segments that support the first `axes_used` axes count.
+    ///
+    /// The pieces of a line, its views in several photographs, and the window frames of a facade lie in one sector.
+    /// What they err by alike, leaving out photographs would not show: another photograph still has it.
+    pub(super) fn without_each_sector(
+        &self,
+        frame: &Matrix3<f64>,
+        vertical: usize,
+        axes_used: usize,
+        axis_weights: &AxisWeights,
+        sector: f64,
+    ) -> Vec<Matrix3<f64>> {
+        let sectors = self.sectors(frame, vertical, sector);
+        let sector_of = |one: SegmentPlace| sectors[one.photograph][one.line];
+        let count = sectors.iter().flatten().max().map_or(0, |last| last + 1);
+        let mut populated = vec![false; count];
+        for (photograph, lines) in self.photographs.iter().enumerate() {
+            for line in 0..lines.planes.len() {
+                let axes = lines.rotation * frame;
+                let supports = lines
+                    .nearest_axis(&axes, axes_used, line)
+                    .is_some_and(|nearest| lines.is_within_tolerance(nearest.residual_px, line));
+                populated[sector_of(SegmentPlace { photograph, line })] |= supports;
+            }
+        }
+        let left_out: Vec<usize> = (0..count).filter(|&sector| populated[sector]).collect();
+        left_out
+            .into_par_iter()
+            .map(|sector| {
+                let last = std::iter::repeat_n(END_SCALE_PX, REPEATS);
+                self.refine(Refinement { start: frame, axes_used, axis_weights }, last, |one| sector_of(one) != sector)
+            })
+            .collect()
+    }
+
+    /// For every segment the sector of longitude its midpoint lies in.
+    fn sectors(&self, frame: &Matrix3<f64>, vertical: usize, sector: f64) -> Vec<Vec<usize>> {
+        let (across, along) = (frame.column((vertical + 1) % 3), frame.column((vertical + 2) % 3));
+        let of_photograph = |photograph: &PhotographLines| {
+            let toward = |midpoint: &Vector2<f64>| photograph.rotation.tr_mul(&midpoint.push(photograph.focal_px));
+            let longitude = |toward: Vector3<f64>| toward.dot(&across).atan2(toward.dot(&along));
+            // From 0 to a full turn; the cast saturates.
+            let index = |angle: f64| ((angle + std::f64::consts::PI) / sector) as usize;
+            photograph.planes.midpoints.iter().map(|midpoint| index(longitude(toward(midpoint)))).collect()
+        };
+        self.photographs.iter().map(of_photograph).collect()
     }
 
     /// Normal matrix and gradient, in px^2 per rad^2 and px^2 per rad, of the squared residuals of photograph `index`
@@ -202,12 +268,19 @@ impl LineVote {
         let (mut matrix, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
         let photograph = &self.photographs[index];
         let mean = self.mean_weight();
-        photograph.for_each_supporter(rotation, frame, 3, scale, |one| {
-            let jacobian = frame.column(one.axis).cross(&one.moment) / one.reach;
-            let weight = one.weight * axis_weights[one.axis] / mean;
-            matrix += jacobian * jacobian.transpose() * weight;
-            gradient += jacobian * (weight * one.residual_px);
-        });
+        photograph.for_each_supporter(
+            rotation,
+            frame,
+            3,
+            scale,
+            |_| true,
+            |one| {
+                let jacobian = frame.column(one.axis).cross(&one.moment) / one.reach;
+                let weight = one.weight * axis_weights[one.axis] / mean;
+                matrix += jacobian * jacobian.transpose() * weight;
+                gradient += jacobian * (weight * one.residual_px);
+            },
+        );
         (matrix, gradient)
     }
 
@@ -238,20 +311,19 @@ impl LineVote {
         direction
     }
 
-    /// Calls `visit` for every segment of the photographs `asked` that supports one of the first `axes_used` axes of
+    /// Calls `visit` for every segment `asked` that supports one of the first `axes_used` axes of
     /// `frame`.
     fn for_each_supporter(
         &self,
         frame: &Matrix3<f64>,
         axes_used: usize,
         scale: f64,
-        asked: impl Fn(usize) -> bool,
+        asked: impl Fn(SegmentPlace) -> bool,
         mut visit: impl FnMut(Supporter),
     ) {
         for (index, photograph) in self.photographs.iter().enumerate() {
-            if asked(index) {
-                photograph.for_each_supporter(&photograph.rotation, frame, axes_used, scale, &mut visit);
-            }
+            let asked = |line| asked(SegmentPlace { photograph: index, line });
+            photograph.for_each_supporter(&photograph.rotation, frame, axes_used, scale, asked, &mut visit);
         }
     }
 
@@ -290,14 +362,14 @@ impl PhotographLines {
         frame: &Matrix3<f64>,
         axes_used: usize,
         scale: f64,
+        asked: impl Fn(usize) -> bool,
         mut visit: impl FnMut(Supporter),
     ) {
-        let widest = TOLERANCE_DEG.to_radians().sin();
         let axes = rotation * frame;
-        for line in 0..self.planes.len() {
+        for line in (0..self.planes.len()).filter(|&line| asked(line)) {
             let Some(nearest) = self.nearest_axis(&axes, axes_used, line) else { continue };
             let NearestAxis { axis, residual_px, reach } = nearest;
-            if residual_px.abs() * 2.0 > widest * self.planes.lengths[line] {
+            if !self.is_within_tolerance(residual_px, line) {
                 continue;
             }
             // Geman-McClure.
@@ -306,6 +378,11 @@ impl PhotographLines {
             let weight = self.planes.weights[line] * robust;
             visit(Supporter { axis, moment, residual_px, weight, reach });
         }
+    }
+
+    /// Whether a segment that is so far from an axis at its ends may vote for it.
+    fn is_within_tolerance(&self, residual_px: f64, line: usize) -> bool {
+        residual_px.abs() * 2.0 <= TOLERANCE_DEG.to_radians().sin() * self.planes.lengths[line]
     }
 
     fn reach(&self, direction: &Vector3<f64>, line: usize) -> f64 {

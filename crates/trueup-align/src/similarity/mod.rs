@@ -14,6 +14,7 @@ mod input;
 mod joint;
 mod options;
 mod path_voting;
+mod posterior;
 mod prior;
 mod scale;
 mod signed_permutation;
@@ -46,6 +47,7 @@ use upright::{Upright, rolls};
 
 pub use input::PriorInput;
 pub use options::{BetaMode, GateMode, PriorMethod, SimilarityOptions};
+pub use posterior::{EstimatedRoll, RollsInput, estimated_rolls};
 pub use prior::{Guidance, SimilarityPrior};
 
 pub(crate) use straighten::level_by_cameras;
