@@ -59,8 +59,7 @@ impl Uprightness {
 /// Leone, Nelson and Nottingham, "The folded normal distribution", Technometrics 3, 1961.
 pub fn expected_magnitude(mean: f64, deviation: f64) -> f64 {
     use std::f64::consts::{FRAC_2_PI, SQRT_2};
-    // Not a number is no deviation either.
-    if !(deviation > 0.0) {
+    if deviation <= 0.0 {
         return mean.abs();
     }
     let ratio = mean / deviation;

@@ -31,6 +31,8 @@ mod gsp_tests;
 #[cfg(test)]
 mod pooled_tests;
 #[cfg(test)]
+mod posterior_tests;
+#[cfg(test)]
 pub(crate) mod synthetic;
 #[cfg(test)]
 mod tests;

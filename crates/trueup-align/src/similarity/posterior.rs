@@ -138,7 +138,8 @@ impl UprightScene {
         let vote = self.vote(input);
         let frame = vote.refine_first_axis(&self.frame);
         // A comparison with NaN is false.
-        if !(frame.column(0).y >= FARTHEST_DEG.to_radians().cos()) {
+        let near = frame.column(0).y >= FARTHEST_DEG.to_radians().cos();
+        if !near {
             return None;
         }
         let certainties = relative_certainties(&self.cameras(input), input.edges);
@@ -214,4 +215,44 @@ fn student_95(degrees_of_freedom: usize) -> f64 {
     let fourth =
         (79.0 * z.powi(9) + 776.0 * z.powi(7) + 1482.0 * z.powi(5) - 1920.0 * z.powi(3) - 945.0 * z) / 92_160.0;
     z + first / n + second / n.powi(2) + third / n.powi(3) + fourth / n.powi(4)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The table of Student's t at 97.5 %.
+    #[test]
+    fn few_sectors_have_long_tails() {
+        for (degrees_of_freedom, expected) in [(3, 3.182_446), (4, 2.776_445), (10, 2.228_139), (30, 2.042_272)] {
+            assert!((student_95(degrees_of_freedom) / expected - 1.0).abs() < 0.003, "{degrees_of_freedom}");
+        }
+    }
+
+    /// Verticals at 1 and -1 hundredths about x and z, four sectors: mean 0, sums of squares 2e-4, times 3/4.
+    #[test]
+    fn the_jackknife_of_known_verticals() {
+        let down = |x: f64, z: f64| Vector3::new(x, 0.0, z);
+        let scatter = Scatter::of(&[down(0.01, 0.0), down(-0.01, 0.0), down(0.0, 0.01), down(0.0, -0.01)]);
+        let expected = Matrix3::from_diagonal(&Vector3::new(1.5e-4, 0.0, 1.5e-4));
+        assert!((scatter.expect("four").covariance - expected).norm() < 1e-15);
+        assert_eq!(Scatter::of(&[]), None);
+    }
+
+    /// A level camera that looks along z: a turn about z of the scene is its roll, one about x is none of it.
+    #[test]
+    fn a_level_camera_rolls_as_far_as_the_vertical_leans_across() {
+        let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 0.0, 9e-4));
+        let scatter = Scatter { covariance, sectors: 31 };
+        let (down, level) = (Vector3::y(), Matrix3::identity());
+        let found = scatter.estimate(&down, &level, &Matrix3::zeros()).expect("level");
+        let alike = SCENE_DEVIATION_DEG.to_radians().powi(2);
+        assert!((found.standard_error - (4e-4 + alike).sqrt()).abs() < 1e-12 && found.roll.abs() < 1e-15);
+        let expected = (2.042_272_f64.powi(2) * 4e-4 + NORMAL_95.powi(2) * alike).sqrt();
+        assert!((found.within / expected - 1.0).abs() < 1e-5);
+        let turned = scatter.estimate(&down, &level, &Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1e-4)));
+        assert!((turned.expect("level").standard_error - (5e-4 + alike).sqrt()).abs() < 1e-12);
+        let steep = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0);
+        assert_eq!(scatter.estimate(&down, &steep, &Matrix3::zeros()), None);
+    }
 }
