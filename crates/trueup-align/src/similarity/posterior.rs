@@ -31,8 +31,8 @@ const SECTOR_DEG: f64 = 20.0;
 const MIN_SECTORS: usize = 4;
 /// Standard deviation, about any level axis, of what all lines of a scene err by alike, degrees. Fitted on 136
 /// photographs cut from four panoramas, so that the 95 % interval holds the truth of 95 % of them; the verticals that
-/// such truths rest on err by as much (0.14 degrees), which is thus part of it. docs/quality.md has the coverage on
-/// others.
+/// such truths rest on are measured and err, too, which is thus part of it. docs/quality.md has the coverage on others:
+/// there it is too large.
 const SCENE_DEVIATION_DEG: f64 = 0.14;
 /// Largest angle between a segment and the vertical for the segment to be a vertical line, degrees.
 const TOLERANCE_DEG: f64 = 1.5;
