@@ -8,7 +8,6 @@
 //! it is v . c / (2 |f v_xy - m v_z|), exactly.
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
-use rayon::prelude::*;
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
 
 use crate::vanishing::{InterpretationPlanes, orthonormal_complement};
@@ -25,11 +24,7 @@ const ITERATIONS_PER_SCALE: usize = 4;
 const SHRINK: f64 = 0.7;
 /// Damping in px^2 per rad^2 and segment: keeps an axis without segments where it is.
 const DAMPING: f64 = 1e-6;
-/// Most groups that photographs are left out in to learn how sure the refinement is.
-const MAX_GROUPS: usize = 8;
-/// A deviation estimated from k groups is too small for Student's t by about this over k - 1 (one standard deviation).
-const FEW_GROUPS: f64 = 0.66;
-/// Rounds of iterations at the last scale that a refinement without a group takes from the full one's result.
+/// Rounds of iterations at the last scale that a refinement by some of the segments takes from the full one's result.
 const REPEATS: usize = 3;
 
 /// Factors on the weights of the segments of each axis (column) of a frame.
@@ -37,18 +32,18 @@ pub(super) type AxisWeights = [f64; 3];
 
 /// A segment: its photograph and its place among the usable ones there.
 #[derive(Debug, Clone, Copy)]
-struct SegmentPlace {
-    photograph: usize,
-    line: usize,
+pub(super) struct SegmentPlace {
+    pub photograph: usize,
+    pub line: usize,
 }
 
 /// A refinement of a frame over its turns.
 #[derive(Debug, Clone, Copy)]
-struct Refinement<'a> {
-    start: &'a Matrix3<f64>,
+pub(super) struct Refinement<'a> {
+    pub start: &'a Matrix3<f64>,
     /// Axes that segments may support: the first so many columns.
-    axes_used: usize,
-    axis_weights: &'a AxisWeights,
+    pub axes_used: usize,
+    pub axis_weights: &'a AxisWeights,
 }
 
 /// A segment that supports an axis of a frame.
@@ -144,33 +139,42 @@ impl LineVote {
         self.total_weight() / segments.max(1) as f64
     }
 
-    /// Standard deviation in radians, by a delete-a-group jackknife over the photographs, of each axis (a column) of a
-    /// frame that [`Self::refine_frame`] found: how much it depends on which photographs are asked. Infinite for a
-    /// single photograph.
-    ///
-    /// # Source
-    /// Efron and Tibshirani, An Introduction to the Bootstrap, chapter 11. Photographs, not segments, are left out,
-    /// because the segments of one photograph err together.
-    pub(super) fn axis_deviations(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> [f64; 3] {
-        let groups = self.photographs.len().min(MAX_GROUPS);
-        if groups < 2 {
-            return [f64::INFINITY; 3];
+    /// Refines a frame that all segments have refined, by those `asked` alone: at the last scale of the loss.
+    pub(super) fn refine_again(
+        &self,
+        refinement: Refinement<'_>,
+        asked: impl Fn(SegmentPlace) -> bool,
+    ) -> Matrix3<f64> {
+        self.refine(refinement, std::iter::repeat_n(END_SCALE_PX, REPEATS), asked)
+    }
+
+    /// Number of photographs.
+    pub(super) fn photographs(&self) -> usize {
+        self.photographs.len()
+    }
+
+    /// `value` of the direction of every segment's midpoint in the common frame, not of unit length; by photograph.
+    pub(super) fn by_midpoint<T>(&self, value: impl Fn(Vector3<f64>) -> T) -> Vec<Vec<T>> {
+        let of_photograph = |photograph: &PhotographLines| {
+            let toward = |midpoint: &Vector2<f64>| photograph.rotation.tr_mul(&midpoint.push(photograph.focal_px));
+            photograph.planes.midpoints.iter().map(|midpoint| value(toward(midpoint))).collect()
+        };
+        self.photographs.iter().map(of_photograph).collect()
+    }
+
+    /// The segments that support one of the first `axes_used` axes of `frame`.
+    pub(super) fn supporters(&self, frame: &Matrix3<f64>, axes_used: usize) -> Vec<SegmentPlace> {
+        let mut found = Vec::new();
+        for (index, photograph) in self.photographs.iter().enumerate() {
+            let axes = photograph.rotation * frame;
+            let supports = |line: usize| {
+                let nearest = photograph.nearest_axis(&axes, axes_used, line);
+                nearest.is_some_and(|nearest| photograph.is_within_tolerance(nearest.residual_px, line))
+            };
+            let lines = (0..photograph.planes.len()).filter(|&line| supports(line));
+            found.extend(lines.map(|line| SegmentPlace { photograph: index, line }));
         }
-        let last = || std::iter::repeat_n(END_SCALE_PX, REPEATS);
-        let frames: Vec<Matrix3<f64>> = (0..groups)
-            .into_par_iter()
-            .map(|group| {
-                let refinement = Refinement { start: frame, axes_used: 3, axis_weights };
-                self.refine(refinement, last(), |one| one.photograph % groups != group)
-            })
-            .collect();
-        std::array::from_fn(|axis| {
-            let mean: Vector3<f64> =
-                frames.iter().map(|frame| frame.column(axis).into_owned()).sum::<Vector3<f64>>() / groups as f64;
-            let spread: f64 = frames.iter().map(|frame| (frame.column(axis) - mean).norm_squared()).sum();
-            let few = 1.0 + FEW_GROUPS / (groups - 1) as f64;
-            few * (spread * (groups - 1) as f64 / groups as f64).sqrt()
-        })
+        found
     }
 
     /// Refines a frame over given scales of the loss, by the segments `asked`.
@@ -202,56 +206,6 @@ impl LineVote {
     /// The frame whose first column alone is refined: the direction that segments near it point to.
     pub(super) fn refine_first_axis(&self, start: &Matrix3<f64>) -> Matrix3<f64> {
         self.refine(Refinement { start, axes_used: 1, axis_weights: &[1.0; 3] }, scales(), |_| true)
-    }
-
-    /// The frames that come out when the segments of one sector of the scene at a time are not asked, whatever
-    /// photographs show them; a sector is as many radians of longitude about `frame`'s column `vertical`. Only sectors
-    /// with segments that support the first `axes_used` axes count.
-    ///
-    /// The pieces of a line, its views in several photographs, and the window frames of a facade lie in one sector.
-    /// What they err by alike, leaving out photographs would not show: another photograph still has it.
-    pub(super) fn without_each_sector(
-        &self,
-        frame: &Matrix3<f64>,
-        vertical: usize,
-        axes_used: usize,
-        axis_weights: &AxisWeights,
-        sector: f64,
-    ) -> Vec<Matrix3<f64>> {
-        let sectors = self.sectors(frame, vertical, sector);
-        let sector_of = |one: SegmentPlace| sectors[one.photograph][one.line];
-        let count = sectors.iter().flatten().max().map_or(0, |last| last + 1);
-        let mut populated = vec![false; count];
-        for (photograph, lines) in self.photographs.iter().enumerate() {
-            for line in 0..lines.planes.len() {
-                let axes = lines.rotation * frame;
-                let supports = lines
-                    .nearest_axis(&axes, axes_used, line)
-                    .is_some_and(|nearest| lines.is_within_tolerance(nearest.residual_px, line));
-                populated[sector_of(SegmentPlace { photograph, line })] |= supports;
-            }
-        }
-        let left_out: Vec<usize> = (0..count).filter(|&sector| populated[sector]).collect();
-        left_out
-            .into_par_iter()
-            .map(|sector| {
-                let last = std::iter::repeat_n(END_SCALE_PX, REPEATS);
-                self.refine(Refinement { start: frame, axes_used, axis_weights }, last, |one| sector_of(one) != sector)
-            })
-            .collect()
-    }
-
-    /// For every segment the sector of longitude its midpoint lies in.
-    fn sectors(&self, frame: &Matrix3<f64>, vertical: usize, sector: f64) -> Vec<Vec<usize>> {
-        let (across, along) = (frame.column((vertical + 1) % 3), frame.column((vertical + 2) % 3));
-        let of_photograph = |photograph: &PhotographLines| {
-            let toward = |midpoint: &Vector2<f64>| photograph.rotation.tr_mul(&midpoint.push(photograph.focal_px));
-            let longitude = |toward: Vector3<f64>| toward.dot(&across).atan2(toward.dot(&along));
-            // From 0 to a full turn; the cast saturates.
-            let index = |angle: f64| ((angle + std::f64::consts::PI) / sector) as usize;
-            photograph.planes.midpoints.iter().map(|midpoint| index(longitude(toward(midpoint)))).collect()
-        };
-        self.photographs.iter().map(of_photograph).collect()
     }
 
     /// Normal matrix and gradient, in px^2 per rad^2 and px^2 per rad, of the squared residuals of photograph `index`

@@ -11,6 +11,7 @@ mod gate;
 mod gsp_2d;
 mod gsp_3d;
 mod input;
+mod jackknife;
 mod joint;
 mod options;
 mod path_voting;
@@ -56,7 +57,7 @@ pub(crate) use straighten::level_by_cameras;
 
 /// What a user can do when lines do not guide the panorama.
 const REFUSED_HINT: &str =
-    "The panorama is levelled by the cameras alone; pictures that show upright edges level it better";
+    "The panorama is levelled by the cameras alone; photographs that show upright edges level it better";
 
 /// Finds the similarity prior of a connected set of photographs.
 ///

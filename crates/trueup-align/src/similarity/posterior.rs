@@ -19,7 +19,8 @@ use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 
 use super::camera_correction::{corrected_rotations, relative_certainties, turn_covariances};
-use super::joint::{AxisWeights, LineVote};
+use super::jackknife::{Sectors, without_each_sector};
+use super::joint::{AxisWeights, LineVote, Refinement};
 use super::prior::SimilarityPrior;
 use super::vertical::roll_of;
 use super::vpg::axis_weights;
@@ -87,7 +88,9 @@ pub fn estimated_rolls(input: &RollsInput<'_>) -> Option<Vec<Option<EstimatedRol
         return None;
     }
     let UprightScene { frame, vertical, axes_used, axis_weights, .. } = &scene;
-    let others = vote.without_each_sector(frame, *vertical, *axes_used, axis_weights, SECTOR_DEG.to_radians());
+    let refinement = Refinement { start: frame, axes_used: *axes_used, axis_weights };
+    let sectors = Sectors { vertical: *vertical, width: SECTOR_DEG.to_radians() };
+    let others = without_each_sector(&vote, refinement, sectors);
     let sign = down.dot(&frame.column(*vertical)).signum();
     let downs: Vec<Vector3<f64>> = others.iter().map(|other| other.column(*vertical) * sign).collect();
     let scatter = Scatter::of(&downs).filter(|scatter| scatter.sectors >= MIN_SECTORS)?;

@@ -11,6 +11,7 @@ use super::dominant::{Dominant, dominant_frame};
 use super::frame_search::{GUIDING_SIGNIFICANCE, PooledFrame, search_frame};
 use super::gate::{GateEvidence, MAX_STRAIGHTENING_ANGLE_DEG, allowed_divergence, divergence, failed_clause};
 use super::input::PriorInput;
+use super::jackknife::axis_deviations;
 use super::joint::{self, AxisWeights, LineVote};
 use super::options::{GateMode, SimilarityOptions};
 use super::prior::Guidance;
@@ -66,7 +67,7 @@ pub(super) fn guide(
     guidance.significance = pooled.map(|pooled| pooled.significance);
     guidance.failed_clause = match &dominant {
         Some(dominant) => scene.judge(dominant, &mut guidance),
-        None => Some("no picture has vanishing directions".to_owned()),
+        None => Some("no photograph has vanishing directions".to_owned()),
     };
     context.check_cancelled()?;
     let accepted = match guidance.failed_clause {
@@ -212,7 +213,7 @@ impl<'a> SceneDirections<'a> {
     /// why not as the failed clause.
     fn is_certain(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights, guidance: &mut Guidance) -> bool {
         let down = vertical_of(frame, self.rotations);
-        let deviation = self.vote.axis_deviations(frame, axis_weights)[frame.tr_mul(&down).iamax()];
+        let deviation = axis_deviations(&self.vote, frame, axis_weights)[frame.tr_mul(&down).iamax()];
         guidance.vertical_deviation = Some(deviation).filter(|deviation| deviation.is_finite());
         let allowed = match guidance.pooled {
             true => MAX_POOLED_DEVIATION_DEG,

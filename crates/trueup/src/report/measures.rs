@@ -42,7 +42,8 @@ pub struct Measures {
     /// Cells that are folded, in all photographs.
     pub folds: usize,
     /// Each photograph's own figures, in the order of the photographs used.
-    pub pictures: Vec<PhotographMeasures>,
+    #[serde(rename = "pictures")]
+    pub photographs: Vec<PhotographMeasures>,
 }
 
 /// How upright the panorama is by the lines of all its photographs, over those whose lean is certain.
@@ -154,7 +155,7 @@ pub(crate) fn run(component: &Component, geometry: &Geometry, layout: &CanvasLay
         ld: HUNDREDTHS * distortion.worst,
         ld_mean: HUNDREDTHS * distortion.mean,
         folds: working.iter().map(folded_cells).sum(),
-        pictures: (0..working.len())
+        photographs: (0..working.len())
             .map(|k| PhotographMeasures {
                 path: component.images[k].path.display().to_string(),
                 vertical_lines: vertical_lines[k],
@@ -236,8 +237,8 @@ fn reprojection(
         .coinciding
         .iter()
         .map(|pair| {
-            let full = |point: [f64; 2], picture: usize| {
-                point.map(|coordinate| coordinate / component.frames[picture].working_from_full)
+            let full = |point: [f64; 2], photograph: usize| {
+                point.map(|coordinate| coordinate / component.frames[photograph].working_from_full)
             };
             let matches = pair
                 .inliers

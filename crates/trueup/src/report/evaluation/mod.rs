@@ -63,7 +63,8 @@ pub struct Evaluation {
     /// What the panorama's measures state without the truth, beside it; `None` if the project holds no measures.
     pub stated: Option<StatedEvaluation>,
     /// Each photograph's own figures.
-    pub pictures: Vec<PhotographEvaluation>,
+    #[serde(rename = "pictures")]
+    pub photographs: Vec<PhotographEvaluation>,
 }
 
 /// How honest the measures are that need no truth.
@@ -109,7 +110,7 @@ pub fn read_truth(path: &Path) -> Result<Truth> {
     let subject = path.display().to_string();
     let truth: Truth = serde_json::from_slice(&bytes).map_err(|error| {
         let reason = format!("not a truth file ({error})");
-        Error::input(&subject, reason, "Give the truth.json that was written together with the pictures.")
+        Error::input(&subject, reason, "Give the truth.json that was written together with the photographs.")
     })?;
     truth.check(&subject)?;
     Ok(truth)
@@ -134,7 +135,7 @@ pub fn read_truth(path: &Path) -> Result<Truth> {
 /// are damaged.
 pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     truth.check(&subject(truth))?;
-    let known = match_pictures(project, truth)?;
+    let known = match_photographs(project, truth)?;
     let records: Vec<&ImageRecord> = known.iter().map(|one| one.record).collect();
     let meshes = used_grids(&records)?;
     let period = project.grid_canvas().period();
@@ -150,7 +151,7 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     let distortion = metrics::local_distortion(&meshes, Outside::Center, period);
     let leans: Vec<Option<StatedLean>> =
         known.iter().zip(&upright.photographs).map(|(one, &lean)| StatedLean::of(project, one, lean)).collect();
-    let pictures = (0..known.len()).map(|k| PhotographEvaluation {
+    let photographs = (0..known.len()).map(|k| PhotographEvaluation {
         file: known[k].truth.file.clone(),
         upright_deg: upright.photographs[k].to_degrees(),
         theta_error_deg: theta_errors.as_ref().map(|errors| errors[k].to_degrees()),
@@ -173,7 +174,7 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
         folds: meshes.iter().map(folded_cells).sum(),
         align_px: alignment(&known, &meshes, period),
         stated: project.measures.as_ref().map(|measures| stated(measures, &leans)),
-        pictures: pictures.collect(),
+        photographs: photographs.collect(),
     })
 }
 
@@ -189,8 +190,8 @@ struct StatedLean {
 
 impl StatedLean {
     fn of(project: &Project, known: &Known, true_lean: f64) -> Option<Self> {
-        let pictures = &project.measures.as_ref()?.pictures;
-        let one = pictures.iter().find(|one| one.path == known.record.path)?;
+        let photographs = &project.measures.as_ref()?.photographs;
+        let one = photographs.iter().find(|one| one.path == known.record.path)?;
         let error_deg = wrap_angle(one.lean_deg?.to_radians() - true_lean).to_degrees();
         Some(Self { error_deg, within_deg: one.within_deg, certain: one.certain, true_deg: true_lean.to_degrees() })
     }
@@ -220,7 +221,7 @@ fn largest(angles: &[f64]) -> f64 {
 }
 
 /// The used photographs that the truth names, in its order.
-fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Known<'a>>> {
+fn match_photographs<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Known<'a>>> {
     let used: Vec<&ImageRecord> = project.used_images().collect();
     let mut known = Vec::new();
     for one in &truth.images {
@@ -229,8 +230,8 @@ fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Know
         if named.next().is_some() {
             return Err(Error::input(
                 &one.file,
-                "the project uses two pictures of this name, and a truth tells pictures apart by their names alone",
-                "Stitch pictures with different names.",
+                "the project uses two photographs of this name, and a truth tells photographs apart by their names alone",
+                "Stitch photographs with different names.",
             ));
         }
         if (record.width, record.height) != (one.width, one.height) {
@@ -238,15 +239,15 @@ fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Know
                 "the project has it at {} x {} px, the truth at {} x {} px",
                 record.width, record.height, one.width, one.height
             );
-            return Err(Error::input(&one.file, reason, "Give the truth of the very pictures that were stitched."));
+            return Err(Error::input(&one.file, reason, "Give the truth of the very photographs that were stitched."));
         }
         known.push(Known { record, truth: one });
     }
     match known.len() {
         0 => Err(Error::input(
             subject(truth),
-            format!("it names none of the {} pictures that the project uses", used.len()),
-            "Give the truth of the pictures that were stitched; pictures are told apart by their file names.",
+            format!("it names none of the {} photographs that the project uses", used.len()),
+            "Give the truth of the photographs that were stitched; photographs are told apart by their file names.",
         )),
         1 => Err(too_few(1)),
         _ => Ok(known),
@@ -256,8 +257,8 @@ fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Know
 fn too_few(count: usize) -> Error {
     Error::input(
         "the truth",
-        format!("of the pictures it names, the project uses {count}, and it takes two to compare"),
-        "Give a project of at least two pictures of the set.",
+        format!("of the photographs it names, the project uses {count}, and it takes two to compare"),
+        "Give a project of at least two photographs of the set.",
     )
 }
 
