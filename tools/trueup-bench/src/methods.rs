@@ -1,7 +1,7 @@
 //! The methods that are compared, each a name and the options that make it.
 
 use crate::published_forms::{
-    FREE_OUTLINES, GSP_2D_AS_PUBLISHED, GSP_2D_PRIOR, GSP_3D_AS_PUBLISHED, GSP_3D_PRIOR, PUBLISHED_WARP_GRID,
+    GSP_2D_AS_PUBLISHED, GSP_2D_PRIOR, GSP_3D_AS_PUBLISHED, GSP_3D_PRIOR, PUBLISHED_WARP_GRID,
     VPG_AS_PUBLISHED,
 };
 
@@ -116,14 +116,14 @@ pub(crate) static METHODS: [ComparedMethod; 19] = [
     ComparedMethod {
         name: VPG_LINES_PUBLISHED,
         meaning: "as published, and matched lines drawn together and held straight",
-        options: &[&VPG_AS_PUBLISHED, &["stitch.align=lines"], &FREE_OUTLINES],
+        options: &[&VPG_AS_PUBLISHED, &["stitch.align=lines"]],
         paper: Some("VPG+DFW"),
         family: Family::Alignment,
     },
     ComparedMethod {
         name: VPG_PIXELS_PUBLISHED,
         meaning: "as published, and the pixels of overlaps drawn together",
-        options: &[&VPG_AS_PUBLISHED, &["stitch.align=photometric"], &FREE_OUTLINES],
+        options: &[&VPG_AS_PUBLISHED, &["stitch.align=photometric"]],
         paper: Some("VPG+GCPW"),
         family: Family::Alignment,
     },
