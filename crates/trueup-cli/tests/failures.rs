@@ -109,7 +109,7 @@ fn two_identical_files_are_one_photograph() {
     desk.put("two.jpg", &street()[0]);
     let run = desk.stitch(&["one.jpg", "two.jpg"]);
     for part in
-        ["pictures  1 of 2 used", "two.jpg: it has the same bytes as one.jpg, which is used", "only one photograph"]
+        ["photographs 1 of 2 used", "two.jpg: it has the same bytes as one.jpg, which is used", "only one photograph"]
     {
         assert!(run.expect_success().contains(part), "\"{part}\" is not in\n{}", run.stdout);
     }

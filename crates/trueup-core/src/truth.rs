@@ -110,7 +110,7 @@ impl Truth {
     /// [`Error::Input`] about `subject` with the first picture at fault.
     pub fn check(&self, subject: &str) -> Result<()> {
         let wrong = |reason: String| {
-            Error::input(subject, reason, "Give the truth.json that was written together with the pictures.")
+            Error::input(subject, reason, "Give the truth.json that was written together with the photographs.")
         };
         if self.images.is_empty() {
             return Err(wrong("it lists no pictures".to_owned()));

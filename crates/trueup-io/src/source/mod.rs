@@ -25,7 +25,7 @@ use inputs::Candidate;
 use opened::{OpenedPicture, open_candidate};
 use rejection::Rejection;
 
-pub use crate::formats::readable_formats;
+pub use crate::formats::{names_photograph, readable_formats};
 pub use inputs::natural_order;
 pub use names::unique_names;
 pub use options::{OrientationTrust, SourceOptions};
