@@ -2,7 +2,9 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod build_stamp;
 mod experiments;
+mod figures;
 mod measure;
 mod methods;
 mod paper;
@@ -13,6 +15,7 @@ mod random_directions;
 mod report;
 mod results;
 mod roc;
+mod rows;
 mod runner;
 mod sets;
 mod statistics;

@@ -1,8 +1,7 @@
 //! The methods that are compared, each a name and the options that make it.
 
 use crate::published_forms::{
-    GSP_2D_AS_PUBLISHED, GSP_2D_PRIOR, GSP_3D_AS_PUBLISHED, GSP_3D_PRIOR, PUBLISHED_WARP_GRID,
-    VPG_AS_PUBLISHED,
+    GSP_2D_AS_PUBLISHED, GSP_2D_PRIOR, GSP_3D_AS_PUBLISHED, GSP_3D_PRIOR, PUBLISHED_WARP_GRID, VPG_AS_PUBLISHED,
 };
 
 /// A method of stitching.

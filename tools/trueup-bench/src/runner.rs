@@ -161,12 +161,7 @@ impl Runner<'_> {
             .map(MatchedPhotographs::remembering)
     }
 
-    fn align(
-        &self,
-        ready: &ReadySet,
-        photographs: &MatchedPhotographs,
-        trial: &Trial,
-    ) -> Result<Outcome> {
+    fn align(&self, ready: &ReadySet, photographs: &MatchedPhotographs, trial: &Trial) -> Result<Outcome> {
         let options = trial.options()?;
         let context = StageContext::new(&Silent, self.cancel).seeded(trial.seed);
         let (stitcher, inputs) = (Stitcher::new(&options, &context), inputs_of(ready, trial));
@@ -299,7 +294,11 @@ mod tests {
     fn small_set() -> SetSpec {
         let scene = SceneOptions { seed: 3, light: LightQuality::Fast, ..SceneOptions::default() };
         let rig = RigOptions { seed: 3, pictures: 2, width: 320, height: 240, ..RigOptions::default() };
-        SetSpec::rendered("test/small".to_owned(), Some(true), Recipe { scene, rig, quality: Quality::Preview, second_roll_deg: 0.0 })
+        SetSpec::rendered(
+            "test/small".to_owned(),
+            Some(true),
+            Recipe { scene, rig, quality: Quality::Preview, second_roll_deg: 0.0 },
+        )
     }
 
     #[test]

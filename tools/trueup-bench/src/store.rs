@@ -14,6 +14,7 @@ use crate::trial::{Row, TrialKey};
 #[derive(Debug)]
 pub(crate) struct ResultStore {
     path: PathBuf,
+    resumed: usize,
     state: Mutex<State>,
 }
 
@@ -52,8 +53,18 @@ impl ResultStore {
         if !text.is_empty() && !text.ends_with('\n') {
             file.write_all(b"\n").map_err(|error| Error::io("writing", path, error))?;
         }
-        let rows = rows.into_iter().map(|row| (row.key.clone(), row)).collect();
-        Ok(Self { path: path.to_owned(), state: Mutex::new(State { file, rows }) })
+        let rows: BTreeMap<TrialKey, Row> = rows.into_iter().map(|row| (row.key.clone(), row)).collect();
+        Ok(Self { path: path.to_owned(), resumed: rows.len(), state: Mutex::new(State { file, rows }) })
+    }
+
+    /// How many results there are.
+    pub(crate) fn count(&self) -> usize {
+        self.locked().rows.len()
+    }
+
+    /// How many results there were when the file was opened: of a run that was stopped.
+    pub(crate) fn resumed(&self) -> usize {
+        self.resumed
     }
 
     /// The stored result of this run, if there is one.

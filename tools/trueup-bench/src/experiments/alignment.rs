@@ -3,8 +3,8 @@
 use trueup::Result;
 
 use crate::methods::{
-    ComparedMethod, Family, GSP_3D, GSP_3D_PUBLISHED, VPG, VPG_LINES_PUBLISHED, VPG_PIXELS_PUBLISHED, VPG_PUBLISHED, method,
-    methods_of,
+    ComparedMethod, Family, GSP_3D, GSP_3D_PUBLISHED, VPG, VPG_LINES_PUBLISHED, VPG_PIXELS_PUBLISHED, VPG_PUBLISHED,
+    method, methods_of,
 };
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::Results;
@@ -42,7 +42,8 @@ const MAX_COST_DEG: f64 = 0.2;
 const LOWERED_BY: f64 = 0.15;
 
 /// What aligns further lowers the error and leaves the direction alone: claimed of the published forms.
-const CLAIMED: [(&str, &str); 2] = [("alignment-lines", VPG_LINES_PUBLISHED), ("alignment-pixels", VPG_PIXELS_PUBLISHED)];
+const CLAIMED: [(&str, &str); 2] =
+    [("alignment-lines", VPG_LINES_PUBLISHED), ("alignment-pixels", VPG_PIXELS_PUBLISHED)];
 
 /// What aligns further lowers the error and leaves the direction alone.
 pub(crate) fn claims(results: &Results) -> Vec<Claim> {

@@ -110,8 +110,7 @@ impl Contest {
     /// LD is comparable with that of every other method, on the sets that both do.
     fn claim_distortion(&self, results: &Results, sets: &[SetSpec]) -> Claim {
         let compared = |other: &&'static str| {
-            let (ours, theirs): (Vec<f64>, Vec<f64>) =
-                pairs(results, sets, self.ours, other, "ld").into_iter().unzip();
+            let (ours, theirs): (Vec<f64>, Vec<f64>) = pairs(results, sets, self.ours, other, "ld").into_iter().unzip();
             Some((*other, mean(&ours)?, mean(&theirs)?, ours.len()))
         };
         let found: Vec<_> = self.others.iter().filter_map(compared).collect();

@@ -54,9 +54,8 @@ fn values(results: &Results, set: &SetSpec, method: &str) -> Vec<f64> {
 /// VPG does not depend on the reference; GSP-2D does; GSP-3D is higher. All as published.
 pub(crate) fn claims(results: &Results) -> Vec<Claim> {
     let of_sets: Vec<&SetSpec> = sets(results.catalogue).collect();
-    let spreads = |method| -> Vec<f64> {
-        of_sets.iter().filter_map(|set| spread(&values(results, set, method))).collect()
-    };
+    let spreads =
+        |method| -> Vec<f64> { of_sets.iter().filter_map(|set| spread(&values(results, set, method))).collect() };
     let widest = |method| spreads(method).into_iter().max_by(f64::total_cmp);
     let means: Vec<(f64, f64)> = of_sets
         .iter()
@@ -83,9 +82,8 @@ pub(crate) fn claims(results: &Results) -> Vec<Claim> {
         Claim {
             id: "reference-gsp",
             text: "Those of GSP-2D are severely affected, and GSP-3D is more inconsistent than VPG.".to_owned(),
-            holds: (!two.is_empty()).then_some(
-                affected * AFFECTED_SETS.1 >= two.len() * AFFECTED_SETS.0 && higher == means.len(),
-            ),
+            holds: (!two.is_empty())
+                .then_some(affected * AFFECTED_SETS.1 >= two.len() * AFFECTED_SETS.0 && higher == means.len()),
             evidence: format!(
                 "GDIC of `{GSP_2D_PUBLISHED}` differs by {} degrees on the {} sets, by more than {AFFECTED_DEG} on {affected} \
                  (wanted: {} of {}); GSP-3D's by up to {}; the mean over the references is higher with GSP-3D than with VPG on \

@@ -7,8 +7,8 @@ use trueup_scenes::cut::find_panoramas;
 use trueup_scenes::{LightQuality, Quality, RigOptions, SceneKind, SceneOptions, SetKind};
 
 use super::ready::truth_folders;
-use super::{from_panorama, photographs, vpg_data};
 use super::spec::{Recipe, SetSource, SetSpec};
+use super::{from_panorama, photographs, vpg_data};
 
 /// The sets of a run, by what they are for.
 #[derive(Debug, Default)]

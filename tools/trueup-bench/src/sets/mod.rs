@@ -9,7 +9,7 @@ mod ready;
 mod spec;
 mod vpg_data;
 
-pub(crate) use catalogue::{Catalogue, GivenFolders, RolledPair};
+pub(crate) use catalogue::{Catalogue, GivenFolders};
 pub(crate) use central::central;
 pub(crate) use ready::{ReadySet, TRUTH_FILE, read_truth, truth_folders};
 #[cfg(test)]

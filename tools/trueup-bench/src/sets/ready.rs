@@ -31,8 +31,8 @@ pub(super) fn ready(folder: &Path) -> Result<ReadySet> {
 
 /// Photographs of which nothing is known but where they are, and what may be true of them.
 pub(super) fn ready_photographs(paths: &[PathBuf], truth: Option<Truth>) -> Result<ReadySet> {
-    let text = serde_json::to_string(&truth)
-        .map_err(|error| Error::input("truth", error, "Report this as a defect."))?;
+    let text =
+        serde_json::to_string(&truth).map_err(|error| Error::input("truth", error, "Report this as a defect."))?;
     Ok(ReadySet { photographs: names(paths), truth, fingerprint: content(&text, paths) })
 }
 

@@ -99,7 +99,7 @@ mod tests {
     use super::*;
 
     fn write_photograph(path: &Path, gray: u8) {
-        let file = std::fs::File::create(path).expect("a file");
+        let file = fs::File::create(path).expect("a file");
         let mut writer = png::Encoder::new(file, 96, 64).write_header().expect("a header");
         writer.write_image_data(&[gray; 96 * 64]).expect("written");
     }
@@ -108,14 +108,14 @@ mod tests {
     fn imitation(folder: &Path) {
         for (set, count) in [("01", 2_u8), ("13", 3)] {
             let set = folder.join(set);
-            std::fs::create_dir(&set).expect("folder");
+            fs::create_dir(&set).expect("folder");
             (0..count).for_each(|index| write_photograph(&set.join(format!("{index}.png")), 60 * index));
         }
-        std::fs::create_dir(folder.join("readme")).expect("folder");
+        fs::create_dir(folder.join("readme")).expect("folder");
         // The second camera is rolled clockwise by 30 degrees: what is down in the world shows to the right of its down.
         let cameras = "# file, focal length, rotation\n0.png 80 1 0 0 0 1 0 0 0 1\n\
                        1.png 82.5 0.8660254 0.5 0 -0.5 0.8660254 0 0 0 1\n";
-        std::fs::write(folder.join("01").join(CAMERAS), cameras).expect("written");
+        fs::write(folder.join("01").join(CAMERAS), cameras).expect("written");
     }
 
     #[test]
@@ -147,7 +147,7 @@ mod tests {
             ("0.png 80 1 0 0 0 1 0 0 0 1\n", "1.png has no camera"),
             ("0.png 80 1 0 0 0 1 0 0 0 1\n1.png 80 1 0 0 0 2 0 0 0 1\n", "R of 1.png is no rotation"),
         ] {
-            std::fs::write(&file, text).expect("written");
+            fs::write(&file, text).expect("written");
             let said = set.prepare(folder.path(), &StageContext::default()).expect_err("must fail").to_string();
             assert!(said.contains(reason) && said.contains(CAMERAS), "{said}");
         }
