@@ -17,6 +17,7 @@ mod results;
 mod roc;
 mod rows;
 mod runner;
+mod set_work;
 mod sets;
 mod statistics;
 mod stopping;

@@ -79,6 +79,9 @@ pub(crate) fn run(arguments: &PaperArguments) -> Result<ExitCode> {
     if wanted.contains(&runtime::NAME) {
         claims.extend(runtime::claims(&results));
     }
+    if !arguments.quick && !stamp.is_clean() {
+        eprintln!("trueup-bench: not to be cited: the program was not built from a commit without changes");
+    }
     let figures = match wanted.contains(&FIGURES) {
         true => Some(figures::section(&runner, &catalogue, &arguments.out)?),
         false => None,

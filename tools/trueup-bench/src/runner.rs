@@ -13,6 +13,7 @@ use trueup::{
 use crate::measure;
 use crate::progress::Tracker;
 use crate::random_directions::with_random_directions;
+use crate::set_work::{MatchingKey, Outcome, SetWork};
 use crate::sets::{ReadySet, SetSpec, central};
 use crate::store::ResultStore;
 use crate::trial::{Row, Trial};
@@ -40,13 +41,6 @@ pub(crate) struct Runner<'a> {
 
 /// Bytes of a set's measured photographs and matched pairs that are kept while its trials run: far more than any needs.
 const SCRATCH_BYTES: f64 = 16e9;
-
-/// What came of one piece of work.
-#[derive(Debug, Clone)]
-struct Outcome {
-    measures: BTreeMap<String, f64>,
-    note: String,
-}
 
 /// The trials of one set.
 #[derive(Debug)]
@@ -146,7 +140,8 @@ impl Runner<'_> {
         Ok(rows.into_iter().flatten().collect())
     }
 
-    fn match_set(
+    /// Measures and matches the photographs of a trial.
+    pub(crate) fn match_set(
         &self,
         ready: &ReadySet,
         trial: &Trial,
@@ -161,7 +156,8 @@ impl Runner<'_> {
             .map(MatchedPhotographs::remembering)
     }
 
-    fn align(&self, ready: &ReadySet, photographs: &MatchedPhotographs, trial: &Trial) -> Result<Outcome> {
+    /// Aligns and measures them.
+    pub(crate) fn align(&self, ready: &ReadySet, photographs: &MatchedPhotographs, trial: &Trial) -> Result<Outcome> {
         let options = trial.options()?;
         let context = StageContext::new(&Silent, self.cancel).seeded(trial.seed);
         let (stitcher, inputs) = (Stitcher::new(&options, &context), inputs_of(ready, trial));
@@ -180,71 +176,6 @@ impl Runner<'_> {
     }
 }
 
-/// What is known while the trials of one set run.
-#[derive(Debug)]
-struct SetWork<'a> {
-    runner: &'a Runner<'a>,
-    ready: &'a ReadySet,
-    /// The matches that were made last.
-    matched: Option<(MatchingKey, Result<MatchedPhotographs>)>,
-    /// What came of each piece of work so far ([`Trial::work`]), of whichever experiment.
-    known: BTreeMap<String, Outcome>,
-    /// Measured photographs and matched pairs of sets that are matched in several parts.
-    cache: Option<PhotographCache>,
-}
-
-impl SetWork<'_> {
-    /// What comes of a trial: known from another one, or found out.
-    ///
-    /// # Errors
-    /// [`Error::Cancelled`], and options that cannot be; everything else is an outcome.
-    fn outcome(&mut self, trial: &Trial) -> Result<Outcome> {
-        let known = self.known.get(&trial.work()?);
-        if let Some(known) = known.filter(|_| !trial.pixels) {
-            return Ok(known.clone());
-        }
-        let wanted = MatchingKey::new(trial);
-        if self.matched.as_ref().is_none_or(|(known, _)| *known != wanted) {
-            // The old one goes before the new one is made: both together may be large.
-            drop(self.matched.take());
-            let found = self.runner.match_set(self.ready, trial, self.cache.as_ref());
-            self.matched = Some((wanted, found));
-        }
-        let outcome = match &self.matched {
-            Some((_, Ok(photographs))) => self.runner.align(self.ready, photographs, trial),
-            Some((_, Err(error))) => Err(repeated(error)),
-            None => Err(Error::Cancelled),
-        };
-        match outcome {
-            Ok(outcome) => Ok(outcome),
-            Err(error @ (Error::Cancelled | Error::Options(_))) => Err(error),
-            Err(error @ Error::NotApplicable { .. }) => Ok(without_figures("refused", &error)),
-            Err(error) => Ok(without_figures("failed", &error)),
-        }
-    }
-
-    /// Keeps what came of a trial for those that come to the same.
-    fn remember(&mut self, trial: &Trial, row: &Row) -> Result<()> {
-        let outcome = || Outcome { measures: row.measures.clone(), note: row.note.clone() };
-        self.known.entry(trial.work()?).or_insert_with(outcome);
-        Ok(())
-    }
-}
-
-/// What decides whether two trials can share their matches.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-struct MatchingKey {
-    photograph_count: Option<usize>,
-    central: bool,
-    overrides: Vec<String>,
-}
-
-impl MatchingKey {
-    fn new(trial: &Trial) -> Self {
-        Self { photograph_count: trial.photograph_count, central: trial.central, overrides: trial.matching_overrides() }
-    }
-}
-
 fn inputs_of(ready: &ReadySet, trial: &Trial) -> Inputs {
     let count = trial.photograph_count.unwrap_or(ready.photographs.len());
     let around = ready.truth.as_ref().filter(|_| trial.central).and_then(|truth| central(truth, count));
@@ -258,19 +189,6 @@ fn inputs_of(ready: &ReadySet, trial: &Trial) -> Inputs {
         inputs.reference = Reference::Named(photograph.clone());
     }
     inputs
-}
-
-/// What became of a run that has no figures.
-fn without_figures(what: &str, error: &Error) -> Outcome {
-    Outcome { measures: BTreeMap::from([(what.to_owned(), 1.0)]), note: error.to_string() }
-}
-
-/// The same error once more, for the next trial that shares the failed matching.
-fn repeated(error: &Error) -> Error {
-    match error {
-        Error::Cancelled => Error::Cancelled,
-        other => Error::input("matching", other.to_string().trim_end_matches('.'), ""),
-    }
 }
 
 /// A pool of this many threads.

@@ -6,6 +6,7 @@ mod focal_claim;
 mod from_panorama;
 mod photographs;
 mod ready;
+mod rendered;
 mod spec;
 mod vpg_data;
 
