@@ -31,6 +31,8 @@ impl ComparedMethod {
 pub(crate) enum Family {
     /// A similarity prior and the mesh: on whole sets, and in every table.
     Prior,
+    /// A prior with the errors of its publication: on whole sets, in the comparison of methods alone.
+    Printed,
     /// VPG, by default or as published, with more energies that draw overlaps together: on whole sets, in the table of alignment.
     Alignment,
     /// Warps without a prior that cannot show a wide field of view: on reduced sets alone.
@@ -61,7 +63,7 @@ pub(crate) const SPHP_FREE: &str = "sphp-free";
 pub(crate) const AANAP: &str = "aanap";
 
 /// Every method that exists.
-pub(crate) static METHODS: [ComparedMethod; 19] = [
+pub(crate) static METHODS: [ComparedMethod; 20] = [
     ComparedMethod {
         name: VPG,
         meaning: "vanishing points, level sphere (the default)",
@@ -97,6 +99,13 @@ pub(crate) static METHODS: [ComparedMethod; 19] = [
         options: &[&VPG_AS_PUBLISHED],
         paper: Some("VPG"),
         family: Family::Prior,
+    },
+    ComparedMethod {
+        name: "vpg-literal",
+        meaning: "vanishing points, by the paper's equations as they are printed, errors included",
+        options: &[&["stitch.method=vpg-literal"]],
+        paper: None,
+        family: Family::Printed,
     },
     ComparedMethod {
         name: GSP_2D_PUBLISHED,

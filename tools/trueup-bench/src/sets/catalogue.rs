@@ -113,7 +113,7 @@ impl Catalogue {
             study,
             gate: gate_sets(EACH_QUICK_CLASS, true),
             reference_sets: vec!["01", "02"],
-            seeds: 3,
+            seeds: 2,
             ..Self::default()
         }
     }
