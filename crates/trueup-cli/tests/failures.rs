@@ -186,7 +186,7 @@ fn graphs_and_references_that_fit_no_photograph() {
     let desk = street_desk();
     desk.put("graph.txt", "# who overlaps whom\na.jpg -- b.jpg\nb.jpg -- q.jpg\n");
     desk.stitch(&["a.jpg", "b.jpg", "--graph", "graph.txt"])
-        .expect_failure(1, &["graph.txt, line 3: \"q.jpg\" is none of the 2 pictures given"]);
+        .expect_failure(1, &["graph.txt, line 3: \"q.jpg\" is none of the 2 photographs given"]);
     desk.stitch(&["a.jpg", "b.jpg", "--graph", "none.txt"])
         .expect_failure(1, &["reading none.txt: No such file or directory"]);
     desk.stitch(&["a.jpg", "b.jpg", "--reference", "q.jpg"])

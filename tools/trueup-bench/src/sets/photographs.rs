@@ -14,7 +14,7 @@ use super::spec::SetSpec;
 /// # Errors
 /// [`Error::Input`] if there is none; those of looking for them.
 pub(super) fn found(folder: &Path, context: &StageContext) -> Result<Vec<SourceImage>> {
-    let mut images = scan(&[folder.display().to_string()], &Default::default(), context)?.images;
+    let mut images = scan(&[folder.display().to_string()], &Default::default(), context)?.photographs;
     images.sort_by(|one, other| one.path.cmp(&other.path));
     match images.is_empty() {
         true => Err(Error::input(folder.display(), "there is no photograph in it", "Name a folder of photographs.")),
