@@ -3,6 +3,7 @@
 use trueup_align::match_points::TransferModel;
 use trueup_align::mesh::BaseShape;
 use trueup_align::similarity::{BetaMode, Fallback, GateMode, PrintedEquations, PriorMethod};
+use trueup_align::vanishing::Intrinsics;
 use trueup_align::warps::WarpModel;
 
 use super::AlignOptions;
@@ -40,6 +41,7 @@ impl Edition {
         if self == Self::Printed {
             options.similarity.as_printed = PrintedEquations::ALL;
             options.similarity.beta_mode = BetaMode::Printed;
+            options.vanishing.intrinsics = Intrinsics::Unknown;
         }
     }
 }

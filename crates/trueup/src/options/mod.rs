@@ -364,7 +364,7 @@ mod tests {
             "similarity.pooled_search",
             "similarity.vertical_only",
         ];
-        let printed = ["similarity.as_printed", "similarity.beta_mode"];
+        let printed = ["similarity.as_printed", "similarity.beta_mode", "vanishing.intrinsics"];
         let sorted = |parts: &[&[&'static str]]| {
             let mut all = parts.concat();
             all.sort_unstable();
