@@ -41,7 +41,6 @@ impl Edition {
         if self == Self::Printed {
             options.similarity.as_printed = PrintedEquations::ALL;
             options.similarity.beta_mode = BetaMode::Printed;
-            options.vanishing.intrinsics = Intrinsics::Unknown;
         }
     }
 }
@@ -61,9 +60,10 @@ fn fix_published_mesh(options: &mut AlignOptions) {
     mesh.outline_weight = 0.0;
 }
 
-/// The guidance of VPG: each photograph's own vanishing points against relative rolls, the divergence alone for a gate, GSP in
+/// The guidance of VPG: each photograph's own vanishing points, found without intrinsics, against relative rolls, the divergence alone for a gate, GSP in
 /// three dimensions behind it.
 fn fix_published_guidance(options: &mut AlignOptions) {
+    options.vanishing.intrinsics = Intrinsics::Unknown;
     let similarity = &mut options.similarity;
     similarity.gate = GateMode::Paper;
     similarity.beta_mode = BetaMode::World;

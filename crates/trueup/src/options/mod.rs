@@ -363,8 +363,9 @@ mod tests {
             "similarity.pitch_prior",
             "similarity.pooled_search",
             "similarity.vertical_only",
+            "vanishing.intrinsics",
         ];
-        let printed = ["similarity.as_printed", "similarity.beta_mode", "vanishing.intrinsics"];
+        let printed = ["similarity.as_printed", "similarity.beta_mode"];
         let sorted = |parts: &[&[&'static str]]| {
             let mut all = parts.concat();
             all.sort_unstable();
