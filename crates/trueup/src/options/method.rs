@@ -60,8 +60,8 @@ fn fix_published_mesh(options: &mut AlignOptions) {
     mesh.outline_weight = 0.0;
 }
 
-/// The guidance of VPG: each photograph's own vanishing points, found without intrinsics, against relative rolls, the divergence alone for a gate, GSP in
-/// three dimensions behind it.
+/// The guidance of VPG: each photograph's own vanishing points, found without intrinsics, against relative rolls, the divergence
+/// alone for a gate, GSP in three dimensions behind it.
 fn fix_published_guidance(options: &mut AlignOptions) {
     options.vanishing.intrinsics = Intrinsics::Unknown;
     let similarity = &mut options.similarity;
