@@ -37,6 +37,8 @@ pub(crate) enum Family {
     Warp,
     /// Warps without a prior that are tried on whole sets too.
     WideWarp,
+    /// What shows errors of the paper: in no table.
+    Errors,
 }
 
 /// The name of the default method in [`METHODS`].
@@ -58,7 +60,7 @@ pub(crate) const SPHP_FREE: &str = "sphp-free";
 pub(crate) const AANAP: &str = "aanap";
 
 /// Every method that exists.
-pub(crate) static METHODS: [ComparedMethod; 17] = [
+pub(crate) static METHODS: [ComparedMethod; 18] = [
     ComparedMethod {
         name: VPG,
         meaning: "vanishing points, level sphere (the default)",
@@ -94,6 +96,13 @@ pub(crate) static METHODS: [ComparedMethod; 17] = [
         options: &[&VPG_AS_PUBLISHED],
         paper: Some("VPG"),
         family: Family::Prior,
+    },
+    ComparedMethod {
+        name: "vpg-literal",
+        meaning: "the paper's equations as they are printed, errors included",
+        options: &[&["stitch.method=vpg-literal"]],
+        paper: None,
+        family: Family::Errors,
     },
     ComparedMethod {
         name: GSP_2D_PUBLISHED,
@@ -193,8 +202,24 @@ pub(crate) fn methods_of(family: Family) -> impl Iterator<Item = &'static Compar
 
 #[cfg(test)]
 mod tests {
+    use trueup::Method;
+
     use super::*;
     use crate::trial::Trial;
+
+    #[test]
+    fn every_method_of_the_stitcher_is_compared() {
+        let compared: Vec<Method> = METHODS
+            .iter()
+            .map(|one| {
+                Trial::new("test", "set", one.name, &one.overrides()).options().expect(one.name).align.stitch.method
+            })
+            .collect();
+        for name in Method::NAMES {
+            let declared = Method::named(name).expect("a declared name");
+            assert!(compared.contains(&declared), "{name}");
+        }
+    }
 
     #[test]
     fn every_method_has_valid_options_and_a_name_of_its_own() {
