@@ -27,6 +27,8 @@ mod vpg;
 mod weighted_solve;
 
 #[cfg(test)]
+mod equation_tests;
+#[cfg(test)]
 mod gsp_tests;
 #[cfg(test)]
 mod pooled_tests;

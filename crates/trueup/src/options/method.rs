@@ -3,6 +3,7 @@
 use trueup_align::match_points::TransferModel;
 use trueup_align::mesh::BaseShape;
 use trueup_align::similarity::{BetaMode, Fallback, GateMode, PrintedEquations, PriorMethod};
+use trueup_align::vanishing::Intrinsics;
 use trueup_align::warps::WarpModel;
 
 use super::AlignOptions;
@@ -59,9 +60,10 @@ fn fix_published_mesh(options: &mut AlignOptions) {
     mesh.outline_weight = 0.0;
 }
 
-/// The guidance of VPG: each photograph's own vanishing points against relative rolls, the divergence alone for a gate, GSP in
-/// three dimensions behind it.
+/// The guidance of VPG: each photograph's own vanishing points, found without intrinsics, against relative rolls, the divergence
+/// alone for a gate, GSP in three dimensions behind it.
 fn fix_published_guidance(options: &mut AlignOptions) {
+    options.vanishing.intrinsics = Intrinsics::Unknown;
     let similarity = &mut options.similarity;
     similarity.gate = GateMode::Paper;
     similarity.beta_mode = BetaMode::World;

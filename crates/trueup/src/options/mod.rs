@@ -363,6 +363,7 @@ mod tests {
             "similarity.pitch_prior",
             "similarity.pooled_search",
             "similarity.vertical_only",
+            "vanishing.intrinsics",
         ];
         let printed = ["similarity.as_printed", "similarity.beta_mode"];
         let sorted = |parts: &[&[&'static str]]| {
