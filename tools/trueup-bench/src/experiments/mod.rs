@@ -129,3 +129,27 @@ pub(crate) const QUICK_CLAIMS: [&str; 7] = [
 fn no_claims(_: &Results) -> Vec<Claim> {
     Vec::new()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sets::GivenFolders;
+
+    /// A method that fixes options refuses other values of them: an experiment that asks for one would end the whole run.
+    #[test]
+    fn every_trial_of_every_experiment_has_options_that_can_be() {
+        for catalogue in [Catalogue::full(&GivenFolders::default()).expect("no folders"), Catalogue::quick()] {
+            let mut work = std::collections::BTreeSet::new();
+            for experiment in &EXPERIMENTS {
+                for trial in (experiment.trials)(&catalogue).expect("trials") {
+                    let said = |error| format!("{} {}: {error}", experiment.name, trial.variant);
+                    // Options repeat over sets and seeds.
+                    if work.insert(trial.overrides.clone()) {
+                        trial.options().map_err(said).expect("options that can be");
+                    }
+                }
+            }
+            assert!(work.len() > 10, "{}", work.len());
+        }
+    }
+}
