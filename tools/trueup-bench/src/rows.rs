@@ -52,7 +52,7 @@ mod tests {
     #[test]
     fn figures_keep_five_digits_and_stand_under_their_names() {
         assert_eq!(
-            [0.123_456_78, 1234.567_8, 0.0, 1.0, 2e-7].map(compact),
+            [0.123_456_78, 1_234.567_8, 0.0, 1.0, 2e-7].map(compact),
             ["0.12346", "1234.6", "0", "1", "0.0000002"]
         );
         let row = |measure: &str, value| {
