@@ -38,12 +38,7 @@ impl HalfPlanes {
     /// The planes of photographs `source` (`ref`) and `target` (`tar`); `onto_source` has every photograph's homography
     /// onto the plane of `source`. `None` if these two do not see each other's centers in front of them, or a
     /// photograph lies wholly in front of neither plane.
-    pub(super) fn new(
-        input: &WarpInput<'_>,
-        onto_source: &[Homography],
-        source: usize,
-        target: usize,
-    ) -> Option<Self> {
+    pub(super) fn new(input: &WarpInput<'_>, onto_source: &[Homography], source: usize, target: usize) -> Option<Self> {
         let frame = &input.frames[source];
         let center = Vector2::new(frame.width / 2.0, frame.height / 2.0);
         let shifted = |by: Vector2<f64>| Homography(Matrix3::new(1.0, 0.0, by.x, 0.0, 1.0, by.y, 0.0, 0.0, 1.0));
@@ -124,10 +119,7 @@ pub(super) struct Sample {
 ///
 /// # Source
 /// Chang, Sato and Chuang, "Shape-preserving half-projective warps for image stitching" (2014), equation 12.
-pub(super) fn distortion(
-    samples: &[Samples],
-    jacobian: impl Fn(Vector2<f64>) -> Option<Matrix2<f64>>,
-) -> Option<f64> {
+pub(super) fn distortion(samples: &[Samples], jacobian: impl Fn(Vector2<f64>) -> Option<Matrix2<f64>>) -> Option<f64> {
     let mut cost = 0.0;
     for photograph in samples {
         let mut sums = SimilaritySums::default();
@@ -155,8 +147,7 @@ struct SimilaritySums {
 impl SimilaritySums {
     fn add(&mut self, derivative: &Matrix2<f64>) {
         self.squares += derivative.norm_squared();
-        let (diagonal, across) =
-            (derivative[(0, 0)] + derivative[(1, 1)], derivative[(1, 0)] - derivative[(0, 1)]);
+        let (diagonal, across) = (derivative[(0, 0)] + derivative[(1, 1)], derivative[(1, 0)] - derivative[(0, 1)]);
         self.turn += Vector2::new(diagonal, across);
         self.count += 1;
     }

@@ -71,7 +71,8 @@ pub(super) fn place(
         let onto_source = onto(input, source, options.pair_homographies)?;
         for target in (0..input.grids.len()).filter(|&target| target != source) {
             let planes = HalfPlanes::new(input, &onto_source, source, target);
-            let found = planes.and_then(|planes| Some((least_distorted(&planes, input, zero_rotation, COARSE)?.0, planes)));
+            let found =
+                planes.and_then(|planes| Some((least_distorted(&planes, input, zero_rotation, COARSE)?.0, planes)));
             compared.extend(found);
         }
         // The sort is stable: between equals the order of the photographs decides.
@@ -92,7 +93,8 @@ pub(super) fn place(
             .unwrap_or(input.reference);
         return Err(refuse(model, input, widest, "cannot be laid on one plane with the others"));
     };
-    let mesh = |photograph: usize| deformed(&input.grids[photograph], |point| warp.place(&planes.routes[photograph], point));
+    let mesh =
+        |photograph: usize| deformed(&input.grids[photograph], |point| warp.place(&planes.routes[photograph], point));
     Ok((0..input.grids.len()).map(mesh).collect())
 }
 
@@ -271,9 +273,8 @@ mod tests {
     /// How many times as large a photograph is at its largest cell as at its smallest.
     fn unevenness(mesh: &GridMesh) -> f64 {
         let across = |vertex: usize| Vector2::from(mesh.target[vertex + 1]) - Vector2::from(mesh.target[vertex]);
-        let down = |vertex: usize| {
-            Vector2::from(mesh.target[vertex + mesh.columns]) - Vector2::from(mesh.target[vertex])
-        };
+        let down =
+            |vertex: usize| Vector2::from(mesh.target[vertex + mesh.columns]) - Vector2::from(mesh.target[vertex]);
         let areas: Vec<f64> = (0..mesh.len() - mesh.columns)
             .filter(|vertex| (vertex + 1) % mesh.columns != 0)
             .map(|vertex| across(vertex).perp(&down(vertex)))
