@@ -42,8 +42,9 @@ trueup_core::options! {
         /// Distance over which that weight falls to 1/e; 72.25 is the published 8.5 squared. Lower it where overlaps
         /// still show double, raise it where they are bent.
         apap_decay_px: f64 = 72.25, between(1.0, 10000.0), "working px";
-        /// Whether the method aanap moves the reference of a pair along with the photograph that joins it, as published.
-        /// Turn it off to keep the reference as it was taken. With more than two photographs it always stays.
+        /// Whether the method aanap moves the photographs that are placed already along with the one that joins them.
+        /// Turn it off to keep the reference as it was taken, and where photographs are refused for their size; what joins
+        /// is then less like a similarity.
         adapt_reference: bool = true, Allowed::Any, "";
     }
 }
