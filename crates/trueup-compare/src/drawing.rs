@@ -70,9 +70,9 @@ fn verticals(image: &ImageRecord, lines: &[LineSegment], frame: &WorkingFrame) -
     let Some(focal_px) = image.focal_px else { return Vec::new() };
     // Down is the levelled world's second axis; without a rotation, cameras are expected to be held level.
     let down = image.rotation.map_or(Vector3::y(), |rows| Vector3::new(rows[0][1], rows[1][1], rows[2][1]));
-    let picture =
+    let photograph =
         VerticalLinesInput { lines, frame, focal_px: focal_px * frame.working_from_full, expected_down: down };
-    vertical_segments(&picture)
+    vertical_segments(&photograph)
 }
 
 /// Positions of the longest segments, ascending.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::{matrix_from_rows, rows_of};
 
-/// A rotating pinhole camera: square pixels, no skew, no lens distortion, principal point at the picture's center.
+/// A rotating pinhole camera: square pixels, no skew, no lens distortion, principal point at the photograph's center.
 ///
 /// Bearings `(u - c_x, v - c_y, f)` are in the camera frame (x right, y down, z forward).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -19,7 +19,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A camera of focal length `focal_px` looking at the center of a `width` x `height` picture.
+    /// A camera of focal length `focal_px` looking at the center of a `width` x `height` photograph.
     pub fn new(focal_px: f64, width: f64, height: f64, camera_from_world: &Matrix3<f64>) -> Self {
         Self { focal_px, principal_point: [width / 2.0, height / 2.0], camera_from_world: rows_of(camera_from_world) }
     }
