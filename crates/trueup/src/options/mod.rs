@@ -280,12 +280,15 @@ impl StitchOptions {
         let mut contradicting = Vec::new();
         for row in Self::describe() {
             let Some((table, option)) = row.name.split_once('.') else { continue };
-            let value = |of: &toml::Table| of.get(table).and_then(|table| table.get(option)).cloned();
-            let (Some(own), Some(fixed)) = (value(&own), value(&fixed)) else { continue };
-            if own != fixed && value(&default).is_none_or(|default| own != default) {
+            // As text: a value that is no number is not equal to itself.
+            let value = |of: &toml::Table| of.get(table).and_then(|table| table.get(option)).map(as_written);
+            let (Some(own), Some(fixed), Some(default)) = (value(&own), value(&fixed), value(&default)) else {
+                continue;
+            };
+            if own != fixed && own != default {
                 let method = self.align.stitch.method.display();
-                let allowed = format!("{}, which the method {method} fixes", as_written(&fixed));
-                contradicting.push(InvalidOption { name: row.name, value: as_written(&own), allowed });
+                let allowed = format!("{fixed}, which the method {method} fixes");
+                contradicting.push(InvalidOption { name: row.name, value: own, allowed });
             }
         }
         contradicting
