@@ -31,10 +31,10 @@ const SECTOR_DEG: f64 = 20.0;
 /// Fewer sectors with lines tell nothing of how they scatter.
 const MIN_SECTORS: usize = 4;
 /// Standard deviation, about any level axis, of what all lines of a scene err by alike, degrees. Fitted on 136
-/// photographs cut from four panoramas, so that the 95 % interval holds the truth of 95 % of them; the verticals that
-/// such truths rest on are measured and err, too, which is thus part of it. docs/quality.md has the coverage on others:
-/// there it is too large.
-const SCENE_DEVIATION_DEG: f64 = 0.14;
+/// photographs cut from four panoramas: the smallest with which the 95 % interval holds the truth of 95 % of them. The
+/// verticals that such truths rest on are measured and err, too, which is thus part of it. docs/quality.md has the
+/// coverage on others.
+const SCENE_DEVIATION_DEG: f64 = 0.111;
 /// Largest angle between a segment and the vertical for the segment to be a vertical line, degrees.
 const TOLERANCE_DEG: f64 = 1.5;
 /// Fewest photographs that must show vertical lines, three each: a single one has nothing to agree with.
@@ -127,7 +127,7 @@ impl UprightScene {
         match (&prior.guidance.dominant, prior.guidance.used) {
             (Some(rows), true) => {
                 let frame = matrix_from_rows(rows);
-                let axis_weights = axis_weights(&frame, &alone.rotations, &prior.guidance);
+                let axis_weights = axis_weights(&frame, &Vector3::y(), &prior.guidance);
                 let vertical = frame.row(1).transpose().iamax();
                 Some(Self { frame, vertical, axes_used: 3, axis_weights, ..alone })
             }
