@@ -201,19 +201,23 @@ fn models_by_matches_keep_a_similar_pair_rigid() {
 }
 
 #[test]
-fn models_on_one_plane_refuse_a_half_turn_with_its_angle_and_others_place_it() {
+fn models_on_planes_refuse_what_lies_behind_them_and_others_place_it() {
+    let refused = |error: Error, model: WarpModel| {
+        assert!(matches!(error, Error::NotApplicable { .. }), "{model:?}: {error}");
+        assert!(error.to_string().contains(" degrees from the axis of 0.jpg"), "{model:?}: {error}");
+    };
     let example = Example::panned(&[0.0, 30.0, 60.0, 90.0], 0);
     for model in models() {
         match (model, example.place(model)) {
-            (WarpModel::Homography | WarpModel::Apap | WarpModel::Sphp | WarpModel::SphpFree, Err(error)) => {
-                assert!(matches!(error, Error::NotApplicable { .. }), "{model:?}: {error}");
-                assert!(error.to_string().contains(" degrees from the axis of 0.jpg"), "{model:?}: {error}");
-            }
-            (WarpModel::Autostitch | WarpModel::Aanap | WarpModel::QuasiHomography, Ok(placed)) => {
-                assert_eq!(placed.folds, 0, "{model:?}");
-            }
-            (_, other) => panic!("{model:?}: {:?}", other.map(|placed| placed.folds)),
+            (WarpModel::Homography | WarpModel::Apap, Err(error)) => refused(error, model),
+            (WarpModel::Homography | WarpModel::Apap, Ok(_)) => panic!("{model:?} places a photograph at 90 degrees"),
+            (_, placed) => assert_eq!(placed.expect("not on the plane of 0.jpg").folds, 0, "{model:?}"),
         }
+    }
+    // Two planes that see each other show less than 90 + 90 + 90 degrees.
+    let wider = Example::panned(&(0..9).map(|k| f64::from(k) * 30.0).collect::<Vec<_>>(), 0);
+    for model in [WarpModel::Sphp, WarpModel::SphpFree] {
+        refused(wider.place(model).expect_err("240 degrees and a photograph"), model);
     }
 }
 
