@@ -1,6 +1,8 @@
 //! The methods that are compared, each a name and the options that make it.
 
-use crate::published_forms::{GSP_2D_PRIOR, GSP_3D_PRIOR, PUBLISHED_MESH, PUBLISHED_WARP_GRID};
+use crate::published_forms::{
+    GSP_2D_AS_PUBLISHED, GSP_2D_PRIOR, GSP_3D_AS_PUBLISHED, GSP_3D_PRIOR, PUBLISHED_WARP_GRID, VPG_AS_PUBLISHED,
+};
 
 /// A method of stitching.
 #[derive(Debug, Clone, Copy)]
@@ -35,6 +37,8 @@ pub(crate) enum Family {
     Warp,
     /// Warps without a prior that are tried on whole sets too.
     WideWarp,
+    /// What shows errors of the paper: in no table.
+    Errors,
 }
 
 /// The name of the default method in [`METHODS`].
@@ -56,7 +60,7 @@ pub(crate) const SPHP_FREE: &str = "sphp-free";
 pub(crate) const AANAP: &str = "aanap";
 
 /// Every method that exists.
-pub(crate) static METHODS: [ComparedMethod; 17] = [
+pub(crate) static METHODS: [ComparedMethod; 18] = [
     ComparedMethod {
         name: VPG,
         meaning: "vanishing points, level sphere (the default)",
@@ -88,22 +92,29 @@ pub(crate) static METHODS: [ComparedMethod; 17] = [
     },
     ComparedMethod {
         name: VPG_PUBLISHED,
-        meaning: "vanishing points, mesh as published",
-        options: &[&PUBLISHED_MESH],
+        meaning: "vanishing points and mesh as published",
+        options: &[&VPG_AS_PUBLISHED],
         paper: Some("VPG"),
         family: Family::Prior,
     },
     ComparedMethod {
+        name: "vpg-literal",
+        meaning: "the paper's equations as they are printed, errors included",
+        options: &[&["stitch.method=vpg-literal"]],
+        paper: None,
+        family: Family::Errors,
+    },
+    ComparedMethod {
         name: GSP_2D_PUBLISHED,
         meaning: "global similarity prior in two dimensions, mesh as published",
-        options: &[&GSP_2D_PRIOR, &PUBLISHED_MESH],
+        options: &[&GSP_2D_AS_PUBLISHED],
         paper: Some("GSP-2D"),
         family: Family::Prior,
     },
     ComparedMethod {
         name: GSP_3D_PUBLISHED,
         meaning: "global similarity prior in three dimensions, mesh as published",
-        options: &[&GSP_3D_PRIOR, &PUBLISHED_MESH],
+        options: &[&GSP_3D_AS_PUBLISHED],
         paper: Some("GSP-3D"),
         family: Family::Prior,
     },

@@ -33,6 +33,8 @@ pub(crate) struct InterpretationPlanes {
     pub indices: Vec<usize>,
     /// Sum of `weights`.
     pub total_weight: f64,
+    /// Focal length of the camera whose frame this is, working pixels.
+    pub focal_px: f64,
 }
 
 impl InterpretationPlanes {
@@ -54,7 +56,7 @@ impl InterpretationPlanes {
         // Ties are broken by the position in the input, so that the order is the same everywhere.
         kept.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         kept.truncate(MAX_SEGMENTS);
-        let mut planes = Self::with_capacity(kept.len());
+        let mut planes = Self::with_capacity(kept.len(), focal_px);
         let center = Vector2::new(frame.width / 2.0, frame.height / 2.0);
         for (index, _) in kept {
             planes.push(index, &lines[index], center, focal_px);
@@ -62,7 +64,7 @@ impl InterpretationPlanes {
         planes
     }
 
-    fn with_capacity(count: usize) -> Self {
+    fn with_capacity(count: usize, focal_px: f64) -> Self {
         Self {
             normals: Vec::with_capacity(count),
             moments: Vec::with_capacity(count),
@@ -71,6 +73,7 @@ impl InterpretationPlanes {
             weights: Vec::with_capacity(count),
             indices: Vec::with_capacity(count),
             total_weight: 0.0,
+            focal_px,
         }
     }
 

@@ -115,7 +115,8 @@ fn fastest(
     trial: &Trial,
 ) -> Result<BTreeMap<String, f64>> {
     let mut best: Option<BTreeMap<String, f64>> = None;
-    let heeds_directions = trial.options()?.align.stitch.method == Method::Vpg;
+    let heeds_directions =
+        matches!(trial.options()?.align.stitch.method, Method::Vpg | Method::VpgPublished | Method::VpgLiteral);
     for _ in 0..REPEATS {
         let aligned = stitcher.align_matched(photographs, inputs)?;
         let first = aligned.alignments.into_iter().next();
