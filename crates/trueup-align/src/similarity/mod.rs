@@ -12,9 +12,11 @@ mod gate;
 mod gsp_2d;
 mod gsp_3d;
 mod input;
+mod jackknife;
 mod joint;
 mod options;
 mod path_voting;
+mod posterior;
 mod printed;
 mod prior;
 mod scale;
@@ -34,6 +36,8 @@ mod gsp_tests;
 #[cfg(test)]
 mod pooled_tests;
 #[cfg(test)]
+mod posterior_tests;
+#[cfg(test)]
 pub(crate) mod synthetic;
 #[cfg(test)]
 mod tests;
@@ -50,6 +54,7 @@ use upright::{Upright, rolls};
 
 pub use input::PriorInput;
 pub use options::{BetaMode, Fallback, GateMode, PriorMethod, SimilarityOptions};
+pub use posterior::{EstimatedRoll, RollsInput, estimated_rolls};
 pub use printed::PrintedEquations;
 pub use prior::{Guidance, SimilarityPrior};
 
