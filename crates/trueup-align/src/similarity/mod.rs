@@ -1,8 +1,9 @@
 //! The similarity prior: how each photograph should be turned and scaled so that the panorama stands upright.
 //!
-//! One file a prior (`vpg`, `gsp_2d`, `gsp_3d`; straightening is here); all share straightening, scales and the least
+//! One file a prior (`vpg`, `gsp_2d`, `gsp_3d`, `aanap`; straightening is here); all share straightening, scales and the least
 //! squares over unit vectors.
 
+mod aanap;
 mod camera_correction;
 mod dominant;
 mod edge_range;
@@ -91,6 +92,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
         PriorMethod::Straightening => (unguided(), None),
         PriorMethod::Gsp2d => (unguided(), Some(gsp_2d::upright(input, straightened.down))),
         PriorMethod::Gsp3d => (unguided(), Some(gsp_3d::upright(input, &rotations, straightened.down))),
+        PriorMethod::Aanap => (unguided(), Some(aanap::upright(input, &rotations, straightened.down, context))),
     };
     if let Some(clause) = guidance.failed_clause.as_ref().filter(|_| !guidance.used) {
         context.report(Diagnostic::note(
@@ -110,7 +112,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     Ok(SimilarityPrior {
         theta: upright.theta.iter().map(|theta| wrap_angle(theta + input.turn)).collect(),
         scale: match input.method {
-            PriorMethod::Gsp2d | PriorMethod::Gsp3d => scale::focal_scales(&focals),
+            PriorMethod::Gsp2d | PriorMethod::Gsp3d | PriorMethod::Aanap => scale::focal_scales(&focals),
             PriorMethod::VanishingPoints | PriorMethod::Straightening => {
                 scale::scales(input.edges, &focals, options.as_printed)
             }
