@@ -1,6 +1,7 @@
 //! The direction of the vertical lines of a photograph: a measure of how upright it stands that needs no truth.
 
 use nalgebra::{Matrix3, Vector2, Vector3};
+use trueup_core::camera::Camera;
 use trueup_core::geometry::{circular_mean, roll_from_down, wrap_angle};
 use trueup_core::lines::LineSegment;
 use trueup_core::mesh::GridMesh;
@@ -51,8 +52,8 @@ pub struct VerticalLinesInput<'a> {
     pub lines: &'a [LineSegment],
     /// The working frame.
     pub frame: &'a WorkingFrame,
-    /// Focal length.
-    pub focal_px: f64,
+    /// The camera of that frame.
+    pub camera: &'a Camera,
     /// Where the cameras expect down, in the camera's frame: a unit vector. Segments decide where it is.
     pub expected_down: Vector3<f64>,
 }
@@ -95,7 +96,7 @@ pub fn vertical_segments(photograph: &VerticalLinesInput) -> Vec<usize> {
 /// A photograph's segments as planes and their vertical vanishing direction; `None` if they point to none, or if the
 /// photograph looks within 15 degrees of straight up or down.
 fn planes_and_down(photograph: &VerticalLinesInput) -> Option<(InterpretationPlanes, Vector3<f64>)> {
-    let planes = InterpretationPlanes::new(photograph.lines, photograph.focal_px, photograph.frame);
+    let planes = InterpretationPlanes::new(photograph.lines, photograph.camera, photograph.frame);
     let down = vertical_direction(&planes, &photograph.expected_down)?;
     // Not a number is no direction either.
     (down.x.hypot(down.y) >= MIN_SINE).then_some((planes, down))
@@ -215,8 +216,7 @@ mod tests {
 
     fn measured(expected: Vector3<f64>, turn: f64) -> VerticalLines {
         let (lines, frame, camera) = photograph();
-        let photograph =
-            VerticalLinesInput { lines: &lines, frame: &frame, focal_px: FOCAL_PX, expected_down: expected };
+        let photograph = VerticalLinesInput { lines: &lines, frame: &frame, camera: &camera, expected_down: expected };
         let mesh = unrolled(&camera, turn);
         vertical_lines(&photograph, &mesh).expect("ten lines")
     }
@@ -241,8 +241,7 @@ mod tests {
     fn the_vertical_segments_are_the_plumb_lines() {
         let (lines, frame, camera) = photograph();
         let found = |down: Vector3<f64>| {
-            let photograph =
-                VerticalLinesInput { lines: &lines, frame: &frame, focal_px: FOCAL_PX, expected_down: down };
+            let photograph = VerticalLinesInput { lines: &lines, frame: &frame, camera: &camera, expected_down: down };
             vertical_segments(&photograph)
         };
         // Plumb and level lines take turns in the photograph.
@@ -255,7 +254,7 @@ mod tests {
         let (lines, frame, camera) = photograph();
         let mesh = unrolled(&camera, 0.0);
         let find = |lines: &[LineSegment], expected_down| {
-            let photograph = VerticalLinesInput { lines, frame: &frame, focal_px: FOCAL_PX, expected_down };
+            let photograph = VerticalLinesInput { lines, frame: &frame, camera: &camera, expected_down };
             vertical_lines(&photograph, &mesh)
         };
         assert_eq!(find(&[], Vector3::y()), None);

@@ -1,4 +1,4 @@
-//! Per photograph: three mutually orthogonal vanishing directions from its line segments and its focal length.
+//! Per photograph: three mutually orthogonal vanishing directions from its line segments and its camera.
 //!
 //! A segment and the camera's center span the *interpretation plane* of the segment; its unit normal n is orthogonal to
 //! the segment's direction in space. A vanishing direction v is a bearing in the camera frame that many normals are
@@ -20,6 +20,7 @@ mod tests;
 
 use nalgebra::{Matrix3, Vector3};
 use rand::Rng;
+use trueup_core::camera::Camera;
 use trueup_core::geometry::rows_of;
 use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
@@ -40,7 +41,7 @@ const MAX_ROTATION_SD_DEG: f64 = 5.0;
 
 /// Finds the three vanishing directions of one photograph.
 ///
-/// `lines` are in the working pixels of `frame`, `focal_px` too; segments that are too short, not finite or artifacts
+/// `lines` and `camera` are in the working pixels of `frame`; segments that are too short, not finite or artifacts
 /// of the frame are ignored. `generator` drives the choice of hypotheses: the same generator gives the same triad.
 /// Cost: about `draws * 45 * 200` evaluations of a segment, 1 to 2 ms with the defaults.
 ///
@@ -54,12 +55,12 @@ const MAX_ROTATION_SD_DEG: f64 = 5.0;
 /// squares.
 pub fn detect_triad(
     lines: &[LineSegment],
-    focal_px: f64,
+    camera: &Camera,
     frame: &WorkingFrame,
     options: &VanishingOptions,
     generator: &mut impl Rng,
 ) -> TriadOutcome {
-    let planes = InterpretationPlanes::new(lines, focal_px, frame);
+    let planes = InterpretationPlanes::new(lines, camera, frame);
     if planes.len() < options.min_lines {
         let missing = MissingTriad::TooFewLines { found: planes.len(), needed: options.min_lines };
         return TriadOutcome::Missing(missing);

@@ -147,7 +147,7 @@ fn vertical_lines(component: &Component, geometry: &Geometry, working: &[GridMes
             let picture = VerticalLinesInput {
                 lines: &component.lines[k],
                 frame: &component.frames[k],
-                focal_px: camera.focal_px,
+                camera,
                 expected_down: camera.rotation() * down,
             };
             metrics::vertical_lines(&picture, &working[k])
