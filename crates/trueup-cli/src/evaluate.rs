@@ -78,14 +78,14 @@ fn text(project: &Project, evaluation: Option<&Evaluation>, pixels: Option<&Pixe
 }
 
 fn truth(lines: &mut LabeledLines, found: &Evaluation) {
-    lines.entry("truth", &format!("{} of {} pictures measured", found.used, found.given));
+    lines.entry("truth", &format!("{} of {} photographs measured", found.used, found.given));
     let (mean, most, spread) = (found.upright_deg, found.upright_max_deg, found.spread_deg);
     lines.item("upright", &format!("{mean:.3} degrees off on average, {most:.3} at most; spread {spread:.3}"));
     let by_reference = found
         .gdic_reference_deg
         .map_or(String::new(), |degrees| format!(", {degrees:.3} from the project's reference"));
     let (gdic, similarity) = (found.gdic_deg, found.gdic_similarity_deg);
-    lines.item("GDIC", &format!("{gdic:.3} degrees from the first picture{by_reference}"));
+    lines.item("GDIC", &format!("{gdic:.3} degrees from the first photograph{by_reference}"));
     lines.item("GDIC-P", &format!("{similarity:.3} degrees, by similarities instead of rectangles"));
     if let Some((mean, most)) = found.theta_error_deg.zip(found.theta_error_max_deg) {
         lines.item("theta", &format!("{mean:.3} degrees off on average, {most:.3} at most"));
@@ -100,9 +100,9 @@ fn truth(lines: &mut LabeledLines, found: &Evaluation) {
             None => "unknown: no overlaps, or photographs from different places".to_owned(),
         },
     );
-    for picture in &found.pictures {
-        let theta = picture.theta_error_deg.map_or(String::new(), |degrees| format!(", theta {degrees:+.3}"));
-        lines.item("", &format!("{}: {:+.3} degrees off upright{theta}", picture.file, picture.upright_deg));
+    for photograph in &found.photographs {
+        let theta = photograph.theta_error_deg.map_or(String::new(), |degrees| format!(", theta {degrees:+.3}"));
+        lines.item("", &format!("{}: {:+.3} degrees off upright{theta}", photograph.file, photograph.upright_deg));
     }
 }
 

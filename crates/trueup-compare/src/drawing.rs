@@ -73,8 +73,8 @@ fn verticals(image: &ImageRecord, lines: &[LineSegment], frame: &WorkingFrame) -
     // Down is the levelled world's second axis; without a rotation, cameras are expected to be held level.
     let down = camera.rotation().column(1).into_owned();
     let camera = camera.scaled(frame.working_from_full);
-    let picture = VerticalLinesInput { lines, frame, camera: &camera, expected_down: down };
-    vertical_segments(&picture)
+    let photograph = VerticalLinesInput { lines, frame, camera: &camera, expected_down: down };
+    vertical_segments(&photograph)
 }
 
 /// Positions of the longest segments, ascending.

@@ -45,7 +45,7 @@ impl ProjectionDerivatives {
 }
 
 impl Camera {
-    /// A pinhole camera of focal length `focal_px` looking at the center of a `width` x `height` picture.
+    /// A pinhole camera of focal length `focal_px` looking at the center of a `width` x `height` photograph.
     pub fn new(focal_px: f64, width: f64, height: f64, camera_from_world: &Matrix3<f64>) -> Self {
         Self {
             focal_px,
@@ -55,7 +55,7 @@ impl Camera {
         }
     }
 
-    /// The same camera of the same picture in pixels of which `factor` are one of the present ones.
+    /// The same camera of the same photograph in pixels of which `factor` are one of the present ones.
     pub fn scaled(&self, factor: f64) -> Self {
         let principal_point = self.principal_point.map(|coordinate| coordinate * factor);
         Self { focal_px: self.focal_px * factor, principal_point, ..*self }

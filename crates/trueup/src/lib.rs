@@ -60,4 +60,4 @@ pub use trueup_io::encode::{
     Metadata, OutputOptions, abandon_unfinished, check_place, write as write_picture, write_atomically,
     written_extensions,
 };
-pub use trueup_io::source::readable_formats;
+pub use trueup_io::source::{names_photograph, readable_formats};

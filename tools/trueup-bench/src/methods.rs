@@ -191,8 +191,24 @@ pub(crate) fn methods_of(family: Family) -> impl Iterator<Item = &'static Compar
 
 #[cfg(test)]
 mod tests {
+    use trueup::Method;
+
     use super::*;
     use crate::trial::Trial;
+
+    #[test]
+    fn every_method_of_the_stitcher_is_compared() {
+        let compared: Vec<Method> = METHODS
+            .iter()
+            .map(|one| {
+                Trial::new("test", "set", one.name, &one.overrides()).options().expect(one.name).align.stitch.method
+            })
+            .collect();
+        for name in Method::NAMES {
+            let declared = Method::named(name).expect("a declared name");
+            assert!(compared.contains(&declared), "{name}");
+        }
+    }
 
     #[test]
     fn every_method_has_valid_options_and_a_name_of_its_own() {

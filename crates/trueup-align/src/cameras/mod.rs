@@ -105,8 +105,8 @@ pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageCont
         context.report(Diagnostic::warning(
             "focal-uncertain",
             Subject::stage("cameras"),
-            "the focal length cannot be told from these pictures; a common value was used",
-            "Keep the camera's metadata in the files, or overlap the pictures more.",
+            "the focal length cannot be told from these photographs; a common value was used",
+            "Keep the camera's metadata in the files, or overlap the photographs more.",
         ));
     }
     let Solution { cameras, per_picture_focal, .. } = solution;

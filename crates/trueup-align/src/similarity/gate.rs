@@ -84,12 +84,14 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
     let share = if photographs <= FEW_PHOTOGRAPHS { MIN_INLIER_SHARE_FEW } else { MIN_INLIER_SHARE };
     let needed = ((share * photographs as f64).ceil() as usize).max(2);
     if inliers < needed {
-        return Some(format!("{inliers} of {photographs} pictures agree on the dominant directions ({needed} needed)"));
+        return Some(format!(
+            "{inliers} of {photographs} photographs agree on the dominant directions ({needed} needed)"
+        ));
     }
     let needed = CONFIRMING_SIGNIFICANCE;
     if let Some(significance) = significance.filter(|&significance| significance < needed) {
         return Some(format!(
-            "the lines of all pictures together prefer no direction clearly ({significance:.1} standard deviations, {needed:.1} needed)"
+            "the lines of all photographs together prefer no direction clearly ({significance:.1} standard deviations, {needed:.1} needed)"
         ));
     }
     let allowed = MAX_STRAIGHTENING_ANGLE_DEG;
@@ -100,5 +102,5 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
     }
     let (roll, allowed) = (median_roll.to_degrees(), MAX_MEDIAN_ROLL_DEG);
     (roll.is_nan() || roll > allowed)
-        .then(|| format!("half of the pictures would be rolled by {roll:.1} degrees or more ({allowed:.1} allowed)"))
+        .then(|| format!("half of the photographs would be rolled by {roll:.1} degrees or more ({allowed:.1} allowed)"))
 }

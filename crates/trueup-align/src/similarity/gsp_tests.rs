@@ -275,6 +275,6 @@ fn a_reference_that_does_not_exist_is_an_error() {
     let graph = Graph::new(2, &[edge(0, 1, [-1.0, 1.0], 0.0)]);
     let vanishing = VanishingOptions::default();
     let input = graph.input(&vanishing, 2);
-    let error = run(&input, &SimilarityOptions::default(), &StageContext::default()).expect_err("no such picture");
+    let error = run(&input, &SimilarityOptions::default(), &StageContext::default()).expect_err("no such photograph");
     assert!(error.to_string().contains("reference 2"));
 }

@@ -52,7 +52,7 @@ pub(crate) use straighten::level_by_cameras;
 
 /// What a user can do when lines do not guide the panorama.
 const REFUSED_HINT: &str =
-    "The panorama is levelled by the cameras alone; pictures that show upright edges level it better";
+    "The panorama is levelled by the cameras alone; photographs that show upright edges level it better";
 
 /// Finds the similarity prior of a connected set of photographs.
 ///

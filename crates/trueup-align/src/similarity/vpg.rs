@@ -66,7 +66,7 @@ pub(super) fn guide(
     guidance.significance = pooled.map(|pooled| pooled.significance);
     guidance.failed_clause = match &dominant {
         Some(dominant) => scene.judge(dominant, &mut guidance),
-        None => Some("no picture has vanishing directions".to_owned()),
+        None => Some("no photograph has vanishing directions".to_owned()),
     };
     context.check_cancelled()?;
     let accepted = match guidance.failed_clause {

@@ -13,11 +13,11 @@ pub(crate) fn text(comparison: &Comparison, folder: &Path) -> String {
     let mut text = String::new();
     let used = comparison.photographs.iter().filter(|photograph| photograph.reason.is_empty()).count();
     let (given, seconds) = (comparison.photographs.len(), comparison.seconds);
-    let _ = writeln!(text, "page      {}", folder.join("index.html").display());
+    let _ = writeln!(text, "page        {}", folder.join("index.html").display());
     if comparison.ranking.is_some() {
-        let _ = writeln!(text, "ranking   {}", folder.join("ranking.html").display());
+        let _ = writeln!(text, "ranking     {}", folder.join("ranking.html").display());
     }
-    let _ = writeln!(text, "pictures  {used} of {given} used; {seconds:.1} s");
+    let _ = writeln!(text, "photographs {used} of {given} used; {seconds:.1} s");
     for photograph in comparison.photographs.iter().filter(|photograph| !photograph.reason.is_empty()) {
         let _ = writeln!(text, "  left out  {}: {}", photograph.path, photograph.reason);
     }

@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn wide_pictures_turned_far_are_plausible() {
+    fn wide_photographs_turned_far_are_plausible() {
         let frame = frame();
         for turn_deg in [-70.0, 70.0] {
             let overlap = PredictedOverlap::new(turned(90.0, turn_deg), &frame, &frame).expect("regular");
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn mirrored_exploding_and_disjoint_pictures_are_not() {
+    fn mirrored_exploding_and_disjoint_photographs_are_not() {
         let frame = frame();
         let maps = [
             Matrix3::new(-1.0, 0.0, 800.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),

@@ -160,13 +160,13 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
         let (written, plane_shift) = framed(plane.clone(), options);
         return Ok(Arrangement { plane, plane_shift, written, projection: None });
     };
-    let shots: Vec<PosedPhotograph> = cameras
+    let photographs: Vec<PosedPhotograph> = cameras
         .iter()
         .zip(&plane.placed)
         .map(|(camera, placed)| PosedPhotograph { camera: *camera, mesh: placed.mesh.clone() })
         .collect();
-    let view = ProjectionView::choose(&shots, dominant.as_ref(), &options.projection);
-    let drawn = draw(&shots, &plane, &view, reference, options, context)?;
+    let view = ProjectionView::choose(&photographs, dominant.as_ref(), &options.projection);
+    let drawn = draw(&photographs, &plane, &view, reference, options, context)?;
     let (written, _) = framed(drawn, options);
     report_cut(&plane, &written, &view, options, context);
     let projection = Some(ProjectionRecord::new(&view, &written));
@@ -175,7 +175,7 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
 
 /// The photographs on the view's canvas.
 fn draw(
-    shots: &[PosedPhotograph],
+    photographs: &[PosedPhotograph],
     plane: &CanvasLayout,
     view: &ProjectionView,
     reference: usize,
@@ -183,12 +183,12 @@ fn draw(
     context: &StageContext,
 ) -> Result<CanvasLayout> {
     let max_parallax = options.projection.max_parallax_deg.to_radians();
-    let shifts = projection::parallax_shifts(shots, plane.period.map(|period| period as f64), max_parallax);
+    let shifts = projection::parallax_shifts(photographs, plane.period.map(|period| period as f64), max_parallax);
     context.check_cancelled()?;
     // The reference keeps its own pixels in the middle of the projection.
-    let canvas_from_plane = options.canvas.scale * shots[reference].camera.focal_px;
+    let canvas_from_plane = options.canvas.scale * photographs[reference].camera.focal_px;
     let placement = Placement { view, canvas_from_plane, closed: view.closed };
-    let placed = projection::place(shots, &shifts, &placement)
+    let placed = projection::place(photographs, &shifts, &placement)
         .into_iter()
         .map(|grid| Placed { photograph: plane.placed[grid.photograph].photograph, mesh: grid.mesh })
         .collect();

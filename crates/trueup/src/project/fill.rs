@@ -179,7 +179,7 @@ pub(crate) fn record_composition(
 fn paths(project: &mut Project) -> impl Iterator<Item = &mut String> {
     let measures = project.measures.iter_mut().flat_map(|measures| {
         let bent = measures.long_lines.iter_mut().filter_map(|lines| lines.longest_bent.as_mut());
-        measures.pictures.iter_mut().map(|one| &mut one.path).chain(bent.map(|bent| &mut bent.path))
+        measures.photographs.iter_mut().map(|one| &mut one.path).chain(bent.map(|bent| &mut bent.path))
     });
     std::iter::once(&mut project.reference).chain(&mut project.manhattan.inliers).chain(measures)
 }
@@ -226,8 +226,8 @@ pub(crate) fn fill_geometry(project: &mut Project, found: &GeometryRecord) {
     project.reference = component.images[component.reference].path.display().to_string();
     let method = project.options.align.stitch.method;
     let is_warp = matches!(method.form(), MethodForm::Warp(_));
-    for (k, &picture) in component.members.iter().enumerate() {
-        let record = &mut project.images[picture];
+    for (k, &photograph) in component.members.iter().enumerate() {
+        let record = &mut project.images[photograph];
         let mesh = &arrangement.plane.placed[k].mesh;
         record.status = ImageStatus::Used;
         record_appearance(record, mesh, arrangement.plane_shift, &corrections.photographs[k]);

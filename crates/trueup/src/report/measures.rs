@@ -35,7 +35,8 @@ pub struct Measures {
     /// Cells that are folded, in all photographs.
     pub folds: usize,
     /// Each photograph's own figures, in the order of the photographs used.
-    pub pictures: Vec<PhotographMeasures>,
+    #[serde(rename = "pictures")]
+    pub photographs: Vec<PhotographMeasures>,
 }
 
 /// Directions of the vertical lines in the panorama, over the photographs that have enough of them.
@@ -125,7 +126,7 @@ pub(crate) fn run(component: &Component, geometry: &Geometry, layout: &CanvasLay
         ld: HUNDREDTHS * distortion.worst,
         ld_mean: HUNDREDTHS * distortion.mean,
         folds: working.iter().map(folded_cells).sum(),
-        pictures: (0..working.len())
+        photographs: (0..working.len())
             .map(|k| PhotographMeasures {
                 path: component.images[k].path.display().to_string(),
                 vertical_lines: verticals[k].map_or(0, |found| found.lines),
@@ -144,13 +145,13 @@ fn vertical_lines(component: &Component, geometry: &Geometry, working: &[GridMes
         .into_par_iter()
         .map(|k| {
             let camera = &geometry.cameras.cameras[k];
-            let picture = VerticalLinesInput {
+            let photograph = VerticalLinesInput {
                 lines: &component.lines[k],
                 frame: &component.frames[k],
                 camera,
                 expected_down: camera.rotation() * down,
             };
-            metrics::vertical_lines(&picture, &working[k])
+            metrics::vertical_lines(&photograph, &working[k])
         })
         .collect()
 }
@@ -182,8 +183,8 @@ fn reprojection(
         .coinciding
         .iter()
         .map(|pair| {
-            let full = |point: [f64; 2], picture: usize| {
-                point.map(|coordinate| coordinate / component.frames[picture].working_from_full)
+            let full = |point: [f64; 2], photograph: usize| {
+                point.map(|coordinate| coordinate / component.frames[photograph].working_from_full)
             };
             let matches = pair
                 .inliers

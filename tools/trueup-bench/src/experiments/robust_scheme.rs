@@ -18,8 +18,8 @@ pub(crate) const NAME: &str = "robust-scheme";
 /// Shares of the vanishing directions that are replaced by random ones.
 const NOISE_SHARES: [f64; 3] = [0.0, 0.1, 0.2];
 
-/// More pictures than this make a set large: its many pictures average the noise within one seed, and take their time.
-const MANY_PICTURES: usize = 20;
+/// More photographs than this make a set large: its many photographs average the noise within one seed, and take their time.
+const MANY_PHOTOGRAPHS: usize = 20;
 /// Seeds for large sets.
 const SEEDS_OF_LARGE_SETS: u64 = 3;
 /// Seeds for sets that are given, of which there may be many.
@@ -52,7 +52,7 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let study = catalogue.study.iter().map(|set| (set, catalogue.seeds));
     let given = catalogue.given.iter().map(|set| (set, catalogue.seeds.min(SEEDS_OF_GIVEN_SETS)));
     for (set, seeds) in study.chain(given) {
-        let seeds = if set.photograph_count()? > MANY_PICTURES { seeds.min(SEEDS_OF_LARGE_SETS) } else { seeds };
+        let seeds = if set.photograph_count()? > MANY_PHOTOGRAPHS { seeds.min(SEEDS_OF_LARGE_SETS) } else { seeds };
         for share in NOISE_SHARES {
             for (name, overrides) in schemes {
                 for seed in 0..seeds {
@@ -93,8 +93,8 @@ pub(crate) fn claims(results: &Results) -> Vec<Claim> {
 pub(crate) fn section(results: &Results) -> Section {
     let mut section = Section::new(NAME, "T3: the robust scheme under noise");
     section.say(format!(
-        "Every vanishing direction of every picture is replaced by a random one with the stated probability, {} seeds each \
-         ({SEEDS_OF_LARGE_SETS} for sets of more than {MANY_PICTURES} pictures, {SEEDS_OF_GIVEN_SETS} for given sets). \
+        "Every vanishing direction of every photograph is replaced by a random one with the stated probability, {} seeds each \
+         ({SEEDS_OF_LARGE_SETS} for sets of more than {MANY_PHOTOGRAPHS} photographs, {SEEDS_OF_GIVEN_SETS} for given sets). \
          `with` and `without` are the paper's scheme (rejection at tau, path voting psi) on the mesh as published, the gate held \
          open; `default` is the whole method with its gate, its search for directions near the common ones and its joint \
          refinement. Means and standard deviations over the seeds.",

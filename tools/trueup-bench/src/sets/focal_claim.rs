@@ -99,7 +99,7 @@ mod tests {
         write(&original, 1.1, &claimed).expect("copy");
         let sources =
             trueup_io::source::scan(&[claimed.join("00.jpg").display().to_string()], &Default::default(), &context);
-        let prior = sources.expect("readable").images[0].focal_prior.expect("a focal length");
+        let prior = sources.expect("readable").photographs[0].focal_prior.expect("a focal length");
         assert!((prior.focal_px / original.truth.images[0].focal_px - 1.1).abs() < 1e-4);
     }
 }

@@ -88,11 +88,7 @@ fn geometry_key(input: &AlignInput, options: &AlignOptions) -> Option<Key> {
 /// The stages in their order.
 fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageContext) -> Result<Geometry> {
     let component = input.component;
-    let grids: Vec<GridMesh> = component
-        .frames
-        .iter()
-        .map(|frame| GridMesh::regular(frame.width, frame.height, options.mesh.cell_px))
-        .collect();
+    let grids = component.grids(options.mesh.cell_px);
     let overlaps = overlaps::run(component, options, input.memo, context)?;
     let Overlaps { cameras, pairs, warps } = &overlaps.value;
     let lines = context
@@ -104,8 +100,7 @@ fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageCont
     let measured = MeasuredLines { lines: &lines, triads: &triads };
     let prior = context.in_one_step("prior", || find_prior(component, &overlaps.value, measured, options, context))?;
 
-    let edges: Vec<GraphEdge> =
-        pairs.iter().map(|pair| GraphEdge { a: pair.a, b: pair.b, weight: pair.agreeing }).collect();
+    let edges: Vec<GraphEdge> = pairs.iter().map(GraphEdge::of).collect();
     let cut = full_turn::find_cut(&cameras.cameras, &edges, &prior.level_from_world());
     let turn = cut.as_ref().map(|cut| Turn::new(cut, warps));
     let within: Cow<'_, [OverlapWarp]> = turn.as_ref().map_or(warps.into(), |turn| turn.within.as_slice().into());

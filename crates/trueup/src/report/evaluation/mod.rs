@@ -61,7 +61,8 @@ pub struct Evaluation {
     /// pixels; `None` if no photographs overlap or they were taken from different places.
     pub align_px: Option<f64>,
     /// Each photograph's own figures.
-    pub pictures: Vec<PhotographEvaluation>,
+    #[serde(rename = "pictures")]
+    pub photographs: Vec<PhotographEvaluation>,
 }
 
 /// One photograph measured against the truth. Angles in degrees, positive clockwise.
@@ -90,7 +91,7 @@ pub fn read_truth(path: &Path) -> Result<Truth> {
     let subject = path.display().to_string();
     let truth: Truth = serde_json::from_slice(&bytes).map_err(|error| {
         let reason = format!("not a truth file ({error})");
-        Error::input(&subject, reason, "Give the truth.json that was written together with the pictures.")
+        Error::input(&subject, reason, "Give the truth.json that was written together with the photographs.")
     })?;
     truth.check(&subject)?;
     Ok(truth)
@@ -115,7 +116,7 @@ pub fn read_truth(path: &Path) -> Result<Truth> {
 /// are damaged.
 pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     truth.check(&subject(truth))?;
-    let known = match_pictures(project, truth)?;
+    let known = match_photographs(project, truth)?;
     let records: Vec<&ImageRecord> = known.iter().map(|one| one.record).collect();
     let meshes = used_grids(&records)?;
     let period = project.grid_canvas().period();
@@ -129,7 +130,7 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     let thetas: Option<Vec<f64>> = records.iter().map(|record| Some(record.theta_deg?.to_radians())).collect();
     let theta_errors = thetas.as_ref().and_then(|thetas| relative_turns(thetas, &gammas, 0));
     let distortion = metrics::local_distortion(&meshes, Outside::Center, period);
-    let pictures = (0..known.len()).map(|k| PhotographEvaluation {
+    let photographs = (0..known.len()).map(|k| PhotographEvaluation {
         file: known[k].truth.file.clone(),
         upright_deg: upright.photographs[k].to_degrees(),
         theta_error_deg: theta_errors.as_ref().map(|errors| errors[k].to_degrees()),
@@ -150,7 +151,7 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
         ld_corners: HUNDREDTHS * metrics::local_distortion(&meshes, Outside::CenterAndCorners, period).worst,
         folds: meshes.iter().map(folded_cells).sum(),
         align_px: alignment(&known, &meshes, period),
-        pictures: pictures.collect(),
+        photographs: photographs.collect(),
     })
 }
 
@@ -163,7 +164,7 @@ fn largest(angles: &[f64]) -> f64 {
 }
 
 /// The used photographs that the truth names, in its order.
-fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Known<'a>>> {
+fn match_photographs<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Known<'a>>> {
     let used: Vec<&ImageRecord> = project.used_images().collect();
     let mut known = Vec::new();
     for one in &truth.images {
@@ -172,8 +173,8 @@ fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Know
         if named.next().is_some() {
             return Err(Error::input(
                 &one.file,
-                "the project uses two pictures of this name, and a truth tells pictures apart by their names alone",
-                "Stitch pictures with different names.",
+                "the project uses two photographs of this name, and a truth tells photographs apart by their names alone",
+                "Stitch photographs with different names.",
             ));
         }
         if (record.width, record.height) != (one.width, one.height) {
@@ -181,15 +182,15 @@ fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Know
                 "the project has it at {} x {} px, the truth at {} x {} px",
                 record.width, record.height, one.width, one.height
             );
-            return Err(Error::input(&one.file, reason, "Give the truth of the very pictures that were stitched."));
+            return Err(Error::input(&one.file, reason, "Give the truth of the very photographs that were stitched."));
         }
         known.push(Known { record, truth: one });
     }
     match known.len() {
         0 => Err(Error::input(
             subject(truth),
-            format!("it names none of the {} pictures that the project uses", used.len()),
-            "Give the truth of the pictures that were stitched; pictures are told apart by their file names.",
+            format!("it names none of the {} photographs that the project uses", used.len()),
+            "Give the truth of the photographs that were stitched; photographs are told apart by their file names.",
         )),
         1 => Err(too_few(1)),
         _ => Ok(known),
@@ -199,8 +200,8 @@ fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Know
 fn too_few(count: usize) -> Error {
     Error::input(
         "the truth",
-        format!("of the pictures it names, the project uses {count}, and it takes two to compare"),
-        "Give a project of at least two pictures of the set.",
+        format!("of the photographs it names, the project uses {count}, and it takes two to compare"),
+        "Give a project of at least two photographs of the set.",
     )
 }
 
