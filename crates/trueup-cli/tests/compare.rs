@@ -227,6 +227,7 @@ fn scores_are_summed_up_over_files() {
     let run = finish(trueup(desk.path(), &["compare", "--tally", "one.json", "two.json"]));
     let printed = run.expect_success();
     assert!(printed.contains("3 answers of 3 participants") && printed.contains("b  4.667       0.333"), "{printed}");
+    assert!(printed.contains("b  to a  2 : 1  67 % (21 to 94)  p = 1.000"), "{printed}");
     desk.put("other.json", "{}");
     let other = finish(trueup(desk.path(), &["compare", "--tally", "other.json"]));
     other.expect_failure(

@@ -56,14 +56,15 @@ pub(super) fn allowed_divergence(photographs: usize, options: &SimilarityOptions
 ///
 /// # Departures
 /// The paper does not say what its sum is divided by; the mean per photograph alone puts its threshold 0.10 between
-/// scenes with and without dominant directions.
-pub(super) fn divergence(inlier_residuals: &[f64], photographs: usize) -> f64 {
+/// scenes with and without dominant directions. `as_printed` leaves the sum as it is, which grows with the photographs.
+pub(super) fn divergence(inlier_residuals: &[f64], photographs: usize, as_printed: bool) -> f64 {
     if inlier_residuals.is_empty() {
         return f64::INFINITY;
     }
     let count = inlier_residuals.len() as f64;
     let share = count / photographs as f64;
-    inlier_residuals.iter().sum::<f64>() / count / share
+    let sum = inlier_residuals.iter().sum::<f64>();
+    if as_printed { sum / share } else { sum / count / share }
 }
 
 /// The first clause that fails, in words; `None` if the guidance is accepted.

@@ -14,6 +14,7 @@ mod input;
 mod joint;
 mod options;
 mod path_voting;
+mod printed;
 mod prior;
 mod scale;
 mod signed_permutation;
@@ -25,6 +26,8 @@ mod vertical_vote;
 mod vpg;
 mod weighted_solve;
 
+#[cfg(test)]
+mod equation_tests;
 #[cfg(test)]
 mod gsp_tests;
 #[cfg(test)]
@@ -45,7 +48,8 @@ use straighten::CameraVertical;
 use upright::{Upright, rolls};
 
 pub use input::PriorInput;
-pub use options::{BetaMode, GateMode, PriorMethod, SimilarityOptions};
+pub use options::{BetaMode, Fallback, GateMode, PriorMethod, SimilarityOptions};
+pub use printed::PrintedEquations;
 pub use prior::{Guidance, SimilarityPrior};
 
 pub(crate) use straighten::level_by_cameras;
@@ -91,7 +95,10 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
             REFUSED_HINT,
         ));
     }
-    let upright = upright.unwrap_or_else(|| fallback(&rotations, &level));
+    let upright = upright.unwrap_or_else(|| match (input.method, options.fallback) {
+        (PriorMethod::VanishingPoints, Fallback::Gsp3d) => gsp_3d::upright(input, &rotations, straightened.down),
+        _ => straightening(&rotations, &level),
+    });
     let level_from_world = straighten::level_from_world(&upright.down, &rotations);
     let mut guidance = guidance;
     guidance.dominant = guidance.dominant.map(|world| rows_of(&(level_from_world * matrix_from_rows(&world))));
@@ -99,7 +106,9 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
         theta: upright.theta.iter().map(|theta| wrap_angle(theta + input.turn)).collect(),
         scale: match input.method {
             PriorMethod::Gsp2d | PriorMethod::Gsp3d => scale::focal_scales(&focals),
-            PriorMethod::VanishingPoints | PriorMethod::Straightening => scale::scales(input.edges, &focals),
+            PriorMethod::VanishingPoints | PriorMethod::Straightening => {
+                scale::scales(input.edges, &focals, options.as_printed)
+            }
         },
         guidance,
         level_from_world: rows_of(&level_from_world),
@@ -111,9 +120,9 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
 /// Straightened cameras.
 ///
 /// # Departures
-/// The paper falls back to the global similarity prior, which corrects turns that an overlap contradicts. Level
-/// photographs that look up are twisted against each other although neither is rolled; that correction rolls them by
-/// the twist, which adds up along a row. Their place on the level sphere has the twist already.
-fn fallback(rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> Upright {
+/// The paper falls back to the global similarity prior ([`Fallback::Gsp3d`]), which corrects turns that an overlap
+/// contradicts. Level photographs that look up are twisted against each other although neither is rolled; that correction
+/// rolls them by the twist, which adds up along a row. Their place on the level sphere has the twist already.
+fn straightening(rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> Upright {
     Upright { down: *down, theta: rolls(down, rotations), rotations: rotations.to_vec() }
 }

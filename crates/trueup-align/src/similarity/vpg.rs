@@ -18,7 +18,7 @@ use super::signed_permutation::{match_triad, triad_residual};
 use super::straighten::{CameraVertical, Straightened};
 use super::turns::{RollEvidence, solve_turns};
 use super::upright::Upright;
-use super::vertical::{roll_of, vertical_of};
+use super::vertical::{roll_of, vertical_by_reference, vertical_of};
 use super::vertical_vote::vertical_peak;
 use crate::vanishing::{InterpretationPlanes, RefinedTriad};
 
@@ -60,7 +60,8 @@ pub(super) fn guide(
     context.check_cancelled()?;
     let mut guidance = Guidance::none(count, allowed_divergence(count, options));
     let mut generator = context.generator(SimilarityOptions::STAGE, 0);
-    let dominant = dominant_frame(&scene.triads, options.rejection, &mut generator);
+    let cut = if options.as_printed.dominant { f64::INFINITY } else { options.rejection };
+    let dominant = dominant_frame(&scene.triads, cut, &mut generator);
     context.check_cancelled()?;
     let pooled = options.pooled_search.then(|| search_frame(&scene.vote, level)).flatten();
     guidance.significance = pooled.map(|pooled| pooled.significance);
@@ -109,6 +110,14 @@ impl<'a> SceneDirections<'a> {
         Self { input, options, rotations, straightened, triads, vote }
     }
 
+    /// The vertical among the directions of `frame`.
+    fn vertical(&self, frame: &Matrix3<f64>) -> Vector3<f64> {
+        match self.options.as_printed.vertical {
+            true => vertical_by_reference(frame, &self.rotations[self.input.reference]),
+            false => vertical_of(frame, self.rotations),
+        }
+    }
+
     /// Photographs whose directions agree with `dominant`.
     fn inliers(&self, dominant: &Dominant) -> Vec<usize> {
         let agrees = |index: &usize| dominant.residuals[*index].is_some_and(|r| r <= self.options.rejection);
@@ -118,8 +127,8 @@ impl<'a> SceneDirections<'a> {
     /// The roll of each agreeing photograph by its own direction that matches the vertical: the paper's alpha_i.
     ///
     /// # Departures
-    /// Eq. 6 is printed with directions already moved to the common frame, which would give every photograph about the
-    /// same roll; those of the camera's own frame are meant.
+    /// Eq. 6 is printed with directions already moved to the common frame, the reference camera's, which gives every
+    /// photograph about the same roll (`similarity.as_printed`); those of the camera's own frame are meant.
     fn own_rolls(&self, frame: &Matrix3<f64>, down: &Vector3<f64>, inliers: &[usize]) -> Vec<Option<f64>> {
         let mut own = vec![None; self.rotations.len()];
         let in_frame = frame.tr_mul(down);
@@ -127,7 +136,8 @@ impl<'a> SceneDirections<'a> {
         for &index in inliers {
             if let Some(triad) = &self.triads[index] {
                 let matched = match_triad(frame, triad).0.column(column) * in_frame[column].signum();
-                own[index] = roll_of(&(self.rotations[index] * matched));
+                let camera = if self.options.as_printed.alpha { self.input.reference } else { index };
+                own[index] = roll_of(&(self.rotations[camera] * matched));
             }
         }
         own
@@ -136,7 +146,7 @@ impl<'a> SceneDirections<'a> {
     /// Fills in what the dominant directions came to and returns the gate's failed clause.
     fn judge(&self, dominant: &Dominant, guidance: &mut Guidance) -> Option<String> {
         let inliers = self.inliers(dominant);
-        let down = vertical_of(&dominant.frame, self.rotations);
+        let down = self.vertical(&dominant.frame);
         let mut magnitudes: Vec<f64> =
             self.own_rolls(&dominant.frame, &down, &inliers).into_iter().flatten().map(f64::abs).collect();
         magnitudes.sort_by(f64::total_cmp);
@@ -145,7 +155,7 @@ impl<'a> SceneDirections<'a> {
         let evidence = GateEvidence {
             photographs,
             inliers: inliers.len(),
-            divergence: divergence(&residuals, photographs),
+            divergence: divergence(&residuals, photographs, self.options.as_printed.divergence),
             straightening_angle: self.straightening_angle(&down),
             significance: guidance.significance,
             median_roll: magnitudes.get(magnitudes.len() / 2).copied().unwrap_or(f64::INFINITY),
@@ -164,7 +174,7 @@ impl<'a> SceneDirections<'a> {
 
     /// The frame of the pooled search in place of one that the photographs agree on, if it stands out far enough.
     fn pooled(&self, pooled: &PooledFrame, guidance: &mut Guidance) -> Option<Dominant> {
-        let down = vertical_of(&pooled.frame, self.rotations);
+        let down = self.vertical(&pooled.frame);
         let limit = MAX_STRAIGHTENING_ANGLE_DEG.to_radians();
         let stands_out = pooled.significance >= GUIDING_SIGNIFICANCE;
         if !stands_out || self.straightening_angle(&down).is_some_and(|angle| angle > limit) {
@@ -190,7 +200,7 @@ impl<'a> SceneDirections<'a> {
         let has_lines = self.vote.total_weight() > 0.0;
         let joint = has_lines && self.options.joint_refinement;
         let frame = if joint { self.refined(&dominant.frame, &axis_weights) } else { dominant.frame };
-        let down = vertical_of(&frame, self.rotations);
+        let down = self.vertical(&frame);
         if joint && !self.is_certain(&frame, &axis_weights, guidance) {
             return None;
         }
@@ -208,7 +218,7 @@ impl<'a> SceneDirections<'a> {
     /// Whether the vertical of a frame that all segments voted for hardly depends on which photographs are asked; says
     /// why not as the failed clause.
     fn is_certain(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights, guidance: &mut Guidance) -> bool {
-        let down = vertical_of(frame, self.rotations);
+        let down = self.vertical(frame);
         let deviation = self.vote.axis_deviations(frame, axis_weights)[frame.tr_mul(&down).iamax()];
         guidance.vertical_deviation = Some(deviation).filter(|deviation| deviation.is_finite());
         let allowed = match guidance.pooled {
@@ -240,7 +250,7 @@ impl<'a> SceneDirections<'a> {
         // r = 4 (1 - cos phi) of the misorientation phi that is ordinary detection noise.
         let ordinary = 4.0 * (1.0 - ORDINARY_MISORIENTATION_DEG.to_radians().cos());
         let horizontal = if mean > ordinary { (ordinary / mean).powi(2) } else { 1.0 };
-        let down = vertical_of(frame, self.rotations);
+        let down = self.vertical(frame);
         let vertical = frame.tr_mul(&down).iamax();
         std::array::from_fn(|axis| if axis == vertical { 1.0 } else { horizontal })
     }
@@ -249,7 +259,7 @@ impl<'a> SceneDirections<'a> {
     fn refined(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {
         let refined = self.vote.refine_frame(frame, axis_weights);
         let limit = MAX_REFINEMENT_TOLERANCES * joint::TOLERANCE_DEG.to_radians();
-        let (before, after) = (vertical_of(frame, self.rotations), vertical_of(&refined, self.rotations));
+        let (before, after) = (self.vertical(frame), self.vertical(&refined));
         // A comparison with NaN is false: a refinement that is not finite is dropped too.
         if before.angle(&after) <= limit { refined } else { *frame }
     }

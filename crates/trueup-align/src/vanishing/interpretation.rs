@@ -36,6 +36,8 @@ pub(crate) struct InterpretationPlanes {
     pub indices: Vec<usize>,
     /// Sum of `weights`.
     pub total_weight: f64,
+    /// Focal length of the camera whose frame this is, working pixels.
+    pub focal_px: f64,
 }
 
 impl InterpretationPlanes {
@@ -76,6 +78,7 @@ impl InterpretationPlanes {
             weights: Vec::with_capacity(count),
             indices: Vec::with_capacity(count),
             total_weight: 0.0,
+            focal_px: camera.focal_px,
         }
     }
 

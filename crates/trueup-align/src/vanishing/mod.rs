@@ -5,15 +5,16 @@
 //! orthogonal to: n . v = 0. No vanishing point in pixels is ever formed, so that one at infinity is no special case.
 //!
 //! # Departures
-//! The paper detects vanishing points without intrinsics; here the focal length of the bundle adjustment is used, which
-//! makes the three directions orthogonal by construction. A focal length wrong by 10 % moves the roll by about 0.1
-//! degree.
+//! The paper detects vanishing points without intrinsics ([`Intrinsics::Unknown`]); by default the focal length of the bundle
+//! adjustment is used, which makes the three directions orthogonal by construction. A focal length wrong by 10 % moves the
+//! roll by about 0.1 degree.
 
 mod interpretation;
 mod options;
 mod refine;
 mod search;
 mod triad;
+mod uncalibrated;
 
 #[cfg(test)]
 mod tests;
@@ -25,7 +26,7 @@ use trueup_core::geometry::rows_of;
 use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
 
-pub use options::VanishingOptions;
+pub use options::{Intrinsics, VanishingOptions};
 pub use triad::{MissingTriad, Triad, TriadOutcome};
 
 pub(crate) use interpretation::{FULL_WEIGHT_LENGTH_PX, InterpretationPlanes};
@@ -43,7 +44,9 @@ const MAX_ROTATION_SD_DEG: f64 = 5.0;
 ///
 /// `lines` and `camera` are in the working pixels of `frame`; segments that are too short, not finite or artifacts
 /// of the frame are ignored. `generator` drives the choice of hypotheses: the same generator gives the same triad.
-/// Cost: about `draws * 45 * 200` evaluations of a segment, 1 to 2 ms with the defaults.
+/// Cost: about `draws * 45 * 200` evaluations of a segment, 1 to 2 ms with the defaults. Without intrinsics (see
+/// `uncalibrated`) the directions are those in the frame of a camera of the focal length that they tell themselves, and
+/// `focal_px` is not heeded.
 ///
 /// # Source
 /// Two-line exhaustive search on the Gaussian sphere (Lu, Yao, Liu, Li: 2-Line Exhaustive Searching for Real-Time
@@ -64,6 +67,14 @@ pub fn detect_triad(
     if planes.len() < options.min_lines {
         let missing = MissingTriad::TooFewLines { found: planes.len(), needed: options.min_lines };
         return TriadOutcome::Missing(missing);
+    }
+    if options.intrinsics == Intrinsics::Unknown {
+        let found = uncalibrated::search(&planes, frame.width.max(frame.height), options, generator);
+        let missing = MissingTriad::LowQuality { quality: 0.0, needed: options.min_quality };
+        return found.map_or(TriadOutcome::Missing(missing), |found| {
+            let planes = InterpretationPlanes::new(lines, &Camera { focal_px: found.focal_px, ..*camera }, frame);
+            judge(&RefinedTriad::refine(&found.triad, &planes, options), &planes, lines.len(), options)
+        });
     }
     let mut best: Option<RefinedTriad> = None;
     for hypothesis in search::best_hypotheses(&planes, options, generator) {

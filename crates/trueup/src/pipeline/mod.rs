@@ -237,7 +237,7 @@ impl<'a> Stitcher<'a> {
             photographs,
         };
         let corrections = context.absorb(compose::light(&light, &self.options.compose, context)?);
-        let mut project = unfilled(matched, self.options, members, groups);
+        let mut project = unfilled(matched, &self.options.fixed_by_method(), members, groups);
         let geometry = geometry.as_ref();
         let found =
             GeometryRecord { component: &component, geometry, arrangement: &arrangement, corrections: &corrections };

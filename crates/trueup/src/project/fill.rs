@@ -264,7 +264,7 @@ pub(crate) fn fill_geometry(project: &mut Project, found: &GeometryRecord) {
             accepted: guidance.used,
             pooled: guidance.pooled,
             failed_clause: match method.form() {
-                MethodForm::Mesh(_) => guidance.failed_clause.clone(),
+                MethodForm::Mesh(..) => guidance.failed_clause.clone(),
                 MethodForm::Warp(_) => Some(format!("the method {} does not ask them", project.method)),
             },
             dominant: guidance.dominant,

@@ -67,6 +67,9 @@ pub(crate) struct Geometry {
 /// Those of the stages; [`trueup_core::Error::NotApplicable`] if a warp model cannot place the photographs;
 /// [`trueup_core::Error::Cancelled`].
 pub(crate) fn run(input: &AlignInput, options: &AlignOptions, context: &StageContext) -> Result<Reported<Geometry>> {
+    let mut fixed = options.clone();
+    options.stitch.method.fix(&mut fixed);
+    let options = &fixed;
     input.memo.run(GEOMETRY, geometry_key(input, options).as_ref(), input, options, find_geometry, context)
 }
 
@@ -120,7 +123,7 @@ fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageCont
         cut: cut.as_ref(),
     };
     let mesh = context.in_one_step("mesh", || match options.stitch.method.form() {
-        MethodForm::Mesh(_) => deformation.by_mesh(options, context),
+        MethodForm::Mesh(..) => deformation.by_mesh(options, context),
         MethodForm::Warp(model) => deformation.by_warp(model, options, context),
     })?;
     if let Some(cut) = &cut {
@@ -147,7 +150,7 @@ fn find_prior(
     context: &StageContext,
 ) -> Result<SimilarityPrior> {
     let method = match options.stitch.method.form() {
-        MethodForm::Mesh(prior) => prior,
+        MethodForm::Mesh(prior, _) => prior,
         MethodForm::Warp(_) => PriorMethod::Straightening,
     };
     let input = PriorInput {
