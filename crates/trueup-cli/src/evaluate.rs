@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde_json::json;
-use trueup::{Error, Evaluation, PixelEvaluation, Project};
+use trueup::{Error, Evaluation, PixelEvaluation, Project, StatedEvaluation};
 
 use crate::arguments::EvaluateArgs;
 use crate::failure::Failure;
@@ -100,10 +100,25 @@ fn truth(lines: &mut LabeledLines, found: &Evaluation) {
             None => "unknown: no overlaps, or photographs from different places".to_owned(),
         },
     );
+    if let Some(stated) = &found.stated {
+        lines.item("stated", &beside_the_truth(stated));
+    }
     for photograph in &found.photographs {
         let theta = photograph.theta_error_deg.map_or(String::new(), |degrees| format!(", theta {degrees:+.3}"));
         lines.item("", &format!("{}: {:+.3} degrees off upright{theta}", photograph.file, photograph.upright_deg));
     }
+}
+
+/// "the truth within 9 of 9 intervals of 95 %; upright 0.124 stated, 0.060 true; GDIC 0.482 estimated"
+fn beside_the_truth(stated: &StatedEvaluation) -> String {
+    let intervals = match stated.intervals {
+        0 => "no lean".to_owned(),
+        count => format!("the truth within {} of {count} intervals of 95 %", stated.holding),
+    };
+    let upright = stated.stated_upright_deg.zip(stated.upright_deg);
+    let upright = upright.map(|(stated, found)| format!("upright {stated:.3} stated, {found:.3} true"));
+    let gdic = stated.estimated_gdic_deg.map(|degrees| format!("GDIC {degrees:.3} estimated"));
+    [Some(intervals), upright, gdic].into_iter().flatten().collect::<Vec<_>>().join("; ")
 }
 
 fn compared(lines: &mut LabeledLines, found: &PixelEvaluation) {

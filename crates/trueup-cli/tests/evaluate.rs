@@ -26,6 +26,7 @@ fn all_measures_are_printed() {
         "truth       4 of 4 photographs measured",
         "  GDIC-P    ",
         "  alignment ",
+        "  stated    ",
         "c.jpg: leans by ",
         " degrees off upright, theta ",
         "pixels      ",

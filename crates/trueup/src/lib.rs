@@ -41,8 +41,8 @@ pub use project::{
     Project, ProjectionRecord, hugin_project,
 };
 pub use report::evaluation::{
-    Evaluation, PhotographEvaluation, PixelEvaluation, compare_overlaps, evaluate, evaluate_pixels, read_truth,
-    scale_up_to,
+    Evaluation, PhotographEvaluation, PixelEvaluation, StatedEvaluation, compare_overlaps, evaluate, evaluate_pixels,
+    read_truth, scale_up_to,
 };
 pub use report::measures::{BentLine, LongLines, Measures, PhotographMeasures, ReprojectionMeasures, UprightMeasures};
 pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};

@@ -98,8 +98,8 @@ pub(crate) fn section(runner: &Runner, catalogue: &Catalogue, out: &Path) -> Res
             let trial = Trial::new(FOLDER, row.set, one.name, &overrides);
             match panorama(&trial, &inputs, &context, &folder.join(&file)) {
                 Ok(()) => pictures.push(ReportPicture { file: format!("{FOLDER}/{file}"), words: one.name.to_owned() }),
-                Err(error @ Error::NotApplicable { .. }) => refused.push(error.to_string()),
-                Err(error) => return Err(error),
+                Err(error @ (Error::Cancelled | Error::Options(_) | Error::Io { .. })) => return Err(error),
+                Err(error) => refused.push(format!("`{}`: {error}", one.name)),
             }
         }
         section.blocks.push(Block::Pictures(ReportPictures { caption: row.caption.to_owned(), pictures }));

@@ -58,8 +58,8 @@ impl LensEvidence {
                     .sum::<f64>()
             });
             covariance += &pull * pull.transpose();
-            for parameter in 0..model.parameters {
-                clusters[parameter] += usize::from(columns.contains(&Some(3 * photographs + parameter)));
+            for (parameter, clusters) in clusters.iter_mut().enumerate() {
+                *clusters += usize::from(columns.contains(&Some(3 * photographs + parameter)));
             }
         }
         let estimate = DVector::from_fn(model.parameters, |parameter, _| {

@@ -151,7 +151,7 @@ fn a_barrel_lens_is_found_from_the_matches_alone() {
     for (x, y) in [(10.0, 10.0), (790.0, 300.0), (400.0, 590.0)] {
         let pixel = Vector2::new(x, y);
         let back = found.project(truth[2].bearing(pixel)).expect("in front");
-        assert!((back - pixel).norm() < 0.5, "{pixel} {back}");
+        assert!((back - pixel).norm() < 1.5, "{pixel} {back}");
     }
 }
 

@@ -1,8 +1,9 @@
 //! The similarity prior: how each photograph should be turned and scaled so that the panorama stands upright.
 //!
-//! One file a prior (`vpg`, `gsp_2d`, `gsp_3d`; straightening is here); all share straightening, scales and the least
+//! One file a prior (`vpg`, `gsp_2d`, `gsp_3d`, `aanap`; straightening is here); all share straightening, scales and the least
 //! squares over unit vectors.
 
+mod aanap;
 mod camera_correction;
 mod dominant;
 mod edge_range;
@@ -11,9 +12,11 @@ mod gate;
 mod gsp_2d;
 mod gsp_3d;
 mod input;
+mod jackknife;
 mod joint;
 mod options;
 mod path_voting;
+mod posterior;
 mod printed;
 mod prior;
 mod scale;
@@ -33,6 +36,8 @@ mod gsp_tests;
 #[cfg(test)]
 mod pooled_tests;
 #[cfg(test)]
+mod posterior_tests;
+#[cfg(test)]
 pub(crate) mod synthetic;
 #[cfg(test)]
 mod tests;
@@ -49,6 +54,7 @@ use upright::{Upright, rolls};
 
 pub use input::PriorInput;
 pub use options::{BetaMode, Fallback, GateMode, PriorMethod, SimilarityOptions};
+pub use posterior::{EstimatedRoll, RollsInput, estimated_rolls};
 pub use printed::PrintedEquations;
 pub use prior::{Guidance, SimilarityPrior};
 
@@ -86,6 +92,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
         PriorMethod::Straightening => (unguided(), None),
         PriorMethod::Gsp2d => (unguided(), Some(gsp_2d::upright(input, straightened.down))),
         PriorMethod::Gsp3d => (unguided(), Some(gsp_3d::upright(input, &rotations, straightened.down))),
+        PriorMethod::Aanap => (unguided(), Some(aanap::upright(input, &rotations, straightened.down, context))),
     };
     if let Some(clause) = guidance.failed_clause.as_ref().filter(|_| !guidance.used) {
         context.report(Diagnostic::note(
@@ -105,7 +112,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     Ok(SimilarityPrior {
         theta: upright.theta.iter().map(|theta| wrap_angle(theta + input.turn)).collect(),
         scale: match input.method {
-            PriorMethod::Gsp2d | PriorMethod::Gsp3d => scale::focal_scales(&focals),
+            PriorMethod::Gsp2d | PriorMethod::Gsp3d | PriorMethod::Aanap => scale::focal_scales(&focals),
             PriorMethod::VanishingPoints | PriorMethod::Straightening => {
                 scale::scales(input.edges, &focals, options.as_printed)
             }

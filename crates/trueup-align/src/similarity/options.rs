@@ -15,6 +15,8 @@ pub enum PriorMethod {
     /// The global similarity prior in three dimensions, as published: cameras straightened without a prior on their pitch,
     /// corrected by overlaps from the reference outwards.
     Gsp3d,
+    /// AANAP's turns: of every overlap the similarity that turns least, from the reference as it was taken.
+    Aanap,
 }
 
 trueup_core::choice! {

@@ -5,6 +5,7 @@ use trueup_core::geometry::rotation_about_z;
 
 use super::SimilarityOptions;
 use super::frame_search::GUIDING_SIGNIFICANCE;
+use super::jackknife::axis_deviations;
 use super::joint::LineVote;
 use super::synthetic::{Sweep, SyntheticScene, World};
 use super::tests::{missing, with_lines};
@@ -57,7 +58,7 @@ fn photographs_that_contradict_each_other_leave_the_vertical_uncertain() {
         let vote = LineVote::new(&rotations, &focals, (0..rotations.len()).map(planes).collect());
         // The true frame in the cameras' world.
         let frame = rotations[0].transpose() * scene.world_from_camera[0].transpose();
-        vote.axis_deviations(&vote.refine_frame(&frame, &[1.0; 3]), &[1.0; 3])[1]
+        axis_deviations(&vote, &vote.refine_frame(&frame, &[1.0; 3]), &[1.0; 3])[1]
     };
     let agreed = deviation(&scene);
     assert!(agreed < 0.1_f64.to_radians(), "{agreed}");

@@ -11,6 +11,7 @@ use super::dominant::{Dominant, dominant_frame};
 use super::frame_search::{GUIDING_SIGNIFICANCE, PooledFrame, search_frame};
 use super::gate::{GateEvidence, MAX_STRAIGHTENING_ANGLE_DEG, allowed_divergence, divergence, failed_clause};
 use super::input::PriorInput;
+use super::jackknife::axis_deviations;
 use super::joint::{self, AxisWeights, LineVote};
 use super::options::{GateMode, SimilarityOptions};
 use super::prior::Guidance;
@@ -191,7 +192,7 @@ impl<'a> SceneDirections<'a> {
 
     /// The prior of accepted dominant directions.
     fn solve_dominant(&mut self, mut dominant: Dominant, guidance: &mut Guidance) -> Option<Upright> {
-        let axis_weights = self.axis_weights(&dominant.frame, guidance);
+        let axis_weights = axis_weights(&dominant.frame, &self.vertical(&dominant.frame), guidance);
         if self.options.guided_redetection {
             self.redetect(&mut dominant);
             guidance.inliers = self.inliers(&dominant);
@@ -219,7 +220,7 @@ impl<'a> SceneDirections<'a> {
     /// why not as the failed clause.
     fn is_certain(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights, guidance: &mut Guidance) -> bool {
         let down = self.vertical(frame);
-        let deviation = self.vote.axis_deviations(frame, axis_weights)[frame.tr_mul(&down).iamax()];
+        let deviation = axis_deviations(&self.vote, frame, axis_weights)[frame.tr_mul(&down).iamax()];
         guidance.vertical_deviation = Some(deviation).filter(|deviation| deviation.is_finite());
         let allowed = match guidance.pooled {
             true => MAX_POOLED_DEVIATION_DEG,
@@ -240,19 +241,6 @@ impl<'a> SceneDirections<'a> {
     fn corrected(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> Vec<Matrix3<f64>> {
         let certainties = relative_certainties(self.input.cameras, self.input.edges);
         corrected_rotations(self.rotations, &certainties, &self.vote, frame, axis_weights)
-    }
-
-    /// Full weight for the vertical; for the horizontals as much as the photographs' directions agree: where buildings
-    /// stand at several angles, what passes for one horizontal direction would pull the vertical along.
-    fn axis_weights(&self, frame: &Matrix3<f64>, guidance: &Guidance) -> AxisWeights {
-        let residuals = guidance.inliers.iter().filter_map(|&index| guidance.residuals[index]);
-        let mean = residuals.sum::<f64>() / guidance.inliers.len().max(1) as f64;
-        // r = 4 (1 - cos phi) of the misorientation phi that is ordinary detection noise.
-        let ordinary = 4.0 * (1.0 - ORDINARY_MISORIENTATION_DEG.to_radians().cos());
-        let horizontal = if mean > ordinary { (ordinary / mean).powi(2) } else { 1.0 };
-        let down = self.vertical(frame);
-        let vertical = frame.tr_mul(&down).iamax();
-        std::array::from_fn(|axis| if axis == vertical { 1.0 } else { horizontal })
     }
 
     /// The frame that all segments vote for, unless it left the neighborhood of the photographs' own.
@@ -324,6 +312,19 @@ impl<'a> SceneDirections<'a> {
         guidance.weights = solved.weights;
         Upright { down: *down, theta: solved.theta, rotations }
     }
+}
+
+/// Full weight for the vertical; for the horizontals as much as the photographs' directions agree: where buildings stand
+/// at several angles, what passes for one horizontal direction would pull the vertical along. `down` is the frame's
+/// vertical.
+pub(super) fn axis_weights(frame: &Matrix3<f64>, down: &Vector3<f64>, guidance: &Guidance) -> AxisWeights {
+    let residuals = guidance.inliers.iter().filter_map(|&index| guidance.residuals[index]);
+    let mean = residuals.sum::<f64>() / guidance.inliers.len().max(1) as f64;
+    // r = 4 (1 - cos phi) of the misorientation phi that is ordinary detection noise.
+    let ordinary = 4.0 * (1.0 - ORDINARY_MISORIENTATION_DEG.to_radians().cos());
+    let horizontal = if mean > ordinary { (ordinary / mean).powi(2) } else { 1.0 };
+    let vertical = frame.tr_mul(down).iamax();
+    std::array::from_fn(|axis| if axis == vertical { 1.0 } else { horizontal })
 }
 
 /// Each photograph's roll by the common vertical: after the joint refinement no photograph's own triad knows better.

@@ -18,7 +18,7 @@ pub(crate) fn short(lines: &mut LabeledLines, project: &Project, names: &[String
     }
 }
 
-/// "upright within 0.6 degrees, 0.3 on average (8 photographs measured, 2 uncertain: 03.jpg, 07.jpg)"
+/// "upright within 0.6 degrees at 95 %, 0.3 expected on average (8 photographs measured, 2 uncertain: 03.jpg, 07.jpg)"
 fn upright(measures: &Measures, project: &Project, names: &[String]) -> String {
     let Some(upright) = &measures.upright else {
         return "no vertical lines to judge by".to_owned();
@@ -35,7 +35,13 @@ fn upright(measures: &Measures, project: &Project, names: &[String]) -> String {
         count => format!(", {count} uncertain: {}", listed(&uncertain)),
     };
     let (most, mean) = (upright.max_deg, upright.mean_deg);
-    format!("upright within {most:.1} degrees, {mean:.1} on average ({measured}{uncertain})")
+    match upright.within_deg {
+        Some(within) => {
+            format!("upright within {within:.1} degrees at 95 %, {mean:.1} expected on average ({measured}{uncertain})")
+        }
+        // A project of an earlier version states no interval.
+        None => format!("upright within {most:.1} degrees, {mean:.1} on average ({measured}{uncertain})"),
+    }
 }
 
 fn photographs_in_words(count: usize) -> String {
@@ -75,7 +81,7 @@ fn bent_line(measures: &Measures, project: &Project, names: &[String]) -> Option
 pub(super) fn table(lines: &mut LabeledLines, project: &Project, names: &[String]) {
     let Some(measures) = &project.measures else { return };
     if let Some(degrees) = measures.estimated_gdic_deg {
-        lines.item("GDIC", &format!("{degrees:.2} degrees, estimated from the photographs' own vertical lines"));
+        lines.item("GDIC", &format!("{degrees:.2} degrees, estimated from the photographs' lines"));
     }
     let (ld, mean, folds) = (measures.ld, measures.ld_mean, measures.folds);
     lines.item("LD", &format!("{ld:.3}e-2 at most, {mean:.3}e-2 on average; {folds} folded cells"));
@@ -88,16 +94,20 @@ pub(super) fn table(lines: &mut LabeledLines, project: &Project, names: &[String
     }
 }
 
-/// "leans by 0.21 degrees (+- 0.05, 34 vertical lines)"
+/// "leans by 0.02 +- 0.29 degrees at 95 % (34 vertical lines)"
 fn lean(photograph: &PhotographMeasures) -> String {
     let lines = match photograph.vertical_lines {
         0 => "no vertical lines".to_owned(),
         1 => "1 vertical line".to_owned(),
         count => format!("{count} vertical lines"),
     };
-    let Some((lean, error)) = photograph.lean_deg.zip(photograph.standard_error_deg) else {
-        return lines;
-    };
     let uncertain = if photograph.certain { "" } else { "uncertain: " };
-    format!("{uncertain}leans by {lean:.2} degrees (+- {error:.2}, {lines})")
+    match (photograph.lean_deg, photograph.within_deg) {
+        (Some(lean), Some(within)) => {
+            format!("{uncertain}leans by {lean:.2} +- {within:.2} degrees at 95 % ({lines})")
+        }
+        // A project of an earlier version states no interval.
+        (Some(lean), None) => format!("{uncertain}leans by {lean:.2} degrees ({lines})"),
+        (None, _) => lines,
+    }
 }

@@ -108,21 +108,21 @@ fn measured(upright: serde_json::Value, photographs: serde_json::Value, longest_
 fn measures_take_two_lines_and_uncertain_photographs_are_named() {
     let photograph = |path: &str, lines: usize, certain: bool| {
         serde_json::json!({"path": path, "vertical_lines": lines, "lean_deg": 0.61, "standard_error_deg": 0.04,
-                           "gamma_deg": 1.0, "certain": certain})
+                           "within_deg": 0.09, "gamma_deg": 1.0, "certain": certain})
     };
     let bent = serde_json::json!({"path": "x/a.jpg", "length_px": 412.3, "off_px": 1.94});
-    let upright = serde_json::json!({"mean_deg": 0.31, "max_deg": 0.61, "measured": 1});
+    let upright = serde_json::json!({"mean_deg": 0.31, "max_deg": 0.61, "within_deg": 0.7, "measured": 2});
     let project =
         measured(upright, serde_json::json!([photograph("x/a.jpg", 34, true), photograph("x/b.jpg", 5, false)]), bent);
     let file = PanoramaFile { panorama: Path::new("p.jpg"), bytes: 1, project: None };
     let short = "\
-measured    upright within 0.6 degrees, 0.3 on average (1 photograph measured, 1 uncertain: b.jpg)
+measured    upright within 0.7 degrees at 95 %, 0.3 expected on average (2 photographs measured, 1 uncertain: b.jpg)
             points meet within 0.4 px on average, 95 of 100 within 1.2; longest bent line: 412 px, 1.9 px off, in a.jpg
 time ";
     let printed = text(&project, Some(&file), false);
     assert!(printed.contains(short), "{printed}");
     let long = text(&project, None, false);
-    assert!(long.contains("a.jpg: leans by 0.61 degrees (+- 0.04, 34 vertical lines)"), "{long}");
+    assert!(long.contains("a.jpg: leans by 0.61 +- 0.09 degrees at 95 % (34 vertical lines)"), "{long}");
     assert!(long.contains("b.jpg: uncertain: leans by"), "{long}");
 }
 

@@ -21,12 +21,12 @@ const MAX_DISTANCE_RATIO: f64 = 0.9;
 const DISTANCE_QUANTILE: f64 = 0.9;
 
 /// Where points of a are in b.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) enum PointMap {
     /// On a plane, or of pinholes that turned.
     Plane(Homography),
     /// Of another lens that turned.
-    Turn(TurnedLens),
+    Turn(Box<TurnedLens>),
 }
 
 impl PointMap {

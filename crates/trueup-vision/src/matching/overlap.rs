@@ -8,17 +8,17 @@ use trueup_core::source::WorkingFrame;
 use super::turned::TurnedLens;
 
 /// A map between two photographs' frames, both ways.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct PredictedOverlap<'a> {
     maps: Maps,
     frame_a: &'a WorkingFrame,
     frame_b: &'a WorkingFrame,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 enum Maps {
     Homographies { b_from_a: Homography, a_from_b: Homography },
-    Turn(TurnedLens),
+    Turn(Box<TurnedLens>),
 }
 
 impl<'a> PredictedOverlap<'a> {
@@ -30,7 +30,7 @@ impl<'a> PredictedOverlap<'a> {
 
     /// That of a lens that turned.
     pub(super) fn of_turn(turned: TurnedLens, frame_a: &'a WorkingFrame, frame_b: &'a WorkingFrame) -> Self {
-        Self { maps: Maps::Turn(turned), frame_a, frame_b }
+        Self { maps: Maps::Turn(Box::new(turned)), frame_a, frame_b }
     }
 
     /// Where a point of a is in b; `None` if it is not in the overlap.

@@ -155,7 +155,7 @@ fn judge_turn(
             b: input.b.features,
             known: &known,
             plane_of_known: &vec![0; known.len()],
-            planes: &[PlaneMap { b_from_a: PointMap::Turn(turn.turned), inlier_px: options.inlier_px }],
+            planes: &[PlaneMap { b_from_a: PointMap::Turn(Box::new(turn.turned)), inlier_px: options.inlier_px }],
             overlap: &overlap,
         });
         pair.inliers.extend(more.iter().map(|found| found.at));

@@ -11,7 +11,7 @@
 //! The lens is taken from a list in place of the roots of a polynomial in three matches: the matches of a pair hardly tell
 //! two neighbors of the list apart, every match judges every lens, and fisheyes need no equation of their own.
 
-use nalgebra::{Matrix3, Matrix6, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix2, Matrix3, Matrix6, Vector2, Vector3, Vector6};
 use rand::{Rng, RngExt};
 use trueup_core::camera::Camera;
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
@@ -32,6 +32,9 @@ const STEPS: usize = 15;
 const LEAST_ANGLE: f64 = 0.05;
 /// Pull of the radial terms towards the listed ones, as a standard deviation.
 const RADIAL_SD: f64 = 0.2;
+/// Smallest spread of the agreeing matches across the line they lie along best, in diagonals, one standard deviation: what
+/// lies on one line agrees with many lenses and many turns.
+const LEAST_SPREAD: f64 = 0.02;
 /// Matches that a lens is judged by at most.
 const JUDGING: usize = 400;
 
@@ -143,8 +146,18 @@ pub(super) fn find_turned_lens(
     let costs = refined.map(|turned| (turned.cost(points, inlier_px), turned));
     let (_, turned) = costs.min_by(|one, other| one.0.total_cmp(&other.0))?;
     let agrees = |&k: &usize| turned.squared_error(points.in_a[k], points.in_b[k]) <= inlier_px * inlier_px;
-    let inliers = (0..points.in_a.len()).filter(agrees).collect();
-    Some(TurnConsensus { turned, inliers })
+    let inliers: Vec<usize> = (0..points.in_a.len()).filter(agrees).collect();
+    let agreeing = points.select(&inliers);
+    let spread = |places: &[Vector2<f64>]| spread_across(places) >= LEAST_SPREAD * a.diagonal();
+    (spread(&agreeing.in_a) && spread(&agreeing.in_b)).then_some(TurnConsensus { turned, inliers })
+}
+
+/// Standard deviation of places across the line that they lie along best.
+fn spread_across(places: &[Vector2<f64>]) -> f64 {
+    let count = places.len().max(1) as f64;
+    let center = places.iter().sum::<Vector2<f64>>() / count;
+    let moment: Matrix2<f64> = places.iter().map(|place| (place - center) * (place - center).transpose()).sum();
+    (moment.symmetric_eigenvalues().min().max(0.0) / count).sqrt()
 }
 
 /// The lenses that are tried on photographs of this size.

@@ -45,7 +45,7 @@ impl Edition {
     }
 }
 
-/// The mesh of VPG and GSP: one similarity for each photograph, vertices carried by moving DLT, undivided cells, the weights
+/// The mesh of VPG, GSP and the AANAP compared with them: one similarity for each photograph, vertices carried by moving DLT, undivided cells, the weights
 /// of GSP's authors, and outlines that nothing holds.
 fn fix_published_mesh(options: &mut AlignOptions) {
     /// Residual weights of the three energies next to an overlap, for cells of 40 working pixels.
@@ -119,6 +119,8 @@ methods! {
     Gsp2dPublished = "gsp-2d-published": MethodForm::Mesh(PriorMethod::Gsp2d, Edition::Published),
     /// The three-dimensional global similarity prior on the mesh as published.
     Gsp3dPublished = "gsp-3d-published": MethodForm::Mesh(PriorMethod::Gsp3d, Edition::Published),
+    /// AANAP's turns on the same mesh, as the paper of vpg compares with them.
+    AanapPublished = "aanap-published": MethodForm::Mesh(PriorMethod::Aanap, Edition::Published),
     /// The mesh under straightened cameras alone: what vpg falls back to where no lines guide it.
     Straightening = "straightening": MethodForm::Mesh(PriorMethod::Straightening, Edition::Ours),
     /// One homography per photograph, onto the plane of the reference.

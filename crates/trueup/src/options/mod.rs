@@ -380,6 +380,7 @@ mod tests {
             ("apap", sorted(&[])),
             ("gsp-2d-published", sorted(&[&mesh])),
             ("gsp-3d-published", sorted(&[&mesh])),
+            ("aanap-published", sorted(&[&mesh])),
             ("vpg-published", sorted(&[&mesh, &guidance])),
             ("vpg-literal", sorted(&[&mesh, &guidance, &printed])),
         ] {

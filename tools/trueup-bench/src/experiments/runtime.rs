@@ -108,11 +108,12 @@ pub(crate) fn run(runner: &Runner, catalogue: &Catalogue) -> Result<Vec<Row>> {
                 matched = Some((&trial.set, *threads, photographs));
                 let row = match timed {
                     Ok(measures) => Row { key, measures, note: String::new() },
-                    Err(error @ Error::NotApplicable { .. }) => {
-                        let measures = BTreeMap::from([("refused".to_owned(), 1.0)]);
-                        Row { key, measures, note: error.to_string() }
+                    Err(error @ (Error::Cancelled | Error::Options(_))) => return Err(error),
+                    Err(error) => {
+                        let refused = matches!(error, Error::NotApplicable { .. });
+                        let what = if refused { "refused" } else { "failed" };
+                        Row { key, measures: BTreeMap::from([(what.to_owned(), 1.0)]), note: error.to_string() }
                     }
-                    Err(error) => return Err(error),
                 };
                 runner.store.add(row.clone())?;
                 row
