@@ -31,8 +31,8 @@ impl ComparedMethod {
 pub(crate) enum Family {
     /// A similarity prior and the mesh: on whole sets, and in every table.
     Prior,
-    /// A prior with the errors of its publication: on whole sets, in the comparison of methods alone.
-    Printed,
+    /// A prior in another reading of its publication: on whole sets, in the comparison of methods alone.
+    Reading,
     /// VPG, by default or as published, with more energies that draw overlaps together: on whole sets, in the table of alignment.
     Alignment,
     /// Warps without a prior that cannot show a wide field of view: on reduced sets alone.
@@ -63,7 +63,7 @@ pub(crate) const SPHP_FREE: &str = "sphp-free";
 pub(crate) const AANAP: &str = "aanap";
 
 /// Every method that exists.
-pub(crate) static METHODS: [ComparedMethod; 20] = [
+pub(crate) static METHODS: [ComparedMethod; 21] = [
     ComparedMethod {
         name: VPG,
         meaning: "vanishing points, level sphere (the default)",
@@ -105,7 +105,14 @@ pub(crate) static METHODS: [ComparedMethod; 20] = [
         meaning: "vanishing points, by the paper's equations as they are printed, errors included",
         options: &[&["stitch.method=vpg-literal"]],
         paper: None,
-        family: Family::Printed,
+        family: Family::Reading,
+    },
+    ComparedMethod {
+        name: "aanap-published",
+        meaning: "the least turns of AANAP as a prior, on the mesh as published",
+        options: &[&["stitch.method=aanap-published"]],
+        paper: None,
+        family: Family::Reading,
     },
     ComparedMethod {
         name: GSP_2D_PUBLISHED,

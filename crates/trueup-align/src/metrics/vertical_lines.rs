@@ -1,6 +1,7 @@
 //! Which lines of a photograph are vertical ones.
 
 use nalgebra::{Matrix3, Vector3};
+use trueup_core::camera::Camera;
 use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
 
@@ -21,8 +22,8 @@ pub struct VerticalLinesInput<'a> {
     pub lines: &'a [LineSegment],
     /// The working frame.
     pub frame: &'a WorkingFrame,
-    /// Focal length.
-    pub focal_px: f64,
+    /// The camera of that frame.
+    pub camera: &'a Camera,
     /// Where the cameras expect down, in the camera's frame: a unit vector. Segments decide where it is.
     pub expected_down: Vector3<f64>,
 }
@@ -43,7 +44,7 @@ pub fn vertical_segments(photograph: &VerticalLinesInput) -> Vec<usize> {
 /// A photograph's segments as planes and their vertical vanishing direction; `None` if they point to none, or if the
 /// photograph looks within 15 degrees of straight up or down.
 fn planes_and_down(photograph: &VerticalLinesInput) -> Option<(InterpretationPlanes, Vector3<f64>)> {
-    let planes = InterpretationPlanes::new(photograph.lines, photograph.focal_px, photograph.frame);
+    let planes = InterpretationPlanes::new(photograph.lines, photograph.camera, photograph.frame);
     let down = vertical_direction(&planes, &photograph.expected_down)?;
     // Not a number is no direction either.
     (down.x.hypot(down.y) >= MIN_SINE).then_some((planes, down))
@@ -90,7 +91,6 @@ fn vertical_direction(planes: &InterpretationPlanes, expected: &Vector3<f64>) ->
 
 #[cfg(test)]
 mod tests {
-    use trueup_core::camera::Camera;
     use trueup_core::geometry::{rotation_about_x, rotation_about_z};
 
     use super::*;
@@ -120,7 +120,7 @@ mod tests {
     fn the_vertical_segments_are_the_plumb_lines_whatever_was_expected() {
         let (lines, frame, camera) = photograph();
         let found = |expected_down: Vector3<f64>| {
-            vertical_segments(&VerticalLinesInput { lines: &lines, frame: &frame, focal_px: FOCAL_PX, expected_down })
+            vertical_segments(&VerticalLinesInput { lines: &lines, frame: &frame, camera: &camera, expected_down })
         };
         // Plumb and level lines take turns in the photograph.
         let plumb: Vec<usize> = (0..20).step_by(2).collect();
@@ -133,9 +133,9 @@ mod tests {
 
     #[test]
     fn straight_down_and_without_lines_nothing_is_vertical() {
-        let (lines, frame, _) = photograph();
+        let (lines, frame, camera) = photograph();
         let found = |lines: &[LineSegment], expected_down| {
-            vertical_segments(&VerticalLinesInput { lines, frame: &frame, focal_px: FOCAL_PX, expected_down })
+            vertical_segments(&VerticalLinesInput { lines, frame: &frame, camera: &camera, expected_down })
         };
         assert!(found(&[], Vector3::y()).is_empty());
         assert!(found(&lines, Vector3::z()).is_empty(), "looks straight down");

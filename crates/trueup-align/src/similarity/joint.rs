@@ -340,7 +340,7 @@ impl PhotographLines {
     }
 
     fn reach(&self, direction: &Vector3<f64>, line: usize) -> f64 {
-        2.0 * (direction.xy() * self.focal_px - self.planes.midpoints[line] * direction.z).norm()
+        self.planes.reach(line, direction, self.focal_px)
     }
 
     fn support(&self, direction: &Vector3<f64>, tolerance: f64) -> (f64, usize) {

@@ -52,10 +52,7 @@ fn clutter_stands_out_nowhere() {
 fn photographs_that_contradict_each_other_leave_the_vertical_uncertain() {
     let mut scene = with_lines(SyntheticScene::new(Sweep::default(), World::Random, 0.0, 11), 0, 0.3);
     let deviation = |scene: &SyntheticScene| {
-        let planes = |k: usize| {
-            let (focal_px, frame) = (scene.cameras[k].focal_px, &scene.frames[k]);
-            InterpretationPlanes::new(&scene.lines[k], focal_px, frame)
-        };
+        let planes = |k: usize| InterpretationPlanes::new(&scene.lines[k], &scene.cameras[k], &scene.frames[k]);
         let rotations: Vec<_> = scene.cameras.iter().map(Camera::rotation).collect();
         let focals: Vec<f64> = scene.cameras.iter().map(|camera| camera.focal_px).collect();
         let vote = LineVote::new(&rotations, &focals, (0..rotations.len()).map(planes).collect());

@@ -163,8 +163,8 @@ impl UprightScene {
 
     fn vote(&self, input: &RollsInput<'_>) -> LineVote {
         let focals: Vec<f64> = input.cameras.iter().map(|camera| camera.focal_px).collect();
-        let planes = input.lines.iter().zip(input.frames).zip(&focals);
-        let planes = planes.map(|((lines, frame), &focal_px)| InterpretationPlanes::new(lines, focal_px, frame));
+        let planes = input.lines.iter().zip(input.frames).zip(input.cameras);
+        let planes = planes.map(|((lines, frame), camera)| InterpretationPlanes::new(lines, camera, frame));
         LineVote::new(&self.rotations, &focals, planes.collect())
     }
 }

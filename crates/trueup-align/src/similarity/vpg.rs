@@ -90,10 +90,7 @@ pub(super) fn guide(
 fn interpretation_planes(input: &PriorInput<'_>) -> Vec<InterpretationPlanes> {
     (0..input.cameras.len())
         .into_par_iter()
-        .map(|index| {
-            let focal_px = input.cameras[index].focal_px;
-            InterpretationPlanes::new(&input.lines[index], focal_px, &input.frames[index])
-        })
+        .map(|index| InterpretationPlanes::new(&input.lines[index], &input.cameras[index], &input.frames[index]))
         .collect()
 }
 

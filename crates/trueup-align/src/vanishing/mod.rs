@@ -1,4 +1,4 @@
-//! Per photograph: three mutually orthogonal vanishing directions from its line segments and its focal length.
+//! Per photograph: three mutually orthogonal vanishing directions from its line segments and its camera.
 //!
 //! A segment and the camera's center span the *interpretation plane* of the segment; its unit normal n is orthogonal to
 //! the segment's direction in space. A vanishing direction v is a bearing in the camera frame that many normals are
@@ -21,6 +21,7 @@ mod tests;
 
 use nalgebra::{Matrix3, Vector3};
 use rand::Rng;
+use trueup_core::camera::Camera;
 use trueup_core::geometry::rows_of;
 use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
@@ -41,7 +42,7 @@ const MAX_ROTATION_SD_DEG: f64 = 5.0;
 
 /// Finds the three vanishing directions of one photograph.
 ///
-/// `lines` are in the working pixels of `frame`, `focal_px` too; segments that are too short, not finite or artifacts
+/// `lines` and `camera` are in the working pixels of `frame`; segments that are too short, not finite or artifacts
 /// of the frame are ignored. `generator` drives the choice of hypotheses: the same generator gives the same triad.
 /// Cost: about `draws * 45 * 200` evaluations of a segment, 1 to 2 ms with the defaults. Without intrinsics (see
 /// `uncalibrated`) the directions are those in the frame of a camera of the focal length that they tell themselves, and
@@ -57,12 +58,12 @@ const MAX_ROTATION_SD_DEG: f64 = 5.0;
 /// squares.
 pub fn detect_triad(
     lines: &[LineSegment],
-    focal_px: f64,
+    camera: &Camera,
     frame: &WorkingFrame,
     options: &VanishingOptions,
     generator: &mut impl Rng,
 ) -> TriadOutcome {
-    let planes = InterpretationPlanes::new(lines, focal_px, frame);
+    let planes = InterpretationPlanes::new(lines, camera, frame);
     if planes.len() < options.min_lines {
         let missing = MissingTriad::TooFewLines { found: planes.len(), needed: options.min_lines };
         return TriadOutcome::Missing(missing);
@@ -71,7 +72,7 @@ pub fn detect_triad(
         let found = uncalibrated::search(&planes, frame.width.max(frame.height), options, generator);
         let missing = MissingTriad::LowQuality { quality: 0.0, needed: options.min_quality };
         return found.map_or(TriadOutcome::Missing(missing), |found| {
-            let planes = InterpretationPlanes::new(lines, found.focal_px, frame);
+            let planes = InterpretationPlanes::new(lines, &Camera { focal_px: found.focal_px, ..*camera }, frame);
             judge(&RefinedTriad::refine(&found.triad, &planes, options), &planes, lines.len(), options)
         });
     }

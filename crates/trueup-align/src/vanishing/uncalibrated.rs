@@ -203,6 +203,7 @@ fn joined(first: &Vector3<f64>, second: &Vector3<f64>) -> Option<(f64, Matrix3<f
 #[cfg(test)]
 mod tests {
     use trueup_core::StageContext;
+    use trueup_core::camera::Camera;
     use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z};
     use trueup_core::source::WorkingFrame;
 
@@ -258,8 +259,9 @@ mod tests {
             let lines = photograph_lines(&world_from_camera.transpose(), 25, 10, 0.3, &mut generator);
             let mut rolls = Vec::new();
             for thought in [0.5, 1.0, 2.0] {
+                let camera = Camera::new(FOCAL_PX * thought, SIZE.0, SIZE.1, &Matrix3::identity());
                 let mut generator = StageContext::default().generator("uncalibrated test", 7);
-                let found = detect_triad(&lines, FOCAL_PX * thought, &frame, &options, &mut generator);
+                let found = detect_triad(&lines, &camera, &frame, &options, &mut generator);
                 let triad = found.triad().unwrap_or_else(|| panic!("{yaw} {pitch} {roll}: {found:?}")).matrix();
                 let down = (0..3).map(|k| triad.column(k).into_owned()).max_by(|a, b| a.y.abs().total_cmp(&b.y.abs()));
                 let down = down.map(|down| down * down.y.signum()).expect("three directions");

@@ -56,7 +56,9 @@ impl ArrangeInput {
             let full = corrected.iter().zip(&component.frames).zip(&placed).map(|((camera, frame), placed)| {
                 let camera_from_level = camera.rotation() * level_from_world.transpose();
                 let focal_px = camera.focal_px / frame.working_from_full;
-                Camera::new(focal_px, placed.mesh.width, placed.mesh.height, &camera_from_level)
+                let pinhole = Camera::new(focal_px, placed.mesh.width, placed.mesh.height, &camera_from_level);
+                let Camera { lens, principal_point, .. } = camera.scaled(1.0 / frame.working_from_full);
+                if lens.is_pinhole() { pinhole } else { Camera { lens, principal_point, ..pinhole } }
             });
             full.collect()
         });
@@ -69,12 +71,8 @@ impl ArrangeInput {
     /// What a project knows of the photographs used, whose grids are `placed` in its order: composing from the record starts
     /// here.
     pub(crate) fn of_project(placed: Vec<Placed>, reference: usize, project: &Project) -> Self {
-        let camera = |(record, placed): (&ImageRecord, &Placed)| {
-            let camera_from_level = record.upright_rotation.or(record.rotation)?;
-            let mesh = &placed.mesh;
-            Some(Camera::new(record.focal_px?, mesh.width, mesh.height, &matrix_from_rows(&camera_from_level)))
-        };
-        let cameras = project.used_images().zip(&placed).map(camera).collect();
+        let camera = |record: &ImageRecord| record.camera(record.level_rotation()?);
+        let cameras = project.used_images().map(camera).collect();
         let dominant = project.manhattan.dominant.as_ref();
         let period = project.grid_canvas().period();
         Self { placed, reference, cameras, dominant: dominant.map(matrix_from_rows), period }

@@ -177,7 +177,7 @@ fn vertical_lines(component: &Component, geometry: &Geometry) -> Vec<usize> {
         let photograph = VerticalLinesInput {
             lines: &component.lines[k],
             frame: &component.frames[k],
-            focal_px: camera.focal_px,
+            camera,
             expected_down: camera.rotation() * down,
         };
         metrics::vertical_segments(&photograph).len()

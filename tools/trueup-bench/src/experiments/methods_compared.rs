@@ -60,7 +60,7 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
 
 /// The methods of the tables.
 fn methods() -> impl Iterator<Item = &'static ComparedMethod> + Clone {
-    methods_of(Family::Prior).chain(methods_of(Family::Printed)).chain(methods_of(Family::WideWarp))
+    methods_of(Family::Prior).chain(methods_of(Family::Reading)).chain(methods_of(Family::WideWarp))
 }
 
 /// A figure of one method and of another on each set, where both have it.

@@ -3,6 +3,7 @@
 pub(crate) mod component;
 mod overlaps;
 mod refinement;
+mod straightened;
 mod turn;
 mod vanishing;
 
@@ -18,6 +19,7 @@ use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::TriadOutcome;
 use trueup_align::warps::{self, WarpInput, WarpModel};
 use trueup_core::diagnostics::Reported;
+use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 use trueup_core::source::SourceImage;
@@ -92,11 +94,14 @@ fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageCont
     let grids = component.grids(options.mesh.cell_px);
     let overlaps = overlaps::run(component, options, input.memo, context)?;
     let Overlaps { cameras, pairs, warps } = &overlaps.value;
+    let lines = context
+        .time("straightened lines", || straightened::lines(component, &cameras.cameras, input.photographs, context))?;
     let triads = match input.directions {
         Some(known) => known.to_vec(),
-        None => vanishing::run(component, cameras, &options.vanishing, context)?,
+        None => vanishing::run(component, &lines, cameras, &options.vanishing, context)?,
     };
-    let prior = context.in_one_step("prior", || find_prior(component, &overlaps.value, &triads, options, context))?;
+    let measured = MeasuredLines { lines: &lines, triads: &triads };
+    let prior = context.in_one_step("prior", || find_prior(component, &overlaps.value, measured, options, context))?;
 
     let edges: Vec<GraphEdge> = pairs.iter().map(GraphEdge::of).collect();
     let cut = full_turn::find_cut(&cameras.cameras, &edges, &prior.level_from_world());
@@ -128,11 +133,19 @@ fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageCont
     Ok(Geometry { cameras: cameras.clone(), triads, prior, mesh, coinciding })
 }
 
+/// What the photographs' lines tell.
+#[derive(Clone, Copy)]
+struct MeasuredLines<'a> {
+    /// The segments, as straight as they are behind a pinhole.
+    lines: &'a [Vec<LineSegment>],
+    triads: &'a [TriadOutcome],
+}
+
 /// How every photograph is to be turned and scaled, under the prior that the method means.
 fn find_prior(
     component: &Component,
     overlaps: &Overlaps,
-    triads: &[TriadOutcome],
+    MeasuredLines { lines, triads }: MeasuredLines,
     options: &AlignOptions,
     context: &StageContext,
 ) -> Result<SimilarityPrior> {
@@ -144,7 +157,7 @@ fn find_prior(
         method,
         cameras: &overlaps.cameras.cameras,
         triads,
-        lines: &component.lines,
+        lines,
         frames: &component.frames,
         edges: &overlaps.pairs,
         overlaps: &overlaps.warps,
