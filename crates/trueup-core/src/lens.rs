@@ -7,7 +7,7 @@
 //!
 //! # Departures
 //! A polynomial that bends light back towards the middle is not followed there: from where its slope has fallen to
-//! [`LEAST_SLOPE`], or at the farthest angle for which the polynomial is taken seriously, the radius grows straight on. So
+//! `LEAST_SLOPE`, or at the farthest angle for which the polynomial is taken seriously, the radius grows straight on. So
 //! every lens maps rays and places one to one, whatever an estimate of its terms may be on the way.
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix2x4, SMatrix, Vector2, Vector3};

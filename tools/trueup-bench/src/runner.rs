@@ -6,15 +6,11 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::PoisonError;
 
-use trueup::{
-    CancelToken, Error, Inputs, MatchedPhotographs, PhotographCache, Reference, Result, Silent, StageContext, Stitcher,
-};
+use trueup::{CancelToken, Error, PhotographCache, Result, Silent, StageContext};
 
-use crate::measure;
 use crate::progress::Tracker;
-use crate::random_directions::with_random_directions;
 use crate::set_work::{MatchingKey, Outcome, SetWork};
-use crate::sets::{ReadySet, SetSpec, central};
+use crate::sets::SetSpec;
 use crate::store::ResultStore;
 use crate::trial::{Row, Trial};
 
@@ -105,7 +101,8 @@ impl Runner<'_> {
     fn run_set(&self, set: &SetSpec, trials: &[&Trial], tracker: &Tracker) -> Result<Vec<Row>> {
         let context = StageContext::new(&Silent, self.cancel);
         let ready = set.prepare(&self.data, &context)?;
-        let mut work = SetWork { runner: self, ready: &ready, matched: None, known: BTreeMap::new(), cache: None };
+        let mut work =
+            SetWork { cancel: self.cancel, ready: &ready, matched: None, known: BTreeMap::new(), cache: None };
         let mut rows = vec![None; trials.len()];
         // Trials that share their matches lie side by side, so that one matching is held at a time; those that compare
         // pixels first, since the others can take their figures over.
@@ -139,56 +136,6 @@ impl Runner<'_> {
         }
         Ok(rows.into_iter().flatten().collect())
     }
-
-    /// Measures and matches the photographs of a trial.
-    pub(crate) fn match_set(
-        &self,
-        ready: &ReadySet,
-        trial: &Trial,
-        cache: Option<&PhotographCache>,
-    ) -> Result<MatchedPhotographs> {
-        let unseeded = Trial { seed: 0, overrides: trial.matching_overrides(), ..trial.clone() };
-        let options = unseeded.options()?;
-        let context = StageContext::new(&Silent, self.cancel);
-        Stitcher::new(&options, &context)
-            .with_cache(cache)
-            .match_photographs(&inputs_of(ready, trial))
-            .map(MatchedPhotographs::remembering)
-    }
-
-    /// Aligns and measures them.
-    pub(crate) fn align(&self, ready: &ReadySet, photographs: &MatchedPhotographs, trial: &Trial) -> Result<Outcome> {
-        let options = trial.options()?;
-        let context = StageContext::new(&Silent, self.cancel).seeded(trial.seed);
-        let (stitcher, inputs) = (Stitcher::new(&options, &context), inputs_of(ready, trial));
-        let mut aligned = stitcher.align_matched(photographs, &inputs)?;
-        if let Some(found) = aligned.alignments.first().filter(|_| trial.random_directions > 0.0) {
-            let directions = with_random_directions(found.directions(), trial.random_directions, &context);
-            aligned = stitcher.align_along(photographs, &inputs, &directions)?;
-        }
-        let first = aligned.alignments.into_iter().next();
-        let project = first.ok_or_else(|| Error::input(&trial.set, "nothing was aligned", "Look at the set."))?.project;
-        let mut measures = measure::figures(&project, ready.truth.as_ref())?;
-        if trial.pixels {
-            measures.extend(measure::pixel_figures(&project, &context)?);
-        }
-        Ok(Outcome { measures, note: project.manhattan.failed_clause.unwrap_or_default() })
-    }
-}
-
-fn inputs_of(ready: &ReadySet, trial: &Trial) -> Inputs {
-    let count = trial.photograph_count.unwrap_or(ready.photographs.len());
-    let around = ready.truth.as_ref().filter(|_| trial.central).and_then(|truth| central(truth, count));
-    if let Some((middle, around)) = around {
-        let mut inputs = Inputs::new(around.iter().map(|&position| ready.photographs[position].clone()));
-        inputs.reference = Reference::Named(ready.photographs[middle].clone());
-        return inputs;
-    }
-    let mut inputs = Inputs::new(ready.photographs.iter().take(count).cloned());
-    if let Some(photograph) = trial.reference.and_then(|reference| ready.photographs.get(reference)) {
-        inputs.reference = Reference::Named(photograph.clone());
-    }
-    inputs
 }
 
 /// A pool of this many threads.

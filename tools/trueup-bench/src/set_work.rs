@@ -2,10 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use trueup::{Error, MatchedPhotographs, PhotographCache, Result};
+use trueup::{
+    CancelToken, Error, Inputs, MatchedPhotographs, PhotographCache, Reference, Result, Silent, StageContext, Stitcher,
+};
 
-use crate::runner::Runner;
-use crate::sets::ReadySet;
+use crate::measure;
+use crate::random_directions::with_random_directions;
+use crate::sets::{ReadySet, central};
 use crate::trial::{Row, Trial};
 
 /// What came of one piece of work.
@@ -35,8 +38,8 @@ impl MatchingKey {
 /// What is known while the trials of one set run.
 #[derive(Debug)]
 pub(crate) struct SetWork<'a> {
-    /// What is the same for all sets.
-    pub runner: &'a Runner<'a>,
+    /// Set by requests to stop.
+    pub cancel: &'a CancelToken,
     /// The set.
     pub ready: &'a ReadySet,
     /// The matches that were made last.
@@ -61,11 +64,11 @@ impl SetWork<'_> {
         if self.matched.as_ref().is_none_or(|(known, _)| *known != wanted) {
             // The old one goes before the new one is made: both together may be large.
             drop(self.matched.take());
-            let found = self.runner.match_set(self.ready, trial, self.cache.as_ref());
+            let found = self.matches_of(trial);
             self.matched = Some((wanted, found));
         }
         let outcome = match &self.matched {
-            Some((_, Ok(photographs))) => self.runner.align(self.ready, photographs, trial),
+            Some((_, Ok(photographs))) => self.align(photographs, trial),
             Some((_, Err(error))) => Err(repeated(error)),
             None => Err(Error::Cancelled),
         };
@@ -83,6 +86,51 @@ impl SetWork<'_> {
         self.known.entry(trial.work()?).or_insert_with(outcome);
         Ok(())
     }
+
+    /// Measures and matches the photographs of a trial.
+    fn matches_of(&self, trial: &Trial) -> Result<MatchedPhotographs> {
+        let unseeded = Trial { seed: 0, overrides: trial.matching_overrides(), ..trial.clone() };
+        let options = unseeded.options()?;
+        let context = StageContext::new(&Silent, self.cancel);
+        Stitcher::new(&options, &context)
+            .with_cache(self.cache.as_ref())
+            .match_photographs(&inputs_of(self.ready, trial))
+            .map(MatchedPhotographs::remembering)
+    }
+
+    /// Aligns and measures them.
+    fn align(&self, photographs: &MatchedPhotographs, trial: &Trial) -> Result<Outcome> {
+        let options = trial.options()?;
+        let context = StageContext::new(&Silent, self.cancel).seeded(trial.seed);
+        let (stitcher, inputs) = (Stitcher::new(&options, &context), inputs_of(self.ready, trial));
+        let mut aligned = stitcher.align_matched(photographs, &inputs)?;
+        if let Some(found) = aligned.alignments.first().filter(|_| trial.random_directions > 0.0) {
+            let directions = with_random_directions(found.directions(), trial.random_directions, &context);
+            aligned = stitcher.align_along(photographs, &inputs, &directions)?;
+        }
+        let first = aligned.alignments.into_iter().next();
+        let project = first.ok_or_else(|| Error::input(&trial.set, "nothing was aligned", "Look at the set."))?.project;
+        let mut measures = measure::figures(&project, self.ready.truth.as_ref())?;
+        if trial.pixels {
+            measures.extend(measure::pixel_figures(&project, &context)?);
+        }
+        Ok(Outcome { measures, note: project.manhattan.failed_clause.unwrap_or_default() })
+    }
+}
+
+fn inputs_of(ready: &ReadySet, trial: &Trial) -> Inputs {
+    let count = trial.photograph_count.unwrap_or(ready.photographs.len());
+    let around = ready.truth.as_ref().filter(|_| trial.central).and_then(|truth| central(truth, count));
+    if let Some((middle, around)) = around {
+        let mut inputs = Inputs::new(around.iter().map(|&position| ready.photographs[position].clone()));
+        inputs.reference = Reference::Named(ready.photographs[middle].clone());
+        return inputs;
+    }
+    let mut inputs = Inputs::new(ready.photographs.iter().take(count).cloned());
+    if let Some(photograph) = trial.reference.and_then(|reference| ready.photographs.get(reference)) {
+        inputs.reference = Reference::Named(photograph.clone());
+    }
+    inputs
 }
 
 /// What became of a run that has no figures.

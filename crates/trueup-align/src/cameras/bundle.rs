@@ -19,6 +19,11 @@ use super::observations::{Observations, PairObservations};
 use super::pair_cost::{LENS_LOCAL, PINHOLE_LOCAL, PairTerm, pair_cost};
 use super::prior::CameraPrior;
 
+/// Distance in working pixels beyond which the influence of a match grows only linearly, in the first pass: the start
+/// values are that far off.
+pub(super) const COARSE_HUBER_PX: f64 = 20.0;
+/// The same in the final pass, working pixels: a few times the error of a match.
+pub(super) const FINE_HUBER_PX: f64 = 2.0;
 /// Most iterations of one pass; it settles long before, unless the data contradict themselves.
 const MAX_ITERATIONS: usize = 100;
 /// Damping at the start of a pass, relative to the diagonal of the normal matrix.

@@ -5,7 +5,7 @@ use trueup_core::geometry::Homography;
 use trueup_core::lens::{TriedLens, tried_lenses};
 use trueup_core::matches::PairMatches;
 
-use super::intrinsics::LensState;
+use super::intrinsics::{InitialIntrinsics, LensState};
 use super::observations::{Observations, PairObservations};
 use super::prior::CameraPrior;
 use super::rotations::fit_rotation;
@@ -87,13 +87,6 @@ fn better_root(first: Quotient, second: Quotient) -> Option<f64> {
 const MISFIT_PX: f64 = 4.0;
 /// Share of a pinhole's errors that another lens may leave to be believed.
 const LENS_SHARE: f64 = 0.6;
-
-/// Where refinement starts from.
-pub(super) struct InitialIntrinsics {
-    pub focal_px: Vec<f64>,
-    /// Pinholes, unless they explain the matches badly and another lens does much better.
-    pub lens: LensState,
-}
 
 /// A focal length for every photograph, and a lens for all.
 pub(super) fn initial_intrinsics(

@@ -15,12 +15,23 @@ pub(super) const RADIAL: usize = 3;
 /// First of the two tangential terms.
 pub(super) const TANGENTIAL: usize = 7;
 
+/// Relative spread of separately estimated focal lengths above which `cameras.focal_sharing=auto` lets every photograph have
+/// its own.
+pub(super) const ZOOM_SPREAD: f64 = 0.03;
+
 /// Standard deviation of a radial term before anything is seen: an action camera's reaches 0.3.
 const RADIAL_SD: f64 = 0.3;
 /// Standard deviation of a tangential term.
 const TANGENTIAL_SD: f64 = 2e-3;
 /// Standard deviation of the principal point from the middle, in diagonals, along each axis.
 const CENTER_SD: f64 = 0.01;
+
+/// Where refinement starts from.
+pub(super) struct InitialIntrinsics {
+    pub focal_px: Vec<f64>,
+    /// Pinholes, unless they explain the matches badly and another lens does much better.
+    pub lens: LensState,
+}
 
 /// How far an intrinsic unknown but the focal length is expected from 0, one standard deviation.
 pub(super) fn standard_deviation(intrinsic: usize, frame: &WorkingFrame) -> f64 {

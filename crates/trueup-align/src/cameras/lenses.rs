@@ -2,10 +2,9 @@
 
 use trueup_core::{Result, StageContext};
 
-use super::bundle::{BundleAdjustment, Parameters};
-use super::intrinsics::{CENTER, FreeTerms, IntrinsicsModel, RADIAL, TANGENTIAL, only_focal};
+use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
+use super::intrinsics::{CENTER, FreeTerms, IntrinsicsModel, RADIAL, TANGENTIAL, ZOOM_SPREAD, only_focal};
 use super::lens_evidence::LensEvidence;
-use super::refinement::{COARSE_HUBER_PX, FINE_HUBER_PX, ZOOM_SPREAD};
 
 /// Squared distance from 0, in standard deviations and by dimension, at which a term is believed: 4 standard deviations, since
 /// the deviations rest on a dozen pairs.

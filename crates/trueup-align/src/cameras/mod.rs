@@ -28,7 +28,7 @@ use trueup_core::{Result, StageContext};
 use crate::stitch_graph::{GraphEdge, StitchGraph};
 use bundle::Parameters;
 use contradictions::contradicting_pairs;
-use focal::InitialIntrinsics;
+use intrinsics::InitialIntrinsics;
 use observations::Observations;
 use refinement::RefinementInput;
 

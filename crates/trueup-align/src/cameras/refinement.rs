@@ -2,21 +2,12 @@
 
 use trueup_core::{Result, StageContext};
 
-use super::bundle::{BundleAdjustment, Parameters};
-use super::intrinsics::{FOCAL, IntrinsicsModel};
+use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
+use super::intrinsics::{FOCAL, IntrinsicsModel, ZOOM_SPREAD};
 use super::lenses::{LensSearch, settings};
 use super::observations::Observations;
 use super::options::{CameraOptions, FocalSharing};
 use super::prior::CameraPrior;
-
-/// Distance in working pixels beyond which the influence of a match grows only linearly, in the first pass: the start
-/// values are that far off.
-pub(super) const COARSE_HUBER_PX: f64 = 20.0;
-/// The same in the final pass, working pixels: a few times the error of a match.
-pub(super) const FINE_HUBER_PX: f64 = 2.0;
-/// Relative spread of separately estimated focal lengths above which [`FocalSharing::Auto`] lets every photograph have
-/// its own.
-pub(super) const ZOOM_SPREAD: f64 = 0.03;
 
 /// What to refine: the photographs, what was observed of them and which of them the others turn about.
 #[derive(Clone, Copy)]

@@ -5,7 +5,7 @@ use trueup_core::camera::Camera;
 use trueup_core::geometry::{exp_rotation, log_rotation, nearest_rotation};
 use trueup_core::matches::{PairMatches, PointMatch};
 
-use super::focal::InitialIntrinsics;
+use super::intrinsics::InitialIntrinsics;
 use super::observations::Observations;
 use super::prior::CameraPrior;
 use crate::stitch_graph::StitchGraph;

@@ -5,11 +5,8 @@ use trueup_core::camera::Camera;
 use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
 
-use crate::vanishing::{FULL_WEIGHT_LENGTH_PX, InterpretationPlanes};
+use crate::vanishing::{FULL_WEIGHT_LENGTH_PX, InterpretationPlanes, VERTICAL_LINE_DEG};
 
-/// Largest angle between the vertical and a segment's interpretation plane for the segment to be a vertical line,
-/// degrees.
-const TOLERANCE_DEG: f64 = 1.5;
 /// Steps of the search for the vertical, each with a smaller scale of the robust loss, then as many at the last scale.
 const STEPS: usize = 10;
 /// Sine of the angle between viewing direction and vertical below which a photograph has no upright: sin 15 degrees.
@@ -52,7 +49,7 @@ fn planes_and_down(photograph: &VerticalLinesInput) -> Option<(InterpretationPla
 
 /// The planes whose segments point to the vertical vanishing direction `down`.
 fn pointing_down<'a>(planes: &'a InterpretationPlanes, down: &'a Vector3<f64>) -> impl Iterator<Item = usize> + 'a {
-    let tolerance = TOLERANCE_DEG.to_radians().sin();
+    let tolerance = VERTICAL_LINE_DEG.to_radians().sin();
     (0..planes.len()).filter(move |&plane| planes.normals[plane].dot(down).abs() <= tolerance)
 }
 

@@ -24,7 +24,7 @@ use super::joint::{AxisWeights, LineVote, Refinement};
 use super::prior::SimilarityPrior;
 use super::vertical::roll_of;
 use super::vpg::axis_weights;
-use crate::vanishing::{InterpretationPlanes, orthonormal_complement};
+use crate::vanishing::{InterpretationPlanes, VERTICAL_LINE_DEG, orthonormal_complement};
 
 /// Width of a sector of the scene, degrees of longitude: a facade, seen from where its lines can be told apart.
 const SECTOR_DEG: f64 = 20.0;
@@ -35,8 +35,6 @@ const MIN_SECTORS: usize = 4;
 /// verticals that such truths rest on are measured and err, too, which is thus part of it. docs/quality.md has the
 /// coverage on others.
 const SCENE_DEVIATION_DEG: f64 = 0.111;
-/// Largest angle between a segment and the vertical for the segment to be a vertical line, degrees.
-const TOLERANCE_DEG: f64 = 1.5;
 /// Fewest photographs that must show vertical lines, three each: a single one has nothing to agree with.
 const MIN_PHOTOGRAPHS: usize = 2;
 /// Where no prior was believed, the vertical is sought so near to where the cameras expect it, degrees.
@@ -83,7 +81,7 @@ pub fn estimated_rolls(input: &RollsInput<'_>) -> Option<Vec<Option<EstimatedRol
     let scene = UprightScene::of(input)?;
     let vote = scene.vote(input);
     let down = scene.down();
-    let support = vote.support(&down, TOLERANCE_DEG.to_radians());
+    let support = vote.support(&down, VERTICAL_LINE_DEG.to_radians());
     if support.photographs < MIN_PHOTOGRAPHS {
         return None;
     }

@@ -33,6 +33,9 @@ pub(crate) use interpretation::{FULL_WEIGHT_LENGTH_PX, InterpretationPlanes};
 pub(crate) use refine::RefinedTriad;
 pub(crate) use search::orthonormal_complement;
 
+/// Largest angle between the vertical and a segment's interpretation plane for the segment to be a vertical line,
+/// degrees.
+pub(crate) const VERTICAL_LINE_DEG: f64 = 1.5;
 /// Clusters that must be populated: a single direction does not fix an orientation.
 const NEEDED_CLUSTERS: usize = 2;
 /// Segments that make a cluster count as populated.

@@ -30,6 +30,14 @@ const ROUGH: f64 = 3.0;
 const STEPS: usize = 15;
 /// Smallest angle between the two rays of a sample, radians.
 const LEAST_ANGLE: f64 = 0.05;
+/// By how much the multiple of the threshold within which matches take part in a refinement shrinks in a step, until it is 1.
+const SHRINKING: f64 = 0.25;
+/// Largest change of the focal length's logarithm in a step.
+const LARGEST_FOCAL_STEP: f64 = 0.2;
+/// Largest change of a radial term in a step.
+const LARGEST_RADIAL_STEP: f64 = 0.1;
+/// Keeps the normal matrix positive where no match takes part.
+const RIDGE: f64 = 1e-9;
 /// Pull of the radial terms towards the listed ones, as a standard deviation.
 const RADIAL_SD: f64 = 0.2;
 /// Smallest spread of the agreeing matches across the line they lie along best, in diagonals, one standard deviation: what
@@ -81,19 +89,19 @@ impl TurnedLens {
         const RADIAL: usize = 3;
         let start = self.a.lens.terms();
         for step in 0..STEPS {
-            let reach_px = inlier_px * (ROUGH - step as f64 * 0.25).max(1.0);
-            let (mut normal, mut gradient) = (Matrix6::<f64>::identity() * 1e-9, Vector6::<f64>::zeros());
+            let reach_px = inlier_px * (ROUGH - step as f64 * SHRINKING).max(1.0);
+            let (mut normal, mut gradient) = (Matrix6::<f64>::identity() * RIDGE, Vector6::<f64>::zeros());
             let b_from_a = self.b.rotation();
             for (&a, &b) in points.in_a.iter().zip(&points.in_b) {
                 let bearing = self.a.bearing(a);
-                let Some(arriving) = self.b.projection_derivatives(b_from_a * bearing) else { continue };
+                let arrived = b_from_a * bearing;
+                let Some(arriving) = self.b.projection_derivatives(arrived) else { continue };
                 let residual = b - arriving.pixel;
                 if residual.norm() > reach_px {
                     continue;
                 }
                 let Some(leaving) = self.a.projection_derivatives(bearing) else { continue };
                 let Some(by_pixel) = leaving.bearing_by_pixel() else { continue };
-                let arrived = b_from_a * bearing;
                 let by_turn = arriving.by_bearing * trueup_core::geometry::cross_matrix(&arrived);
                 let by_intrinsics =
                     arriving.by_bearing * b_from_a * by_pixel * leaving.by_intrinsics - arriving.by_intrinsics;
@@ -112,9 +120,9 @@ impl TurnedLens {
             }
             let Some(change) = normal.cholesky().map(|factor| -factor.solve(&gradient)) else { break };
             let turn: Vector3<f64> = change.fixed_rows::<3>(0).into_owned();
-            let focal_px = self.a.focal_px * change[3].clamp(-0.2, 0.2).exp();
-            terms.radial[0] += change[4].clamp(-0.1, 0.1);
-            terms.radial[1] += change[5].clamp(-0.1, 0.1);
+            let focal_px = self.a.focal_px * change[3].clamp(-LARGEST_FOCAL_STEP, LARGEST_FOCAL_STEP).exp();
+            terms.radial[0] += change[4].clamp(-LARGEST_RADIAL_STEP, LARGEST_RADIAL_STEP);
+            terms.radial[1] += change[5].clamp(-LARGEST_RADIAL_STEP, LARGEST_RADIAL_STEP);
             let lens = Lens::new(terms);
             (self.a.focal_px, self.b.focal_px) = (focal_px, focal_px);
             (self.a.lens, self.b.lens) = (lens, lens);

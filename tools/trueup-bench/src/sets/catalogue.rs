@@ -6,10 +6,14 @@ use trueup::{Error, Result, StageContext};
 use trueup_scenes::SetKind;
 use trueup_scenes::cut::find_panoramas;
 
+use super::folders::name_of;
 use super::ready::truth_folders;
-use super::rendered::{EACH_GATE_CLASS, focal_sets, gate_sets, pitch_sets, quick_sets, rendered_sets, rolled_pairs};
+use super::rendered::{
+    EACH_GATE_CLASS, FocalSet, PitchSet, RolledPair, focal_sets, gate_sets, pitch_sets, quick_sets, rendered_sets,
+    rolled_pairs,
+};
 use super::spec::{SetSource, SetSpec};
-use super::{from_panorama, photographs, vpg_data};
+use super::{from_panorama, photographs};
 
 /// The sets of a run, by what they are for.
 #[derive(Debug, Default)]
@@ -49,37 +53,6 @@ pub(crate) struct GivenFolders<'a> {
     pub photographs: &'a [PathBuf],
     /// The authors' own data set.
     pub vpg_data: Option<&'a Path>,
-}
-
-/// Two photographs of one scene, the second turned about its axis.
-#[derive(Debug, Clone)]
-pub(crate) struct RolledPair {
-    /// What is photographed.
-    pub scene: &'static str,
-    /// By how much the second photograph is turned, clockwise, degrees.
-    pub roll_deg: f64,
-    /// The set.
-    pub set: SetSpec,
-}
-
-/// A set of the pitch sweep.
-#[derive(Debug, Clone)]
-pub(crate) struct PitchSet {
-    /// Mean elevation of its cameras, degrees.
-    pub pitch_deg: f64,
-    /// The set.
-    pub set: SetSpec,
-}
-
-/// A set of the study with metadata that claim a wrong focal length.
-#[derive(Debug, Clone)]
-pub(crate) struct FocalSet {
-    /// Claimed over true focal length.
-    pub factor: f64,
-    /// Name of the set it is a copy of.
-    pub original: String,
-    /// The copy.
-    pub set: SetSpec,
 }
 
 impl Catalogue {
@@ -131,7 +104,9 @@ impl Catalogue {
 /// The sets cut from panoramas and those inside the given folders, named after theirs.
 fn given_sets(folders: &GivenFolders) -> Result<Vec<SetSpec>> {
     let mut sets: Vec<SetSpec> = folders.panoramas.map_or_else(|| Ok(Vec::new()), cut_sets)?;
-    sets.extend(folders.vpg_data.map_or_else(|| Ok(Vec::new()), vpg_data::sets)?);
+    sets.extend(
+        folders.vpg_data.map_or_else(|| Ok(Vec::new()), |folder| photographs::sets("vpg", &[folder.to_owned()]))?,
+    );
     for parent in folders.truth_sets {
         for folder in truth_folders(parent)? {
             let name = format!("given/{}", name_of(&folder));
@@ -163,10 +138,6 @@ fn cut_sets(folder: &Path) -> Result<Vec<SetSpec>> {
         })
     };
     Ok(found.iter().flat_map(|image| each(&image.path)).collect())
-}
-
-fn name_of(folder: &Path) -> String {
-    folder.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 #[cfg(test)]

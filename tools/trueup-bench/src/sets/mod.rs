@@ -3,6 +3,7 @@
 mod catalogue;
 mod central;
 mod focal_claim;
+mod folders;
 mod from_panorama;
 mod photographs;
 mod ready;

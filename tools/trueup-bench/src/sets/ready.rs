@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use trueup::{Error, Result, Truth};
 
+use super::folders::folders_in;
+
 /// Name of the file that holds what is true of a set.
 pub(crate) const TRUTH_FILE: &str = "truth.json";
 
@@ -62,10 +64,8 @@ pub(crate) fn read_truth(folder: &Path) -> Result<(Truth, String)> {
 /// # Errors
 /// [`Error::Io`] if it cannot be read; [`Error::Input`] if none holds one.
 pub(crate) fn truth_folders(parent: &Path) -> Result<Vec<PathBuf>> {
-    let entries = fs::read_dir(parent).map_err(|error| Error::io("reading the folder", parent, error))?;
-    let mut folders: Vec<PathBuf> =
-        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.join(TRUTH_FILE).is_file()).collect();
-    folders.sort();
+    let mut folders = folders_in(parent)?;
+    folders.retain(|path| path.join(TRUTH_FILE).is_file());
     if folders.is_empty() {
         let hint = "Name a folder whose folders each hold photographs and their truth.json.";
         return Err(Error::input(parent.display(), "no folder in it holds a truth.json", hint));

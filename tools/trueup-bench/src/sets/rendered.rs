@@ -2,8 +2,38 @@
 
 use trueup_scenes::{LightQuality, Quality, RigOptions, SceneKind, SceneOptions, SetKind};
 
-use super::catalogue::{FocalSet, PitchSet, RolledPair};
 use super::spec::{Recipe, SetSpec};
+
+/// Two photographs of one scene, the second turned about its axis.
+#[derive(Debug, Clone)]
+pub(crate) struct RolledPair {
+    /// What is photographed.
+    pub scene: &'static str,
+    /// By how much the second photograph is turned, clockwise, degrees.
+    pub roll_deg: f64,
+    /// The set.
+    pub set: SetSpec,
+}
+
+/// A set of the pitch sweep.
+#[derive(Debug, Clone)]
+pub(crate) struct PitchSet {
+    /// Mean elevation of its cameras, degrees.
+    pub pitch_deg: f64,
+    /// The set.
+    pub set: SetSpec,
+}
+
+/// A set of the study with metadata that claim a wrong focal length.
+#[derive(Debug, Clone)]
+pub(crate) struct FocalSet {
+    /// Claimed over true focal length.
+    pub factor: f64,
+    /// Name of the set it is a copy of.
+    pub original: String,
+    /// The copy.
+    pub set: SetSpec,
+}
 
 /// A few small sets that are rendered in seconds.
 pub(super) fn quick_sets() -> Vec<SetSpec> {

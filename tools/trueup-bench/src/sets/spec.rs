@@ -11,8 +11,9 @@ use trueup_scenes::{
     LitScene, Quality, RECIPE, RigOptions, SceneKind, SceneOptions, SetKind, SetOutput, SetRequest, rig, write_set,
 };
 
+use super::folders::photographs_in;
 use super::ready::{ReadySet, read_truth, ready, ready_photographs};
-use super::{focal_claim, from_panorama, photographs, vpg_data};
+use super::{focal_claim, from_panorama, vpg_data};
 
 /// A set of photographs and where it comes from.
 #[derive(Debug, Clone)]
@@ -107,7 +108,7 @@ impl SetSpec {
             SetSource::Rendered(recipe) => Ok(recipe.rig.pictures),
             SetSource::Cut(_, kind) => Ok(from_panorama::views_of(*kind)),
             SetSource::Folder(folder) => Ok(read_truth(folder)?.0.images.len()),
-            SetSource::Photographs(folder) => Ok(photographs::found(folder, &StageContext::default())?.len()),
+            SetSource::Photographs(folder) => Ok(photographs_in(folder, &StageContext::default())?.len()),
             SetSource::FocalClaimed(original, _) => original.photograph_count(),
         }
     }
@@ -122,7 +123,7 @@ impl SetSpec {
         match &self.source {
             SetSource::Folder(folder) => ready(folder),
             SetSource::Photographs(folder) => {
-                let images = photographs::found(folder, context)?;
+                let images = photographs_in(folder, context)?;
                 let truth = vpg_data::truth(folder, &images)?;
                 let paths: Vec<PathBuf> = images.into_iter().map(|image| image.path).collect();
                 ready_photographs(&paths, truth)

@@ -8,25 +8,14 @@
 //! Lines that begin with `#` are remarks. A set without the file has no truth: it takes part where none is needed.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use trueup::{Error, ImageTruth, Result, Truth};
 use trueup_core::geometry::{matrix_from_rows, roll_from_down};
 use trueup_core::source::SourceImage;
 
-use super::photographs;
-use super::spec::SetSpec;
-
 /// Name of the file with a set's cameras.
 const CAMERAS: &str = "cameras.txt";
-
-/// The sets of the data set, `vpg/01` and so on.
-///
-/// # Errors
-/// Those of [`photographs::sets`].
-pub(super) fn sets(folder: &Path) -> Result<Vec<SetSpec>> {
-    photographs::sets("vpg", &[PathBuf::from(folder)])
-}
 
 /// What is known of a set's cameras; `None` without a file of them.
 ///
@@ -97,6 +86,11 @@ mod tests {
     use trueup::StageContext;
 
     use super::*;
+    use crate::sets::photographs;
+
+    fn sets(folder: &Path) -> Result<Vec<crate::sets::SetSpec>> {
+        photographs::sets("vpg", &[folder.to_owned()])
+    }
 
     fn write_photograph(path: &Path, gray: u8) {
         let file = fs::File::create(path).expect("a file");
