@@ -8,7 +8,7 @@ use trueup_core::source::{PhotographSource, SourceImage};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::color::PhotographColors;
 use trueup_io::decode::FilePhotographs;
-use trueup_io::source::{self, RejectedSource, Sources};
+use trueup_io::source::{self, InMemory, RejectedSource, Sources};
 
 use super::budget::Budget;
 use crate::job::inputs::{Inputs, Reference};
@@ -17,6 +17,19 @@ use crate::job::names::reference_named;
 use crate::memo::KeyMaker;
 use crate::options::StitchOptions;
 use crate::report::left_out::{none_usable, reason_of_rejected};
+
+/// Photographs that were found, before their colors are looked into.
+#[derive(Debug, Default)]
+pub(crate) struct FoundPhotographs {
+    /// Those that can be read.
+    pub images: Vec<SourceImage>,
+    /// The pixels of those among them that are no files.
+    pub in_memory: InMemory,
+    /// Inputs that cannot be read.
+    pub rejected: Vec<RejectedSource>,
+    /// What is ignored or kept of `images`.
+    pub masks: AllMasks,
+}
 
 /// The photographs to be stitched. They are numbered by their place in `images`.
 #[derive(Debug)]
@@ -42,7 +55,7 @@ impl PhotographSet {
     pub(crate) fn find(inputs: &Inputs, options: &StitchOptions, context: &StageContext) -> Result<Self> {
         let accepted = &options.measure.source;
         let Sources { photographs: images, rejected } =
-            context.time("source", || source::scan(&inputs.photographs, accepted, context))?;
+            context.time("source", || source::scan_with(&inputs.photographs, &inputs.in_memory, accepted, context))?;
         if images.is_empty() {
             return Err(nothing_found(inputs, &rejected));
         }
@@ -50,24 +63,21 @@ impl PhotographSet {
             reference_named(&images, name)?;
         }
         let masks = AllMasks::read(&inputs.masks, &images, accepted, context)?;
-        Self::open(images, rejected, masks, options, context)
+        Self::open(FoundPhotographs { images, in_memory: inputs.in_memory.clone(), rejected, masks }, options, context)
     }
 
-    /// Photographs that are found already, with their masks.
+    /// Photographs that are found already.
     ///
     /// # Errors
     /// [`Error::Limits`] if one is too large for the memory.
-    pub(crate) fn open(
-        images: Vec<SourceImage>,
-        rejected: Vec<RejectedSource>,
-        masks: AllMasks,
-        options: &StitchOptions,
-        context: &StageContext,
-    ) -> Result<Self> {
-        let AllMasks { masks, records } = masks;
+    pub(crate) fn open(found: FoundPhotographs, options: &StitchOptions, context: &StageContext) -> Result<Self> {
+        let FoundPhotographs { images, in_memory, rejected, masks: AllMasks { masks, records } } = found;
         let measuring = Budget::new(&options.run.resources).measuring(&images, options.measure.working.pixels)?;
         let colors = PhotographColors::survey(&images, context);
-        let files = FilePhotographs::new(images.clone(), measuring.kept_bytes).in_colors(colors).with_masks(masks);
+        let files = FilePhotographs::new(images.clone(), measuring.kept_bytes)
+            .with_in_memory(&in_memory)
+            .in_colors(colors)
+            .with_masks(masks);
         Ok(Self { images, rejected, masks: records, files: Arc::new(files), at_once: measuring.at_once })
     }
 
@@ -89,6 +99,9 @@ impl PhotographSet {
             let mut maker = KeyMaker::new().part(&color_space).part(&(image.width, image.height, image.orientation));
             if let Masks { ignored: Some(ignored), .. } = self.files.masks(index) {
                 maker = maker.part(&ignored.words());
+            }
+            if let Some(photograph) = self.files.in_memory(index) {
+                return Ok(Some(maker.photograph(photograph)));
             }
             Ok(std::fs::File::open(&image.path).and_then(|file| maker.file(file)).ok())
         };

@@ -1,0 +1,71 @@
+//! The geometry of a panorama, to be composed once or often.
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use trueup::{Error, Inputs, PhotographCache, StitchOptions, Stitcher};
+
+use crate::errors::exception;
+use crate::keywords::Wishes;
+use crate::panorama::Panorama;
+use crate::photographs::{GivenPhotograph, collected};
+use crate::work::{Surroundings, run};
+
+/// The geometry of one panorama, ready to be composed.
+#[pyclass(frozen, module = "trueup._trueup")]
+#[derive(Debug)]
+pub(crate) struct Alignment {
+    alignment: trueup::Alignment,
+    options: StitchOptions,
+    threads: usize,
+}
+
+/// Finds, measures, matches and aligns photographs: one alignment for the largest group of photographs that overlap, or with
+/// `all` one for each, the largest first. `progress` is called with a stage's name, the steps done, and how many there are.
+#[pyfunction]
+pub(crate) fn align<'py>(
+    py: Python<'py>,
+    photographs: Vec<GivenPhotograph<'py>>,
+    keywords: &Bound<'py, PyDict>,
+    all: bool,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Vec<Alignment>> {
+    let wishes = Wishes::of(keywords, "stitch", StitchOptions::default())?;
+    let (photographs, in_memory) = collected(photographs)?;
+    let Wishes { options, reference, graph, require_all, masks, cache, threads } = wishes;
+    let inputs = Inputs { photographs, in_memory, reference, graph, all, masks, require_all };
+    let aligned = run(py, Surroundings { progress, threads }, |context| {
+        let max_bytes = options.run.resources.cache_bytes;
+        let cache = cache.map(|folder| PhotographCache::open(&folder, max_bytes)).transpose()?;
+        Stitcher::new(&options, context).with_cache(cache.as_ref()).align(&inputs)
+    })?;
+    let one = |alignment| Alignment { alignment, options: options.clone(), threads };
+    Ok(aligned.alignments.into_iter().map(one).collect())
+}
+
+#[pymethods]
+impl Alignment {
+    /// The panorama of the photographs that were aligned.
+    fn compose<'py>(&self, py: Python<'py>, progress: Option<Bound<'py, PyAny>>) -> PyResult<Panorama> {
+        let mut alignment = self.alignment.clone();
+        let (options, threads) = (self.options.clone(), self.threads);
+        let composed = run(py, Surroundings { progress, threads }, |context| {
+            let stitcher = Stitcher::new(&options, context);
+            let rendered = stitcher.compose(&mut alignment)?;
+            // Asked for now: the files may be gone when the pixels are.
+            let depth = Panorama::depth_of(&options, &alignment)?;
+            Ok((rendered, depth))
+        });
+        let (rendered, depth) = composed?;
+        Ok(Panorama { alignment, rendered, options, depth, threads })
+    }
+
+    /// The record so far, as JSON.
+    fn project_json(&self, py: Python<'_>) -> PyResult<String> {
+        self.alignment.project.to_json().map_err(|error: Error| exception(py, error))
+    }
+
+    /// What was made of which photographs, in words.
+    fn summary(&self, verbose: bool) -> String {
+        trueup_cli::summary_text(&self.alignment.project, verbose)
+    }
+}
