@@ -64,6 +64,11 @@ impl Alignment {
         self.alignment.project.to_json().map_err(|error: Error| exception(py, error))
     }
 
+    /// What messages call the photographs, in the order given.
+    fn photograph_names(&self) -> Vec<String> {
+        self.alignment.project.photograph_names()
+    }
+
     /// What was made of which photographs, in words.
     fn summary(&self, verbose: bool) -> String {
         trueup_cli::summary_text(&self.alignment.project, verbose)

@@ -121,6 +121,11 @@ impl Panorama {
         self.alignment.project.to_json().map_err(|error| exception(py, error))
     }
 
+    /// What messages call the photographs, in the order given.
+    fn photograph_names(&self) -> Vec<String> {
+        self.alignment.project.photograph_names()
+    }
+
     /// What was made of which photographs, in words.
     fn summary(&self, verbose: bool) -> String {
         trueup_cli::summary_text(&self.alignment.project, verbose)

@@ -1,0 +1,45 @@
+"""Photographs in, an upright panorama out, with numbers and reasons for what was done.
+
+>>> panorama = trueup.stitch("holiday/")
+>>> panorama.save("holiday.jpg")
+"""
+
+from trueup._alignment import Alignment, align, align_all, stitch, stitch_all
+from trueup._errors import (
+    Error,
+    InputError,
+    IoError,
+    LimitsError,
+    NotApplicableError,
+    OptionsError,
+    UnsolvableError,
+    UnsupportedError,
+)
+from trueup._options import Option, options
+from trueup._panorama import Panorama
+from trueup._record import Finding, Photograph, Report
+from trueup._trueup import version as _version
+
+__version__ = _version()
+
+__all__ = [
+    "Alignment",
+    "Error",
+    "Finding",
+    "InputError",
+    "IoError",
+    "LimitsError",
+    "NotApplicableError",
+    "Option",
+    "OptionsError",
+    "Panorama",
+    "Photograph",
+    "Report",
+    "UnsolvableError",
+    "UnsupportedError",
+    "align",
+    "align_all",
+    "options",
+    "stitch",
+    "stitch_all",
+]

@@ -1,0 +1,96 @@
+"""From photographs to panoramas."""
+
+import json
+from functools import cached_property
+from typing import Any, Unpack
+
+from trueup import _record, _trueup
+from trueup._keywords import StitchKeywords
+from trueup._panorama import Panorama
+from trueup._photographs import Photographs, native
+from trueup._progress import Heard, Progress
+from trueup._record import Photograph, Report
+
+
+class Alignment:
+    """The geometry of a panorama: cameras, vanishing points, deformed grids, canvas. Made by :func:`trueup.align`."""
+
+    def __init__(self, native_alignment: _trueup.Alignment) -> None:
+        self._native = native_alignment
+
+    def compose(self, *, progress: Progress = None) -> Panorama:
+        """The panorama of the photographs that were aligned.
+
+        Raises :class:`trueup.LimitsError` if it is too large for the memory or the disk, :class:`trueup.InputError` or
+        :class:`trueup.IoError` if a file can no longer be read.
+        """
+        with Heard(progress) as heard:
+            return Panorama(self._native.compose(heard))
+
+    @cached_property
+    def project(self) -> dict[str, Any]:
+        """The record of everything that was decided so far, as docs/project-file.md describes it."""
+        project: dict[str, Any] = json.loads(self._native.project_json())
+        return project
+
+    @property
+    def photographs(self) -> list[Photograph]:
+        """What became of every photograph that was given, in the order given."""
+        return _record.photographs(self.project, self._native.photograph_names())
+
+    @property
+    def report(self) -> Report:
+        """How it was made, and how good it is."""
+        return Report(self.project, self._native.summary(False), self._native.summary(True))
+
+    def __repr__(self) -> str:
+        canvas = self.project["canvas"]
+        used = sum(photograph.used for photograph in self.photographs)
+        return f"<trueup.Alignment of {used} photographs on {canvas['width']} x {canvas['height']} px>"
+
+
+def stitch(photographs: Photographs, *, progress: Progress = None, **keywords: Unpack[StitchKeywords]) -> Panorama:
+    """The panorama of the largest group of photographs that overlap.
+
+    ``photographs`` is a folder, a file pattern, or a list of files, arrays (height x width x 3, RGB; ``uint8``, ``uint16``, or
+    floating point from 0 to 1) and Pillow images, or a mapping of names to these. Files tell more than arrays: focal length, color
+    profile, time and place.
+
+    Keywords are the command's flags: ``method``, ``projection``, ``crop``, ``scale`` and so on; ``set={"table.option": value}`` sets
+    any option that :func:`trueup.options` lists. ``progress`` is ``True`` for bars, or a callback that is called with a stage's
+    name, the steps done and how many there are. Ctrl-C stops the work.
+
+    Photographs that do not fit are left out, with a reason in :attr:`Panorama.photographs`. Raises :class:`trueup.InputError` if none
+    can be used, :class:`trueup.UnsolvableError` if no two overlap, :class:`trueup.OptionsError`,
+    :class:`trueup.NotApplicableError`, :class:`trueup.LimitsError`.
+    """
+    with Heard(progress) as heard:
+        [alignment] = _trueup.align(native(photographs), dict(keywords), False, heard)
+        return Panorama(alignment.compose(heard))
+
+
+def stitch_all(
+    photographs: Photographs, *, progress: Progress = None, **keywords: Unpack[StitchKeywords]
+) -> list[Panorama]:
+    """A panorama of every group of photographs that overlap, the largest group first. Otherwise as :func:`stitch`."""
+    with Heard(progress) as heard:
+        alignments = _trueup.align(native(photographs), dict(keywords), True, heard)
+        return [Panorama(alignment.compose(heard)) for alignment in alignments]
+
+
+def align(photographs: Photographs, *, progress: Progress = None, **keywords: Unpack[StitchKeywords]) -> Alignment:
+    """The geometry of the panorama that :func:`stitch` makes with the same arguments, ready to be composed.
+
+    Raises what :func:`stitch` raises.
+    """
+    with Heard(progress) as heard:
+        [alignment] = _trueup.align(native(photographs), dict(keywords), False, heard)
+        return Alignment(alignment)
+
+
+def align_all(
+    photographs: Photographs, *, progress: Progress = None, **keywords: Unpack[StitchKeywords]
+) -> list[Alignment]:
+    """The geometry of every group of photographs that overlap, the largest group first. Otherwise as :func:`align`."""
+    with Heard(progress) as heard:
+        return [Alignment(one) for one in _trueup.align(native(photographs), dict(keywords), True, heard)]
