@@ -26,10 +26,10 @@ SHARED = [
 ]
 COMPOSING = [
     ("threads", "int", "Number of threads; 0 for one per core. The panorama is the same for any number."),
-    ("masks", "Mapping[str, Path]", "Pictures by the names of photographs: what is black or transparent in them is ignored."),
-    ("keep", "Mapping[str, Path]", "Pictures by the names of photographs: what is white in them is shown."),
 ]
 STITCHING = [
+    ("masks", "Mapping[str, Path]", "Pictures by the names of photographs: what is black or transparent in them is ignored."),
+    ("keep", "Mapping[str, Path]", "Pictures by the names of photographs: what is white in them is shown."),
     ("reference", "str", "The photograph that sets the pixel scale and stays in place; auto takes the one in the middle."),
     ("graph", "Path", "A text file with the pairs to be matched, NAME -- NAME a line."),
     ("require_all", "bool", "Fails unless every photograph is used."),

@@ -44,18 +44,29 @@ pub(crate) fn align<'py>(
 
 #[pymethods]
 impl Alignment {
-    /// The panorama of the photographs that were aligned.
-    fn compose<'py>(&self, py: Python<'py>, progress: Option<Bound<'py, PyAny>>) -> PyResult<Panorama> {
-        let mut alignment = self.alignment.clone();
-        let (options, threads) = (self.options.clone(), self.threads);
-        let composed = run(py, Surroundings { progress, threads }, |context| {
+    /// The panorama of the photographs that were aligned, or of others in their places.
+    fn compose<'py>(
+        &self,
+        py: Python<'py>,
+        photographs: Option<Vec<GivenPhotograph<'py>>>,
+        keywords: &Bound<'py, PyDict>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Panorama> {
+        let Wishes { options, threads, .. } = Wishes::of(keywords, "compose", self.options.clone())?;
+        let threads = if threads == 0 { self.threads } else { threads };
+        let shown = photographs.map(collected).transpose()?;
+        let shown = shown.map(|(photographs, in_memory)| Inputs { photographs, in_memory, ..Inputs::default() });
+        let (alignment, rendered, depth) = run(py, Surroundings { progress, threads }, |context| {
             let stitcher = Stitcher::new(&options, context);
+            let mut alignment = match &shown {
+                None if options == self.options => self.alignment.clone(),
+                shown => stitcher.rearrange(&self.alignment, shown.as_ref())?,
+            };
             let rendered = stitcher.compose(&mut alignment)?;
             // Asked for now: the files may be gone when the pixels are.
             let depth = Panorama::depth_of(&options, &alignment)?;
-            Ok((rendered, depth))
-        });
-        let (rendered, depth) = composed?;
+            Ok((alignment, rendered, depth))
+        })?;
         Ok(Panorama { alignment, rendered, options, depth, threads })
     }
 

@@ -66,8 +66,8 @@ impl Wishes {
         match name {
             "config" | "set" => {}
             "threads" => self.threads = value.extract::<u16>()?.into(),
-            "masks" => self.masks.extend(masks(value, MaskKind::Use)?),
-            "keep" => self.masks.extend(masks(value, MaskKind::Keep)?),
+            "masks" if is_stitch => self.masks.extend(masks(value, MaskKind::Use)?),
+            "keep" if is_stitch => self.masks.extend(masks(value, MaskKind::Keep)?),
             "reference" if is_stitch => match value.extract::<String>()? {
                 name if name == AUTO => {}
                 name => self.reference = Reference::Named(name),

@@ -134,6 +134,36 @@ def test_an_alignment_is_composed_later(pictures: list[Array], panorama: trueup.
     assert np.array_equal(alignment.compose().image, panorama.image), "as often as one likes"
 
 
+def test_an_alignment_serves_other_photographs(folder: Path, pictures: list[Array]) -> None:
+    noise = np.random.default_rng(1).integers(0, 256, pictures[0].shape, np.uint8)
+    alignment = trueup.align([*pictures[:2], noise, *pictures[2:]])
+    own = alignment.compose()
+    darker = [picture // 2 for picture in pictures]
+    panorama = alignment.compose(darker)
+    assert panorama.image.shape == own.image.shape
+    assert np.abs(panorama.image[own.mask == 255] * 2.0 - own.image[own.mask == 255]).mean() < 3
+    with_the_unused = alignment.compose([*darker[:2], noise, *darker[2:]])
+    assert np.array_equal(with_the_unused.image, panorama.image)
+    files = [Path("room") / f"{number}.png" for number in range(5)]
+    assert np.array_equal(alignment.compose(files).image, own.image)
+    with pytest.raises(trueup.InputError, match="4 were given for 5"):
+        alignment.compose(darker[:4])
+    with pytest.raises(trueup.InputError, match="333 x 300|300 px"):
+        alignment.compose([picture[:, :333] for picture in darker])
+
+
+def test_an_alignment_is_drawn_in_other_views(pictures: list[Array]) -> None:
+    alignment = trueup.align(pictures)
+    sphere = alignment.compose(projection="equirectangular", scale=0.5)
+    assert sphere.project["projection"]["kind"] == "equirectangular"
+    again = trueup.stitch(pictures, projection="equirectangular", scale=0.5)
+    assert np.array_equal(sphere.image, again.image)
+    with pytest.raises(trueup.UnsupportedError, match="mesh.cell_px"):
+        alignment.compose(set={"mesh.cell_px": 50})
+    with pytest.raises(TypeError, match="unexpected keyword argument 'method'"):
+        alignment.compose(method="apap")  # type: ignore[call-arg]
+
+
 def test_threads_change_nothing(pictures: list[Array], panorama: trueup.Panorama) -> None:
     assert np.array_equal(trueup.stitch(pictures, threads=1).image, panorama.image)
 

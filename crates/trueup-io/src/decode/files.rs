@@ -21,8 +21,8 @@ use crate::source::InMemory;
 #[derive(Debug)]
 pub struct FilePhotographs {
     sources: Vec<SourceImage>,
-    /// By index, those that are no files.
-    in_memory: Vec<Option<Arc<Photograph>>>,
+    /// Those that are no files.
+    in_memory: InMemory,
     /// By index; those beyond the end have none.
     masks: Vec<Masks>,
     colors: Option<PhotographColors>,
@@ -44,14 +44,12 @@ impl FilePhotographs {
         let photographs = sources.iter().map(|_| None).collect();
         let bytes = sources.iter().map(|_| AtomicUsize::new(0)).collect();
         let kept = Mutex::new(Kept { photographs, free_bytes: cache_bytes });
-        let in_memory = vec![None; sources.len()];
-        Self { sources, in_memory, masks: Vec::new(), colors: None, bytes, kept }
+        Self { sources, in_memory: InMemory::default(), masks: Vec::new(), colors: None, bytes, kept }
     }
 
     /// The same with the pixels of those that are no files: they count for nothing in the budget.
     #[must_use]
-    pub fn with_in_memory(self, in_memory: &InMemory) -> Self {
-        let in_memory = self.sources.iter().map(|source| in_memory.of(source).cloned()).collect();
+    pub fn with_in_memory(self, in_memory: InMemory) -> Self {
         Self { in_memory, ..self }
     }
 
@@ -78,7 +76,12 @@ impl FilePhotographs {
 
     /// The pixels of photograph `index` if it is no file, as they were given.
     pub fn in_memory(&self, index: usize) -> Option<&Photograph> {
-        self.in_memory.get(index)?.as_deref()
+        self.in_memory.of(self.sources.get(index)?).map(Arc::as_ref)
+    }
+
+    /// All pixels that are in memory.
+    pub fn in_memory_photographs(&self) -> &InMemory {
+        &self.in_memory
     }
 
     /// Bits of a sample of photograph `index`, as [`sample_bits`](super::sample_bits) has them.

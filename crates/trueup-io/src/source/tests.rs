@@ -278,7 +278,7 @@ fn photographs_in_memory_stand_among_files() {
     assert_eq!((first.width, first.height, first.orientation), (40, 30, 1));
     assert_eq!(super::files(&inputs, &in_memory), [Path::new(&a)], "what is in memory is no file");
 
-    let photographs = FilePhotographs::new(sources.photographs, 0).with_in_memory(&in_memory);
+    let photographs = FilePhotographs::new(sources.photographs, 0).with_in_memory(in_memory);
     assert_eq!(photographs.photograph(0).expect("in memory"), plain(40, 30, 7));
     assert_eq!(photographs.photograph(1).expect("a file").width(), 20);
     assert_eq!([0, 1].map(|index| photographs.sample_bits(index).expect("known")), [16, 8]);

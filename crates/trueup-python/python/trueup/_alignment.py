@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Any, Unpack
 
 from trueup import _record, _trueup
-from trueup._keywords import StitchKeywords
+from trueup._keywords import ComposeKeywords, StitchKeywords
 from trueup._panorama import Panorama
 from trueup._photographs import Photographs, native
 from trueup._progress import Heard, Progress
@@ -18,14 +18,34 @@ class Alignment:
     def __init__(self, native_alignment: _trueup.Alignment) -> None:
         self._native = native_alignment
 
-    def compose(self, *, progress: Progress = None) -> Panorama:
-        """The panorama of the photographs that were aligned.
+    def compose(
+        self,
+        photographs: Photographs | None = None,
+        *,
+        progress: Progress = None,
+        **keywords: Unpack[ComposeKeywords],
+    ) -> Panorama:
+        """The panorama of the photographs that were aligned, or of others in their places: one alignment serves every moment of
+        a rig or a video.
 
-        Raises :class:`trueup.LimitsError` if it is too large for the memory or the disk, :class:`trueup.InputError` or
-        :class:`trueup.IoError` if a file can no longer be read.
+        ``photographs`` are as many as were used, or as were given, in that order and of the same sizes. Keywords set options
+        of the view, the canvas, the light and the file: ``projection``, ``crop``, ``scale`` and so on; those of the geometry are
+        refused.
+
+        Raises :class:`trueup.InputError` for photographs that do not fit, :class:`trueup.UnsupportedError` for options of the
+        geometry, :class:`trueup.LimitsError` if the panorama is too large for the memory or the disk,
+        :class:`trueup.OptionsError`, :class:`trueup.IoError`.
         """
+        shown = None if photographs is None else self._of_those_used(native(photographs))
         with Heard(progress) as heard:
-            return Panorama(self._native.compose(heard))
+            return Panorama(self._native.compose(shown, dict(keywords), heard))
+
+    def _of_those_used(self, shown: list[str | tuple[str, Any]]) -> list[str | tuple[str, Any]]:
+        """Of as many photographs as were given, those in the places of the used ones."""
+        used = [photograph.used for photograph in self.photographs]
+        if len(shown) == len(used) != sum(used):
+            return [one for one, is_used in zip(shown, used, strict=True) if is_used]
+        return shown
 
     @cached_property
     def project(self) -> dict[str, Any]:
@@ -66,7 +86,7 @@ def stitch(photographs: Photographs, *, progress: Progress = None, **keywords: U
     """
     with Heard(progress) as heard:
         [alignment] = _trueup.align(native(photographs), dict(keywords), False, heard)
-        return Panorama(alignment.compose(heard))
+        return Panorama(alignment.compose(None, {}, heard))
 
 
 def stitch_all(
@@ -75,7 +95,7 @@ def stitch_all(
     """A panorama of every group of photographs that overlap, the largest group first. Otherwise as :func:`stitch`."""
     with Heard(progress) as heard:
         alignments = _trueup.align(native(photographs), dict(keywords), True, heard)
-        return [Panorama(alignment.compose(heard)) for alignment in alignments]
+        return [Panorama(alignment.compose(None, {}, heard)) for alignment in alignments]
 
 
 def align(photographs: Photographs, *, progress: Progress = None, **keywords: Unpack[StitchKeywords]) -> Alignment:

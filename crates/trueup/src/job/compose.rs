@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use trueup_core::source::SourceImage;
-use trueup_core::{Error, Result, StageContext};
+use trueup_core::{Result, StageContext};
 
 use super::masks::{AllMasks, MaskFile, MaskRecord};
 use super::outputs::{Outputs, ReadFile};
@@ -11,6 +11,7 @@ use super::threads::thread_pool;
 use super::write::Written;
 use crate::options::StitchOptions;
 use crate::pipeline::Stitcher;
+use crate::pipeline::photographs::FoundPhotographs;
 use crate::project::read::Recorded;
 use crate::project::record::{ImageRecord, Project};
 use crate::project::replace::{other_photographs, recorded_photographs};
@@ -62,21 +63,12 @@ impl ComposeJob {
     /// photographs, the panorama is the very one that was stitched.
     ///
     /// # Errors
-    /// [`Error::Options`]; [`Error::Unsupported`] if an option of the geometry differs from the recorded one;
-    /// [`Error::Input`] if the project was damaged, or photographs are missing or have other sizes; those of composing and
-    /// writing; [`Error::Cancelled`].
+    /// [`trueup_core::Error::Options`]; [`trueup_core::Error::Unsupported`] if an option of the geometry differs from the recorded one;
+    /// [`trueup_core::Error::Input`] if the project was damaged, or photographs are missing or have other sizes; those of composing and
+    /// writing; [`trueup_core::Error::Cancelled`].
     pub fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<Written> {
         options.validate()?;
-        let differing = options.differing_geometry(&self.project.options)?;
-        if !differing.is_empty() {
-            return Err(Error::Unsupported {
-                what: format!("composing a recorded panorama with another {}", differing.join(", ")),
-                hint: format!(
-                    "Its geometry was found with the recorded value: stitch the photographs again. Composing heeds {}.",
-                    StitchOptions::composing_tables()
-                ),
-            });
-        }
+        options.refuse_other_geometry(&self.project.options)?;
         // Before files are looked for: a project that was edited to nonsense names itself.
         Recorded::new(&self.project)?;
         self.outputs.check(options)?;
@@ -87,7 +79,7 @@ impl ComposeJob {
             let mut masks = AllMasks::read(&self.masks, &images, &options.measure.source, context)?;
             let recorded: Vec<&[MaskRecord]> = self.project.used_images().map(|one| one.masks.as_slice()).collect();
             masks.recall(&recorded, &images, &self.project_folder, &options.measure.source, context)?;
-            let alignment = stitcher.recall(&self.project, images, masks)?;
+            let alignment = stitcher.recall(&self.project, FoundPhotographs { images, masks, ..FoundPhotographs::default() })?;
             self.outputs.write(&stitcher, alignment)
         })
     }

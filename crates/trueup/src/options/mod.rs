@@ -309,6 +309,24 @@ impl StitchOptions {
         self.measure == other.measure && self.matching == other.matching
     }
 
+    /// Refuses to compose what was aligned by `recorded` options if the geometry would be another by these.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] that names the options.
+    pub(crate) fn refuse_other_geometry(&self, recorded: &Self) -> Result<()> {
+        let differing = self.differing_geometry(recorded)?;
+        if differing.is_empty() {
+            return Ok(());
+        }
+        Err(Error::Unsupported {
+            what: format!("composing a recorded panorama with another {}", differing.join(", ")),
+            hint: format!(
+                "Its geometry was found with the recorded value: stitch the photographs again. Composing heeds {}.",
+                Self::composing_tables()
+            ),
+        })
+    }
+
     /// The options, `table.option`, of the phases up to the geometry in which these options differ from `recorded` ones: a
     /// project records the geometry once and for all.
     ///

@@ -15,6 +15,7 @@ pub(crate) mod measured;
 #[cfg(test)]
 mod phases_tests;
 pub(crate) mod photographs;
+mod rearrange;
 mod results;
 mod scratch;
 
@@ -24,7 +25,6 @@ use trueup_align::vanishing::TriadOutcome;
 use trueup_compose::exposure::Corrections;
 use trueup_compose::fidelity::{self, Fidelity};
 use trueup_compose::render::{self, Rendered};
-use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::color::PhotographColors;
 use trueup_io::encode::Metadata;
@@ -39,7 +39,6 @@ use self::matching::MatchInput;
 use self::measure::MeasureInput;
 use self::photographs::{FoundPhotographs, PhotographSet};
 use crate::job::inputs::Inputs;
-use crate::job::masks::AllMasks;
 use crate::memo::{KeyMaker, Memo, PhotographCache};
 use crate::options::StitchOptions;
 use crate::project::fill::{GeometryRecord, fill_geometry, place, record_composition, unfilled};
@@ -252,18 +251,17 @@ impl<'a> Stitcher<'a> {
         Ok(Alignment { project, layout, corrections, photographs, directions, positions: None })
     }
 
-    /// The geometry that `project` records, over `images` with their `masks`: those used in it, in its order, or others of
-    /// their sizes. The canvas is laid out anew if the options ask for another one, and the light evened out anew if they ask
+    /// The geometry that `project` records, over the photographs that were `found`: those used in it, in its order, or others
+    /// of their sizes. The canvas is laid out anew if the options ask for another one, and the light evened out anew if they ask
     /// for that.
     ///
     /// # Errors
     /// [`Error::Options`]; [`Error::Input`] if the project was damaged; [`Error::NotApplicable`] if a projection is asked
     /// for and the project has no cameras; those of the layout; [`Error::Limits`]; [`Error::Cancelled`].
-    pub(crate) fn recall(&self, project: &Project, images: Vec<SourceImage>, masks: AllMasks) -> Result<Alignment> {
+    pub(crate) fn recall(&self, project: &Project, found: FoundPhotographs) -> Result<Alignment> {
         self.options.validate()?;
         let recalled = self.context.gather(|context| {
             let Recorded { used, layout, corrections, reference } = Recorded::new(project)?;
-            let found = FoundPhotographs { images, masks, ..FoundPhotographs::default() };
             let set = PhotographSet::open(found, self.options, context)?;
             let arrangement = arrange::recall(layout, reference, project, &self.options.arrange, context)?;
             let arrangement: Arrangement = context.absorb(arrangement);

@@ -75,7 +75,7 @@ impl PhotographSet {
         let measuring = Budget::new(&options.run.resources).measuring(&images, options.measure.working.pixels)?;
         let colors = PhotographColors::survey(&images, context);
         let files = FilePhotographs::new(images.clone(), measuring.kept_bytes)
-            .with_in_memory(&in_memory)
+            .with_in_memory(in_memory)
             .in_colors(colors)
             .with_masks(masks);
         Ok(Self { images, rejected, masks: records, files: Arc::new(files), at_once: measuring.at_once })

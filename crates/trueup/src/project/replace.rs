@@ -4,7 +4,7 @@ use std::path::Path;
 
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
-use trueup_io::source::{self, RejectedSource, SourceOptions};
+use trueup_io::source::{self, InMemory, RejectedSource, SourceOptions};
 
 use super::read::{check_size, find_photograph};
 use super::record::ImageRecord;
@@ -22,6 +22,33 @@ pub(crate) fn recorded_photographs(
 ) -> Result<Vec<SourceImage>> {
     let found = records.iter().map(|record| find_photograph(record, project_folder, options, context));
     all_of(found, "Give the folder that holds the photographs after --photos.")
+}
+
+/// Other photographs of the same sizes, in the order of `records`: each of `names` is one, a file or in memory.
+///
+/// # Errors
+/// [`Error::Input`] if there are more or fewer of them, or one cannot be read or has another size; [`Error::Cancelled`].
+pub(crate) fn named_photographs(
+    records: &[&ImageRecord],
+    names: &[String],
+    in_memory: &InMemory,
+    options: &SourceOptions,
+    context: &StageContext,
+) -> Result<Vec<SourceImage>> {
+    if names.len() != records.len() {
+        let reason = format!("{} were given for {} in the panorama", names.len(), records.len());
+        return Err(Error::input("photographs", reason, "Give one for each photograph that is used, in their order."));
+    }
+    // One by one: two cameras may well see the same black night.
+    let found = records.iter().zip(names).map(|(record, name)| {
+        let mut found = source::scan_with(std::slice::from_ref(name), in_memory, options, context)?;
+        match (found.photographs.pop(), found.photographs.is_empty()) {
+            (Some(image), true) => check_size(&image, record).map(|()| image),
+            (None, _) if !found.rejected.is_empty() => Err(found.rejected.swap_remove(0).to_error()),
+            _ => Err(Error::input(name, "it is no single photograph", "")),
+        }
+    });
+    all_of(found, "Give photographs of the same sizes, by the same cameras in the same places.")
 }
 
 /// Other photographs of the same shape from `folder`, in the order of `records`: by their file names, by these without
