@@ -39,7 +39,8 @@ STITCHING = [
 
 def annotation(option: trueup.Option) -> str:
     """The type of an option's values."""
-    if option.choices:
+    # Some choices stand for many, as #rgb does.
+    if option.choices and not any(choice.startswith("#") for choice in option.choices):
         return f"Literal[{', '.join(repr(choice).replace(chr(39), chr(34)) for choice in option.choices)}]"
     match option.default:
         case bool():

@@ -32,11 +32,10 @@ def test_options_of_the_file_are_heeded(panorama: trueup.Panorama, tmp_path: Pat
 
 
 def test_what_is_wanted_beside_it(panorama: trueup.Panorama, tmp_path: Path) -> None:
-    files = {kind: tmp_path / name for kind, name in [("project", "a.json"), ("layers", "a-l.tif"), ("seams", "a-s.png")]}
-    panorama.save(tmp_path / "a.png", **files)
-    project = json.loads(files["project"].read_text())
-    assert project["images"] == panorama.project["images"]
-    assert all(file.stat().st_size > 0 for file in files.values())
+    record, layers, seams, cameras = (tmp_path / name for name in ["a.json", "a-layers.tif", "a-seams.png", "a.pto"])
+    panorama.save(tmp_path / "a.png", project=record, layers=layers, seams=seams, pto=cameras)
+    assert json.loads(record.read_text())["images"] == panorama.project["images"]
+    assert all(file.stat().st_size > 0 for file in [layers, seams, cameras])
 
 
 def test_nothing_is_left_behind_where_it_cannot_be_written(panorama: trueup.Panorama, tmp_path: Path) -> None:

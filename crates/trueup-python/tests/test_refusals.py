@@ -112,15 +112,17 @@ def test_an_exception_in_the_callback_stops_the_work(pictures: list[Array]) -> N
 
 
 def test_ctrl_c_interrupts(room: Path) -> None:
+    started = threading.Event()
+
     def interrupt() -> None:
+        started.wait()
         os.kill(os.getpid(), signal.SIGINT)
 
-    started = threading.Event()
-    timer = threading.Thread(target=lambda: (started.wait(), interrupt()))
-    timer.start()
+    interrupting = threading.Thread(target=interrupt)
+    interrupting.start()
     with pytest.raises(KeyboardInterrupt):
         trueup.stitch(room, scale=3, progress=lambda *_: started.set())
-    timer.join()
+    interrupting.join()
 
 
 def test_other_threads_go_on_meanwhile(pictures: list[Array]) -> None:

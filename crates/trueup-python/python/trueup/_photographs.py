@@ -28,11 +28,11 @@ class SupportsArrayInterface(Protocol):
         """Where the memory is."""
 
 
-Picture: TypeAlias = "str | os.PathLike[str] | SupportsArray | SupportsArrayInterface"
+Picture: TypeAlias = str | os.PathLike[str] | SupportsArray | SupportsArrayInterface
 """A file, folder or pattern; or pixels: height x width (gray), x 3 (RGB) or x 4 (RGBA), uint8, uint16, or floating point
 numbers from 0 to 1, encoded as in sRGB."""
 
-Photographs: TypeAlias = "Picture | Iterable[Picture] | Mapping[str, Picture]"
+Photographs: TypeAlias = Picture | Iterable[Picture] | Mapping[str, Picture]
 """One or several; a mapping gives arrays their names, which are else ``photographs[0]`` and so on."""
 
 

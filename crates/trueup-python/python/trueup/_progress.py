@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 ProgressCallback: TypeAlias = Callable[[str, int, int], object]
 """Called in the calling thread with a stage's name, the steps done, and how many there are. An exception stops the work."""
 
-Progress: TypeAlias = "ProgressCallback | bool | None"
+Progress: TypeAlias = ProgressCallback | bool | None
 """A callback; ``True`` for bars by tqdm; ``None`` or ``False`` for silence."""
 
 

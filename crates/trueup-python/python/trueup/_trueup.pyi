@@ -6,6 +6,8 @@ from typing import Any, final
 import numpy as np
 import numpy.typing as npt
 
+__all__ = ["Alignment", "Panorama", "align", "command", "option_flags", "options", "png", "version"]
+
 def align(
     photographs: list[str | tuple[str, Any]],
     keywords: dict[str, Any],

@@ -1,0 +1,117 @@
+"""Keyword arguments, typed. Made by generate_keywords.py from the declarations of the options: change those."""
+
+import os
+from collections.abc import Mapping
+from typing import Literal, TypeAlias, TypedDict
+
+Path: TypeAlias = str | os.PathLike[str]
+Value: TypeAlias = bool | int | float | str | os.PathLike[str]
+
+
+class SaveKeywords(TypedDict, total=False):
+    """Keywords of a panorama's file."""
+
+    quality: int
+    """JPEG quality on the usual scale of the Independent JPEG Group. Raise it for prints, lower it where the file is
+    too large to send (default 92)."""
+    depth: Literal["auto", "8", "16", "float"]
+    """Bits of a sample; JPEG, WebP and Deep Zoom have 8. Choose 16 or float when the panorama is to be edited further,
+    8 when 16-bit photographs are to make a small file (default auto)."""
+    background: str
+    """What shows where no photograph is. A color is laid under the panorama in every format, unless alpha is kept:
+    choose one to match the page or print that the panorama is put on (default auto)."""
+    set: Mapping[str, Value]
+    """Any options by their names, table.option."""
+    config: Path
+    """A TOML file with options, which set and keywords overrule."""
+
+
+class ComposeKeywords(SaveKeywords, total=False):
+    """Keywords of composing."""
+
+    scale: float
+    """Size of the panorama relative to the reference photograph's own pixels: 1 keeps every detail the reference has.
+    Lower it for a quick preview (0.25) or a smaller file; raise it only if the reference was taken with a shorter lens
+    than the others (default 1.0)."""
+    projection: Literal[
+        "mesh",
+        "auto",
+        "equirectangular",
+        "cylindrical",
+        "perspective",
+        "mercator",
+        "panini",
+        "stereographic",
+    ]
+    """What the panorama is drawn on. Choose another than the mesh for straight lines over a wide view, for full turns
+    and for viewers of spherical panoramas (default mesh)."""
+    yaw: float
+    """Turns the viewer to the right of where the panorama faces: change it to bring another place to the middle. Not
+    for the mesh, as the next three (default 0.0)."""
+    pitch: float
+    """Turns the viewer up: change it where the panorama shows too much ground, or too much sky (default 0.0)."""
+    roll: float
+    """Turns the viewer clockwise: change it where the panorama leans (default 0.0)."""
+    fov: float
+    """Horizontal field of view that may be shown; 0 shows what is there, as far as the projection carries well. Lower
+    it to leave stretched sides out, raise it to see them (default 0.0)."""
+    crop: Literal["none", "auto", "rectangle"]
+    """What of the canvas is kept. Choose `auto` or `rectangle` for a panorama without ragged borders (default none)."""
+    fill: float
+    """Gaps between and beside the photographs of up to twice this width, as a share of a photograph's side, are filled
+    with a smooth surface over their borders' colors. 0 fills nothing; raise it to 0.1 where ragged borders lie in an
+    even sky or wall, in which small fillings are not noticed (default 0.0)."""
+    memory: str
+    """Memory that the work may take; auto is a quarter of the machine's, or more where less is too little. With less,
+    the canvas goes to a scratch file and photographs are decoded again. Set it where other programs need theirs
+    (default auto)."""
+    scratch: str
+    """Folder for the scratch file; empty for the folder of the panorama. Set it where that disk is slow or full."""
+    threads: int
+    """Number of threads; 0 for one per core. The panorama is the same for any number."""
+
+
+class StitchKeywords(ComposeKeywords, total=False):
+    """Keywords of stitching."""
+
+    method: Literal[
+        "vpg",
+        "gsp-2d",
+        "gsp-3d",
+        "vpg-published",
+        "vpg-literal",
+        "gsp-2d-published",
+        "gsp-3d-published",
+        "aanap-published",
+        "straightening",
+        "homography",
+        "autostitch",
+        "apap",
+        "sphp",
+        "sphp-free",
+        "aanap",
+        "quasi-homography",
+    ]
+    """How the panorama's shape is found. Choose another one to compare, or for photographs that it serves better
+    (default vpg)."""
+    align: Literal["points", "lines", "photometric", "lines+photometric"]
+    """What draws overlapping photographs together. Where things stand twice or lines break at seams, take more: it is
+    slower and shows fewer ghosts (default points)."""
+    structure: Literal["none", "lines"]
+    """What of the photographs' structure is kept, beyond the neighborhoods of grid vertices. Choose lines where long
+    edges bend (default none)."""
+    seed: int
+    """Every random choice, from the verification of pairs on, derives from this number. Change it to see how much of a
+    result is chance (default 0)."""
+    masks: Mapping[str, Path]
+    """Pictures by the names of photographs: what is black or transparent in them is ignored."""
+    keep: Mapping[str, Path]
+    """Pictures by the names of photographs: what is white in them is shown."""
+    reference: str
+    """The photograph that sets the pixel scale and stays in place; auto takes the one in the middle."""
+    graph: Path
+    """A text file with the pairs to be matched, NAME -- NAME a line."""
+    require_all: bool
+    """Fails unless every photograph is used."""
+    cache: Path
+    """A folder for what is found in the photographs, for later runs."""
