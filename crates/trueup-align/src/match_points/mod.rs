@@ -19,6 +19,8 @@ use trueup_core::{Result, StageContext};
 pub use moving_dlt::MovingDlt;
 use residual::{CameraResidual, MAX_DEVIATION};
 
+use crate::mesh::evidence;
+
 /// The vertices of photograph `from`'s grid carried into photograph `to` (working pixels).
 #[derive(Debug, Clone, PartialEq)]
 pub struct OverlapWarp {
@@ -51,7 +53,8 @@ impl OverlapWarp {
 trueup_core::choice! {
     /// How a grid vertex is carried into another photograph.
     pub enum TransferModel {
-        /// The cameras' transfer, corrected by the matches' local deviation from it.
+        /// The cameras' transfer, corrected by the matches' local deviation from it; as far as that deviation is common to
+        /// neighboring matches, and so of parallax, a homography fitted to the matches around the vertex.
         CameraResidual = "camera-residual",
         /// A homography fitted to the matches around the vertex (APAP), as published.
         MovingDlt = "moving-dlt",
@@ -124,26 +127,58 @@ impl Transfer<'_> {
         let inside = |place: Vector2<f64>| frame.contains(place.x, place.y).then_some([place.x, place.y]);
         match self.model {
             TransferModel::CameraResidual => {
-                let model = CameraResidual::new(self.from, self.to, self.source, self.target);
-                (0..grid.len()).map(|vertex| model.at(grid.source(vertex)).and_then(inside)).collect()
+                let places = self.by_cameras_and_matches(grid, frame);
+                places.into_iter().map(|place| place.and_then(inside)).collect()
             }
             TransferModel::MovingDlt => {
-                let Some(global) = self.global else { return vec![None; grid.len()] };
-                let Some(model) = MovingDlt::new(self.source, self.target) else { return vec![None; grid.len()] };
-                let limit = MAX_DEVIATION * frame.diagonal();
-                let place = |vertex: Vector2<f64>| {
-                    let expected = global.apply(vertex);
-                    // Vertices that the global homography sees far outside need no local one.
-                    let near = (-limit..=frame.width + limit).contains(&expected.x)
-                        && (-limit..=frame.height + limit).contains(&expected.y)
-                        && global.denominator(vertex) > 0.0;
-                    let local = near.then(|| model.at(vertex)).flatten().unwrap_or(global);
-                    let place = local.apply(vertex);
-                    ((place - expected).norm() <= limit && near).then_some(place)
-                };
-                (0..grid.len()).map(|vertex| place(grid.source(vertex)).and_then(inside)).collect()
+                self.by_matches(grid, frame).into_iter().map(|place| place.and_then(inside)).collect()
             }
         }
+    }
+
+    /// By the cameras, corrected, where the photographs were taken from one point, and by the matches where they were not:
+    /// the mean of both, weighed by how far neighboring matches agree that the cameras are wrong.
+    ///
+    /// The noise of matches has nothing in common, so that photographs taken from one point keep the cameras' consistency
+    /// exactly.
+    fn by_cameras_and_matches(&self, grid: &GridMesh, frame: &WorkingFrame) -> Vec<Option<Vector2<f64>>> {
+        /// Deviation from the cameras, common to neighboring matches, from which on the matches alone decide, working px
+        /// per axis: as for the matches that align the mesh (`mesh::line_alignment`).
+        const FULL_PX: f64 = 0.7;
+        let cameras = CameraResidual::new(self.from, self.to, self.source, self.target);
+        let share = evidence::share(cameras.common_square(), FULL_PX);
+        let by_cameras = || (0..grid.len()).map(|vertex| cameras.at(grid.source(vertex))).collect();
+        if share == 0.0 {
+            return by_cameras();
+        }
+        let by_matches = self.by_matches(grid, frame);
+        if share == 1.0 {
+            return by_matches;
+        }
+        let by_cameras: Vec<Option<Vector2<f64>>> = by_cameras();
+        let between = |(camera, matches): (Option<Vector2<f64>>, Option<Vector2<f64>>)| match (camera, matches) {
+            (Some(camera), Some(matches)) => Some(camera.lerp(&matches, share)),
+            (camera, _) => camera,
+        };
+        by_cameras.into_iter().zip(by_matches).map(between).collect()
+    }
+
+    /// By moving DLT, as published.
+    fn by_matches(&self, grid: &GridMesh, frame: &WorkingFrame) -> Vec<Option<Vector2<f64>>> {
+        let Some(global) = self.global else { return vec![None; grid.len()] };
+        let Some(model) = MovingDlt::new(self.source, self.target) else { return vec![None; grid.len()] };
+        let limit = MAX_DEVIATION * frame.diagonal();
+        let place = |vertex: Vector2<f64>| {
+            let expected = global.apply(vertex);
+            // Vertices that the global homography sees far outside need no local one.
+            let near = (-limit..=frame.width + limit).contains(&expected.x)
+                && (-limit..=frame.height + limit).contains(&expected.y)
+                && global.denominator(vertex) > 0.0;
+            let local = near.then(|| model.at(vertex)).flatten().unwrap_or(global);
+            let place = local.apply(vertex);
+            ((place - expected).norm() <= limit && near).then_some(place)
+        };
+        (0..grid.len()).map(|vertex| place(grid.source(vertex))).collect()
     }
 }
 

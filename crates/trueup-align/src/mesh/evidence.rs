@@ -80,23 +80,23 @@ pub(super) fn common_squares(evidence: &[OverlapGap]) -> Vec<f64> {
 
 /// What neighbors say alike, summed.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct CommonSum {
+pub(crate) struct CommonSum {
     /// Of the products of neighbors' distances.
-    pub products: f64,
+    pub(crate) products: f64,
     /// Of what they would be for a misalignment of 1 px.
-    pub units: f64,
+    pub(crate) units: f64,
 }
 
 impl CommonSum {
     /// The mean square that the sums come to; not negative.
-    pub(super) fn mean_square(self) -> f64 {
+    pub(crate) fn mean_square(self) -> f64 {
         if self.units > 0.0 { (self.products / self.units).max(0.0) } else { 0.0 }
     }
 }
 
 /// The share of its weight that evidence has where the misalignment has a mean square of `common` per axis, and would
 /// have its whole weight from `full_px` on.
-pub(super) fn share(common: f64, full_px: f64) -> f64 {
+pub(crate) fn share(common: f64, full_px: f64) -> f64 {
     (common / (full_px * full_px)).min(1.0)
 }
 

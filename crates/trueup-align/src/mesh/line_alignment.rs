@@ -81,6 +81,16 @@ pub(super) struct MatchShares {
     lines: Vec<Vec<f64>>,
 }
 
+impl MatchShares {
+    /// Whether the matched points say hardly anything that is common to neighbors.
+    pub(super) fn are_negligible(&self) -> bool {
+        /// Mean share: a common misalignment of a tenth of a pixel per axis.
+        const NEGLIGIBLE: f64 = 0.02;
+        let count = self.points.iter().map(Vec::len).sum::<usize>();
+        self.points.iter().flatten().sum::<f64>() <= NEGLIGIBLE * count as f64
+    }
+}
+
 /// A match by its list and its index there.
 #[derive(Debug, Clone, Copy)]
 enum Match {

@@ -13,7 +13,7 @@ mod base;
 mod closure;
 mod complex;
 mod current_grids;
-mod evidence;
+pub(crate) mod evidence;
 mod input;
 mod line_alignment;
 mod normal_equations;
