@@ -55,8 +55,9 @@ fn triad_of_400_segments(bencher: divan::Bencher<'_, '_>) {
     let context = StageContext::default();
     let rotation = rotations(3)[1] * rotation_about_y(0.5);
     let lines = lines(&rotation, &mut context.generator("lines", 0));
+    let camera = Camera::new(FOCAL_PX, FRAME.width, FRAME.height, &rotation);
     let options = VanishingOptions::default();
-    bencher.bench(|| detect_triad(&lines, FOCAL_PX, &FRAME, &options, &mut context.generator("vanishing", 0)));
+    bencher.bench(|| detect_triad(&lines, &camera, &FRAME, &options, &mut context.generator("vanishing", 0)));
 }
 
 #[divan::bench(args = [12, 40, 72])]
@@ -71,8 +72,9 @@ fn prior(bencher: divan::Bencher<'_, '_>, count: usize) {
         subjects().map(|(subject, rotation)| lines(rotation, &mut context.generator("lines", subject))).collect();
     let triads: Vec<TriadOutcome> = subjects()
         .zip(&lines)
-        .map(|((subject, _), lines)| {
-            detect_triad(lines, FOCAL_PX, &FRAME, &vanishing, &mut context.generator("vanishing", subject))
+        .zip(&cameras)
+        .map(|(((subject, _), lines), camera)| {
+            detect_triad(lines, camera, &FRAME, &vanishing, &mut context.generator("vanishing", subject))
         })
         .collect();
     let columns = count.div_ceil(3);

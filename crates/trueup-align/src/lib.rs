@@ -6,6 +6,7 @@ pub mod full_turn;
 pub mod match_points;
 pub mod mesh;
 pub mod metrics;
+mod plane_similarity;
 pub mod projection;
 pub mod similarity;
 pub mod stitch_graph;

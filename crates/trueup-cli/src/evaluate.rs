@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde_json::json;
-use trueup::{Error, Evaluation, PixelEvaluation, Project};
+use trueup::{Error, Evaluation, PixelEvaluation, Project, StatedEvaluation};
 
 use crate::arguments::EvaluateArgs;
 use crate::failure::Failure;
@@ -78,14 +78,14 @@ fn text(project: &Project, evaluation: Option<&Evaluation>, pixels: Option<&Pixe
 }
 
 fn truth(lines: &mut LabeledLines, found: &Evaluation) {
-    lines.entry("truth", &format!("{} of {} pictures measured", found.used, found.given));
+    lines.entry("truth", &format!("{} of {} photographs measured", found.used, found.given));
     let (mean, most, spread) = (found.upright_deg, found.upright_max_deg, found.spread_deg);
     lines.item("upright", &format!("{mean:.3} degrees off on average, {most:.3} at most; spread {spread:.3}"));
     let by_reference = found
         .gdic_reference_deg
         .map_or(String::new(), |degrees| format!(", {degrees:.3} from the project's reference"));
     let (gdic, similarity) = (found.gdic_deg, found.gdic_similarity_deg);
-    lines.item("GDIC", &format!("{gdic:.3} degrees from the first picture{by_reference}"));
+    lines.item("GDIC", &format!("{gdic:.3} degrees from the first photograph{by_reference}"));
     lines.item("GDIC-P", &format!("{similarity:.3} degrees, by similarities instead of rectangles"));
     if let Some((mean, most)) = found.theta_error_deg.zip(found.theta_error_max_deg) {
         lines.item("theta", &format!("{mean:.3} degrees off on average, {most:.3} at most"));
@@ -100,10 +100,25 @@ fn truth(lines: &mut LabeledLines, found: &Evaluation) {
             None => "unknown: no overlaps, or photographs from different places".to_owned(),
         },
     );
-    for picture in &found.pictures {
-        let theta = picture.theta_error_deg.map_or(String::new(), |degrees| format!(", theta {degrees:+.3}"));
-        lines.item("", &format!("{}: {:+.3} degrees off upright{theta}", picture.file, picture.upright_deg));
+    if let Some(stated) = &found.stated {
+        lines.item("stated", &beside_the_truth(stated));
     }
+    for photograph in &found.photographs {
+        let theta = photograph.theta_error_deg.map_or(String::new(), |degrees| format!(", theta {degrees:+.3}"));
+        lines.item("", &format!("{}: {:+.3} degrees off upright{theta}", photograph.file, photograph.upright_deg));
+    }
+}
+
+/// "the truth within 9 of 9 intervals of 95 %; upright 0.124 stated, 0.060 true; GDIC 0.482 estimated"
+fn beside_the_truth(stated: &StatedEvaluation) -> String {
+    let intervals = match stated.intervals {
+        0 => "no lean".to_owned(),
+        count => format!("the truth within {} of {count} intervals of 95 %", stated.holding),
+    };
+    let upright = stated.stated_upright_deg.zip(stated.upright_deg);
+    let upright = upright.map(|(stated, found)| format!("upright {stated:.3} stated, {found:.3} true"));
+    let gdic = stated.estimated_gdic_deg.map(|degrees| format!("GDIC {degrees:.3} estimated"));
+    [Some(intervals), upright, gdic].into_iter().flatten().collect::<Vec<_>>().join("; ")
 }
 
 fn compared(lines: &mut LabeledLines, found: &PixelEvaluation) {

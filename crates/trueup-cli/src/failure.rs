@@ -79,8 +79,8 @@ mod tests {
 
     #[test]
     fn the_hint_has_a_line_of_its_own() {
-        let failure = Failure::from(Error::input("a.jpg", "it is a text", "Give a picture."));
-        assert_eq!(failure.to_string(), "trueup: error: a.jpg: it is a text\ntrueup: hint: Give a picture.\n");
+        let failure = Failure::from(Error::input("a.jpg", "it is a text", "Give a photograph."));
+        assert_eq!(failure.to_string(), "trueup: error: a.jpg: it is a text\ntrueup: hint: Give a photograph.\n");
         assert_eq!(failure.status, STATUS_FAILURE);
     }
 

@@ -9,14 +9,14 @@ fn photographs_become_a_panorama_and_a_summary() {
     let run = desk.stitch(&["a.jpg", "b.jpg", "c.jpg", "d.jpg", "--project", "pano.json"]);
     let summary = run.expect_success();
     for part in [
-        "panorama  pano.jpg  ",
+        "panorama    pano.jpg  ",
         " px, ",
-        "project   pano.json",
-        "pictures  4 of 4 used",
-        "upright   ",
-        "measured  ",
+        "project     pano.json",
+        "photographs 4 of 4 used",
+        "upright     ",
+        "measured    ",
         "points meet within",
-        "time      ",
+        "time        ",
     ] {
         assert!(summary.contains(part), "\"{part}\" is not in\n{summary}");
     }
@@ -56,10 +56,10 @@ fn folders_patterns_and_strange_names_are_photographs_too() {
         desk.put(&format!("süße Bilder/{name}"), bytes);
     }
     let by_folder = desk.stitch(&["süße Bilder", "--project", "p.json"]);
-    assert!(by_folder.expect_success().contains("pictures  3 of 3 used"), "{}", by_folder.stdout);
+    assert!(by_folder.expect_success().contains("photographs 3 of 3 used"), "{}", by_folder.stdout);
     assert!(desk.json("p.json")["images"][2]["path"].as_str().expect("a path").ends_with("写真 3.jpg"));
     let by_pattern = desk.stitch(&["süße Bilder/Nr*.jpg"]);
-    assert!(by_pattern.expect_success().contains("pictures  2 of 2 used"), "{}", by_pattern.stdout);
+    assert!(by_pattern.expect_success().contains("photographs 2 of 2 used"), "{}", by_pattern.stdout);
 }
 
 #[test]
@@ -94,10 +94,14 @@ fn scale_sets_the_size_and_quality_the_bytes() {
 fn one_photograph_is_written_as_it_is_with_a_warning() {
     let desk = street_desk();
     let run = finish(trueup(desk.path(), &["stitch", "a.jpg", "-o", "pano.png", "--project", "pano.json"]));
-    assert!(run.expect_success().contains("warning   a.jpg: there is only one photograph to use"), "{}", run.stdout);
+    assert!(run.expect_success().contains("warning     a.jpg: there is only one photograph to use"), "{}", run.stdout);
     assert_eq!(picture_size(&desk.join("pano.png")), (pictures::WIDTH as u32, pictures::HEIGHT as u32));
     let evaluated = finish(trueup(desk.path(), &["evaluate", "pano.json"]));
-    assert!(evaluated.expect_success().contains("measured  nothing: it takes two photographs"), "{}", evaluated.stdout);
+    assert!(
+        evaluated.expect_success().contains("measured    nothing: it takes two photographs"),
+        "{}",
+        evaluated.stdout
+    );
 }
 
 #[test]
@@ -109,7 +113,7 @@ fn all_writes_a_numbered_panorama_of_every_group() {
     let photographs = ["a.jpg", "x.jpg", "b.jpg", "y.jpg", "c.jpg", "z.jpg", "d.jpg"];
     let all = desk.stitch(&[&photographs[..], &["--all", "--project", "pano.json"]].concat());
     let summary = all.expect_success();
-    assert!(summary.contains("panorama  pano-1.jpg") && summary.contains("panorama  pano-2.jpg"), "{summary}");
+    assert!(summary.contains("panorama    pano-1.jpg") && summary.contains("panorama    pano-2.jpg"), "{summary}");
     assert!(!summary.contains("Use --all"), "{summary}");
     for name in ["pano-1.jpg", "pano-1.json", "pano-2.jpg", "pano-2.json"] {
         assert!(desk.files().contains(&name.to_owned()), "{name}");
@@ -117,7 +121,7 @@ fn all_writes_a_numbered_panorama_of_every_group() {
     assert!(!desk.files().contains(&"pano.jpg".to_owned()));
 
     let largest = desk.stitch(&photographs);
-    assert!(largest.expect_success().contains("pictures  4 of 7 used"), "{}", largest.stdout);
+    assert!(largest.expect_success().contains("photographs 4 of 7 used"), "{}", largest.stdout);
     assert!(largest.stdout.contains("left out  x.jpg: it belongs to another panorama, with "), "{}", largest.stdout);
     assert!(largest.stdout.contains("Use --all"), "{}", largest.stdout);
 }
@@ -155,7 +159,7 @@ fn a_bad_file_among_good_ones_is_left_out_with_its_reason() {
     let run = desk.stitch(&photographs);
     let summary = run.expect_success();
     for part in [
-        "pictures  4 of 10 used",
+        "photographs 4 of 10 used",
         "left out  broken.jpg: ",
         "left out  text.jpg: its content is not a JPEG",
         "left out  missing.jpg: there is no such file or folder",
@@ -176,7 +180,7 @@ fn impossible_focal_lengths_in_metadata_do_no_harm() {
     desk.put("huge.jpg", pictures::with_focal_length(b, [u32::MAX, 1], u16::MAX));
     desk.put("tiny.jpg", pictures::with_focal_length(c, [1, u32::MAX], 1));
     let run = desk.stitch(&["zero.jpg", "huge.jpg", "tiny.jpg", "--project", "p.json"]);
-    assert!(run.expect_success().contains("pictures  3 of 3 used"), "{}", run.stdout);
+    assert!(run.expect_success().contains("photographs 3 of 3 used"), "{}", run.stdout);
     for image in desk.json("p.json")["images"].as_array().expect("images") {
         let focal_px = image["focal_px"].as_f64().expect("a focal length");
         assert!((200.0..1500.0).contains(&focal_px), "{focal_px}");
@@ -209,7 +213,7 @@ fn gray_deep_and_transparent_photographs_are_photographs() {
     rgb.to_rgba16().save(desk.join("deep.tif")).expect("written");
     for name in ["gray.png", "deep.tif"] {
         let run = desk.stitch(&["a.jpg", name, "c.jpg"]);
-        assert!(run.expect_success().contains("pictures  3 of 3 used"), "{name}: {}", run.stdout);
+        assert!(run.expect_success().contains("photographs 3 of 3 used"), "{name}: {}", run.stdout);
     }
 }
 
@@ -217,6 +221,6 @@ fn gray_deep_and_transparent_photographs_are_photographs() {
 fn the_example_stands_upright() {
     let examples = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
     let run = Desk::new().stitch(&[examples]);
-    assert!(run.expect_success().contains("pictures  5 of 5 used"), "{}", run.stdout);
-    assert!(run.stdout.contains("upright   guided by vanishing points (divergence "), "{}", run.stdout);
+    assert!(run.expect_success().contains("photographs 5 of 5 used"), "{}", run.stdout);
+    assert!(run.stdout.contains("upright     guided by vanishing points (divergence "), "{}", run.stdout);
 }

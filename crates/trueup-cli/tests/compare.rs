@@ -41,7 +41,7 @@ fn every_method_is_made_or_says_why_not() {
     let options: Vec<Value> = serde_json::from_str(options.expect_success()).expect("JSON");
     let run = compare(&desk, &["--truth", "truth.json", "--scale", "0.3"]);
     let printed = run.expect_success();
-    assert!(printed.contains("page      out/index.html") && printed.contains("pictures  3 of 3 used"), "{printed}");
+    assert!(printed.contains("page        out/index.html") && printed.contains("photographs 3 of 3 used"), "{printed}");
     let mut expected = before;
     expected.insert(4, "out".to_owned());
     assert_eq!(desk.files(), expected);
@@ -185,7 +185,7 @@ fn photographs_that_do_not_overlap_and_truths_of_others_fail_as_a_whole() {
     let desk = street_desk();
     desk.put("strange.json", street_truth().replace(".jpg", ".png"));
     let strange = compare(&desk, &[&QUICK[..], &["--truth", "strange.json"]].concat());
-    strange.expect_failure(1, &["it names none of the 3 pictures"]);
+    strange.expect_failure(1, &["it names none of the 3 photographs"]);
     let desk = Desk::new();
     for seed in 1..3 {
         desk.put(&format!("noise{seed}.jpg"), noise(seed, 320, 240));
@@ -227,6 +227,7 @@ fn scores_are_summed_up_over_files() {
     let run = finish(trueup(desk.path(), &["compare", "--tally", "one.json", "two.json"]));
     let printed = run.expect_success();
     assert!(printed.contains("3 answers of 3 participants") && printed.contains("b  4.667       0.333"), "{printed}");
+    assert!(printed.contains("b  to a  2 : 1  67 % (21 to 94)  p = 1.000"), "{printed}");
     desk.put("other.json", "{}");
     let other = finish(trueup(desk.path(), &["compare", "--tally", "other.json"]));
     other.expect_failure(

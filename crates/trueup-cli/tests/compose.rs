@@ -20,7 +20,7 @@ fn compose(desk: &Desk, arguments: &[&str]) -> FinishedRun {
 fn the_same_options_give_the_same_bytes() {
     let desk = stitched();
     let stdout = compose(&desk, &["--project", "again.json"]).expect_success().to_owned();
-    assert!(stdout.contains("pictures  4 of 4 used"), "{stdout}");
+    assert!(stdout.contains("photographs 4 of 4 used"), "{stdout}");
     assert!(desk.read("pano.jpg") == desk.read("again.jpg"), "the panoramas differ");
     let without_seconds = |name: &str| {
         let mut project = desk.json(name);
@@ -135,7 +135,7 @@ fn photographs_are_found_where_they_moved_and_others_shown_in_their_place() {
     std::fs::copy(desk.join("pano.json"), folder.join("pano.json")).expect("copied");
     finish(trueup(desk.path(), &["compose", "moved/pano.json", "-o", "third.jpg"])).expect_success();
     assert!(desk.read("pano.jpg") == desk.read("third.jpg"), "the panoramas differ");
-    // Plain pictures of the same names and size.
+    // Plain photographs of the same names and size.
     std::fs::create_dir(desk.join("gray")).expect("a folder");
     for (name, level) in [("a.jpg", 90), ("b.jpeg", 91), ("c.jpg", 92), ("d.jpg", 93)] {
         desk.put(&format!("gray/{name}"), plain(480, 360, level));

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde_json::Value;
+use trueup_align::warps::WarpModel;
 
 use crate::pictures::street_desk;
 use crate::run::{Desk, finish, trueup};
@@ -63,24 +64,23 @@ fn the_order_of_the_photographs_hardly_matters() {
     }
 }
 
-/// Compared, so that photographs are measured and matched twice and not fourteen times.
+/// Compared, so that photographs are measured and matched twice and not twice a method.
 #[test]
-fn threads_change_no_byte_of_any_method() {
-    const METHODS: [&str; 7] = ["homography", "autostitch", "apap", "sphp", "sphp-free", "aanap", "quasi-homography"];
+fn threads_change_no_byte_of_any_warp_model() {
     let desk = street_desk();
     let panoramas = |threads: &str| -> Vec<(Vec<u8>, Value)> {
-        let methods = METHODS.join(",");
+        let methods = WarpModel::NAMES.join(",");
         let arguments =
             ["compare", "a.jpg", "b.jpg", "c.jpg", "-o", "out", "--methods", &methods, "--threads", threads];
         finish(trueup(desk.path(), &[&arguments[..], &["--scale", "0.5"]].concat())).expect_success();
-        let made = METHODS.iter().map(|method| {
+        let made = WarpModel::NAMES.iter().map(|method| {
             let project = without_seconds(desk.json(&format!("out/{method}.json")));
             (desk.read(&format!("out/{method}.jpg")), project)
         });
         made.collect()
     };
     let (one_thread, three) = (panoramas("1"), panoramas("3"));
-    for (method, (one_thread, three)) in METHODS.iter().zip(one_thread.iter().zip(&three)) {
+    for (method, (one_thread, three)) in WarpModel::NAMES.iter().zip(one_thread.iter().zip(&three)) {
         assert!(one_thread.0 == three.0, "the panoramas differ by {method}");
         assert_eq!(one_thread.1, three.1, "the projects differ by {method}");
         assert_eq!(one_thread.1["method"], *method);

@@ -23,7 +23,7 @@ const fn mistake(what: &'static str, arguments: &'static [&'static str]) -> Mist
 const MISTAKES: &[Mistake] = &[
     mistake("no such file", &["stitch", "none.jpg", "-o", "pano.jpg"]),
     mistake("pattern without match", &["stitch", "none*.jpg", "-o", "pano.jpg"]),
-    mistake("folder without pictures", &["stitch", "notes", "-o", "pano.jpg"]),
+    mistake("folder without photographs", &["stitch", "notes", "-o", "pano.jpg"]),
     mistake("text file named .jpg", &["stitch", "text.jpg", "-o", "pano.jpg"]),
     mistake("another format", &["stitch", "movie.gif", "-o", "pano.jpg"]),
     mistake("empty file", &["stitch", "empty.jpg", "-o", "pano.jpg"]),
@@ -32,8 +32,8 @@ const MISTAKES: &[Mistake] = &[
     mistake("8 x 8 pixels", &["stitch", "dot.jpg", "-o", "pano.jpg"]),
     mistake("several files, none usable", &["stitch", "text.jpg", "empty.jpg", "-o", "pano.jpg"]),
     mistake("too little memory", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--memory", "100MB"]),
-    mistake("black pictures", &["stitch", "black.jpg", "white.jpg", "-o", "pano.jpg"]),
-    mistake("unrelated pictures", &["stitch", "noise1.jpg", "noise2.jpg", "noise3.jpg", "-o", "pano.jpg"]),
+    mistake("black photographs", &["stitch", "black.jpg", "white.jpg", "-o", "pano.jpg"]),
+    mistake("unrelated photographs", &["stitch", "noise1.jpg", "noise2.jpg", "noise3.jpg", "-o", "pano.jpg"]),
     mistake(
         "a method that cannot place them",
         &["stitch", "turn0.jpg", "turn1.jpg", "turn2.jpg", "turn3.jpg", "-o", "pano.jpg", "--method", "homography"],
@@ -86,9 +86,9 @@ const MISTAKES: &[Mistake] = &[
     mistake("no truth file", &["evaluate", "pano.json", "--truth", "none.json"]),
     mistake("not a truth file", &["evaluate", "pano.json", "--truth", "other.json"]),
     mistake("truth with a rotation that is none", &["evaluate", "pano.json", "--truth", "bent.json"]),
-    mistake("truth of other pictures", &["evaluate", "pano.json", "--truth", "strange.json"]),
-    mistake("truth of pictures of another size", &["evaluate", "pano.json", "--truth", "small.json"]),
-    mistake("truth that knows one picture", &["evaluate", "pano.json", "--truth", "one.json"]),
+    mistake("truth of other photographs", &["evaluate", "pano.json", "--truth", "strange.json"]),
+    mistake("truth of photographs of another size", &["evaluate", "pano.json", "--truth", "small.json"]),
+    mistake("truth that knows one photograph", &["evaluate", "pano.json", "--truth", "one.json"]),
 ];
 
 fn desk() -> Desk {

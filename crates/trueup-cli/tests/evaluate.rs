@@ -22,13 +22,14 @@ fn all_measures_are_printed() {
     let desk = stitched();
     let run = evaluate(&desk, &["--truth", "truth.json"]);
     let parts = [
-        "measured  upright within ",
-        "truth     4 of 4 pictures measured",
+        "measured    upright within ",
+        "truth       4 of 4 photographs measured",
         "  GDIC-P    ",
         "  alignment ",
+        "  stated    ",
         "c.jpg: leans by ",
         " degrees off upright, theta ",
-        "pixels    ",
+        "pixels      ",
         "  NCC       RMSE ",
         " dB, SSIM ",
     ];
@@ -39,7 +40,7 @@ fn all_measures_are_printed() {
     assert!(!short.expect_success().contains("pixels") && !short.stdout.contains("truth"), "{}", short.stdout);
 }
 
-/// A rendered street is upright to a fraction of a degree, and its pictures look alike where they overlap.
+/// A rendered street is upright to a fraction of a degree, and its photographs look alike where they overlap.
 #[test]
 fn json_holds_the_same_figures_and_they_are_those_of_a_good_panorama() {
     let desk = stitched();
@@ -72,7 +73,7 @@ fn photographs_are_found_beside_the_project_and_missing_ones_are_told_of() {
     assert!(moved.expect_success().contains("NCC       RMSE"), "{}", moved.stdout);
     std::fs::remove_file(desk.join("away/c.jpg")).expect("removed");
     let without = finish(trueup(desk.path(), &["evaluate", "away/pano.json"]));
-    let expected = "pixels    skipped: photograph not found, neither here nor beside the project file: c.jpg";
+    let expected = "pixels      skipped: photograph not found, neither here nor beside the project file: c.jpg";
     assert!(without.expect_success().contains(expected), "{}", without.stdout);
 }
 

@@ -109,7 +109,7 @@ fn two_identical_files_are_one_photograph() {
     desk.put("two.jpg", &street()[0]);
     let run = desk.stitch(&["one.jpg", "two.jpg"]);
     for part in
-        ["pictures  1 of 2 used", "two.jpg: it has the same bytes as one.jpg, which is used", "only one photograph"]
+        ["photographs 1 of 2 used", "two.jpg: it has the same bytes as one.jpg, which is used", "only one photograph"]
     {
         assert!(run.expect_success().contains(part), "\"{part}\" is not in\n{}", run.stdout);
     }
@@ -186,7 +186,7 @@ fn graphs_and_references_that_fit_no_photograph() {
     let desk = street_desk();
     desk.put("graph.txt", "# who overlaps whom\na.jpg -- b.jpg\nb.jpg -- q.jpg\n");
     desk.stitch(&["a.jpg", "b.jpg", "--graph", "graph.txt"])
-        .expect_failure(1, &["graph.txt, line 3: \"q.jpg\" is none of the 2 pictures given"]);
+        .expect_failure(1, &["graph.txt, line 3: \"q.jpg\" is none of the 2 photographs given"]);
     desk.stitch(&["a.jpg", "b.jpg", "--graph", "none.txt"])
         .expect_failure(1, &["reading none.txt: No such file or directory"]);
     desk.stitch(&["a.jpg", "b.jpg", "--reference", "q.jpg"])

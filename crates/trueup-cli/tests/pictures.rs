@@ -33,15 +33,15 @@ pub(crate) fn room() -> &'static [Vec<u8>] {
     FILES.get_or_init(|| photograph_scene(SceneKind::Room, 3, 3).iter().map(|rgb| jpeg(rgb, WIDTH, HEIGHT)).collect())
 }
 
-fn photograph_scene(kind: SceneKind, seed: u64, pictures: usize) -> Vec<Vec<u8>> {
+fn photograph_scene(kind: SceneKind, seed: u64, count: usize) -> Vec<Vec<u8>> {
     let scene = LitScene::new(&SceneOptions { kind, seed, light: LightQuality::Fast, ..SceneOptions::default() })
         .expect("a valid scene");
-    let cameras = cameras(&scene, seed, pictures);
+    let cameras = cameras(&scene, seed, count);
     cameras.iter().map(|camera| render(&scene, camera, Quality::Preview).data().to_vec()).collect()
 }
 
-fn cameras(scene: &LitScene, seed: u64, pictures: usize) -> Vec<PosedCamera> {
-    let options = RigOptions { seed, pictures, width: WIDTH, height: HEIGHT, ..RigOptions::default() };
+fn cameras(scene: &LitScene, seed: u64, count: usize) -> Vec<PosedCamera> {
+    let options = RigOptions { seed, pictures: count, width: WIDTH, height: HEIGHT, ..RigOptions::default() };
     rig(&options, &scene.viewpoint()).expect("valid options")
 }
 

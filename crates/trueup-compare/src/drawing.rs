@@ -1,8 +1,9 @@
 //! Lines and grids to be drawn over a panorama.
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2};
 use trueup_align::metrics::{VerticalLinesInput, vertical_segments};
 use trueup_core::Result;
+use trueup_core::geometry::rows_of;
 use trueup_core::lines::LineSegment;
 use trueup_core::mesh::GridMesh;
 use trueup_core::source::WorkingFrame;
@@ -67,12 +68,13 @@ pub(crate) fn draw(set: &MatchedPhotographs, project: &Project) -> Result<Drawin
 
 /// Positions of the vertical segments, as the measures of uprightness find them.
 fn verticals(image: &ImageRecord, lines: &[LineSegment], frame: &WorkingFrame) -> Vec<usize> {
-    let Some(focal_px) = image.focal_px else { return Vec::new() };
+    let rotation = image.rotation.unwrap_or_else(|| rows_of(&Matrix3::identity()));
+    let Some(camera) = image.camera(&rotation) else { return Vec::new() };
     // Down is the levelled world's second axis; without a rotation, cameras are expected to be held level.
-    let down = image.rotation.map_or(Vector3::y(), |rows| Vector3::new(rows[0][1], rows[1][1], rows[2][1]));
-    let picture =
-        VerticalLinesInput { lines, frame, focal_px: focal_px * frame.working_from_full, expected_down: down };
-    vertical_segments(&picture)
+    let down = camera.rotation().column(1).into_owned();
+    let camera = camera.scaled(frame.working_from_full);
+    let photograph = VerticalLinesInput { lines, frame, camera: &camera, expected_down: down };
+    vertical_segments(&photograph)
 }
 
 /// Positions of the longest segments, ascending.

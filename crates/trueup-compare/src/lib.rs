@@ -11,6 +11,7 @@ mod job;
 mod making;
 mod overlaps;
 mod place;
+mod preference;
 mod ranking;
 mod record;
 mod tally;
@@ -21,6 +22,7 @@ pub use entry::ComparisonEntry;
 pub use figures::{Better, ComparisonFigure};
 pub use format::PanoramaFormat;
 pub use job::{CompareJob, ComparisonPage};
+pub use preference::{Preference, ShareInterval};
 pub use ranking::{MAX_RANKED, RankedPanorama, Ranking};
 pub use record::{COMPARISON_FORMAT, COMPARISON_VERSION, ComparedPhotograph, Comparison};
 pub use tally::{

@@ -9,6 +9,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use trueup_core::{Error, Result};
 
+use super::preference::{PairCounts, Preference, ShareInterval, wilson_interval};
 use super::ranking::MAX_RANKED;
 
 /// The `format` field of every file of results.
@@ -50,7 +51,7 @@ pub struct RankingAnswer {
     pub ranking: Vec<String>,
 }
 
-/// Mean scores over all answers.
+/// Mean scores over all answers, and which of two methods is preferred.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Tally {
     /// Different comparisons that were ranked.
@@ -63,6 +64,8 @@ pub struct Tally {
     pub repeated: usize,
     /// The methods, the best first.
     pub methods: Vec<MethodScore>,
+    /// Every two methods that somebody ranked together, the surest preference first.
+    pub preferences: Vec<Preference>,
 }
 
 /// What participants think of one method.
@@ -81,6 +84,10 @@ pub struct MethodScore {
     pub answers: usize,
     /// How often it was ranked first, second, third, fourth.
     pub ranks: [usize; MAX_RANKED],
+    /// Mean over the participants of the share of their answers that rank it first.
+    pub first_share: f64,
+    /// Interval of that share, as wide as if each participant had answered once.
+    pub first_interval: Option<ShareInterval>,
 }
 
 /// Reads a file of results.
@@ -141,6 +148,7 @@ pub fn tally(results: &[RankingResults]) -> Result<Tally> {
     let mut participants: BTreeSet<String> = BTreeSet::new();
     let mut comparisons: BTreeSet<&str> = BTreeSet::new();
     let mut scores: BTreeMap<&str, Scores> = BTreeMap::new();
+    let mut pairs = PairCounts::default();
     let mut repeated = 0;
     for (result, answer) in results.iter().flat_map(|result| result.answers.iter().map(move |answer| (result, answer)))
     {
@@ -150,6 +158,7 @@ pub fn tally(results: &[RankingResults]) -> Result<Tally> {
         }
         comparisons.insert(&result.comparison);
         let participant = participant(result, answer);
+        pairs.add(&participant, &answer.ranking);
         for (position, name) in answer.ranking.iter().enumerate() {
             let of_method = scores.entry(name).or_default();
             // Rankings of more entries than there are ranks are refused when they are read.
@@ -166,7 +175,7 @@ pub fn tally(results: &[RankingResults]) -> Result<Tally> {
     let mut methods: Vec<MethodScore> = scores.into_iter().map(|(name, scores)| method_score(name, &scores)).collect();
     methods.sort_by(|one, two| two.mean_score.total_cmp(&one.mean_score).then(one.name.cmp(&two.name)));
     let (comparisons, participants) = (comparisons.len(), participants.len());
-    Ok(Tally { comparisons, participants, answers: known.len(), repeated, methods })
+    Ok(Tally { comparisons, participants, answers: known.len(), repeated, methods, preferences: pairs.preferences() })
 }
 
 fn participant(result: &RankingResults, answer: &RankingAnswer) -> String {
@@ -181,6 +190,9 @@ fn method_score(name: &str, scores: &Scores) -> MethodScore {
     let means: Vec<f64> = scores.by_participant.values().map(|values| mean(values)).collect();
     let mean_score = mean(&means);
     let count = means.len() as f64;
+    let best = BEST_SCORE as f64;
+    let first = |values: &Vec<f64>| values.iter().filter(|score| **score == best).count() as f64 / values.len() as f64;
+    let first: f64 = scores.by_participant.values().map(first).sum();
     let squares: f64 = means.iter().map(|value| (value - mean_score).powi(2)).sum();
     MethodScore {
         name: name.to_owned(),
@@ -189,6 +201,8 @@ fn method_score(name: &str, scores: &Scores) -> MethodScore {
         participants: means.len(),
         answers: scores.by_participant.values().map(Vec::len).sum(),
         ranks: scores.ranks,
+        first_share: first / count,
+        first_interval: wilson_interval(first, means.len()),
     }
 }
 
@@ -227,6 +241,14 @@ mod tests {
         let error = |method: &MethodScore| method.standard_error.expect("three participants");
         assert!((error(b) - 0.5).abs() < 1e-12 && (error(a) - 0.881_917_103_688_197).abs() < 1e-12);
         assert_eq!((a.ranks, a.answers, a.participants), ([2, 1, 0, 1], 4, 3));
+        // Of three participants, Ann put a first both times; Bob and Cyd put b first.
+        assert!((a.first_share - 1.0 / 3.0).abs() < 1e-12 && (b.first_share - 2.0 / 3.0).abs() < 1e-12);
+        assert!(b.first_interval.is_some_and(|interval| interval.low < 0.5 && interval.high > 0.9));
+        // a above b: Ann twice; below: Bob and Cyd.
+        let pair =
+            found.preferences.iter().find(|one| one.preferred == "b" && one.other == "a").expect("ranked together");
+        assert_eq!((pair.agree, pair.disagree, pair.undecided, pair.p_value), (2, 1, 0, 1.0));
+        assert_eq!(found.preferences.len(), 6);
     }
 
     #[test]

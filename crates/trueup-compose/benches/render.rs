@@ -25,12 +25,12 @@ impl PhotographSource for Memory {
 }
 
 fn photographs() -> Memory {
-    let picture = |seed: usize| {
+    let photograph = |seed: usize| {
         let data =
             (0..WIDTH * HEIGHT * 3).map(|i| (i / 3 % WIDTH / 8 + (i * 2_654_435_761 + seed) % 61) as u8).collect();
         Photograph::Eight(Raster::from_data(WIDTH, HEIGHT, 3, data).expect("as many samples"))
     };
-    Memory(vec![picture(1), picture(2)])
+    Memory(vec![photograph(1), photograph(2)])
 }
 
 fn layout(scale: f64) -> CanvasLayout {

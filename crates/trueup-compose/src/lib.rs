@@ -37,7 +37,7 @@ mod sampling;
 mod simd;
 mod store;
 #[cfg(test)]
-mod test_pictures;
+mod test_photographs;
 mod transfer_curve;
 mod warped;
 mod weights;

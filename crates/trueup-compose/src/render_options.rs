@@ -63,7 +63,7 @@ impl Blend {
 }
 
 trueup_core::options! {
-    /// How the photographs become one picture.
+    /// How the photographs become one panorama.
     pub struct RenderOptions("render") {
         /// How a photograph is read between its samples. Choose `bilinear` if sharp contours show faint lines beside them.
         interpolation: Interpolation = Interpolation::Bicubic, Allowed::Any, "";

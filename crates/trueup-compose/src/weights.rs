@@ -3,7 +3,7 @@
 //! One number carries both. A photograph that covers a pixel wholly has a weight of at least [`EDGE_WEIGHT`]; one that
 //! covers it in part (its border cuts the pixel, or the sample is partly transparent) has the covered share of
 //! `EDGE_WEIGHT`, too little to be seen against a photograph that covers the pixel. The sum of the weights divided by
-//! `EDGE_WEIGHT`, at most 1, is then the panorama's alpha, and no picture darkens where it ends.
+//! `EDGE_WEIGHT`, at most 1, is then the panorama's alpha, and no photograph darkens where it ends.
 
 /// Weight of a photograph that only just covers a pixel; whole weights lie between this and 1.
 ///

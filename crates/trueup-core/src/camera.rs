@@ -1,13 +1,14 @@
-//! The pinhole camera of one photograph.
+//! The camera of one photograph: the one place where rays become pixels and pixels rays.
 
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, SMatrix, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{matrix_from_rows, rows_of};
+use crate::lens::{Lens, LensDerivatives};
 
-/// A rotating pinhole camera: square pixels, no skew, no lens distortion, principal point at the picture's center.
+/// A rotating camera: square pixels, no skew, and a lens, which may be a pinhole.
 ///
-/// Bearings `(u - c_x, v - c_y, f)` are in the camera frame (x right, y down, z forward).
+/// Bearings are in the camera frame (x right, y down, z forward); a pinhole's are `(u - c_x, v - c_y, f)`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
     /// Focal length in pixels of the frame the camera belongs to (working pixels inside the pipeline).
@@ -16,12 +17,48 @@ pub struct Camera {
     pub principal_point: [f64; 2],
     /// Rows of the rotation from world to camera, the paper's R_i.
     pub camera_from_world: [[f64; 3]; 3],
+    /// What the lens does, in units of the focal length.
+    #[serde(default, skip_serializing_if = "Lens::is_pinhole")]
+    pub lens: Lens,
+}
+
+/// Unknowns of a camera beside its rotation, in this order: ln focal length, principal point (x, y), k1 to k4, p1, p2.
+pub const INTRINSICS: usize = 9;
+
+/// How the pixel of a bearing moves.
+#[derive(Debug, Clone, Copy)]
+pub struct ProjectionDerivatives {
+    /// The pixel itself.
+    pub pixel: Vector2<f64>,
+    /// By the bearing's three entries.
+    pub by_bearing: Matrix2x3<f64>,
+    /// By the [`INTRINSICS`].
+    pub by_intrinsics: SMatrix<f64, 2, INTRINSICS>,
+}
+
+impl ProjectionDerivatives {
+    /// How the bearing of the pixel moves with the pixel: the least change that does it.
+    pub fn bearing_by_pixel(&self) -> Option<Matrix3x2<f64>> {
+        let by_bearing = &self.by_bearing;
+        (by_bearing * by_bearing.transpose()).try_inverse().map(|inverse| by_bearing.transpose() * inverse)
+    }
 }
 
 impl Camera {
-    /// A camera of focal length `focal_px` looking at the center of a `width` x `height` picture.
+    /// A pinhole camera of focal length `focal_px` looking at the center of a `width` x `height` photograph.
     pub fn new(focal_px: f64, width: f64, height: f64, camera_from_world: &Matrix3<f64>) -> Self {
-        Self { focal_px, principal_point: [width / 2.0, height / 2.0], camera_from_world: rows_of(camera_from_world) }
+        Self {
+            focal_px,
+            principal_point: [width / 2.0, height / 2.0],
+            camera_from_world: rows_of(camera_from_world),
+            lens: Lens::PINHOLE,
+        }
+    }
+
+    /// The same camera of the same photograph in pixels of which `factor` are one of the present ones.
+    pub fn scaled(&self, factor: f64) -> Self {
+        let principal_point = self.principal_point.map(|coordinate| coordinate * factor);
+        Self { focal_px: self.focal_px * factor, principal_point, ..*self }
     }
 
     /// The rotation from world to camera.
@@ -34,24 +71,52 @@ impl Camera {
         self.camera_from_world = rows_of(camera_from_world);
     }
 
-    /// The bearing of a pixel in the camera frame, z = 1 (not normalized).
+    /// The bearing of a pixel in the camera frame: z = 1 (not normalized), or of length 1 for a fisheye.
     pub fn bearing(&self, pixel: Vector2<f64>) -> Vector3<f64> {
-        Vector3::new(
+        let bearing = Vector3::new(
             (pixel.x - self.principal_point[0]) / self.focal_px,
             (pixel.y - self.principal_point[1]) / self.focal_px,
             1.0,
-        )
+        );
+        if self.lens.is_pinhole() { bearing } else { self.lens.ray(bearing.xy()) }
     }
 
-    /// The pixel of a bearing in the camera frame; `None` behind the camera or within 1e-6 of its plane.
+    /// The pixel of a bearing in the camera frame; `None` behind the camera or within 1e-6 of its plane, and for a fisheye
+    /// within 1e-6 of straight behind.
     pub fn project(&self, bearing: Vector3<f64>) -> Option<Vector2<f64>> {
         const MIN_DEPTH: f64 = 1e-6;
+        if !self.lens.is_pinhole() {
+            let place = self.lens.place(bearing)?;
+            return Some(place * self.focal_px + Vector2::from(self.principal_point));
+        }
         (bearing.z > MIN_DEPTH * bearing.norm()).then(|| {
             Vector2::new(
                 self.focal_px * bearing.x / bearing.z + self.principal_point[0],
                 self.focal_px * bearing.y / bearing.z + self.principal_point[1],
             )
         })
+    }
+
+    /// The pixel of a bearing and how it moves; `None` as [`Self::project`].
+    pub fn projection_derivatives(&self, bearing: Vector3<f64>) -> Option<ProjectionDerivatives> {
+        let LensDerivatives { place, by_ray, by_radial, by_tangential } = self.lens.derivatives(bearing)?;
+        let mut by_intrinsics = SMatrix::<f64, 2, INTRINSICS>::zeros();
+        by_intrinsics.fixed_columns_mut::<1>(0).copy_from(&(place * self.focal_px));
+        by_intrinsics.fixed_columns_mut::<2>(1).fill_with_identity();
+        by_intrinsics.fixed_columns_mut::<4>(3).copy_from(&(by_radial * self.focal_px));
+        by_intrinsics.fixed_columns_mut::<2>(7).copy_from(&(by_tangential * self.focal_px));
+        let pixel = place * self.focal_px + Vector2::from(self.principal_point);
+        Some(ProjectionDerivatives { pixel, by_bearing: by_ray * self.focal_px, by_intrinsics })
+    }
+
+    /// How far the bearing of `pixel` moves, to first order, as the pixel moves by `step`.
+    pub fn bearing_change(&self, pixel: Vector2<f64>, step: Vector2<f64>) -> Vector3<f64> {
+        if self.lens.is_pinhole() {
+            return (step / self.focal_px).push(0.0);
+        }
+        let derivatives = self.projection_derivatives(self.bearing(pixel));
+        let by_pixel = derivatives.and_then(|derivatives| derivatives.bearing_by_pixel());
+        by_pixel.map_or(Vector3::zeros(), |by_pixel| by_pixel * step)
     }
 
     /// The direction in the world of a pixel, unit length.

@@ -13,10 +13,10 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A file or picture the user gave cannot be used.
+    /// A file or photograph the user gave cannot be used.
     #[error("{subject}: {reason}. {hint}")]
     Input {
-        /// The file, picture or argument at fault.
+        /// The file, photograph or argument at fault.
         subject: String,
         /// Why it cannot be used, without a closing full stop.
         reason: String,
@@ -51,19 +51,19 @@ pub enum Error {
     Unsolvable {
         /// The stage that gave up.
         stage: &'static str,
-        /// The picture, pair or system it gave up on.
+        /// The photograph, pair or system it gave up on.
         subject: String,
         /// Why there is no answer, without a closing full stop.
         why: String,
         /// What the user can do about it, a whole sentence.
         hint: String,
     },
-    /// The method that was chosen cannot make a panorama of these pictures; another one can.
+    /// The method that was chosen cannot make a panorama of these photographs; another one can.
     #[error("the method {method} is not applicable: {reason}. {hint}")]
     NotApplicable {
         /// The method, as in the options.
         method: String,
-        /// Which picture it cannot place and why, with the angle where the field of view is at fault, without a closing
+        /// Which photograph it cannot place and why, with the angle where the field of view is at fault, without a closing
         /// full stop.
         reason: String,
         /// What the user can do about it, a whole sentence.
@@ -95,7 +95,7 @@ impl Error {
         Self::Unsolvable { stage, subject: subject.to_string(), why: why.to_string(), hint: hint.to_string() }
     }
 
-    /// An [`Error::NotApplicable`]: `method` cannot place the pictures because of `reason`; `hint` says what to do.
+    /// An [`Error::NotApplicable`]: `method` cannot place the photographs because of `reason`; `hint` says what to do.
     pub fn not_applicable(method: impl ToString, reason: impl ToString, hint: impl ToString) -> Self {
         Self::NotApplicable { method: method.to_string(), reason: reason.to_string(), hint: hint.to_string() }
     }

@@ -23,6 +23,7 @@ pub mod error;
 pub mod geometry;
 pub mod interpolation;
 mod invalid_option;
+pub mod lens;
 pub mod lines;
 pub mod mask;
 pub mod matches;

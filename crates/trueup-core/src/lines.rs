@@ -1,4 +1,4 @@
-//! Straight line segments found in a picture.
+//! Straight line segments found in a photograph.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,12 +23,12 @@ impl LineSegment {
     }
 }
 
-/// Segments of two pictures that show the same edge.
+/// Segments of two photographs that show the same edge.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairLines {
-    /// Index of the first picture.
+    /// Index of the first photograph.
     pub a: usize,
-    /// Index of the second picture.
+    /// Index of the second photograph.
     pub b: usize,
     /// The matched segments, in the working pixels of the first and of the second.
     pub lines: Vec<[LineSegment; 2]>,

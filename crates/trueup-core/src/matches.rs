@@ -1,13 +1,13 @@
-//! What is known of a pair of pictures after matching.
+//! What is known of a pair of photographs after matching.
 
 use serde::{Deserialize, Serialize};
 
-/// A point seen in both pictures of a pair, in working pixels of each.
+/// A point seen in both photographs of a pair, in working pixels of each.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PointMatch {
-    /// Position in picture a (x, y).
+    /// Position in photograph a (x, y).
     pub in_a: [f64; 2],
-    /// Position in picture b (x, y).
+    /// Position in photograph b (x, y).
     pub in_b: [f64; 2],
 }
 
@@ -15,13 +15,13 @@ pub struct PointMatch {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PairVerdict {
-    /// The pictures overlap.
+    /// The photographs overlap.
     Joined,
     /// The user's graph says that they overlap, and enough matches agree to use it.
     JoinedByGraph,
     /// Fewer putative matches than a homography needs.
     TooFewMatches,
-    /// The best homography folds, mirrors or explodes the picture.
+    /// The best homography folds, mirrors or explodes the photograph.
     ImplausibleHomography,
     /// Too few of the matches in the predicted overlap agree.
     TooFewInliers,
@@ -34,12 +34,12 @@ impl PairVerdict {
     }
 }
 
-/// The outcome of matching pictures `a` and `b` (`a < b`).
+/// The outcome of matching photographs `a` and `b` (`a < b`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PairMatches {
-    /// Index of the first picture.
+    /// Index of the first photograph.
     pub a: usize,
-    /// Index of the second picture, larger than `a`.
+    /// Index of the second photograph, larger than `a`.
     pub b: usize,
     /// Number of putative matches (after ratio and mutual tests).
     pub putative: usize,

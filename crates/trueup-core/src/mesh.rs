@@ -1,9 +1,9 @@
-//! The deformed grid of one picture: what every warp model yields and the renderer and the metrics consume.
+//! The deformed grid of one photograph: what every warp model yields and the renderer and the metrics consume.
 
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// A grid over one picture and where its vertices go in the panorama.
+/// A grid over one photograph and where its vertices go in the panorama.
 ///
 /// `rows` x `columns` vertices, row-major (index = row * columns + column). Inside a cell the warp is bilinear.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -12,19 +12,19 @@ pub struct GridMesh {
     pub rows: usize,
     /// Number of vertex columns, at least 2.
     pub columns: usize,
-    /// Width of the picture in the pixels of `source`.
+    /// Width of the photograph in the pixels of `source`.
     pub width: f64,
-    /// Height of the picture in the pixels of `source`.
+    /// Height of the photograph in the pixels of `source`.
     pub height: f64,
     /// Vertices in the panorama, row-major. A vertex outside what a projection can show is NaN on both axes; cells that
     /// touch one are not there.
     pub target: Vec<[f64; 2]>,
-    /// Where the columns and rows of vertices lie; `None`: evenly over the picture.
+    /// Where the columns and rows of vertices lie; `None`: evenly over the photograph.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lines: Option<GridLines>,
 }
 
-/// Where the columns and rows of a grid's vertices lie in the picture, as shares of its width and height: each ascending
+/// Where the columns and rows of a grid's vertices lie in the photograph, as shares of its width and height: each ascending
 /// from 0 to 1.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GridLines {
@@ -43,7 +43,7 @@ impl GridLines {
 }
 
 impl GridMesh {
-    /// An undeformed grid over a `width` x `height` picture with cells of at most `cell_px` on a side.
+    /// An undeformed grid over a `width` x `height` photograph with cells of at most `cell_px` on a side.
     pub fn regular(width: f64, height: f64, cell_px: f64) -> Self {
         let columns = (width / cell_px).ceil().max(1.0) as usize + 1;
         let rows = (height / cell_px).ceil().max(1.0) as usize + 1;
@@ -72,7 +72,7 @@ impl GridMesh {
         self.height / (self.rows - 1) as f64
     }
 
-    /// Position of a vertex in the picture.
+    /// Position of a vertex in the photograph.
     pub fn source(&self, index: usize) -> Vector2<f64> {
         let (row, column) = (index / self.columns, index % self.columns);
         match &self.lines {
@@ -100,14 +100,14 @@ impl GridMesh {
             .filter(|corners| corners.iter().all(|&corner| self.is_defined(corner)))
     }
 
-    /// The cell along one axis that holds the share `at` of the picture, and the share of the cell that lies before it.
+    /// The cell along one axis that holds the share `at` of the photograph, and the share of the cell that lies before it.
     fn within(lines: &[f64], at: f64) -> (usize, f64) {
         let cell = lines.partition_point(|&line| line <= at).clamp(1, lines.len() - 1) - 1;
         (cell, (at - lines[cell]) / (lines[cell + 1] - lines[cell]))
     }
 
-    /// The four vertices around a point of the picture (top left, top right, bottom right, bottom left) and their
-    /// bilinear weights. Points outside the picture use the nearest cell and extrapolate.
+    /// The four vertices around a point of the photograph (top left, top right, bottom right, bottom left) and their
+    /// bilinear weights. Points outside the photograph use the nearest cell and extrapolate.
     pub fn bilinear(&self, point: Vector2<f64>) -> ([usize; 4], [f64; 4]) {
         let ((column, u), (row, v)) = match &self.lines {
             None => {
@@ -128,7 +128,7 @@ impl GridMesh {
         )
     }
 
-    /// Where a point of the picture goes in the panorama (the paper's phi_i).
+    /// Where a point of the photograph goes in the panorama (the paper's phi_i).
     pub fn warp(&self, point: Vector2<f64>) -> Vector2<f64> {
         let (corners, weights) = self.bilinear(point);
         corners
@@ -151,7 +151,7 @@ impl GridMesh {
     }
 
     /// The pixel that goes to `place`, by Newton's method from the pixel `start`; `None` if it is not found, which is
-    /// usual far outside the picture. The pixel may lie outside.
+    /// usual far outside the photograph. The pixel may lie outside.
     pub fn source_of(&self, place: Vector2<f64>, start: Vector2<f64>) -> Option<Vector2<f64>> {
         /// Steps; each squares the error once it is in the right cell.
         const STEPS: usize = 12;

@@ -21,10 +21,10 @@ pub enum FocalSource {
     CameraModel,
 }
 
-/// A focal length known before the pictures are compared.
+/// A focal length known before the photographs are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FocalPrior {
-    /// Focal length in pixels of the full-resolution picture.
+    /// Focal length in pixels of the full-resolution photograph.
     pub focal_px: f64,
     /// Where it came from.
     pub source: FocalSource,
@@ -45,7 +45,7 @@ pub struct SourceImage {
     pub orientation: u8,
     /// Focal length from metadata, if believable.
     pub focal_prior: Option<FocalPrior>,
-    /// Camera make and model, trimmed, if stated; pictures of one camera share a focal length where none is stated.
+    /// Camera make and model, trimmed, if stated; photographs of one camera share a focal length where none is stated.
     pub camera_model: Option<String>,
 }
 
@@ -64,7 +64,7 @@ pub struct WorkingFrame {
 }
 
 impl WorkingFrame {
-    /// The frame of a picture of `width` x `height` full pixels, reduced to at most `max_area_px` working pixels.
+    /// The frame of a photograph of `width` x `height` full pixels, reduced to at most `max_area_px` working pixels.
     pub fn new(width: usize, height: usize, max_area_px: f64) -> Self {
         let (width, height) = (width as f64, height as f64);
         let working_from_full = (max_area_px / (width * height)).sqrt().min(1.0);
@@ -76,7 +76,7 @@ impl WorkingFrame {
         self.width.hypot(self.height)
     }
 
-    /// Whether (x, y) lies inside the picture, borders included.
+    /// Whether (x, y) lies inside the photograph, borders included.
     pub fn contains(&self, x: f64, y: f64) -> bool {
         (0.0..=self.width).contains(&x) && (0.0..=self.height).contains(&y)
     }

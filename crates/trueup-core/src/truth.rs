@@ -1,4 +1,4 @@
-//! What is exactly known of a set of pictures: the content of a `truth.json`.
+//! What is exactly known of a set of photographs: the content of a `truth.json`.
 
 use std::collections::BTreeSet;
 
@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::matrix_from_rows;
 use crate::{Error, Result};
 
-/// What is true of a set of pictures.
+/// What is true of a set of photographs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Truth {
-    /// What the pictures show, or what they were cut from.
+    /// What the photographs show, or what they were cut from.
     pub source: String,
-    /// One a picture, in order.
+    /// One a photograph, in order.
     pub images: Vec<ImageTruth>,
     /// What the world's vertical rests on; absent where it is exact, as in rendered scenes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -28,7 +28,7 @@ pub enum LevelOrigin {
     Given,
     /// Measured from the scene's vertical lines.
     Measured,
-    /// The vertical of the panorama the pictures were cut from, for want of a better one.
+    /// The vertical of the panorama the photographs were cut from, for want of a better one.
     Panorama,
 }
 
@@ -38,7 +38,7 @@ pub enum LevelOrigin {
 pub struct Level {
     /// Where it comes from.
     pub origin: LevelOrigin,
-    /// The direction "down" in the frame of the panorama that the pictures were cut from, a unit vector.
+    /// The direction "down" in the frame of the panorama that the photographs were cut from, a unit vector.
     pub down: [f64; 3],
     /// Angle by which the measurement's two components together err, one standard deviation, degrees.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -67,7 +67,7 @@ impl Level {
     }
 }
 
-/// What is true of one picture.
+/// What is true of one photograph.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ImageTruth {
     /// File name beside `truth.json`.
@@ -81,9 +81,9 @@ pub struct ImageTruth {
     /// Rows of the rotation from world to camera (x right, y down, z forward; world y is down).
     #[serde(rename = "R")]
     pub rotation: [[f64; 3]; 3],
-    /// Angle from the picture's down to the world's vertical, positive towards the right, degrees.
+    /// Angle from the photograph's down to the world's vertical, positive towards the right, degrees.
     pub gamma_deg: f64,
-    /// Center of projection in the world, metres; absent where all pictures share one.
+    /// Center of projection in the world, metres; absent where all photographs share one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub center: Option<[f64; 3]>,
     /// File name of the depth map beside `truth.json`, where one was asked for.
@@ -99,7 +99,7 @@ impl ImageTruth {
 }
 
 impl Truth {
-    /// The truth of the picture stored as `file` (a name without folders).
+    /// The truth of the photograph stored as `file` (a name without folders).
     pub fn of_file(&self, file: &str) -> Option<&ImageTruth> {
         self.images.iter().find(|image| image.file == file)
     }
@@ -107,13 +107,13 @@ impl Truth {
     /// Checks what a file may get wrong: sizes, focal lengths, angles, rotations that are none, names given twice.
     ///
     /// # Errors
-    /// [`Error::Input`] about `subject` with the first picture at fault.
+    /// [`Error::Input`] about `subject` with the first photograph at fault.
     pub fn check(&self, subject: &str) -> Result<()> {
         let wrong = |reason: String| {
-            Error::input(subject, reason, "Give the truth.json that was written together with the pictures.")
+            Error::input(subject, reason, "Give the truth.json that was written together with the photographs.")
         };
         if self.images.is_empty() {
-            return Err(wrong("it lists no pictures".to_owned()));
+            return Err(wrong("it lists no photographs".to_owned()));
         }
         let mut names = BTreeSet::new();
         for image in &self.images {
@@ -149,7 +149,7 @@ fn is_rotation(matrix: &Matrix3<f64>) -> bool {
 mod tests {
     use super::*;
 
-    fn picture(file: &str) -> ImageTruth {
+    fn photograph(file: &str) -> ImageTruth {
         ImageTruth {
             file: file.to_owned(),
             width: 4,
@@ -169,17 +169,17 @@ mod tests {
 
     #[test]
     fn good_truth_passes() {
-        assert_eq!(complaint(vec![picture("a.jpg"), picture("b.jpg")]), "");
+        assert_eq!(complaint(vec![photograph("a.jpg"), photograph("b.jpg")]), "");
     }
 
     #[test]
     fn every_fault_is_named() {
         let mirrored = [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        assert!(complaint(Vec::new()).contains("no pictures"));
-        assert!(complaint(vec![picture("a.jpg"), picture("a.jpg")]).contains("a.jpg is listed twice"));
-        assert!(complaint(vec![ImageTruth { width: 0, ..picture("a.jpg") }]).contains("no size"));
-        assert!(complaint(vec![ImageTruth { focal_px: -1.0, ..picture("a.jpg") }]).contains("focal length"));
-        assert!(complaint(vec![ImageTruth { gamma_deg: f64::NAN, ..picture("a.jpg") }]).contains("gamma_deg"));
-        assert!(complaint(vec![ImageTruth { rotation: mirrored, ..picture("a.jpg") }]).contains("no rotation"));
+        assert!(complaint(Vec::new()).contains("no photographs"));
+        assert!(complaint(vec![photograph("a.jpg"), photograph("a.jpg")]).contains("a.jpg is listed twice"));
+        assert!(complaint(vec![ImageTruth { width: 0, ..photograph("a.jpg") }]).contains("no size"));
+        assert!(complaint(vec![ImageTruth { focal_px: -1.0, ..photograph("a.jpg") }]).contains("focal length"));
+        assert!(complaint(vec![ImageTruth { gamma_deg: f64::NAN, ..photograph("a.jpg") }]).contains("gamma_deg"));
+        assert!(complaint(vec![ImageTruth { rotation: mirrored, ..photograph("a.jpg") }]).contains("no rotation"));
     }
 }

@@ -34,7 +34,7 @@ pub(crate) type Input = BufReader<File>;
 
 /// How a format is read. Nothing but `pixels` reads pixels.
 pub(crate) struct Reading {
-    /// Which pictures are read, for docs/formats.md.
+    /// Which photographs are read, for docs/formats.md.
     #[cfg_attr(not(test), expect(dead_code, reason = "for the page of formats, which a test compares"))]
     pub(crate) kinds: &'static str,
     /// Whether a file that begins with these bytes, [`SIGNATURE_BYTES`] or all of a shorter file, is of this format.

@@ -49,13 +49,13 @@ fn texture(Size { width, height }: Size) -> Raster<f32> {
 }
 
 fn run(bencher: Bencher, size: Size, max_points: usize, threads: usize) {
-    let image = texture(size);
+    let picture = texture(size);
     let options = FeatureOptions { max_points, ..FeatureOptions::default() };
     // Zero threads means as many as there are processors.
     let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(threads).build() else { return };
     bencher
         .counter(ItemsCount::new(size.width * size.height))
-        .bench_local(|| pool.install(|| detect(&image, &options, &StageContext::default())));
+        .bench_local(|| pool.install(|| detect(&picture, &options, &StageContext::default())));
 }
 
 #[divan::bench(args = SIZES)]

@@ -44,9 +44,9 @@ fn facades(Size { width, height }: Size) -> Raster<f32> {
 
 #[divan::bench(args = SIZES)]
 fn detect_lines(bencher: divan::Bencher, size: Size) {
-    let image = facades(size);
+    let picture = facades(size);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool of one thread");
-    let run = || detect(&image, &LineOptions::default(), &StageContext::default());
+    let run = || detect(&picture, &LineOptions::default(), &StageContext::default());
     bencher
         .counter(divan::counter::ItemsCount::new(size.width * size.height))
         .bench_local(|| pool.install(run).map(|found| found.len()));

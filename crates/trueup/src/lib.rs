@@ -41,8 +41,8 @@ pub use project::{
     Project, ProjectionRecord, hugin_project,
 };
 pub use report::evaluation::{
-    Evaluation, PhotographEvaluation, PixelEvaluation, compare_overlaps, evaluate, evaluate_pixels, read_truth,
-    scale_up_to,
+    Evaluation, PhotographEvaluation, PixelEvaluation, StatedEvaluation, compare_overlaps, evaluate, evaluate_pixels,
+    read_truth, scale_up_to,
 };
 pub use report::measures::{BentLine, LongLines, Measures, PhotographMeasures, ReprojectionMeasures, UprightMeasures};
 pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
@@ -60,4 +60,4 @@ pub use trueup_io::encode::{
     Metadata, OutputOptions, abandon_unfinished, check_place, write as write_picture, write_atomically,
     written_extensions,
 };
-pub use trueup_io::source::readable_formats;
+pub use trueup_io::source::{names_photograph, readable_formats};

@@ -2,7 +2,9 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod build_stamp;
 mod experiments;
+mod figures;
 mod measure;
 mod methods;
 mod paper;
@@ -13,7 +15,9 @@ mod random_directions;
 mod report;
 mod results;
 mod roc;
+mod rows;
 mod runner;
+mod set_work;
 mod sets;
 mod statistics;
 mod stopping;

@@ -6,30 +6,48 @@ use std::path::Path;
 use serde_json::Value;
 use trueup::{Error, Project, Result, StageContext, Truth};
 
-/// Everything that is measured of a panorama with known cameras: the numbers of [`trueup::evaluate`], the gate's, and the distance
-/// of matched points.
-/// `accepted`: the dominant directions guide; `guided`: they or the vertical alone do. What could not be measured is
-/// absent.
+/// Everything that is measured of a panorama: the gate's numbers, what the panorama's own lines and matches say, and with
+/// known cameras the numbers of [`trueup::evaluate`].
+///
+/// `accepted`: the dominant directions guide; `guided`: they or the vertical alone do. `lean_deg`, `estimated_gdic_deg` and
+/// `certain` are told by vertical lines, without the truth. What could not be measured is absent.
 ///
 /// # Errors
 /// Those of [`trueup::evaluate`].
-pub(crate) fn figures(project: &Project, truth: &Truth) -> Result<BTreeMap<String, f64>> {
-    let evaluation = trueup::evaluate(project, truth)?;
-    let value = serde_json::to_value(&evaluation)
-        .map_err(|error| Error::input("evaluation", error, "Report this as a defect."))?;
-    let mut figures = numbers_of(&value);
+pub(crate) fn figures(project: &Project, truth: Option<&Truth>) -> Result<BTreeMap<String, f64>> {
+    let mut figures = own_figures(project);
+    if let Some(truth) = truth {
+        let evaluation = trueup::evaluate(project, truth)?;
+        let value = serde_json::to_value(&evaluation)
+            .map_err(|error| Error::input("evaluation", error, "Report this as a defect."))?;
+        figures.extend(numbers_of(&value));
+    }
+    Ok(figures)
+}
+
+/// What a panorama says of itself.
+fn own_figures(project: &Project) -> BTreeMap<String, f64> {
     // Where the vertical alone guides, the clause that kept the other directions out is stated.
     let guided = project.manhattan.accepted;
     let accepted = guided && project.manhattan.failed_clause.is_none();
-    figures.insert("guided".to_owned(), f64::from(u8::from(guided)));
-    figures.insert("accepted".to_owned(), f64::from(u8::from(accepted)));
-    if let Some(divergence) = project.manhattan.divergence.filter(|divergence| divergence.is_finite()) {
-        figures.insert("divergence".to_owned(), divergence);
-    }
-    if let Some(reprojection) = project.measures.as_ref().and_then(|measures| measures.reprojection) {
-        figures.insert("match_rms_px".to_owned(), reprojection.rms_px);
-    }
-    Ok(figures)
+    let flag = |value: bool| Some(f64::from(u8::from(value)));
+    let measures = project.measures.as_ref();
+    let upright = measures.and_then(|measures| measures.upright);
+    let found = [
+        ("guided", flag(guided)),
+        ("accepted", flag(accepted)),
+        ("divergence", project.manhattan.divergence),
+        ("used", Some(project.used() as f64)),
+        ("given", Some(project.images.len() as f64)),
+        ("match_rms_px", measures.and_then(|measures| measures.reprojection).map(|found| found.rms_px)),
+        ("ld", measures.map(|measures| measures.ld)),
+        ("folds", measures.map(|measures| measures.folds as f64)),
+        ("estimated_gdic_deg", measures.and_then(|measures| measures.estimated_gdic_deg)),
+        ("lean_deg", upright.map(|upright| upright.mean_deg)),
+        ("certain", upright.map(|upright| upright.measured as f64)),
+    ];
+    let finite = |(name, value): (&str, Option<f64>)| Some((name.to_owned(), value.filter(|value| value.is_finite())?));
+    found.into_iter().filter_map(finite).collect()
 }
 
 /// How alike the photographs look where they overlap: the numbers of [`trueup::evaluate_pixels`].

@@ -1,6 +1,8 @@
 //! The methods that are compared, each a name and the options that make it.
 
-use crate::published_forms::{GSP_2D_PRIOR, GSP_3D_PRIOR, PUBLISHED_MESH, PUBLISHED_WARP_GRID};
+use crate::published_forms::{
+    GSP_2D_AS_PUBLISHED, GSP_2D_PRIOR, GSP_3D_AS_PUBLISHED, GSP_3D_PRIOR, PUBLISHED_WARP_GRID, VPG_AS_PUBLISHED,
+};
 
 /// A method of stitching.
 #[derive(Debug, Clone, Copy)]
@@ -29,7 +31,9 @@ impl ComparedMethod {
 pub(crate) enum Family {
     /// A similarity prior and the mesh: on whole sets, and in every table.
     Prior,
-    /// The default with more energies that draw overlaps together: on whole sets, in the table of alignment.
+    /// A prior in another reading of its publication: on whole sets, in the comparison of methods alone.
+    Reading,
+    /// VPG, by default or as published, with more energies that draw overlaps together: on whole sets, in the table of alignment.
     Alignment,
     /// Warps without a prior that cannot show a wide field of view: on reduced sets alone.
     Warp,
@@ -48,6 +52,9 @@ pub(crate) const LEVELLED: &str = "levelled";
 pub(crate) const VPG_PUBLISHED: &str = "vpg-published";
 pub(crate) const GSP_2D_PUBLISHED: &str = "gsp-2d-published";
 pub(crate) const GSP_3D_PUBLISHED: &str = "gsp-3d-published";
+/// VPG as published with what the paper adds for alignment.
+pub(crate) const VPG_LINES_PUBLISHED: &str = "vpg-published+lines";
+pub(crate) const VPG_PIXELS_PUBLISHED: &str = "vpg-published+photometric";
 
 /// The warps that the paper compares with.
 pub(crate) const APAP: &str = "apap";
@@ -56,7 +63,7 @@ pub(crate) const SPHP_FREE: &str = "sphp-free";
 pub(crate) const AANAP: &str = "aanap";
 
 /// Every method that exists.
-pub(crate) static METHODS: [ComparedMethod; 17] = [
+pub(crate) static METHODS: [ComparedMethod; 21] = [
     ComparedMethod {
         name: VPG,
         meaning: "vanishing points, level sphere (the default)",
@@ -88,24 +95,52 @@ pub(crate) static METHODS: [ComparedMethod; 17] = [
     },
     ComparedMethod {
         name: VPG_PUBLISHED,
-        meaning: "vanishing points, mesh as published",
-        options: &[&PUBLISHED_MESH],
+        meaning: "vanishing points, as published",
+        options: &[&VPG_AS_PUBLISHED],
         paper: Some("VPG"),
         family: Family::Prior,
     },
     ComparedMethod {
+        name: "vpg-literal",
+        meaning: "vanishing points, by the paper's equations as they are printed, errors included",
+        options: &[&["stitch.method=vpg-literal"]],
+        paper: None,
+        family: Family::Reading,
+    },
+    ComparedMethod {
+        name: "aanap-published",
+        meaning: "the least turns of AANAP as a prior, on the mesh as published",
+        options: &[&["stitch.method=aanap-published"]],
+        paper: None,
+        family: Family::Reading,
+    },
+    ComparedMethod {
         name: GSP_2D_PUBLISHED,
-        meaning: "global similarity prior in two dimensions, mesh as published",
-        options: &[&GSP_2D_PRIOR, &PUBLISHED_MESH],
+        meaning: "global similarity prior in two dimensions, as published",
+        options: &[&GSP_2D_AS_PUBLISHED],
         paper: Some("GSP-2D"),
         family: Family::Prior,
     },
     ComparedMethod {
         name: GSP_3D_PUBLISHED,
-        meaning: "global similarity prior in three dimensions, mesh as published",
-        options: &[&GSP_3D_PRIOR, &PUBLISHED_MESH],
+        meaning: "global similarity prior in three dimensions, as published",
+        options: &[&GSP_3D_AS_PUBLISHED],
         paper: Some("GSP-3D"),
         family: Family::Prior,
+    },
+    ComparedMethod {
+        name: VPG_LINES_PUBLISHED,
+        meaning: "as published, and matched lines drawn together and held straight",
+        options: &[&VPG_AS_PUBLISHED, &["stitch.align=lines"]],
+        paper: Some("VPG+DFW"),
+        family: Family::Alignment,
+    },
+    ComparedMethod {
+        name: VPG_PIXELS_PUBLISHED,
+        meaning: "as published, and the pixels of overlaps drawn together",
+        options: &[&VPG_AS_PUBLISHED, &["stitch.align=photometric"]],
+        paper: Some("VPG+GCPW"),
+        family: Family::Alignment,
     },
     ComparedMethod {
         name: "vpg+lines",
@@ -191,8 +226,24 @@ pub(crate) fn methods_of(family: Family) -> impl Iterator<Item = &'static Compar
 
 #[cfg(test)]
 mod tests {
+    use trueup::Method;
+
     use super::*;
     use crate::trial::Trial;
+
+    #[test]
+    fn every_method_of_the_stitcher_is_compared() {
+        let compared: Vec<Method> = METHODS
+            .iter()
+            .map(|one| {
+                Trial::new("test", "set", one.name, &one.overrides()).options().expect(one.name).align.stitch.method
+            })
+            .collect();
+        for name in Method::NAMES {
+            let declared = Method::named(name).expect("a declared name");
+            assert!(compared.contains(&declared), "{name}");
+        }
+    }
 
     #[test]
     fn every_method_has_valid_options_and_a_name_of_its_own() {
@@ -208,6 +259,8 @@ mod tests {
             VPG_PUBLISHED,
             GSP_2D_PUBLISHED,
             GSP_3D_PUBLISHED,
+            VPG_LINES_PUBLISHED,
+            VPG_PIXELS_PUBLISHED,
             APAP,
             SPHP,
             SPHP_FREE,

@@ -6,19 +6,22 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use trueup::{Error, Result, check_place, write_atomically};
+use trueup::{Error, Result, check_place};
 
 use crate::arguments::PaperArguments;
-use crate::experiments::{CLAIM_EXPERIMENTS, EXPERIMENTS, Experiment, runtime};
-use crate::report::csv;
+use crate::build_stamp::BuildStamp;
+use crate::experiments::{EXPERIMENTS, Experiment, QUICK_CLAIMS, QUICK_EXPERIMENTS, runtime};
+use crate::figures;
 use crate::report::document::{Block, Claim, Document, Section};
+use crate::report::overview::RunDescription;
 use crate::report::{self, overview};
 use crate::results::Results;
+use crate::rows;
 use crate::runner::Runner;
-use crate::sets::Catalogue;
+use crate::sets::{Catalogue, GivenFolders};
 use crate::stopping;
 use crate::store::ResultStore;
-use crate::trial::{Row, Trial, fingerprint};
+use crate::trial::{Row, Trial};
 
 /// Runs the experiments that were asked for.
 ///
@@ -35,17 +38,32 @@ pub(crate) fn run(arguments: &PaperArguments) -> Result<ExitCode> {
     let rows_file = arguments.out.join("rows.csv");
     check_place(&rows_file)?;
     report::check(&arguments.out)?;
-    let catalogue = match arguments.quick {
-        true => Catalogue::quick(),
-        false => Catalogue::full(arguments.panoramas.as_deref(), &arguments.truth_sets)?,
+    let folders = GivenFolders {
+        panoramas: arguments.panoramas.as_deref(),
+        truth_sets: &arguments.truth_sets,
+        photographs: &arguments.photographs,
+        vpg_data: arguments.vpg_data.as_deref(),
     };
-    let version = program_version()?;
-    let store = ResultStore::open(&arguments.out.join("rows.jsonl"), arguments.reuse.then_some(version.as_str()))?;
+    let catalogue = if arguments.quick { Catalogue::quick() } else { Catalogue::full(&folders)? };
+    let stamp = BuildStamp::of_this_program();
+    let store = store(arguments, &stamp)?;
     let cancel = stopping::cancel_token();
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = if arguments.jobs == 0 { cores } else { arguments.jobs };
     let threads = (cores / jobs).max(1);
-    let runner = Runner { data, store: &store, version, jobs, threads, cancel: &cancel, quiet: arguments.quiet };
+    let runner = Runner {
+        data,
+        scratch: arguments.out.join("scratch"),
+        store: &store,
+        version: stamp.identity(),
+        jobs,
+        threads,
+        cancel: &cancel,
+        quiet: arguments.quiet,
+    };
+    if !arguments.quiet {
+        eprintln!("trueup-bench: {}; {} results are there already", stamp.in_words(), store.count());
+    }
 
     let experiments: Vec<&Experiment> = EXPERIMENTS.iter().filter(|one| wanted.contains(&one.name)).collect();
     let mut trials: Vec<Trial> = Vec::new();
@@ -61,17 +79,44 @@ pub(crate) fn run(arguments: &PaperArguments) -> Result<ExitCode> {
     if wanted.contains(&runtime::NAME) {
         claims.extend(runtime::claims(&results));
     }
-    let document = document(&results, &experiments, &claims, &runner, &wanted);
+    if !arguments.quick && !stamp.is_clean() {
+        eprintln!("trueup-bench: not to be cited: the program was not built from a commit without changes");
+    }
+    let figures = match wanted.contains(&FIGURES) {
+        true => Some(figures::section(&runner, &catalogue, &arguments.out)?),
+        false => None,
+    };
+    let minutes = start.elapsed().as_secs_f64() / SECONDS_PER_MINUTE;
+    let made = RunDescription { stamp: &stamp, arguments, jobs, threads, minutes, resumed: store.resumed() };
+    let document = document(&results, &experiments, &claims, figures, &made, &wanted);
     report::write(&document, &arguments.out)?;
-    write_rows(&results.rows, &rows_file)?;
+    rows::write(&results.rows, &rows_file)?;
     Ok(conclude(arguments, &claims, start.elapsed().as_secs_f64()))
+}
+
+/// The name of the figures among the experiments.
+const FIGURES: &str = "figures";
+const SECONDS_PER_MINUTE: f64 = 60.0;
+
+/// The results that are there already, of this build, unless the run is to begin anew.
+fn store(arguments: &PaperArguments, stamp: &BuildStamp) -> Result<ResultStore> {
+    let path = arguments.out.join("rows.jsonl");
+    if arguments.anew {
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(Error::io("removing", &path, error));
+            }
+            _ => {}
+        }
+    }
+    ResultStore::open(&path, &stamp.identity())
 }
 
 /// The names of the experiments to be run.
 fn wanted(arguments: &PaperArguments) -> Result<Vec<&'static str>> {
-    let all: Vec<&'static str> = EXPERIMENTS.iter().map(|one| one.name).chain([runtime::NAME]).collect();
+    let all: Vec<&'static str> = EXPERIMENTS.iter().map(|one| one.name).chain([runtime::NAME, FIGURES]).collect();
     if arguments.only.is_empty() {
-        return Ok(if arguments.quick { CLAIM_EXPERIMENTS.to_vec() } else { all });
+        return Ok(if arguments.quick { QUICK_EXPERIMENTS.to_vec() } else { all });
     }
     let known = |name: &String| {
         all.iter().find(|known| *known == name).copied().ok_or_else(|| {
@@ -81,26 +126,21 @@ fn wanted(arguments: &PaperArguments) -> Result<Vec<&'static str>> {
     arguments.only.iter().map(known).collect()
 }
 
-/// The package's version and what stands for this build: results of another build are not taken for this one's.
-fn program_version() -> Result<String> {
-    let path = std::env::current_exe().map_err(|error| Error::io("finding", Path::new("trueup-bench"), error))?;
-    let bytes = fs::read(&path).map_err(|error| Error::io("reading", &path, error))?;
-    Ok(format!("{}+{}", env!("CARGO_PKG_VERSION"), &fingerprint(&bytes)[..8]))
-}
-
 fn document(
     results: &Results,
     experiments: &[&Experiment],
     claims: &[Claim],
-    runner: &Runner,
+    figures: Option<Section>,
+    made: &RunDescription,
     wanted: &[&str],
 ) -> Document {
-    let mut sections = vec![overview::summary(claims), overview::measures(), overview::sets(results.catalogue)];
+    let mut sections = vec![overview::summary(claims, made), overview::measures(), overview::sets(results.catalogue)];
+    sections.extend(figures);
     sections.extend(experiments.iter().map(|one| (one.section)(results)));
     if wanted.contains(&runtime::NAME) {
         sections.push(runtime::section(results));
     }
-    sections.push(overview::how_it_was_made(results, &runner.version, runner.jobs, runner.threads));
+    sections.push(overview::how_it_was_made(results, made));
     let failed: Vec<&Row> = results.rows.iter().filter(|row| row.measures.contains_key("failed")).collect();
     if !failed.is_empty() {
         let mut section = Section::new("failed", "Runs without a result");
@@ -123,34 +163,14 @@ fn document(
     }
 }
 
-/// Every result, a column per measure.
-fn write_rows(rows: &[Row], path: &Path) -> Result<()> {
-    let mut measures: Vec<&str> = rows.iter().flat_map(|row| row.measures.keys().map(String::as_str)).collect();
-    measures.sort_unstable();
-    measures.dedup();
-    let heads = ["experiment", "set", "variant", "seed", "reference", "pictures", "note", "version"];
-    let mut text = csv::line(heads.into_iter().chain(measures.iter().copied()));
-    let optional = |number: Option<usize>| number.map_or(String::new(), |number| number.to_string());
-    for Row { key, measures: found, note } in rows {
-        let (seed, reference, photographs) =
-            (key.seed.to_string(), optional(key.reference), optional(key.photograph_count));
-        let heads = [&key.experiment, &key.set, &key.variant, &seed, &reference, &photographs, note, &key.version];
-        let figures: Vec<String> =
-            measures.iter().map(|name| found.get(*name).map_or(String::new(), f64::to_string)).collect();
-        text.push_str(&csv::line(heads.into_iter().chain(&figures).map(String::as_str)));
-    }
-    write_atomically(path, text.as_bytes())
-}
-
-/// Prints what came of the claims, last of all; the exit status says whether all hold.
+/// Prints what came of the claims, last of all; the exit status says whether all that are expected to hold do.
 fn conclude(arguments: &PaperArguments, claims: &[Claim], seconds: f64) -> ExitCode {
     let tried: Vec<&Claim> = claims.iter().filter(|claim| claim.holds.is_some()).collect();
     let failed: Vec<&&Claim> = tried.iter().filter(|claim| claim.holds == Some(false)).collect();
-    let untried: Vec<&Claim> = claims.iter().filter(|claim| claim.holds.is_none()).collect();
     for claim in &failed {
         eprintln!("trueup-bench: does not hold: {} {}", claim.text, claim.evidence);
     }
-    for claim in &untried {
+    for claim in claims.iter().filter(|claim| claim.holds.is_none()) {
         eprintln!("trueup-bench: not tried for want of results: {}", claim.text);
     }
     println!("report: {}", arguments.out.join("report.html").display());
@@ -158,9 +178,74 @@ fn conclude(arguments: &PaperArguments, claims: &[Claim], seconds: f64) -> ExitC
     let command = if arguments.quick { "paper --quick" } else { "paper" };
     let holding = tried.len() - failed.len();
     println!("{command}: {holding} of {} claims hold ({}) in {seconds:.0} s", claims.len(), briefs.join(", "));
-    // A quick run that could not try a claim has shown nothing.
-    match failed.is_empty() && (!arguments.quick || untried.is_empty()) {
+    match as_expected(arguments, claims) {
         true => ExitCode::SUCCESS,
         false => ExitCode::FAILURE,
+    }
+}
+
+/// Whether every claim holds that is expected to: of a quick run those of [`QUICK_CLAIMS`], each of which must have been
+/// tried unless its experiment was not asked for; of others all that were tried.
+fn as_expected(arguments: &PaperArguments, claims: &[Claim]) -> bool {
+    if !arguments.quick {
+        return claims.iter().all(|claim| claim.holds != Some(false));
+    }
+    let holds = |id: &&str| match claims.iter().find(|claim| claim.id == *id) {
+        // A quick run that could not try a claim has shown nothing.
+        Some(claim) => claim.holds == Some(true),
+        None => !arguments.only.is_empty(),
+    };
+    QUICK_CLAIMS.iter().all(holds)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::arguments::{Arguments, BenchCommand};
+
+    fn quick(more: &[&str]) -> PaperArguments {
+        let words = ["trueup-bench", "paper", "--quick", "--out", "x"].into_iter().chain(more.iter().copied());
+        match Arguments::parse_from(words).command {
+            BenchCommand::Paper(arguments) => arguments,
+            BenchCommand::Quality(_) => unreachable!("paper was asked for"),
+        }
+    }
+
+    fn claim(id: &'static str, holds: Option<bool>) -> Claim {
+        let (text, evidence, brief) = (String::new(), String::new(), String::new());
+        Claim { id, text, holds, evidence, reason: "", brief }
+    }
+
+    #[test]
+    fn a_quick_run_fails_when_an_expected_claim_does_not_hold_or_was_not_tried() {
+        let with = |id: &str, holds| -> Vec<Claim> {
+            let known = QUICK_CLAIMS.map(|known| claim(known, if known == id { holds } else { Some(true) }));
+            known.into_iter().chain([claim("warps-distortion", Some(false))]).collect()
+        };
+        assert!(as_expected(&quick(&[]), &with("gate", Some(true))));
+        for holds in [Some(false), None] {
+            for id in QUICK_CLAIMS {
+                assert!(!as_expected(&quick(&[]), &with(id, holds)), "{id}");
+            }
+        }
+        let missing = &with("gate", Some(true))[1..];
+        assert!(!as_expected(&quick(&[]), missing) && as_expected(&quick(&["--only", "gate"]), missing));
+    }
+
+    #[test]
+    fn every_expected_claim_is_one_of_a_quick_experiment() {
+        let catalogue = Catalogue::quick();
+        let results = Results { catalogue: &catalogue, rows: Vec::new() };
+        let of_quick = EXPERIMENTS.iter().filter(|one| QUICK_EXPERIMENTS.contains(&one.name));
+        let ids: Vec<&str> = of_quick.flat_map(|one| (one.claims)(&results)).map(|claim| claim.id).collect();
+        assert!(QUICK_CLAIMS.iter().all(|id| ids.contains(id)), "{ids:?}");
+        let mut all: Vec<&str> =
+            EXPERIMENTS.iter().flat_map(|one| (one.claims)(&results)).map(|claim| claim.id).collect();
+        let count = all.len();
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), count, "a name for each claim");
     }
 }

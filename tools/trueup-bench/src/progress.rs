@@ -1,4 +1,4 @@
-//! How far the work is, on standard error: a bar on a terminal, a line per set elsewhere.
+//! How far the work is, on standard error: a bar on a terminal, elsewhere a line per set and now and then one between.
 
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -15,7 +15,12 @@ pub(crate) struct Tracker {
     done: AtomicU64,
     total: u64,
     start: Instant,
+    /// Seconds from the start to the last line.
+    told: AtomicU64,
 }
+
+/// Seconds without a line after which one says how far the work is.
+const SILENCE_SECONDS: u64 = 30;
 
 impl Tracker {
     /// A tracker of `total` steps; a quiet one prints nothing.
@@ -33,6 +38,7 @@ impl Tracker {
             done: AtomicU64::new(0),
             total,
             start: Instant::now(),
+            told: AtomicU64::new(0),
         }
     }
 
@@ -45,14 +51,25 @@ impl Tracker {
     pub(crate) fn advance(&self, steps: u64) {
         self.done.fetch_add(steps, Ordering::Relaxed);
         self.bar.inc(steps);
+        let (now, last) = (self.start.elapsed().as_secs(), self.told.load(Ordering::Relaxed));
+        let silent = !self.on_terminal && now >= last + SILENCE_SECONDS;
+        // Of several workers, one says it.
+        if silent && self.told.compare_exchange(last, now, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
+            self.tell("");
+        }
     }
 
     /// A part of the work is over: where there is no bar, a line says so.
     pub(crate) fn finished(&self, what: &str) {
         if !self.on_terminal {
-            let (done, seconds) = (self.done.load(Ordering::Relaxed), self.start.elapsed().as_secs_f64());
-            eprintln!("{}: {done} of {} after {seconds:.0} s ({what})", self.title, self.total);
+            self.told.store(self.start.elapsed().as_secs(), Ordering::Relaxed);
+            self.tell(&format!(" ({what})"));
         }
+    }
+
+    fn tell(&self, what: &str) {
+        let (done, seconds) = (self.done.load(Ordering::Relaxed), self.start.elapsed().as_secs_f64());
+        eprintln!("{}: {done} of {} after {seconds:.0} s{what}", self.title, self.total);
     }
 
     /// All is over.

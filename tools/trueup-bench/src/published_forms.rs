@@ -9,6 +9,13 @@ pub(crate) const PUBLISHED_MESH: [&str; 3] =
 /// The grid that the published warps deform: moving DLT, undivided cells.
 pub(crate) const PUBLISHED_WARP_GRID: [&str; 2] = ["mesh.subdivision=1", "match_points.model=moving-dlt"];
 
+/// VPG as published: prior and mesh.
+pub(crate) const VPG_AS_PUBLISHED: [&str; 1] = ["stitch.method=vpg-published"];
+
+/// GSP as published, in two and in three dimensions.
+pub(crate) const GSP_2D_AS_PUBLISHED: [&str; 1] = ["stitch.method=gsp-2d-published"];
+pub(crate) const GSP_3D_AS_PUBLISHED: [&str; 1] = ["stitch.method=gsp-3d-published"];
+
 /// The prior of GSP in two dimensions.
 pub(crate) const GSP_2D_PRIOR: [&str; 1] = ["stitch.method=gsp-2d"];
 

@@ -1,16 +1,16 @@
-//! Runs trials: set by set, sets in parallel, each photograph matched as seldom as possible.
+//! Runs trials: set by set, sets in parallel, each photograph measured and matched and each panorama aligned as seldom as
+//! possible.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::PoisonError;
 
-use trueup::{CancelToken, Error, Inputs, MatchedPhotographs, Reference, Result, Silent, StageContext, Stitcher};
+use trueup::{CancelToken, Error, PhotographCache, Result, Silent, StageContext};
 
-use crate::measure;
 use crate::progress::Tracker;
-use crate::random_directions::with_random_directions;
-use crate::sets::{ReadySet, SetSpec, central};
+use crate::set_work::{MatchingKey, Outcome, SetWork};
+use crate::sets::SetSpec;
 use crate::store::ResultStore;
 use crate::trial::{Row, Trial};
 
@@ -21,8 +21,10 @@ pub(crate) struct Runner<'a> {
     pub data: PathBuf,
     /// Where results go.
     pub store: &'a ResultStore,
-    /// Version and fingerprint of the program.
+    /// What stands for the build of the program.
     pub version: String,
+    /// Folder for what is measured of a set that is matched in several parts; empty before and after.
+    pub scratch: PathBuf,
     /// Sets that are worked on at a time.
     pub jobs: usize,
     /// Threads of each.
@@ -32,6 +34,9 @@ pub(crate) struct Runner<'a> {
     /// Whether progress is kept quiet.
     pub quiet: bool,
 }
+
+/// Bytes of a set's measured photographs and matched pairs that are kept while its trials run: far more than any needs.
+const SCRATCH_BYTES: f64 = 16e9;
 
 /// The trials of one set.
 #[derive(Debug)]
@@ -96,11 +101,18 @@ impl Runner<'_> {
     fn run_set(&self, set: &SetSpec, trials: &[&Trial], tracker: &Tracker) -> Result<Vec<Row>> {
         let context = StageContext::new(&Silent, self.cancel);
         let ready = set.prepare(&self.data, &context)?;
-        let mut matched: Option<(MatchingKey, Result<MatchedPhotographs>)> = None;
+        let mut work =
+            SetWork { cancel: self.cancel, ready: &ready, matched: None, known: BTreeMap::new(), cache: None };
         let mut rows = vec![None; trials.len()];
-        // Trials that share their matches lie side by side, so that one matching is held at a time.
+        // Trials that share their matches lie side by side, so that one matching is held at a time; those that compare
+        // pixels first, since the others can take their figures over.
         let mut order: Vec<usize> = (0..trials.len()).collect();
-        order.sort_by_key(|&index| MatchingKey::new(trials[index]));
+        order.sort_by_key(|&index| (MatchingKey::new(trials[index]), !trials[index].pixels));
+        let parts: BTreeSet<MatchingKey> = trials.iter().map(|trial| MatchingKey::new(trial)).collect();
+        let scratch = self.scratch.join(set.name.replace('/', "-"));
+        if parts.len() > 1 {
+            work.cache = Some(PhotographCache::open(&scratch, SCRATCH_BYTES)?);
+        }
         for index in order {
             context.check_cancelled()?;
             let trial = trials[index];
@@ -108,106 +120,21 @@ impl Runner<'_> {
             let row = match self.store.get(&key) {
                 Some(row) => row,
                 None => {
-                    let wanted = MatchingKey::new(trial);
-                    if matched.as_ref().is_none_or(|(known, _)| *known != wanted) {
-                        // The old one goes before the new one is made: both together may be large.
-                        drop(matched.take());
-                        let found = self.match_set(&ready, trial);
-                        matched = Some((wanted, found));
-                    }
-                    let outcome = match &matched {
-                        Some((_, Ok(photographs))) => self.align(&ready, photographs, trial),
-                        Some((_, Err(error))) => Err(repeated(error)),
-                        None => Err(Error::Cancelled),
-                    };
-                    let (measures, note) = match outcome {
-                        Ok(found) => found,
-                        Err(error @ (Error::Cancelled | Error::Options(_))) => return Err(error),
-                        Err(error @ Error::NotApplicable { .. }) => (outcome_alone("refused"), error.to_string()),
-                        Err(error) => (outcome_alone("failed"), error.to_string()),
-                    };
+                    let Outcome { measures, note } = work.outcome(trial)?;
                     let row = Row { key, measures, note };
                     self.store.add(row.clone())?;
                     row
                 }
             };
+            work.remember(trial, &row)?;
             rows[index] = Some(row);
             tracker.advance(1);
         }
+        if work.cache.take().is_some() {
+            // What is left there after a failure is overwritten or taken over by the next run of the same build.
+            std::fs::remove_dir_all(&scratch).map_err(|error| Error::io("clearing", &scratch, error))?;
+        }
         Ok(rows.into_iter().flatten().collect())
-    }
-
-    fn match_set(&self, ready: &ReadySet, trial: &Trial) -> Result<MatchedPhotographs> {
-        let unseeded = Trial { seed: 0, overrides: trial.matching_overrides(), ..trial.clone() };
-        let options = unseeded.options()?;
-        let context = StageContext::new(&Silent, self.cancel);
-        Stitcher::new(&options, &context)
-            .match_photographs(&inputs_of(ready, trial))
-            .map(MatchedPhotographs::remembering)
-    }
-
-    fn align(
-        &self,
-        ready: &ReadySet,
-        photographs: &MatchedPhotographs,
-        trial: &Trial,
-    ) -> Result<(BTreeMap<String, f64>, String)> {
-        let options = trial.options()?;
-        let context = StageContext::new(&Silent, self.cancel).seeded(trial.seed);
-        let (stitcher, inputs) = (Stitcher::new(&options, &context), inputs_of(ready, trial));
-        let mut aligned = stitcher.align_matched(photographs, &inputs)?;
-        if let Some(found) = aligned.alignments.first().filter(|_| trial.random_directions > 0.0) {
-            let directions = with_random_directions(found.directions(), trial.random_directions, &context);
-            aligned = stitcher.align_along(photographs, &inputs, &directions)?;
-        }
-        let first = aligned.alignments.into_iter().next();
-        let project = first.ok_or_else(|| Error::input(&trial.set, "nothing was aligned", "Look at the set."))?.project;
-        let mut figures = measure::figures(&project, &ready.truth)?;
-        if trial.pixels {
-            figures.extend(measure::pixel_figures(&project, &context)?);
-        }
-        Ok((figures, project.manhattan.failed_clause.unwrap_or_default()))
-    }
-}
-
-/// What decides whether two trials can share their matches.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-struct MatchingKey {
-    photograph_count: Option<usize>,
-    central: bool,
-    overrides: Vec<String>,
-}
-
-impl MatchingKey {
-    fn new(trial: &Trial) -> Self {
-        Self { photograph_count: trial.photograph_count, central: trial.central, overrides: trial.matching_overrides() }
-    }
-}
-
-fn inputs_of(ready: &ReadySet, trial: &Trial) -> Inputs {
-    let count = trial.photograph_count.unwrap_or(ready.photographs.len());
-    if let Some((middle, around)) = central(&ready.truth, count).filter(|_| trial.central) {
-        let mut inputs = Inputs::new(around.iter().map(|&position| ready.photographs[position].clone()));
-        inputs.reference = Reference::Named(ready.photographs[middle].clone());
-        return inputs;
-    }
-    let mut inputs = Inputs::new(ready.photographs.iter().take(count).cloned());
-    if let Some(photograph) = trial.reference.and_then(|reference| ready.photographs.get(reference)) {
-        inputs.reference = Reference::Named(photograph.clone());
-    }
-    inputs
-}
-
-/// In place of figures: what became of a run that has none.
-fn outcome_alone(name: &str) -> BTreeMap<String, f64> {
-    BTreeMap::from([(name.to_owned(), 1.0)])
-}
-
-/// The same error once more, for the next trial that shares the failed matching.
-fn repeated(error: &Error) -> Error {
-    match error {
-        Error::Cancelled => Error::Cancelled,
-        other => Error::input("matching", other.to_string().trim_end_matches('.'), ""),
     }
 }
 
@@ -232,7 +159,11 @@ mod tests {
     fn small_set() -> SetSpec {
         let scene = SceneOptions { seed: 3, light: LightQuality::Fast, ..SceneOptions::default() };
         let rig = RigOptions { seed: 3, pictures: 2, width: 320, height: 240, ..RigOptions::default() };
-        SetSpec::rendered("test/small".to_owned(), Some(true), Recipe { scene, rig, quality: Quality::Preview })
+        SetSpec::rendered(
+            "test/small".to_owned(),
+            Some(true),
+            Recipe { scene, rig, quality: Quality::Preview, second_roll_deg: 0.0 },
+        )
     }
 
     #[test]
@@ -245,11 +176,13 @@ mod tests {
             Trial::new("test", &set.name, "default", &[]),
             Trial::new("test", &set.name, "small working copy", &["working.pixels=50000"]),
             Trial { seed: 1, random_directions: 0.5, ..Trial::new("test", &set.name, "default", &[]) },
+            Trial::new("another", &set.name, "the same", &[]),
         ];
         let run = || {
-            let store = ResultStore::open(&path, None).expect("opens");
+            let store = ResultStore::open(&path, "1").expect("opens");
             let runner = Runner {
                 data: folder.path().join("data"),
+                scratch: folder.path().join("scratch"),
                 store: &store,
                 version: "1".to_owned(),
                 jobs: 2,
@@ -260,16 +193,19 @@ mod tests {
             runner.run(&[&set], &trials).expect("runs")
         };
         let (first, stored) = (run(), std::fs::read_to_string(&path).expect("rows"));
-        assert_eq!(stored.lines().count(), 3);
+        assert_eq!(stored.lines().count(), 4);
         let order: Vec<(&str, u64)> = first.iter().map(|row| (row.key.variant.as_str(), row.key.seed)).collect();
-        assert_eq!(order, [("default", 0), ("small working copy", 0), ("default", 1)]);
+        assert_eq!(order, [("default", 0), ("small working copy", 0), ("default", 1), ("the same", 0)]);
+        assert_eq!((&first[3].measures, &first[3].note), (&first[0].measures, &first[0].note));
+        assert!(!folder.path().join("scratch/test-small").exists());
         assert_eq!((first[0].measure("used"), first[2].measure("used")), (Some(2.0), Some(2.0)), "{first:?}");
         assert_eq!(run(), first);
         assert_eq!(std::fs::read_to_string(&path).expect("rows"), stored);
         cancel.cancel();
-        let store = ResultStore::open(&path, None).expect("opens");
+        let store = ResultStore::open(&path, "1").expect("opens");
         let runner = Runner {
             data: folder.path().join("data"),
+            scratch: folder.path().join("scratch"),
             store: &store,
             version: "2".to_owned(),
             jobs: 1,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use serde::{Deserialize, Serialize};
-use trueup::{Phase, Result, StitchOptions};
+use trueup::{Error, Phase, Result, StitchOptions};
 
 /// What is to be run.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,6 +70,18 @@ impl Trial {
             tables.iter().find(named).and_then(|(_, phase)| *phase).is_some_and(|phase| phase <= Phase::Match)
         };
         self.overrides.iter().filter(concerns).cloned().collect()
+    }
+
+    /// Everything that decides the figures on a set, as text: two trials of different experiments with the same are one
+    /// piece of work.
+    ///
+    /// # Errors
+    /// Those of [`Self::options`].
+    pub(crate) fn work(&self) -> Result<String> {
+        let options = serde_json::to_string(&self.options()?)
+            .map_err(|error| Error::input("options", error, "Report this as a defect."))?;
+        let random = (self.random_directions > 0.0).then_some((self.random_directions, self.seed));
+        Ok(format!("{options} {random:?} {:?} {:?} {}", self.reference, self.photograph_count, self.central))
     }
 
     /// What identifies the run. `set_fingerprint` stands for the set's content.
@@ -157,6 +169,16 @@ mod tests {
             &["mesh.cell_px=20", "matching.max_distance_ratio=0.7", "lines.min_length_px=30", "stitch.align=points"],
         );
         assert_eq!(trial.matching_overrides(), ["matching.max_distance_ratio=0.7", "lines.min_length_px=30"]);
+    }
+
+    #[test]
+    fn trials_that_come_to_the_same_options_are_one_piece_of_work() {
+        let trial = |variant, overrides| Trial::new("test", "01", variant, overrides).work().expect("valid");
+        let plain = trial("plain", &[]);
+        assert_eq!(trial("the default, named", &["similarity.rejection=0.24"]), plain);
+        assert_ne!(trial("plain", &["similarity.rejection=0.25"]), plain);
+        let other = Trial { reference: Some(0), ..Trial::new("test", "01", "plain", &[]) };
+        assert_ne!(other.work().expect("valid"), plain);
     }
 
     #[test]

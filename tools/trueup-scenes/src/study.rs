@@ -14,15 +14,15 @@ trueup_core::choice! {
         Twins = "twins",
         /// Sets 1 to 4 with one vertical and horizontals at free angles.
         Mixed = "mixed",
-        /// Sets 1 to 65 for statistics: small, with dominant directions.
+        /// Sets 1 to 130 for statistics: small, with dominant directions.
         GateManhattan = "gate-manhattan",
-        /// Sets 1 to 65 for statistics: small, without dominant directions.
+        /// Sets 1 to 130 for statistics: small, without dominant directions.
         GateRandom = "gate-random",
     }
 }
 
 /// Sets of each kind for statistics of the gate.
-pub(crate) const GATE_SETS: usize = 65;
+pub(crate) const GATE_SETS: usize = 130;
 
 impl SetKind {
     /// How many sets there are; they are numbered from 1.

@@ -10,14 +10,20 @@
 use faer::linalg::solvers::Solve;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
-use trueup_core::camera::Camera;
+use trueup_core::camera::{Camera, INTRINSICS};
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
 use trueup_core::{Result, StageContext};
 
+use super::intrinsics::{FOCAL, IntrinsicsModel, LensState, standard_deviation};
 use super::observations::{Observations, PairObservations};
-use super::pair_cost::{LOCAL, PairTerm, pair_cost};
+use super::pair_cost::{LENS_LOCAL, PINHOLE_LOCAL, PairTerm, pair_cost};
 use super::prior::CameraPrior;
 
+/// Distance in working pixels beyond which the influence of a match grows only linearly, in the first pass: the start
+/// values are that far off.
+pub(super) const COARSE_HUBER_PX: f64 = 20.0;
+/// The same in the final pass, working pixels: a few times the error of a match.
+pub(super) const FINE_HUBER_PX: f64 = 2.0;
 /// Most iterations of one pass; it settles long before, unless the data contradict themselves.
 const MAX_ITERATIONS: usize = 100;
 /// Damping at the start of a pass, relative to the diagonal of the normal matrix.
@@ -37,39 +43,17 @@ const STOPPED_SHORT: f64 = 1.001;
 pub(super) struct Parameters {
     pub focal_px: Vec<f64>,
     pub rotations: Vec<Matrix3<f64>>,
+    pub lenses: Vec<LensState>,
 }
 
 impl Parameters {
     /// The cameras of this state.
     pub(super) fn cameras(&self, priors: &[CameraPrior]) -> Vec<Camera> {
-        (0..priors.len()).map(|k| priors[k].camera(self.focal_px[k], &self.rotations[k])).collect()
-    }
-}
-
-/// Which unknown scales which photograph's focal length; `None` holds it fixed.
-pub(super) struct FocalModel {
-    pub parameter_of: Vec<Option<usize>>,
-    pub parameters: usize,
-}
-
-impl FocalModel {
-    /// One unknown per camera group.
-    pub(super) fn shared(priors: &[CameraPrior]) -> Self {
-        let mut groups: Vec<usize> = priors.iter().map(|prior| prior.camera_group).collect();
-        groups.sort_unstable();
-        groups.dedup();
-        let parameter_of = priors.iter().map(|prior| groups.binary_search(&prior.camera_group).ok()).collect();
-        Self { parameter_of, parameters: groups.len() }
+        (0..priors.len()).map(|k| self.lenses[k].on(priors[k].camera(self.focal_px[k], &self.rotations[k]))).collect()
     }
 
-    /// One unknown per photograph.
-    pub(super) fn per_photograph(photographs: usize) -> Self {
-        Self { parameter_of: (0..photographs).map(Some).collect(), parameters: photographs }
-    }
-
-    /// No unknowns: focal lengths stay as they are.
-    pub(super) fn fixed(photographs: usize) -> Self {
-        Self { parameter_of: vec![None; photographs], parameters: 0 }
+    fn has_lens(&self) -> bool {
+        self.lenses.iter().any(|lens| !lens.is_pinhole())
     }
 }
 
@@ -90,7 +74,7 @@ impl BundleAdjustment<'_> {
     pub(super) fn minimize(
         &self,
         mut parameters: Parameters,
-        model: &FocalModel,
+        model: &IntrinsicsModel,
         huber_px: f64,
         context: &StageContext,
     ) -> Result<Parameters> {
@@ -131,57 +115,89 @@ impl BundleAdjustment<'_> {
             })
     }
 
-    fn unknowns(&self, model: &FocalModel) -> usize {
+    pub(super) fn unknowns(&self, model: &IntrinsicsModel) -> usize {
         3 * self.priors.len() + model.parameters
     }
 
     /// Columns of a pair's local unknowns in the global system; `None` is held fixed. The reference photograph's
     /// rotation is fixed: it is the gauge.
-    fn columns(&self, pair: &PairObservations, model: &FocalModel) -> [Option<usize>; LOCAL] {
+    pub(super) fn columns<const LOCAL: usize>(
+        &self,
+        pair: &PairObservations,
+        model: &IntrinsicsModel,
+    ) -> [Option<usize>; LOCAL] {
         let rotation = |photograph: usize, axis: usize| (photograph != self.reference).then_some(3 * photograph + axis);
-        let focal = |photograph: usize| model.parameter_of[photograph].map(|k| 3 * self.priors.len() + k);
+        let of_each = (LOCAL - 6) / 2;
         std::array::from_fn(|local| match local {
             0..3 => rotation(pair.a, local),
             3..6 => rotation(pair.b, local - 3),
-            6 => focal(pair.a),
-            _ => focal(pair.b),
+            _ if local < 6 + of_each => self.column(model, pair.a, local - 6),
+            _ => self.column(model, pair.b, local - 6 - of_each),
         })
     }
 
-    /// Pull of the focal lengths towards their start values: (ln f - ln f0) / sd, one per photograph with a free one.
-    fn focal_prior(&self, parameters: &Parameters, model: &FocalModel) -> Vec<(usize, f64, f64)> {
-        (0..self.priors.len())
-            .filter_map(|k| {
-                let column = 3 * self.priors.len() + model.parameter_of[k]?;
-                let known = self.priors[k].focal_px.is_some();
-                let sd = if known { self.known_focal_sd } else { ESTIMATED_FOCAL_SD };
-                Some((column, (parameters.focal_px[k] / self.start_focal_px[k]).ln() / sd, 1.0 / sd))
-            })
-            .collect()
+    /// Column of a photograph's intrinsic unknown; `None` is held fixed.
+    pub(super) fn column(&self, model: &IntrinsicsModel, photograph: usize, intrinsic: usize) -> Option<usize> {
+        model.parameters_of[photograph][intrinsic].map(|parameter| 3 * self.priors.len() + parameter)
     }
 
-    fn cost(&self, parameters: &Parameters, model: &FocalModel, huber_px: f64) -> f64 {
+    /// Pull of the focal lengths towards their start values, (ln f - ln f0) / sd, and of lens terms towards 0, one per
+    /// photograph with a free one.
+    fn pulls(&self, parameters: &Parameters, model: &IntrinsicsModel) -> Vec<Pull> {
+        let of_photograph = |k: usize| {
+            let known = self.priors[k].focal_px.is_some();
+            let sd = if known { self.known_focal_sd } else { ESTIMATED_FOCAL_SD };
+            let stretch = (parameters.focal_px[k] / self.start_focal_px[k]).ln();
+            let focal = self.column(model, k, FOCAL).map(|column| Pull::new(column, stretch, sd));
+            let lens = (FOCAL + 1..INTRINSICS).filter_map(move |intrinsic| {
+                let sd = standard_deviation(intrinsic, &self.priors[k].frame);
+                Some(Pull::new(self.column(model, k, intrinsic)?, parameters.lenses[k].term(intrinsic), sd))
+            });
+            focal.into_iter().chain(lens)
+        };
+        (0..self.priors.len()).flat_map(of_photograph).collect()
+    }
+
+    /// The quadratic model of every pair.
+    pub(super) fn pair_terms<const LOCAL: usize>(&self, cameras: &[Camera], huber_px: f64) -> Vec<PairTerm<LOCAL>> {
+        self.observations.pairs.par_iter().map(|pair| PairTerm::new(cameras, pair, huber_px)).collect()
+    }
+
+    /// The sum of squares that is minimized.
+    pub(super) fn cost(&self, parameters: &Parameters, model: &IntrinsicsModel, huber_px: f64) -> f64 {
         let cameras = parameters.cameras(self.priors);
         let costs: Vec<f64> =
             self.observations.pairs.par_iter().map(|pair| pair_cost(&cameras, pair, huber_px)).collect();
-        let prior: f64 = self.focal_prior(parameters, model).iter().map(|(_, residual, _)| residual * residual).sum();
+        let prior: f64 = self.pulls(parameters, model).iter().map(|pull| pull.residual * pull.residual).sum();
         costs.iter().sum::<f64>() + prior
     }
 
-    fn normal_equations(
+    /// Those of the data and the pulls.
+    pub(super) fn normal_equations(
         &self,
         parameters: &Parameters,
-        model: &FocalModel,
+        model: &IntrinsicsModel,
+        huber_px: f64,
+    ) -> (faer::Mat<f64>, faer::Mat<f64>) {
+        match parameters.has_lens() || model.has_lens() {
+            false => self.equations::<PINHOLE_LOCAL>(parameters, model, huber_px),
+            true => self.equations::<LENS_LOCAL>(parameters, model, huber_px),
+        }
+    }
+
+    fn equations<const LOCAL: usize>(
+        &self,
+        parameters: &Parameters,
+        model: &IntrinsicsModel,
         huber_px: f64,
     ) -> (faer::Mat<f64>, faer::Mat<f64>) {
         let cameras = parameters.cameras(self.priors);
         let unknowns = self.unknowns(model);
         let mut normal = faer::Mat::<f64>::zeros(unknowns, unknowns);
         let mut gradient = faer::Mat::<f64>::zeros(unknowns, 1);
-        let terms: Vec<PairTerm> =
-            self.observations.pairs.par_iter().map(|pair| PairTerm::new(&cameras, pair, huber_px)).collect();
+        let terms: Vec<PairTerm<LOCAL>> = self.pair_terms(&cameras, huber_px);
         for (pair, term) in self.observations.pairs.iter().zip(&terms) {
-            let columns = self.columns(pair, model);
+            let columns: [Option<usize>; LOCAL] = self.columns(pair, model);
             for (local_row, row) in columns.iter().enumerate() {
                 let Some(row) = *row else { continue };
                 gradient[(row, 0)] += term.gradient[local_row];
@@ -192,24 +208,43 @@ impl BundleAdjustment<'_> {
                 }
             }
         }
-        for (column, residual, slope) in self.focal_prior(parameters, model) {
+        for Pull { column, residual, slope } in self.pulls(parameters, model) {
             normal[(column, column)] += slope * slope;
             gradient[(column, 0)] += slope * residual;
         }
         (normal, gradient)
     }
 
-    fn moved(&self, parameters: &Parameters, model: &FocalModel, step: &faer::Mat<f64>) -> Parameters {
+    fn moved(&self, parameters: &Parameters, model: &IntrinsicsModel, step: &faer::Mat<f64>) -> Parameters {
         let mut moved = parameters.clone();
         for k in 0..self.priors.len() {
             let turn = Vector3::new(step[(3 * k, 0)], step[(3 * k + 1, 0)], step[(3 * k + 2, 0)]);
             moved.rotations[k] = nearest_rotation(&(exp_rotation(&turn) * parameters.rotations[k]));
-            if let Some(parameter) = model.parameter_of[k] {
-                let stretched = parameters.focal_px[k] * step[(3 * self.priors.len() + parameter, 0)].exp();
+            if let Some(column) = self.column(model, k, FOCAL) {
+                let stretched = parameters.focal_px[k] * step[(column, 0)].exp();
                 moved.focal_px[k] = self.priors[k].believable_focal_px(stretched);
+            }
+            for intrinsic in FOCAL + 1..INTRINSICS {
+                if let Some(column) = self.column(model, k, intrinsic) {
+                    moved.lenses[k].add(intrinsic, step[(column, 0)]);
+                }
             }
         }
         moved
+    }
+}
+
+/// A residual that holds one unknown near where it is expected.
+struct Pull {
+    column: usize,
+    residual: f64,
+    /// Its derivative by the unknown.
+    slope: f64,
+}
+
+impl Pull {
+    fn new(column: usize, distance: f64, sd: f64) -> Self {
+        Self { column, residual: distance / sd, slope: 1.0 / sd }
     }
 }
 
@@ -227,48 +262,5 @@ fn solve_damped(normal: &faer::Mat<f64>, gradient: &faer::Mat<f64>, damping: f64
 }
 
 #[cfg(test)]
-mod tests {
-    use trueup_core::matches::PointMatch;
-    use trueup_core::source::WorkingFrame;
-
-    use super::*;
-
-    /// The analytic gradient of the quadratic cost must be that of finite differences.
-    #[test]
-    fn gradient_matches_finite_differences() {
-        let frame = WorkingFrame { width: 640.0, height: 480.0, working_from_full: 1.0 };
-        let priors: Vec<CameraPrior> =
-            [0, 1].map(|group| CameraPrior { frame, focal_px: None, camera_group: group }).to_vec();
-        let matches = vec![
-            PointMatch { in_a: [400.0, 200.0], in_b: [180.0, 260.0] },
-            PointMatch { in_a: [520.0, 410.0], in_b: [300.0, 440.0] },
-        ];
-        let observations = Observations { pairs: vec![PairObservations { a: 0, b: 1, matches }] };
-        let problem = BundleAdjustment {
-            priors: &priors,
-            observations: &observations,
-            start_focal_px: vec![500.0, 520.0],
-            reference: 0,
-            known_focal_sd: 0.1,
-        };
-        let model = FocalModel::per_photograph(2);
-        let at = Parameters {
-            focal_px: vec![510.0, 505.0],
-            rotations: vec![Matrix3::identity(), exp_rotation(&Vector3::new(0.05, -0.35, 0.1))],
-        };
-        let huge = 1e9;
-        let (_, gradient) = problem.normal_equations(&at, &model, huge);
-        for unknown in 3..problem.unknowns(&model) {
-            let shifted = |amount: f64| {
-                let mut step = faer::Mat::<f64>::zeros(problem.unknowns(&model), 1);
-                step[(unknown, 0)] = amount;
-                problem.cost(&problem.moved(&at, &model, &step), &model, huge)
-            };
-            let step = 1e-6;
-            let numeric = (shifted(step) - shifted(-step)) / (2.0 * step);
-            // The cost is the sum of squares; its gradient is twice J^T r.
-            let analytic = 2.0 * gradient[(unknown, 0)];
-            assert!((numeric - analytic).abs() < 1e-4 * (1.0 + analytic.abs()), "{unknown}: {numeric} {analytic}");
-        }
-    }
-}
+#[path = "bundle_tests.rs"]
+mod tests;

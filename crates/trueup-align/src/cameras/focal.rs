@@ -1,9 +1,11 @@
-//! Start values for focal lengths.
+//! Start values for focal lengths and lenses.
 
 use nalgebra::{Matrix3, Vector2};
 use trueup_core::geometry::Homography;
+use trueup_core::lens::{TriedLens, tried_lenses};
 use trueup_core::matches::PairMatches;
 
+use super::intrinsics::{InitialIntrinsics, LensState};
 use super::observations::{Observations, PairObservations};
 use super::prior::CameraPrior;
 use super::rotations::fit_rotation;
@@ -81,19 +83,56 @@ fn better_root(first: Quotient, second: Quotient) -> Option<f64> {
     }
 }
 
+/// Mean error of the matches, working pixels, above which another lens is looked for: more than parallax mostly leaves.
+const MISFIT_PX: f64 = 4.0;
+/// Share of a pinhole's errors that another lens may leave to be believed.
+const LENS_SHARE: f64 = 0.6;
+
+/// A focal length for every photograph, and a lens for all.
+pub(super) fn initial_intrinsics(
+    priors: &[CameraPrior],
+    pairs: &[&PairMatches],
+    observations: &Observations,
+) -> InitialIntrinsics {
+    let focal_px = initial_focal_lengths(priors, pairs, observations);
+    let pinhole = InitialIntrinsics { focal_px, lens: LensState::default() };
+    let matches: usize = observations.pairs.iter().map(|pair| pair.matches.len()).sum();
+    let cost = |start: &InitialIntrinsics| -> f64 {
+        observations.pairs.iter().map(|pair| rotation_cost(priors, &start.focal_px, &start.lens, pair)).sum()
+    };
+    let by_pinhole = cost(&pinhole);
+    if by_pinhole <= MISFIT_PX * matches as f64 {
+        return pinhole;
+    }
+    let known = known_focal_lengths(priors);
+    let tried = tried_lenses().into_iter().map(|TriedLens { lens, relative_focal }| {
+        let focal_px = priors.iter().zip(&known).map(|(prior, known)| {
+            known.unwrap_or_else(|| {
+                prior.believable_focal_px(relative_focal * prior.frame.width.max(prior.frame.height))
+            })
+        });
+        let lens = LensState { terms: lens.terms(), ..LensState::default() };
+        let start = InitialIntrinsics { focal_px: focal_px.collect(), lens };
+        (cost(&start), start)
+    });
+    let best = tried.min_by(|one, other| one.0.total_cmp(&other.0));
+    best.filter(|(cost, _)| *cost < LENS_SHARE * by_pinhole).map_or(pinhole, |(_, start)| start)
+}
+
+/// The focal lengths that metadata state.
+fn known_focal_lengths(priors: &[CameraPrior]) -> Vec<Option<f64>> {
+    priors
+        .iter()
+        .map(|prior| prior.focal_px.filter(|focal| focal.is_finite()).map(|focal| prior.believable_focal_px(focal)))
+        .collect()
+}
+
 /// A focal length for every photograph: from metadata where there is any, else from the photographs.
 ///
 /// Photographs without metadata get a common value (relative to their diagonal), found by trying a range of values and
 /// the homographies' own estimates and keeping the one under which rotations explain the matches best.
-pub(super) fn initial_focal_lengths(
-    priors: &[CameraPrior],
-    pairs: &[&PairMatches],
-    observations: &Observations,
-) -> Vec<f64> {
-    let known: Vec<Option<f64>> = priors
-        .iter()
-        .map(|prior| prior.focal_px.filter(|focal| focal.is_finite()).map(|focal| prior.believable_focal_px(focal)))
-        .collect();
+fn initial_focal_lengths(priors: &[CameraPrior], pairs: &[&PairMatches], observations: &Observations) -> Vec<f64> {
+    let known = known_focal_lengths(priors);
     let relative = common_relative_focal(priors, pairs, observations, &known);
     filled_in(priors, &known, relative)
 }
@@ -121,7 +160,7 @@ fn common_relative_focal(
     candidates.extend(median_from_homographies(priors, pairs));
     let cost = |relative: f64| -> f64 {
         let focal = filled_in(priors, known, relative);
-        observations.pairs.iter().map(|pair| rotation_cost(priors, &focal, pair)).sum()
+        observations.pairs.iter().map(|pair| rotation_cost(priors, &focal, &LensState::default(), pair)).sum()
     };
     let costs: Vec<f64> = candidates.iter().map(|&candidate| cost(candidate)).collect();
     let best = (0..candidates.len()).min_by(|&one, &other| costs[one].total_cmp(&costs[other]));
@@ -149,13 +188,13 @@ fn median_from_homographies(priors: &[CameraPrior], pairs: &[&PairMatches]) -> O
 }
 
 /// How badly the best rotation explains a pair: Huber-like sum of transfer errors over a subset of the matches.
-fn rotation_cost(priors: &[CameraPrior], focal: &[f64], pair: &PairObservations) -> f64 {
+fn rotation_cost(priors: &[CameraPrior], focal: &[f64], lens: &LensState, pair: &PairObservations) -> f64 {
     let step = pair.matches.len().div_ceil(SAMPLE).max(1);
     let sample: Vec<_> = pair.matches.iter().copied().step_by(step).collect();
     let (prior_a, prior_b) = (&priors[pair.a], &priors[pair.b]);
-    let camera_a = prior_a.unturned_camera(focal[pair.a]);
-    let rotation = fit_rotation(&camera_a, &prior_b.unturned_camera(focal[pair.b]), &sample);
-    let turned = prior_b.camera(focal[pair.b], &rotation);
+    let camera_a = lens.on(prior_a.unturned_camera(focal[pair.a]));
+    let mut turned = lens.on(prior_b.unturned_camera(focal[pair.b]));
+    turned.set_rotation(&fit_rotation(&camera_a, &turned, &sample));
     let sum: f64 = sample
         .iter()
         .map(|one| {

@@ -1,13 +1,17 @@
-//! Focal lengths and rotations of the photographs of one component: the paper's R_i.
+//! Focal lengths, lenses and rotations of the photographs of one component: the paper's R_i.
 //!
 //! Start values come from metadata, from the pair homographies and from a search over a common focal length (`focal`);
 //! rotations from the spanning tree and from averaging over all edges (`rotations`); both are refined together by
-//! bundle adjustment (`bundle`), from coarse to fine (`refinement`); pairs that then contradict the others are set
+//! bundle adjustment (`bundle`), from coarse to fine (`refinement`). Terms of the lenses are added as long as the matches are
+//! sure of them (`lenses`, `lens_evidence`): a pinhole stays one. Pairs that then contradict the others are set
 //! aside (`contradictions`).
 
 mod bundle;
 mod contradictions;
 mod focal;
+mod intrinsics;
+mod lens_evidence;
+mod lenses;
 mod observations;
 mod options;
 mod pair_cost;
@@ -24,6 +28,7 @@ use trueup_core::{Result, StageContext};
 use crate::stitch_graph::{GraphEdge, StitchGraph};
 use bundle::Parameters;
 use contradictions::contradicting_pairs;
+use intrinsics::InitialIntrinsics;
 use observations::Observations;
 use refinement::RefinementInput;
 
@@ -100,8 +105,8 @@ pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageCont
         context.report(Diagnostic::warning(
             "focal-uncertain",
             Subject::stage("cameras"),
-            "the focal length cannot be told from these pictures; a common value was used",
-            "Keep the camera's metadata in the files, or overlap the pictures more.",
+            "the focal length cannot be told from these photographs; a common value was used",
+            "Keep the camera's metadata in the files, or overlap the photographs more.",
         ));
     }
     let Solution { cameras, per_picture_focal, .. } = solution;
@@ -140,11 +145,12 @@ fn solve(
     context: &StageContext,
 ) -> Result<Solution> {
     let observations = Observations::choose(priors, pairs);
-    let start_focal_px = focal::initial_focal_lengths(priors, pairs, &observations);
-    let relative = rotations::relative_rotations(priors, pairs, &observations, &start_focal_px);
+    let intrinsics = focal::initial_intrinsics(priors, pairs, &observations);
+    let relative = rotations::relative_rotations(priors, pairs, &observations, &intrinsics);
     let graph = graph_of(priors.len(), pairs.iter().copied());
     let rotations = rotations::average(&graph, pairs, &relative, anchor);
-    let start = Parameters { focal_px: start_focal_px, rotations };
+    let InitialIntrinsics { focal_px, lens } = intrinsics;
+    let start = Parameters { focal_px, rotations, lenses: vec![lens; priors.len()] };
     let input = RefinementInput { priors, observations: &observations, anchor };
     let refined = refinement::refine(input, &start, options, context)?;
     Ok(Solution {

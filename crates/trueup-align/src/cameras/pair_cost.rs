@@ -1,22 +1,22 @@
 //! The cost of one pair in bundle adjustment, and its quadratic model.
 
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, SVector, Vector2, Vector3};
-use trueup_core::camera::Camera;
+use trueup_core::camera::{Camera, INTRINSICS};
 use trueup_core::geometry::cross_matrix;
 
 use super::observations::PairObservations;
 
-/// Unknowns of one pair: rotation of a, rotation of b, log focal length of a, of b.
-pub(super) const LOCAL: usize = 8;
-type LocalMatrix = SMatrix<f64, LOCAL, LOCAL>;
-type LocalVector = SVector<f64, LOCAL>;
+/// Unknowns of one pair of pinholes: rotation of a, rotation of b, log focal length of a, of b.
+pub(super) const PINHOLE_LOCAL: usize = 8;
+/// Unknowns of one pair with lenses: rotation of a, rotation of b, all intrinsics of a, of b.
+pub(super) const LENS_LOCAL: usize = 6 + 2 * INTRINSICS;
 
 /// The quadratic model of one pair's cost.
-pub(super) struct PairTerm {
+pub(super) struct PairTerm<const LOCAL: usize> {
     /// Weighted J^T J.
-    pub normal: LocalMatrix,
+    pub normal: SMatrix<f64, LOCAL, LOCAL>,
     /// Weighted J^T r.
-    pub gradient: LocalVector,
+    pub gradient: SVector<f64, LOCAL>,
 }
 
 /// Huber's loss, quadratic up to the limit: rho and the weight rho'(e)/(2 e).
@@ -41,24 +41,25 @@ pub(super) fn pair_cost(cameras: &[Camera], pair: &PairObservations, huber_px: f
         .sum()
 }
 
-impl PairTerm {
+impl<const LOCAL: usize> PairTerm<LOCAL> {
     /// Both directions of every match, linearized at these cameras.
     pub(super) fn new(cameras: &[Camera], pair: &PairObservations, huber_px: f64) -> Self {
         let (a, b) = (&cameras[pair.a], &cameras[pair.b]);
         let b_from_a = b.rotation() * a.rotation().transpose();
         let a_from_b = b_from_a.transpose();
-        let mut term = Self { normal: LocalMatrix::zeros(), gradient: LocalVector::zeros() };
+        let mut term = Self { normal: SMatrix::zeros(), gradient: SVector::zeros() };
+        let second = 6 + (LOCAL - 6) / 2;
         let there = Transfer {
             from: a,
             to: b,
             to_from_from: &b_from_a,
-            columns: TransferColumns { from_rotation: 0, to_rotation: 3, from_focal: 6, to_focal: 7 },
+            columns: TransferColumns { from_rotation: 0, to_rotation: 3, from_intrinsics: 6, to_intrinsics: second },
         };
         let back = Transfer {
             from: b,
             to: a,
             to_from_from: &a_from_b,
-            columns: TransferColumns { from_rotation: 3, to_rotation: 0, from_focal: 7, to_focal: 6 },
+            columns: TransferColumns { from_rotation: 3, to_rotation: 0, from_intrinsics: second, to_intrinsics: 6 },
         };
         for one in &pair.matches {
             there.accumulate(&mut term, one.in_a, one.in_b, huber_px);
@@ -68,12 +69,12 @@ impl PairTerm {
     }
 }
 
-/// Where a transfer's unknowns are among the eight of its pair; rotations take three columns.
+/// Where a transfer's unknowns start among those of its pair; rotations take three columns, intrinsics one or all.
 struct TransferColumns {
     from_rotation: usize,
     to_rotation: usize,
-    from_focal: usize,
-    to_focal: usize,
+    from_intrinsics: usize,
+    to_intrinsics: usize,
 }
 
 /// One direction of a pair: points of `from` are carried into `to`.
@@ -87,14 +88,35 @@ struct Transfer<'a> {
 
 impl Transfer<'_> {
     /// Adds the linearized residual of a match of `source` with `target`.
-    fn accumulate(&self, term: &mut PairTerm, source: [f64; 2], target: [f64; 2], huber_px: f64) {
-        let Self { from, to, to_from_from, columns } = self;
-        let bearing = from.bearing(Vector2::from(source));
-        let arrived = *to_from_from * bearing;
-        let Some(place) = to.project(arrived) else { return };
+    fn accumulate<const LOCAL: usize>(
+        &self,
+        term: &mut PairTerm<LOCAL>,
+        source: [f64; 2],
+        target: [f64; 2],
+        huber_px: f64,
+    ) {
+        let bearing = self.from.bearing(Vector2::from(source));
+        let arrived = *self.to_from_from * bearing;
+        let Some(place) = self.to.project(arrived) else { return };
         let residual = Vector2::from(target) - place;
         let weight = huber(residual.norm(), huber_px).1;
+        let jacobian: Option<SMatrix<f64, 2, LOCAL>> = match LOCAL {
+            PINHOLE_LOCAL => Some(self.pinhole_jacobian(bearing, arrived, place)),
+            _ => self.lens_jacobian(bearing, arrived),
+        };
+        let Some(jacobian) = jacobian else { return };
+        term.normal += jacobian.transpose() * jacobian * weight;
+        term.gradient += jacobian.transpose() * residual * weight;
+    }
 
+    /// How the residual of two pinholes changes with the rotations and the focal lengths.
+    fn pinhole_jacobian<const LOCAL: usize>(
+        &self,
+        bearing: Vector3<f64>,
+        arrived: Vector3<f64>,
+        place: Vector2<f64>,
+    ) -> SMatrix<f64, 2, LOCAL> {
+        let Self { to, to_from_from, columns, .. } = self;
         let (inverse_depth, focal_px) = (1.0 / arrived.z, to.focal_px);
         let projection = Matrix2x3::new(1.0, 0.0, -arrived.x * inverse_depth, 0.0, 1.0, -arrived.y * inverse_depth)
             * (focal_px * inverse_depth);
@@ -107,9 +129,30 @@ impl Transfer<'_> {
         let mut jacobian = SMatrix::<f64, 2, LOCAL>::zeros();
         jacobian.fixed_columns_mut::<3>(columns.from_rotation).copy_from(&by_from_rotation);
         jacobian.fixed_columns_mut::<3>(columns.to_rotation).copy_from(&by_to_rotation);
-        jacobian.column_mut(columns.from_focal).copy_from(&by_from_focal);
-        jacobian.column_mut(columns.to_focal).copy_from(&by_to_focal);
-        term.normal += jacobian.transpose() * jacobian * weight;
-        term.gradient += jacobian.transpose() * residual * weight;
+        jacobian.column_mut(columns.from_intrinsics).copy_from(&by_from_focal);
+        jacobian.column_mut(columns.to_intrinsics).copy_from(&by_to_focal);
+        jacobian
+    }
+
+    /// How the residual changes with the rotations and all intrinsics. `None` where a lens does not tell.
+    ///
+    /// A pixel of `from` stays where it is: its bearing moves so as to undo what the intrinsics do to the pixel.
+    fn lens_jacobian<const LOCAL: usize>(
+        &self,
+        bearing: Vector3<f64>,
+        arrived: Vector3<f64>,
+    ) -> Option<SMatrix<f64, 2, LOCAL>> {
+        let Self { from, to, to_from_from, columns } = self;
+        let (leaving, arriving) = (from.projection_derivatives(bearing)?, to.projection_derivatives(arrived)?);
+        let projection = arriving.by_bearing;
+        let by_bearing = projection * *to_from_from;
+        let by_from_intrinsics = by_bearing * leaving.bearing_by_pixel()? * leaving.by_intrinsics;
+
+        let mut jacobian = SMatrix::<f64, 2, LOCAL>::zeros();
+        jacobian.fixed_columns_mut::<3>(columns.from_rotation).copy_from(&-(by_bearing * cross_matrix(&bearing)));
+        jacobian.fixed_columns_mut::<3>(columns.to_rotation).copy_from(&(projection * cross_matrix(&arrived)));
+        jacobian.fixed_columns_mut::<INTRINSICS>(columns.from_intrinsics).copy_from(&by_from_intrinsics);
+        jacobian.fixed_columns_mut::<INTRINSICS>(columns.to_intrinsics).copy_from(&-arriving.by_intrinsics);
+        Some(jacobian)
     }
 }

@@ -27,6 +27,16 @@ impl CameraPrior {
         focal_px.clamp(MIN_FOCAL * longer, MAX_FOCAL * longer)
     }
 
+    /// Which photographs one lens at one setting may have taken: a number for each. Those held upright are apart from those
+    /// held across, whose pictures were turned: what a lens does aside turns with them.
+    pub(super) fn lens_groups(priors: &[Self]) -> Vec<usize> {
+        let key = |prior: &Self| (prior.camera_group, prior.frame.width >= prior.frame.height);
+        let mut keys: Vec<_> = priors.iter().map(key).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        priors.iter().map(|prior| keys.binary_search(&key(prior)).unwrap_or(0)).collect()
+    }
+
     /// The camera of this photograph with the rotation `camera_from_world`.
     pub(super) fn camera(&self, focal_px: f64, camera_from_world: &Matrix3<f64>) -> Camera {
         Camera::new(focal_px, self.frame.width, self.frame.height, camera_from_world)

@@ -2,19 +2,12 @@
 
 use trueup_core::{Result, StageContext};
 
-use super::bundle::{BundleAdjustment, FocalModel, Parameters};
+use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
+use super::intrinsics::{FOCAL, IntrinsicsModel, ZOOM_SPREAD};
+use super::lenses::{LensSearch, settings};
 use super::observations::Observations;
 use super::options::{CameraOptions, FocalSharing};
 use super::prior::CameraPrior;
-
-/// Distance in working pixels beyond which the influence of a match grows only linearly, in the first pass: the start
-/// values are that far off.
-const COARSE_HUBER_PX: f64 = 20.0;
-/// The same in the final pass, working pixels: a few times the error of a match.
-const FINE_HUBER_PX: f64 = 2.0;
-/// Relative spread of separately estimated focal lengths above which [`FocalSharing::Auto`] lets every photograph have
-/// its own.
-const ZOOM_SPREAD: f64 = 0.03;
 
 /// What to refine: the photographs, what was observed of them and which of them the others turn about.
 #[derive(Clone, Copy)]
@@ -54,18 +47,35 @@ pub(super) fn refine(
         known_focal_sd: options.known_focal_sd,
     };
     // Start values that already differ (metadata of a zoom) keep their ratios inside a shared model.
-    let shared = FocalModel::shared(priors);
-    let own = FocalModel::per_photograph(priors.len());
+    let shared = IntrinsicsModel::shared(priors);
+    let own = IntrinsicsModel::per_photograph(priors.len());
     let mut per_picture_focal = options.focal_sharing == FocalSharing::PerPicture;
     let first_model = if per_picture_focal { &own } else { &shared };
 
     let coarse = problem.minimize(start.clone(), first_model, COARSE_HUBER_PX, context)?;
     let mut fine = problem.minimize(coarse, first_model, FINE_HUBER_PX, context)?;
+    let search = LensSearch { problem: &problem, context };
+    let with_lens = match per_picture_focal {
+        false => search.find(&fine, &CameraPrior::lens_groups(priors))?,
+        true => None,
+    };
     if options.focal_sharing == FocalSharing::Auto && priors.len() > 1 {
         let free = problem.minimize(fine.clone(), &own, COARSE_HUBER_PX, context)?;
         if problem.is_sound(&free) && focal_spread(&shared, &fine.focal_px, &free.focal_px) > ZOOM_SPREAD {
             fine = problem.minimize(free, &own, FINE_HUBER_PX, context)?;
             per_picture_focal = true;
+        }
+    }
+    let explains_more = |lens: &Parameters| {
+        !per_picture_focal || cost_without_pulls(&problem, lens) < cost_without_pulls(&problem, &fine)
+    };
+    if let Some(lens) = with_lens.filter(explains_more) {
+        return Ok(Refined { parameters: lens, per_picture_focal: false, focal_failed: false });
+    }
+    if per_picture_focal && problem.is_sound(&fine) {
+        let settings = settings(&fine, &CameraPrior::lens_groups(priors));
+        if let Some(parameters) = search.find(&fine, &settings)? {
+            return Ok(Refined { parameters, per_picture_focal, focal_failed: false });
         }
     }
     if problem.is_sound(&fine) {
@@ -75,24 +85,29 @@ pub(super) fn refine(
     Ok(Refined { parameters, per_picture_focal: false, focal_failed: true })
 }
 
+/// What the matches alone cost.
+fn cost_without_pulls(problem: &BundleAdjustment<'_>, parameters: &Parameters) -> f64 {
+    problem.cost(parameters, &IntrinsicsModel::fixed(problem.priors.len()), FINE_HUBER_PX)
+}
+
 /// The rotations refined from `start` with all focal lengths fixed to the median start value.
 fn with_common_focal(problem: &BundleAdjustment<'_>, start: &Parameters, context: &StageContext) -> Result<Parameters> {
     let mut sorted = start.focal_px.clone();
     sorted.sort_by(f64::total_cmp);
     let common = sorted[sorted.len() / 2];
-    let fixed = Parameters { focal_px: vec![common; sorted.len()], rotations: start.rotations.clone() };
-    let model = FocalModel::fixed(sorted.len());
+    let fixed = Parameters { focal_px: vec![common; sorted.len()], ..start.clone() };
+    let model = IntrinsicsModel::fixed(sorted.len());
     let coarse = problem.minimize(fixed, &model, COARSE_HUBER_PX, context)?;
     problem.minimize(coarse, &model, FINE_HUBER_PX, context)
 }
 
 /// The largest robust spread, within a group, of the ratio of free to shared focal lengths: half the range between the
 /// quartile-like order statistics, which one runaway photograph cannot move.
-fn focal_spread(shared: &FocalModel, shared_focal: &[f64], free_focal: &[f64]) -> f64 {
+fn focal_spread(shared: &IntrinsicsModel, shared_focal: &[f64], free_focal: &[f64]) -> f64 {
     let mut spread: f64 = 0.0;
     for group in 0..shared.parameters {
         let mut logs: Vec<f64> = (0..shared_focal.len())
-            .filter(|&k| shared.parameter_of[k] == Some(group))
+            .filter(|&k| shared.parameters_of[k][FOCAL] == Some(group))
             .map(|k| (free_focal[k] / shared_focal[k]).ln())
             .collect();
         if logs.len() < 2 {

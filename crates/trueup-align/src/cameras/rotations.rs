@@ -5,6 +5,7 @@ use trueup_core::camera::Camera;
 use trueup_core::geometry::{exp_rotation, log_rotation, nearest_rotation};
 use trueup_core::matches::{PairMatches, PointMatch};
 
+use super::intrinsics::InitialIntrinsics;
 use super::observations::Observations;
 use super::prior::CameraPrior;
 use crate::stitch_graph::StitchGraph;
@@ -34,14 +35,15 @@ pub(super) fn relative_rotations(
     priors: &[CameraPrior],
     pairs: &[&PairMatches],
     observations: &Observations,
-    focal_px: &[f64],
+    intrinsics: &InitialIntrinsics,
 ) -> Vec<Matrix3<f64>> {
+    let InitialIntrinsics { focal_px, lens } = intrinsics;
     pairs
         .iter()
         .zip(&observations.pairs)
         .map(|(pair, observed)| {
-            let a = priors[pair.a].unturned_camera(focal_px[pair.a]);
-            let b = priors[pair.b].unturned_camera(focal_px[pair.b]);
+            let a = lens.on(priors[pair.a].unturned_camera(focal_px[pair.a]));
+            let b = lens.on(priors[pair.b].unturned_camera(focal_px[pair.b]));
             fit_rotation(&a, &b, &observed.matches)
         })
         .collect()

@@ -3,6 +3,7 @@
 use nalgebra::Vector2;
 use rand::RngExt;
 use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z, wrap_angle};
+use trueup_core::lens::{Lens, LensProjection, LensTerms};
 use trueup_core::matches::{PairVerdict, PointMatch};
 use trueup_core::source::WorkingFrame;
 
@@ -121,6 +122,68 @@ fn a_zoom_is_noticed() {
     for (camera, wanted) in cameras.cameras.iter().zip(focal) {
         assert!((camera.focal_px / wanted - 1.0).abs() < 0.03, "{} for {wanted}", camera.focal_px);
     }
+}
+
+/// Cameras with this lens, and the principal point off center.
+fn bent(cameras: Vec<Camera>, radial: [f64; 4], off: [f64; 2]) -> Vec<Camera> {
+    let lens = Lens::new(LensTerms { radial, ..LensTerms::default() });
+    let principal_point = [WIDTH / 2.0 + off[0], HEIGHT / 2.0 + off[1]];
+    cameras.into_iter().map(|camera| Camera { lens, principal_point, ..camera }).collect()
+}
+
+fn row(rolls: [f64; 8]) -> Vec<Camera> {
+    (0..8).map(|k| camera(650.0, 20.0 * k as f64, 2.0 * (k % 3) as f64, rolls[k])).collect()
+}
+
+const ROLLS: [f64; 8] = [3.0, -5.0, 1.0, 7.0, -2.0, 4.0, -6.0, 2.0];
+
+/// The corners are 500 px from the middle; the lens moves them by 500 (500 / 650)^2 0.08 = 24 px.
+#[test]
+fn a_barrel_lens_is_found_from_the_matches_alone() {
+    let truth = bent(row(ROLLS), [-0.08, 0.015, 0.0, 0.0], [6.0, -4.0]);
+    let cameras = estimate(&matched(&truth, 0.3, 0.05), None, &[0; 8]);
+    assert!(!cameras.per_picture_focal);
+    let found = &cameras.cameras[2];
+    assert!((found.focal_px / 650.0 - 1.0).abs() < 0.002, "{found:?}");
+    assert!((found.principal_point[0] - WIDTH / 2.0 - 6.0).abs() < 1.0, "{found:?}");
+    assert!((found.principal_point[1] - HEIGHT / 2.0 + 4.0).abs() < 1.0, "{found:?}");
+    assert!(worst_rotation_error(&truth, &cameras.cameras) < 0.25);
+    for (x, y) in [(10.0, 10.0), (790.0, 300.0), (400.0, 590.0)] {
+        let pixel = Vector2::new(x, y);
+        let back = found.project(truth[2].bearing(pixel)).expect("in front");
+        assert!((back - pixel).norm() < 1.5, "{pixel} {back}");
+    }
+}
+
+#[test]
+fn a_pinhole_stays_exactly_one() {
+    for noise_px in [0.2, 0.5, 1.0] {
+        let cameras = estimate(&matched(&row(ROLLS), noise_px, 0.1), None, &[0; 8]);
+        assert!(cameras.cameras.iter().all(|camera| camera.lens.is_pinhole()), "{noise_px}");
+        assert!(cameras.cameras.iter().all(|camera| camera.principal_point == [WIDTH / 2.0, HEIGHT / 2.0]));
+    }
+}
+
+/// A pair is no evidence: parallax bends it as a lens would.
+#[test]
+fn a_single_pair_tells_no_lens() {
+    let truth = bent(row(ROLLS)[..2].to_vec(), [-0.08, 0.0, 0.0, 0.0], [0.0; 2]);
+    let cameras = estimate(&matched(&truth, 0.3, 0.0), None, &[0; 2]);
+    assert!(cameras.cameras.iter().all(|camera| camera.lens.is_pinhole()));
+}
+
+/// 150 degrees across, nothing told.
+#[test]
+fn a_fisheye_is_recognized() {
+    let terms =
+        LensTerms { projection: LensProjection::Equidistant, radial: [-0.015, 0.002, 0.0, 0.0], ..Default::default() };
+    let truth: Vec<Camera> = (0..6)
+        .map(|k| Camera { lens: Lens::new(terms), ..camera(305.0, 60.0 * k as f64, 3.0 * (k % 2) as f64, ROLLS[k]) })
+        .collect();
+    let cameras = estimate(&matched(&truth, 0.3, 0.0), None, &[0; 6]);
+    assert!(cameras.cameras.iter().all(|camera| camera.lens.is_fisheye()), "{:?}", cameras.cameras[0]);
+    assert!((cameras.cameras[0].focal_px / 305.0 - 1.0).abs() < 0.005, "{:?}", cameras.cameras[0]);
+    assert!(worst_rotation_error(&truth, &cameras.cameras) < 0.1);
 }
 
 #[test]

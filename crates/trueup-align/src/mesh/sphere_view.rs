@@ -47,7 +47,7 @@ impl SphereView {
         let Some(share) = self.moderate_share(pixel) else { return self.projected(self.ray(pixel)) };
         let center = Vector2::from(self.camera.principal_point);
         let last = center + (pixel - center) * share;
-        self.projected(self.ray(last)) + self.derivative(self.ray(last), pixel - last)
+        self.projected(self.ray(last)) + self.derivative(last, pixel - last)
     }
 
     /// The share of the way from the photograph's center to `pixel` after which it is too near a pole; `None` if it is
@@ -78,9 +78,10 @@ impl SphereView {
         Vector2::new(longitude, unrolled_latitude(ray.y.atan2(horizontal), self.conformality))
     }
 
-    /// How far [`Self::projected`] moves, to first order, as the pixel of `ray` (of depth 1) moves by `step`.
-    fn derivative(&self, ray: Vector3<f64>, step: Vector2<f64>) -> Vector2<f64> {
-        let change = self.level_from_camera * (step / self.camera.focal_px).push(0.0);
+    /// How far [`Self::projected`] moves, to first order, as `pixel` moves by `step`.
+    fn derivative(&self, pixel: Vector2<f64>, step: Vector2<f64>) -> Vector2<f64> {
+        let ray = self.ray(pixel);
+        let change = self.level_from_camera * self.camera.bearing_change(pixel, step);
         let horizontal = ray.x.hypot(ray.z);
         let longitude = (ray.z * change.x - ray.x * change.z) / horizontal.powi(2);
         let outward = (ray.x * change.x + ray.z * change.z) / horizontal;

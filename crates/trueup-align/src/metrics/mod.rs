@@ -2,7 +2,8 @@
 //!
 //! * Against the truth: [`mean_relative_turn`] (GDIC), [`Uprightness`], [`true_alignment`].
 //! * From the grids alone: [`local_distortion`] (LD), [`folded_cells`].
-//! * From grids, lines and matches, without truth: [`vertical_lines`], [`Straightness`], [`reprojection`].
+//! * From grids, lines and matches, without truth: [`Straightness`], [`reprojection`]; [`Uprightness`] too, against the
+//!   rolls that [`crate::similarity::estimated_rolls`] finds in place of the true ones.
 //! * From the pixels of two photographs where both lie on the panorama: [`OverlapPixels::measure`].
 
 mod alignment;
@@ -27,5 +28,5 @@ pub use overlap::{OverlapMeasures, mean_over_overlaps};
 pub use overlap_pixels::OverlapPixels;
 pub use reprojection::{MatchedPair, Reprojection, reprojection};
 pub use straightness::{LINE_STEP_PX, LONG_LINE_DIAGONAL, Straightness};
-pub use upright::Uprightness;
-pub use vertical_lines::{VerticalLines, VerticalLinesInput, vertical_lines, vertical_segments};
+pub use upright::{Uprightness, expected_magnitude};
+pub use vertical_lines::{VerticalLinesInput, vertical_segments};

@@ -52,6 +52,31 @@ impl Uprightness {
     }
 }
 
+/// Expected absolute value of an angle that is known to be `mean`, with the standard error `deviation`, in the same unit:
+/// the mean of the folded normal distribution.
+///
+/// # Source
+/// Leone, Nelson and Nottingham, "The folded normal distribution", Technometrics 3, 1961.
+pub fn expected_magnitude(mean: f64, deviation: f64) -> f64 {
+    use std::f64::consts::{FRAC_2_PI, SQRT_2};
+    if deviation <= 0.0 {
+        return mean.abs();
+    }
+    let ratio = mean / deviation;
+    deviation * FRAC_2_PI.sqrt() * (-0.5 * ratio * ratio).exp() + mean * error_function(ratio / SQRT_2)
+}
+
+/// erf(x), right to 1.5e-7.
+///
+/// # Source
+/// Abramowitz and Stegun, Handbook of Mathematical Functions, 7.1.26.
+fn error_function(x: f64) -> f64 {
+    const COEFFICIENTS: [f64; 5] = [1.061_405_429, -1.453_152_027, 1.421_413_741, -0.284_496_736, 0.254_829_592];
+    let t = 1.0 / (1.0 + 0.327_591_1 * x.abs());
+    let polynomial = COEFFICIENTS.iter().fold(0.0, |sum, coefficient| sum * t + coefficient) * t;
+    x.signum() * (1.0 - polynomial * (-x * x).exp())
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::Rotation2;
@@ -81,6 +106,16 @@ mod tests {
         assert!((uprightness.mean.to_degrees() - 3.0).abs() < 1e-9);
         assert!((uprightness.largest.to_degrees() - 6.0).abs() < 1e-9);
         assert!((uprightness.spread.to_degrees() - 2.0).abs() < 2e-3);
+    }
+
+    /// E|N(0, 1)| is the root of 2 / pi; E|N(1, 1)| is 1.16663 (Leone and others, table 1); far from zero it is the mean.
+    #[test]
+    fn an_uncertain_angle_is_expected_to_be_larger() {
+        for (mean, deviation, expected) in [(0.0, 1.0, 0.797_884_6), (1.0, 1.0, 1.166_63), (-1.0, 1.0, 1.166_63)] {
+            assert!((expected_magnitude(mean, deviation) - expected).abs() < 1e-5, "{mean}");
+        }
+        assert!((expected_magnitude(-3.0, 0.3) - 3.0).abs() < 1e-6);
+        assert!((expected_magnitude(-3.0, 0.0) - 3.0).abs() < 1e-15);
     }
 
     #[test]

@@ -158,6 +158,29 @@ pub(super) fn corrected_rotations(
     rotations.iter().zip(&turns).map(|(rotation, turn)| nearest_rotation(&(rotation * exp_rotation(turn)))).collect()
 }
 
+/// Covariance of every camera's own turn in the common frame, rad^2: what its segments and its overlaps leave open of
+/// the turns of [`corrected_rotations`], for rotations that these have corrected. `None` where nothing can be told.
+pub(super) fn turn_covariances(
+    rotations: &[Matrix3<f64>],
+    certainties: &[RelativeCertainty],
+    vote: &LineVote,
+    frame: &Matrix3<f64>,
+    axis_weights: &AxisWeights,
+) -> Option<Vec<Matrix3<f64>>> {
+    let count = rotations.len();
+    let scale = scales().last()?;
+    let mut matrix = DMatrix::<f64>::zeros(3 * count, 3 * count);
+    for (index, rotation) in rotations.iter().enumerate() {
+        let (normal, _) = vote.turn_equations(index, rotation, frame, axis_weights, scale);
+        let mut block = matrix.fixed_view_mut::<3, 3>(3 * index, 3 * index);
+        block += normal * LINE_ERROR_PX.powi(-2);
+    }
+    add_overlaps(&mut matrix, certainties);
+    hold_common_turn(&mut matrix);
+    let inverse = matrix.cholesky()?.inverse();
+    Some((0..count).map(|index| inverse.fixed_view::<3, 3>(3 * index, 3 * index).into_owned()).collect())
+}
+
 /// Adds (w_i - w_j)^T information (w_i - w_j) of every overlap.
 fn add_overlaps(matrix: &mut DMatrix<f64>, certainties: &[RelativeCertainty]) {
     for edge in certainties {

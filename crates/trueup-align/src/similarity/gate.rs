@@ -56,14 +56,15 @@ pub(super) fn allowed_divergence(photographs: usize, options: &SimilarityOptions
 ///
 /// # Departures
 /// The paper does not say what its sum is divided by; the mean per photograph alone puts its threshold 0.10 between
-/// scenes with and without dominant directions.
-pub(super) fn divergence(inlier_residuals: &[f64], photographs: usize) -> f64 {
+/// scenes with and without dominant directions. `as_printed` leaves the sum as it is, which grows with the photographs.
+pub(super) fn divergence(inlier_residuals: &[f64], photographs: usize, as_printed: bool) -> f64 {
     if inlier_residuals.is_empty() {
         return f64::INFINITY;
     }
     let count = inlier_residuals.len() as f64;
     let share = count / photographs as f64;
-    inlier_residuals.iter().sum::<f64>() / count / share
+    let sum = inlier_residuals.iter().sum::<f64>();
+    if as_printed { sum / share } else { sum / count / share }
 }
 
 /// The first clause that fails, in words; `None` if the guidance is accepted.
@@ -84,12 +85,14 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
     let share = if photographs <= FEW_PHOTOGRAPHS { MIN_INLIER_SHARE_FEW } else { MIN_INLIER_SHARE };
     let needed = ((share * photographs as f64).ceil() as usize).max(2);
     if inliers < needed {
-        return Some(format!("{inliers} of {photographs} pictures agree on the dominant directions ({needed} needed)"));
+        return Some(format!(
+            "{inliers} of {photographs} photographs agree on the dominant directions ({needed} needed)"
+        ));
     }
     let needed = CONFIRMING_SIGNIFICANCE;
     if let Some(significance) = significance.filter(|&significance| significance < needed) {
         return Some(format!(
-            "the lines of all pictures together prefer no direction clearly ({significance:.1} standard deviations, {needed:.1} needed)"
+            "the lines of all photographs together prefer no direction clearly ({significance:.1} standard deviations, {needed:.1} needed)"
         ));
     }
     let allowed = MAX_STRAIGHTENING_ANGLE_DEG;
@@ -100,5 +103,5 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
     }
     let (roll, allowed) = (median_roll.to_degrees(), MAX_MEDIAN_ROLL_DEG);
     (roll.is_nan() || roll > allowed)
-        .then(|| format!("half of the pictures would be rolled by {roll:.1} degrees or more ({allowed:.1} allowed)"))
+        .then(|| format!("half of the photographs would be rolled by {roll:.1} degrees or more ({allowed:.1} allowed)"))
 }

@@ -2,8 +2,9 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
+use trueup_core::geometry::{roll_from_down, wrap_angle};
 
 use super::edge_range::{OverlapTurns, TurnRange};
 use super::input::PriorInput;
@@ -35,15 +36,18 @@ struct Decided {
     held: bool,
 }
 
-/// The turns of the published prior; `down` is the vertical that straightening finds, which the turns do not depend on.
+/// The turns of the published prior; `down` is the vertical that straightening finds, in the cameras' world.
 ///
-/// The reference stands as the user wants it. A walk from there leaves every photograph unturned whose overlap with a
-/// decided one allows that, and turns the others by least line distortion; a least squares then holds the reference and
-/// the unturned photographs and takes the turns of least line distortion along all edges. The result depends on the
-/// reference by construction.
+/// The reference takes the roll that straightening finds for it, and the turn that the user wants. A walk from there leaves
+/// every photograph unturned whose overlap with a decided one allows that, and turns the others by least line distortion; a
+/// least squares then holds the reference and the unturned photographs and takes the turns of least line distortion along
+/// all edges. The result depends on the reference by construction: it alone stands upright among photographs that stay as
+/// they were taken.
 ///
 /// # Source
-/// Chen and Chuang, Natural Image Stitching with the Global Similarity Prior (2016), section 4 (the 2D method).
+/// Chen and Chuang, Natural Image Stitching with the Global Similarity Prior (2016), section 4 (the 2D method), and what
+/// their program does: the reference's roll is that of its three-dimensional method, and the range of an overlap's turns
+/// is that of all its grid edges.
 ///
 /// # Departures
 /// See `edge_range` for how the turn of least line distortion is measured.
@@ -66,7 +70,9 @@ pub(super) fn upright(input: &PriorInput<'_>, down: Vector3<f64>) -> Upright {
     for of_one in &mut neighbors {
         of_one.sort_by_key(|neighbor| neighbor.index);
     }
-    let decided = walk(&neighbors, input.reference, input.turn);
+    let rotations: Vec<Matrix3<f64>> = input.cameras.iter().map(trueup_core::camera::Camera::rotation).collect();
+    let roll = roll_from_down(&(rotations[input.reference] * down));
+    let decided = walk(&neighbors, input.reference, wrap_angle(roll + input.turn));
     let hard: Vec<DataTerm> = decided
         .iter()
         .enumerate()
@@ -80,7 +86,6 @@ pub(super) fn upright(input: &PriorInput<'_>, down: Vector3<f64>) -> Upright {
         None => decided.iter().map(|one| one.theta).collect(),
     };
     // The reference took the user's turn already; the common last step adds it to every photograph.
-    let rotations = input.cameras.iter().map(trueup_core::camera::Camera::rotation).collect();
     Upright { down, theta: theta.iter().map(|theta| theta - input.turn).collect(), rotations }
 }
 

@@ -1,7 +1,7 @@
 use nalgebra::{Matrix3, Vector2};
 use trueup_core::StageContext;
 use trueup_core::camera::Camera;
-use trueup_core::geometry::{Homography, rotation_about_y, rows_of, wrap_angle};
+use trueup_core::geometry::{Homography, rotation_about_y, rotation_about_z, rows_of, wrap_angle};
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
@@ -181,6 +181,24 @@ fn gsp_2d_leaves_photographs_upright_where_the_overlaps_let_it_and_depends_on_th
     assert_close(&graph.theta_deg(PriorMethod::Gsp2d, 3), &[-6.0, -5.0, -3.0, 0.0]);
 }
 
+/// The reference takes its straightened roll and the others, whose overlaps allow them to, stay as they were taken: each
+/// reference makes another panorama, which is what the paper holds against this prior.
+#[test]
+fn gsp_2d_straightens_its_reference_alone() {
+    let mut graph = Graph::new(3, &[edge(0, 1, [-9.0, 9.0], 0.0), edge(1, 2, [-9.0, 9.0], 0.0)]);
+    for (camera, roll) in graph.cameras.iter_mut().zip([6.0_f64, -3.0, 4.0]) {
+        let rotation = rotation_about_z(-roll.to_radians()) * camera.rotation();
+        camera.set_rotation(&rotation);
+    }
+    let rotations: Vec<Matrix3<f64>> = graph.cameras.iter().map(Camera::rotation).collect();
+    let straightened = rolls(&straighten::straighten(&rotations).down, &rotations);
+    assert!(straightened.iter().all(|roll| roll.to_degrees().abs() > 1.0), "{straightened:?}");
+    for reference in 0..3 {
+        let expected = [0, 1, 2].map(|index| if index == reference { straightened[index].to_degrees() } else { 0.0 });
+        assert_close(&graph.theta_deg(PriorMethod::Gsp2d, reference), &expected);
+    }
+}
+
 /// Photograph 1 cannot be upright as seen from 0 but can as seen from 2, which is asked before 1 takes its lines' turn.
 #[test]
 fn gsp_2d_asks_upright_photographs_first() {
@@ -275,6 +293,6 @@ fn a_reference_that_does_not_exist_is_an_error() {
     let graph = Graph::new(2, &[edge(0, 1, [-1.0, 1.0], 0.0)]);
     let vanishing = VanishingOptions::default();
     let input = graph.input(&vanishing, 2);
-    let error = run(&input, &SimilarityOptions::default(), &StageContext::default()).expect_err("no such picture");
+    let error = run(&input, &SimilarityOptions::default(), &StageContext::default()).expect_err("no such photograph");
     assert!(error.to_string().contains("reference 2"));
 }

@@ -48,19 +48,19 @@ impl PriorInput<'_> {
         let input = self;
         let count = input.cameras.len();
         let unsolvable = |why: String| {
-            Err(Error::unsolvable(SimilarityOptions::STAGE, "similarity prior", why, "Give one entry per picture"))
+            Err(Error::unsolvable(SimilarityOptions::STAGE, "similarity prior", why, "Give one entry per photograph"))
         };
         if count == 0 {
-            return unsolvable("there are no pictures".to_owned());
+            return unsolvable("there are no photographs".to_owned());
         }
         if [input.triads.len(), input.lines.len(), input.frames.len()].iter().any(|&length| length != count) {
             return unsolvable(format!("cameras, triads, segments and frames differ in number from {count}"));
         }
         if let Some(edge) = input.edges.iter().find(|edge| edge.a >= count || edge.b >= count || edge.a == edge.b) {
-            return unsolvable(format!("there is no pair {} - {} among {count} pictures", edge.a, edge.b));
+            return unsolvable(format!("there is no pair {} - {} among {count} photographs", edge.a, edge.b));
         }
         if input.reference >= count {
-            return unsolvable(format!("there is no reference {} among {count} pictures", input.reference));
+            return unsolvable(format!("there is no reference {} among {count} photographs", input.reference));
         }
         let finite = |camera: &Camera| {
             camera.focal_px > 0.0
@@ -71,7 +71,7 @@ impl PriorInput<'_> {
             |frame: &WorkingFrame| frame.width > 0.0 && frame.height > 0.0 && frame.diagonal().is_finite();
         let has_grid = input.cell_px >= 1.0 && input.frames.iter().all(frame_is_sane);
         if !input.overlaps.is_empty() && !has_grid {
-            return unsolvable(format!("there is no grid of cells of {} pixels on every picture", input.cell_px));
+            return unsolvable(format!("there is no grid of cells of {} pixels on every photograph", input.cell_px));
         }
         match input.cameras.iter().position(|camera| !finite(camera)) {
             Some(index) => unsolvable(format!("camera {index} is not finite")),

@@ -8,7 +8,6 @@
 //! it is v . c / (2 |f v_xy - m v_z|), exactly.
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
-use rayon::prelude::*;
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
 
 use crate::vanishing::{InterpretationPlanes, orthonormal_complement};
@@ -25,21 +24,26 @@ const ITERATIONS_PER_SCALE: usize = 4;
 const SHRINK: f64 = 0.7;
 /// Damping in px^2 per rad^2 and segment: keeps an axis without segments where it is.
 const DAMPING: f64 = 1e-6;
-/// Most groups that photographs are left out in to learn how sure the refinement is.
-const MAX_GROUPS: usize = 8;
-/// A deviation estimated from k groups is too small for Student's t by about this over k - 1 (one standard deviation).
-const FEW_GROUPS: f64 = 0.66;
-/// Rounds of iterations at the last scale that a refinement without a group takes from the full one's result.
+/// Rounds of iterations at the last scale that a refinement by some of the segments takes from the full one's result.
 const REPEATS: usize = 3;
 
 /// Factors on the weights of the segments of each axis (column) of a frame.
 pub(super) type AxisWeights = [f64; 3];
 
-/// Photographs that are not asked: those whose position is `group` modulo `groups`.
+/// A segment: its photograph and its place among the usable ones there.
 #[derive(Debug, Clone, Copy)]
-struct LeftOut {
-    group: usize,
-    groups: usize,
+pub(super) struct SegmentPlace {
+    pub photograph: usize,
+    pub line: usize,
+}
+
+/// A refinement of a frame over its turns.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Refinement<'a> {
+    pub start: &'a Matrix3<f64>,
+    /// Axes that segments may support: the first so many columns.
+    pub axes_used: usize,
+    pub axis_weights: &'a AxisWeights,
 }
 
 /// A segment that supports an axis of a frame.
@@ -127,7 +131,7 @@ impl LineVote {
     /// Refines a frame (columns are directions in the common frame) over SO(3); `axis_weights` multiply the weights of
     /// the segments of each axis.
     pub(super) fn refine_frame(&self, start: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {
-        self.refine_frame_without(None, start, axis_weights, scales())
+        self.refine(Refinement { start, axes_used: 3, axis_weights }, scales(), |_| true)
     }
 
     fn mean_weight(&self) -> f64 {
@@ -135,46 +139,57 @@ impl LineVote {
         self.total_weight() / segments.max(1) as f64
     }
 
-    /// Standard deviation in radians, by a delete-a-group jackknife over the photographs, of each axis (a column) of a
-    /// frame that [`Self::refine_frame`] found: how much it depends on which photographs are asked. Infinite for a
-    /// single photograph.
-    ///
-    /// # Source
-    /// Efron and Tibshirani, An Introduction to the Bootstrap, chapter 11. Photographs, not segments, are left out,
-    /// because the segments of one photograph err together.
-    pub(super) fn axis_deviations(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> [f64; 3] {
-        let groups = self.photographs.len().min(MAX_GROUPS);
-        if groups < 2 {
-            return [f64::INFINITY; 3];
-        }
-        let last = || std::iter::repeat_n(END_SCALE_PX, REPEATS);
-        let frames: Vec<Matrix3<f64>> = (0..groups)
-            .into_par_iter()
-            .map(|group| self.refine_frame_without(Some(LeftOut { group, groups }), frame, axis_weights, last()))
-            .collect();
-        std::array::from_fn(|axis| {
-            let mean: Vector3<f64> =
-                frames.iter().map(|frame| frame.column(axis).into_owned()).sum::<Vector3<f64>>() / groups as f64;
-            let spread: f64 = frames.iter().map(|frame| (frame.column(axis) - mean).norm_squared()).sum();
-            let few = 1.0 + FEW_GROUPS / (groups - 1) as f64;
-            few * (spread * (groups - 1) as f64 / groups as f64).sqrt()
-        })
+    /// Refines a frame that all segments have refined, by those `asked` alone: at the last scale of the loss.
+    pub(super) fn refine_again(
+        &self,
+        refinement: Refinement<'_>,
+        asked: impl Fn(SegmentPlace) -> bool,
+    ) -> Matrix3<f64> {
+        self.refine(refinement, std::iter::repeat_n(END_SCALE_PX, REPEATS), asked)
     }
 
-    /// [`Self::refine_frame`] over given scales of the loss, by all photographs but those left out.
-    fn refine_frame_without(
+    /// Number of photographs.
+    pub(super) fn photographs(&self) -> usize {
+        self.photographs.len()
+    }
+
+    /// `value` of the direction of every segment's midpoint in the common frame, not of unit length; by photograph.
+    pub(super) fn by_midpoint<T>(&self, value: impl Fn(Vector3<f64>) -> T) -> Vec<Vec<T>> {
+        let of_photograph = |photograph: &PhotographLines| {
+            let toward = |midpoint: &Vector2<f64>| photograph.rotation.tr_mul(&midpoint.push(photograph.focal_px));
+            photograph.planes.midpoints.iter().map(|midpoint| value(toward(midpoint))).collect()
+        };
+        self.photographs.iter().map(of_photograph).collect()
+    }
+
+    /// The segments that support one of the first `axes_used` axes of `frame`.
+    pub(super) fn supporters(&self, frame: &Matrix3<f64>, axes_used: usize) -> Vec<SegmentPlace> {
+        let mut found = Vec::new();
+        for (index, photograph) in self.photographs.iter().enumerate() {
+            let axes = photograph.rotation * frame;
+            let supports = |line: usize| {
+                let nearest = photograph.nearest_axis(&axes, axes_used, line);
+                nearest.is_some_and(|nearest| photograph.is_within_tolerance(nearest.residual_px, line))
+            };
+            let lines = (0..photograph.planes.len()).filter(|&line| supports(line));
+            found.extend(lines.map(|line| SegmentPlace { photograph: index, line }));
+        }
+        found
+    }
+
+    /// Refines a frame over given scales of the loss, by the segments `asked`.
+    fn refine(
         &self,
-        left_out: Option<LeftOut>,
-        start: &Matrix3<f64>,
-        axis_weights: &AxisWeights,
+        refinement: Refinement<'_>,
         scales: impl Iterator<Item = f64>,
+        asked: impl Fn(SegmentPlace) -> bool,
     ) -> Matrix3<f64> {
-        let asked = |index: usize| left_out.is_none_or(|LeftOut { group, groups }| index % groups != group);
+        let Refinement { start, axes_used, axis_weights } = refinement;
         let mut frame = *start;
         for scale in scales {
             for _ in 0..ITERATIONS_PER_SCALE {
                 let (mut matrix, mut gradient) = (Matrix3::identity() * DAMPING, Vector3::zeros());
-                self.for_each_supporter(&frame, 3, scale, asked, |one| {
+                self.for_each_supporter(&frame, axes_used, scale, &asked, |one| {
                     let jacobian = Vector3::ith(one.axis, 1.0).cross(&frame.tr_mul(&one.moment)) / one.reach;
                     let weight = one.weight * axis_weights[one.axis];
                     matrix += jacobian * jacobian.transpose() * weight;
@@ -186,6 +201,11 @@ impl LineVote {
             }
         }
         frame
+    }
+
+    /// The frame whose first column alone is refined: the direction that segments near it point to.
+    pub(super) fn refine_first_axis(&self, start: &Matrix3<f64>) -> Matrix3<f64> {
+        self.refine(Refinement { start, axes_used: 1, axis_weights: &[1.0; 3] }, scales(), |_| true)
     }
 
     /// Normal matrix and gradient, in px^2 per rad^2 and px^2 per rad, of the squared residuals of photograph `index`
@@ -202,12 +222,19 @@ impl LineVote {
         let (mut matrix, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
         let photograph = &self.photographs[index];
         let mean = self.mean_weight();
-        photograph.for_each_supporter(rotation, frame, 3, scale, |one| {
-            let jacobian = frame.column(one.axis).cross(&one.moment) / one.reach;
-            let weight = one.weight * axis_weights[one.axis] / mean;
-            matrix += jacobian * jacobian.transpose() * weight;
-            gradient += jacobian * (weight * one.residual_px);
-        });
+        photograph.for_each_supporter(
+            rotation,
+            frame,
+            3,
+            scale,
+            |_| true,
+            |one| {
+                let jacobian = frame.column(one.axis).cross(&one.moment) / one.reach;
+                let weight = one.weight * axis_weights[one.axis] / mean;
+                matrix += jacobian * jacobian.transpose() * weight;
+                gradient += jacobian * (weight * one.residual_px);
+            },
+        );
         (matrix, gradient)
     }
 
@@ -238,20 +265,19 @@ impl LineVote {
         direction
     }
 
-    /// Calls `visit` for every segment of the photographs `asked` that supports one of the first `axes_used` axes of
+    /// Calls `visit` for every segment `asked` that supports one of the first `axes_used` axes of
     /// `frame`.
     fn for_each_supporter(
         &self,
         frame: &Matrix3<f64>,
         axes_used: usize,
         scale: f64,
-        asked: impl Fn(usize) -> bool,
+        asked: impl Fn(SegmentPlace) -> bool,
         mut visit: impl FnMut(Supporter),
     ) {
         for (index, photograph) in self.photographs.iter().enumerate() {
-            if asked(index) {
-                photograph.for_each_supporter(&photograph.rotation, frame, axes_used, scale, &mut visit);
-            }
+            let asked = |line| asked(SegmentPlace { photograph: index, line });
+            photograph.for_each_supporter(&photograph.rotation, frame, axes_used, scale, asked, &mut visit);
         }
     }
 
@@ -290,14 +316,14 @@ impl PhotographLines {
         frame: &Matrix3<f64>,
         axes_used: usize,
         scale: f64,
+        asked: impl Fn(usize) -> bool,
         mut visit: impl FnMut(Supporter),
     ) {
-        let widest = TOLERANCE_DEG.to_radians().sin();
         let axes = rotation * frame;
-        for line in 0..self.planes.len() {
+        for line in (0..self.planes.len()).filter(|&line| asked(line)) {
             let Some(nearest) = self.nearest_axis(&axes, axes_used, line) else { continue };
             let NearestAxis { axis, residual_px, reach } = nearest;
-            if residual_px.abs() * 2.0 > widest * self.planes.lengths[line] {
+            if !self.is_within_tolerance(residual_px, line) {
                 continue;
             }
             // Geman-McClure.
@@ -308,8 +334,13 @@ impl PhotographLines {
         }
     }
 
+    /// Whether a segment that is so far from an axis at its ends may vote for it.
+    fn is_within_tolerance(&self, residual_px: f64, line: usize) -> bool {
+        residual_px.abs() * 2.0 <= TOLERANCE_DEG.to_radians().sin() * self.planes.lengths[line]
+    }
+
     fn reach(&self, direction: &Vector3<f64>, line: usize) -> f64 {
-        2.0 * (direction.xy() * self.focal_px - self.planes.midpoints[line] * direction.z).norm()
+        self.planes.reach(line, direction, self.focal_px)
     }
 
     fn support(&self, direction: &Vector3<f64>, tolerance: f64) -> (f64, usize) {

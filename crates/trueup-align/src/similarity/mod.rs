@@ -1,8 +1,9 @@
 //! The similarity prior: how each photograph should be turned and scaled so that the panorama stands upright.
 //!
-//! One file a prior (`vpg`, `gsp_2d`, `gsp_3d`; straightening is here); all share straightening, scales and the least
+//! One file a prior (`vpg`, `gsp_2d`, `gsp_3d`, `aanap`; straightening is here); all share straightening, scales and the least
 //! squares over unit vectors.
 
+mod aanap;
 mod camera_correction;
 mod dominant;
 mod edge_range;
@@ -11,9 +12,12 @@ mod gate;
 mod gsp_2d;
 mod gsp_3d;
 mod input;
+mod jackknife;
 mod joint;
 mod options;
 mod path_voting;
+mod posterior;
+mod printed;
 mod prior;
 mod scale;
 mod signed_permutation;
@@ -26,9 +30,13 @@ mod vpg;
 mod weighted_solve;
 
 #[cfg(test)]
+mod equation_tests;
+#[cfg(test)]
 mod gsp_tests;
 #[cfg(test)]
 mod pooled_tests;
+#[cfg(test)]
+mod posterior_tests;
 #[cfg(test)]
 pub(crate) mod synthetic;
 #[cfg(test)]
@@ -45,14 +53,16 @@ use straighten::CameraVertical;
 use upright::{Upright, rolls};
 
 pub use input::PriorInput;
-pub use options::{BetaMode, GateMode, PriorMethod, SimilarityOptions};
+pub use options::{BetaMode, Fallback, GateMode, PriorMethod, SimilarityOptions};
+pub use posterior::{EstimatedRoll, RollsInput, estimated_rolls};
+pub use printed::PrintedEquations;
 pub use prior::{Guidance, SimilarityPrior};
 
 pub(crate) use straighten::level_by_cameras;
 
 /// What a user can do when lines do not guide the panorama.
 const REFUSED_HINT: &str =
-    "The panorama is levelled by the cameras alone; pictures that show upright edges level it better";
+    "The panorama is levelled by the cameras alone; photographs that show upright edges level it better";
 
 /// Finds the similarity prior of a connected set of photographs.
 ///
@@ -82,6 +92,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
         PriorMethod::Straightening => (unguided(), None),
         PriorMethod::Gsp2d => (unguided(), Some(gsp_2d::upright(input, straightened.down))),
         PriorMethod::Gsp3d => (unguided(), Some(gsp_3d::upright(input, &rotations, straightened.down))),
+        PriorMethod::Aanap => (unguided(), Some(aanap::upright(input, &rotations, straightened.down, context))),
     };
     if let Some(clause) = guidance.failed_clause.as_ref().filter(|_| !guidance.used) {
         context.report(Diagnostic::note(
@@ -91,15 +102,20 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
             REFUSED_HINT,
         ));
     }
-    let upright = upright.unwrap_or_else(|| fallback(&rotations, &level));
+    let upright = upright.unwrap_or_else(|| match (input.method, options.fallback) {
+        (PriorMethod::VanishingPoints, Fallback::Gsp3d) => gsp_3d::upright(input, &rotations, straightened.down),
+        _ => straightening(&rotations, &level),
+    });
     let level_from_world = straighten::level_from_world(&upright.down, &rotations);
     let mut guidance = guidance;
     guidance.dominant = guidance.dominant.map(|world| rows_of(&(level_from_world * matrix_from_rows(&world))));
     Ok(SimilarityPrior {
         theta: upright.theta.iter().map(|theta| wrap_angle(theta + input.turn)).collect(),
         scale: match input.method {
-            PriorMethod::Gsp2d | PriorMethod::Gsp3d => scale::focal_scales(&focals),
-            PriorMethod::VanishingPoints | PriorMethod::Straightening => scale::scales(input.edges, &focals),
+            PriorMethod::Gsp2d | PriorMethod::Gsp3d | PriorMethod::Aanap => scale::focal_scales(&focals),
+            PriorMethod::VanishingPoints | PriorMethod::Straightening => {
+                scale::scales(input.edges, &focals, options.as_printed)
+            }
         },
         guidance,
         level_from_world: rows_of(&level_from_world),
@@ -111,9 +127,9 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
 /// Straightened cameras.
 ///
 /// # Departures
-/// The paper falls back to the global similarity prior, which corrects turns that an overlap contradicts. Level
-/// photographs that look up are twisted against each other although neither is rolled; that correction rolls them by
-/// the twist, which adds up along a row. Their place on the level sphere has the twist already.
-fn fallback(rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> Upright {
+/// The paper falls back to the global similarity prior ([`Fallback::Gsp3d`]), which corrects turns that an overlap
+/// contradicts. Level photographs that look up are twisted against each other although neither is rolled; that correction
+/// rolls them by the twist, which adds up along a row. Their place on the level sphere has the twist already.
+fn straightening(rotations: &[Matrix3<f64>], down: &Vector3<f64>) -> Upright {
     Upright { down: *down, theta: rolls(down, rotations), rotations: rotations.to_vec() }
 }

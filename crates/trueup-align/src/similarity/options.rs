@@ -1,5 +1,7 @@
 //! What a user can choose about the similarity prior.
 
+use super::printed::PrintedEquations;
+
 /// Where the turns and scales come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PriorMethod {
@@ -7,12 +9,14 @@ pub enum PriorMethod {
     VanishingPoints,
     /// Straightening.
     Straightening,
-    /// The global similarity prior in two dimensions, as published: the reference is upright, and so is every photograph
-    /// that its overlaps let be.
+    /// The global similarity prior in two dimensions, as published: the reference is straightened, and every photograph
+    /// stays as it was taken that its overlaps let be.
     Gsp2d,
     /// The global similarity prior in three dimensions, as published: cameras straightened without a prior on their pitch,
     /// corrected by overlaps from the reference outwards.
     Gsp3d,
+    /// AANAP's turns: of every overlap the similarity that turns least, from the reference as it was taken.
+    Aanap,
 }
 
 trueup_core::choice! {
@@ -20,8 +24,10 @@ trueup_core::choice! {
     pub enum BetaMode {
         /// The difference of the rolls that the dominant vertical means for each camera.
         World = "world",
-        /// The twist of the relative rotation, as published; biased when cameras are pitched.
+        /// The twist of the relative rotation, with the sign that the paper's eq. 7 needs; biased when cameras are pitched.
         Relative = "relative",
+        /// The same with the sign of the rotation that the paper decomposes, which is the opposite one.
+        Printed = "printed",
     }
 }
 
@@ -35,6 +41,16 @@ trueup_core::choice! {
     }
 }
 
+trueup_core::choice! {
+    /// What stands in for vanishing directions that are not believed.
+    pub enum Fallback {
+        /// Straightened cameras.
+        Straightening = "straightening",
+        /// The global similarity prior in three dimensions, as published.
+        Gsp3d = "gsp-3d",
+    }
+}
+
 trueup_core::options! {
     /// How the similarity prior is found.
     pub struct SimilarityOptions("similarity") {
@@ -42,7 +58,7 @@ trueup_core::options! {
         /// them; 0.24 is a misorientation of 19.9 degrees. Lower it where wrong directions take part, raise it where
         /// right ones are left out.
         rejection: f64 = 0.24, between(1e-6, 1e9), "";
-        /// Where relative rolls come from. `relative` to compare with the published form.
+        /// Where relative rolls come from. The others to see what the published wording does.
         beta_mode: BetaMode = BetaMode::World, Allowed::Any, "";
         /// Weight of the relative rolls against the photographs' own. Raise it where single photographs lean against
         /// their neighbors, lower it where one wrong pair turns a whole row.
@@ -74,6 +90,11 @@ trueup_core::options! {
         /// Whether a vertical alone may guide where the horizontal directions do not agree. Turn it off where what
         /// looks vertical is not, as leaning trees or masts.
         vertical_only: bool = true, Allowed::Any, "";
+        /// What stands in for vanishing directions that are not believed. `gsp-3d` to compare with the published method.
+        fallback: Fallback = Fallback::Straightening, Allowed::Any, "";
+        /// Equations of the paper that are taken as they are printed, joined by +, where this program corrects them; `all`
+        /// or `none` of them. Name some to see what the correction does.
+        as_printed: PrintedEquations = PrintedEquations::NONE, Allowed::Any, "";
         /// How much straightening expects photographs to look level: variance of the roll over that of the pitch among
         /// photographers. Raise it if a panorama without buildings leans, lower it for photographs taken steeply up or
         /// down. 0 is the published form, which lets a short sweep with some roll pitch by tens of degrees; it is

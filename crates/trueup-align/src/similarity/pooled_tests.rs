@@ -5,6 +5,7 @@ use trueup_core::geometry::rotation_about_z;
 
 use super::SimilarityOptions;
 use super::frame_search::GUIDING_SIGNIFICANCE;
+use super::jackknife::axis_deviations;
 use super::joint::LineVote;
 use super::synthetic::{Sweep, SyntheticScene, World};
 use super::tests::{missing, with_lines};
@@ -51,16 +52,13 @@ fn clutter_stands_out_nowhere() {
 fn photographs_that_contradict_each_other_leave_the_vertical_uncertain() {
     let mut scene = with_lines(SyntheticScene::new(Sweep::default(), World::Random, 0.0, 11), 0, 0.3);
     let deviation = |scene: &SyntheticScene| {
-        let planes = |k: usize| {
-            let (focal_px, frame) = (scene.cameras[k].focal_px, &scene.frames[k]);
-            InterpretationPlanes::new(&scene.lines[k], focal_px, frame)
-        };
+        let planes = |k: usize| InterpretationPlanes::new(&scene.lines[k], &scene.cameras[k], &scene.frames[k]);
         let rotations: Vec<_> = scene.cameras.iter().map(Camera::rotation).collect();
         let focals: Vec<f64> = scene.cameras.iter().map(|camera| camera.focal_px).collect();
         let vote = LineVote::new(&rotations, &focals, (0..rotations.len()).map(planes).collect());
         // The true frame in the cameras' world.
         let frame = rotations[0].transpose() * scene.world_from_camera[0].transpose();
-        vote.axis_deviations(&vote.refine_frame(&frame, &[1.0; 3]), &[1.0; 3])[1]
+        axis_deviations(&vote, &vote.refine_frame(&frame, &[1.0; 3]), &[1.0; 3])[1]
     };
     let agreed = deviation(&scene);
     assert!(agreed < 0.1_f64.to_radians(), "{agreed}");

@@ -4,6 +4,8 @@ use geo::{ConvexHull, Coord, Euclidean, Length, LineString, MultiPoint, Point};
 use nalgebra::{DMatrix, DVector};
 use trueup_core::matches::PairMatches;
 
+use super::printed::PrintedEquations;
+
 /// Perimeter below which a hull says nothing of the scale, working pixels.
 const MIN_PERIMETER_PX: f64 = 20.0;
 /// Weight of an edge without a usable hull, which is taken to keep the scale.
@@ -21,9 +23,10 @@ const BELIEVABLE: std::ops::RangeInclusive<f64> = 0.2..=5.0;
 /// # Departures
 /// The printed constraint eta_ij s_j = s_i scales the wrong way round: a photograph in which the matches span more must
 /// shrink, s_j = eta_ij s_i. Rows are divided by sqrt(eta_ij), so that the order of a pair does not matter.
-pub(super) fn scales(edges: &[PairMatches], focals: &[f64]) -> Vec<f64> {
+/// [`PrintedEquations::scale`] has the constraint as it is printed, divided by nothing.
+pub(super) fn scales(edges: &[PairMatches], focals: &[f64], printed: PrintedEquations) -> Vec<f64> {
     let count = focals.len();
-    hull_scales(edges, count)
+    hull_scales(edges, count, if printed.scale { printed_row } else { corrected_row })
         .filter(|scales| scales.iter().all(|scale| BELIEVABLE.contains(scale)))
         .unwrap_or_else(|| focal_scales(focals))
 }
@@ -42,16 +45,33 @@ pub(super) fn focal_scales(focals: &[f64]) -> Vec<f64> {
     focals.iter().map(|focal| if mean > 0.0 && mean.is_finite() { 1.0 / focal / mean } else { 1.0 }).collect()
 }
 
-/// Minimizes sum w (sqrt(eta) s_i - s_j / sqrt(eta))^2 subject to sum s_i = N.
-fn hull_scales(edges: &[PairMatches], count: usize) -> Option<Vec<f64>> {
+/// One row (a s_i - b s_j) of the least squares.
+struct ScaleRow {
+    a: f64,
+    b: f64,
+}
+
+/// eta_ij s_i = s_j, divided by sqrt(eta_ij).
+fn corrected_row(eta: f64) -> ScaleRow {
+    ScaleRow { a: eta.sqrt(), b: 1.0 / eta.sqrt() }
+}
+
+/// s_i = eta_ij s_j, eq. 11 as printed.
+fn printed_row(eta: f64) -> ScaleRow {
+    ScaleRow { a: 1.0, b: eta }
+}
+
+/// Minimizes sum w (a s_i - b s_j)^2 subject to sum s_i = N, a and b of `row` by the pair's eta.
+fn hull_scales(edges: &[PairMatches], count: usize, row: fn(f64) -> ScaleRow) -> Option<Vec<f64>> {
     let mut system = DMatrix::<f64>::zeros(count + 1, count + 1);
     for edge in edges {
         let (eta, weight) = perimeter_ratio(edge).map_or((1.0, WEAK_WEIGHT), |eta| (eta, 1.0));
         let (i, j) = (edge.a, edge.b);
-        system[(i, i)] += 2.0 * weight * eta;
-        system[(j, j)] += 2.0 * weight / eta;
-        system[(i, j)] -= 2.0 * weight;
-        system[(j, i)] -= 2.0 * weight;
+        let ScaleRow { a, b } = row(eta);
+        system[(i, i)] += 2.0 * weight * a * a;
+        system[(j, j)] += 2.0 * weight * b * b;
+        system[(i, j)] -= 2.0 * weight * a * b;
+        system[(j, i)] -= 2.0 * weight * a * b;
     }
     for index in 0..count {
         system[(index, count)] = 1.0;

@@ -128,13 +128,17 @@ fn focal_ratios_come_back_as_scales() {
             joined(i, i + 1, points.collect())
         })
         .collect();
-    let scales = scale::scales(&edges, &focals);
+    let scales = scale::scales(&edges, &focals, PrintedEquations::NONE);
     let mean_inverse = focals.iter().map(|focal| 1.0 / focal).sum::<f64>() / 6.0;
     for (scale, focal) in scales.iter().zip(focals) {
         assert!((scale * focal * mean_inverse - 1.0).abs() < 0.06, "{scales:?}");
     }
     // Without matches the focal lengths decide only if the hulls contradict themselves: here nothing is known.
-    assert!(scale::scales(&[joined(0, 1, Vec::new())], &[500.0, 700.0]).iter().all(|s| (s - 1.0).abs() < 1e-9));
+    assert!(
+        scale::scales(&[joined(0, 1, Vec::new())], &[500.0, 700.0], PrintedEquations::NONE)
+            .iter()
+            .all(|s| (s - 1.0).abs() < 1e-9)
+    );
 }
 
 fn accepted(world: World, camera_noise_deg: f64, count: usize) -> usize {

@@ -47,7 +47,8 @@ pub(super) fn solve_turns(evidence: &RollEvidence<'_>, options: &SimilarityOptio
             let (i, j) = (edge.a, edge.b);
             let turn = match options.beta_mode {
                 BetaMode::World => wrap_angle(predicted[j] - predicted[i]),
-                BetaMode::Relative => twist(&evidence.given_rotations[i], &evidence.given_rotations[j]),
+                BetaMode::Relative => -printed_twist(&evidence.given_rotations[i], &evidence.given_rotations[j]),
+                BetaMode::Printed => printed_twist(&evidence.given_rotations[i], &evidence.given_rotations[j]),
             };
             TurnTerm { i, j, turn, weight: options.relative_weight }
         })
@@ -80,14 +81,14 @@ fn neighbors(photographs: usize, turns: &[TurnTerm]) -> Vec<Vec<(usize, f64)>> {
     neighbors
 }
 
-/// beta_ij of the twist of the relative rotation.
+/// The twist about the viewing direction of R_j R_i^-1, the paper's beta_ij.
 ///
 /// # Departures
-/// The published decomposition of R_j R_i^-1 has the opposite sign, and is the difference of upright rolls only for
-/// level cameras: two level cameras at pitch p that pan by y twist by about y sin p.
-fn twist(rotation_i: &Matrix3<f64>, rotation_j: &Matrix3<f64>) -> f64 {
+/// What predicts theta_j - theta_i has the opposite sign, since R_i takes the world to the camera; and the twist is the
+/// difference of upright rolls only for level cameras: two level cameras at pitch p that pan by y twist by about y sin p.
+fn printed_twist(rotation_i: &Matrix3<f64>, rotation_j: &Matrix3<f64>) -> f64 {
     let relative = rotation_j * rotation_i.transpose();
-    -(relative[(1, 0)] - relative[(0, 1)]).atan2(relative[(0, 0)] + relative[(1, 1)])
+    (relative[(1, 0)] - relative[(0, 1)]).atan2(relative[(0, 0)] + relative[(1, 1)])
 }
 
 fn angle_of(vector: &[f64; 2], otherwise: f64) -> f64 {

@@ -3,6 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 use trueup_core::geometry::roll_from_down;
 
+use super::signed_permutation::match_triad;
+
 /// Difference of mean squared cosines within which two directions are equally perpendicular to the cameras' x axes.
 const TIE: f64 = 0.05;
 /// Sine of the angle to the viewing direction below which the vertical says nothing of the roll: sin 15 degrees.
@@ -33,6 +35,17 @@ pub(super) fn vertical_of(frame: &Matrix3<f64>, rotations: &[Matrix3<f64>]) -> V
     let tie = along_x[order[1]] - along_x[order[0]] < TIE && along_y[order[1]] > along_y[order[0]];
     let vertical = if tie { order[1] } else { order[0] };
     frame.column(vertical) * if signed_y[vertical] > 0.0 { 1.0 } else { -1.0 }
+}
+
+/// The column of `frame` that lies nearest to the y axis of the `reference` camera, pointing down: the paper's eq. 5.
+///
+/// # Departures
+/// The paper takes for each direction the nearest of the world's axes, which heeds no sign and may take one axis twice,
+/// so that its M has no inverse; here one axis goes to one direction, whatever its sign, for the largest sum of cosines.
+pub(super) fn vertical_by_reference(frame: &Matrix3<f64>, reference: &Matrix3<f64>) -> Vector3<f64> {
+    // The world's axes are those of the reference camera.
+    let (down, _) = match_triad(&reference.transpose(), frame);
+    down.column(1).into_owned()
 }
 
 /// The roll of a camera that sees "down" in direction `down` of its own frame: atan2(g_x, g_y), positive when the

@@ -11,6 +11,7 @@ use super::dominant::{Dominant, dominant_frame};
 use super::frame_search::{GUIDING_SIGNIFICANCE, PooledFrame, search_frame};
 use super::gate::{GateEvidence, MAX_STRAIGHTENING_ANGLE_DEG, allowed_divergence, divergence, failed_clause};
 use super::input::PriorInput;
+use super::jackknife::axis_deviations;
 use super::joint::{self, AxisWeights, LineVote};
 use super::options::{GateMode, SimilarityOptions};
 use super::prior::Guidance;
@@ -18,7 +19,7 @@ use super::signed_permutation::{match_triad, triad_residual};
 use super::straighten::{CameraVertical, Straightened};
 use super::turns::{RollEvidence, solve_turns};
 use super::upright::Upright;
-use super::vertical::{roll_of, vertical_of};
+use super::vertical::{roll_of, vertical_by_reference, vertical_of};
 use super::vertical_vote::vertical_peak;
 use crate::vanishing::{InterpretationPlanes, RefinedTriad};
 
@@ -60,13 +61,14 @@ pub(super) fn guide(
     context.check_cancelled()?;
     let mut guidance = Guidance::none(count, allowed_divergence(count, options));
     let mut generator = context.generator(SimilarityOptions::STAGE, 0);
-    let dominant = dominant_frame(&scene.triads, options.rejection, &mut generator);
+    let cut = if options.as_printed.dominant { f64::INFINITY } else { options.rejection };
+    let dominant = dominant_frame(&scene.triads, cut, &mut generator);
     context.check_cancelled()?;
     let pooled = options.pooled_search.then(|| search_frame(&scene.vote, level)).flatten();
     guidance.significance = pooled.map(|pooled| pooled.significance);
     guidance.failed_clause = match &dominant {
         Some(dominant) => scene.judge(dominant, &mut guidance),
-        None => Some("no picture has vanishing directions".to_owned()),
+        None => Some("no photograph has vanishing directions".to_owned()),
     };
     context.check_cancelled()?;
     let accepted = match guidance.failed_clause {
@@ -88,10 +90,7 @@ pub(super) fn guide(
 fn interpretation_planes(input: &PriorInput<'_>) -> Vec<InterpretationPlanes> {
     (0..input.cameras.len())
         .into_par_iter()
-        .map(|index| {
-            let focal_px = input.cameras[index].focal_px;
-            InterpretationPlanes::new(&input.lines[index], focal_px, &input.frames[index])
-        })
+        .map(|index| InterpretationPlanes::new(&input.lines[index], &input.cameras[index], &input.frames[index]))
         .collect()
 }
 
@@ -112,6 +111,14 @@ impl<'a> SceneDirections<'a> {
         Self { input, options, rotations, straightened, triads, vote }
     }
 
+    /// The vertical among the directions of `frame`.
+    fn vertical(&self, frame: &Matrix3<f64>) -> Vector3<f64> {
+        match self.options.as_printed.vertical {
+            true => vertical_by_reference(frame, &self.rotations[self.input.reference]),
+            false => vertical_of(frame, self.rotations),
+        }
+    }
+
     /// Photographs whose directions agree with `dominant`.
     fn inliers(&self, dominant: &Dominant) -> Vec<usize> {
         let agrees = |index: &usize| dominant.residuals[*index].is_some_and(|r| r <= self.options.rejection);
@@ -121,8 +128,8 @@ impl<'a> SceneDirections<'a> {
     /// The roll of each agreeing photograph by its own direction that matches the vertical: the paper's alpha_i.
     ///
     /// # Departures
-    /// Eq. 6 is printed with directions already moved to the common frame, which would give every photograph about the
-    /// same roll; those of the camera's own frame are meant.
+    /// Eq. 6 is printed with directions already moved to the common frame, the reference camera's, which gives every
+    /// photograph about the same roll (`similarity.as_printed`); those of the camera's own frame are meant.
     fn own_rolls(&self, frame: &Matrix3<f64>, down: &Vector3<f64>, inliers: &[usize]) -> Vec<Option<f64>> {
         let mut own = vec![None; self.rotations.len()];
         let in_frame = frame.tr_mul(down);
@@ -130,7 +137,8 @@ impl<'a> SceneDirections<'a> {
         for &index in inliers {
             if let Some(triad) = &self.triads[index] {
                 let matched = match_triad(frame, triad).0.column(column) * in_frame[column].signum();
-                own[index] = roll_of(&(self.rotations[index] * matched));
+                let camera = if self.options.as_printed.alpha { self.input.reference } else { index };
+                own[index] = roll_of(&(self.rotations[camera] * matched));
             }
         }
         own
@@ -139,7 +147,7 @@ impl<'a> SceneDirections<'a> {
     /// Fills in what the dominant directions came to and returns the gate's failed clause.
     fn judge(&self, dominant: &Dominant, guidance: &mut Guidance) -> Option<String> {
         let inliers = self.inliers(dominant);
-        let down = vertical_of(&dominant.frame, self.rotations);
+        let down = self.vertical(&dominant.frame);
         let mut magnitudes: Vec<f64> =
             self.own_rolls(&dominant.frame, &down, &inliers).into_iter().flatten().map(f64::abs).collect();
         magnitudes.sort_by(f64::total_cmp);
@@ -148,7 +156,7 @@ impl<'a> SceneDirections<'a> {
         let evidence = GateEvidence {
             photographs,
             inliers: inliers.len(),
-            divergence: divergence(&residuals, photographs),
+            divergence: divergence(&residuals, photographs, self.options.as_printed.divergence),
             straightening_angle: self.straightening_angle(&down),
             significance: guidance.significance,
             median_roll: magnitudes.get(magnitudes.len() / 2).copied().unwrap_or(f64::INFINITY),
@@ -167,7 +175,7 @@ impl<'a> SceneDirections<'a> {
 
     /// The frame of the pooled search in place of one that the photographs agree on, if it stands out far enough.
     fn pooled(&self, pooled: &PooledFrame, guidance: &mut Guidance) -> Option<Dominant> {
-        let down = vertical_of(&pooled.frame, self.rotations);
+        let down = self.vertical(&pooled.frame);
         let limit = MAX_STRAIGHTENING_ANGLE_DEG.to_radians();
         let stands_out = pooled.significance >= GUIDING_SIGNIFICANCE;
         if !stands_out || self.straightening_angle(&down).is_some_and(|angle| angle > limit) {
@@ -184,7 +192,7 @@ impl<'a> SceneDirections<'a> {
 
     /// The prior of accepted dominant directions.
     fn solve_dominant(&mut self, mut dominant: Dominant, guidance: &mut Guidance) -> Option<Upright> {
-        let axis_weights = self.axis_weights(&dominant.frame, guidance);
+        let axis_weights = axis_weights(&dominant.frame, &self.vertical(&dominant.frame), guidance);
         if self.options.guided_redetection {
             self.redetect(&mut dominant);
             guidance.inliers = self.inliers(&dominant);
@@ -193,7 +201,7 @@ impl<'a> SceneDirections<'a> {
         let has_lines = self.vote.total_weight() > 0.0;
         let joint = has_lines && self.options.joint_refinement;
         let frame = if joint { self.refined(&dominant.frame, &axis_weights) } else { dominant.frame };
-        let down = vertical_of(&frame, self.rotations);
+        let down = self.vertical(&frame);
         if joint && !self.is_certain(&frame, &axis_weights, guidance) {
             return None;
         }
@@ -211,8 +219,8 @@ impl<'a> SceneDirections<'a> {
     /// Whether the vertical of a frame that all segments voted for hardly depends on which photographs are asked; says
     /// why not as the failed clause.
     fn is_certain(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights, guidance: &mut Guidance) -> bool {
-        let down = vertical_of(frame, self.rotations);
-        let deviation = self.vote.axis_deviations(frame, axis_weights)[frame.tr_mul(&down).iamax()];
+        let down = self.vertical(frame);
+        let deviation = axis_deviations(&self.vote, frame, axis_weights)[frame.tr_mul(&down).iamax()];
         guidance.vertical_deviation = Some(deviation).filter(|deviation| deviation.is_finite());
         let allowed = match guidance.pooled {
             true => MAX_POOLED_DEVIATION_DEG,
@@ -235,24 +243,11 @@ impl<'a> SceneDirections<'a> {
         corrected_rotations(self.rotations, &certainties, &self.vote, frame, axis_weights)
     }
 
-    /// Full weight for the vertical; for the horizontals as much as the photographs' directions agree: where buildings
-    /// stand at several angles, what passes for one horizontal direction would pull the vertical along.
-    fn axis_weights(&self, frame: &Matrix3<f64>, guidance: &Guidance) -> AxisWeights {
-        let residuals = guidance.inliers.iter().filter_map(|&index| guidance.residuals[index]);
-        let mean = residuals.sum::<f64>() / guidance.inliers.len().max(1) as f64;
-        // r = 4 (1 - cos phi) of the misorientation phi that is ordinary detection noise.
-        let ordinary = 4.0 * (1.0 - ORDINARY_MISORIENTATION_DEG.to_radians().cos());
-        let horizontal = if mean > ordinary { (ordinary / mean).powi(2) } else { 1.0 };
-        let down = vertical_of(frame, self.rotations);
-        let vertical = frame.tr_mul(&down).iamax();
-        std::array::from_fn(|axis| if axis == vertical { 1.0 } else { horizontal })
-    }
-
     /// The frame that all segments vote for, unless it left the neighborhood of the photographs' own.
     fn refined(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> Matrix3<f64> {
         let refined = self.vote.refine_frame(frame, axis_weights);
         let limit = MAX_REFINEMENT_TOLERANCES * joint::TOLERANCE_DEG.to_radians();
-        let (before, after) = (vertical_of(frame, self.rotations), vertical_of(&refined, self.rotations));
+        let (before, after) = (self.vertical(frame), self.vertical(&refined));
         // A comparison with NaN is false: a refinement that is not finite is dropped too.
         if before.angle(&after) <= limit { refined } else { *frame }
     }
@@ -317,6 +312,19 @@ impl<'a> SceneDirections<'a> {
         guidance.weights = solved.weights;
         Upright { down: *down, theta: solved.theta, rotations }
     }
+}
+
+/// Full weight for the vertical; for the horizontals as much as the photographs' directions agree: where buildings stand
+/// at several angles, what passes for one horizontal direction would pull the vertical along. `down` is the frame's
+/// vertical.
+pub(super) fn axis_weights(frame: &Matrix3<f64>, down: &Vector3<f64>, guidance: &Guidance) -> AxisWeights {
+    let residuals = guidance.inliers.iter().filter_map(|&index| guidance.residuals[index]);
+    let mean = residuals.sum::<f64>() / guidance.inliers.len().max(1) as f64;
+    // r = 4 (1 - cos phi) of the misorientation phi that is ordinary detection noise.
+    let ordinary = 4.0 * (1.0 - ORDINARY_MISORIENTATION_DEG.to_radians().cos());
+    let horizontal = if mean > ordinary { (ordinary / mean).powi(2) } else { 1.0 };
+    let vertical = frame.tr_mul(down).iamax();
+    std::array::from_fn(|axis| if axis == vertical { 1.0 } else { horizontal })
 }
 
 /// Each photograph's roll by the common vertical: after the joint refinement no photograph's own triad knows better.

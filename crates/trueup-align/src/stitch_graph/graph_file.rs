@@ -41,12 +41,12 @@ pub fn parse_graph_file(text: &str, names: &[String], file: &str) -> Result<Grap
             Error::input(
                 format!("{file}, line {}", number + 1),
                 reason,
-                "Write one pair per line as NAME -- NAME, with the names of pictures that are being stitched.",
+                "Write one pair per line as NAME -- NAME, with the names of photographs that are being stitched.",
             )
         })?;
     }
     if graph.edges.is_empty() {
-        return Err(Error::input(file, "no pair of pictures in it", "Write one pair per line as NAME -- NAME."));
+        return Err(Error::input(file, "no pair of photographs in it", "Write one pair per line as NAME -- NAME."));
     }
     graph.edges.sort_unstable();
     graph.edges.dedup();
@@ -75,7 +75,7 @@ fn keyed_line(fields: &str, names: &[String], graph: &mut GraphFile) -> std::res
             graph.reference_rotation_deg = angle.is_finite().then_some(angle);
         }
         "images_count" if value.parse() != Ok(names.len()) => {
-            return Err(format!("the graph is for {value} pictures, {} were given", names.len()));
+            return Err(format!("the graph is for {value} photographs, {} were given", names.len()));
         }
         // Other keys of the notation carry nothing this program uses.
         _ => {}
@@ -87,19 +87,21 @@ fn photograph(text: &str, names: &[String]) -> std::result::Result<usize, String
     let text = text.trim().trim_matches('"');
     match names.iter().position(|name| name == text) {
         Some(found) => Ok(found),
-        None => index(text, names).map_err(|_| format!("\"{text}\" is none of the {} pictures given", names.len())),
+        None => index(text, names).map_err(|_| format!("\"{text}\" is none of the {} photographs given", names.len())),
     }
 }
 
 fn index(text: &str, names: &[String]) -> std::result::Result<usize, String> {
     match text.trim().parse::<usize>() {
         Ok(value) if value < names.len() => Ok(value),
-        _ => Err(format!("\"{}\" is not a picture's index from 0 to {}", text.trim(), names.len().saturating_sub(1))),
+        _ => {
+            Err(format!("\"{}\" is not a photograph's index from 0 to {}", text.trim(), names.len().saturating_sub(1)))
+        }
     }
 }
 
 fn ordered(a: usize, b: usize) -> std::result::Result<(usize, usize), String> {
-    if a == b { Err("a picture is joined to itself".to_owned()) } else { Ok((a.min(b), a.max(b))) }
+    if a == b { Err("a photograph is joined to itself".to_owned()) } else { Ok((a.min(b), a.max(b))) }
 }
 
 #[cfg(test)]
@@ -128,11 +130,11 @@ mod tests {
     #[test]
     fn mistakes_are_named_with_their_line() {
         for (text, reason) in [
-            ("0 -- 1\nb.jpg -- d.jpg", "line 2: \"d.jpg\" is none of the 3 pictures given"),
+            ("0 -- 1\nb.jpg -- d.jpg", "line 2: \"d.jpg\" is none of the 3 photographs given"),
             ("b.jpg c.jpg", "line 1: \"b.jpg c.jpg\" is not a pair"),
-            ("1 -- 1", "line 1: a picture is joined to itself"),
-            ("{images_count | 5 | count}", "the graph is for 5 pictures, 3 were given"),
-            ("# nothing", "no pair of pictures in it"),
+            ("1 -- 1", "line 1: a photograph is joined to itself"),
+            ("{images_count | 5 | count}", "the graph is for 5 photographs, 3 were given"),
+            ("# nothing", "no pair of photographs in it"),
         ] {
             let message = parse_graph_file(text, &names(), "g.txt").expect_err("must fail").to_string();
             assert!(message.contains(reason), "{message}");

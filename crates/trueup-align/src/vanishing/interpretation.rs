@@ -1,6 +1,7 @@
 //! The interpretation planes of a photograph's segments.
 
 use nalgebra::{Vector2, Vector3};
+use trueup_core::camera::Camera;
 use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
 
@@ -21,10 +22,12 @@ pub(crate) struct InterpretationPlanes {
     /// Unit normals in the camera frame.
     pub normals: Vec<Vector3<f64>>,
     /// P x Q of the segment's ends P, Q = (x, y, f), x and y from the principal point: the normal's direction, of
-    /// magnitude area.
+    /// magnitude area. Behind a lens that bends, the normal times the length.
     pub moments: Vec<Vector3<f64>>,
     /// Midpoints from the principal point, in working pixels.
     pub midpoints: Vec<Vector2<f64>>,
+    /// Unit rays of the midpoints, in the segments' planes; `None` for a pinhole, whose midpoints tell them.
+    middle_rays: Option<Vec<Vector3<f64>>>,
     /// Lengths in working pixels.
     pub lengths: Vec<f64>,
     /// Weights: the length, capped.
@@ -33,13 +36,17 @@ pub(crate) struct InterpretationPlanes {
     pub indices: Vec<usize>,
     /// Sum of `weights`.
     pub total_weight: f64,
+    /// Focal length of the camera whose frame this is, working pixels.
+    pub focal_px: f64,
 }
 
 impl InterpretationPlanes {
     /// Keeps the segments that are finite, long enough and no artifact of the photograph's border, the longest first.
+    /// `camera` is that of the frame.
     ///
     /// Empty if the focal length or the frame is not a positive number.
-    pub(crate) fn new(lines: &[LineSegment], focal_px: f64, frame: &WorkingFrame) -> Self {
+    pub(crate) fn new(lines: &[LineSegment], camera: &Camera, frame: &WorkingFrame) -> Self {
+        let focal_px = camera.focal_px;
         let usable = focal_px.is_finite() && focal_px > 0.0 && frame.diagonal().is_finite();
         let min_length = MIN_LENGTH_PX.max(MIN_LENGTH_DIAGONAL * frame.diagonal());
         let mut kept: Vec<(usize, f64)> = lines
@@ -54,42 +61,65 @@ impl InterpretationPlanes {
         // Ties are broken by the position in the input, so that the order is the same everywhere.
         kept.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         kept.truncate(MAX_SEGMENTS);
-        let mut planes = Self::with_capacity(kept.len());
-        let center = Vector2::new(frame.width / 2.0, frame.height / 2.0);
+        let mut planes = Self::with_capacity(kept.len(), camera);
         for (index, _) in kept {
-            planes.push(index, &lines[index], center, focal_px);
+            planes.push(index, &lines[index], camera);
         }
         planes
     }
 
-    fn with_capacity(count: usize) -> Self {
+    fn with_capacity(count: usize, camera: &Camera) -> Self {
         Self {
             normals: Vec::with_capacity(count),
             moments: Vec::with_capacity(count),
             midpoints: Vec::with_capacity(count),
+            middle_rays: (!camera.lens.is_pinhole()).then(Vec::new),
             lengths: Vec::with_capacity(count),
             weights: Vec::with_capacity(count),
             indices: Vec::with_capacity(count),
             total_weight: 0.0,
+            focal_px: camera.focal_px,
         }
     }
 
-    fn push(&mut self, index: usize, line: &LineSegment, center: Vector2<f64>, focal_px: f64) {
+    fn push(&mut self, index: usize, line: &LineSegment, camera: &Camera) {
+        let center = Vector2::from(camera.principal_point);
         let (start, end) = (Vector2::from(line.start) - center, Vector2::from(line.end) - center);
-        let moment = start.push(focal_px).cross(&end.push(focal_px));
+        let length = line.length();
+        let mut moment = match self.middle_rays {
+            None => start.push(camera.focal_px).cross(&end.push(camera.focal_px)),
+            Some(_) => camera.bearing(line.start.into()).cross(&camera.bearing(line.end.into())),
+        };
         let norm = moment.norm();
         if !(norm > 0.0 && norm.is_finite()) {
             return;
         }
-        let length = line.length();
+        if let Some(rays) = &mut self.middle_rays {
+            // The middle of a bent line is beside its chord, and only what it is along the plane counts.
+            let ray = camera.bearing(Vector2::from(line.start).lerp(&line.end.into(), 0.5));
+            rays.push((ray - moment * (ray.dot(&moment) / (norm * norm))).normalize());
+            self.normals.push(moment / norm);
+            moment *= length / norm;
+        } else {
+            self.normals.push(moment / norm);
+        }
         let weight = length.min(FULL_WEIGHT_LENGTH_PX);
-        self.normals.push(moment / norm);
         self.moments.push(moment);
         self.midpoints.push((start + end) / 2.0);
         self.lengths.push(length);
         self.weights.push(weight);
         self.indices.push(index);
         self.total_weight += weight;
+    }
+
+    /// What `direction . moment` of a segment is to be divided by for the distance in pixels of the segment's ends from the
+    /// line that joins its midpoint to the direction's vanishing point: `2 |f v_xy - m v_z|` for a pinhole. Behind another
+    /// lens the pixels are those of a picture that looks along the segment's middle, where the two are the same.
+    pub(crate) fn reach(&self, line: usize, direction: &Vector3<f64>, focal_px: f64) -> f64 {
+        match &self.middle_rays {
+            None => 2.0 * (direction.xy() * focal_px - self.midpoints[line] * direction.z).norm(),
+            Some(rays) => 2.0 * rays[line].cross(direction).norm(),
+        }
     }
 
     /// Number of usable segments.

@@ -1,36 +1,41 @@
-//! Per photograph: three mutually orthogonal vanishing directions from its line segments and its focal length.
+//! Per photograph: three mutually orthogonal vanishing directions from its line segments and its camera.
 //!
 //! A segment and the camera's center span the *interpretation plane* of the segment; its unit normal n is orthogonal to
 //! the segment's direction in space. A vanishing direction v is a bearing in the camera frame that many normals are
 //! orthogonal to: n . v = 0. No vanishing point in pixels is ever formed, so that one at infinity is no special case.
 //!
 //! # Departures
-//! The paper detects vanishing points without intrinsics; here the focal length of the bundle adjustment is used, which
-//! makes the three directions orthogonal by construction. A focal length wrong by 10 % moves the roll by about 0.1
-//! degree.
+//! The paper detects vanishing points without intrinsics ([`Intrinsics::Unknown`]); by default the focal length of the bundle
+//! adjustment is used, which makes the three directions orthogonal by construction. A focal length wrong by 10 % moves the
+//! roll by about 0.1 degree.
 
 mod interpretation;
 mod options;
 mod refine;
 mod search;
 mod triad;
+mod uncalibrated;
 
 #[cfg(test)]
 mod tests;
 
 use nalgebra::{Matrix3, Vector3};
 use rand::Rng;
+use trueup_core::camera::Camera;
 use trueup_core::geometry::rows_of;
 use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
 
-pub use options::VanishingOptions;
+pub use options::{Intrinsics, VanishingOptions};
 pub use triad::{MissingTriad, Triad, TriadOutcome};
 
 pub(crate) use interpretation::{FULL_WEIGHT_LENGTH_PX, InterpretationPlanes};
 pub(crate) use refine::RefinedTriad;
 pub(crate) use search::orthonormal_complement;
 
+/// Largest angle between the vertical and a segment's interpretation plane for the segment to be a vertical line,
+/// degrees.
+pub(crate) const VERTICAL_LINE_DEG: f64 = 1.5;
 /// Clusters that must be populated: a single direction does not fix an orientation.
 const NEEDED_CLUSTERS: usize = 2;
 /// Segments that make a cluster count as populated.
@@ -40,9 +45,11 @@ const MAX_ROTATION_SD_DEG: f64 = 5.0;
 
 /// Finds the three vanishing directions of one photograph.
 ///
-/// `lines` are in the working pixels of `frame`, `focal_px` too; segments that are too short, not finite or artifacts
+/// `lines` and `camera` are in the working pixels of `frame`; segments that are too short, not finite or artifacts
 /// of the frame are ignored. `generator` drives the choice of hypotheses: the same generator gives the same triad.
-/// Cost: about `draws * 45 * 200` evaluations of a segment, 1 to 2 ms with the defaults.
+/// Cost: about `draws * 45 * 200` evaluations of a segment, 1 to 2 ms with the defaults. Without intrinsics (see
+/// `uncalibrated`) the directions are those in the frame of a camera of the focal length that they tell themselves, and
+/// `focal_px` is not heeded.
 ///
 /// # Source
 /// Two-line exhaustive search on the Gaussian sphere (Lu, Yao, Liu, Li: 2-Line Exhaustive Searching for Real-Time
@@ -54,15 +61,23 @@ const MAX_ROTATION_SD_DEG: f64 = 5.0;
 /// squares.
 pub fn detect_triad(
     lines: &[LineSegment],
-    focal_px: f64,
+    camera: &Camera,
     frame: &WorkingFrame,
     options: &VanishingOptions,
     generator: &mut impl Rng,
 ) -> TriadOutcome {
-    let planes = InterpretationPlanes::new(lines, focal_px, frame);
+    let planes = InterpretationPlanes::new(lines, camera, frame);
     if planes.len() < options.min_lines {
         let missing = MissingTriad::TooFewLines { found: planes.len(), needed: options.min_lines };
         return TriadOutcome::Missing(missing);
+    }
+    if options.intrinsics == Intrinsics::Unknown {
+        let found = uncalibrated::search(&planes, frame.width.max(frame.height), options, generator);
+        let missing = MissingTriad::LowQuality { quality: 0.0, needed: options.min_quality };
+        return found.map_or(TriadOutcome::Missing(missing), |found| {
+            let planes = InterpretationPlanes::new(lines, &Camera { focal_px: found.focal_px, ..*camera }, frame);
+            judge(&RefinedTriad::refine(&found.triad, &planes, options), &planes, lines.len(), options)
+        });
     }
     let mut best: Option<RefinedTriad> = None;
     for hypothesis in search::best_hypotheses(&planes, options, generator) {

@@ -1,5 +1,15 @@
 //! What a user can choose about vanishing directions.
 
+trueup_core::choice! {
+    /// What of the cameras the search for vanishing directions knows.
+    pub enum Intrinsics {
+        /// The focal length that was adjusted to the matches.
+        Adjusted = "adjusted",
+        /// Nothing: two vanishing points tell the focal length, as published.
+        Unknown = "unknown",
+    }
+}
+
 trueup_core::options! {
     /// How vanishing directions are found in one photograph.
     pub struct VanishingOptions("vanishing") {
@@ -14,5 +24,8 @@ trueup_core::options! {
         /// Lower quality (fraction of the segments' weight that supports the triad) yields no triad. Raise it where
         /// organic scenes yield directions that are none; lower it where architecture is seen between much clutter.
         min_quality: f64 = 0.25, between(0.0, 1.0), "";
+        /// What the search knows of the camera. `unknown` to compare with the published method, or where the cameras are far
+        /// from what the photographs show.
+        intrinsics: Intrinsics = Intrinsics::Adjusted, Allowed::Any, "";
     }
 }

@@ -41,7 +41,7 @@ pub(super) fn best_hypotheses(
     best.into_iter().map(|(_, triad)| triad).collect()
 }
 
-fn cumulative_weights(weights: &[f64]) -> Vec<f64> {
+pub(super) fn cumulative_weights(weights: &[f64]) -> Vec<f64> {
     weights
         .iter()
         .scan(0.0, |sum, weight| {
@@ -52,7 +52,7 @@ fn cumulative_weights(weights: &[f64]) -> Vec<f64> {
 }
 
 /// An index drawn with probability proportional to its weight.
-fn draw(cumulative: &[f64], generator: &mut impl Rng) -> usize {
+pub(super) fn draw(cumulative: &[f64], generator: &mut impl Rng) -> usize {
     let total = cumulative.last().copied().unwrap_or(0.0);
     let place = total * generator.random::<f64>();
     cumulative.partition_point(|&sum| sum <= place).min(cumulative.len().saturating_sub(1))

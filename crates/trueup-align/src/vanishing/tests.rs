@@ -9,6 +9,10 @@ fn frame() -> WorkingFrame {
     WorkingFrame { width: SIZE.0, height: SIZE.1, working_from_full: 1.0 }
 }
 
+fn camera(focal_px: f64) -> Camera {
+    Camera::new(focal_px, SIZE.0, SIZE.1, &Matrix3::identity())
+}
+
 /// Roll errors in degrees of 25 photographs, ascending; panics on a wrong triad.
 fn roll_errors(noise_px: f64, clutter: usize, focal_error: f64) -> Vec<f64> {
     let context = StageContext::default();
@@ -21,7 +25,7 @@ fn roll_errors(noise_px: f64, clutter: usize, focal_error: f64) -> Vec<f64> {
         let camera_from_world = (rotation_about_y(yaw) * rotation_about_x(pitch) * rotation_about_z(roll)).transpose();
         let lines = photograph_lines(&camera_from_world, 20, clutter, noise_px, &mut generator);
         let options = VanishingOptions::default();
-        let outcome = detect_triad(&lines, FOCAL_PX * focal_error, &frame(), &options, &mut generator);
+        let outcome = detect_triad(&lines, &camera(FOCAL_PX * focal_error), &frame(), &options, &mut generator);
         let triad = outcome.triad().unwrap_or_else(|| panic!("{outcome:?}"));
         let matrix = triad.matrix();
         // The direction closest to the true vertical.
@@ -57,7 +61,7 @@ fn a_focal_length_wrong_by_a_tenth_hardly_moves_the_roll() {
 
 fn outcome_of(lines: &[LineSegment], focal_px: f64) -> TriadOutcome {
     let mut generator = StageContext::default().generator("vanishing test", 0);
-    detect_triad(lines, focal_px, &frame(), &VanishingOptions::default(), &mut generator)
+    detect_triad(lines, &camera(focal_px), &frame(), &VanishingOptions::default(), &mut generator)
 }
 
 #[test]

@@ -3,9 +3,8 @@
 
 use nalgebra::{Matrix3, Vector2};
 use rand::Rng;
-use rand::seq::index::sample;
 use rayon::prelude::*;
-use trueup_core::geometry::{Homography, Normalization};
+use trueup_core::geometry::Homography;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
@@ -17,6 +16,7 @@ use super::limits::corners;
 use super::options::WarpOptions;
 use super::placement::{Anchored, Step, one_after_another};
 use crate::match_points::MovingDlt;
+use crate::plane_similarity::{MatchedPoints, similarity_of_least_turn};
 
 /// Places the photographs one after the other, each between its local homography and a similarity.
 ///
@@ -27,12 +27,14 @@ use crate::match_points::MovingDlt;
 ///
 /// # Departures
 /// The published method is for two photographs. Here each further one is fitted to the places that its matches have in
-/// the panorama by then, and moves what is placed already in the same way; `warps.adapt_reference` turns that off.
+/// the panorama by then, and moves what is placed already in the same way. With `warps.adapt_reference` off what is
+/// placed stays: a photograph that joins follows its local homographies as far as its matches reach, so that it meets
+/// what stays, and becomes the similarity from there to its far corner.
 pub(super) fn place(input: &WarpInput<'_>, options: &WarpOptions, context: &StageContext<'_>) -> Result<Vec<GridMesh>> {
     one_after_another(input, context, |step, data, placed| {
         let mut generator = context.generator(STAGE, input.seeds[step.photograph]);
-        let join =
-            Join::new(input, step, data, placed, &mut generator).ok_or_else(|| undetermined(input, step.photograph))?;
+        let join = Join::new(input, step, data, placed, options.adapt_reference, &mut generator)
+            .ok_or_else(|| undetermined(input, step.photograph))?;
         if options.adapt_reference {
             for mesh in placed.iter_mut() {
                 *mesh = mesh.take().map(|mesh| join.adapted(mesh));
@@ -50,17 +52,18 @@ struct Join {
     global: Homography,
     photograph_from_global: Homography,
     similarity: Matrix3<f64>,
-    /// Where in the panorama the similarity starts, and the way to where it is reached.
-    start: Vector2<f64>,
-    way: Vector2<f64>,
+    change: Change,
 }
 
 impl Join {
+    /// `None` if the matches determine no map. With `adapts` the change to the similarity is the published one, in
+    /// which what is placed takes part; without, it begins where the matches end.
     fn new(
         input: &WarpInput<'_>,
         step: Step,
         data: &Anchored,
         placed: &[Option<GridMesh>],
+        adapts: bool,
         generator: &mut impl Rng,
     ) -> Option<Self> {
         let grid = &input.grids[step.photograph];
@@ -70,22 +73,19 @@ impl Join {
         let target: Vec<[f64; 2]> =
             (0..grid.len()).into_par_iter().map(|vertex| fields.place(grid.source(vertex)).into()).collect();
         let local = GridMesh { target, ..grid.clone() };
-        let similarity = global_similarity(data, generator)?;
-        let parent = placed[step.parent].as_ref()?;
-        let center = |mesh: &GridMesh| mesh.warp(Vector2::new(mesh.width / 2.0, mesh.height / 2.0));
-        let from = center(parent);
-        let axis = (center(&local) - from).try_normalize(f64::MIN_POSITIVE)?;
-        let along = corners(grid.width, grid.height).map(|corner| axis.dot(&(local.warp(corner) - from)));
-        let low = along.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = along.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let matched = MatchedPoints { points: &data.points, places: &data.places };
+        let similarity = similarity_of_least_turn(matched, generator)?;
         let photograph_from_global = global.inverse()?;
-        let way = axis * (high - low);
-        Some(Self { local, global, photograph_from_global, similarity, start: from + axis * low, way })
+        let change = match adapts {
+            true => Change::across(&local, center(placed[step.parent].as_ref()?))?,
+            false => Change::beyond(&local, &data.places),
+        };
+        Some(Self { local, global, photograph_from_global, similarity, change })
     }
 
     /// Share of the similarity at a place that the local homographies mean.
     fn share(&self, place: Vector2<f64>) -> f64 {
-        ((place - self.start).dot(&self.way) / self.way.norm_squared()).clamp(0.0, 1.0)
+        self.change.share(place)
     }
 
     /// Where a point of the photograph goes.
@@ -121,6 +121,65 @@ impl Join {
         }
         point
     }
+}
+
+/// Where the middle of a photograph lies.
+fn center(mesh: &GridMesh) -> Vector2<f64> {
+    mesh.warp(Vector2::new(mesh.width / 2.0, mesh.height / 2.0))
+}
+
+/// Where in the panorama the similarity takes over: evenly along a way.
+#[derive(Debug, Clone, Copy)]
+struct Change {
+    start: Vector2<f64>,
+    /// To where the similarity is reached; zero where it is not.
+    way: Vector2<f64>,
+}
+
+impl Change {
+    /// From the first corner of the photograph, as its local homographies place it, to the last one, along the line
+    /// from the center of its neighbor to its own. `None` if these coincide.
+    ///
+    /// # Source
+    /// Lin et al. (2015), equations 15 and 16.
+    fn across(local: &GridMesh, from: Vector2<f64>) -> Option<Self> {
+        let axis = (center(local) - from).try_normalize(f64::MIN_POSITIVE)?;
+        let [low, high] = extent(corner_places(local), from, axis)?;
+        Some(Self { start: from + axis * low, way: axis * (high - low) })
+    }
+
+    /// From the last of the matches to the last corner, along the line from the middle of the matches to that of the
+    /// photograph. The similarity is nowhere reached if the matches surround the middle, or reach to the far corner.
+    fn beyond(local: &GridMesh, places: &[Vector2<f64>]) -> Self {
+        /// Least way, in diagonals of the photograph: a change within less would be a crease.
+        const LEAST_WAY: f64 = 0.05;
+        let from = places.iter().sum::<Vector2<f64>>() / places.len() as f64;
+        let found = || {
+            let axis = (center(local) - from).try_normalize(f64::MIN_POSITIVE)?;
+            let [_, low] = extent(places.iter().copied(), from, axis)?;
+            let [_, high] = extent(corner_places(local), from, axis)?;
+            let long = high - low > LEAST_WAY * local.width.hypot(local.height);
+            long.then_some(Self { start: from + axis * low, way: axis * (high - low) })
+        };
+        found().unwrap_or(Self { start: from, way: Vector2::zeros() })
+    }
+
+    /// Share of the similarity at a place: 0 before the way, 1 behind it.
+    fn share(&self, place: Vector2<f64>) -> f64 {
+        let squared = self.way.norm_squared();
+        if squared > 0.0 { ((place - self.start).dot(&self.way) / squared).clamp(0.0, 1.0) } else { 0.0 }
+    }
+}
+
+/// Where a photograph's corners lie.
+fn corner_places(mesh: &GridMesh) -> impl Iterator<Item = Vector2<f64>> {
+    corners(mesh.width, mesh.height).into_iter().map(|corner| mesh.warp(corner))
+}
+
+/// The least and the greatest distance of places from a point along an axis; `None` without places.
+fn extent(places: impl Iterator<Item = Vector2<f64>>, from: Vector2<f64>, axis: Vector2<f64>) -> Option<[f64; 2]> {
+    let distances = places.map(|place| axis.dot(&(place - from)));
+    distances.map(|distance| [distance; 2]).reduce(|[low, high], [next, _]| [low.min(next), high.max(next)])
 }
 
 /// Local homographies inside the rectangle around the matches, their linearization outside.
@@ -195,103 +254,6 @@ impl<'a> LocalHomographies<'a> {
     }
 }
 
-/// The similarity of least rotation among those of the planes that the matches lie on.
-fn global_similarity(data: &Anchored, generator: &mut impl Rng) -> Option<Matrix3<f64>> {
-    /// Matches that make a plane, as published.
-    const PLANE_MATCHES: usize = 50;
-    let normalized = Normalized::of(data)?;
-    let mut left: Vec<usize> = (0..data.points.len()).collect();
-    let mut candidates: Vec<Matrix3<f64>> = Vec::new();
-    loop {
-        let plane = largest_plane(&normalized, &left, generator);
-        let large = plane.len() >= PLANE_MATCHES;
-        // Without any large plane the largest one has to do.
-        if large || (candidates.is_empty() && plane.len() >= 4) {
-            candidates.extend(fitted_similarity(data, &plane));
-        }
-        if !large {
-            break;
-        }
-        left.retain(|index| plane.binary_search(index).is_err());
-    }
-    if candidates.is_empty() {
-        candidates.extend(fitted_similarity(data, &(0..data.points.len()).collect::<Vec<_>>()));
-    }
-    let turn = |similarity: &Matrix3<f64>| similarity[(1, 0)].atan2(similarity[(0, 0)]).abs();
-    candidates.into_iter().reduce(|best, next| if turn(&next) < turn(&best) { next } else { best })
-}
-
-/// Matches whose points and places are centered, and 1.4 from their center on average.
-struct Normalized {
-    points: Vec<Vector2<f64>>,
-    places: Vec<Vector2<f64>>,
-}
-
-impl Normalized {
-    /// `None` if all points or all places coincide.
-    fn of(data: &Anchored) -> Option<Self> {
-        let applied = |points: &[Vector2<f64>]| -> Option<Vec<Vector2<f64>>> {
-            let normalization = Normalization::of(points)?;
-            Some(points.iter().map(|&point| normalization.apply(point)).collect())
-        };
-        Some(Self { points: applied(&data.points)?, places: applied(&data.places)? })
-    }
-}
-
-/// The largest set of the matches `left` that one homography explains, ascending; by RANSAC.
-fn largest_plane(data: &Normalized, left: &[usize], generator: &mut impl Rng) -> Vec<usize> {
-    /// Largest distance of a match from a plane's homography, in units in which matches are 1.4 from their center on
-    /// average; as published.
-    const TOLERANCE: f64 = 0.01;
-    /// Most samples of four matches: one of them is all on a plane of 1 in 4 matches with 86 %, of 1 in 3 with 99.8 %.
-    const MOST_SAMPLES: f64 = 500.0;
-    const SAMPLE_SIZE: usize = 4;
-    /// How sure it must be that no larger plane was missed for the search to end early.
-    const CONFIDENCE: f64 = 0.999;
-    let mut best = Vec::new();
-    if left.len() < SAMPLE_SIZE {
-        return best;
-    }
-    let mut needed = MOST_SAMPLES;
-    let mut taken = 0.0;
-    while taken < needed {
-        taken += 1.0;
-        let chosen = sample(generator, left.len(), SAMPLE_SIZE);
-        let of = |points: &[Vector2<f64>]| -> [Vector2<f64>; SAMPLE_SIZE] {
-            std::array::from_fn(|k| points[left[chosen.index(k)]])
-        };
-        let Some(plane) = Homography::from_four_points(&of(&data.points), &of(&data.places)) else {
-            continue;
-        };
-        let agrees = |&index: &usize| (plane.apply(data.points[index]) - data.places[index]).norm() <= TOLERANCE;
-        let agreeing: Vec<usize> = left.iter().copied().filter(agrees).collect();
-        if agreeing.len() > best.len() {
-            best = agreeing;
-            let all_on_it = (best.len() as f64 / left.len() as f64).powi(SAMPLE_SIZE as i32);
-            // Never negative nor NaN: a share of 1 gives ln(0) = -infinity, and 0 samples more.
-            needed = ((1.0 - CONFIDENCE).ln() / (1.0 - all_on_it).ln()).clamp(0.0, MOST_SAMPLES);
-        }
-    }
-    best
-}
-
-/// The least-squares similarity of some matches; `None` if they coincide.
-fn fitted_similarity(data: &Anchored, chosen: &[usize]) -> Option<Matrix3<f64>> {
-    let mean =
-        |points: &[Vector2<f64>]| chosen.iter().map(|&index| points[index]).sum::<Vector2<f64>>() / chosen.len() as f64;
-    let (from, to) = (mean(&data.points), mean(&data.places));
-    let (mut turn, mut spread) = (Vector2::zeros(), 0.0);
-    for &index in chosen {
-        let (p, q) = (data.points[index] - from, data.places[index] - to);
-        turn += Vector2::new(p.dot(&q), p.perp(&q));
-        spread += p.norm_squared();
-    }
-    let (a, b) = (turn.x / spread, turn.y / spread);
-    let shift = to - Vector2::new(a * from.x - b * from.y, b * from.x + a * from.y);
-    let similarity = Matrix3::new(a, -b, shift.x, b, a, shift.y, 0.0, 0.0, 1.0);
-    similarity.iter().all(|entry| entry.is_finite()).then_some(similarity)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::WarpModel;
@@ -304,7 +266,8 @@ mod tests {
         let placed = vec![Some(example.grids[0].clone()), None];
         let data = anchored(&input, 1, &placed);
         let mut generator = StageContext::default().generator(STAGE, 0);
-        Join::new(&input, Step { photograph: 1, parent: 0 }, &data, &placed, &mut generator).expect("regular")
+        let step = Step { photograph: 1, parent: 0 };
+        Join::new(&input, step, &data, &placed, true, &mut generator).expect("regular")
     }
 
     #[test]
@@ -336,13 +299,25 @@ mod tests {
     #[test]
     fn the_reference_is_adapted_so_that_the_overlap_still_meets() {
         let example = Example::panned(&[0.0, 28.0], 0);
-        let fixed = WarpOptions { adapt_reference: false, ..WarpOptions::default() };
         let adapted = example.place(WarpModel::Aanap).expect("a pair");
         assert_eq!(adapted.folds, 0);
+        assert_ne!(adapted.meshes[0], example.grids[0]);
         assert!(misalignment(&example, &adapted.meshes) < 1.5, "{}", misalignment(&example, &adapted.meshes));
-        let fixed = example.place_with(WarpModel::Aanap, &fixed).expect("a pair");
-        assert_eq!(fixed.meshes[0], example.grids[0]);
-        assert!(misalignment(&example, &fixed.meshes) > 5.0);
+    }
+
+    /// Without moving the reference the photograph follows its local homographies wherever it has matches.
+    #[test]
+    fn a_fixed_reference_stays_and_the_overlap_meets() {
+        let example = Example::panned(&[0.0, 28.0], 0);
+        let options = WarpOptions { adapt_reference: false, ..WarpOptions::default() };
+        let fixed = example.place_with(WarpModel::Aanap, &options).expect("a pair");
+        assert_eq!((fixed.folds, &fixed.meshes[0]), (0, &example.grids[0]));
+        assert!(misalignment(&example, &fixed.meshes) < 1.0, "{}", misalignment(&example, &fixed.meshes));
+        // Panned by 28 degrees, the far border would be (cos 1.7 / cos 57.7)^2 = 3.5 times as high; the similarity, which
+        // the overlap decides, is nearly as large as the photograph.
+        let border = |y: f64| fixed.meshes[1].warp(Vector2::new(WIDTH, y));
+        let height = (border(HEIGHT) - border(0.0)).norm() / HEIGHT;
+        assert!(height < 1.5, "{height}");
     }
 
     #[test]
@@ -368,5 +343,22 @@ mod tests {
         let example = Example::panned(&[-56.0, -28.0, 0.0, 28.0, 56.0], 2);
         let placed = example.place(WarpModel::Aanap).expect("a row");
         assert!(misalignment(&example, &placed.meshes) < 12.0, "{}", misalignment(&example, &placed.meshes));
+    }
+
+    /// Where what is placed stays, each photograph is as large as the reference, give or take what its overlap stretches.
+    #[test]
+    fn photographs_of_a_wide_row_meet_a_reference_that_stays() {
+        let yaws: Vec<f64> = (-4..=4).map(|k| 26.0 * f64::from(k)).collect();
+        let example = Example::panned(&yaws, 4);
+        let options = WarpOptions { adapt_reference: false, ..WarpOptions::default() };
+        let placed = example.place_with(WarpModel::Aanap, &options).expect("a row of 208 degrees");
+        assert_eq!((placed.folds, &placed.meshes[4]), (0, &example.grids[4]));
+        // Local homographies follow a neighbor that turns from a homography into a similarity only nearly.
+        assert!(misalignment(&example, &placed.meshes) < 20.0, "{}", misalignment(&example, &placed.meshes));
+        for mesh in &placed.meshes {
+            let (low, high) = mesh.bounds();
+            let (width, height) = ((high.x - low.x) / WIDTH, (high.y - low.y) / HEIGHT);
+            assert!((0.7..1.6).contains(&width) && (0.7..1.6).contains(&height), "{width} x {height}");
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! SPHP for any number of photographs: which pair the warp is made of, and where its lines lie.
 
-use nalgebra::{Matrix2, Matrix3, Vector2};
+use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use trueup_core::geometry::Homography;
 use trueup_core::mesh::GridMesh;
@@ -8,33 +8,46 @@ use trueup_core::{Result, StageContext};
 
 use super::WarpModel;
 use super::deformed::deformed;
+use super::half_planes::{HalfPlanes, Route, Samples, distortion};
 use super::homography::onto;
 use super::input::WarpInput;
-use super::limits::{MIN_DEPTH, farthest_angle, least_depth, refuse};
+use super::limits::{farthest_angle, refuse};
 use super::options::WarpOptions;
 use super::sphp::SphpWarp;
-use crate::stitch_graph::StitchGraph;
 
 /// Offsets of the first line that are tried, in working pixels of a photograph whose longer side is
 /// [`PUBLISHED_SIDE_PX`].
 const FIRST_OFFSETS: [f64; 2] = [-300.0, 600.0];
 /// Offsets of the second line.
 const SECOND_OFFSETS: [f64; 2] = [-300.0, 200.0];
-/// Step of both.
-const OFFSET_STEP: f64 = 10.0;
 /// Least distance of the lines.
 const LEAST_GAP: f64 = 120.0;
 /// The longer side of photographs that these lengths belong to.
 const PUBLISHED_SIDE_PX: f64 = 800.0;
-/// Distance of the points at which the distortion is sampled, working pixels.
-const SAMPLE_STEP_PX: f64 = 40.0;
+
+/// How closely the lines are searched.
+#[derive(Debug, Clone, Copy)]
+struct Raster {
+    /// Step of both offsets, in the unit of [`FIRST_OFFSETS`].
+    offset_step: f64,
+    /// Distance of the points at which the distortion is sampled, working pixels.
+    sample_step_px: f64,
+}
+
+/// The raster that compares pairs: both ranges of offsets have several steps, a photograph a few tens of samples.
+const COARSE: Raster = Raster { offset_step: 100.0, sample_step_px: 120.0 };
+/// The raster that finds the lines of a pair; the step of the authors' program.
+const FINE: Raster = Raster { offset_step: 10.0, sample_step_px: 40.0 };
+/// Pairs whose lines are searched on the fine raster: the best of the coarse one, and those that may be better after all.
+const FINE_PAIRS: usize = 3;
 
 /// Places all photographs by one half-projective warp.
 ///
-/// The panorama lies on the plane of a photograph `tar` where the warp is a homography, and follows the photograph
-/// `ref` where it is a similarity; tried are the two photographs farthest apart in the graph and the reference with the
-/// one farthest from it, in both roles, and all pairs of lines on a raster. The least distorted one is taken: that with
-/// the smallest sum of squared distances of the Jacobians from each photograph's best similarity.
+/// The panorama lies on the plane of a photograph `tar` where the warp is a homography, and follows the plane of a
+/// photograph `ref` where it is a similarity. Tried are all pairs of photographs in both roles, and for each all pairs
+/// of lines on a raster. The least distorted one is taken: that with the smallest sum of squared distances of the
+/// Jacobians from each photograph's best similarity. A photograph beyond either is as distorted as it is on that plane;
+/// so in a row the two lie inside its ends, which are both as near to them as can be.
 ///
 /// # Source
 /// Chang, Sato and Chuang, "Shape-preserving half-projective warps for image stitching" (2014), sections 3 and 4;
@@ -42,7 +55,9 @@ const SAMPLE_STEP_PX: f64 = 40.0;
 ///
 /// # Departures
 /// Jacobians are sampled every 40 px instead of at every pixel. For more than two photographs the paper leaves the
-/// choice of the pair to the user.
+/// choice of the pair to the user; the same cost chooses it here, on a coarse raster first. The ranges of the lines
+/// start at the centers of the pair, not of the outermost photographs. A photograph that reaches behind the plane of
+/// `ref`, where the published map does not exist, is where it lies on the plane of `tar` if it lies there wholly.
 pub(super) fn place(
     model: WarpModel,
     input: &WarpInput<'_>,
@@ -50,72 +65,40 @@ pub(super) fn place(
     context: &StageContext<'_>,
 ) -> Result<Vec<GridMesh>> {
     let zero_rotation = model == WarpModel::Sphp;
-    let mut best: Option<(f64, Plan)> = None;
-    for (source, target) in roles(input) {
+    let mut compared: Vec<(f64, HalfPlanes)> = Vec::new();
+    for source in 0..input.grids.len() {
         context.check_cancelled()?;
-        let Some(found) = Plan::search(input, source, target, zero_rotation, options)? else { continue };
-        if best.as_ref().is_none_or(|(cost, _)| found.0 < *cost) {
-            best = Some(found);
+        let onto_source = onto(input, source, options.pair_homographies)?;
+        for target in (0..input.grids.len()).filter(|&target| target != source) {
+            let planes = HalfPlanes::new(input, &onto_source, source, target);
+            let found =
+                planes.and_then(|planes| Some((least_distorted(&planes, input, zero_rotation, COARSE)?.0, planes)));
+            compared.extend(found);
+        }
+        // The sort is stable: between equals the order of the photographs decides.
+        compared.sort_by(|one, other| one.0.total_cmp(&other.0));
+        compared.truncate(FINE_PAIRS);
+    }
+    let mut best: Option<(f64, Warp, &HalfPlanes)> = None;
+    for (_, planes) in &compared {
+        context.check_cancelled()?;
+        let Some((cost, warp)) = least_distorted(planes, input, zero_rotation, FINE) else { continue };
+        if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
+            best = Some((cost, warp, planes));
         }
     }
-    let Some((_, plan)) = best else {
+    let Some((_, warp, planes)) = best else {
         let widest = (0..input.grids.len())
             .max_by(|&a, &b| farthest_angle(input, a).total_cmp(&farthest_angle(input, b)))
             .unwrap_or(input.reference);
         return Err(refuse(model, input, widest, "cannot be laid on one plane with the others"));
     };
-    Ok((0..input.grids.len()).map(|photograph| plan.mesh(input, photograph)).collect())
+    let mesh =
+        |photograph: usize| deformed(&input.grids[photograph], |point| warp.place(&planes.routes[photograph], point));
+    Ok((0..input.grids.len()).map(mesh).collect())
 }
 
-/// The pairs (ref, tar) to be tried.
-fn roles(input: &WarpInput<'_>) -> Vec<(usize, usize)> {
-    let distances = hop_distances(input);
-    let count = input.grids.len();
-    let far = |from: usize| (0..count).rev().max_by_key(|&to| distances[from][to]).unwrap_or(from);
-    let one_end = (0..count).rev().max_by_key(|&from| distances[from][far(from)]).unwrap_or(0);
-    let mut roles = Vec::new();
-    for (a, b) in [(one_end, far(one_end)), (input.reference, far(input.reference))] {
-        for role in [(a, b), (b, a)] {
-            if a != b && !roles.contains(&role) {
-                roles.push(role);
-            }
-        }
-    }
-    roles
-}
-
-/// Steps between all photographs along overlaps.
-fn hop_distances(input: &WarpInput<'_>) -> Vec<Vec<usize>> {
-    let count = input.grids.len();
-    let graph = StitchGraph::new(count, input.pairs);
-    (0..count)
-        .map(|start| {
-            let mut distance = vec![usize::MAX; count];
-            distance[start] = 0;
-            let mut queue = std::collections::VecDeque::from([start]);
-            while let Some(here) = queue.pop_front() {
-                for edge in graph.edges.iter().filter(|edge| edge.a == here || edge.b == here) {
-                    let other = if edge.a == here { edge.b } else { edge.a };
-                    if distance[other] == usize::MAX {
-                        distance[other] = distance[here] + 1;
-                        queue.push_back(other);
-                    }
-                }
-            }
-            // Photographs that are not connected are never the farthest.
-            distance.into_iter().map(|steps| if steps == usize::MAX { 0 } else { steps }).collect()
-        })
-        .collect()
-}
-
-/// A warp of all photographs.
-#[derive(Debug)]
-struct Plan {
-    /// For each photograph the homography into the plane of `ref`, its center the origin.
-    onto_ref: Vec<Homography>,
-    warp: Warp,
-}
-
+/// The map from the plane of `ref` to the panorama.
 #[derive(Debug)]
 enum Warp {
     Halves(Box<SphpWarp>),
@@ -123,143 +106,102 @@ enum Warp {
     Affine(Homography),
 }
 
-/// A place of a photograph in the plane of `ref`, and the derivative there.
-struct Sample {
-    place: Vector2<f64>,
-    derivative: Matrix2<f64>,
-}
-
-impl Plan {
-    /// The least distorted warp for these roles with its cost; `None` if the homographies do not allow one.
-    fn search(
-        input: &WarpInput<'_>,
-        source: usize,
-        target: usize,
-        zero_rotation: bool,
-        options: &WarpOptions,
-    ) -> Result<Option<(f64, Self)>> {
-        let onto_source = onto(input, source, options.pair_homographies)?;
-        let in_front = (0..onto_source.len())
-            .all(|photograph| least_depth(&onto_source[photograph], input, photograph) > MIN_DEPTH);
-        if !in_front {
-            return Ok(None);
+impl Warp {
+    /// Where a point of a photograph goes.
+    fn place(&self, route: &Route, point: Vector2<f64>) -> Vector2<f64> {
+        match (route, self) {
+            (Route::ThroughRef(onto_ref), Self::Halves(warp)) => warp.apply(onto_ref.apply(point)),
+            (Route::ThroughRef(onto_ref), Self::Affine(tar_from_ref)) => tar_from_ref.apply(onto_ref.apply(point)),
+            (Route::OnTar { onto_tar, .. }, _) => onto_tar.apply(point),
         }
-        let frame = &input.frames[source];
-        let (x, y) = (frame.width / 2.0, frame.height / 2.0);
-        let to_center = Homography(Matrix3::new(1.0, 0.0, -x, 0.0, 1.0, -y, 0.0, 0.0, 1.0));
-        let from_center = Homography(Matrix3::new(1.0, 0.0, x, 0.0, 1.0, y, 0.0, 0.0, 1.0));
-        let onto_ref: Vec<Homography> = onto_source.iter().map(|homography| to_center.after(homography)).collect();
-        let target_from_ref = onto(input, target, options.pair_homographies)?[source].after(&from_center);
-        let scale = target_from_ref.0[(2, 2)];
-        if scale <= MIN_DEPTH {
-            return Ok(None);
-        }
-        let target_from_ref = Homography(target_from_ref.0 / scale);
-        let samples: Vec<Vec<Sample>> =
-            (0..onto_ref.len()).map(|photograph| sampled(input, photograph, &onto_ref[photograph])).collect();
-        let centers = input
-            .frames
-            .iter()
-            .zip(&onto_ref)
-            .map(|(frame, homography)| homography.apply(Vector2::new(frame.width / 2.0, frame.height / 2.0)));
-        let unit = frame.width.max(frame.height) / PUBLISHED_SIDE_PX;
-        let found = match SphpWarp::growth(&target_from_ref) {
-            None => {
-                let cost = distortion(&samples, |place| Some(target_from_ref.jacobian(place)));
-                cost.map(|cost| (cost, Warp::Affine(target_from_ref)))
-            }
-            Some(direction) => {
-                let along: Vec<f64> = centers.map(|center| direction.dot(&center)).collect();
-                let start = [
-                    along.iter().copied().fold(f64::INFINITY, f64::min),
-                    along.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-                ];
-                least_distorted(&target_from_ref, start, unit, zero_rotation, &samples)
-            }
-        };
-        Ok(found.map(|(cost, warp)| (cost, Self { onto_ref, warp })))
-    }
-
-    fn mesh(&self, input: &WarpInput<'_>, photograph: usize) -> GridMesh {
-        deformed(&input.grids[photograph], |point| {
-            let place = self.onto_ref[photograph].apply(point);
-            match &self.warp {
-                Warp::Halves(warp) => warp.apply(place),
-                Warp::Affine(homography) => homography.apply(place),
-            }
-        })
     }
 }
 
-fn sampled(input: &WarpInput<'_>, photograph: usize, onto_ref: &Homography) -> Vec<Sample> {
-    let frame = &input.frames[photograph];
-    let grid = GridMesh::regular(frame.width, frame.height, SAMPLE_STEP_PX);
-    let sample = |point| Sample { place: onto_ref.apply(point), derivative: onto_ref.jacobian(point) };
-    (0..grid.len()).map(|vertex| sample(grid.source(vertex))).collect()
-}
-
-/// Tries all pairs of lines around `start`; `unit` is the scale of the published lengths.
+/// The least distorted warp over these planes, and its distortion; `None` if no lines yield one.
 fn least_distorted(
-    homography: &Homography,
-    start: [f64; 2],
-    unit: f64,
+    planes: &HalfPlanes,
+    input: &WarpInput<'_>,
     zero_rotation: bool,
-    samples: &[Vec<Sample>],
+    raster: Raster,
 ) -> Option<(f64, Warp)> {
-    let offsets = |[low, high]: [f64; 2]| {
-        let steps = ((high - low) / OFFSET_STEP).round() as usize;
-        (0..=steps).map(move |step| (low + OFFSET_STEP * step as f64) * unit)
+    let samples = planes.sampled(input, raster.sample_step_px);
+    let Some(direction) = SphpWarp::growth(&planes.tar_from_ref) else {
+        let cost = distortion(&samples, |place| Some(planes.tar_from_ref.jacobian(place)));
+        return cost.map(|cost| (cost, Warp::Affine(planes.tar_from_ref)));
     };
-    let firsts: Vec<f64> = offsets(FIRST_OFFSETS).map(|offset| start[0] + offset).collect();
-    let candidates: Vec<Option<(f64, SphpWarp)>> = firsts
+    let ranges = LineRanges::new(planes, direction, &samples);
+    let candidates: Vec<Option<(f64, SphpWarp)>> = ranges
+        .firsts(raster)
         .into_par_iter()
         .map(|first| {
-            let mut best: Option<(f64, SphpWarp)> = None;
-            for second in offsets(SECOND_OFFSETS).map(|offset| start[1] + offset) {
-                if second - first < LEAST_GAP * unit {
-                    continue;
-                }
-                let Some(warp) = SphpWarp::new(homography, first, second, zero_rotation) else { continue };
-                let cost = distortion(samples, |place| {
-                    let derivative = warp.jacobian(place);
-                    (derivative.determinant() > 0.0).then_some(derivative)
-                });
-                if let Some(cost) = cost
-                    && best.as_ref().is_none_or(|(least, _)| cost < *least)
-                {
-                    best = Some((cost, warp));
-                }
-            }
-            best
+            let seconds = ranges.seconds(raster, first);
+            let tried = seconds.filter_map(|second| {
+                let warp = SphpWarp::new(&planes.tar_from_ref, first, second, zero_rotation)?;
+                let upright = |derivative: Matrix2<f64>| (derivative.determinant() > 0.0).then_some(derivative);
+                Some((distortion(&samples, |place| upright(warp.jacobian(place)))?, warp))
+            });
+            tried.reduce(less)
         })
         .collect();
     // The order of the candidates, not of the threads, decides between equals.
-    let least = candidates.into_iter().flatten().reduce(|best, next| if next.0 < best.0 { next } else { best });
-    least.map(|(cost, warp)| (cost, Warp::Halves(Box::new(warp))))
+    candidates.into_iter().flatten().reduce(less).map(|(cost, warp)| (cost, Warp::Halves(Box::new(warp))))
 }
 
-/// Sum over the photographs of the squared distances of the derivatives from the photograph's best similarity; `None`
-/// where the warp has no derivative.
-fn distortion(samples: &[Vec<Sample>], jacobian: impl Fn(Vector2<f64>) -> Option<Matrix2<f64>>) -> Option<f64> {
-    let mut cost = 0.0;
-    for of_photograph in samples {
-        let (mut squares, mut turn) = (0.0, Vector2::zeros());
-        for sample in of_photograph {
-            let whole = jacobian(sample.place)? * sample.derivative;
-            squares += whole.norm_squared();
-            turn += Vector2::new(whole[(0, 0)] + whole[(1, 1)], whole[(1, 0)] - whole[(0, 1)]);
+/// The one of less cost; the earlier one between equals.
+fn less(best: (f64, SphpWarp), next: (f64, SphpWarp)) -> (f64, SphpWarp) {
+    if next.0 < best.0 { next } else { best }
+}
+
+/// Where the lines are searched.
+struct LineRanges {
+    /// Along u, the centers of `tar` and `ref`: the lesser, the greater.
+    start: f64,
+    end: f64,
+    /// The scale of the published lengths.
+    unit: f64,
+    /// The first line lies no earlier: what follows the homography wholly does not reach beyond.
+    least_first: f64,
+}
+
+impl LineRanges {
+    fn new(planes: &HalfPlanes, direction: Vector2<f64>, samples: &[Samples]) -> Self {
+        let [of_tar, of_ref] = [planes.tar_center, Vector2::zeros()].map(|center| direction.dot(&center));
+        let beside = samples.iter().filter_map(|photograph| match photograph {
+            Samples::ThroughRef(_) => None,
+            Samples::OnTar { in_front, .. } => Some(in_front),
+        });
+        Self {
+            start: of_tar.min(of_ref),
+            end: of_tar.max(of_ref),
+            unit: planes.ref_side_px / PUBLISHED_SIDE_PX,
+            least_first: beside.flatten().map(|place| direction.dot(place)).fold(f64::NEG_INFINITY, f64::max),
         }
-        // The best similarity is (alpha, beta) = turn / 2n; what it explains is 2 n (alpha^2 + beta^2).
-        cost += squares - turn.norm_squared() / (2.0 * of_photograph.len() as f64);
     }
-    cost.is_finite().then_some(cost)
+
+    fn firsts(&self, raster: Raster) -> Vec<f64> {
+        let lines = offsets(FIRST_OFFSETS, raster).map(|offset| self.start + offset * self.unit);
+        lines.filter(|first| *first >= self.least_first).collect()
+    }
+
+    fn seconds(&self, raster: Raster, first: f64) -> impl Iterator<Item = f64> {
+        let lines = offsets(SECOND_OFFSETS, raster).map(|offset| self.end + offset * self.unit);
+        lines.filter(move |second| second - first >= LEAST_GAP * self.unit)
+    }
+}
+
+fn offsets([low, high]: [f64; 2], raster: Raster) -> impl Iterator<Item = f64> {
+    let steps = ((high - low) / raster.offset_step).round() as usize;
+    (0..=steps).map(move |step| low + raster.offset_step * step as f64)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::limits::{LIMITS, Limits};
+    use super::super::options::HomographySource;
     use super::super::tests::{Example, HEIGHT, WIDTH, misalignment};
     use super::*;
+    use trueup_core::camera::Camera;
+    use trueup_core::geometry::{rotation_about_y, rotation_about_z};
 
     const MODELS: [WarpModel; 2] = [WarpModel::Sphp, WarpModel::SphpFree];
 
@@ -280,25 +222,29 @@ mod tests {
         }
     }
 
+    /// The warp of these roles.
+    fn searched(example: &Example, source: usize, target: usize, zero_rotation: bool) -> (HalfPlanes, Warp) {
+        let input = example.input();
+        let onto_source = onto(&input, source, HomographySource::Pairs).expect("connected");
+        let planes = HalfPlanes::new(&input, &onto_source, source, target).expect("two planes");
+        let (_, warp) = least_distorted(&planes, &input, zero_rotation, FINE).expect("a narrow set");
+        (planes, warp)
+    }
+
     /// Value and derivative of the whole map of a photograph have no jump anywhere.
     #[test]
     fn the_whole_map_of_a_photograph_is_smooth() {
         let example = Example::panned(&[-25.0, 0.0, 25.0], 1);
-        let input = example.input();
         for zero_rotation in [true, false] {
-            let (_, plan) = Plan::search(&input, 2, 0, zero_rotation, &WarpOptions::default())
-                .expect("connected")
-                .expect("a narrow set");
-            let Warp::Halves(warp) = &plan.warp else { panic!("a pan is projective") };
-            let whole = |photograph: usize, point: Vector2<f64>| warp.apply(plan.onto_ref[photograph].apply(point));
-            for photograph in 0..3 {
+            let (planes, warp) = searched(&example, 2, 0, zero_rotation);
+            for route in &planes.routes {
                 let step = 0.5;
                 let mut earlier: Option<Vector2<f64>> = None;
                 for k in 0..(WIDTH / step) as usize {
-                    let at = |k: usize| whole(photograph, Vector2::new(k as f64 * step, HEIGHT / 3.0));
+                    let at = |k: usize| warp.place(route, Vector2::new(k as f64 * step, HEIGHT / 3.0));
                     let slope = (at(k + 1) - at(k)) / step;
                     let change = earlier.map_or(0.0, |earlier| (slope - earlier).norm());
-                    assert!(change < 0.02, "photograph {photograph} at {k}: {change}");
+                    assert!(change < 0.02, "at {k}: {change}");
                     earlier = Some(slope);
                 }
             }
@@ -308,10 +254,82 @@ mod tests {
     #[test]
     fn zero_rotation_leaves_a_photograph_upright() {
         let example = Example::panned(&[0.0, 20.0], 0);
-        let input = example.input();
-        let (_, plan) =
-            Plan::search(&input, 1, 0, true, &WarpOptions::default()).expect("connected").expect("a narrow pair");
-        let Warp::Halves(warp) = &plan.warp else { panic!("a pan is projective") };
+        let (_, warp) = searched(&example, 1, 0, true);
+        let Warp::Halves(warp) = &warp else { panic!("a pan is projective") };
         assert!(warp.similarity_rotation().abs() < 1e-9);
+    }
+
+    /// Cameras panned by 26 degrees each, turned about their axes by these angles in degrees.
+    fn rolled(rolls_deg: &[f64]) -> Example {
+        let middle = (rolls_deg.len() as f64 - 1.0) / 2.0;
+        let camera = |(k, roll): (usize, &f64)| {
+            let yaw = (26.0 * (k as f64 - middle)).to_radians();
+            let world_from_camera = rotation_about_y(yaw) * rotation_about_z(roll.to_radians());
+            Camera::new(700.0, WIDTH, HEIGHT, &world_from_camera.transpose())
+        };
+        Example::new(rolls_deg.iter().enumerate().map(camera).collect(), rolls_deg.len() / 2)
+    }
+
+    /// How many times as large a photograph is at its largest cell as at its smallest.
+    fn unevenness(mesh: &GridMesh) -> f64 {
+        let across = |vertex: usize| Vector2::from(mesh.target[vertex + 1]) - Vector2::from(mesh.target[vertex]);
+        let down =
+            |vertex: usize| Vector2::from(mesh.target[vertex + mesh.columns]) - Vector2::from(mesh.target[vertex]);
+        let areas: Vec<f64> = (0..mesh.len() - mesh.columns)
+            .filter(|vertex| (vertex + 1) % mesh.columns != 0)
+            .map(|vertex| across(vertex).perp(&down(vertex)))
+            .collect();
+        areas.iter().copied().fold(0.0, f64::max) / areas.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Five photographs span 104 degrees between their outer axes: no plane through an end shows them all. On the plane of the middle
+    /// one a photograph at 52 degrees is uneven by (cos 22 / cos 82)^3 = 296 from side to side; beside a neighbor of
+    /// its own, at 26 degrees, by (cos 4 / cos 56)^3 = 6.
+    #[test]
+    fn both_ends_of_a_wide_row_keep_their_shape() {
+        let example = rolled(&[3.0, -4.0, 1.0, 2.0, -3.0]);
+        for model in MODELS {
+            let placed = example.place(model).expect("five photographs");
+            assert_eq!(placed.folds, 0);
+            assert!(misalignment(&example, &placed.meshes) < 1.5, "{}", misalignment(&example, &placed.meshes));
+            let uneven: Vec<f64> = placed.meshes.iter().map(unevenness).collect();
+            assert!(uneven.iter().all(|uneven| *uneven < 12.0), "{model:?}: {uneven:?}");
+        }
+    }
+
+    /// The turn of a photograph: that of its lower border against its upper one, which a change of scale leaves alone.
+    fn turn(mesh: &GridMesh) -> f64 {
+        let middle = |row: usize| Vector2::from(mesh.target[row * mesh.columns + mesh.columns / 2]);
+        let down = middle(mesh.rows - 1) - middle(0);
+        (-down.x).atan2(down.y).to_degrees()
+    }
+
+    /// The photographs differ by a roll of 12 degrees, which the panorama shows unless the switch takes it away.
+    #[test]
+    fn the_switch_keeps_a_rolled_photograph_unturned() {
+        let example = rolled(&[0.0, 12.0]);
+        let turned = |model| {
+            let meshes = example.place(model).expect("a pair").meshes;
+            (turn(&meshes[1]) - turn(&meshes[0])).abs()
+        };
+        let (upright, free) = (turned(WarpModel::Sphp), turned(WarpModel::SphpFree));
+        assert!((free - 12.0).abs() < 3.0, "{free}");
+        assert!(upright < 0.5 * free, "{upright}");
+    }
+
+    /// A photograph that reaches behind the plane of `ref` lies where it lies on the plane of `tar`.
+    #[test]
+    fn a_photograph_behind_one_plane_lies_on_the_other() {
+        let example = Example::panned(&[-52.0, -26.0, 0.0, 26.0, 52.0], 2);
+        let (planes, warp) = searched(&example, 1, 3, true);
+        // 52 + 26 degrees from the axis of 1, and half a photograph more: its far border is behind that plane.
+        assert!(matches!(planes.routes[4], Route::OnTar { .. }) && matches!(planes.routes[3], Route::ThroughRef(_)));
+        let center = warp.place(&planes.routes[4], Vector2::new(WIDTH / 2.0, HEIGHT / 2.0));
+        let expected = WIDTH / 2.0 + 700.0 * 26_f64.to_radians().tan();
+        assert!((center - Vector2::new(expected, HEIGHT / 2.0)).norm() < 1e-3, "{center}");
+        // The other way round no plane is left for it: it lies behind that of 0 and of 1.
+        let input = example.input();
+        let onto_source = onto(&input, 0, HomographySource::Pairs).expect("connected");
+        assert!(HalfPlanes::new(&input, &onto_source, 0, 1).is_none());
     }
 }

@@ -10,6 +10,7 @@ mod apap;
 mod autostitch;
 mod deformed;
 mod distance_kernel;
+mod half_planes;
 mod half_projective;
 mod homography;
 mod input;

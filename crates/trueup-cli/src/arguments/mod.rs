@@ -51,7 +51,7 @@ pub(crate) enum Task {
     /// Photographs are measured and matched once. The folder holds a page to look at (index.html), a page on which people
     /// rank unnamed panoramas (ranking.html), every figure as JSON, the panoramas and their project files.
     Compare(Box<CompareArgs>),
-    /// Print what a project file says of its panorama: the summary that `stitch` printed, with each picture's measures
+    /// Print what a project file says of its panorama: the summary that `stitch` printed, with each photograph's measures
     Inspect(InspectArgs),
     /// Print every measure of a panorama: its own, against the truth, and of the pixels where photographs overlap
     Evaluate(EvaluateArgs),
@@ -67,7 +67,7 @@ pub(crate) struct InspectArgs {
     #[arg(value_name = "PROJECT.json")]
     pub project: PathBuf,
 
-    /// Print also the pairs' verdicts, each picture's geometry, notes, and a line per stage's time
+    /// Print also the pairs' verdicts, each photograph's geometry, notes, and a line per stage's time
     #[arg(short, long)]
     pub verbose: bool,
 }

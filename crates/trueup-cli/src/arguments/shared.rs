@@ -12,7 +12,7 @@ const MAX_THREADS: i64 = 1024;
 /// The help on photographs.
 pub(crate) fn photographs_help() -> String {
     let formats = trueup::readable_formats();
-    format!("Files, folders (their pictures, not those of folders inside) or glob patterns; {formats}")
+    format!("Files, folders (their photographs, not those of folders inside) or glob patterns; {formats}")
 }
 
 fn panorama_help() -> String {
@@ -92,7 +92,7 @@ pub(crate) struct MessageArgs {
     #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]
     pub quiet: bool,
 
-    /// Print also the pairs' verdicts, each picture's geometry, notes, and a line per stage's time
+    /// Print also the pairs' verdicts, each photograph's geometry, notes, and a line per stage's time
     #[arg(short, long, help_heading = "Messages")]
     pub verbose: bool,
 }

@@ -9,7 +9,7 @@ use super::shared::{FileArgs, GeometryArgs, MaskArgs, MessageArgs, TuningArgs, p
 const EXAMPLES: &str = "\
 Examples:
   trueup stitch a.jpg b.jpg c.jpg -o pano.jpg
-  trueup stitch holiday/ -o pano.tif                     every picture of a folder
+  trueup stitch holiday/ -o pano.tif                     every photograph of a folder
   trueup stitch 'holiday/IMG_*.jpg' -o pano.jpg --all    pano-1.jpg, pano-2.jpg, ...
   trueup stitch holiday/ -o small.webp --scale 0.25      a quick preview
   trueup stitch holiday/ -o pano.jpg --set mesh.cell_px=30 --set exposure.enabled=false

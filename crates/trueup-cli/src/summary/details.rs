@@ -7,7 +7,7 @@ use trueup::{ImageRecord, ImageStatus, PairRecord, Project};
 use super::labeled_lines::LabeledLines;
 
 /// What was found of each photograph that is used.
-pub(super) fn pictures(lines: &mut LabeledLines, project: &Project, names: &[String]) {
+pub(super) fn photographs(lines: &mut LabeledLines, project: &Project, names: &[String]) {
     for (image, name) in project.images.iter().zip(names) {
         if image.status == ImageStatus::Used {
             lines.item("used", &format!("{name}: {}", geometry(image)));

@@ -12,7 +12,7 @@ impl LabeledLines {
     }
 
     pub(crate) fn entry(&mut self, label: &str, text: &str) {
-        let _ = writeln!(self.0, "{label:<9} {text}");
+        let _ = writeln!(self.0, "{label:<11} {text}");
     }
 
     /// A line that belongs to the entry above, with its own label.

@@ -5,7 +5,7 @@ use trueup::{Measures, PhotographMeasures, Project};
 use super::labeled_lines::LabeledLines;
 use super::names::name_of;
 
-/// Uncertain pictures named before the rest are counted.
+/// Uncertain photographs named before the rest are counted.
 const NAMED: usize = 4;
 
 /// One or two lines: how upright, how well aligned, how straight.
@@ -18,28 +18,34 @@ pub(crate) fn short(lines: &mut LabeledLines, project: &Project, names: &[String
     }
 }
 
-/// "upright within 0.6 degrees, 0.3 on average (8 pictures measured, 2 uncertain: 03.jpg, 07.jpg)"
+/// "upright within 0.6 degrees at 95 %, 0.3 expected on average (8 photographs measured, 2 uncertain: 03.jpg, 07.jpg)"
 fn upright(measures: &Measures, project: &Project, names: &[String]) -> String {
     let Some(upright) = &measures.upright else {
         return "no vertical lines to judge by".to_owned();
     };
     let uncertain: Vec<&str> = measures
-        .pictures
+        .photographs
         .iter()
-        .filter(|picture| !picture.certain)
-        .map(|picture| name_of(&picture.path, project, names))
+        .filter(|photograph| !photograph.certain)
+        .map(|photograph| name_of(&photograph.path, project, names))
         .collect();
-    let measured = format!("{} measured", pictures_in_words(upright.measured));
+    let measured = format!("{} measured", photographs_in_words(upright.measured));
     let uncertain = match uncertain.len() {
         0 => String::new(),
         count => format!(", {count} uncertain: {}", listed(&uncertain)),
     };
     let (most, mean) = (upright.max_deg, upright.mean_deg);
-    format!("upright within {most:.1} degrees, {mean:.1} on average ({measured}{uncertain})")
+    match upright.within_deg {
+        Some(within) => {
+            format!("upright within {within:.1} degrees at 95 %, {mean:.1} expected on average ({measured}{uncertain})")
+        }
+        // A project of an earlier version states no interval.
+        None => format!("upright within {most:.1} degrees, {mean:.1} on average ({measured}{uncertain})"),
+    }
 }
 
-fn pictures_in_words(count: usize) -> String {
-    if count == 1 { "1 picture".to_owned() } else { format!("{count} pictures") }
+fn photographs_in_words(count: usize) -> String {
+    if count == 1 { "1 photograph".to_owned() } else { format!("{count} photographs") }
 }
 
 /// Names separated by commas; many are cut short.
@@ -71,11 +77,11 @@ fn bent_line(measures: &Measures, project: &Project, names: &[String]) -> Option
     })
 }
 
-/// The figures that the short form leaves out, and a line per picture.
+/// The figures that the short form leaves out, and a line per photograph.
 pub(super) fn table(lines: &mut LabeledLines, project: &Project, names: &[String]) {
     let Some(measures) = &project.measures else { return };
     if let Some(degrees) = measures.estimated_gdic_deg {
-        lines.item("GDIC", &format!("{degrees:.2} degrees, estimated from the pictures' own vertical lines"));
+        lines.item("GDIC", &format!("{degrees:.2} degrees, estimated from the photographs' lines"));
     }
     let (ld, mean, folds) = (measures.ld, measures.ld_mean, measures.folds);
     lines.item("LD", &format!("{ld:.3}e-2 at most, {mean:.3}e-2 on average; {folds} folded cells"));
@@ -83,21 +89,25 @@ pub(super) fn table(lines: &mut LabeledLines, project: &Project, names: &[String
         let bend = 1000.0 * long.mean_bend;
         lines.item("lines", &format!("{} of {} long lines bent; {bend:.2} in 1000 off", long.bent, long.lines));
     }
-    for picture in &measures.pictures {
-        lines.item("", &format!("{}: {}", name_of(&picture.path, project, names), lean(picture)));
+    for photograph in &measures.photographs {
+        lines.item("", &format!("{}: {}", name_of(&photograph.path, project, names), lean(photograph)));
     }
 }
 
-/// "leans by 0.21 degrees (+- 0.05, 34 vertical lines)"
-fn lean(picture: &PhotographMeasures) -> String {
-    let lines = match picture.vertical_lines {
+/// "leans by 0.02 +- 0.29 degrees at 95 % (34 vertical lines)"
+fn lean(photograph: &PhotographMeasures) -> String {
+    let lines = match photograph.vertical_lines {
         0 => "no vertical lines".to_owned(),
         1 => "1 vertical line".to_owned(),
         count => format!("{count} vertical lines"),
     };
-    let Some((lean, error)) = picture.lean_deg.zip(picture.standard_error_deg) else {
-        return lines;
-    };
-    let uncertain = if picture.certain { "" } else { "uncertain: " };
-    format!("{uncertain}leans by {lean:.2} degrees (+- {error:.2}, {lines})")
+    let uncertain = if photograph.certain { "" } else { "uncertain: " };
+    match (photograph.lean_deg, photograph.within_deg) {
+        (Some(lean), Some(within)) => {
+            format!("{uncertain}leans by {lean:.2} +- {within:.2} degrees at 95 % ({lines})")
+        }
+        // A project of an earlier version states no interval.
+        (Some(lean), None) => format!("{uncertain}leans by {lean:.2} degrees ({lines})"),
+        (None, _) => lines,
+    }
 }

@@ -29,15 +29,15 @@ pub(crate) struct PanoramaFile<'a> {
 /// Stages faster than this, in seconds, are not named in the short list.
 const WORTH_NAMING_SECONDS: f64 = 0.05;
 
-/// What was made of which photographs, and why. `verbose` adds every pair, picture, note and stage. Without a panorama's
-/// file, the measures are given for each picture.
+/// What was made of which photographs, and why. `verbose` adds every pair, photograph, note and stage. Without a panorama's
+/// file, the measures are given for each photograph.
 pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool) -> String {
     let mut lines = LabeledLines::default();
     panorama(&mut lines, project, file);
     let names = names(&project.images);
-    pictures(&mut lines, project, &names);
+    photographs(&mut lines, project, &names);
     if verbose {
-        details::pictures(&mut lines, project, &names);
+        details::photographs(&mut lines, project, &names);
         details::pairs(&mut lines, project, &names);
     }
     lines.entry("upright", &upright(project));
@@ -86,10 +86,10 @@ fn panorama(lines: &mut LabeledLines, project: &Project, file: Option<&PanoramaF
 }
 
 /// How many were used, and each one left out with its reason and what to do about it.
-fn pictures(lines: &mut LabeledLines, project: &Project, names: &[String]) {
+fn photographs(lines: &mut LabeledLines, project: &Project, names: &[String]) {
     let reference = project.images.iter().position(|image| image.path == project.reference);
     let reference = reference.map_or(String::new(), |index| format!("; the reference is {}", names[index]));
-    lines.entry("pictures", &format!("{} of {} used{reference}", project.used(), project.images.len()));
+    lines.entry("photographs", &format!("{} of {} used{reference}", project.used(), project.images.len()));
     for (image, name) in project.images.iter().zip(names) {
         if image.status == ImageStatus::LeftOut {
             lines.item("left out", &format!("{name}: {}", image.reason));
@@ -113,7 +113,7 @@ fn upright(project: &Project) -> String {
                 .map_or(String::new(), |deviation| format!(", certain to {deviation:.1} degrees"))
         ),
         (true, _) => format!(
-            "guided by vanishing points ({}; {} of {} pictures agree)",
+            "guided by vanishing points ({}; {} of {} photographs agree)",
             divergence.unwrap_or(trusted),
             manhattan.inliers.len(),
             project.used()

@@ -32,13 +32,13 @@ fn project() -> Project {
 fn the_short_summary_says_what_was_made_of_what_and_why() {
     let file = PanoramaFile { panorama: Path::new("p.jpg"), bytes: 4_200_000, project: Some(Path::new("p.json")) };
     let expected = "\
-panorama  p.jpg  70 x 31 px, 4.2 MB
-project   p.json
-pictures  2 of 3 used; the reference is b.jpg
+panorama    p.jpg  70 x 31 px, 4.2 MB
+project     p.json
+photographs 2 of 3 used; the reference is b.jpg
   left out  c.jpg: no overlap found
             Shoot one.
-upright   guided by vanishing points (divergence 0.003, up to 0.1 is trusted; 1 of 2 pictures agree)
-time      2.5 s: render 2.0, features 0.5
+upright     guided by vanishing points (divergence 0.003, up to 0.1 is trusted; 1 of 2 photographs agree)
+time        2.5 s: render 2.0, features 0.5
 ";
     assert_eq!(text(&project(), Some(&file), false), expected);
 }
@@ -49,18 +49,18 @@ fn a_full_turn_is_said_beside_the_size() {
     // Files that do not say so are of panoramas with two ends.
     assert!(!project.canvas.full_turn);
     project.canvas.full_turn = true;
-    assert!(text(&project, None, false).starts_with("panorama  70 x 31 px, a full turn: the ends meet\n"));
+    assert!(text(&project, None, false).starts_with("panorama    70 x 31 px, a full turn: the ends meet\n"));
 }
 
 #[test]
-fn the_long_summary_adds_pictures_pairs_notes_and_stages() {
+fn the_long_summary_adds_photographs_pairs_notes_and_stages() {
     let long = text(&project(), None, true);
     for part in [
-        "panorama  70 x 31 px\n",
+        "panorama    70 x 31 px\n",
         "used      a.jpg: 40 x 30 px, turned by 1.50 degrees\n",
-        "pairs     1 joined of 1 tried\n",
+        "pairs       1 joined of 1 tried\n",
         "a.jpg - b.jpg: joined, 40 of 50 matches agree (15 needed)\n",
-        "note      mesh: all the way round\n",
+        "note        mesh: all the way round\n",
         "0.010 s  mesh\n",
     ] {
         assert!(long.contains(part), "{part} is not in\n{long}");
@@ -79,11 +79,11 @@ fn guidance_by_all_lines_together_says_how_certain_it_is() {
 fn refused_guidance_is_explained_with_its_numbers() {
     let mut project = project();
     project.manhattan.accepted = false;
-    project.manhattan.failed_clause = Some("2 of 9 pictures agree".to_owned());
-    let expected = "not guided by vanishing points: 2 of 9 pictures agree (divergence 0.003, up to 0.1 is trusted)";
+    project.manhattan.failed_clause = Some("2 of 9 photographs agree".to_owned());
+    let expected = "not guided by vanishing points: 2 of 9 photographs agree (divergence 0.003, up to 0.1 is trusted)";
     assert_eq!(upright(&project), expected);
     project.manhattan.divergence = None;
-    assert_eq!(upright(&project), "not guided by vanishing points: 2 of 9 pictures agree");
+    assert_eq!(upright(&project), "not guided by vanishing points: 2 of 9 photographs agree");
 }
 
 #[test]
@@ -93,10 +93,10 @@ fn photographs_of_the_same_name_are_told_apart_by_their_paths() {
     assert_eq!(names(&project.images), ["x/a.jpg", "y/a.jpg", "c.jpg"]);
 }
 
-fn measured(upright: serde_json::Value, pictures: serde_json::Value, longest_bent: serde_json::Value) -> Project {
+fn measured(upright: serde_json::Value, photographs: serde_json::Value, longest_bent: serde_json::Value) -> Project {
     let mut project = project();
     let measures = serde_json::json!({
-        "upright": upright, "estimated_gdic_deg": 0.5, "ld": 0.8, "ld_mean": 0.7, "folds": 0, "pictures": pictures,
+        "upright": upright, "estimated_gdic_deg": 0.5, "ld": 0.8, "ld_mean": 0.7, "folds": 0, "pictures": photographs,
         "reprojection": {"matches": 40, "mean_px": 0.36, "rms_px": 0.5, "percentile_95_px": 1.24},
         "long_lines": {"lines": 12, "mean_bend": 0.001, "bent": 3, "longest_bent": longest_bent}
     });
@@ -105,30 +105,30 @@ fn measured(upright: serde_json::Value, pictures: serde_json::Value, longest_ben
 }
 
 #[test]
-fn measures_take_two_lines_and_uncertain_pictures_are_named() {
-    let picture = |path: &str, lines: usize, certain: bool| {
+fn measures_take_two_lines_and_uncertain_photographs_are_named() {
+    let photograph = |path: &str, lines: usize, certain: bool| {
         serde_json::json!({"path": path, "vertical_lines": lines, "lean_deg": 0.61, "standard_error_deg": 0.04,
-                           "gamma_deg": 1.0, "certain": certain})
+                           "within_deg": 0.09, "gamma_deg": 1.0, "certain": certain})
     };
     let bent = serde_json::json!({"path": "x/a.jpg", "length_px": 412.3, "off_px": 1.94});
-    let upright = serde_json::json!({"mean_deg": 0.31, "max_deg": 0.61, "measured": 1});
+    let upright = serde_json::json!({"mean_deg": 0.31, "max_deg": 0.61, "within_deg": 0.7, "measured": 2});
     let project =
-        measured(upright, serde_json::json!([picture("x/a.jpg", 34, true), picture("x/b.jpg", 5, false)]), bent);
+        measured(upright, serde_json::json!([photograph("x/a.jpg", 34, true), photograph("x/b.jpg", 5, false)]), bent);
     let file = PanoramaFile { panorama: Path::new("p.jpg"), bytes: 1, project: None };
     let short = "\
-measured  upright within 0.6 degrees, 0.3 on average (1 picture measured, 1 uncertain: b.jpg)
-          points meet within 0.4 px on average, 95 of 100 within 1.2; longest bent line: 412 px, 1.9 px off, in a.jpg
+measured    upright within 0.7 degrees at 95 %, 0.3 expected on average (2 photographs measured, 1 uncertain: b.jpg)
+            points meet within 0.4 px on average, 95 of 100 within 1.2; longest bent line: 412 px, 1.9 px off, in a.jpg
 time ";
     let printed = text(&project, Some(&file), false);
     assert!(printed.contains(short), "{printed}");
     let long = text(&project, None, false);
-    assert!(long.contains("a.jpg: leans by 0.61 degrees (+- 0.04, 34 vertical lines)"), "{long}");
+    assert!(long.contains("a.jpg: leans by 0.61 +- 0.09 degrees at 95 % (34 vertical lines)"), "{long}");
     assert!(long.contains("b.jpg: uncertain: leans by"), "{long}");
 }
 
 #[test]
 fn without_vertical_lines_the_summary_says_so() {
     let printed = text(&measured(serde_json::Value::Null, serde_json::json!([]), serde_json::Value::Null), None, false);
-    assert!(printed.contains("measured  no vertical lines to judge by\n"), "{printed}");
+    assert!(printed.contains("measured    no vertical lines to judge by\n"), "{printed}");
     assert!(printed.contains("; none of 12 long lines is bent\n"), "{printed}");
 }

@@ -116,7 +116,7 @@ impl<'a> LoadedPhotographs<'a> {
 
     fn held_bytes(&self) -> usize {
         let kept: usize = self.kept.iter().flatten().map(Photograph::bytes).sum();
-        kept + self.warped.iter().flatten().map(|picture| picture.photograph().0.bytes()).sum::<usize>()
+        kept + self.warped.iter().flatten().map(|photograph| photograph.photograph().0.bytes()).sum::<usize>()
     }
 }
 

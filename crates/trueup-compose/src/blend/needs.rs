@@ -8,11 +8,11 @@ use crate::pyramid::{first_level, mask_margin, tile_side};
 use crate::small_views::{RIM, SAMPLE_BYTES, small_size};
 use crate::store::{Pixel, RootPixel};
 
-/// Bytes of the search for seams per pixel of all small pictures: pixels at all levels, gradients, depths.
+/// Bytes of the search for seams per pixel of all small views: pixels at all levels, gradients, depths.
 const SEARCH_VIEW: f64 = 4.0 * 4.0 / 3.0 + 4.0 + 1.0;
 /// The same per pixel of their canvas: labels, parts that moved, flags, each at two levels.
 const SEARCH_CANVAS: f64 = 16.0;
-/// The same per pixel of the largest small picture: the flow network.
+/// The same per pixel of the largest small view: the flow network.
 const SEARCH_CUT: f64 = 36.0;
 /// A photograph's pyramid, its masks and interpolated levels, and its samples before they are reduced, in pictures of its
 /// finest level.

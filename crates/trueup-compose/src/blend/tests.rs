@@ -15,7 +15,7 @@ use crate::render::test_rendering::{compose, roots};
 use crate::render::{Blend, Interpolation, RenderOptions, Resources};
 use crate::seam::{self, SeamInput, SeamOptions};
 use crate::small_views::{self, SmallViewsInput};
-use crate::test_pictures::Memory;
+use crate::test_photographs::Memory;
 use crate::warped::WarpedPhotograph;
 
 const WIDTH: usize = 150;
@@ -29,7 +29,7 @@ fn scene(x: usize, y: usize) -> [u8; 3] {
 }
 
 /// A photograph of the scene at column `left`, its levels changed by `look`.
-fn picture(left: usize, look: impl Fn(u8) -> u8) -> Photograph {
+fn photograph(left: usize, look: impl Fn(u8) -> u8) -> Photograph {
     let data = (0..WIDTH * HEIGHT).flat_map(|at| scene(left + at % WIDTH, at / WIDTH).map(&look)).collect();
     Photograph::Eight(Raster::from_data(WIDTH, HEIGHT, 3, data).expect("as many samples"))
 }
@@ -50,9 +50,9 @@ fn layout(lefts: &[usize]) -> CanvasLayout {
     CanvasLayout { width, height: HEIGHT, canvas_from_target: 1.0, origin: [0.0; 2], placed, period: None }
 }
 
-fn composed(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Vec<RootPixel> {
-    let corrections = Corrections::plain(pictures.len());
-    let panorama = compose(layout, &corrections, &Memory(pictures), options, &StageContext::default());
+fn composed(layout: &CanvasLayout, photographs: Vec<Photograph>, options: &RenderOptions) -> Vec<RootPixel> {
+    let corrections = Corrections::plain(photographs.len());
+    let panorama = compose(layout, &corrections, &Memory(photographs), options, &StageContext::default());
     roots(&panorama.expect("renders"))
 }
 
@@ -68,7 +68,7 @@ fn blending_photographs_that_agree_changes_nothing() {
     let half_a_level = 65535 / 255 / 2;
     for (blend, tolerance) in [(Blend::MultiBand, half_a_level), (Blend::None, 1)] {
         let options = RenderOptions { blend, ..RenderOptions::default() };
-        let pixels = composed(&layout, lefts.map(|left| picture(left, |level| level)).to_vec(), &options);
+        let pixels = composed(&layout, lefts.map(|left| photograph(left, |level| level)).to_vec(), &options);
         for (at, pixel) in pixels.iter().enumerate() {
             let expected = scene(at % layout.width, at / layout.width).map(root_of);
             for (got, expected) in pixel.iter().zip(expected) {
@@ -78,7 +78,7 @@ fn blending_photographs_that_agree_changes_nothing() {
         }
     }
     let layout = self::layout(&[0, 0, 0]);
-    let pixels = composed(&layout, vec![picture(9, |level| level); 3], &RenderOptions::default());
+    let pixels = composed(&layout, vec![photograph(9, |level| level); 3], &RenderOptions::default());
     for (at, pixel) in pixels.iter().enumerate() {
         let expected = scene(9 + at % WIDTH, at / WIDTH).map(root_of);
         assert!(pixel.iter().zip(expected).all(|(got, expected)| got.abs_diff(expected) <= 1), "{at}");
@@ -89,7 +89,7 @@ fn blending_photographs_that_agree_changes_nothing() {
 fn a_difference_in_brightness_fades_over_the_seam() {
     let lefts = [0, 60];
     let layout = layout(&lefts);
-    let flat = |level: u8| picture(0, move |_| level);
+    let flat = |level: u8| photograph(0, move |_| level);
     let options = RenderOptions::default();
     let pixels = composed(&layout, vec![flat(100), flat(120)], &options);
     let row: Vec<u16> = (0..layout.width).map(|x| pixels[55 * layout.width + x][0]).collect();
@@ -139,7 +139,7 @@ fn no_border_of_the_panorama_is_darker_than_its_photographs() {
     });
     layout.width += 20;
     let options = RenderOptions::default();
-    let pixels = composed(&layout, vec![picture(0, |_| 140), picture(0, |_| 150)], &options);
+    let pixels = composed(&layout, vec![photograph(0, |_| 140), photograph(0, |_| 150)], &options);
     let covered = pixels.iter().filter(|pixel| pixel[3] > 0);
     let (low, high) = (root_of(140) - 8, root_of(150) + 8);
     assert!(covered.clone().all(|pixel| pixel[..3].iter().all(|level| (low..=high).contains(level))));
@@ -153,12 +153,12 @@ fn with_work<T>(
     test: impl FnOnce(&BlendWork<'_>, &[Option<WarpedPhotograph<'_>>]) -> T,
 ) -> T {
     let layout = layout(lefts);
-    let pictures: Vec<Photograph> = (0..lefts.len())
-        .map(|index| picture(lefts[index], |level| (usize::from(level) * (10 + index) / 12) as u8))
+    let photographs: Vec<Photograph> = (0..lefts.len())
+        .map(|index| photograph(lefts[index], |level| (usize::from(level) * (10 + index) / 12) as u8))
         .collect();
     let corrections = vec![Correction::default(); lefts.len()];
     let context = StageContext::default();
-    let memory = Memory(pictures.clone());
+    let memory = Memory(photographs.clone());
     let levels = WholeLevels { first_level, above: 2 };
     let unrolled = Unrolled::new(&layout, first_level, Some(levels.above)).expect("few");
     let needs = MemoryNeeds::new(&layout, &memory, needed_bytes(&unrolled, Some(levels)));
@@ -180,7 +180,7 @@ fn with_work<T>(
     let resampling = Resampling::of(Interpolation::Bicubic);
     let work = BlendWork { resampling, shown, first_level, levels, ignored };
     let light = PhotographLight { curve: &TransferCurve::SRGB, correction: &Correction::default() };
-    let warped: Vec<Option<WarpedPhotograph<'_>>> = pictures
+    let warped: Vec<Option<WarpedPhotograph<'_>>> = photographs
         .into_iter()
         .zip(&layout.placed)
         .map(|(photograph, placed)| {
@@ -192,12 +192,15 @@ fn with_work<T>(
 
 fn blended(
     work: &BlendWork<'_>,
-    pictures: &[Option<WarpedPhotograph<'_>>],
+    photographs: &[Option<WarpedPhotograph<'_>>],
     columns: Range<usize>,
     rows: Range<usize>,
 ) -> Vec<RootPixel> {
-    let shown: Vec<(Label, &WarpedPhotograph<'_>)> =
-        pictures.iter().enumerate().filter_map(|(label, picture)| Some((label as Label, picture.as_ref()?))).collect();
+    let shown: Vec<(Label, &WarpedPhotograph<'_>)> = photographs
+        .iter()
+        .enumerate()
+        .filter_map(|(label, photograph)| Some((label as Label, photograph.as_ref()?)))
+        .collect();
     BlendTile { columns, rows, shown: Vec::new() }.blended(work, &shown, &mut SamplingMemory::default())
 }
 
@@ -208,9 +211,9 @@ fn tiles_of_any_size_give_the_same_bits_as_the_whole() {
     }
 }
 
-fn assert_that_tiles_give_the_whole(work: &BlendWork<'_>, pictures: &[Option<WarpedPhotograph<'_>>]) {
+fn assert_that_tiles_give_the_whole(work: &BlendWork<'_>, photographs: &[Option<WarpedPhotograph<'_>>]) {
     let [width, height] = work.shown.unrolled.canvas();
-    let whole = blended(work, pictures, 0..width, 0..height);
+    let whole = blended(work, photographs, 0..width, 0..height);
     // There is something to be compared: all of it is covered, and no two of its rows are alike.
     assert!(whole.len() == width * height && whole.iter().all(|pixel| pixel[3] == u16::MAX));
     assert!(whole.chunks_exact(width).collect::<Vec<_>>().windows(2).all(|rows| rows[0] != rows[1]));
@@ -218,7 +221,7 @@ fn assert_that_tiles_give_the_whole(work: &BlendWork<'_>, pictures: &[Option<War
         for top in (0..height).step_by(side) {
             for left in (0..width).step_by(side) {
                 let (columns, rows) = (left..(left + side).min(width), top..(top + side).min(height));
-                let tile = blended(work, pictures, columns.clone(), rows.clone());
+                let tile = blended(work, photographs, columns.clone(), rows.clone());
                 for (y, row) in rows.zip(tile.chunks_exact(columns.len())) {
                     assert_eq!(row, &whole[y * width..][columns.clone()], "tile of {side} at ({left}, {top})");
                 }
@@ -240,13 +243,13 @@ fn the_level_that_is_blended_as_a_whole_follows_from_the_canvas() {
 
 #[test]
 fn a_tile_of_one_photograph_is_what_blending_would_give() {
-    with_work(&[0, 60, 130], 3, |work, pictures| {
+    with_work(&[0, 60, 130], 3, |work, photographs| {
         let mut compared = 0;
         for left in (0..work.shown.unrolled.canvas()[0] - 24).step_by(8) {
             let tile = BlendTile::new(work, left..left + 24, 40..64);
             if tile.shown.len() == 1 {
-                let fast = tile.finish(work, pictures, &mut SamplingMemory::default());
-                let full = blended(work, pictures, tile.columns.clone(), tile.rows.clone());
+                let fast = tile.finish(work, photographs, &mut SamplingMemory::default());
+                let full = blended(work, photographs, tile.columns.clone(), tile.rows.clone());
                 for (fast, full) in fast.iter().flatten().zip(full.iter().flatten()) {
                     assert!(fast.abs_diff(*full) <= 1, "{fast} {full} at {left}");
                 }
@@ -273,7 +276,7 @@ const AROUND: usize = 384;
 const RING: [usize; 4] = [0, 100, 190, 290];
 
 /// Photographs of a scene that repeats, each darker than the one before.
-fn ring_pictures() -> Vec<Photograph> {
+fn ring_photographs() -> Vec<Photograph> {
     let of = |(index, left): (usize, usize)| {
         let level = |level: u8| (usize::from(level) * (20 - index) / 20) as u8;
         let pixel = |at: usize| scene((left + at % WIDTH) % AROUND, at / WIDTH).map(level);
@@ -290,7 +293,7 @@ fn composed_in_any_way(layout: &CanvasLayout, blend: Blend) -> Vec<[f32; 4]> {
 fn composed_around(layout: &CanvasLayout, options: &RenderOptions) -> Vec<[f32; 4]> {
     let corrections = Corrections::plain(RING.len());
     let context = StageContext::default();
-    let panorama = compose(layout, &corrections, &Memory(ring_pictures()), options, &context).expect("renders");
+    let panorama = compose(layout, &corrections, &Memory(ring_photographs()), options, &context).expect("renders");
     // Square roots of light, as the eye sees steps.
     let root = |at: usize| panorama.linear_pixel(at % AROUND, at / AROUND).expect("in memory").map(f32::sqrt);
     (0..AROUND * HEIGHT).map(root).collect()
@@ -390,11 +393,11 @@ proptest! {
         levels in prop::collection::vec(20..235_u8, 5),
     ) {
         let layout = layout(&lefts);
-        let pictures: Vec<Photograph> = (0..lefts.len()).map(|index| { let level = levels[index]; picture(0, move |_| level) }).collect();
+        let photographs: Vec<Photograph> = (0..lefts.len()).map(|index| { let level = levels[index]; photograph(0, move |_| level) }).collect();
         let corrections = Corrections::plain(lefts.len());
         let context = StageContext::default();
         let options = RenderOptions::default();
-        let panorama = compose(&layout, &corrections, &Memory(pictures), &options, &context);
+        let panorama = compose(&layout, &corrections, &Memory(photographs), &options, &context);
         let panorama = panorama.expect("renders");
         let used = &levels[..lefts.len()];
         let linear = |level: u8| crate::transfer_curve::Linearize::of(&TransferCurve::SRGB).linear(f32::from(level));

@@ -46,18 +46,18 @@ impl BlendTile {
     pub(super) fn finish(
         &self,
         work: &BlendWork<'_>,
-        pictures: &[Option<WarpedPhotograph<'_>>],
+        photographs: &[Option<WarpedPhotograph<'_>>],
         scratch: &mut SamplingMemory,
     ) -> Vec<RootPixel> {
-        let picture = |label: &Label| pictures.get(usize::from(*label)).and_then(Option::as_ref);
+        let photograph = |label: &Label| photographs.get(usize::from(*label)).and_then(Option::as_ref);
         match self.shown.as_slice() {
             [] => vec![[0; 4]; self.columns.len() * self.rows.len()],
-            [only] => match picture(only) {
-                Some(picture) => self.of_one(work, picture, usize::from(*only), scratch),
+            [only] => match photograph(only) {
+                Some(photograph) => self.of_one(work, photograph, usize::from(*only), scratch),
                 None => vec![[0; 4]; self.columns.len() * self.rows.len()],
             },
             several => {
-                let shown: Vec<_> = several.iter().filter_map(|label| Some((*label, picture(label)?))).collect();
+                let shown: Vec<_> = several.iter().filter_map(|label| Some((*label, photograph(label)?))).collect();
                 if work.levels.is_some() {
                     self.blended(work, &shown, scratch)
                 } else {
@@ -75,12 +75,12 @@ impl BlendTile {
     fn of_one(
         &self,
         work: &BlendWork<'_>,
-        picture: &WarpedPhotograph<'_>,
+        photograph: &WarpedPhotograph<'_>,
         label: usize,
         scratch: &mut SamplingMemory,
     ) -> Vec<RootPixel> {
         let mut pixels = vec![[0.0; 4]; self.columns.len() * self.rows.len()];
-        picture.sample(self.window(&self.columns, &self.rows), &mut pixels, &work.resampling, scratch);
+        photograph.sample(self.window(&self.columns, &self.rows), &mut pixels, &work.resampling, scratch);
         let offset = work
             .levels
             .as_ref()
@@ -146,9 +146,9 @@ impl BlendTile {
         let mut out = vec![[0; 4]; width * self.rows.len()];
         let mut taken = vec![0.0_f32; out.len()];
         let mut labels = Vec::new();
-        for (label, picture) in shown {
+        for (label, photograph) in shown {
             let mut pixels = vec![[0.0; 4]; out.len()];
-            picture.sample(self.window(&self.columns, &self.rows), &mut pixels, &work.resampling, scratch);
+            photograph.sample(self.window(&self.columns, &self.rows), &mut pixels, &work.resampling, scratch);
             for (row, y) in self.rows.clone().enumerate() {
                 work.shown.labels(y, &self.columns, 1, &mut labels);
                 for (x, own) in labels.iter().enumerate() {
@@ -178,9 +178,9 @@ impl BlendTile {
         let mut sums: Vec<PyramidPlane<[f32; 4]>> = Vec::new();
         let (mask_columns, mask_rows) = Self::with_margin(&self.columns, &self.rows, work);
         let masks = self.masks(work, shown, &mask_columns, &mask_rows);
-        for ((label, picture), mask) in shown.iter().zip(masks) {
+        for ((label, photograph), mask) in shown.iter().zip(masks) {
             let mut plane = PyramidPlane::new(columns.clone(), rows.clone());
-            picture.sample(self.window(&columns, &rows), &mut plane.texels, &work.resampling, scratch);
+            photograph.sample(self.window(&columns, &rows), &mut plane.texels, &work.resampling, scratch);
             for texel in &mut plane.texels {
                 let [r, g, b, share] = *texel;
                 *texel = [r * share, g * share, b * share, share];
@@ -189,7 +189,7 @@ impl BlendTile {
             let mut mask = mask;
             // Contours at the finest level change at the seam itself.
             let mut weights = mask.part(&columns, &rows);
-            hide_ignored(&mut plane, &weights, picture, work.ignored[usize::from(*label)].as_deref());
+            hide_ignored(&mut plane, &weights, photograph, work.ignored[usize::from(*label)].as_deref());
             for level in 0..work.first_level {
                 if sums.len() <= level as usize {
                     sums.push(PyramidPlane::new(plane.columns.clone(), plane.rows.clone()));
@@ -262,14 +262,14 @@ impl BlendTile {
 fn hide_ignored(
     plane: &mut PyramidPlane<[f32; 4]>,
     shown: &PyramidPlane<f32>,
-    picture: &WarpedPhotograph<'_>,
+    photograph: &WarpedPhotograph<'_>,
     ignored: Option<&Mask>,
 ) {
     let Some(ignored) = ignored else { return };
     let (columns, rows) = (plane.columns.clone(), plane.rows.clone());
-    picture.grid().each_place(&columns, &rows, |[x, y], place, _| {
+    photograph.grid().each_place(&columns, &rows, |[x, y], place, _| {
         let at = (y - rows.start) * columns.len() + x - columns.start;
-        if shown.texels[at] == 0.0 && ignored.contains(in_mask(ignored, place, picture.grid().size)) {
+        if shown.texels[at] == 0.0 && ignored.contains(in_mask(ignored, place, photograph.grid().size)) {
             plane.texels[at] = [0.0; 4];
         }
     });

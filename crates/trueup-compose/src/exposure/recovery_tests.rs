@@ -1,4 +1,4 @@
-//! Known light, found again: pictures of a scene are made with gains, casts, vignetting, noise and a response that are known.
+//! Known light, found again: photographs of a scene are made with gains, casts, vignetting, noise and a response that are known.
 
 use trueup_core::color::TransferCurve;
 use trueup_core::mesh::GridMesh;

@@ -21,7 +21,7 @@ const WIDTH: usize = 240;
 const HEIGHT: usize = 160;
 
 /// A photograph at x = `shift` whose light is `gain` times the scene's.
-fn picture(shift: f64, gain: f64) -> Raster<u8> {
+fn photograph(shift: f64, gain: f64) -> Raster<u8> {
     let data = (0..WIDTH * HEIGHT)
         .flat_map(|i| [encoded(gain * scene((i % WIDTH) as f64 + shift, (i / WIDTH) as f64)); 3])
         .collect();
@@ -68,7 +68,7 @@ fn falloff(r2: f64) -> f64 {
 const AROUND: usize = 480;
 
 /// A photograph at column `shift` of the cylinder whose light is `gain` times the scene's.
-fn picture_around(shift: usize, gain: f64) -> Raster<u8> {
+fn photograph_around(shift: usize, gain: f64) -> Raster<u8> {
     let level = |i: usize| encoded(gain * scene(((i % WIDTH + shift) % AROUND) as f64, (i / WIDTH) as f64));
     let data = (0..WIDTH * HEIGHT).flat_map(|i| [level(i); 3]).collect();
     Raster::from_data(WIDTH, HEIGHT, 3, data).expect("as many samples")
@@ -77,7 +77,7 @@ fn picture_around(shift: usize, gain: f64) -> Raster<u8> {
 /// Two photographs on a cylinder of 480 columns, the second 300 to the right of the first: they meet only across the ends.
 #[test]
 fn overlaps_across_the_ends_of_a_full_turn_count() {
-    let rasters = [picture_around(0, 1.0), picture_around(300, 0.7)];
+    let rasters = [photograph_around(0, 1.0), photograph_around(300, 0.7)];
     let frame = WorkingFrame::new(WIDTH, HEIGHT, 480_000.0);
     let thumbnails: Vec<Thumbnail> =
         rasters.iter().map(|raster| Thumbnail { raster, curve: &TransferCurve::SRGB, frame, camera: 0 }).collect();
@@ -103,7 +103,7 @@ fn overlaps_across_the_ends_of_a_full_turn_count() {
 #[test]
 fn a_full_turn_is_corrected_alike_wherever_it_is_cut_open() {
     let shifts = [0_usize, 170, 330];
-    let rasters = [picture_around(0, 1.0), picture_around(170, 0.7), picture_around(330, 1.4)];
+    let rasters = [photograph_around(0, 1.0), photograph_around(170, 0.7), photograph_around(330, 1.4)];
     let frame = WorkingFrame::new(WIDTH, HEIGHT, 480_000.0);
     let thumbnails: Vec<Thumbnail> =
         rasters.iter().map(|raster| Thumbnail { raster, curve: &TransferCurve::SRGB, frame, camera: 0 }).collect();
@@ -175,7 +175,7 @@ fn gain_color_and_vignetting_are_recovered_together() {
 fn gains_from_a_quarter_to_four_are_recovered() {
     let shifts = [0.0, 150.0, 300.0, 450.0];
     let lights = [1.0, 0.25, 4.0, 1.7];
-    let rasters: Vec<_> = shifts.iter().zip(lights).map(|(&shift, light)| picture(shift, light)).collect();
+    let rasters: Vec<_> = shifts.iter().zip(lights).map(|(&shift, light)| photograph(shift, light)).collect();
     for anchor in [GainAnchor::Mean, GainAnchor::Reference] {
         let exposure = estimate(&shifts, &rasters, &ExposureOptions { anchor, ..ExposureOptions::default() });
         assert_eq!(exposure.pairs.len(), 3);
@@ -197,7 +197,7 @@ fn gains_from_a_quarter_to_four_are_recovered() {
 fn exposures_four_stops_apart_are_followed() {
     let lights = [4.0, 1.0, 0.25];
     let shifts = [0.0, 100.0, 200.0];
-    let rasters: Vec<_> = shifts.iter().zip(lights).map(|(&shift, light)| picture(shift, light)).collect();
+    let rasters: Vec<_> = shifts.iter().zip(lights).map(|(&shift, light)| photograph(shift, light)).collect();
     let gains = gains(&estimate(&shifts, &rasters, &ExposureOptions::default()));
     assert!((gains[1] / 4.0 - 1.0).abs() < 0.02 && (gains[2] / 16.0 - 1.0).abs() < 0.03, "{gains:?}");
 }
@@ -205,7 +205,7 @@ fn exposures_four_stops_apart_are_followed() {
 #[test]
 fn saturated_and_moving_things_do_not_count() {
     let shifts = [0.0, 100.0];
-    let mut rasters = [picture(0.0, 1.0), picture(100.0, 2.0)];
+    let mut rasters = [photograph(0.0, 1.0), photograph(100.0, 2.0)];
     for y in 0..HEIGHT {
         for x in 110..WIDTH {
             // A third of the overlap is blown out in both, a fifth is a dark passer-by in the second only.
@@ -223,7 +223,7 @@ fn saturated_and_moving_things_do_not_count() {
 
 #[test]
 fn photographs_without_overlap_keep_their_brightness() {
-    let rasters = [picture(0.0, 1.0), picture(150.0, 2.0), picture(900.0, 3.0)];
+    let rasters = [photograph(0.0, 1.0), photograph(150.0, 2.0), photograph(900.0, 3.0)];
     let exposure = estimate(&[0.0, 150.0, 900.0], &rasters, &ExposureOptions::default());
     assert_eq!(gains(&exposure)[2], 1.0);
     assert!((gains(&exposure)[0] / gains(&exposure)[1] - 2.0).abs() < 0.04);
@@ -235,12 +235,12 @@ fn photographs_without_overlap_keep_their_brightness() {
 
 #[test]
 fn gains_stay_within_their_limit_and_black_says_nothing() {
-    let rasters = [picture(0.0, 1.0), picture(150.0, 8.0)];
+    let rasters = [photograph(0.0, 1.0), photograph(150.0, 8.0)];
     let options = ExposureOptions { max_gain: 1.5, ..ExposureOptions::default() };
     let bounded = estimate(&[0.0, 150.0], &rasters, &ExposureOptions { anchor: GainAnchor::Mean, ..options });
     assert!((gains(&bounded)[0] - 1.5).abs() < 1e-9 && (gains(&bounded)[1] - 1.5_f64.recip()).abs() < 1e-9);
     let black = Raster::new(WIDTH, HEIGHT, 3);
-    let exposure = estimate(&[0.0, 150.0], &[black, picture(150.0, 1.0)], &ExposureOptions::default());
+    let exposure = estimate(&[0.0, 150.0], &[black, photograph(150.0, 1.0)], &ExposureOptions::default());
     assert_eq!(gains(&exposure), [1.0; 2]);
 }
 

@@ -28,7 +28,7 @@ pub(crate) fn check_mesh(placed: &Placed) -> Result<()> {
                 mesh.width,
                 mesh.height
             ),
-            "Give rows * columns vertices, at least 2 x 2, over a picture of at least one pixel.",
+            "Give rows * columns vertices, at least 2 x 2, over a photograph of at least one pixel.",
         ));
     }
     let lined = |lines: &GridLines| {

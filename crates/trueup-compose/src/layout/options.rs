@@ -5,7 +5,7 @@ trueup_core::choice! {
     pub enum Crop {
         /// All that any photograph covers; what none covers is transparent or background.
         None = "none",
-        /// The largest rectangle without holes if it keeps most of the picture (canvas.min_kept), otherwise all: no head is lost
+        /// The largest rectangle without holes if it keeps most of the panorama (canvas.min_kept), otherwise all: no head is lost
         /// for a straight border.
         Auto = "auto",
         /// The largest rectangle without holes, however much it costs.
@@ -27,7 +27,7 @@ trueup_core::options! {
         /// than 400 million pixels is reduced evenly: a shape that runs away is not worth its time. Raise it if
         /// `canvas-reduced` is reported for a panorama whose stretched borders you want.
         max_growth: f64 = 8.0, between(1.0, 1e6), "";
-        /// What of the canvas is kept. Choose `auto` or `rectangle` for a picture without ragged borders.
+        /// What of the canvas is kept. Choose `auto` or `rectangle` for a panorama without ragged borders.
         crop: Crop = Crop::None, Allowed::Any, "", basic;
         /// Share of the covered pixels that the largest rectangle must keep for `crop = auto` to crop to it. Lower it if
         /// `auto` keeps ragged borders that you would rather lose, raise it if it takes too much.

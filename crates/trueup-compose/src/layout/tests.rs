@@ -15,13 +15,13 @@ fn placed(scale: f64, shift: [f64; 2]) -> Placed {
 #[test]
 fn the_reference_keeps_its_pixel_scale() {
     let context = StageContext::default();
-    let pictures = vec![placed(0.25, [-7.0, 3.0]), placed(0.5, [43.0, 3.0])];
-    let layout = run(pictures.clone(), 0, &CanvasOptions::default(), &context).expect("two grids");
+    let photographs = vec![placed(0.25, [-7.0, 3.0]), placed(0.5, [43.0, 3.0])];
+    let layout = run(photographs.clone(), 0, &CanvasOptions::default(), &context).expect("two grids");
     // In units of 0.25: the first spans 400 px, the second starts 200 px in and is twice as large.
     assert_eq!((layout.width, layout.height), (1000, 600));
     assert!((layout.canvas_from_target - 4.0).abs() < 1e-12);
     let half = CanvasOptions { scale: 0.5, ..CanvasOptions::default() };
-    let layout = run(pictures, 1, &half, &context).expect("two grids");
+    let layout = run(photographs, 1, &half, &context).expect("two grids");
     assert_eq!((layout.width, layout.height), (250, 150));
     assert!(context.findings().is_empty());
 }
@@ -40,16 +40,16 @@ fn a_canvas_above_the_limit_is_reduced_and_reported() {
 fn a_cylinder_is_its_period_in_whole_pixels_around_the_middle() {
     let context = StageContext::default();
     // From -10 to 490, with a period of 380.3: 59.85 beyond each end. 384 is the nearest multiple of 8.
-    let pictures = vec![placed(1.0, [-10.0, 3.0]), placed(1.0, [90.0, 3.0])];
+    let photographs = vec![placed(1.0, [-10.0, 3.0]), placed(1.0, [90.0, 3.0])];
     let options = CanvasOptions::default();
-    let layout = run_around(pictures.clone(), 0, Some(380.3), &options, &context).expect("two grids");
+    let layout = run_around(photographs.clone(), 0, Some(380.3), &options, &context).expect("two grids");
     assert_eq!((layout.width, layout.height, layout.period), (384, 303, Some(384)));
     let share = 384.0 / 380.3;
     assert!((layout.canvas_from_target - share).abs() < 1e-12);
     let (low, _) = layout.placed[0].mesh.bounds();
     let (_, high) = layout.placed[1].mesh.bounds();
     assert!((low.x + 59.85 * share).abs() < 1e-9 && (high.x - 384.0 - 59.85 * share).abs() < 1e-9);
-    assert!(run_around(pictures.clone(), 0, Some(f64::NAN), &options, &context).is_err());
+    assert!(run_around(photographs.clone(), 0, Some(f64::NAN), &options, &context).is_err());
     // Each lies across one end, and so is placed there again; 100 px further out, both are seen once more.
     let (wide, originals) = layout.unrolled(0);
     assert_eq!((originals.as_slice(), wide.width, wide.period), ([0, 0, 1, 1].as_slice(), 384, None));
@@ -64,7 +64,7 @@ fn a_cylinder_is_its_period_in_whole_pixels_around_the_middle() {
     assert_eq!(columns_around(390..420, Some(380)), (10..40, 0));
     assert_eq!(columns_around(390..800, Some(380)), (0..380, 10));
     assert_eq!(columns_around(390..800, None), (390..800, 0));
-    let flat = run(pictures, 0, &options, &context).expect("two grids");
+    let flat = run(photographs, 0, &options, &context).expect("two grids");
     assert_eq!(flat.unrolled(100), (Cow::Borrowed(&flat), vec![0, 1]));
 }
 
@@ -91,14 +91,14 @@ fn a_turn_is_a_whole_number_of_the_samples_of_a_blend() {
 #[test]
 fn a_framed_turn_is_shown_whole_within_the_pixels_allowed() {
     let context = StageContext::default();
-    let pictures = || vec![placed(1.0, [-10.0, 3.0]), placed(1.0, [4000.0, 90.2])];
+    let photographs = || vec![placed(1.0, [-10.0, 3.0]), placed(1.0, [4000.0, 90.2])];
     let window = Some([Vector2::new(-100.0, 10.0), Vector2::new(900.0, 200.0)]);
     let frame = Frame { canvas_from_target: 1.0, window, period: Some(4380.3) };
-    let layout = framed(pictures(), &frame, &CanvasOptions::default(), &context).expect("two grids");
+    let layout = framed(photographs(), &frame, &CanvasOptions::default(), &context).expect("two grids");
     assert_eq!((layout.width, layout.height, layout.period), (4352, 189, Some(4352)));
     for max_pixels in [1.0, 5.0, 100.0, 3000.0, 700_000.0] {
         let options = CanvasOptions { max_pixels, ..CanvasOptions::default() };
-        let layout = framed(pictures(), &frame, &options, &context).expect("two grids");
+        let layout = framed(photographs(), &frame, &options, &context).expect("two grids");
         assert!((layout.width * layout.height) as f64 <= max_pixels, "{} x {}", layout.width, layout.height);
         assert_eq!(layout.period, Some(layout.width));
     }

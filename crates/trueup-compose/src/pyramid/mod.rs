@@ -1,4 +1,4 @@
-//! Levels of pyramids whose pictures do not cover every sample.
+//! Levels of pyramids whose photographs do not cover every sample.
 //!
 //! Sample i of level l sits on pixel 2^l i of the canvas, whatever part of the canvas a plane holds: two planes that both
 //! hold what a sample is made of give it the same bits.
@@ -11,7 +11,7 @@
 //! photographs goes over within the width of its own contours instead of half of it, and shows less of a step.
 //!
 //! Samples carry the share that is covered, colors are multiplied by it, and sums are divided by the sum of the shares
-//! (normalized convolution: Knutsson, Westin, CVPR 1993), so that what lies beside a picture never bleeds into it.
+//! (normalized convolution: Knutsson, Westin, CVPR 1993), so that what lies beside a photograph never bleeds into it.
 
 mod plane;
 mod sums;

@@ -8,7 +8,7 @@ fn mean([r, g, b, weight]: [f32; 4]) -> Option<[f32; 3]> {
     (weight > 0.0).then(|| [r / weight, g / weight, b / weight])
 }
 
-/// Adds to `sum` the level's detail of one picture, `level` minus its interpolated coarser level, weighted by `mask` and by
+/// Adds to `sum` the level's detail of one photograph, `level` minus its interpolated coarser level, weighted by `mask` and by
 /// the share covered (its fourth power).
 pub(crate) fn add_detail(
     sum: &mut PyramidPlane<[f32; 4]>,
@@ -26,12 +26,12 @@ pub(crate) fn add_detail(
     });
 }
 
-/// Adds to `sum` one picture at the coarsest level.
+/// Adds to `sum` one photograph at the coarsest level.
 pub(crate) fn add_base(sum: &mut PyramidPlane<[f32; 4]>, level: &PyramidPlane<[f32; 4]>, mask: &PyramidPlane<f32>) {
     for_each_weighted(sum, level, mask, |_, own| own);
 }
 
-/// A picture that covers a place counts this much there even where its mask is zero: it shows where no other does.
+/// A photograph that covers a place counts this much there even where its mask is zero: it shows where no other does.
 const LEAST_WEIGHT: f32 = 1e-6;
 
 /// Smallest share that weights tell apart; their products stay far from where numbers lose digits.
@@ -53,7 +53,7 @@ fn for_each_weighted(
         let sums = &mut sum.row_mut(y)[shift..shift + width];
         for (x, (sum, (own, mask))) in sums.iter_mut().zip(own.iter().zip(mask)).enumerate() {
             if let Some(own_color) = color(*own) {
-                // Where a picture ends, its samples are means of one side only: they soon count nothing beside others.
+                // Where a photograph ends, its samples are means of one side only: they soon count nothing beside others.
                 let share = own[3].max(LEAST_TRUST);
                 let weight = (mask + LEAST_WEIGHT) * (share * share) * (share * share);
                 let [r, g, b] = value(start + x, own_color);

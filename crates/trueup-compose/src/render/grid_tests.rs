@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use crate::deformed_grid::DeformedGrid;
 use crate::layout::Placed;
 use crate::simd::{Positions, invert_row};
-use crate::test_pictures::moved;
+use crate::test_photographs::moved;
 
 /// A moved photograph, every vertex of its mesh moved a little more.
 fn jittered(jitter: &[f64]) -> Placed {

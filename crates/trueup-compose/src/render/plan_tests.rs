@@ -6,7 +6,7 @@ use trueup_core::mesh::GridMesh;
 
 use super::*;
 use crate::layout::Placed;
-use crate::test_pictures::{Memory, RamDisk};
+use crate::test_photographs::{Memory, RamDisk};
 
 fn layout(count: usize) -> CanvasLayout {
     let placed = (0..count)

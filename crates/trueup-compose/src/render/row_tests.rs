@@ -7,7 +7,7 @@ use super::test_rendering::{compose, render};
 use super::*;
 use crate::layout::{self, CanvasOptions};
 use crate::light::{Correction, Corrections, Response};
-use crate::test_pictures::{Memory, canvas, gradient, moved, noise};
+use crate::test_photographs::{Memory, canvas, gradient, moved, noise};
 
 /// A gradient of gray moved by (30, 20): its layer is that box, with the levels it has.
 #[test]

@@ -5,11 +5,11 @@ use trueup_core::raster::{Photograph, RowSource};
 use super::panorama::PanoramaPixels;
 use super::*;
 use crate::light::Corrections;
-use crate::test_pictures::Memory;
+use crate::test_photographs::Memory;
 
-pub(crate) fn render(layout: &CanvasLayout, pictures: Vec<Photograph>, options: &RenderOptions) -> Panorama {
+pub(crate) fn render(layout: &CanvasLayout, photographs: Vec<Photograph>, options: &RenderOptions) -> Panorama {
     let corrections = Corrections::plain(layout.placed.len());
-    compose(layout, &corrections, &Memory(pictures), options, &StageContext::default()).expect("renders")
+    compose(layout, &corrections, &Memory(photographs), options, &StageContext::default()).expect("renders")
 }
 
 pub(crate) fn compose(

@@ -9,7 +9,7 @@ use super::test_rendering::{bits, compose, linear, render, rows};
 use super::*;
 use crate::layout::{self, CanvasOptions};
 use crate::light::{Correction, Corrections};
-use crate::test_pictures::{Memory, canvas, gradient, moved, noise};
+use crate::test_photographs::{Memory, canvas, gradient, moved, noise};
 
 #[test]
 fn an_undeformed_grid_returns_the_photograph() {
@@ -50,9 +50,9 @@ fn gray_masked_and_deep_photographs_come_back_too() {
 
 #[test]
 fn a_shift_by_half_a_pixel_moves_a_gradient_by_half_a_step() {
-    let picture = gradient(64, 48, |x, y| 20.0 + 2.0 * x + y);
+    let photograph = gradient(64, 48, |x, y| 20.0 + 2.0 * x + y);
     let layout = canvas(65, 49, vec![moved(0, 64.0, 48.0, |p| [p.x + 0.5, p.y + 0.5])]);
-    let bytes = rows(&render(&layout, vec![picture], &RenderOptions::default()));
+    let bytes = rows(&render(&layout, vec![photograph], &RenderOptions::default()));
     for y in 3..46 {
         for x in 3..61 {
             let expected = 20.0 + 2.0 * x as f64 + y as f64;
@@ -68,11 +68,11 @@ fn a_shift_by_half_a_pixel_moves_a_gradient_by_half_a_step() {
 
 #[test]
 fn the_border_is_anti_aliased_where_it_runs_askew() {
-    let picture = gradient(60, 60, |_, _| 180.0);
+    let photograph = gradient(60, 60, |_, _| 180.0);
     let turn = nalgebra::Rotation2::new(0.3);
     let center = Vector2::new(50.0, 50.0);
     let layout = canvas(100, 100, vec![moved(0, 60.0, 60.0, |p| (turn * (p - Vector2::repeat(30.0)) + center).into())]);
-    let bytes = rows(&render(&layout, vec![picture], &RenderOptions::default()));
+    let bytes = rows(&render(&layout, vec![photograph], &RenderOptions::default()));
     let covered: f64 = bytes.chunks_exact(4).map(|pixel| f64::from(pixel[3]) / 255.0).sum();
     assert!((covered - 3600.0).abs() < 4.0, "{covered}");
     let partial = bytes.chunks_exact(4).filter(|pixel| pixel[3] > 0 && pixel[3] < 255).count();
@@ -83,15 +83,15 @@ fn the_border_is_anti_aliased_where_it_runs_askew() {
 }
 
 #[test]
-fn an_inner_border_leaves_no_trace_on_equal_pictures() {
+fn an_inner_border_leaves_no_trace_on_equal_photographs() {
     let options = RenderOptions::default();
-    let picture = gradient(60, 60, |_, _| 137.0);
+    let photograph = gradient(60, 60, |_, _| 137.0);
     let layout = canvas(
         90,
         60,
         vec![moved(0, 60.0, 60.0, |p| p.into()), moved(1, 60.0, 60.0, |p| [p.x + 29.7, p.y * 0.9 + 2.3])],
     );
-    let bytes = rows(&render(&layout, vec![picture.clone(), picture], &options));
+    let bytes = rows(&render(&layout, vec![photograph.clone(), photograph], &options));
     for pixel in bytes.chunks_exact(4).filter(|pixel| pixel[3] > 0) {
         assert_eq!(&pixel[..3], [137; 3]);
     }
@@ -151,8 +151,8 @@ fn folds_are_counted_and_every_pixel_is_hit_once() {
 }
 
 #[test]
-fn pictures_outside_or_far_too_small_are_harmless() {
-    let picture = gradient(30, 30, |_, _| 90.0);
+fn photographs_outside_or_far_too_small_are_harmless() {
+    let photograph = gradient(30, 30, |_, _| 90.0);
     let layout = canvas(
         20,
         20,
@@ -165,7 +165,7 @@ fn pictures_outside_or_far_too_small_are_harmless() {
     );
     for blend in [Blend::Feather, Blend::MultiBand, Blend::None] {
         let options = RenderOptions { blend, ..RenderOptions::default() };
-        let panorama = render(&layout, vec![picture.clone()], &options);
+        let panorama = render(&layout, vec![photograph.clone()], &options);
         assert!((0..400).all(|at| linear(&panorama, at % 20, at / 20).iter().all(|value| value.is_finite())));
     }
 }
@@ -174,8 +174,8 @@ fn pictures_outside_or_far_too_small_are_harmless() {
 fn photographs_of_another_size_are_refused() {
     let layout = canvas(30, 30, vec![moved(0, 30.0, 30.0, |p| p.into())]);
     let options = RenderOptions::default();
-    for picture in [noise(30, 29, 3), noise(30, 30, 2)] {
-        let photographs = Memory(vec![Photograph::Eight(picture)]);
+    for photograph in [noise(30, 29, 3), noise(30, 30, 2)] {
+        let photographs = Memory(vec![Photograph::Eight(photograph)]);
         let result = compose(&layout, &Corrections::plain(1), &photographs, &options, &StageContext::default());
         assert!(matches!(result, Err(Error::Input { .. })));
     }
@@ -191,13 +191,13 @@ fn an_empty_layout_is_transparent() {
 
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
-    let pictures: Vec<Photograph> = (0..5).map(|_| Photograph::Eight(noise(90, 70, 3))).collect();
+    let photographs: Vec<Photograph> = (0..5).map(|_| Photograph::Eight(noise(90, 70, 3))).collect();
     let placed =
         (0..5).map(|i| moved(i, 90.0, 70.0, |p| [p.x + 13.3 * i as f64, p.y * 1.1 + 0.002 * p.x * p.y])).collect();
     let layout = canvas(160, 110, placed);
     let of_threads = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
-        let of = |blend| render(&layout, pictures.clone(), &RenderOptions { blend, ..RenderOptions::default() });
+        let of = |blend| render(&layout, photographs.clone(), &RenderOptions { blend, ..RenderOptions::default() });
         pool.install(|| [Blend::MultiBand, Blend::Feather, Blend::None].map(|blend| bits(&of(blend))))
     };
     let single = of_threads(1);

@@ -12,7 +12,7 @@ use crate::coverage::Coverage;
 use crate::gaps::Gaps;
 use crate::layout::CanvasLayout;
 use crate::light::{Correction, Corrections};
-use crate::test_pictures::{Memory, RamDisk, canvas, moved, noise};
+use crate::test_photographs::{Memory, RamDisk, canvas, moved, noise};
 
 /// Counts how often photographs are decoded.
 struct Counting(Memory, AtomicUsize);
@@ -34,14 +34,14 @@ fn scene() -> (CanvasLayout, Corrections, Counting) {
             moved(i, 420.0, 260.0, move |p| [p.x + left + 0.02 * p.y, 1.01 * p.y + top + 2e-5 * p.x * p.y])
         })
         .collect();
-    let pictures = (0..COUNT).map(|i| {
+    let photographs = (0..COUNT).map(|i| {
         let noise = noise(420, 260, 3);
         let data = noise.into_data().into_iter().map(|level| level / 4 + 40 + 7 * i as u8).collect();
         let raster = trueup_core::raster::Raster::from_data(420, 260, 3, data).expect("as many samples");
         trueup_core::raster::Photograph::Eight(raster)
     });
     let corrections: Vec<_> = (0..COUNT).map(|i| Correction::uniform(1.0 + 0.01 * i as f64)).collect();
-    (canvas(1670, 460, placed), corrections.into(), Counting(Memory(pictures.collect()), AtomicUsize::new(0)))
+    (canvas(1670, 460, placed), corrections.into(), Counting(Memory(photographs.collect()), AtomicUsize::new(0)))
 }
 
 fn composed(blend: Blend, memory: usize, disk: &RamDisk, threads: usize) -> Result<(Rendered, usize)> {

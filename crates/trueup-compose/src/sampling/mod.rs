@@ -210,7 +210,7 @@ fn average_one<K: InterpolationKernel, T: Sample, const C: usize>(
     sum.mean()
 }
 
-/// [`average_one`] for opaque pictures where all columns lie inside: rows are summed first, as they lie in memory.
+/// [`average_one`] for opaque photographs where all columns lie inside: rows are summed first, as they lie in memory.
 #[inline(always)]
 fn average_inside<T: Sample, const C: usize>(
     raster: &Raster<T>,

@@ -87,12 +87,12 @@ fn vector_and_portable_forms_agree_bit_for_bit() {
 }
 
 #[test]
-fn all_depths_and_layouts_agree_on_a_gray_picture() {
+fn all_depths_and_layouts_agree_on_a_gray_photograph() {
     let gray = noise(16, 12, 1);
     let rgb: Vec<u8> = gray.data().iter().flat_map(|&level| [level; 3]).collect();
     let rgba: Vec<u8> = gray.data().iter().flat_map(|&level| [level, level, level, 255]).collect();
     let deep: Vec<u16> = rgb.iter().map(|&level| u16::from(level) * 257).collect();
-    let pictures = [
+    let photographs = [
         Photograph::Eight(gray),
         Photograph::Eight(Raster::from_data(16, 12, 3, rgb).expect("rgb")),
         Photograph::Eight(Raster::from_data(16, 12, 4, rgba).expect("rgba")),
@@ -100,12 +100,12 @@ fn all_depths_and_layouts_agree_on_a_gray_picture() {
     ];
     let points = [(0.5, 0.5), (3.3, 4.9), (15.99, 11.99), (8.0, 6.0), (-3.0, 40.0)];
     for stretch in [[1.0, 1.0], [2.3, 1.4]] {
-        let expected = sample::<Bicubic>(&pictures[0], stretch, &points);
-        for picture in &pictures[1..] {
-            for (got, expected) in sample::<Bicubic>(picture, stretch, &points).iter().zip(&expected) {
+        let expected = sample::<Bicubic>(&photographs[0], stretch, &points);
+        for photograph in &photographs[1..] {
+            for (got, expected) in sample::<Bicubic>(photograph, stretch, &points).iter().zip(&expected) {
                 for (got, expected) in got.iter().zip(expected) {
-                    // Masked pictures are averaged without negative lobes, so only the plain form must agree there.
-                    let tolerance = if picture.channels() == 4 && stretch != [1.0, 1.0] { 60.0 } else { 1e-3 };
+                    // Masked photographs are averaged without negative lobes, so only the plain form must agree there.
+                    let tolerance = if photograph.channels() == 4 && stretch != [1.0, 1.0] { 60.0 } else { 1e-3 };
                     assert!((got - expected).abs() < tolerance, "{got} {expected}");
                 }
             }
@@ -117,9 +117,9 @@ fn all_depths_and_layouts_agree_on_a_gray_picture() {
 fn parabolas_are_interpolated_exactly() {
     let level = |x: f64, y: f64| 20.0 + x * x / 4.0 + y * y / 8.0 - x * y / 16.0;
     let data = (0..20 * 16).map(|i| (level(f64::from(i % 20), f64::from(i / 20)) * 257.0).round() as u16).collect();
-    let picture = Photograph::Sixteen(Raster::from_data(20, 16, 1, data).expect("20 x 16"));
+    let photograph = Photograph::Sixteen(Raster::from_data(20, 16, 1, data).expect("20 x 16"));
     for (x, y) in [(4.3, 5.7), (10.5, 8.25), (15.9, 12.1)] {
-        let got = sample::<Bicubic>(&picture, [1.0, 1.0], &[(x, y)])[0][0];
+        let got = sample::<Bicubic>(&photograph, [1.0, 1.0], &[(x, y)])[0][0];
         assert!((f64::from(got) - level(x - 0.5, y - 0.5)).abs() < 0.01);
     }
 }
@@ -128,9 +128,9 @@ fn parabolas_are_interpolated_exactly() {
 fn a_widened_kernel_removes_what_the_canvas_cannot_hold() {
     // Columns alternate between 0 and 200: at a third of the scale only their mean may remain.
     let data = (0..64 * 8).map(|i| if i % 2 == 0 { 0_u8 } else { 200 }).collect();
-    let picture = Photograph::Eight(Raster::from_data(64, 8, 1, data).expect("64 x 8"));
+    let photograph = Photograph::Eight(Raster::from_data(64, 8, 1, data).expect("64 x 8"));
     let points: Vec<(f64, f64)> = (4..18).map(|i| (3.0 * f64::from(i) + 0.4, 4.0)).collect();
-    for sampled in sample::<Bicubic>(&picture, [3.0, 1.0], &points) {
+    for sampled in sample::<Bicubic>(&photograph, [3.0, 1.0], &points) {
         assert!((sampled[0] - 100.0).abs() < 4.0, "{}", sampled[0]);
     }
 }
@@ -138,20 +138,20 @@ fn a_widened_kernel_removes_what_the_canvas_cannot_hold() {
 #[test]
 fn colors_under_transparency_do_not_show() {
     let data = (0..8 * 8).flat_map(|i| if i % 8 < 4 { [180_u8, 90, 30, 255] } else { [0, 255, 0, 0] }).collect();
-    let picture = Photograph::Eight(Raster::from_data(8, 8, 4, data).expect("8 x 8"));
+    let photograph = Photograph::Eight(Raster::from_data(8, 8, 4, data).expect("8 x 8"));
     for stretch in [[1.0, 1.0], [1.7, 1.7]] {
-        for sampled in sample::<Bicubic>(&picture, stretch, &[(3.9, 4.0), (4.2, 3.0)]) {
+        for sampled in sample::<Bicubic>(&photograph, stretch, &[(3.9, 4.0), (4.2, 3.0)]) {
             assert!((sampled[0] - 180.0).abs() < 1e-3 && (sampled[1] - 90.0).abs() < 1e-3);
             assert!(sampled[3] > 0.0 && sampled[3] < 255.0);
         }
     }
-    assert_eq!(sample::<Bicubic>(&picture, [1.0, 1.0], &[(7.5, 4.0)])[0], [0.0; 4]);
+    assert_eq!(sample::<Bicubic>(&photograph, [1.0, 1.0], &[(7.5, 4.0)])[0], [0.0; 4]);
 }
 
 #[test]
-fn a_single_pixel_is_a_picture() {
-    let picture = Photograph::Eight(Raster::from_data(1, 1, 3, vec![7, 8, 9]).expect("one pixel"));
-    for sampled in sample::<Bicubic>(&picture, [1.0, 1.0], &[(0.5, 0.5), (-4.0, 9.0)]) {
+fn a_single_pixel_is_a_photograph() {
+    let photograph = Photograph::Eight(Raster::from_data(1, 1, 3, vec![7, 8, 9]).expect("one pixel"));
+    for sampled in sample::<Bicubic>(&photograph, [1.0, 1.0], &[(0.5, 0.5), (-4.0, 9.0)]) {
         assert_eq!(sampled, [7.0, 8.0, 9.0, 255.0]);
     }
 }

@@ -98,7 +98,7 @@ mod tests {
     use trueup_core::scratch::ScratchFile;
 
     use super::*;
-    use crate::test_pictures::RamDisk;
+    use crate::test_photographs::RamDisk;
 
     #[test]
     fn a_canvas_in_a_file_is_the_canvas() {

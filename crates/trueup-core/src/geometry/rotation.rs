@@ -19,7 +19,7 @@ pub fn matrix_from_rows(rows: &[[f64; 3]; 3]) -> Matrix3<f64> {
 }
 
 /// The roll of a camera that sees "down" in direction `down` of its own frame: the clockwise turn, in radians, that stands
-/// its picture upright. 0 straight up or down.
+/// its photograph upright. 0 straight up or down.
 pub fn roll_from_down(down: &Vector3<f64>) -> f64 {
     down.x.atan2(down.y)
 }

@@ -48,9 +48,9 @@ impl PhotographColors {
     /// sRGB, or in Adobe RGB if their EXIF names it. Spaces given by tables or by a different curve for each channel are
     /// converted to the one chosen among the others, or to sRGB; gray has no gamut and does not take part in the choice.
     /// A profile that cannot be understood is as good as none; a warning says so.
-    pub fn survey(images: &[SourceImage], context: &StageContext) -> Self {
+    pub fn survey(sources: &[SourceImage], context: &StageContext) -> Self {
         let read: Vec<(Meaning, Option<Diagnostic>)> =
-            images.par_iter().enumerate().map(|(number, image)| meaning(number, image)).collect();
+            sources.par_iter().enumerate().map(|(number, source)| meaning(number, source)).collect();
         let (meanings, findings): (Vec<_>, Vec<_>) = read.into_iter().unzip();
         findings.into_iter().flatten().for_each(|finding| context.report(finding));
         let mut space: Option<&RgbSpace> = None;
@@ -101,8 +101,8 @@ impl PhotographColors {
     }
 }
 
-fn meaning(number: usize, image: &SourceImage) -> (Meaning, Option<Diagnostic>) {
-    let embedded = embedded::read(&image.path);
+fn meaning(number: usize, source: &SourceImage) -> (Meaning, Option<Diagnostic>) {
+    let embedded = embedded::read(&source.path);
     let srgb = || Meaning::of_space(RgbSpace::srgb());
     let Some(icc) = embedded.icc else {
         let space = if embedded.is_adobe_rgb { RgbSpace::adobe_rgb() } else { RgbSpace::srgb() };

@@ -43,16 +43,16 @@ fn examine(paths: &[PathBuf]) -> Vec<SourceImage> {
     let inputs: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     let sources = scan(&inputs, &SourceOptions::default(), &StageContext::default()).expect("a scan");
     assert!(sources.rejected.is_empty(), "{:?}", sources.rejected);
-    sources.images
+    sources.photographs
 }
 
 /// The photographs brought to one space, the space, and the codes of what was found.
 fn survey(paths: &[PathBuf]) -> (FilePhotographs, PhotographColors, Vec<String>) {
-    let images = examine(paths);
+    let sources = examine(paths);
     let context = StageContext::default();
-    let colors = PhotographColors::survey(&images, &context);
+    let colors = PhotographColors::survey(&sources, &context);
     let codes = context.findings().into_iter().map(|finding| finding.code).collect();
-    (FilePhotographs::new(images, 0).in_colors(colors.clone()), colors, codes)
+    (FilePhotographs::new(sources, 0).in_colors(colors.clone()), colors, codes)
 }
 
 /// A pixel on the scale of 0 to 255, and whether the photograph has 16 bits.

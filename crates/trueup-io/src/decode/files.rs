@@ -19,7 +19,7 @@ use crate::color::PhotographColors;
 /// The budget decides only how often files are decoded, never what is returned.
 #[derive(Debug)]
 pub struct FilePhotographs {
-    images: Vec<SourceImage>,
+    sources: Vec<SourceImage>,
     /// By index; those beyond the end have none.
     masks: Vec<Masks>,
     colors: Option<PhotographColors>,
@@ -36,12 +36,12 @@ struct Kept {
 }
 
 impl FilePhotographs {
-    /// Over `images`, keeping at most `cache_bytes` bytes of decoded pixels; 0 keeps none.
-    pub fn new(images: Vec<SourceImage>, cache_bytes: usize) -> Self {
-        let photographs = images.iter().map(|_| None).collect();
-        let bytes = images.iter().map(|_| AtomicUsize::new(0)).collect();
+    /// Over `sources`, keeping at most `cache_bytes` bytes of decoded pixels; 0 keeps none.
+    pub fn new(sources: Vec<SourceImage>, cache_bytes: usize) -> Self {
+        let photographs = sources.iter().map(|_| None).collect();
+        let bytes = sources.iter().map(|_| AtomicUsize::new(0)).collect();
         let kept = Mutex::new(Kept { photographs, free_bytes: cache_bytes });
-        Self { images, masks: Vec::new(), colors: None, bytes, kept }
+        Self { sources, masks: Vec::new(), colors: None, bytes, kept }
     }
 
     /// The same with what the photographer wants of the photographs' parts, in their order.
@@ -61,8 +61,8 @@ impl FilePhotographs {
     }
 
     /// The photographs this hands out, in order.
-    pub fn images(&self) -> &[SourceImage] {
-        &self.images
+    pub fn sources(&self) -> &[SourceImage] {
+        &self.sources
     }
 
     /// Decodes photograph `index` and reduces it as [`working`](super::working) does; keeps the photograph if it fits.
@@ -70,9 +70,9 @@ impl FilePhotographs {
     /// # Errors
     /// As [`working`](super::working); [`Error::Input`] if there is no photograph `index`.
     pub fn working(&self, index: usize, frame: &WorkingFrame, thumbnail_max_area: f64) -> Result<WorkingPicture> {
-        let image = self.image(index)?;
-        let photograph = self.decode(index, image)?;
-        let working = reduce_photograph(&photograph, &image.name, frame, thumbnail_max_area)?;
+        let source = self.source(index)?;
+        let photograph = self.decode(index, source)?;
+        let working = reduce_photograph(&photograph, &source.name, frame, thumbnail_max_area)?;
         self.keep(index, photograph);
         Ok(working)
     }
@@ -88,10 +88,10 @@ impl FilePhotographs {
         kept.photographs.iter().flatten().map(Photograph::bytes).sum()
     }
 
-    fn decode(&self, index: usize, image: &SourceImage) -> Result<Photograph> {
-        let mut photograph = photograph(image)?;
+    fn decode(&self, index: usize, source: &SourceImage) -> Result<Photograph> {
+        let mut photograph = photograph(source)?;
         if let Some(conversion) = self.colors.as_ref().and_then(|colors| colors.conversion(index)) {
-            photograph = conversion.apply(photograph, &image.name)?;
+            photograph = conversion.apply(photograph, &source.name)?;
         }
         if let Some(bytes) = self.bytes.get(index) {
             bytes.store(photograph.bytes(), Ordering::Relaxed);
@@ -99,9 +99,9 @@ impl FilePhotographs {
         Ok(photograph)
     }
 
-    fn image(&self, index: usize) -> Result<&SourceImage> {
-        self.images.get(index).ok_or_else(|| {
-            let reason = format!("there are only {} photographs", self.images.len());
+    fn source(&self, index: usize) -> Result<&SourceImage> {
+        self.sources.get(index).ok_or_else(|| {
+            let reason = format!("there are only {} photographs", self.sources.len());
             Error::input(format!("photograph number {index}"), reason, "Ask for one of them.")
         })
     }
@@ -128,10 +128,10 @@ impl FilePhotographs {
 impl PhotographSource for FilePhotographs {
     /// Hands out a kept photograph, which is then no longer kept, or decodes the file.
     fn photograph(&self, index: usize) -> Result<Photograph> {
-        let image = self.image(index)?;
+        let source = self.source(index)?;
         match self.take(index) {
             Some(photograph) => Ok(photograph),
-            None => self.decode(index, image),
+            None => self.decode(index, source),
         }
     }
 

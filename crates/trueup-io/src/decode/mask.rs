@@ -14,37 +14,37 @@ use crate::source::{self, RejectedSource, SourceOptions};
 /// The share of white from which on a pixel of a mask counts as white, and the opacity from which on it counts as opaque.
 const HALF: f32 = 0.5;
 
-/// Reads a picture that marks parts of the photograph `image`: the pixels that are white and opaque, at least by half.
+/// Reads a picture that marks parts of the photograph `source`: the pixels that are white and opaque, at least by half.
 ///
 /// The picture has the photograph's size as it is shown. One that has the size in which a photograph with a quarter turn
 /// is stored is turned with it.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read or has another size; [`Error::Options`]; [`Error::Cancelled`].
-pub fn mask(file: &Path, image: &SourceImage, options: &SourceOptions, context: &StageContext) -> Result<Mask> {
+pub fn mask(file: &Path, source: &SourceImage, options: &SourceOptions, context: &StageContext) -> Result<Mask> {
     let path = file.display().to_string();
     // A mask may be smaller than any photograph worth stitching; its size is that of one.
     let mut found = source::scan_any_size(std::slice::from_ref(&path), options, context)?;
-    let Some(picture) = found.images.pop().filter(|_| found.images.is_empty()) else {
+    let Some(picture) = found.photographs.pop().filter(|_| found.photographs.is_empty()) else {
         return Err(found.rejected.first().map_or_else(
             || Error::input(&path, "it is no single picture", "Give one picture as a mask."),
             RejectedSource::to_error,
         ));
     };
     let size = (picture.width, picture.height);
-    let turned = image.orientation >= 5 && image.width != image.height && size == (image.height, image.width);
-    if size != (image.width, image.height) && !turned {
+    let turned = source.orientation >= 5 && source.width != source.height && size == (source.height, source.width);
+    if size != (source.width, source.height) && !turned {
         return Err(Error::input(
             &path,
             format!(
                 "the mask has {} x {} px, the photograph {} has {} x {} px",
-                size.0, size.1, image.name, image.width, image.height
+                size.0, size.1, source.name, source.width, source.height
             ),
             "Save the mask in the size of the photograph as it is shown.",
         ));
     }
     let white = white(&photograph(&picture)?)?;
-    let white = if turned { orientation::upright(white, image.orientation) } else { white };
+    let white = if turned { orientation::upright(white, source.orientation) } else { white };
     Ok(Mask::from_fn(white.width(), white.height(), |x, y| white.pixel(x, y)[0]))
 }
 

@@ -13,17 +13,17 @@ use crate::metadata::header;
 
 /// Decodes a photograph in full size, upright.
 ///
-/// Gray stays one channel; gray with alpha becomes RGBA; palettes, CMYK and one-bit pictures become RGB or gray;
+/// Gray stays one channel; gray with alpha becomes RGBA; palettes, CMYK and one-bit photographs become RGB or gray;
 /// 16 bits a sample stay 16; floating point is taken for linear light, 1 for white, and becomes 16 bits of sRGB, what is
 /// brighter than white becoming white.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read, [`Error::Input`] if its pixels are damaged or incomplete (no missing part
 /// is tolerated), of an unsupported kind, or no longer of the size that was found when it was examined.
-pub fn photograph(image: &SourceImage) -> Result<Photograph> {
-    Ok(match stored(image)? {
-        Photograph::Eight(raster) => Photograph::Eight(upright(raster, image.orientation)),
-        Photograph::Sixteen(raster) => Photograph::Sixteen(upright(raster, image.orientation)),
+pub fn photograph(source: &SourceImage) -> Result<Photograph> {
+    Ok(match stored(source)? {
+        Photograph::Eight(raster) => Photograph::Eight(upright(raster, source.orientation)),
+        Photograph::Sixteen(raster) => Photograph::Sixteen(upright(raster, source.orientation)),
     })
 }
 
@@ -31,11 +31,11 @@ pub fn photograph(image: &SourceImage) -> Result<Photograph> {
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read, [`Error::Input`] if its header no longer can.
-pub fn sample_bits(image: &SourceImage) -> Result<u16> {
-    let file = File::open(&image.path).map_err(|error| Error::io("reading", &image.path, error))?;
+pub fn sample_bits(source: &SourceImage) -> Result<u16> {
+    let file = File::open(&source.path).map_err(|error| Error::io("reading", &source.path, error))?;
     header::sample_bits(file).ok_or_else(|| {
         Error::input(
-            &image.name,
+            &source.name,
             "its header can no longer be read",
             "Do not change photographs while they are stitched; start again.",
         )
@@ -43,12 +43,12 @@ pub fn sample_bits(image: &SourceImage) -> Result<u16> {
 }
 
 /// Decodes the pixels as they are stored, before orientation.
-fn stored(image: &SourceImage) -> Result<Photograph> {
-    let reading = |error| Error::io("reading", &image.path, error);
-    let mut input = BufReader::new(File::open(&image.path).map_err(reading)?);
+fn stored(source: &SourceImage) -> Result<Photograph> {
+    let reading = |error| Error::io("reading", &source.path, error);
+    let mut input = BufReader::new(File::open(&source.path).map_err(reading)?);
     let format = formats::recognize(&mut input).map_err(reading)?.ok_or_else(|| {
         let reason = format!("it is not a {} picture", formats::readable_formats());
-        Error::input(&image.name, reason, "Give the photograph again.")
+        Error::input(&source.name, reason, "Give the photograph again.")
     })?;
-    (format.pixels)(image, input)
+    (format.pixels)(source, input)
 }

@@ -29,7 +29,7 @@ fn examine(path: PathBuf) -> SourceImage {
     let inputs = [path.display().to_string()];
     let mut sources = scan(&inputs, &SourceOptions::default(), &StageContext::default()).expect("a scan");
     assert!(sources.rejected.is_empty(), "{:?}", sources.rejected);
-    sources.images.remove(0)
+    sources.photographs.remove(0)
 }
 
 fn rgb8() -> Specimen {
@@ -60,8 +60,8 @@ fn every_kind_of_pixel_keeps_its_depth() {
     ];
     for (picture, formats, pixel) in eight {
         for &format in formats {
-            let image = examine(write(&folder, "picture", &picture.file(format)));
-            let Photograph::Eight(raster) = photograph(&image).expect("a photograph") else {
+            let source = examine(write(&folder, "picture", &picture.file(format)));
+            let Photograph::Eight(raster) = photograph(&source).expect("a photograph") else {
                 panic!("{format:?}: 16 bit")
             };
             assert_eq!((raster.width(), raster.height()), (WIDTH as usize, HEIGHT as usize));
@@ -69,8 +69,8 @@ fn every_kind_of_pixel_keeps_its_depth() {
         }
     }
     for format in [Container::Png, Container::Tiff] {
-        let image = examine(write(&folder, "picture", &rgb16().file(format)));
-        let Photograph::Sixteen(raster) = photograph(&image).expect("a photograph") else {
+        let source = examine(write(&folder, "picture", &rgb16().file(format)));
+        let Photograph::Sixteen(raster) = photograph(&source).expect("a photograph") else {
             panic!("{format:?}: 8 bit")
         };
         assert_eq!(raster.pixel(11, 5), [v0, v1, v2].map(|v| u16::from(v) * 257 + 3), "{format:?}");
@@ -81,11 +81,11 @@ fn every_kind_of_pixel_keeps_its_depth() {
 fn floating_point_is_linear_light() {
     let folder = TempDir::new().expect("a temporary folder");
     let picture = Specimen::float(WIDTH, HEIGHT, |_, _| [0.5, -1.0, 7.0]);
-    let image = examine(write(&folder, "float.tif", &picture.file(Container::Tiff)));
-    let Photograph::Sixteen(raster) = photograph(&image).expect("a photograph") else { panic!("8 bit") };
+    let source = examine(write(&folder, "float.tif", &picture.file(Container::Tiff)));
+    let Photograph::Sixteen(raster) = photograph(&source).expect("a photograph") else { panic!("8 bit") };
     // IEC 61966-2-1: 1.055 * 0.5^(1 / 2.4) - 0.055 = 0.735357, of 65535.
     assert_eq!(raster.pixel(0, 0), [48_192, 0, 65_535]);
-    assert_eq!(sample_bits(&image).expect("a header"), 32);
+    assert_eq!(sample_bits(&source).expect("a header"), 32);
 }
 
 #[test]
@@ -99,8 +99,8 @@ fn palettes_and_single_bits_are_spread() {
     let mut writer = encoder.write_header().expect("a header");
     writer.write_image_data(&[0b0100_0000; 32]).expect("pixels");
     writer.finish().expect("an end");
-    let image = examine(write(&folder, "palette.png", &bytes));
-    let Photograph::Eight(raster) = photograph(&image).expect("a photograph") else { panic!("16 bit") };
+    let source = examine(write(&folder, "palette.png", &bytes));
+    let Photograph::Eight(raster) = photograph(&source).expect("a photograph") else { panic!("16 bit") };
     assert_eq!((raster.pixel(0, 0), raster.pixel(1, 0)), (&[10, 20, 30][..], &[40, 50, 60][..]));
 }
 
@@ -127,8 +127,8 @@ fn every_kind_of_jpeg_is_decoded_but_none_that_is_cut_off() {
         for progressive in [false, true] {
             let bytes = jpeg(color, progressive);
             let path = write(&folder, "picture.jpg", &bytes);
-            let image = examine(path);
-            let decoded = photograph(&image).expect("a photograph");
+            let source = examine(path);
+            let decoded = photograph(&source).expect("a photograph");
             assert_eq!(decoded.channels(), channels, "{color:?} {progressive}");
             if let (Luma | Rgb, Photograph::Eight(raster)) = (color, &decoded) {
                 for (c, level) in raster.pixel(20, 20).iter().enumerate() {
@@ -138,7 +138,7 @@ fn every_kind_of_jpeg_is_decoded_but_none_that_is_cut_off() {
             // Anywhere in the file, and just before its end.
             for cut in (16..bytes.len()).step_by(101).chain(bytes.len() - 4..bytes.len()) {
                 write(&folder, "picture.jpg", &bytes[..cut]);
-                let error = photograph(&image).expect_err("a cut file").to_string();
+                let error = photograph(&source).expect_err("a cut file").to_string();
                 assert!(error.starts_with("picture.jpg"), "{error}");
             }
         }
@@ -160,8 +160,8 @@ fn jpegs_with_a_scan_per_component_and_reduced_color_are_decoded() {
             encoder.set_sampling_factor(factor);
             encoder.set_optimized_huffman_tables(separate);
             encoder.encode(&pixels, WIDTH as u16, HEIGHT as u16, jpeg_encoder::ColorType::Rgb).expect("encoded");
-            let image = examine(write(&folder, "scans.jpg", &bytes));
-            let Photograph::Eight(raster) = photograph(&image).expect("a photograph") else { panic!("16 bit") };
+            let source = examine(write(&folder, "scans.jpg", &bytes));
+            let Photograph::Eight(raster) = photograph(&source).expect("a photograph") else { panic!("16 bit") };
             raster
         });
         for (together, separate) in decoded[0].data().iter().zip(decoded[1].data()) {
@@ -185,35 +185,35 @@ fn cut_pngs_tiffs_and_webps_are_refused() {
     let folder = TempDir::new().expect("a temporary folder");
     for format in Container::ALL {
         let bytes = rgb8().file(format);
-        let image = examine(write(&folder, "picture", &bytes));
+        let source = examine(write(&folder, "picture", &bytes));
         write(&folder, "picture", &bytes[..bytes.len() / 2]);
-        assert!(matches!(photograph(&image), Err(Error::Input { .. })), "{format:?}");
+        assert!(matches!(photograph(&source), Err(Error::Input { .. })), "{format:?}");
     }
 }
 
 #[test]
 fn files_that_change_after_the_scan_are_refused() {
     let folder = TempDir::new().expect("a temporary folder");
-    let image = examine(write(&folder, "picture", &rgb8().file(Container::Png)));
+    let source = examine(write(&folder, "picture", &rgb8().file(Container::Png)));
     write(&folder, "picture", &rgb8_of(20, 20).file(Container::Png));
-    assert!(photograph(&image).expect_err("another size").to_string().contains("examined"));
-    std::fs::remove_file(&image.path).expect("our own file");
-    assert!(matches!(photograph(&image), Err(Error::Io { .. })));
+    assert!(photograph(&source).expect_err("another size").to_string().contains("examined"));
+    std::fs::remove_file(&source.path).expect("our own file");
+    assert!(matches!(photograph(&source), Err(Error::Io { .. })));
 }
 
 #[test]
 fn working_pictures_have_the_size_of_their_frames() {
     let folder = TempDir::new().expect("a temporary folder");
-    let image = examine(write(&folder, "picture", &rgb8().file(Container::Png)));
-    let frame = WorkingFrame::new(image.width, image.height, 500.0);
-    let picture = working(&image, &frame, 100.0).expect("a working picture");
+    let source = examine(write(&folder, "picture", &rgb8().file(Container::Png)));
+    let frame = WorkingFrame::new(source.width, source.height, 500.0);
+    let picture = working(&source, &frame, 100.0).expect("a working picture");
     assert_eq!((picture.gray.width(), picture.gray.height()), (frame.width as usize, frame.height as usize));
     assert_eq!((picture.gray.channels(), picture.thumbnail.channels()), (1, 3));
-    let thumbnail_frame = WorkingFrame::new(image.width, image.height, 100.0);
+    let thumbnail_frame = WorkingFrame::new(source.width, source.height, 100.0);
     assert_eq!(picture.thumbnail_frame, thumbnail_frame);
     assert_eq!(picture.thumbnail.width(), thumbnail_frame.width as usize);
-    let wrong = WorkingFrame::new(image.width * 2, image.height, 500.0);
-    assert!(matches!(working(&image, &wrong, 100.0), Err(Error::Input { .. })));
+    let wrong = WorkingFrame::new(source.width * 2, source.height, 500.0);
+    assert!(matches!(working(&source, &wrong, 100.0), Err(Error::Input { .. })));
 }
 
 #[test]
@@ -235,27 +235,27 @@ fn luma_is_that_of_the_standard_and_depths_agree() {
 #[test]
 fn the_cache_changes_nothing_but_the_work() {
     let folder = TempDir::new().expect("a temporary folder");
-    let images = vec![
+    let sources = vec![
         examine(write(&folder, "a.png", &rgb8().file(Container::Png))),
         examine(write(&folder, "b.png", &rgb16().file(Container::Png))),
     ];
-    let frame = WorkingFrame::new(images[0].width, images[0].height, 300.0);
+    let frame = WorkingFrame::new(sources[0].width, sources[0].height, 300.0);
     let first_size = (WIDTH * HEIGHT * 3) as usize;
     for budget in [0, first_size, usize::MAX] {
-        let files = FilePhotographs::new(images.clone(), budget);
-        for (index, image) in images.iter().enumerate() {
+        let files = FilePhotographs::new(sources.clone(), budget);
+        for (index, source) in sources.iter().enumerate() {
             let kept = files.working(index, &frame, 50.0).expect("a working picture");
-            assert_eq!(kept, working(image, &frame, 50.0).expect("a working picture"));
+            assert_eq!(kept, working(source, &frame, 50.0).expect("a working picture"));
         }
         // The first photograph fits wherever there is a budget, and is then there without its file.
         let away = folder.path().join("away");
-        let whole = photograph(&images[0]).expect("decoded");
-        std::fs::rename(&images[0].path, &away).expect("our own file");
+        let whole = photograph(&sources[0]).expect("decoded");
+        std::fs::rename(&sources[0].path, &away).expect("our own file");
         assert_eq!(files.photograph(0).ok(), (budget > 0).then_some(whole));
         assert!(files.photograph(0).is_err());
-        std::fs::rename(&away, &images[0].path).expect("our own file");
-        for (index, image) in images.iter().enumerate() {
-            assert_eq!(files.photograph(index).expect("decoded"), photograph(image).expect("decoded"));
+        std::fs::rename(&away, &sources[0].path).expect("our own file");
+        for (index, source) in sources.iter().enumerate() {
+            assert_eq!(files.photograph(index).expect("decoded"), photograph(source).expect("decoded"));
         }
         assert!(files.photograph(2).is_err());
     }

@@ -22,8 +22,8 @@ pub struct WorkingPicture {
 ///
 /// # Errors
 /// As [`photograph`]; [`Error::Input`] if `frame` is not a frame of this photograph.
-pub fn working(image: &SourceImage, frame: &WorkingFrame, thumbnail_max_area: f64) -> Result<WorkingPicture> {
-    reduce_photograph(&photograph(image)?, &image.name, frame, thumbnail_max_area)
+pub fn working(source: &SourceImage, frame: &WorkingFrame, thumbnail_max_area: f64) -> Result<WorkingPicture> {
+    reduce_photograph(&photograph(source)?, &source.name, frame, thumbnail_max_area)
 }
 
 /// Reduces a decoded photograph by exact area averaging: every working pixel is the mean of the full pixels under it,
@@ -31,7 +31,7 @@ pub fn working(image: &SourceImage, frame: &WorkingFrame, thumbnail_max_area: f6
 /// Transparent parts count as black. Where nothing is to be reduced, the values are those of the photograph.
 ///
 /// # Errors
-/// [`Error::Input`] if `frame` is not a frame of a picture of this size.
+/// [`Error::Input`] if `frame` is not a frame of a photograph of this size.
 pub fn reduce_photograph(
     photograph: &Photograph,
     name: &str,

@@ -53,8 +53,8 @@ impl RowSource for Gradient {
 pub(super) fn read(path: &Path) -> Raster<u8> {
     let sources =
         scan(&[path.display().to_string()], &SourceOptions::default(), &StageContext::default()).expect("a scan");
-    let image = sources.images.first().unwrap_or_else(|| panic!("{:?}", sources.rejected));
-    match crate::decode::photograph(image).expect("what was written can be read") {
+    let source = sources.photographs.first().unwrap_or_else(|| panic!("{:?}", sources.rejected));
+    match crate::decode::photograph(source).expect("what was written can be read") {
         Photograph::Eight(raster) => raster,
         Photograph::Sixteen(_) => panic!("8 bits were written"),
     }

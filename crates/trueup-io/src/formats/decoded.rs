@@ -13,19 +13,19 @@ pub(crate) const MAX_PIXEL_BYTES: u64 = 16;
 /// Memory that reading a header may take, in bytes: profiles may be compressed.
 pub(crate) const HEADER_BYTES: usize = 64 << 20;
 
-/// Most bytes a decoder may take for this picture.
-pub(crate) fn decoding_limit(image: &SourceImage) -> u64 {
-    let pixels = (image.width as u64).saturating_mul(image.height as u64);
+/// Most bytes a decoder may take for this photograph.
+pub(crate) fn decoding_limit(source: &SourceImage) -> u64 {
+    let pixels = (source.width as u64).saturating_mul(source.height as u64);
     pixels.saturating_mul(MAX_PIXEL_BYTES).saturating_add(DECODER_SLACK_BYTES)
 }
 
-/// How many samples a picture of this size has.
+/// How many samples a photograph of this size has.
 ///
 /// # Errors
 /// [`Error::Input`] if they are more than a program can address.
-pub(crate) fn sample_count(image: &SourceImage, width: usize, height: usize, channels: usize) -> Result<usize> {
+pub(crate) fn sample_count(source: &SourceImage, width: usize, height: usize, channels: usize) -> Result<usize> {
     let samples = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(channels));
-    samples.ok_or_else(|| damaged(image, "it is larger than memory can be"))
+    samples.ok_or_else(|| damaged(source, "it is larger than memory can be"))
 }
 
 /// A photograph of 8-bit samples: gray, gray with alpha (which becomes RGBA), RGB or RGBA.
@@ -49,16 +49,16 @@ fn spread_gray_alpha<T: Copy>(samples: &[T]) -> Vec<T> {
 }
 
 /// The memory limit was judged by the size found when the file was examined, so it must still have that size.
-pub(crate) fn check_unchanged(image: &SourceImage, stored_width: usize, stored_height: usize) -> Result<()> {
-    let expected = match image.orientation {
-        5..=8 => (image.height, image.width),
-        _ => (image.width, image.height),
+pub(crate) fn check_unchanged(source: &SourceImage, stored_width: usize, stored_height: usize) -> Result<()> {
+    let expected = match source.orientation {
+        5..=8 => (source.height, source.width),
+        _ => (source.width, source.height),
     };
     if (stored_width, stored_height) == expected {
         return Ok(());
     }
     Err(Error::input(
-        &image.name,
+        &source.name,
         format!(
             "it now has {stored_width} x {stored_height} stored pixels, but {} x {} when it was examined",
             expected.0, expected.1
@@ -68,11 +68,11 @@ pub(crate) fn check_unchanged(image: &SourceImage, stored_width: usize, stored_h
 }
 
 /// Pixels that the codec, in its own words, cannot make sense of.
-pub(crate) fn damaged(image: &SourceImage, words: impl ToString) -> Error {
+pub(crate) fn damaged(source: &SourceImage, words: impl ToString) -> Error {
     let words = words.to_string();
     let reason = format!("its pixels cannot be decoded ({})", words.trim().trim_end_matches('.'));
     Error::input(
-        &image.name,
+        &source.name,
         reason,
         "The file is damaged, cut off or of an unusual kind; export it again or leave it out.",
     )

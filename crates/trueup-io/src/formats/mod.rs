@@ -63,7 +63,7 @@ pub(crate) fn writing_of(path: &Path) -> Option<&'static Writing> {
 }
 
 /// Whether the extension of `path` names a photograph, in a format that is read or in another.
-pub(crate) fn names_photograph(path: &Path) -> bool {
+pub fn names_photograph(path: &Path) -> bool {
     readable().any(|(format, _)| format.names(path)) || has_foreign_extension(path)
 }
 

@@ -77,16 +77,16 @@ fn icc(input: &mut Input) -> Option<Vec<u8>> {
     decoder(input, HEADER_BYTES).ok()?.info().icc_profile.as_ref().map(|icc| icc.to_vec())
 }
 
-fn pixels(image: &SourceImage, mut input: Input) -> Result<Photograph> {
-    let failed = |error: DecodingError| damaged(image, error);
-    let limit = usize::try_from(decoding_limit(image)).unwrap_or(usize::MAX);
+fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
+    let failed = |error: DecodingError| damaged(source, error);
+    let limit = usize::try_from(decoding_limit(source)).unwrap_or(usize::MAX);
     let mut reader = decoder(&mut input, limit).map_err(failed)?;
     let (width, height) = reader.info().size();
     let (width, height) = (width as usize, height as usize);
-    check_unchanged(image, width, height)?;
+    check_unchanged(source, width, height)?;
     let (color, depth) = reader.output_color_type();
     let channels = color.samples();
-    let count = sample_count(image, width, height, channels)?;
+    let count = sample_count(source, width, height, channels)?;
     if depth != BitDepth::Sixteen {
         let mut samples = vec![0; count];
         reader.next_frame(&mut samples).map_err(failed)?;

@@ -52,14 +52,14 @@ fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
     Ok(StoredPixels { width: width as usize, height: height as usize, bits: 8, is_float: false })
 }
 
-fn pixels(image: &SourceImage, mut input: Input) -> Result<Photograph> {
-    let failed = |error: DecodingError| damaged(image, error);
+fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
+    let failed = |error: DecodingError| damaged(source, error);
     let mut decoder = WebPDecoder::new(&mut input).map_err(failed)?;
     let (width, height) = decoder.dimensions();
     let (width, height) = (width as usize, height as usize);
-    check_unchanged(image, width, height)?;
+    check_unchanged(source, width, height)?;
     let channels = if decoder.has_alpha() { 4 } else { 3 };
-    let mut samples = vec![0; sample_count(image, width, height, channels)?];
+    let mut samples = vec![0; sample_count(source, width, height, channels)?];
     decoder.read_image(&mut samples).map_err(failed)?;
     eight(width, height, channels, samples)
 }

@@ -21,7 +21,7 @@ const FOCAL_LENGTH_IN_35MM_FILM: u16 = 0xa405;
 pub(crate) struct ExifFields {
     /// Orientation, 1 to 8 where valid.
     pub(crate) orientation: Option<u32>,
-    /// PixelXDimension, pixels. Tools that reduce a picture often leave it at the original's size.
+    /// PixelXDimension, pixels. Tools that reduce a photograph often leave it at the original's size.
     pub(crate) pixel_width: Option<f64>,
     /// PixelYDimension, pixels.
     pub(crate) pixel_height: Option<f64>,

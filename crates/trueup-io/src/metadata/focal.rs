@@ -7,11 +7,11 @@ use super::exif_fields::ExifFields;
 /// Diagonal of the 36 x 24 mm film frame, which "35 mm equivalent" refers to (CIPA DCG-001).
 const FILM_DIAGONAL_MM: f64 = 43.266_615;
 
-/// Believable focal lengths, as multiples of the picture's long side: 118 degrees of view to 6 degrees.
+/// Believable focal lengths, as multiples of the photograph's long side: 118 degrees of view to 6 degrees.
 const BELIEVABLE_FOCAL: std::ops::RangeInclusive<f64> = 0.3..=10.0;
 
 /// Believable long sides of a sensor in millimetres, from small telephones to medium format. A focal plane resolution
-/// that implies less was left behind by a program that reduced the picture and rewrote only its pixel size.
+/// that implies less was left behind by a program that reduced the photograph and rewrote only its pixel size.
 const BELIEVABLE_SENSOR_MM: std::ops::RangeInclusive<f64> = 3.0..=60.0;
 
 /// Long side of the sensor in millimetres by model name as EXIF has it (lower case), for cameras that write no 35 mm
@@ -29,14 +29,14 @@ const SENSOR_LONG_SIDE_MM: [(&str, f64); 10] = [
     ("mx5", 5.88),
 ];
 
-/// The focal length that `exif` gives for a picture stored as `width` x `height` pixels, if it gives a believable one.
+/// The focal length that `exif` gives for a photograph stored as `width` x `height` pixels, if it gives a believable one.
 ///
 /// In this order: the 35 mm equivalent; the lens's focal length on the sensor of a known camera; the lens's focal
 /// length on a sensor measured by the focal plane resolution. Every way gives the focal length relative to the whole
-/// frame, so a picture that was reduced since is served as well; a cropped one is not.
+/// frame, so a photograph that was reduced since is served as well; a cropped one is not.
 ///
 /// # Departures
-/// A known camera outranks the focal plane resolution: programs that reduce a picture often rewrite PixelXDimension but
+/// A known camera outranks the focal plane resolution: programs that reduce a photograph often rewrite PixelXDimension but
 /// not the resolution, and the two then describe a sensor that does not exist.
 pub(crate) fn focal_prior(exif: &ExifFields, width: f64, height: f64) -> Option<FocalPrior> {
     let long_side = width.max(height);
@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn equivalent_follows_the_diagonal() {
-        // A 3:4 picture has the diagonal 5/4 of its long side: 24 mm gives 24 / 43.2666 * 2000 = 1109.4.
+        // A 3:4 photograph has the diagonal 5/4 of its long side: 24 mm gives 24 / 43.2666 * 2000 = 1109.4.
         let prior = focal_prior(&ExifFields { focal_35mm: Some(24.0), ..exif() }, 1200.0, 1600.0).expect("a prior");
         assert_eq!(prior.source, FocalSource::Equivalent35mm);
         assert!((prior.focal_px - 1109.4).abs() < 0.05, "{prior:?}");
@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn impossible_sensors_are_ignored() {
-        // 720 px at 8114 px/inch would be a sensor of 2.3 mm: the picture was reduced, the resolution kept.
+        // 720 px at 8114 px/inch would be a sensor of 2.3 mm: the photograph was reduced, the resolution kept.
         let reduced = ExifFields {
             pixel_width: Some(540.0),
             pixel_height: Some(720.0),

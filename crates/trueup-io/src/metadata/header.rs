@@ -22,7 +22,7 @@ pub(crate) struct Header {
 }
 
 impl Header {
-    /// The focal length that EXIF tells, in pixels of this picture.
+    /// The focal length that EXIF tells, in pixels of this photograph.
     pub(crate) fn focal_prior(&self) -> Option<FocalPrior> {
         focal_prior(&self.exif, self.stored.width as f64, self.stored.height as f64)
     }

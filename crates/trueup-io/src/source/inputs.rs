@@ -45,7 +45,7 @@ fn expand_one(input: &str) -> Vec<Candidate> {
     }
 }
 
-/// The pictures directly inside a folder. What cannot be used but was clearly meant as a photograph stays in the list,
+/// The photographs directly inside a folder. What cannot be used but was clearly meant as a photograph stays in the list,
 /// so that it is rejected by name.
 fn expand_folder(folder: PathBuf) -> Vec<Candidate> {
     let entries = match std::fs::read_dir(&folder) {

@@ -25,7 +25,7 @@ use inputs::Candidate;
 use opened::{OpenedPicture, open_candidate};
 use rejection::Rejection;
 
-pub use crate::formats::readable_formats;
+pub use crate::formats::{names_photograph, readable_formats};
 pub use inputs::natural_order;
 pub use names::unique_names;
 pub use options::{OrientationTrust, SourceOptions};
@@ -37,7 +37,7 @@ const MIN_SIDE_PX: usize = 16;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Sources {
     /// The photographs, in the order of the inputs; within a folder or pattern in the natural order of names.
-    pub images: Vec<SourceImage>,
+    pub photographs: Vec<SourceImage>,
     /// Everything that was asked for and cannot be used, in the same order.
     pub rejected: Vec<RejectedSource>,
 }
@@ -68,7 +68,7 @@ impl RejectedSource {
 
 /// Finds the photographs that `inputs` name and reads their headers.
 ///
-/// An input is a file, a folder (its pictures, not those of folders inside it, hidden files left out) or a pattern with
+/// An input is a file, a folder (its photographs, not those of folders inside it, hidden files left out) or a pattern with
 /// `*`, `?`, `[...]` and `**`. A path that exists is never read as a pattern. A file is taken for what its content says,
 /// whatever its name. In folders and patterns, files that are no photographs are passed over in silence; everything
 /// else that cannot be used is listed in [`Sources::rejected`], and the good files beside it are used all the same.
@@ -104,11 +104,11 @@ fn scan_from_side(
     for (candidate, name) in candidates.into_iter().zip(names) {
         context.check_cancelled()?;
         let path = candidate.path().to_owned();
-        let number = sources.images.len();
+        let number = sources.photographs.len();
         let examined = open_candidate(candidate, options, min_side_px)
             .and_then(|opened| examine(opened, &name, number, options, &mut accepted, context));
         match examined {
-            Ok(image) => sources.images.push(image),
+            Ok(source) => sources.photographs.push(source),
             Err(Rejection { code, reason, hint }) => {
                 sources.rejected.push(RejectedSource { path, name, code: code.to_owned(), reason, hint });
             }

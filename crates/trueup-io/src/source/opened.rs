@@ -59,8 +59,8 @@ fn open(path: &Path) -> Result<(File, u64), Rejection> {
     if metadata.is_dir() {
         return Err(Rejection::new(
             "folder-not-file",
-            "it is a folder, not a picture",
-            "Give the folder itself to use the pictures in it.",
+            "it is a folder, not a photograph",
+            "Give the folder itself to use the photographs in it.",
         ));
     }
     if !metadata.is_file() {
@@ -118,7 +118,7 @@ fn check_size(header: &Header, options: &SourceOptions, min_side_px: usize) -> R
                 "{width} x {height} px are {megapixels:.0} megapixels, at most {} are accepted",
                 options.max_megapixels
             ),
-            "Export a smaller copy, or raise source.max_megapixels if the picture is truly this large.",
+            "Export a smaller copy, or raise source.max_megapixels if the photograph is truly this large.",
         ));
     }
     if width.min(height) < min_side_px {

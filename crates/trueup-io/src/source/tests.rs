@@ -23,7 +23,7 @@ fn exif_block(fields: &[(Tag, Value)]) -> Vec<u8> {
     block.into_inner()
 }
 
-/// A gray JPEG; `shade` tells pictures apart.
+/// A gray JPEG; `shade` tells photographs apart.
 fn jpeg(width: u16, height: u16, shade: u8, exif: &[(Tag, Value)]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, 90);
@@ -62,7 +62,7 @@ impl Files {
 }
 
 fn names(sources: &Sources) -> Vec<&str> {
-    sources.images.iter().map(|image| image.name.as_str()).collect()
+    sources.photographs.iter().map(|source| source.name.as_str()).collect()
 }
 
 /// The code of the only rejection, which must come with a reason and a hint.
@@ -75,19 +75,19 @@ fn only_code(sources: &Sources) -> &str {
 
 #[test]
 fn folders_are_read_in_natural_order() {
-    let picture = |shade| jpeg(32, 24, shade, &[]);
+    let photograph = |shade| jpeg(32, 24, shade, &[]);
     let files = Files::new(&[
-        ("img10.jpg", picture(1)),
-        ("IMG2.JPEG", picture(2)),
-        ("img1 été.jpg", picture(3)),
-        (".hidden.jpg", picture(4)),
+        ("img10.jpg", photograph(1)),
+        ("IMG2.JPEG", photograph(2)),
+        ("img1 été.jpg", photograph(3)),
+        (".hidden.jpg", photograph(4)),
         ("notes.txt", b"hello".to_vec()),
     ]);
     std::fs::create_dir(files.path("inner")).expect("a folder");
     let sources = files.scan(&[""]);
     assert_eq!(names(&sources), ["img1 été.jpg", "IMG2.JPEG", "img10.jpg"]);
     assert!(sources.rejected.is_empty(), "{:?}", sources.rejected);
-    assert_eq!((sources.images[0].width, sources.images[0].height), (32, 24));
+    assert_eq!((sources.photographs[0].width, sources.photographs[0].height), (32, 24));
     assert_eq!(names(&files.scan(&["img1*.jpg"])), ["img1 été.jpg", "img10.jpg"]);
 }
 
@@ -131,7 +131,7 @@ fn every_bad_file_is_named_and_the_good_ones_are_used() {
         assert_eq!(only_code(&sources), code, "{name}: {:?}", sources.rejected);
         assert_eq!(sources.rejected[0].name, name);
         let folder = files.scan(&[""]);
-        assert_eq!((folder.images.len(), only_code(&folder)), (1, code), "{name} in a folder");
+        assert_eq!((folder.photographs.len(), only_code(&folder)), (1, code), "{name} in a folder");
     }
 }
 
@@ -193,13 +193,13 @@ fn stale_orientation_tags_are_not_applied() {
     let facts = |trust_orientation| {
         let context = StageContext::default();
         let options = SourceOptions { trust_orientation, ..SourceOptions::default() };
-        let sources = scan(&inputs, &options, &context).expect("three pictures");
+        let sources = scan(&inputs, &options, &context).expect("three photographs");
         let notes: Vec<String> = context
             .findings()
             .into_iter()
             .map(|note| format!("{} {}", note.code, note.subject.named(&["true.jpg", "stale.jpg"])))
             .collect();
-        let facts: Vec<_> = sources.images.iter().map(|i| (i.orientation, i.width, i.height)).collect();
+        let facts: Vec<_> = sources.photographs.iter().map(|i| (i.orientation, i.width, i.height)).collect();
         (facts, notes)
     };
     let (auto, notes) = facts(OrientationTrust::Auto);
@@ -218,9 +218,9 @@ fn focal_length_and_camera_come_from_exif() {
         (Tag::FocalLengthIn35mmFilm, Value::Short(vec![157])),
     ];
     let files = Files::new(&[("a.jpg", jpeg(400, 300, 1, &exif))]);
-    let image = &files.scan(&["a.jpg"]).images[0];
-    assert_eq!(image.camera_model.as_deref(), Some("NIKON D7000"));
-    let prior = image.focal_prior.expect("a focal length");
+    let source = &files.scan(&["a.jpg"]).photographs[0];
+    assert_eq!(source.camera_model.as_deref(), Some("NIKON D7000"));
+    let prior = source.focal_prior.expect("a focal length");
     assert_eq!(prior.source, FocalSource::Equivalent35mm);
     // 157 mm * 500 px / 43.2666 mm.
     assert!((prior.focal_px - 1814.3).abs() < 0.1, "{prior:?}");
@@ -232,14 +232,14 @@ fn tiff_tags_are_read_like_exif() {
     use tiff::tags::Tag as TiffTag;
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut encoder = TiffEncoder::new(&mut bytes).expect("to memory");
-    let mut image = encoder.new_image::<Gray8>(32, 24).expect("a picture");
-    image.encoder().write_tag(TiffTag::Orientation, 6_u16).expect("a tag");
-    image.encoder().write_tag(TiffTag::Model, "NIKON D7000").expect("a tag");
-    image.write_data(&[9; 32 * 24]).expect("pixels");
+    let mut page = encoder.new_image::<Gray8>(32, 24).expect("a picture");
+    page.encoder().write_tag(TiffTag::Orientation, 6_u16).expect("a tag");
+    page.encoder().write_tag(TiffTag::Model, "NIKON D7000").expect("a tag");
+    page.write_data(&[9; 32 * 24]).expect("pixels");
     let files = Files::new(&[("a.tif", bytes.into_inner())]);
-    let image = &files.scan(&["a.tif"]).images[0];
-    assert_eq!((image.orientation, image.width, image.height), (6, 24, 32));
-    assert_eq!(image.camera_model.as_deref(), Some("NIKON D7000"));
+    let source = &files.scan(&["a.tif"]).photographs[0];
+    assert_eq!((source.orientation, source.width, source.height), (6, 24, 32));
+    assert_eq!(source.camera_model.as_deref(), Some("NIKON D7000"));
 }
 
 #[test]
@@ -261,9 +261,9 @@ fn digest(folder: &Path, bytes: &[u8]) {
     let options = SourceOptions { max_megapixels: 0.1, ..SourceOptions::default() };
     let sources =
         scan_any_size(&[path.display().to_string()], &options, &StageContext::default()).expect("never fails");
-    assert_eq!(sources.images.len() + sources.rejected.len(), 1);
-    for image in &sources.images {
-        let _ = crate::decode::photograph(image);
+    assert_eq!(sources.photographs.len() + sources.rejected.len(), 1);
+    for source in &sources.photographs {
+        let _ = crate::decode::photograph(source);
     }
 }
 

@@ -41,7 +41,7 @@ const NEIGHBOR_ROWS: usize = 16;
 
 /// Finds and describes the features of a photograph.
 ///
-/// `image` has one channel of 0 to 255. A photograph too small or too flat has no features; one in which few are found is
+/// `picture` has one channel of 0 to 255. A photograph too small or too flat has no features; one in which few are found is
 /// searched again at double size. The result is the same for any number of threads and every vector width; only the
 /// system's sine and cosine may differ between machines, in the last bit.
 ///
@@ -51,33 +51,33 @@ const NEIGHBOR_ROWS: usize = 16;
 ///
 /// # Source
 /// Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 2004.
-pub fn detect(image: &Raster<f32>, options: &FeatureOptions, context: &StageContext) -> Result<Features> {
+pub fn detect(picture: &Raster<f32>, options: &FeatureOptions, context: &StageContext) -> Result<Features> {
     let instructions = InstructionSet::detect();
-    let features = detect_at(SearchSize::Original, image, options, instructions, context)?;
-    if features.points.len() >= SPARSE_POINTS || !may_double(image) {
+    let features = detect_at(SearchSize::Original, picture, options, instructions, context)?;
+    if features.points.len() >= SPARSE_POINTS || !may_double(picture) {
         return Ok(features);
     }
-    detect_at(SearchSize::Doubled, image, options, instructions, context)
+    detect_at(SearchSize::Doubled, picture, options, instructions, context)
 }
 
 /// Whether the doubled photograph is within the limit.
-fn may_double(image: &Raster<f32>) -> bool {
-    image.width().saturating_mul(image.height()) <= MAX_PIXELS / 4
+fn may_double(picture: &Raster<f32>) -> bool {
+    picture.width().saturating_mul(picture.height()) <= MAX_PIXELS / 4
 }
 
 /// [`detect`] at one size, whatever is found.
 fn detect_at(
     size: SearchSize,
-    image: &Raster<f32>,
+    picture: &Raster<f32>,
     options: &FeatureOptions,
     instructions: InstructionSet,
     context: &StageContext,
 ) -> Result<Features> {
-    check(size, image, options)?;
-    if image.width() == 0 || image.height() == 0 {
+    check(size, picture, options)?;
+    if picture.width() == 0 || picture.height() == 0 {
         return Ok(Features::default());
     }
-    let octaves = scale_space::build(image, size, instructions, context)?;
+    let octaves = scale_space::build(picture, size, instructions, context)?;
     let mut extrema = Vec::new();
     for octave in 0..octaves.len() {
         extrema.extend(extrema::find(&octaves, octave, options, instructions, context)?);
@@ -119,18 +119,18 @@ fn described(
     Ok(described)
 }
 
-fn check(size: SearchSize, image: &Raster<f32>, options: &FeatureOptions) -> Result<()> {
+fn check(size: SearchSize, picture: &Raster<f32>, options: &FeatureOptions) -> Result<()> {
     options.check()?;
-    if image.channels() != 1 {
+    if picture.channels() != 1 {
         return Err(Error::input(
             "picture for feature detection",
-            format!("it has {} channels", image.channels()),
+            format!("it has {} channels", picture.channels()),
             "Give a gray picture of one channel.",
         ));
     }
     let pixels = match size {
-        SearchSize::Original => image.data().len(),
-        SearchSize::Doubled => 4 * image.data().len(),
+        SearchSize::Original => picture.data().len(),
+        SearchSize::Doubled => 4 * picture.data().len(),
     };
     if pixels > MAX_PIXELS {
         return Err(Error::Limits {

@@ -88,14 +88,14 @@ pub(super) enum SearchSize {
 /// of the fine detail. Kernels are cut at three standard deviations, and their width corrected so that the variance
 /// is exact.
 pub(super) fn build(
-    image: &Raster<f32>,
+    picture: &Raster<f32>,
     size: SearchSize,
     instructions: InstructionSet,
     context: &StageContext,
 ) -> Result<Vec<Octave>> {
     let (mut base, mut step_px) = match size {
-        SearchSize::Original => (plane_of(image), 1.0),
-        SearchSize::Doubled => (doubled(&plane_of(image)), 0.5),
+        SearchSize::Original => (plane_of(picture), 1.0),
+        SearchSize::Doubled => (doubled(&plane_of(picture)), 0.5),
     };
     let assumed_blur = ASSUMED_BLUR_PX / step_px;
     let missing_blur = (BASE_SIGMA.powi(2) - assumed_blur.powi(2)).max(0.0).sqrt();
@@ -116,13 +116,13 @@ pub(super) fn build(
     Ok(octaves)
 }
 
-fn plane_of(image: &Raster<f32>) -> BlurredPlane {
-    let mut plane = BlurredPlane::new(image.width(), image.height());
+fn plane_of(picture: &Raster<f32>) -> BlurredPlane {
+    let mut plane = BlurredPlane::new(picture.width(), picture.height());
     let width = plane.width;
     plane.bands().for_each(|(first, rows)| {
         let stride = (width.div_ceil(MAX_LANES) | 1) * MAX_LANES;
         for (offset, row) in rows.chunks_exact_mut(stride).enumerate() {
-            row[..width].copy_from_slice(image.row(first + offset));
+            row[..width].copy_from_slice(picture.row(first + offset));
         }
     });
     plane

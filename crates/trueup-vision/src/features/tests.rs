@@ -17,7 +17,7 @@ struct Blob {
 
 /// The sum of blobs on mid gray, sampled at the pixel centers.
 fn render(width: usize, height: usize, blobs: &[Blob]) -> Raster<f32> {
-    let mut image = vec![128.0; width * height];
+    let mut picture = vec![128.0; width * height];
     for blob in blobs {
         let reach = 5.0 * blob.sigma;
         let range = |center: f64, size: usize| {
@@ -26,11 +26,11 @@ fn render(width: usize, height: usize, blobs: &[Blob]) -> Raster<f32> {
         for y in range(blob.center[1], height) {
             for x in range(blob.center[0], width) {
                 let (dx, dy) = (x as f64 + 0.5 - blob.center[0], y as f64 + 0.5 - blob.center[1]);
-                image[y * width + x] += blob.amplitude * (-0.5 * (dx * dx + dy * dy) / blob.sigma.powi(2)).exp();
+                picture[y * width + x] += blob.amplitude * (-0.5 * (dx * dx + dy * dy) / blob.sigma.powi(2)).exp();
             }
         }
     }
-    let samples = image.iter().map(|&value: &f64| value as f32).collect();
+    let samples = picture.iter().map(|&value: &f64| value as f32).collect();
     Raster::from_data(width, height, 1, samples).expect("as many samples as pixels")
 }
 
@@ -46,14 +46,14 @@ fn texture_blobs(count: usize, size: f64) -> Vec<Blob> {
         .collect()
 }
 
-fn find(image: &Raster<f32>, options: &FeatureOptions) -> Features {
-    detect(image, options, &StageContext::default()).expect("a valid picture and valid options")
+fn find(picture: &Raster<f32>, options: &FeatureOptions) -> Features {
+    detect(picture, options, &StageContext::default()).expect("a valid picture and valid options")
 }
 
 /// What is found at one size, whether or not it is little.
-fn find_at(size: SearchSize, image: &Raster<f32>) -> Features {
+fn find_at(size: SearchSize, picture: &Raster<f32>) -> Features {
     let (options, context) = (FeatureOptions::default(), StageContext::default());
-    detect_at(size, image, &options, InstructionSet::detect(), &context).expect("a valid picture")
+    detect_at(size, picture, &options, InstructionSet::detect(), &context).expect("a valid picture")
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
@@ -67,8 +67,8 @@ fn blobs_are_found_where_they_are() {
         {
             // Pixel (100, 90) has its center at (100.5, 90.5).
             let center = [100.5 + offset, 90.5 - 0.7 * offset];
-            let image = render(200, 180, &[Blob { center, sigma, amplitude: 90.0 }]);
-            let strongest = find_at(size, &image).points[0];
+            let picture = render(200, 180, &[Blob { center, sigma, amplitude: 90.0 }]);
+            let strongest = find_at(size, &picture).points[0];
             let error = distance(strongest.position, center);
             assert!(error < 0.05, "sigma {sigma}, offset {offset}, {size:?}: {error} px");
             // The difference of Gaussians between s and 2^(1/3) s is greatest where their geometric mean is the
@@ -155,7 +155,7 @@ fn assert_same(a: &Features, b: &Features) {
 #[test]
 fn result_depends_neither_on_threads_nor_on_instructions() {
     // Odd sizes, so that the last vectors of rows are partial.
-    let image = render(261, 187, &texture_blobs(600, 260.0));
+    let picture = render(261, 187, &texture_blobs(600, 260.0));
     let sets = InstructionSet::available();
     if sets.len() == 1 {
         eprintln!("only the portable instructions are compared with themselves: this processor has no others");
@@ -163,14 +163,14 @@ fn result_depends_neither_on_threads_nor_on_instructions() {
     for size in SIZES {
         let on_threads = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a small pool");
-            pool.install(|| find_at(size, &image))
+            pool.install(|| find_at(size, &picture))
         };
         let reference = on_threads(1);
         assert!(reference.points.len() > 100 && reference.descriptors.len() > 100);
         assert_same(&reference, &on_threads(2));
         for &instructions in &sets {
             let (options, context) = (FeatureOptions::default(), StageContext::default());
-            let other = detect_at(size, &image, &options, instructions, &context);
+            let other = detect_at(size, &picture, &options, instructions, &context);
             assert_same(&reference, &other.expect("valid input"));
         }
     }
@@ -178,23 +178,23 @@ fn result_depends_neither_on_threads_nor_on_instructions() {
 
 #[test]
 fn features_are_consistent_and_capped() {
-    let image = render(260, 260, &texture_blobs(600, 260.0));
-    let all = find(&image, &FeatureOptions::default());
+    let picture = render(260, 260, &texture_blobs(600, 260.0));
+    let all = find(&picture, &FeatureOptions::default());
     assert!(all.descriptors.len() >= all.points.len() && all.points.len() > 100);
     assert!(all.points.is_sorted_by(|a, b| a.response >= b.response));
     assert!(all.descriptor_points.is_sorted());
     assert_eq!(all.descriptors.len(), all.descriptor_points.len());
-    let few = find(&image, &FeatureOptions { max_points: 10, ..FeatureOptions::default() });
+    let few = find(&picture, &FeatureOptions { max_points: 10, ..FeatureOptions::default() });
     assert_eq!(few.points, all.points[..10]);
     let threshold = all.points[20].response;
-    let strong = find(&image, &FeatureOptions { peak_threshold: threshold, ..FeatureOptions::default() });
+    let strong = find(&picture, &FeatureOptions { peak_threshold: threshold, ..FeatureOptions::default() });
     assert_eq!(strong.points, all.points[..21]);
 }
 
 #[test]
 fn descriptors_have_the_length_of_their_norm() {
-    let image = render(260, 260, &texture_blobs(600, 260.0));
-    let features = find(&image, &FeatureOptions::default());
+    let picture = render(260, 260, &texture_blobs(600, 260.0));
+    let features = find(&picture, &FeatureOptions::default());
     assert!(features.descriptors.len() > 100, "{} descriptors", features.descriptors.len());
     for descriptor in &features.descriptors {
         let squares: f64 = descriptor.iter().map(|&component| f64::from(component).powi(2)).sum();
@@ -207,10 +207,10 @@ fn descriptors_have_the_length_of_their_norm() {
 fn pictures_without_texture_have_no_features() {
     for (width, height) in [(0, 0), (1, 1), (8, 8), (9, 300), (64, 64), (100, 40)] {
         for value in [0.0, 37.0, 255.0, f32::NAN, f32::INFINITY, f32::MAX] {
-            let image = Raster::from_data(width, height, 1, vec![value; width * height]).expect("enough samples");
-            assert!(find(&image, &FeatureOptions::default()).points.is_empty(), "{width} x {height} of {value}");
+            let picture = Raster::from_data(width, height, 1, vec![value; width * height]).expect("enough samples");
+            assert!(find(&picture, &FeatureOptions::default()).points.is_empty(), "{width} x {height} of {value}");
             for size in SIZES {
-                assert!(find_at(size, &image).points.is_empty(), "{width} x {height} of {value}, {size:?}");
+                assert!(find_at(size, &picture).points.is_empty(), "{width} x {height} of {value}, {size:?}");
             }
         }
     }
@@ -218,10 +218,10 @@ fn pictures_without_texture_have_no_features() {
 
 #[test]
 fn a_bad_pixel_harms_only_its_surroundings() {
-    let mut image = render(260, 260, &texture_blobs(600, 260.0));
-    image.pixel_mut(130, 130)[0] = f32::NAN;
-    image.pixel_mut(20, 20)[0] = f32::INFINITY;
-    let features = find_at(SearchSize::Doubled, &image);
+    let mut picture = render(260, 260, &texture_blobs(600, 260.0));
+    picture.pixel_mut(130, 130)[0] = f32::NAN;
+    picture.pixel_mut(20, 20)[0] = f32::INFINITY;
+    let features = find_at(SearchSize::Doubled, &picture);
     assert!(features.points.len() > 50);
     assert!(
         features.points.iter().all(|point| {
@@ -240,8 +240,8 @@ proptest! {
         }),
         size in proptest::sample::select(&SIZES),
     ) {
-        let image = Raster::from_data(width, height, 1, data).expect("enough samples");
-        let features = find_at(size, &image);
+        let picture = Raster::from_data(width, height, 1, data).expect("enough samples");
+        let features = find_at(size, &picture);
         for point in &features.points {
             prop_assert!((0.0..=width as f64).contains(&point.position[0]));
             prop_assert!((0.0..=height as f64).contains(&point.position[1]));

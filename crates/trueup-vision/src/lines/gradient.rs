@@ -1,16 +1,16 @@
-//! The reduced image's gradient: magnitudes and unit vectors along the level lines.
+//! The reduced picture's gradient: magnitudes and unit vectors along the level lines.
 
 use rayon::prelude::*;
 use trueup_core::raster::Raster;
 
-/// Reduction of the image before its gradient is taken, which removes aliasing and the staircase of pixels (IPOL,
+/// Reduction of the picture before its gradient is taken, which removes aliasing and the staircase of pixels (IPOL,
 /// section 2.1).
 const REDUCTION: f64 = 0.8;
 
-/// Factor from the reduced image's coordinates to the image's.
-pub(super) const IMAGE_FROM_FIELD: f64 = 1.0 / REDUCTION;
+/// Factor from the reduced picture's coordinates to the picture's.
+pub(super) const PICTURE_FROM_FIELD: f64 = 1.0 / REDUCTION;
 
-/// Standard deviation of the Gaussian that goes with the reduction, in pixels of the reduced image (IPOL, section 2.1).
+/// Standard deviation of the Gaussian that goes with the reduction, in pixels of the reduced picture (IPOL, section 2.1).
 const SIGMA_REDUCED_PX: f64 = 0.6;
 
 /// Bound on the error of a gray level by quantization, in levels of 0 to 255 (IPOL, section 2.2). Pixels whose gradient
@@ -29,11 +29,11 @@ const GAUSSIAN_REACH_SIGMAS: f64 = 3.717;
 /// Rows a thread reduces at a time.
 const ROWS_PER_TASK: usize = 16;
 
-/// Level lines and gradient magnitudes at the nodes between the pixels of the reduced image.
+/// Level lines and gradient magnitudes at the nodes between the pixels of the reduced picture.
 ///
 /// Arrays are padded by one element on every side, which is never aligned with anything, so that neighbors need no
 /// check of the border: the element at column x and row y of the padded arrays lies at (x, y) in corner coordinates of
-/// the reduced image.
+/// the reduced picture.
 #[derive(Debug)]
 pub(super) struct GradientField {
     width: usize,
@@ -43,9 +43,9 @@ pub(super) struct GradientField {
 }
 
 impl GradientField {
-    /// Reduces the image and takes its gradient.
-    pub(super) fn new(image: &Raster<f32>) -> Self {
-        Self::of_reduced(&reduce(image, REDUCTION, SIGMA_REDUCED_PX))
+    /// Reduces the picture and takes its gradient.
+    pub(super) fn new(picture: &Raster<f32>) -> Self {
+        Self::of_reduced(&reduce(picture, REDUCTION, SIGMA_REDUCED_PX))
     }
 
     /// The gradient on 2 x 2 pixels.
@@ -157,23 +157,23 @@ fn gradient_row(upper: &[f32], lower: &[f32], threshold: f32, lines: &mut [[f32;
     }
 }
 
-/// The image smoothed by a Gaussian of `sigma_scale / scale` pixels and sampled at the centers of pixels that are
+/// The picture smoothed by a Gaussian of `sigma_scale / scale` pixels and sampled at the centers of pixels that are
 /// `1 / scale` wide; corners coincide. `scale` is below 1.
-fn reduce(image: &Raster<f32>, scale: f64, sigma_scale: f64) -> Raster<f32> {
-    if image.data().is_empty() {
-        return image.clone();
+fn reduce(picture: &Raster<f32>, scale: f64, sigma_scale: f64) -> Raster<f32> {
+    if picture.data().is_empty() {
+        return picture.clone();
     }
-    let columns = AxisFilter::new(image.width(), scale, sigma_scale);
-    let rows = AxisFilter::new(image.height(), scale, sigma_scale);
+    let columns = AxisFilter::new(picture.width(), scale, sigma_scale);
+    let rows = AxisFilter::new(picture.height(), scale, sigma_scale);
     let mut reduced = Raster::new(columns.starts.len(), rows.starts.len(), 1);
     if reduced.data().is_empty() {
         return reduced;
     }
     let reduced_width = reduced.width();
     reduced.data_mut().par_chunks_mut(reduced_width).with_min_len(ROWS_PER_TASK).enumerate().for_each_init(
-        || vec![0.0_f32; image.width()],
+        || vec![0.0_f32; picture.width()],
         |blended, (y, output)| {
-            rows.blend_rows(y, image, blended);
+            rows.blend_rows(y, picture, blended);
             columns.filter_row(blended, output);
         },
     );
@@ -214,14 +214,14 @@ impl AxisFilter {
         Self { taps, starts, weights }
     }
 
-    /// The weighted mean of the image's rows that make output row `y`.
-    fn blend_rows(&self, y: usize, image: &Raster<f32>, blended: &mut [f32]) {
+    /// The weighted mean of the picture's rows that make output row `y`.
+    fn blend_rows(&self, y: usize, picture: &Raster<f32>, blended: &mut [f32]) {
         blended.fill(0.0);
         let weights = &self.weights[y * self.taps..(y + 1) * self.taps];
         for (tap, &weight) in weights.iter().enumerate() {
             // A weight of zero is a tap beyond the Gaussian's reach.
             if weight != 0.0 {
-                let row = image.row(self.starts[y] + tap);
+                let row = picture.row(self.starts[y] + tap);
                 blended.iter_mut().zip(row).for_each(|(sum, &sample)| *sum += weight * sample);
             }
         }
@@ -276,16 +276,16 @@ mod tests {
     #[test]
     fn level_lines_have_the_brighter_side_on_their_right() {
         // Brighter towards larger x: up the screen.
-        let image = Raster::from_data(2, 2, 1, vec![0.0, 100.0, 0.0, 100.0]).expect("sizes agree");
-        let field = GradientField::of_reduced(&image);
+        let picture = Raster::from_data(2, 2, 1, vec![0.0, 100.0, 0.0, 100.0]).expect("sizes agree");
+        let field = GradientField::of_reduced(&picture);
         assert_eq!(field.level_lines()[field.stride() + 1], [0.0, -1.0]);
         assert_eq!(field.magnitudes()[field.stride() + 1], 100.0);
     }
 
     #[test]
     fn seeds_come_by_falling_magnitude() {
-        let image = Raster::from_data(4, 2, 1, vec![0.0, 10.0, 60.0, 100.0, 0.0, 10.0, 60.0, 100.0]).expect("sizes");
-        let field = GradientField::of_reduced(&image);
+        let picture = Raster::from_data(4, 2, 1, vec![0.0, 10.0, 60.0, 100.0, 0.0, 10.0, 60.0, 100.0]).expect("sizes");
+        let field = GradientField::of_reduced(&picture);
         let first = field.stride() as u32 + 1;
         assert_eq!(field.seeds(), [first + 1, first + 2, first]);
     }

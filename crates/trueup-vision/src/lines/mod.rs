@@ -34,7 +34,7 @@ mod tidy;
 #[cfg(test)]
 mod tests;
 
-use gradient::{GradientField, IMAGE_FROM_FIELD};
+use gradient::{GradientField, PICTURE_FROM_FIELD};
 use rectangle::{LineSupportRectangle, improve};
 use region::RegionGrower;
 use significance::FalseAlarms;
@@ -66,48 +66,48 @@ const SEEDS_PER_CHECK: usize = 8192;
 
 /// The straight line segments of a photograph with one channel of gray levels 0 to 255, longest first.
 ///
-/// Positions are in the image's pixels, its corner at (0, 0): a step edge between columns c - 1 and c lies at x = c.
+/// Positions are in the picture's pixels, its corner at (0, 0): a step edge between columns c - 1 and c lies at x = c.
 /// Segments are directed so that the brighter side is on their right on the screen (travelling up, brighter towards
 /// larger x). Both sides of a bar give a segment each, of opposite directions. Segments along the photograph's frame,
 /// artifacts of scans and of earlier warps, are left out.
 ///
-/// Pixels that are not finite take no part. An image too small for a gradient has no segments.
+/// Pixels that are not finite take no part. A picture too small for a gradient has no segments.
 ///
 /// # Errors
-/// [`Error::Options`] for options out of range; [`Error::Input`] if the image has not exactly one channel;
+/// [`Error::Options`] for options out of range; [`Error::Input`] if the picture has not exactly one channel;
 /// [`Error::Limits`] above 2^31 pixels; [`Error::Cancelled`].
 ///
 /// # Source
 /// Algorithm 1 of the IPOL article; the steps after the rectangles are ours: those that fit segments again to sub-pixel
-/// edge points of the unreduced image make the directions of sharp edges about twice as accurate.
-pub fn detect(image: &Raster<f32>, options: &LineOptions, context: &StageContext) -> Result<Vec<LineSegment>> {
-    let mut segments = refined_segments(image, options, context)?;
-    tidy::drop_frame(&mut segments, image.width() as f64, image.height() as f64);
+/// edge points of the unreduced picture make the directions of sharp edges about twice as accurate.
+pub fn detect(picture: &Raster<f32>, options: &LineOptions, context: &StageContext) -> Result<Vec<LineSegment>> {
+    let mut segments = refined_segments(picture, options, context)?;
+    tidy::drop_frame(&mut segments, picture.width() as f64, picture.height() as f64);
     Ok(tidy::longest_first(segments, options.min_length_px, MAX_SEGMENTS))
 }
 
-/// As [`detect`], but with the segments along the border: for an image that was cut out of a larger one, whose border is
+/// As [`detect`], but with the segments along the border: for a picture that was cut out of a larger one, whose border is
 /// no frame.
 ///
 /// # Errors
 /// As [`detect`].
 pub fn detect_keeping_frame(
-    image: &Raster<f32>,
+    picture: &Raster<f32>,
     options: &LineOptions,
     context: &StageContext,
 ) -> Result<Vec<LineSegment>> {
-    let segments = refined_segments(image, options, context)?;
+    let segments = refined_segments(picture, options, context)?;
     Ok(tidy::longest_first(segments, options.min_length_px, MAX_SEGMENTS))
 }
 
 /// All segments, in the order of the seeds.
-fn refined_segments(image: &Raster<f32>, options: &LineOptions, context: &StageContext) -> Result<Vec<LineSegment>> {
-    check(image, options)?;
+fn refined_segments(picture: &Raster<f32>, options: &LineOptions, context: &StageContext) -> Result<Vec<LineSegment>> {
+    check(picture, options)?;
     context.check_cancelled()?;
-    let field = GradientField::new(image);
+    let field = GradientField::new(picture);
     context.check_cancelled()?;
     let mut segments = segments_of_field(&field, MIN_SIGNIFICANCE, context)?;
-    let profiles = refine::EdgeProfiles::new(image);
+    let profiles = refine::EdgeProfiles::new(picture);
     segments
         .par_iter_mut()
         .filter(|segment| segment.length() >= MIN_REFINED_LENGTH_PX)
@@ -116,20 +116,20 @@ fn refined_segments(image: &Raster<f32>, options: &LineOptions, context: &StageC
     Ok(segments)
 }
 
-fn check(image: &Raster<f32>, options: &LineOptions) -> Result<()> {
+fn check(picture: &Raster<f32>, options: &LineOptions) -> Result<()> {
     options.check()?;
     // An empty raster has no meaningful number of channels.
-    if image.channels() != 1 && !image.data().is_empty() {
+    if picture.channels() != 1 && !picture.data().is_empty() {
         return Err(Error::input(
             "picture for line detection",
-            format!("{} channels", image.channels()),
+            format!("{} channels", picture.channels()),
             "Give one channel of gray levels 0 to 255.",
         ));
     }
-    if image.data().len() > MAX_PIXELS {
+    if picture.data().len() > MAX_PIXELS {
         return Err(Error::Limits {
             subject: "line detection".to_owned(),
-            needed: format!("{} pixels", image.data().len()),
+            needed: format!("{} pixels", picture.data().len()),
             allowed: format!("{MAX_PIXELS} pixels"),
             hint: "Reduce the picture first.".to_owned(),
         });
@@ -156,10 +156,10 @@ fn segments_of_field(field: &GradientField, min_significance: f64, context: &Sta
     Ok(segments)
 }
 
-/// The segment of a rectangle, from the field's nodes to the image's pixels.
+/// The segment of a rectangle, from the field's nodes to the picture's pixels.
 fn in_image(rectangle: &LineSupportRectangle, significance: f64) -> LineSegment {
     // Node (x, y) of the field is the corner shared by four reduced pixels, (x + 1, y + 1) in corner coordinates; the
     // padding of the field has added this one already.
-    let [start, end] = rectangle.axis().map(|point| point.map(|coordinate| coordinate * IMAGE_FROM_FIELD));
-    LineSegment { start, end, width_px: rectangle.width() * IMAGE_FROM_FIELD, significance }
+    let [start, end] = rectangle.axis().map(|point| point.map(|coordinate| coordinate * PICTURE_FROM_FIELD));
+    LineSegment { start, end, width_px: rectangle.width() * PICTURE_FROM_FIELD, significance }
 }

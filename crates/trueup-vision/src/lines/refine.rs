@@ -58,7 +58,7 @@ const MAX_SHIFT_PX: f64 = 2.0;
 /// Measures edge points in a photograph.
 #[derive(Debug)]
 pub(super) struct EdgeProfiles<'a> {
-    image: &'a Raster<f32>,
+    picture: &'a Raster<f32>,
     sharp: Filter,
     blurred: Filter,
 }
@@ -129,8 +129,8 @@ struct EdgePoint {
 }
 
 impl<'a> EdgeProfiles<'a> {
-    pub(super) fn new(image: &'a Raster<f32>) -> Self {
-        Self { image, sharp: Filter::new(SHARP_SIGMA_PX), blurred: Filter::new(BLURRED_SIGMA_PX) }
+    pub(super) fn new(picture: &'a Raster<f32>) -> Self {
+        Self { picture, sharp: Filter::new(SHARP_SIGMA_PX), blurred: Filter::new(BLURRED_SIGMA_PX) }
     }
 
     /// Replaces the segment's ends by those of the line through its edge points, at the same rows (or columns). Leaves
@@ -174,15 +174,15 @@ impl<'a> EdgeProfiles<'a> {
     fn edge_points(&self, fit: &Fit, crossing: &Crossing, scan: &Scan, points: &mut Vec<EdgePoint>) {
         points.clear();
         let (rows, columns, row_step, column_step) = if crossing.major == 1 {
-            (self.image.height(), self.image.width(), self.image.width(), 1)
+            (self.picture.height(), self.picture.width(), self.picture.width(), 1)
         } else {
-            (self.image.width(), self.image.height(), 1, self.image.width())
+            (self.picture.width(), self.picture.height(), 1, self.picture.width())
         };
         let first = (crossing.from - 0.5).ceil().max(0.0) as usize;
         let end = ((crossing.to - 0.5).floor() + 1.0).clamp(0.0, rows as f64) as usize;
         for row in first..end {
             let center = row as f64 + 0.5;
-            let profile = Profile { samples: self.image.data(), start: row * row_step, step: column_step, columns };
+            let profile = Profile { samples: self.picture.data(), start: row * row_step, step: column_step, columns };
             points.extend(scan.peak(&profile, center, fit.at(center)));
         }
     }
@@ -315,7 +315,7 @@ mod tests {
     fn position_error(blur_px: f64, phase: f64) -> f64 {
         const SUBSAMPLES: usize = 200;
         let edge = 12.0 + phase;
-        let mut image = Raster::new(24, 30, 1);
+        let mut picture = Raster::new(24, 30, 1);
         for x in 0..24 {
             let brightness = |index: usize| {
                 let distance = (x as f64 + (index as f64 + 0.5) / SUBSAMPLES as f64) - edge;
@@ -328,11 +328,11 @@ mod tests {
             };
             let mean = (0..SUBSAMPLES).map(brightness).sum::<f64>() / SUBSAMPLES as f64;
             for y in 0..30 {
-                image.pixel_mut(x, y)[0] = (50.0 + 150.0 * mean) as f32;
+                picture.pixel_mut(x, y)[0] = (50.0 + 150.0 * mean) as f32;
             }
         }
         let mut segment = LineSegment { start: [12.3, 28.0], end: [12.6, 2.0], width_px: 2.0, significance: 1.0 };
-        EdgeProfiles::new(&image).refine(&mut segment);
+        EdgeProfiles::new(&picture).refine(&mut segment);
         assert!((segment.start[0] - segment.end[0]).abs() < 1e-3, "{segment:?}");
         segment.start[0] - edge
     }

@@ -51,17 +51,17 @@ fn steps(size: usize) -> Raster<f32> {
     picture
 }
 
-fn found(image: &Raster<f32>) -> Vec<LineSegment> {
-    found_from(image, 0.0)
+fn found(picture: &Raster<f32>) -> Vec<LineSegment> {
+    found_from(picture, 0.0)
 }
 
-fn found_from(image: &Raster<f32>, min_length_px: f64) -> Vec<LineSegment> {
-    detect(image, &LineOptions { min_length_px }, &StageContext::default()).expect("valid input")
+fn found_from(picture: &Raster<f32>, min_length_px: f64) -> Vec<LineSegment> {
+    detect(picture, &LineOptions { min_length_px }, &StageContext::default()).expect("valid input")
 }
 
 /// Those of some significance, not refined.
-fn rough(image: &Raster<f32>, min_significance: f64) -> Vec<LineSegment> {
-    let segments = segments_of_field(&GradientField::new(image), min_significance, &StageContext::default());
+fn rough(picture: &Raster<f32>, min_significance: f64) -> Vec<LineSegment> {
+    let segments = segments_of_field(&GradientField::new(picture), min_significance, &StageContext::default());
     tidy::longest_first(segments.expect("not cancelled"), 0.0, MAX_SEGMENTS)
 }
 
@@ -75,8 +75,8 @@ fn errors(segment: &LineSegment, point: [f64; 2], normal_angle: f64) -> (f64, f6
 
 #[test]
 fn a_step_between_columns_is_found_at_their_border() {
-    let image = half_plane(100, [40.0, 50.0], 0.0);
-    for segments in [rough(&image, MIN_SIGNIFICANCE), found(&image)] {
+    let picture = half_plane(100, [40.0, 50.0], 0.0);
+    for segments in [rough(&picture, MIN_SIGNIFICANCE), found(&picture)] {
         assert_eq!(segments.len(), 1);
         let segment = segments[0];
         assert!((segment.start[0] - 40.0).abs() < 1e-2 && (segment.end[0] - 40.0).abs() < 1e-2, "{segment:?}");
@@ -92,9 +92,9 @@ fn tilted_steps_are_found_within_a_fiftieth_of_a_pixel_once_refined() {
     for degrees in [0.0, 2.0, 7.0, 22.5, 30.0, 45.0, 62.0, 90.0, 100.0, 135.0, 171.0, 180.0, 250.0, 300.0_f64] {
         for offset in [0.0, 0.2, 0.5, 0.77] {
             let point = [80.0 + offset, 80.0 - 0.3 * offset];
-            let image = half_plane(160, point, degrees.to_radians());
+            let picture = half_plane(160, point, degrees.to_radians());
             for (segments, max_distance_px, max_turn_deg) in
-                [(rough(&image, MIN_SIGNIFICANCE), 0.08, 0.05), (found(&image), 0.02, 0.02)]
+                [(rough(&picture, MIN_SIGNIFICANCE), 0.08, 0.05), (found(&picture), 0.02, 0.02)]
             {
                 assert_eq!(segments.len(), 1, "{degrees} deg");
                 let (distance, turn) = errors(&segments[0], point, degrees.to_radians());
@@ -112,11 +112,11 @@ fn tilted_steps_are_found_within_a_fiftieth_of_a_pixel_once_refined() {
 
 #[test]
 fn both_sides_of_a_bar_are_segments_of_opposite_directions() {
-    let mut image = Raster::new(90, 60, 1);
+    let mut picture = Raster::new(90, 60, 1);
     for y in 10..50 {
-        image.row_mut(y)[30..42].fill(180.0);
+        picture.row_mut(y)[30..42].fill(180.0);
     }
-    let segments = found_from(&image, 20.0);
+    let segments = found_from(&picture, 20.0);
     assert_eq!(segments.len(), 2);
     let mut sides: Vec<(f64, f64)> =
         segments.iter().map(|segment| (segment.start[0], segment.end[1] - segment.start[1])).collect();
@@ -130,11 +130,11 @@ fn refinement_makes_noisy_directions_better() {
     let (mut before, mut after) = (0.0, 0.0);
     for index in 0..12 {
         let (point, angle) = ([75.3, 75.0], 0.13 + 0.5 * f64::from(index));
-        let mut image = half_plane(150, point, angle);
+        let mut picture = half_plane(150, point, angle);
         let disturbance = noise(150, 150, 4.0);
-        image.data_mut().iter_mut().zip(disturbance.data()).for_each(|(sample, noise)| *sample += noise - 128.0);
-        before += errors(&rough(&image, MIN_SIGNIFICANCE)[0], point, angle).1.powi(2);
-        after += errors(&found(&image)[0], point, angle).1.powi(2);
+        picture.data_mut().iter_mut().zip(disturbance.data()).for_each(|(sample, noise)| *sample += noise - 128.0);
+        before += errors(&rough(&picture, MIN_SIGNIFICANCE)[0], point, angle).1.powi(2);
+        after += errors(&found(&picture)[0], point, angle).1.powi(2);
     }
     assert!(after < 0.7 * before, "{after} deg^2 against {before} deg^2");
     assert!((after / 12.0).sqrt() < 0.03, "{after} deg^2");
@@ -166,9 +166,9 @@ fn pictures_without_content_have_no_segments() {
 fn pixels_that_are_not_numbers_take_no_part() {
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX] {
         assert!(found(&Raster::from_data(40, 40, 1, vec![bad; 1600]).expect("sizes")).is_empty());
-        let mut image = half_plane(100, [40.0, 50.0], 0.0);
-        image.pixel_mut(80, 50)[0] = bad;
-        let segments = found(&image);
+        let mut picture = half_plane(100, [40.0, 50.0], 0.0);
+        picture.pixel_mut(80, 50)[0] = bad;
+        let segments = found(&picture);
         assert!(segments.iter().all(|segment| segment.start.iter().chain(&segment.end).all(|end| end.is_finite())));
         assert!(segments.iter().any(|segment| segment.length() > 95.0));
     }
@@ -229,15 +229,15 @@ fn segments_along_the_frame_are_dropped() {
 #[test]
 fn an_interrupted_edge_is_merged_if_asked_to() {
     let point = [60.4, 60.0];
-    let mut image = half_plane(120, point, 0.3);
+    let mut picture = half_plane(120, point, 0.3);
     for y in 54..66 {
-        image.row_mut(y).fill(130.0);
+        picture.row_mut(y).fill(130.0);
     }
     let near_edge = |segments: &[LineSegment]| -> Vec<LineSegment> {
         let near = |segment: &&LineSegment| segment.length() >= 30.0 && errors(segment, point, 0.3).1.abs() < 5.0;
         segments.iter().filter(near).copied().collect()
     };
-    let segments = detect_keeping_frame(&image, &LineOptions::default(), &StageContext::default());
+    let segments = detect_keeping_frame(&picture, &LineOptions::default(), &StageContext::default());
     let segments = segments.expect("valid input");
     let apart = near_edge(&segments);
     assert_eq!(apart.len(), 2, "{apart:?}");
@@ -249,11 +249,11 @@ fn an_interrupted_edge_is_merged_if_asked_to() {
 }
 
 /// The photograph turned by a quarter: what was at (x, y) is at (height - y, x).
-fn quarter_turn(image: &Raster<f32>) -> Raster<f32> {
-    let mut turned = Raster::new(image.height(), image.width(), 1);
-    for y in 0..image.height() {
-        for x in 0..image.width() {
-            turned.pixel_mut(image.height() - 1 - y, x)[0] = image.pixel(x, y)[0];
+fn quarter_turn(picture: &Raster<f32>) -> Raster<f32> {
+    let mut turned = Raster::new(picture.height(), picture.width(), 1);
+    for y in 0..picture.height() {
+        for x in 0..picture.width() {
+            turned.pixel_mut(picture.height() - 1 - y, x)[0] = picture.pixel(x, y)[0];
         }
     }
     turned
@@ -274,9 +274,9 @@ proptest! {
     /// A photograph turned by a quarter has its segments turned, up to the order in which equal pixels are visited.
     #[test]
     fn a_quarter_turn_turns_the_segments(angle in 0.0..std::f64::consts::TAU, x in 30.0..50.0) {
-        let image = half_plane(80, [x, 40.0], angle);
-        let original = found(&image);
-        let turned = found(&quarter_turn(&image));
+        let picture = half_plane(80, [x, 40.0], angle);
+        let original = found(&picture);
+        let turned = found(&quarter_turn(&picture));
         prop_assert_eq!(original.len(), turned.len());
         for (original, turned) in original.iter().zip(&turned) {
             for (end, other) in [(original.start, turned.start), (original.end, turned.end)] {
@@ -291,8 +291,8 @@ proptest! {
     fn any_small_picture_is_survived(width in 1_usize..24, height in 1_usize..24, seed in any::<u64>()) {
         let mut generator = StageContext::default().generator("any", seed);
         let samples = (0..width * height).map(|_| f32::from_bits(generator.next_u32())).collect();
-        let image = Raster::from_data(width, height, 1, samples).expect("sizes agree");
-        for segment in found(&image).into_iter().chain(merged(&rough(&image, -10.0))) {
+        let picture = Raster::from_data(width, height, 1, samples).expect("sizes agree");
+        for segment in found(&picture).into_iter().chain(merged(&rough(&picture, -10.0))) {
             prop_assert!(segment.start.iter().chain(&segment.end).all(|coordinate| coordinate.is_finite()));
         }
     }

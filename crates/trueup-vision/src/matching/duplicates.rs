@@ -29,7 +29,7 @@ fn near_duplicate(pair: &PairMatches) -> Diagnostic {
     Diagnostic::warning(
         "near-duplicate",
         Subject::Pair(pair.a, pair.b),
-        format!("the two pictures show the same view: {} of {} matches agree", pair.agreeing, pair.in_overlap),
+        format!("the two photographs show the same view: {} of {} matches agree", pair.agreeing, pair.in_overlap),
         "Leave one of them out, unless both are wanted.",
     )
 }

@@ -7,6 +7,7 @@ use trueup_core::matches::PointMatch;
 use super::overlap::PredictedOverlap;
 use super::putative::{PutativeMatch, SECOND_SEPARATION_PX};
 use super::search::squared_distance;
+use super::turned::TurnedLens;
 use crate::features::{Descriptor, Features};
 
 /// How far around the predicted place a match and its rivals are sought, in working pixels.
@@ -19,11 +20,29 @@ const MAX_DISTANCE_RATIO: f64 = 0.9;
 /// The part of the inliers, ordered by distance, that a guided match may not exceed.
 const DISTANCE_QUANTILE: f64 = 0.9;
 
+/// Where points of a are in b.
+#[derive(Debug, Clone)]
+pub(super) enum PointMap {
+    /// On a plane, or of pinholes that turned.
+    Plane(Homography),
+    /// Of another lens that turned.
+    Turn(Box<TurnedLens>),
+}
+
+impl PointMap {
+    fn apply(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
+        match self {
+            Self::Plane(b_from_a) => Some(b_from_a.apply(point)),
+            Self::Turn(turned) => turned.in_b(point),
+        }
+    }
+}
+
 /// The map that one plane's matches follow.
 #[derive(Debug, Clone)]
 pub(super) struct PlaneMap {
     /// Where the surroundings of its matches go.
-    pub(super) b_from_a: Homography,
+    pub(super) b_from_a: PointMap,
     /// How far a match may lie from there.
     pub(super) inlier_px: f64,
 }
@@ -40,7 +59,7 @@ pub(super) struct GuidedInput<'a> {
     pub(super) plane_of_known: &'a [usize],
     /// The planes' maps.
     pub(super) planes: &'a [PlaneMap],
-    /// The overlap that the global homography predicts.
+    /// The overlap that the global map predicts.
     pub(super) overlap: &'a PredictedOverlap<'a>,
 }
 
@@ -67,7 +86,7 @@ pub(super) fn guided_matches(input: &GuidedInput<'_>) -> Vec<PutativeMatch> {
             continue;
         }
         let plane = &input.planes[nearest_plane(point.position, input.known, input.plane_of_known)];
-        let predicted = plane.b_from_a.apply(point.position.into());
+        let Some(predicted) = plane.b_from_a.apply(point.position.into()) else { continue };
         let candidate = nearest_in_reach(input, point_a, predicted, &grid);
         let Some(candidate) = candidate.filter(|candidate| candidate.squared_distance <= farthest) else { continue };
         let error = (Vector2::from(candidate.at.in_b) - predicted).norm();

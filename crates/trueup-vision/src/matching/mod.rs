@@ -2,7 +2,8 @@
 //!
 //! Descriptors of the strongest features are compared exhaustively (`putative`), a homography is sought that many matches agree on
 //! (`ransac`), the pair is judged by how many do (`pair`), and the matches of a joined pair are completed by further planes
-//! (`planes`) and by a second look near the predicted places (`guided`).
+//! (`planes`) and by a second look near the predicted places (`guided`). Where a lens bends so that no homography holds, turns
+//! are sought on rays (`turned`), and stand in for homography and planes.
 
 mod duplicates;
 mod guided;
@@ -17,6 +18,7 @@ mod ransac;
 mod search;
 #[cfg(test)]
 mod tests;
+mod turned;
 
 use std::collections::BTreeSet;
 

@@ -5,30 +5,48 @@ use trueup_core::geometry::Homography;
 use trueup_core::matches::PointMatch;
 use trueup_core::source::WorkingFrame;
 
-/// A homography between two photographs' frames, both ways.
-#[derive(Debug, Clone, Copy)]
+use super::turned::TurnedLens;
+
+/// A map between two photographs' frames, both ways.
+#[derive(Debug, Clone)]
 pub(super) struct PredictedOverlap<'a> {
-    b_from_a: Homography,
-    a_from_b: Homography,
+    maps: Maps,
     frame_a: &'a WorkingFrame,
     frame_b: &'a WorkingFrame,
+}
+
+#[derive(Debug, Clone)]
+enum Maps {
+    Homographies { b_from_a: Homography, a_from_b: Homography },
+    Turn(Box<TurnedLens>),
 }
 
 impl<'a> PredictedOverlap<'a> {
     /// `b_from_a` signed so that its denominator is positive on the visible side; `None` if it is singular.
     pub(super) fn new(b_from_a: Homography, frame_a: &'a WorkingFrame, frame_b: &'a WorkingFrame) -> Option<Self> {
         let a_from_b = b_from_a.inverse()?;
-        Some(Self { b_from_a, a_from_b, frame_a, frame_b })
+        Some(Self { maps: Maps::Homographies { b_from_a, a_from_b }, frame_a, frame_b })
+    }
+
+    /// That of a lens that turned.
+    pub(super) fn of_turn(turned: TurnedLens, frame_a: &'a WorkingFrame, frame_b: &'a WorkingFrame) -> Self {
+        Self { maps: Maps::Turn(Box::new(turned)), frame_a, frame_b }
     }
 
     /// Where a point of a is in b; `None` if it is not in the overlap.
     pub(super) fn point_in_b(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
-        visible(&self.b_from_a, point, self.frame_b)
+        match &self.maps {
+            Maps::Homographies { b_from_a, .. } => visible(b_from_a, point, self.frame_b),
+            Maps::Turn(turned) => turned.in_b(point).filter(|at| self.frame_b.contains(at.x, at.y)),
+        }
     }
 
     /// Where a point of b is in a; `None` if it is not in the overlap.
     pub(super) fn point_in_a(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
-        visible(&self.a_from_b, point, self.frame_a)
+        match &self.maps {
+            Maps::Homographies { a_from_b, .. } => visible(a_from_b, point, self.frame_a),
+            Maps::Turn(turned) => turned.in_a(point).filter(|at| self.frame_a.contains(at.x, at.y)),
+        }
     }
 
     /// Whether both ends of a match lie in the overlap.
@@ -37,20 +55,21 @@ impl<'a> PredictedOverlap<'a> {
     }
 
     /// Whether the overlap is not empty, and at its corners the map keeps the orientation and changes areas by a
-    /// factor of at most `max_area_ratio`.
+    /// factor of at most `max_area_ratio`. A turn is always plausible.
     ///
     /// # Departures
     /// Outside the overlap nothing is asked: in a wide photograph turned far from its neighbor, parts that the neighbor
     /// does not see lie on or beyond its horizon, rightly.
     pub(super) fn is_plausible(&self, max_area_ratio: f64) -> bool {
-        let corners = self.corners_in_a();
-        let area_ratio = |corner: &Vector2<f64>| self.b_from_a.jacobian(*corner).determinant();
+        let Maps::Homographies { b_from_a, .. } = &self.maps else { return true };
+        let corners = self.corners_in_a(b_from_a);
+        let area_ratio = |corner: &Vector2<f64>| b_from_a.jacobian(*corner).determinant();
         corners.len() >= 3
             && corners.iter().map(area_ratio).all(|ratio| (1.0 / max_area_ratio..=max_area_ratio).contains(&ratio))
     }
 
     /// The corners of the overlap, a convex polygon in a; empty if there is none.
-    fn corners_in_a(&self) -> Vec<Vector2<f64>> {
+    fn corners_in_a(&self, b_from_a: &Homography) -> Vec<Vector2<f64>> {
         let (width, height) = (self.frame_a.width, self.frame_a.height);
         let mut polygon = vec![
             Vector2::new(0.0, 0.0),
@@ -59,7 +78,7 @@ impl<'a> PredictedOverlap<'a> {
             Vector2::new(0.0, height),
         ];
         // Inside b means 0 <= x/w <= W and 0 <= y/w <= H with w > 0: linear in the point of a.
-        let rows: [Vector3<f64>; 3] = std::array::from_fn(|row| self.b_from_a.0.row(row).transpose());
+        let rows: [Vector3<f64>; 3] = std::array::from_fn(|row| b_from_a.0.row(row).transpose());
         let [x, y, w] = rows;
         for line in [x, w * self.frame_b.width - x, y, w * self.frame_b.height - y] {
             polygon = clip(&polygon, &line);
@@ -115,7 +134,7 @@ mod tests {
         let frame = frame();
         let shift = Homography(Matrix3::new(1.0, 0.0, -400.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0));
         let overlap = PredictedOverlap::new(shift, &frame, &frame).expect("regular");
-        let corners = overlap.corners_in_a();
+        let corners = overlap.corners_in_a(&shift);
         assert_eq!(corners.len(), 4);
         assert!(corners.iter().all(|corner| (400.0..=800.0).contains(&corner.x)));
         assert!(overlap.is_plausible(1.5));
@@ -124,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn wide_pictures_turned_far_are_plausible() {
+    fn wide_photographs_turned_far_are_plausible() {
         let frame = frame();
         for turn_deg in [-70.0, 70.0] {
             let overlap = PredictedOverlap::new(turned(90.0, turn_deg), &frame, &frame).expect("regular");
@@ -133,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn mirrored_exploding_and_disjoint_pictures_are_not() {
+    fn mirrored_exploding_and_disjoint_photographs_are_not() {
         let frame = frame();
         let maps = [
             Matrix3::new(-1.0, 0.0, 800.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),

@@ -7,13 +7,14 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 
-use super::guided::{GuidedInput, PlaneMap, guided_matches};
+use super::guided::{GuidedInput, PlaneMap, PointMap, guided_matches};
 use super::matched_points::MatchedPoints;
 use super::options::MatchingOptions;
 use super::overlap::PredictedOverlap;
 use super::planes::{PLANE_INLIER_PX, find_planes};
 use super::putative::{PutativeMatch, putative_matches};
 use super::ransac::{Consensus, HomographySearch, NoConsensus, find_homography};
+use super::turned::{TurnConsensus, find_turned_lens};
 use crate::features::Features;
 
 /// See [`PairInput::compared_features`]. More would find smaller overlaps; the time grows with the square.
@@ -34,6 +35,11 @@ const MIN_INLIERS_BY_GRAPH: usize = 8;
 
 /// Largest factor by which a homography may enlarge or reduce areas in the overlap it predicts.
 const MAX_AREA_RATIO: f64 = 20.0;
+
+/// A turned lens stands in for the homography if this many times as many matches agree with it ...
+const TURN_FACTOR: f64 = 1.25;
+/// ... and this many more: a homography has three unknowns more to please wrong matches with.
+const TURN_MORE: usize = 15;
 
 /// A photograph of a pair.
 #[derive(Debug, Clone, Copy)]
@@ -90,9 +96,75 @@ impl<'a> PairInput<'a> {
         let tested = options.min_inliers.max(more_than.floor() as usize + 1);
         if forced { MIN_INLIERS_BY_GRAPH.min(tested) } else { tested }
     }
+
+    /// The verdict on a pair whose matches are counted.
+    fn judge(&self, pair: &mut PairMatches, options: &MatchingOptions) {
+        pair.needed = Self::needed(pair.in_overlap, self.forced, options);
+        pair.verdict = if pair.agreeing >= Self::needed(pair.in_overlap, false, options) {
+            PairVerdict::Joined
+        } else if self.forced && pair.agreeing >= pair.needed {
+            PairVerdict::JoinedByGraph
+        } else {
+            PairVerdict::TooFewInliers
+        };
+    }
+}
+
+/// The turned lens that clearly more matches agree with than with the homography, if there is one.
+fn better_turn(
+    input: &PairInput<'_>,
+    points: &MatchedPoints,
+    global: Option<&Consensus>,
+    seed: u64,
+    options: &MatchingOptions,
+    context: &StageContext<'_>,
+) -> Option<TurnConsensus> {
+    let agreeing = global.map_or(0, |global| global.inliers.len());
+    let wanted = ((TURN_FACTOR * agreeing as f64) as usize).max(agreeing + TURN_MORE).max(options.min_inliers);
+    if points.in_a.len() < wanted {
+        return None;
+    }
+    // Draws of its own: what the homography draws does not depend on whether lenses are tried.
+    let mut generator = context.generator("turned lens", seed);
+    let turn = find_turned_lens(points, [input.a.frame, input.b.frame], options.inlier_px, &mut generator)?;
+    (turn.inliers.len() >= wanted).then_some(turn)
+}
+
+/// Judges a pair by the turned lens, and completes its matches.
+fn judge_turn(
+    pair: &mut PairMatches,
+    input: &PairInput<'_>,
+    putative: &[PutativeMatch],
+    turn: &TurnConsensus,
+    options: &MatchingOptions,
+) {
+    let overlap = PredictedOverlap::of_turn(turn.turned, input.a.frame, input.b.frame);
+    pair.in_overlap = putative.iter().filter(|candidate| overlap.contains(&candidate.at)).count();
+    pair.agreeing = turn.inliers.iter().filter(|&&k| overlap.contains(&putative[k].at)).count();
+    let known: Vec<PutativeMatch> = turn.inliers.iter().map(|&k| putative[k]).collect();
+    let at = matched_points(&known);
+    pair.b_from_a = Homography::fit(&at.in_a, &at.in_b, None).map(|map| scaled_rows(&map));
+    input.judge(pair, options);
+    if !pair.verdict.is_joined() {
+        return;
+    }
+    pair.inliers = known.iter().map(|known| known.at).collect();
+    if options.guided {
+        let more = guided_matches(&GuidedInput {
+            a: input.a.features,
+            b: input.b.features,
+            known: &known,
+            plane_of_known: &vec![0; known.len()],
+            planes: &[PlaneMap { b_from_a: PointMap::Turn(Box::new(turn.turned)), inlier_px: options.inlier_px }],
+            overlap: &overlap,
+        });
+        pair.inliers.extend(more.iter().map(|found| found.at));
+    }
 }
 
 /// Matches two photographs and judges whether they overlap.
+///
+/// Where clearly more matches agree with a lens that turned than with any homography, that is what is believed.
 ///
 /// A pair is joined if its homography is believable in the overlap it predicts, and the matches that agree with it are
 /// at least `min_inliers` and more than alpha + beta n_f of the n_f matches in that overlap. A forced pair needs only
@@ -140,7 +212,12 @@ pub(super) fn match_pair(
         useful_inliers: pair.needed,
         start: None,
     };
-    let global = match find_homography(&points, &search, |map| input.is_plausible(map), &mut generator) {
+    let found = find_homography(&points, &search, |map| input.is_plausible(map), &mut generator);
+    if let Some(turn) = better_turn(input, &points, found.as_ref().ok(), seed, options, context) {
+        judge_turn(&mut pair, input, &putative, &turn, options);
+        return Ok(pair);
+    }
+    let global = match found {
         Ok(global) => global,
         Err(failure) => {
             pair.verdict = match failure {
@@ -154,14 +231,7 @@ pub(super) fn match_pair(
     pair.in_overlap = putative.iter().filter(|candidate| overlap.contains(&candidate.at)).count();
     pair.agreeing = global.inliers.iter().filter(|&&k| overlap.contains(&putative[k].at)).count();
     pair.b_from_a = Some(scaled_rows(&global.b_from_a));
-    pair.needed = PairInput::needed(pair.in_overlap, forced, options);
-    pair.verdict = if pair.agreeing >= PairInput::needed(pair.in_overlap, false, options) {
-        PairVerdict::Joined
-    } else if forced && pair.agreeing >= pair.needed {
-        PairVerdict::JoinedByGraph
-    } else {
-        PairVerdict::TooFewInliers
-    };
+    input.judge(&mut pair, options);
     if pair.verdict.is_joined() {
         let joined = JoinedPair { input, putative: &putative, points: &points, global: &global, overlap: &overlap };
         pair.inliers = joined.all_inliers(options, &mut generator);
@@ -186,7 +256,8 @@ impl JoinedPair<'_> {
         let (a, b, global) = (self.input.a, self.input.b, self.global);
         let is_plausible = |map: &Homography| self.input.is_plausible(map);
         let planes = find_planes(self.points, &global.b_from_a, b.frame.diagonal(), is_plausible, generator);
-        let mut plane_maps = vec![PlaneMap { b_from_a: global.b_from_a, inlier_px: options.inlier_px }];
+        let mut plane_maps =
+            vec![PlaneMap { b_from_a: PointMap::Plane(global.b_from_a), inlier_px: options.inlier_px }];
         let mut plane_of: Vec<Option<usize>> = vec![None; self.putative.len()];
         let mut matches: Vec<usize> = global.inliers.clone();
         global.inliers.iter().for_each(|&k| plane_of[k] = Some(0));
@@ -197,7 +268,7 @@ impl JoinedPair<'_> {
                     plane_of[k] = Some(plane_maps.len());
                 }
             }
-            plane_maps.push(PlaneMap { b_from_a: plane.b_from_a, inlier_px: PLANE_INLIER_PX });
+            plane_maps.push(PlaneMap { b_from_a: PointMap::Plane(plane.b_from_a), inlier_px: PLANE_INLIER_PX });
         }
         let known: Vec<PutativeMatch> = matches.iter().map(|&k| self.putative[k]).collect();
         let mut inliers: Vec<PointMatch> = known.iter().map(|known| known.at).collect();

@@ -16,13 +16,13 @@ impl Alignment {
     /// # Errors
     /// If a photograph's file can no longer be read.
     pub fn photograph_bits(&self) -> Result<u16> {
-        let images = self.photographs().images();
+        let images = self.photographs().sources();
         let mut bits = self.layout().placed.iter().map(|placed| decode::sample_bits(&images[placed.photograph]));
         bits.try_fold(8, |most, bits| bits.map(|bits| most.max(bits)))
     }
 
     fn name(&self, position: usize) -> String {
-        self.photographs().images()[self.layout().placed[position].photograph].name.clone()
+        self.photographs().sources()[self.layout().placed[position].photograph].name.clone()
     }
 }
 

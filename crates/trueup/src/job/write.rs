@@ -28,7 +28,7 @@ impl Outputs {
     /// Those of [`Stitcher::compose`] and of writing; [`trueup_core::Error::Input`] if a file is one of the photographs.
     pub fn write(&self, stitcher: &Stitcher, mut alignment: Alignment) -> Result<Written> {
         self.refuse_inputs(alignment.project.images.iter().map(|image| Path::new(&image.path)), [])?;
-        let rendered = stitcher.to_be_written(&self.panorama).compose(&mut alignment)?;
+        let rendered = stitcher.writing_to(&self.panorama).compose(&mut alignment)?;
         let written = stitcher.context().gather(|context| {
             context.time("output", || {
                 let options = stitcher.output_options(&alignment, &self.panorama)?;

@@ -18,7 +18,7 @@ use trueup_compose::layout::CanvasOptions;
 use trueup_compose::render::RenderOptions;
 use trueup_compose::seam::SeamOptions;
 use trueup_core::memory::MemoryBudget;
-use trueup_core::options::{InvalidOption, OptionDescription, StageOptions};
+use trueup_core::options::{InvalidOption, OptionDescription, OptionValue, StageOptions};
 use trueup_core::{Error, Result};
 use trueup_io::encode::OutputOptions;
 use trueup_io::source::SourceOptions;
@@ -250,7 +250,48 @@ impl StitchOptions {
     pub fn invalid(&self) -> Vec<InvalidOption> {
         let mut invalid = self.out_of_range();
         invalid.extend(self.arrange.projection.beyond_the_projection());
+        invalid.extend(self.contradicting_the_method());
         invalid
+    }
+
+    /// The options with those that the method fixes at their values: what the geometry is found with, and what is recorded.
+    ///
+    /// ```
+    /// let mut options = trueup::StitchOptions::default();
+    /// options.set("stitch.method=vpg-published")?;
+    /// assert_eq!(options.fixed_by_method().align.mesh.subdivision, 1);
+    /// options.set("mesh.subdivision=3")?;
+    /// let refused = options.validate().unwrap_err().to_string();
+    /// assert!(refused.contains("mesh.subdivision = 3 (allowed: 1, which the method vpg-published fixes)"), "{refused}");
+    /// # Ok::<(), trueup::Error>(())
+    /// ```
+    #[must_use]
+    pub fn fixed_by_method(&self) -> Self {
+        let mut fixed = self.clone();
+        fixed.align.stitch.method.fix(&mut fixed.align);
+        fixed
+    }
+
+    /// Options that were changed to another value than the method fixes them at. Those at their defaults pass: they were not
+    /// asked for.
+    fn contradicting_the_method(&self) -> Vec<InvalidOption> {
+        let tables = [self.to_table(), self.fixed_by_method().to_table(), Self::default().to_table()];
+        let [Ok(own), Ok(fixed), Ok(default)] = tables else { return Vec::new() };
+        let mut contradicting = Vec::new();
+        for row in Self::describe() {
+            let Some((table, option)) = row.name.split_once('.') else { continue };
+            // As text: a value that is no number is not equal to itself.
+            let value = |of: &toml::Table| of.get(table).and_then(|table| table.get(option)).map(as_written);
+            let (Some(own), Some(fixed), Some(default)) = (value(&own), value(&fixed), value(&default)) else {
+                continue;
+            };
+            if own != fixed && own != default {
+                let method = self.align.stitch.method.display();
+                let allowed = format!("{fixed}, which the method {method} fixes");
+                contradicting.push(InvalidOption { name: row.name, value: own, allowed });
+            }
+        }
+        contradicting
     }
 
     /// Checks every option.
@@ -287,6 +328,11 @@ impl StitchOptions {
     }
 }
 
+/// A value as one writes it after an option's name.
+fn as_written(value: &toml::Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+}
+
 /// Whether the options of a table of this phase take part in the geometry. Files are found and judged anew whenever a
 /// panorama is composed.
 fn is_geometry(table: &str, phase: Option<Phase>) -> bool {
@@ -296,6 +342,53 @@ fn is_geometry(table: &str, phase: Option<Phase>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What a published method fixes is no default of ours under another name: whoever changes a default sees here what the
+    /// publication has.
+    #[test]
+    fn published_methods_fix_the_published_values() {
+        let of = |method: &str| {
+            let mut options = StitchOptions::default();
+            options.set(&format!("stitch.method={method}")).expect("a method");
+            options.validate().expect("a method goes with the defaults");
+            let fixed = options.fixed_by_method();
+            fixed.validate().expect("what a method fixes is valid");
+            assert_eq!(fixed.fixed_by_method(), fixed, "{method}");
+            fixed.differing_geometry(&options).expect("tables")
+        };
+        let mesh = ["match_points.model", "mesh.base", "mesh.outline_weight", "mesh.subdivision"];
+        let guidance = [
+            "similarity.camera_correction",
+            "similarity.fallback",
+            "similarity.gate",
+            "similarity.guided_redetection",
+            "similarity.joint_refinement",
+            "similarity.pitch_prior",
+            "similarity.pooled_search",
+            "similarity.vertical_only",
+            "vanishing.intrinsics",
+        ];
+        let printed = ["similarity.as_printed", "similarity.beta_mode"];
+        let sorted = |parts: &[&[&'static str]]| {
+            let mut all = parts.concat();
+            all.sort_unstable();
+            all
+        };
+        for (method, expected) in [
+            ("vpg", sorted(&[])),
+            ("gsp-3d", sorted(&[])),
+            ("apap", sorted(&[])),
+            ("gsp-2d-published", sorted(&[&mesh])),
+            ("gsp-3d-published", sorted(&[&mesh])),
+            ("aanap-published", sorted(&[&mesh])),
+            ("vpg-published", sorted(&[&mesh, &guidance])),
+            ("vpg-literal", sorted(&[&mesh, &guidance, &printed])),
+        ] {
+            let mut differing = of(method);
+            differing.sort_unstable();
+            assert_eq!(differing, expected, "{method}");
+        }
+    }
 
     #[test]
     fn all_bad_values_are_listed() {

@@ -56,7 +56,9 @@ impl ArrangeInput {
             let full = corrected.iter().zip(&component.frames).zip(&placed).map(|((camera, frame), placed)| {
                 let camera_from_level = camera.rotation() * level_from_world.transpose();
                 let focal_px = camera.focal_px / frame.working_from_full;
-                Camera::new(focal_px, placed.mesh.width, placed.mesh.height, &camera_from_level)
+                let pinhole = Camera::new(focal_px, placed.mesh.width, placed.mesh.height, &camera_from_level);
+                let Camera { lens, principal_point, .. } = camera.scaled(1.0 / frame.working_from_full);
+                if lens.is_pinhole() { pinhole } else { Camera { lens, principal_point, ..pinhole } }
             });
             full.collect()
         });
@@ -69,12 +71,8 @@ impl ArrangeInput {
     /// What a project knows of the photographs used, whose grids are `placed` in its order: composing from the record starts
     /// here.
     pub(crate) fn of_project(placed: Vec<Placed>, reference: usize, project: &Project) -> Self {
-        let camera = |(record, placed): (&ImageRecord, &Placed)| {
-            let camera_from_level = record.upright_rotation.or(record.rotation)?;
-            let mesh = &placed.mesh;
-            Some(Camera::new(record.focal_px?, mesh.width, mesh.height, &matrix_from_rows(&camera_from_level)))
-        };
-        let cameras = project.used_images().zip(&placed).map(camera).collect();
+        let camera = |record: &ImageRecord| record.camera(record.level_rotation()?);
+        let cameras = project.used_images().map(camera).collect();
         let dominant = project.manhattan.dominant.as_ref();
         let period = project.grid_canvas().period();
         Self { placed, reference, cameras, dominant: dominant.map(matrix_from_rows), period }
@@ -162,13 +160,13 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
         let (written, plane_shift) = framed(plane.clone(), options);
         return Ok(Arrangement { plane, plane_shift, written, projection: None });
     };
-    let shots: Vec<PosedPhotograph> = cameras
+    let photographs: Vec<PosedPhotograph> = cameras
         .iter()
         .zip(&plane.placed)
         .map(|(camera, placed)| PosedPhotograph { camera: *camera, mesh: placed.mesh.clone() })
         .collect();
-    let view = ProjectionView::choose(&shots, dominant.as_ref(), &options.projection);
-    let drawn = draw(&shots, &plane, &view, reference, options, context)?;
+    let view = ProjectionView::choose(&photographs, dominant.as_ref(), &options.projection);
+    let drawn = draw(&photographs, &plane, &view, reference, options, context)?;
     let (written, _) = framed(drawn, options);
     report_cut(&plane, &written, &view, options, context);
     let projection = Some(ProjectionRecord::new(&view, &written));
@@ -177,7 +175,7 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
 
 /// The photographs on the view's canvas.
 fn draw(
-    shots: &[PosedPhotograph],
+    photographs: &[PosedPhotograph],
     plane: &CanvasLayout,
     view: &ProjectionView,
     reference: usize,
@@ -185,12 +183,12 @@ fn draw(
     context: &StageContext,
 ) -> Result<CanvasLayout> {
     let max_parallax = options.projection.max_parallax_deg.to_radians();
-    let shifts = projection::parallax_shifts(shots, plane.period.map(|period| period as f64), max_parallax);
+    let shifts = projection::parallax_shifts(photographs, plane.period.map(|period| period as f64), max_parallax);
     context.check_cancelled()?;
     // The reference keeps its own pixels in the middle of the projection.
-    let canvas_from_plane = options.canvas.scale * shots[reference].camera.focal_px;
+    let canvas_from_plane = options.canvas.scale * photographs[reference].camera.focal_px;
     let placement = Placement { view, canvas_from_plane, closed: view.closed };
-    let placed = projection::place(shots, &shifts, &placement)
+    let placed = projection::place(photographs, &shifts, &placement)
         .into_iter()
         .map(|grid| Placed { photograph: plane.placed[grid.photograph].photograph, mesh: grid.mesh })
         .collect();

@@ -113,7 +113,7 @@ pub(crate) fn run(
 fn measure(one: &OnePhotograph, options: &MeasureOptions, context: &StageContext) -> Result<Measured> {
     context.check_cancelled()?;
     let OnePhotograph { files, index, keep_grays } = *one;
-    let image = &files.images()[index];
+    let image = &files.sources()[index];
     let frame = WorkingFrame::new(image.width, image.height, options.working.pixels);
     let picture = context.time(DECODING, || files.working(index, &frame, THUMBNAIL_PIXELS))?;
     let mut features = context.time(FEATURES, || features::detect(&picture.gray, &options.features, context))?;
@@ -157,7 +157,7 @@ pub(crate) fn thumbnails(
     let photographs = &set.files;
     let thumbnail = |index: usize| {
         context.check_cancelled()?;
-        let image = &photographs.images()[index];
+        let image = &photographs.sources()[index];
         let frame = WorkingFrame::new(image.width, image.height, options.working.pixels);
         let picture = photographs.working(index, &frame, THUMBNAIL_PIXELS)?;
         let mut thumbnail = picture.thumbnail;
@@ -166,7 +166,7 @@ pub(crate) fn thumbnails(
         }
         Ok(SmallCopy { thumbnail, frame: picture.thumbnail_frame })
     };
-    let count = photographs.images().len();
+    let count = photographs.sources().len();
     let mut thumbnails = Vec::with_capacity(count);
     for group in groups(count, set.at_once) {
         thumbnails.extend(group.into_par_iter().map(thumbnail).collect::<Result<Vec<_>>>()?);

@@ -86,15 +86,11 @@ impl<'a> Stitcher<'a> {
         Self { cache, ..self }
     }
 
-    /// Says where composed panoramas will be written: scratch files go into the same folder, unless `resources.scratch` names
-    /// one, and leave room for them. Without, scratch files go where the system wants temporary files.
+    /// The same stitcher for panoramas that will be written to `output`: scratch files go into the same folder, unless
+    /// `resources.scratch` names one, and leave room for them. Without, scratch files go where the system wants temporary
+    /// files.
     #[must_use]
-    pub fn writing_to(self, output: &'a Path) -> Self {
-        Self { output: Some(output), ..self }
-    }
-
-    /// The same stitcher for a panorama that will be written to `output`, see [`Self::writing_to`].
-    pub(crate) fn to_be_written<'b>(&'b self, output: &'b Path) -> Stitcher<'b>
+    pub fn writing_to<'b>(&self, output: &'b Path) -> Stitcher<'b>
     where
         'a: 'b,
     {
@@ -241,7 +237,7 @@ impl<'a> Stitcher<'a> {
             photographs,
         };
         let corrections = context.absorb(compose::light(&light, &self.options.compose, context)?);
-        let mut project = unfilled(matched, self.options, members, groups);
+        let mut project = unfilled(matched, &self.options.fixed_by_method(), members, groups);
         let geometry = geometry.as_ref();
         let found =
             GeometryRecord { component: &component, geometry, arrangement: &arrangement, corrections: &corrections };

@@ -41,7 +41,7 @@ impl PhotographSet {
     /// [`Error::Cancelled`].
     pub(crate) fn find(inputs: &Inputs, options: &StitchOptions, context: &StageContext) -> Result<Self> {
         let accepted = &options.measure.source;
-        let Sources { images, rejected } =
+        let Sources { photographs: images, rejected } =
             context.time("source", || source::scan(&inputs.photographs, accepted, context))?;
         if images.is_empty() {
             return Err(nothing_found(inputs, &rejected));

@@ -7,7 +7,8 @@ use trueup_core::geometry::{matrix_from_rows, rows_of};
 use trueup_core::mesh::GridMesh;
 
 use super::record::{
-    Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
+    Canvas, ImageRecord, ImageStatus, LensRecord, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION,
+    PairRecord, Project,
 };
 use crate::options::{MethodForm, StitchOptions};
 use crate::pipeline::align::Geometry;
@@ -99,6 +100,7 @@ fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
         hint,
         component: None,
         focal_px: None,
+        lens: None,
         rotation: None,
         upright_rotation: None,
         theta_deg: None,
@@ -177,7 +179,7 @@ pub(crate) fn record_composition(
 fn paths(project: &mut Project) -> impl Iterator<Item = &mut String> {
     let measures = project.measures.iter_mut().flat_map(|measures| {
         let bent = measures.long_lines.iter_mut().filter_map(|lines| lines.longest_bent.as_mut());
-        measures.pictures.iter_mut().map(|one| &mut one.path).chain(bent.map(|bent| &mut bent.path))
+        measures.photographs.iter_mut().map(|one| &mut one.path).chain(bent.map(|bent| &mut bent.path))
     });
     std::iter::once(&mut project.reference).chain(&mut project.manhattan.inliers).chain(measures)
 }
@@ -224,8 +226,8 @@ pub(crate) fn fill_geometry(project: &mut Project, found: &GeometryRecord) {
     project.reference = component.images[component.reference].path.display().to_string();
     let method = project.options.align.stitch.method;
     let is_warp = matches!(method.form(), MethodForm::Warp(_));
-    for (k, &picture) in component.members.iter().enumerate() {
-        let record = &mut project.images[picture];
+    for (k, &photograph) in component.members.iter().enumerate() {
+        let record = &mut project.images[photograph];
         let mesh = &arrangement.plane.placed[k].mesh;
         record.status = ImageStatus::Used;
         record_appearance(record, mesh, arrangement.plane_shift, &corrections.photographs[k]);
@@ -233,6 +235,12 @@ pub(crate) fn fill_geometry(project: &mut Project, found: &GeometryRecord) {
         let camera = &geometry.cameras.cameras[k];
         let camera_from_level = camera.rotation() * geometry.prior.level_from_world().transpose();
         record.focal_px = Some(camera.focal_px / component.frames[k].working_from_full);
+        record.lens = (!camera.lens.is_pinhole()).then(|| {
+            let full = camera.scaled(1.0 / component.frames[k].working_from_full);
+            let [x, y] = full.principal_point;
+            let center_px = [x - record.width as f64 / 2.0, y - record.height as f64 / 2.0];
+            LensRecord { terms: camera.lens.terms(), center_px }
+        });
         record.rotation = Some(rows_of(&camera_from_level));
         let upright = matrix_from_rows(&geometry.prior.camera_from_world[k]);
         record.upright_rotation = Some(rows_of(&(upright * geometry.prior.level_from_world().transpose())));
@@ -256,7 +264,7 @@ pub(crate) fn fill_geometry(project: &mut Project, found: &GeometryRecord) {
             accepted: guidance.used,
             pooled: guidance.pooled,
             failed_clause: match method.form() {
-                MethodForm::Mesh(_) => guidance.failed_clause.clone(),
+                MethodForm::Mesh(..) => guidance.failed_clause.clone(),
                 MethodForm::Warp(_) => Some(format!("the method {} does not ask them", project.method)),
             },
             dominant: guidance.dominant,

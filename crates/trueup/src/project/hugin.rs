@@ -7,12 +7,13 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt::Write;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix4, Vector2, Vector3, Vector4};
 use trueup_compose::exposure::Correction;
 use trueup_core::geometry::{matrix_from_rows, wrap_angle};
+use trueup_core::lens::{Lens, LensProjection, LensTerms};
 use trueup_core::{Error, Result};
 
-use super::record::{ImageRecord, Project};
+use super::record::{ImageRecord, LensRecord, Project};
 
 /// A camera's attitude in Hugin's angles, radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,13 +96,18 @@ fn image_line(image: &ImageRecord, camera_from_level: &Matrix3<f64>, focal_px: f
     };
     let Attitude { yaw, pitch, roll } = Attitude::of(camera_from_level);
     let roll = wrap_angle(roll + quarter_turns * FRAC_PI_2);
-    let field_of_view = 2.0 * (0.5 * width as f64 / focal_px).atan();
+    let stored = StoredPicture { width: width as f64, height: height as f64, turn: quarter_turns * FRAC_PI_2 };
+    let lens = match &image.lens {
+        Some(lens) => HuginLens::of(lens, focal_px, &stored),
+        None => HuginLens::pinhole(focal_px, &stored),
+    };
+    let HuginLens { format, field_of_view, radial: [a, b, c], center_px: [d, e] } = lens;
     let correction = image.correction.unwrap_or_else(|| Correction::uniform(image.gain.unwrap_or(1.0)));
     let [red, green, blue] = correction.gain;
     let [vb, vc, vd] = vignetting(&correction);
     // Hugin divides by the white balance, ours are factors; exposure values count stops by which a photograph is brightened.
     Ok(format!(
-        "i w{width} h{height} f0 v{:.6} r{:.6} p{:.6} y{:.6} TrX0 TrY0 TrZ0 a0 b0 c0 d0 e0 g0 t0 Eev{:.6} Er{:.6} \
+        "i w{width} h{height} f{format} v{:.6} r{:.6} p{:.6} y{:.6} TrX0 TrY0 TrZ0 a{a} b{b} c{c} d{d} e{e} g0 t0 Eev{:.6} Er{:.6} \
          Eb{:.6} Ra0 Rb0 Rc0 Rd0 Re0 Va1 Vb{vb:.6} Vc{vc:.6} Vd{vd:.6} Vx0 Vy0 Vm5 n\"{}\"",
         field_of_view.to_degrees(),
         roll.to_degrees(),
@@ -112,6 +118,78 @@ fn image_line(image: &ImageRecord, camera_from_level: &Matrix3<f64>, focal_px: f
         green / blue,
         image.path,
     ))
+}
+
+/// A photograph as its file has it.
+struct StoredPicture {
+    width: f64,
+    height: f64,
+    /// Clockwise turn, radians, that stands it upright.
+    turn: f64,
+}
+
+/// A lens in Hugin's terms: a pixel at the radius a r^4 + b r^3 + c r^2 + (1 - a - b - c) r, in units of half the shorter
+/// side, where the projection alone has r, from a center moved by d and e pixels.
+struct HuginLens {
+    /// 0 rectilinear, 3 fisheye.
+    format: u8,
+    /// Across the stored picture, radians.
+    field_of_view: f64,
+    /// a, b and c.
+    radial: [f64; 3],
+    /// d and e.
+    center_px: [f64; 2],
+}
+
+impl HuginLens {
+    fn pinhole(focal_px: f64, stored: &StoredPicture) -> Self {
+        let field_of_view = 2.0 * (0.5 * stored.width / focal_px).atan();
+        Self { format: 0, field_of_view, radial: [0.0; 3], center_px: [0.0; 2] }
+    }
+
+    /// The polynomial nearest to the lens over the photograph, by least squares on radii; tangential terms have no place in
+    /// the format. The coefficient of r is made what Hugin wants of it by the unit of r, which the focal length takes up.
+    fn of(lens: &LensRecord, focal_px: f64, stored: &StoredPicture) -> Self {
+        const SAMPLES: usize = 128;
+        const STEPS: usize = 20;
+        let LensTerms { projection, radial, .. } = lens.terms;
+        let radially = Lens::new(LensTerms { projection, radial, tangential: [0.0; 2] });
+        let (unit_px, farthest) = (0.5 * stored.width.min(stored.height), 0.5 * stored.width.hypot(stored.height));
+        let (mut normal, mut right) = (Matrix4::<f64>::zeros(), Vector4::zeros());
+        for step in 1..=SAMPLES {
+            let distorted_px = farthest * step as f64 / SAMPLES as f64;
+            let ray = radially.ray(Vector2::new(distorted_px / focal_px, 0.0));
+            let alone = match projection {
+                LensProjection::Rectilinear => ray.x / ray.z,
+                LensProjection::Equidistant => ray.x.atan2(ray.z),
+            };
+            let r = alone * focal_px / unit_px;
+            let powers = Vector4::new(r.powi(4), r.powi(3), r * r, r);
+            normal += powers * powers.transpose();
+            right += powers * (distorted_px / unit_px);
+        }
+        let Some(inverse) = normal.try_inverse() else { return Self::pinhole(focal_px, stored) };
+        let fitted = inverse * right;
+        // With r = s / stretch the coefficients are to add up to 1.
+        let scaled = |stretch: f64| std::array::from_fn::<f64, 4, _>(|k| fitted[k] / stretch.powi(4 - k as i32));
+        let mut stretch = fitted[3].max(f64::MIN_POSITIVE);
+        for _ in 0..STEPS {
+            let terms = scaled(stretch);
+            let sum: f64 = terms.iter().sum();
+            let slope: f64 = (0..4).map(|k| -(4.0 - k as f64) * terms[k] / stretch).sum();
+            stretch -= (sum - 1.0) / slope;
+        }
+        let [a, b, c, _] = scaled(stretch);
+        let half = 0.5 * stored.width / (focal_px * stretch);
+        let (format, field_of_view) = match projection {
+            LensProjection::Rectilinear => (0, 2.0 * half.atan()),
+            LensProjection::Equidistant => (3, 2.0 * half),
+        };
+        // From the upright photograph back to the stored one.
+        let (sine, cosine) = stored.turn.sin_cos();
+        let [x, y] = lens.center_px;
+        Self { format, field_of_view, radial: [a, b, c], center_px: [x * cosine + y * sine, y * cosine - x * sine] }
+    }
 }
 
 /// Coefficients of r^2, r^4 and r^6 in Hugin's polynomial, by which it divides and whose constant is 1: fitted to the
@@ -167,6 +245,36 @@ mod tests {
             let found = Attitude::of(&level_from_camera.transpose());
             let error = (found.yaw - yaw).abs() + (found.pitch - pitch).abs() + (found.roll - roll).abs();
             assert!(error < 1e-12, "{found:?}");
+        }
+    }
+
+    /// Radii by Hugin's formula against the lens's own, all over the photograph.
+    #[test]
+    fn lenses_are_handed_on_to_a_fifth_of_a_pixel() {
+        let stored = StoredPicture { width: 800.0, height: 600.0, turn: FRAC_PI_2 };
+        for (projection, focal_px, k1, k2) in [
+            (LensProjection::Rectilinear, 670.0, -0.065, 0.012),
+            (LensProjection::Rectilinear, 670.0, 0.08, 0.0),
+            (LensProjection::Equidistant, 310.0, -0.015, 0.002),
+        ] {
+            let terms = LensTerms { projection, radial: [k1, k2, 0.0, 0.0], tangential: [0.0; 2] };
+            let record = LensRecord { terms, center_px: [5.0, 2.0] };
+            let HuginLens { format, field_of_view, radial: [a, b, c], center_px } =
+                HuginLens::of(&record, focal_px, &stored);
+            // The quarter turn took the stored picture's right to down: what is right in the upright one was up.
+            assert!((center_px[0] - 2.0).abs() < 1e-12 && (center_px[1] + 5.0).abs() < 1e-12, "{center_px:?}");
+            for step in 0..=20 {
+                let angle = f64::from(step) / 20.0 * (500.0_f64 / focal_px).atan();
+                let (hugin_focal, alone) = match format {
+                    0 => (400.0 / (field_of_view / 2.0).tan(), angle.tan()),
+                    _ => (800.0 / field_of_view, angle),
+                };
+                let r = hugin_focal * alone / 300.0;
+                let by_hugin = 300.0 * r * (a * r.powi(3) + b * r * r + c * r + 1.0 - a - b - c);
+                let ray = Vector3::new(angle.sin(), 0.0, angle.cos());
+                let by_lens = focal_px * Lens::new(terms).place(ray).expect("in front").x;
+                assert!((by_hugin - by_lens).abs() < 0.2, "{projection:?} {angle}: {by_hugin} {by_lens}");
+            }
         }
     }
 

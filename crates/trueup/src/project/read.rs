@@ -174,7 +174,7 @@ pub(crate) fn find_photograph(
     };
     let path = path.display().to_string();
     let mut found = source::scan(std::slice::from_ref(&path), options, context)?;
-    let Some(image) = found.images.pop() else {
+    let Some(image) = found.photographs.pop() else {
         return Err(found.rejected.first().map_or_else(
             || Error::input(&path, "it cannot be read", "Check the file and its permissions."),
             RejectedSource::to_error,

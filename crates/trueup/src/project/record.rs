@@ -5,7 +5,10 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use trueup_compose::exposure::{Correction, Response};
+use trueup_core::camera::Camera;
 use trueup_core::diagnostics::Diagnostic;
+use trueup_core::geometry::matrix_from_rows;
+use trueup_core::lens::{Lens, LensTerms};
 use trueup_core::matches::PairVerdict;
 use trueup_io::source::unique_names;
 
@@ -43,6 +46,16 @@ pub struct MeshRecord {
     pub target: Vec<[f64; 2]>,
 }
 
+/// A lens that is no pinhole. Its terms are in units of the focal length.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LensRecord {
+    /// Projection, radial and tangential terms.
+    #[serde(flatten)]
+    pub terms: LensTerms,
+    /// The principal point in pixels of the original photograph after orientation, from its middle.
+    pub center_px: [f64; 2],
+}
+
 /// What became of one photograph. The geometry of a left-out one is `None`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ImageRecord {
@@ -65,6 +78,9 @@ pub struct ImageRecord {
     pub component: Option<usize>,
     /// Focal length in pixels of the original photograph.
     pub focal_px: Option<f64>,
+    /// What the lens does beside that; nothing recorded of a pinhole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lens: Option<LensRecord>,
     /// Rows of the rotation from the levelled world (y down) to the camera.
     pub rotation: Option<[[f64; 3]; 3]>,
     /// The same as the photograph's own lines correct it, which projections are drawn by; `None` in files of programs that
@@ -203,6 +219,18 @@ impl ImageRecord {
     /// recorded.
     pub(crate) fn level_rotation(&self) -> Option<&[[f64; 3]; 3]> {
         self.upright_rotation.as_ref().or(self.rotation.as_ref())
+    }
+
+    /// The camera in the photograph's own pixels, with the rotation of these rows; `None` where no focal length is known.
+    pub fn camera(&self, camera_from_world: &[[f64; 3]; 3]) -> Option<Camera> {
+        let (width, height) = (self.width as f64, self.height as f64);
+        let pinhole = Camera::new(self.focal_px?, width, height, &matrix_from_rows(camera_from_world));
+        Some(match self.lens {
+            Some(LensRecord { terms, center_px: [x, y] }) => {
+                Camera { lens: Lens::new(terms), principal_point: [width / 2.0 + x, height / 2.0 + y], ..pinhole }
+            }
+            None => pinhole,
+        })
     }
 
     /// The file's name without folders; paths written on another system are understood.

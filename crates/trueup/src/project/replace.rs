@@ -38,19 +38,19 @@ pub(crate) fn other_photographs(
 ) -> Result<Vec<SourceImage>> {
     let folder_text = folder.display().to_string();
     let sources = source::scan(std::slice::from_ref(&folder_text), options, context)?;
-    if sources.images.is_empty() {
+    if sources.photographs.is_empty() {
         return Err(match sources.rejected.first() {
             Some(rejected) => rejected.to_error(),
             None => Error::input(folder_text, "it holds no photographs", "Give the folder that holds them."),
         });
     }
     let names: Vec<&str> = records.iter().map(|record| record.file_name()).collect();
-    let files: Vec<String> = sources.images.iter().map(|image| file_name(&image.path)).collect();
+    let files: Vec<String> = sources.photographs.iter().map(|image| file_name(&image.path)).collect();
     let chosen = choose(&names, &files);
     let found = records.iter().zip(chosen).map(|(record, choice)| {
         let missing = |reason: String| Error::input(record.file_name(), reason, "");
         let image = match choice {
-            Choice::File(position) => sources.images[position].clone(),
+            Choice::File(position) => sources.photographs[position].clone(),
             Choice::Several => return Err(missing(format!("several files in {folder_text} have its name"))),
             Choice::None => return Err(missing(why_none(record, &folder_text, &sources.rejected))),
         };

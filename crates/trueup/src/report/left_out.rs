@@ -17,10 +17,10 @@ pub(crate) struct LeftOut {
 /// Why photograph `photograph` is not joined to the stitched component `component`.
 ///
 /// `names` are the photographs' names, `pairs` every pair tried.
-pub(crate) fn explain(picture: usize, component: &[usize], pairs: &[PairMatches], names: &[String]) -> LeftOut {
-    let touching = |pair: &&PairMatches| pair.a == picture || pair.b == picture;
+pub(crate) fn explain(photograph: usize, component: &[usize], pairs: &[PairMatches], names: &[String]) -> LeftOut {
+    let touching = |pair: &&PairMatches| pair.a == photograph || pair.b == photograph;
     if let Some(joined) = pairs.iter().filter(touching).find(|pair| pair.verdict.is_joined()) {
-        let neighbor = other(joined, picture);
+        let neighbor = other(joined, photograph);
         return LeftOut {
             code: "other-panorama",
             reason: format!("it belongs to another panorama, with {}", names[neighbor]),
@@ -30,12 +30,12 @@ pub(crate) fn explain(picture: usize, component: &[usize], pairs: &[PairMatches]
     let best = pairs
         .iter()
         .filter(touching)
-        .filter(|pair| component.is_empty() || component.contains(&other(pair, picture)))
+        .filter(|pair| component.is_empty() || component.contains(&other(pair, photograph)))
         .max_by(|one, two| strength(one).total_cmp(&strength(two)));
     match best {
         Some(pair) if pair.putative > 0 => LeftOut {
             code: "no-overlap",
-            reason: format!("no overlap found: best neighbor {}, {}", names[other(pair, picture)], counts(pair)),
+            reason: format!("no overlap found: best neighbor {}, {}", names[other(pair, photograph)], counts(pair)),
             hint: hint(pair).to_owned(),
         },
         _ => LeftOut {
@@ -72,8 +72,8 @@ fn hint(pair: &PairMatches) -> &'static str {
     }
 }
 
-fn other(pair: &PairMatches, picture: usize) -> usize {
-    if pair.a == picture { pair.b } else { pair.a }
+fn other(pair: &PairMatches, photograph: usize) -> usize {
+    if pair.a == photograph { pair.b } else { pair.a }
 }
 
 /// Name, reason and hint of an input that cannot be used.

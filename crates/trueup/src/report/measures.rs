@@ -3,9 +3,10 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_align::metrics::{
-    self, MatchedPair, Outside, Straightness, Uprightness, VerticalLines, VerticalLinesInput, folded_cells,
+    self, MatchedPair, Outside, Straightness, Uprightness, VerticalLinesInput, expected_magnitude, folded_cells,
     mean_relative_turn, rectangle_rotation,
 };
+use trueup_align::similarity::{EstimatedRoll, RollsInput, estimated_rolls};
 use trueup_compose::layout::CanvasLayout;
 use trueup_core::matches::PointMatch;
 use trueup_core::mesh::GridMesh;
@@ -16,13 +17,19 @@ use crate::pipeline::align::component::Component;
 /// The paper prints LD in hundredths.
 pub(crate) const HUNDREDTHS: f64 = 100.0;
 
+/// A photograph whose lean is less sure than this, half the width of its 95 % interval, has no figure: a lean of a degree is
+/// seen. Degrees.
+const WIDEST_DEG: f64 = 1.0;
+/// Fewer photographs have no uprightness in common.
+const FEWEST: usize = 2;
+
 /// Measures of a panorama that need no truth. Angles in degrees, positive clockwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Measures {
-    /// Directions of the vertical lines; `None` if no photograph has enough of them.
+    /// How upright it is by all its lines; `None` if fewer than two photographs are certain.
     pub upright: Option<UprightMeasures>,
-    /// Estimate of the paper's GDIC: each photograph's true direction is taken from its own vertical lines' vanishing
-    /// direction. Over the photographs that are certain; `None` with fewer than two.
+    /// Estimate of the paper's GDIC, with each photograph's roll by the lines of all of them in place of its true angle.
+    /// Over the photographs that are certain; `None` with fewer than two.
     pub estimated_gdic_deg: Option<f64>,
     /// How far apart matched points land; `None` without matches.
     pub reprojection: Option<ReprojectionMeasures>,
@@ -35,16 +42,21 @@ pub struct Measures {
     /// Cells that are folded, in all photographs.
     pub folds: usize,
     /// Each photograph's own figures, in the order of the photographs used.
-    pub pictures: Vec<PhotographMeasures>,
+    #[serde(rename = "pictures")]
+    pub photographs: Vec<PhotographMeasures>,
 }
 
-/// Directions of the vertical lines in the panorama, over the photographs that have enough of them.
+/// How upright the panorama is by the lines of all its photographs, over those whose lean is certain.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct UprightMeasures {
-    /// Mean over the photographs of |mean lean of the photograph's vertical lines|.
+    /// Mean over the photographs of |lean|: its expected value, uncertainty and all.
     pub mean_deg: f64,
-    /// The largest such lean.
+    /// The largest |lean|, as estimated.
     pub max_deg: f64,
+    /// Every single lean is smaller with a probability of 95 %: the largest of |lean| and half its interval together.
+    /// `None` in projects of earlier versions.
+    #[serde(default)]
+    pub within_deg: Option<f64>,
     /// Photographs that are certain.
     pub measured: usize,
 }
@@ -86,21 +98,39 @@ pub struct BentLine {
     pub off_px: f64,
 }
 
-/// What a photograph's vertical lines say of it.
+/// How a photograph stands by the lines of all of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PhotographMeasures {
     /// Path of the photograph.
     pub path: String,
-    /// Vertical lines found.
+    /// Its own vertical lines.
     pub vertical_lines: usize,
-    /// Their mean lean in the panorama; `None` with fewer than two, or straight up or down.
+    /// By how much what is vertical in its middle leans clockwise in the panorama; `None` if the lines of all
+    /// photographs do not tell, or straight up or down.
     pub lean_deg: Option<f64>,
     /// Standard error of the lean.
     pub standard_error_deg: Option<f64>,
-    /// Angle in the photograph from its down to the vertical, by the lines' vanishing direction.
+    /// Half the interval around `lean_deg` that holds the true lean with a probability of 95 %. `None` also in projects of
+    /// earlier versions.
+    #[serde(default)]
+    pub within_deg: Option<f64>,
+    /// Angle in the photograph from its down to the vertical.
     pub gamma_deg: Option<f64>,
-    /// Whether there are enough lines, and they agree.
+    /// Whether the lean is sure to a degree.
     pub certain: bool,
+}
+
+/// A photograph's lean in the panorama and the roll it follows from. Radians.
+#[derive(Debug, Clone, Copy)]
+struct Lean {
+    lean: f64,
+    by: EstimatedRoll,
+}
+
+impl Lean {
+    fn is_certain(&self) -> bool {
+        self.by.within <= WIDEST_DEG.to_radians()
+    }
 }
 
 /// Measures a panorama whose grids lie on the canvas of `layout`.
@@ -113,9 +143,9 @@ pub(crate) fn run(component: &Component, geometry: &Geometry, layout: &CanvasLay
         .zip(&component.frames)
         .map(|(&mesh, frame)| GridMesh { width: frame.width, height: frame.height, ..mesh.clone() })
         .collect();
-    let verticals = vertical_lines(component, geometry, &working);
-    let certain: Vec<Option<VerticalLines>> =
-        verticals.iter().map(|found| found.filter(|found| found.is_certain())).collect();
+    let leans = leans(component, geometry, &working);
+    let certain: Vec<Option<Lean>> = leans.iter().map(|one| one.filter(Lean::is_certain)).collect();
+    let vertical_lines = vertical_lines(component, geometry);
     let distortion = metrics::local_distortion(&working, Outside::Center, period);
     Measures {
         upright: upright(&certain),
@@ -125,47 +155,72 @@ pub(crate) fn run(component: &Component, geometry: &Geometry, layout: &CanvasLay
         ld: HUNDREDTHS * distortion.worst,
         ld_mean: HUNDREDTHS * distortion.mean,
         folds: working.iter().map(folded_cells).sum(),
-        pictures: (0..working.len())
+        photographs: (0..working.len())
             .map(|k| PhotographMeasures {
                 path: component.images[k].path.display().to_string(),
-                vertical_lines: verticals[k].map_or(0, |found| found.lines),
-                lean_deg: verticals[k].map(|found| found.lean.to_degrees()),
-                standard_error_deg: verticals[k].map(|found| found.standard_error.to_degrees()),
-                gamma_deg: verticals[k].map(|found| found.gamma.to_degrees()),
+                vertical_lines: vertical_lines[k],
+                lean_deg: leans[k].map(|one| one.lean.to_degrees()),
+                standard_error_deg: leans[k].map(|one| one.by.standard_error.to_degrees()),
+                within_deg: leans[k].map(|one| one.by.within.to_degrees()),
+                gamma_deg: leans[k].map(|one| one.by.roll.to_degrees()),
                 certain: certain[k].is_some(),
             })
             .collect(),
     }
 }
 
-fn vertical_lines(component: &Component, geometry: &Geometry, working: &[GridMesh]) -> Vec<Option<VerticalLines>> {
+/// How many vertical lines each photograph has.
+fn vertical_lines(component: &Component, geometry: &Geometry) -> Vec<usize> {
     let down = geometry.prior.level_from_world().row(1).transpose();
-    (0..working.len())
-        .into_par_iter()
-        .map(|k| {
-            let camera = &geometry.cameras.cameras[k];
-            let picture = VerticalLinesInput {
-                lines: &component.lines[k],
-                frame: &component.frames[k],
-                focal_px: camera.focal_px,
-                expected_down: camera.rotation() * down,
-            };
-            metrics::vertical_lines(&picture, &working[k])
-        })
-        .collect()
+    let count = |k: usize| {
+        let camera = &geometry.cameras.cameras[k];
+        let photograph = VerticalLinesInput {
+            lines: &component.lines[k],
+            frame: &component.frames[k],
+            camera,
+            expected_down: camera.rotation() * down,
+        };
+        metrics::vertical_segments(&photograph).len()
+    };
+    (0..component.lines.len()).into_par_iter().map(count).collect()
 }
 
-fn upright(certain: &[Option<VerticalLines>]) -> Option<UprightMeasures> {
-    let leans: Vec<f64> = certain.iter().flatten().map(|found| found.lean).collect();
-    let measured = leans.len();
-    let all = Uprightness::of(leans)?;
-    Some(UprightMeasures { mean_deg: all.mean.to_degrees(), max_deg: all.largest.to_degrees(), measured })
+/// The lean of every photograph that the lines of all of them tell.
+fn leans(component: &Component, geometry: &Geometry, working: &[GridMesh]) -> Vec<Option<Lean>> {
+    let input = RollsInput {
+        cameras: &geometry.cameras.cameras,
+        edges: &geometry.coinciding,
+        lines: &component.lines,
+        frames: &component.frames,
+        prior: &geometry.prior,
+    };
+    let Some(rolls) = estimated_rolls(&input) else { return vec![None; working.len()] };
+    let lean = |(mesh, roll): (&GridMesh, Option<EstimatedRoll>)| {
+        let by = roll?;
+        let off = Uprightness::against(std::slice::from_ref(mesh), &[by.roll])?;
+        Some(Lean { lean: off.photographs[0], by })
+    };
+    working.iter().zip(rolls).map(lean).collect()
+}
+
+fn upright(certain: &[Option<Lean>]) -> Option<UprightMeasures> {
+    let found: Vec<Lean> = certain.iter().flatten().copied().collect();
+    let measured = found.len();
+    let all = Uprightness::of(found.iter().map(|one| one.lean).collect()).filter(|_| measured >= FEWEST)?;
+    let expected: f64 = found.iter().map(|one| expected_magnitude(one.lean, one.by.standard_error)).sum();
+    let within = found.iter().fold(0.0, |widest: f64, one| widest.max(one.lean.abs() + one.by.within));
+    Some(UprightMeasures {
+        mean_deg: (expected / measured as f64).to_degrees(),
+        max_deg: all.largest.to_degrees(),
+        within_deg: Some(within.to_degrees()),
+        measured,
+    })
 }
 
 /// GDIC over the photographs that are certain, with the reference among them or else the first.
-fn estimated_inconsistency(certain: &[Option<VerticalLines>], meshes: &[GridMesh], reference: usize) -> Option<f64> {
+fn estimated_inconsistency(certain: &[Option<Lean>], meshes: &[GridMesh], reference: usize) -> Option<f64> {
     let known: Vec<(usize, f64)> =
-        certain.iter().enumerate().filter_map(|(k, found)| Some((k, found.as_ref()?.gamma))).collect();
+        certain.iter().enumerate().filter_map(|(k, found)| Some((k, found.as_ref()?.by.roll))).collect();
     let rotations: Vec<f64> = known.iter().map(|&(k, _)| rectangle_rotation(&meshes[k])).collect();
     let gammas: Vec<f64> = known.iter().map(|&(_, gamma)| gamma).collect();
     let reference = known.iter().position(|&(k, _)| k == reference).unwrap_or(0);
@@ -182,8 +237,8 @@ fn reprojection(
         .coinciding
         .iter()
         .map(|pair| {
-            let full = |point: [f64; 2], picture: usize| {
-                point.map(|coordinate| coordinate / component.frames[picture].working_from_full)
+            let full = |point: [f64; 2], photograph: usize| {
+                point.map(|coordinate| coordinate / component.frames[photograph].working_from_full)
             };
             let matches = pair
                 .inliers

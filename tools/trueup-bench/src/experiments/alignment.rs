@@ -2,7 +2,10 @@
 
 use trueup::Result;
 
-use crate::methods::{ComparedMethod, Family, VPG, methods_of};
+use crate::methods::{
+    ComparedMethod, Family, GSP_3D, GSP_3D_PUBLISHED, VPG, VPG_LINES_PUBLISHED, VPG_PIXELS_PUBLISHED, VPG_PUBLISHED,
+    method, methods_of,
+};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::Results;
 use crate::sets::{Catalogue, SetSpec};
@@ -15,10 +18,10 @@ pub(crate) const NAME: &str = "alignment";
 /// Larger sets are left out: their pixels take minutes to compare and say the same.
 const MAX_PHOTOGRAPHS: usize = 16;
 
-/// Every method on the study's sets of moderate size and on the given ones, with their pixels compared.
+/// Every method on the study's sets of moderate size, with their pixels compared.
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     let mut trials = Vec::new();
-    for set in catalogue.study.iter().chain(&catalogue.given) {
+    for set in &catalogue.study {
         if set.photograph_count()? <= MAX_PHOTOGRAPHS {
             let of_method = |one: &ComparedMethod| Trial::new(NAME, &set.name, one.name, &one.overrides());
             trials.extend(methods().map(|one| Trial { pixels: true, ..of_method(one) }));
@@ -27,42 +30,57 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     Ok(trials)
 }
 
-/// The methods of the tables: each prior, and what bends the mesh further.
+/// The methods of the table: as published and by default, each with what bends the mesh further.
 fn methods() -> impl Iterator<Item = &'static ComparedMethod> {
-    methods_of(Family::Prior).chain(methods_of(Family::Alignment))
+    let plain = [VPG_PUBLISHED, GSP_3D_PUBLISHED, VPG, GSP_3D].into_iter().filter_map(method);
+    plain.chain(methods_of(Family::Alignment))
 }
 
 /// GDIC that alignment may cost, degrees: less than the rectangle in GDIC errs by itself.
 const MAX_COST_DEG: f64 = 0.2;
+/// Share by which alignment is to lower the error; the paper shows one set, where it falls by more.
+const LOWERED_BY: f64 = 0.15;
+
+/// What aligns further lowers the error and leaves the direction alone: claimed of the published forms.
+const CLAIMED: [(&str, &str); 2] =
+    [("alignment-lines", VPG_LINES_PUBLISHED), ("alignment-pixels", VPG_PIXELS_PUBLISHED)];
 
 /// What aligns further lowers the error and leaves the direction alone.
 pub(crate) fn claims(results: &Results) -> Vec<Claim> {
     let sets = &results.catalogue.study;
     let value = |name, measure| mean(&results.values_of_all(NAME, sets, name, measure));
-    let of_method = |one: &ComparedMethod| {
-        let error = value(one.name, "ncc_mse").zip(value(VPG, "ncc_mse"));
-        let gdic = value(one.name, "gdic_deg").zip(value(VPG, "gdic_deg"));
-        let verdict =
-            error.zip(gdic).map(|((error, before), (gdic, own))| error < before && (gdic - own).abs() <= MAX_COST_DEG);
+    let of_method = |(id, name): (&'static str, &'static str)| {
+        let error = value(name, "ncc_mse").zip(value(VPG_PUBLISHED, "ncc_mse"));
+        let gdic = value(name, "gdic_deg").zip(value(VPG_PUBLISHED, "gdic_deg"));
+        let verdict = error.zip(gdic).map(|((error, before), (gdic, own))| {
+            error <= (1.0 - LOWERED_BY) * before && (gdic - own).abs() <= MAX_COST_DEG
+        });
+        let lower = error.map(|(error, before)| 100.0 * (1.0 - error / before));
         let (error, before) = error.unzip();
         let (gdic, own) = gdic.unzip();
         Claim {
-            text: format!("`{}` aligns better than VPG alone and turns the photographs alike.", one.name),
+            id,
+            text: format!(
+                "`{name}` aligns better than VPG alone, by {:.0} % or more, and turns the photographs alike.",
+                100.0 * LOWERED_BY
+            ),
             holds: verdict,
             evidence: format!(
-                "Mean NCC MSE {} against {}, GDIC {} against {} degrees (alike means within {MAX_COST_DEG}).",
+                "Mean NCC MSE {} against {}, {} % lower; GDIC {} against {} degrees (alike means within {MAX_COST_DEG}).",
                 number(error, 4),
                 number(before, 4),
+                number(lower, 1),
                 number(gdic, 2),
                 number(own, 2)
             ),
-            brief: format!("{} NCC MSE {} against {}", one.name, number(error, 4), number(before, 4)),
+            reason: "",
+            brief: format!("{name} NCC MSE {} % lower", number(lower, 0)),
         }
     };
-    methods_of(Family::Alignment).map(of_method).collect()
+    CLAIMED.map(of_method).into()
 }
 
-/// A table per family of sets.
+/// The table.
 pub(crate) fn section(results: &Results) -> Section {
     let mut section = Section::new(NAME, "T7: alignment against direction");
     section.say(
@@ -73,18 +91,18 @@ pub(crate) fn section(results: &Results) -> Section {
          points, source pixels.",
     );
     section.blocks.extend(claims(results).into_iter().map(Block::Claim));
-    let caption = format!("Means over the study's sets of at most {MAX_PHOTOGRAPHS} photographs.");
-    section.blocks.push(Block::Table(table(results, &results.catalogue.study, "t7-alignment", &caption)));
-    if !results.catalogue.given.is_empty() {
-        let caption = format!("Means over the given sets of at most {MAX_PHOTOGRAPHS} photographs.");
-        section.blocks.push(Block::Table(table(results, &results.catalogue.given, "t7-given", &caption)));
-    }
+    section.say(
+        "Published forms leave outlines free (`mesh.outline_weight=0`), as DFW and GCPW do; by default they are held, so that \
+         a panorama keeps its borders.",
+    );
+    section.blocks.push(Block::Table(table(results, &results.catalogue.study)));
     section
 }
 
-fn table(results: &Results, sets: &[SetSpec], id: &str, caption: &str) -> Table {
+fn table(results: &Results, sets: &[SetSpec]) -> Table {
+    let caption = format!("Means over the study's sets of at most {MAX_PHOTOGRAPHS} photographs.");
     let columns = ["method", "NCC MSE", "gray MSE", "PSNR dB", "SSIM", "matches px", "GDIC deg", "LD x 1e-2", "folds"];
-    let mut table = Table::new(id, caption, columns);
+    let mut table = Table::new("t7-alignment", &caption, columns);
     for one in methods() {
         let value = |measure| mean(&results.values_of_all(NAME, sets, one.name, measure));
         table.push([

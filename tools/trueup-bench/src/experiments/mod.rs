@@ -2,15 +2,18 @@
 
 pub(crate) mod ablations;
 pub(crate) mod alignment;
+pub(crate) mod estimated_gdic;
 pub(crate) mod few_photographs;
 pub(crate) mod focal_error;
 pub(crate) mod gate;
 mod grid;
 pub(crate) mod methods_compared;
 mod paper_figures;
+pub(crate) mod photographs;
 pub(crate) mod pitch_sweep;
 pub(crate) mod reference_choice;
 pub(crate) mod robust_scheme;
+pub(crate) mod rolled_pairs;
 pub(crate) mod runtime;
 pub(crate) mod warps_compared;
 
@@ -36,7 +39,13 @@ pub(crate) struct Experiment {
 
 /// Every experiment whose trials are run side by side, in the order of the report. Times are taken apart from them
 /// ([`runtime`]).
-pub(crate) const EXPERIMENTS: [Experiment; 10] = [
+pub(crate) const EXPERIMENTS: [Experiment; 13] = [
+    Experiment {
+        name: rolled_pairs::NAME,
+        trials: rolled_pairs::trials,
+        section: rolled_pairs::section,
+        claims: rolled_pairs::claims,
+    },
     Experiment {
         name: warps_compared::NAME,
         trials: warps_compared::trials,
@@ -68,6 +77,18 @@ pub(crate) const EXPERIMENTS: [Experiment; 10] = [
         section: alignment::section,
         claims: alignment::claims,
     },
+    Experiment {
+        name: photographs::NAME,
+        trials: photographs::trials,
+        section: photographs::section,
+        claims: no_claims,
+    },
+    Experiment {
+        name: estimated_gdic::NAME,
+        trials: estimated_gdic::trials,
+        section: estimated_gdic::section,
+        claims: estimated_gdic::claims,
+    },
     Experiment { name: ablations::NAME, trials: ablations::trials, section: ablations::section, claims: no_claims },
     Experiment {
         name: pitch_sweep::NAME,
@@ -89,9 +110,46 @@ pub(crate) const EXPERIMENTS: [Experiment; 10] = [
     },
 ];
 
-/// The experiments that test the three claims of the method: those of a quick run.
-pub(crate) const CLAIM_EXPERIMENTS: [&str; 3] = [robust_scheme::NAME, reference_choice::NAME, gate::NAME];
+/// The experiments of a quick run.
+pub(crate) const QUICK_EXPERIMENTS: [&str; 4] =
+    [methods_compared::NAME, robust_scheme::NAME, reference_choice::NAME, gate::NAME];
+
+/// The claims that are expected to hold on the few rough sets of a quick run ([`Claim::id`]): if one of them does not, a
+/// change broke something. The others are tried by the whole run alone: a handful of sets says little of them.
+pub(crate) const QUICK_CLAIMS: [&str; 7] = [
+    "methods-distortion",
+    "default-direction",
+    "default-distortion",
+    "robust-scheme",
+    "reference-vpg",
+    "reference-gsp",
+    "gate",
+];
 
 fn no_claims(_: &Results) -> Vec<Claim> {
     Vec::new()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sets::GivenFolders;
+
+    /// A method that fixes options refuses other values of them: an experiment that asks for one would end the whole run.
+    #[test]
+    fn every_trial_of_every_experiment_has_options_that_can_be() {
+        for catalogue in [Catalogue::full(&GivenFolders::default()).expect("no folders"), Catalogue::quick()] {
+            let mut work = std::collections::BTreeSet::new();
+            for experiment in &EXPERIMENTS {
+                for trial in (experiment.trials)(&catalogue).expect("trials") {
+                    let said = |error| format!("{} {}: {error}", experiment.name, trial.variant);
+                    // Options repeat over sets and seeds.
+                    if work.insert(trial.overrides.clone()) {
+                        trial.options().map_err(said).expect("options that can be");
+                    }
+                }
+            }
+            assert!(work.len() > 10, "{}", work.len());
+        }
+    }
 }

@@ -91,6 +91,37 @@ pub(super) const NOISE: [PaperNoise; 3] = [
     },
 ];
 
+/// A panorama of the paper's gallery (its table 4).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct GalleryPanorama {
+    /// Its letter.
+    pub letter: char,
+    /// How many photographs it was made of.
+    pub photographs: usize,
+    /// Their divergence.
+    pub divergence: f64,
+}
+
+const fn panorama(letter: char, photographs: usize, divergence: f64) -> GalleryPanorama {
+    GalleryPanorama { letter, photographs, divergence }
+}
+
+/// The gallery, (a) to (h) taken for Manhattan scenes and (i) to (l) not.
+pub(super) const GALLERY: [GalleryPanorama; 12] = [
+    panorama('a', 2, 0.0204),
+    panorama('b', 4, 0.0019),
+    panorama('c', 5, 0.0068),
+    panorama('d', 6, 0.0005),
+    panorama('e', 11, 0.0740),
+    panorama('f', 3, 0.0002),
+    panorama('g', 5, 0.0114),
+    panorama('h', 21, 0.0781),
+    panorama('i', 10, 0.1917),
+    panorama('j', 5, 0.1291),
+    panorama('k', 7, 0.1464),
+    panorama('l', 15, 0.2022),
+];
+
 /// Divergences that the paper's gallery states for Manhattan scenes.
 pub(super) const MANHATTAN_DIVERGENCES: [f64; 8] = [0.0204, 0.0019, 0.0068, 0.0005, 0.0740, 0.0002, 0.0114, 0.0781];
 /// Divergences that it states for others.

@@ -4,7 +4,7 @@ use trueup::Result;
 
 use super::grid::{GridRow, table};
 use super::paper_figures::NOISE;
-use crate::published_forms::PUBLISHED_MESH;
+use crate::published_forms::VPG_AS_PUBLISHED;
 use crate::report::charts::{Chart, Point, Series, SeriesMark};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::{Results, short_name};
@@ -18,42 +18,41 @@ pub(crate) const NAME: &str = "robust-scheme";
 /// Shares of the vanishing directions that are replaced by random ones.
 const NOISE_SHARES: [f64; 3] = [0.0, 0.1, 0.2];
 
-/// More pictures than this make a set large: its many pictures average the noise within one seed, and take their time.
-const MANY_PICTURES: usize = 20;
+/// More photographs than this make a set large: its many photographs average the noise within one seed, and take their time.
+const MANY_PHOTOGRAPHS: usize = 20;
 /// Seeds for large sets.
-const SEEDS_OF_LARGE_SETS: u64 = 3;
-/// Seeds for sets that are given, of which there may be many.
-const SEEDS_OF_GIVEN_SETS: u64 = 1;
+const SEEDS_OF_LARGE_SETS: u64 = 2;
+/// Without noise nothing is drawn.
+const SEEDS_WITHOUT_NOISE: u64 = 1;
+/// Mean GDIC that counts as straight under the most noise, degrees: the paper's own sets have 0.56 without their one
+/// outlier, 0.90 with it.
+const STRAIGHT_DEG: f64 = 0.8;
+/// The scheme is to leave at most this share of what noise does without it; in the paper 0.29.
+const SHARE_LEFT: f64 = 1.0 / 3.0;
 
 const WITHOUT: &str = "without";
 const WITH: &str = "with";
 const DEFAULT: &str = "default";
 
-/// The gate is held open so that the scheme itself is seen, and what goes beyond the paper is off.
-const AS_PUBLISHED: [&str; 5] = [
-    "similarity.gate=paper",
-    "similarity.max_divergence=1000",
-    "similarity.max_divergence_few=1000",
-    "similarity.guided_redetection=false",
-    "similarity.joint_refinement=false",
-];
+/// The gate is held open so that the scheme itself is seen.
+const GATE_OPEN: [&str; 2] = ["similarity.max_divergence=1000", "similarity.max_divergence_few=1000"];
 const NO_SCHEME: [&str; 2] = ["similarity.rejection=1e9", "similarity.path_voting=false"];
 
 fn variant(scheme: &str, share: f64) -> String {
     format!("{scheme}, {:.0} %", 100.0 * share)
 }
 
-/// Each scheme at each noise with each seed, on the study's sets and the given ones.
+/// Each scheme at each noise with each seed, on the study's sets.
 pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
-    let with = [&PUBLISHED_MESH[..], &AS_PUBLISHED].concat();
+    let with = [&VPG_AS_PUBLISHED[..], &GATE_OPEN].concat();
     let without = [&with[..], &NO_SCHEME].concat();
     let schemes: [(&str, &[&str]); 3] = [(WITHOUT, &without), (WITH, &with), (DEFAULT, &[])];
     let mut trials = Vec::new();
-    let study = catalogue.study.iter().map(|set| (set, catalogue.seeds));
-    let given = catalogue.given.iter().map(|set| (set, catalogue.seeds.min(SEEDS_OF_GIVEN_SETS)));
-    for (set, seeds) in study.chain(given) {
-        let seeds = if set.photograph_count()? > MANY_PICTURES { seeds.min(SEEDS_OF_LARGE_SETS) } else { seeds };
+    for set in &catalogue.study {
+        let large = set.photograph_count()? > MANY_PHOTOGRAPHS;
+        let noisy = if large { catalogue.seeds.min(SEEDS_OF_LARGE_SETS) } else { catalogue.seeds };
         for share in NOISE_SHARES {
+            let seeds = if share > 0.0 { noisy } else { SEEDS_WITHOUT_NOISE };
             for (name, overrides) in schemes {
                 for seed in 0..seeds {
                     let trial = Trial::new(NAME, &set.name, &variant(name, share), overrides);
@@ -65,37 +64,57 @@ pub(crate) fn trials(catalogue: &Catalogue) -> Result<Vec<Trial>> {
     Ok(trials)
 }
 
-/// The scheme lowers GDIC under noise.
+/// Mean over the study's sets of a scheme's mean GDIC over the seeds, degrees.
+fn mean_gdic(results: &Results, scheme: &str, share: f64) -> Option<f64> {
+    let of_set = |set: &SetSpec| mean(&results.values(NAME, &set.name, &variant(scheme, share), "gdic_deg"));
+    mean(&results.catalogue.study.iter().filter_map(of_set).collect::<Vec<f64>>())
+}
+
+/// The scheme takes away what noise does, and the panorama stays straight.
 pub(crate) fn claims(results: &Results) -> Vec<Claim> {
     let share = NOISE_SHARES[NOISE_SHARES.len() - 1];
-    let value = |scheme| {
-        let values = results.values_of_all(NAME, &results.catalogue.study, &variant(scheme, share), "gdic_deg");
-        mean(&values)
-    };
-    let (with, without) = (value(WITH), value(WITHOUT));
+    let [with, without, default] = [WITH, WITHOUT, DEFAULT].map(|scheme| mean_gdic(results, scheme, share));
+    let clean = mean_gdic(results, WITH, 0.0);
     let evidence = format!(
-        "Mean GDIC at {:.0} % replaced vanishing points: {} degrees with the scheme, {} without, {} by default.",
+        "Mean GDIC at {:.0} % replaced vanishing points: {} degrees with the scheme, {} without, {} by default; without noise {} \
+         with the scheme",
         100.0 * share,
         number(with, 2),
         number(without, 2),
-        number(value(DEFAULT), 2)
+        number(default, 2),
+        number(clean, 2)
     );
-    vec![Claim {
-        text: "Outlier rejection and path voting keep the panorama straight when vanishing points are wrong."
-            .to_owned(),
-        holds: with.zip(without).map(|(with, without)| with < without),
-        evidence,
-        brief: format!("robust {} < {} deg at {:.0} %", number(with, 2), number(without, 2), 100.0 * share),
-    }]
+    vec![
+        Claim {
+            id: "robust-scheme",
+            text: "When vanishing points are wrong, outlier rejection and path voting leave at most a third of what that does \
+                   without them."
+                .to_owned(),
+            holds: with.zip(without).map(|(with, without)| with <= SHARE_LEFT * without),
+            evidence: format!("{evidence} (the paper's: 0.90 and 3.13)."),
+            reason: "",
+            brief: format!("robust {} of {} deg at {:.0} %", number(with, 2), number(without, 2), 100.0 * share),
+        },
+        Claim {
+            id: "robust-straight",
+            text: "With them, the panorama stays straight when vanishing points are wrong.".to_owned(),
+            holds: with.map(|with| with <= STRAIGHT_DEG),
+            evidence: format!("{evidence} (straight: at most {STRAIGHT_DEG})."),
+            reason: "What is left is there without noise as well: the published mesh gives each photograph one similarity, and \
+                     GDIC takes the smallest rectangle around its warped grid, which perspective turns. The turns that the prior \
+                     wants, in the table below, are free of both.",
+            brief: format!("straight {} deg", number(with, 2)),
+        },
+    ]
 }
 
 /// Tables and bars.
 pub(crate) fn section(results: &Results) -> Section {
     let mut section = Section::new(NAME, "T3: the robust scheme under noise");
     section.say(format!(
-        "Every vanishing direction of every picture is replaced by a random one with the stated probability, {} seeds each \
-         ({SEEDS_OF_LARGE_SETS} for sets of more than {MANY_PICTURES} pictures, {SEEDS_OF_GIVEN_SETS} for given sets). \
-         `with` and `without` are the paper's scheme (rejection at tau, path voting psi) on the mesh as published, the gate held \
+        "Every vanishing direction of every photograph is replaced by a random one with the stated probability, {} seeds each \
+         ({SEEDS_OF_LARGE_SETS} for sets of more than {MANY_PHOTOGRAPHS} photographs). \
+         `with` and `without` are the method as published with its scheme (rejection at tau, path voting psi) and without, the gate held \
          open; `default` is the whole method with its gate, its search for directions near the common ones and its joint \
          refinement. Means and standard deviations over the seeds.",
         results.catalogue.seeds
@@ -116,19 +135,11 @@ pub(crate) fn section(results: &Results) -> Section {
         "GDIC at 20 % noise per set: mean over the seeds, the thin lines reach one standard deviation to both sides.",
         bars(results, sets, highest, "gdic_deg", "GDIC, degrees"),
     );
-    section.blocks.push(Block::Table(means(results, sets, "t3-means", "Means over the study's sets.")));
+    section.blocks.push(Block::Table(means(results, sets)));
     section.draw(
         "Error of the turns that the prior wants, at 20 % noise: the same without mesh and rectangle.",
         bars(results, sets, highest, "theta_error_deg", "theta error, degrees"),
     );
-    let given = &results.catalogue.given;
-    match given.is_empty() {
-        true => section.blocks.push(Block::Skipped("sets cut from panoramas: no data given".to_owned())),
-        false => {
-            let caption = format!("Means over {} given sets.", given.len());
-            section.blocks.push(Block::Table(means(results, given, "t3-given", &caption)));
-        }
-    }
     section
 }
 
@@ -138,10 +149,10 @@ fn grid_rows(results: &Results, sets: &[SetSpec], share: f64, measure: &str) -> 
         .into()
 }
 
-fn means(results: &Results, sets: &[SetSpec], id: &str, caption: &str) -> Table {
+fn means(results: &Results, sets: &[SetSpec]) -> Table {
     let columns =
         ["scheme", "noise", "GDIC deg", "theta error deg", "theta error, worst deg", "upright deg", "guided %"];
-    let mut table = Table::new(id, caption, columns);
+    let mut table = Table::new("t3-means", "Means over the study's sets.", columns);
     for share in NOISE_SHARES {
         for scheme in [WITHOUT, WITH, DEFAULT] {
             let values = |measure| results.values_of_all(NAME, sets, &variant(scheme, share), measure);

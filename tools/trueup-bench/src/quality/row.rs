@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use trueup::{Error, Evaluation, Measures, Project, Result, write_atomically};
+use trueup::{Error, Evaluation, Measures, Project, Result, names_photograph, write_atomically};
 
 use super::child::MeasuredStitch;
 use super::discover::{Part, StitchSet};
@@ -208,15 +208,10 @@ fn guided(project: &Project) -> &'static str {
     }
 }
 
-/// Files in a folder that look like photographs, for sets that could not be stitched.
+/// Files in a folder that are named like photographs, for sets that could not be stitched.
 fn photographs_in(folder: &Path) -> Result<usize> {
-    const EXTENSIONS: [&str; 6] = ["jpg", "jpeg", "png", "tif", "tiff", "webp"];
     let entries = fs::read_dir(folder).map_err(|error| Error::io("reading the folder", folder, error))?;
-    let is_photograph = |path: &Path| {
-        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        EXTENSIONS.contains(&extension.as_str())
-    };
-    Ok(entries.filter_map(std::result::Result::ok).filter(|entry| is_photograph(&entry.path())).count())
+    Ok(entries.filter_map(std::result::Result::ok).filter(|entry| names_photograph(&entry.path())).count())
 }
 
 /// Writes rows as CSV.

@@ -33,6 +33,8 @@ pub(crate) enum Block {
     Drawing(ReportDrawing),
     /// A claim and whether it holds.
     Claim(Claim),
+    /// Pictures beside each other, in files beside the report.
+    Pictures(ReportPictures),
     /// Something that was not run, and why.
     Skipped(String),
 }
@@ -68,15 +70,37 @@ pub(crate) struct ReportDrawing {
     pub svg: String,
 }
 
+/// Pictures with their words.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ReportPictures {
+    /// What they show.
+    pub caption: String,
+    /// The pictures, in order.
+    pub pictures: Vec<ReportPicture>,
+}
+
+/// A picture in a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ReportPicture {
+    /// The file, seen from the report's folder, with `/` between folders.
+    pub file: String,
+    /// What it shows, in a few words.
+    pub words: String,
+}
+
 /// A claim about the method and whether our figures bear it out.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Claim {
+    /// Its name in the list of those that a quick run expects to hold.
+    pub id: &'static str,
     /// What is claimed, a whole sentence.
     pub text: String,
     /// Whether it holds; `None` if it was not tried.
     pub holds: Option<bool>,
     /// The figures that say so.
     pub evidence: String,
+    /// Why it does not hold, where it does not: what was found out, or nothing.
+    pub reason: &'static str,
     /// The same in a few words, for a summing-up line.
     pub brief: String,
 }
@@ -117,6 +141,16 @@ impl Section {
     /// Adds a drawing.
     pub(crate) fn draw(&mut self, caption: &str, svg: String) {
         self.blocks.push(Block::Drawing(ReportDrawing { caption: caption.to_owned(), svg }));
+    }
+}
+
+impl Claim {
+    /// The figures that say whether it holds, and why not where it does not.
+    pub(crate) fn grounds(&self) -> String {
+        match (self.holds, self.reason) {
+            (Some(false), reason) if !reason.is_empty() => format!("{} {reason}", self.evidence),
+            _ => self.evidence.clone(),
+        }
     }
 }
 

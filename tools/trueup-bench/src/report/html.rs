@@ -52,8 +52,16 @@ fn block_text(block: &Block) -> String {
                 "<p class=\"claim {class}\"><strong>{}</strong> {} <span class=\"evidence\">{}</span></p>\n",
                 verdict(claim),
                 inline(&claim.text),
-                inline(&claim.evidence)
+                inline(&claim.grounds())
             )
+        }
+        Block::Pictures(row) => {
+            let each = row.pictures.iter().map(|picture| {
+                let (file, words) = (escape(&picture.file), inline(&picture.words));
+                format!("<figure><img src=\"{file}\" alt=\"{words}\"><figcaption>{words}</figcaption></figure>\n")
+            });
+            let each: String = each.collect();
+            format!("<p class=\"caption\">{}</p>\n<div class=\"pictures\">\n{each}</div>\n", inline(&row.caption))
         }
         Block::Skipped(reason) => format!("<p class=\"skipped\">Skipped: {}</p>\n", inline(reason)),
     }
@@ -126,7 +134,7 @@ pub(crate) fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::document::{Claim, Section};
+    use crate::report::document::{Claim, ReportPicture, ReportPictures, Section};
 
     #[test]
     fn words_of_tables_are_escaped_and_code_is_marked() {
@@ -142,10 +150,16 @@ mod tests {
         section.blocks = vec![
             Block::List(vec!["point".to_owned()]),
             Block::Table(table),
+            Block::Pictures(ReportPictures {
+                caption: "Side by side.".to_owned(),
+                pictures: vec![ReportPicture { file: "figures/a.jpg".to_owned(), words: "a < b".to_owned() }],
+            }),
             Block::Claim(Claim {
+                id: "so",
                 text: "It is so.".to_owned(),
                 holds: Some(false),
                 evidence: "1 > 2".to_owned(),
+                reason: "It cannot.",
                 brief: String::new(),
             }),
             Block::Skipped("no data".to_owned()),
@@ -155,7 +169,8 @@ mod tests {
             "<a href=\"#one\">One &amp; all</a>",
             "<ul>\n<li>point</li>",
             "<tr class=\"paper\"><td class=\"number\">01</td><td class=\"number\">0.82</td></tr>",
-            "<p class=\"claim fails\"><strong>Does not hold:</strong> It is so.",
+            "<p class=\"claim fails\"><strong>Does not hold:</strong> It is so. <span class=\"evidence\">1 &gt; 2 It cannot.",
+            "<figure><img src=\"figures/a.jpg\" alt=\"a &lt; b\">",
             "Skipped: no data",
         ] {
             assert!(page.contains(part), "{part} is not in {page}");

@@ -23,7 +23,11 @@ fn block_text(block: &Block) -> String {
         Block::List(points) => points.iter().map(|point| format!("- {point}\n")).collect(),
         Block::Table(table) => table_text(table),
         Block::Drawing(drawing) => format!("*{}* (drawn in report.html)\n", drawing.caption),
-        Block::Claim(claim) => format!("> **{}** {} {}\n", verdict(claim), claim.text, claim.evidence),
+        Block::Claim(claim) => format!("> **{}** {} {}\n", verdict(claim), claim.text, claim.grounds()),
+        Block::Pictures(row) => {
+            let each = row.pictures.iter().map(|picture| format!("![{0}]({1})\n{0}\n", picture.words, picture.file));
+            format!("{}\n\n{}", row.caption, each.collect::<Vec<_>>().join("\n"))
+        }
         Block::Skipped(reason) => format!("*skipped: {reason}*\n"),
     }
 }

@@ -1,12 +1,33 @@
 //! The sections that say what the report is about.
 
 use super::document::{Block, Claim, Section, Table};
+use crate::arguments::PaperArguments;
+use crate::build_stamp::BuildStamp;
 use crate::results::Results;
 use crate::sets::Catalogue;
 
+/// How a report was made.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RunDescription<'a> {
+    /// The build that made it, and every result in it.
+    pub stamp: &'a BuildStamp,
+    /// What was typed.
+    pub arguments: &'a PaperArguments,
+    /// Sets worked on at a time.
+    pub jobs: usize,
+    /// Threads of each.
+    pub threads: usize,
+    /// Wall time, minutes, since it was started or last went on.
+    pub minutes: f64,
+    /// Results that an earlier, stopped run of the same build had stored.
+    pub resumed: usize,
+}
+
 /// What it is, and the claims at a glance.
-pub(crate) fn summary(claims: &[Claim]) -> Section {
+pub(crate) fn summary(claims: &[Claim], made: &RunDescription) -> Section {
     let mut section = Section::new("summary", "Summary");
+    let holding = claims.iter().filter(|claim| claim.holds == Some(true)).count();
+    section.say(format!("Made by one build: {}. {holding} of {} claims hold.", made.stamp.in_words(), claims.len()));
     section.say(
         "A panorama of several photographs looks natural when what is vertical in the world stands vertical in it. The paper \
          guides the rotation of every photograph by its vanishing points, with a robust scheme against wrong ones and a gate for \
@@ -65,21 +86,53 @@ pub(crate) fn sets(catalogue: &Catalogue) -> Section {
 }
 
 /// The command, and what is not here.
-pub(crate) fn how_it_was_made(results: &Results, version: &str, jobs: usize, threads: usize) -> Section {
+pub(crate) fn how_it_was_made(results: &Results, made: &RunDescription) -> Section {
     let mut section = Section::new("made", "How it was made, and what is missing");
+    let RunDescription { jobs, threads, minutes, resumed, .. } = made;
+    let parts = parts(made.arguments);
+    let resumed = match resumed {
+        0 => String::new(),
+        count => format!(" It went on from {count} results of a stopped run of the same build."),
+    };
     section.say(format!(
-        "`trueup-bench paper --out DIR`, version {version}: {} runs, {jobs} sets at a time with {threads} threads each. Every \
-         single result is in `rows.csv`, every table in a CSV file of its own. The same sets, options and seeds give the same \
-         figures for any number of threads.",
+        "`trueup-bench paper --out DIR`{parts}, built from {}: {} results in {minutes:.0} minutes, {jobs} sets at a time with \
+         {threads} threads each.{resumed} Every single result is in `rows.csv` beside this report, every table in a CSV file of \
+         its own. The same sets, options and seeds give the same figures for any number of threads; times alone do not come \
+         back.",
+        made.stamp.in_words(),
         results.rows.len()
     ));
+    section.say(
+        "The commit and whether sources differed from it are found when the program is built, not when it runs. Built outside of \
+         a checkout, a hash of all sources stands for the commit. Results of another build are refused.",
+    );
     section.blocks.push(Block::List(
         [
-            "Methods of the paper without a row of ours beside their figures do not exist here yet.",
-            "T8, the user study, cannot be repeated by a machine; `upright` is what it comes down to.",
+            "The user study cannot be repeated by a machine; `trueup compare` makes its pages and its statistics, and `upright` \
+             is what it comes down to.",
+            "The paper's own sets are shown only if somebody has them (`--vpg-data DIR`).",
         ]
         .map(str::to_owned)
         .into(),
     ));
     section
+}
+
+/// The options that decide which data the report is of; folders are named by what they are, wherever they lie.
+fn parts(arguments: &PaperArguments) -> String {
+    let given = [
+        (arguments.panoramas.is_some(), "--panoramas"),
+        (!arguments.truth_sets.is_empty(), "--truth-sets"),
+        (!arguments.photographs.is_empty(), "--photographs"),
+        (arguments.vpg_data.is_some(), "--vpg-data"),
+    ];
+    let mut words: Vec<String> =
+        given.iter().filter(|(given, _)| *given).map(|(_, option)| format!("`{option} DIR`")).collect();
+    if !arguments.only.is_empty() {
+        words.push(format!("`--only {}`", arguments.only.join(",")));
+    }
+    if arguments.quick {
+        words.push("`--quick`".to_owned());
+    }
+    if words.is_empty() { String::new() } else { format!(" with {}", words.join(", ")) }
 }

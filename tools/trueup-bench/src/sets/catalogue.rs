@@ -3,12 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use trueup::{Error, Result, StageContext};
+use trueup_scenes::SetKind;
 use trueup_scenes::cut::find_panoramas;
-use trueup_scenes::{LightQuality, Quality, RigOptions, SceneKind, SceneOptions, SetKind};
 
-use super::from_panorama;
+use super::folders::name_of;
 use super::ready::truth_folders;
-use super::spec::{Recipe, SetSource, SetSpec};
+use super::rendered::{
+    EACH_GATE_CLASS, FocalSet, PitchSet, RolledPair, focal_sets, gate_sets, pitch_sets, quick_sets, rendered_sets,
+    rolled_pairs,
+};
+use super::spec::{SetSource, SetSpec};
+use super::{from_panorama, photographs};
 
 /// The sets of a run, by what they are for.
 #[derive(Debug, Default)]
@@ -19,10 +24,14 @@ pub(crate) struct Catalogue {
     pub twins: Vec<SetSpec>,
     /// Sets with one vertical and horizontals at free angles.
     pub mixed: Vec<SetSpec>,
-    /// Sets cut from panoramas, or given with their truth.
+    /// Sets cut from panoramas, or given with their truth, or of the authors' own data set.
     pub given: Vec<SetSpec>,
-    /// Many small sets with and without dominant directions.
+    /// Photographs of which nothing is known.
+    pub photographs: Vec<SetSpec>,
+    /// Many small sets with and without dominant directions. Half of each class is held out: nothing was chosen by them.
     pub gate: Vec<SetSpec>,
+    /// Pairs of which one photograph is turned.
+    pub rolled: Vec<RolledPair>,
     /// Sets that differ in how far up the cameras look.
     pub pitch: Vec<PitchSet>,
     /// Sets of the study whose metadata are wrong.
@@ -33,74 +42,51 @@ pub(crate) struct Catalogue {
     pub seeds: u64,
 }
 
-/// A set of the pitch sweep.
-#[derive(Debug, Clone)]
-pub(crate) struct PitchSet {
-    /// Mean elevation of its cameras, degrees.
-    pub pitch_deg: f64,
-    /// The set.
-    pub set: SetSpec,
-}
-
-/// A set of the study with metadata that claim a wrong focal length.
-#[derive(Debug, Clone)]
-pub(crate) struct FocalSet {
-    /// Claimed over true focal length.
-    pub factor: f64,
-    /// Name of the set it is a copy of.
-    pub original: String,
-    /// The copy.
-    pub set: SetSpec,
+/// Folders that the user gave.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct GivenFolders<'a> {
+    /// Panoramas to cut sets from.
+    pub panoramas: Option<&'a Path>,
+    /// Folders of folders with their `truth.json`.
+    pub truth_sets: &'a [PathBuf],
+    /// Folders of photographs, or of such folders.
+    pub photographs: &'a [PathBuf],
+    /// The authors' own data set.
+    pub vpg_data: Option<&'a Path>,
 }
 
 impl Catalogue {
-    /// The sets of the whole study; `panoramas` is a folder of panoramas to cut sets from, `truth_sets` are folders that
-    /// hold given ones.
+    /// The sets of the whole study, and what `folders` hold.
     ///
     /// # Errors
     /// Those of reading the folders.
-    pub(crate) fn full(panoramas: Option<&Path>, truth_sets: &[PathBuf]) -> Result<Self> {
+    pub(crate) fn full(folders: &GivenFolders) -> Result<Self> {
         let study = rendered_sets(SetKind::Manhattan, "study", Some(true));
         Ok(Self {
             focal: focal_sets(&study),
             study,
-            given: given_sets(panoramas, truth_sets)?,
+            given: given_sets(folders)?,
+            photographs: photographs::sets("photographs", folders.photographs)?,
+            rolled: rolled_pairs(),
             twins: rendered_sets(SetKind::Twins, "twins", Some(false)),
             mixed: rendered_sets(SetKind::Mixed, "mixed", None),
-            gate: gate_sets(None),
+            gate: gate_sets(EACH_GATE_CLASS, false),
             pitch: pitch_sets(),
             reference_sets: vec!["03", "05", "08", "11"],
-            seeds: 10,
+            seeds: 5,
         })
     }
 
     /// A few small sets that are rendered in seconds.
     pub(crate) fn quick() -> Self {
-        const SETS: usize = 4;
-        const EACH_GATE_CLASS: usize = 6;
-        let study = (0..SETS).map(|index| {
-            let kind = if index % 2 == 0 { SceneKind::Room } else { SceneKind::Street };
-            let seed = 300 + index as u64;
-            let scene = SceneOptions { kind, seed, light: LightQuality::Fast, ..SceneOptions::default() };
-            let rig = RigOptions {
-                seed,
-                pictures: 6,
-                width: 640,
-                height: 480,
-                pitch_deg: 5.0,
-                roll_sd_deg: 6.0,
-                ..RigOptions::default()
-            };
-            let recipe = Recipe { scene, rig, quality: Quality::Preview };
-            SetSpec::rendered(format!("quick/{:02}", index + 1), Some(true), recipe)
-        });
-        let study: Vec<SetSpec> = study.collect();
+        const EACH_QUICK_CLASS: usize = 6;
+        let study = quick_sets();
         Self {
             focal: focal_sets(&study),
             study,
-            gate: gate_sets(Some(EACH_GATE_CLASS)),
+            gate: gate_sets(EACH_QUICK_CLASS, true),
             reference_sets: vec!["01", "02"],
-            seeds: 3,
+            seeds: 2,
             ..Self::default()
         }
     }
@@ -109,76 +95,19 @@ impl Catalogue {
     pub(crate) fn all(&self) -> Vec<&SetSpec> {
         let pitch = self.pitch.iter().map(|one| &one.set);
         let focal = self.focal.iter().map(|one| &one.set);
-        let plain = [&self.study, &self.twins, &self.mixed, &self.given, &self.gate];
-        plain.into_iter().flatten().chain(pitch).chain(focal).collect()
+        let rolled = self.rolled.iter().map(|one| &one.set);
+        let plain = [&self.study, &self.twins, &self.mixed, &self.given, &self.photographs, &self.gate];
+        plain.into_iter().flatten().chain(pitch).chain(focal).chain(rolled).collect()
     }
-}
-
-/// The sets of a kind, named `folder/01` and so on.
-fn rendered_sets(kind: SetKind, folder: &str, manhattan: Option<bool>) -> Vec<SetSpec> {
-    (1..=kind.count()).filter_map(|number| SetSpec::catalogue(kind, number, folder, manhattan)).collect()
-}
-
-/// Sets for the gate with dominant directions, and as many without: of each class the first so many in a quick version,
-/// or all as they are.
-fn gate_sets(quick: Option<usize>) -> Vec<SetSpec> {
-    let classes = [(SetKind::GateManhattan, "gate/manhattan", true), (SetKind::GateRandom, "gate/random", false)];
-    let of_class = |(kind, folder, manhattan): (SetKind, &str, bool)| -> Vec<SetSpec> {
-        let Some(each) = quick else { return rendered_sets(kind, folder, Some(manhattan)) };
-        let one = |number| {
-            let (scene, rig) = kind.set(number)?;
-            let recipe = Recipe { scene, rig, quality: Quality::Preview };
-            Some(SetSpec::rendered(format!("quick-{folder}-{number:02}"), Some(manhattan), recipe))
-        };
-        (1..=kind.count().min(each)).filter_map(one).collect()
-    };
-    classes.into_iter().flat_map(of_class).collect()
-}
-
-fn pitch_sets() -> Vec<PitchSet> {
-    let mut sets = Vec::new();
-    for pitch_deg in [0.0, 10.0, 20.0, 30.0, 40.0] {
-        for (kind, name) in [(SceneKind::Room, "room"), (SceneKind::Street, "street")] {
-            for seed in 701..=702 {
-                let light = LightQuality::Standard;
-                let scene = SceneOptions { kind, seed, light, ..SceneOptions::default() };
-                let rig = RigOptions {
-                    seed,
-                    pictures: 7,
-                    width: 800,
-                    height: 600,
-                    pitch_deg,
-                    yaw_step_deg: 22.0,
-                    roll_sd_deg: 6.0,
-                    ..RigOptions::default()
-                };
-                let recipe = Recipe { scene, rig, quality: Quality::Standard };
-                let set = SetSpec::rendered(format!("pitch/{name}-{pitch_deg:02.0}-{seed}"), Some(true), recipe);
-                sets.push(PitchSet { pitch_deg, set });
-            }
-        }
-    }
-    sets
-}
-
-/// Copies of a room, of one with parallax, and of a street, with claims from 0.7 to 1.4 of the truth.
-fn focal_sets(study: &[SetSpec]) -> Vec<FocalSet> {
-    const FACTORS: [f64; 7] = [0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4];
-    let originals = [0, 3, 6].into_iter().filter_map(|index| study.get(index));
-    let copies = |original: &SetSpec| {
-        FACTORS.map(|factor| FocalSet {
-            factor,
-            original: original.name.clone(),
-            set: original.with_focal_claim(factor),
-        })
-    };
-    originals.flat_map(copies).collect()
 }
 
 /// The sets cut from panoramas and those inside the given folders, named after theirs.
-fn given_sets(panoramas: Option<&Path>, parents: &[PathBuf]) -> Result<Vec<SetSpec>> {
-    let mut sets: Vec<SetSpec> = panoramas.map_or_else(|| Ok(Vec::new()), cut_sets)?;
-    for parent in parents {
+fn given_sets(folders: &GivenFolders) -> Result<Vec<SetSpec>> {
+    let mut sets: Vec<SetSpec> = folders.panoramas.map_or_else(|| Ok(Vec::new()), cut_sets)?;
+    sets.extend(
+        folders.vpg_data.map_or_else(|| Ok(Vec::new()), |folder| photographs::sets("vpg", &[folder.to_owned()]))?,
+    );
+    for parent in folders.truth_sets {
         for folder in truth_folders(parent)? {
             let name = format!("given/{}", name_of(&folder));
             if sets.iter().any(|known| known.name == name) {
@@ -204,14 +133,11 @@ fn cut_sets(folder: &Path) -> Result<Vec<SetSpec>> {
             name: format!("given/{stem}-{kind}"),
             content: format!("{kind} cut from {stem}"),
             manhattan: None,
+            held_out: false,
             source: SetSource::Cut(source.clone(), kind),
         })
     };
     Ok(found.iter().flat_map(|image| each(&image.path)).collect())
-}
-
-fn name_of(folder: &Path) -> String {
-    folder.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 #[cfg(test)]
@@ -227,7 +153,7 @@ mod tests {
 
     #[test]
     fn every_set_has_a_name_of_its_own() {
-        for catalogue in [Catalogue::full(None, &[]).expect("no folders"), Catalogue::quick()] {
+        for catalogue in [Catalogue::full(&GivenFolders::default()).expect("no folders"), Catalogue::quick()] {
             let mut names: Vec<&str> = catalogue.all().iter().map(|set| set.name.as_str()).collect();
             let count = names.len();
             assert!(count > 12, "{count} sets");
@@ -239,10 +165,14 @@ mod tests {
 
     #[test]
     fn the_gate_has_as_many_sets_as_in_the_paper() {
-        let catalogue = Catalogue::full(None, &[]).expect("no folders");
+        let catalogue = Catalogue::full(&GivenFolders::default()).expect("no folders");
         let manhattan = catalogue.gate.iter().filter(|set| set.manhattan == Some(true)).count();
         assert_eq!((catalogue.study.len(), catalogue.gate.len(), manhattan), (12, 130, 65));
+        let held_out = |set: &&SetSpec| set.held_out && set.manhattan == Some(true);
+        assert_eq!(catalogue.gate.iter().filter(held_out).count(), 32);
+        assert_eq!(Catalogue::quick().gate.iter().filter(held_out).count(), 3);
     }
+
     #[test]
     fn views_are_counted_as_they_are_cut_and_are_not_cut_again() {
         let folder = tempfile::tempdir().expect("folder");

@@ -9,7 +9,11 @@ use super::ready::{ReadySet, TRUTH_FILE};
 
 /// Copies a set into `folder`; its photographs' EXIF claim `factor` times their true focal length.
 pub(super) fn write(original: &ReadySet, factor: f64, folder: &Path) -> Result<()> {
-    for (photograph, truth) in original.photographs.iter().zip(&original.truth.images) {
+    let truth = original.truth.as_ref().ok_or_else(|| {
+        Error::input(folder.display(), "the original's focal lengths are not known", "Take a set with its truth.json.")
+    })?;
+    let images = &truth.images;
+    for (photograph, truth) in original.photographs.iter().zip(images) {
         let source = Path::new(photograph);
         let bytes = fs::read(source).map_err(|error| Error::io("reading", source, error))?;
         let claimed =
@@ -20,7 +24,7 @@ pub(super) fn write(original: &ReadySet, factor: f64, folder: &Path) -> Result<(
         fs::write(&target, claimed).map_err(|error| Error::io("writing", &target, error))?;
     }
     let target = folder.join(TRUTH_FILE);
-    let text = serde_json::to_string_pretty(&original.truth)
+    let text = serde_json::to_string_pretty(truth)
         .map_err(|error| Error::io("writing", &target, std::io::Error::other(error)))?;
     fs::write(&target, text).map_err(|error| Error::io("writing", &target, error))
 }
@@ -99,7 +103,8 @@ mod tests {
         write(&original, 1.1, &claimed).expect("copy");
         let sources =
             trueup_io::source::scan(&[claimed.join("00.jpg").display().to_string()], &Default::default(), &context);
-        let prior = sources.expect("readable").images[0].focal_prior.expect("a focal length");
-        assert!((prior.focal_px / original.truth.images[0].focal_px - 1.1).abs() < 1e-4);
+        let prior = sources.expect("readable").photographs[0].focal_prior.expect("a focal length");
+        let truth = original.truth.expect("rendered");
+        assert!((prior.focal_px / truth.images[0].focal_px - 1.1).abs() < 1e-4);
     }
 }

@@ -3,11 +3,15 @@
 mod catalogue;
 mod central;
 mod focal_claim;
+mod folders;
 mod from_panorama;
+mod photographs;
 mod ready;
+mod rendered;
 mod spec;
+mod vpg_data;
 
-pub(crate) use catalogue::Catalogue;
+pub(crate) use catalogue::{Catalogue, GivenFolders};
 pub(crate) use central::central;
 pub(crate) use ready::{ReadySet, TRUTH_FILE, read_truth, truth_folders};
 #[cfg(test)]

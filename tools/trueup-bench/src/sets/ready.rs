@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use trueup::{Error, Result, Truth};
 
+use super::folders::folders_in;
+
 /// Name of the file that holds what is true of a set.
 pub(crate) const TRUTH_FILE: &str = "truth.json";
 
@@ -13,8 +15,8 @@ pub(crate) const TRUTH_FILE: &str = "truth.json";
 pub(crate) struct ReadySet {
     /// Its photographs' paths, in order.
     pub photographs: Vec<String>,
-    /// What is true of them.
-    pub truth: Truth,
+    /// What is true of them, if anybody knows.
+    pub truth: Option<Truth>,
     /// Stands for its content.
     pub fingerprint: String,
 }
@@ -26,11 +28,25 @@ pub(crate) struct ReadySet {
 pub(super) fn ready(folder: &Path) -> Result<ReadySet> {
     let (truth, text) = read_truth(folder)?;
     let paths: Vec<PathBuf> = truth.images.iter().map(|image| folder.join(&image.file)).collect();
-    // Photographs that were made anew from the same truth differ in their size.
+    Ok(ReadySet { photographs: names(&paths), truth: Some(truth), fingerprint: content(&text, &paths) })
+}
+
+/// Photographs of which nothing is known but where they are, and what may be true of them.
+pub(super) fn ready_photographs(paths: &[PathBuf], truth: Option<Truth>) -> Result<ReadySet> {
+    let text =
+        serde_json::to_string(&truth).map_err(|error| Error::input("truth", error, "Report this as a defect."))?;
+    Ok(ReadySet { photographs: names(paths), truth, fingerprint: content(&text, paths) })
+}
+
+fn names(paths: &[PathBuf]) -> Vec<String> {
+    paths.iter().map(|path| path.display().to_string()).collect()
+}
+
+/// Stands for photographs and what is said of them.
+fn content(text: &str, paths: &[PathBuf]) -> String {
     let size = |path: &PathBuf| fs::metadata(path).map_or(0, |found| found.len());
-    let sizes: Vec<u64> = paths.iter().map(size).collect();
-    let photographs = paths.iter().map(|path| path.display().to_string()).collect();
-    Ok(ReadySet { photographs, truth, fingerprint: crate::trial::fingerprint(&(text, sizes)) })
+    let files: Vec<(Option<&std::ffi::OsStr>, u64)> = paths.iter().map(|path| (path.file_name(), size(path))).collect();
+    crate::trial::fingerprint(&(text, files))
 }
 
 /// A folder's truth and the text it was read from.
@@ -48,10 +64,8 @@ pub(crate) fn read_truth(folder: &Path) -> Result<(Truth, String)> {
 /// # Errors
 /// [`Error::Io`] if it cannot be read; [`Error::Input`] if none holds one.
 pub(crate) fn truth_folders(parent: &Path) -> Result<Vec<PathBuf>> {
-    let entries = fs::read_dir(parent).map_err(|error| Error::io("reading the folder", parent, error))?;
-    let mut folders: Vec<PathBuf> =
-        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.join(TRUTH_FILE).is_file()).collect();
-    folders.sort();
+    let mut folders = folders_in(parent)?;
+    folders.retain(|path| path.join(TRUTH_FILE).is_file());
     if folders.is_empty() {
         let hint = "Name a folder whose folders each hold photographs and their truth.json.";
         return Err(Error::input(parent.display(), "no folder in it holds a truth.json", hint));

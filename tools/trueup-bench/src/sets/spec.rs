@@ -5,13 +5,15 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use trueup::{Error, Result, StageContext};
+use trueup_core::geometry::rotation_about_z;
 use trueup_scenes::cut::SpecKind;
 use trueup_scenes::{
     LitScene, Quality, RECIPE, RigOptions, SceneKind, SceneOptions, SetKind, SetOutput, SetRequest, rig, write_set,
 };
 
-use super::ready::{ReadySet, read_truth, ready};
-use super::{focal_claim, from_panorama};
+use super::folders::photographs_in;
+use super::ready::{ReadySet, read_truth, ready, ready_photographs};
+use super::{focal_claim, from_panorama, vpg_data};
 
 /// A set of photographs and where it comes from.
 #[derive(Debug, Clone)]
@@ -22,6 +24,8 @@ pub(crate) struct SetSpec {
     pub content: String,
     /// Whether its scene has dominant directions; `None` if nobody has said.
     pub manhattan: Option<bool>,
+    /// Whether it was kept aside when constants were chosen, to judge them by.
+    pub held_out: bool,
     /// Where it comes from.
     pub source: SetSource,
 }
@@ -37,6 +41,8 @@ pub(crate) enum SetSource {
     Cut(PathBuf, SpecKind),
     /// It lies in a folder with its `truth.json`.
     Folder(PathBuf),
+    /// Photographs in a folder, with the cameras of the data set of the paper's authors if they are there.
+    Photographs(PathBuf),
     /// Another set, whose metadata claim a focal length that is wrong by this factor.
     FocalClaimed(Box<SetSpec>, f64),
 }
@@ -50,13 +56,15 @@ pub(crate) struct Recipe {
     pub rig: RigOptions,
     /// How carefully it is drawn.
     pub quality: Quality,
+    /// By how much the second camera is turned about its axis, clockwise, beyond what the rig says; degrees.
+    pub second_roll_deg: f64,
 }
 
 impl SetSpec {
     /// A set to be rendered.
     pub(crate) fn rendered(name: String, manhattan: Option<bool>, recipe: Recipe) -> Self {
         let content = describe(&recipe.scene, &recipe.rig);
-        Self { name, content, manhattan, source: SetSource::Rendered(Box::new(recipe)) }
+        Self { name, content, manhattan, held_out: false, source: SetSource::Rendered(Box::new(recipe)) }
     }
 
     /// A set of the catalogue, in a folder below `parent`.
@@ -64,13 +72,19 @@ impl SetSpec {
         let (scene, rig) = kind.set(number)?;
         let content = describe(&scene, &rig);
         let source = SetSource::Catalogue(SetRequest { kind, number, preview: false, depth: false });
-        Some(Self { name: format!("{parent}/{number:02}"), content, manhattan, source })
+        Some(Self { name: format!("{parent}/{number:02}"), content, manhattan, held_out: false, source })
     }
 
     /// A set in a folder.
     pub(crate) fn folder(name: String, folder: PathBuf) -> Self {
         let content = "given with its truth.json".to_owned();
-        Self { name, content, manhattan: None, source: SetSource::Folder(folder) }
+        Self { name, content, manhattan: None, held_out: false, source: SetSource::Folder(folder) }
+    }
+
+    /// Photographs in a folder.
+    pub(crate) fn photographs(name: String, folder: PathBuf) -> Self {
+        let content = "photographs".to_owned();
+        Self { name, content, manhattan: None, held_out: false, source: SetSource::Photographs(folder) }
     }
 
     /// The same set with metadata that claim `factor` times its focal lengths.
@@ -79,6 +93,7 @@ impl SetSpec {
             name: format!("{}-focal-{:03.0}", self.name, 100.0 * factor),
             content: format!("{}, metadata claim {factor:.2} of the focal length", self.content),
             manhattan: self.manhattan,
+            held_out: self.held_out,
             source: SetSource::FocalClaimed(Box::new(self.clone()), factor),
         }
     }
@@ -93,6 +108,7 @@ impl SetSpec {
             SetSource::Rendered(recipe) => Ok(recipe.rig.pictures),
             SetSource::Cut(_, kind) => Ok(from_panorama::views_of(*kind)),
             SetSource::Folder(folder) => Ok(read_truth(folder)?.0.images.len()),
+            SetSource::Photographs(folder) => Ok(photographs_in(folder, &StageContext::default())?.len()),
             SetSource::FocalClaimed(original, _) => original.photograph_count(),
         }
     }
@@ -106,6 +122,12 @@ impl SetSpec {
         let folder = self.name.split('/').fold(data.to_owned(), |path, part| path.join(part));
         match &self.source {
             SetSource::Folder(folder) => ready(folder),
+            SetSource::Photographs(folder) => {
+                let images = photographs_in(folder, context)?;
+                let truth = vpg_data::truth(folder, &images)?;
+                let paths: Vec<PathBuf> = images.into_iter().map(|image| image.path).collect();
+                ready_photographs(&paths, truth)
+            }
             SetSource::Catalogue(request) => {
                 let parent = folder.parent().unwrap_or(data);
                 request.write(parent, context)?;
@@ -129,13 +151,21 @@ impl SetSpec {
 impl Recipe {
     fn render(&self, folder: &Path, name: &str, context: &StageContext) -> Result<()> {
         let scene = LitScene::new(&self.scene)?;
-        let cameras = rig(&self.rig, &scene.viewpoint())?;
+        let mut cameras = rig(&self.rig, &scene.viewpoint())?;
+        if let Some(second) = cameras.get_mut(1).filter(|_| self.second_roll_deg != 0.0) {
+            let turned_from_camera = rotation_about_z(self.second_roll_deg.to_radians()).transpose();
+            let turned = turned_from_camera * second.camera.rotation();
+            second.camera.set_rotation(&turned);
+        }
         let output = SetOutput { quality: self.quality, depth: false };
         write_set(folder, name, &scene, &cameras, output, context).map(drop)
     }
 
     fn fingerprint(&self) -> String {
-        let recipe = json!({ "recipe": RECIPE, "scene": self.scene, "rig": self.rig, "quality": self.quality });
+        let recipe = json!({
+            "recipe": RECIPE, "scene": self.scene, "rig": self.rig, "quality": self.quality,
+            "second_roll_deg": self.second_roll_deg,
+        });
         crate::trial::fingerprint(&recipe.to_string())
     }
 }

@@ -30,10 +30,10 @@ pub fn find_panoramas(inputs: &[String], context: &StageContext) -> Result<Vec<S
     if let Some(rejected) = sources.rejected.first() {
         return Err(rejected.to_error());
     }
-    for image in &sources.images {
+    for image in &sources.photographs {
         check_shape(&image.path.display().to_string(), image.width, image.height)?;
     }
-    Ok(sources.images)
+    Ok(sources.photographs)
 }
 
 impl Panorama360 {

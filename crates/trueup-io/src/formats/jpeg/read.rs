@@ -38,33 +38,33 @@ pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
 }
 
 /// Decodes the pixels as they are stored.
-pub(super) fn pixels(image: &SourceImage, mut input: Input) -> Result<Photograph> {
+pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
     let mut bytes = Vec::new();
-    input.read_to_end(&mut bytes).map_err(|error| Error::io("reading", &image.path, error))?;
-    decode(image, &bytes)
+    input.read_to_end(&mut bytes).map_err(|error| Error::io("reading", &source.path, error))?;
+    decode(source, &bytes)
 }
 
-fn decode(image: &SourceImage, bytes: &[u8]) -> Result<Photograph> {
+fn decode(source: &SourceImage, bytes: &[u8]) -> Result<Photograph> {
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options());
-    decoder.decode_headers().map_err(|error| damaged(image, format!("{error:?}")))?;
-    let (width, height) = decoder.dimensions().ok_or_else(|| damaged(image, "no frame header"))?;
-    check_unchanged(image, width, height)?;
+    decoder.decode_headers().map_err(|error| damaged(source, format!("{error:?}")))?;
+    let (width, height) = decoder.dimensions().ok_or_else(|| damaged(source, "no frame header"))?;
+    check_unchanged(source, width, height)?;
     if !has_end_of_image(bytes) {
         return Err(Error::input(
-            &image.name,
-            "the picture is cut off: the JPEG ends before its end-of-image marker",
+            &source.name,
+            "the photograph is cut off: the JPEG ends before its end-of-image marker",
             "Copy it again from the camera or leave it out.",
         ));
     }
     if has_separate_subsampled_scans(bytes) {
-        return decode_separate_scans(image, bytes, width, height);
+        return decode_separate_scans(source, bytes, width, height);
     }
     let (space, channels) = match decoder.input_colorspace() {
         Some(ColorSpace::Luma) => (ColorSpace::Luma, 1),
         _ => (ColorSpace::RGB, 3),
     };
     decoder.set_options(options().jpeg_set_out_colorspace(space));
-    let pixels = decoder.decode().map_err(|error| damaged(image, format!("{error:?}")))?;
+    let pixels = decoder.decode().map_err(|error| damaged(source, format!("{error:?}")))?;
     Ok(Photograph::Eight(Raster::from_data(width, height, channels, pixels)?))
 }
 
@@ -72,13 +72,13 @@ fn decode(image: &SourceImage, bytes: &[u8]) -> Result<Photograph> {
 ///
 /// # Departures
 /// zune-jpeg 0.5.15 turns these into stripes without an error (its issue 422), so that another decoder reads them.
-fn decode_separate_scans(image: &SourceImage, bytes: &[u8], width: usize, height: usize) -> Result<Photograph> {
+fn decode_separate_scans(source: &SourceImage, bytes: &[u8], width: usize, height: usize) -> Result<Photograph> {
     let mut decoder = jpeg_decoder::Decoder::new(bytes);
     decoder.set_max_decoding_buffer_size(width.saturating_mul(height).saturating_mul(MAX_PIXEL_BYTES as usize));
-    let pixels = decoder.decode().map_err(|error| damaged(image, error))?;
+    let pixels = decoder.decode().map_err(|error| damaged(source, error))?;
     match decoder.info().map(|info| info.pixel_format) {
         Some(jpeg_decoder::PixelFormat::RGB24) => Ok(Photograph::Eight(Raster::from_data(width, height, 3, pixels)?)),
-        _ => Err(Error::input(&image.name, "its kind of pixels is not read", "Export it as an RGB JPEG.")),
+        _ => Err(Error::input(&source.name, "its kind of pixels is not read", "Export it as an RGB JPEG.")),
     }
 }
 

@@ -46,27 +46,27 @@ pub(super) fn whole_fields(input: &mut Input, wanted: &[ExifTag]) -> Option<Vec<
 }
 
 /// Decodes the first page.
-pub(super) fn pixels(image: &SourceImage, mut input: Input) -> Result<Photograph> {
-    let reading = |error| Error::io("reading", &image.path, error);
+pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
+    let reading = |error| Error::io("reading", &source.path, error);
     let page = Decoder::new(&mut input as &mut dyn TiffInput).and_then(|mut decoder| FirstPage::of(&mut decoder));
-    let page = page.map_err(|error| damaged(image, error))?;
+    let page = page.map_err(|error| damaged(source, error))?;
     input.rewind().map_err(reading)?;
     let FirstPage { width, height, .. } = page;
-    check_unchanged(image, width, height)?;
+    check_unchanged(source, width, height)?;
     if let PixelKind::Palette(bits) = page.kind {
         let mut bytes = Vec::new();
         input.read_to_end(&mut bytes).map_err(reading)?;
-        return palette::decode(image, bytes, page, bits);
+        return palette::decode(source, bytes, page, bits);
     }
     if page.kind == PixelKind::Wide {
         return Err(Error::input(
-            &image.name,
+            &source.name,
             "its kind of pixels is not read",
             "Export it with 8 or 16 bits a sample.",
         ));
     }
-    let mut decoder = open(image, &mut input)?;
-    let samples = Samples::read(image, &mut decoder, page)?;
+    let mut decoder = open(source, &mut input)?;
+    let samples = Samples::read(source, &mut decoder, page)?;
     match (page.kind, samples) {
         (PixelKind::Plain(channels), Samples::Eight(samples)) if samples.len() == width * height * channels => {
             eight(width, height, channels, samples)
@@ -94,6 +94,6 @@ pub(super) fn pixels(image: &SourceImage, mut input: Input) -> Result<Photograph
             let coefficients = decoder.get_tag_f32_vec(YCBCR_COEFFICIENTS).ok();
             eight(width, height, 3, rgb_of_ycbcr(&samples, coefficients.as_deref()))
         }
-        _ => Err(not_as_stated(image)),
+        _ => Err(not_as_stated(source)),
     }
 }

@@ -14,16 +14,16 @@ pub(super) trait TiffInput: Read + Seek {}
 
 impl<R: Read + Seek> TiffInput for R {}
 
-/// A decoder that takes no more memory than the picture needs.
-pub(super) fn open<'a>(image: &SourceImage, input: &'a mut dyn TiffInput) -> Result<Decoder<&'a mut dyn TiffInput>> {
-    let bytes = usize::try_from(decoding_limit(image)).unwrap_or(usize::MAX);
+/// A decoder that takes no more memory than the photograph needs.
+pub(super) fn open<'a>(source: &SourceImage, input: &'a mut dyn TiffInput) -> Result<Decoder<&'a mut dyn TiffInput>> {
+    let bytes = usize::try_from(decoding_limit(source)).unwrap_or(usize::MAX);
     let mut limits = Limits::default();
     limits.decoding_buffer_size = bytes;
     limits.intermediate_buffer_size = bytes;
-    Ok(Decoder::new(input).map_err(|error| damaged(image, error))?.with_limits(limits))
+    Ok(Decoder::new(input).map_err(|error| damaged(source, error))?.with_limits(limits))
 }
 
-/// All samples of a picture, channels interleaved; bits below 8 packed.
+/// All samples of a photograph, channels interleaved; bits below 8 packed.
 pub(super) enum Samples {
     Eight(Vec<u8>),
     Sixteen(Vec<u16>),
@@ -36,16 +36,16 @@ impl Samples {
     /// # Errors
     /// If they are damaged, incomplete or of a kind that no page has.
     pub(super) fn read(
-        image: &SourceImage,
+        source: &SourceImage,
         decoder: &mut Decoder<&mut dyn TiffInput>,
         page: FirstPage,
     ) -> Result<Self> {
         let mut buffer = DecodingResult::U8(Vec::new());
-        let layout = decoder.read_image_to_buffer(&mut buffer).map_err(|error| damaged(image, error))?;
+        let layout = decoder.read_image_to_buffer(&mut buffer).map_err(|error| damaged(source, error))?;
         let pixels = page.width * page.height;
         let planes = layout.planes;
         if planes > 1 && page.kind == PixelKind::Cmyk {
-            return Err(damaged(image, "CMYK in planes is not read"));
+            return Err(damaged(source, "CMYK in planes is not read"));
         }
         Ok(match buffer {
             DecodingResult::U8(samples) => Self::Eight(interleaved(samples, pixels, planes)),
@@ -57,7 +57,7 @@ impl Samples {
             DecodingResult::F64(samples) => {
                 Self::Float(interleaved(samples.into_iter().map(|value| value as f32).collect(), pixels, planes))
             }
-            _ => return Err(not_as_stated(image)),
+            _ => return Err(not_as_stated(source)),
         })
     }
 }
@@ -71,6 +71,6 @@ fn interleaved<T: Copy>(samples: Vec<T>, pixels: usize, planes: usize) -> Vec<T>
 }
 
 /// The samples are of another kind or number than the header says.
-pub(super) fn not_as_stated(image: &SourceImage) -> Error {
-    damaged(image, "its samples are not what its header says")
+pub(super) fn not_as_stated(source: &SourceImage) -> Error {
+    damaged(source, "its samples are not what its header says")
 }

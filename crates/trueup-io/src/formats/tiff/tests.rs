@@ -76,7 +76,7 @@ fn examined(folder: &TempDir, bytes: &[u8]) -> Result<SourceImage, String> {
     let mut sources = scan(&inputs, &SourceOptions::default(), &StageContext::default()).expect("a scan");
     match sources.rejected.pop() {
         Some(rejected) => Err(rejected.reason),
-        None => Ok(sources.images.remove(0)),
+        None => Ok(sources.photographs.remove(0)),
     }
 }
 
@@ -151,12 +151,12 @@ fn palettes_are_looked_up() {
 
     let folder = TempDir::new().expect("a temporary folder");
     let short = tiff(&Form { palette: Some(&palette[..30]), ..form }, &[&[0_u8; SIDE * SIDE / 2][..]]);
-    let image = examined(&folder, &short).expect("its header is well");
-    assert!(photograph_error(&image).contains("palette"), "{}", photograph_error(&image));
+    let source = examined(&folder, &short).expect("its header is well");
+    assert!(photograph_error(&source).contains("palette"), "{}", photograph_error(&source));
 }
 
-fn photograph_error(image: &SourceImage) -> String {
-    photograph(image).expect_err("damaged").to_string()
+fn photograph_error(source: &SourceImage) -> String {
+    photograph(source).expect_err("damaged").to_string()
 }
 
 #[test]
@@ -190,11 +190,11 @@ fn damaged_files_of_these_kinds_are_refused() {
     let form = Form { photometric: 3, bits: &[8], palette: Some(&palette), ..Form::default() };
     let whole = tiff(&form, &[&[7_u8; SIDE * SIDE][..]]);
     let folder = TempDir::new().expect("a temporary folder");
-    let image = examined(&folder, &whole).expect("accepted");
-    photograph(&image).expect("decoded");
+    let source = examined(&folder, &whole).expect("accepted");
+    photograph(&source).expect("decoded");
     // The directory lies behind the pixels: cut files are found out when they are decoded after they were examined.
     for length in (0..whole.len()).step_by(7) {
-        std::fs::write(&image.path, &whole[..length]).expect("our own file");
-        assert!(matches!(photograph(&image), Err(Error::Input { .. })), "cut to {length} of {}", whole.len());
+        std::fs::write(&source.path, &whole[..length]).expect("our own file");
+        assert!(matches!(photograph(&source), Err(Error::Input { .. })), "cut to {length} of {}", whole.len());
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use trueup_align::cameras::CameraPrior;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
+use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
 use trueup_core::source::{SourceImage, WorkingFrame};
 
@@ -36,8 +37,8 @@ impl<'a> Component<'a> {
         measured: &'a [Option<Measured>],
         pairs: &[PairMatches],
     ) -> Self {
-        let local = |picture: usize| members.binary_search(&picture).ok();
-        let known = |picture: &usize| measured[*picture].as_ref();
+        let local = |photograph: usize| members.binary_search(&photograph).ok();
+        let known = |photograph: &usize| measured[*photograph].as_ref();
         let pairs = pairs
             .iter()
             .filter(|pair| pair.verdict.is_joined())
@@ -45,7 +46,7 @@ impl<'a> Component<'a> {
             .collect();
         Self {
             members: members.to_vec(),
-            images: members.iter().map(|&picture| &images[picture]).collect(),
+            images: members.iter().map(|&photograph| &images[photograph]).collect(),
             frames: members.iter().filter_map(known).map(|one| one.frame).collect(),
             lines: members.iter().filter_map(known).map(|one| one.lines.clone()).collect(),
             grays: members.iter().filter_map(known).map(|one| one.gray.as_ref()).collect(),
@@ -57,6 +58,11 @@ impl<'a> Component<'a> {
 
     pub(super) fn names(&self) -> Vec<String> {
         self.images.iter().map(|image| image.name.clone()).collect()
+    }
+
+    /// Even grids over the working photographs, of cells about `cell_px` wide.
+    pub(super) fn grids(&self, cell_px: f64) -> Vec<GridMesh> {
+        self.frames.iter().map(|frame| GridMesh::regular(frame.width, frame.height, cell_px)).collect()
     }
 
     /// A number for each photograph that depends neither on its folder nor on the order of the inputs.

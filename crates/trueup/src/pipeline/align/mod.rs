@@ -3,6 +3,7 @@
 pub(crate) mod component;
 mod overlaps;
 mod refinement;
+mod straightened;
 mod turn;
 mod vanishing;
 
@@ -18,6 +19,7 @@ use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::TriadOutcome;
 use trueup_align::warps::{self, WarpInput, WarpModel};
 use trueup_core::diagnostics::Reported;
+use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 use trueup_core::source::SourceImage;
@@ -65,6 +67,9 @@ pub(crate) struct Geometry {
 /// Those of the stages; [`trueup_core::Error::NotApplicable`] if a warp model cannot place the photographs;
 /// [`trueup_core::Error::Cancelled`].
 pub(crate) fn run(input: &AlignInput, options: &AlignOptions, context: &StageContext) -> Result<Reported<Geometry>> {
+    let mut fixed = options.clone();
+    options.stitch.method.fix(&mut fixed);
+    let options = &fixed;
     input.memo.run(GEOMETRY, geometry_key(input, options).as_ref(), input, options, find_geometry, context)
 }
 
@@ -86,21 +91,19 @@ fn geometry_key(input: &AlignInput, options: &AlignOptions) -> Option<Key> {
 /// The stages in their order.
 fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageContext) -> Result<Geometry> {
     let component = input.component;
-    let grids: Vec<GridMesh> = component
-        .frames
-        .iter()
-        .map(|frame| GridMesh::regular(frame.width, frame.height, options.mesh.cell_px))
-        .collect();
+    let grids = component.grids(options.mesh.cell_px);
     let overlaps = overlaps::run(component, options, input.memo, context)?;
     let Overlaps { cameras, pairs, warps } = &overlaps.value;
+    let lines = context
+        .time("straightened lines", || straightened::lines(component, &cameras.cameras, input.photographs, context))?;
     let triads = match input.directions {
         Some(known) => known.to_vec(),
-        None => vanishing::run(component, cameras, &options.vanishing, context)?,
+        None => vanishing::run(component, &lines, cameras, &options.vanishing, context)?,
     };
-    let prior = context.in_one_step("prior", || find_prior(component, &overlaps.value, &triads, options, context))?;
+    let measured = MeasuredLines { lines: &lines, triads: &triads };
+    let prior = context.in_one_step("prior", || find_prior(component, &overlaps.value, measured, options, context))?;
 
-    let edges: Vec<GraphEdge> =
-        pairs.iter().map(|pair| GraphEdge { a: pair.a, b: pair.b, weight: pair.agreeing }).collect();
+    let edges: Vec<GraphEdge> = pairs.iter().map(GraphEdge::of).collect();
     let cut = full_turn::find_cut(&cameras.cameras, &edges, &prior.level_from_world());
     let turn = cut.as_ref().map(|cut| Turn::new(cut, warps));
     let within: Cow<'_, [OverlapWarp]> = turn.as_ref().map_or(warps.into(), |turn| turn.within.as_slice().into());
@@ -120,7 +123,7 @@ fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageCont
         cut: cut.as_ref(),
     };
     let mesh = context.in_one_step("mesh", || match options.stitch.method.form() {
-        MethodForm::Mesh(_) => deformation.by_mesh(options, context),
+        MethodForm::Mesh(..) => deformation.by_mesh(options, context),
         MethodForm::Warp(model) => deformation.by_warp(model, options, context),
     })?;
     if let Some(cut) = &cut {
@@ -130,23 +133,31 @@ fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageCont
     Ok(Geometry { cameras: cameras.clone(), triads, prior, mesh, coinciding })
 }
 
+/// What the photographs' lines tell.
+#[derive(Clone, Copy)]
+struct MeasuredLines<'a> {
+    /// The segments, as straight as they are behind a pinhole.
+    lines: &'a [Vec<LineSegment>],
+    triads: &'a [TriadOutcome],
+}
+
 /// How every photograph is to be turned and scaled, under the prior that the method means.
 fn find_prior(
     component: &Component,
     overlaps: &Overlaps,
-    triads: &[TriadOutcome],
+    MeasuredLines { lines, triads }: MeasuredLines,
     options: &AlignOptions,
     context: &StageContext,
 ) -> Result<SimilarityPrior> {
     let method = match options.stitch.method.form() {
-        MethodForm::Mesh(prior) => prior,
+        MethodForm::Mesh(prior, _) => prior,
         MethodForm::Warp(_) => PriorMethod::Straightening,
     };
     let input = PriorInput {
         method,
         cameras: &overlaps.cameras.cameras,
         triads,
-        lines: &component.lines,
+        lines,
         frames: &component.frames,
         edges: &overlaps.pairs,
         overlaps: &overlaps.warps,

@@ -7,7 +7,6 @@ use trueup_align::cameras::{self, CameraOptions, Cameras};
 use trueup_align::match_points::{self, MatchPointOptions, OverlapWarp};
 use trueup_core::diagnostics::Reported;
 use trueup_core::matches::PairMatches;
-use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
 use super::component::Component;
@@ -64,8 +63,7 @@ fn find(component: &Component, options: &OverlapOptions, context: &StageContext)
         .filter(|position| cameras.contradicting.binary_search(position).is_err())
         .map(|position| component.pairs[position].clone())
         .collect();
-    let grids: Vec<GridMesh> =
-        component.frames.iter().map(|frame| GridMesh::regular(frame.width, frame.height, options.cell_px)).collect();
+    let grids = component.grids(options.cell_px);
     let warps = context.time("match points", || {
         match_points::run(&component.frames, &grids, &cameras.cameras, &pairs, options.match_points, context)
     })?;

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use trueup_align::cameras::Cameras;
 use trueup_align::vanishing::{self, TriadOutcome, VanishingOptions};
+use trueup_core::lines::LineSegment;
 use trueup_core::{Result, StageContext};
 
 use super::component::{Component, name_seed};
@@ -15,6 +16,7 @@ const STAGE: &str = "vanishing points";
 /// [`trueup_core::Error::Cancelled`].
 pub(super) fn run(
     component: &Component,
+    lines: &[Vec<LineSegment>],
     cameras: &Cameras,
     options: &VanishingOptions,
     context: &StageContext,
@@ -24,9 +26,8 @@ pub(super) fn run(
         context.check_cancelled()?;
         // Seeded by the photograph's own content-independent name, so that the order of inputs does not matter.
         let mut generator = context.generator(STAGE, name_seed(&component.images[k].path));
-        let focal_px = cameras.cameras[k].focal_px;
-        let found =
-            vanishing::detect_triad(&component.lines[k], focal_px, &component.frames[k], options, &mut generator);
+        let (lines, camera) = (&lines[k], &cameras.cameras[k]);
+        let found = vanishing::detect_triad(lines, camera, &component.frames[k], options, &mut generator);
         context.progress().advance(STAGE, 1);
         Ok(found)
     };

@@ -16,7 +16,7 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::truth::{ImageTruth, Truth};
 use trueup_core::{Error, Result};
 
-use super::measures::HUNDREDTHS;
+use super::measures::{HUNDREDTHS, Measures};
 use crate::project::read::used_grids;
 use crate::project::record::{ImageRecord, Project};
 pub use pixels::{PixelEvaluation, compare_overlaps, evaluate_pixels, scale_up_to};
@@ -60,8 +60,26 @@ pub struct Evaluation {
     /// Root mean square distance in the panorama of the two places of what two photographs both show, in the photographs' own
     /// pixels; `None` if no photographs overlap or they were taken from different places.
     pub align_px: Option<f64>,
+    /// What the panorama's measures state without the truth, beside it; `None` if the project holds no measures.
+    pub stated: Option<StatedEvaluation>,
     /// Each photograph's own figures.
-    pub pictures: Vec<PhotographEvaluation>,
+    #[serde(rename = "pictures")]
+    pub photographs: Vec<PhotographEvaluation>,
+}
+
+/// How honest the measures are that need no truth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StatedEvaluation {
+    /// Photographs whose lean is stated with a 95 % interval.
+    pub intervals: usize,
+    /// Those of them whose true lean lies in it.
+    pub holding: usize,
+    /// Mean |true lean| of the photographs that the stated mean is over, beside `stated_upright_deg`.
+    pub upright_deg: Option<f64>,
+    /// The mean |lean| that the measures expect.
+    pub stated_upright_deg: Option<f64>,
+    /// The GDIC that the measures estimate, beside `gdic_reference_deg`.
+    pub estimated_gdic_deg: Option<f64>,
 }
 
 /// One photograph measured against the truth. Angles in degrees, positive clockwise.
@@ -73,6 +91,8 @@ pub struct PhotographEvaluation {
     pub upright_deg: f64,
     /// By how much the prior's rotation is wrong, relative to the first photograph.
     pub theta_error_deg: Option<f64>,
+    /// By how much the lean that the measures state is wrong; `None` if they state none.
+    pub lean_error_deg: Option<f64>,
 }
 
 /// A used photograph with its truth and its grid.
@@ -90,7 +110,7 @@ pub fn read_truth(path: &Path) -> Result<Truth> {
     let subject = path.display().to_string();
     let truth: Truth = serde_json::from_slice(&bytes).map_err(|error| {
         let reason = format!("not a truth file ({error})");
-        Error::input(&subject, reason, "Give the truth.json that was written together with the pictures.")
+        Error::input(&subject, reason, "Give the truth.json that was written together with the photographs.")
     })?;
     truth.check(&subject)?;
     Ok(truth)
@@ -115,7 +135,7 @@ pub fn read_truth(path: &Path) -> Result<Truth> {
 /// are damaged.
 pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     truth.check(&subject(truth))?;
-    let known = match_pictures(project, truth)?;
+    let known = match_photographs(project, truth)?;
     let records: Vec<&ImageRecord> = known.iter().map(|one| one.record).collect();
     let meshes = used_grids(&records)?;
     let period = project.grid_canvas().period();
@@ -129,10 +149,13 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     let thetas: Option<Vec<f64>> = records.iter().map(|record| Some(record.theta_deg?.to_radians())).collect();
     let theta_errors = thetas.as_ref().and_then(|thetas| relative_turns(thetas, &gammas, 0));
     let distortion = metrics::local_distortion(&meshes, Outside::Center, period);
-    let pictures = (0..known.len()).map(|k| PhotographEvaluation {
+    let leans: Vec<Option<StatedLean>> =
+        known.iter().zip(&upright.photographs).map(|(one, &lean)| StatedLean::of(project, one, lean)).collect();
+    let photographs = (0..known.len()).map(|k| PhotographEvaluation {
         file: known[k].truth.file.clone(),
         upright_deg: upright.photographs[k].to_degrees(),
         theta_error_deg: theta_errors.as_ref().map(|errors| errors[k].to_degrees()),
+        lean_error_deg: leans[k].map(|lean| lean.error_deg),
     });
     Ok(Evaluation {
         used: known.len(),
@@ -150,8 +173,43 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
         ld_corners: HUNDREDTHS * metrics::local_distortion(&meshes, Outside::CenterAndCorners, period).worst,
         folds: meshes.iter().map(folded_cells).sum(),
         align_px: alignment(&known, &meshes, period),
-        pictures: pictures.collect(),
+        stated: project.measures.as_ref().map(|measures| stated(measures, &leans)),
+        photographs: photographs.collect(),
     })
+}
+
+/// What the measures state of a photograph's lean, and what is true.
+#[derive(Debug, Clone, Copy)]
+struct StatedLean {
+    error_deg: f64,
+    /// Half of the stated interval.
+    within_deg: Option<f64>,
+    certain: bool,
+    true_deg: f64,
+}
+
+impl StatedLean {
+    fn of(project: &Project, known: &Known, true_lean: f64) -> Option<Self> {
+        let photographs = &project.measures.as_ref()?.photographs;
+        let one = photographs.iter().find(|one| one.path == known.record.path)?;
+        let error_deg = wrap_angle(one.lean_deg?.to_radians() - true_lean).to_degrees();
+        Some(Self { error_deg, within_deg: one.within_deg, certain: one.certain, true_deg: true_lean.to_degrees() })
+    }
+}
+
+/// The measures of a panorama beside what is true of it.
+fn stated(measures: &Measures, leans: &[Option<StatedLean>]) -> StatedEvaluation {
+    let intervals = || leans.iter().flatten().filter_map(|lean| Some((lean.error_deg.abs(), lean.within_deg?)));
+    let certain: Vec<f64> =
+        leans.iter().flatten().filter(|lean| lean.certain).map(|lean| lean.true_deg.abs()).collect();
+    let mean = certain.iter().sum::<f64>() / certain.len() as f64;
+    StatedEvaluation {
+        intervals: intervals().count(),
+        holding: intervals().filter(|(error, within)| error <= within).count(),
+        upright_deg: (!certain.is_empty()).then_some(mean),
+        stated_upright_deg: measures.upright.map(|upright| upright.mean_deg),
+        estimated_gdic_deg: measures.estimated_gdic_deg,
+    }
 }
 
 fn subject(truth: &Truth) -> String {
@@ -163,7 +221,7 @@ fn largest(angles: &[f64]) -> f64 {
 }
 
 /// The used photographs that the truth names, in its order.
-fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Known<'a>>> {
+fn match_photographs<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Known<'a>>> {
     let used: Vec<&ImageRecord> = project.used_images().collect();
     let mut known = Vec::new();
     for one in &truth.images {
@@ -172,8 +230,8 @@ fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Know
         if named.next().is_some() {
             return Err(Error::input(
                 &one.file,
-                "the project uses two pictures of this name, and a truth tells pictures apart by their names alone",
-                "Stitch pictures with different names.",
+                "the project uses two photographs of this name, and a truth tells photographs apart by their names alone",
+                "Stitch photographs with different names.",
             ));
         }
         if (record.width, record.height) != (one.width, one.height) {
@@ -181,15 +239,15 @@ fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Know
                 "the project has it at {} x {} px, the truth at {} x {} px",
                 record.width, record.height, one.width, one.height
             );
-            return Err(Error::input(&one.file, reason, "Give the truth of the very pictures that were stitched."));
+            return Err(Error::input(&one.file, reason, "Give the truth of the very photographs that were stitched."));
         }
         known.push(Known { record, truth: one });
     }
     match known.len() {
         0 => Err(Error::input(
             subject(truth),
-            format!("it names none of the {} pictures that the project uses", used.len()),
-            "Give the truth of the pictures that were stitched; pictures are told apart by their file names.",
+            format!("it names none of the {} photographs that the project uses", used.len()),
+            "Give the truth of the photographs that were stitched; photographs are told apart by their file names.",
         )),
         1 => Err(too_few(1)),
         _ => Ok(known),
@@ -199,8 +257,8 @@ fn match_pictures<'a>(project: &'a Project, truth: &'a Truth) -> Result<Vec<Know
 fn too_few(count: usize) -> Error {
     Error::input(
         "the truth",
-        format!("of the pictures it names, the project uses {count}, and it takes two to compare"),
-        "Give a project of at least two pictures of the set.",
+        format!("of the photographs it names, the project uses {count}, and it takes two to compare"),
+        "Give a project of at least two photographs of the set.",
     )
 }
 

@@ -43,7 +43,7 @@ fn truth(gammas: [f64; 2]) -> Truth {
 /// Turned by 3 and -1 degrees where 2 and 1 stand upright: off by 1 and -2, so 1.5 on average and 3 between them.
 #[test]
 fn known_turns_have_known_figures() {
-    let evaluation = evaluate(&project([3.0, -1.0]), &truth([2.0, 1.0])).expect("two pictures");
+    let evaluation = evaluate(&project([3.0, -1.0]), &truth([2.0, 1.0])).expect("two photographs");
     let near = |value: f64, expected: f64| assert!((value - expected).abs() < 1e-9, "{value} {expected}");
     assert_eq!((evaluation.used, evaluation.given, evaluation.folds), (2, 2, 0));
     near(evaluation.upright_deg, 1.5);
@@ -54,9 +54,9 @@ fn known_turns_have_known_figures() {
     near(evaluation.gdic_reference_deg.expect("b.jpg is known"), 3.0);
     near(evaluation.theta_error_deg.expect("rotations"), 3.0);
     near(evaluation.theta_error_max_deg.expect("rotations"), 3.0);
-    assert_eq!(evaluation.pictures[0].file, "a.jpg");
-    near(evaluation.pictures[1].upright_deg, -2.0);
-    near(evaluation.pictures[1].theta_error_deg.expect("rotations"), -3.0);
+    assert_eq!(evaluation.photographs[0].file, "a.jpg");
+    near(evaluation.photographs[1].upright_deg, -2.0);
+    near(evaluation.photographs[1].theta_error_deg.expect("rotations"), -3.0);
 }
 
 fn complaint(project: &Project, truth: &Truth) -> String {
@@ -72,10 +72,10 @@ fn a_truth_that_does_not_fit_is_refused_by_name() {
     other.images[1].file = "c.jpg".to_owned();
     assert!(complaint(&whole, &other).contains("it takes two to compare"));
     other.images[0].file = "d.jpg".to_owned();
-    assert!(complaint(&whole, &other).contains("the truth of test set: it names none of the 2 pictures"));
+    assert!(complaint(&whole, &other).contains("the truth of test set: it names none of the 2 photographs"));
     let mut twice = whole.clone();
     twice.images[0].path = "else/a.jpg".to_owned();
-    assert!(complaint(&twice, &truth([0.0, 0.0])).contains("two pictures of this name"));
+    assert!(complaint(&twice, &truth([0.0, 0.0])).contains("two photographs of this name"));
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn damaged_grids_are_refused_by_name() {
 }
 
 #[test]
-fn pictures_from_different_places_have_no_alignment() {
+fn photographs_from_different_places_have_no_alignment() {
     let mut moved = truth([0.0, 0.0]);
     assert!(evaluate(&project([0.0, 0.0]), &moved).expect("fits").align_px.is_some());
     moved.images[0].center = Some([0.0, 0.0, 1.0]);

@@ -8,7 +8,7 @@ use super::html::escape;
 use axis::Scale;
 
 /// Colors that the color-blind can tell apart (Okabe and Ito, Color Universal Design, 2008).
-const COLORS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+const COLORS: [&str; 8] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#f0e442"];
 
 const WIDTH: f64 = 860.0;
 const HEIGHT: f64 = 330.0;
@@ -224,17 +224,24 @@ impl Chart {
     fn draw_legend(&self, svg: &mut String) {
         /// Mean advance of a letter at the legend's size, pixels.
         const LETTER: f64 = 6.6;
-        let mut at = LEFT;
+        /// Between the lines of the legend, two of which lie above the drawing.
+        const LINE: f64 = 16.0;
+        let (mut at, mut line) = (LEFT, 4.0);
         for (index, series) in self.series.iter().enumerate() {
             let color = COLORS[index % COLORS.len()];
+            let width = 34.0 + LETTER * series.name.chars().count() as f64;
+            if at > LEFT && at + width > WIDTH {
+                (at, line) = (LEFT, line + LINE);
+            }
             let _ = writeln!(
                 svg,
-                "<rect x=\"{at:.1}\" y=\"10\" width=\"12\" height=\"12\" fill=\"{color}\"/>\
-                 <text x=\"{:.1}\" y=\"20.5\">{}</text>",
+                "<rect x=\"{at:.1}\" y=\"{line}\" width=\"12\" height=\"12\" fill=\"{color}\"/>\
+                 <text x=\"{:.1}\" y=\"{:.1}\">{}</text>",
                 at + 17.0,
+                line + 10.5,
                 escape(&series.name)
             );
-            at += 34.0 + LETTER * series.name.chars().count() as f64;
+            at += width;
         }
     }
 }
@@ -264,6 +271,13 @@ mod tests {
         assert!(svg.contains("<rect x=\"103.0\""), "{svg}");
         assert!(svg.contains("<rect x=\"259.0\""), "{svg}");
         assert!(!svg.contains("NaN"));
+    }
+
+    #[test]
+    fn a_long_legend_goes_on_below() {
+        let series = (0..10).map(|index| Series::plain(&format!("a method number {index}"), SeriesMark::Line, []));
+        let svg = Chart::new("x", "y", series.collect()).svg();
+        assert!(svg.contains("y=\"4\" width=\"12\"") && svg.contains("y=\"20\" width=\"12\""), "{svg}");
     }
 
     #[test]

@@ -1,0 +1,146 @@
+//! What bundle adjustment may change of a camera beside its rotation, and who shares it.
+
+use trueup_core::camera::{Camera, INTRINSICS};
+use trueup_core::lens::{Lens, LensTerms};
+use trueup_core::source::WorkingFrame;
+
+use super::prior::CameraPrior;
+
+/// Place of the focal length's logarithm among the intrinsic unknowns.
+pub(super) const FOCAL: usize = 0;
+/// First of the principal point's two.
+pub(super) const CENTER: usize = 1;
+/// First of the four radial terms.
+pub(super) const RADIAL: usize = 3;
+/// First of the two tangential terms.
+pub(super) const TANGENTIAL: usize = 7;
+
+/// Relative spread of separately estimated focal lengths above which `cameras.focal_sharing=auto` lets every photograph have
+/// its own.
+pub(super) const ZOOM_SPREAD: f64 = 0.03;
+
+/// Standard deviation of a radial term before anything is seen: an action camera's reaches 0.3.
+const RADIAL_SD: f64 = 0.3;
+/// Standard deviation of a tangential term.
+const TANGENTIAL_SD: f64 = 2e-3;
+/// Standard deviation of the principal point from the middle, in diagonals, along each axis.
+const CENTER_SD: f64 = 0.01;
+
+/// Where refinement starts from.
+pub(super) struct InitialIntrinsics {
+    pub focal_px: Vec<f64>,
+    /// Pinholes, unless they explain the matches badly and another lens does much better.
+    pub lens: LensState,
+}
+
+/// How far an intrinsic unknown but the focal length is expected from 0, one standard deviation.
+pub(super) fn standard_deviation(intrinsic: usize, frame: &WorkingFrame) -> f64 {
+    match intrinsic {
+        CENTER..RADIAL => CENTER_SD * frame.diagonal(),
+        TANGENTIAL.. => TANGENTIAL_SD,
+        _ => RADIAL_SD,
+    }
+}
+
+/// A photograph's lens on the way.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct LensState {
+    pub terms: LensTerms,
+    /// The principal point from the photograph's middle, working pixels.
+    pub center_px: [f64; 2],
+}
+
+impl LensState {
+    /// Whether nothing is bent, and nothing off center.
+    pub(super) fn is_pinhole(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// A pinhole camera with this lens put on.
+    pub(super) fn on(&self, pinhole: Camera) -> Camera {
+        if self.is_pinhole() {
+            return pinhole;
+        }
+        let [x, y] = pinhole.principal_point;
+        let principal_point = [x + self.center_px[0], y + self.center_px[1]];
+        Camera { lens: Lens::new(self.terms), principal_point, ..pinhole }
+    }
+
+    /// An intrinsic unknown's value.
+    pub(super) fn term(&self, intrinsic: usize) -> f64 {
+        match intrinsic {
+            CENTER..RADIAL => self.center_px[intrinsic - CENTER],
+            RADIAL..TANGENTIAL => self.terms.radial[intrinsic - RADIAL],
+            TANGENTIAL..INTRINSICS => self.terms.tangential[intrinsic - TANGENTIAL],
+            _ => 0.0,
+        }
+    }
+
+    /// Adds to an intrinsic unknown.
+    pub(super) fn add(&mut self, intrinsic: usize, amount: f64) {
+        match intrinsic {
+            CENTER..RADIAL => self.center_px[intrinsic - CENTER] += amount,
+            RADIAL..TANGENTIAL => self.terms.radial[intrinsic - RADIAL] += amount,
+            TANGENTIAL..INTRINSICS => self.terms.tangential[intrinsic - TANGENTIAL] += amount,
+            _ => {}
+        }
+    }
+}
+
+/// Which intrinsic unknowns are free.
+pub(super) type FreeTerms = [bool; INTRINSICS];
+
+/// Which unknown moves which intrinsic of which photograph; `None` holds it fixed.
+#[derive(Debug, Clone)]
+pub(super) struct IntrinsicsModel {
+    pub parameters_of: Vec<[Option<usize>; INTRINSICS]>,
+    pub parameters: usize,
+}
+
+impl IntrinsicsModel {
+    /// One focal length per camera group.
+    pub(super) fn shared(priors: &[CameraPrior]) -> Self {
+        let mut groups: Vec<usize> = priors.iter().map(|prior| prior.camera_group).collect();
+        groups.sort_unstable();
+        groups.dedup();
+        let group_of: Vec<usize> =
+            priors.iter().map(|prior| groups.binary_search(&prior.camera_group).unwrap_or(0)).collect();
+        Self::grouped(&group_of, &vec![only_focal(); groups.len()])
+    }
+
+    /// One focal length per photograph.
+    pub(super) fn per_photograph(photographs: usize) -> Self {
+        Self::grouped(&(0..photographs).collect::<Vec<_>>(), &vec![only_focal(); photographs])
+    }
+
+    /// No unknowns: everything stays as it is.
+    pub(super) fn fixed(photographs: usize) -> Self {
+        Self { parameters_of: vec![[None; INTRINSICS]; photographs], parameters: 0 }
+    }
+
+    /// The unknowns that are `free` for each group, common to the photographs that `group_of` puts into it.
+    pub(super) fn grouped(group_of: &[usize], free: &[FreeTerms]) -> Self {
+        let mut parameters = 0;
+        let columns: Vec<[Option<usize>; INTRINSICS]> = free
+            .iter()
+            .map(|free| {
+                std::array::from_fn(|intrinsic| {
+                    let next = free[intrinsic].then_some(parameters);
+                    parameters += usize::from(free[intrinsic]);
+                    next
+                })
+            })
+            .collect();
+        Self { parameters_of: group_of.iter().map(|&group| columns[group]).collect(), parameters }
+    }
+
+    /// Whether anything but focal lengths is free.
+    pub(super) fn has_lens(&self) -> bool {
+        self.parameters_of.iter().any(|of| of[FOCAL + 1..].iter().any(Option::is_some))
+    }
+}
+
+/// The focal length alone.
+pub(super) fn only_focal() -> FreeTerms {
+    std::array::from_fn(|intrinsic| intrinsic == FOCAL)
+}

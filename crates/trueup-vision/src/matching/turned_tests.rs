@@ -1,0 +1,67 @@
+//! Turns and lenses against exactly known ones.
+
+use trueup_core::StageContext;
+use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z};
+use trueup_core::lens::{LensProjection, LensTerms};
+
+use super::*;
+
+/// Matches of two photographs of a lens, `right` of them right within half a pixel, the others anywhere.
+fn matches(camera: &Camera, turn: &Matrix3<f64>, right: usize, wrong: usize) -> MatchedPoints {
+    let mut generator = StageContext::default().generator("turned test", 0);
+    let mut b = *camera;
+    b.set_rotation(turn);
+    let mut points = MatchedPoints::default();
+    while points.in_a.len() < right + wrong {
+        let mut anywhere = || Vector2::new(800.0 * generator.random::<f64>(), 600.0 * generator.random::<f64>());
+        let (source, other) = (anywhere(), anywhere());
+        let seen =
+            camera.transfer(&b, source).filter(|at| (0.0..800.0).contains(&at.x) && (0.0..600.0).contains(&at.y));
+        if points.in_a.len() % (right + wrong) < wrong {
+            points.in_a.push(source);
+            points.in_b.push(other);
+        } else if let Some(seen) = seen {
+            points.in_a.push(source);
+            points.in_b.push(seen + (other - Vector2::new(400.0, 300.0)) / 1000.0);
+        }
+    }
+    points
+}
+
+fn camera(projection: LensProjection, focal_px: f64, k1: f64) -> Camera {
+    let lens = Lens::new(LensTerms { projection, radial: [k1, 0.0, 0.0, 0.0], tangential: [0.0; 2] });
+    Camera { lens, ..Camera::new(focal_px, 800.0, 600.0, &Matrix3::identity()) }
+}
+
+#[test]
+fn turns_are_found_under_every_lens_among_wrong_matches() {
+    let turn = rotation_about_z(0.1) * rotation_about_y(-0.6) * rotation_about_x(0.05);
+    let frame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
+    let lenses = [
+        (LensProjection::Rectilinear, 620.0, 0.0),
+        (LensProjection::Rectilinear, 380.0, -0.2),
+        (LensProjection::Equidistant, 300.0, -0.02),
+    ];
+    for (projection, focal_px, k1) in lenses {
+        let truth = camera(projection, focal_px, k1);
+        let points = matches(&truth, &turn, 150, 150);
+        let mut generator = StageContext::default().generator("turned test", 1);
+        let found = find_turned_lens(&points, [&frame; 2], 5.0, &mut generator).expect("found");
+        // Wrong matches come first; a few of them agree by chance.
+        let right = found.inliers.iter().filter(|&&k| k >= 150).count();
+        assert!(right >= 147, "{right} of 150 under {truth:?}");
+        assert!(found.inliers.len() - right < 8, "{}", found.inliers.len() - right);
+        let error = found.turned.b.rotation() * turn.transpose();
+        assert!(error.trace() > 1.0 + 2.0 * 0.5_f64.to_radians().cos(), "{error}");
+    }
+}
+
+#[test]
+fn photographs_of_different_sizes_and_no_matches_have_no_common_lens() {
+    let frame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
+    let other = WorkingFrame { width: 600.0, ..frame };
+    let mut generator = StageContext::default().generator("turned test", 1);
+    let points = matches(&camera(LensProjection::Rectilinear, 600.0, 0.0), &rotation_about_y(0.3), 20, 0);
+    assert!(find_turned_lens(&points, [&frame, &other], 5.0, &mut generator).is_none());
+    assert!(find_turned_lens(&MatchedPoints::default(), [&frame; 2], 5.0, &mut generator).is_none());
+}
