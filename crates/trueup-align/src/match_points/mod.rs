@@ -19,7 +19,7 @@ use trueup_core::{Result, StageContext};
 pub use moving_dlt::MovingDlt;
 use residual::{CameraResidual, MAX_DEVIATION};
 
-use crate::mesh::evidence;
+use crate::evidence::{self, FULL_PX, NEGLIGIBLE_SHARE};
 
 /// The vertices of photograph `from`'s grid carried into photograph `to` (working pixels).
 #[derive(Debug, Clone, PartialEq)]
@@ -53,8 +53,8 @@ impl OverlapWarp {
 trueup_core::choice! {
     /// How a grid vertex is carried into another photograph.
     pub enum TransferModel {
-        /// The cameras' transfer, corrected by the matches' local deviation from it; as far as that deviation is common to
-        /// neighboring matches, and so of parallax, a homography fitted to the matches around the vertex.
+        /// The cameras' transfer, corrected by the matches' local deviation from it; under parallax, as far as neighboring
+        /// matches agree that the cameras are wrong, a homography fitted to the matches around the vertex.
         CameraResidual = "camera-residual",
         /// A homography fitted to the matches around the vertex (APAP), as published.
         MovingDlt = "moving-dlt",
@@ -136,31 +136,22 @@ impl Transfer<'_> {
         }
     }
 
-    /// By the cameras, corrected, where the photographs were taken from one point, and by the matches where they were not:
-    /// the mean of both, weighed by how far neighboring matches agree that the cameras are wrong.
+    /// By the cameras, corrected, where the photographs were taken from one point, and by the matches where they were
+    /// not: the mean of both, weighed by how far neighboring matches agree that the cameras are wrong.
     ///
-    /// The noise of matches has nothing in common, so that photographs taken from one point keep the cameras' consistency
-    /// exactly.
+    /// The noise of matches has nothing in common: photographs taken from one point keep the cameras' consistency.
     fn by_cameras_and_matches(&self, grid: &GridMesh, frame: &WorkingFrame) -> Vec<Option<Vector2<f64>>> {
-        /// Deviation from the cameras, common to neighboring matches, from which on the matches alone decide, working px
-        /// per axis: as for the matches that align the mesh (`mesh::line_alignment`).
-        const FULL_PX: f64 = 0.7;
         let cameras = CameraResidual::new(self.from, self.to, self.source, self.target);
+        let by_cameras = (0..grid.len()).map(|vertex| cameras.at(grid.source(vertex)));
         let share = evidence::share(cameras.common_square(), FULL_PX);
-        let by_cameras = || (0..grid.len()).map(|vertex| cameras.at(grid.source(vertex))).collect();
-        if share == 0.0 {
-            return by_cameras();
+        if share <= NEGLIGIBLE_SHARE {
+            return by_cameras.collect();
         }
-        let by_matches = self.by_matches(grid, frame);
-        if share == 1.0 {
-            return by_matches;
-        }
-        let by_cameras: Vec<Option<Vector2<f64>>> = by_cameras();
-        let between = |(camera, matches): (Option<Vector2<f64>>, Option<Vector2<f64>>)| match (camera, matches) {
-            (Some(camera), Some(matches)) => Some(camera.lerp(&matches, share)),
-            (camera, _) => camera,
+        // Where the matches determine no homography the cameras alone must do.
+        let mean = |(camera, matches): (Option<Vector2<f64>>, Option<Vector2<f64>>)| {
+            camera.map(|camera| matches.map_or(camera, |matches| camera.lerp(&matches, share)))
         };
-        by_cameras.into_iter().zip(by_matches).map(between).collect()
+        by_cameras.zip(self.by_matches(grid, frame)).map(mean).collect()
     }
 
     /// By moving DLT, as published.

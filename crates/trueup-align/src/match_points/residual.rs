@@ -1,10 +1,10 @@
 //! The cameras' transfer corrected by what the matches around a place say.
 
-use nalgebra::{Matrix3, Matrix3x2, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 use trueup_core::camera::Camera;
 
 use super::moving_dlt::DECAY_PX;
-use crate::mesh::evidence::CommonSum;
+use crate::evidence::{self, OverlapGap};
 
 /// Largest distance of a carried vertex from its place without local corrections, in diagonals of the other photograph.
 pub(super) const MAX_DEVIATION: f64 = 0.1;
@@ -58,31 +58,12 @@ impl<'a> CameraResidual<'a> {
         (correction.norm() <= self.margin).then(|| place + correction)
     }
 
-    /// Square, per axis, of the deviation that matches have in common with their neighbors: what no noise explains.
-    ///
-    /// Less its standard error if they had nothing in common; 0 where no match has a neighbor.
+    /// Square, per axis, of the deviation that neighboring matches have in common, in the mean of all: parallax, beyond
+    /// what noise explains.
     pub(super) fn common_square(&self) -> f64 {
-        /// Matches that are compared with one another; more hardly change the mean.
-        const MOST: usize = 400;
-        /// Closer matches share their pixels and so their noise.
-        const NEAREST_PX: f64 = 8.0;
-        /// Two cells of the usual grid: what is common over less, a grid cannot follow.
-        const FARTHEST_PX: f64 = 80.0;
-        let step = self.samples.len().div_ceil(MOST).max(1);
-        let some: Vec<&Sample> = self.samples.iter().step_by(step).collect();
-        let (mut sum, mut squares) = (CommonSum::default(), 0.0);
-        for (k, one) in some.iter().enumerate() {
-            for other in &some[..k] {
-                if (NEAREST_PX..FARTHEST_PX).contains(&(one.position - other.position).norm()) {
-                    let product = one.deviation.dot(&other.deviation);
-                    sum.products += product;
-                    squares += product * product;
-                    // Both axes of a deviation of 1 px each.
-                    sum.units += 2.0;
-                }
-            }
-        }
-        CommonSum { products: sum.products - squares.sqrt(), ..sum }.mean_square()
+        let gap =
+            |sample: &Sample| OverlapGap { place: sample.position, gap: sample.deviation, known: Matrix2::identity() };
+        evidence::common_square(&self.samples.iter().map(gap).collect::<Vec<_>>())
     }
 
     fn correction(&self, point: Vector2<f64>) -> Vector2<f64> {

@@ -18,9 +18,9 @@ use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 
 use super::current_grids::{CurrentGrids, PhotographPixel, PixelPair};
-use super::evidence::{self, OverlapGap};
 use super::normal_equations::{Metric, NormalEquations};
 use super::straight_line::{DeviationTerm, StraightLine};
+use crate::evidence::{self, FULL_PX, NEGLIGIBLE_SHARE, OverlapGap};
 
 trueup_core::options! {
     /// How matched lines align the grids (`stitch.align = lines`).
@@ -84,10 +84,8 @@ pub(super) struct MatchShares {
 impl MatchShares {
     /// Whether the matched points say hardly anything that is common to neighbors.
     pub(super) fn are_negligible(&self) -> bool {
-        /// Mean share: a common misalignment of a tenth of a pixel per axis.
-        const NEGLIGIBLE: f64 = 0.02;
         let count = self.points.iter().map(Vec::len).sum::<usize>();
-        self.points.iter().flatten().sum::<f64>() <= NEGLIGIBLE * count as f64
+        self.points.iter().flatten().sum::<f64>() <= NEGLIGIBLE_SHARE * count as f64
     }
 }
 
@@ -102,9 +100,6 @@ impl LineAlignmentInput<'_> {
     /// The shares of their weights that all matches have: how much of the distances in the current `grids` is common to
     /// neighbors.
     pub(super) fn shares(&self, grids: &CurrentGrids) -> MatchShares {
-        /// Misalignment, common to neighboring matches of a pair, from which on they weigh fully, panorama units per
-        /// axis; with less their weight falls with its square.
-        const FULL_PX: f64 = 0.7;
         let mut pairs: Vec<(usize, usize)> = self.points.iter().map(|pair| (pair.a, pair.b)).collect();
         pairs.extend(self.matched.iter().map(|pair| (pair.a, pair.b)));
         pairs.sort_unstable();

@@ -69,8 +69,8 @@ impl MeshProblem<'_> {
         Ok(solved)
     }
 
-    /// Rounds of alignment by lines and points; with the last round's equations. A step that folds the grids is shortened; if that
-    /// does not help it is undone and ends the rounds.
+    /// Rounds of alignment by lines and points; with the last round's equations. A step that folds the grids is
+    /// shortened; if that does not help it is undone and ends the rounds.
     fn align_features(
         &self,
         solver: &mut MeshSolver,
