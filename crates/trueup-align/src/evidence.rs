@@ -166,6 +166,30 @@ mod tests {
         assert!((found - 0.5).abs() < 0.06, "{found}");
     }
 
+    /// Less its standard error: of about 9,500 products the square root of the number times their own, 0.5 each.
+    #[test]
+    fn the_mean_of_all_is_common_less_its_standard_error() {
+        assert!(common_square(&lattice(Vector2::zeros())) < 0.002);
+        let found = common_square(&lattice(Vector2::new(0.6, -0.8)));
+        assert!((found - 0.5).abs() < 0.06, "{found}");
+    }
+
+    /// Four points 10 px apart in a square, 1 px off to the right: six products of 1, twelve axes, and a standard error of
+    /// the square root of six.
+    #[test]
+    fn a_few_neighbors_are_believed_with_caution() {
+        let one = |x: f64, y: f64| OverlapGap {
+            place: Vector2::new(x, y),
+            gap: Vector2::new(1.0, 0.0),
+            known: Matrix2::identity(),
+        };
+        let square = [one(0.0, 0.0), one(10.0, 0.0), one(0.0, 10.0), one(10.0, 10.0)];
+        assert!((common_square(&square) - (6.0 - 6.0_f64.sqrt()) / 12.0).abs() < 1e-12);
+        // Too near to be told apart by their noise, or too far to be neighbors.
+        assert_eq!(common_square(&[one(0.0, 0.0), one(7.9, 0.0), one(90.0, 0.0)]), 0.0);
+        assert_eq!(common_square(&[]), 0.0);
+    }
+
     #[test]
     fn what_has_no_neighbor_must_exceed_the_usual_noise() {
         assert_eq!(common_squares(&[]), [0.0; 0]);

@@ -20,7 +20,7 @@ use trueup_core::mesh::GridMesh;
 use super::current_grids::{CurrentGrids, PhotographPixel, PixelPair};
 use super::normal_equations::{Metric, NormalEquations};
 use super::straight_line::{DeviationTerm, StraightLine};
-use crate::evidence::{self, FULL_PX, NEGLIGIBLE_SHARE, OverlapGap};
+use crate::evidence::{self, FULL_PX, OverlapGap};
 
 trueup_core::options! {
     /// How matched lines align the grids (`stitch.align = lines`).
@@ -79,14 +79,6 @@ impl StraightInput<'_> {
 pub(super) struct MatchShares {
     points: Vec<Vec<f64>>,
     lines: Vec<Vec<f64>>,
-}
-
-impl MatchShares {
-    /// Whether the matched points say hardly anything that is common to neighbors.
-    pub(super) fn are_negligible(&self) -> bool {
-        let count = self.points.iter().map(Vec::len).sum::<usize>();
-        self.points.iter().flatten().sum::<f64>() <= NEGLIGIBLE_SHARE * count as f64
-    }
 }
 
 /// A match by its list and its index there.

@@ -14,9 +14,6 @@ pub struct Refinements<'a> {
     pub closure: Option<Closure<'a>>,
     /// Long lines that keep their shape.
     pub structure: Option<StructureInput<'a>>,
-    /// Points that align overlaps where neighboring ones agree that they do not meet; photographs taken from one point
-    /// stay exactly as they are.
-    pub points: Option<LineAlignmentInput<'a>>,
     /// Lines and points that align overlaps.
     pub lines: Option<LineAlignmentInput<'a>>,
     /// Lines that keep straight while lines or pixels align overlaps.

@@ -13,20 +13,6 @@ use super::refinements::Refinements;
 use super::solver::MeshSolver;
 use super::warped_mesh::total_folds;
 
-/// Times the mesh is solved with lines, points and their weights found on the solution before.
-const LINE_ROUNDS: usize = 4;
-/// The same with points alone.
-const POINT_ROUNDS: usize = 2;
-
-/// What the rounds of alignment by lines and points are made from.
-#[derive(Debug, Clone, Copy)]
-struct FeatureAlignment<'a> {
-    input: LineAlignmentInput<'a>,
-    /// Lines that are kept straight meanwhile.
-    straight: Option<StraightInput<'a>>,
-    rounds: usize,
-}
-
 /// What the rounds of photometric alignment are made from.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PixelAlignment<'a> {
@@ -45,20 +31,11 @@ impl MeshProblem<'_> {
             structure.add(&mut equations, &self.current(self.grids, self.grids));
         }
         let mut solved = self.solve(&mut solver, &equations)?;
-        let points = refinements.points.filter(|points| {
-            let fine = self.delivered(&solved.meshes);
-            !points.shares(&self.current(&solved.meshes, &fine)).are_negligible()
-        });
-        if points.is_some() || refinements.photometric.is_some() || refinements.lines.is_some() {
+        if refinements.photometric.is_some() || refinements.lines.is_some() {
             self.hold_outlines(&mut equations, &solved.meshes, refinements.outline_weight);
         }
-        if let Some(input) = points {
-            let points = FeatureAlignment { input, straight: refinements.straight, rounds: POINT_ROUNDS };
-            (equations, solved) = self.align_features(&mut solver, equations, &points, solved)?;
-        }
-        if let Some(input) = refinements.lines {
-            let lines = FeatureAlignment { input, straight: refinements.straight, rounds: LINE_ROUNDS };
-            (equations, solved) = self.align_features(&mut solver, equations, &lines, solved)?;
+        if let Some(input) = &refinements.lines {
+            (equations, solved) = self.align_lines(&mut solver, equations, input, refinements.straight, solved)?;
         }
         if let Some(input) = &refinements.photometric {
             let fine = self.delivered(&solved.meshes);
@@ -69,26 +46,28 @@ impl MeshProblem<'_> {
         Ok(solved)
     }
 
-    /// Rounds of alignment by lines and points; with the last round's equations. A step that folds the grids is
-    /// shortened; if that does not help it is undone and ends the rounds.
-    fn align_features(
+    /// Rounds of line alignment; with the last round's equations. A step that folds the grids is shortened; if that
+    /// does not help it is undone and ends the rounds.
+    fn align_lines(
         &self,
         solver: &mut MeshSolver,
         equations: NormalEquations,
-        features: &FeatureAlignment,
+        input: &LineAlignmentInput,
+        straight: Option<StraightInput>,
         start: Solved,
     ) -> Result<(NormalEquations, Solved)> {
+        /// Times the mesh is solved with lines and weights found on the solution before.
+        const ROUNDS: usize = 4;
         /// Factor on the robust distance from round to round: where depth differs within a cell, the surface that most
         /// matches are on wins.
         const NARROWING: f64 = 0.7;
-        let FeatureAlignment { input, straight, rounds } = *features;
         let mut best = start;
         let mut fine = self.delivered(&best.meshes);
         let folds = total_folds(&fine);
         let shares = input.shares(&self.current(&best.meshes, &fine));
         let mut last = None;
         let mut robust_px = ROBUST_PX;
-        for _ in 0..rounds {
+        for _ in 0..ROUNDS {
             let mut with_lines = equations.clone();
             let grids = self.current(&best.meshes, &fine);
             input.add(&mut with_lines, &grids, &shares, robust_px);

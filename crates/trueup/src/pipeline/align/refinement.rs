@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use rayon::prelude::*;
-use trueup_align::match_points::{OverlapWarp, TransferModel};
+use trueup_align::match_points::OverlapWarp;
 use trueup_align::mesh::{
     GrayPyramid, LineAlignmentInput, PhotometricInput, Refinements, StraightInput, StructureInput,
 };
@@ -94,23 +94,16 @@ impl RefinementSources {
         options: &'a AlignOptions,
     ) -> Refinements<'a> {
         let align = options.stitch.align;
-        // The published match points are all that the published mesh meets by.
-        let follows_matches = options.match_points.model == TransferModel::CameraResidual;
         Refinements {
             closure: None,
             structure: (options.stitch.structure == Structure::Lines)
                 .then_some(StructureInput { chains: &self.chains, options: &options.structure }),
-            points: follows_matches.then_some(LineAlignmentInput {
-                matched: &[],
-                points: met,
-                options: &options.line_alignment,
-            }),
             lines: align.uses_lines().then_some(LineAlignmentInput {
                 matched: &self.matched,
                 points: met,
                 options: &options.line_alignment,
             }),
-            straight: (needs_pixels(options) || follows_matches)
+            straight: needs_pixels(options)
                 .then_some(StraightInput { lines: &component.lines, options: &options.line_alignment }),
             photometric: align
                 .uses_pixels()
