@@ -1,10 +1,10 @@
 //! How far overlaps are apart beyond the noise of what says so.
 //!
-//! Cameras and plain mesh meets overlaps to a tenth of a pixel where the photographs were taken from one point, better than any
-//! single match or cell of pixels says. Drawn to each of them it would follow their noise. Noise differs from neighbor
-//! to neighbor; a true misalignment is common to them. The product of neighbors' distances is therefore, on the mean,
-//! the square of the true one, and evidence weighs by it, as the prior variance of what is estimated says in a Wiener
-//! filter.
+//! Cameras, and the plain mesh after them, bring overlaps within a tenth of a pixel where the photographs were taken from
+//! one point, nearer than any single match or cell of pixels says. Drawn to each of these, overlaps would follow their
+//! noise. Noise differs from neighbor to neighbor; a true misalignment is common to them. The product of neighbors'
+//! distances is therefore, on the mean, the square of the true one, and evidence weighs by it, as the prior variance of
+//! what is estimated says in a Wiener filter.
 
 use nalgebra::{Matrix2, Vector2};
 

@@ -61,6 +61,11 @@ fn both_models_carry_vertices_to_their_true_place() {
     }
 }
 
+/// Where a pair's matches are in its first and in its second photograph.
+fn ends(pair: &PairMatches) -> (Vec<Vector2<f64>>, Vec<Vector2<f64>>) {
+    pair.inliers.iter().map(|one| (Vector2::from(one.in_a), Vector2::from(one.in_b))).unzip()
+}
+
 /// How far the vertices of the example's first photograph are carried from where the cameras alone would, with the
 /// model that is the default.
 fn beyond_cameras(pair: PairMatches) -> Vec<Vector2<f64>> {
@@ -89,14 +94,10 @@ fn vertices_follow_the_few_matches_of_a_plane_that_the_cameras_miss() {
     for one in &mut pair.inliers {
         one.in_b = (Vector2::from(one.in_b) + SHIFT).into();
     }
-    let of = |place: fn(&PointMatch) -> [f64; 2]| -> Vec<Vector2<f64>> {
-        pair.inliers.iter().map(|one| Vector2::from(place(one))).collect()
-    };
-    let (source, target) = (of(|one| one.in_a), of(|one| one.in_b));
+    let (source, target) = ends(&pair);
     pair.b_from_a = Homography::fit(&source, &target, None).map(|homography| homography.to_rows());
     let corrected = CameraResidual::new(&cameras[0], &cameras[1], &source, &target);
-    let corner =
-        corrected.at(source[0]).expect("near") - cameras[0].transfer(&cameras[1], source[0]).expect("near");
+    let corner = corrected.at(source[0]).expect("near") - cameras[0].transfer(&cameras[1], source[0]).expect("near");
     assert!((corner - SHIFT).norm() > 0.1, "the correction alone reaches {corner}");
     for deviation in beyond_cameras(pair) {
         assert!((deviation - SHIFT).norm() < 1e-4, "{deviation}");
@@ -112,10 +113,7 @@ fn a_smaller_parallax_is_followed_in_part() {
     for one in &mut pair.inliers {
         one.in_b = (Vector2::from(one.in_b) + SHIFT).into();
     }
-    let of = |place: fn(&PointMatch) -> [f64; 2]| -> Vec<Vector2<f64>> {
-        pair.inliers.iter().map(|one| Vector2::from(place(one))).collect()
-    };
-    let (source, target) = (of(|one| one.in_a), of(|one| one.in_b));
+    let (source, target) = ends(&pair);
     let homography = Homography::fit(&source, &target, None).expect("regular");
     pair.b_from_a = Some(homography.to_rows());
     let corrected = CameraResidual::new(&cameras[0], &cameras[1], &source, &target);
@@ -147,10 +145,8 @@ fn noise_of_matches_is_no_parallax() {
         let noise = |salt: f64| ((k as f64 * 12.9898 + salt).sin() * 43_758.545).fract() * 0.8;
         one.in_b = [one.in_b[0] + noise(0.0), one.in_b[1] + noise(78.233)];
     }
-    let of = |place: fn(&PointMatch) -> [f64; 2]| -> Vec<Vector2<f64>> {
-        pair.inliers.iter().map(|one| Vector2::from(place(one))).collect()
-    };
-    let corrected = CameraResidual::new(&cameras[0], &cameras[1], &of(|one| one.in_a), &of(|one| one.in_b));
+    let (source, target) = ends(&pair);
+    let corrected = CameraResidual::new(&cameras[0], &cameras[1], &source, &target);
     let grids = vec![GridMesh::regular(800.0, 600.0, 40.0); 2];
     let options = MatchPointOptions::default();
     let run = |pair: &PairMatches| {
