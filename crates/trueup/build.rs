@@ -3,13 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The sources that decide what is measured, matched and aligned.
+/// The sources that decide what is measured, matched and aligned. Of a published crate, the others' are not beside it: there
+/// the version that they have in common tells them apart.
 const SOURCES: [&str; 5] =
     ["../trueup-core/src", "../trueup-vision/src", "../trueup-align/src", "../trueup-io/src", "src"];
 
 fn main() -> std::io::Result<()> {
     let mut files = Vec::new();
-    for folder in SOURCES {
+    for folder in SOURCES.into_iter().filter(|folder| Path::new(folder).is_dir()) {
         println!("cargo:rerun-if-changed={folder}");
         collect(Path::new(folder), &mut files)?;
     }

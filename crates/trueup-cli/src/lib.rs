@@ -11,6 +11,7 @@ mod compose;
 mod evaluate;
 mod failure;
 mod inspect;
+mod installing;
 mod option_list;
 mod output;
 mod progress;
@@ -46,6 +47,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Task::Inspect(args) => inspect::run(&args),
         Task::Evaluate(args) => evaluate::run(&args),
         Task::Options(args) => option_list::run(&args),
+        Task::Completions(args) => installing::completions(&args),
+        Task::Manual(args) => installing::manual(&args),
     };
     match outcome {
         Ok(()) => 0,

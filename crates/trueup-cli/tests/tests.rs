@@ -12,6 +12,7 @@ mod evaluate;
 mod failures;
 mod formats;
 mod full_turn;
+mod installing;
 mod likeness;
 mod masks;
 mod options;

@@ -58,8 +58,11 @@ impl Panorama {
                     context.check_cancelled()?;
                     row(y, rgba)?;
                     for ((pixel, color), mask) in rgba.chunks_exact(4).zip(colors.chunks_exact_mut(3)).zip(mask) {
-                        color.copy_from_slice(&pixel[..3]);
                         *mask = opacity(pixel[3]);
+                        // What is all but transparent has colors at some depths, and none at others.
+                        if *mask > 0 {
+                            color.copy_from_slice(&pixel[..3]);
+                        }
                     }
                     Ok(())
                 },

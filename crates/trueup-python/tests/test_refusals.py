@@ -28,7 +28,7 @@ def test_errors_have_the_names_of_the_library_and_a_hint(pictures: list[Array], 
         trueup.stitch(pictures, scale=-1)
     assert invalid.value.invalid[0][:2] == ("canvas.scale", "-1")
     with pytest.raises(trueup.LimitsError) as limits:
-        trueup.stitch(pictures, scale=100)
+        trueup.stitch(pictures, memory="10MB")
     assert limits.value.needed and isinstance(limits.value, MemoryError)
 
 

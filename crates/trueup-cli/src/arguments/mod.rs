@@ -10,6 +10,7 @@ mod stitch;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use clap_complete::Shell;
 
 pub(crate) use compare::CompareArgs;
 pub(crate) use compose::ComposeArgs;
@@ -60,6 +61,25 @@ pub(crate) enum Task {
     ///
     /// Those that people have a reason to change for a panorama of their own; with --expert, those of the methods as well.
     Options(OptionsArgs),
+    /// Print what completes commands, flags and their values when Tab is pressed
+    ///
+    /// For bash: trueup completions bash > ~/.local/share/bash-completion/completions/trueup
+    Completions(CompletionsArgs),
+    /// Write the manual pages into a folder: trueup.1, and one for every command
+    Manual(ManualArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CompletionsArgs {
+    /// The shell
+    pub shell: Shell,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ManualArgs {
+    /// The folder; pages that are there are replaced
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
 }
 
 #[derive(Debug, Args)]
