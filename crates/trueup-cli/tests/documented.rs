@@ -55,7 +55,7 @@ const MISTAKES: &[Mistake] = &[
     ),
     mistake("output format unknown", &["stitch", "a.jpg", "b.jpg", "-o", "pano.gif"]),
     mistake("option out of range", &["stitch", "a.jpg", "-o", "pano.jpg", "--scale", "-1"]),
-    mistake("viewer turned without a projection", &["stitch", "a.jpg", "-o", "pano.jpg", "--yaw", "30"]),
+    mistake("viewer turned on the mesh", &["stitch", "a.jpg", "-o", "pano.jpg", "--projection", "mesh", "--yaw", "30"]),
     mistake("option of the wrong kind", &["stitch", "a.jpg", "-o", "pano.jpg", "--seed", "soon"]),
     mistake("unknown option", &["stitch", "a.jpg", "-o", "pano.jpg", "--set", "mesh.cell=3"]),
     mistake("no configuration file", &["stitch", "a.jpg", "-o", "pano.jpg", "--config", "none.toml"]),

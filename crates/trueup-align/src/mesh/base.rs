@@ -63,7 +63,7 @@ pub fn turn_length(cameras: &[Camera], prior: &SimilarityPrior) -> f64 {
 }
 
 /// The turn about the horizontal axis that brings a steep panorama's mean direction level; `None` if it is not steep.
-fn tilt_from_level(cameras: &[Camera], level_from_world: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+pub(crate) fn tilt_from_level(cameras: &[Camera], level_from_world: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     /// Radians, 40 degrees.
     const STEEP: f64 = 0.7;
     /// Length of the mean direction below which the photographs look all round and have none.

@@ -35,6 +35,7 @@ use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::{Result, StageContext};
 
 use alignment::AlignmentEnergy;
+pub(crate) use base::tilt_from_level;
 pub use base::{BaseMap, bases, turn_length};
 pub use closure::Closure;
 pub use input::MeshInput;

@@ -219,10 +219,9 @@ impl Scene<'_> {
             .map(|grid| Placed { photograph: plane.placed[grid.photograph].photograph, mesh: grid.mesh })
             .collect();
         context.check_cancelled()?;
-        let reach = self.view.flat.reach(self.view.half);
         let frame = Frame {
             canvas_from_target: canvas_from_plane,
-            window: Some([-reach, reach]),
+            window: Some(self.view.window(0.0)),
             period: self.view.flat.period().filter(|_| self.view.closed),
         };
         layout::framed(placed, &frame, &options.canvas, context)

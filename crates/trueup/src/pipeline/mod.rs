@@ -229,7 +229,8 @@ impl<'a> Stitcher<'a> {
             }
         };
         let input = ArrangeInput::of_geometry(place(&component, geometry.as_ref()), &component, geometry.as_ref());
-        let arrangement = context.absorb(arrange::run(input, &self.options.arrange, context)?);
+        let fixed = self.options.fixed_by_method();
+        let arrangement = context.absorb(arrange::run(input, &fixed.arrange, context)?);
         let light = LightInput {
             layout: &arrangement.plane,
             small: matched.small_photographs(&component),
@@ -237,7 +238,7 @@ impl<'a> Stitcher<'a> {
             photographs,
         };
         let corrections = context.absorb(compose::light(&light, &self.options.compose, context)?);
-        let mut project = unfilled(matched, &self.options.fixed_by_method(), members, groups);
+        let mut project = unfilled(matched, &fixed, members, groups);
         let geometry = geometry.as_ref();
         let found =
             GeometryRecord { component: &component, geometry, arrangement: &arrangement, corrections: &corrections };
@@ -264,14 +265,15 @@ impl<'a> Stitcher<'a> {
         let recalled = self.context.gather(|context| {
             let Recorded { used, layout, corrections, reference } = Recorded::new(project)?;
             let set = PhotographSet::open(images, Vec::new(), masks, self.options, context)?;
-            let arrangement = arrange::recall(layout, reference, project, &self.options.arrange, context)?;
+            let fixed = self.options.fixed_by_method();
+            let arrangement = arrange::recall(layout, reference, project, &fixed.arrange, context)?;
             let arrangement: Arrangement = context.absorb(arrangement);
             let corrections = match self.options.compose.exposure == project.options.compose.exposure {
                 true => corrections,
                 false => self.light_anew(&set, &arrangement, reference, context)?,
             };
-            let same_view = self.options.arrange == project.options.arrange;
-            let mut project = Project { options: self.options.clone(), seconds: Default::default(), ..project.clone() };
+            let same_view = fixed.arrange == project.options.arrange;
+            let mut project = Project { options: fixed, seconds: Default::default(), ..project.clone() };
             record_composition(&mut project, &used, &set, &arrangement, &corrections);
             project.color_space = set.files.colors().map(PhotographColors::name).unwrap_or_default();
             if !same_view {
