@@ -28,7 +28,8 @@ mod project;
 mod report;
 
 pub use job::{
-    ComposeJob, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, Reference, SideOutput, StitchJob, Written, thread_pool,
+    ComposeJob, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, ReadFile, Reference, SideOutput, StitchJob, Written,
+    thread_pool,
 };
 pub use memo::{CacheUse, PhotographCache};
 pub use options::{

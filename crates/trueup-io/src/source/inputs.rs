@@ -10,14 +10,17 @@ use super::rejection::Rejection;
 /// A file to look into, or an input that already failed.
 #[derive(Debug, Clone)]
 pub(crate) enum Candidate {
+    /// Named itself.
     File(PathBuf),
+    /// Found in a folder or by a pattern.
+    Found(PathBuf),
     Rejected(PathBuf, Rejection),
 }
 
 impl Candidate {
     pub(crate) fn path(&self) -> &Path {
         match self {
-            Self::File(path) | Self::Rejected(path, _) => path,
+            Self::File(path) | Self::Found(path) | Self::Rejected(path, _) => path,
         }
     }
 }
@@ -98,7 +101,7 @@ fn expand_pattern(pattern: &str) -> Vec<Candidate> {
 fn photographs_in_natural_order(paths: impl Iterator<Item = PathBuf>) -> Vec<Candidate> {
     let mut paths: Vec<PathBuf> = paths.filter(|path| names_photograph(path)).collect();
     paths.sort_by(|a, b| natural_order(a, b));
-    paths.into_iter().map(Candidate::File).collect()
+    paths.into_iter().map(Candidate::Found).collect()
 }
 
 /// Natural order without regard to case. Ties fall back to the bytes, so that the order never depends on the file system.

@@ -17,12 +17,12 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 
-use crate::metadata::header::Header;
+use crate::metadata::header::{self, Header};
 use crate::metadata::orientation::{TagVerdict, judge_orientation};
 
 use duplicates::Accepted;
 use inputs::Candidate;
-use opened::{OpenedPicture, open_candidate};
+use opened::{OWN_PANORAMA, OpenedPicture, open_candidate};
 use rejection::Rejection;
 
 pub use crate::formats::{names_photograph, readable_formats};
@@ -51,7 +51,7 @@ pub struct RejectedSource {
     pub name: String,
     /// Stable machine-readable reason in kebab case: `file-missing`, `pattern-without-match`, `folder-without-pictures`,
     /// `folder-not-file`, `file-unreadable`, `file-empty`, `not-a-picture`, `format-unsupported`, `picture-damaged`,
-    /// `picture-too-large`, `picture-too-small`, `duplicate`.
+    /// `picture-too-large`, `picture-too-small`, `duplicate`, `own-panorama`.
     pub code: String,
     /// Why it cannot be used, without a closing full stop.
     pub reason: String,
@@ -64,14 +64,19 @@ impl RejectedSource {
     pub fn to_error(&self) -> Error {
         Error::input(&self.name, &self.reason, &self.hint)
     }
+
+    /// Whether it was left out because an earlier run of this program made it.
+    pub fn is_own_panorama(&self) -> bool {
+        self.code == OWN_PANORAMA
+    }
 }
 
 /// Finds the photographs that `inputs` name and reads their headers.
 ///
 /// An input is a file, a folder (its photographs, not those of folders inside it, hidden files left out) or a pattern with
 /// `*`, `?`, `[...]` and `**`. A path that exists is never read as a pattern. A file is taken for what its content says,
-/// whatever its name. In folders and patterns, files that are no photographs are passed over in silence; everything
-/// else that cannot be used is listed in [`Sources::rejected`], and the good files beside it are used all the same.
+/// whatever its name. In folders and patterns, files that are no photographs are passed over in silence, and panoramas that
+/// this program made are left out: they are of an earlier run, of the photographs beside them. Everything else that cannot be used is listed in [`Sources::rejected`], and the good files beside it are used all the same.
 /// Of the same file given twice, or of two files with the same bytes, the first is used.
 ///
 /// A stale orientation tag is reported as the note `orientation-tag-stale`.
@@ -119,13 +124,22 @@ fn scan_from_side(
     Ok(sources)
 }
 
-/// The files that `inputs` name, as [`scan`] finds them, without a look into any: photographs and what is none.
+/// The files that `inputs` name, as [`scan`] finds them, photographs and what is none; without a look into any but those of
+/// folders and patterns, of which panoramas that this program made are left out.
 pub fn files(inputs: &[String]) -> Vec<PathBuf> {
     let file = |candidate| match candidate {
         Candidate::File(path) => Some(path),
+        Candidate::Found(path) => Some(path).filter(|path| !is_own_panorama(path)),
         Candidate::Rejected(..) => None,
     };
     inputs::expand(inputs).into_iter().filter_map(file).collect()
+}
+
+/// Whether the file at `path` says that this program made it.
+pub fn is_own_panorama(path: &Path) -> bool {
+    // Looked at before it is opened: opening a named pipe would wait for its writer.
+    let opened = if path.is_file() { header::open(path) } else { None };
+    opened.and_then(|(mut input, format)| (format.exif)(&mut input)).is_some_and(|exif| exif.is_by_this_program())
 }
 
 /// Decides over one picture, which is to be photograph `number`.

@@ -13,6 +13,9 @@ use crate::metadata::header::{Header, read_header};
 /// The largest file that is opened. Files are read into memory to be decoded; no photograph is this large.
 const MAX_FILE_BYTES: u64 = 4 << 30;
 
+/// The code of panoramas among the photographs of a folder.
+pub(super) const OWN_PANORAMA: &str = "own-panorama";
+
 /// A candidate whose header was read, and whose size is accepted.
 pub(super) struct OpenedPicture {
     pub(super) path: PathBuf,
@@ -27,9 +30,10 @@ pub(super) fn open_candidate(
     options: &SourceOptions,
     min_side_px: usize,
 ) -> Result<OpenedPicture, Rejection> {
-    let path = match candidate {
+    let (path, is_found) = match candidate {
         Candidate::Rejected(_, rejection) => return Err(rejection),
-        Candidate::File(path) => path,
+        Candidate::File(path) => (path, false),
+        Candidate::Found(path) => (path, true),
     };
     let (mut file, length) = open(&path)?;
     let format = recognize(&mut file, length)?;
@@ -45,6 +49,13 @@ pub(super) fn open_candidate(
             "Export it as gray or RGB with 8 or 16 bits a sample.",
         ),
     })?;
+    if is_found && header.exif.is_by_this_program() {
+        return Err(Rejection::new(
+            OWN_PANORAMA,
+            "it is a panorama that this program made",
+            "Name the file itself if it is to be stitched all the same.",
+        ));
+    }
     check_size(&header, options, min_side_px)?;
     Ok(OpenedPicture { path, length, header })
 }

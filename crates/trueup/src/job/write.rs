@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use trueup_core::Result;
-use trueup_io::encode;
+use trueup_io::{encode, source};
 
-use super::outputs::Outputs;
+use super::outputs::{Outputs, ReadFile};
 use super::side_outputs::{SideOutput, SideOutputWriter};
 use crate::pipeline::{Alignment, Stitcher};
-use crate::project::record::Project;
+use crate::project::record::{ImageRecord, ImageStatus, Project};
 
 /// A panorama that was written.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,7 +27,8 @@ impl Outputs {
     /// # Errors
     /// Those of [`Stitcher::compose`] and of writing; [`trueup_core::Error::Input`] if a file is one of the photographs.
     pub fn write(&self, stitcher: &Stitcher, mut alignment: Alignment) -> Result<Written> {
-        self.refuse_inputs(alignment.project.images.iter().map(|image| Path::new(&image.path)), [])?;
+        let photographs = alignment.project.images.iter().filter(|image| !is_older_panorama(image));
+        self.refuse_over(photographs.map(|image| (Path::new(&image.path), ReadFile::Photograph)))?;
         let rendered = stitcher.writing_to(&self.panorama).compose(&mut alignment)?;
         let written = stitcher.context().gather(|context| {
             context.time("output", || {
@@ -58,6 +59,11 @@ impl Outputs {
         }
         Ok(Written { outputs: self.clone(), bytes, project })
     }
+}
+
+/// Whether a photograph was left out because it is none: a panorama of an earlier run, which may be written over.
+fn is_older_panorama(image: &ImageRecord) -> bool {
+    image.status == ImageStatus::LeftOut && source::is_own_panorama(Path::new(&image.path))
 }
 
 impl Written {
