@@ -202,7 +202,8 @@ fn photographs_are_found_where_they_moved_and_others_shown_in_their_place() {
 #[test]
 fn projects_edited_to_nonsense_are_refused() {
     let desk = stitched();
-    let project = desk.json("pano.json");
+    compose(&desk, &["--projection", "mesh", "--project", "mesh.json"]).expect_success();
+    let project = desk.json("mesh.json");
     let target = "/images/0/mesh/target";
     let mistakes = [
         ("/images/0/width", json!(0), "is damaged"),

@@ -244,8 +244,7 @@ mod tests {
     #[test]
     fn paninis_distance_leads_from_the_plane_to_the_cylinder() {
         let direction = toward(50.0, -20.0);
-        let at =
-            |panini_distance: f64| Flat::named(FlatKind::Panini, panini_distance).place(direction).expect("shown");
+        let at = |panini_distance: f64| Flat::named(FlatKind::Panini, panini_distance).place(direction).expect("shown");
         assert!((at(0.0) - flat(FlatKind::Perspective).place(direction).expect("shown")).norm() < 1e-12);
         assert!((at(1e9).x - 50_f64.to_radians().sin()).abs() < 1e-8);
     }

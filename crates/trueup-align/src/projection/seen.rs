@@ -76,12 +76,12 @@ impl Seen {
         self.within(|direction| direction.y.atan2(direction.x.hypot(direction.z)))
     }
 
-    /// The middle of all elevations, upwards from straight ahead, over the zenith too.
-    pub(super) fn middle_elevation(&self) -> f64 {
+    /// The lowest and the highest elevation but for corners, upwards from straight ahead, over the zenith too.
+    pub(super) fn elevations(&self) -> [f64; 2] {
         let elevations = || self.directions.iter().map(|direction| (-direction.y).atan2(direction.z));
         let high = quantile(elevations().collect());
         let low = -quantile(elevations().map(|elevation| -elevation).collect());
-        0.5 * (low + high)
+        [low, high]
     }
 
     /// The straightest of the family that keeps the limits; where none does, the straightest of those that exceed them
@@ -91,8 +91,7 @@ impl Seen {
         let upright = upright_height(self.height()) * (1.0 - smooth(half, ROUNDING));
         let fit = |step: f64| Fit { round: 2.0 * step / STEPS as f64, upright, turned: false };
         let limits = self.limits(&Flat::fitted(fit(STEPS as f64)), 1.0 - smooth(half, EVENING));
-        let excess: Vec<f64> =
-            (0..=STEPS).map(|step| self.excess(&Flat::fitted(fit(step as f64)), &limits)).collect();
+        let excess: Vec<f64> = (0..=STEPS).map(|step| self.excess(&Flat::fitted(fit(step as f64)), &limits)).collect();
         let limit = excess.iter().copied().fold(f64::INFINITY, f64::min).max(1.0);
         let Some(first) = excess.iter().position(|&one| one <= limit).filter(|&first| first > 0) else {
             return fit(0.0);

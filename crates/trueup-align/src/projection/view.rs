@@ -42,9 +42,13 @@ const ONE_WAY: [f64; 2] = [0.4, 0.6];
 /// beyond it the turn ends (10 degrees).
 const FACED: f64 = 0.873;
 const FACED_FADE: f64 = 0.175;
-/// A column of photographs: seen within so much to both sides (45 degrees), and higher or lower than this (55 degrees).
+/// A column of photographs is seen within so much to both sides (45 degrees), and from top to bottom over more than a plane
+/// carries without stretching (95 degrees). Its middle is near the horizon (20 degrees), so that what is vertical hardly
+/// leans in it, or it reaches so high or low (75 degrees) that no level view is of use.
 const COLUMN_SIDE: f64 = 0.785;
-const COLUMN_HEIGHT: f64 = 0.96;
+const COLUMN_LENGTH: f64 = 1.66;
+const COLUMN_MIDDLE: f64 = 0.349;
+const COLUMN_HEIGHT: f64 = 1.309;
 
 impl ProjectionView {
     /// The view that the options ask for.
@@ -122,8 +126,12 @@ impl ProjectionView {
             (view, seen)
         };
         let (_, level) = looking(0.0);
-        let is_column = level.height() > COLUMN_HEIGHT && level.turned().height() < COLUMN_SIDE;
-        let (view, seen) = looking(if is_column { level.middle_elevation() } else { steep });
+        let [low, high] = level.elevations();
+        let middle = 0.5 * (low + high);
+        let is_column = high - low > COLUMN_LENGTH
+            && (middle.abs() < COLUMN_MIDDLE || level.height() > COLUMN_HEIGHT)
+            && level.turned().height() < COLUMN_SIDE;
+        let (view, seen) = looking(if is_column { middle } else { steep });
         let fitted = |seen: &Seen| {
             let flat = Flat::fitted(seen.fit());
             (flat, seen.window(&flat))
