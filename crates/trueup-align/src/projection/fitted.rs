@@ -3,8 +3,6 @@
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::flat::NEAREST;
-
 /// Which of the family. Verticals are straight in all of them, and upright.
 ///
 /// A direction of longitude l and latitude p (down) lies at x = s sin l and, before heights are compressed, at y = s tan p.
@@ -28,6 +26,8 @@ impl Default for Fit {
     }
 }
 
+/// Sine below which a direction is too near the place where a projection has no end.
+pub(super) const NEAREST: f64 = 1e-3;
 /// Factors below which the limit of the formulas is meant.
 const NONE: f64 = 1e-6;
 
@@ -117,30 +117,10 @@ mod tests {
 
     use proptest::prelude::*;
 
-    use super::super::flat::{Flat, FlatKind};
     use super::*;
 
     fn toward(longitude: f64, latitude: f64) -> Vector3<f64> {
         Vector3::new(latitude.cos() * longitude.sin(), latitude.sin(), latitude.cos() * longitude.cos())
-    }
-
-    /// The ends of the family are the named projections, and its two halves meet.
-    #[test]
-    fn the_named_projections_are_of_the_family() {
-        let named = [
-            (0.0, 1.0, FlatKind::Perspective, 0.0),
-            (0.4, 1.0, FlatKind::Panini, 0.4),
-            (1.0, 1.0, FlatKind::Panini, 1.0),
-            (1.0 + 1e-9, 1.0, FlatKind::Panini, 1.0),
-            (2.0, 1.0, FlatKind::Cylindrical, 0.0),
-            (2.0, 0.0, FlatKind::Equirectangular, 0.0),
-        ];
-        let direction = toward(0.9, -0.5);
-        for (round, upright, kind, distance) in named {
-            let place = Fit { round, upright, turned: false }.place(&direction).expect("shown");
-            let expected = Flat::named(kind, distance).place(direction).expect("shown");
-            assert!((place - expected).norm() < 1e-7, "{kind:?}: {place} instead of {expected}");
-        }
     }
 
     /// A turned one does to heights what the others do to widths.

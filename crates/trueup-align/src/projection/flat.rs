@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::fitted::{Fit, panini_longitude};
+use super::fitted::{Fit, NEAREST, panini_longitude};
 
 /// A projection that is decided on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -90,9 +90,6 @@ pub struct Flat {
     #[serde(default)]
     pub fit: Fit,
 }
-
-/// Sine below which a direction is too near the place where a projection has no end.
-pub(super) const NEAREST: f64 = 1e-3;
 
 impl Flat {
     /// A projection by its name, Panini's of this distance.
@@ -247,6 +244,25 @@ mod tests {
         let at = |panini_distance: f64| Flat::named(FlatKind::Panini, panini_distance).place(direction).expect("shown");
         assert!((at(0.0) - flat(FlatKind::Perspective).place(direction).expect("shown")).norm() < 1e-12);
         assert!((at(1e9).x - 50_f64.to_radians().sin()).abs() < 1e-8);
+    }
+
+    /// The ends of the family are the named projections, and its two halves meet.
+    #[test]
+    fn the_named_projections_are_of_the_family() {
+        let named = [
+            (0.0, 1.0, FlatKind::Perspective, 0.0),
+            (0.4, 1.0, FlatKind::Panini, 0.4),
+            (1.0, 1.0, FlatKind::Panini, 1.0),
+            (1.0 + 1e-9, 1.0, FlatKind::Panini, 1.0),
+            (2.0, 1.0, FlatKind::Cylindrical, 0.0),
+            (2.0, 0.0, FlatKind::Equirectangular, 0.0),
+        ];
+        let direction = toward(50.0, -30.0);
+        for (round, upright, kind, distance) in named {
+            let place = Fit { round, upright, turned: false }.place(&direction).expect("shown");
+            let expected = Flat::named(kind, distance).place(direction).expect("shown");
+            assert!((place - expected).norm() < 1e-7, "{kind:?}: {place} instead of {expected}");
+        }
     }
 
     #[test]

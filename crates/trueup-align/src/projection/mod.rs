@@ -18,6 +18,8 @@ mod parallax;
 mod photograph;
 mod seen;
 mod view;
+#[cfg(test)]
+mod view_tests;
 
 pub use fitted::Fit;
 pub use flat::{Flat, FlatKind};

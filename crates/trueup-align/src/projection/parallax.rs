@@ -8,8 +8,8 @@
 //! over long rows are forgotten by this; only what it knows of overlaps remains, so that any mesh will do, of whatever
 //! method.
 //!
-//! Near the poles the mesh knows nothing: photographs that look there cannot be unrolled, and pull at their neighbors.
-//! They are drawn as their cameras see.
+//! Near the poles of its sphere the mesh knows nothing: photographs that look there cannot be unrolled, and pull at
+//! their neighbors. They are drawn as their cameras see.
 //!
 //! # Source
 //! H.-Y. Shum and R. Szeliski, "Construction and refinement of panoramic mosaics with global and local alignment"
@@ -153,7 +153,7 @@ mod tests {
             let level_from_camera = rotation_about_y(yaw);
             let camera = Camera::new(700.0, 800.0, 600.0, &level_from_camera.transpose());
             let mut mesh = GridMesh::regular(800.0, 600.0, 20.0);
-            let own = Camera::new(700.0, 800.0, 600.0, &nalgebra::Matrix3::identity());
+            let own = Camera::new(700.0, 800.0, 600.0, &Matrix3::identity());
             for vertex in 0..mesh.len() {
                 let ray = own.world_direction(mesh.source(vertex));
                 let place = Vector2::new(yaw + ray.x.atan2(ray.z), ray.y.asin()) * 700.0;
