@@ -1,0 +1,95 @@
+//! Where the cameras' directions lie on a plane: longitude and latitude.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Vector2, Vector3};
+use serde::{Deserialize, Serialize};
+use trueup_core::camera::Camera;
+use trueup_core::geometry::wrap_angle;
+use trueup_core::mesh::GridMesh;
+
+use super::super::options::MeshOptions;
+use super::super::subdivision::divided;
+use super::ByCamerasInput;
+use super::corrections::CameraCorrections;
+use crate::projection::{ParallaxShift, PosedPhotograph, Projection, ProjectionOptions, ProjectionView};
+
+/// A plane of longitudes and latitudes of the level world on which grids lie.
+///
+/// Photographs lie in one piece: their longitudes are counted from that of their middle, and may go on beyond half a
+/// turn. Around a pole, cells are torn, whose corners lie up to a turn apart.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CameraPlane {
+    /// Longitude of x = 0 but for `origin`, radians to the right of straight ahead.
+    pub yaw: f64,
+    /// Units of the plane per radian.
+    pub units_per_radian: f64,
+    /// Longitude from `yaw` and latitude, downwards, of the plane's (0, 0), radians.
+    pub origin: [f64; 2],
+}
+
+impl CameraPlane {
+    /// The same plane after `(place - origin) * scale`.
+    pub fn moved(&self, origin: [f64; 2], scale: f64) -> Self {
+        let at = |axis: usize| self.origin[axis] + origin[axis] / self.units_per_radian;
+        Self { units_per_radian: self.units_per_radian * scale, origin: [at(0), at(1)], ..*self }
+    }
+
+    /// The place of a direction of any length, its longitude within half a turn of `middle`, a longitude from `yaw`.
+    fn place(&self, direction: Vector3<f64>, middle: f64) -> Vector2<f64> {
+        let longitude = middle + wrap_angle(direction.x.atan2(direction.z) - self.yaw - middle);
+        let latitude = direction.y.atan2(direction.x.hypot(direction.z));
+        (Vector2::new(longitude, latitude) - Vector2::from(self.origin)) * self.units_per_radian
+    }
+
+    /// The unit direction of a place.
+    pub fn direction(&self, place: Vector2<f64>) -> Vector3<f64> {
+        let angles = place / self.units_per_radian + Vector2::from(self.origin);
+        let (longitude, latitude) = (angles.x + self.yaw, angles.y);
+        Vector3::new(latitude.cos() * longitude.sin(), latitude.sin(), latitude.cos() * longitude.cos())
+    }
+
+    /// How far each vertex of a photograph whose grid lies on this plane looks aside.
+    pub fn shift(&self, photograph: &PosedPhotograph) -> ParallaxShift {
+        let PosedPhotograph { camera, mesh } = photograph;
+        let aside = (0..mesh.len()).map(|vertex| {
+            let drawn = self.direction(Vector2::from(mesh.target[vertex]));
+            let seen = camera.project(camera.rotation() * drawn);
+            seen.map_or(Vector2::zeros(), |seen| seen - mesh.source(vertex))
+        });
+        ParallaxShift { aside: aside.collect() }
+    }
+}
+
+/// The photographs on the plane.
+pub(super) struct Drawing {
+    pub meshes: Vec<GridMesh>,
+    /// Length of a full turn, where the photographs go all the way round.
+    pub period: Option<f64>,
+    pub plane: CameraPlane,
+}
+
+impl Drawing {
+    /// Every photograph as its camera sees it, corrected; divided as the mesh would have been.
+    pub(super) fn new(input: &ByCamerasInput, corrections: &CameraCorrections, options: &MeshOptions) -> Self {
+        let posed = |(camera, grid): (&Camera, &GridMesh)| PosedPhotograph { camera: *camera, mesh: grid.clone() };
+        let posed: Vec<PosedPhotograph> = input.cameras.iter().zip(input.grids).map(posed).collect();
+        let whole = ProjectionOptions { kind: Projection::Equirectangular, ..ProjectionOptions::default() };
+        let view = ProjectionView::choose(&posed, input.dominant, &whole);
+        let plane = CameraPlane { yaw: view.yaw, units_per_radian: input.units_per_radian, origin: [0.0; 2] };
+        let drawn = |(k, photograph): (usize, &PosedPhotograph)| {
+            let PosedPhotograph { camera, mesh } = photograph;
+            let ahead = camera.rotation().row(2).transpose();
+            let middle = wrap_angle(ahead.x.atan2(ahead.z) - plane.yaw);
+            let mut fine = divided(mesh, options.subdivision);
+            for vertex in 0..fine.len() {
+                let pixel = fine.source(vertex);
+                let direction = camera.world_direction(pixel + corrections.aside(k, pixel));
+                fine.target[vertex] = plane.place(direction, middle).into();
+            }
+            fine
+        };
+        let meshes = posed.iter().enumerate().map(drawn).collect();
+        Self { meshes, period: view.closed.then_some(TAU * plane.units_per_radian), plane }
+    }
+}
