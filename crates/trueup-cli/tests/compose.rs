@@ -96,6 +96,39 @@ fn views_and_what_lies_beside_a_panorama_come_out_as_stitched() {
     assert!(desk.read("again.jpg") == desk.read("third.jpg"), "from the cropped project");
 }
 
+/// Rows of a photograph's recorded grid lie where the panorama shows them: straight with the perspective projection, on
+/// which the edge of a photograph is a straight line, and within the canvas.
+#[test]
+fn recorded_grids_are_those_of_the_panorama() {
+    let desk = stitched();
+    compose(&desk, &["--projection", "perspective", "--project", "again.json"]).expect_success();
+    let project = desk.json("again.json");
+    let canvas = ["width", "height"].map(|side| project["canvas"][side].as_f64().expect("a size"));
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for image in project["images"].as_array().expect("photographs") {
+        let mesh = &image["mesh"];
+        let columns = mesh["cols"].as_u64().expect("a number") as usize;
+        let target: Vec<[f64; 2]> = serde_json::from_value(mesh["target"].clone()).expect("places");
+        let row = &target[..columns];
+        let [from, to] = [row[0], row[columns - 1]];
+        let along = [to[0] - from[0], to[1] - from[1]];
+        let length = along[0].hypot(along[1]);
+        let bend = row.iter().map(|at| (along[0] * (at[1] - from[1]) - along[1] * (at[0] - from[0])).abs() / length);
+        assert!(bend.fold(0.0, f64::max) < 0.01 * length, "{}", image["path"]);
+        for at in &target {
+            for axis in 0..2 {
+                low[axis] = low[axis].min(at[axis]);
+                high[axis] = high[axis].max(at[axis]);
+            }
+        }
+    }
+    for axis in 0..2 {
+        assert!(low[axis].abs() < 1.0 && (high[axis] - canvas[axis]).abs() < 1.5, "{low:?} {high:?} {canvas:?}");
+    }
+    assert_ne!(project["images"][0]["mesh"], project["images"][0]["solved_mesh"]);
+    assert_eq!(project["images"][0]["solved_mesh"], desk.json("pano.json")["images"][0]["mesh"]);
+}
+
 #[test]
 fn other_options_of_composing_are_heeded_and_others_refused() {
     let desk = stitched();

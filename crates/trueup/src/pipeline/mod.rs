@@ -243,8 +243,8 @@ impl<'a> Stitcher<'a> {
             GeometryRecord { component: &component, geometry, arrangement: &arrangement, corrections: &corrections };
         fill_geometry(&mut project, &found);
         project.color_space = photographs.colors().map(PhotographColors::name).unwrap_or_default();
-        project.measures = geometry
-            .map(|geometry| context.time("measures", || measures::run(&component, geometry, &arrangement.plane)));
+        project.measures =
+            geometry.map(|geometry| context.time("measures", || measures::run(&component, geometry, &arrangement)));
         let layout = arrangement.written;
         let corrections = corrections.of_placed(&layout, |photograph| members.binary_search(&photograph).ok());
         let directions = geometry.map(|geometry| geometry.triads.clone()).unwrap_or_default();
@@ -270,11 +270,11 @@ impl<'a> Stitcher<'a> {
                 true => corrections,
                 false => self.light_anew(&set, &arrangement, reference, context)?,
             };
-            let same_canvas = self.options.arrange.canvas == project.options.arrange.canvas;
+            let same_view = self.options.arrange == project.options.arrange;
             let mut project = Project { options: self.options.clone(), seconds: Default::default(), ..project.clone() };
             record_composition(&mut project, &used, &set, &arrangement, &corrections);
             project.color_space = set.files.colors().map(PhotographColors::name).unwrap_or_default();
-            if !same_canvas {
+            if !same_view {
                 project.measures = None;
             }
             let layout = arrangement.written;
