@@ -231,7 +231,7 @@ impl<'a> Stitcher<'a> {
         let input = ArrangeInput::of_geometry(place(&component, geometry.as_ref()), &component, geometry.as_ref());
         let arrangement = context.absorb(arrange::run(input, &self.options.arrange, context)?);
         let light = LightInput {
-            layout: &arrangement.plane,
+            layout: &arrangement.lit_plane(),
             small: matched.small_photographs(&component),
             reference: component.reference,
             photographs,
@@ -303,7 +303,7 @@ impl<'a> Stitcher<'a> {
             frame: copy.frame,
             camera,
         });
-        let layout = &arrangement.plane;
+        let layout = &arrangement.lit_plane();
         let light = LightInput { layout, small: small.collect(), reference, photographs: &set.files };
         Ok(context.absorb(compose::light(&light, &self.options.compose, context)?))
     }

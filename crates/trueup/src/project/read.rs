@@ -55,6 +55,9 @@ impl Recorded {
         })?;
         let meshes = records.iter().map(|record| solved_grid(record)).collect::<Result<Vec<_>>>()?;
         let corrections = recorded_corrections(project, &records)?;
+        if !project.by_cameras.is_none_or(|plane| plane.is_sound()) {
+            return Err(Error::input("the project", "its plane of directions is none", AS_WRITTEN));
+        }
         let canvas = project.solved_canvas();
         let (width, height) = (canvas.width, canvas.height);
         // Grids may lie beyond the ends of a full turn by less than a turn, and anywhere around what was cropped.

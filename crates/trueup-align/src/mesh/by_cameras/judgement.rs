@@ -82,7 +82,8 @@ impl Suspicion {
     pub(super) fn reasons(self, evidence: &Evidence, by_cameras: f64) -> String {
         let Evidence { at_poles, folds, opened, lean, mesh_px, .. } = *evidence;
         let said = [
-            (at_poles > 0).then(|| format!("{at_poles} photographs look at a pole, which the mesh's plane does not have")),
+            (at_poles > 0)
+                .then(|| format!("{at_poles} photographs look at a pole, which the mesh's plane does not have")),
             (folds > 0).then(|| format!("the mesh folds ({folds} triangles)")),
             opened.then(|| "its ends do not meet".to_owned()),
             (lean > MOST_LEAN).then(|| format!("it leans by up to {:.0} degrees", lean.to_degrees())),
@@ -99,10 +100,7 @@ fn forward(camera: &Camera) -> Vector3<f64> {
 
 /// Whether a photograph shows a pole of the level world, or looks so near to one that it cannot be unrolled.
 fn is_at_pole(camera: &Camera, grid: &GridMesh) -> bool {
-    let shows = |down: f64| {
-        let seen = camera.project(camera.rotation() * Vector3::new(0.0, down, 0.0));
-        seen.is_some_and(|seen| (0.0..=grid.width).contains(&seen.x) && (0.0..=grid.height).contains(&seen.y))
-    };
+    let shows = |down: f64| camera.shows(Vector3::new(0.0, down, 0.0), [grid.width, grid.height]);
     !is_moderate(forward(camera)) || shows(1.0) || shows(-1.0)
 }
 

@@ -55,11 +55,9 @@ pub fn unless_worse(
 ) -> Result<Option<WarpedMesh>> {
     context.check_cancelled()?;
     let evidence = Evidence::of(mesh, input);
-    if std::env::var("TU_EV").is_ok() { eprintln!("EV {evidence:?}"); }
     let Some(suspicion) = Suspicion::of(&evidence) else { return Ok(None) };
     let Some(corrections) = CameraCorrections::find(input, options) else { return Ok(None) };
     let by_cameras = corrections.misfit_px(input);
-    if std::env::var("TU_EV").is_ok() { eprintln!("EV by_cameras {by_cameras} largest {}", corrections.largest_px()); }
     if !suspicion.is_confirmed(&evidence, by_cameras) {
         return Ok(None);
     }
@@ -67,7 +65,7 @@ pub fn unless_worse(
         "drawn-by-cameras",
         Subject::stage("mesh"),
         format!(
-            "drawn as the cameras see, with corrections of up to {:.1} px where matches ask for them: {}",
+            "drawn by the cameras instead, with corrections of up to {:.1} px where matches ask for them: {}",
             corrections.largest_px(),
             suspicion.reasons(&evidence, by_cameras)
         ),
@@ -84,3 +82,5 @@ pub fn unless_worse(
     }))
 }
 
+#[cfg(test)]
+mod tests;

@@ -35,8 +35,14 @@ impl CameraPlane {
         Self { units_per_radian: self.units_per_radian * scale, origin: [at(0), at(1)], ..*self }
     }
 
+    /// Whether it is a plane at all, however it was read.
+    pub fn is_sound(&self) -> bool {
+        let numbers = [self.yaw, self.units_per_radian, self.origin[0], self.origin[1]];
+        numbers.iter().all(|number| number.is_finite()) && self.units_per_radian > 0.0
+    }
+
     /// The place of a direction of any length, its longitude within half a turn of `middle`, a longitude from `yaw`.
-    fn place(&self, direction: Vector3<f64>, middle: f64) -> Vector2<f64> {
+    pub(super) fn place(&self, direction: Vector3<f64>, middle: f64) -> Vector2<f64> {
         let longitude = middle + wrap_angle(direction.x.atan2(direction.z) - self.yaw - middle);
         let latitude = direction.y.atan2(direction.x.hypot(direction.z));
         (Vector2::new(longitude, latitude) - Vector2::from(self.origin)) * self.units_per_radian
