@@ -1,8 +1,8 @@
 //! What the arguments that several commands have make of what was typed.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use trueup::{Error, MaskFile, MaskKind, Outputs, Projection, Reference, StitchOptions};
+use trueup::{Error, MaskFile, MaskKind, Outputs, Projection, ReadFile, Reference, StitchOptions};
 
 use crate::arguments::{FileArgs, MaskArgs, TuningArgs, TypedOptions};
 use crate::failure::Failure;
@@ -101,15 +101,19 @@ fn mask(flag: &str, typed: &str, kind: MaskKind) -> Result<MaskFile, Failure> {
     }
 }
 
-/// Refuses one name for two files.
-pub(crate) fn check_files(args: &FileArgs) -> Result<(), Failure> {
-    let beside = args.beside.0.iter().map(|(kind, path)| (format!("--{}", kind.flag()), path));
-    let given: Vec<(String, &PathBuf)> = std::iter::once(("--output".to_owned(), &args.output)).chain(beside).collect();
-    for (index, (flag, path)) in given.iter().enumerate() {
-        if let Some((other, _)) = given[..index].iter().find(|(_, other)| other == path) {
-            let message = format!("{} cannot be the file of both {other} and {flag}", path.display());
-            return Err(Failure::usage(message, format!("Give {other} and {flag} different names.")));
-        }
-    }
-    Ok(())
+/// Refuses one place for two files, or for one of the files that is read; `read` names those the library knows nothing of.
+pub(crate) fn check_files<'a>(
+    outputs: &Outputs,
+    read: impl IntoIterator<Item = (&'a Path, ReadFile)>,
+) -> Result<(), Failure> {
+    outputs.refuse_one_place_for_two().map_err(|error| match error {
+        Error::Input { subject, reason, hint } => Failure::usage(format!("{subject}: {reason}"), hint),
+        other => other.into(),
+    })?;
+    Ok(outputs.refuse_over(read)?)
+}
+
+/// The configuration as a file that is read, if there is one.
+pub(crate) fn configuration(tuning: &TuningArgs) -> impl Iterator<Item = (&Path, ReadFile)> {
+    tuning.config.iter().map(|path| (path.as_path(), ReadFile::Configuration))
 }

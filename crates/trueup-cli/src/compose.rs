@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use trueup::{ComposeJob, StitchOptions};
+use trueup::{ComposeJob, Outputs, ReadFile, SideOutput, StitchOptions};
 
 use crate::arguments::ComposeArgs;
 use crate::chosen;
@@ -15,15 +15,17 @@ use crate::summary;
 pub(crate) fn run(args: ComposeArgs) -> Result<(), Failure> {
     let (quiet, verbose) = (args.messages.quiet, args.messages.verbose);
     let (job, options) = checked(args)?;
+    let takes_output = job.outputs.take_standard_output();
     let written = progress::shown(quiet, |context| job.run(&options, context))?;
-    if quiet { Ok(()) } else { output::print(&summary::of_written(&[written], verbose)) }
+    if quiet { Ok(()) } else { output::report(&summary::of_written(&[written], verbose), takes_output) }
 }
 
 /// Arguments that make sense: what the library needs.
 fn checked(args: ComposeArgs) -> Result<(ComposeJob, StitchOptions), Failure> {
-    chosen::check_files(&args.files)?;
-    let project = inspect::read(&args.recorded)?;
-    project.options.validate()?;
+    let outputs = chosen::outputs(args.files);
+    chosen::check_files(&outputs, chosen::configuration(&args.tuning))?;
+    refuse_over_project(&outputs, &args.recorded)?;
+    let project = inspect::read_to_use(&args.recorded)?;
     let options = chosen::options(project.options.clone(), &args.tuning, &args.typed)?;
     let project_folder = args.recorded.parent().unwrap_or(Path::new("")).to_owned();
     let job = ComposeJob {
@@ -31,8 +33,15 @@ fn checked(args: ComposeArgs) -> Result<(ComposeJob, StitchOptions), Failure> {
         project_folder,
         photographs: args.photos,
         masks: chosen::masks(&args.masks)?,
-        outputs: chosen::outputs(args.files),
+        outputs,
         threads: chosen::threads(&args.tuning),
     };
     Ok((job, options))
+}
+
+/// Refuses to write over the project that is composed anything but a project, which is the new panorama's record.
+fn refuse_over_project(outputs: &Outputs, recorded: &Path) -> Result<(), Failure> {
+    let mut others = outputs.clone();
+    others.beside.remove(&SideOutput::Project);
+    Ok(others.refuse_over([(recorded, ReadFile::Project)])?)
 }

@@ -16,7 +16,7 @@ use crate::summary::{self, LabeledLines};
 type PixelOutcome = Result<PixelEvaluation, String>;
 
 pub(crate) fn run(args: &EvaluateArgs) -> Result<(), Failure> {
-    let project = inspect::read(&args.project)?;
+    let project = inspect::read_to_use(&args.project)?;
     let evaluation = args.truth.as_deref().map(|truth| against(&project, &args.project, truth)).transpose()?;
     let pixels = match args.no_pixels {
         true => None,

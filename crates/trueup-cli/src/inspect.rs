@@ -28,3 +28,19 @@ pub(crate) fn read(path: &Path) -> Result<Project, Error> {
     let text = String::from_utf8_lossy(&bytes);
     Project::from_json(&text, &path.display().to_string())
 }
+
+/// Reads a project file that something is to be made of: options that cannot be are the file's fault.
+pub(crate) fn read_to_use(path: &Path) -> Result<Project, Error> {
+    let project = read(path)?;
+    match project.options.validate() {
+        Err(Error::Options(invalid)) => Err(Error::input(
+            path.display(),
+            format!(
+                "an option in it cannot be: {}",
+                invalid.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+            ),
+            "Give a project file as `trueup stitch --project` wrote it.",
+        )),
+        checked => checked.map(|()| project),
+    }
+}

@@ -17,3 +17,13 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
         _ => Ok(()),
     }
 }
+
+/// Prints a report beside what was written: to standard error if standard output holds a file.
+pub(crate) fn report(text: &str, is_output_taken: bool) -> Result<(), Failure> {
+    if !is_output_taken {
+        return print(text);
+    }
+    // As with messages: nobody is left to be told that nobody reads them.
+    drop(std::io::stderr().lock().write_all(text.as_bytes()));
+    Ok(())
+}

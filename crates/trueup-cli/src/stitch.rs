@@ -12,8 +12,9 @@ use crate::summary;
 pub(crate) fn run(args: StitchArgs) -> Result<(), Failure> {
     let (quiet, verbose) = (args.messages.quiet, args.messages.verbose);
     let CheckedStitch { job, options } = CheckedStitch::new(args)?;
+    let takes_output = job.outputs.take_standard_output();
     let written = progress::shown(quiet, |context| job.run(&options, context))?;
-    if quiet { Ok(()) } else { output::print(&summary::of_written(&written, verbose)) }
+    if quiet { Ok(()) } else { output::report(&summary::of_written(&written, verbose), takes_output) }
 }
 
 /// Arguments that make sense: what the library needs.
@@ -26,7 +27,8 @@ impl CheckedStitch {
     fn new(args: StitchArgs) -> Result<Self, Failure> {
         let StitchArgs { photographs, files, geometry, .. } = args;
         let options = chosen::options(StitchOptions::default(), &args.tuning, &args.typed)?;
-        chosen::check_files(&files)?;
+        let outputs = chosen::outputs(files);
+        chosen::check_files(&outputs, chosen::configuration(&args.tuning))?;
         let inputs = Inputs {
             photographs,
             reference: chosen::reference(geometry.reference),
@@ -34,13 +36,9 @@ impl CheckedStitch {
             all: args.all,
             masks: chosen::masks(&args.masks)?,
             require_all: geometry.require_all,
+            ..Inputs::default()
         };
-        let job = StitchJob {
-            inputs,
-            outputs: chosen::outputs(files),
-            cache: geometry.cache,
-            threads: chosen::threads(&args.tuning),
-        };
+        let job = StitchJob { inputs, outputs, cache: geometry.cache, threads: chosen::threads(&args.tuning) };
         Ok(Self { job, options })
     }
 }

@@ -100,3 +100,76 @@ fn a_place_for_the_last_panorama_is_wanted_before_the_first_is_made() {
     desk.stitch(&photographs).expect_failure(1, &["pano-2.jpg: it is a folder"]);
     assert_eq!(desk.files(), files);
 }
+
+/// The same place is the same place however it is spelled; what is read is not written over.
+#[test]
+fn one_place_is_not_taken_twice_whatever_its_spelling() {
+    let desk = street_desk();
+    desk.put("m.toml", "[canvas]\nscale = 0.5\n");
+    desk.put("graph.txt", "a.jpg -- b.jpg\n");
+    let stitch = |arguments: &[&str]| finish(trueup(desk.path(), &[&["stitch", "a.jpg", "b.jpg"], arguments].concat()));
+    let twice = "it cannot be the file of both --output and --seams";
+    stitch(&["-o", "x.png", "--seams", "./x.png"]).expect_failure(2, &[twice]);
+    stitch(&["-o", "-", "--project", "-"]).expect_failure(2, &["both --output and --project"]);
+    stitch(&["-o", "x.png", "--config", "m.toml", "--project", "./m.toml"])
+        .expect_failure(1, &["./m.toml: this file is the configuration"]);
+    stitch(&["-o", "x.png", "--graph", "graph.txt", "--pto", "./graph.txt"])
+        .expect_failure(1, &["./graph.txt: this file is the graph"]);
+    assert_eq!(desk.read("m.toml"), b"[canvas]\nscale = 0.5\n");
+    assert_eq!(desk.read("graph.txt"), b"a.jpg -- b.jpg\n");
+}
+
+/// What leads to standard output is written there, and the summary elsewhere.
+#[test]
+fn a_dash_is_standard_output() {
+    let desk = street_desk();
+    let run = desk.stitch(&["a.jpg", "b.jpg", "--project", "-"]);
+    assert_eq!(run.status, 0, "{}", run.stderr);
+    let project: serde_json::Value = serde_json::from_str(&run.stdout).expect("a project and nothing else");
+    assert_eq!(project["format"], "trueup-project");
+    assert!(run.stderr.contains("photographs 2 of 2 used"), "{}", run.stderr);
+    let arguments = ["stitch", "a.jpg", "b.jpg", "--scale", "0.2", "--quiet", "-o", "-"];
+    let output = trueup(desk.path(), &arguments).output().expect("the command starts");
+    assert!(output.status.success() && output.stdout.starts_with(b"\x89PNG\r\n") && output.stderr.is_empty());
+    assert_eq!(desk.files(), ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "pano.jpg"]);
+}
+
+/// A file is not put in place of a pipe: who waits for it gets what was written.
+#[cfg(unix)]
+#[test]
+fn pipes_are_written_through() {
+    use std::os::unix::fs::FileTypeExt;
+    let desk = street_desk();
+    let pipe = desk.join("pipe.json");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
+    let reader = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || std::fs::read(pipe).expect("readable")
+    });
+    let run = desk.stitch(&["a.jpg", "b.jpg", "--project", "pipe.json"]);
+    assert!(pipe.metadata().expect("still there").file_type().is_fifo());
+    run.expect_success();
+    let read: serde_json::Value = serde_json::from_slice(&reader.join().expect("read")).expect("a project");
+    assert_eq!(read["format"], "trueup-project");
+}
+
+/// The panorama of an earlier run lies among the photographs, and is made again.
+#[test]
+fn an_older_panorama_in_the_folder_is_left_out_and_written_again() {
+    let desk = street_desk();
+    for arguments in [&["."][..], &["*.jpg"], &[".", "--require-all"]] {
+        let before = desk.join("pano.jpg").exists().then(|| desk.read("pano.jpg"));
+        let run = desk.stitch(arguments);
+        let said = run.expect_success();
+        assert!(said.contains("4 of "), "{said}");
+        if let Some(before) = before {
+            assert!(said.contains("pano.jpg: it is a panorama that this program made"), "{said}");
+            assert!(desk.read("pano.jpg") == before, "the same photographs, the same panorama");
+        }
+    }
+    // Named itself, it is a photograph, and not written over.
+    desk.stitch(&["a.jpg", "b.jpg", "pano.jpg"]).expect_failure(1, &["pano.jpg: this file is one of the photographs"]);
+    // A photograph of that name that bears no mark is not written over either.
+    std::fs::rename(desk.join("a.jpg"), desk.join("pano.jpg")).expect("renamed");
+    desk.stitch(&["."]).expect_failure(1, &["pano.jpg: this file is one of the photographs"]);
+}

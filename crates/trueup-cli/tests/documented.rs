@@ -48,6 +48,16 @@ const MISTAKES: &[Mistake] = &[
     mistake("output folder does not exist", &["stitch", "a.jpg", "b.jpg", "-o", "none/pano.jpg"]),
     mistake("output is a folder", &["stitch", "a.jpg", "b.jpg", "-o", "notes.jpg"]),
     mistake("output is a photograph", &["stitch", "a.jpg", "b.jpg", "-o", "a.jpg"]),
+    mistake("one place for two files", &["stitch", "a.jpg", "-o", "pano.png", "--seams", "./pano.png"]),
+    mistake(
+        "output is the configuration",
+        &["stitch", "a.jpg", "-o", "pano.jpg", "--config", "half.toml", "--project", "half.toml"],
+    ),
+    mistake(
+        "output is the graph",
+        &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--graph", "graph.txt", "--pto", "graph.txt"],
+    ),
+    mistake("output is the project composed", &["compose", "pano.json", "-o", "pano.jpg", "--pto", "./pano.json"]),
     mistake("scratch folder does not exist", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--scratch", "none"]),
     mistake(
         "transparent background in JPEG",
@@ -79,6 +89,8 @@ const MISTAKES: &[Mistake] = &[
     mistake("cache over a file", &["stitch", "a.jpg", "b.jpg", "-o", "pano.jpg", "--cache", "dot.jpg"]),
     mistake("another geometry to compose", &["compose", "pano.json", "-o", "pano.jpg", "--set", "mesh.cell_px=30"]),
     mistake("project edited to nonsense", &["compose", "nonsense.json", "-o", "pano.jpg"]),
+    mistake("project with a lens that cannot be", &["compose", "lens.json", "-o", "pano.jpg"]),
+    mistake("project with an option out of range", &["evaluate", "range.json"]),
     mistake("photograph that is gone", &["compose", "gone.json", "-o", "pano.jpg"]),
     mistake("no project file", &["inspect", "none.json"]),
     mistake("not a project file", &["inspect", "other.json"]),
@@ -114,12 +126,20 @@ fn desk() -> Desk {
         desk.put(&format!("turn{number}.jpg"), bytes);
     }
     desk.put("graph.txt", "a.jpg -- q.jpg\n");
+    desk.put("half.toml", "[canvas]\nscale = 0.5\n");
     desk.put("mine.toml", "[mash]\ncell_px = 30\n");
     desk.put("other.json", "{}");
     desk.stitch(&["a.jpg", "b.jpg", "--project", "pano.json"]).expect_success();
     std::fs::remove_file(desk.join("pano.jpg")).expect("removed");
     let project = String::from_utf8(desk.read("pano.json")).expect("UTF-8");
     desk.put("nonsense.json", project.replacen("\"gain\":[", "\"gain\":[-", 1));
+    let changed = |place: &str, value: f64| {
+        let mut changed = desk.json("pano.json");
+        *changed.pointer_mut(place).expect("such a place") = value.into();
+        changed.to_string()
+    };
+    desk.put("lens.json", changed("/images/0/focal_px", 3e8));
+    desk.put("range.json", changed("/options/canvas/scale", -1.0));
     desk.put("gone.json", project.replace("a.jpg", "gone.jpg"));
     let truth = street_truth();
     desk.put("bent.json", truth.replacen("\"R\":[[", "\"R\":[[7", 1));

@@ -151,7 +151,7 @@ fn wrong_usage_ends_with_two() {
         (&[], "Usage: trueup"),
         (
             &["stitch", "a.jpg", "-o", "p.jpg", "--project", "p.jpg"],
-            "p.jpg cannot be the file of both --output and --project",
+            "p.jpg: it cannot be the file of both --output and --project",
         ),
     ] {
         run(arguments).expect_failure(2, &[message]);

@@ -15,7 +15,6 @@ mod by_cameras;
 mod closure;
 mod complex;
 mod current_grids;
-mod evidence;
 mod input;
 mod line_alignment;
 mod normal_equations;

@@ -28,6 +28,8 @@ pub struct GraphFile {
 /// photograph joined to itself, or a file without any pair.
 pub fn parse_graph_file(text: &str, names: &[String], file: &str) -> Result<GraphFile> {
     let mut graph = GraphFile::default();
+    // Editors of some systems begin a text with a mark of its byte order, which is no part of the first name.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     for (number, line) in text.lines().enumerate() {
         let line = line.split('#').next().unwrap_or_default().trim();
         if line.is_empty() {
@@ -125,6 +127,12 @@ mod tests {
         let graph = parse_graph_file(text, &names(), "g.txt").expect("valid");
         assert_eq!(graph.edges, [(0, 1), (0, 2)]);
         assert_eq!((graph.reference, graph.reference_rotation_deg), (Some(1), Some(-3.5)));
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_a_name() {
+        let graph = parse_graph_file("\u{feff}a 1.jpg -- b.jpg\r\nb.jpg -- c.jpg\r\n", &names(), "g.txt");
+        assert_eq!(graph.expect("valid").edges, [(0, 1), (1, 2)]);
     }
 
     #[test]

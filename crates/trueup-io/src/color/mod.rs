@@ -15,6 +15,7 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use convert::Conversion;
 pub use icc::srgb_profile;
 pub(crate) use rows::InSrgb;
 pub use survey::PhotographColors;

@@ -11,6 +11,7 @@ use super::destination::check_sides;
 use super::failure::WriteFailure;
 use super::options::OutputOptions;
 use super::pending::{PendingFile, check_place};
+use super::place::is_standard_output;
 use super::strips::{BUFFER_BYTES, STRIP_ROWS};
 use crate::format::Output;
 use crate::formats::png::{PNG, SIDES, compression, failure};
@@ -39,7 +40,7 @@ pub trait LabelMap {
 /// # Errors
 /// As [`write_labels`].
 pub fn check_labels_place(path: &Path) -> Result<()> {
-    if PNG.names(path) {
+    if PNG.names(path) || is_standard_output(path) {
         return check_place(path);
     }
     Err(Error::Unsupported {

@@ -12,6 +12,7 @@ use super::failure::WriteFailure;
 use super::metadata::Metadata;
 use super::options::{Depth, LayerExtent, OutputOptions};
 use super::pending::{PendingFile, check_place};
+use super::place::is_standard_output;
 use super::strips::BUFFER_BYTES;
 use crate::color::InSrgb;
 use crate::format::{Output, SideLimit};
@@ -54,7 +55,7 @@ pub trait LayerSet {
 /// # Errors
 /// As [`write_layers`].
 pub fn check_layers_place(path: &Path) -> Result<()> {
-    if TIFF.names(path) {
+    if TIFF.names(path) || is_standard_output(path) {
         return check_place(path);
     }
     Err(Error::Unsupported {

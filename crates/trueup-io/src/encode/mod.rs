@@ -16,8 +16,10 @@ mod layers;
 pub(crate) mod metadata;
 pub(crate) mod options;
 pub(crate) mod pending;
+pub(crate) mod place;
 pub(crate) mod pyramid;
 pub(crate) mod samples;
+mod stale;
 pub(crate) mod strips;
 #[cfg(test)]
 mod tests;
@@ -47,6 +49,7 @@ pub use options::{
     PngCompression, TiffCompression, TiffLayout,
 };
 pub use pending::check_place;
+pub use place::{is_standard_output, passes_through, same_place};
 pub use unfinished::abandon_unfinished;
 
 /// Writes a panorama to `path`, in the format its extension names; returns the file's length in bytes, for Deep Zoom that

@@ -2,11 +2,14 @@
 
 use std::fmt::Display;
 use std::fs::File;
+use std::io::Seek;
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 use trueup_core::{Error, Result};
 
+use super::place::{open_through, passes_through, refuse_disk};
+use super::stale::{STALE_AGE, clear_stale, mark_in_use};
 use super::unfinished::{UNFINISHED, UnfinishedEntry};
 
 /// How temporary names begin, and how those of what is not yet complete end.
@@ -15,26 +18,33 @@ pub(super) const PART: &str = ".part";
 /// Permissions that any new file asks for.
 const NEW_FILE: u32 = 0o666;
 
-/// A file under a temporary name beside its target; dropped uncommitted, it is removed.
+/// A file under a temporary name beside its target; dropped uncommitted, it is removed. What passes through a pipe or a
+/// device is kept in a file without a name until it is whole.
 #[derive(Debug)]
 pub(crate) struct PendingFile {
-    temporary: NamedTempFile,
     target: PathBuf,
-    /// After the file, which is gone before it leaves the list.
-    _entry: UnfinishedEntry<'static>,
+    way: Way,
+}
+
+/// How what was written comes to its target.
+#[derive(Debug)]
+enum Way {
+    /// By its name. The entry comes after the file, which is gone before it leaves the list.
+    Renamed { temporary: NamedTempFile, _entry: UnfinishedEntry<'static> },
+    /// Byte for byte into what is no regular file, and must not be replaced by one.
+    Through(File),
 }
 
 impl PendingFile {
-    /// Makes an empty file in the folder of `path`.
+    /// Makes an empty file in the folder of `path`, or for what is no regular file in that for temporary files.
     pub(crate) fn create(path: &Path) -> Result<Self> {
+        refuse_folder(path)?;
+        if passes_through(path) {
+            return Self::create_through(path);
+        }
         // A link is followed, so that the file behind it is replaced and not the link.
         let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        let folder = match target.parent() {
-            Some(folder) if folder.as_os_str().is_empty() => Path::new("."),
-            Some(folder) => folder,
-            None => Path::new("/"),
-        };
-        refuse_folder(path)?;
+        let folder = folder_of(&target);
         require_folder(folder, path.display())?;
         let existing = target.metadata().ok();
         if existing.as_ref().is_some_and(|metadata| metadata.permissions().readonly()) {
@@ -52,32 +62,65 @@ impl PendingFile {
             None => allow_umask(&mut builder, NEW_FILE),
         }
         let make = || builder.tempfile_in(folder).map_err(|error| takes_nothing(folder, &error));
-        let (temporary, entry) = UNFINISHED.begin(make, NamedTempFile::path)?;
-        Ok(Self { temporary, target, _entry: entry })
+        let (temporary, _entry) = UNFINISHED.begin(make, NamedTempFile::path)?;
+        mark_in_use(temporary.as_file());
+        Ok(Self { target, way: Way::Renamed { temporary, _entry } })
+    }
+
+    fn create_through(path: &Path) -> Result<Self> {
+        refuse_disk(path)?;
+        let folder = std::env::temp_dir();
+        let kept = tempfile::tempfile_in(&folder).map_err(|error| takes_nothing(&folder, &error))?;
+        Ok(Self { target: path.to_owned(), way: Way::Through(kept) })
     }
 
     /// The file to write to.
     pub(crate) fn file(&mut self) -> &mut File {
-        self.temporary.as_file_mut()
+        match &mut self.way {
+            Way::Renamed { temporary, .. } => temporary.as_file_mut(),
+            Way::Through(kept) => kept,
+        }
     }
 
-    /// Gives the file its name; returns its length in bytes.
+    /// Gives the file its name, or passes it on; returns its length in bytes.
     pub(crate) fn commit(self) -> Result<u64> {
-        let Self { temporary, target, _entry } = self;
-        let length = temporary.as_file().metadata().map_err(|error| Error::io("writing", &target, error))?.len();
-        UNFINISHED
-            .complete(|| temporary.persist(&target).map_err(|failed| Error::io("writing", &target, failed.error)))?;
-        Ok(length)
+        let Self { target, way } = self;
+        let failed = |error| Error::io("writing", &target, error);
+        match way {
+            Way::Renamed { temporary, _entry } => {
+                let length = temporary.as_file().metadata().map_err(failed)?.len();
+                UNFINISHED.complete(|| temporary.persist(&target).map_err(|error| failed(error.error)))?;
+                Ok(length)
+            }
+            Way::Through(mut kept) => {
+                let mut into = open_through(&target)?;
+                kept.rewind().and_then(|()| std::io::copy(&mut kept, &mut into)).map_err(failed)
+            }
+        }
+    }
+}
+
+/// The folder that `target` lies in.
+fn folder_of(target: &Path) -> &Path {
+    match target.parent() {
+        Some(folder) if folder.as_os_str().is_empty() => Path::new("."),
+        Some(folder) => folder,
+        None => Path::new("/"),
     }
 }
 
 /// Checks that a file of any kind could be written to `path`: the folder exists and takes files, and `path` is no folder
-/// itself. Nothing is left behind.
+/// itself. Pipes and character devices are written through, disks refused. Nothing is left behind, nor what an earlier
+/// program that was killed has left in that folder.
 ///
 /// # Errors
 /// [`Error::Input`] if the folder does not exist or takes no files, [`Error::Io`] if the operating system refuses.
 pub fn check_place(path: &Path) -> Result<()> {
-    PendingFile::create(path).map(drop)
+    PendingFile::create(path)?;
+    if !passes_through(path) {
+        clear_stale(folder_of(path), STALE_AGE);
+    }
+    Ok(())
 }
 
 /// Refuses a folder where a file is to be.

@@ -18,6 +18,7 @@ mod webp;
 use std::io::{Read, Seek};
 use std::path::Path;
 
+use crate::encode::place::is_standard_output;
 use crate::format::{Format, Input, Reading, SIGNATURE_BYTES, Writing};
 
 pub(crate) use foreign::{describe_foreign_content, has_foreign_extension};
@@ -57,8 +58,12 @@ pub(crate) fn read_start(file: &mut impl Read) -> std::io::Result<Vec<u8>> {
     Ok(start)
 }
 
-/// How to write what the extension of `path` names, in any case.
+/// How to write what the extension of `path` names, in any case. Standard output, which has none, gets PNG: without loss,
+/// with transparency, and read by every program.
 pub(crate) fn writing_of(path: &Path) -> Option<&'static Writing> {
+    if path.extension().is_none() && is_standard_output(path) {
+        return png::PNG.writing.as_ref();
+    }
     writable().find(|(format, _)| format.names(path)).map(|(_, writing)| writing)
 }
 

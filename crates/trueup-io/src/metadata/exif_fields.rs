@@ -7,6 +7,8 @@ use tiff::decoder::Decoder;
 use tiff::decoder::ifd::Value as TiffValue;
 use tiff::tags::Tag as TiffTag;
 
+use crate::provenance::description::SOFTWARE;
+
 /// EXIF 3.0 tag numbers read from a TIFF's EXIF directory (section 4.6).
 const FOCAL_LENGTH: u16 = 0x920a;
 const COLOR_SPACE: u16 = 0xa001;
@@ -37,6 +39,8 @@ pub(crate) struct ExifFields {
     pub(crate) make: Option<String>,
     /// Model, trimmed.
     pub(crate) model: Option<String>,
+    /// Software, trimmed.
+    pub(crate) software: Option<String>,
     /// ColorSpace: 1 sRGB, 65535 uncalibrated, by some cameras 2 for Adobe RGB.
     pub(crate) color_space: Option<u32>,
     /// InteroperabilityIndex, trimmed; not read from a TIFF's own directories.
@@ -62,6 +66,7 @@ impl ExifFields {
             focal_plane_unit: value(Tag::FocalPlaneResolutionUnit).and_then(|value| value.get_uint(0)),
             make: text(Tag::Make),
             model: text(Tag::Model),
+            software: text(Tag::Software),
             color_space: value(Tag::ColorSpace).and_then(|value| value.get_uint(0)),
             interoperability: text(Tag::InteroperabilityIndex),
         }
@@ -74,6 +79,7 @@ impl ExifFields {
             orientation: decoder.find_tag_unsigned(TiffTag::Orientation).ok().flatten(),
             make: text(decoder.find_tag(TiffTag::Make).ok().flatten()),
             model: text(decoder.find_tag(TiffTag::Model).ok().flatten()),
+            software: text(decoder.find_tag(TiffTag::Software).ok().flatten()),
             ..Self::default()
         };
         let pointer = decoder.find_tag(TiffTag::ExifDirectory).ok().flatten();
@@ -92,6 +98,12 @@ impl ExifFields {
         fields.color_space = number(COLOR_SPACE).map(|space| space as u32);
         fields.focal_plane_unit = number(FOCAL_PLANE_RESOLUTION_UNIT).map(|unit| unit as u32);
         Some(fields)
+    }
+
+    /// Whether the picture names this program, of any version, as its maker.
+    pub(crate) fn is_by_this_program(&self) -> bool {
+        let program = SOFTWARE.split_whitespace().next();
+        self.software.as_deref().is_some_and(|software| software.split_whitespace().next() == program)
     }
 
     /// Make and model in one line. A model that names its maker already ("NIKON CORPORATION", "NIKON D7000") stands alone.

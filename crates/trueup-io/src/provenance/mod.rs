@@ -3,7 +3,7 @@
 //! [`describe`] gathers it from the files. Of the reference photograph come camera, lens and exposure; the time is that of
 //! the earliest photograph, and the place the reference's, or that of the first photograph that knows it.
 
-mod description;
+pub(crate) mod description;
 mod fields;
 mod gpano;
 mod record;

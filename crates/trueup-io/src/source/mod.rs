@@ -1,6 +1,7 @@
 //! Finds the photographs the user means and reads their headers: size, orientation, focal length, camera.
 
 mod duplicates;
+mod in_memory;
 mod inputs;
 mod names;
 mod opened;
@@ -17,15 +18,17 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 
-use crate::metadata::header::Header;
+use crate::metadata::header::{self, Header};
 use crate::metadata::orientation::{TagVerdict, judge_orientation};
 
 use duplicates::Accepted;
+use in_memory::in_memory_source;
 use inputs::Candidate;
-use opened::{OpenedPicture, open_candidate};
+use opened::{Named, OWN_PANORAMA, OpenedPicture, check_size, open_picture};
 use rejection::Rejection;
 
 pub use crate::formats::{names_photograph, readable_formats};
+pub use in_memory::InMemory;
 pub use inputs::natural_order;
 pub use names::unique_names;
 pub use options::{OrientationTrust, SourceOptions};
@@ -51,7 +54,7 @@ pub struct RejectedSource {
     pub name: String,
     /// Stable machine-readable reason in kebab case: `file-missing`, `pattern-without-match`, `folder-without-pictures`,
     /// `folder-not-file`, `file-unreadable`, `file-empty`, `not-a-picture`, `format-unsupported`, `picture-damaged`,
-    /// `picture-too-large`, `picture-too-small`, `duplicate`.
+    /// `picture-too-large`, `picture-too-small`, `duplicate`, `own-panorama`, `name-of-a-file`.
     pub code: String,
     /// Why it cannot be used, without a closing full stop.
     pub reason: String,
@@ -64,14 +67,19 @@ impl RejectedSource {
     pub fn to_error(&self) -> Error {
         Error::input(&self.name, &self.reason, &self.hint)
     }
+
+    /// Whether it was left out because an earlier run of this program made it.
+    pub fn is_own_panorama(&self) -> bool {
+        self.code == OWN_PANORAMA
+    }
 }
 
 /// Finds the photographs that `inputs` name and reads their headers.
 ///
 /// An input is a file, a folder (its photographs, not those of folders inside it, hidden files left out) or a pattern with
 /// `*`, `?`, `[...]` and `**`. A path that exists is never read as a pattern. A file is taken for what its content says,
-/// whatever its name. In folders and patterns, files that are no photographs are passed over in silence; everything
-/// else that cannot be used is listed in [`Sources::rejected`], and the good files beside it are used all the same.
+/// whatever its name. In folders and patterns, files that are no photographs are passed over in silence, and panoramas that
+/// this program made are left out: they are of an earlier run, of the photographs beside them. Everything else that cannot be used is listed in [`Sources::rejected`], and the good files beside it are used all the same.
 /// Of the same file given twice, or of two files with the same bytes, the first is used.
 ///
 /// A stale orientation tag is reported as the note `orientation-tag-stale`.
@@ -79,22 +87,34 @@ impl RejectedSource {
 /// # Errors
 /// [`Error::Options`] for options out of range, [`Error::Cancelled`]. Never for what is in the files.
 pub fn scan(inputs: &[String], options: &SourceOptions, context: &StageContext) -> Result<Sources> {
-    scan_from_side(MIN_SIDE_PX, inputs, options, context)
+    scan_with(inputs, &InMemory::default(), options, context)
+}
+
+/// [`scan`] where an input may also be the name of a photograph in memory, which is looked for there first.
+///
+/// # Errors
+/// As [`scan`].
+pub fn scan_with(
+    inputs: &[String],
+    in_memory: &InMemory,
+    options: &SourceOptions,
+    context: &StageContext<'_>,
+) -> Result<Sources> {
+    scan_candidates(inputs::expand(inputs, in_memory), MIN_SIDE_PX, options, context)
 }
 
 /// [`scan`] that accepts pictures of any size from a pixel on.
 pub(crate) fn scan_any_size(inputs: &[String], options: &SourceOptions, context: &StageContext<'_>) -> Result<Sources> {
-    scan_from_side(1, inputs, options, context)
+    scan_candidates(inputs::expand(inputs, &InMemory::default()), 1, options, context)
 }
 
-fn scan_from_side(
+fn scan_candidates(
+    candidates: Vec<Candidate>,
     min_side_px: usize,
-    inputs: &[String],
     options: &SourceOptions,
     context: &StageContext<'_>,
 ) -> Result<Sources> {
     options.check()?;
-    let candidates = inputs::expand(inputs);
     let paths: Vec<&Path> = candidates.iter().map(Candidate::path).collect();
     let names = unique_names(&paths);
 
@@ -105,8 +125,20 @@ fn scan_from_side(
         context.check_cancelled()?;
         let path = candidate.path().to_owned();
         let number = sources.photographs.len();
-        let examined = open_candidate(candidate, options, min_side_px)
-            .and_then(|opened| examine(opened, &name, number, options, &mut accepted, context));
+        let mut examine_file = |path: PathBuf, named: Named| {
+            let opened = open_picture(path, named, options, min_side_px)?;
+            examine(opened, &name, number, options, &mut accepted, context)
+        };
+        let examined = match candidate {
+            Candidate::Rejected(_, rejection) => Err(rejection),
+            Candidate::File(path) => examine_file(path, Named::Itself),
+            Candidate::Found(path) => examine_file(path, Named::ByItsFolder),
+            Candidate::InMemory(path, photograph) => {
+                check_size([photograph.width(), photograph.height()], options, min_side_px)
+                    .and_then(|()| accepted.admit_in_memory(&name, &photograph))
+                    .and_then(|()| in_memory_source(path, &name, &photograph))
+            }
+        };
         match examined {
             Ok(source) => sources.photographs.push(source),
             Err(Rejection { code, reason, hint }) => {
@@ -119,13 +151,22 @@ fn scan_from_side(
     Ok(sources)
 }
 
-/// The files that `inputs` name, as [`scan`] finds them, without a look into any: photographs and what is none.
-pub fn files(inputs: &[String]) -> Vec<PathBuf> {
+/// The files that `inputs` name, as [`scan_with`] finds them, photographs and what is none; without a look into any but those of
+/// folders and patterns, of which panoramas that this program made are left out.
+pub fn files(inputs: &[String], in_memory: &InMemory) -> Vec<PathBuf> {
     let file = |candidate| match candidate {
         Candidate::File(path) => Some(path),
-        Candidate::Rejected(..) => None,
+        Candidate::Found(path) => Some(path).filter(|path| !is_own_panorama(path)),
+        Candidate::InMemory(..) | Candidate::Rejected(..) => None,
     };
-    inputs::expand(inputs).into_iter().filter_map(file).collect()
+    inputs::expand(inputs, in_memory).into_iter().filter_map(file).collect()
+}
+
+/// Whether the file at `path` says that this program made it.
+pub fn is_own_panorama(path: &Path) -> bool {
+    // Looked at before it is opened: opening a named pipe would wait for its writer.
+    let opened = if path.is_file() { header::open(path) } else { None };
+    opened.and_then(|(mut input, format)| (format.exif)(&mut input)).is_some_and(|exif| exif.is_by_this_program())
 }
 
 /// Decides over one picture, which is to be photograph `number`.

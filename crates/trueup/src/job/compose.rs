@@ -6,7 +6,7 @@ use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 
 use super::masks::{AllMasks, MaskFile, MaskRecord};
-use super::outputs::Outputs;
+use super::outputs::{Outputs, ReadFile};
 use super::threads::thread_pool;
 use super::write::Written;
 use crate::options::StitchOptions;
@@ -80,7 +80,7 @@ impl ComposeJob {
         // Before files are looked for: a project that was edited to nonsense names itself.
         Recorded::new(&self.project)?;
         self.outputs.check(options)?;
-        self.outputs.refuse_inputs([], self.masks.iter().map(|mask| mask.file.as_path()))?;
+        self.outputs.refuse_over(self.masks.iter().map(|mask| (mask.file.as_path(), ReadFile::Mask)))?;
         thread_pool(self.threads)?.install(|| {
             let stitcher = Stitcher::new(options, context);
             let images = self.find_photographs(options, context)?;

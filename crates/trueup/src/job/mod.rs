@@ -14,7 +14,7 @@ mod write;
 pub use compose::ComposeJob;
 pub use inputs::{Inputs, Reference};
 pub use masks::{MaskFile, MaskKind, MaskRecord};
-pub use outputs::Outputs;
+pub use outputs::{Outputs, ReadFile};
 pub use side_outputs::SideOutput;
 pub use stitch::StitchJob;
 pub use threads::thread_pool;

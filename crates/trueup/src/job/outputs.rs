@@ -10,6 +10,42 @@ use trueup_io::scratch::check_scratch;
 use super::side_outputs::SideOutput;
 use crate::options::StitchOptions;
 
+/// What a file is read for that must not be written over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReadFile {
+    /// A photograph to be stitched.
+    Photograph,
+    /// A mask of one.
+    Mask,
+    /// The pairs to be matched.
+    Graph,
+    /// The options.
+    Configuration,
+    /// The record of the panorama that is composed again.
+    Project,
+}
+
+impl ReadFile {
+    fn words(self) -> &'static str {
+        match self {
+            Self::Photograph => "one of the photographs to be stitched",
+            Self::Mask => "one of the masks",
+            Self::Graph => "the graph of the photographs",
+            Self::Configuration => "the configuration",
+            Self::Project => "the project to be composed",
+        }
+    }
+
+    fn advice(self) -> &'static str {
+        match self {
+            Self::Photograph => {
+                "Give the panorama another name or folder, or move an older panorama away from the photographs."
+            }
+            _ => "Give what is written another name or folder.",
+        }
+    }
+}
+
 /// The files that one panorama is written to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outputs {
@@ -37,6 +73,7 @@ impl Outputs {
     /// # Errors
     /// [`Error::Input`], [`Error::Unsupported`] or [`Error::Io`] that names the file.
     pub fn check(&self, options: &StitchOptions) -> Result<()> {
+        self.refuse_one_place_for_two()?;
         encode::check_writable(&self.panorama, &options.compose.output)?;
         self.beside.iter().try_for_each(|(kind, path)| kind.check(path, options))?;
         match options.run.resources.scratch.as_str() {
@@ -45,31 +82,60 @@ impl Outputs {
         }
     }
 
-    /// Refuses to write over one of the photographs or masks, which may be the only copies. An older panorama in the folder
-    /// of the photographs is met here, too.
-    pub(crate) fn refuse_inputs<'a>(
-        &self,
-        photographs: impl IntoIterator<Item = &'a Path>,
-        masks: impl IntoIterator<Item = &'a Path>,
-    ) -> Result<()> {
+    /// Refuses one place for two of the files, however it is spelled.
+    ///
+    /// # Errors
+    /// [`Error::Input`] that names the place and both flags.
+    pub fn refuse_one_place_for_two(&self) -> Result<()> {
+        let beside = self.beside.iter().map(|(kind, path)| (kind.flag(), path));
+        let wanted: Vec<(&str, &PathBuf)> = std::iter::once(("output", &self.panorama)).chain(beside).collect();
+        for (index, (flag, path)) in wanted.iter().enumerate() {
+            if let Some((other, _)) = wanted[..index].iter().find(|(_, other)| encode::same_place(other, path)) {
+                let reason = format!("it cannot be the file of both --{other} and --{flag}");
+                let hint = format!("Give --{other} and --{flag} different names.");
+                return Err(Error::input(path.display(), reason, hint));
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses to write over a file that the work reads, which may be the only copy, however it is spelled.
+    ///
+    /// # Errors
+    /// [`Error::Input`] that names the file and what it is.
+    pub fn refuse_over<'a>(&self, read: impl IntoIterator<Item = (&'a Path, ReadFile)>) -> Result<()> {
         let existing: Vec<(&Path, PathBuf)> =
             self.files().filter_map(|output| Some((output, output.canonicalize().ok()?))).collect();
-        let photographs = photographs.into_iter().map(|path| (path, "photographs to be stitched"));
-        let masks = masks.into_iter().map(|path| (path, "masks"));
         // Paths are looked up on the disk: most often there is nothing to look up.
-        let mut inputs = photographs.chain(masks).filter(|_| !existing.is_empty());
-        let found = inputs.find_map(|(input, what)| {
-            let input = input.canonicalize().ok()?;
-            let (output, _) = existing.iter().find(|(_, existing)| *existing == input)?;
+        let mut read = read.into_iter().filter(|_| !existing.is_empty());
+        let found = read.find_map(|(path, what)| {
+            let path = path.canonicalize().ok()?;
+            let (output, _) = existing.iter().find(|(_, existing)| *existing == path)?;
             Some((output.display().to_string(), what))
         });
         match found {
             None => Ok(()),
-            Some((output, what)) => Err(Error::input(
-                output,
-                format!("this file is one of the {what}"),
-                "Give the panorama another name or folder, or move an older panorama away from the photographs.",
+            Some((output, what)) => Err(Error::input(output, format!("this file is {}", what.words()), what.advice())),
+        }
+    }
+
+    /// Whether one of the files is standard output, where nothing else is to be printed then.
+    pub fn take_standard_output(&self) -> bool {
+        self.files().any(encode::is_standard_output)
+    }
+
+    /// Refuses what holds one panorama where there are `count`: a pipe or a device has no second name.
+    ///
+    /// # Errors
+    /// [`Error::Input`] that names it.
+    pub(crate) fn refuse_several(&self, count: usize) -> Result<()> {
+        match self.files().find(|path| encode::passes_through(path)) {
+            Some(path) if count > 1 => Err(Error::input(
+                path.display(),
+                format!("it takes the files of one panorama, and there are {count}"),
+                "Give the name of a file, which is numbered then, or leave --all out.",
             )),
+            _ => Ok(()),
         }
     }
 

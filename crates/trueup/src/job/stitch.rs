@@ -6,7 +6,7 @@ use trueup_core::{Result, StageContext};
 use trueup_io::source;
 
 use super::inputs::Inputs;
-use super::outputs::Outputs;
+use super::outputs::{Outputs, ReadFile};
 use super::threads::thread_pool;
 use super::write::Written;
 use crate::memo::PhotographCache;
@@ -66,6 +66,7 @@ impl StitchJob {
         let outputs: Vec<Outputs> =
             (1..=count).map(|number| self.outputs.numbered((count > 1).then_some(number))).collect();
         // Not before now is it known how many there are: the last panorama is not to fail when the others are made.
+        self.outputs.refuse_several(count)?;
         for outputs in outputs.iter().filter(|_| count > 1) {
             self.check(outputs, options)?;
         }
@@ -76,8 +77,10 @@ impl StitchJob {
     /// Refuses outputs that cannot be written, or are among the inputs, before the inputs are looked into.
     fn check(&self, outputs: &Outputs, options: &StitchOptions) -> Result<()> {
         outputs.check(options)?;
-        let photographs = source::files(&self.inputs.photographs);
-        let masks = self.inputs.masks.iter().map(|mask| mask.file.as_path());
-        outputs.refuse_inputs(photographs.iter().map(PathBuf::as_path), masks)
+        let photographs = source::files(&self.inputs.photographs, &self.inputs.in_memory);
+        let photographs = photographs.iter().map(|path| (path.as_path(), ReadFile::Photograph));
+        let masks = self.inputs.masks.iter().map(|mask| (mask.file.as_path(), ReadFile::Mask));
+        let graph = self.inputs.graph.iter().map(|path| (path.as_path(), ReadFile::Graph));
+        outputs.refuse_over(photographs.chain(masks).chain(graph))
     }
 }

@@ -5,6 +5,7 @@ use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
+use trueup_io::source::RejectedSource;
 use trueup_vision::features::Features;
 
 use super::align::component::Component;
@@ -206,7 +207,9 @@ impl Matched {
     /// # Errors
     /// [`Error::Input`] with the reason for each that would be.
     pub(crate) fn require_all(&self, stitched: &[Vec<usize>]) -> Result<()> {
-        let PhotographSet { images, rejected, .. } = &self.set;
+        let images = &self.set.images;
+        // A panorama of an earlier run is no photograph that was given.
+        let rejected: Vec<&RejectedSource> = self.set.rejected.iter().filter(|one| !one.is_own_panorama()).collect();
         let used: usize = stitched.iter().map(Vec::len).sum();
         let given = images.len() + rejected.len();
         if used == given {

@@ -9,13 +9,13 @@ use trueup_io::scratch::{ScratchFolder, check_room};
 
 use crate::options::StitchOptions;
 
-/// Where the scratch file of a panorama on `layout` would go that is to be written to `output`, if that is known.
+/// Where the scratch file of a panorama on `layout` would go that is to be written to `output`, if that is known and a file.
 ///
 /// # Errors
 /// [`trueup_core::Error::Limits`] if there is no room for the panorama.
 pub(super) fn folder(layout: &CanvasLayout, options: &StitchOptions, output: Option<&Path>) -> Result<ScratchFolder> {
     let named = Some(&options.run.resources.scratch).filter(|named| !named.is_empty()).map(PathBuf::from);
-    let Some(output) = output else {
+    let Some(output) = output.filter(|output| !encode::passes_through(output)) else {
         return Ok(ScratchFolder::new(named.unwrap_or_else(std::env::temp_dir)));
     };
     let folder = output.parent().unwrap_or(Path::new(""));

@@ -24,6 +24,10 @@ const ROUNDED_PX: f64 = 1.0;
 /// rounding leaves.
 const EVEN: f64 = 1e-6;
 
+/// Recorded focal lengths, in longer sides of the photograph: ten times beyond what cameras are estimated at, so that a
+/// record of any program passes, and one that no lens has does not.
+const FOCAL: std::ops::RangeInclusive<f64> = 0.03..=100.0;
+
 /// What a project says of its panorama's geometry, checked.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Recorded {
@@ -53,6 +57,7 @@ impl Recorded {
         let reference = records.iter().position(|record| record.path == project.reference).ok_or_else(|| {
             Error::input(&project.reference, "it is the reference, but none of the photographs used", AS_WRITTEN)
         })?;
+        records.iter().try_for_each(|record| check_focal(record))?;
         let meshes = records.iter().map(|record| solved_grid(record)).collect::<Result<Vec<_>>>()?;
         let corrections = recorded_corrections(project, &records)?;
         if !project.by_cameras.is_none_or(|plane| plane.is_sound()) {
@@ -85,6 +90,18 @@ impl Recorded {
         let period = canvas.full_turn.then_some(width);
         let layout = CanvasLayout { width, height, canvas_from_target: 1.0, origin: [0.0; 2], placed, period };
         Ok(Self { used, layout, corrections, reference })
+    }
+}
+
+/// Refuses a focal length that no photograph can have: projections would become of any size.
+fn check_focal(record: &ImageRecord) -> Result<()> {
+    let longer = record.width.max(record.height) as f64;
+    match record.focal_px {
+        Some(focal_px) if !FOCAL.contains(&(focal_px / longer)) => {
+            let reason = format!("its recorded focal length of {focal_px} px cannot be");
+            Err(Error::input(&record.path, reason, AS_WRITTEN))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -310,6 +327,15 @@ mod tests {
         let grid = again.images[0].grid().expect("a grid");
         assert!(!grid.is_defined(0) && grid.is_defined(1));
         Recorded::new(&again).expect("solved everywhere");
+    }
+
+    #[test]
+    fn focal_lengths_that_no_lens_has_are_refused() {
+        for (focal_px, can_be) in [(-1.0, false), (0.0, false), (3e8, false), (1.0, true), (80.0, true)] {
+            let mut changed = project();
+            changed["images"][1]["focal_px"] = json!(focal_px);
+            assert_eq!(read(&changed).is_ok(), can_be, "{focal_px}");
+        }
     }
 
     /// Every place in a value, as a JSON pointer.

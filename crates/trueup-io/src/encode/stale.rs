@@ -1,0 +1,61 @@
+//! What a program that was killed left behind under temporary names.
+
+use std::fs::File;
+use std::path::Path;
+use std::time::Duration;
+
+use super::pending::{PART, PREFIX};
+
+/// Younger files may be of a program that has made but not yet marked them.
+pub(super) const STALE_AGE: Duration = Duration::from_secs(60);
+
+/// Marks a temporary file as that of a living program: a lock, which goes with the program however it ends. Where the file
+/// system knows none, the file is never taken for stale either.
+pub(super) fn mark_in_use(file: &File) {
+    drop(file.try_lock());
+}
+
+/// Takes away the temporary files in `folder` that no living program has marked, once nothing was written to them for
+/// `age`. What cannot be looked at or taken away stays.
+pub(super) fn clear_stale(folder: &Path, age: Duration) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
+        let is_part = path.file_name().and_then(|name| name.to_str()).is_some_and(is_temporary);
+        if is_part && is_stale(&path, age).unwrap_or(false) {
+            drop(std::fs::remove_file(&path));
+        }
+    }
+}
+
+fn is_temporary(name: &str) -> bool {
+    name.starts_with(PREFIX) && name.ends_with(PART)
+}
+
+fn is_stale(path: &Path, age: Duration) -> std::io::Result<bool> {
+    // Not followed: a link of that name is not of this program's making.
+    let metadata = path.symlink_metadata()?;
+    let is_old = metadata.modified()?.elapsed().is_ok_and(|elapsed| elapsed >= age);
+    Ok(metadata.is_file() && is_old && File::options().write(true).open(path)?.try_lock().is_ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::encode::pending::PendingFile;
+
+    #[test]
+    fn parts_of_killed_programs_go_and_those_in_use_stay() {
+        let desk = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| desk.path().join(name);
+        for name in [".trueup-gone.part", ".trueup-kept.txt", "trueup-own.part"] {
+            std::fs::write(at(name), "left").expect("written");
+        }
+        let pending = PendingFile::create(&at("pano.jpg")).expect("possible");
+        clear_stale(desk.path(), STALE_AGE);
+        assert!(at(".trueup-gone.part").exists(), "too young to tell");
+        clear_stale(desk.path(), Duration::ZERO);
+        assert!(!at(".trueup-gone.part").exists());
+        assert!(at(".trueup-kept.txt").exists() && at("trueup-own.part").exists());
+        pending.commit().expect("its temporary file is still there");
+    }
+}
