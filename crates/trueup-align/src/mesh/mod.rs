@@ -12,6 +12,7 @@
 mod alignment;
 mod base;
 mod by_cameras;
+mod camera_plane;
 mod closure;
 mod complex;
 mod current_grids;
@@ -37,7 +38,8 @@ use trueup_core::{Result, StageContext};
 
 use alignment::AlignmentEnergy;
 pub use base::{BaseMap, bases, tilts, turn_length};
-pub use by_cameras::{ByCamerasInput, CameraPlane, unless_worse};
+pub use by_cameras::{ByCamerasInput, unless_worse};
+pub use camera_plane::CameraPlane;
 pub use closure::Closure;
 pub use input::MeshInput;
 pub use line_alignment::{LineAlignmentInput, LineAlignmentOptions, StraightInput};

@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use trueup_core::mesh::GridMesh;
 
-use super::by_cameras::CameraPlane;
+use super::camera_plane::CameraPlane;
 
 /// The deformed grids of one component.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -4,11 +4,12 @@ use nalgebra::Vector2;
 use trueup_core::camera::Camera;
 use trueup_core::mesh::GridMesh;
 
+use super::super::complex::product;
 use super::super::normal_equations::{CarriedVertex, NormalEquations};
 use super::super::options::MeshOptions;
 use super::super::similarity::{PRIOR_SLOPE, SimilarityEnergy};
 use super::super::solver::MeshSolver;
-use super::ByCamerasInput;
+use super::input::ByCamerasInput;
 use crate::match_points::OverlapWarp;
 
 /// By how many of its own pixels each vertex of a photograph's grid looks aside.
@@ -91,7 +92,7 @@ impl CameraCorrections {
             let (corners, shares) = input.grids[point.to].bilinear(point.place);
             let members: [(usize, f64); 4] = std::array::from_fn(|k| (corners[k], shares[k]));
             let vertex = input.grids[point.from].source(point.vertex);
-            let already = super::super::complex::product(carried.factor, self.aside(point.to, point.place));
+            let already = product(carried.factor, self.aside(point.to, point.place));
             equations.add_carried(&CarriedVertex {
                 from: [point.from, point.vertex],
                 to: point.to,
@@ -156,8 +157,8 @@ impl CarriedPoint {
         let (from, to): (&Camera, &Camera) = (&input.cameras[self.from], &input.cameras[self.to]);
         let seen = self.place + corrections.aside(self.to, self.place);
         let at = |x: f64, y: f64| to.transfer(from, seen + Vector2::new(x, y));
-        let by_x = (at(0.5, 0.0)? - at(-0.5, 0.0)?, at(0.0, 0.5)? - at(0.0, -0.5)?);
-        let (dx, dy) = by_x;
+        let dx = at(0.5, 0.0)? - at(-0.5, 0.0)?;
+        let dy = at(0.0, 0.5)? - at(0.0, -0.5)?;
         Some(Carried { place: at(0.0, 0.0)?, factor: Vector2::new(dx.x + dy.y, dx.y - dy.x) / 2.0 })
     }
 

@@ -7,8 +7,8 @@ use trueup_core::mesh::GridMesh;
 
 use super::super::sphere_view::is_moderate;
 use super::super::warped_mesh::WarpedMesh;
-use super::ByCamerasInput;
 use super::corrections::{CarriedPoint, points, root_mean};
+use super::input::ByCamerasInput;
 
 /// What was measured of a mesh.
 #[derive(Debug, Clone, PartialEq)]

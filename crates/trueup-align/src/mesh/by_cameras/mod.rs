@@ -7,39 +7,19 @@
 //! and nothing folds, tears or bends that the cameras do not. [`judgement`] measures which of the two is better.
 
 mod corrections;
+mod drawing;
+mod input;
 mod judgement;
-mod plane;
 
-use nalgebra::Matrix3;
-use trueup_core::camera::Camera;
 use trueup_core::diagnostics::{Diagnostic, Subject};
-use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
 use super::options::MeshOptions;
 use super::warped_mesh::WarpedMesh;
-use crate::match_points::OverlapWarp;
 use corrections::CameraCorrections;
+use drawing::Drawing;
+pub use input::ByCamerasInput;
 use judgement::{Evidence, Suspicion};
-pub use plane::CameraPlane;
-use plane::Drawing;
-
-/// What the mesh is judged by.
-#[derive(Debug, Clone, Copy)]
-pub struct ByCamerasInput<'a> {
-    /// The undeformed grids.
-    pub grids: &'a [GridMesh],
-    /// The cameras as the prior's lines correct them, in working pixels; their world is the level one.
-    pub cameras: &'a [Camera],
-    /// Match points of all pairs, those across the cut of a full turn among them.
-    pub warps: &'a [OverlapWarp],
-    /// Pairs (a < b, sorted) whose photographs the mesh lays a whole turn apart.
-    pub severed: &'a [(usize, usize)],
-    /// The scene's dominant directions in the level world (columns), if they are known.
-    pub dominant: Option<&'a Matrix3<f64>>,
-    /// Panorama units per radian.
-    pub units_per_radian: f64,
-}
 
 /// The grids that the cameras draw, where the mesh is worse than these; `None` where it is not.
 ///

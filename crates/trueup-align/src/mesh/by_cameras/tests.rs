@@ -5,10 +5,14 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;
 use trueup_core::StageContext;
+use trueup_core::camera::Camera;
 use trueup_core::geometry::{rotation_about_x, rotation_about_y};
+use trueup_core::mesh::GridMesh;
 
+use super::super::camera_plane::CameraPlane;
 use super::super::{BaseMap, MeshInput, Refinements, run};
 use super::*;
+use crate::match_points::OverlapWarp;
 
 const FOCAL_PX: f64 = 350.0;
 const SIZE: [f64; 2] = [400.0, 300.0];
