@@ -18,5 +18,6 @@ mod options;
 mod pictures;
 mod references;
 mod run;
+mod sphere;
 #[cfg(unix)]
 mod stopping;

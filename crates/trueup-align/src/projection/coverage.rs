@@ -106,10 +106,7 @@ pub(super) fn steepest(photograph: &PosedPhotograph, frame: &Matrix3<f64>) -> f6
 
 /// Whether a photograph shows a direction of the level world.
 pub(super) fn shows(photograph: &PosedPhotograph, direction: Vector3<f64>) -> bool {
-    let pixel = photograph.camera.project(photograph.camera.rotation() * direction);
-    pixel.is_some_and(|pixel| {
-        (0.0..=photograph.mesh.width).contains(&pixel.x) && (0.0..=photograph.mesh.height).contains(&pixel.y)
-    })
+    photograph.camera.shows(direction, [photograph.mesh.width, photograph.mesh.height])
 }
 
 /// First step and length of the widest run of uncovered steps around the turn.

@@ -147,7 +147,7 @@ impl<'a> Drawing<'a> {
             .unwrap_or_else(|| GridLines::even(self.photograph.mesh.columns, self.photograph.mesh.rows));
         // What is smaller than this share of a pixel is not seen, not even at a pole, half a pixel from the first row's
         // centers.
-        let smallest = 0.125 * (self.photograph.camera.focal_px / self.placement.canvas_from_plane).max(1.0);
+        let smallest = 0.0625 * (self.photograph.camera.focal_px / self.placement.canvas_from_plane).max(1.0);
         for _ in 0..ROUNDS {
             let places = self.places(&lines);
             let (rows, columns) = (lines.rows.len(), lines.columns.len());

@@ -126,15 +126,18 @@ fn upright(project: &Project) -> String {
     }
 }
 
-/// Warnings, and with `verbose` notes, that are not told elsewhere.
+/// Warnings, and with `verbose` notes, that are not told elsewhere; always, that another thing was drawn than the method means.
 fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool) {
+    /// The note's code.
+    const DRAWN: &str = "drawn-by-cameras";
     let names = project.photograph_names();
     for diagnostic in &project.diagnostics {
         let label = match diagnostic.severity {
             Severity::Warning => "warning",
             Severity::Note => "note",
         };
-        if (diagnostic.severity == Severity::Note && !verbose) || tells_of_left_out(diagnostic, project) {
+        let is_detail = diagnostic.severity == Severity::Note && !verbose && diagnostic.code != DRAWN;
+        if is_detail || tells_of_left_out(diagnostic, project) {
             continue;
         }
         lines.entry(label, &format!("{}: {}", diagnostic.subject.named(&names), diagnostic.message));

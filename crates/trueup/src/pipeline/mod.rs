@@ -232,7 +232,7 @@ impl<'a> Stitcher<'a> {
         let fixed = self.options.fixed_by_method();
         let arrangement = context.absorb(arrange::run(input, &fixed.arrange, context)?);
         let light = LightInput {
-            layout: &arrangement.plane,
+            layout: &arrangement.lit_plane(),
             small: matched.small_photographs(&component),
             reference: component.reference,
             photographs,
@@ -306,7 +306,7 @@ impl<'a> Stitcher<'a> {
             frame: copy.frame,
             camera,
         });
-        let layout = &arrangement.plane;
+        let layout = &arrangement.lit_plane();
         let light = LightInput { layout, small: small.collect(), reference, photographs: &set.files };
         Ok(context.absorb(compose::light(&light, &self.options.compose, context)?))
     }

@@ -85,6 +85,7 @@ pub(crate) fn unfilled(
         response: Response::default(),
         projection: None,
         mesh_canvas: None,
+        by_cameras: None,
         seconds: std::collections::BTreeMap::new(),
         diagnostics: Vec::new(),
     }
@@ -211,6 +212,7 @@ fn record_canvas(project: &mut Project, arrangement: &Arrangement) {
     project.canvas = canvas(&arrangement.written);
     project.mesh_canvas = arrangement.projection.map(|_| canvas(&arrangement.plane));
     project.projection = arrangement.projection;
+    project.by_cameras = arrangement.by_cameras;
 }
 
 /// What was found of a group of photographs.
