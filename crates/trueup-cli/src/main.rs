@@ -11,6 +11,7 @@ mod evaluate;
 mod failure;
 mod inspect;
 mod option_list;
+mod outcome;
 mod output;
 mod progress;
 mod stitch;
@@ -36,7 +37,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            trueup_terminal::complain(&failure.to_string());
+            trueup_terminal::complain(&words::printable(&failure.to_string()));
             failure.exit_code()
         }
     }

@@ -20,3 +20,4 @@ mod references;
 mod run;
 #[cfg(unix)]
 mod stopping;
+mod told;

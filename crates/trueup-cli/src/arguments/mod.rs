@@ -14,7 +14,7 @@ use clap::{Args, Parser, Subcommand};
 pub(crate) use compare::CompareArgs;
 pub(crate) use compose::ComposeArgs;
 pub(crate) use option_flags::TypedOptions;
-pub(crate) use shared::{FileArgs, MaskArgs, TuningArgs};
+pub(crate) use shared::{FailOn, FileArgs, MaskArgs, MessageArgs, TuningArgs};
 pub(crate) use stitch::StitchArgs;
 
 const EXAMPLES: &str = "\
