@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod cameras;
+mod evidence;
 pub mod full_turn;
 pub mod match_points;
 pub mod mesh;

@@ -1,7 +1,6 @@
 //! What the command says when it fails, and with which status it ends.
 
 use std::fmt;
-use std::process::ExitCode;
 
 use trueup::{Error, InvalidOption};
 use trueup_terminal::status_of_stopping;
@@ -44,8 +43,9 @@ impl Failure {
         }
     }
 
-    pub(crate) fn exit_code(&self) -> ExitCode {
-        ExitCode::from(self.status)
+    /// The status that the command ends with.
+    pub(crate) fn status(&self) -> u8 {
+        self.status
     }
 }
 

@@ -35,6 +35,7 @@ impl CheckedStitch {
             all: args.all,
             masks: chosen::masks(&args.masks)?,
             require_all: geometry.require_all,
+            ..Inputs::default()
         };
         let job = StitchJob { inputs, outputs, cache: geometry.cache, threads: chosen::threads(&args.tuning) };
         Ok(Self { job, options })

@@ -106,7 +106,7 @@ impl CompareJob {
         self.check_formats(options)?;
         let truth = self.truth.as_deref().map(read_truth).transpose()?;
         check_replaceable(&self.output)?;
-        let photographs = source::files(&self.inputs.photographs);
+        let photographs = source::files(&self.inputs.photographs, &self.inputs.in_memory);
         refuse_photographs(&self.output, photographs.iter().map(PathBuf::as_path))?;
         let folder = PendingFolder::create(&self.output)?;
         let pool = thread_pool(self.threads)?;

@@ -11,7 +11,7 @@ pub const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
 /// A picture of `width` x `height` pixels with `channels` interleaved samples each.
 ///
 /// Sample `c` of the pixel whose center is at (x + 0.5, y + 0.5) is `data[(y * width + x) * channels + c]`.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Raster<T> {
     width: usize,
     height: usize,
@@ -98,7 +98,7 @@ impl<T: Copy + Default> Raster<T> {
 
 /// A decoded photograph at its own depth: 8 or 16 bits a sample, 1 (gray), 3 (RGB) or 4 (RGBA) channels, sRGB-like
 /// encoding, already in its upright orientation.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Photograph {
     /// 8 bits a sample, 0 to 255.
     Eight(Raster<u8>),
@@ -128,6 +128,14 @@ impl Photograph {
         match self {
             Self::Eight(raster) => size_of_val(raster.data()),
             Self::Sixteen(raster) => size_of_val(raster.data()),
+        }
+    }
+
+    /// Bits of a sample: 8 or 16.
+    pub fn sample_bits(&self) -> u16 {
+        match self {
+            Self::Eight(_) => 8,
+            Self::Sixteen(_) => 16,
         }
     }
 

@@ -56,12 +56,12 @@ pub use trueup_compose::render::{Panorama, Rendered};
 pub use trueup_core::context::{CancelToken, Progress, Silent};
 pub use trueup_core::diagnostics::{Diagnostic, Reported, Severity, Subject};
 pub use trueup_core::options::{InvalidOption, OptionDescription, Tier};
-pub use trueup_core::raster::RowSource;
+pub use trueup_core::raster::{Photograph, Raster, RowSource};
 pub use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 pub use trueup_core::truth::{ImageTruth, Truth};
 pub use trueup_core::{Error, Result, StageContext};
 pub use trueup_io::encode::{
-    Metadata, OutputOptions, abandon_unfinished, check_place, write as write_picture, write_atomically,
+    Depth, Metadata, OutputOptions, abandon_unfinished, check_place, write as write_picture, write_atomically,
     written_extensions,
 };
-pub use trueup_io::source::{names_photograph, readable_formats};
+pub use trueup_io::source::{InMemory, names_photograph, readable_formats};

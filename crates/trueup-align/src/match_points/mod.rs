@@ -19,6 +19,8 @@ use trueup_core::{Result, StageContext};
 pub use moving_dlt::MovingDlt;
 use residual::{CameraResidual, MAX_DEVIATION};
 
+use crate::evidence::{self, FULL_PX, NEGLIGIBLE_SHARE};
+
 /// The vertices of photograph `from`'s grid carried into photograph `to` (working pixels).
 #[derive(Debug, Clone, PartialEq)]
 pub struct OverlapWarp {
@@ -51,7 +53,8 @@ impl OverlapWarp {
 trueup_core::choice! {
     /// How a grid vertex is carried into another photograph.
     pub enum TransferModel {
-        /// The cameras' transfer, corrected by the matches' local deviation from it.
+        /// The cameras' transfer, corrected by the matches' local deviation from it; under parallax, as far as neighboring
+        /// matches agree that the cameras are wrong, a homography fitted to the matches around the vertex.
         CameraResidual = "camera-residual",
         /// A homography fitted to the matches around the vertex (APAP), as published.
         MovingDlt = "moving-dlt",
@@ -124,109 +127,51 @@ impl Transfer<'_> {
         let inside = |place: Vector2<f64>| frame.contains(place.x, place.y).then_some([place.x, place.y]);
         match self.model {
             TransferModel::CameraResidual => {
-                let model = CameraResidual::new(self.from, self.to, self.source, self.target);
-                (0..grid.len()).map(|vertex| model.at(grid.source(vertex)).and_then(inside)).collect()
+                let places = self.by_cameras_and_matches(grid, frame);
+                places.into_iter().map(|place| place.and_then(inside)).collect()
             }
             TransferModel::MovingDlt => {
-                let Some(global) = self.global else { return vec![None; grid.len()] };
-                let Some(model) = MovingDlt::new(self.source, self.target) else { return vec![None; grid.len()] };
-                let limit = MAX_DEVIATION * frame.diagonal();
-                let place = |vertex: Vector2<f64>| {
-                    let expected = global.apply(vertex);
-                    // Vertices that the global homography sees far outside need no local one.
-                    let near = (-limit..=frame.width + limit).contains(&expected.x)
-                        && (-limit..=frame.height + limit).contains(&expected.y)
-                        && global.denominator(vertex) > 0.0;
-                    let local = near.then(|| model.at(vertex)).flatten().unwrap_or(global);
-                    let place = local.apply(vertex);
-                    ((place - expected).norm() <= limit && near).then_some(place)
-                };
-                (0..grid.len()).map(|vertex| place(grid.source(vertex)).and_then(inside)).collect()
+                self.by_matches(grid, frame).into_iter().map(|place| place.and_then(inside)).collect()
             }
         }
+    }
+
+    /// By the cameras, corrected, where the photographs were taken from one point, and by the matches where they were
+    /// not: the mean of both, weighed by how far neighboring matches agree that the cameras are wrong.
+    ///
+    /// The noise of matches has nothing in common: photographs taken from one point keep the cameras' consistency.
+    fn by_cameras_and_matches(&self, grid: &GridMesh, frame: &WorkingFrame) -> Vec<Option<Vector2<f64>>> {
+        let cameras = CameraResidual::new(self.from, self.to, self.source, self.target);
+        let by_cameras = (0..grid.len()).map(|vertex| cameras.at(grid.source(vertex)));
+        let share = evidence::share(cameras.common_square(), FULL_PX);
+        if share <= NEGLIGIBLE_SHARE {
+            return by_cameras.collect();
+        }
+        // Where the matches determine no homography the cameras alone must do.
+        let mean = |(camera, matches): (Option<Vector2<f64>>, Option<Vector2<f64>>)| {
+            camera.map(|camera| matches.map_or(camera, |matches| camera.lerp(&matches, share)))
+        };
+        by_cameras.zip(self.by_matches(grid, frame)).map(mean).collect()
+    }
+
+    /// By moving DLT, as published.
+    fn by_matches(&self, grid: &GridMesh, frame: &WorkingFrame) -> Vec<Option<Vector2<f64>>> {
+        let Some(global) = self.global else { return vec![None; grid.len()] };
+        let Some(model) = MovingDlt::new(self.source, self.target) else { return vec![None; grid.len()] };
+        let limit = MAX_DEVIATION * frame.diagonal();
+        let place = |vertex: Vector2<f64>| {
+            let expected = global.apply(vertex);
+            // Vertices that the global homography sees far outside need no local one.
+            let near = (-limit..=frame.width + limit).contains(&expected.x)
+                && (-limit..=frame.height + limit).contains(&expected.y)
+                && global.denominator(vertex) > 0.0;
+            let local = near.then(|| model.at(vertex)).flatten().unwrap_or(global);
+            let place = local.apply(vertex);
+            ((place - expected).norm() <= limit && near).then_some(place)
+        };
+        (0..grid.len()).map(|vertex| place(grid.source(vertex))).collect()
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use nalgebra::Matrix3;
-    use trueup_core::geometry::rotation_about_y;
-    use trueup_core::matches::{PairVerdict, PointMatch};
-
-    use super::*;
-
-    fn example() -> (Vec<WorkingFrame>, Vec<Camera>, PairMatches) {
-        let frame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
-        let cameras = vec![
-            Camera::new(700.0, 800.0, 600.0, &Matrix3::identity()),
-            Camera::new(700.0, 800.0, 600.0, &rotation_about_y(0.35).transpose()),
-        ];
-        let mut inliers = Vec::new();
-        for k in 0..900 {
-            let source = Vector2::new((f64::from(k) * 0.618).fract() * 800.0, (f64::from(k) * 0.755).fract() * 600.0);
-            let target = cameras[0].transfer(&cameras[1], source).expect("in front");
-            if frame.contains(target.x, target.y) {
-                inliers.push(PointMatch { in_a: source.into(), in_b: target.into() });
-            }
-        }
-        let points = |of: fn(&PointMatch) -> [f64; 2]| -> Vec<Vector2<f64>> {
-            inliers.iter().map(|one| Vector2::from(of(one))).collect()
-        };
-        let homography = Homography::fit(&points(|one| one.in_a), &points(|one| one.in_b), None).expect("regular");
-        let pair = PairMatches {
-            a: 0,
-            b: 1,
-            putative: inliers.len(),
-            in_overlap: inliers.len(),
-            agreeing: inliers.len(),
-            needed: 15,
-            verdict: PairVerdict::Joined,
-            b_from_a: Some(homography.to_rows()),
-            inliers,
-        };
-        (vec![frame, frame], cameras, pair)
-    }
-
-    #[test]
-    fn both_models_carry_vertices_to_their_true_place() {
-        let (frames, cameras, pair) = example();
-        let grids = vec![GridMesh::regular(800.0, 600.0, 40.0); 2];
-        for model in [TransferModel::CameraResidual, TransferModel::MovingDlt] {
-            let options = MatchPointOptions { model };
-            let context = StageContext::default();
-            let warps =
-                run(&frames, &grids, &cameras, std::slice::from_ref(&pair), &options, &context).expect("not cancelled");
-            assert_eq!((warps[0].from, warps[0].to, warps[1].from, warps[1].to), (0, 1, 1, 0));
-            for warp in &warps {
-                let carried = warp.vertices.iter().flatten().count();
-                assert!(carried > 100, "{model:?}: only {carried} vertices in the overlap");
-                let placed = warp.vertices.iter().enumerate().filter_map(|(vertex, place)| Some((vertex, (*place)?)));
-                for (vertex, place) in placed {
-                    let truth = cameras[warp.from].transfer(&cameras[warp.to], grids[0].source(vertex));
-                    let error = (truth.expect("in front") - Vector2::from(place)).norm();
-                    assert!(error < 1e-5, "{model:?}: vertex {vertex} is off by {error} px");
-                }
-            }
-        }
-    }
-
-    /// Parallax: the matches deviate from the cameras smoothly; the correction must follow.
-    #[test]
-    fn the_correction_follows_parallax() {
-        let (frames, cameras, mut pair) = example();
-        for one in &mut pair.inliers {
-            one.in_b[0] += 6.0;
-        }
-        let grids = vec![GridMesh::regular(800.0, 600.0, 40.0); 2];
-        let options = MatchPointOptions::default();
-        let context = StageContext::default();
-        let warps = run(&frames, &grids, &cameras, &[pair], &options, &context).expect("not cancelled");
-        let carried: Vec<(usize, [f64; 2])> =
-            warps[0].vertices.iter().enumerate().filter_map(|(vertex, place)| Some((vertex, (*place)?))).collect();
-        assert!(carried.len() > 100, "only {} vertices in the overlap", carried.len());
-        for (vertex, place) in carried {
-            let truth = cameras[0].transfer(&cameras[1], grids[0].source(vertex)).expect("in front");
-            assert!((place[0] - truth.x - 6.0).abs() < 1.0, "{} of 6 px", place[0] - truth.x);
-        }
-    }
-}
+mod tests;

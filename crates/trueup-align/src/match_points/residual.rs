@@ -1,9 +1,10 @@
 //! The cameras' transfer corrected by what the matches around a place say.
 
-use nalgebra::{Matrix3, Matrix3x2, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 use trueup_core::camera::Camera;
 
 use super::moving_dlt::DECAY_PX;
+use crate::evidence::{self, OverlapGap};
 
 /// Largest distance of a carried vertex from its place without local corrections, in diagonals of the other photograph.
 pub(super) const MAX_DEVIATION: f64 = 0.1;
@@ -12,7 +13,8 @@ pub(super) const MAX_DEVIATION: f64 = 0.1;
 ///
 /// The correction at a place is a local linear regression of the matches' deviations from the cameras, weighted by
 /// distance and robustly, and drawn towards zero. Where the photographs were taken from one point it vanishes and the
-/// places are as consistent as the cameras; with parallax it follows the matches.
+/// places are as consistent as the cameras. Deviations of several planes it follows only in part, see
+/// [`Self::common_square`].
 ///
 /// # Departures
 /// The published method carries vertices by moving DLT from the matches alone. On rotating cameras that adds the noise
@@ -54,6 +56,14 @@ impl<'a> CameraResidual<'a> {
         }
         let correction = self.correction(point);
         (correction.norm() <= self.margin).then(|| place + correction)
+    }
+
+    /// Square, per axis, of the deviation that neighboring matches have in common, in the mean of all: parallax, beyond
+    /// what noise explains.
+    pub(super) fn common_square(&self) -> f64 {
+        let gap =
+            |sample: &Sample| OverlapGap { place: sample.position, gap: sample.deviation, known: Matrix2::identity() };
+        evidence::common_square(&self.samples.iter().map(gap).collect::<Vec<_>>())
     }
 
     fn correction(&self, point: Vector2<f64>) -> Vector2<f64> {

@@ -18,9 +18,9 @@ use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 
 use super::current_grids::{CurrentGrids, PhotographPixel, PixelPair};
-use super::evidence::{self, OverlapGap};
 use super::normal_equations::{Metric, NormalEquations};
 use super::straight_line::{DeviationTerm, StraightLine};
+use crate::evidence::{self, FULL_PX, OverlapGap};
 
 trueup_core::options! {
     /// How matched lines align the grids (`stitch.align = lines`).
@@ -92,9 +92,6 @@ impl LineAlignmentInput<'_> {
     /// The shares of their weights that all matches have: how much of the distances in the current `grids` is common to
     /// neighbors.
     pub(super) fn shares(&self, grids: &CurrentGrids) -> MatchShares {
-        /// Misalignment, common to neighboring matches of a pair, from which on they weigh fully, panorama units per
-        /// axis; with less their weight falls with its square.
-        const FULL_PX: f64 = 0.7;
         let mut pairs: Vec<(usize, usize)> = self.points.iter().map(|pair| (pair.a, pair.b)).collect();
         pairs.extend(self.matched.iter().map(|pair| (pair.a, pair.b)));
         pairs.sort_unstable();

@@ -13,7 +13,6 @@ mod base;
 mod closure;
 mod complex;
 mod current_grids;
-mod evidence;
 mod input;
 mod line_alignment;
 mod normal_equations;

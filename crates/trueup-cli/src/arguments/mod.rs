@@ -14,6 +14,7 @@ use clap::{Args, Parser, Subcommand};
 pub(crate) use compare::CompareArgs;
 pub(crate) use compose::ComposeArgs;
 pub(crate) use option_flags::TypedOptions;
+pub use option_flags::{OPTION_FLAGS, OptionFlag};
 pub(crate) use shared::{FailOn, FileArgs, MaskArgs, MessageArgs, TuningArgs};
 pub(crate) use stitch::StitchArgs;
 

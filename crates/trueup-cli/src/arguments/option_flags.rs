@@ -16,7 +16,7 @@ const VIEW: &str = "View";
 const TUNING: &str = "Tuning";
 
 /// Every flag that sets an option: the flag, the option, the heading in the help, the subcommands that take it.
-pub(crate) const OPTION_FLAGS: &[OptionFlag] = &[
+pub const OPTION_FLAGS: &[OptionFlag] = &[
     OptionFlag::new("scale", "canvas.scale", OUTPUT, STITCH_AND_COMPOSE),
     OptionFlag::new("quality", "output.jpeg_quality", OUTPUT, ALL),
     OptionFlag::new("depth", "output.depth", OUTPUT, STITCH_AND_COMPOSE),
@@ -40,20 +40,20 @@ pub(crate) const OPTION_FLAGS: &[OptionFlag] = &[
 
 /// A flag that sets an option.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct OptionFlag {
+pub struct OptionFlag {
     /// The flag without its dashes.
-    flag: &'static str,
+    pub flag: &'static str,
     /// The option it sets, `table.option`.
-    pub(crate) option: &'static str,
+    pub option: &'static str,
     heading: &'static str,
     /// The subcommands that take it.
-    subcommands: &'static [&'static str],
+    pub subcommands: &'static [&'static str],
     /// What stands for the value in the help, where the option's declaration says too little.
     value: Option<&'static str>,
     /// What people at a command line need to know beside the option's meaning; empty if that is nothing.
     note: &'static str,
     /// Whether it turns or bounds a view, which only a projection other than the mesh has.
-    pub(crate) of_a_view: bool,
+    pub of_a_view: bool,
 }
 
 impl OptionFlag {

@@ -106,7 +106,7 @@ pub(crate) struct MessageArgs {
 
     /// End with status 3 if matched points land farther apart than this, 95 of 100, in the photographs' pixels; what was made
     /// is written all the same
-    #[arg(long, value_name = "PX", value_parser = distance, help_heading = "Messages")]
+    #[arg(long, value_name = "PX", allow_hyphen_values = true, value_parser = distance, help_heading = "Messages")]
     pub max_error: Option<f64>,
 }
 

@@ -59,6 +59,7 @@ fn checked(args: CompareArgs) -> Result<(CompareJob, StitchOptions), Failure> {
         all: false,
         masks: chosen::masks(&args.masks)?,
         require_all: args.geometry.require_all,
+        ..Inputs::default()
     };
     let threads = chosen::threads(&args.tuning);
     // The command demands an output wherever this is called.

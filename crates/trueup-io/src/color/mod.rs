@@ -18,6 +18,7 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use convert::Conversion;
 pub use icc::srgb_profile;
 pub(crate) use rows::InSrgb;
 pub use survey::PhotographColors;

@@ -1,7 +1,7 @@
-//! Photographs in files, each decoded once where memory allows.
+//! Photographs in files, each decoded once where memory allows, and photographs in memory beside them.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use trueup_core::color::TransferCurve;
 use trueup_core::mask::Masks;
@@ -9,9 +9,10 @@ use trueup_core::raster::Photograph;
 use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
 use trueup_core::{Error, Result};
 
-use super::photograph::photograph;
+use super::photograph::{photograph, sample_bits};
 use super::working::{WorkingPicture, reduce_photograph};
-use crate::color::PhotographColors;
+use crate::color::{Conversion, PhotographColors};
+use crate::source::InMemory;
 
 /// Photographs in files. What [`working`](Self::working) decodes is kept, within a budget of bytes, until
 /// [`photograph`](PhotographSource::photograph) asks for it, so that a small set is decoded once.
@@ -20,6 +21,8 @@ use crate::color::PhotographColors;
 #[derive(Debug)]
 pub struct FilePhotographs {
     sources: Vec<SourceImage>,
+    /// By index, those that are no files.
+    in_memory: Vec<Option<Arc<Photograph>>>,
     /// By index; those beyond the end have none.
     masks: Vec<Masks>,
     colors: Option<PhotographColors>,
@@ -41,7 +44,15 @@ impl FilePhotographs {
         let photographs = sources.iter().map(|_| None).collect();
         let bytes = sources.iter().map(|_| AtomicUsize::new(0)).collect();
         let kept = Mutex::new(Kept { photographs, free_bytes: cache_bytes });
-        Self { sources, masks: Vec::new(), colors: None, bytes, kept }
+        let in_memory = vec![None; sources.len()];
+        Self { sources, in_memory, masks: Vec::new(), colors: None, bytes, kept }
+    }
+
+    /// The same with the pixels of those that are no files: they count for nothing in the budget.
+    #[must_use]
+    pub fn with_in_memory(self, in_memory: &InMemory) -> Self {
+        let in_memory = self.sources.iter().map(|source| in_memory.of(source).cloned()).collect();
+        Self { in_memory, ..self }
     }
 
     /// The same with what the photographer wants of the photographs' parts, in their order.
@@ -65,14 +76,35 @@ impl FilePhotographs {
         &self.sources
     }
 
+    /// The pixels of photograph `index` if it is no file, as they were given.
+    pub fn in_memory(&self, index: usize) -> Option<&Photograph> {
+        self.in_memory.get(index)?.as_deref()
+    }
+
+    /// Bits of a sample of photograph `index`, as [`sample_bits`](super::sample_bits) has them.
+    ///
+    /// # Errors
+    /// As [`sample_bits`](super::sample_bits); [`Error::Input`] if there is no photograph `index`.
+    pub fn sample_bits(&self, index: usize) -> Result<u16> {
+        match self.in_memory(index) {
+            Some(photograph) => Ok(photograph.sample_bits()),
+            None => sample_bits(self.source(index)?),
+        }
+    }
+
     /// Decodes photograph `index` and reduces it as [`working`](super::working) does; keeps the photograph if it fits.
     ///
     /// # Errors
     /// As [`working`](super::working); [`Error::Input`] if there is no photograph `index`.
     pub fn working(&self, index: usize, frame: &WorkingFrame, thumbnail_max_area: f64) -> Result<WorkingPicture> {
         let source = self.source(index)?;
+        let whole = |photograph: &Photograph| reduce_photograph(photograph, &source.name, frame, thumbnail_max_area);
+        // As it is, without a copy.
+        if let Some(photograph) = self.in_memory(index).filter(|_| self.conversion(index).is_none()) {
+            return whole(photograph);
+        }
         let photograph = self.decode(index, source)?;
-        let working = reduce_photograph(&photograph, &source.name, frame, thumbnail_max_area)?;
+        let working = whole(&photograph)?;
         self.keep(index, photograph);
         Ok(working)
     }
@@ -89,14 +121,21 @@ impl FilePhotographs {
     }
 
     fn decode(&self, index: usize, source: &SourceImage) -> Result<Photograph> {
-        let mut photograph = photograph(source)?;
-        if let Some(conversion) = self.colors.as_ref().and_then(|colors| colors.conversion(index)) {
+        let mut photograph = match self.in_memory(index) {
+            Some(photograph) => photograph.clone(),
+            None => photograph(source)?,
+        };
+        if let Some(conversion) = self.conversion(index) {
             photograph = conversion.apply(photograph, &source.name)?;
         }
         if let Some(bytes) = self.bytes.get(index) {
             bytes.store(photograph.bytes(), Ordering::Relaxed);
         }
         Ok(photograph)
+    }
+
+    fn conversion(&self, index: usize) -> Option<&Conversion> {
+        self.colors.as_ref()?.conversion(index)
     }
 
     fn source(&self, index: usize) -> Result<&SourceImage> {

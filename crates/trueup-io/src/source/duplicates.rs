@@ -3,12 +3,19 @@
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use trueup_core::raster::Photograph;
 
 use super::rejection::Rejection;
 
-/// The files accepted so far.
+/// What was accepted so far.
 #[derive(Debug, Default)]
-pub(crate) struct Accepted(Vec<AcceptedFile>);
+pub(crate) struct Accepted {
+    files: Vec<AcceptedFile>,
+    /// By name, those in memory.
+    in_memory: Vec<(String, Arc<Photograph>)>,
+}
 
 #[derive(Debug)]
 struct AcceptedFile {
@@ -23,7 +30,7 @@ impl Accepted {
     pub(crate) fn admit(&mut self, path: &Path, name: &str, length: u64) -> Result<(), Rejection> {
         let resolved = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         // Files of one length are rare but for uncompressed formats, and those differ within the first pixels.
-        for known in self.0.iter().filter(|known| known.length == length) {
+        for known in self.files.iter().filter(|known| known.length == length) {
             let reason = if known.resolved == resolved {
                 format!("it is the same file as {}, which is used", known.name)
             } else if same_bytes(&known.resolved, path).unwrap_or(false) {
@@ -31,11 +38,24 @@ impl Accepted {
             } else {
                 continue;
             };
-            return Err(Rejection::new("duplicate", reason, "Leave one of them out; a photograph is used once."));
+            return Err(duplicate(reason));
         }
-        self.0.push(AcceptedFile { resolved, name: name.to_owned(), length });
+        self.files.push(AcceptedFile { resolved, name: name.to_owned(), length });
         Ok(())
     }
+
+    /// Notes a photograph in memory, unless one like it is known.
+    pub(crate) fn admit_in_memory(&mut self, name: &str, photograph: &Arc<Photograph>) -> Result<(), Rejection> {
+        if let Some((known, _)) = self.in_memory.iter().find(|(_, known)| known == photograph) {
+            return Err(duplicate(format!("it has the same pixels as {known}, which is used")));
+        }
+        self.in_memory.push((name.to_owned(), photograph.clone()));
+        Ok(())
+    }
+}
+
+fn duplicate(reason: String) -> Rejection {
+    Rejection::new("duplicate", reason, "Leave one of them out; a photograph is used once.")
 }
 
 /// Compares two files up to their first difference.

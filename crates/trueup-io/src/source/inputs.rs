@@ -2,9 +2,13 @@
 
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use trueup_core::raster::Photograph;
 
 use crate::formats::{names_photograph, readable_formats};
 
+use super::in_memory::InMemory;
 use super::rejection::Rejection;
 
 /// A file to look into, or an input that already failed.
@@ -14,20 +18,26 @@ pub(crate) enum Candidate {
     File(PathBuf),
     /// Found in a folder or by a pattern.
     Found(PathBuf),
+    /// No file: its name, and its pixels.
+    InMemory(PathBuf, Arc<Photograph>),
     Rejected(PathBuf, Rejection),
 }
 
 impl Candidate {
     pub(crate) fn path(&self) -> &Path {
         match self {
-            Self::File(path) | Self::Found(path) | Self::Rejected(path, _) => path,
+            Self::File(path) | Self::Found(path) | Self::InMemory(path, _) | Self::Rejected(path, _) => path,
         }
     }
 }
 
-/// Expands files, folders and patterns, in the order given.
-pub(crate) fn expand(inputs: &[String]) -> Vec<Candidate> {
-    inputs.iter().flat_map(|input| expand_one(input)).collect()
+/// Expands files, folders and patterns, in the order given; names of photographs in memory come before files.
+pub(crate) fn expand(inputs: &[String], in_memory: &InMemory) -> Vec<Candidate> {
+    let expanded = |input: &String| match in_memory.get(input) {
+        Some(photograph) => vec![Candidate::InMemory(PathBuf::from(input), photograph.clone())],
+        None => expand_one(input),
+    };
+    inputs.iter().flat_map(expanded).collect()
 }
 
 fn expand_one(input: &str) -> Vec<Candidate> {

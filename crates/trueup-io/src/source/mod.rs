@@ -1,6 +1,7 @@
 //! Finds the photographs the user means and reads their headers: size, orientation, focal length, camera.
 
 mod duplicates;
+mod in_memory;
 mod inputs;
 mod names;
 mod opened;
@@ -21,11 +22,13 @@ use crate::metadata::header::{self, Header};
 use crate::metadata::orientation::{TagVerdict, judge_orientation};
 
 use duplicates::Accepted;
+use in_memory::in_memory_source;
 use inputs::Candidate;
-use opened::{OWN_PANORAMA, OpenedPicture, open_candidate};
+use opened::{Named, OWN_PANORAMA, OpenedPicture, check_size, open_picture};
 use rejection::Rejection;
 
 pub use crate::formats::{names_photograph, readable_formats};
+pub use in_memory::InMemory;
 pub use inputs::natural_order;
 pub use names::unique_names;
 pub use options::{OrientationTrust, SourceOptions};
@@ -51,7 +54,7 @@ pub struct RejectedSource {
     pub name: String,
     /// Stable machine-readable reason in kebab case: `file-missing`, `pattern-without-match`, `folder-without-pictures`,
     /// `folder-not-file`, `file-unreadable`, `file-empty`, `not-a-picture`, `format-unsupported`, `picture-damaged`,
-    /// `picture-too-large`, `picture-too-small`, `duplicate`, `own-panorama`.
+    /// `picture-too-large`, `picture-too-small`, `duplicate`, `own-panorama`, `name-of-a-file`.
     pub code: String,
     /// Why it cannot be used, without a closing full stop.
     pub reason: String,
@@ -84,22 +87,34 @@ impl RejectedSource {
 /// # Errors
 /// [`Error::Options`] for options out of range, [`Error::Cancelled`]. Never for what is in the files.
 pub fn scan(inputs: &[String], options: &SourceOptions, context: &StageContext) -> Result<Sources> {
-    scan_from_side(MIN_SIDE_PX, inputs, options, context)
+    scan_with(inputs, &InMemory::default(), options, context)
+}
+
+/// [`scan`] where an input may also be the name of a photograph in memory, which is looked for there first.
+///
+/// # Errors
+/// As [`scan`].
+pub fn scan_with(
+    inputs: &[String],
+    in_memory: &InMemory,
+    options: &SourceOptions,
+    context: &StageContext<'_>,
+) -> Result<Sources> {
+    scan_candidates(inputs::expand(inputs, in_memory), MIN_SIDE_PX, options, context)
 }
 
 /// [`scan`] that accepts pictures of any size from a pixel on.
 pub(crate) fn scan_any_size(inputs: &[String], options: &SourceOptions, context: &StageContext<'_>) -> Result<Sources> {
-    scan_from_side(1, inputs, options, context)
+    scan_candidates(inputs::expand(inputs, &InMemory::default()), 1, options, context)
 }
 
-fn scan_from_side(
+fn scan_candidates(
+    candidates: Vec<Candidate>,
     min_side_px: usize,
-    inputs: &[String],
     options: &SourceOptions,
     context: &StageContext<'_>,
 ) -> Result<Sources> {
     options.check()?;
-    let candidates = inputs::expand(inputs);
     let paths: Vec<&Path> = candidates.iter().map(Candidate::path).collect();
     let names = unique_names(&paths);
 
@@ -110,8 +125,20 @@ fn scan_from_side(
         context.check_cancelled()?;
         let path = candidate.path().to_owned();
         let number = sources.photographs.len();
-        let examined = open_candidate(candidate, options, min_side_px)
-            .and_then(|opened| examine(opened, &name, number, options, &mut accepted, context));
+        let mut examine_file = |path: PathBuf, named: Named| {
+            let opened = open_picture(path, named, options, min_side_px)?;
+            examine(opened, &name, number, options, &mut accepted, context)
+        };
+        let examined = match candidate {
+            Candidate::Rejected(_, rejection) => Err(rejection),
+            Candidate::File(path) => examine_file(path, Named::Itself),
+            Candidate::Found(path) => examine_file(path, Named::ByItsFolder),
+            Candidate::InMemory(path, photograph) => {
+                check_size([photograph.width(), photograph.height()], options, min_side_px)
+                    .and_then(|()| accepted.admit_in_memory(&name, &photograph))
+                    .and_then(|()| in_memory_source(path, &name, &photograph))
+            }
+        };
         match examined {
             Ok(source) => sources.photographs.push(source),
             Err(Rejection { code, reason, hint }) => {
@@ -124,15 +151,15 @@ fn scan_from_side(
     Ok(sources)
 }
 
-/// The files that `inputs` name, as [`scan`] finds them, photographs and what is none; without a look into any but those of
+/// The files that `inputs` name, as [`scan_with`] finds them, photographs and what is none; without a look into any but those of
 /// folders and patterns, of which panoramas that this program made are left out.
-pub fn files(inputs: &[String]) -> Vec<PathBuf> {
+pub fn files(inputs: &[String], in_memory: &InMemory) -> Vec<PathBuf> {
     let file = |candidate| match candidate {
         Candidate::File(path) => Some(path),
         Candidate::Found(path) => Some(path).filter(|path| !is_own_panorama(path)),
-        Candidate::Rejected(..) => None,
+        Candidate::InMemory(..) | Candidate::Rejected(..) => None,
     };
-    inputs::expand(inputs).into_iter().filter_map(file).collect()
+    inputs::expand(inputs, in_memory).into_iter().filter_map(file).collect()
 }
 
 /// Whether the file at `path` says that this program made it.

@@ -3,7 +3,6 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use super::inputs::Candidate;
 use super::options::SourceOptions;
 use super::rejection::Rejection;
 use crate::format::{Foreign, HeaderError, Reading};
@@ -16,7 +15,7 @@ const MAX_FILE_BYTES: u64 = 4 << 30;
 /// The code of panoramas among the photographs of a folder.
 pub(super) const OWN_PANORAMA: &str = "own-panorama";
 
-/// A candidate whose header was read, and whose size is accepted.
+/// A picture whose header was read, and whose size is accepted.
 pub(super) struct OpenedPicture {
     pub(super) path: PathBuf,
     /// Bytes of the file.
@@ -24,17 +23,22 @@ pub(super) struct OpenedPicture {
     pub(super) header: Header,
 }
 
-/// Reads a candidate's header.
-pub(super) fn open_candidate(
-    candidate: Candidate,
+/// How the user named a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Named {
+    /// By its own path.
+    Itself,
+    /// By a folder or pattern that it was found in.
+    ByItsFolder,
+}
+
+/// Reads a file's header.
+pub(super) fn open_picture(
+    path: PathBuf,
+    named: Named,
     options: &SourceOptions,
     min_side_px: usize,
 ) -> Result<OpenedPicture, Rejection> {
-    let (path, is_found) = match candidate {
-        Candidate::Rejected(_, rejection) => return Err(rejection),
-        Candidate::File(path) => (path, false),
-        Candidate::Found(path) => (path, true),
-    };
     let (mut file, length) = open(&path)?;
     let format = recognize(&mut file, length)?;
     let header = read_header(file, format).map_err(|error| match error {
@@ -50,14 +54,14 @@ pub(super) fn open_candidate(
         ),
         HeaderError::Foreign(foreign) => not_read(foreign),
     })?;
-    if is_found && header.exif.is_by_this_program() {
+    if named == Named::ByItsFolder && header.exif.is_by_this_program() {
         return Err(Rejection::new(
             OWN_PANORAMA,
             "it is a panorama that this program made",
             "Name the file itself if it is to be stitched all the same.",
         ));
     }
-    check_size(&header, options, min_side_px)?;
+    check_size([header.stored.width, header.stored.height], options, min_side_px)?;
     Ok(OpenedPicture { path, length, header })
 }
 
@@ -126,8 +130,12 @@ fn not_read(foreign: &Foreign) -> Rejection {
     )
 }
 
-fn check_size(header: &Header, options: &SourceOptions, min_side_px: usize) -> Result<(), Rejection> {
-    let (width, height) = (header.stored.width, header.stored.height);
+/// Refuses pictures with too many pixels or too few.
+pub(super) fn check_size(
+    [width, height]: [usize; 2],
+    options: &SourceOptions,
+    min_side_px: usize,
+) -> Result<(), Rejection> {
     let megapixels = width as f64 * height as f64 / 1e6;
     if megapixels > options.max_megapixels {
         return Err(Rejection::new(

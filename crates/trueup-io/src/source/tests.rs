@@ -7,9 +7,11 @@ use exif::{Field, In, Rational, Tag, Value};
 use jpeg_encoder::{ColorType, Encoder};
 use proptest::prelude::*;
 use tempfile::TempDir;
-use trueup_core::source::FocalSource;
+use trueup_core::raster::{Photograph, Raster};
+use trueup_core::source::{FocalSource, PhotographSource, WorkingFrame};
 
 use super::*;
+use crate::decode::FilePhotographs;
 use crate::formats::specimens::{Container, Specimen};
 
 /// An EXIF block of the given fields.
@@ -251,6 +253,39 @@ fn options_out_of_range_are_refused_and_a_stop_is_obeyed() {
     let context = StageContext::new(&trueup_core::context::Silent, &cancel);
     let stopped = scan(&["nowhere.jpg".to_owned()], &SourceOptions::default(), &context);
     assert!(matches!(stopped, Err(Error::Cancelled)));
+}
+
+#[test]
+fn photographs_in_memory_stand_among_files() {
+    let plain = |width, height, shade: u16| {
+        Photograph::Sixteen(Raster::from_data(width, height, 1, vec![shade; width * height]).expect("samples"))
+    };
+    let files = Files::new(&[("a.jpg", jpeg(20, 17, 1, &[])), ("b.jpg", jpeg(20, 17, 2, &[]))]);
+    let [a, b] = ["a.jpg", "b.jpg"].map(|name| files.path(name).display().to_string());
+    let mut in_memory = InMemory::default();
+    in_memory.insert("first", plain(40, 30, 7));
+    in_memory.insert("same", plain(40, 30, 7));
+    in_memory.insert("dot", plain(9, 30, 8));
+    in_memory.insert(&b, plain(40, 30, 9));
+    let inputs = ["dot", "first", &a, "same", &b].map(str::to_owned);
+    let (options, context) = (SourceOptions::default(), StageContext::default());
+    let sources = scan_with(&inputs, &in_memory, &options, &context).expect("scanned");
+    assert_eq!(names(&sources), ["first", "a.jpg"]);
+    let rejected: Vec<(&str, &str)> =
+        sources.rejected.iter().map(|one| (one.name.as_str(), one.code.as_str())).collect();
+    assert_eq!(rejected, [("dot", "picture-too-small"), ("same", "duplicate"), ("b.jpg", "name-of-a-file")]);
+    let first = &sources.photographs[0];
+    assert_eq!((first.width, first.height, first.orientation), (40, 30, 1));
+    assert_eq!(super::files(&inputs, &in_memory), [Path::new(&a)], "what is in memory is no file");
+
+    let photographs = FilePhotographs::new(sources.photographs, 0).with_in_memory(&in_memory);
+    assert_eq!(photographs.photograph(0).expect("in memory"), plain(40, 30, 7));
+    assert_eq!(photographs.photograph(1).expect("a file").width(), 20);
+    assert_eq!([0, 1].map(|index| photographs.sample_bits(index).expect("known")), [16, 8]);
+    let frame = WorkingFrame::new(40, 30, 300.0);
+    let working = photographs.working(0, &frame, 50.0).expect("a working picture");
+    assert_eq!((working.gray.width(), working.gray.height()), (20, 15));
+    assert!(working.gray.data().iter().all(|value| (value - 7.0 / 257.0).abs() < 1e-5));
 }
 
 /// Scans bytes as a file and decodes whatever was accepted; only a panic can fail.

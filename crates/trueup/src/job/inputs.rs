@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use trueup_align::stitch_graph::{GraphFile, parse_graph_file};
 use trueup_core::{Error, Result};
+use trueup_io::source::InMemory;
 
 use super::masks::MaskFile;
 
@@ -20,8 +21,10 @@ pub enum Reference {
 /// Photographs and wishes that are no tuning.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Inputs {
-    /// Files, folders and glob patterns, in the user's order.
+    /// Files, folders, glob patterns, and names of photographs in memory, in the user's order.
     pub photographs: Vec<String>,
+    /// The photographs that are no files.
+    pub in_memory: InMemory,
     /// Which photograph is the reference.
     pub reference: Reference,
     /// A stitch graph in a text file: only its pairs are matched.

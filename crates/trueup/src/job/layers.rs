@@ -5,7 +5,6 @@ use std::path::Path;
 use trueup_compose::render::{self, Rendered};
 use trueup_compose::seam::{NOBODY, Seams};
 use trueup_core::{Error, Result};
-use trueup_io::decode;
 use trueup_io::encode::{self, LabelMap, LayerPage, LayerSet, OutputOptions};
 
 use crate::pipeline::{Alignment, Stitcher};
@@ -16,8 +15,8 @@ impl Alignment {
     /// # Errors
     /// If a photograph's file can no longer be read.
     pub fn photograph_bits(&self) -> Result<u16> {
-        let images = self.photographs().sources();
-        let mut bits = self.layout().placed.iter().map(|placed| decode::sample_bits(&images[placed.photograph]));
+        let photographs = self.photographs();
+        let mut bits = self.layout().placed.iter().map(|placed| photographs.sample_bits(placed.photograph));
         bits.try_fold(8, |most, bits| bits.map(|bits| most.max(bits)))
     }
 

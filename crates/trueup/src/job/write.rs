@@ -1,7 +1,9 @@
 //! From an aligned panorama to its files.
 
+use std::borrow::Borrow;
 use std::path::{Path, PathBuf};
 
+use trueup_compose::render::Rendered;
 use trueup_core::Result;
 use trueup_io::{encode, source};
 
@@ -27,17 +29,32 @@ impl Outputs {
     /// # Errors
     /// Those of [`Stitcher::compose`] and of writing; [`trueup_core::Error::Input`] if a file is one of the photographs.
     pub fn write(&self, stitcher: &Stitcher, mut alignment: Alignment) -> Result<Written> {
-        let photographs = alignment.project.images.iter().filter(|image| !is_older_panorama(image));
-        self.refuse_over(photographs.map(|image| (Path::new(&image.path), ReadFile::Photograph)))?;
+        self.refuse_photographs(&alignment)?;
         let rendered = stitcher.writing_to(&self.panorama).compose(&mut alignment)?;
+        self.write_composed(stitcher, alignment, rendered)
+    }
+
+    /// Writes a panorama that was `rendered` of `alignment`, and what is wanted beside it. A panorama that is handed over,
+    /// not lent, is let go before layers take its memory.
+    ///
+    /// # Errors
+    /// Those of writing; [`trueup_core::Error::Input`] if a file is one of the photographs.
+    pub fn write_composed(
+        &self,
+        stitcher: &Stitcher,
+        mut alignment: Alignment,
+        rendered: impl Borrow<Rendered>,
+    ) -> Result<Written> {
+        self.refuse_photographs(&alignment)?;
         let written = stitcher.context().gather(|context| {
             context.time("output", || {
                 let options = stitcher.output_options(&alignment, &self.panorama)?;
                 let metadata = stitcher.metadata(&alignment);
-                let bytes = encode::write(&self.panorama, &rendered.panorama, &metadata, &options, context)?;
+                let panorama = &rendered.borrow().panorama;
+                let bytes = encode::write(&self.panorama, panorama, &metadata, &options, context)?;
                 for (kind, path) in &self.beside {
                     if let SideOutputWriter::Panorama(write) = kind.writer() {
-                        write(stitcher, &alignment, &rendered, path)?;
+                        write(stitcher, &alignment, rendered.borrow(), path)?;
                     }
                 }
                 drop(rendered);
@@ -58,6 +75,11 @@ impl Outputs {
             }
         }
         Ok(Written { outputs: self.clone(), bytes, project })
+    }
+
+    fn refuse_photographs(&self, alignment: &Alignment) -> Result<()> {
+        let photographs = alignment.project.images.iter().filter(|image| !is_older_panorama(image));
+        self.refuse_over(photographs.map(|image| (Path::new(&image.path), ReadFile::Photograph)))
     }
 }
 

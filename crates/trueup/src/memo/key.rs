@@ -3,6 +3,7 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use trueup_core::raster::Photograph;
 
 /// Name and version of the program, and the number of its stages: results of other stages are never found.
 const PROGRAM: &str = concat!("trueup ", env!("CARGO_PKG_VERSION"), " ", env!("TRUEUP_STAGES"));
@@ -53,6 +54,16 @@ impl KeyMaker {
             // Nothing that is written here can fail; were it so, the key would be nobody else's.
             Err(error) => self.bytes(error.to_string().as_bytes()).bytes(&std::process::id().to_le_bytes()),
         }
+    }
+
+    /// The pixels of a photograph in memory.
+    pub(crate) fn photograph(mut self, photograph: &Photograph) -> Self {
+        self = self.part(&(photograph.width(), photograph.height(), photograph.channels(), photograph.sample_bits()));
+        match photograph {
+            Photograph::Eight(raster) => self.0.update(raster.data()),
+            Photograph::Sixteen(raster) => self.0.update(bytemuck::cast_slice(raster.data())),
+        };
+        self
     }
 
     /// The content of a file.

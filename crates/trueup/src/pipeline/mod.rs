@@ -38,7 +38,7 @@ use self::compose::{ComposeInput, LightInput, SmallPhotograph};
 use self::matched::Matched;
 use self::matching::MatchInput;
 use self::measure::MeasureInput;
-use self::photographs::PhotographSet;
+use self::photographs::{FoundPhotographs, PhotographSet};
 use crate::job::inputs::Inputs;
 use crate::job::masks::AllMasks;
 use crate::memo::{KeyMaker, Memo, PhotographCache};
@@ -266,7 +266,8 @@ impl<'a> Stitcher<'a> {
         self.options.validate()?;
         let recalled = self.context.gather(|context| {
             let Recorded { used, layout, corrections, reference } = Recorded::new(project)?;
-            let set = PhotographSet::open(images, Vec::new(), masks, self.options, context)?;
+            let found = FoundPhotographs { images, masks, ..FoundPhotographs::default() };
+            let set = PhotographSet::open(found, self.options, context)?;
             let arrangement = arrange::recall(layout, reference, project, &self.options.arrange, context)?;
             let arrangement: Arrangement = context.absorb(arrangement);
             let corrections = match self.options.compose.exposure == project.options.compose.exposure {

@@ -8,7 +8,7 @@ use trueup_core::source::{PhotographSource, SourceImage};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::color::PhotographColors;
 use trueup_io::decode::FilePhotographs;
-use trueup_io::source::{self, RejectedSource, Sources};
+use trueup_io::source::{self, InMemory, RejectedSource, Sources};
 
 use super::budget::Budget;
 use crate::job::inputs::{Inputs, Reference};
@@ -17,6 +17,19 @@ use crate::job::names::reference_named;
 use crate::memo::KeyMaker;
 use crate::options::StitchOptions;
 use crate::report::left_out::{none_usable, reason_of_rejected};
+
+/// Photographs that were found, before their colors are looked into.
+#[derive(Debug, Default)]
+pub(crate) struct FoundPhotographs {
+    /// Those that can be read.
+    pub images: Vec<SourceImage>,
+    /// The pixels of those among them that are no files.
+    pub in_memory: InMemory,
+    /// Inputs that cannot be read.
+    pub rejected: Vec<RejectedSource>,
+    /// What is ignored or kept of `images`.
+    pub masks: AllMasks,
+}
 
 /// The photographs to be stitched. They are numbered by their place in `images`.
 #[derive(Debug)]
@@ -42,7 +55,7 @@ impl PhotographSet {
     pub(crate) fn find(inputs: &Inputs, options: &StitchOptions, context: &StageContext) -> Result<Self> {
         let accepted = &options.measure.source;
         let Sources { photographs: images, rejected } =
-            context.time("source", || source::scan(&inputs.photographs, accepted, context))?;
+            context.time("source", || source::scan_with(&inputs.photographs, &inputs.in_memory, accepted, context))?;
         if images.is_empty() {
             return Err(nothing_found(inputs, &rejected));
         }
@@ -50,24 +63,21 @@ impl PhotographSet {
             reference_named(&images, name)?;
         }
         let masks = AllMasks::read(&inputs.masks, &images, accepted, context)?;
-        Self::open(images, rejected, masks, options, context)
+        Self::open(FoundPhotographs { images, in_memory: inputs.in_memory.clone(), rejected, masks }, options, context)
     }
 
-    /// Photographs that are found already, with their masks.
+    /// Photographs that are found already.
     ///
     /// # Errors
     /// [`Error::Limits`] if one is too large for the memory.
-    pub(crate) fn open(
-        images: Vec<SourceImage>,
-        rejected: Vec<RejectedSource>,
-        masks: AllMasks,
-        options: &StitchOptions,
-        context: &StageContext,
-    ) -> Result<Self> {
-        let AllMasks { masks, records } = masks;
+    pub(crate) fn open(found: FoundPhotographs, options: &StitchOptions, context: &StageContext) -> Result<Self> {
+        let FoundPhotographs { images, in_memory, rejected, masks: AllMasks { masks, records } } = found;
         let measuring = Budget::new(&options.run.resources).measuring(&images, options.measure.working.pixels)?;
         let colors = PhotographColors::survey(&images, context);
-        let files = FilePhotographs::new(images.clone(), measuring.kept_bytes).in_colors(colors).with_masks(masks);
+        let files = FilePhotographs::new(images.clone(), measuring.kept_bytes)
+            .with_in_memory(&in_memory)
+            .in_colors(colors)
+            .with_masks(masks);
         Ok(Self { images, rejected, masks: records, files: Arc::new(files), at_once: measuring.at_once })
     }
 
@@ -90,6 +100,9 @@ impl PhotographSet {
             if let Masks { ignored: Some(ignored), .. } = self.files.masks(index) {
                 maker = maker.part(&ignored.words());
             }
+            if let Some(photograph) = self.files.in_memory(index) {
+                return Ok(Some(maker.photograph(photograph)));
+            }
             Ok(std::fs::File::open(&image.path).and_then(|file| maker.file(file)).ok())
         };
         (0..self.images.len()).into_par_iter().map(key).collect()
@@ -106,4 +119,60 @@ fn nothing_found(inputs: &Inputs, rejected: &[RejectedSource]) -> Error {
         "no photographs were given",
         "Name at least two overlapping photographs, or a folder that holds them.",
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_compose::render::Rendered;
+    use trueup_core::raster::RowSource;
+    use trueup_io::decode;
+    use trueup_io::source::{InMemory, SourceOptions, scan};
+
+    use super::*;
+    use crate::memo::PhotographCache;
+    use crate::pipeline::{Alignment, Stitcher};
+
+    fn stitched(inputs: &Inputs, options: &StitchOptions, cache: Option<&PhotographCache>) -> (Alignment, Rendered) {
+        let context = StageContext::default();
+        let stitcher = Stitcher::new(options, &context).with_cache(cache);
+        let mut alignment = stitcher.align(inputs).expect("a panorama").alignments.remove(0);
+        let rendered = stitcher.compose(&mut alignment).expect("composed");
+        (alignment, rendered)
+    }
+
+    fn rows(rendered: &Rendered) -> Vec<u8> {
+        let panorama = &rendered.panorama;
+        let mut samples = vec![0; panorama.width() * panorama.height() * 4];
+        for (y, row) in samples.chunks_exact_mut(panorama.width() * 4).enumerate() {
+            panorama.rgba8_row(y, row).expect("a row");
+        }
+        samples
+    }
+
+    /// The photographs of the room say nothing of camera and colors: their pixels are all there is of them.
+    #[test]
+    fn photographs_in_memory_are_stitched_as_their_files_are_and_kept_by_their_pixels() {
+        let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room");
+        let context = StageContext::default();
+        let files = scan(&[room.to_owned()], &SourceOptions::default(), &context).expect("the room").photographs;
+        let mut in_memory = InMemory::default();
+        for file in &files {
+            in_memory.insert(&file.name, decode::photograph(file).expect("decoded"));
+        }
+        let mut options = StitchOptions::default();
+        options.set("canvas.scale=0.1").expect("an option");
+        let inputs = Inputs { in_memory, ..Inputs::new(files.iter().map(|file| file.name.clone())) };
+        let desk = tempfile::tempdir().expect("a folder");
+        let cache = PhotographCache::open(desk.path(), 1e9).expect("a cache");
+        let (from_files, rendered) = stitched(&Inputs::new([room]), &options, None);
+        for _ in 0..2 {
+            let (alignment, again) = stitched(&inputs, &options, Some(&cache));
+            assert_eq!(rows(&again), rows(&rendered));
+            assert_eq!(alignment.photograph_bits().expect("known"), from_files.photograph_bits().expect("known"));
+            assert_eq!(alignment.project.images[0].path, "00.jpg");
+            assert_eq!(alignment.project.images[0].mesh, from_files.project.images[0].mesh);
+        }
+        let found = cache.uses().get("measured").map_or(0, |one| one.found);
+        assert_eq!(found, files.len(), "the second time, nothing is measured");
+    }
 }

@@ -57,8 +57,8 @@ impl MatchedPhotographs {
     }
 }
 
-/// The geometry of one panorama, ready to be composed.
-#[derive(Debug)]
+/// The geometry of one panorama, ready to be composed. Copies share the photographs.
+#[derive(Debug, Clone)]
 pub struct Alignment {
     /// The record so far; complete but for the seconds that composing and writing take.
     pub project: Project,

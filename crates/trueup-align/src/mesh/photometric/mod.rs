@@ -19,8 +19,8 @@ use rayon::prelude::*;
 use trueup_core::{Result, StageContext};
 
 use super::current_grids::CurrentGrids;
-use super::evidence;
 use super::normal_equations::NormalEquations;
+use crate::evidence;
 use crate::match_points::OverlapWarp;
 pub use options::PhotometricOptions;
 use overlap::{OverlapEquations, PhotometricOverlap};

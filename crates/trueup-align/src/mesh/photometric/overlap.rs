@@ -4,11 +4,11 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use trueup_core::mesh::GridMesh;
 
-use super::super::evidence::CommonSum;
 use super::super::normal_equations::{Metric, WeightedVertex};
 use super::colors::Colors;
 use super::pyramid::{Gray, GrayPyramid};
 use super::sample::PixelSample;
+use crate::evidence::CommonSum;
 use crate::match_points::OverlapWarp;
 
 /// Vertices of one cell in each photograph.

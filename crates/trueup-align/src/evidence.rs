@@ -1,22 +1,32 @@
 //! How far overlaps are apart beyond the noise of what says so.
 //!
-//! The plain mesh meets overlaps to a tenth of a pixel where the photographs were taken from one point, better than any
-//! single match or cell of pixels says. Drawn to each of them it would follow their noise. Noise differs from neighbor
-//! to neighbor; a true misalignment is common to them. The product of neighbors' distances is therefore, on the mean,
-//! the square of the true one, and evidence weighs by it, as the prior variance of what is estimated says in a Wiener
-//! filter.
+//! Cameras, and the plain mesh after them, bring overlaps within a tenth of a pixel where the photographs were taken from
+//! one point, nearer than any single match or cell of pixels says. Drawn to each of these, overlaps would follow their
+//! noise. Noise differs from neighbor to neighbor; a true misalignment is common to them. The product of neighbors'
+//! distances is therefore, on the mean, the square of the true one, and evidence weighs by it, as the prior variance of
+//! what is estimated says in a Wiener filter.
 
 use nalgebra::{Matrix2, Vector2};
 
+/// Misalignment, common to neighboring matches of a pair, from which on they are believed fully, pixels per axis; with
+/// less the share falls with its square.
+pub(crate) const FULL_PX: f64 = 0.7;
+/// A share not worth the work: a common misalignment of a tenth of a pixel per axis, as cameras have.
+pub(crate) const NEGLIGIBLE_SHARE: f64 = 0.02;
+/// Closer matches share their pixels and so their noise.
+const NEAREST_PX: f64 = 8.0;
+/// Two cells of the usual grid: what is common over less, a grid cannot follow.
+const FARTHEST_PX: f64 = 80.0;
+
 /// One match, seen in the first photograph of a pair.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct OverlapGap {
+pub(crate) struct OverlapGap {
     /// Where, in working pixels.
-    pub place: Vector2<f64>,
+    pub(crate) place: Vector2<f64>,
     /// Distance in the panorama of what should meet.
-    pub gap: Vector2<f64>,
+    pub(crate) gap: Vector2<f64>,
     /// The directions in which the distance is known: the identity for points, across the line for lines.
-    pub known: Matrix2<f64>,
+    pub(crate) known: Matrix2<f64>,
 }
 
 impl OverlapGap {
@@ -30,11 +40,7 @@ impl OverlapGap {
 
 /// Square, per axis, of the misalignment that neighbors have in common, around every piece of evidence. Where
 /// none has a neighbor, what exceeds the usual noise.
-pub(super) fn common_squares(evidence: &[OverlapGap]) -> Vec<f64> {
-    /// Closer matches share their pixels and so their noise.
-    const NEAREST_PX: f64 = 8.0;
-    /// Two cells of the usual grid: what is common over less, a grid cannot follow.
-    const FARTHEST_PX: f64 = 80.0;
+pub(crate) fn common_squares(evidence: &[OverlapGap]) -> Vec<f64> {
     /// Neighbors that are compared with one another.
     const NEIGHBORS: usize = 12;
     /// Products with which a neighborhood is drawn to the mean of all.
@@ -58,8 +64,7 @@ pub(super) fn common_squares(evidence: &[OverlapGap]) -> Vec<f64> {
             for (k, (_, one)) in near.iter().enumerate() {
                 for (_, other) in &near[..k] {
                     if (other.place - one.place).norm_squared() >= NEAREST_PX.powi(2) {
-                        sum.products += one.gap.dot(&other.gap);
-                        sum.units += (one.known * other.known).trace();
+                        sum.add(one, other);
                     }
                 }
             }
@@ -78,25 +83,51 @@ pub(super) fn common_squares(evidence: &[OverlapGap]) -> Vec<f64> {
         .collect()
 }
 
+/// Square, per axis, of the misalignment that neighbors have in common, in the mean of all `evidence`, less its standard
+/// error if they had nothing in common. 0 where none has a neighbor.
+pub(crate) fn common_square(evidence: &[OverlapGap]) -> f64 {
+    /// Pieces that are compared with one another; more hardly change the mean.
+    const MOST: usize = 400;
+    let some: Vec<&OverlapGap> = evidence.iter().step_by(evidence.len().div_ceil(MOST).max(1)).collect();
+    let (mut sum, mut squares) = (CommonSum::default(), 0.0);
+    for (k, one) in some.iter().enumerate() {
+        for other in &some[..k] {
+            if (NEAREST_PX..FARTHEST_PX).contains(&(other.place - one.place).norm()) {
+                // Products with a member in common are uncorrelated all the same, so that their squares add up.
+                squares += sum.add(one, other).powi(2);
+            }
+        }
+    }
+    CommonSum { products: sum.products - squares.sqrt(), ..sum }.mean_square()
+}
+
 /// What neighbors say alike, summed.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct CommonSum {
+pub(crate) struct CommonSum {
     /// Of the products of neighbors' distances.
-    pub products: f64,
+    pub(crate) products: f64,
     /// Of what they would be for a misalignment of 1 px.
-    pub units: f64,
+    pub(crate) units: f64,
 }
 
 impl CommonSum {
+    /// Adds what two neighbors say, and says the product of their distances.
+    fn add(&mut self, one: &OverlapGap, other: &OverlapGap) -> f64 {
+        let product = one.gap.dot(&other.gap);
+        self.products += product;
+        self.units += (one.known * other.known).trace();
+        product
+    }
+
     /// The mean square that the sums come to; not negative.
-    pub(super) fn mean_square(self) -> f64 {
+    pub(crate) fn mean_square(self) -> f64 {
         if self.units > 0.0 { (self.products / self.units).max(0.0) } else { 0.0 }
     }
 }
 
 /// The share of its weight that evidence has where the misalignment has a mean square of `common` per axis, and would
 /// have its whole weight from `full_px` on.
-pub(super) fn share(common: f64, full_px: f64) -> f64 {
+pub(crate) fn share(common: f64, full_px: f64) -> f64 {
     (common / (full_px * full_px)).min(1.0)
 }
 
@@ -133,6 +164,33 @@ mod tests {
         // Half of 0.6^2 + 0.8^2 per axis.
         let found = mean(Vector2::new(0.6, -0.8));
         assert!((found - 0.5).abs() < 0.06, "{found}");
+    }
+
+    /// Of points alone. The standard error of some 7,800 products is 0.007 of the 0.5.
+    #[test]
+    fn the_mean_of_all_is_common_less_its_standard_error() {
+        let points = |true_gap| -> Vec<OverlapGap> {
+            lattice(true_gap).into_iter().filter(|one| one.known == Matrix2::identity()).collect()
+        };
+        assert!(common_square(&points(Vector2::zeros())) < 0.002);
+        let found = common_square(&points(Vector2::new(0.6, -0.8)));
+        assert!((found - 0.5).abs() < 0.06, "{found}");
+    }
+
+    /// Four points 10 px apart in a square, 1 px off to the right: six products of 1, twelve axes, and a standard error of
+    /// the square root of six.
+    #[test]
+    fn a_few_neighbors_are_believed_with_caution() {
+        let one = |x: f64, y: f64| OverlapGap {
+            place: Vector2::new(x, y),
+            gap: Vector2::new(1.0, 0.0),
+            known: Matrix2::identity(),
+        };
+        let square = [one(0.0, 0.0), one(10.0, 0.0), one(0.0, 10.0), one(10.0, 10.0)];
+        assert!((common_square(&square) - (6.0 - 6.0_f64.sqrt()) / 12.0).abs() < 1e-12);
+        // Too near to be told apart by their noise, or too far to be neighbors.
+        assert_eq!(common_square(&[one(0.0, 0.0), one(7.9, 0.0), one(90.0, 0.0)]), 0.0);
+        assert_eq!(common_square(&[]), 0.0);
     }
 
     #[test]
