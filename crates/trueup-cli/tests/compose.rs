@@ -96,6 +96,47 @@ fn views_and_what_lies_beside_a_panorama_come_out_as_stitched() {
     assert!(desk.read("again.jpg") == desk.read("third.jpg"), "from the cropped project");
 }
 
+/// The recorded grids, row after row, and the size of the panorama.
+fn recorded_grids(project: &Value) -> (Vec<Vec<Vec<[f64; 2]>>>, [f64; 2]) {
+    let grid = |image: &Value| {
+        let columns = image["mesh"]["cols"].as_u64().expect("a number") as usize;
+        let target: Vec<[f64; 2]> = serde_json::from_value(image["mesh"]["target"].clone()).expect("places");
+        target.chunks(columns).map(<[_]>::to_vec).collect()
+    };
+    let grids = project["images"].as_array().expect("photographs").iter().map(grid).collect();
+    (grids, ["width", "height"].map(|side| project["canvas"][side].as_f64().expect("a size")))
+}
+
+/// Recorded grids lie where the panorama shows the photographs: on the perspective projection, on which the edge of a
+/// photograph is a straight line, their rows are straight; and on a cylinder, which shows all, they reach from end to end.
+#[test]
+fn recorded_grids_are_those_of_the_panorama() {
+    let desk = stitched();
+    let composed = |projection: &str| {
+        compose(&desk, &["--projection", projection, "--project", "again.json"]).expect_success();
+        desk.json("again.json")
+    };
+    let (grids, _) = recorded_grids(&composed("perspective"));
+    for row in grids.iter().flatten() {
+        let [from, to] = [row[0], row[row.len() - 1]];
+        let along = [to[0] - from[0], to[1] - from[1]];
+        let length = along[0].hypot(along[1]);
+        let aside = |at: &[f64; 2]| (along[0] * (at[1] - from[1]) - along[1] * (at[0] - from[0])).abs() / length;
+        assert!(row.iter().map(aside).fold(0.0, f64::max) < 0.01 * length, "{from:?} to {to:?}");
+    }
+    let cylinder = composed("cylindrical");
+    let (grids, size) = recorded_grids(&cylinder);
+    for (axis, size) in size.into_iter().enumerate() {
+        let along = || grids.iter().flatten().flatten().map(|place| place[axis]);
+        let (low, high) = (along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max));
+        assert!(low.abs() < 1.5 && (high - size).abs() < 1.5, "from {low} to {high} of {size}");
+    }
+    let mesh = composed("mesh");
+    assert_ne!(cylinder["images"][0]["mesh"], mesh["images"][0]["mesh"]);
+    assert_eq!(cylinder["images"][0]["solved_mesh"], mesh["images"][0]["mesh"]);
+    assert!(mesh["images"][0].get("solved_mesh").is_none());
+}
+
 #[test]
 fn other_options_of_composing_are_heeded_and_others_refused() {
     let desk = stitched();
@@ -170,7 +211,8 @@ fn projects_edited_to_nonsense_are_refused() {
         ("/images/0/mesh/cols", json!(u64::MAX), "is damaged"),
         (target, json!([]), "is damaged"),
         ("/images/0/mesh/target/0", json!([1e300, 0.0]), "is damaged"),
-        ("/images/0/mesh/target/0/0", Value::Null, "the project is damaged"),
+        ("/images/0/mesh/target/0/0", Value::Null, "is damaged"),
+        ("/images/0/mesh/target/0", json!([null, null]), "vertices of its grid are missing"),
         ("/images/0/mesh/source/1", json!([3.0, 3.0]), "is damaged"),
         ("/images/0/correction/gain/1", json!(-0.5), "no positive factors on light"),
         ("/images/0/correction/vignetting/2", json!(1e5), "no positive factors on light"),

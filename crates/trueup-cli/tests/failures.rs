@@ -223,7 +223,7 @@ fn project_files_that_are_none() {
     inspect("noise.json")
         .expect_failure(1, &["noise.json: not a project file", "that `trueup stitch --project` wrote"]);
     inspect("other.json").expect_failure(1, &["other.json: its format is not \"trueup-project\""]);
-    inspect("later.json").expect_failure(1, &["later.json: its version is 99, this program reads version 1"]);
+    inspect("later.json").expect_failure(1, &["later.json: its version is 99, this program reads versions 1 to 2"]);
     inspect("damaged.json").expect_failure(1, &["damaged.json: the project is damaged ("]);
     inspect("none.json").expect_failure(1, &["reading none.json: No such file or directory"]);
     inspect(".").expect_failure(1, &[".: it is a folder", "that `trueup stitch --project` wrote"]);

@@ -41,6 +41,10 @@ pub(crate) enum Family {
     WideWarp,
 }
 
+/// What every method is seen on: the mesh that it solved. A projection is drawn from the cameras, which all methods have
+/// alike, and would hide what is compared.
+pub(crate) const VIEW: &str = "projection.kind=mesh";
+
 /// The name of the default method in [`METHODS`].
 pub(crate) const VPG: &str = "vpg";
 /// The published priors of others, on the default mesh.

@@ -6,6 +6,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use serde::{Deserialize, Serialize};
 use trueup::{Error, Phase, Result, StitchOptions};
 
+use crate::methods::VIEW;
+
 /// What is to be run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Trial {
@@ -48,13 +50,14 @@ impl Trial {
         }
     }
 
-    /// The options of the run.
+    /// The options of the run: the defaults but for the view, which is the mesh's own, see [`VIEW`].
     ///
     /// # Errors
     /// Those of an override that does not exist or is out of range.
     pub(crate) fn options(&self) -> Result<StitchOptions> {
         let mut options = StitchOptions::default();
         options.matching.random.seed = self.seed;
+        options.set(VIEW)?;
         for assignment in &self.overrides {
             options.set(assignment)?;
         }

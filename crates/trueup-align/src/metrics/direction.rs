@@ -7,9 +7,10 @@ use trueup_core::mesh::GridMesh;
 
 /// Clockwise rotation of the similarity that maps a grid best onto its target, radians.
 pub fn best_rotation(mesh: &GridMesh) -> f64 {
-    let count = mesh.len() as f64;
-    let source: Vec<Vector2<f64>> = (0..mesh.len()).map(|vertex| mesh.source(vertex)).collect();
-    let target: Vec<Vector2<f64>> = mesh.target.iter().map(|&vertex| Vector2::from(vertex)).collect();
+    let defined: Vec<usize> = (0..mesh.len()).filter(|&vertex| mesh.is_defined(vertex)).collect();
+    let count = defined.len() as f64;
+    let source: Vec<Vector2<f64>> = defined.iter().map(|&vertex| mesh.source(vertex)).collect();
+    let target: Vec<Vector2<f64>> = defined.iter().map(|&vertex| Vector2::from(mesh.target[vertex])).collect();
     let (source_mean, target_mean) =
         (source.iter().sum::<Vector2<f64>>() / count, target.iter().sum::<Vector2<f64>>() / count);
     let (mut cross, mut dot) = (0.0, 0.0);
@@ -26,7 +27,8 @@ pub fn best_rotation(mesh: &GridMesh) -> f64 {
 /// A rectangle's rotation is defined up to quarter turns; the one nearest to [`best_rotation`] is meant.
 pub fn rectangle_rotation(mesh: &GridMesh) -> f64 {
     use std::f64::consts::FRAC_PI_2;
-    let points: MultiPoint<f64> = mesh.target.iter().map(|&[x, y]| (x, y)).collect::<Vec<_>>().into();
+    let defined = mesh.target.iter().filter(|place| place.iter().all(|coordinate| coordinate.is_finite()));
+    let points: MultiPoint<f64> = defined.map(|&[x, y]| (x, y)).collect::<Vec<_>>().into();
     let hull: Vec<Vector2<f64>> =
         points.convex_hull().exterior().points().map(|point| Vector2::new(point.x(), point.y())).collect();
     let mut smallest = (f64::INFINITY, 0.0);

@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
-use super::outline::{Outline, cells, is_sound, target};
+use super::outline::{Outline, is_sound, target};
 
 /// Samples per axis of a cell, at most.
 const SAMPLES: usize = 16;
@@ -66,7 +66,7 @@ pub fn local_distortion(meshes: &[GridMesh], outside: Outside, period: Option<f6
             Outside::Center => vec![true; mesh.len()],
         };
         let (mut sum, mut count) = (0.0, 0_usize);
-        for cell in cells(mesh) {
+        for cell in mesh.whole_cells() {
             let center = cell.iter().map(|&corner| target(mesh, corner)).sum::<Vector2<f64>>() / 4.0;
             if !cell.iter().all(|&corner| vertices_alone[corner]) || !alone(center) {
                 continue;

@@ -23,7 +23,7 @@ pub use alignment::true_alignment;
 pub use direction::{best_rotation, mean_relative_turn, rectangle_rotation, relative_turns};
 pub use distortion::{LocalDistortion, Outside, local_distortion};
 pub use options::PixelMeasureOptions;
-pub use outline::folded_cells;
+pub use outline::{folded_cells, without_torn_cells};
 pub use overlap::{OverlapMeasures, mean_over_overlaps};
 pub use overlap_pixels::OverlapPixels;
 pub use reprojection::{MatchedPair, Reprojection, reprojection};

@@ -8,17 +8,6 @@ pub(super) fn target(mesh: &GridMesh, vertex: usize) -> Vector2<f64> {
     Vector2::from(mesh.target[vertex])
 }
 
-/// The vertices of each cell, row-major: top left, top right, bottom right, bottom left.
-pub(super) fn cells(mesh: &GridMesh) -> impl Iterator<Item = [usize; 4]> {
-    let columns = mesh.columns;
-    (0..mesh.rows - 1).flat_map(move |row| {
-        (0..columns - 1).map(move |column| {
-            let first = row * columns + column;
-            [first, first + 1, first + columns + 1, first + columns]
-        })
-    })
-}
-
 /// Whether a cell's target is convex and not turned over: each corner turns clockwise on the screen.
 pub(super) fn is_sound(mesh: &GridMesh, cell: [usize; 4]) -> bool {
     let corners = cell.map(|vertex| target(mesh, vertex));
@@ -28,12 +17,29 @@ pub(super) fn is_sound(mesh: &GridMesh, cell: [usize; 4]) -> bool {
     })
 }
 
-/// The number of cells of a grid that are folded: turned over, crossed, bent inwards or collapsed.
+/// The number of cells of a grid that are folded: turned over, crossed, bent inwards or collapsed. Cells that are not there
+/// (NaN) are not folded.
 pub fn folded_cells(mesh: &GridMesh) -> usize {
-    cells(mesh).filter(|&cell| !is_sound(mesh, cell)).count()
+    mesh.whole_cells().filter(|&cell| !is_sound(mesh, cell)).count()
 }
 
-/// The deformed border of a photograph, a closed polygon, ready to be asked for many points.
+/// The grid without the vertices (NaN) of its torn cells: around a pole, one that reaches over more than half of a `turn` of
+/// the panorama joins what lies a turn apart. Without a turn, the grid as it is.
+pub fn without_torn_cells(mesh: &GridMesh, turn: Option<f64>) -> GridMesh {
+    let mut whole = mesh.clone();
+    let Some(turn) = turn else { return whole };
+    for cell in mesh.whole_cells() {
+        let (low, high) = cell.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &corner| {
+            (low.min(mesh.target[corner][0]), high.max(mesh.target[corner][0]))
+        });
+        if high - low > 0.5 * turn {
+            cell.iter().for_each(|&corner| whole.target[corner] = [f64::NAN; 2]);
+        }
+    }
+    whole
+}
+
+/// The deformed border of a photograph, a closed polygon without the vertices that are not defined, ready to be asked for many points.
 #[derive(Debug)]
 pub(super) struct Outline {
     ring: Vec<Vector2<f64>>,
@@ -50,7 +56,8 @@ impl Outline {
         let right = (1..rows).map(|row| row * columns + columns - 1);
         let bottom = (0..columns - 1).rev().map(|column| (rows - 1) * columns + column);
         let left = (1..rows - 1).rev().map(|row| row * columns);
-        let ring: Vec<_> = top.chain(right).chain(bottom).chain(left).map(|vertex| target(mesh, vertex)).collect();
+        let ring = top.chain(right).chain(bottom).chain(left);
+        let ring: Vec<_> = ring.filter(|&vertex| mesh.is_defined(vertex)).map(|vertex| target(mesh, vertex)).collect();
         let start = (Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY));
         let (low, high) = ring.iter().fold(start, |(low, high), corner| (low.inf(corner), high.sup(corner)));
         let mut outline = Self { strips: vec![Vec::new(); ring.len()], ring, low, high };
@@ -120,6 +127,18 @@ mod tests {
         assert_eq!(folded_cells(&mesh), 1);
         mesh.target[2 * 6 + 2] = [45.0, 45.0];
         assert_eq!(folded_cells(&mesh), 3);
+    }
+
+    /// Two columns of a grid of 5 x 5 cells lie a turn of 60 to the left: the five cells between them and the others are
+    /// torn, and with their twelve vertices their neighbors on both sides go, which leaves the outer columns.
+    #[test]
+    fn torn_cells_are_taken_away() {
+        let mut mesh = GridMesh::regular(50.0, 50.0, 10.0);
+        (0..mesh.len()).filter(|vertex| vertex % 6 > 3).for_each(|vertex| mesh.target[vertex][0] -= 60.0);
+        assert_eq!(without_torn_cells(&mesh, None), mesh);
+        let whole = without_torn_cells(&mesh, Some(60.0));
+        assert_eq!((whole.whole_cells().count(), folded_cells(&whole)), (10, 0));
+        assert_eq!((0..whole.len()).filter(|&vertex| !whole.is_defined(vertex)).count(), 12);
     }
 
     proptest! {

@@ -18,7 +18,8 @@ fn center_rotation(mesh: &GridMesh) -> f64 {
 /// Signed angles of photographs to upright, in radians, and what they come to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Uprightness {
-    /// By how much each photograph is turned too far clockwise, in [-pi, pi).
+    /// By how much each photograph is turned too far clockwise, in [-pi, pi); NaN where its middle is not shown, and such
+    /// count for nothing.
     pub photographs: Vec<f64>,
     /// Mean of the absolute values.
     pub mean: f64,
@@ -29,15 +30,16 @@ pub struct Uprightness {
 }
 
 impl Uprightness {
-    /// Sums up angles to upright; `None` without any.
+    /// Sums up angles to upright; `None` without any that is known.
     pub fn of(photographs: Vec<f64>) -> Option<Self> {
-        let count = photographs.len() as f64;
+        let known: Vec<f64> = photographs.iter().copied().filter(|angle| !angle.is_nan()).collect();
+        let count = known.len() as f64;
         // Angles that cancel out have no common direction; the spread is then about 0.
-        let common = circular_mean(photographs.iter().map(|&angle| (angle, 1.0))).unwrap_or(0.0);
-        let mean_of = |angle: &dyn Fn(&f64) -> f64| photographs.iter().map(|one| angle(one).abs()).sum::<f64>() / count;
+        let common = circular_mean(known.iter().map(|&angle| (angle, 1.0))).unwrap_or(0.0);
+        let mean_of = |angle: &dyn Fn(&f64) -> f64| known.iter().map(|one| angle(one).abs()).sum::<f64>() / count;
         let (mean, spread) = (mean_of(&|&one| one), mean_of(&|&one| wrap_angle(one - common)));
-        let largest = photographs.iter().fold(0.0, |largest: f64, angle| largest.max(angle.abs()));
-        (!photographs.is_empty()).then_some(Self { photographs, mean, largest, spread })
+        let largest = known.iter().fold(0.0, |largest: f64, angle| largest.max(angle.abs()));
+        (!known.is_empty()).then_some(Self { photographs, mean, largest, spread })
     }
 
     /// How far photographs whose verticals truly stand at `gammas` (radians, the clockwise turns that stand them
@@ -121,6 +123,9 @@ mod tests {
     #[test]
     fn no_photographs_have_no_figure() {
         assert!(Uprightness::of(Vec::new()).is_none());
+        assert!(Uprightness::of(vec![f64::NAN]).is_none());
+        let known = Uprightness::of(vec![0.2, f64::NAN, -0.4]).expect("two are known");
+        assert!((known.mean - 0.3).abs() < 1e-12 && known.largest == 0.4);
         assert!(Uprightness::against(&[turned(0.0)], &[]).is_none());
     }
 }

@@ -89,9 +89,8 @@ impl<'a> Drawing<'a> {
 
     /// The viewer's direction of a pixel.
     fn direction(&self, pixel: Vector2<f64>) -> Vector3<f64> {
-        let (corners, shares) = self.photograph.mesh.bilinear(pixel);
-        let aside = (0..4).fold(Vector2::zeros(), |sum, k| sum + self.shift.aside[corners[k]] * shares[k]);
-        self.view_from_camera * self.photograph.camera.bearing(pixel + aside)
+        let looked_through = self.shift.looked_through(&self.photograph.mesh, pixel);
+        self.view_from_camera * self.photograph.camera.bearing(looked_through)
     }
 
     /// The place of a pixel, if the view comes near it.

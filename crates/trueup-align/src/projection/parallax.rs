@@ -18,6 +18,7 @@
 
 use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
+use trueup_core::mesh::GridMesh;
 
 use super::coverage::steepest;
 use super::photograph::PosedPhotograph;
@@ -27,6 +28,14 @@ use super::photograph::PosedPhotograph;
 pub struct ParallaxShift {
     /// One for each vertex; bilinear between.
     pub aside: Vec<Vector2<f64>>,
+}
+
+impl ParallaxShift {
+    /// The pixel whose ray is drawn where `pixel` of the photograph over which `mesh` lies is shown.
+    pub(super) fn looked_through(&self, mesh: &GridMesh, pixel: Vector2<f64>) -> Vector2<f64> {
+        let (corners, shares) = mesh.bilinear(pixel);
+        (0..4).fold(pixel, |sum, k| sum + self.aside[corners[k]] * shares[k])
+    }
 }
 
 /// What the overlaps ask of every photograph.
@@ -131,7 +140,6 @@ fn common_direction(own: Sight, others: impl Iterator<Item = Sight>, max_paralla
 mod tests {
     use trueup_core::camera::Camera;
     use trueup_core::geometry::rotation_about_y;
-    use trueup_core::mesh::GridMesh;
 
     use super::*;
 
@@ -155,9 +163,7 @@ mod tests {
 
     /// The direction a photograph draws a pixel in.
     fn drawn(photographs: &[PosedPhotograph], shifts: &[ParallaxShift], k: usize, pixel: Vector2<f64>) -> Vector3<f64> {
-        let (corners, shares) = photographs[k].mesh.bilinear(pixel);
-        let aside = (0..4).fold(Vector2::zeros(), |sum, one| sum + shifts[k].aside[corners[one]] * shares[one]);
-        photographs[k].camera.world_direction(pixel + aside)
+        photographs[k].camera.world_direction(shifts[k].looked_through(&photographs[k].mesh, pixel))
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! Works from what a stitch has at hand as from what its project records: grids in any plane and levelled cameras.
 
 use nalgebra::Matrix3;
-use trueup_align::projection::{self, Placement, PosedPhotograph, Projection, ProjectionView};
+use trueup_align::projection::{self, ParallaxShift, Placement, PosedPhotograph, Projection, ProjectionView};
 use trueup_compose::crop::{self, Crop, Rectangle};
 use trueup_compose::layout::{self, CanvasLayout, CanvasOptions, Frame, Placed};
 use trueup_core::camera::Camera;
@@ -39,12 +39,27 @@ pub(crate) struct Arrangement {
     /// Every photograph once in the plane of the mesh, in pixels of the canvas if that is the mesh's; for measures, exposure
     /// and the record.
     pub plane: CanvasLayout,
-    /// The canvas's pixel (0, 0) in `plane`'s pixels; zero but for a cropped mesh.
-    pub plane_shift: [f64; 2],
     /// What is composed.
     pub written: CanvasLayout,
+    /// Every photograph once in pixels of the canvas `written`, in the order of `plane`: the panorama as it is measured and
+    /// recorded. Vertices beyond what a projection can show are NaN.
+    pub delivered: Vec<GridMesh>,
     /// How directions were drawn; `None` for the mesh.
     pub projection: Option<ProjectionRecord>,
+}
+
+impl Arrangement {
+    /// The mesh itself, of which `written` is all, or a part that begins at `shift`, in pixels of `plane`.
+    fn of_mesh(plane: CanvasLayout, written: CanvasLayout, shift: [f64; 2]) -> Self {
+        let delivered = plane.placed.iter().map(|placed| {
+            let mut mesh = placed.mesh.clone();
+            for vertex in &mut mesh.target {
+                *vertex = [vertex[0] - shift[0], vertex[1] - shift[1]];
+            }
+            mesh
+        });
+        Self { delivered: delivered.collect(), plane, written, projection: None }
+    }
 }
 
 impl ArrangeInput {
@@ -74,7 +89,7 @@ impl ArrangeInput {
         let camera = |record: &ImageRecord| record.camera(record.level_rotation()?);
         let cameras = project.used_images().map(camera).collect();
         let dominant = project.manhattan.dominant.as_ref();
-        let period = project.grid_canvas().period();
+        let period = project.solved_canvas().period();
         Self { placed, reference, cameras, dominant: dominant.map(matrix_from_rows), period }
     }
 }
@@ -121,7 +136,7 @@ pub(crate) fn recall(
             if may_be_cropped && options == recorded {
                 let whole = Rectangle { columns: 0..plane.width, rows: 0..plane.height };
                 let written = crop::cropped(plane.clone(), &whole);
-                return Ok(Arrangement { plane, plane_shift: [0.0; 2], written, projection: None });
+                return Ok(Arrangement::of_mesh(plane, written, [0.0; 2]));
             }
             let CanvasOptions { crop, min_kept, fill, .. } = recorded.canvas;
             let same_plane = CanvasOptions { crop, min_kept, fill, ..options.canvas.clone() } == recorded.canvas;
@@ -157,8 +172,8 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
                 "Stitch at least two overlapping photographs, or leave the projection to mesh.",
             ));
         }
-        let (written, plane_shift) = framed(plane.clone(), options);
-        return Ok(Arrangement { plane, plane_shift, written, projection: None });
+        let (written, shift) = framed(plane.clone(), options);
+        return Ok(Arrangement::of_mesh(plane, written, shift));
     };
     let photographs: Vec<PosedPhotograph> = cameras
         .iter()
@@ -166,40 +181,62 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
         .map(|(camera, placed)| PosedPhotograph { camera: *camera, mesh: placed.mesh.clone() })
         .collect();
     let view = ProjectionView::choose(&photographs, dominant.as_ref(), &options.projection);
-    let drawn = draw(&photographs, &plane, &view, reference, options, context)?;
+    let max_parallax = options.projection.max_parallax_deg.to_radians();
+    let shifts = projection::parallax_shifts(&photographs, plane.period.map(|period| period as f64), max_parallax);
+    context.check_cancelled()?;
+    let scene = Scene { photographs: &photographs, shifts: &shifts, view: &view };
+    // The reference keeps its own pixels in the middle of the projection.
+    let canvas_from_plane = options.canvas.scale * photographs[reference].camera.focal_px;
+    let drawn = scene.draw(&plane, canvas_from_plane, options, context)?;
     let (written, _) = framed(drawn, options);
     report_cut(&plane, &written, &view, options, context);
     let projection = Some(ProjectionRecord::new(&view, &written));
-    Ok(Arrangement { plane, plane_shift: [0.0; 2], written, projection })
+    Ok(Arrangement { delivered: scene.delivered(&written), plane, written, projection })
 }
 
-/// The photographs on the view's canvas.
-fn draw(
-    photographs: &[PosedPhotograph],
-    plane: &CanvasLayout,
-    view: &ProjectionView,
-    reference: usize,
-    options: &ArrangeOptions,
-    context: &StageContext,
-) -> Result<CanvasLayout> {
-    let max_parallax = options.projection.max_parallax_deg.to_radians();
-    let shifts = projection::parallax_shifts(photographs, plane.period.map(|period| period as f64), max_parallax);
-    context.check_cancelled()?;
-    // The reference keeps its own pixels in the middle of the projection.
-    let canvas_from_plane = options.canvas.scale * photographs[reference].camera.focal_px;
-    let placement = Placement { view, canvas_from_plane, closed: view.closed };
-    let placed = projection::place(photographs, &shifts, &placement)
-        .into_iter()
-        .map(|grid| Placed { photograph: plane.placed[grid.photograph].photograph, mesh: grid.mesh })
-        .collect();
-    context.check_cancelled()?;
-    let reach = view.flat.reach(view.half);
-    let frame = Frame {
-        canvas_from_target: canvas_from_plane,
-        window: Some([-reach, reach]),
-        period: view.flat.period().filter(|_| view.closed),
-    };
-    layout::framed(placed, &frame, &options.canvas, context)
+/// Photographs that a view shows.
+struct Scene<'a> {
+    photographs: &'a [PosedPhotograph],
+    shifts: &'a [ParallaxShift],
+    view: &'a ProjectionView,
+}
+
+impl Scene<'_> {
+    fn placement(&self, canvas_from_plane: f64) -> Placement<'_> {
+        Placement { view: self.view, canvas_from_plane, closed: self.view.closed }
+    }
+
+    /// The photographs on the view's canvas, of so many pixels per radian in its middle.
+    fn draw(
+        &self,
+        plane: &CanvasLayout,
+        canvas_from_plane: f64,
+        options: &ArrangeOptions,
+        context: &StageContext,
+    ) -> Result<CanvasLayout> {
+        let placed = projection::place(self.photographs, self.shifts, &self.placement(canvas_from_plane))
+            .into_iter()
+            .map(|grid| Placed { photograph: plane.placed[grid.photograph].photograph, mesh: grid.mesh })
+            .collect();
+        context.check_cancelled()?;
+        let reach = self.view.flat.reach(self.view.half);
+        let frame = Frame {
+            canvas_from_target: canvas_from_plane,
+            window: Some([-reach, reach]),
+            period: self.view.flat.period().filter(|_| self.view.closed),
+        };
+        layout::framed(placed, &frame, &options.canvas, context)
+    }
+
+    /// Every photograph once on the canvas `written`, see [`Arrangement::delivered`].
+    fn delivered(&self, written: &CanvasLayout) -> Vec<GridMesh> {
+        let (scale, [left, top]) = (written.canvas_from_target, written.origin);
+        let mut meshes = projection::place_once(self.photographs, self.shifts, &self.placement(scale));
+        for vertex in meshes.iter_mut().flat_map(|mesh| &mut mesh.target) {
+            *vertex = [(vertex[0] - left) * scale, (vertex[1] - top) * scale];
+        }
+        meshes
+    }
 }
 
 /// The layout as it is cropped, and by how much it moved.

@@ -244,8 +244,8 @@ impl<'a> Stitcher<'a> {
             GeometryRecord { component: &component, geometry, arrangement: &arrangement, corrections: &corrections };
         fill_geometry(&mut project, &found);
         project.color_space = photographs.colors().map(PhotographColors::name).unwrap_or_default();
-        project.measures = geometry
-            .map(|geometry| context.time("measures", || measures::run(&component, geometry, &arrangement.plane)));
+        project.measures =
+            geometry.map(|geometry| context.time("measures", || measures::run(&component, geometry, &arrangement)));
         let on_side = geometry.and_then(|geometry| sideways::warning(&geometry.cameras.cameras, members));
         judgement::warnings(&project).into_iter().chain(on_side).for_each(|warning| context.report(warning));
         let layout = arrangement.written;
@@ -274,11 +274,11 @@ impl<'a> Stitcher<'a> {
                 true => corrections,
                 false => self.light_anew(&set, &arrangement, reference, context)?,
             };
-            let same_canvas = self.options.arrange.canvas == project.options.arrange.canvas;
+            let same_view = self.options.arrange == project.options.arrange;
             let mut project = Project { options: self.options.clone(), seconds: Default::default(), ..project.clone() };
             record_composition(&mut project, &used, &set, &arrangement, &corrections);
             project.color_space = set.files.colors().map(PhotographColors::name).unwrap_or_default();
-            if !same_canvas {
+            if !same_view {
                 project.measures = None;
             }
             let layout = arrangement.written;

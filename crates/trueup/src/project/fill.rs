@@ -110,6 +110,7 @@ fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
         masks: Vec::new(),
         vanishing_points: None,
         mesh: None,
+        solved_mesh: None,
     }
 }
 
@@ -154,8 +155,7 @@ pub(crate) fn record_composition(
     let mut renamed = Vec::new();
     for (k, &position) in used.iter().enumerate() {
         let record = &mut project.images[position];
-        let mesh = &arrangement.plane.placed[k].mesh;
-        record_appearance(record, mesh, arrangement.plane_shift, &corrections.photographs[k]);
+        record_appearance(record, arrangement, k, &corrections.photographs[k]);
         let path = set.images[k].path.display().to_string();
         if path != record.path {
             project.diagnostics.push(Diagnostic::note(
@@ -179,21 +179,28 @@ pub(crate) fn record_composition(
 fn paths(project: &mut Project) -> impl Iterator<Item = &mut String> {
     let measures = project.measures.iter_mut().flat_map(|measures| {
         let bent = measures.long_lines.iter_mut().filter_map(|lines| lines.longest_bent.as_mut());
-        measures.photographs.iter_mut().map(|one| &mut one.path).chain(bent.map(|bent| &mut bent.path))
+        let apart = measures.reprojection.iter_mut().filter_map(|found| found.worst_pair.as_mut());
+        let places = bent.map(|bent| &mut bent.path).chain(apart.flat_map(|pair| [&mut pair.a, &mut pair.b]));
+        measures.photographs.iter_mut().map(|one| &mut one.path).chain(places)
     });
     std::iter::once(&mut project.reference).chain(&mut project.manhattan.inliers).chain(measures)
 }
 
-/// Where a photograph is shown and in which light.
-fn record_appearance(record: &mut ImageRecord, mesh: &GridMesh, shift: [f64; 2], correction: &Correction) {
+/// Where the photograph of that number in the arrangement is shown, and in which light.
+fn record_appearance(record: &mut ImageRecord, arrangement: &Arrangement, number: usize, correction: &Correction) {
     record.gain = Some(correction.brightness());
     record.correction = Some(*correction);
-    record.mesh = Some(MeshRecord {
+    record.mesh = Some(mesh_record(&arrangement.delivered[number]));
+    record.solved_mesh = arrangement.projection.map(|_| mesh_record(&arrangement.plane.placed[number].mesh));
+}
+
+fn mesh_record(mesh: &GridMesh) -> MeshRecord {
+    MeshRecord {
         rows: mesh.rows,
         cols: mesh.columns,
         source: (0..mesh.len()).map(|vertex| mesh.source(vertex).into()).collect(),
-        target: mesh.target.iter().map(|vertex| [vertex[0] - shift[0], vertex[1] - shift[1]]).collect(),
-    });
+        target: mesh.target.clone(),
+    }
 }
 
 /// What the panorama is drawn on.
@@ -228,9 +235,8 @@ pub(crate) fn fill_geometry(project: &mut Project, found: &GeometryRecord) {
     let is_warp = matches!(method.form(), MethodForm::Warp(_));
     for (k, &photograph) in component.members.iter().enumerate() {
         let record = &mut project.images[photograph];
-        let mesh = &arrangement.plane.placed[k].mesh;
         record.status = ImageStatus::Used;
-        record_appearance(record, mesh, arrangement.plane_shift, &corrections.photographs[k]);
+        record_appearance(record, arrangement, k, &corrections.photographs[k]);
         let Some(geometry) = geometry else { continue };
         let camera = &geometry.cameras.cameras[k];
         let camera_from_level = camera.rotation() * geometry.prior.level_from_world().transpose();

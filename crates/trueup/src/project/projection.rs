@@ -45,6 +45,11 @@ impl ProjectionRecord {
             sphere: sphere(view, written),
         }
     }
+
+    /// Pixels of the canvas after which directions repeat; `None` on a plane, on which they do not.
+    pub(crate) fn turn_px(&self) -> Option<f64> {
+        self.kind.turns().then_some(TAU * self.px_per_radian)
+    }
 }
 
 /// Where a canvas lies on the whole sphere, in whole pixels.

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use trueup_align::metrics::without_torn_cells;
 use trueup_compose::crop::Crop;
 use trueup_compose::exposure::{Correction, Corrections};
 use trueup_compose::layout::{CanvasLayout, Placed};
@@ -10,6 +11,7 @@ use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::{self, RejectedSource, SourceOptions};
 
+use super::projection::ProjectionRecord;
 use super::record::{ImageRecord, ImageStatus, MeshRecord, Project};
 
 /// What a project must be to be read again.
@@ -56,9 +58,9 @@ impl Recorded {
             Error::input(&project.reference, "it is the reference, but none of the photographs used", AS_WRITTEN)
         })?;
         records.iter().try_for_each(|record| check_focal(record))?;
-        let meshes = used_grids(&records)?;
+        let meshes = records.iter().map(|record| solved_grid(record)).collect::<Result<Vec<_>>>()?;
         let corrections = recorded_corrections(project, &records)?;
-        let canvas = project.grid_canvas();
+        let canvas = project.solved_canvas();
         let (width, height) = (canvas.width, canvas.height);
         // Grids may lie beyond the ends of a full turn by less than a turn, and anywhere around what was cropped.
         let turn = if canvas.full_turn { width as f64 } else { 0.0 };
@@ -100,27 +102,41 @@ fn check_focal(record: &ImageRecord) -> Result<()> {
     }
 }
 
-/// The grids of used photographs over the original photographs.
+/// The grids of used photographs over the original photographs, in the panorama, without cells that are torn.
 ///
 /// # Errors
 /// [`Error::Input`] if one is missing or damaged.
-pub(crate) fn used_grids(records: &[&ImageRecord]) -> Result<Vec<GridMesh>> {
-    records.iter().map(|record| grid(record)).collect()
+pub(crate) fn whole_grids(project: &Project, records: &[&ImageRecord]) -> Result<Vec<GridMesh>> {
+    let turn = project.projection.as_ref().and_then(ProjectionRecord::turn_px);
+    records.iter().map(|record| Ok(without_torn_cells(&record.grid()?, turn))).collect()
 }
 
 impl ImageRecord {
-    /// The grid of a photograph in use over the original photograph.
+    /// The grid of a photograph in use over the original photograph, in the panorama. Vertices for which a projection has no
+    /// place are NaN.
     ///
     /// # Errors
     /// [`Error::Input`] if it is missing or damaged.
     pub fn grid(&self) -> Result<GridMesh> {
-        grid(self)
+        /// Why a grid may be missing, and what helps.
+        const COMPOSE_AGAIN: &str = "If an earlier version wrote the project, compose it again with `--project`.";
+        let missing = || Error::input(&self.path, "the project holds no grid of it in the panorama", COMPOSE_AGAIN);
+        grid(self, self.mesh.as_ref().ok_or_else(missing)?)
     }
 }
 
-fn grid(record: &ImageRecord) -> Result<GridMesh> {
+/// The grid of a photograph in use as it was solved: all of it is defined.
+fn solved_grid(record: &ImageRecord) -> Result<GridMesh> {
+    let missing = || Error::input(&record.path, "the project holds no grid of it", AS_WRITTEN);
+    let solved = grid(record, record.solved_mesh.as_ref().or(record.mesh.as_ref()).ok_or_else(missing)?)?;
+    match (0..solved.len()).all(|vertex| solved.is_defined(vertex)) {
+        true => Ok(solved),
+        false => Err(Error::input(&record.path, "vertices of its grid are missing", AS_WRITTEN)),
+    }
+}
+
+fn grid(record: &ImageRecord, mesh: &MeshRecord) -> Result<GridMesh> {
     let damaged = |reason: String| Error::input(&record.path, reason, AS_WRITTEN);
-    let mesh = record.mesh.as_ref().ok_or_else(|| damaged("the project holds no grid of it".to_owned()))?;
     if !is_whole(mesh, record.width, record.height) {
         return Err(damaged(format!(
             "its grid of {} x {} with {} vertices over {} x {} px is damaged",
@@ -141,7 +157,10 @@ fn is_whole(mesh: &MeshRecord, width: usize, height: usize) -> bool {
         && mesh.rows.checked_mul(mesh.cols) == Some(mesh.target.len())
         && mesh.source.len() == mesh.target.len()
         && width.min(height) > 0;
-    if !counted || !mesh.target.iter().flatten().all(|coordinate| coordinate.abs() <= FARTHEST_PX) {
+    let is_place = |place: &[f64; 2]| {
+        place.iter().all(|coordinate| coordinate.abs() <= FARTHEST_PX) || place.iter().all(|one| one.is_nan())
+    };
+    if !counted || !mesh.target.iter().all(is_place) {
         return false;
     }
     let (width, height) = (width as f64, height as f64);
@@ -276,6 +295,35 @@ mod tests {
         older.as_object_mut().expect("an object").remove("response");
         let (_, recorded) = read(&older).expect("whole");
         assert!(recorded.corrections.response.is_plain());
+    }
+
+    /// Version 1 recorded the solved grids, whatever the panorama was drawn on: such a file can be composed, but holds no
+    /// grids of the panorama.
+    #[test]
+    fn a_projection_of_version_1_has_solved_grids_alone() {
+        let mut older = project();
+        older["projection"] = json!({
+            "kind": "perspective", "yaw_deg": 0.0, "pitch_deg": 0.0, "roll_deg": 0.0, "panini_distance": 1.0,
+            "px_per_radian": 100.0, "origin": [-0.1, -0.1], "sphere": null
+        });
+        older["mesh_canvas"] = older["canvas"].take();
+        older["canvas"] = json!({"width": 30, "height": 9});
+        let (read, recorded) = read(&older).expect("whole");
+        assert_eq!((recorded.layout.width, recorded.layout.placed[1].mesh.target[4]), (14, [9.5, 3.0]));
+        let refused = read.images[0].grid().expect_err("no grid of the panorama").to_string();
+        assert!(refused.contains("compose it again"), "{refused}");
+    }
+
+    /// A vertex that the projection has no place for is written as null and read as no number.
+    #[test]
+    fn vertices_without_a_place_are_kept() {
+        let (mut project, _) = read(&project()).expect("whole");
+        project.images[0].solved_mesh = project.images[0].mesh.clone();
+        project.images[0].mesh.as_mut().expect("a grid").target[0] = [f64::NAN; 2];
+        let again = Project::from_json(&project.to_json().expect("text"), "p.json").expect("a project");
+        let grid = again.images[0].grid().expect("a grid");
+        assert!(!grid.is_defined(0) && grid.is_defined(1));
+        Recorded::new(&again).expect("solved everywhere");
     }
 
     #[test]

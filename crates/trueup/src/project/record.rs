@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use trueup_compose::exposure::{Correction, Response};
 use trueup_core::camera::Camera;
 use trueup_core::diagnostics::Diagnostic;
@@ -20,7 +20,10 @@ use crate::report::measures::Measures;
 /// The `format` field of every project file.
 pub const PROJECT_FORMAT: &str = "trueup-project";
 /// The `version` field: raised when a field changes its meaning.
-pub const PROJECT_VERSION: u32 = 1;
+///
+/// 2: the grids are those of the panorama, with a projection too. Files of version 1 are read; those with a projection can
+/// be composed, but hold no grids of the panorama.
+pub const PROJECT_VERSION: u32 = 2;
 
 /// Whether a photograph is in the panorama.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -41,9 +44,16 @@ pub struct MeshRecord {
     pub cols: usize,
     /// Vertices in pixels of the original photograph after orientation; the corner is (0, 0).
     pub source: Vec<[f64; 2]>,
-    /// Vertices in pixels of the written panorama; the corner is (0, 0), and where the panorama was cropped they may lie
-    /// outside. With [`Project::projection`], in a plane of their own in which the mesh was solved.
+    /// Vertices in pixels of the written panorama; the corner is (0, 0), and where the panorama was cropped, or a projection
+    /// shows a part, they may lie outside. NaN (null in the file) where a projection has no place for them.
+    #[serde(deserialize_with = "places_or_nowhere")]
     pub target: Vec<[f64; 2]>,
+}
+
+/// Places of which `null` is NaN, as it is written.
+fn places_or_nowhere<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 2]>, D::Error> {
+    let places = Vec::<[Option<f64>; 2]>::deserialize(deserializer)?;
+    Ok(places.into_iter().map(|place| place.map(|coordinate| coordinate.unwrap_or(f64::NAN))).collect())
 }
 
 /// A lens that is no pinhole. Its terms are in units of the focal length.
@@ -101,8 +111,12 @@ pub struct ImageRecord {
     pub masks: Vec<MaskRecord>,
     /// Three orthogonal vanishing directions in the camera frame, if found.
     pub vanishing_points: Option<[[f64; 3]; 3]>,
-    /// The deformed grid.
+    /// The deformed grid, in the panorama.
     pub mesh: Option<MeshRecord>,
+    /// The same as the method solved it, with [`Project::projection`]: on [`Project::mesh_canvas`]. From its overlaps the
+    /// projection takes how photographs meet.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solved_mesh: Option<MeshRecord>,
 }
 
 /// The outcome of matching two photographs, by their positions in `images`.
@@ -205,7 +219,7 @@ pub struct Project {
     /// projections.
     #[serde(default)]
     pub projection: Option<ProjectionRecord>,
-    /// The canvas of the plane in which the grids lie, where that is not the panorama's: with a projection.
+    /// The canvas of the plane in which the grids were solved, where that is not the panorama's: with a projection.
     #[serde(default)]
     pub mesh_canvas: Option<Canvas>,
     /// Wall seconds per stage.
@@ -240,8 +254,8 @@ impl ImageRecord {
 }
 
 impl Project {
-    /// The canvas that the grids of the photographs lie on.
-    pub fn grid_canvas(&self) -> Canvas {
+    /// The canvas that the grids of the photographs were solved on.
+    pub fn solved_canvas(&self) -> Canvas {
         self.mesh_canvas.unwrap_or(self.canvas)
     }
 
@@ -285,13 +299,26 @@ impl Project {
             return Err(wrong(format!("its format is not \"{PROJECT_FORMAT}\"")));
         }
         let version = value.get("version").and_then(serde_json::Value::as_u64);
-        if version != Some(u64::from(PROJECT_VERSION)) {
+        if !version.is_some_and(|version| (1..=u64::from(PROJECT_VERSION)).contains(&version)) {
             let found = version.map_or("unknown".to_owned(), |version| version.to_string());
-            return Err(wrong(format!("its version is {found}, this program reads version {PROJECT_VERSION}")));
+            return Err(wrong(format!("its version is {found}, this program reads versions 1 to {PROJECT_VERSION}")));
         }
         if let Some(options) = value.get_mut("options") {
             StitchOptions::update_recorded(options, file)?;
         }
-        serde_json::from_value(value).map_err(|error| wrong(format!("the project is damaged ({error})")))
+        let project: Self =
+            serde_json::from_value(value).map_err(|error| wrong(format!("the project is damaged ({error})")))?;
+        Ok(project.brought_up_to_date())
+    }
+
+    /// Version 1 recorded grids as they were solved, whatever the panorama was drawn on.
+    fn brought_up_to_date(mut self) -> Self {
+        if self.version == 1 && self.projection.is_some() {
+            for image in &mut self.images {
+                image.solved_mesh = image.mesh.take();
+            }
+        }
+        self.version = PROJECT_VERSION;
+        self
     }
 }

@@ -7,12 +7,12 @@ use trueup_align::metrics::{
     mean_relative_turn, rectangle_rotation,
 };
 use trueup_align::similarity::{EstimatedRoll, RollsInput, estimated_rolls};
-use trueup_compose::layout::CanvasLayout;
 use trueup_core::matches::PointMatch;
 use trueup_core::mesh::GridMesh;
 
 use crate::pipeline::align::Geometry;
 use crate::pipeline::align::component::Component;
+use crate::pipeline::arrange::Arrangement;
 
 /// The paper prints LD in hundredths.
 pub(crate) const HUNDREDTHS: f64 = 100.0;
@@ -147,10 +147,13 @@ impl Lean {
     }
 }
 
-/// Measures a panorama whose grids lie on the canvas of `layout`.
-pub(crate) fn run(component: &Component, geometry: &Geometry, layout: &CanvasLayout) -> Measures {
-    let meshes: Vec<&GridMesh> = layout.placed.iter().map(|placed| &placed.mesh).collect();
-    let period = layout.period.map(|columns| columns as f64);
+/// Measures a panorama as it is delivered, whatever it is drawn on.
+pub(crate) fn run(component: &Component, geometry: &Geometry, arrangement: &Arrangement) -> Measures {
+    let period = arrangement.written.period.map(|columns| columns as f64);
+    let turn = arrangement.projection.as_ref().and_then(|projection| projection.turn_px());
+    let whole: Vec<GridMesh> =
+        arrangement.delivered.iter().map(|mesh| metrics::without_torn_cells(mesh, turn)).collect();
+    let meshes: Vec<&GridMesh> = whole.iter().collect();
     // The same grids over the working pictures, in whose pixels lines are.
     let working: Vec<GridMesh> = meshes
         .iter()
@@ -211,6 +214,7 @@ fn leans(component: &Component, geometry: &Geometry, working: &[GridMesh]) -> Ve
     let Some(rolls) = estimated_rolls(&input) else { return vec![None; working.len()] };
     let lean = |(mesh, roll): (&GridMesh, Option<EstimatedRoll>)| {
         let by = roll?;
+        // None where the photograph's middle is not shown.
         let off = Uprightness::against(std::slice::from_ref(mesh), &[by.roll])?;
         Some(Lean { lean: off.photographs[0], by })
     };

@@ -5,7 +5,7 @@ use trueup::Result;
 use super::grid::{GridRow, id_of, table};
 use super::paper_figures::NATURAL;
 use crate::methods::{
-    AANAP_PUBLISHED, ComparedMethod, Family, GSP_2D, GSP_2D_PUBLISHED, GSP_3D, GSP_3D_PUBLISHED, METHODS, VPG,
+    AANAP_PUBLISHED, ComparedMethod, Family, GSP_2D, GSP_2D_PUBLISHED, GSP_3D, GSP_3D_PUBLISHED, METHODS, VIEW, VPG,
     VPG_PUBLISHED, methods_of,
 };
 use crate::report::charts::{Chart, Series, SeriesMark};
@@ -200,7 +200,9 @@ fn refusals(results: &Results, sets: &[SetSpec]) -> Vec<String> {
 fn list_of_methods() -> Table {
     let mut list = Table::new(
         "methods",
-        "The methods that exist, and the options that make them.",
+        &format!(
+            "The methods that exist, and the options that make them. All are seen on the mesh that they solved (`{VIEW}`)."
+        ),
         ["method", "what it is", "stands beside the paper's", "options"],
     );
     for one in &METHODS {

@@ -17,7 +17,7 @@ use trueup_core::truth::{ImageTruth, Truth};
 use trueup_core::{Error, Result};
 
 use super::measures::{HUNDREDTHS, Measures};
-use crate::project::read::used_grids;
+use crate::project::read::whole_grids;
 use crate::project::record::{ImageRecord, Project};
 pub use pixels::{PixelEvaluation, compare_overlaps, evaluate_pixels, scale_up_to};
 
@@ -137,8 +137,8 @@ pub fn evaluate(project: &Project, truth: &Truth) -> Result<Evaluation> {
     truth.check(&subject(truth))?;
     let known = match_photographs(project, truth)?;
     let records: Vec<&ImageRecord> = known.iter().map(|one| one.record).collect();
-    let meshes = used_grids(&records)?;
-    let period = project.grid_canvas().period();
+    let meshes = whole_grids(project, &records)?;
+    let period = project.canvas.period();
     let gammas: Vec<f64> = known.iter().map(|one| one.truth.gamma_deg.to_radians()).collect();
     let reference = known.iter().position(|one| one.record.path == project.reference);
 

@@ -14,7 +14,7 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::color::PhotographColors;
 use trueup_io::decode::FilePhotographs;
 
-use crate::project::read::{find_photograph, recorded_corrections, used_grids};
+use crate::project::read::{find_photograph, recorded_corrections, whole_grids};
 use crate::project::record::{Canvas, ImageRecord, Project};
 
 /// Progress is reported as this.
@@ -65,7 +65,7 @@ pub fn evaluate_pixels(project: &Project, project_folder: &Path, context: &Stage
         .collect::<Result<Vec<SourceImage>>>()?;
     let colors = PhotographColors::survey(&images, context);
     let photographs = FilePhotographs::new(images, 0).in_colors(colors);
-    let meshes = used_grids(&records)?;
+    let meshes = whole_grids(project, &records)?;
     let scale = scale(&meshes, project.options.run.measures.canvas_pixels);
     let positions: Vec<usize> = (0..records.len()).collect();
     compare_overlaps(project, &photographs, &positions, scale, context)
@@ -77,7 +77,7 @@ pub fn evaluate_pixels(project: &Project, project_folder: &Path, context: &Stage
 /// [`Error::Input`] if the project's grids are damaged.
 pub fn scale_up_to(project: &Project, wanted: f64) -> Result<f64> {
     let records: Vec<&ImageRecord> = project.used_images().collect();
-    Ok(wanted.min(layers_scale(&used_grids(&records)?)))
+    Ok(wanted.min(layers_scale(&whole_grids(project, &records)?)))
 }
 
 /// Compares the used photographs of a project, which are at `positions` of `photographs`, where they overlap, at a scale
@@ -93,7 +93,7 @@ pub fn compare_overlaps(
     context: &StageContext,
 ) -> Result<PixelEvaluation> {
     let records: Vec<&ImageRecord> = project.used_images().collect();
-    let layout = layout(used_grids(&records)?, positions, project.grid_canvas(), scale);
+    let layout = layout(whole_grids(project, &records)?, positions, project.canvas, scale);
     let corrections = recorded_corrections(project, &records)?;
 
     let input = RenderInput { layout: &layout, corrections: &corrections, photographs };
