@@ -12,12 +12,11 @@ use super::convert::transform;
 /// beyond that of linear light (0.5). Cameras and screens are at 0.17 to 0.29.
 const MIDDLE_LIGHT: std::ops::RangeInclusive<f64> = 0.004..=0.65;
 
-/// Most that an encoded value may change by being made light and encoded again: levels that many encoded values share are
-/// lost.
-const MOST_LOST: f64 = 0.05;
+/// Least factor by which light grows over a tenth of the encoded range, from a tenth on: linear light, the slowest in use, grows by
+/// 1.11 over the last. Less is a stretch of levels that all mean the same.
+const LEAST_RISE: f64 = 1.03;
 
-/// Places between 0 and 1 where curves are tried, and grays.
-const TRIED: u32 = 64;
+/// Grays that are tried.
 const GRAYS: u32 = 8;
 
 /// Most that the sum of the primaries may differ from the white of profiles, as CIE XYZ: rounding and coarse adaptation
@@ -40,12 +39,12 @@ const WHITE: f64 = 0.7;
 
 /// What is wrong with a tone curve that never falls, if anything.
 pub(super) fn flaw_of_curve(curve: &TransferCurve) -> Option<&'static str> {
-    let tried = |step| f64::from(step) / f64::from(TRIED);
     if !MIDDLE_LIGHT.contains(&curve.linear(0.5)) {
         return Some("its tone curve is too steep or too flat");
     }
-    let is_lost = |step| (curve.encoded(curve.linear(tried(step))) - tried(step)).abs() > MOST_LOST;
-    (0..=TRIED).any(is_lost).then_some("its tone curve makes one level of many")
+    let light = |tenth: u32| curve.linear(f64::from(tenth) / 10.0);
+    let stands_still = (1..10).any(|tenth| light(tenth + 1) < LEAST_RISE * light(tenth));
+    stands_still.then_some("its tone curve makes one level of many")
 }
 
 /// What is wrong with the primaries of a space, if anything.

@@ -50,7 +50,7 @@ fn absurd_profiles_are_not_believed() {
     };
     assert!(with(&|profile| curve(profile, ToneReprCurve::Lut(vec![50 * 256]))).contains("too steep"));
     assert!(with(&|profile| curve(profile, ToneReprCurve::Lut(vec![26]))).contains("too flat"));
-    let steps = |step: u16| if step < 40 { 2000 } else { 60_000 };
+    let steps = |step: u16| if step < 40 { 2000 + step } else { 60_000 + step };
     let staircase: Vec<u16> = [0].into_iter().chain((1..63).map(steps)).chain([65535]).collect();
     let message = with(&|profile| curve(profile, ToneReprCurve::Lut(staircase.clone())));
     assert!(message.contains("one level of many"), "{message}");

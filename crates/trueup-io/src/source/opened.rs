@@ -126,7 +126,7 @@ fn not_read(foreign: &Foreign) -> Rejection {
     Rejection::new(
         "format-unsupported",
         format!("it is {}, a format that is not read", foreign.what),
-        format!("Convert it to {readable}, for example with: {}", foreign.command),
+        format!("Convert it to {readable}, for example with `{}`.", foreign.command),
     )
 }
 

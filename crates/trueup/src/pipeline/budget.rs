@@ -55,7 +55,7 @@ impl Budget {
                 (memory, machine.free.max(memory))
             }
         };
-        let limit = machine.hard.filter(|hard| hard.bytes < ceiling);
+        let limit = machine.hard.filter(|hard| hard.bytes <= ceiling);
         let most = limit.map_or(u64::MAX, |hard| hard.bytes);
         let bytes = |amount: u64| usize::try_from(amount.min(most)).unwrap_or(usize::MAX);
         let advice = limit.map_or(RAISE_OPTION, |hard| hard.by.advice());

@@ -27,7 +27,7 @@ pub(crate) fn warning(cameras: &[Camera], members: &[usize]) -> Option<Diagnosti
             "it and all the others lie on their side, it seems: the camera turned by {sweep:.0} degrees along their columns, and \
              nobody looks so far up and down; the panorama lies on its side, too"
         ),
-        "Turn the photographs by a quarter and stitch them again, for example with: exiftool -Orientation#=6 (or 8) photo.jpg",
+        "Turn the photographs by a quarter and stitch them again, for example with `exiftool -Orientation#=6 photo.jpg` (or 8).",
     ))
 }
 

@@ -1,10 +1,17 @@
 //! Camera raw in the form of a TIFF: the first page is a small copy, or its samples are those of the sensor.
+//!
+//! # Source
+//! TIFF/EP (ISO 12234-2) 5.1.2, and Adobe Digital Negative 1.7, chapter 3, for samples of the sensor: their interpretations
+//! are none that TIFF 6.0 has.
 
 use std::io::{Read, Seek};
 
-use tiff::TiffResult;
 use tiff::decoder::Decoder;
 use tiff::tags::Tag;
+use tiff::{TiffError, TiffFormatError, TiffResult, TiffUnsupportedError};
+
+use crate::format::HeaderError;
+use crate::formats::foreign::RAW;
 
 /// Tag that every Digital Negative has in its first directory.
 ///
@@ -12,25 +19,28 @@ use tiff::tags::Tag;
 /// Adobe Digital Negative 1.7, chapter 4, "DNGVersion".
 const DNG_VERSION: Tag = Tag::Unknown(50706);
 
-/// PhotometricInterpretation of samples behind a color filter array, and of those interpolated to linear colors of the sensor.
-///
-/// # Source
-/// TIFF/EP (ISO 12234-2) 5.1.2; Adobe Digital Negative 1.7, chapter 3.
-const SENSOR_SAMPLES: [u16; 2] = [32803, 34892];
-
 /// NewSubfileType's bit for "a reduced-resolution version of another image in this TIFF file" (TIFF 6.0 section 8).
 const REDUCED: u32 = 1;
 
 /// Sub-directories that are looked into: raw files have up to five.
 const LOOKED_INTO: usize = 8;
 
+/// Why a first page cannot be made sense of.
+pub(super) fn failure(error: TiffError) -> HeaderError {
+    match error {
+        // Samples of the sensor; or no strips and no tiles, as where a small copy is kept as a JPEG of its own.
+        TiffError::UnsupportedError(TiffUnsupportedError::UnknownInterpretation)
+        | TiffError::FormatError(TiffFormatError::StripTileTagConflict) => HeaderError::Foreign(&RAW),
+        TiffError::UnsupportedError(unsupported) => HeaderError::Unsupported(unsupported.to_string()),
+        other => HeaderError::damaged(other),
+    }
+}
+
 /// Whether the first page is not the photograph: a sub-image is never taken for it.
 pub(super) fn is_raw<R: Read + Seek>(decoder: &mut Decoder<R>) -> bool {
     let mut number = |tag| decoder.find_tag(tag).ok().flatten().and_then(|value| value.into_u32().ok());
     let is_reduced = number(Tag::NewSubfileType).is_some_and(|kind| kind & REDUCED != 0);
-    let photometric = number(Tag::PhotometricInterpretation);
     is_reduced
-        || photometric.is_some_and(|code| SENSOR_SAMPLES.iter().any(|&one| u32::from(one) == code))
         || decoder.find_tag(DNG_VERSION).is_ok_and(|version| version.is_some())
         || hides_larger_picture(decoder).unwrap_or(false)
 }
@@ -66,6 +76,8 @@ mod tests {
     const LENGTH: u16 = 257;
     const NEW_SUBFILE_TYPE: u16 = 254;
     const PHOTOMETRIC: u16 = 262;
+    const STRIP_OFFSETS: u16 = 273;
+    const STRIP_BYTE_COUNTS: u16 = 279;
     const SUB_DIRECTORIES: u16 = 330;
     /// Where the first directory is, and how long each is made.
     const START: u32 = 8;
@@ -73,6 +85,10 @@ mod tests {
 
     /// A TIFF of a first directory and those it points to, each with entries of a tag and a number (TIFF 6.0 section 2).
     fn file(first: &[(u16, u32)], below: &[&[(u16, u32)]]) -> Decoder<Cursor<Vec<u8>>> {
+        Decoder::new(bytes(first, below)).expect("a directory")
+    }
+
+    fn bytes(first: &[(u16, u32)], below: &[&[(u16, u32)]]) -> Cursor<Vec<u8>> {
         let place = |number: usize| START + (number * DIRECTORY_BYTES) as u32;
         let mut first = first.to_vec();
         first.extend((!below.is_empty()).then(|| (SUB_DIRECTORIES, place(1))));
@@ -88,11 +104,13 @@ mod tests {
             }
             bytes.resize(place(number + 1) as usize, 0);
         }
-        Decoder::new(Cursor::new(bytes)).expect("a directory")
+        Cursor::new(bytes)
     }
 
-    const SMALL: [(u16, u32); 3] = [(WIDTH, 256), (LENGTH, 171), (PHOTOMETRIC, 2)];
-    const LARGE: [(u16, u32); 3] = [(WIDTH, 6000), (LENGTH, 4000), (PHOTOMETRIC, 32803)];
+    const SMALL: [(u16, u32); 5] =
+        [(WIDTH, 256), (LENGTH, 171), (PHOTOMETRIC, 1), (STRIP_OFFSETS, 8), (STRIP_BYTE_COUNTS, 4)];
+    const LARGE: [(u16, u32); 5] =
+        [(WIDTH, 6000), (LENGTH, 4000), (PHOTOMETRIC, 32803), (STRIP_OFFSETS, 8), (STRIP_BYTE_COUNTS, 4)];
 
     #[test]
     fn a_sub_image_is_never_taken_for_the_photograph() {
@@ -100,8 +118,11 @@ mod tests {
         assert!(!is_raw(&mut file(&SMALL, &[])), "a plain picture");
         assert!(is_raw(&mut file(&with(NEW_SUBFILE_TYPE, 1), &[])), "a reduced copy");
         assert!(is_raw(&mut file(&with(50706, 0x0104), &[])), "a Digital Negative");
-        assert!(is_raw(&mut file(&LARGE, &[])), "samples of the sensor");
         assert!(is_raw(&mut file(&SMALL, &[&LARGE])), "a larger picture below");
+        for (what, first) in [("samples of the sensor", &LARGE[..]), ("a copy kept elsewhere", &SMALL[..3])] {
+            let error = Decoder::new(bytes(first, &[])).expect_err("nothing that can be decoded");
+            assert!(matches!(failure(error), HeaderError::Foreign(_)), "{what}");
+        }
     }
 
     #[test]
