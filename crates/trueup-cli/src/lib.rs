@@ -12,6 +12,7 @@ mod evaluate;
 mod failure;
 mod inspect;
 mod option_list;
+mod outcome;
 mod output;
 mod progress;
 mod stitch;
@@ -50,7 +51,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     match outcome {
         Ok(()) => 0,
         Err(failure) => {
-            trueup_terminal::complain(&failure.to_string());
+            trueup_terminal::complain(&words::printable(&failure.to_string()));
             failure.status()
         }
     }

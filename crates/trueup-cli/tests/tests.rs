@@ -21,3 +21,4 @@ mod run;
 mod sphere;
 #[cfg(unix)]
 mod stopping;
+mod told;

@@ -8,6 +8,7 @@ pub(crate) mod align;
 pub(crate) mod arrange;
 mod budget;
 pub(crate) mod compose;
+mod machine;
 pub(crate) mod matched;
 pub(crate) mod matching;
 pub(crate) mod measure;
@@ -46,7 +47,7 @@ use crate::project::fill::{GeometryRecord, fill_geometry, place, record_composit
 use crate::project::provenance;
 use crate::project::read::Recorded;
 use crate::project::record::Project;
-use crate::report::measures;
+use crate::report::{judgement, measures, sideways};
 
 pub use results::{Aligned, Alignment, MatchedPhotographs};
 
@@ -245,6 +246,8 @@ impl<'a> Stitcher<'a> {
         project.color_space = photographs.colors().map(PhotographColors::name).unwrap_or_default();
         project.measures =
             geometry.map(|geometry| context.time("measures", || measures::run(&component, geometry, &arrangement)));
+        let on_side = geometry.and_then(|geometry| sideways::warning(&geometry.cameras.cameras, members));
+        judgement::warnings(&project).into_iter().chain(on_side).for_each(|warning| context.report(warning));
         let layout = arrangement.written;
         let corrections = corrections.of_placed(&layout, |photograph| members.binary_search(&photograph).ok());
         let directions = geometry.map(|geometry| geometry.triads.clone()).unwrap_or_default();

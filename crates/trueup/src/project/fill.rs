@@ -180,7 +180,9 @@ pub(crate) fn record_composition(
 fn paths(project: &mut Project) -> impl Iterator<Item = &mut String> {
     let measures = project.measures.iter_mut().flat_map(|measures| {
         let bent = measures.long_lines.iter_mut().filter_map(|lines| lines.longest_bent.as_mut());
-        measures.photographs.iter_mut().map(|one| &mut one.path).chain(bent.map(|bent| &mut bent.path))
+        let apart = measures.reprojection.iter_mut().filter_map(|found| found.worst_pair.as_mut());
+        let places = bent.map(|bent| &mut bent.path).chain(apart.flat_map(|pair| [&mut pair.a, &mut pair.b]));
+        measures.photographs.iter_mut().map(|one| &mut one.path).chain(places)
     });
     std::iter::once(&mut project.reference).chain(&mut project.manhattan.inliers).chain(measures)
 }
