@@ -32,7 +32,7 @@ fn photographed() -> (Desk, Vec<PosedCamera>) {
     std::fs::create_dir(desk.join("room")).expect("made");
     for (k, camera) in cameras.iter().enumerate() {
         let picture = render(&scene, camera, Quality::Preview);
-        desk.put(&format!("room/{k:02}.jpg"), &jpeg(picture.data(), WIDTH, HEIGHT));
+        desk.put(&format!("room/{k:02}.jpg"), jpeg(picture.data(), WIDTH, HEIGHT));
     }
     (desk, cameras)
 }
