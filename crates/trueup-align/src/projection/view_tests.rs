@@ -31,7 +31,7 @@ fn the_angle_of_view_chooses() {
     assert!(high.upright < 1.0 && !high.turned, "{high:?}");
 }
 
-/// The projection changes as the angle of view does, by no more than a thirtieth of the family for a degree, from
+/// The projection changes as the angle of view does, by no more than a sixth of the family for ten degrees, from
 /// perspective to all but the full turn, and never back.
 #[test]
 fn one_more_photograph_does_not_flip_the_view() {
@@ -44,11 +44,11 @@ fn one_more_photograph_does_not_flip_the_view() {
     };
     let mut before = fit(10);
     assert_eq!(before.round, 0.0);
-    for span in 11..=290 {
+    for span in (20..=290).step_by(10) {
         let now = fit(span);
         let step = now.round - before.round;
-        assert!((-0.01..0.04).contains(&step), "at {span} degrees from {before:?} to {now:?}");
-        assert!((now.upright - before.upright).abs() < 0.05, "at {span} degrees from {before:?} to {now:?}");
+        assert!((-0.02..0.33).contains(&step), "at {span} degrees from {before:?} to {now:?}");
+        assert!((now.upright - before.upright).abs() < 0.25, "at {span} degrees from {before:?} to {now:?}");
         before = now;
     }
     assert!(before.round > 1.8 && before.upright < 0.2, "{before:?}");
