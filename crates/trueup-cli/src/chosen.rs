@@ -33,7 +33,7 @@ pub(crate) fn options(
         set(one.typed(), &format!("{}={}", one.flag.option, one.value));
     }
     // A projection that was not understood is not there.
-    if wrong.is_empty() && options.arrange.projection.kind == Projection::Mesh {
+    if wrong.is_empty() && options.fixed_by_method().arrange.projection.kind == Projection::Mesh {
         wrong.extend(views_of_the_mesh(typed));
     }
     wrong.extend(options.invalid().iter().map(ToString::to_string));
@@ -43,7 +43,9 @@ pub(crate) fn options(
 /// The flags that turn or bound a view where there is none: a mesh is drawn as it lies. Zero turns and bounds nothing.
 fn views_of_the_mesh(typed: &TypedOptions) -> impl Iterator<Item = String> {
     let idle = typed.iter().filter(|one| one.flag.of_a_view && one.value.trim().parse() != Ok(0.0));
-    idle.map(|one| format!("{}: the panorama is drawn on the mesh, which has no view; add a --projection", one.typed()))
+    idle.map(|one| {
+        format!("{}: the panorama is drawn on the mesh, which has no view; take another --projection", one.typed())
+    })
 }
 
 fn read_config(options: &mut StitchOptions, path: &Path) -> Result<(), Failure> {

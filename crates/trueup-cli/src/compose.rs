@@ -8,16 +8,15 @@ use crate::arguments::ComposeArgs;
 use crate::chosen;
 use crate::failure::Failure;
 use crate::inspect;
-use crate::output;
+use crate::outcome;
 use crate::progress;
-use crate::summary;
 
 pub(crate) fn run(args: ComposeArgs) -> Result<(), Failure> {
-    let (quiet, verbose) = (args.messages.quiet, args.messages.verbose);
+    let messages = args.messages.clone();
     let (job, options) = checked(args)?;
     let takes_output = job.outputs.take_standard_output();
-    let written = progress::shown(quiet, |context| job.run(&options, context))?;
-    if quiet { Ok(()) } else { output::report(&summary::of_written(&[written], verbose), takes_output) }
+    let written = progress::shown(messages.quiet, |context| job.run(&options, context))?;
+    outcome::tell(&[written], &messages, takes_output)
 }
 
 /// Arguments that make sense: what the library needs.

@@ -9,6 +9,8 @@ use trueup_terminal::status_of_stopping;
 const STATUS_FAILURE: u8 = 1;
 /// Wrong usage: arguments or options that cannot be.
 const STATUS_USAGE: u8 = 2;
+/// A panorama was written, and is not as good as was asked for.
+const STATUS_UNSATISFIED: u8 = 3;
 
 /// An error as the user sees it, printed once.
 #[derive(Debug, PartialEq, Eq)]
@@ -25,6 +27,11 @@ impl Failure {
     /// Wrong usage.
     pub(crate) fn usage(message: impl Into<String>, hint: impl Into<String>) -> Self {
         Self { status: STATUS_USAGE, message: message.into(), details: Vec::new(), hint: hint.into() }
+    }
+
+    /// What was written is not as good as was asked for.
+    pub(crate) fn unsatisfied(message: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self { status: STATUS_UNSATISFIED, ..Self::usage(message, hint) }
     }
 
     /// Options that cannot be, all of them.

@@ -13,6 +13,7 @@ mod failure;
 mod inspect;
 mod installing;
 mod option_list;
+mod outcome;
 mod output;
 mod progress;
 mod stitch;
@@ -53,7 +54,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     match outcome {
         Ok(()) => 0,
         Err(failure) => {
-            trueup_terminal::complain(&failure.to_string());
+            trueup_terminal::complain(&words::printable(&failure.to_string()));
             failure.status()
         }
     }

@@ -6,11 +6,12 @@ use std::path::Path;
 use trueup::Error;
 
 use crate::failure::Failure;
+use crate::words::printable;
 
-/// Writes `text` to standard output. A reader that went away (`| head`) is no failure.
+/// Writes `text` to standard output, without what would command a terminal. A reader that went away (`| head`) is no failure.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
-    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+    match stdout.write_all(printable(text).as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(Error::Io { action: "writing", path: Path::new("standard output").to_owned(), source: error }.into())
         }
@@ -24,6 +25,6 @@ pub(crate) fn report(text: &str, is_output_taken: bool) -> Result<(), Failure> {
         return print(text);
     }
     // As with messages: nobody is left to be told that nobody reads them.
-    drop(std::io::stderr().lock().write_all(text.as_bytes()));
+    drop(std::io::stderr().lock().write_all(printable(text).as_bytes()));
     Ok(())
 }

@@ -5,16 +5,15 @@ use trueup::{Inputs, StitchJob, StitchOptions};
 use crate::arguments::StitchArgs;
 use crate::chosen;
 use crate::failure::Failure;
-use crate::output;
+use crate::outcome;
 use crate::progress;
-use crate::summary;
 
 pub(crate) fn run(args: StitchArgs) -> Result<(), Failure> {
-    let (quiet, verbose) = (args.messages.quiet, args.messages.verbose);
+    let messages = args.messages.clone();
     let CheckedStitch { job, options } = CheckedStitch::new(args)?;
     let takes_output = job.outputs.take_standard_output();
-    let written = progress::shown(quiet, |context| job.run(&options, context))?;
-    if quiet { Ok(()) } else { output::report(&summary::of_written(&written, verbose), takes_output) }
+    let written = progress::shown(messages.quiet, |context| job.run(&options, context))?;
+    outcome::tell(&written, &messages, takes_output)
 }
 
 /// Arguments that make sense: what the library needs.

@@ -96,8 +96,11 @@ fn views_and_what_lies_beside_a_panorama_come_out_as_stitched() {
     assert!(desk.read("again.jpg") == desk.read("third.jpg"), "from the cropped project");
 }
 
+/// Rows of vertices.
+type RecordedGrid = Vec<Vec<[f64; 2]>>;
+
 /// The recorded grids, row after row, and the size of the panorama.
-fn recorded_grids(project: &Value) -> (Vec<Vec<Vec<[f64; 2]>>>, [f64; 2]) {
+fn recorded_grids(project: &Value) -> (Vec<RecordedGrid>, [f64; 2]) {
     let grid = |image: &Value| {
         let columns = image["mesh"]["cols"].as_u64().expect("a number") as usize;
         let target: Vec<[f64; 2]> = serde_json::from_value(image["mesh"]["target"].clone()).expect("places");
@@ -202,7 +205,8 @@ fn photographs_are_found_where_they_moved_and_others_shown_in_their_place() {
 #[test]
 fn projects_edited_to_nonsense_are_refused() {
     let desk = stitched();
-    let project = desk.json("pano.json");
+    compose(&desk, &["--projection", "mesh", "--project", "mesh.json"]).expect_success();
+    let project = desk.json("mesh.json");
     let target = "/images/0/mesh/target";
     let mistakes = [
         ("/images/0/width", json!(0), "is damaged"),

@@ -1,7 +1,7 @@
 //! The table of bad inputs in docs/command-line.md holds what is really printed.
 
 use crate::full_turn::photographs;
-use crate::pictures::{claiming, noise, plain, put_street, street, street_truth};
+use crate::pictures::{claiming, digital_negative, noise, plain, put_street, street, street_truth};
 use crate::run::{Desk, finish, trueup};
 
 const PAGE: &str = include_str!("../../../docs/command-line.md");
@@ -26,6 +26,11 @@ const MISTAKES: &[Mistake] = &[
     mistake("folder without photographs", &["stitch", "notes", "-o", "pano.jpg"]),
     mistake("text file named .jpg", &["stitch", "text.jpg", "-o", "pano.jpg"]),
     mistake("another format", &["stitch", "movie.gif", "-o", "pano.jpg"]),
+    mistake("camera raw", &["stitch", "raw.dng", "-o", "pano.jpg"]),
+    mistake("HEIC", &["stitch", "phone.heic", "-o", "pano.jpg"]),
+    mistake("AVIF", &["stitch", "phone.avif", "-o", "pano.jpg"]),
+    mistake("JPEG XL", &["stitch", "photo.jxl", "-o", "pano.jpg"]),
+    mistake("video", &["stitch", "clip.mp4", "-o", "pano.jpg"]),
     mistake("empty file", &["stitch", "empty.jpg", "-o", "pano.jpg"]),
     mistake("truncated JPEG", &["stitch", "cut.jpg", "-o", "pano.jpg"]),
     mistake("header that claims 60000 x 60000", &["stitch", "giant.jpg", "-o", "pano.jpg"]),
@@ -65,7 +70,7 @@ const MISTAKES: &[Mistake] = &[
     ),
     mistake("output format unknown", &["stitch", "a.jpg", "b.jpg", "-o", "pano.gif"]),
     mistake("option out of range", &["stitch", "a.jpg", "-o", "pano.jpg", "--scale", "-1"]),
-    mistake("viewer turned without a projection", &["stitch", "a.jpg", "-o", "pano.jpg", "--yaw", "30"]),
+    mistake("viewer turned on the mesh", &["stitch", "a.jpg", "-o", "pano.jpg", "--projection", "mesh", "--yaw", "30"]),
     mistake("option of the wrong kind", &["stitch", "a.jpg", "-o", "pano.jpg", "--seed", "soon"]),
     mistake("unknown option", &["stitch", "a.jpg", "-o", "pano.jpg", "--set", "mesh.cell=3"]),
     mistake("no configuration file", &["stitch", "a.jpg", "-o", "pano.jpg", "--config", "none.toml"]),
@@ -113,6 +118,11 @@ fn desk() -> Desk {
     desk.put("notes/diary.txt", "Dear diary");
     desk.put("text.jpg", "Dear diary");
     desk.put("movie.gif", "GIF89a....");
+    desk.put("raw.dng", digital_negative());
+    desk.put("phone.heic", b"\0\0\0\x18ftypheic\0\0\0\0");
+    desk.put("phone.avif", b"\0\0\0\x18ftypavif\0\0\0\0");
+    desk.put("photo.jxl", b"\xff\x0a\xfa\x1f\x01\x90\x01\0");
+    desk.put("clip.mp4", b"\0\0\0\x20ftypisom\0\0\x02\0");
     desk.put("empty.jpg", "");
     desk.put("cut.jpg", &whole[..whole.len() / 2]);
     desk.put("giant.jpg", claiming(whole, 60_000, 60_000));

@@ -152,3 +152,36 @@ pub(crate) fn with_focal_length(bytes: &[u8], millimeters: [u32; 2], equivalent:
 pub(crate) fn picture_size(path: &Path) -> (u32, u32) {
     image::image_dimensions(path).expect("a readable picture")
 }
+
+/// A small picture of 64 x 48 px as the first of a TIFF that says it is a Digital Negative and that the first is a copy.
+pub(crate) fn digital_negative() -> Vec<u8> {
+    const FIRST_DIRECTORY: u32 = 8;
+    let (width, height): (u32, u32) = (64, 48);
+    let bytes_of_pixels = width * height;
+    // Tag, type (1 byte, 3 short, 4 long), number (TIFF 6.0 section 2); the pixels lie behind the directory.
+    let entries = 11_u16;
+    let pixels = FIRST_DIRECTORY + 2 + 12 * u32::from(entries) + 4;
+    let fields: [(u16, u16, u32, u32); 11] = [
+        (254, 4, 1, 1),
+        (256, 4, 1, width),
+        (257, 4, 1, height),
+        (258, 3, 1, 8),
+        (259, 3, 1, 1),
+        (262, 3, 1, 1),
+        (273, 4, 1, pixels),
+        (277, 3, 1, 1),
+        (278, 4, 1, height),
+        (279, 4, 1, bytes_of_pixels),
+        (50706, 1, 4, 0x0000_0401),
+    ];
+    let mut bytes = b"II*\0".to_vec();
+    bytes.extend(FIRST_DIRECTORY.to_le_bytes());
+    bytes.extend(entries.to_le_bytes());
+    for (tag, kind, count, value) in fields {
+        bytes.extend(tag.to_le_bytes().into_iter().chain(kind.to_le_bytes()));
+        bytes.extend(count.to_le_bytes().into_iter().chain(value.to_le_bytes()));
+    }
+    bytes.extend([0; 4]);
+    bytes.extend((0..bytes_of_pixels).map(|pixel| (pixel * 7) as u8));
+    bytes
+}

@@ -19,5 +19,7 @@ mod options;
 mod pictures;
 mod references;
 mod run;
+mod sphere;
 #[cfg(unix)]
 mod stopping;
+mod told;

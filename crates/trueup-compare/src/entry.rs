@@ -1,6 +1,7 @@
 //! What is compared: names and the options that make them.
 
 use trueup::{Method, StitchOptions};
+use trueup_align::projection::Projection;
 use trueup_core::options::OptionValue;
 use trueup_core::{Error, Result};
 
@@ -64,11 +65,17 @@ impl ComparisonEntry {
 
     /// The common options with this entry's departures.
     ///
+    /// Shapes are compared: with `projection.kind` at its default, the panorama is the mesh that was solved, unless the entry
+    /// itself says `projection.kind=auto`. A view chosen for the scene would show the cameras, which all entries have alike.
+    ///
     /// # Errors
     /// [`Error::Input`] for a departure that cannot be, or that changes how photographs are measured and matched, which all
     /// entries share; [`Error::Options`] for values out of range.
     pub fn options(&self, common: &StitchOptions) -> Result<StitchOptions> {
         let mut options = common.clone();
+        if options.arrange.projection.kind == Projection::Auto {
+            options.arrange.projection.kind = Projection::Mesh;
+        }
         for assignment in &self.overrides {
             options.set(assignment)?;
             if !options.matches_alike(common) {

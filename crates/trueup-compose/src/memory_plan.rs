@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use trueup_core::memory::bytes_in_words;
+use trueup_core::memory::{bytes_in_words, check_room};
 use trueup_core::scratch::{NoScratch, ScratchFile, ScratchSpace};
 use trueup_core::source::PhotographSource;
 use trueup_core::{Error, Result};
@@ -84,6 +84,9 @@ impl MemoryPlan {
         // Half of what is left may be canvas.
         let left = memory - least;
         let in_memory = needs.canvas() <= left / 2;
+        if in_memory {
+            check_room("the canvas", needs.canvas())?;
+        }
         let left = left - if in_memory { needs.canvas() } else { 0 };
         // The photographs' own coarse levels are smaller than the photographs, which are to be had again, too.
         let hold_levels = work.coarse_levels <= left / 4;

@@ -124,6 +124,18 @@ impl Camera {
         (self.rotation().transpose() * self.bearing(pixel)).normalize()
     }
 
+    /// Whether a picture of `size` (width and height, pixels) shows a direction of the world.
+    ///
+    /// Terms of a lens that are large far beside its picture may carry a direction back into it, to a pixel that looks
+    /// elsewhere: such a direction is not shown.
+    pub fn shows(&self, world_direction: Vector3<f64>, size: [f64; 2]) -> bool {
+        /// Radians by which rounding may turn a direction there and back.
+        const SAME: f64 = 1e-3;
+        let inside = |pixel: &Vector2<f64>| (0..2).all(|axis| (0.0..=size[axis]).contains(&pixel[axis]));
+        let pixel = self.project(self.rotation() * world_direction).filter(inside);
+        pixel.is_some_and(|pixel| self.world_direction(pixel).angle(&world_direction) < SAME)
+    }
+
     /// Where the pixel of this camera appears in `other`, both at one place: `K_j R_j R_i^T K_i^-1`.
     pub fn transfer(&self, other: &Self, pixel: Vector2<f64>) -> Option<Vector2<f64>> {
         other.project(other.rotation() * (self.rotation().transpose() * self.bearing(pixel)))
@@ -134,6 +146,7 @@ impl Camera {
 mod tests {
     use super::*;
     use crate::geometry::rotation_about_y;
+    use crate::lens::{LensProjection, LensTerms};
 
     #[test]
     fn a_pan_moves_the_center_by_focal_times_tangent() {
@@ -151,5 +164,32 @@ mod tests {
         let camera = Camera::new(500.0, 640.0, 480.0, &Matrix3::identity());
         assert!(camera.project(Vector3::new(0.0, 0.0, -1.0)).is_none());
         assert!(camera.project(Vector3::new(1.0, 0.0, 0.0)).is_none());
+    }
+
+    /// A decentered lens, as one was found for a phone, folds directions nearly at right angles to its axis back into the
+    /// picture.
+    #[test]
+    fn what_a_lens_folds_back_is_not_shown() {
+        let terms = LensTerms {
+            projection: LensProjection::Rectilinear,
+            radial: [0.26, -0.316, 0.0, 0.0],
+            tangential: [0.016, -0.002],
+        };
+        let mut camera = Camera::new(1481.0, 1224.0, 1632.0, &Matrix3::identity());
+        camera.lens = Lens::new(terms);
+        let size = [1224.0, 1632.0];
+        let (mut folded, mut shown) = (0, 0);
+        for (step, around) in (1..900).flat_map(|step| (0..60).map(move |around| (step, around))) {
+            let (aside, around) = ((0.1 * f64::from(step)).to_radians(), (6.0 * f64::from(around)).to_radians());
+            let direction = Vector3::new(aside.sin() * around.cos(), aside.sin() * around.sin(), aside.cos());
+            let pixel = camera.project(direction);
+            let is_inside = pixel.is_some_and(|one| (0..2).all(|axis| (0.0..=size[axis]).contains(&one[axis])));
+            // Half the diagonal of the picture is 35 degrees.
+            let is_far = aside > 0.8;
+            folded += usize::from(is_inside && is_far);
+            shown += usize::from(camera.shows(direction, size));
+            assert_eq!(camera.shows(direction, size), is_inside && !is_far, "{direction}");
+        }
+        assert!(folded > 0 && shown > 1000, "{folded} {shown}");
     }
 }

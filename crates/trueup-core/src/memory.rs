@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use crate::error::{Error, Result};
 use crate::options::OptionValue;
 
 /// Units, the largest first: name in lower case and bytes. The first three are those that amounts are shown in.
@@ -34,6 +35,24 @@ pub fn bytes_in_words(bytes: u64) -> String {
     }
 }
 
+/// Asks for `bytes` of memory in one piece and gives them back, so that a large allocation which the system would refuse is an
+/// error and not the program's end. `subject` is what they are for.
+///
+/// # Errors
+/// [`Error::Limits`] if they are not to be had.
+pub fn check_room(subject: impl fmt::Display, bytes: usize) -> Result<()> {
+    let mut room: Vec<u8> = Vec::new();
+    // Seen from outside: a piece that nothing is done with would never be asked for.
+    let taken = std::hint::black_box(&mut room).try_reserve_exact(bytes);
+    drop(std::hint::black_box(room));
+    taken.map_err(|_| Error::Limits {
+        subject: subject.to_string(),
+        needed: format!("{} of memory", bytes_in_words(bytes as u64)),
+        allowed: "less than that".to_owned(),
+        hint: "Raise the limit of the shell or the container (ulimit -v), or give smaller photographs.".to_owned(),
+    })
+}
+
 /// How much memory the work may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MemoryBudget {
@@ -48,7 +67,7 @@ impl FromStr for MemoryBudget {
     type Err = String;
 
     /// `auto`, or a number with a unit: `2GB`, `512 MB`, `1.5GiB`.
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
         let text = text.trim().to_ascii_lowercase();
         if text == "auto" {
             return Ok(Self::Auto);
@@ -76,13 +95,13 @@ impl fmt::Display for MemoryBudget {
 }
 
 impl Serialize for MemoryBudget {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
 }
 
 impl<'de> Deserialize<'de> for MemoryBudget {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
         String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
     }
 }
@@ -123,6 +142,16 @@ mod tests {
     fn what_is_shown_can_be_read_again() {
         for budget in [MemoryBudget::Auto, MemoryBudget::Bytes(1_234_567_000), MemoryBudget::Bytes(7)] {
             assert_eq!(budget.to_string().parse(), Ok(budget));
+        }
+    }
+
+    #[test]
+    fn memory_that_is_not_to_be_had_is_an_error() {
+        assert!(check_room("a little", 1 << 20).is_ok());
+        // More than a program can address.
+        for bytes in [usize::MAX, usize::MAX >> 2] {
+            let refused = check_room("decoding a.jpg", bytes).expect_err("too much").to_string();
+            assert!(refused.starts_with("decoding a.jpg: ") && refused.contains("less than that allowed"), "{refused}");
         }
     }
 

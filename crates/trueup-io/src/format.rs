@@ -67,12 +67,28 @@ pub(crate) struct StoredPixels {
 }
 
 /// Why a header gives no picture; the codec's words.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(crate) enum HeaderError {
     /// The header contradicts its format.
     Damaged(String),
     /// The picture is well formed, but of a kind that is not read.
     Unsupported(String),
+    /// The form is this format's, what is in it another's.
+    Foreign(&'static Foreign),
+}
+
+/// A format of photographs that is not read.
+#[derive(Debug)]
+pub(crate) struct Foreign {
+    /// What a file of it is, for messages.
+    pub(crate) what: &'static str,
+    /// How the names of its files end, in lower case. In a folder such files are named in a rejection, while files that are
+    /// no photographs at all are passed over in silence.
+    pub(crate) extensions: &'static [&'static str],
+    /// Whether a file that begins with these bytes, [`SIGNATURE_BYTES`] or all of a shorter file, is of this format.
+    pub(crate) has_signature: fn(&[u8]) -> bool,
+    /// A command that makes a photograph of one that can be read.
+    pub(crate) command: &'static str,
 }
 
 impl HeaderError {

@@ -45,7 +45,10 @@ pub use report::evaluation::{
     Evaluation, PhotographEvaluation, PixelEvaluation, StatedEvaluation, compare_overlaps, evaluate, evaluate_pixels,
     read_truth, scale_up_to,
 };
-pub use report::measures::{BentLine, LongLines, Measures, PhotographMeasures, ReprojectionMeasures, UprightMeasures};
+pub use report::judgement::{Judgement, Verdict};
+pub use report::measures::{
+    BentLine, LongLines, Measures, PhotographMeasures, ReprojectionMeasures, UprightMeasures, WorstPair,
+};
 pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;

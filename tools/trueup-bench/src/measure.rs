@@ -39,7 +39,7 @@ fn own_figures(project: &Project) -> BTreeMap<String, f64> {
         ("divergence", project.manhattan.divergence),
         ("used", Some(project.used() as f64)),
         ("given", Some(project.images.len() as f64)),
-        ("match_rms_px", measures.and_then(|measures| measures.reprojection).map(|found| found.rms_px)),
+        ("match_rms_px", measures.and_then(|measures| measures.reprojection.as_ref()).map(|found| found.rms_px)),
         ("ld", measures.map(|measures| measures.ld)),
         ("folds", measures.map(|measures| measures.folds as f64)),
         ("estimated_gdic_deg", measures.and_then(|measures| measures.estimated_gdic_deg)),

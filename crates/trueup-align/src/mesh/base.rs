@@ -62,8 +62,13 @@ pub fn turn_length(cameras: &[Camera], prior: &SimilarityPrior) -> f64 {
     TAU * units_per_radian(&prior.corrected_cameras(cameras), prior)
 }
 
+/// Whether the panorama of [`bases`] is tilted, so that its rows are not those of the level world.
+pub fn tilts(cameras: &[Camera], prior: &SimilarityPrior) -> bool {
+    tilt_from_level(&prior.corrected_cameras(cameras), &prior.level_from_world()).is_some()
+}
+
 /// The turn about the horizontal axis that brings a steep panorama's mean direction level; `None` if it is not steep.
-fn tilt_from_level(cameras: &[Camera], level_from_world: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+pub(crate) fn tilt_from_level(cameras: &[Camera], level_from_world: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     /// Radians, 40 degrees.
     const STEEP: f64 = 0.7;
     /// Length of the mean direction below which the photographs look all round and have none.

@@ -3,13 +3,16 @@
 //! Energies, one file each: alignment of the overlaps (`alignment`); local similarity of the grid's edges and their
 //! agreement with the similarity prior (`similarity`); and what refines the plain mesh: matched lines and points
 //! (`line_alignment`), pixels (`photometric`), long lines that keep their shape (`structure`). Unknown are the vertices
-//! of all grids in the panorama. `problem` holds the plain mesh, `rounds` the order of the refinements.
+//! of all grids in the panorama. `problem` holds the plain mesh, `rounds` the order of the refinements. Where the mesh is
+//! worse than the cameras, these draw (`by_cameras`).
 //!
 //! # Source
 //! Chen and Chuang (2016), section 3; VPG section IV with its global similarity.
 
 mod alignment;
 mod base;
+mod by_cameras;
+mod camera_plane;
 mod closure;
 mod complex;
 mod current_grids;
@@ -34,7 +37,10 @@ use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::{Result, StageContext};
 
 use alignment::AlignmentEnergy;
-pub use base::{BaseMap, bases, turn_length};
+pub(crate) use base::tilt_from_level;
+pub use base::{BaseMap, bases, tilts, turn_length};
+pub use by_cameras::{ByCamerasInput, unless_worse};
+pub use camera_plane::CameraPlane;
 pub use closure::Closure;
 pub use input::MeshInput;
 pub use line_alignment::{LineAlignmentInput, LineAlignmentOptions, StraightInput};

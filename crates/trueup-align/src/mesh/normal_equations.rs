@@ -106,6 +106,23 @@ pub(super) struct GridSum<'a> {
     pub members: &'a [(usize, f64)],
 }
 
+/// A vertex of one grid that is to lie where a sum over vertices of another does, after that was turned and scaled.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CarriedVertex<'a> {
+    /// The grid and the vertex.
+    pub from: [usize; 2],
+    /// The other grid.
+    pub to: usize,
+    /// Vertices of it with their weights; each occurs once.
+    pub members: &'a [(usize, f64)],
+    /// Turns and scales the sum.
+    pub factor: Coefficient,
+    /// What is added to it.
+    pub value: Vector2<f64>,
+    /// How much the residual's square counts.
+    pub squared_weight: f64,
+}
+
 impl NormalEquations {
     /// Empty equations for the vertices of `grids`.
     pub(super) fn new(grids: &[GridMesh]) -> Self {
@@ -169,6 +186,30 @@ impl NormalEquations {
                 let block = [product, 0.0, 0.0, product];
                 self.between.push((one.max(other) as u32, one.min(other) as u32, block));
             }
+        }
+    }
+
+    /// Adds squared_weight |v - factor sum_m weight_m v_m - value|^2 for a vertex v and `members` of different grids.
+    pub(super) fn add_carried(&mut self, carried: &CarriedVertex) {
+        let CarriedVertex { from: [photograph, vertex], to, members, factor, value, squared_weight } = *carried;
+        self.add_right(photograph, vertex, value * squared_weight);
+        self.add_block_inside(photograph, vertex, vertex, [squared_weight, 0.0, 0.0, squared_weight]);
+        let back = -conjugate_product(factor, value) * squared_weight;
+        let one = self.first[photograph] + vertex;
+        for &(m, weight_m) in members {
+            self.add_right(to, m, back * weight_m);
+            for &(n, weight_n) in members {
+                if n <= m {
+                    let product = squared_weight * factor.norm_squared() * weight_m * weight_n;
+                    self.add_block_inside(to, m, n, [product, 0.0, 0.0, product]);
+                }
+            }
+            let other = self.first[to] + m;
+            let turned = factor * (-squared_weight * weight_m);
+            // The row is the later vertex; seen from there the other turns the opposite way.
+            let sine = if one > other { turned.y } else { -turned.y };
+            let block = [turned.x, -sine, sine, turned.x];
+            self.between.push((one.max(other) as u32, one.min(other) as u32, block));
         }
     }
 

@@ -15,6 +15,30 @@ fn sums() -> Vec<(Vec<WeightedVertex>, Metric, Vector2<f64>)> {
     ]
 }
 
+/// A vertex carried from the later grid into the earlier one, and the other way round.
+fn carried() -> [CarriedVertex<'static>; 2] {
+    let members = &[(3, 0.4), (4, 0.6)];
+    let (factor, value) = (Vector2::new(0.8, -0.5), Vector2::new(1.0, -2.0));
+    let one = CarriedVertex { from: [0, 7], to: 1, members, factor, value, squared_weight: 2.0 };
+    [one, CarriedVertex { from: [1, 8], to: 0, ..one }]
+}
+
+fn carried_energy(at: &[f64], vertices: usize) -> f64 {
+    let vertex = |grid: usize, vertex: usize| {
+        let first = 2 * (grid * vertices + vertex);
+        Vector2::new(at[first], at[first + 1])
+    };
+    carried()
+        .iter()
+        .map(|one| {
+            let sum = one.members.iter().fold(Vector2::zeros(), |sum, &(m, weight)| sum + vertex(one.to, m) * weight);
+            let turned = nalgebra::Complex::new(one.factor.x, one.factor.y) * nalgebra::Complex::new(sum.x, sum.y);
+            let residual = vertex(one.from[0], one.from[1]) - Vector2::new(turned.re, turned.im) - one.value;
+            one.squared_weight * residual.norm_squared()
+        })
+        .sum()
+}
+
 fn energy(at: &[f64]) -> f64 {
     let vertices = at.len() / 4;
     let sum_of = |members: &[WeightedVertex]| {
@@ -29,7 +53,8 @@ fn energy(at: &[f64]) -> f64 {
             let residual: Vector2<f64> = sum_of(members) - value;
             residual.dot(&metric.apply(residual))
         })
-        .sum()
+        .sum::<f64>()
+        + carried_energy(at, vertices)
 }
 
 proptest! {
@@ -41,6 +66,7 @@ proptest! {
         for (members, metric, value) in sums() {
             equations.add_sum(&members, metric, value);
         }
+        carried().iter().for_each(|one| equations.add_carried(one));
         // Every vertex needs a block of its own.
         for photograph in 0..2 {
             for vertex in 0..grids[0].len() {

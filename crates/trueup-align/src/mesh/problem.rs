@@ -92,7 +92,7 @@ impl MeshProblem<'_> {
         let alignment_rms = self.alignment.rms(&meshes, period);
         let meshes = self.delivered(&meshes);
         let folds = total_folds(&meshes);
-        Ok(WarpedMesh { meshes, alignment_rms, folds, relative_gradient, period })
+        Ok(WarpedMesh { meshes, alignment_rms, folds, relative_gradient, period, by_cameras: None })
     }
 
     pub(super) fn solve(&self, solver: &mut MeshSolver, equations: &NormalEquations) -> Result<Solved> {

@@ -4,6 +4,8 @@ use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use trueup_core::mesh::GridMesh;
 
+use super::camera_plane::CameraPlane;
+
 /// The deformed grids of one component.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WarpedMesh {
@@ -19,6 +21,9 @@ pub struct WarpedMesh {
     /// not go all the way round, or their ends do not meet.
     #[serde(default)]
     pub period: Option<f64>,
+    /// Where directions lie in the panorama, if it was drawn by the cameras because the mesh was worse.
+    #[serde(default)]
+    pub by_cameras: Option<CameraPlane>,
 }
 
 /// Triangles of the grid with a signed area that is not positive.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use trueup_core::geometry::wrap_angle;
 
 use super::photograph::PosedPhotograph;
@@ -32,7 +32,7 @@ impl SphereCoverage {
         let mut forward = Vector3::zeros();
         for photograph in photographs {
             let directions: Vec<Vector3<f64>> =
-                samples(photograph).map(|pixel| photograph.camera.world_direction(pixel)).collect();
+                samples(photograph, SAMPLES).map(|pixel| photograph.camera.world_direction(pixel)).collect();
             let ahead = photograph.camera.rotation().row(2).transpose();
             forward += ahead / photographs.len() as f64;
             for direction in &directions {
@@ -71,34 +71,42 @@ impl SphereCoverage {
         self.span >= TAU
     }
 
+    /// Whether a photograph shows the zenith or the nadir.
+    pub(super) fn shows_a_pole(&self) -> bool {
+        self.steepest() >= PI / 2.0
+    }
+
+    /// The longitude of the mean viewing direction.
+    pub(super) fn forward_longitude(&self) -> f64 {
+        self.forward.x.atan2(self.forward.z)
+    }
+
     /// The largest angle from the horizon, radians.
     pub(super) fn steepest(&self) -> f64 {
         self.latitudes[0].abs().max(self.latitudes[1].abs())
     }
 }
 
-/// Pixels spread over a photograph, its border included.
-fn samples(photograph: &PosedPhotograph) -> impl Iterator<Item = Vector2<f64>> {
+/// Pixels spread over a photograph, so many along each side, its border included.
+pub(super) fn samples(photograph: &PosedPhotograph, count: usize) -> impl Iterator<Item = Vector2<f64>> + use<> {
     let size = Vector2::new(photograph.mesh.width, photograph.mesh.height);
-    let share = |index: usize| index as f64 / (SAMPLES - 1) as f64;
-    (0..SAMPLES * SAMPLES)
-        .map(move |index| size.component_mul(&Vector2::new(share(index % SAMPLES), share(index / SAMPLES))))
+    let share = move |index: usize| index as f64 / (count - 1) as f64;
+    (0..count * count).map(move |index| size.component_mul(&Vector2::new(share(index % count), share(index / count))))
 }
 
-/// The largest angle from the horizon that a photograph reaches, radians.
-pub(super) fn steepest(photograph: &PosedPhotograph) -> f64 {
-    if [-1.0, 1.0].iter().any(|&down| shows(photograph, Vector3::new(0.0, down, 0.0))) {
+/// The largest angle from the horizon of `frame` (from the level world) that a photograph reaches, radians.
+pub(super) fn steepest(photograph: &PosedPhotograph, frame: &Matrix3<f64>) -> f64 {
+    let down = frame.row(1).transpose();
+    if shows(photograph, down) || shows(photograph, -down) {
         return PI / 2.0;
     }
-    samples(photograph).map(|pixel| photograph.camera.world_direction(pixel).y.asin().abs()).fold(0.0, f64::max)
+    let angle = |pixel: Vector2<f64>| photograph.camera.world_direction(pixel).dot(&down).clamp(-1.0, 1.0).asin().abs();
+    samples(photograph, SAMPLES).map(angle).fold(0.0, f64::max)
 }
 
 /// Whether a photograph shows a direction of the level world.
 pub(super) fn shows(photograph: &PosedPhotograph, direction: Vector3<f64>) -> bool {
-    let pixel = photograph.camera.project(photograph.camera.rotation() * direction);
-    pixel.is_some_and(|pixel| {
-        (0.0..=photograph.mesh.width).contains(&pixel.x) && (0.0..=photograph.mesh.height).contains(&pixel.y)
-    })
+    photograph.camera.shows(direction, [photograph.mesh.width, photograph.mesh.height])
 }
 
 /// First step and length of the widest run of uncovered steps around the turn.

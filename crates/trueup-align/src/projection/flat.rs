@@ -5,6 +5,8 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::fitted::{Fit, NEAREST, panini_longitude};
+
 /// A projection that is decided on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -21,6 +23,8 @@ pub enum FlatKind {
     Panini,
     /// The sphere seen from its own surface.
     Stereographic,
+    /// One between the others, see [`Fit`].
+    Fitted,
 }
 
 impl FlatKind {
@@ -33,6 +37,7 @@ impl FlatKind {
             Self::Perspective => "perspective",
             Self::Panini => "panini",
             Self::Stereographic => "stereographic",
+            Self::Fitted => "fitted",
         }
     }
 
@@ -51,6 +56,8 @@ impl FlatKind {
             Self::Perspective => [55.0, 55.0],
             Self::Panini => [105.0, 60.0],
             Self::Stereographic => [120.0, 120.0],
+            // Shown as far as the limits that it was fitted to allow.
+            Self::Fitted => [180.0, 90.0],
         };
         degrees.map(f64::to_radians)
     }
@@ -58,7 +65,7 @@ impl FlatKind {
     /// Half of the largest horizontal angle in radians that can be asked for.
     pub fn largest_half_width(self) -> f64 {
         let degrees: f64 = match self {
-            Self::Equirectangular | Self::Cylindrical | Self::Mercator => 180.0,
+            Self::Equirectangular | Self::Cylindrical | Self::Mercator | Self::Fitted => 180.0,
             Self::Perspective => 80.0,
             Self::Panini => 150.0,
             Self::Stereographic => 160.0,
@@ -79,12 +86,34 @@ pub struct Flat {
     pub kind: FlatKind,
     /// Distance of Panini's viewpoint behind the axis; the others do not ask.
     pub panini_distance: f64,
+    /// Which of the family a fitted projection is; the others do not ask.
+    #[serde(default)]
+    pub fit: Fit,
 }
 
-/// Sine below which a direction is too near the place where a projection has no end.
-const NEAREST: f64 = 1e-3;
-
 impl Flat {
+    /// A projection by its name, Panini's of this distance.
+    pub fn named(kind: FlatKind, panini_distance: f64) -> Self {
+        Self { kind, panini_distance, fit: Fit::default() }
+    }
+
+    /// One of the family, by its name if it has one.
+    pub fn fitted(fit: Fit) -> Self {
+        match fit {
+            Fit { round, upright: 1.0, .. } if round <= 0.0 => Self::named(FlatKind::Perspective, 0.0),
+            Fit { round, upright: 1.0, turned: false } if round <= 1.0 => Self::named(FlatKind::Panini, round),
+            _ => Self { kind: FlatKind::Fitted, panini_distance: 0.0, fit },
+        }
+    }
+
+    /// The member of the family that a fitted projection is, or the plane's and Panini's.
+    pub(super) fn family(&self) -> Fit {
+        match self.kind {
+            FlatKind::Panini => Fit { round: self.panini_distance, ..Fit::default() },
+            _ => self.fit,
+        }
+    }
+
     /// The place of a direction of any length; `None` where the projection has none or it is all but infinitely far.
     ///
     /// Longitudes lie within half a turn of the middle.
@@ -107,6 +136,7 @@ impl Flat {
                     Vector2::new(scale * x / level, scale * y / level)
                 })
             }
+            FlatKind::Fitted => self.fit.place(&Vector3::new(x, y, z)),
             FlatKind::Stereographic => (1.0 + z > NEAREST).then(|| Vector2::new(x, y) * (2.0 / (1.0 + z))),
         }
     }
@@ -124,12 +154,10 @@ impl Flat {
             FlatKind::Perspective => Some(Vector3::new(x, y, 1.0).normalize()),
             FlatKind::Panini => {
                 let d = self.panini_distance;
-                let k = (x / (d + 1.0)).powi(2);
-                let root = (k * d).powi(2) - (k + 1.0) * (k * d * d - 1.0);
-                let cosine = (root.max(0.0).sqrt() - k * d) / (k + 1.0);
-                let scale = (d + 1.0) / (d + cosine);
-                (root >= 0.0 && scale > 0.0).then(|| turned((x / scale).atan2(cosine), y / scale))
+                let longitude = panini_longitude(x, d)?;
+                Some(turned(longitude, y * (d + longitude.cos()) / (d + 1.0)))
             }
+            FlatKind::Fitted => self.fit.direction(place),
             FlatKind::Stereographic => {
                 let square = place.norm_squared();
                 Some(Vector3::new(4.0 * x, 4.0 * y, 4.0 - square) / (4.0 + square))
@@ -178,7 +206,7 @@ mod tests {
     }
 
     fn flat(kind: FlatKind) -> Flat {
-        Flat { kind, panini_distance: 1.0 }
+        Flat::named(kind, 1.0)
     }
 
     /// Longitude and latitude (down) in degrees.
@@ -213,10 +241,28 @@ mod tests {
     #[test]
     fn paninis_distance_leads_from_the_plane_to_the_cylinder() {
         let direction = toward(50.0, -20.0);
-        let at =
-            |panini_distance: f64| Flat { kind: FlatKind::Panini, panini_distance }.place(direction).expect("shown");
+        let at = |panini_distance: f64| Flat::named(FlatKind::Panini, panini_distance).place(direction).expect("shown");
         assert!((at(0.0) - flat(FlatKind::Perspective).place(direction).expect("shown")).norm() < 1e-12);
         assert!((at(1e9).x - 50_f64.to_radians().sin()).abs() < 1e-8);
+    }
+
+    /// The ends of the family are the named projections, and its two halves meet.
+    #[test]
+    fn the_named_projections_are_of_the_family() {
+        let named = [
+            (0.0, 1.0, FlatKind::Perspective, 0.0),
+            (0.4, 1.0, FlatKind::Panini, 0.4),
+            (1.0, 1.0, FlatKind::Panini, 1.0),
+            (1.0 + 1e-9, 1.0, FlatKind::Panini, 1.0),
+            (2.0, 1.0, FlatKind::Cylindrical, 0.0),
+            (2.0, 0.0, FlatKind::Equirectangular, 0.0),
+        ];
+        let direction = toward(50.0, -30.0);
+        for (round, upright, kind, distance) in named {
+            let place = Fit { round, upright, turned: false }.place(&direction).expect("shown");
+            let expected = Flat::named(kind, distance).place(direction).expect("shown");
+            assert!((place - expected).norm() < 1e-7, "{kind:?}: {place} instead of {expected}");
+        }
     }
 
     #[test]
@@ -242,7 +288,7 @@ mod tests {
         #[test]
         fn places_and_directions_are_inverse(longitude in -100.0..100.0_f64, latitude in -75.0..75.0_f64, d in 0.0..3.0_f64) {
             for kind in FlatKind::ALL {
-                let flat = Flat { kind, panini_distance: d };
+                let flat = Flat::named(kind, d);
                 let direction = toward(longitude, latitude);
                 if let Some(place) = flat.place(direction) {
                     let back = flat.direction(place).expect("a place has a direction");

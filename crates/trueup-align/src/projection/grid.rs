@@ -61,8 +61,8 @@ struct Drawing<'a> {
     shift: &'a ParallaxShift,
     placement: &'a Placement<'a>,
     view_from_camera: Matrix3<f64>,
-    /// Largest |x| and |y| of the plane that are drawn.
-    reach: Vector2<f64>,
+    /// The smallest and largest coordinates of the plane that are drawn.
+    window: [Vector2<f64>; 2],
 }
 
 /// A pixel of the photograph and its place on the plane, if the view comes near it.
@@ -77,13 +77,13 @@ impl<'a> Drawing<'a> {
         let view = placement.view;
         let cell = photograph.mesh.cell_width().max(photograph.mesh.cell_height()) / photograph.camera.focal_px;
         let margin = MARGIN.max(3.0 * cell);
-        let reach = view.flat.reach(view.half.map(|half| half + margin));
+        let window = view.window(margin);
         Self {
             photograph,
             shift,
             placement,
             view_from_camera: view.view_from_level() * photograph.camera.rotation().transpose(),
-            reach,
+            window,
         }
     }
 
@@ -96,8 +96,9 @@ impl<'a> Drawing<'a> {
     /// The place of a pixel, if the view comes near it.
     fn place(&self, pixel: Vector2<f64>) -> Option<Vector2<f64>> {
         let place = self.placement.view.flat.place(self.direction(pixel))?;
-        let turns = self.placement.view.flat.kind.turns();
-        ((turns || place.x.abs() <= self.reach.x) && place.y.abs() <= self.reach.y).then_some(place)
+        let [low, high] = self.window;
+        let is_within = |axis: usize| (low[axis]..=high[axis]).contains(&place[axis]);
+        ((self.placement.view.flat.kind.turns() || is_within(0)) && is_within(1)).then_some(place)
     }
 
     fn pixel(&self, lines: &GridLines, row: usize, column: usize) -> Vector2<f64> {
@@ -146,7 +147,7 @@ impl<'a> Drawing<'a> {
             .unwrap_or_else(|| GridLines::even(self.photograph.mesh.columns, self.photograph.mesh.rows));
         // What is smaller than this share of a pixel is not seen, not even at a pole, half a pixel from the first row's
         // centers.
-        let smallest = 0.125 * (self.photograph.camera.focal_px / self.placement.canvas_from_plane).max(1.0);
+        let smallest = 0.0625 * (self.photograph.camera.focal_px / self.placement.canvas_from_plane).max(1.0);
         for _ in 0..ROUNDS {
             let places = self.places(&lines);
             let (rows, columns) = (lines.rows.len(), lines.columns.len());
@@ -264,11 +265,12 @@ mod tests {
     fn view(kind: FlatKind) -> ProjectionView {
         let half = kind.comfortable();
         ProjectionView {
-            flat: Flat { kind, panini_distance: 1.0 },
+            flat: Flat::named(kind, 1.0),
             yaw: 0.0,
             pitch: 0.0,
             roll: 0.0,
             half,
+            shown: None,
             closed: false,
         }
     }

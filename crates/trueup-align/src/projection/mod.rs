@@ -9,14 +9,19 @@
 //! Directions are in the level world: x right, y down, z forward.
 
 mod coverage;
+mod fitted;
 mod flat;
 mod grid;
 mod once;
 mod options;
 mod parallax;
 mod photograph;
+mod seen;
 mod view;
+#[cfg(test)]
+mod view_tests;
 
+pub use fitted::Fit;
 pub use flat::{Flat, FlatKind};
 pub use grid::{PlacedGrid, Placement, place};
 pub use once::place_once;

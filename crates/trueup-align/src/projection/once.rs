@@ -103,11 +103,12 @@ mod tests {
 
     fn placed(photograph: &PosedPhotograph, kind: FlatKind) -> GridMesh {
         let view = ProjectionView {
-            flat: Flat { kind, panini_distance: 1.0 },
+            flat: Flat::named(kind, 1.0),
             yaw: 0.0,
             pitch: 0.0,
             roll: 0.0,
             half: kind.comfortable(),
+            shown: None,
             closed: false,
         };
         let shift = ParallaxShift { aside: vec![Vector2::zeros(); photograph.mesh.len()] };

@@ -7,11 +7,12 @@ use super::flat::FlatKind;
 trueup_core::choice! {
     /// What the panorama is drawn on.
     pub enum Projection {
+        /// The view a person would choose: as straight as it can be without stretching. Perspective up to about 95 degrees,
+        /// from there ever more like Panini's and the cylinder, and equirectangular for full turns. For vpg; other methods
+        /// keep their mesh.
+        Auto = "auto",
         /// The solved mesh itself: every photograph as natural as its neighbors allow.
         Mesh = "mesh",
-        /// The one of the others that suits the angle of view: perspective up to 100 degrees, Panini's up to 180, the
-        /// cylinder up to 220, and the equirectangular projection for more, for full turns and for steep views.
-        Auto = "auto",
         /// Longitude and latitude: holds the whole sphere; what viewers of spherical panoramas read.
         Equirectangular = "equirectangular",
         /// The cylinder seen from its axis: verticals stay straight, heights grow with the tangent.
@@ -30,9 +31,9 @@ trueup_core::choice! {
 trueup_core::options! {
     /// What the panorama is drawn on, and where the viewer looks.
     pub struct ProjectionOptions("projection") {
-        /// What the panorama is drawn on. Choose another than the mesh for straight lines over a wide view, for full
-        /// turns and for viewers of spherical panoramas.
-        kind: Projection = Projection::Mesh, Allowed::Any, "", basic;
+        /// What the panorama is drawn on. Choose equirectangular for viewers of spherical panoramas, the mesh where
+        /// photographs that were taken from several places do not meet, and any other as you like it.
+        kind: Projection = Projection::Auto, Allowed::Any, "", basic;
         /// Turns the viewer to the right of where the panorama faces: change it to bring another place to the middle.
         /// Not for the mesh, as the next three.
         yaw: f64 = 0.0, between(-360.0, 360.0), "degrees", basic;
@@ -49,7 +50,7 @@ trueup_core::options! {
         /// How far photographs may contradict each other because of parallax and still be made to meet; beyond, each
         /// stays where its camera looks. Raise it for hand-held photographs of near things that show double, lower it
         /// where meeting bends them.
-        max_parallax_deg: f64 = 2.0, between(0.0, 45.0), "degrees";
+        max_parallax_deg: f64 = 4.0, between(0.0, 45.0), "degrees";
     }
 }
 

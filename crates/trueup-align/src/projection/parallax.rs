@@ -8,20 +8,22 @@
 //! over long rows are forgotten by this; only what it knows of overlaps remains, so that any mesh will do, of whatever
 //! method.
 //!
-//! Near the poles the mesh knows nothing: photographs that look there cannot be unrolled, and pull at their neighbors.
-//! They are drawn as their cameras see.
+//! Near the poles of its sphere the mesh knows nothing: photographs that look there cannot be unrolled, and pull at
+//! their neighbors. They are drawn as their cameras see.
 //!
 //! # Source
 //! H.-Y. Shum and R. Szeliski, "Construction and refinement of panoramic mosaics with global and local alignment"
 //! (2000), section 5: local alignment ("deghosting") towards the mean ray; here the correspondences are the mesh's, and
 //! the weights make the field continuous.
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
+use trueup_core::camera::Camera;
 use trueup_core::mesh::GridMesh;
 
 use super::coverage::steepest;
 use super::photograph::PosedPhotograph;
+use crate::mesh::tilt_from_level;
 
 /// By how many of its own pixels each vertex of a photograph's grid looks aside, row-major.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -44,7 +46,9 @@ impl ParallaxShift {
 /// * `max_parallax`: the largest angle in radians between where a camera sees a place and where it is drawn; from half
 ///   of it on, corrections fade, since a mesh that has to contradict its cameras more than that is torn itself.
 pub fn parallax_shifts(photographs: &[PosedPhotograph], period: Option<f64>, max_parallax: f64) -> Vec<ParallaxShift> {
-    let trusts: Vec<f64> = photographs.iter().map(|photograph| trust(steepest(photograph))).collect();
+    let cameras: Vec<Camera> = photographs.iter().map(|photograph| photograph.camera).collect();
+    let frame = tilt_from_level(&cameras, &Matrix3::identity()).unwrap_or_else(Matrix3::identity);
+    let trusts: Vec<f64> = photographs.iter().map(|photograph| trust(steepest(photograph, &frame))).collect();
     let bounds: Vec<_> = photographs.iter().map(|photograph| photograph.mesh.bounds()).collect();
     (0..photographs.len())
         .into_par_iter()
@@ -77,11 +81,11 @@ struct Sight {
     trust: f64,
 }
 
-/// How far the mesh of a photograph is believed that reaches this far from the horizon (radians). The mesh's sphere is
-/// unrolled up to 70 degrees, and what lies beyond pulls at its neighbors.
+/// How far the mesh of a photograph is believed that reaches this far from the horizon of the mesh's sphere (radians),
+/// which is unrolled up to 70 degrees: what lies beyond pulls at its neighbors.
 fn trust(steepest: f64) -> f64 {
-    const WHOLE_DEG: f64 = 55.0;
-    const NONE_DEG: f64 = 65.0;
+    const WHOLE_DEG: f64 = 65.0;
+    const NONE_DEG: f64 = 75.0;
     ((NONE_DEG - steepest.to_degrees()) / (NONE_DEG - WHOLE_DEG)).clamp(0.0, 1.0)
 }
 
@@ -138,7 +142,6 @@ fn common_direction(own: Sight, others: impl Iterator<Item = Sight>, max_paralla
 
 #[cfg(test)]
 mod tests {
-    use trueup_core::camera::Camera;
     use trueup_core::geometry::rotation_about_y;
 
     use super::*;
@@ -150,7 +153,7 @@ mod tests {
             let level_from_camera = rotation_about_y(yaw);
             let camera = Camera::new(700.0, 800.0, 600.0, &level_from_camera.transpose());
             let mut mesh = GridMesh::regular(800.0, 600.0, 20.0);
-            let own = Camera::new(700.0, 800.0, 600.0, &nalgebra::Matrix3::identity());
+            let own = Camera::new(700.0, 800.0, 600.0, &Matrix3::identity());
             for vertex in 0..mesh.len() {
                 let ray = own.world_direction(mesh.source(vertex));
                 let place = Vector2::new(yaw + ray.x.atan2(ray.z), ray.y.asin()) * 700.0;

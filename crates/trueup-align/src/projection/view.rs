@@ -1,13 +1,17 @@
 //! Where the viewer looks, what is shown, and on which projection.
 
-use nalgebra::Matrix3;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::{Matrix3, Vector2};
 use serde::{Deserialize, Serialize};
 use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z, wrap_angle};
 
 use super::coverage::SphereCoverage;
+use super::fitted::Fit;
 use super::flat::{Flat, FlatKind};
 use super::options::{Projection, ProjectionOptions};
 use super::photograph::PosedPhotograph;
+use super::seen::{Seen, smooth};
 
 /// A projection, where it looks, and how far it is shown. Angles in radians.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -22,31 +26,60 @@ pub struct ProjectionView {
     pub roll: f64,
     /// Half of the horizontal and of the vertical angle that may be shown.
     pub half: [f64; 2],
+    /// The smallest and largest coordinates of the plane that are shown; `None`: what `half` reaches.
+    pub shown: Option<[[f64; 2]; 2]>,
     /// Whether a full turn is shown: the plane's left and right ends are the same place.
     pub closed: bool,
 }
 
-/// Mean pitch in radians (40 degrees) from which photographs that look one way are shown looking there: drawn upright,
-/// they would be stretched beyond recognition. The mesh's sphere is tilted from there, too.
-const STEEP: f64 = 0.7;
-/// Length of the mean viewing direction below which the photographs look all round and have no such pitch.
-const ONE_WAY: f64 = 0.5;
+/// Mean pitches, radians (35 and 50 degrees), between which photographs that look one way come to be shown looking there:
+/// drawn level, they would be stretched beyond recognition.
+const STEEP: [f64; 2] = [0.611, 0.873];
+/// Lengths of the mean viewing direction between which photographs come to look one way: those that look all round have no
+/// common pitch.
+const ONE_WAY: [f64; 2] = [0.4, 0.6];
+/// Half angle, radians (50 degrees), within which the whole view must lie to be turned towards a facade, and by how much
+/// beyond it the turn ends (10 degrees).
+const FACED: f64 = 0.873;
+const FACED_FADE: f64 = 0.175;
+/// A column of photographs is seen within so much to both sides (45 degrees), and from top to bottom over more than a plane
+/// carries without stretching (95 degrees). Its middle is near the horizon (20 degrees), so that what is vertical hardly
+/// leans in it, or it reaches so high or low (75 degrees) that no level view is of use.
+const COLUMN_SIDE: f64 = 0.785;
+const COLUMN_LENGTH: f64 = 1.66;
+const COLUMN_MIDDLE: f64 = 0.349;
+const COLUMN_HEIGHT: f64 = 1.309;
 
 impl ProjectionView {
     /// The view that the options ask for.
     ///
     /// `dominant`: the scene's directions in the level world (columns), if lines guided the panorama. The viewer faces
     /// the horizontal one that is nearest to the photographs' middle (up to 45 degrees aside): always for full turns,
-    /// whose middle is arbitrary, and for planes where nothing more is cut off by it; a cylinder looks the same
-    /// wherever its middle is.
+    /// whose middle is arbitrary, and for planes where nothing more is cut off or stretched by it; a cylinder looks the
+    /// same wherever its middle is.
     pub fn choose(
         photographs: &[PosedPhotograph],
         dominant: Option<&Matrix3<f64>>,
         options: &ProjectionOptions,
     ) -> Self {
         let coverage = SphereCoverage::of(photographs);
-        let kind = flat_kind(&coverage, options);
-        let flat = Flat { kind, panini_distance: options.panini_distance };
+        match named_kind(options.kind) {
+            Some(kind) => Self::named(kind, &coverage, dominant, options),
+            None if goes_round(&coverage, options) => {
+                Self::named(FlatKind::Equirectangular, &coverage, dominant, options)
+            }
+            None => Self::fitting(photographs, &coverage, dominant, options),
+        }
+    }
+
+    /// The view on a projection that is asked for.
+    fn named(
+        kind: FlatKind,
+        coverage: &SphereCoverage,
+        dominant: Option<&Matrix3<f64>>,
+        options: &ProjectionOptions,
+    ) -> Self {
+        let flat = Flat::named(kind, options.panini_distance);
         let facade = dominant.and_then(|dominant| nearest_facade(dominant, coverage.middle));
         let far = |yaw: f64| 0.5 * coverage.span + wrap_angle(yaw - coverage.middle).abs();
         let straight = match facade {
@@ -55,18 +88,83 @@ impl ProjectionView {
             }
             _ => coverage.middle,
         };
-        let one_way = coverage.forward.norm() >= ONE_WAY;
-        let forward_pitch = (-coverage.forward.y).atan2(coverage.forward.x.hypot(coverage.forward.z));
-        let steep = !kind.turns() && one_way && forward_pitch.abs() > STEEP;
         let [yaw, pitch, roll] = [options.yaw, options.pitch, options.roll].map(f64::to_radians);
-        let (straight, level) = match steep {
-            true => (coverage.forward.x.atan2(coverage.forward.z), forward_pitch),
-            false => (straight, 0.0),
-        };
+        let steep = if kind.turns() { 0.0 } else { steep_pitch(coverage) };
+        let straight = if steep == 0.0 { straight } else { coverage.forward_longitude() };
         let [width, height] = kind.comfortable();
         let width = if options.fov > 0.0 { 0.5 * options.fov.to_radians() } else { width };
-        let closed = kind.turns() && coverage.is_full_turn() && width >= std::f64::consts::PI;
-        Self { flat, yaw: wrap_angle(straight + yaw), pitch: level + pitch, roll, half: [width, height], closed }
+        let closed = kind.turns() && coverage.is_full_turn() && width >= PI;
+        let yaw = wrap_angle(straight + yaw);
+        Self { flat, yaw, pitch: steep + pitch, roll, half: [width, height], shown: None, closed }
+    }
+
+    /// The view that suits photographs that do not go round: the straightest one without stretching, see [`Seen::fit`].
+    fn fitting(
+        photographs: &[PosedPhotograph],
+        coverage: &SphereCoverage,
+        dominant: Option<&Matrix3<f64>>,
+        options: &ProjectionOptions,
+    ) -> Self {
+        let [yaw, pitch, roll] = [options.yaw, options.pitch, options.roll].map(f64::to_radians);
+        let half_width = if options.fov > 0.0 { 0.5 * options.fov.to_radians() } else { PI };
+        let steep = steep_pitch(coverage);
+        let straight = match steep == 0.0 && !coverage.shows_a_pole() {
+            true => coverage.middle + toward_facade(coverage, dominant),
+            false => coverage.forward_longitude(),
+        };
+        let looking = |level_pitch: f64| {
+            let view = Self {
+                flat: Flat::named(FlatKind::Perspective, 0.0),
+                yaw: wrap_angle(straight + yaw),
+                pitch: level_pitch + pitch,
+                roll,
+                half: [half_width, FRAC_PI_2],
+                shown: None,
+                closed: false,
+            };
+            let seen = Seen::of(photographs, &view.view_from_level(), half_width);
+            (view, seen)
+        };
+        let (_, level) = looking(0.0);
+        let [low, high] = level.elevations();
+        let middle = 0.5 * (low + high);
+        let is_column = high - low > COLUMN_LENGTH
+            && (middle.abs() < COLUMN_MIDDLE || level.height() > COLUMN_HEIGHT)
+            && level.turned().height() < COLUMN_SIDE;
+        let (view, seen) = looking(if is_column { middle } else { steep });
+        let fitted = |seen: &Seen| {
+            let flat = Flat::fitted(seen.fit());
+            (flat, seen.window(&flat))
+        };
+        let (flat, shown) = match is_column {
+            false => fitted(&seen),
+            true => {
+                let (flat, shown) = fitted(&seen.turned());
+                let turned = Flat::fitted(Fit { turned: true, ..flat.family() });
+                (turned, shown.map(|corners| corners.map(|[x, y]| [y, x])))
+            }
+        };
+        let shown = shown.map(|[low, high]| {
+            let reach = if options.fov > 0.0 { flat.reach([half_width, 0.0]).x } else { f64::INFINITY };
+            if reach.is_finite() { [[-reach, low[1]], [reach, high[1]]] } else { [low, high] }
+        });
+        Self { flat, half: [seen.half_width(), seen.height()], shown, ..view }
+    }
+
+    /// The smallest and largest coordinates of the plane that are shown, and `margin` radians beyond.
+    pub fn window(&self, margin: f64) -> [Vector2<f64>; 2] {
+        /// On the plane, a radian is at most about so long where a fitted view still shows something.
+        const LONGEST: f64 = 4.0;
+        match self.shown {
+            Some([low, high]) => {
+                let aside = Vector2::repeat(LONGEST * margin);
+                [Vector2::from(low) - aside, Vector2::from(high) + aside]
+            }
+            None => {
+                let reach = self.flat.reach(self.half.map(|half| half + margin));
+                [-reach, reach]
+            }
+        }
     }
 
     /// The rotation from the level world to the viewer.
@@ -74,6 +172,42 @@ impl ProjectionView {
         let level_from_view = rotation_about_y(self.yaw) * rotation_about_x(self.pitch) * rotation_about_z(self.roll);
         level_from_view.transpose()
     }
+}
+
+/// The projection asked for; `None` if it is to be chosen.
+fn named_kind(projection: Projection) -> Option<FlatKind> {
+    match projection {
+        Projection::Equirectangular => Some(FlatKind::Equirectangular),
+        Projection::Cylindrical => Some(FlatKind::Cylindrical),
+        Projection::Perspective => Some(FlatKind::Perspective),
+        Projection::Mercator => Some(FlatKind::Mercator),
+        Projection::Panini => Some(FlatKind::Panini),
+        Projection::Stereographic => Some(FlatKind::Stereographic),
+        Projection::Mesh | Projection::Auto => None,
+    }
+}
+
+/// Whether the panorama is one for viewers of spherical panoramas: photographs all around, and no narrower view asked for.
+/// Photographs that look one way and show a pole have all longitudes, too, and do not go round.
+fn goes_round(coverage: &SphereCoverage, options: &ProjectionOptions) -> bool {
+    let is_wanted = options.fov == 0.0 || options.fov >= 360.0;
+    let looks_at_a_pole = coverage.shows_a_pole() && smooth(coverage.forward.norm(), ONE_WAY) >= 0.5;
+    is_wanted && coverage.is_full_turn() && !looks_at_a_pole
+}
+
+/// How far up photographs are looked at that look one way and steeply; 0 where they are drawn level.
+fn steep_pitch(coverage: &SphereCoverage) -> f64 {
+    let forward = coverage.forward;
+    let pitch = (-forward.y).atan2(forward.x.hypot(forward.z));
+    pitch * smooth(pitch.abs(), STEEP) * smooth(forward.norm(), ONE_WAY)
+}
+
+/// By how much the viewer turns from the photographs' middle to face the nearest facade: wholly if all is still within
+/// [`FACED`], less and less beyond.
+fn toward_facade(coverage: &SphereCoverage, dominant: Option<&Matrix3<f64>>) -> f64 {
+    let Some(facade) = dominant.and_then(|dominant| nearest_facade(dominant, coverage.middle)) else { return 0.0 };
+    let turn = wrap_angle(facade - coverage.middle);
+    turn * (1.0 - smooth(0.5 * coverage.span + turn.abs(), [FACED, FACED + FACED_FADE]))
 }
 
 /// The horizontal dominant direction nearest to the longitude `middle`, as a longitude.
@@ -85,109 +219,4 @@ fn nearest_facade(dominant: &Matrix3<f64>, middle: f64) -> Option<f64> {
         .filter(|direction| direction.y.abs() < HORIZONTAL)
         .flat_map(|direction| [direction.x.atan2(direction.z), (-direction.x).atan2(-direction.z)]);
     longitudes.min_by(|one, other| wrap_angle(one - middle).abs().total_cmp(&wrap_angle(other - middle).abs()))
-}
-
-/// The projection asked for, or the one that suits.
-///
-/// A plane is what one wide lens would have drawn, and people are used to its stretching up to about 100 degrees.
-/// Panini's keeps verticals and the lines into the depth straight up to about 180; beyond, the far sides grow too
-/// large, while a cylinder stays even, up to where nobody sees it as one view any more. Full turns belong to viewers of
-/// spherical panoramas, and what reaches more than 45 degrees up or down (several rows) is stretched by all of these.
-fn flat_kind(coverage: &SphereCoverage, options: &ProjectionOptions) -> FlatKind {
-    /// Degrees across.
-    const PERSPECTIVE: f64 = 100.0;
-    const PANINI: f64 = 180.0;
-    const CYLINDRICAL: f64 = 220.0;
-    /// Degrees up or down.
-    const HIGH: f64 = 45.0;
-    let across = match options.fov > 0.0 {
-        true => options.fov.min(coverage.span.to_degrees()),
-        false => coverage.span.to_degrees(),
-    };
-    let high = coverage.steepest().to_degrees() > HIGH;
-    match options.kind {
-        Projection::Equirectangular => FlatKind::Equirectangular,
-        Projection::Cylindrical => FlatKind::Cylindrical,
-        Projection::Perspective => FlatKind::Perspective,
-        Projection::Mercator => FlatKind::Mercator,
-        Projection::Panini => FlatKind::Panini,
-        Projection::Stereographic => FlatKind::Stereographic,
-        Projection::Mesh | Projection::Auto => match across {
-            _ if high || across > CYLINDRICAL => FlatKind::Equirectangular,
-            _ if across > PANINI => FlatKind::Cylindrical,
-            _ if across > PERSPECTIVE => FlatKind::Panini,
-            _ => FlatKind::Perspective,
-        },
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use nalgebra::Vector3;
-
-    use super::super::coverage::tests::photograph;
-    use super::*;
-
-    fn row(count: u32, pitch_deg: f64) -> Vec<PosedPhotograph> {
-        (0..count).map(|k| photograph(30.0 * (f64::from(k) - 0.5 * f64::from(count - 1)), pitch_deg)).collect()
-    }
-
-    fn kind(photographs: &[PosedPhotograph]) -> FlatKind {
-        let options = ProjectionOptions { kind: Projection::Auto, ..ProjectionOptions::default() };
-        ProjectionView::choose(photographs, None, &options).flat.kind
-    }
-
-    #[test]
-    fn the_angle_of_view_chooses() {
-        assert_eq!(kind(&row(2, 0.0)), FlatKind::Perspective);
-        assert_eq!(kind(&row(4, 0.0)), FlatKind::Panini);
-        assert_eq!(kind(&row(6, 0.0)), FlatKind::Cylindrical);
-        assert_eq!(kind(&row(12, 0.0)), FlatKind::Equirectangular);
-        assert_eq!(kind(&[row(2, 0.0), row(2, 35.0)].concat()), FlatKind::Equirectangular);
-    }
-
-    /// Facades at 20 and 110 degrees: a narrow panorama faces the nearer one, a wide plane keeps to its middle, since
-    /// its far side would be cut.
-    #[test]
-    fn the_viewer_faces_the_nearest_facade() {
-        let dominant = rotation_about_y(20_f64.to_radians());
-        let faced = |photographs: &[PosedPhotograph], kind: Projection| {
-            let options = ProjectionOptions { kind, ..ProjectionOptions::default() };
-            ProjectionView::choose(photographs, Some(&dominant), &options).yaw.to_degrees()
-        };
-        assert!((faced(&row(1, 0.0), Projection::Perspective) - 20.0).abs() < 1e-6);
-        assert!(faced(&row(3, 0.0), Projection::Perspective).abs() < 0.5);
-        assert!(faced(&row(3, 0.0), Projection::Cylindrical).abs() < 0.5);
-        assert!((faced(&row(12, 0.0), Projection::Equirectangular) - 20.0).abs() < 1e-6);
-        assert!(ProjectionView::choose(&row(1, 0.0), None, &ProjectionOptions::default()).yaw.abs() < 0.01);
-    }
-
-    /// Yaw turns right, pitch up, roll clockwise: the direction to the right, above, and at the viewer's right hand.
-    #[test]
-    fn the_viewer_turns_as_asked() {
-        let options = |yaw: f64, pitch: f64, roll: f64| ProjectionOptions {
-            kind: Projection::Perspective,
-            yaw,
-            pitch,
-            roll,
-            ..ProjectionOptions::default()
-        };
-        let seen = |options: ProjectionOptions, direction: Vector3<f64>| {
-            ProjectionView::choose(&row(1, 0.0), None, &options).view_from_level() * direction
-        };
-        let right = Vector3::new(0.5, 0.0, 0.75_f64.sqrt());
-        assert!((seen(options(30.0, 0.0, 0.0), right) - Vector3::z()).norm() < 1e-2);
-        let above = Vector3::new(0.0, -0.5, 0.75_f64.sqrt());
-        assert!((seen(options(0.0, 30.0, 0.0), above) - Vector3::z()).norm() < 1e-2);
-        // Rolled clockwise by a quarter, the viewer's right hand points down.
-        assert!((seen(options(0.0, 0.0, 90.0), Vector3::y()) - Vector3::x()).norm() < 1e-2);
-    }
-
-    #[test]
-    fn photographs_of_a_ceiling_are_looked_up_at() {
-        let options = ProjectionOptions { kind: Projection::Perspective, ..ProjectionOptions::default() };
-        let view = ProjectionView::choose(&[photograph(0.0, 80.0), photograph(10.0, 80.0)], None, &options);
-        assert!((view.pitch.to_degrees() - 80.0).abs() < 0.5, "{view:?}");
-        assert!(ProjectionView::choose(&row(2, 30.0), None, &options).pitch == 0.0);
-    }
 }

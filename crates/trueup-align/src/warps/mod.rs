@@ -91,6 +91,7 @@ fn run_within(
         folds: meshes.iter().map(count_folds).sum(),
         relative_gradient: 0.0,
         period: autostitch::period(model, input, options),
+        by_cameras: None,
         meshes,
     })
 }

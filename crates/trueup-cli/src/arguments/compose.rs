@@ -17,7 +17,8 @@ Examples:
 The options of the project are overruled by --config, that by --set, and that by the flags of their own. Options of what
 comes before composing are recorded with the geometry: to change them, stitch again.
 
-Exit status: 0 the panorama was written, 1 the input or the system failed, 2 wrong usage, 130 stopped by Ctrl-C, 143 by a \
+Exit status: 0 the panorama was written, 1 the input or the system failed, 2 wrong usage, 3 written, but not as good as --fail-on \
+or --max-error ask for, 130 stopped by Ctrl-C, 143 by a \
 request to terminate.";
 
 #[derive(Debug, Args)]

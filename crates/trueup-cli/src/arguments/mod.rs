@@ -16,7 +16,7 @@ pub(crate) use compare::CompareArgs;
 pub(crate) use compose::ComposeArgs;
 pub(crate) use option_flags::TypedOptions;
 pub use option_flags::{OPTION_FLAGS, OptionFlag};
-pub(crate) use shared::{FileArgs, MaskArgs, TuningArgs};
+pub(crate) use shared::{FailOn, FileArgs, MaskArgs, MessageArgs, TuningArgs};
 pub(crate) use stitch::StitchArgs;
 
 const EXAMPLES: &str = "\

@@ -85,14 +85,42 @@ pub(crate) struct TuningArgs {
     pub threads: Option<u16>,
 }
 
-/// What is printed.
-#[derive(Debug, Args)]
+/// What is printed, and what of it is a failure.
+#[derive(Debug, Clone, Args)]
 pub(crate) struct MessageArgs {
-    /// Print nothing but errors
+    /// Print nothing but errors and warnings, each in one line on standard error
     #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]
     pub quiet: bool,
 
     /// Print also the pairs' verdicts, each photograph's geometry, notes, and a line per stage's time
     #[arg(short, long, help_heading = "Messages")]
     pub verbose: bool,
+
+    /// Print the summary as JSON
+    #[arg(long, conflicts_with = "verbose", help_heading = "Messages")]
+    pub json: bool,
+
+    /// End with status 3 if there is a warning; what was made is written all the same
+    #[arg(long, value_name = "warning", value_enum, help_heading = "Messages")]
+    pub fail_on: Option<FailOn>,
+
+    /// End with status 3 if matched points land farther apart than this, 95 of 100, in the photographs' pixels; what was made
+    /// is written all the same
+    #[arg(long, value_name = "PX", allow_hyphen_values = true, value_parser = distance, help_heading = "Messages")]
+    pub max_error: Option<f64>,
+}
+
+/// What is a failure though a panorama was made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum FailOn {
+    /// Any warning.
+    Warning,
+}
+
+/// A distance, not below 0.
+fn distance(typed: &str) -> Result<f64, String> {
+    match typed.parse::<f64>() {
+        Ok(distance) if distance >= 0.0 && distance.is_finite() => Ok(distance),
+        _ => Err("a number of pixels, 0 or more, is wanted".to_owned()),
+    }
 }

@@ -17,7 +17,8 @@ Examples:
 
 Defaults are overruled by --config, that by --set, and that by the flags of their own (--scale, --quality, ...).
 
-Exit status: 0 a panorama was written, 1 the input or the system failed, 2 wrong usage, 130 stopped by Ctrl-C, 143 by a \
+Exit status: 0 a panorama was written, 1 the input or the system failed, 2 wrong usage, 3 written, but not as good as --fail-on or \
+--max-error ask for, 130 stopped by Ctrl-C, 143 by a \
 request to terminate. The first Ctrl-C stops at the next safe place and leaves nothing half written; the second kills at \
 once.";
 

@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use crate::words::one_line;
+
 /// Lines of a label and a text; texts stand below each other.
 #[derive(Debug, Default)]
 pub(crate) struct LabeledLines(String);
@@ -12,11 +14,11 @@ impl LabeledLines {
     }
 
     pub(crate) fn entry(&mut self, label: &str, text: &str) {
-        let _ = writeln!(self.0, "{label:<11} {text}");
+        let _ = writeln!(self.0, "{label:<11} {}", one_line(text));
     }
 
     /// A line that belongs to the entry above, with its own label.
     pub(crate) fn item(&mut self, label: &str, text: &str) {
-        let _ = writeln!(self.0, "  {label:<9} {text}");
+        let _ = writeln!(self.0, "  {label:<9} {}", one_line(text));
     }
 }

@@ -1,12 +1,9 @@
 //! What the panorama's own lines and matches say of it.
 
-use trueup::{Measures, PhotographMeasures, Project};
+use trueup::{Judgement, Measures, PhotographMeasures, Project};
 
 use super::labeled_lines::LabeledLines;
-use super::names::name_of;
-
-/// Uncertain photographs named before the rest are counted.
-const NAMED: usize = 4;
+use super::names::{listed, name_of};
 
 /// One or two lines: how upright, how well aligned, how straight.
 pub(crate) fn short(lines: &mut LabeledLines, project: &Project, names: &[String]) {
@@ -15,6 +12,18 @@ pub(crate) fn short(lines: &mut LabeledLines, project: &Project, names: &[String
     let rest: Vec<String> = [alignment(measures), bent_line(measures, project, names)].into_iter().flatten().collect();
     if !rest.is_empty() {
         lines.entry("", &rest.join("; "));
+    }
+}
+
+/// "upright good, alignment fair, lines look at it": a plain word for each.
+pub(super) fn judged(lines: &mut LabeledLines, project: &Project) {
+    let Judgement { upright, alignment, lines: straight } = project.judgement();
+    let words: Vec<String> = [("upright", upright), ("alignment", alignment), ("lines", straight)]
+        .into_iter()
+        .filter_map(|(what, verdict)| Some(format!("{what} {}", verdict?)))
+        .collect();
+    if !words.is_empty() {
+        lines.entry("judged", &words.join(", "));
     }
 }
 
@@ -46,14 +55,6 @@ fn upright(measures: &Measures, project: &Project, names: &[String]) -> String {
 
 fn photographs_in_words(count: usize) -> String {
     if count == 1 { "1 photograph".to_owned() } else { format!("{count} photographs") }
-}
-
-/// Names separated by commas; many are cut short.
-fn listed(names: &[&str]) -> String {
-    match names.len() {
-        count if count > NAMED + 1 => format!("{} and {} others", names[..NAMED].join(", "), count - NAMED),
-        _ => names.join(", "),
-    }
 }
 
 fn alignment(measures: &Measures) -> Option<String> {

@@ -1,22 +1,28 @@
 //! The summary of a panorama, printed after a stitch and by `trueup inspect`.
 
 mod details;
+mod json;
 mod labeled_lines;
+mod left_out;
 mod measures;
 mod names;
+mod quiet;
 #[cfg(test)]
 mod tests;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use trueup::{Diagnostic, ImageStatus, Project, Severity, Written};
+use trueup::{Project, Severity, Written};
 
 use crate::words::file_size;
 
-use names::names;
+use left_out::{LeftOut, left_out, tells_of_left_out};
+use names::{listed, names};
 
+pub(crate) use json::json;
 pub(crate) use labeled_lines::LabeledLines;
+pub(crate) use quiet::warnings;
 
 /// Where a panorama was written; a project file does not say.
 #[derive(Debug, Clone, Copy)]
@@ -35,13 +41,14 @@ pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool
     let mut lines = LabeledLines::default();
     panorama(&mut lines, project, file);
     let names = names(&project.images);
-    photographs(&mut lines, project, &names);
+    photographs(&mut lines, project, &names, verbose);
     if verbose {
         details::photographs(&mut lines, project, &names);
         details::pairs(&mut lines, project, &names);
     }
     lines.entry("upright", &upright(project));
     measures::short(&mut lines, project, &names);
+    measures::judged(&mut lines, project);
     if verbose || file.is_none() {
         measures::table(&mut lines, project, &names);
     }
@@ -86,16 +93,18 @@ fn panorama(lines: &mut LabeledLines, project: &Project, file: Option<&PanoramaF
 }
 
 /// How many were used, and each one left out with its reason and what to do about it.
-fn photographs(lines: &mut LabeledLines, project: &Project, names: &[String]) {
+fn photographs(lines: &mut LabeledLines, project: &Project, names: &[String], verbose: bool) {
     let reference = project.images.iter().position(|image| image.path == project.reference);
     let reference = reference.map_or(String::new(), |index| format!("; the reference is {}", names[index]));
     lines.entry("photographs", &format!("{} of {} used{reference}", project.used(), project.images.len()));
-    for (image, name) in project.images.iter().zip(names) {
-        if image.status == ImageStatus::LeftOut {
-            lines.item("left out", &format!("{name}: {}", image.reason));
-            if !image.hint.is_empty() {
-                lines.item("", &image.hint);
-            }
+    let groups = left_out(project, names, |_| true);
+    for (index, LeftOut { photographs, reason, hint }) in groups.iter().enumerate() {
+        let listed = if verbose { photographs.join(", ") } else { listed(photographs) };
+        lines.item("left out", &format!("{listed}: {reason}"));
+        // One that the next line has, too, stands there.
+        let is_repeated = groups.get(index + 1).is_some_and(|next| next.hint == *hint);
+        if !hint.is_empty() && !is_repeated {
+            lines.item("", hint);
         }
     }
 }
@@ -126,15 +135,18 @@ fn upright(project: &Project) -> String {
     }
 }
 
-/// Warnings, and with `verbose` notes, that are not told elsewhere.
+/// Warnings, and with `verbose` notes, that are not told elsewhere; always, that another thing was drawn than the method means.
 fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool) {
+    /// The note's code.
+    const DRAWN: &str = "drawn-by-cameras";
     let names = project.photograph_names();
     for diagnostic in &project.diagnostics {
         let label = match diagnostic.severity {
             Severity::Warning => "warning",
             Severity::Note => "note",
         };
-        if (diagnostic.severity == Severity::Note && !verbose) || tells_of_left_out(diagnostic, project) {
+        let is_detail = diagnostic.severity == Severity::Note && !verbose && diagnostic.code != DRAWN;
+        if is_detail || tells_of_left_out(diagnostic, project) {
             continue;
         }
         lines.entry(label, &format!("{}: {}", diagnostic.subject.named(&names), diagnostic.message));
@@ -142,11 +154,6 @@ fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool) {
             lines.entry("", &diagnostic.hint);
         }
     }
-}
-
-/// Whether a finding is the reason of a left-out photograph, which stands with that photograph.
-fn tells_of_left_out(diagnostic: &Diagnostic, project: &Project) -> bool {
-    project.images.iter().any(|image| image.status == ImageStatus::LeftOut && image.reason == diagnostic.message)
 }
 
 /// "3.2 s: features 1.1, matching 0.7": the longest first.

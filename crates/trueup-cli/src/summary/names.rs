@@ -5,6 +5,9 @@ use std::path::Path;
 
 use trueup::{ImageRecord, Project};
 
+/// Photographs named before the rest are counted.
+const NAMED: usize = 4;
+
 /// The file name of each photograph; the whole path where names collide.
 pub(super) fn names(images: &[ImageRecord]) -> Vec<String> {
     let short = |image: &ImageRecord| match Path::new(&image.path).file_name() {
@@ -24,4 +27,12 @@ pub(super) fn names(images: &[ImageRecord]) -> Vec<String> {
 /// The name that stands for a photograph's path.
 pub(super) fn name_of<'a>(path: &'a str, project: &Project, names: &'a [String]) -> &'a str {
     project.images.iter().position(|image| image.path == path).map_or(path, |index| &names[index])
+}
+
+/// Names separated by commas; many are cut short.
+pub(super) fn listed(names: &[&str]) -> String {
+    match names.len() {
+        count if count > NAMED + 1 => format!("{} and {} others", names[..NAMED].join(", "), count - NAMED),
+        _ => names.join(", "),
+    }
 }

@@ -118,6 +118,7 @@ fn measures_take_two_lines_and_uncertain_photographs_are_named() {
     let short = "\
 measured    upright within 0.7 degrees at 95 %, 0.3 expected on average (2 photographs measured, 1 uncertain: b.jpg)
             points meet within 0.4 px on average, 95 of 100 within 1.2; longest bent line: 412 px, 1.9 px off, in a.jpg
+judged      upright good, alignment good, lines fair
 time ";
     let printed = text(&project, Some(&file), false);
     assert!(printed.contains(short), "{printed}");

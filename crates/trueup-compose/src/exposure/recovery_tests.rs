@@ -89,11 +89,22 @@ fn layout() -> CanvasLayout {
 }
 
 fn found(lights: &[Light], encoded: impl Fn(f64) -> f64, seed: u64, options: &ExposureOptions) -> Corrections {
+    found_beside(&TransferCurve::SRGB, lights, encoded, seed, options)
+}
+
+/// The same where the photographs' profile has another curve.
+fn found_beside(
+    curve: &TransferCurve,
+    lights: &[Light],
+    encoded: impl Fn(f64) -> f64,
+    seed: u64,
+    options: &ExposureOptions,
+) -> Corrections {
     let mut dice = Dice(seed);
     let rasters: Vec<Raster<u8>> =
         lights.iter().zip(PLACES).map(|(light, place)| light.photograph(place, &encoded, &mut dice)).collect();
     let frame = WorkingFrame::new(WIDTH, HEIGHT, 480_000.0);
-    let thumbnail = |raster| Thumbnail { raster, curve: &TransferCurve::SRGB, frame, camera: 0 };
+    let thumbnail = |raster| Thumbnail { raster, curve, frame, camera: 0 };
     let thumbnails: Vec<Thumbnail> = rasters.iter().map(thumbnail).collect();
     let input = ExposureInput { layout: &layout(), thumbnails: &thumbnails, reference: 0 };
     run(&input, options, &StageContext::default()).expect("estimates").corrections
@@ -191,6 +202,22 @@ fn no_response_drives_gains_to_their_limit() {
     assert!(limited.response.is_plain(), "{limited:?}");
     let without = ExposureOptions { max_gain: 1.2, response: false, ..ExposureOptions::default() };
     assert_eq!(limited, found(&lights, by_film, 1, &without));
+}
+
+/// A profile that stands still for some levels, where the response falls: together they make no curve, and so the profile stays
+/// as it is.
+#[test]
+fn a_response_that_makes_no_curve_with_the_profile_is_left_out() {
+    let exposures = [1.0, 0.5, 2.0, 0.5, 2.0, 1.0];
+    let lights = exposures.map(|gain| Light { gain: [gain; 3], vignetting: [0.0; 3] });
+    let s_shaped = Response { coefficients: [0.0, -0.5, 0.4, 0.1] }.curve(&TransferCurve::SRGB).expect("a curve");
+    let still = |e: f64| if (0.30..0.34).contains(&e) { 0.30 } else { e };
+    let light = (0..=1024).map(|step| TransferCurve::SRGB.linear(still(f64::from(step) / 1024.0))).collect();
+    let profile = TransferCurve::table(light).expect("a curve");
+    let options = ExposureOptions::default();
+    let found = found_beside(&profile, &lights, |light| s_shaped.encoded(light), 1, &options);
+    assert!(found.response.curve(&profile).is_ok(), "{found:?}");
+    assert_eq!(found.photographs.len(), lights.len());
 }
 
 #[test]

@@ -36,8 +36,10 @@ pub(super) fn solve(input: &SolveInput<'_>, options: &ExposureOptions, context: 
     for repetition in 0..REPETITIONS {
         context.check_cancelled()?;
         if repetition > 0 {
-            if let Some(profile) = profile {
-                problem.predict(&mut solution, profile)?;
+            if let Some(profile) = profile
+                && problem.predict(&mut solution, profile).is_err()
+            {
+                return without_response(input, options, context);
             }
             problem.weigh(&solution, &mut weights);
         }
@@ -65,10 +67,20 @@ pub(super) fn solve(input: &SolveInput<'_>, options: &ExposureOptions, context: 
     // than what a response is good for.
     let limits = [options.max_gain, options.max_gain.recip()];
     let at_limit = |correction: &Correction| correction.gain.iter().any(|gain| limits.contains(gain));
-    if !corrections.response.is_plain() && corrections.photographs.iter().any(at_limit) {
-        return solve(&SolveInput { profile: None, ..*input }, options, context);
+    let makes_curve = profile.is_none_or(|profile| corrections.response.curve(profile).is_ok());
+    if !makes_curve || (!corrections.response.is_plain() && corrections.photographs.iter().any(at_limit)) {
+        return without_response(input, options, context);
     }
     Ok(corrections)
+}
+
+/// The same with the profile's curve as it is: what falls back on where a response that was found is of no use.
+fn without_response(
+    input: &SolveInput<'_>,
+    options: &ExposureOptions,
+    context: &StageContext<'_>,
+) -> Result<Corrections> {
+    solve(&SolveInput { profile: None, ..*input }, options, context)
 }
 
 impl LightEquations<'_> {

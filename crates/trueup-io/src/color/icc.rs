@@ -5,6 +5,8 @@ use std::sync::{Arc, LazyLock};
 use moxcms::{ColorProfile, DataColorSpace, ProfileText, ToneReprCurve, WHITE_POINT_D50, Xyzd};
 use trueup_core::color::TransferCurve;
 
+use super::sanity::{flaw_of_conversion, flaw_of_curve, flaw_of_primaries};
+
 /// Most that two spaces' primaries may differ, as CIE XYZ relative to a white of 1, and be the same for pictures: half an
 /// 8-bit level of light. Profiles of one space by different makers differ by a quarter of this.
 const SAME_PRIMARIES: f64 = 2e-3;
@@ -84,30 +86,44 @@ pub(crate) fn understand(icc: &[u8]) -> Understood {
     match profile.color_space {
         DataColorSpace::Rgb => {}
         DataColorSpace::Gray => {
-            return match profile.gray_trc.as_ref().and_then(curve_of) {
-                Some(curve) => Understood::Gray(curve.simplified()),
-                None => Understood::Damaged("its tone curve is missing or falls".to_owned()),
-            };
+            let curve = profile.gray_trc.as_ref().and_then(curve_of);
+            let damaged = |reason: &str| Understood::Damaged(reason.to_owned());
+            return curve.map_or_else(
+                || damaged("its tone curve is missing or falls"),
+                |curve| flaw_of_curve(&curve).map_or_else(|| Understood::Gray(curve.simplified()), damaged),
+            );
         }
         DataColorSpace::Cmyk => return Understood::Foreign("CMYK"),
         DataColorSpace::Lab => return Understood::Foreign("Lab"),
         _ => return Understood::Foreign("an unusual color space"),
     }
+    understand_rgb(profile, icc).unwrap_or_else(Understood::Damaged)
+}
+
+/// The same of a profile for RGB samples; why it cannot be used, if it cannot.
+fn understand_rgb(profile: ColorProfile, icc: &[u8]) -> Result<Understood, String> {
     let has_tables = profile.lut_a_to_b_perceptual.is_some() || profile.lut_a_to_b_colorimetric.is_some();
-    if has_tables {
-        return Understood::Tables(Arc::new(profile));
+    if !has_tables {
+        if !profile.is_matrix_shaper() {
+            return Err("its primaries or tone curves are missing".to_owned());
+        }
+        flaw_of_primaries(primaries(&profile)).map_or(Ok(()), |flaw| Err(flaw.to_owned()))?;
     }
-    if !profile.is_matrix_shaper() || !primaries_are_possible(&profile) {
-        return Understood::Damaged("its primaries or tone curves are missing or impossible".to_owned());
+    if let Some(flaw) = flaw_of_conversion(&profile) {
+        return Err(flaw);
+    }
+    if has_tables {
+        return Ok(Understood::Tables(Arc::new(profile)));
     }
     let curves = [&profile.red_trc, &profile.green_trc, &profile.blue_trc].map(|trc| trc.as_ref().and_then(curve_of));
     let [Some(red), Some(green), Some(blue)] = curves else {
-        return Understood::Damaged("a tone curve falls or does not reach white".to_owned());
+        return Err("a tone curve falls or does not reach white".to_owned());
     };
+    [&red, &green, &blue].into_iter().find_map(flaw_of_curve).map_or(Ok(()), |flaw| Err(flaw.to_owned()))?;
     if !(red.is_same(&green) && red.is_same(&blue)) {
-        return Understood::Tables(Arc::new(profile));
+        return Ok(Understood::Tables(Arc::new(profile)));
     }
-    Understood::Space(RgbSpace { icc: Some(icc.into()), profile: Arc::new(profile), curve: red.simplified() })
+    Ok(Understood::Space(RgbSpace { icc: Some(icc.into()), profile: Arc::new(profile), curve: red.simplified() }))
 }
 
 /// Whether samples in the space of this profile mean sRGB colors.
@@ -149,15 +165,6 @@ fn compact(mut profile: ColorProfile, name: &str) -> Arc<[u8]> {
 
 fn primaries(profile: &ColorProfile) -> [Xyzd; 3] {
     [profile.red_colorant, profile.green_colorant, profile.blue_colorant]
-}
-
-/// Finite, spanning all colors, and adding up to a white about as bright as 1.
-fn primaries_are_possible(profile: &ColorProfile) -> bool {
-    let [r, g, b] = primaries(profile).map(|primary| [primary.x, primary.y, primary.z]);
-    let determinant =
-        r[0] * (g[1] * b[2] - g[2] * b[1]) - g[0] * (r[1] * b[2] - r[2] * b[1]) + b[0] * (r[1] * g[2] - r[2] * g[1]);
-    let white = r[1] + g[1] + b[1];
-    determinant.is_finite() && determinant.abs() > 1e-3 && (0.9..=1.1).contains(&white)
 }
 
 /// The curve that a profile's tag gives.

@@ -11,6 +11,9 @@ mod convert;
 mod embedded;
 pub(crate) mod icc;
 mod rows;
+mod sanity;
+#[cfg(test)]
+mod sanity_tests;
 mod survey;
 #[cfg(test)]
 mod tests;

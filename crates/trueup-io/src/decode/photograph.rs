@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::BufReader;
 
+use trueup_core::memory::check_room;
 use trueup_core::raster::Photograph;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
@@ -10,6 +11,9 @@ use trueup_core::{Error, Result};
 use super::orientation::upright;
 use crate::formats;
 use crate::metadata::header;
+
+/// Bytes of a pixel while it is decoded: four channels of 8 bits, in the decoder and in the photograph, or once with 16 bits.
+const ROOM_PIXEL_BYTES: usize = 8;
 
 /// Decodes a photograph in full size, upright.
 ///
@@ -19,7 +23,8 @@ use crate::metadata::header;
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read, [`Error::Input`] if its pixels are damaged or incomplete (no missing part
-/// is tolerated), of an unsupported kind, or no longer of the size that was found when it was examined.
+/// is tolerated), of an unsupported kind, or no longer of the size that was found when it was examined; [`Error::Limits`]
+/// if the memory is not to be had.
 pub fn photograph(source: &SourceImage) -> Result<Photograph> {
     Ok(match stored(source)? {
         Photograph::Eight(raster) => Photograph::Eight(upright(raster, source.orientation)),
@@ -42,6 +47,11 @@ pub fn sample_bits(source: &SourceImage) -> Result<u16> {
     })
 }
 
+/// Bytes that a photograph takes on its way into memory.
+fn room(source: &SourceImage) -> usize {
+    source.width.saturating_mul(source.height).saturating_mul(ROOM_PIXEL_BYTES)
+}
+
 /// Decodes the pixels as they are stored, before orientation.
 fn stored(source: &SourceImage) -> Result<Photograph> {
     let reading = |error| Error::io("reading", &source.path, error);
@@ -50,5 +60,6 @@ fn stored(source: &SourceImage) -> Result<Photograph> {
         let reason = format!("it is not a {} picture", formats::readable_formats());
         Error::input(&source.name, reason, "Give the photograph again.")
     })?;
+    check_room(format_args!("decoding {}", source.name), room(source))?;
     (format.pixels)(source, input)
 }

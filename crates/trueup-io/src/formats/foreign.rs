@@ -1,32 +1,179 @@
-//! Formats that are not read, known to be told apart from files that are no pictures.
+//! Formats that are not read, known to be told apart from files that are no pictures, and what converts them.
 
 use std::path::Path;
 
-use crate::format::lower_extension;
+use crate::format::{Foreign, lower_extension};
 
-/// Name extensions of photographs in formats this program does not read. In a folder such files are named in a
-/// rejection, while files that are no photographs at all are passed over in silence.
-const FOREIGN_EXTENSIONS: [&str; 21] = [
-    "heic", "heif", "avif", "jxl", "jp2", "gif", "bmp", "exr", "hdr", "cr2", "cr3", "nef", "arw", "orf", "rw2", "raf",
-    "pef", "srw", "dng", "psd", "tga",
+/// What of the pixels is not stored as colors, or not first in the file: camera raw in the form of a TIFF.
+///
+/// Its signature is a TIFF's; what tells them apart is found by [`super::tiff`].
+pub(crate) static RAW: Foreign = Foreign {
+    what: "a camera raw photograph, or another file that begins with a small copy",
+    extensions: &["dng", "nef", "nrw", "arw", "srf", "sr2", "pef", "srw", "erf", "3fr", "iiq", "rwl", "kdc", "dcr"],
+    has_signature: |_| false,
+    command: "darktable-cli photo.dng photo.tif",
+};
+
+/// The formats, the more special before the more general.
+///
+/// # Source
+/// ISO/IEC 14496-12 and 23008-12 (boxes and their brands), ISO/IEC 18181-2 (JPEG XL), ISO/IEC 15444-1 annex I (JPEG 2000),
+/// OpenEXR File Layout, Radiance's picture files; of camera raw, LibRaw's identification of makers.
+static FOREIGN: [&Foreign; 18] = [
+    &RAW,
+    &Foreign {
+        what: "a camera raw photograph of Canon (CR2)",
+        extensions: &["cr2"],
+        has_signature: is_cr2,
+        command: "darktable-cli photo.cr2 photo.tif",
+    },
+    &Foreign {
+        what: "a camera raw photograph of Canon (CR3)",
+        extensions: &["cr3"],
+        has_signature: |start| has_brand(start, b"crx"),
+        command: "darktable-cli photo.cr3 photo.tif",
+    },
+    &Foreign {
+        what: "a camera raw photograph of Fujifilm (RAF)",
+        extensions: &["raf"],
+        has_signature: |start| start.starts_with(b"FUJIFILMCCD-RAW"),
+        command: "darktable-cli photo.raf photo.tif",
+    },
+    &Foreign {
+        what: "a camera raw photograph of Olympus (ORF)",
+        extensions: &["orf"],
+        has_signature: |start| [b"IIRO", b"IIRS", b"MMOR"].iter().any(|signature| start.starts_with(*signature)),
+        command: "darktable-cli photo.orf photo.tif",
+    },
+    &Foreign {
+        what: "a camera raw photograph of Panasonic (RW2)",
+        extensions: &["rw2"],
+        has_signature: |start| start.starts_with(b"IIU\0"),
+        command: "darktable-cli photo.rw2 photo.tif",
+    },
+    &Foreign {
+        what: "an AVIF picture",
+        extensions: &["avif", "avifs"],
+        has_signature: |start| has_brand(start, b"avi"),
+        command: "avifdec photo.avif photo.png",
+    },
+    &Foreign {
+        what: "a HEIC picture",
+        extensions: &["heic", "heif", "hif"],
+        has_signature: |start| [b"hei", b"hev", b"mif", b"msf"].iter().any(|brand| has_brand(start, brand)),
+        command: "heif-convert photo.heic photo.jpg",
+    },
+    &Foreign {
+        what: "a video",
+        extensions: &[],
+        has_signature: |start| start.get(4..8) == Some(b"ftyp") || start.starts_with(&[0x1a, 0x45, 0xdf, 0xa3]),
+        command: "ffmpeg -i clip.mp4 -vf fps=2 frame-%03d.png",
+    },
+    &Foreign {
+        what: "a JPEG XL picture",
+        extensions: &["jxl"],
+        has_signature: |start| start.starts_with(&[0xff, 0x0a]) || start.starts_with(b"\0\0\0\x0cJXL \r\n\x87\n"),
+        command: "djxl photo.jxl photo.png",
+    },
+    &Foreign {
+        what: "a JPEG 2000 picture",
+        extensions: &["jp2", "j2k", "jpx"],
+        has_signature: |start| {
+            start.starts_with(b"\0\0\0\x0cjP  \r\n\x87\n") || start.starts_with(&[0xff, 0x4f, 0xff, 0x51])
+        },
+        command: "magick photo.jp2 photo.tif",
+    },
+    &Foreign {
+        what: "an OpenEXR picture",
+        extensions: &["exr"],
+        has_signature: |start| start.starts_with(&[0x76, 0x2f, 0x31, 0x01]),
+        command: "magick photo.exr photo.tif",
+    },
+    &Foreign {
+        what: "a Radiance picture",
+        extensions: &["hdr"],
+        has_signature: |start| start.starts_with(b"#?RADIANCE") || start.starts_with(b"#?RGBE"),
+        command: "magick photo.hdr photo.tif",
+    },
+    &Foreign {
+        what: "a GIF picture",
+        extensions: &["gif"],
+        has_signature: |start| start.starts_with(b"GIF8"),
+        command: "magick photo.gif photo.png",
+    },
+    &Foreign {
+        what: "a BMP picture",
+        extensions: &["bmp"],
+        has_signature: |start| start.starts_with(b"BM"),
+        command: "magick photo.bmp photo.png",
+    },
+    &Foreign {
+        what: "a Photoshop document",
+        extensions: &["psd", "psb"],
+        has_signature: |start| start.starts_with(b"8BPS"),
+        command: "magick 'photo.psd[0]' photo.tif",
+    },
+    &Foreign {
+        what: "a PDF document",
+        extensions: &[],
+        has_signature: |start| start.starts_with(b"%PDF"),
+        command: "pdftoppm -png pages.pdf page",
+    },
+    // Without a signature of its own.
+    &Foreign {
+        what: "a Targa picture",
+        extensions: &["tga"],
+        has_signature: |_| false,
+        command: "magick photo.tga photo.png",
+    },
 ];
+
+/// Whether a box of the kind `ftyp` names a brand that begins so.
+fn has_brand(start: &[u8], brand: &[u8; 3]) -> bool {
+    start.get(4..8) == Some(b"ftyp") && start.get(8..11) == Some(brand)
+}
+
+/// Whether a file that begins so, as a TIFF does, is camera raw of Canon, whose first picture is a reduced copy.
+pub(crate) fn is_cr2(start: &[u8]) -> bool {
+    start.starts_with(b"II*\0") && start.get(8..10) == Some(b"CR")
+}
 
 /// Whether the extension of `path` names a photograph in a format that is not read.
 pub(crate) fn has_foreign_extension(path: &Path) -> bool {
-    lower_extension(path).is_some_and(|extension| FOREIGN_EXTENSIONS.contains(&extension.as_str()))
+    lower_extension(path)
+        .is_some_and(|extension| FOREIGN.iter().any(|foreign| foreign.extensions.contains(&extension.as_str())))
 }
 
-/// What a file that is no supported picture seems to be, for messages; `None` when its first bytes tell nothing.
-pub(crate) fn describe_foreign_content(start: &[u8]) -> Option<&'static str> {
-    match start {
-        [b'G', b'I', b'F', b'8', ..] => Some("a GIF picture"),
-        [b'B', b'M', ..] => Some("a BMP picture"),
-        [b'8', b'B', b'P', b'S', ..] => Some("a Photoshop document"),
-        [b'%', b'P', b'D', b'F', ..] => Some("a PDF document"),
-        [0xff, 0x0a, ..] => Some("a JPEG XL picture"),
-        [_, _, _, _, b'f', b't', b'y', b'p', b'a', b'v', b'i', ..] => Some("an AVIF picture"),
-        [_, _, _, _, b'f', b't', b'y', b'p', b'h' | b'm', ..] => Some("a HEIC picture"),
-        [_, _, _, _, b'f', b't', b'y', b'p', ..] => Some("a video"),
-        _ => None,
+/// What a file that is no supported picture seems to be; `None` when its first bytes tell nothing.
+pub(crate) fn foreign_of(start: &[u8]) -> Option<&'static Foreign> {
+    FOREIGN.iter().find(|foreign| (foreign.has_signature)(start)).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_read_is_told_by_its_first_bytes() {
+        for (start, what) in [
+            (&b"II*\0\x10\0\0\0CR\x02\0"[..], "a camera raw photograph of Canon (CR2)"),
+            (b"\0\0\0\x18ftypcrx \0\0\0\x01", "a camera raw photograph of Canon (CR3)"),
+            (b"FUJIFILMCCD-RAW 0201", "a camera raw photograph of Fujifilm (RAF)"),
+            (b"IIRO\x08\0\0\0", "a camera raw photograph of Olympus (ORF)"),
+            (b"IIU\0\x08\0\0\0", "a camera raw photograph of Panasonic (RW2)"),
+            (b"\0\0\0\x1cftypavif\0\0\0\0", "an AVIF picture"),
+            (b"\0\0\0\x18ftypheic\0\0\0\0", "a HEIC picture"),
+            (b"\0\0\0\x18ftypmif1\0\0\0\0", "a HEIC picture"),
+            (b"\0\0\0\x20ftypisom\0\0\x02\0", "a video"),
+            (b"\0\0\0\x20ftypmp42\0\0\x02\0", "a video"),
+            (b"\xff\x0a\xfa\x1f", "a JPEG XL picture"),
+            (b"\0\0\0\x0cjP  \r\n\x87\n", "a JPEG 2000 picture"),
+            (b"\x76\x2f\x31\x01\x02\0\0\0", "an OpenEXR picture"),
+            (b"#?RADIANCE\nFORMAT", "a Radiance picture"),
+            (b"GIF89a", "a GIF picture"),
+        ] {
+            assert_eq!(foreign_of(start).map(|foreign| foreign.what), Some(what));
+        }
+        assert!(foreign_of(b"to be or not to be").is_none() && foreign_of(b"").is_none());
     }
 }

@@ -21,7 +21,7 @@ use std::path::Path;
 use crate::encode::place::is_standard_output;
 use crate::format::{Format, Input, Reading, SIGNATURE_BYTES, Writing};
 
-pub(crate) use foreign::{describe_foreign_content, has_foreign_extension};
+pub(crate) use foreign::{foreign_of, has_foreign_extension};
 
 /// All formats, in the order in which messages and pages name them.
 pub(crate) static FORMATS: [&Format; 5] = [&jpeg::JPEG, &png::PNG, &tiff::TIFF, &webp::WEBP, &deep_zoom::DEEP_ZOOM];

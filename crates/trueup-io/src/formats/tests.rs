@@ -22,6 +22,7 @@ fn content_decides_not_the_name() {
     assert_eq!(format_of_content(b"RIFF\x00\x00\x00\x00WEBPVP8 "), Some("WebP"));
     assert_eq!(format_of_content(b"RIFF\x00\x00\x00\x00WAVEfmt "), None);
     assert_eq!(format_of_content(b"MM\x00*"), Some("TIFF"));
+    assert_eq!(format_of_content(b"II*\0\x10\0\0\0CR\x02\0"), None);
     assert_eq!(format_of_content(b"\x89PNG\r\n\x1a\n\0"), Some("PNG"));
     assert_eq!(format_of_content(b""), None);
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::options::SourceOptions;
 use super::rejection::Rejection;
-use crate::format::{HeaderError, Reading};
+use crate::format::{Foreign, HeaderError, Reading};
 use crate::formats;
 use crate::metadata::header::{Header, read_header};
 
@@ -52,6 +52,7 @@ pub(super) fn open_picture(
             format!("it is of a kind that is not read ({words})"),
             "Export it as gray or RGB with 8 or 16 bits a sample.",
         ),
+        HeaderError::Foreign(foreign) => not_read(foreign),
     })?;
     if named == Named::ByItsFolder && header.exif.is_by_this_program() {
         return Err(Rejection::new(
@@ -109,18 +110,24 @@ fn recognize(file: &mut File, length: u64) -> Result<&'static Reading, Rejection
         return Ok(format);
     }
     let readable = formats::readable_formats();
-    Err(match formats::describe_foreign_content(&start) {
-        Some(what) => Rejection::new(
-            "format-unsupported",
-            format!("it is {what}, a format that is not read"),
-            format!("Convert it to {readable}."),
-        ),
+    Err(match formats::foreign_of(&start) {
+        Some(foreign) => not_read(foreign),
         None => Rejection::new(
             "not-a-picture",
             format!("its content is not a {readable} picture, whatever its name says"),
             format!("Give photographs in {readable}."),
         ),
     })
+}
+
+/// Why a photograph of another format is left out, and what makes one of it that is not.
+fn not_read(foreign: &Foreign) -> Rejection {
+    let readable = formats::readable_formats();
+    Rejection::new(
+        "format-unsupported",
+        format!("it is {}, a format that is not read", foreign.what),
+        format!("Convert it to {readable}, for example with `{}`.", foreign.command),
+    )
 }
 
 /// Refuses pictures with too many pixels or too few.

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use trueup_core::{Error, Result};
-use trueup_io::encode;
 use trueup_io::scratch::check_scratch;
+use trueup_io::{encode, source};
 
 use super::side_outputs::SideOutput;
 use crate::options::StitchOptions;
@@ -137,6 +137,14 @@ impl Outputs {
             )),
             _ => Ok(()),
         }
+    }
+
+    /// Panoramas of an earlier run that stand in the row of numbered ones and that this run, of `count` panoramas, has not
+    /// written: `pano-3.jpg` where there are two now. Files that are not by this program end the row.
+    pub(crate) fn stale(&self, count: usize) -> Vec<PathBuf> {
+        let first = if count > 1 { count + 1 } else { 1 };
+        let numbered = (first..).map(|number| self.numbered(Some(number)).panorama);
+        numbered.take_while(|path| source::is_own_panorama(path)).collect()
     }
 
     fn files(&self) -> impl Iterator<Item = &Path> {

@@ -1,7 +1,8 @@
 //! From photographs to files: the whole job with its outputs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::{Result, StageContext};
 use trueup_io::source;
 
@@ -61,7 +62,7 @@ impl StitchJob {
         context: &StageContext,
     ) -> Result<Vec<Written>> {
         let stitcher = Stitcher::new(options, context).with_cache(cache);
-        let aligned = stitcher.align(&self.inputs)?;
+        let mut aligned = stitcher.align(&self.inputs)?;
         let count = aligned.alignments.len();
         let outputs: Vec<Outputs> =
             (1..=count).map(|number| self.outputs.numbered((count > 1).then_some(number))).collect();
@@ -69,6 +70,10 @@ impl StitchJob {
         self.outputs.refuse_several(count)?;
         for outputs in outputs.iter().filter(|_| count > 1) {
             self.check(outputs, options)?;
+        }
+        let stale = if self.inputs.all { self.outputs.stale(count) } else { Vec::new() };
+        if let Some(first) = aligned.alignments.first_mut() {
+            first.project.diagnostics.extend(stale.iter().map(|path| stale_panorama(path, count)));
         }
         let all = aligned.alignments.into_iter().zip(&outputs);
         all.map(|(alignment, outputs)| outputs.write(&stitcher, alignment)).collect()
@@ -83,4 +88,15 @@ impl StitchJob {
         let graph = self.inputs.graph.iter().map(|path| (path.as_path(), ReadFile::Graph));
         outputs.refuse_over(photographs.chain(masks).chain(graph))
     }
+}
+
+/// Says that a file is no panorama of this run though it is numbered like one; nobody's file is deleted.
+fn stale_panorama(path: &Path, count: usize) -> Diagnostic {
+    let made = if count == 1 { "1 panorama".to_owned() } else { format!("{count} panoramas") };
+    Diagnostic::warning(
+        "stale-panorama",
+        Subject::file(path.display()),
+        format!("it is a panorama of an earlier run; this one made {made}"),
+        "Remove it if it is not wanted.",
+    )
 }

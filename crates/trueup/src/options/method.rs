@@ -88,6 +88,12 @@ macro_rules! methods {
         }
 
         impl Method {
+            /// What `projection.kind = auto` means under this method: a view chosen for the scene if it is ours, by default
+            /// ("vpg"); of every other method, which is there to be compared, the shape that is its own.
+            pub(crate) fn chooses_view(self) -> bool {
+                self == Self::Vpg
+            }
+
             /// What the method is made of.
             pub(crate) fn form(self) -> MethodForm {
                 match self { $(Self::$variant => $form,)* }

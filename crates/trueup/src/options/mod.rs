@@ -9,7 +9,7 @@ use trueup_align::cameras::CameraOptions;
 use trueup_align::match_points::MatchPointOptions;
 use trueup_align::mesh::{LineAlignmentOptions, MeshOptions, PhotometricOptions, StructureOptions};
 use trueup_align::metrics::PixelMeasureOptions;
-use trueup_align::projection::ProjectionOptions;
+use trueup_align::projection::{Projection, ProjectionOptions};
 use trueup_align::similarity::SimilarityOptions;
 use trueup_align::vanishing::VanishingOptions;
 use trueup_align::warps::WarpOptions;
@@ -268,7 +268,11 @@ impl StitchOptions {
     #[must_use]
     pub fn fixed_by_method(&self) -> Self {
         let mut fixed = self.clone();
-        fixed.align.stitch.method.fix(&mut fixed.align);
+        let method = fixed.align.stitch.method;
+        method.fix(&mut fixed.align);
+        if fixed.arrange.projection.kind == Projection::Auto && !method.chooses_view() {
+            fixed.arrange.projection.kind = Projection::Mesh;
+        }
         fixed
     }
 

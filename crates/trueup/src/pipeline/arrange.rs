@@ -2,8 +2,15 @@
 //!
 //! Works from what a stitch has at hand as from what its project records: grids in any plane and levelled cameras.
 
+use std::borrow::Cow;
+use std::f64::consts::TAU;
+
 use nalgebra::Matrix3;
-use trueup_align::projection::{self, ParallaxShift, Placement, PosedPhotograph, Projection, ProjectionView};
+use trueup_align::mesh::CameraPlane;
+use trueup_align::metrics::without_torn_cells;
+use trueup_align::projection::{
+    self, ParallaxShift, Placement, PosedPhotograph, Projection, ProjectionOptions, ProjectionView,
+};
 use trueup_compose::crop::{self, Crop, Rectangle};
 use trueup_compose::layout::{self, CanvasLayout, CanvasOptions, Frame, Placed};
 use trueup_core::camera::Camera;
@@ -31,6 +38,8 @@ pub(crate) struct ArrangeInput {
     pub dominant: Option<Matrix3<f64>>,
     /// The turn of the plane of `placed` in its unit, if it closes on itself.
     pub period: Option<f64>,
+    /// Where directions lie in the plane of `placed`, if the cameras drew it because the mesh was worse.
+    pub by_cameras: Option<CameraPlane>,
 }
 
 /// A canvas, and how it came about.
@@ -46,6 +55,8 @@ pub(crate) struct Arrangement {
     pub delivered: Vec<GridMesh>,
     /// How directions were drawn; `None` for the mesh.
     pub projection: Option<ProjectionRecord>,
+    /// Where directions lie in `plane`, if the cameras drew it because the mesh was worse.
+    pub by_cameras: Option<CameraPlane>,
 }
 
 impl Arrangement {
@@ -58,7 +69,20 @@ impl Arrangement {
             }
             mesh
         });
-        Self { delivered: delivered.collect(), plane, written, projection: None }
+        Self { delivered: delivered.collect(), plane, written, projection: None, by_cameras: None }
+    }
+}
+
+impl Arrangement {
+    /// The plane by which light is evened out: without cells that are torn around a pole.
+    pub(crate) fn lit_plane(&self) -> Cow<'_, CanvasLayout> {
+        let Some(by_cameras) = self.by_cameras else { return Cow::Borrowed(&self.plane) };
+        let turn = Some(TAU * by_cameras.units_per_radian);
+        let mut plane = self.plane.clone();
+        for placed in &mut plane.placed {
+            placed.mesh = without_torn_cells(&placed.mesh, turn);
+        }
+        Cow::Owned(plane)
     }
 }
 
@@ -80,7 +104,8 @@ impl ArrangeInput {
         let dominant = geometry.and_then(|geometry| geometry.prior.guidance.dominant);
         let dominant = dominant.as_ref().map(matrix_from_rows);
         let period = geometry.and_then(|geometry| geometry.mesh.period);
-        Self { placed, reference: component.reference, cameras, dominant, period }
+        let by_cameras = geometry.and_then(|geometry| geometry.mesh.by_cameras);
+        Self { placed, reference: component.reference, cameras, dominant, period, by_cameras }
     }
 
     /// What a project knows of the photographs used, whose grids are `placed` in its order: composing from the record starts
@@ -90,7 +115,8 @@ impl ArrangeInput {
         let cameras = project.used_images().map(camera).collect();
         let dominant = project.manhattan.dominant.as_ref();
         let period = project.solved_canvas().period();
-        Self { placed, reference, cameras, dominant: dominant.map(matrix_from_rows), period }
+        let by_cameras = project.by_cameras;
+        Self { placed, reference, cameras, dominant: dominant.map(matrix_from_rows), period, by_cameras }
     }
 }
 
@@ -109,12 +135,14 @@ pub(crate) fn run(
 }
 
 fn lay_out(input: ArrangeInput, options: &ArrangeOptions, context: &StageContext) -> Result<Arrangement> {
-    let ArrangeInput { placed, reference, cameras, dominant, period } = input;
-    let is_drawn = cameras.is_none() || options.projection.kind == Projection::Mesh;
+    let ArrangeInput { placed, reference, cameras, dominant, period, by_cameras } = input;
+    let by_mesh = options.projection.kind == Projection::Mesh && by_cameras.is_none();
+    let is_drawn = cameras.is_none() || by_mesh;
     let lay = |context: &StageContext| layout::run_around(placed, reference, period, &options.canvas, context);
     // A canvas that is never drawn is of a size that is nobody's concern.
     let plane = if is_drawn { lay(context)? } else { context.gather(lay)?.value };
-    on_plane(Plane { layout: plane, reference, cameras, dominant }, options, context)
+    let by_cameras = by_cameras.map(|by_cameras| by_cameras.moved(plane.origin, plane.canvas_from_target));
+    on_plane(Plane { layout: plane, reference, cameras, dominant, by_cameras }, options, context)
 }
 
 /// Arranges the photographs of `project`, recorded on `plane`, as the options ask: with the recorded options as they were
@@ -144,8 +172,8 @@ pub(crate) fn recall(
             if may_be_cropped || !same_plane {
                 return lay_out(input, options, context);
             }
-            let ArrangeInput { cameras, dominant, .. } = input;
-            on_plane(Plane { layout: plane, reference, cameras, dominant }, options, context)
+            let ArrangeInput { cameras, dominant, by_cameras, .. } = input;
+            on_plane(Plane { layout: plane, reference, cameras, dominant, by_cameras }, options, context)
         })
     })
 }
@@ -159,11 +187,18 @@ struct Plane {
     cameras: Option<Vec<Camera>>,
     /// See [`ArrangeInput::dominant`].
     dominant: Option<Matrix3<f64>>,
+    /// See [`Arrangement::by_cameras`].
+    by_cameras: Option<CameraPlane>,
 }
 
 fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> Result<Arrangement> {
-    let Plane { layout: plane, reference, cameras, dominant } = plane;
-    let wanted = options.projection.kind;
+    let Plane { layout: plane, reference, cameras, dominant, by_cameras } = plane;
+    let asked = match (options.projection.kind, by_cameras) {
+        // There is no mesh: the view that suits.
+        (Projection::Mesh, Some(_)) => ProjectionOptions { kind: Projection::Auto, ..options.projection.clone() },
+        _ => options.projection.clone(),
+    };
+    let wanted = asked.kind;
     let Some(cameras) = cameras.filter(|_| wanted != Projection::Mesh) else {
         if !matches!(wanted, Projection::Mesh | Projection::Auto) {
             return Err(Error::not_applicable(
@@ -180,9 +215,12 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
         .zip(&plane.placed)
         .map(|(camera, placed)| PosedPhotograph { camera: *camera, mesh: placed.mesh.clone() })
         .collect();
-    let view = ProjectionView::choose(&photographs, dominant.as_ref(), &options.projection);
-    let max_parallax = options.projection.max_parallax_deg.to_radians();
-    let shifts = projection::parallax_shifts(&photographs, plane.period.map(|period| period as f64), max_parallax);
+    let view = ProjectionView::choose(&photographs, dominant.as_ref(), &asked);
+    let max_parallax = asked.max_parallax_deg.to_radians();
+    let shifts = match by_cameras {
+        Some(by_cameras) => photographs.iter().map(|photograph| by_cameras.shift(photograph)).collect(),
+        None => projection::parallax_shifts(&photographs, plane.period.map(|period| period as f64), max_parallax),
+    };
     context.check_cancelled()?;
     let scene = Scene { photographs: &photographs, shifts: &shifts, view: &view };
     // The reference keeps its own pixels in the middle of the projection.
@@ -191,7 +229,7 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
     let (written, _) = framed(drawn, options);
     report_cut(&plane, &written, &view, options, context);
     let projection = Some(ProjectionRecord::new(&view, &written));
-    Ok(Arrangement { delivered: scene.delivered(&written), plane, written, projection })
+    Ok(Arrangement { delivered: scene.delivered(&written), plane, written, projection, by_cameras })
 }
 
 /// Photographs that a view shows.
@@ -219,10 +257,9 @@ impl Scene<'_> {
             .map(|grid| Placed { photograph: plane.placed[grid.photograph].photograph, mesh: grid.mesh })
             .collect();
         context.check_cancelled()?;
-        let reach = self.view.flat.reach(self.view.half);
         let frame = Frame {
             canvas_from_target: canvas_from_plane,
-            window: Some([-reach, reach]),
+            window: Some(self.view.window(0.0)),
             period: self.view.flat.period().filter(|_| self.view.closed),
         };
         layout::framed(placed, &frame, &options.canvas, context)
@@ -315,6 +352,7 @@ mod tests {
             cameras: None,
             dominant: None,
             period,
+            by_cameras: None,
         };
         let mut options = ArrangeOptions::default();
         options.projection.kind = Projection::Perspective;

@@ -7,6 +7,7 @@ use trueup_core::scratch::ScratchSpace;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
 
+use super::machine::{self, MachineMemory};
 use crate::options::ResourceOptions;
 
 /// What the program takes beside what is counted: itself, features and matches, meshes, and what the allocator cannot give
@@ -15,9 +16,6 @@ const PROGRAM_BYTES: usize = 96_000_000;
 
 /// The share of the machine's memory that is taken without being asked for less or more: 1 / 4.
 const AUTOMATIC_SHARE: u64 = 4;
-
-/// Where the machine does not say how much memory it has, it is taken to have so much.
-const ASSUMED_MACHINE: u64 = 8_000_000_000;
 
 /// Bytes that finding features takes per working pixel: the levels of the scale space of a photograph of twice the size.
 const FEATURE_BYTES: f64 = 240.0;
@@ -29,6 +27,9 @@ const PIXEL_BYTES: usize = 4;
 /// copy when it is turned upright.
 const DECODING: usize = 2;
 
+/// What to do where it is the option that allows too little.
+const RAISE_OPTION: &str = "Raise --memory (resources.memory), or give smaller photographs.";
+
 /// Memory to be divided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Budget {
@@ -36,22 +37,29 @@ pub(crate) struct Budget {
     memory: usize,
     /// Bytes that may be taken where less is too little to work at all.
     ceiling: usize,
+    /// What to do where that is too little.
+    advice: &'static str,
 }
 
 impl Budget {
-    /// What the options allow on this machine.
+    /// What the options allow on this machine: never more than the limits under which the program runs.
     pub(super) fn new(options: &ResourceOptions) -> Self {
-        match options.memory {
-            MemoryBudget::Bytes(bytes) => {
-                let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
-                Self { memory: bytes, ceiling: bytes }
-            }
+        Self::of(options, machine::memory(rayon::current_num_threads()))
+    }
+
+    fn of(options: &ResourceOptions, machine: MachineMemory) -> Self {
+        let (memory, ceiling) = match options.memory {
+            MemoryBudget::Bytes(bytes) => (bytes, bytes),
             MemoryBudget::Auto => {
-                let (machine, free) = machine_memory();
-                let memory = usize::try_from(machine / AUTOMATIC_SHARE).unwrap_or(usize::MAX);
-                Self { memory, ceiling: usize::try_from(free).unwrap_or(usize::MAX).max(memory) }
+                let memory = machine.total / AUTOMATIC_SHARE;
+                (memory, machine.free.max(memory))
             }
-        }
+        };
+        let limit = machine.hard.filter(|hard| hard.bytes <= ceiling);
+        let most = limit.map_or(u64::MAX, |hard| hard.bytes);
+        let bytes = |amount: u64| usize::try_from(amount.min(most)).unwrap_or(usize::MAX);
+        let advice = limit.map_or(RAISE_OPTION, |hard| hard.by.advice());
+        Self { memory: bytes(memory), ceiling: bytes(ceiling), advice }
     }
 
     /// How many photographs may be measured at once on copies of `working_pixels`, and how many bytes of them kept until they are composed.
@@ -72,7 +80,7 @@ impl Budget {
                 subject: format!("measuring {} ({} x {} px)", largest.name, largest.width, largest.height),
                 needed: format!("at least {} of memory", words(least)),
                 allowed: words(self.ceiling),
-                hint: "Raise --memory (resources.memory), or give smaller photographs.".to_owned(),
+                hint: self.advice.to_owned(),
             });
         }
         let memory = self.memory.max(least) - PROGRAM_BYTES;
@@ -98,23 +106,9 @@ pub(crate) struct Measuring {
     pub kept_bytes: usize,
 }
 
-/// Bytes of memory that this machine, or the container that the program runs in, has, and how many of them are free.
-fn machine_memory() -> (u64, u64) {
-    let (mut total, mut free) = (0, 0);
-    // An error where the operating system is not known.
-    if let Ok(mut system) = sysinfo::System::new() {
-        system.refresh_memory();
-        (total, free) = (system.total_memory(), system.available_memory());
-        if let Some(container) = system.cgroup_limits().filter(|container| container.total_memory > 0) {
-            total = total.min(container.total_memory);
-            free = free.min(container.free_memory);
-        }
-    }
-    if total == 0 { (ASSUMED_MACHINE, ASSUMED_MACHINE / AUTOMATIC_SHARE) } else { (total, free) }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::machine::{HardLimit, LimitedBy};
     use super::*;
     use crate::options::StitchOptions;
 
@@ -136,7 +130,7 @@ mod tests {
     fn budget(memory: &str) -> Budget {
         let mut options = StitchOptions::default();
         options.set(&format!("resources.memory={memory}")).expect("an amount");
-        Budget::new(&options.run.resources)
+        Budget::of(&options.run.resources, MachineMemory { total: 8_000_000_000, free: 3_000_000_000, hard: None })
     }
 
     #[test]
@@ -166,8 +160,31 @@ mod tests {
 
     #[test]
     fn without_a_word_a_share_of_the_machine_is_taken_and_more_if_it_must_be() {
-        let Budget { memory, ceiling } = Budget::new(&ResourceOptions::default());
+        let machine = MachineMemory { total: 8_000_000_000, free: 3_000_000_000, hard: None };
+        let Budget { memory, ceiling, .. } = Budget::of(&ResourceOptions::default(), machine);
+        assert_eq!((memory, ceiling), (2_000_000_000, 3_000_000_000));
+        let Budget { memory, ceiling, .. } = Budget::new(&ResourceOptions::default());
         assert!(memory > 0 && ceiling >= memory);
-        assert_eq!(budget("2GB"), Budget { memory: 2_000_000_000, ceiling: 2_000_000_000 });
+    }
+
+    /// Whatever was asked for: beyond these the program is killed, or its allocations fail.
+    #[test]
+    fn limits_of_containers_and_shells_are_never_exceeded() {
+        for by in [LimitedBy::ControlGroup, LimitedBy::Process] {
+            let hard = Some(HardLimit { bytes: 150_000_000, by });
+            let machine = MachineMemory { total: 150_000_000, free: 150_000_000, hard };
+            for memory in ["auto", "2GB"] {
+                let mut options = StitchOptions::default();
+                options.set(&format!("resources.memory={memory}")).expect("an amount");
+                let budget = Budget::of(&options.run.resources, machine);
+                let refused =
+                    budget.measuring(&images(3, 6000, 4000), WORKING_PIXELS).err().map(|error| error.to_string());
+                let message = refused.expect("too little");
+                assert!(message.contains("150 MB allowed") && message.ends_with(by.advice()), "{message}");
+            }
+            let mut options = StitchOptions::default();
+            options.set("resources.memory=100MB").expect("an amount");
+            assert_eq!(Budget::of(&options.run.resources, machine).advice, RAISE_OPTION);
+        }
     }
 }

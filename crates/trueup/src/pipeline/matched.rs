@@ -16,7 +16,7 @@ use super::photographs::PhotographSet;
 use crate::job::inputs::{Inputs, Reference};
 use crate::job::names::reference_named;
 use crate::memo::{Key, KeyMaker};
-use crate::report::left_out::{LeftOut, counts, explain, none_usable, reason_of_rejected, strength};
+use crate::report::left_out::{LeftOut, counts, explain, none_usable, not_in_graph, reason_of_rejected, strength};
 use crate::report::several::several;
 
 /// Everything known of the photographs after matching.
@@ -132,6 +132,10 @@ impl Matched {
         if let Some(position) = stitched.iter().position(|members| members.contains(&index)) {
             let reason = format!("it is in panorama {} of {}", position + 1, stitched.len());
             return LeftOut { code: "other-panorama", reason, hint: String::new() };
+        }
+        let edges = &self.graph_file.edges;
+        if !edges.is_empty() && !edges.iter().any(|&(a, b)| a == index || b == index) {
+            return not_in_graph();
         }
         let component = stitched.first().map_or(&[][..], Vec::as_slice);
         explain(index, component, &self.pairs, &self.set.names())

@@ -8,6 +8,7 @@ pub(crate) mod align;
 pub(crate) mod arrange;
 mod budget;
 pub(crate) mod compose;
+mod machine;
 pub(crate) mod matched;
 pub(crate) mod matching;
 pub(crate) mod measure;
@@ -45,7 +46,7 @@ use crate::project::fill::{GeometryRecord, fill_geometry, place, record_composit
 use crate::project::provenance;
 use crate::project::read::Recorded;
 use crate::project::record::Project;
-use crate::report::measures;
+use crate::report::{judgement, measures, sideways};
 
 pub use results::{Aligned, Alignment, MatchedPhotographs};
 
@@ -228,15 +229,16 @@ impl<'a> Stitcher<'a> {
             }
         };
         let input = ArrangeInput::of_geometry(place(&component, geometry.as_ref()), &component, geometry.as_ref());
-        let arrangement = context.absorb(arrange::run(input, &self.options.arrange, context)?);
+        let fixed = self.options.fixed_by_method();
+        let arrangement = context.absorb(arrange::run(input, &fixed.arrange, context)?);
         let light = LightInput {
-            layout: &arrangement.plane,
+            layout: &arrangement.lit_plane(),
             small: matched.small_photographs(&component),
             reference: component.reference,
             photographs,
         };
         let corrections = context.absorb(compose::light(&light, &self.options.compose, context)?);
-        let mut project = unfilled(matched, &self.options.fixed_by_method(), members, groups);
+        let mut project = unfilled(matched, &fixed, members, groups);
         let geometry = geometry.as_ref();
         let found =
             GeometryRecord { component: &component, geometry, arrangement: &arrangement, corrections: &corrections };
@@ -244,6 +246,8 @@ impl<'a> Stitcher<'a> {
         project.color_space = photographs.colors().map(PhotographColors::name).unwrap_or_default();
         project.measures =
             geometry.map(|geometry| context.time("measures", || measures::run(&component, geometry, &arrangement)));
+        let on_side = geometry.and_then(|geometry| sideways::warning(&geometry.cameras.cameras, members));
+        judgement::warnings(&project).into_iter().chain(on_side).for_each(|warning| context.report(warning));
         let layout = arrangement.written;
         let corrections = corrections.of_placed(&layout, |photograph| members.binary_search(&photograph).ok());
         let directions = geometry.map(|geometry| geometry.triads.clone()).unwrap_or_default();
@@ -263,14 +267,15 @@ impl<'a> Stitcher<'a> {
         let recalled = self.context.gather(|context| {
             let Recorded { used, layout, corrections, reference } = Recorded::new(project)?;
             let set = PhotographSet::open(found, self.options, context)?;
-            let arrangement = arrange::recall(layout, reference, project, &self.options.arrange, context)?;
+            let fixed = self.options.fixed_by_method();
+            let arrangement = arrange::recall(layout, reference, project, &fixed.arrange, context)?;
             let arrangement: Arrangement = context.absorb(arrangement);
             let corrections = match self.options.compose.exposure == project.options.compose.exposure {
                 true => corrections,
                 false => self.light_anew(&set, &arrangement, reference, context)?,
             };
-            let same_view = self.options.arrange == project.options.arrange;
-            let mut project = Project { options: self.options.clone(), seconds: Default::default(), ..project.clone() };
+            let same_view = fixed.arrange == project.options.arrange;
+            let mut project = Project { options: fixed, seconds: Default::default(), ..project.clone() };
             record_composition(&mut project, &used, &set, &arrangement, &corrections);
             project.color_space = set.files.colors().map(PhotographColors::name).unwrap_or_default();
             if !same_view {
@@ -302,7 +307,7 @@ impl<'a> Stitcher<'a> {
             frame: copy.frame,
             camera,
         });
-        let layout = &arrangement.plane;
+        let layout = &arrangement.lit_plane();
         let light = LightInput { layout, small: small.collect(), reference, photographs: &set.files };
         Ok(context.absorb(compose::light(&light, &self.options.compose, context)?))
     }

@@ -85,6 +85,7 @@ pub(crate) fn unfilled(
         response: Response::default(),
         projection: None,
         mesh_canvas: None,
+        by_cameras: None,
         seconds: std::collections::BTreeMap::new(),
         diagnostics: Vec::new(),
     }
@@ -179,7 +180,9 @@ pub(crate) fn record_composition(
 fn paths(project: &mut Project) -> impl Iterator<Item = &mut String> {
     let measures = project.measures.iter_mut().flat_map(|measures| {
         let bent = measures.long_lines.iter_mut().filter_map(|lines| lines.longest_bent.as_mut());
-        measures.photographs.iter_mut().map(|one| &mut one.path).chain(bent.map(|bent| &mut bent.path))
+        let apart = measures.reprojection.iter_mut().filter_map(|found| found.worst_pair.as_mut());
+        let places = bent.map(|bent| &mut bent.path).chain(apart.flat_map(|pair| [&mut pair.a, &mut pair.b]));
+        measures.photographs.iter_mut().map(|one| &mut one.path).chain(places)
     });
     std::iter::once(&mut project.reference).chain(&mut project.manhattan.inliers).chain(measures)
 }
@@ -211,6 +214,7 @@ fn record_canvas(project: &mut Project, arrangement: &Arrangement) {
     project.canvas = canvas(&arrangement.written);
     project.mesh_canvas = arrangement.projection.map(|_| canvas(&arrangement.plane));
     project.projection = arrangement.projection;
+    project.by_cameras = arrangement.by_cameras;
 }
 
 /// What was found of a group of photographs.

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use serde::{Deserialize, Serialize};
-use trueup_align::projection::{FlatKind, ProjectionView};
+use trueup_align::projection::{Fit, FlatKind, ProjectionView};
 use trueup_compose::layout::CanvasLayout;
 use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 
@@ -22,6 +22,9 @@ pub struct ProjectionRecord {
     pub roll_deg: f64,
     /// Distance of Panini's viewpoint behind the axis; the others do not ask.
     pub panini_distance: f64,
+    /// Which of its family a fitted projection is; nothing recorded of the others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fit: Option<Fit>,
     /// Canvas pixels per radian at the projection's middle.
     pub px_per_radian: f64,
     /// The plane's coordinates (radians at the middle) at the canvas's corner.
@@ -40,6 +43,7 @@ impl ProjectionRecord {
             pitch_deg: view.pitch.to_degrees(),
             roll_deg: view.roll.to_degrees(),
             panini_distance: view.flat.panini_distance,
+            fit: (view.flat.kind == FlatKind::Fitted).then_some(view.flat.fit),
             px_per_radian,
             origin: written.origin,
             sphere: sphere(view, written),
@@ -87,8 +91,8 @@ mod tests {
     use super::*;
 
     fn view(kind: FlatKind) -> ProjectionView {
-        let flat = Flat { kind, panini_distance: 1.0 };
-        ProjectionView { flat, yaw: 0.25, pitch: 0.0, roll: 0.0, half: kind.comfortable(), closed: false }
+        let (flat, half) = (Flat::named(kind, 1.0), kind.comfortable());
+        ProjectionView { flat, yaw: 0.25, pitch: 0.0, roll: 0.0, half, shown: None, closed: false }
     }
 
     fn canvas(width: usize, height: usize, origin: [f64; 2]) -> CanvasLayout {

@@ -60,6 +60,9 @@ impl Recorded {
         records.iter().try_for_each(|record| check_focal(record))?;
         let meshes = records.iter().map(|record| solved_grid(record)).collect::<Result<Vec<_>>>()?;
         let corrections = recorded_corrections(project, &records)?;
+        if !project.by_cameras.is_none_or(|plane| plane.is_sound()) {
+            return Err(Error::input("the project", "its plane of directions is none", AS_WRITTEN));
+        }
         let canvas = project.solved_canvas();
         let (width, height) = (canvas.width, canvas.height);
         // Grids may lie beyond the ends of a full turn by less than a turn, and anywhere around what was cropped.

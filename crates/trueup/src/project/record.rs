@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::{Deserialize, Deserializer, Serialize};
+use trueup_align::mesh::CameraPlane;
 use trueup_compose::exposure::{Correction, Response};
 use trueup_core::camera::Camera;
 use trueup_core::diagnostics::Diagnostic;
@@ -222,6 +223,10 @@ pub struct Project {
     /// The canvas of the plane in which the grids were solved, where that is not the panorama's: with a projection.
     #[serde(default)]
     pub mesh_canvas: Option<Canvas>,
+    /// Where directions of the level world lie on `mesh_canvas`, if the mesh was worse than the cameras, so that these drew
+    /// the panorama.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub by_cameras: Option<CameraPlane>,
     /// Wall seconds per stage.
     pub seconds: BTreeMap<String, f64>,
     /// What was found on the way.

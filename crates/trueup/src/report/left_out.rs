@@ -47,6 +47,15 @@ pub(crate) fn explain(photograph: usize, component: &[usize], pairs: &[PairMatch
     }
 }
 
+/// Why a photograph that no pair of the graph names is left out: nobody looked whether it overlaps another one.
+pub(crate) fn not_in_graph() -> LeftOut {
+    LeftOut {
+        code: "not-in-graph",
+        reason: "the graph has no pair with it".to_owned(),
+        hint: "Add a line that joins it to another photograph, or stitch without --graph.".to_owned(),
+    }
+}
+
 /// "9 of 24 matches agree (15 needed)".
 pub(crate) fn counts(pair: &PairMatches) -> String {
     match pair.verdict {

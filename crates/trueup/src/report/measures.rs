@@ -62,7 +62,7 @@ pub struct UprightMeasures {
 }
 
 /// Distances of matched points in the panorama, in the photographs' own pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReprojectionMeasures {
     /// Matches measured.
     pub matches: usize,
@@ -71,6 +71,20 @@ pub struct ReprojectionMeasures {
     /// Root mean square distance.
     pub rms_px: f64,
     /// 95 of 100 are not farther apart.
+    pub percentile_95_px: f64,
+    /// Where they are farthest apart. `None` in projects of earlier versions.
+    #[serde(default)]
+    pub worst_pair: Option<WorstPair>,
+}
+
+/// The two photographs whose matched points land farthest apart.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WorstPair {
+    /// Path of the first photograph.
+    pub a: String,
+    /// Path of the second photograph.
+    pub b: String,
+    /// 95 of 100 of their matches are not farther apart.
     pub percentile_95_px: f64,
 }
 
@@ -253,11 +267,22 @@ fn reprojection(
         })
         .collect();
     let found = metrics::reprojection(&pairs, period)?;
+    let apart = pairs.iter().zip(&geometry.coinciding).filter_map(|(pair, known)| {
+        let alone = metrics::reprojection(std::slice::from_ref(pair), period)?;
+        Some((known, alone.percentile_95_px))
+    });
+    let path = |photograph: usize| component.images[photograph].path.display().to_string();
+    let worst_pair = apart.max_by(|one, two| one.1.total_cmp(&two.1)).map(|(pair, percentile_95_px)| WorstPair {
+        a: path(pair.a),
+        b: path(pair.b),
+        percentile_95_px,
+    });
     Some(ReprojectionMeasures {
         matches: found.matches,
         mean_px: found.mean_px,
         rms_px: found.rms_px,
         percentile_95_px: found.percentile_95_px,
+        worst_pair,
     })
 }
 

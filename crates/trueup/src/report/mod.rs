@@ -1,6 +1,8 @@
 //! What is told of a panorama: measures, evaluation against the truth, and why photographs were left out.
 
 pub(crate) mod evaluation;
+pub(crate) mod judgement;
 pub(crate) mod left_out;
 pub(crate) mod measures;
 pub(crate) mod several;
+pub(crate) mod sideways;

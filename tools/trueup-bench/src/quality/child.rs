@@ -9,6 +9,7 @@ use trueup::{CancelToken, Error, Result};
 use wait4::Wait4;
 
 use super::discover::StitchSet;
+use crate::methods::VIEW;
 
 /// What became of a set's process.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,6 +49,7 @@ pub(super) fn measure(
         .arg(&panorama)
         .arg("--project")
         .arg(&project)
+        .args(["--set", VIEW])
         .arg("--quiet")
         .stdin(Stdio::null())
         .stdout(Stdio::null())

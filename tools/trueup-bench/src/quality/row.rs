@@ -135,7 +135,7 @@ impl QualityRow {
         self.upright_max_deg = measures.upright.map(|upright| upright.max_deg);
         self.ld = Some(measures.ld);
         self.gdic_deg = measures.estimated_gdic_deg;
-        self.align_px = measures.reprojection.map(|reprojection| reprojection.rms_px);
+        self.align_px = measures.reprojection.as_ref().map(|reprojection| reprojection.rms_px);
     }
 
     fn take_truth(&mut self, evaluation: &Evaluation) {

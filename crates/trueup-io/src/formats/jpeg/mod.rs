@@ -16,9 +16,10 @@ use crate::metadata::block;
 pub(crate) static JPEG: Format = Format {
     name: "JPEG",
     extensions: &["jpg", "jpeg"],
-    rare_extensions: &["jpe", "jfif"],
+    rare_extensions: &["jpe", "jfif", "mpo"],
     reading: Some(Reading {
-        kinds: "baseline and progressive, gray and color",
+        kinds: "baseline and progressive, gray and color; the first picture of a multi-picture file (MPO), the photograph of a motion \
+                photograph",
         has_signature: |start| start.starts_with(&[0xff, 0xd8, 0xff]),
         stored: read::stored,
         icc: read::icc,

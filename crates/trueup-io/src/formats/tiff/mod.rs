@@ -6,12 +6,14 @@ mod directory;
 pub(crate) mod metadata;
 mod page;
 mod palette;
+mod raw;
 mod read;
 mod samples;
 #[cfg(test)]
 mod tests;
 pub(crate) mod write;
 
+use super::foreign::is_cr2;
 use crate::encode::options::{Depth, TiffCompression};
 use crate::format::{Format, LOSSLESS_BYTES, Reading, Transparency, Writer, Writing};
 
@@ -27,7 +29,9 @@ pub(crate) static TIFF: Format = Format {
         kinds: "classic and BigTIFF, 8 and 16 bits, gray, RGB, CMYK, with or without alpha; palettes; YCbCr (color differences at \
                 reduced resolution within JPEG compression only); gray of 1, 2 or 4 bits; floating point of 16, 32 or 64 \
                 bits; in strips, tiles or planes; the first page",
-        has_signature: |start| matches!(start, [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..]),
+        has_signature: |start| {
+            matches!(start, [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..]) && !is_cr2(start)
+        },
         stored: read::stored,
         icc: read::icc,
         exif: read::exif,

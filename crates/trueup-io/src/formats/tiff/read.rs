@@ -3,7 +3,6 @@
 use std::io::{Read, Seek};
 
 use exif::{Field, Tag as ExifTag};
-use tiff::TiffError;
 use tiff::decoder::Decoder;
 use tiff::tags::Tag;
 use trueup_core::raster::Photograph;
@@ -13,9 +12,11 @@ use trueup_core::{Error, Result};
 use super::convert::{encoded, rgb_of_cmyk, rgb_of_ycbcr, unpacked};
 use super::page::{FirstPage, PixelKind};
 use super::palette;
+use super::raw::{failure, is_raw};
 use super::samples::{Samples, TiffInput, not_as_stated, open};
 use crate::format::{HeaderError, Input, StoredPixels};
 use crate::formats::decoded::{check_unchanged, damaged, eight, sixteen};
+use crate::formats::foreign::RAW;
 use crate::metadata::exif_fields::ExifFields;
 use crate::metadata::tiff_fields;
 
@@ -23,11 +24,11 @@ use crate::metadata::tiff_fields;
 const YCBCR_COEFFICIENTS: Tag = Tag::Unknown(529);
 
 pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
-    let page = Decoder::new(input as &mut dyn TiffInput).and_then(|mut decoder| FirstPage::of(&mut decoder));
-    let FirstPage { width, height, bits, kind } = page.map_err(|error| match error {
-        TiffError::UnsupportedError(unsupported) => HeaderError::Unsupported(unsupported.to_string()),
-        other => HeaderError::damaged(other),
-    })?;
+    let mut decoder = Decoder::new(input as &mut dyn TiffInput).map_err(failure)?;
+    if is_raw(&mut decoder) {
+        return Err(HeaderError::Foreign(&RAW));
+    }
+    let FirstPage { width, height, bits, kind } = FirstPage::of(&mut decoder).map_err(failure)?;
     Ok(StoredPixels { width, height, bits, is_float: matches!(kind, PixelKind::Float(_)) })
 }
 

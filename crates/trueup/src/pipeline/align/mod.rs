@@ -8,17 +8,19 @@ mod turn;
 mod vanishing;
 
 use std::borrow::Cow;
+use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 use trueup_align::cameras::Cameras;
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points::OverlapWarp;
-use trueup_align::mesh::{self, MeshInput, Refinements, WarpedMesh};
+use trueup_align::mesh::{self, BaseShape, ByCamerasInput, MeshInput, Refinements, WarpedMesh};
 use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityPrior};
 use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::TriadOutcome;
 use trueup_align::warps::{self, WarpInput, WarpModel};
 use trueup_core::diagnostics::Reported;
+use trueup_core::geometry::matrix_from_rows;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
@@ -117,6 +119,7 @@ fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageCont
         grids: &grids,
         cameras,
         prior: &prior,
+        all_warps: warps,
         warps: &within,
         pairs: &within_turn,
         turn: turn.as_ref(),
@@ -176,6 +179,8 @@ struct Deformation<'a> {
     grids: &'a [GridMesh],
     cameras: &'a Cameras,
     prior: &'a SimilarityPrior,
+    /// All overlaps.
+    all_warps: &'a [OverlapWarp],
     /// The overlaps and pairs that do not lie across the cut of a full turn.
     warps: &'a [OverlapWarp],
     pairs: &'a [PairMatches],
@@ -194,7 +199,42 @@ impl Deformation<'_> {
         let closure = closure.filter(|_| component.reference_rotation == 0.0);
         let refinements = Refinements { closure, ..sources.refinements(component, self.pairs, options) };
         let (grids, warps, reference) = (self.grids, self.warps, component.reference);
-        mesh::run(&MeshInput { grids, warps, bases: &bases, reference, refinements }, &options.mesh, context)
+        let input = MeshInput { grids, warps, bases: &bases, reference, refinements };
+        let solved = context.gather(|context| mesh::run(&input, &options.mesh, context))?;
+        // What is turned or tilted as a whole, and the published similarity, want the mesh's own plane.
+        let on_sphere = options.mesh.base == BaseShape::Sphere;
+        if !on_sphere || component.reference_rotation != 0.0 || mesh::tilts(cameras, self.prior) {
+            return Ok(context.absorb(solved));
+        }
+        self.unless_worse(solved, options, context)
+    }
+
+    /// The mesh, with what it told, or the cameras where it is worse than they are.
+    fn unless_worse(
+        &self,
+        solved: Reported<WarpedMesh>,
+        options: &AlignOptions,
+        context: &StageContext,
+    ) -> Result<WarpedMesh> {
+        let cameras = &self.cameras.cameras;
+        let level_from_world = self.prior.level_from_world();
+        let mut level = self.prior.corrected_cameras(cameras);
+        for camera in &mut level {
+            camera.set_rotation(&(camera.rotation() * level_from_world.transpose()));
+        }
+        let dominant = self.prior.guidance.dominant.as_ref().map(matrix_from_rows);
+        let input = ByCamerasInput {
+            grids: self.grids,
+            cameras: &level,
+            warps: self.all_warps,
+            severed: self.cut.map_or(&[], |cut| &cut.severed),
+            dominant: dominant.as_ref(),
+            units_per_radian: mesh::turn_length(cameras, self.prior) / TAU,
+        };
+        match mesh::unless_worse(&solved.value, &input, &options.mesh, context)? {
+            Some(drawn) => Ok(drawn),
+            None => Ok(context.absorb(solved)),
+        }
     }
 
     fn by_warp(&self, model: WarpModel, options: &AlignOptions, context: &StageContext) -> Result<WarpedMesh> {

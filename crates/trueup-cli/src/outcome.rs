@@ -1,0 +1,47 @@
+//! What is said of panoramas that were written, and whether they are what was asked for.
+
+use trueup::{Severity, Written};
+
+use crate::arguments::{FailOn, MessageArgs};
+use crate::failure::Failure;
+use crate::output;
+use crate::summary;
+use crate::words::printable;
+
+/// Says what was written, in the form asked for; `takes_output` tells that standard output holds a file.
+///
+/// # Errors
+/// What [`MessageArgs::fail_on`] and [`MessageArgs::max_error`] make of it, and those of writing.
+pub(crate) fn tell(written: &[Written], messages: &MessageArgs, takes_output: bool) -> Result<(), Failure> {
+    if messages.quiet {
+        trueup_terminal::complain(&printable(&summary::warnings(written)));
+    }
+    if messages.json {
+        output::report(&summary::json(written), takes_output)?;
+    } else if !messages.quiet {
+        output::report(&summary::of_written(written, messages.verbose), takes_output)?;
+    }
+    refuse(written, messages)
+}
+
+fn refuse(written: &[Written], messages: &MessageArgs) -> Result<(), Failure> {
+    let apart = |one: &Written| Some(one.project.measures.as_ref()?.reprojection.as_ref()?.percentile_95_px);
+    let widest = written.iter().filter_map(apart).fold(0.0, f64::max);
+    if let Some(allowed) = messages.max_error.filter(|&allowed| widest > allowed) {
+        return Err(Failure::unsatisfied(
+            format!("95 of 100 matched points land within {widest:.1} px, {allowed} px are allowed (--max-error)"),
+            "Look at the panorama, which is written. Leave photographs out, or try --align lines+photometric.",
+        ));
+    }
+    let warnings = written.iter().flat_map(|one| &one.project.diagnostics);
+    let warnings: Vec<&str> =
+        warnings.filter(|one| one.severity == Severity::Warning).map(|one| one.message.as_str()).collect();
+    match (messages.fail_on, warnings.as_slice()) {
+        (None, _) | (_, []) => Ok(()),
+        (Some(FailOn::Warning), [first, others @ ..]) => {
+            let more = if others.is_empty() { String::new() } else { format!("; and {} more", others.len()) };
+            let hint = "The panorama is written; see the summary or the project for every warning.";
+            Err(Failure::unsatisfied(format!("a warning is a failure here (--fail-on): {first}{more}"), hint))
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! What the measures mean, in plain words: good, fair, or something to look at, by stated limits.
+
+use std::fmt;
+
+use serde::Serialize;
+use trueup_core::diagnostics::{Diagnostic, Subject};
+
+use super::measures::Measures;
+use crate::project::record::Project;
+
+/// What a measured figure means for people.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Nobody sees that it is not perfect.
+    Good,
+    /// To be seen by who looks for it.
+    Fair,
+    /// It may be seen at once.
+    LookAtIt,
+}
+
+impl Verdict {
+    /// Of a figure: good up to the first limit, fair up to the second.
+    fn of(figure: f64, [good, fair]: [f64; 2]) -> Self {
+        if figure <= good {
+            Self::Good
+        } else if figure <= fair {
+            Self::Fair
+        } else {
+            Self::LookAtIt
+        }
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Good => "good",
+            Self::Fair => "fair",
+            Self::LookAtIt => "look at it",
+        })
+    }
+}
+
+/// Limits of the lean, 95 % sure, in degrees: a degree is seen beside a straight edge, three without one.
+const LEAN_DEG: [f64; 2] = [1.0, 3.0];
+/// Limits of how far apart 95 of 100 matched points may land, as shares of the photographs' longer side: what is a pixel on
+/// a screen that shows a whole photograph, and four.
+const APART: [f64; 2] = [1.0 / 2000.0, 1.0 / 500.0];
+/// The same in pixels, which no photograph is too small for: blending hides a pixel and a half.
+const LEAST_APART_PX: [f64; 2] = [1.5, 4.0];
+/// Limits of how far a long line may stray, as shares of its length: what counts as bent, and what the level sphere unrolled,
+/// the shape that costs nothing, bends a line along the upper edge of a photograph 90 degrees wide and 70 high: that falls
+/// from 35 degrees of elevation to atan(tan 35 cos 45) = 26.3.
+const BENT: [f64; 2] = [0.003, 0.1];
+
+/// A plain word for every figure that was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Judgement {
+    /// How upright it is: by the widest lean that is probable.
+    pub upright: Option<Verdict>,
+    /// How well photographs meet: by the distances of matched points.
+    pub alignment: Option<Verdict>,
+    /// How straight lines are: by the longest that is bent.
+    pub lines: Option<Verdict>,
+}
+
+impl Project {
+    /// What the measures that were recorded mean; `None` for figures that were not measured.
+    pub fn judgement(&self) -> Judgement {
+        let Some(measures) = &self.measures else { return Judgement::default() };
+        let upright = measures.upright.as_ref().map(|upright| upright.within_deg.unwrap_or(upright.max_deg));
+        let apart = measures.reprojection.as_ref().map(|found| found.percentile_95_px);
+        Judgement {
+            upright: upright.map(|degrees| Verdict::of(degrees, LEAN_DEG)),
+            alignment: apart.map(|apart| Verdict::of(apart, self.limits_apart_px())),
+            lines: measures.long_lines.as_ref().map(|lines| match &lines.longest_bent {
+                None => Verdict::Good,
+                Some(line) => Verdict::of(line.off_px / line.length_px, BENT),
+            }),
+        }
+    }
+
+    fn limits_apart_px(&self) -> [f64; 2] {
+        let side = self.used_images().map(|image| image.width.max(image.height)).max().unwrap_or(0) as f64;
+        [0, 1].map(|limit| (APART[limit] * side).max(LEAST_APART_PX[limit]))
+    }
+}
+
+/// A warning for every figure that is to be looked at, which names the place.
+pub(crate) fn warnings(project: &Project) -> Vec<Diagnostic> {
+    let Some(measures) = &project.measures else { return Vec::new() };
+    let is_bad = |verdict| verdict == Some(Verdict::LookAtIt);
+    let judgement = project.judgement();
+    let place = |path: &str| project.images.iter().position(|image| image.path == path);
+    [
+        leaning(measures, &place).filter(|_| is_bad(judgement.upright)),
+        misaligned(measures, &place).filter(|_| is_bad(judgement.alignment)),
+        bent(measures, &place).filter(|_| is_bad(judgement.lines)),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+fn leaning(measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Option<Diagnostic> {
+    let certain = measures.photographs.iter().filter(|photograph| photograph.certain);
+    let widest = certain.filter_map(|one| {
+        let lean = one.lean_deg?;
+        Some((one, lean, lean.abs() + one.within_deg.unwrap_or(0.0)))
+    });
+    let (photograph, lean, within) = widest.max_by(|one, two| one.2.total_cmp(&two.2))?;
+    let side = if lean < 0.0 { "left" } else { "right" };
+    Some(Diagnostic::warning(
+        "leaning",
+        Subject::Photograph(place(&photograph.path)?),
+        format!("what is vertical in it leans to the {side} by {:.1} degrees, up to {within:.1} at 95 %", lean.abs()),
+        "Look at it there. If it does lean, try --projection auto, or --roll with it.",
+    ))
+}
+
+fn misaligned(measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Option<Diagnostic> {
+    let found = measures.reprojection.as_ref()?;
+    let worst = found.worst_pair.as_ref()?;
+    Some(Diagnostic::warning(
+        "misaligned",
+        Subject::Pair(place(&worst.a)?, place(&worst.b)?),
+        format!(
+            "points that both show are up to {:.1} px apart (95 of 100; of all photographs {:.1})",
+            worst.percentile_95_px, found.percentile_95_px
+        ),
+        "Look at the seam between them. Parallax or a false match may be the reason: leave one out, or try --align \
+         lines+photometric.",
+    ))
+}
+
+fn bent(measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Option<Diagnostic> {
+    let line = measures.long_lines.as_ref()?.longest_bent.as_ref()?;
+    Some(Diagnostic::warning(
+        "line-bent",
+        Subject::Photograph(place(&line.path)?),
+        format!("a straight line of {:.0} px strays by {:.1} px", line.length_px, line.off_px),
+        "Look at it there. --structure lines keeps long lines straight.",
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::measures::{BentLine, LongLines, ReprojectionMeasures, UprightMeasures, WorstPair};
+    use super::*;
+
+    fn project(lean: f64, apart: f64, off_px: f64) -> Project {
+        let image = |path: &str| {
+            serde_json::json!({"path": path, "width": 4000, "height": 3000, "status": "used", "reason": "", "hint": "",
+                "component": 0, "focal_px": null, "rotation": null, "theta_deg": null, "scale": null, "gain": null,
+                "vanishing_points": null, "mesh": null})
+        };
+        let json = serde_json::json!({"format": "trueup-project", "version": 1, "method": "vpg", "options": {},
+            "reference": "a.jpg", "images": [image("a.jpg"), image("b.jpg")], "pairs": [],
+            "manhattan": {"divergence": null, "threshold": 0.1, "accepted": false, "failed_clause": null,
+                "dominant": null, "inliers": []},
+            "canvas": {"width": 1, "height": 1}, "seconds": {}, "diagnostics": []});
+        let mut project = Project::from_json(&json.to_string(), "test").expect("a project");
+        let photograph = serde_json::json!({"path": "b.jpg", "vertical_lines": 9, "lean_deg": -lean,
+            "standard_error_deg": 0.1, "within_deg": 0.2, "gamma_deg": 0.0, "certain": true});
+        project.measures = Some(Measures {
+            upright: Some(UprightMeasures { mean_deg: lean, max_deg: lean, within_deg: Some(lean + 0.2), measured: 2 }),
+            estimated_gdic_deg: None,
+            reprojection: Some(ReprojectionMeasures {
+                matches: 9,
+                mean_px: apart / 3.0,
+                rms_px: apart / 2.0,
+                percentile_95_px: apart,
+                worst_pair: Some(WorstPair { a: "a.jpg".into(), b: "b.jpg".into(), percentile_95_px: 2.0 * apart }),
+            }),
+            long_lines: Some(LongLines {
+                lines: 3,
+                mean_bend: 0.0,
+                bent: 1,
+                longest_bent: Some(BentLine { path: "a.jpg".into(), length_px: 1000.0, off_px }),
+            }),
+            ld: 0.0,
+            ld_mean: 0.0,
+            folds: 0,
+            photographs: vec![serde_json::from_value(photograph).expect("a photograph")],
+        });
+        project
+    }
+
+    #[test]
+    fn every_figure_has_a_plain_word() {
+        let words = |project: Project| {
+            let Judgement { upright, alignment, lines } = project.judgement();
+            [upright, alignment, lines].map(|verdict| verdict.expect("measured").to_string())
+        };
+        // Of a side of 4000 px: 2 px are good, 8 fair.
+        assert_eq!(words(project(0.5, 1.9, 2.9)), ["good", "good", "good"]);
+        assert_eq!(words(project(2.5, 7.9, 99.0)), ["fair", "fair", "fair"]);
+        assert_eq!(words(project(3.5, 8.1, 101.0)), ["look at it", "look at it", "look at it"]);
+    }
+
+    #[test]
+    fn bad_figures_become_warnings_that_name_the_place() {
+        assert!(warnings(&project(2.5, 7.9, 99.0)).is_empty());
+        let found = warnings(&project(3.5, 282.0, 101.0));
+        let told: Vec<(&str, &Subject)> = found.iter().map(|one| (one.code.as_str(), &one.subject)).collect();
+        assert_eq!(
+            told,
+            [
+                ("leaning", &Subject::Photograph(1)),
+                ("misaligned", &Subject::Pair(0, 1)),
+                ("line-bent", &Subject::Photograph(0))
+            ]
+        );
+        assert!(found[0].message.contains("to the left by 3.5 degrees, up to 3.7"), "{}", found[0].message);
+        assert!(
+            found[1].message.contains("564.0 px apart (95 of 100; of all photographs 282.0)"),
+            "{}",
+            found[1].message
+        );
+    }
+}

@@ -1,0 +1,47 @@
+//! What is fuzzed: everything that reads what somebody else wrote.
+
+mod pictures;
+mod texts;
+
+use std::io;
+use std::path::PathBuf;
+
+use tempfile::TempDir;
+
+/// Something that reads.
+pub(crate) struct Target {
+    pub(crate) name: &'static str,
+    /// Valid inputs to start from, at least one.
+    pub(crate) seeds: fn() -> Vec<Vec<u8>>,
+    /// Reads an input; panics if it must not be read so.
+    pub(crate) read: fn(&Work, &[u8]),
+}
+
+/// All targets.
+pub(crate) static TARGETS: [Target; 8] = [
+    Target { name: "jpeg", seeds: || pictures::seeds("jpg"), read: pictures::read },
+    Target { name: "png", seeds: || pictures::seeds("png"), read: pictures::read },
+    Target { name: "tiff", seeds: || pictures::seeds("tif"), read: pictures::read },
+    Target { name: "webp", seeds: || pictures::seeds("webp"), read: pictures::read },
+    Target { name: "icc", seeds: pictures::profiles, read: pictures::read_profile },
+    Target { name: "project", seeds: texts::projects, read: texts::read_project },
+    Target { name: "graph", seeds: texts::graphs, read: texts::read_graph },
+    Target { name: "config", seeds: texts::configurations, read: texts::read_configuration },
+];
+
+/// A folder for files that are read.
+#[derive(Debug)]
+pub(crate) struct Work(TempDir);
+
+impl Work {
+    pub(crate) fn new() -> io::Result<Self> {
+        Ok(Self(tempfile::tempdir()?))
+    }
+
+    /// The input as a file; the one before it is gone.
+    fn file(&self, name: &str, input: &[u8]) -> PathBuf {
+        let path = self.0.path().join(name);
+        std::fs::write(&path, input).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        path
+    }
+}

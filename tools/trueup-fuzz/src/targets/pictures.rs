@@ -1,0 +1,141 @@
+//! Photographs: headers, EXIF, profiles, pixels, and the same file as a mask.
+
+use std::path::Path;
+
+use moxcms::ColorProfile;
+use trueup_core::raster::RowSource;
+use trueup_core::source::PhotographSource;
+use trueup_core::{Result, StageContext};
+use trueup_io::color::PhotographColors;
+use trueup_io::decode::{FilePhotographs, mask};
+use trueup_io::encode::{Depth, Metadata, MetadataKept, OutputOptions, write};
+use trueup_io::provenance::{PanoramaDescription, describe};
+use trueup_io::source::{SourceOptions, scan};
+
+use super::Work;
+
+/// Side of the pictures that are changed, in pixels: little more than photographs must have, so that many are read in a
+/// second.
+const SIDE: usize = 20;
+
+/// Largest picture that is decoded, in megapixels: headers claim any size.
+const MOST_MEGAPIXELS: f64 = 1.0;
+
+/// A picture of many colors.
+struct Colors;
+
+impl Colors {
+    fn level(x: usize, y: usize, channel: usize) -> u8 {
+        [x * 13, y * 11, x * y, 255][channel].min(255) as u8
+    }
+}
+
+impl RowSource for Colors {
+    fn width(&self) -> usize {
+        SIDE
+    }
+
+    fn height(&self) -> usize {
+        SIDE
+    }
+
+    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
+        row.iter_mut().enumerate().for_each(|(at, sample)| *sample = Self::level(at / 4, y, at % 4));
+        Ok(())
+    }
+
+    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
+        row.iter_mut().enumerate().for_each(|(at, sample)| *sample = u16::from(Self::level(at / 4, y, at % 4)) * 257);
+        Ok(())
+    }
+
+    fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()> {
+        row.iter_mut().enumerate().for_each(|(at, sample)| *sample = f32::from(Self::level(at / 4, y, at % 4)) / 255.0);
+        Ok(())
+    }
+}
+
+/// An EXIF block: orientation 6, a focal length of 24 mm, GPS directions; tag, type, number and value of every field (EXIF 3.0
+/// 4.6, TIFF 6.0 section 2).
+fn exif() -> Vec<u8> {
+    let field = |tag: u16, kind: u16, count: u32, value: u32| {
+        [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()].concat()
+    };
+    let (first, second, ratio) = (8_u32, 50_u32, 80_u32);
+    let mut block = [b"II*\0", &first.to_le_bytes()[..], &[3, 0]].concat();
+    block.extend([field(0x0112, 3, 1, 6), field(0x0131, 2, 4, 0x0061_6263), field(0x8769, 4, 1, second)].concat());
+    block.extend([0; 4]);
+    block.extend([&[2, 0][..], &field(0x920a, 5, 1, ratio), &field(0xa405, 3, 1, 24), &[0; 4]].concat());
+    block.extend([24_u32.to_le_bytes(), 1_u32.to_le_bytes()].concat());
+    block
+}
+
+/// Small pictures in a format, by their extension: with all the metadata it holds, at every depth it has.
+pub(super) fn seeds(extension: &str) -> Vec<Vec<u8>> {
+    let folder = tempfile::tempdir().expect("a folder for the seeds");
+    let path = folder.path().join("seed").with_extension(extension);
+    let icc = ColorProfile::new_display_p3().encode().ok();
+    let full = Metadata { exif: Some(exif()), icc, xmp: Some("<x:xmpmeta xmlns:x=\"adobe:ns:meta/\"/>".to_owned()) };
+    let mut seeds = Vec::new();
+    for (depth, metadata) in
+        [(Depth::Auto, &full), (Depth::Sixteen, &full), (Depth::Float, &full), (Depth::Eight, &Metadata::default())]
+    {
+        let options = OutputOptions { depth, ..OutputOptions::default() };
+        // Formats have some of the depths.
+        if write(&path, &Colors, metadata, &options, &StageContext::default()).is_ok() {
+            seeds.extend(std::fs::read(&path).ok());
+        }
+    }
+    seeds
+}
+
+/// Profiles of every kind that is read.
+pub(super) fn profiles() -> Vec<Vec<u8>> {
+    let all = [
+        ColorProfile::new_display_p3(),
+        ColorProfile::new_srgb(),
+        ColorProfile::new_gray_with_gamma(2.2),
+        ColorProfile::new_bt2020_pq(),
+    ];
+    all.iter().filter_map(|profile| profile.encode().ok()).collect()
+}
+
+/// Reads a photograph in every way there is.
+pub(super) fn read(work: &Work, input: &[u8]) {
+    read_file(&work.file("photograph.jpg", input));
+}
+
+/// Reads a photograph with this profile.
+pub(super) fn read_profile(work: &Work, input: &[u8]) {
+    let path = work.file("profile.png", &[]);
+    let metadata = Metadata { icc: Some(input.to_vec()), ..Metadata::default() };
+    // Files with profiles that cannot be are not written.
+    if write(&path, &Colors, &metadata, &OutputOptions::default(), &StageContext::default()).is_ok() {
+        read_file(&path);
+    }
+}
+
+fn read_file(path: &Path) {
+    let context = StageContext::default();
+    let options = SourceOptions { max_megapixels: MOST_MEGAPIXELS, ..SourceOptions::default() };
+    let Ok(sources) = scan(&[path.display().to_string()], &options, &context) else { return };
+    let Some(source) = sources.photographs.first() else { return };
+    let colors = PhotographColors::survey(&sources.photographs, &context);
+    let files = FilePhotographs::new(sources.photographs.clone(), 0).in_colors(colors);
+    let size = (source.width, source.height);
+    if let Ok(photograph) = files.photograph(0) {
+        assert_eq!((photograph.width(), photograph.height()), size, "a photograph is as large as its header says");
+    }
+    let _ = mask(path, source, &options, &context);
+    let description = PanoramaDescription {
+        photographs: &[path],
+        reference: 0,
+        yaws: &[Some(0.3)],
+        width: size.0,
+        height: size.1,
+        is_srgb: true,
+        spherical: None,
+        pose_deg: [0.0; 2],
+    };
+    describe(&description, MetadataKept::Keep);
+}

@@ -1,0 +1,80 @@
+//! Projects, graphs and configurations.
+
+use trueup::{Project, StitchOptions, hugin_project};
+use trueup_align::stitch_graph::parse_graph_file;
+
+use super::Work;
+
+/// A project by hand: two photographs with cameras and grids, one left out.
+pub(super) fn projects() -> Vec<Vec<u8>> {
+    let image = |path: &str, status: &str| {
+        serde_json::json!({
+            "path": path, "width": 640, "height": 480, "orientation": 1, "status": status, "reason": "", "hint": "",
+            "component": 0, "focal_px": 500.0, "rotation": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            "theta_deg": 0.5, "scale": 1.0, "gain": [1.0, 1.0, 1.0], "vanishing_points": null,
+            "mesh": {"columns": 1, "rows": 1, "vertices": [[0.0, 0.0], [640.0, 0.0], [0.0, 480.0], [640.0, 480.0]]}
+        })
+    };
+    let project = serde_json::json!({
+        "format": "trueup-project", "version": 1, "method": "vpg", "options": {}, "reference": "b.jpg",
+        "images": [image("a.jpg", "used"), image("b.jpg", "used"), image("c.jpg", "left_out")],
+        "pairs": [{"a": 0, "b": 1, "matches": 50, "inliers": 40, "needed": 15, "verdict": "joined"}],
+        "manhattan": {"divergence": 0.0031, "threshold": 0.1, "accepted": true, "failed_clause": null, "dominant": null,
+            "inliers": ["a.jpg"]},
+        "measures": {"upright": {"mean_deg": 0.1, "max_deg": 0.2, "within_deg": 0.3, "measured": 2},
+            "estimated_gdic_deg": 0.1, "long_lines": {"lines": 2, "mean_bend": 0.001, "bent": 1,
+            "longest_bent": {"path": "a.jpg", "length_px": 100.0, "off_px": 1.0}},
+            "reprojection": {"matches": 40, "mean_px": 0.36, "rms_px": 0.5, "percentile_95_px": 1.24},
+            "ld": 1.0, "ld_mean": 0.5, "folds": 0, "pictures": []},
+        "canvas": {"width": 1280, "height": 480}, "seconds": {"features": 0.5},
+        "diagnostics": [{"code": "full-turn", "severity": "note", "subject": {"stage": "mesh"}, "message": "round",
+            "hint": ""}]
+    });
+    vec![project.to_string().into_bytes(), b"{}".to_vec()]
+}
+
+pub(super) fn read_project(_: &Work, input: &[u8]) {
+    let Ok(project) = Project::from_json(&String::from_utf8_lossy(input), "project.json") else { return };
+    project.judgement();
+    project.photograph_names();
+    let _ = project.options.validate();
+    let _ = hugin_project(&project);
+    let written = project.to_json();
+    assert!(written.is_ok_and(|text| Project::from_json(&text, "again").is_ok()), "what is written can be read again");
+}
+
+pub(super) fn graphs() -> Vec<Vec<u8>> {
+    let texts = [
+        "\u{feff}# pairs\r\na 1.jpg -- b.jpg\r\nb.jpg -- c.jpg # and so on\r\n",
+        "{center_image_index | 1}\n{center_image_rotation_angle | -3.5}\n{matching_graph_image_edges-0 | 1 2}\n",
+    ];
+    texts.map(|text| text.as_bytes().to_vec()).into()
+}
+
+pub(super) fn read_graph(_: &Work, input: &[u8]) {
+    let names = ["a 1.jpg", "b.jpg", "c.jpg"].map(str::to_owned);
+    if let Ok(graph) = parse_graph_file(&String::from_utf8_lossy(input), &names, "graph.txt") {
+        let is_known = |photograph: usize| photograph < names.len();
+        assert!(graph.edges.iter().all(|&(a, b)| is_known(a) && is_known(b) && a != b));
+        assert!(graph.reference.is_none_or(is_known));
+    }
+}
+
+pub(super) fn configurations() -> Vec<Vec<u8>> {
+    let texts = [
+        "[mesh]\ncell_px = 30.0\n\n[canvas]\nscale = 0.5\ncrop = \"auto\"\n",
+        "[resources]\nmemory = \"2GB\"\n[output]\njpeg_quality = 90\n[exposure]\nenabled = false\n",
+    ];
+    texts.map(|text| text.as_bytes().to_vec()).into()
+}
+
+pub(super) fn read_configuration(_: &Work, input: &[u8]) {
+    let text = String::from_utf8_lossy(input);
+    let mut options = StitchOptions::default();
+    if options.merge_toml(&text, "mine.toml").is_ok() {
+        let _ = options.validate();
+    }
+    for line in text.lines() {
+        let _ = options.set(line);
+    }
+}
