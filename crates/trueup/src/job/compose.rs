@@ -79,7 +79,8 @@ impl ComposeJob {
             let mut masks = AllMasks::read(&self.masks, &images, &options.measure.source, context)?;
             let recorded: Vec<&[MaskRecord]> = self.project.used_images().map(|one| one.masks.as_slice()).collect();
             masks.recall(&recorded, &images, &self.project_folder, &options.measure.source, context)?;
-            let alignment = stitcher.recall(&self.project, FoundPhotographs { images, masks, ..FoundPhotographs::default() })?;
+            let alignment =
+                stitcher.recall(&self.project, FoundPhotographs { images, masks, ..FoundPhotographs::default() })?;
             self.outputs.write(&stitcher, alignment)
         })
     }

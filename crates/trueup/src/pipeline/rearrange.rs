@@ -51,7 +51,8 @@ impl Alignment {
                 .filter(|&number| self.project.images[number].status == ImageStatus::Used)
                 .collect(),
         };
-        let images: Vec<SourceImage> = numbers.iter().map(|&number| self.photographs.sources()[number].clone()).collect();
+        let images: Vec<SourceImage> =
+            numbers.iter().map(|&number| self.photographs.sources()[number].clone()).collect();
         let masks: Vec<Masks> = numbers.iter().map(|&number| self.photographs.masks(number)).collect();
         let records = self.project.used_images().map(|image| image.masks.clone()).collect();
         let in_memory = self.photographs.in_memory_photographs().clone();
