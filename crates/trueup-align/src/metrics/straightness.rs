@@ -28,7 +28,7 @@ pub struct Straightness {
 impl Straightness {
     /// Carries a segment to the panorama point by point, `step_px` apart at most and at least three, and measures their
     /// distances from the straight line that fits them best (total least squares). `None` if that is no line: no
-    /// length, or not finite.
+    /// length, or not finite anywhere, as where a projection has no place for a part of it.
     ///
     /// `mesh` lies over the photograph that the segment's pixels are of.
     pub fn of(line: &LineSegment, mesh: &GridMesh, step_px: f64) -> Option<Self> {
@@ -38,7 +38,8 @@ impl Straightness {
         let points: Vec<Vector2<f64>> =
             (0..=steps).map(|k| mesh.warp(start.lerp(&end, k as f64 / steps as f64))).collect();
         let length_px = (points[steps] - points[0]).norm();
-        if !(length_px.is_finite() && length_px > 0.0) {
+        let is_whole = points.iter().all(|point| point.x.is_finite() && point.y.is_finite());
+        if !(is_whole && length_px.is_finite() && length_px > 0.0) {
             return None;
         }
         let count = points.len() as f64;
@@ -103,5 +104,15 @@ mod tests {
     fn a_point_is_no_line() {
         assert_eq!(Straightness::of(&line(0.0), &mapped(|p| p), 3.0), None);
         assert_eq!(Straightness::of(&line(f64::NAN), &mapped(|p| p), 3.0), None);
+    }
+
+    /// A line that is torn in its middle alone, as around a pole, is none.
+    #[test]
+    fn a_line_over_a_cell_that_is_not_there_has_no_straightness() {
+        let mut mesh = GridMesh::regular(100.0, 100.0, 10.0);
+        let line = LineSegment { start: [5.0, 50.0], end: [95.0, 50.0], width_px: 1.0, significance: 1.0 };
+        assert!(Straightness::of(&line, &mesh, LINE_STEP_PX).is_some());
+        mesh.target[5 * 11 + 5] = [f64::NAN; 2];
+        assert!(Straightness::of(&line, &mesh, LINE_STEP_PX).is_none());
     }
 }
