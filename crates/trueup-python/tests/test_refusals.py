@@ -38,7 +38,7 @@ def test_errors_have_the_names_of_the_library_and_a_hint(pictures: list[Array], 
         ({"set": {"mesh.cell": 3}}, 'no option "mesh.cell"'),
         ({"method": "magic"}, "magic"),
         ({"seed": 1.5}, "whole number"),
-        ({"yaw": 30}, "has no view"),
+        ({"projection": "mesh", "yaw": 30}, "has no view"),
         ({"reference": "q.jpg"}, "no photograph of this name"),
     ],
 )

@@ -73,7 +73,8 @@ def test_every_kind_of_pixels(pictures: list[Array], panorama: trueup.Panorama) 
     gray = trueup.stitch([np.asarray(Image.fromarray(picture).convert("L")) for picture in pictures])
     assert gray.image.shape[2] == 3 and np.array_equal(gray.image[..., 0], gray.image[..., 2])
     opaque = [np.dstack([picture, np.full(picture.shape[:2], 255, np.uint8)]) for picture in pictures]
-    assert np.array_equal(trueup.stitch(opaque).image, panorama.image)
+    # What lies across a photograph's border is weighed by opacity: a level, here and there.
+    assert np.abs(trueup.stitch(opaque).image.astype(float) - eight).max() <= 1
 
 
 def test_rows_may_lie_anywhere_in_memory(pictures: list[Array], panorama: trueup.Panorama) -> None:

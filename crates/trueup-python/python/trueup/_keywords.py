@@ -34,8 +34,8 @@ class ComposeKeywords(SaveKeywords, total=False):
     Lower it for a quick preview (0.25) or a smaller file; raise it only if the reference was taken with a shorter lens
     than the others (default 1.0)."""
     projection: Literal[
-        "mesh",
         "auto",
+        "mesh",
         "equirectangular",
         "cylindrical",
         "perspective",
@@ -43,8 +43,8 @@ class ComposeKeywords(SaveKeywords, total=False):
         "panini",
         "stereographic",
     ]
-    """What the panorama is drawn on. Choose another than the mesh for straight lines over a wide view, for full turns
-    and for viewers of spherical panoramas (default mesh)."""
+    """What the panorama is drawn on. Choose equirectangular for viewers of spherical panoramas, the mesh where
+    photographs that were taken from several places do not meet, and any other as you like it (default auto)."""
     yaw: float
     """Turns the viewer to the right of where the panorama faces: change it to bring another place to the middle. Not
     for the mesh, as the next three (default 0.0)."""
