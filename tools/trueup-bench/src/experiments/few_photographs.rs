@@ -11,7 +11,7 @@ use crate::statistics::{mean, median};
 use crate::trial::{Row, Trial};
 
 /// The experiment's name.
-pub(crate) const NAME: &str = "few-pictures";
+pub(crate) const NAME: &str = "few-photographs";
 
 const COUNTS: std::ops::RangeInclusive<usize> = 2..=6;
 /// Scenes of each class: the first of the gate's.
@@ -77,7 +77,7 @@ pub(crate) fn section(results: &Results) -> Section {
         "fallback %, others",
         "upright deg, others, median",
     ];
-    let mut table = Table::new("few-pictures", "Fallback by number of photographs.", columns);
+    let mut table = Table::new("few-photographs", "Fallback by number of photographs.", columns);
     for count in COUNTS {
         for (variant, _) in VARIANTS {
             let (yes, other) = (rows(results, true, count, variant), rows(results, false, count, variant));
