@@ -61,7 +61,12 @@ fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
         return Ok(());
     }
     for entry in fs::read_dir(path)? {
-        collect(&entry?.path(), files)?;
+        let entry = entry?;
+        // Caches of tools that look at the sources.
+        let name = entry.file_name();
+        if !name.to_string_lossy().starts_with('.') && name != "__pycache__" {
+            collect(&entry.path(), files)?;
+        }
     }
     Ok(())
 }

@@ -93,7 +93,7 @@ pub(crate) fn goes_round(cameras: &[Camera], edges: &[GraphEdge], level_from_wor
 
 /// The direction a camera looks in, in the level world.
 fn viewing_direction(camera: &Camera, level_from_world: &Matrix3<f64>) -> Vector3<f64> {
-    level_from_world * camera.rotation().row(2).transpose()
+    level_from_world * camera.forward()
 }
 
 /// The direction a camera looks in, radians from the levelled forward axis towards the right.

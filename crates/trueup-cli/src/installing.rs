@@ -23,7 +23,7 @@ pub(crate) fn manual(args: &ManualArgs) -> Result<(), Failure> {
     for (name, page) in pages(&command) {
         let mut text = Vec::new();
         let path = args.folder.join(format!("{name}.{SECTION}"));
-        page.render(&mut text).map_err(|source| Error::Io { action: "writing", path: path.clone(), source })?;
+        page.render(&mut text).map_err(|error| Error::io("writing", &path, error))?;
         trueup::write_atomically(&path, &text)?;
     }
     Ok(())

@@ -1,6 +1,6 @@
 //! What is said of panoramas that were written, and whether they are what was asked for.
 
-use trueup::{Severity, Written};
+use trueup::Written;
 
 use crate::arguments::{FailOn, MessageArgs};
 use crate::failure::Failure;
@@ -33,9 +33,8 @@ fn refuse(written: &[Written], messages: &MessageArgs) -> Result<(), Failure> {
             "Look at the panorama, which is written. Leave photographs out, or try --align lines+photometric.",
         ));
     }
-    let warnings = written.iter().flat_map(|one| &one.project.diagnostics);
-    let warnings: Vec<&str> =
-        warnings.filter(|one| one.severity == Severity::Warning).map(|one| one.message.as_str()).collect();
+    let warnings = written.iter().flat_map(|one| one.project.warnings());
+    let warnings: Vec<&str> = warnings.map(|one| one.message.as_str()).collect();
     match (messages.fail_on, warnings.as_slice()) {
         (None, _) | (_, []) => Ok(()),
         (Some(FailOn::Warning), [first, others @ ..]) => {

@@ -3,7 +3,7 @@
 use trueup_core::{Error, Result, StageContext};
 
 use trueup::MatchedPhotographs;
-use trueup::{ImageStatus, Project};
+use trueup::Project;
 use trueup::{PixelEvaluation, compare_overlaps, scale_up_to};
 
 /// The pixel measures, or why there are none.
@@ -27,8 +27,7 @@ pub(crate) fn compare(
     common_scale: f64,
     context: &StageContext,
 ) -> Result<Pixels> {
-    let used = |position: &usize| project.images[*position].status == ImageStatus::Used;
-    let positions: Vec<usize> = (0..project.images.len()).filter(used).collect();
+    let positions = project.used_positions();
     let compared = scale_up_to(project, common_scale / panorama_scale)
         .and_then(|scale| compare_overlaps(project, set.photographs(), &positions, scale, context));
     match compared {

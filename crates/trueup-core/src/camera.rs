@@ -66,6 +66,11 @@ impl Camera {
         matrix_from_rows(&self.camera_from_world)
     }
 
+    /// The unit direction in the world that the camera looks in: its z axis.
+    pub fn forward(&self) -> Vector3<f64> {
+        self.rotation().row(2).transpose()
+    }
+
     /// Replaces the rotation from world to camera.
     pub fn set_rotation(&mut self, camera_from_world: &Matrix3<f64>) {
         self.camera_from_world = rows_of(camera_from_world);

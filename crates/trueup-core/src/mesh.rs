@@ -3,6 +3,8 @@
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
+use crate::geometry::{roll_from_down, wrap_angle};
+
 /// A grid over one photograph and where its vertices go in the panorama.
 ///
 /// `rows` x `columns` vertices, row-major (index = row * columns + column). Inside a cell the warp is bilinear.
@@ -150,6 +152,26 @@ impl GridMesh {
         Matrix2::from_columns(&[along_x, along_y])
     }
 
+    /// Clockwise angle from down to where the direction that the clockwise turn `gamma` stands upright points, in the middle of
+    /// the photograph as it lies in the panorama; radians, in [-pi, pi). NaN where the middle has no place.
+    ///
+    /// By central differences over the cells around the middle vertex, in both directions: a panorama may stretch the two
+    /// differently, and then the direction of the columns says nothing of another one.
+    pub fn lean_in_the_middle(&self, gamma: f64) -> f64 {
+        let (row, column) = (self.rows / 2, self.columns / 2);
+        let (above, below) = (row.saturating_sub(1), (row + 1).min(self.rows - 1));
+        let (left, right) = (column.saturating_sub(1), (column + 1).min(self.columns - 1));
+        let step = |from: usize, to: usize| {
+            let length = (self.source(to) - self.source(from)).norm();
+            (Vector2::from(self.target[to]) - Vector2::from(self.target[from])) / length
+        };
+        let along_row = step(row * self.columns + left, row * self.columns + right);
+        let along_column = step(above * self.columns + column, below * self.columns + column);
+        let down = along_row * gamma.sin() + along_column * gamma.cos();
+        // What points down in the scene points to `down`: turned by the angle that takes (0, 1) there.
+        wrap_angle(-roll_from_down(&down.push(0.0)))
+    }
+
     /// The pixel that goes to `place`, by Newton's method from the pixel `start`; `None` if it is not found, which is
     /// usual far outside the photograph. The pixel may lie outside.
     pub fn source_of(&self, place: Vector2<f64>, start: Vector2<f64>) -> Option<Vector2<f64>> {
@@ -186,6 +208,7 @@ impl GridMesh {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Rotation2;
     use proptest::prelude::*;
 
     use super::*;
@@ -194,6 +217,33 @@ mod tests {
     fn regular_grid_of_the_working_size_has_the_published_vertex_count() {
         let mesh = GridMesh::regular(800.0, 600.0, 40.0);
         assert_eq!((mesh.columns, mesh.rows, mesh.len()), (21, 16, 336));
+    }
+
+    /// A photograph that is turned clockwise.
+    fn turned(angle: f64) -> GridMesh {
+        let mut mesh = GridMesh::regular(400.0, 300.0, 40.0);
+        mesh.target = (0..mesh.len()).map(|vertex| (Rotation2::new(angle) * mesh.source(vertex)).into()).collect();
+        mesh
+    }
+
+    #[test]
+    fn a_turned_photograph_has_its_turn() {
+        for angle in [-3.0, -0.4, 0.0, 0.7, 2.9] {
+            assert!((turned(angle).lean_in_the_middle(0.0) - angle).abs() < 1e-12);
+        }
+    }
+
+    /// Near a pole of an equirectangular panorama, rows are drawn longer than columns: a rolled photograph whose verticals stand
+    /// upright there has columns that lean by more than its roll.
+    #[test]
+    fn verticals_stand_upright_however_much_rows_are_stretched() {
+        let gamma = 0.2_f64;
+        let mut mesh = turned(gamma);
+        mesh.target.iter_mut().for_each(|point| point[0] *= 3.0);
+        assert!(mesh.lean_in_the_middle(gamma).abs() < 1e-12);
+        // A vertical that is off by a tenth of a radian is drawn off by three times its tangent.
+        let expected = (3.0 * 0.1_f64.tan()).atan();
+        assert!((mesh.lean_in_the_middle(gamma - 0.1) - expected).abs() < 1e-12);
     }
 
     /// A smooth bend: the derivative agrees with differences, and the inverse with the warp, from a start a cell away.

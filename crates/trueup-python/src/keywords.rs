@@ -137,11 +137,7 @@ fn masks(files: &Bound<'_, PyAny>, kind: MaskKind) -> PyResult<Vec<MaskFile>> {
 }
 
 fn read_config(options: &mut StitchOptions, path: &std::path::Path) -> trueup::Result<()> {
-    let text = std::fs::read_to_string(path).map_err(|source| Error::Io {
-        action: "reading",
-        path: path.to_owned(),
-        source,
-    })?;
+    let text = std::fs::read_to_string(path).map_err(|error| Error::io("reading", path, error))?;
     options.merge_toml(&text, &path.display().to_string())
 }
 

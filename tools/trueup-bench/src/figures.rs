@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
-use trueup::{Error, Inputs, Outputs, Reference, Result, Silent, StageContext, Stitcher};
+use trueup::{Error, Inputs, Outputs, Result, Silent, StageContext, Stitcher};
 
 use crate::methods::{
     AANAP_PUBLISHED, APAP, GSP_2D_PUBLISHED, GSP_3D_PUBLISHED, SPHP, SPHP_FREE, VPG, VPG_PUBLISHED, method,
 };
 use crate::report::document::{Block, ReportPicture, ReportPictures, Section};
 use crate::runner::Runner;
-use crate::sets::{Catalogue, central};
+use crate::set_work::inputs_of;
+use crate::sets::Catalogue;
 use crate::trial::Trial;
 
 /// Folder of the pictures, beside the report.
@@ -85,20 +86,17 @@ pub(crate) fn section(runner: &Runner, catalogue: &Catalogue, out: &Path) -> Res
         let Some(set) = catalogue.all().into_iter().find(|set| set.name == row.set) else { continue };
         let context = StageContext::new(&Silent, runner.cancel);
         let ready = set.prepare(&runner.data, &context)?;
-        let mut inputs = Inputs::new(ready.photographs.iter().cloned());
-        let around = row.photographs.zip(ready.truth.as_ref()).and_then(|(count, truth)| central(truth, count));
-        if let Some((middle, around)) = around {
-            inputs = Inputs::new(around.iter().map(|&position| ready.photographs[position].clone()));
-            inputs.reference = Reference::Named(ready.photographs[middle].clone());
-        } else if let Some(first) = ready.photographs.first().filter(|_| row.set.starts_with("rolled/")) {
-            inputs.reference = Reference::Named(first.clone());
-        }
         let (mut pictures, mut refused) = (Vec::new(), Vec::new());
         for one in row.methods.iter().filter_map(|name| method(name)) {
             let file = format!("{}-{}.jpg", row.set.replace('/', "-"), one.name);
             let overrides = [&one.overrides()[..], &[SCALE, QUALITY]].concat();
-            let trial = Trial::new(FOLDER, row.set, one.name, &overrides);
-            match panorama(&trial, &inputs, &context, &folder.join(&file)) {
+            let trial = Trial {
+                photograph_count: row.photographs,
+                central: row.photographs.is_some(),
+                reference: row.set.starts_with("rolled/").then_some(0),
+                ..Trial::new(FOLDER, row.set, one.name, &overrides)
+            };
+            match panorama(&trial, &inputs_of(&ready, &trial), &context, &folder.join(&file)) {
                 Ok(()) => pictures.push(ReportPicture { file: format!("{FOLDER}/{file}"), words: one.name.to_owned() }),
                 Err(error @ (Error::Cancelled | Error::Options(_) | Error::Io { .. })) => return Err(error),
                 Err(error) => refused.push(format!("`{}`: {error}", one.name)),

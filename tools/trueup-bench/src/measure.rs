@@ -10,7 +10,7 @@ use trueup::{Error, Project, Result, StageContext, Truth};
 /// known cameras the numbers of [`trueup::evaluate`].
 ///
 /// `accepted`: the dominant directions guide; `guided`: they or the vertical alone do. `lean_deg`, `estimated_gdic_deg` and
-/// `certain` are told by vertical lines, without the truth. What could not be measured is absent.
+/// `certain` are told by the lines of all photographs, without the truth. What could not be measured is absent.
 ///
 /// # Errors
 /// Those of [`trueup::evaluate`].

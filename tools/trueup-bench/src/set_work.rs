@@ -118,7 +118,8 @@ impl SetWork<'_> {
     }
 }
 
-fn inputs_of(ready: &ReadySet, trial: &Trial) -> Inputs {
+/// The photographs of a set that a trial is of, and its reference.
+pub(crate) fn inputs_of(ready: &ReadySet, trial: &Trial) -> Inputs {
     let count = trial.photograph_count.unwrap_or(ready.photographs.len());
     let around = ready.truth.as_ref().filter(|_| trial.central).and_then(|truth| central(truth, count));
     if let Some((middle, around)) = around {

@@ -115,12 +115,11 @@ pub(crate) struct TrialKey {
     pub seed: u64,
     /// [`Trial::reference`].
     pub reference: Option<usize>,
-    /// [`Trial::photograph_count`], by the name it has in stored rows.
-    #[serde(rename = "pictures")]
+    /// [`Trial::photograph_count`].
     pub photograph_count: Option<usize>,
     /// Fingerprint of the overrides and the set.
     pub inputs: String,
-    /// Version and fingerprint of the program.
+    /// [`crate::build_stamp::BuildStamp::identity`] of the program.
     pub version: String,
 }
 

@@ -173,7 +173,7 @@ impl BundleAdjustment<'_> {
     }
 
     /// Those of the data and the pulls.
-    pub(super) fn normal_equations(
+    fn normal_equations(
         &self,
         parameters: &Parameters,
         model: &IntrinsicsModel,
@@ -191,12 +191,21 @@ impl BundleAdjustment<'_> {
         model: &IntrinsicsModel,
         huber_px: f64,
     ) -> (faer::Mat<f64>, faer::Mat<f64>) {
-        let cameras = parameters.cameras(self.priors);
+        let terms: Vec<PairTerm<LOCAL>> = self.pair_terms(&parameters.cameras(self.priors), huber_px);
+        self.assembled(&terms, parameters, model)
+    }
+
+    /// The normal equations of the pairs' `terms` and of the pulls at `parameters`.
+    pub(super) fn assembled<const LOCAL: usize>(
+        &self,
+        terms: &[PairTerm<LOCAL>],
+        parameters: &Parameters,
+        model: &IntrinsicsModel,
+    ) -> (faer::Mat<f64>, faer::Mat<f64>) {
         let unknowns = self.unknowns(model);
         let mut normal = faer::Mat::<f64>::zeros(unknowns, unknowns);
         let mut gradient = faer::Mat::<f64>::zeros(unknowns, 1);
-        let terms: Vec<PairTerm<LOCAL>> = self.pair_terms(&cameras, huber_px);
-        for (pair, term) in self.observations.pairs.iter().zip(&terms) {
+        for (pair, term) in self.observations.pairs.iter().zip(terms) {
             let columns: [Option<usize>; LOCAL] = self.columns(pair, model);
             for (local_row, row) in columns.iter().enumerate() {
                 let Some(row) = *row else { continue };

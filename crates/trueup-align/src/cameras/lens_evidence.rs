@@ -29,7 +29,8 @@ impl LensEvidence {
         huber_px: f64,
     ) -> Option<Self> {
         let photographs = problem.priors.len();
-        let (mut normal, gradient) = problem.normal_equations(parameters, model, huber_px);
+        let terms: Vec<PairTerm<LENS_LOCAL>> = problem.pair_terms(&parameters.cameras(problem.priors), huber_px);
+        let (mut normal, gradient) = problem.assembled(&terms, parameters, model);
         for k in 0..normal.nrows() {
             if normal[(k, k)] == 0.0 {
                 normal[(k, k)] = 1.0;
@@ -43,8 +44,6 @@ impl LensEvidence {
         let influence = factor.solve(&selection);
         let mut covariance = DMatrix::zeros(model.parameters, model.parameters);
         let mut clusters = vec![0; model.parameters];
-        let cameras = parameters.cameras(problem.priors);
-        let terms: Vec<PairTerm<LENS_LOCAL>> = problem.pair_terms(&cameras, huber_px);
         for (pair, term) in problem.observations.pairs.iter().zip(&terms) {
             let columns: [Option<usize>; LENS_LOCAL] = problem.columns(pair, model);
             let moved = term.normal

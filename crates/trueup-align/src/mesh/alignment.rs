@@ -103,18 +103,9 @@ impl AlignmentEnergy {
         }
     }
 
-    /// For every photograph and grid cell (row-major), whether a match point lies in it: a vertex carried elsewhere
-    /// counts for the cell to its lower right.
+    /// See [`overlap_cells`].
     pub(super) fn overlap_cells(&self, grids: &[GridMesh]) -> Vec<Vec<bool>> {
-        let mut cells: Vec<Vec<bool>> =
-            grids.iter().map(|grid| vec![false; (grid.rows - 1) * (grid.columns - 1)]).collect();
-        for point in &self.points {
-            let grid = &grids[point.from];
-            let row = (point.vertex / grid.columns).min(grid.rows - 2);
-            let column = (point.vertex % grid.columns).min(grid.columns - 2);
-            cells[point.from][row * (grid.columns - 1) + column] = true;
-        }
-        cells
+        overlap_cells(grids, self.points.iter().map(|point| [point.from, point.vertex]))
     }
 
     /// Root mean square distance of the two places of a match point in the deformed `meshes`, across a full turn's cut
@@ -124,4 +115,18 @@ impl AlignmentEnergy {
         let squares = self.points.iter().map(|point| (point.distance(meshes) - turn * point.turns).norm_squared());
         (squares.sum::<f64>() / self.points.len().max(1) as f64).sqrt()
     }
+}
+
+/// For every photograph and grid cell (row-major), whether one of `carried`, photographs and their vertices, lies in it: a
+/// vertex carried elsewhere counts for the cell to its lower right.
+pub(super) fn overlap_cells(grids: &[GridMesh], carried: impl Iterator<Item = [usize; 2]>) -> Vec<Vec<bool>> {
+    let mut cells: Vec<Vec<bool>> =
+        grids.iter().map(|grid| vec![false; (grid.rows - 1) * (grid.columns - 1)]).collect();
+    for [photograph, vertex] in carried {
+        let grid = &grids[photograph];
+        let row = (vertex / grid.columns).min(grid.rows - 2);
+        let column = (vertex % grid.columns).min(grid.columns - 2);
+        cells[photograph][row * (grid.columns - 1) + column] = true;
+    }
+    cells
 }

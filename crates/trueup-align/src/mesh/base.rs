@@ -73,8 +73,7 @@ pub(crate) fn tilt_from_level(cameras: &[Camera], level_from_world: &Matrix3<f64
     const STEEP: f64 = 0.7;
     /// Length of the mean direction below which the photographs look all round and have none.
     const ONE_WAY: f64 = 0.5;
-    let forwards: Vec<Vector3<f64>> =
-        cameras.iter().map(|camera| level_from_world * camera.rotation().row(2).transpose()).collect();
+    let forwards: Vec<Vector3<f64>> = cameras.iter().map(|camera| level_from_world * camera.forward()).collect();
     let forward: Vector3<f64> = forwards.iter().sum();
     let pitch = forward.y.atan2(forward.z);
     let reaches_pole = forwards.iter().any(|&forward| !is_moderate(forward));

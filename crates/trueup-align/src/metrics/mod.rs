@@ -27,6 +27,6 @@ pub use outline::{folded_cells, without_torn_cells};
 pub use overlap::{OverlapMeasures, mean_over_overlaps};
 pub use overlap_pixels::OverlapPixels;
 pub use reprojection::{MatchedPair, Reprojection, reprojection};
-pub use straightness::{LINE_STEP_PX, LONG_LINE_DIAGONAL, Straightness};
+pub use straightness::{BENT_SHARE, LINE_STEP_PX, LONG_LINE_DIAGONAL, Straightness};
 pub use upright::{Uprightness, expected_magnitude};
 pub use vertical_lines::{VerticalLinesInput, vertical_segments};

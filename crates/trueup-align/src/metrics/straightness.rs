@@ -10,7 +10,7 @@ pub const LONG_LINE_DIAGONAL: f64 = 0.1;
 /// Distance of the points of a line that are carried to the panorama, working pixels.
 pub const LINE_STEP_PX: f64 = 3.0;
 /// A line that strays from straight by more than this share of its length is bent: 3 px in 1000.
-const BENT_SHARE: f64 = 0.003;
+pub const BENT_SHARE: f64 = 0.003;
 /// Most steps along a line.
 const MAX_STEPS: usize = 10_000;
 

@@ -1,27 +1,7 @@
 //! How far the photographs stand from upright, against the truth.
 
-use trueup_core::geometry::{circular_mean, roll_from_down, wrap_angle};
+use trueup_core::geometry::{circular_mean, wrap_angle};
 use trueup_core::mesh::GridMesh;
-
-use super::outline::target;
-
-/// Clockwise angle from the panorama's down to where a photograph's vertical, which the clockwise turn `gamma` stands upright,
-/// points in its middle as it is drawn; radians. By central differences over the cells around the middle vertex, in both
-/// directions: a drawing may stretch the two differently, and then the direction of the columns says nothing of another one.
-fn lean_in_the_middle(mesh: &GridMesh, gamma: f64) -> f64 {
-    let (row, column) = (mesh.rows / 2, mesh.columns / 2);
-    let (above, below) = (row.saturating_sub(1), (row + 1).min(mesh.rows - 1));
-    let (left, right) = (column.saturating_sub(1), (column + 1).min(mesh.columns - 1));
-    let step = |from: usize, to: usize| {
-        let length = (mesh.source(to) - mesh.source(from)).norm();
-        (target(mesh, to) - target(mesh, from)) / length
-    };
-    let along_row = step(row * mesh.columns + left, row * mesh.columns + right);
-    let along_column = step(above * mesh.columns + column, below * mesh.columns + column);
-    let down = along_row * gamma.sin() + along_column * gamma.cos();
-    // What points down in the scene points to `down`: turned by the angle that takes (0, 1) there.
-    wrap_angle(-roll_from_down(&down.push(0.0)))
-}
 
 /// Signed angles of photographs to upright, in radians, and what they come to.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +34,7 @@ impl Uprightness {
     /// upright) are from upright in the middle; `None` without
     /// photographs, or if the lists differ in length.
     pub fn against(meshes: &[GridMesh], gammas: &[f64]) -> Option<Self> {
-        let off = |(mesh, gamma): (&GridMesh, &f64)| lean_in_the_middle(mesh, *gamma);
+        let off = |(mesh, gamma): (&GridMesh, &f64)| mesh.lean_in_the_middle(*gamma);
         if meshes.len() != gammas.len() {
             return None;
         }
@@ -97,26 +77,6 @@ mod tests {
         let mut mesh = GridMesh::regular(400.0, 300.0, 40.0);
         mesh.target = (0..mesh.len()).map(|vertex| (Rotation2::new(angle) * mesh.source(vertex)).into()).collect();
         mesh
-    }
-
-    #[test]
-    fn a_turned_photograph_has_its_turn() {
-        for angle in [-3.0, -0.4, 0.0, 0.7, 2.9] {
-            assert!((lean_in_the_middle(&turned(angle), 0.0) - angle).abs() < 1e-12);
-        }
-    }
-
-    /// Near a pole of an equirectangular panorama, rows are drawn longer than columns: a rolled photograph whose verticals stand
-    /// upright there has columns that lean by more than its roll.
-    #[test]
-    fn verticals_stand_upright_however_much_rows_are_stretched() {
-        let gamma = 0.2_f64;
-        let mut mesh = turned(gamma);
-        mesh.target.iter_mut().for_each(|point| point[0] *= 3.0);
-        assert!(lean_in_the_middle(&mesh, gamma).abs() < 1e-12);
-        // A vertical that is off by a tenth of a radian is drawn off by three times its tangent.
-        let expected = (3.0 * 0.1_f64.tan()).atan();
-        assert!((lean_in_the_middle(&mesh, gamma - 0.1) - expected).abs() < 1e-12);
     }
 
     /// Off by 1, 2 and 6 degrees clockwise: mean 3, largest 6, common direction 3 (2.999 on the circle), spread 2.

@@ -32,25 +32,15 @@ pub struct VerticalLinesInput<'a> {
 /// degrees. Empty if they point to no such direction, or if the photograph looks within 15 degrees of straight up or
 /// down, where there is no upright.
 pub fn vertical_segments(photograph: &VerticalLinesInput) -> Vec<usize> {
-    let Some((planes, down)) = planes_and_down(photograph) else { return Vec::new() };
-    let mut segments: Vec<usize> = pointing_down(&planes, &down).map(|plane| planes.indices[plane]).collect();
+    let planes = InterpretationPlanes::new(photograph.lines, photograph.camera, photograph.frame);
+    let found = vertical_direction(&planes, &photograph.expected_down);
+    // Not a number is no direction either.
+    let Some(down) = found.filter(|down| down.x.hypot(down.y) >= MIN_SINE) else { return Vec::new() };
+    let tolerance = VERTICAL_LINE_DEG.to_radians().sin();
+    let points_down = |plane: &usize| planes.normals[*plane].dot(&down).abs() <= tolerance;
+    let mut segments: Vec<usize> = (0..planes.len()).filter(points_down).map(|plane| planes.indices[plane]).collect();
     segments.sort_unstable();
     segments
-}
-
-/// A photograph's segments as planes and their vertical vanishing direction; `None` if they point to none, or if the
-/// photograph looks within 15 degrees of straight up or down.
-fn planes_and_down(photograph: &VerticalLinesInput) -> Option<(InterpretationPlanes, Vector3<f64>)> {
-    let planes = InterpretationPlanes::new(photograph.lines, photograph.camera, photograph.frame);
-    let down = vertical_direction(&planes, &photograph.expected_down)?;
-    // Not a number is no direction either.
-    (down.x.hypot(down.y) >= MIN_SINE).then_some((planes, down))
-}
-
-/// The planes whose segments point to the vertical vanishing direction `down`.
-fn pointing_down<'a>(planes: &'a InterpretationPlanes, down: &'a Vector3<f64>) -> impl Iterator<Item = usize> + 'a {
-    let tolerance = VERTICAL_LINE_DEG.to_radians().sin();
-    (0..planes.len()).filter(move |&plane| planes.normals[plane].dot(down).abs() <= tolerance)
 }
 
 /// The direction that the segments' planes share, near the expected one, down in the camera's frame.

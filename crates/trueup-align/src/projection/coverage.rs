@@ -33,7 +33,7 @@ impl SphereCoverage {
         for photograph in photographs {
             let directions: Vec<Vector3<f64>> =
                 samples(photograph, SAMPLES).map(|pixel| photograph.camera.world_direction(pixel)).collect();
-            let ahead = photograph.camera.rotation().row(2).transpose();
+            let ahead = photograph.camera.forward();
             forward += ahead / photographs.len() as f64;
             for direction in &directions {
                 let latitude = direction.y.asin();

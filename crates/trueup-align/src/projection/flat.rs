@@ -106,14 +106,6 @@ impl Flat {
         }
     }
 
-    /// The member of the family that a fitted projection is, or the plane's and Panini's.
-    pub(super) fn family(&self) -> Fit {
-        match self.kind {
-            FlatKind::Panini => Fit { round: self.panini_distance, ..Fit::default() },
-            _ => self.fit,
-        }
-    }
-
     /// The place of a direction of any length; `None` where the projection has none or it is all but infinitely far.
     ///
     /// Longitudes lie within half a turn of the middle.

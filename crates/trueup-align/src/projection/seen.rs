@@ -91,7 +91,14 @@ impl Seen {
         let upright = upright_height(self.height()) * (1.0 - smooth(half, ROUNDING));
         let fit = |step: f64| Fit { round: 2.0 * step / STEPS as f64, upright, turned: false };
         let limits = self.limits(&Flat::fitted(fit(STEPS as f64)), 1.0 - smooth(half, EVENING));
-        let excess: Vec<f64> = (0..=STEPS).map(|step| self.excess(&Flat::fitted(fit(step as f64)), &limits)).collect();
+        // From straight to round, no further than to the first that keeps the limits.
+        let mut excess = Vec::new();
+        for step in 0..=STEPS {
+            excess.push(self.excess(&Flat::fitted(fit(step as f64)), &limits));
+            if excess[step] <= 1.0 {
+                break;
+            }
+        }
         let limit = excess.iter().copied().fold(f64::INFINITY, f64::min).max(1.0);
         let Some(first) = excess.iter().position(|&one| one <= limit).filter(|&first| first > 0) else {
             return fit(0.0);

@@ -125,25 +125,26 @@ impl ProjectionView {
             let seen = Seen::of(photographs, &view.view_from_level(), half_width);
             (view, seen)
         };
-        let (_, level) = looking(0.0);
+        let (level_view, level) = looking(0.0);
         let [low, high] = level.elevations();
         let middle = 0.5 * (low + high);
         let is_column = high - low > COLUMN_LENGTH
             && (middle.abs() < COLUMN_MIDDLE || level.height() > COLUMN_HEIGHT)
             && level.turned().height() < COLUMN_SIDE;
-        let (view, seen) = looking(if is_column { middle } else { steep });
+        let level_pitch = if is_column { middle } else { steep };
+        let (view, seen) = if level_pitch == 0.0 { (level_view, level) } else { looking(level_pitch) };
         let fitted = |seen: &Seen| {
-            let flat = Flat::fitted(seen.fit());
-            (flat, seen.window(&flat))
+            let fit = seen.fit();
+            (fit, seen.window(&Flat::fitted(fit)))
         };
-        let (flat, shown) = match is_column {
+        let (fit, shown) = match is_column {
             false => fitted(&seen),
             true => {
-                let (flat, shown) = fitted(&seen.turned());
-                let turned = Flat::fitted(Fit { turned: true, ..flat.family() });
-                (turned, shown.map(|corners| corners.map(|[x, y]| [y, x])))
+                let (fit, shown) = fitted(&seen.turned());
+                (Fit { turned: true, ..fit }, shown.map(|corners| corners.map(|[x, y]| [y, x])))
             }
         };
+        let flat = Flat::fitted(fit);
         let shown = shown.map(|[low, high]| {
             let reach = if options.fov > 0.0 { flat.reach([half_width, 0.0]).x } else { f64::INFINITY };
             if reach.is_finite() { [[-reach, low[1]], [reach, high[1]]] } else { [low, high] }

@@ -9,10 +9,10 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
+use trueup_core::geometry::orthonormal_complement;
 
 use super::joint::LineVote;
 use super::vertical_vote::{SEARCH_DEG, cone};
-use crate::vanishing::orthonormal_complement;
 
 /// Turns about a vertical that are scored: steps of 1.5 degrees over the quarter turn after which a frame repeats.
 const TURNS: usize = 60;

@@ -5,12 +5,13 @@
 //!
 //! The residual is measured where the segment was: the distance in pixels of its ends from the line that joins its
 //! midpoint to the vanishing point. With moment c = P x Q (ends P, Q), midpoint m and direction v in the camera frame,
-//! it is v . c / (2 |f v_xy - m v_z|), exactly.
+//! it is v . c / (2 |f v_xy - m v_z|), exactly; behind a lens that bends, what [`InterpretationPlanes::reach`] has in place
+//! of the divisor.
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
-use trueup_core::geometry::{exp_rotation, nearest_rotation};
+use trueup_core::geometry::{exp_rotation, nearest_rotation, orthonormal_complement};
 
-use crate::vanishing::{InterpretationPlanes, orthonormal_complement};
+use crate::vanishing::InterpretationPlanes;
 
 /// Scale of the robust loss at which the refinement starts, working pixels.
 const START_SCALE_PX: f64 = 4.0;
@@ -51,13 +52,13 @@ pub(super) struct Refinement<'a> {
 struct Supporter {
     /// The axis: a column of the frame.
     axis: usize,
-    /// P x Q of the segment's ends, in the common frame.
+    /// [`InterpretationPlanes::moments`], in the common frame.
     moment: Vector3<f64>,
     /// axis . moment / reach: how far the axis misses the segment, in pixels at the segment.
     residual_px: f64,
     /// The segment's weight times that of the robust loss.
     weight: f64,
-    /// 2 |f v_xy - m v_z|.
+    /// See [`InterpretationPlanes::reach`].
     reach: f64,
 }
 
@@ -78,7 +79,6 @@ pub(super) struct LineVote {
 #[derive(Debug)]
 struct PhotographLines {
     rotation: Matrix3<f64>,
-    focal_px: f64,
     planes: InterpretationPlanes,
 }
 
@@ -94,15 +94,10 @@ pub(super) struct Support {
 }
 
 impl LineVote {
-    /// `rotations` and `planes` per photograph; `focals` in the pixels of the planes.
-    pub(super) fn new(rotations: &[Matrix3<f64>], focals: &[f64], planes: Vec<InterpretationPlanes>) -> Self {
-        let photographs = rotations
-            .iter()
-            .zip(focals)
-            .zip(planes)
-            .map(|((&rotation, &focal_px), planes)| PhotographLines { rotation, focal_px, planes })
-            .collect();
-        Self { photographs }
+    /// `rotations` and `planes` per photograph.
+    pub(super) fn new(rotations: &[Matrix3<f64>], planes: Vec<InterpretationPlanes>) -> Self {
+        let photographs = rotations.iter().zip(planes).map(|(&rotation, planes)| PhotographLines { rotation, planes });
+        Self { photographs: photographs.collect() }
     }
 
     /// The usable segments of photograph `index`.
@@ -156,7 +151,8 @@ impl LineVote {
     /// `value` of the direction of every segment's midpoint in the common frame, not of unit length; by photograph.
     pub(super) fn by_midpoint<T>(&self, value: impl Fn(Vector3<f64>) -> T) -> Vec<Vec<T>> {
         let of_photograph = |photograph: &PhotographLines| {
-            let toward = |midpoint: &Vector2<f64>| photograph.rotation.tr_mul(&midpoint.push(photograph.focal_px));
+            let toward =
+                |midpoint: &Vector2<f64>| photograph.rotation.tr_mul(&midpoint.push(photograph.planes.focal_px));
             photograph.planes.midpoints.iter().map(|midpoint| value(toward(midpoint))).collect()
         };
         self.photographs.iter().map(of_photograph).collect()
@@ -340,7 +336,7 @@ impl PhotographLines {
     }
 
     fn reach(&self, direction: &Vector3<f64>, line: usize) -> f64 {
-        self.planes.reach(line, direction, self.focal_px)
+        self.planes.reach(line, direction)
     }
 
     fn support(&self, direction: &Vector3<f64>, tolerance: f64) -> (f64, usize) {

@@ -54,8 +54,7 @@ fn photographs_that_contradict_each_other_leave_the_vertical_uncertain() {
     let deviation = |scene: &SyntheticScene| {
         let planes = |k: usize| InterpretationPlanes::new(&scene.lines[k], &scene.cameras[k], &scene.frames[k]);
         let rotations: Vec<_> = scene.cameras.iter().map(Camera::rotation).collect();
-        let focals: Vec<f64> = scene.cameras.iter().map(|camera| camera.focal_px).collect();
-        let vote = LineVote::new(&rotations, &focals, (0..rotations.len()).map(planes).collect());
+        let vote = LineVote::new(&rotations, (0..rotations.len()).map(planes).collect());
         // The true frame in the cameras' world.
         let frame = rotations[0].transpose() * scene.world_from_camera[0].transpose();
         axis_deviations(&vote, &vote.refine_frame(&frame, &[1.0; 3]), &[1.0; 3])[1]

@@ -13,7 +13,7 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 use trueup_core::camera::Camera;
-use trueup_core::geometry::{matrix_from_rows, roll_from_down, rows_of};
+use trueup_core::geometry::{matrix_from_rows, orthonormal_complement, roll_from_down, rows_of};
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
@@ -24,7 +24,7 @@ use super::joint::{AxisWeights, LineVote, Refinement};
 use super::prior::SimilarityPrior;
 use super::vertical::roll_of;
 use super::vpg::axis_weights;
-use crate::vanishing::{InterpretationPlanes, VERTICAL_LINE_DEG, orthonormal_complement};
+use crate::vanishing::{InterpretationPlanes, VERTICAL_LINE_DEG};
 
 /// Width of a sector of the scene, degrees of longitude: a facade, seen from where its lines can be told apart.
 const SECTOR_DEG: f64 = 20.0;
@@ -160,10 +160,7 @@ impl UprightScene {
     }
 
     fn vote(&self, input: &RollsInput<'_>) -> LineVote {
-        let focals: Vec<f64> = input.cameras.iter().map(|camera| camera.focal_px).collect();
-        let planes = input.lines.iter().zip(input.frames).zip(input.cameras);
-        let planes = planes.map(|((lines, frame), camera)| InterpretationPlanes::new(lines, camera, frame));
-        LineVote::new(&self.rotations, &focals, planes.collect())
+        LineVote::new(&self.rotations, InterpretationPlanes::of_all(input.lines, input.cameras, input.frames))
     }
 }
 

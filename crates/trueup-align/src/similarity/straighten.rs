@@ -2,8 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use trueup_core::camera::Camera;
-
-use crate::vanishing::orthonormal_complement;
+use trueup_core::geometry::orthonormal_complement;
 
 /// Second eigenvalue of the mean moment of the x axes below which the photographs do not fix a vertical.
 const CONDITIONED: f64 = 0.05;

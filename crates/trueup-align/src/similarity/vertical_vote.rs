@@ -1,9 +1,9 @@
 //! A vertical from the segments of all photographs alone, where the horizontal directions do not agree.
 
 use nalgebra::{Matrix3, Vector3};
+use trueup_core::geometry::orthonormal_complement;
 
 use super::joint::{LineVote, Support};
-use crate::vanishing::orthonormal_complement;
 
 /// How far from the cameras' own vertical the segments' is sought, degrees.
 pub(super) const SEARCH_DEG: f64 = 25.0;

@@ -1,7 +1,6 @@
 //! The vanishing point guided prior: dominant directions, gate, joint refinement, weighted solve.
 
 use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
 use trueup_core::geometry::rows_of;
 use trueup_core::options::StageOptions;
 use trueup_core::{Result, StageContext};
@@ -87,18 +86,10 @@ pub(super) fn guide(
     Ok((guidance, upright))
 }
 
-fn interpretation_planes(input: &PriorInput<'_>) -> Vec<InterpretationPlanes> {
-    (0..input.cameras.len())
-        .into_par_iter()
-        .map(|index| InterpretationPlanes::new(&input.lines[index], &input.cameras[index], &input.frames[index]))
-        .collect()
-}
-
 impl<'a> SceneDirections<'a> {
     fn new(input: &'a PriorInput<'a>, cameras: &CameraVertical<'a>, options: &'a SimilarityOptions) -> Self {
         let CameraVertical { rotations, straightened, .. } = *cameras;
-        let planes = interpretation_planes(input);
-        let focals: Vec<f64> = input.cameras.iter().map(|camera| camera.focal_px).collect();
+        let planes = InterpretationPlanes::of_all(input.lines, input.cameras, input.frames);
         let triads = rotations
             .iter()
             .zip(input.triads)
@@ -107,7 +98,7 @@ impl<'a> SceneDirections<'a> {
                 matrix.iter().all(|value| value.is_finite()).then(|| rotation.tr_mul(&matrix))
             })
             .collect();
-        let vote = LineVote::new(rotations, &focals, planes);
+        let vote = LineVote::new(rotations, planes);
         Self { input, options, rotations, straightened, triads, vote }
     }
 

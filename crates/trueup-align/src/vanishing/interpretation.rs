@@ -1,6 +1,7 @@
 //! The interpretation planes of a photograph's segments.
 
 use nalgebra::{Vector2, Vector3};
+use rayon::prelude::*;
 use trueup_core::camera::Camera;
 use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
@@ -68,6 +69,12 @@ impl InterpretationPlanes {
         planes
     }
 
+    /// Those of every photograph: [`Self::new`] of its lines, its camera and its frame.
+    pub(crate) fn of_all(lines: &[Vec<LineSegment>], cameras: &[Camera], frames: &[WorkingFrame]) -> Vec<Self> {
+        let of_one = |index: usize| Self::new(&lines[index], &cameras[index], &frames[index]);
+        (0..cameras.len()).into_par_iter().map(of_one).collect()
+    }
+
     fn with_capacity(count: usize, camera: &Camera) -> Self {
         Self {
             normals: Vec::with_capacity(count),
@@ -94,14 +101,12 @@ impl InterpretationPlanes {
         if !(norm > 0.0 && norm.is_finite()) {
             return;
         }
+        self.normals.push(moment / norm);
         if let Some(rays) = &mut self.middle_rays {
             // The middle of a bent line is beside its chord, and only what it is along the plane counts.
             let ray = camera.bearing(Vector2::from(line.start).lerp(&line.end.into(), 0.5));
             rays.push((ray - moment * (ray.dot(&moment) / (norm * norm))).normalize());
-            self.normals.push(moment / norm);
             moment *= length / norm;
-        } else {
-            self.normals.push(moment / norm);
         }
         let weight = length.min(FULL_WEIGHT_LENGTH_PX);
         self.moments.push(moment);
@@ -115,9 +120,9 @@ impl InterpretationPlanes {
     /// What `direction . moment` of a segment is to be divided by for the distance in pixels of the segment's ends from the
     /// line that joins its midpoint to the direction's vanishing point: `2 |f v_xy - m v_z|` for a pinhole. Behind another
     /// lens the pixels are those of a picture that looks along the segment's middle, where the two are the same.
-    pub(crate) fn reach(&self, line: usize, direction: &Vector3<f64>, focal_px: f64) -> f64 {
+    pub(crate) fn reach(&self, line: usize, direction: &Vector3<f64>) -> f64 {
         match &self.middle_rays {
-            None => 2.0 * (direction.xy() * focal_px - self.midpoints[line] * direction.z).norm(),
+            None => 2.0 * (direction.xy() * self.focal_px - self.midpoints[line] * direction.z).norm(),
             Some(rays) => 2.0 * rays[line].cross(direction).norm(),
         }
     }

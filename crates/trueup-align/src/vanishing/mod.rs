@@ -31,7 +31,6 @@ pub use triad::{MissingTriad, Triad, TriadOutcome};
 
 pub(crate) use interpretation::{FULL_WEIGHT_LENGTH_PX, InterpretationPlanes};
 pub(crate) use refine::RefinedTriad;
-pub(crate) use search::orthonormal_complement;
 
 /// Largest angle between the vertical and a segment's interpretation plane for the segment to be a vertical line,
 /// degrees.
@@ -49,7 +48,7 @@ const MAX_ROTATION_SD_DEG: f64 = 5.0;
 /// of the frame are ignored. `generator` drives the choice of hypotheses: the same generator gives the same triad.
 /// Cost: about `draws * 45 * 200` evaluations of a segment, 1 to 2 ms with the defaults. Without intrinsics (see
 /// `uncalibrated`) the directions are those in the frame of a camera of the focal length that they tell themselves, and
-/// `focal_px` is not heeded.
+/// that of `camera` is not heeded.
 ///
 /// # Source
 /// Two-line exhaustive search on the Gaussian sphere (Lu, Yao, Liu, Li: 2-Line Exhaustive Searching for Real-Time

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, RngExt};
+use trueup_core::geometry::orthonormal_complement;
 
 use super::interpretation::InterpretationPlanes;
 use super::options::VanishingOptions;
@@ -56,14 +57,6 @@ pub(super) fn draw(cumulative: &[f64], generator: &mut impl Rng) -> usize {
     let total = cumulative.last().copied().unwrap_or(0.0);
     let place = total * generator.random::<f64>();
     cumulative.partition_point(|&sum| sum <= place).min(cumulative.len().saturating_sub(1))
-}
-
-/// Two unit vectors that complete `axis` to a right-handed orthonormal frame (axis, first, second).
-pub(crate) fn orthonormal_complement(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    // The coordinate axis with the smallest component is farthest from parallel.
-    let helper = Vector3::ith(axis.iamin(), 1.0);
-    let first = axis.cross(&helper).normalize();
-    (first, axis.cross(&first))
 }
 
 /// Scores the turns of a triad about its first direction: sum over segments of w max(0, 1 - (sine / sin tolerance)^2),

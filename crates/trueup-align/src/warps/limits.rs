@@ -48,7 +48,7 @@ pub(super) fn refuse(model: WarpModel, input: &WarpInput<'_>, photograph: usize,
 
 /// The largest angle in radians between the reference's axis and a direction that a photograph's border sees.
 pub(super) fn farthest_angle(input: &WarpInput<'_>, photograph: usize) -> f64 {
-    let axis = input.cameras[input.reference].rotation().row(2).transpose();
+    let axis = input.cameras[input.reference].forward();
     let frame = &input.frames[photograph];
     corners(frame.width, frame.height)
         .into_iter()

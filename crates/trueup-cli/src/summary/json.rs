@@ -1,7 +1,7 @@
 //! The summary for programs.
 
 use serde_json::{Value, json};
-use trueup::{Diagnostic, ImageStatus, Project, Severity, Written};
+use trueup::{Diagnostic, ImageStatus, Project, Written};
 
 /// The summary of panoramas that were written, as JSON: docs/command-line.md says what its fields mean.
 pub(crate) fn json(written: &[Written]) -> String {
@@ -12,7 +12,7 @@ pub(crate) fn json(written: &[Written]) -> String {
 }
 
 fn panorama(written: &Written) -> Value {
-    let Project { images, canvas, measures, diagnostics, seconds, reference, .. } = &written.project;
+    let Project { images, canvas, measures, seconds, reference, .. } = &written.project;
     let names = written.project.photograph_names();
     let path = |path: &std::path::Path| path.display().to_string();
     let beside: serde_json::Map<String, Value> =
@@ -20,7 +20,7 @@ fn panorama(written: &Written) -> Value {
     let used: Vec<&str> = written.project.used_images().map(|image| image.path.as_str()).collect();
     let left_out = images.iter().filter(|image| image.status == ImageStatus::LeftOut);
     let warning = |one: &Diagnostic| json!({ "code": one.code, "subject": one.subject.named(&names), "message": one.message, "hint": one.hint });
-    let warnings = diagnostics.iter().filter(|one| one.severity == Severity::Warning).map(warning);
+    let warnings = written.project.warnings().map(warning);
     json!({
         "panorama": path(&written.outputs.panorama),
         "beside": beside,

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use trueup::{Project, Severity, Written};
+use trueup::{Project, Written};
 
 use super::left_out::{left_out, tells_of_left_out};
 use super::names::{listed, names};
@@ -30,13 +30,10 @@ fn warnings_of(project: &Project, used: &BTreeSet<&Path>) -> Vec<String> {
     let count: usize = groups.iter().map(|group| group.photographs.len()).sum();
     let reasons: Vec<String> =
         groups.iter().map(|group| format!("{}: {}", listed(&group.photographs), group.reason)).collect();
-    let told = |one: &&trueup::Diagnostic| one.severity == Severity::Warning && !tells_of_left_out(one, project);
+    let told = |one: &&trueup::Diagnostic| !tells_of_left_out(one, project);
     let photograph_names = project.photograph_names();
-    let others = project
-        .diagnostics
-        .iter()
-        .filter(told)
-        .map(|one| format!("{}: {}", one.subject.named(&photograph_names), one.message));
+    let others =
+        project.warnings().filter(told).map(|one| format!("{}: {}", one.subject.named(&photograph_names), one.message));
     let left_out = (count > 0).then(|| format!("{count} of {} left out: {}", project.images.len(), reasons.join("; ")));
     left_out.into_iter().chain(others).collect()
 }

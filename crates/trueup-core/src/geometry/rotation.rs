@@ -24,6 +24,14 @@ pub fn roll_from_down(down: &Vector3<f64>) -> f64 {
     down.x.atan2(down.y)
 }
 
+/// Two unit vectors that complete `axis` to a right-handed orthonormal frame (axis, first, second).
+pub fn orthonormal_complement(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    // The coordinate axis with the smallest component is farthest from parallel.
+    let helper = Vector3::ith(axis.iamin(), 1.0);
+    let first = axis.cross(&helper).normalize();
+    (first, axis.cross(&first))
+}
+
 /// The rotation by |v| radians about v (Rodrigues).
 pub fn exp_rotation(v: &Vector3<f64>) -> Matrix3<f64> {
     const SMALL: f64 = 1e-12;

@@ -14,7 +14,7 @@ use super::working::{WorkingPicture, reduce_photograph};
 use crate::color::{Conversion, PhotographColors};
 use crate::source::InMemory;
 
-/// Photographs in files. What [`working`](Self::working) decodes is kept, within a budget of bytes, until
+/// Photographs in files and in memory. What [`working`](Self::working) decodes is kept, within a budget of bytes, until
 /// [`photograph`](PhotographSource::photograph) asks for it, so that a small set is decoded once.
 ///
 /// The budget decides only how often files are decoded, never what is returned.
@@ -95,7 +95,8 @@ impl FilePhotographs {
         }
     }
 
-    /// Decodes photograph `index` and reduces it as [`working`](super::working) does; keeps the photograph if it fits.
+    /// Photograph `index`, reduced as [`working`](super::working) does; what had to be decoded or converted for it is kept if it
+    /// fits.
     ///
     /// # Errors
     /// As [`working`](super::working); [`Error::Input`] if there is no photograph `index`.
@@ -106,7 +107,7 @@ impl FilePhotographs {
         if let Some(photograph) = self.in_memory(index).filter(|_| self.conversion(index).is_none()) {
             return whole(photograph);
         }
-        let photograph = self.decode(index, source)?;
+        let photograph = self.photograph(index)?;
         let working = whole(&photograph)?;
         self.keep(index, photograph);
         Ok(working)
@@ -168,7 +169,7 @@ impl FilePhotographs {
 }
 
 impl PhotographSource for FilePhotographs {
-    /// Hands out a kept photograph, which is then no longer kept, or decodes the file.
+    /// Hands out a kept photograph, which is then no longer kept, or decodes the file, or copies what is in memory.
     fn photograph(&self, index: usize) -> Result<Photograph> {
         let source = self.source(index)?;
         match self.take(index) {

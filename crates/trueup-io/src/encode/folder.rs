@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use trueup_core::{Error, Result};
 
-use super::pending::{PART, PREFIX, allow_umask, require_folder, takes_nothing};
+use super::pending::{allow_umask, require_folder, takes_nothing};
+use super::stale::{PART, PREFIX};
 use super::unfinished::{UNFINISHED, UnfinishedEntry};
 
 /// Permissions that any new folder asks for.

@@ -9,12 +9,9 @@ use tempfile::NamedTempFile;
 use trueup_core::{Error, Result};
 
 use super::place::{open_through, passes_through, refuse_disk};
-use super::stale::{STALE_AGE, clear_stale, mark_in_use};
+use super::stale::{PART, PREFIX, STALE_AGE, clear_stale, mark_in_use};
 use super::unfinished::{UNFINISHED, UnfinishedEntry};
 
-/// How temporary names begin, and how those of what is not yet complete end.
-pub(super) const PREFIX: &str = ".trueup-";
-pub(super) const PART: &str = ".part";
 /// Permissions that any new file asks for.
 const NEW_FILE: u32 = 0o666;
 

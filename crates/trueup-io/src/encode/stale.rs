@@ -1,11 +1,12 @@
-//! What a program that was killed left behind under temporary names.
+//! Temporary names, and what a program that was killed left behind under them.
 
 use std::fs::File;
 use std::path::Path;
 use std::time::Duration;
 
-use super::pending::{PART, PREFIX};
-
+/// How temporary names begin, and how those of what is not yet complete end.
+pub(super) const PREFIX: &str = ".trueup-";
+pub(super) const PART: &str = ".part";
 /// Younger files may be of a program that has made but not yet marked them.
 pub(super) const STALE_AGE: Duration = Duration::from_secs(60);
 

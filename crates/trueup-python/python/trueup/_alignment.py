@@ -1,22 +1,17 @@
 """From photographs to panoramas."""
 
-import json
-from functools import cached_property
 from typing import Any, Unpack
 
-from trueup import _record, _trueup
+from trueup import _trueup
 from trueup._keywords import ComposeKeywords, StitchKeywords
 from trueup._panorama import Panorama
 from trueup._photographs import Photographs, native
 from trueup._progress import Heard, Progress
-from trueup._record import Photograph, Report
+from trueup._record import Recorded
 
 
-class Alignment:
+class Alignment(Recorded[_trueup.Alignment]):
     """The geometry of a panorama: cameras, vanishing points, deformed grids, canvas. Made by :func:`trueup.align`."""
-
-    def __init__(self, native_alignment: _trueup.Alignment) -> None:
-        self._native = native_alignment
 
     def compose(
         self,
@@ -46,22 +41,6 @@ class Alignment:
         if len(shown) == len(used) != sum(used):
             return [one for one, is_used in zip(shown, used, strict=True) if is_used]
         return shown
-
-    @cached_property
-    def project(self) -> dict[str, Any]:
-        """The record of everything that was decided so far, as docs/project-file.md describes it."""
-        project: dict[str, Any] = json.loads(self._native.project_json())
-        return project
-
-    @property
-    def photographs(self) -> list[Photograph]:
-        """What became of every photograph that was given, in the order given."""
-        return _record.photographs(self.project, self._native.photograph_names())
-
-    @property
-    def report(self) -> Report:
-        """How it was made, and how good it is."""
-        return Report(self.project, self._native.summary(False), self._native.summary(True))
 
     def __repr__(self) -> str:
         canvas = self.project["canvas"]

@@ -2,15 +2,14 @@
 
 import base64
 import html
-import json
 import os
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Unpack
 
-from trueup import _record, _trueup
+from trueup import _trueup
 from trueup._keywords import SaveKeywords
 from trueup._progress import Heard, Progress
-from trueup._record import Photograph, Report
+from trueup._record import Recorded
 
 if TYPE_CHECKING:
     import numpy as np
@@ -20,11 +19,8 @@ _SHOWN_SIDE_PX = 1000
 """Longer side of the pictures that notebooks show: as wide as their columns are."""
 
 
-class Panorama:
+class Panorama(Recorded[_trueup.Panorama]):
     """A panorama. Made by :func:`trueup.stitch` or :meth:`trueup.Alignment.compose`."""
-
-    def __init__(self, native: _trueup.Panorama) -> None:
-        self._native = native
 
     @cached_property
     def _pixels(self) -> "tuple[npt.NDArray[Any], npt.NDArray[np.uint8]]":
@@ -44,22 +40,6 @@ class Panorama:
     def mask(self) -> "npt.NDArray[np.uint8]":
         """Opacity, height x width: 255 where photographs are, 0 where none is."""
         return self._pixels[1]
-
-    @cached_property
-    def project(self) -> dict[str, Any]:
-        """The record of everything that was decided, as docs/project-file.md describes it."""
-        project: dict[str, Any] = json.loads(self._native.project_json())
-        return project
-
-    @property
-    def photographs(self) -> list[Photograph]:
-        """What became of every photograph that was given, in the order given."""
-        return _record.photographs(self.project, self._native.photograph_names())
-
-    @property
-    def report(self) -> Report:
-        """How it was made, and how good it is; ``print(panorama.report)`` prints a summary."""
-        return Report(self.project, self._native.summary(False), self._native.summary(True))
 
     def save(
         self,

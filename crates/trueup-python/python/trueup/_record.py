@@ -1,7 +1,13 @@
 """What a project records, in classes for what people ask most."""
 
+import json
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, Generic, TypeVar
+
+from trueup import _trueup
+
+Native = TypeVar("Native", _trueup.Alignment, _trueup.Panorama)
 
 
 @dataclass(frozen=True)
@@ -72,19 +78,37 @@ class Report:
         return f"<trueup.Report\n{self._summary}>"
 
 
-def photographs(project: dict[str, Any], names: list[str]) -> list[Photograph]:
-    """What became of every photograph that was given, in the order given."""
-    return [
-        Photograph(
-            name=name,
-            path=image["path"],
-            used=image["status"] == "used",
-            reason=image["reason"],
-            hint=image["hint"],
-            width=image["width"],
-            height=image["height"],
-            focal_px=image["focal_px"],
-            rotation=image["rotation"],
-        )
-        for name, image in zip(names, project["images"], strict=True)
-    ]
+class Recorded(Generic[Native]):
+    """What has a record of how it was made."""
+
+    def __init__(self, native: Native) -> None:
+        self._native = native
+
+    @cached_property
+    def project(self) -> dict[str, Any]:
+        """The record of everything that was decided so far, as docs/project-file.md describes it."""
+        project: dict[str, Any] = json.loads(self._native.project_json())
+        return project
+
+    @property
+    def photographs(self) -> list[Photograph]:
+        """What became of every photograph that was given, in the order given."""
+        return [
+            Photograph(
+                name=name,
+                path=image["path"],
+                used=image["status"] == "used",
+                reason=image["reason"],
+                hint=image["hint"],
+                width=image["width"],
+                height=image["height"],
+                focal_px=image["focal_px"],
+                rotation=image["rotation"],
+            )
+            for name, image in zip(self._native.photograph_names(), self.project["images"], strict=True)
+        ]
+
+    @property
+    def report(self) -> Report:
+        """How it was made, and how good it is; printed, it is a summary."""
+        return Report(self.project, self._native.summary(False), self._native.summary(True))

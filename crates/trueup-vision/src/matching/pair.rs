@@ -38,7 +38,7 @@ const MAX_AREA_RATIO: f64 = 20.0;
 
 /// A turned lens stands in for the homography if this many times as many matches agree with it ...
 const TURN_FACTOR: f64 = 1.25;
-/// ... and this many more: a homography has three unknowns more to please wrong matches with.
+/// ... and this many more: a homography has two unknowns more to please wrong matches with.
 const TURN_MORE: usize = 15;
 
 /// A photograph of a pair.

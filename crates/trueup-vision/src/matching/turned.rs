@@ -1,6 +1,6 @@
 //! Matches verified on rays: two photographs by one lens that only turned, where no homography holds.
 //!
-//! The focal length and one radial term are unknown. Lenses are tried one after the other, from pinholes to fisheyes; under
+//! The focal length and two radial terms are unknown. Lenses are tried one after the other, from pinholes to fisheyes; under
 //! each, two matches give the turn. The best are refined on all matches that agree.
 //!
 //! # Source

@@ -279,7 +279,11 @@ impl StitchOptions {
     /// Options that were changed to another value than the method fixes them at. Those at their defaults pass: they were not
     /// asked for.
     fn contradicting_the_method(&self) -> Vec<InvalidOption> {
-        let tables = [self.to_table(), self.fixed_by_method().to_table(), Self::default().to_table()];
+        let fixed = self.fixed_by_method();
+        if fixed == *self {
+            return Vec::new();
+        }
+        let tables = [self.to_table(), fixed.to_table(), Self::default().to_table()];
         let [Ok(own), Ok(fixed), Ok(default)] = tables else { return Vec::new() };
         let mut contradicting = Vec::new();
         for row in Self::describe() {

@@ -87,9 +87,13 @@ fn hard_limit(root: &Path, threads: usize) -> Option<HardLimit> {
 /// # Source
 /// proc_pid_status(5).
 fn kibibytes(status: &str, name: &str) -> Option<u64> {
-    let words = status.lines().find_map(|line| line.strip_prefix(name))?;
-    let number: u64 = words.split_whitespace().next()?.parse().ok()?;
-    number.checked_mul(1024)
+    number_after(status, name)?.checked_mul(1024)
+}
+
+/// The number that follows `name` at the beginning of a line.
+fn number_after(text: &str, name: &str) -> Option<u64> {
+    let words = text.lines().find_map(|line| line.strip_prefix(name))?;
+    words.split_whitespace().next()?.parse().ok()
 }
 
 /// What the text of /proc/PID/limits leaves to a program's data.
@@ -100,13 +104,9 @@ fn kibibytes(status: &str, name: &str) -> Option<u64> {
 /// # Source
 /// proc_pid_limits(5); getrlimit(2): RLIMIT_AS, RLIMIT_DATA.
 fn process_limits(limits: &str, threads: usize) -> Vec<u64> {
-    let soft = |name: &str| -> Option<u64> {
-        let words = limits.lines().find_map(|line| line.strip_prefix(name))?;
-        words.split_whitespace().next()?.parse().ok()
-    };
     let reserved = THREAD_SPACE.saturating_mul(threads as u64);
-    let space = soft("Max address space").map(|limit| limit - reserved.min(limit / 2));
-    space.into_iter().chain(soft("Max data size")).collect()
+    let space = number_after(limits, "Max address space").map(|limit| limit - reserved.min(limit / 2));
+    space.into_iter().chain(number_after(limits, "Max data size")).collect()
 }
 
 /// How the two versions of control groups call the files of a group.
@@ -143,8 +143,7 @@ impl ControlGroup {
         let limit = number(self.files.limit).filter(|&limit| limit < NO_LIMIT)?;
         let taken = number(self.files.taken).unwrap_or(0);
         let stat = text("memory.stat").unwrap_or_default();
-        let dropped =
-            stat.lines().find_map(|line| line.strip_prefix(self.files.dropped)?.trim().parse().ok()).unwrap_or(0);
+        let dropped = number_after(&stat, self.files.dropped).unwrap_or(0);
         let others = taken.saturating_sub(dropped).saturating_sub(own);
         Some(limit.saturating_sub(others))
     }

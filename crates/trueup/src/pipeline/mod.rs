@@ -46,7 +46,7 @@ use crate::project::fill::{GeometryRecord, fill_geometry, place, record_composit
 use crate::project::provenance;
 use crate::project::read::Recorded;
 use crate::project::record::Project;
-use crate::report::{judgement, measures, sideways};
+use crate::report::{judgement, measuring, sideways};
 
 pub use results::{Aligned, Alignment, MatchedPhotographs};
 
@@ -212,6 +212,7 @@ impl<'a> Stitcher<'a> {
         directions: Option<&[TriadOutcome]>,
         context: &StageContext,
     ) -> Result<Alignment> {
+        let fixed = self.options.fixed_by_method();
         let (matched, photographs) = (&set.matched, &set.matched.set.files);
         let component = matched.component(members, inputs)?;
         let input = AlignInput {
@@ -224,12 +225,11 @@ impl<'a> Stitcher<'a> {
         let geometry: Option<Geometry> = match members.len() {
             1 => None,
             _ => {
-                let found = align::run(&input, &self.options.align, context)?;
+                let found = align::run(&input, &fixed.align, context)?;
                 Some(context.absorb(found.renumbered(|local| members[local])))
             }
         };
         let input = ArrangeInput::of_geometry(place(&component, geometry.as_ref()), &component, geometry.as_ref());
-        let fixed = self.options.fixed_by_method();
         let arrangement = context.absorb(arrange::run(input, &fixed.arrange, context)?);
         let light = LightInput {
             layout: &arrangement.lit_plane(),
@@ -245,7 +245,7 @@ impl<'a> Stitcher<'a> {
         fill_geometry(&mut project, &found);
         project.color_space = photographs.colors().map(PhotographColors::name).unwrap_or_default();
         project.measures =
-            geometry.map(|geometry| context.time("measures", || measures::run(&component, geometry, &arrangement)));
+            geometry.map(|geometry| context.time("measures", || measuring::run(&component, geometry, &arrangement)));
         let on_side = geometry.and_then(|geometry| sideways::warning(&geometry.cameras.cameras, members));
         judgement::warnings(&project).into_iter().chain(on_side).for_each(|warning| context.report(warning));
         let layout = arrangement.written;

@@ -9,7 +9,7 @@ use super::photographs::FoundPhotographs;
 use super::results::Alignment;
 use crate::job::inputs::Inputs;
 use crate::job::masks::AllMasks;
-use crate::project::record::{ImageRecord, ImageStatus};
+use crate::project::record::ImageRecord;
 use crate::project::replace::named_photographs;
 
 impl Stitcher<'_> {
@@ -47,9 +47,7 @@ impl Alignment {
     fn found(&self) -> FoundPhotographs {
         let numbers: Vec<usize> = match &self.positions {
             Some(positions) => (0..positions.len()).collect(),
-            None => (0..self.project.images.len())
-                .filter(|&number| self.project.images[number].status == ImageStatus::Used)
-                .collect(),
+            None => self.project.used_positions(),
         };
         let images: Vec<SourceImage> =
             numbers.iter().map(|&number| self.photographs.sources()[number].clone()).collect();

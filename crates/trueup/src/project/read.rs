@@ -12,7 +12,7 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::{self, RejectedSource, SourceOptions};
 
 use super::projection::ProjectionRecord;
-use super::record::{ImageRecord, ImageStatus, MeshRecord, Project};
+use super::record::{ImageRecord, MeshRecord, Project};
 
 /// What a project must be to be read again.
 const AS_WRITTEN: &str = "Give a project file as `trueup stitch --project` wrote it.";
@@ -48,8 +48,7 @@ impl Recorded {
     /// [`Error::Options`]; [`Error::Input`] if grids, corrections, canvas or reference are missing or cannot be.
     pub(crate) fn new(project: &Project) -> Result<Self> {
         project.options.validate()?;
-        let used: Vec<usize> =
-            (0..project.images.len()).filter(|&at| project.images[at].status == ImageStatus::Used).collect();
+        let used = project.used_positions();
         let records: Vec<&ImageRecord> = project.used_images().collect();
         if used.is_empty() {
             return Err(Error::input("the project", "it uses no photographs", AS_WRITTEN));

@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use trueup_align::mesh::CameraPlane;
 use trueup_compose::exposure::{Correction, Response};
 use trueup_core::camera::Camera;
-use trueup_core::diagnostics::Diagnostic;
+use trueup_core::diagnostics::{Diagnostic, Severity};
 use trueup_core::geometry::matrix_from_rows;
 use trueup_core::lens::{Lens, LensTerms};
 use trueup_core::matches::PairVerdict;
@@ -267,6 +267,16 @@ impl Project {
     /// The photographs in the panorama, in the order given.
     pub fn used_images(&self) -> impl Iterator<Item = &ImageRecord> {
         self.images.iter().filter(|image| image.status == ImageStatus::Used)
+    }
+
+    /// What was found and makes the panorama worse.
+    pub fn warnings(&self) -> impl Iterator<Item = &Diagnostic> {
+        self.diagnostics.iter().filter(|one| one.severity == Severity::Warning)
+    }
+
+    /// The positions of these in [`Self::images`].
+    pub fn used_positions(&self) -> Vec<usize> {
+        (0..self.images.len()).filter(|&position| self.images[position].status == ImageStatus::Used).collect()
     }
 
     /// The names by which people know the photographs, in the order of [`Self::images`]: file names, with as much of their

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use serde::Serialize;
+use trueup_align::metrics::BENT_SHARE;
 use trueup_core::diagnostics::{Diagnostic, Subject};
 
 use super::measures::Measures;
@@ -53,7 +54,7 @@ const LEAST_APART_PX: [f64; 2] = [1.5, 4.0];
 /// Limits of how far a long line may stray, as shares of its length: what counts as bent, and what the level sphere unrolled,
 /// the shape that costs nothing, bends a line along the upper edge of a photograph 90 degrees wide and 70 high: that falls
 /// from 35 degrees of elevation to atan(tan 35 cos 45) = 26.3.
-const BENT: [f64; 2] = [0.003, 0.1];
+const BENT: [f64; 2] = [BENT_SHARE, 0.1];
 
 /// A plain word for every figure that was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]

@@ -4,5 +4,6 @@ pub(crate) mod evaluation;
 pub(crate) mod judgement;
 pub(crate) mod left_out;
 pub(crate) mod measures;
+pub(crate) mod measuring;
 pub(crate) mod several;
 pub(crate) mod sideways;

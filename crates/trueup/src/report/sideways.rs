@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use trueup_core::camera::Camera;
 use trueup_core::diagnostics::{Diagnostic, Subject};
+use trueup_core::geometry::orthonormal_complement;
 
 /// Photographs sweep farther than this only about the vertical: up and down, people look from 30 degrees below the horizon to
 /// the zenith at most. Degrees.
@@ -47,20 +48,13 @@ fn sweep_on_side(cameras: &[Camera]) -> Option<f64> {
     if !cameras.iter().map(axis(0)).all(|rows| rows.dot(&turned_about).abs() >= least) {
         return None;
     }
-    let (along, across) = plane(&turned_about);
+    let (along, across) = orthonormal_complement(&turned_about);
     let mut angles: Vec<f64> = views.iter().map(|view| view.dot(&across).atan2(view.dot(&along))).collect();
     angles.sort_by(f64::total_cmp);
     let around = angles.first()? + std::f64::consts::TAU - angles.last()?;
     let widest_gap = angles.windows(2).map(|pair| pair[1] - pair[0]).fold(around, f64::max);
     let sweep = (std::f64::consts::TAU - widest_gap).to_degrees();
     (sweep >= LEAST_SWEEP_DEG).then_some(sweep)
-}
-
-/// Two directions at right angles to `normal` and to each other.
-fn plane(normal: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let least = normal.iamin();
-    let along = normal.cross(&Vector3::ith(least, 1.0)).normalize();
-    (along, normal.cross(&along))
 }
 
 #[cfg(test)]

@@ -55,7 +55,7 @@ pub(crate) fn claims(results: &Results) -> Vec<Claim> {
     let correlation = correlation(&found);
     vec![Claim {
         id: "estimated-gdic",
-        text: "GDIC estimated from a panorama's own vertical lines ranks panoramas as the true one does.".to_owned(),
+        text: "GDIC estimated from a panorama's own lines ranks panoramas as the true one does.".to_owned(),
         holds: correlation.map(|correlation| correlation >= MIN_CORRELATION),
         evidence: format!(
             "Spearman's correlation over {} panoramas of all methods with known cameras: {} (wanted: {MIN_CORRELATION}).",
@@ -72,8 +72,8 @@ pub(crate) fn section(results: &Results) -> Section {
     let mut section = Section::new(NAME, "GDIC without the truth");
     section.say(
         "GDIC asks for known cameras, which photographs seldom come with. Its estimate takes each photograph's true direction from \
-         the vanishing point of its own vertical lines, over the photographs that have enough of them. Both are relative to the \
-         reference of the stitch. Panoramas of which too few photographs have vertical lines have no estimate and do not count.",
+         the lines of all of them, over the photographs for which these are certain. Both are relative to the \
+         reference of the stitch. Panoramas of which fewer than two photographs are certain have no estimate and do not count.",
     );
     section.blocks.extend(claims(results).into_iter().map(Block::Claim));
     let columns =

@@ -32,8 +32,8 @@ pub(crate) fn section(results: &Results) -> Section {
     let mut section = Section::new(NAME, "Table 4: photographs of the GSP data set");
     section.say(format!(
         "Sets of photographs with unknown cameras. The paper believes their vanishing points up to a divergence of {THRESHOLD:.2} \
-         and shows twelve panoramas. **lean**: mean lean of the vertical lines, over the photographs with enough of them \
-         (certain); **estimated GDIC**: from the same lines. What the photographs are and how many were used is stated, since a \
+         and shows twelve panoramas. **lean**: mean lean by the lines of all photographs, over those for which it is \
+         certain; **estimated GDIC**: from the same lines. What the photographs are and how many were used is stated, since a \
          set of the same name may be another selection."
     ));
     let sets = &results.catalogue.photographs;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use trueup::{Error, Result, StageContext};
+use trueup::{Result, StageContext};
 use trueup_scenes::SetKind;
 use trueup_scenes::cut::find_panoramas;
 
@@ -12,7 +12,7 @@ use super::rendered::{
     EACH_GATE_CLASS, FocalSet, PitchSet, RolledPair, focal_sets, gate_sets, pitch_sets, quick_sets, rendered_sets,
     rolled_pairs,
 };
-use super::spec::{SetSource, SetSpec};
+use super::spec::{SetSource, SetSpec, refuse_known};
 use super::{from_panorama, photographs};
 
 /// The sets of a run, by what they are for.
@@ -110,10 +110,7 @@ fn given_sets(folders: &GivenFolders) -> Result<Vec<SetSpec>> {
     for parent in folders.truth_sets {
         for folder in truth_folders(parent)? {
             let name = format!("given/{}", name_of(&folder));
-            if sets.iter().any(|known| known.name == name) {
-                let hint = "Give the folders of sets names of their own.";
-                return Err(Error::input(folder.display(), "there are two sets of this name", hint));
-            }
+            refuse_known(&sets, &name, &folder)?;
             sets.push(SetSpec::folder(name, folder));
         }
     }

@@ -1,4 +1,4 @@
-//! The sets of photographs with known cameras that experiments run on, made when they are first needed.
+//! The sets of photographs that experiments run on, most of them with known cameras, made when they are first needed.
 
 mod catalogue;
 mod central;

@@ -170,6 +170,18 @@ impl Recipe {
     }
 }
 
+/// Refuses a set in `folder` whose name one of `sets` has.
+///
+/// # Errors
+/// [`Error::Input`].
+pub(super) fn refuse_known(sets: &[SetSpec], name: &str, folder: &Path) -> Result<()> {
+    if sets.iter().all(|known| known.name != name) {
+        return Ok(());
+    }
+    let hint = "Give the folders of sets names of their own.";
+    Err(Error::input(folder.display(), "there are two sets of this name", hint))
+}
+
 /// "room (office), 5 of 1024 x 768 px, ..."
 fn describe(scene: &SceneOptions, rig: &RigOptions) -> String {
     use trueup_core::options::OptionValue;

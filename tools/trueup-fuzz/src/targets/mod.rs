@@ -2,11 +2,9 @@
 
 mod pictures;
 mod texts;
+mod work;
 
-use std::io;
-use std::path::PathBuf;
-
-use tempfile::TempDir;
+pub(crate) use work::Work;
 
 /// Something that reads.
 pub(crate) struct Target {
@@ -28,20 +26,3 @@ pub(crate) static TARGETS: [Target; 8] = [
     Target { name: "graph", seeds: texts::graphs, read: texts::read_graph },
     Target { name: "config", seeds: texts::configurations, read: texts::read_configuration },
 ];
-
-/// A folder for files that are read.
-#[derive(Debug)]
-pub(crate) struct Work(TempDir);
-
-impl Work {
-    pub(crate) fn new() -> io::Result<Self> {
-        Ok(Self(tempfile::tempdir()?))
-    }
-
-    /// The input as a file; the one before it is gone.
-    fn file(&self, name: &str, input: &[u8]) -> PathBuf {
-        let path = self.0.path().join(name);
-        std::fs::write(&path, input).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        path
-    }
-}

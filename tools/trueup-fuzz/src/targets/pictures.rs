@@ -12,7 +12,7 @@ use trueup_io::encode::{Depth, Metadata, MetadataKept, OutputOptions, write};
 use trueup_io::provenance::{PanoramaDescription, describe};
 use trueup_io::source::{SourceOptions, scan};
 
-use super::Work;
+use super::work::Work;
 
 /// Side of the pictures that are changed, in pixels: little more than photographs must have, so that many are read in a
 /// second.

@@ -3,16 +3,17 @@
 use trueup::{Project, StitchOptions, hugin_project};
 use trueup_align::stitch_graph::parse_graph_file;
 
-use super::Work;
+use super::work::Work;
 
 /// A project by hand: two photographs with cameras and grids, one left out.
 pub(super) fn projects() -> Vec<Vec<u8>> {
+    let corners = [[0.0, 0.0], [640.0, 0.0], [0.0, 480.0], [640.0, 480.0]];
     let image = |path: &str, status: &str| {
         serde_json::json!({
             "path": path, "width": 640, "height": 480, "orientation": 1, "status": status, "reason": "", "hint": "",
             "component": 0, "focal_px": 500.0, "rotation": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-            "theta_deg": 0.5, "scale": 1.0, "gain": [1.0, 1.0, 1.0], "vanishing_points": null,
-            "mesh": {"columns": 1, "rows": 1, "vertices": [[0.0, 0.0], [640.0, 0.0], [0.0, 480.0], [640.0, 480.0]]}
+            "theta_deg": 0.5, "scale": 1.0, "gain": 1.0, "vanishing_points": null,
+            "mesh": {"rows": 2, "cols": 2, "source": corners, "target": corners}
         })
     };
     let project = serde_json::json!({
@@ -30,7 +31,7 @@ pub(super) fn projects() -> Vec<Vec<u8>> {
         "diagnostics": [{"code": "full-turn", "severity": "note", "subject": {"stage": "mesh"}, "message": "round",
             "hint": ""}]
     });
-    vec![project.to_string().into_bytes(), b"{}".to_vec()]
+    vec![project.to_string().into_bytes()]
 }
 
 pub(super) fn read_project(_: &Work, input: &[u8]) {
@@ -76,5 +77,23 @@ pub(super) fn read_configuration(_: &Work, input: &[u8]) {
     }
     for line in text.lines() {
         let _ = options.set(line);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A seed that is refused at once leads nowhere behind that.
+    #[test]
+    fn the_seeds_are_read() {
+        for seed in projects() {
+            let text = String::from_utf8(seed).expect("text");
+            assert_eq!(Project::from_json(&text, "seed").expect("a project").used(), 2);
+        }
+        for seed in configurations() {
+            let text = String::from_utf8(seed).expect("text");
+            StitchOptions::default().merge_toml(&text, "seed").expect("a configuration");
+        }
     }
 }

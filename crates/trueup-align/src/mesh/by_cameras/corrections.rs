@@ -4,6 +4,7 @@ use nalgebra::Vector2;
 use trueup_core::camera::Camera;
 use trueup_core::mesh::GridMesh;
 
+use super::super::alignment::overlap_cells;
 use super::super::complex::product;
 use super::super::normal_equations::{CarriedVertex, NormalEquations};
 use super::super::options::MeshOptions;
@@ -24,17 +25,10 @@ use crate::match_points::OverlapWarp;
 /// section 3, in place of their averages.
 #[derive(Debug)]
 pub(super) struct CameraCorrections {
-    /// One for each photograph, on its undeformed grid.
-    fields: Vec<Field>,
+    /// One for each photograph: its undeformed grid with the steps as targets, bilinear between the vertices.
+    steps: Vec<GridMesh>,
     /// Relative gradient of the energy at the solution.
     pub relative_gradient: f64,
-}
-
-/// Steps aside over one photograph, bilinear between the vertices of its grid.
-#[derive(Debug)]
-struct Field {
-    /// The targets are the steps.
-    steps: GridMesh,
 }
 
 /// Pull of every vertex to where its camera sees it, as a share of that of a match point: fixes what matches leave open,
@@ -47,8 +41,8 @@ const ROUNDS: usize = 3;
 impl CameraCorrections {
     /// The corrections that minimize the energies; `None` if there are none.
     pub(super) fn find(input: &ByCamerasInput, options: &MeshOptions) -> Option<Self> {
-        let still = |grid: &GridMesh| Field { steps: GridMesh { target: vec![[0.0; 2]; grid.len()], ..grid.clone() } };
-        let mut corrections = Self { fields: input.grids.iter().map(still).collect(), relative_gradient: 0.0 };
+        let still = |grid: &GridMesh| GridMesh { target: vec![[0.0; 2]; grid.len()], ..grid.clone() };
+        let mut corrections = Self { steps: input.grids.iter().map(still).collect(), relative_gradient: 0.0 };
         let shape = shape_energy(input, options);
         let mut solver = MeshSolver::default();
         for _ in 0..ROUNDS {
@@ -58,8 +52,7 @@ impl CameraCorrections {
             if !solution.coordinates.iter().all(|coordinate| coordinate.is_finite()) {
                 return None;
             }
-            let steps = equations.meshes(input.grids, &solution.coordinates);
-            corrections.fields = steps.into_iter().map(|steps| Field { steps }).collect();
+            corrections.steps = equations.meshes(input.grids, &solution.coordinates);
             corrections.relative_gradient = solution.relative_gradient;
         }
         Some(corrections)
@@ -67,12 +60,12 @@ impl CameraCorrections {
 
     /// How far aside a pixel of a photograph looks.
     pub(super) fn aside(&self, photograph: usize, pixel: Vector2<f64>) -> Vector2<f64> {
-        self.fields[photograph].steps.warp(pixel)
+        self.steps[photograph].warp(pixel)
     }
 
     /// The longest step, working pixels.
     pub(super) fn largest_px(&self) -> f64 {
-        let steps = self.fields.iter().flat_map(|field| &field.steps.target);
+        let steps = self.steps.iter().flat_map(|steps| &steps.target);
         steps.map(|&step| Vector2::from(step).norm()).fold(0.0, f64::max)
     }
 
@@ -108,15 +101,10 @@ impl CameraCorrections {
 /// What keeps photographs as their cameras see them.
 fn shape_energy(input: &ByCamerasInput, options: &MeshOptions) -> NormalEquations {
     let mut equations = NormalEquations::new(input.grids);
-    for (photograph, grid) in input.grids.iter().enumerate() {
-        let mut overlap = vec![false; (grid.rows - 1) * (grid.columns - 1)];
-        for point in points(input.warps).filter(|point| point.from == photograph) {
-            let row = (point.vertex / grid.columns).min(grid.rows - 2);
-            let column = (point.vertex % grid.columns).min(grid.columns - 2);
-            overlap[row * (grid.columns - 1) + column] = true;
-        }
+    let overlaps = overlap_cells(input.grids, points(input.warps).map(|point| [point.from, point.vertex]));
+    for (photograph, (grid, overlap)) in input.grids.iter().zip(&overlaps).enumerate() {
         let still = vec![Vector2::zeros(); grid.len()];
-        SimilarityEnergy::new(grid, &still, &overlap, options, PRIOR_SLOPE).add(photograph, &mut equations);
+        SimilarityEnergy::new(grid, &still, overlap, options, PRIOR_SLOPE).add(photograph, &mut equations);
         for vertex in 0..grid.len() {
             let pull = [(vertex, Vector2::new(REST_WEIGHT, 0.0))];
             equations.add_inside(photograph, &pull, Vector2::zeros());

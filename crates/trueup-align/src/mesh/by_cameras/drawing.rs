@@ -31,7 +31,7 @@ impl Drawing {
         let plane = CameraPlane { yaw: view.yaw, units_per_radian: input.units_per_radian, origin: [0.0; 2] };
         let drawn = |(k, photograph): (usize, &PosedPhotograph)| {
             let PosedPhotograph { camera, mesh } = photograph;
-            let ahead = camera.rotation().row(2).transpose();
+            let ahead = camera.forward();
             let middle = wrap_angle(ahead.x.atan2(ahead.z) - plane.yaw);
             let mut fine = divided(mesh, options.subdivision);
             for vertex in 0..fine.len() {

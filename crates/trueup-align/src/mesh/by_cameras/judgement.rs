@@ -1,6 +1,6 @@
 //! Whether the mesh is worse than the cameras, by what can be measured of both.
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector3;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::{roll_from_down, wrap_length};
 use trueup_core::mesh::GridMesh;
@@ -31,7 +31,7 @@ impl Evidence {
     pub(super) fn of(mesh: &WarpedMesh, input: &ByCamerasInput) -> Self {
         let apart = |point: CarriedPoint| mesh_misfit(mesh, input, &point);
         let upright: Vec<f64> = (0..input.grids.len())
-            .filter(|&k| is_moderate(forward(&input.cameras[k])))
+            .filter(|&k| is_moderate(input.cameras[k].forward()))
             .map(|k| lean(&input.cameras[k], &mesh.meshes[k]).abs())
             .collect();
         Self {
@@ -94,21 +94,15 @@ impl Suspicion {
     }
 }
 
-fn forward(camera: &Camera) -> Vector3<f64> {
-    camera.rotation().row(2).transpose()
-}
-
 /// Whether a photograph shows a pole of the level world, or looks so near to one that it cannot be unrolled.
 fn is_at_pole(camera: &Camera, grid: &GridMesh) -> bool {
     let shows = |down: f64| camera.shows(Vector3::new(0.0, down, 0.0), [grid.width, grid.height]);
-    !is_moderate(forward(camera)) || shows(1.0) || shows(-1.0)
+    !is_moderate(camera.forward()) || shows(1.0) || shows(-1.0)
 }
 
-/// Angle in the panorama, clockwise, between down and what is down by the camera in the photograph's middle.
+/// Clockwise angle in the mesh from down to what is down by the camera in the photograph's middle.
 fn lean(camera: &Camera, mesh: &GridMesh) -> f64 {
-    let roll = roll_from_down(&(camera.rotation() * Vector3::y()));
-    let down = mesh.derivative(Vector2::new(mesh.width, mesh.height) / 2.0) * Vector2::new(roll.sin(), roll.cos());
-    (-down.x).atan2(down.y)
+    mesh.lean_in_the_middle(roll_from_down(&(camera.rotation() * Vector3::y())))
 }
 
 /// Squared distance of a match point in the mesh, taken back to pixels of its photograph; `None` where the mesh lays the two

@@ -87,7 +87,7 @@ fn sphere() -> (Scene, Vec<(usize, usize)>) {
     let rows = [50.0, 0.0, -50.0].map(|pitch| (0..10).map(move |k| camera(36.0 * f64::from(k) - 170.0, pitch)));
     let cameras: Vec<Camera> = rows.into_iter().flatten().chain([camera(10.0, 88.0), camera(0.0, -89.0)]).collect();
     let scene = Scene::new(cameras, [0.0; 2]);
-    let yaw = |k: usize| scene.cameras[k].rotation().row(2).transpose();
+    let yaw = |k: usize| scene.cameras[k].forward();
     let is_across = |one: usize, other: usize| {
         let [one, other] = [one, other].map(|k| yaw(k).x.atan2(yaw(k).z));
         (one - other).abs() > PI

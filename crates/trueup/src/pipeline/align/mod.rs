@@ -63,15 +63,13 @@ pub(crate) struct Geometry {
     pub coinciding: Vec<PairMatches>,
 }
 
-/// Finds the geometry of a group, unless an earlier run did. Photographs are numbered within the group.
+/// Finds the geometry of a group, unless an earlier run did, by `options` that are fixed by the method. Photographs are numbered
+/// within the group.
 ///
 /// # Errors
 /// Those of the stages; [`trueup_core::Error::NotApplicable`] if a warp model cannot place the photographs;
 /// [`trueup_core::Error::Cancelled`].
 pub(crate) fn run(input: &AlignInput, options: &AlignOptions, context: &StageContext) -> Result<Reported<Geometry>> {
-    let mut fixed = options.clone();
-    options.stitch.method.fix(&mut fixed);
-    let options = &fixed;
     input.memo.run(GEOMETRY, geometry_key(input, options).as_ref(), input, options, find_geometry, context)
 }
 

@@ -2,7 +2,7 @@
 
 use trueup::StitchOptions;
 
-use super::{Class, FULL, NAME, PAPER, Part, claims, class, families, fitted_threshold};
+use super::classes::{Class, FULL, NAME, PAPER, Part, claims, class, families, fitted_threshold};
 use crate::experiments::paper_figures::{MANHATTAN_DIVERGENCES, OTHER_DIVERGENCES, THRESHOLD};
 use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Section, Table, number};
