@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use trueup::{Error, MaskFile, MaskKind, Outputs, Projection, ReadFile, Reference, StitchOptions};
+use trueup::{Error, MaskFile, MaskKind, Outputs, ReadFile, Reference, StitchOptions};
 
 use crate::arguments::{FileArgs, MaskArgs, TuningArgs, TypedOptions};
 use crate::failure::Failure;
@@ -33,16 +33,16 @@ pub(crate) fn options(
         set(one.typed(), &format!("{}={}", one.flag.option, one.value));
     }
     // A projection that was not understood is not there.
-    if wrong.is_empty() && options.fixed_by_method().arrange.projection.kind == Projection::Mesh {
-        wrong.extend(views_of_the_mesh(typed));
+    if wrong.is_empty() {
+        wrong.extend(views_of_the_mesh(typed, &options));
     }
     wrong.extend(options.invalid().iter().map(ToString::to_string));
     if wrong.is_empty() { Ok(options) } else { Err(Failure::options(wrong)) }
 }
 
-/// The flags that turn or bound a view where there is none: a mesh is drawn as it lies. Zero turns and bounds nothing.
-fn views_of_the_mesh(typed: &TypedOptions) -> impl Iterator<Item = String> {
-    let idle = typed.iter().filter(|one| one.flag.of_a_view && one.value.trim().parse() != Ok(0.0));
+/// The flags that turn or bound a view where there is none.
+fn views_of_the_mesh(typed: &TypedOptions, options: &StitchOptions) -> impl Iterator<Item = String> {
+    let idle = typed.iter().filter(|one| one.flag.lacks_a_view(&one.value, options));
     idle.map(|one| {
         format!("{}: the panorama is drawn on the mesh, which has no view; take another --projection", one.typed())
     })

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyMapping, PyString};
-use trueup::{Error, MaskFile, MaskKind, Projection, Reference, StitchOptions};
+use trueup::{Error, MaskFile, MaskKind, Reference, StitchOptions};
 use trueup_cli::{OPTION_FLAGS, OptionFlag};
 
 use crate::errors::exception;
@@ -141,17 +141,14 @@ fn read_config(options: &mut StitchOptions, path: &std::path::Path) -> trueup::R
     options.merge_toml(&text, &path.display().to_string())
 }
 
-/// Refuses keywords that turn or bound a view where there is none: a mesh is drawn as it lies. Zero turns and bounds nothing.
+/// Refuses keywords that turn or bound a view where there is none.
 fn refuse_view_of_the_mesh(keywords: &Bound<'_, PyDict>, options: &StitchOptions) -> PyResult<()> {
-    if options.arrange.projection.kind != Projection::Mesh {
-        return Ok(());
-    }
-    for flag in OPTION_FLAGS.iter().filter(|flag| flag.of_a_view) {
+    for flag in OPTION_FLAGS {
         let keyword = keyword_of(flag);
         let Some(value) = given(keywords, &keyword)? else { continue };
-        if text(&value)?.trim().parse() != Ok(0.0) {
+        if flag.lacks_a_view(&text(&value)?, options) {
             let reason = "the panorama is drawn on the mesh, which has no view";
-            return Err(exception(keywords.py(), Error::input(keyword, reason, "Add a projection.")));
+            return Err(exception(keywords.py(), Error::input(keyword, reason, "Take another projection.")));
         }
     }
     Ok(())

@@ -39,6 +39,7 @@ def test_errors_have_the_names_of_the_library_and_a_hint(pictures: list[Array], 
         ({"method": "magic"}, "magic"),
         ({"seed": 1.5}, "whole number"),
         ({"projection": "mesh", "yaw": 30}, "has no view"),
+        ({"method": "gsp-2d", "yaw": 30}, "has no view"),
         ({"reference": "q.jpg"}, "no photograph of this name"),
     ],
 )

@@ -3,7 +3,7 @@
 use clap::builder::{PossibleValue, TypedValueParser};
 use clap::error::ErrorKind;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
-use trueup::{OptionDescription, StitchOptions};
+use trueup::{OptionDescription, Projection, StitchOptions};
 
 /// The subcommands that make panoramas, by the names that they are typed with.
 const STITCH: &[&str] = &["stitch"];
@@ -53,7 +53,7 @@ pub struct OptionFlag {
     /// What people at a command line need to know beside the option's meaning; empty if that is nothing.
     note: &'static str,
     /// Whether it turns or bounds a view, which only a projection other than the mesh has.
-    pub of_a_view: bool,
+    of_a_view: bool,
 }
 
 impl OptionFlag {
@@ -72,6 +72,13 @@ impl OptionFlag {
 
     const fn note(self, note: &'static str) -> Self {
         Self { note, ..self }
+    }
+
+    /// Whether it turns or bounds a view by `value` where `options` have none: a mesh is drawn as it lies. Zero turns and bounds
+    /// nothing.
+    pub fn lacks_a_view(&self, value: &str, options: &StitchOptions) -> bool {
+        let on_the_mesh = || options.fixed_by_method().arrange.projection.kind == Projection::Mesh;
+        self.of_a_view && value.trim().parse() != Ok(0.0) && on_the_mesh()
     }
 
     const fn of_a_view(self) -> Self {

@@ -322,7 +322,8 @@ impl StitchOptions {
     /// # Errors
     /// [`Error::Unsupported`] that names the options.
     pub(crate) fn refuse_other_geometry(&self, recorded: &Self) -> Result<()> {
-        let differing = self.differing_geometry(recorded)?;
+        // Records have what the method fixes.
+        let differing = self.fixed_by_method().differing_geometry(&recorded.fixed_by_method())?;
         if differing.is_empty() {
             return Ok(());
         }
@@ -368,6 +369,20 @@ fn is_geometry(table: &str, phase: Option<Phase>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A record has the options as the method fixed them, whoever composes it has them as they were asked for.
+    #[test]
+    fn what_a_method_fixes_is_no_other_geometry() {
+        let mut asked = StitchOptions::default();
+        asked.set("stitch.method=vpg-published").expect("an option");
+        let recorded = asked.fixed_by_method();
+        assert!(recorded != asked);
+        asked.set("projection.kind=cylindrical").expect("an option");
+        asked.refuse_other_geometry(&recorded).expect("the same geometry");
+        asked.set("similarity.rejection=0.1").expect("an option");
+        let refused = asked.refuse_other_geometry(&recorded).expect_err("another").to_string();
+        assert!(refused.contains("similarity.rejection"), "{refused}");
+    }
 
     /// What a published method fixes is no default of ours under another name: whoever changes a default sees here what the
     /// publication has.
