@@ -82,7 +82,7 @@ class Recorded(Generic[Native]):
     """What has a record of how it was made."""
 
     def __init__(self, native: Native) -> None:
-        self._native = native
+        self._native: Native = native
 
     @cached_property
     def project(self) -> dict[str, Any]:
