@@ -49,6 +49,7 @@ pub use report::judgement::{Judgement, Verdict};
 pub use report::measures::{
     BentLine, LongLines, Measures, PhotographMeasures, ReprojectionMeasures, UprightMeasures, WorstPair,
 };
+pub use trueup_align::cameras::{CameraOptions, LensKind};
 pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;

@@ -13,7 +13,7 @@ mod tests;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use trueup::{Project, Severity, Written};
+use trueup::{LensKind, Project, Severity, Written};
 
 use crate::words::file_size;
 
@@ -42,6 +42,7 @@ pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool
     panorama(&mut lines, project, file);
     let names = names(&project.images);
     photographs(&mut lines, project, &names, verbose);
+    told_lens(&mut lines, project);
     if verbose {
         details::photographs(&mut lines, project, &names);
         details::pairs(&mut lines, project, &names);
@@ -106,6 +107,21 @@ fn photographs(lines: &mut LabeledLines, project: &Project, names: &[String], ve
         if !hint.is_empty() && !is_repeated {
             lines.item("", hint);
         }
+    }
+}
+
+/// What the user told of the lens, if anything.
+fn told_lens(lines: &mut LabeledLines, project: &Project) {
+    let cameras = &project.options.align.cameras;
+    let of_project = project.lens_from.as_ref().map(|file| {
+        let told = project.used_images().filter(|image| image.lens_told).count();
+        format!("that of {file}, for {told} of {} photographs", project.used())
+    });
+    let kind = (cameras.lens != LensKind::Auto).then(|| cameras.lens.display());
+    let wide = (cameras.fov > 0.0).then(|| format!("{} degrees across the longer side", cameras.fov));
+    let told: Vec<String> = [of_project, kind, wide].into_iter().flatten().collect();
+    if !told.is_empty() {
+        lines.entry("lens", &format!("told: {}", told.join("; ")));
     }
 }
 

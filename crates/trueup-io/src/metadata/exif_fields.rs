@@ -17,6 +17,7 @@ const PIXEL_Y_DIMENSION: u16 = 0xa003;
 const FOCAL_PLANE_X_RESOLUTION: u16 = 0xa20e;
 const FOCAL_PLANE_RESOLUTION_UNIT: u16 = 0xa210;
 const FOCAL_LENGTH_IN_35MM_FILM: u16 = 0xa405;
+const LENS_MODEL: u16 = 0xa434;
 
 /// EXIF fields as written, unjudged: numbers may be zero, infinite or absurd.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -39,6 +40,8 @@ pub(crate) struct ExifFields {
     pub(crate) make: Option<String>,
     /// Model, trimmed.
     pub(crate) model: Option<String>,
+    /// LensModel, trimmed.
+    pub(crate) lens_model: Option<String>,
     /// Software, trimmed.
     pub(crate) software: Option<String>,
     /// ColorSpace: 1 sRGB, 65535 uncalibrated, by some cameras 2 for Adobe RGB.
@@ -66,6 +69,7 @@ impl ExifFields {
             focal_plane_unit: value(Tag::FocalPlaneResolutionUnit).and_then(|value| value.get_uint(0)),
             make: text(Tag::Make),
             model: text(Tag::Model),
+            lens_model: text(Tag::LensModel),
             software: text(Tag::Software),
             color_space: value(Tag::ColorSpace).and_then(|value| value.get_uint(0)),
             interoperability: text(Tag::InteroperabilityIndex),
@@ -86,6 +90,7 @@ impl ExifFields {
         let Some(pointer) = pointer.and_then(|value| value.into_ifd_pointer().ok()) else { return Some(fields) };
         let Ok(directory) = decoder.read_directory(pointer) else { return Some(fields) };
         let mut tags = decoder.read_directory_tags(&directory);
+        fields.lens_model = text(tags.find_tag(TiffTag::from_u16_exhaustive(LENS_MODEL)).ok().flatten());
         let mut number = |tag| {
             let value = tags.find_tag(TiffTag::from_u16_exhaustive(tag)).ok().flatten()?;
             first_tiff_number(value)

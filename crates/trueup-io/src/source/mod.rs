@@ -210,7 +210,20 @@ fn examine(
     };
     let focal_prior = header.focal_prior();
     let camera_model = header.exif.camera_model();
-    Ok(SourceImage { path, name: name.to_owned(), width, height, orientation, focal_prior, camera_model })
+    let Header { exif, .. } = header;
+    let focal_mm = exif.focal_mm.filter(|focal_mm| focal_mm.is_finite() && *focal_mm > 0.0);
+    Ok(SourceImage {
+        path,
+        name: name.to_owned(),
+        width,
+        height,
+        orientation,
+        focal_prior,
+        camera_model,
+        lens_model: exif.lens_model,
+        focal_mm,
+        lens: None,
+    })
 }
 
 fn stale_tag_note(number: usize, header: &Header) -> Diagnostic {

@@ -74,6 +74,13 @@ class ComposeKeywords(SaveKeywords, total=False):
 class StitchKeywords(ComposeKeywords, total=False):
     """Keywords of stitching."""
 
+    lens: Literal["auto", "pinhole", "rectilinear", "fisheye"]
+    """What kind of lens took the photographs. Say it where few photographs overlap, which tell little of a lens, or
+    where a line that is straight comes out bent (default auto)."""
+    lens_fov: float
+    """Field of view of every photograph across its longer side, through the whole lens, by any calibration or
+    specification; the matches may still change the focal length by up to 5 %. Say it where photographs carry no focal
+    length, or a wrong one; 0 leaves it to them (default 0.0)."""
     method: Literal[
         "vpg",
         "gsp-2d",
@@ -111,6 +118,8 @@ class StitchKeywords(ComposeKeywords, total=False):
     """The photograph that sets the pixel scale and stays in place; auto takes the one in the middle."""
     graph: Path
     """A text file with the pairs to be matched, NAME -- NAME a line."""
+    lens_from: Path
+    """The project of other photographs through the same lens, which is taken from there."""
     require_all: bool
     """Fails unless every photograph is used."""
     cache: Path

@@ -29,6 +29,8 @@ pub struct Inputs {
     pub reference: Reference,
     /// A stitch graph in a text file: only its pairs are matched.
     pub graph: Option<PathBuf>,
+    /// A project of other photographs through the same lens, which is taken from there.
+    pub lens_from: Option<PathBuf>,
     /// Stitch every group of overlapping photographs, not only the largest.
     pub all: bool,
     /// Pictures that mark what is to be ignored or kept of the photographs.

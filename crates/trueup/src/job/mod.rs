@@ -3,6 +3,7 @@
 mod compose;
 pub(crate) mod inputs;
 mod layers;
+pub(crate) mod lens_from;
 pub(crate) mod masks;
 pub(crate) mod names;
 mod outputs;

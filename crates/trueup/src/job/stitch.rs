@@ -86,7 +86,8 @@ impl StitchJob {
         let photographs = photographs.iter().map(|path| (path.as_path(), ReadFile::Photograph));
         let masks = self.inputs.masks.iter().map(|mask| (mask.file.as_path(), ReadFile::Mask));
         let graph = self.inputs.graph.iter().map(|path| (path.as_path(), ReadFile::Graph));
-        outputs.refuse_over(photographs.chain(masks).chain(graph))
+        let lens = self.inputs.lens_from.iter().map(|path| (path.as_path(), ReadFile::Lens));
+        outputs.refuse_over(photographs.chain(masks).chain(graph).chain(lens))
     }
 }
 

@@ -249,6 +249,7 @@ impl StitchOptions {
     /// Every option outside its allowed range, and every one that does not go with another; empty when all is well.
     pub fn invalid(&self) -> Vec<InvalidOption> {
         let mut invalid = self.out_of_range();
+        invalid.extend(self.align.cameras.beyond_the_lens());
         invalid.extend(self.arrange.projection.beyond_the_projection());
         invalid.extend(self.contradicting_the_method());
         invalid

@@ -4,11 +4,11 @@ use trueup_compose::exposure::{Correction, Corrections, Response};
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::geometry::{matrix_from_rows, rows_of};
+use trueup_core::lens::PlacedLens;
 use trueup_core::mesh::GridMesh;
 
 use super::record::{
-    Canvas, ImageRecord, ImageStatus, LensRecord, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION,
-    PairRecord, Project,
+    Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
 };
 use crate::options::{MethodForm, StitchOptions};
 use crate::pipeline::align::Geometry;
@@ -43,6 +43,8 @@ pub(crate) fn unfilled(
                 width: image.width,
                 height: image.height,
                 orientation: image.orientation,
+                camera: image.camera_model.clone(),
+                lens_told: image.lens.is_some(),
                 component: component.filter(|_| matched.measured[index].is_some()),
                 masks: matched.set.masks[index].clone(),
                 ..left_out_record(image.path.display().to_string(), reason, hint)
@@ -65,6 +67,7 @@ pub(crate) fn unfilled(
         version: PROJECT_VERSION,
         method: trueup_core::options::OptionValue::display(&options.align.stitch.method),
         options: options.clone(),
+        lens_from: matched.set.lens_from.as_ref().map(|path| path.display().to_string()),
         reference: String::new(),
         images,
         pairs: pairs.collect(),
@@ -100,6 +103,8 @@ fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
         reason,
         hint,
         component: None,
+        camera: None,
+        lens_told: false,
         focal_px: None,
         lens: None,
         rotation: None,
@@ -247,7 +252,7 @@ pub(crate) fn fill_geometry(project: &mut Project, found: &GeometryRecord) {
             let full = camera.scaled(1.0 / component.frames[k].working_from_full);
             let [x, y] = full.principal_point;
             let center_px = [x - record.width as f64 / 2.0, y - record.height as f64 / 2.0];
-            LensRecord { terms: camera.lens.terms(), center_px }
+            PlacedLens { terms: camera.lens.terms(), center_px }
         });
         record.rotation = Some(rows_of(&camera_from_level));
         let upright = matrix_from_rows(&geometry.prior.camera_from_world[k]);
