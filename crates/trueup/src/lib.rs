@@ -56,7 +56,7 @@ pub use trueup_compose::fidelity::Fidelity;
 pub use trueup_compose::render::{Panorama, Rendered};
 pub use trueup_core::context::{CancelToken, Progress, Silent};
 pub use trueup_core::diagnostics::{Diagnostic, Reported, Severity, Subject};
-pub use trueup_core::options::{InvalidOption, OptionDescription, Tier};
+pub use trueup_core::options::{InvalidOption, OptionDescription, OptionValue, Tier};
 pub use trueup_core::raster::{Photograph, Raster, RowSource};
 pub use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 pub use trueup_core::truth::{ImageTruth, Truth};

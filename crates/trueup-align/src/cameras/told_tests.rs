@@ -15,12 +15,8 @@ fn a_pair_has_the_lens_that_was_told() {
     let truth = bent(row(ROLLS)[..2].to_vec(), radial, [6.0, -4.0]);
     let pairs = matched(&truth, 0.3, 0.0);
     let lens = PlacedLens { terms: LensTerms { radial, ..LensTerms::default() }, center_px: [6.0, -4.0] };
-    let told = CameraPrior {
-        focal_px: Some(660.0),
-        focal_told: true,
-        lens: Some(lens),
-        ..CameraPrior::unknown(frame(), 0)
-    };
+    let told =
+        CameraPrior { focal_px: Some(660.0), focal_told: true, lens: Some(lens), ..CameraPrior::unknown(frame(), 0) };
     let cameras = solved_by(&[told; 2], &pairs, &CameraOptions::default());
     let untold = solved_by(&[CameraPrior::unknown(frame(), 0); 2], &pairs, &CameraOptions::default());
     for camera in &cameras {

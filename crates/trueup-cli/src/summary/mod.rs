@@ -13,7 +13,7 @@ mod tests;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use trueup::{LensKind, Project, Severity, Written};
+use trueup::{LensKind, OptionValue, Project, Severity, Written};
 
 use crate::words::file_size;
 
