@@ -23,7 +23,8 @@ fn stitched(folder: &Path) -> Project {
     for choice in ["canvas.scale=0.2", "mesh.cell_px=45"] {
         options.set(choice).expect("an option");
     }
-    let inputs = Inputs::new(["00.jpg", HARMFUL, "02.jpg", "<b>torn.jpg"].map(|name| folder.join(name).display().to_string()));
+    let inputs =
+        Inputs::new(["00.jpg", HARMFUL, "02.jpg", "<b>torn.jpg"].map(|name| folder.join(name).display().to_string()));
     let outputs = Outputs::new(folder.join("pano.png"));
     let job = StitchJob { inputs, outputs, cache: None, threads: 1 };
     job.run(&options, &StageContext::default()).expect("stitched").remove(0).project
@@ -84,7 +85,11 @@ fn the_page_says_what_the_project_says_and_runs_nothing() {
     }
     assert!(page.contains("mesh.cell_px") && page.contains("45.0"), "options that differ are listed");
     assert_eq!(page.matches("<img ").count(), 3);
-    assert_eq!(page.matches("role=\"img\"").count(), page.matches("role=\"img\" aria-label=\"").count(), "each is told");
+    assert_eq!(
+        page.matches("role=\"img\"").count(),
+        page.matches("role=\"img\" aria-label=\"").count(),
+        "each is told"
+    );
 }
 
 /// The heat map and the lines are those that the figures were taken of.

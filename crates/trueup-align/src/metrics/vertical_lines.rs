@@ -145,11 +145,6 @@ mod tests {
         assert!(found(&[], Vector3::y()).is_empty());
         assert!(found(&lines, Vector3::z()).is_empty(), "looks straight down");
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
 
     /// A camera of focal length 100 px that looks along z: an upright segment points to y, one that runs to the middle to z,
     /// one aslant beside it to none, and a point nowhere.

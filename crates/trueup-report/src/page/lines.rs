@@ -11,8 +11,9 @@ pub(super) fn values(page: &Page) -> Value {
     let measures = page.project.measures.as_ref();
     let found = measures.and_then(|measures| measures.long_lines.as_ref());
     let field = |name: &str| format!("/measures/long_lines/{name}");
-    let figures = found
-        .map(|found| json!({ "bent": count(&field("bent"), found.bent), "lines": count(&field("lines"), found.lines) }));
+    let figures = found.map(
+        |found| json!({ "bent": count(&field("bent"), found.bent), "lines": count(&field("lines"), found.lines) }),
+    );
     let longest = found.and_then(|found| found.longest_bent.as_ref()).map(|line| {
         json!({
             "length": figure(&field("longest_bent/length_px"), line.length_px, 0),

@@ -77,7 +77,10 @@ impl Page<'_> {
         let wrong = |error: minijinja::Error| Error::input("report", error, "Report this as a defect.");
         let mut environment = Environment::new();
         environment.add_template("page.html", TEMPLATE).map_err(wrong)?;
-        environment.get_template("page.html").and_then(|page| page.render(values)).map_err(wrong)
+        environment
+            .get_template("page.html")
+            .and_then(|page| page.render(minijinja::value::Serde(values)))
+            .map_err(wrong)
     }
 
     /// What lies over the panorama.

@@ -19,14 +19,14 @@ impl Told {
     pub(super) fn of(page: &Page) -> Result<Self> {
         let images = page.project.images.iter().enumerate();
         let left_out = images.filter(|(_, image)| image.status == ImageStatus::LeftOut);
-        let left_out = left_out.map(|(position, image)| {
-            json!({ "name": page.named(position), "reason": image.reason, "hint": image.hint })
-        });
+        let left_out = left_out.map(
+            |(position, image)| json!({ "name": page.named(position), "reason": image.reason, "hint": image.hint }),
+        );
         let of = |severity: Severity| -> Vec<Value> {
             let alike = page.project.diagnostics.iter().filter(|one| one.severity == severity);
-            let told = alike.map(|one| {
-                json!({ "subject": one.subject.named(page.names), "message": one.message, "hint": one.hint })
-            });
+            let told = alike.map(
+                |one| json!({ "subject": one.subject.named(page.names), "message": one.message, "hint": one.hint }),
+            );
             told.collect()
         };
         Ok(Self {

@@ -34,7 +34,8 @@ fn guidance(project: &Project) -> String {
     let found = &project.manhattan;
     match (found.accepted, found.pooled) {
         (true, true) => {
-            "The lines of all photographs together told which way is down, since those of single ones did not agree.".to_owned()
+            "The lines of all photographs together told which way is down, since those of single ones did not agree."
+                .to_owned()
         }
         (true, false) => format!(
             "Vanishing points told which way is down: those of {} of {} photographs agree.",
@@ -43,7 +44,9 @@ fn guidance(project: &Project) -> String {
         ),
         (false, _) => {
             let why = found.failed_clause.as_ref().map_or(String::new(), |clause| format!(": {clause}"));
-            format!("Vanishing points did not guide this panorama{why}. It is upright as far as the camera was held level.")
+            format!(
+                "Vanishing points did not guide this panorama{why}. It is upright as far as the camera was held level."
+            )
         }
     }
 }
@@ -64,7 +67,8 @@ fn leans(project: &Project) -> Option<Value> {
     if series.is_empty() {
         return None;
     }
-    let position = |one: &PhotographMeasures| project.images.iter().position(|image| image.path == one.path).unwrap_or(0);
+    let position =
+        |one: &PhotographMeasures| project.images.iter().position(|image| image.path == one.path).unwrap_or(0);
     let names = photographs.iter().map(|one| (position(one) + 1).to_string()).collect();
     let drawn = reaching_down(Chart::new("photograph", "lean to the right, degrees", series));
     let caption = "By how much each photograph leans to the right in the panorama, with its interval of 95 %.";
@@ -88,9 +92,8 @@ fn photograph(page: &Page, position: usize) -> Value {
         let (index, one) = measured?;
         Some(figure(&format!("/measures/pictures/{index}/{name}"), value(one)?, 2))
     };
-    let lines = measured.map(|(index, one)| {
-        count(&format!("/measures/pictures/{index}/vertical_lines"), one.vertical_lines)
-    });
+    let lines =
+        measured.map(|(index, one)| count(&format!("/measures/pictures/{index}/vertical_lines"), one.vertical_lines));
     let lean = measured.and_then(|(_, one)| one.lean_deg);
     json!({
         "name": page.named(position),
