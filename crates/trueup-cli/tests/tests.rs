@@ -18,6 +18,7 @@ mod masks;
 mod options;
 mod pictures;
 mod references;
+mod report;
 mod run;
 mod sphere;
 #[cfg(unix)]

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use trueup::{Alignment, Inputs, MatchedPhotographs, Outputs, Project, SideOutput, StitchOptions, Stitcher, evaluate};
+use trueup::{
+    Alignment, Inputs, MatchedPhotographs, Measures, Outputs, Project, SideOutput, StitchOptions, Stitcher, evaluate,
+};
 use trueup_compose::layout::median_cell_scale;
 use trueup_core::options::OptionValue;
 use trueup_core::truth::Truth;
@@ -78,7 +80,7 @@ impl Common<'_> {
         let written = outputs.write(stitcher, alignment)?;
         let project = written.project;
         compared.diagnostics.clone_from(&project.diagnostics);
-        compared.measures.clone_from(&project.measures);
+        compared.measures = project.measures.as_ref().map(Measures::without_places);
         compared.seconds.clone_from(&project.seconds);
         compared.panorama = Some(PanoramaRecord {
             file,

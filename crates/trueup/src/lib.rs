@@ -28,8 +28,8 @@ mod project;
 mod report;
 
 pub use job::{
-    ComposeJob, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, ReadFile, Reference, SideOutput, StitchJob, Written,
-    thread_pool,
+    ComposeJob, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, ReadFile, RecordedPanorama, Reference, SideOutput,
+    StitchJob, Written, thread_pool,
 };
 pub use memo::{CacheUse, PhotographCache};
 pub use options::{
@@ -41,14 +41,17 @@ pub use project::{
     Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord,
     Project, ProjectionRecord, hugin_project,
 };
+pub use report::brightness::BrightnessStep;
 pub use report::evaluation::{
     Evaluation, PhotographEvaluation, PixelEvaluation, StatedEvaluation, compare_overlaps, evaluate, evaluate_pixels,
     read_truth, scale_up_to,
 };
 pub use report::judgement::{Judgement, Verdict};
 pub use report::measures::{
-    BentLine, LongLines, Measures, PhotographMeasures, ReprojectionMeasures, UprightMeasures, WorstPair,
+    BentLine, LongLines, MeasuredLine, Measures, PairMeasures, PhotographMeasures, PlaceMeasures, ReprojectionMeasures,
+    UprightMeasures, WorstPair,
 };
+pub use report::shown::ShownPhotographs;
 pub use trueup_align::cameras::{CameraOptions, LensKind};
 pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
 pub use trueup_align::similarity::PriorMethod;
@@ -62,7 +65,7 @@ pub use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 pub use trueup_core::truth::{ImageTruth, Truth};
 pub use trueup_core::{Error, Result, StageContext};
 pub use trueup_io::encode::{
-    Depth, Metadata, OutputOptions, abandon_unfinished, check_place, write as write_picture, write_atomically,
-    written_extensions,
+    Depth, Metadata, OutputOptions, abandon_unfinished, check_place, same_place, write as write_picture,
+    write_atomically, written_extensions,
 };
 pub use trueup_io::source::{InMemory, names_photograph, readable_formats};

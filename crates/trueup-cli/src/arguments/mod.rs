@@ -3,6 +3,7 @@
 mod compare;
 mod compose;
 mod option_flags;
+mod report;
 mod shared;
 mod side_outputs;
 mod stitch;
@@ -16,6 +17,7 @@ pub(crate) use compare::CompareArgs;
 pub(crate) use compose::ComposeArgs;
 pub(crate) use option_flags::TypedOptions;
 pub use option_flags::{OPTION_FLAGS, OptionFlag};
+pub(crate) use report::ReportArgs;
 pub(crate) use shared::{FailOn, FileArgs, MaskArgs, MessageArgs, TuningArgs};
 pub(crate) use stitch::StitchArgs;
 
@@ -26,6 +28,7 @@ Examples:
   trueup compose pano.json -o large.tif
   trueup inspect pano.json --verbose
   trueup evaluate pano.json --truth truth.json
+  trueup report pano.json -o pano.html
   trueup compare holiday/ -o holiday-compared
   trueup options --expert";
 
@@ -57,6 +60,10 @@ pub(crate) enum Task {
     Inspect(InspectArgs),
     /// Print every measure of a panorama: its own, against the truth, and of the pixels where photographs overlap
     Evaluate(EvaluateArgs),
+    /// Write a page that shows why a panorama looks as it does: outlines, seams, lines, alignment, light, and what to make of it
+    ///
+    /// One HTML file that loads nothing. The photographs are read again to draw them; nothing is measured again.
+    Report(ReportArgs),
     /// List the options: default, range, unit, meaning
     ///
     /// Those that people have a reason to change for a panorama of their own; with --expert, those of the methods as well.

@@ -1,7 +1,7 @@
 //! The summary for programs.
 
 use serde_json::{Value, json};
-use trueup::{Diagnostic, ImageStatus, Project, Written};
+use trueup::{Diagnostic, ImageStatus, Measures, Project, Written};
 
 /// The summary of panoramas that were written, as JSON: docs/command-line.md says what its fields mean.
 pub(crate) fn json(written: &[Written]) -> String {
@@ -34,7 +34,7 @@ fn panorama(written: &Written) -> Value {
             .map(|image| json!({ "path": image.path, "reason": image.reason, "hint": image.hint }))
             .collect::<Vec<_>>(),
         "judgement": written.project.judgement(),
-        "measures": measures,
+        "measures": measures.as_ref().map(Measures::without_places),
         "warnings": warnings.collect::<Vec<_>>(),
         "seconds": seconds.values().sum::<f64>(),
     })

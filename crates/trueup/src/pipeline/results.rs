@@ -81,6 +81,14 @@ impl Alignment {
         &self.layout
     }
 
+    /// The position in [`Project::images`] of the photograph that the layout gives this number.
+    pub(crate) fn position_of(&self, number: usize) -> usize {
+        match &self.positions {
+            Some(positions) => positions.get(number).copied().unwrap_or(number),
+            None => number,
+        }
+    }
+
     /// The photographs, in the order of [`Project::images`].
     pub(crate) fn photographs(&self) -> &FilePhotographs {
         &self.photographs
@@ -94,10 +102,7 @@ impl Alignment {
 
     /// Adds what a later stage told, of photographs as the layout numbers them, to the record.
     pub(crate) fn record(&mut self, told: Reported<()>) {
-        let told = match &self.positions {
-            Some(positions) => told.renumbered(|number| positions.get(number).copied().unwrap_or(number)),
-            None => told,
-        };
+        let told = told.renumbered(|number| self.position_of(number));
         self.project.diagnostics.extend(told.findings);
         for (stage, seconds) in told.seconds {
             *self.project.seconds.entry(stage).or_default() += seconds;
