@@ -29,6 +29,7 @@ mod ignored;
 mod kernel;
 mod label;
 mod light;
+mod look;
 mod memory_plan;
 mod pyramid;
 mod render_options;

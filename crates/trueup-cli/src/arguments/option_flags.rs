@@ -23,6 +23,7 @@ pub const OPTION_FLAGS: &[OptionFlag] = &[
     OptionFlag::new("scale", "canvas.scale", OUTPUT, STITCH_AND_COMPOSE),
     OptionFlag::new("quality", "output.jpeg_quality", OUTPUT, ALL),
     OptionFlag::new("depth", "output.depth", OUTPUT, STITCH_AND_COMPOSE),
+    OptionFlag::new("look", "render.look", VIEW, STITCH_AND_COMPOSE),
     OptionFlag::new("projection", "projection.kind", VIEW, STITCH_AND_COMPOSE),
     OptionFlag::new("yaw", "projection.yaw", VIEW, STITCH_AND_COMPOSE).of_a_view(),
     OptionFlag::new("pitch", "projection.pitch", VIEW, STITCH_AND_COMPOSE).of_a_view(),

@@ -12,6 +12,7 @@ use super::input::RenderInput;
 use crate::deformed_grid::DeformedGrid;
 use crate::layout::{CanvasLayout, TURNS, columns_around};
 use crate::light::{ByResponse, PhotographLight};
+use crate::look::local_exposure;
 use crate::render_options::RenderOptions;
 use crate::transfer_curve::Encoding;
 use crate::warped::{Resampling, SamplingMemory, WarpedPhotograph, check_photograph};
@@ -97,7 +98,9 @@ fn alone(
     check_photograph(placed, &photograph)?;
     let photographs = ByResponse::new(photographs, &corrections.response)?;
     let curve = photographs.transfer_curve();
-    let light = PhotographLight { curve: &curve, correction: &corrections.photographs[position] };
+    let local = local_exposure(layout, &corrections.photographs, options.look);
+    let light =
+        PhotographLight { curve: &curve, correction: &corrections.photographs[position], local: local.as_ref() };
     let mesh = &placed.in_first_turn(layout.period).mesh;
     let (size, resampling) = (unrolled_size(layout), Resampling::of(options.interpolation));
     let warped = WarpedPhotograph::new(Cow::Owned(photograph), mesh, size, light, &resampling);

@@ -33,6 +33,10 @@ class ComposeKeywords(SaveKeywords, total=False):
     """Size of the panorama relative to the reference photograph's own pixels: 1 keeps every detail the reference has.
     Lower it for a quick preview (0.25) or a smaller file; raise it only if the reference was taken with a shorter lens
     than the others (default 1.0)."""
+    look: Literal["natural", "linear", "hdr"]
+    """How photographs of very different exposure come together. Choose `linear` to measure light or to finish tones by
+    hand, `hdr` for detail in sun and shade alike. Photographs of like exposure look the same with all of them (default
+    natural)."""
     projection: Literal[
         "auto",
         "mesh",

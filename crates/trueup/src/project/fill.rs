@@ -135,11 +135,12 @@ pub(crate) fn place(component: &Component, geometry: Option<&Geometry>) -> Vec<P
 }
 
 /// What is found on the way from the geometry to the panorama, each time anew.
-const FOUND_IN_COMPOSING: [&str; 9] = [
+const FOUND_IN_COMPOSING: [&str; 10] = [
     "canvas-reduced",
     "color-converted",
     "color-profile-damaged",
     "color-profile-ignored",
+    "exposures-far-apart",
     "gaps-filled",
     "grid-folded",
     "photograph-replaced",
