@@ -116,7 +116,11 @@ fn a_crop_changes_nothing_but_the_frame() {
         for crop in ["auto", "rectangle"] {
             let (part, seams, project) = composed(crop);
             let [left, top] = ["left", "top"].map(|side| project["crop"][side].as_u64().expect("a place") as u32);
-            assert!(project["crop"]["lost"].as_f64().is_some_and(|lost| lost > 0.0 && lost < 0.5), "{}", project["crop"]);
+            assert!(
+                project["crop"]["lost"].as_f64().is_some_and(|lost| lost > 0.0 && lost < 0.5),
+                "{}",
+                project["crop"]
+            );
             assert_eq!(project["crop"]["canvas_width"], whole_project["canvas"]["width"]);
             for (x, y, pixel) in part.enumerate_pixels() {
                 let there = whole.get_pixel(left + x, top + y);

@@ -148,9 +148,8 @@ fn deepest(coverage: &Coverage, rectangle: &Rectangle) -> f64 {
     let cell = (1..).find(|cell| width.div_ceil(*cell) * height.div_ceil(*cell) <= CELLS).unwrap_or(1);
     let (columns, rows) = (width.div_ceil(cell), height.div_ceil(cell));
     let middle = |index: usize, range: &Range<usize>| (range.start + index * cell + cell / 2).min(range.end - 1);
-    let is_covered = |at: &usize| {
-        coverage.holds(middle(at % columns, &rectangle.columns), middle(at / columns, &rectangle.rows))
-    };
+    let is_covered =
+        |at: &usize| coverage.holds(middle(at % columns, &rectangle.columns), middle(at / columns, &rectangle.rows));
     let mut front: Vec<usize> = (0..columns * rows).filter(is_covered).collect();
     let mut is_reached = vec![false; columns * rows];
     front.iter().for_each(|&at| is_reached[at] = true);
@@ -234,9 +233,7 @@ mod tests {
         let slit = layout(206, 160, &[[0.0, 0.0], [106.0, 0.0]], None);
         let gaps = gaps(&slit, 5.0);
         assert!((0..55).all(|y| gaps.is_gap(103, y)));
-        assert!(
-            !gaps.is_gap(30, 120) && !gaps.is_gap(103, 100) && !gaps.is_gap(0, 159) && !gaps.is_gap(205, 159)
-        );
+        assert!(!gaps.is_gap(30, 120) && !gaps.is_gap(103, 100) && !gaps.is_gap(0, 159) && !gaps.is_gap(205, 159));
         let filled = gaps.filled_coverage();
         assert!(filled.holds(103, 20) && !filled.holds(30, 120));
     }

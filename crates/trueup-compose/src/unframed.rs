@@ -152,7 +152,8 @@ mod tests {
         for (level, frame) in [(255, 1), (0, 1), (250, 2), (4, 3)] {
             let cleaned = unframed(framed(frame, level, picture), 255.0);
             for (x, y) in [(0_usize, 0_usize), (0, 30), (40, 0), (91, 35), (45, 71), (91, 71)] {
-                let [expected_x, expected_y] = [(x, 88), (y, 68)].map(|(at, last)| at.saturating_sub(frame).clamp(1, last));
+                let [expected_x, expected_y] =
+                    [(x, 88), (y, 68)].map(|(at, last)| at.saturating_sub(frame).clamp(1, last));
                 assert_eq!(cleaned.pixel(x, y)[0], picture(expected_x, expected_y), "{level}: ({x}, {y})");
             }
             assert_eq!(cleaned.pixel(frame + 20, frame + 20)[0], picture(20, 20));

@@ -6,23 +6,28 @@ use trueup_core::raster::RowSource;
 use super::cells::Cells;
 use super::search::{Best, Worths};
 use super::smooth::Fillable;
-use super::worth::Worth;
+use super::worth::{UpperEnd, Worth};
 use crate::coverage::{Coverage, Rectangle};
 use crate::gaps::FRAME_REACH;
 use crate::layout::CanvasLayout;
 
 /// What a cell of a thing that stands out is worth beside a calm one, which is worth 1.
 const THING: f32 = 4.0;
-/// What a cell is worth that no photograph covers and that is filled: less than nothing, so that it is filled only where
-/// that saves more than as many calm cells.
-const FILLED: f32 = -1.0;
+/// Cost of a cell that no photograph covers and that is filled: it is filled only where that saves more than as many calm
+/// cells.
+const FILLED: f32 = 1.0;
+/// Further cost of a filled cell if what is nearest to it were not smooth at all; a share of it for a share.
+const FILLED_BESIDE_ROUGH: f32 = 6.0;
 /// Cost of cutting through a thing, for each cell of the cut: calm cells as a share of the panorama's longer side.
 const CUT: f32 = 0.1;
 /// Of that, what cutting it to the left or right costs: things that stand on the ground are expected to go on to the sides.
 const CUT_ASIDE: f32 = 0.5;
 /// Cost of cutting off the upper end of a thing that ends within the picture, for each column of cells: calm cells as a share
 /// of the panorama's longer side.
-const BEHEADED: f32 = 0.6;
+const BEHEADED: f32 = 0.3;
+/// How much more it costs if the end rises above most of what is beside it, for each part of the panorama's longer side by
+/// which it does: a tower that rises by a tenth counts four times as much as a roof among roofs.
+const PROMINENT: f32 = 30.0;
 /// Half the width of the thing that an upper end belongs to, as a share of the panorama's longer side: a spire counts as much
 /// as the tower that bears it.
 const BEARER: f64 = 0.02;
@@ -42,7 +47,7 @@ pub(super) fn rectangle(
     let fillable = Fillable::of(&cells, reach.min(cells.columns + cells.rows));
     let Some(best) = worths(&cells, &fillable).best(around) else { return Ok(None) };
     let is_open = |x: usize, y: usize| {
-        coverage.holds(x, y) || fillable.cells[y / cells.side * cells.columns + x / cells.side]
+        coverage.holds(x, y) || fillable.smooth[y / cells.side * cells.columns + x / cells.side].is_some()
     };
     Ok(Some(grown(&best, cells.side, [layout.width, layout.height], is_open)))
 }
@@ -53,10 +58,10 @@ fn worths(cells: &Cells, fillable: &Fillable) -> Worths {
     let Worth { salience, ends } = Worth::of(cells);
     let longer = columns.max(rows) as f32;
     let ends = widened(&ends, (BEARER * f64::from(longer)).round() as usize);
-    let cell = |at: usize| match (cells.covered[at], fillable.cells[at]) {
-        (true, _) => Some(1.0 + THING * salience[at]),
-        (false, true) => Some(FILLED),
-        (false, false) => None,
+    let beheaded = |end: &UpperEnd| BEHEADED * (longer + PROMINENT * end.prominence as f32);
+    let cell = |at: usize| match cells.covered[at] {
+        true => Some(1.0 + THING * salience[at]),
+        false => fillable.smooth[at].map(|smooth| -FILLED - FILLED_BESIDE_ROUGH * (1.0 - smooth)),
     };
     // What two cells have of one thing.
     let joined = |a: usize, b: usize| CUT * longer * salience[a].min(salience[b]);
@@ -64,10 +69,8 @@ fn worths(cells: &Cells, fillable: &Fillable) -> Worths {
         true => joined((y - 1) * columns + x, y * columns + x),
         false => 0.0,
     };
-    let above = |x: usize, y: usize| {
-        let beheaded = if ends[x] > 0 && y > ends[x] { BEHEADED * longer } else { 0.0 };
-        between_rows(x, y) + beheaded
-    };
+    let above =
+        |x: usize, y: usize| between_rows(x, y) + ends[x].as_ref().filter(|end| y > end.row).map_or(0.0, beheaded);
     let beside = |x: usize, y: usize| match x > 0 && x < columns {
         true => CUT_ASIDE * joined(y * columns + x - 1, y * columns + x),
         false => 0.0,
@@ -82,10 +85,10 @@ fn worths(cells: &Cells, fillable: &Fillable) -> Worths {
     }
 }
 
-/// The highest end within `reach` columns of each; 0 where there is none.
-fn widened(ends: &[usize], reach: usize) -> Vec<usize> {
-    let near = |x: usize| &ends[x.saturating_sub(reach)..(x + reach + 1).min(ends.len())];
-    (0..ends.len()).map(|x| near(x).iter().copied().filter(|&end| end > 0).min().unwrap_or(0)).collect()
+/// The highest end within `reach` columns of each.
+fn widened(ends: &[Option<UpperEnd>], reach: usize) -> Vec<Option<UpperEnd>> {
+    let near = |x: usize| ends[x.saturating_sub(reach)..(x + reach + 1).min(ends.len())].iter().flatten();
+    (0..ends.len()).map(|x| near(x).min_by_key(|end| end.row).copied()).collect()
 }
 
 /// A rectangle of cells in pixels, with the rows and columns of pixels around it that are open all along.

@@ -7,15 +7,15 @@ const SMOOTH_DEVIATION: f32 = 6.0;
 /// Largest contrast between smooth cells beside each other, levels.
 const SMOOTH_CONTRAST: f32 = 10.0;
 
-/// Share of what is nearest to an empty cell that must be smooth: a twig or a wire that runs into the border may be beside it,
+/// Least share of what is nearest to an empty cell that is smooth: a twig or a wire that runs into the border may be beside it,
 /// a tree may not.
-const SMOOTH_SHARE: f32 = 0.75;
+const LEAST_SMOOTH: f32 = 0.5;
 
 /// What may be filled.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Fillable {
-    /// Whether a cell that is not covered may be filled.
-    pub(super) cells: Vec<bool>,
+    /// For every empty cell that may be filled, which share of what is nearest to it is smooth.
+    pub(super) smooth: Vec<Option<f32>>,
 }
 
 impl Fillable {
@@ -45,9 +45,11 @@ impl Fillable {
             next.iter().zip(found).for_each(|(&at, mean)| smooth[at] = Some(mean));
             front = next;
         }
-        let enough = |smooth: &Option<f32>| smooth.is_some_and(|share| share >= SMOOTH_SHARE);
-        let fillable = smooth.iter().zip(&cells.covered).map(|(smooth, covered)| !covered && enough(smooth));
-        Self { cells: fillable.collect() }
+        let fillable = smooth
+            .iter()
+            .zip(&cells.covered)
+            .map(|(smooth, &covered)| smooth.filter(|&share| !covered && share >= LEAST_SMOOTH));
+        Self { smooth: fillable.collect() }
     }
 }
 
@@ -70,8 +72,8 @@ fn near(cells: &Cells, at: usize) -> impl Iterator<Item = usize> {
 fn smooth_border(cells: &Cells, at: usize) -> Option<bool> {
     let is_border = cells.covered[at] && near(cells, at).any(|other| !cells.covered[other]);
     is_border.then(|| {
-        near(cells, at).filter(|&other| cells.covered[other]).all(|other| {
-            cells.deviations[other] <= SMOOTH_DEVIATION && cells.contrast(at, other) <= SMOOTH_CONTRAST
-        })
+        near(cells, at)
+            .filter(|&other| cells.covered[other])
+            .all(|other| cells.deviations[other] <= SMOOTH_DEVIATION && cells.contrast(at, other) <= SMOOTH_CONTRAST)
     })
 }

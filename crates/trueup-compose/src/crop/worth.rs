@@ -13,20 +13,32 @@ const SURROUNDINGS: f64 = 0.05;
 /// edges have by themselves.
 const CROWDED: f32 = 2.0;
 
+/// Salience from which on there is a thing, and up to which there is none: what rises from the one to the other within
+/// [`HEADROOM`] ends there.
+const THERE: f32 = 0.2;
+const CALM: f32 = 0.1;
+/// Calm above a thing that shows that it ends there, as a share of the panorama's longer side; half of it is to be kept.
+const HEADROOM: f64 = 0.012;
+/// Half the width of the skyline over which a thing stands out, as a share of the panorama's longer side.
+const SKYLINE: f64 = 0.1;
+
 /// What of a panorama matters.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Worth {
     /// How far a cell is part of a thing that stands out, 0 to 1; 0 where nothing is covered.
     pub(super) salience: Vec<f32>,
-    /// For every column, the row of cells above which everything that is covered is calm, if some of it is: where the
-    /// thing that is highest there ends within the picture. 0 where none does.
-    pub(super) ends: Vec<usize>,
+    /// For every column, where the thing that is highest there ends within the picture.
+    pub(super) ends: Vec<Option<UpperEnd>>,
 }
 
-/// Salience below which a cell is calm.
-const CALM: f32 = 0.05;
-/// Calm above a thing that shows that it ends there, as a share of the panorama's longer side.
-const HEADROOM: f64 = 0.006;
+/// The upper end of a thing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct UpperEnd {
+    /// The first row of cells that is to be kept for it.
+    pub(super) row: usize,
+    /// Rows of cells by which it rises above most of what ends beside it.
+    pub(super) prominence: usize,
+}
 
 impl Worth {
     pub(super) fn of(cells: &Cells) -> Self {
@@ -44,7 +56,7 @@ impl Worth {
                 false => 0.0,
             })
             .collect();
-        let ends = ends(cells, &salience, reach(HEADROOM));
+        let ends = ends(cells, &salience, longer);
         Self { salience, ends }
     }
 }
@@ -95,12 +107,24 @@ fn box_means(values: &[f32], cells: &Cells, reach: usize) -> Vec<f32> {
 }
 
 /// See [`Worth::ends`].
-fn ends(cells: &Cells, salience: &[f32], headroom: usize) -> Vec<usize> {
+fn ends(cells: &Cells, salience: &[f32], longer: f64) -> Vec<Option<UpperEnd>> {
+    let headroom = (HEADROOM * longer).round().max(2.0) as usize;
     let end = |x: usize| {
         let column = |y: usize| y * cells.columns + x;
         let first = (0..cells.rows).find(|&y| cells.covered[column(y)])?;
-        let thing = (first..cells.rows).find(|&y| salience[column(y)] >= CALM)?;
-        (thing >= first + headroom).then_some(thing)
+        let rising = (first..cells.rows).find(|&y| salience[column(y)] >= CALM)?;
+        let thing = (rising..cells.rows).find(|&y| salience[column(y)] >= THERE)?;
+        (rising >= first + headroom && thing <= rising + headroom).then_some(thing)
     };
-    (0..cells.columns).map(|x| end(x).unwrap_or(0)).collect()
+    let rows: Vec<Option<usize>> = (0..cells.columns).map(end).collect();
+    let reach = (SKYLINE * longer).round() as usize;
+    let with_prominence = |x: usize| {
+        let row = rows[x]?;
+        let mut beside: Vec<usize> =
+            rows[x.saturating_sub(reach)..(x + reach + 1).min(rows.len())].iter().copied().flatten().collect();
+        beside.sort_unstable();
+        let prominence = beside[beside.len() / 2].saturating_sub(row);
+        Some(UpperEnd { row: row - headroom / 2, prominence })
+    };
+    (0..rows.len()).map(with_prominence).collect()
 }

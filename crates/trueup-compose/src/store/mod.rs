@@ -80,9 +80,11 @@ impl<P: Pixel> PixelStore<P> {
     pub(crate) fn is_opaque(&self, part: &Rectangle) -> bool {
         match self {
             Self::Scratch(blocks) if blocks.is_opaque() => true,
-            _ => part.rows.clone().into_par_iter().all(|y| {
-                self.row(y).is_ok_and(|row| row[part.columns.clone()].iter().all(P::is_opaque))
-            }),
+            _ => part
+                .rows
+                .clone()
+                .into_par_iter()
+                .all(|y| self.row(y).is_ok_and(|row| row[part.columns.clone()].iter().all(P::is_opaque))),
         }
     }
 

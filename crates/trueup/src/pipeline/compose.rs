@@ -90,9 +90,8 @@ pub(crate) fn run(
 ) -> Result<Reported<Composed>> {
     let ComposeInput { render: photographs, resources, canvas, kept } = input;
     context.gather(|context| {
-        let rendered = context.time("render", || {
-            render::run(photographs, resources, &options.render, &options.seam, context)
-        })?;
+        let rendered =
+            context.time("render", || render::run(photographs, resources, &options.render, &options.seam, context))?;
         context.time("crop", || framed(rendered, photographs.layout, canvas, kept.as_ref(), context))
     })
 }

@@ -328,7 +328,8 @@ impl<'a> Stitcher<'a> {
         let budget = Budget::new(&self.options.run.resources);
         let mut canvas = self.options.arrange.canvas.clone();
         let turn = alignment.layout.period;
-        let is_sphere = alignment.project.projection.is_some_and(|one| one.is_whole_sphere(alignment.layout.height, turn));
+        let is_sphere =
+            alignment.project.projection.is_some_and(|one| one.is_whole_sphere(alignment.layout.height, turn));
         if is_sphere && canvas.crop == Crop::Auto {
             // Viewers want all of it, whatever is missing at a pole.
             canvas.crop = Crop::None;
@@ -339,9 +340,8 @@ impl<'a> Stitcher<'a> {
             canvas: &canvas,
             kept: alignment.kept.clone(),
         };
-        let composed = self.context.gather(|context| {
-            Ok(context.absorb(compose::run(&input, &self.options.compose, context)?))
-        })?;
+        let composed =
+            self.context.gather(|context| Ok(context.absorb(compose::run(&input, &self.options.compose, context)?)))?;
         let (Composed { rendered, kept, lost, filled }, told) = composed.split();
         alignment.record(told);
         if let Some(kept) = kept {
