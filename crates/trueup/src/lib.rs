@@ -38,8 +38,8 @@ pub use options::{
 };
 pub use pipeline::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use project::{
-    Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord,
-    Project, ProjectionRecord, hugin_project,
+    Canvas, CropRecord, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION,
+    PairRecord, Project, ProjectionRecord, hugin_project,
 };
 pub use report::brightness::BrightnessStep;
 pub use report::evaluation::{

@@ -12,7 +12,7 @@ pub(crate) fn json(written: &[Written]) -> String {
 }
 
 fn panorama(written: &Written) -> Value {
-    let Project { images, canvas, measures, seconds, reference, .. } = &written.project;
+    let Project { images, canvas, crop, measures, seconds, reference, .. } = &written.project;
     let names = written.project.photograph_names();
     let path = |path: &std::path::Path| path.display().to_string();
     let beside: serde_json::Map<String, Value> =
@@ -28,6 +28,7 @@ fn panorama(written: &Written) -> Value {
         "width": canvas.width,
         "height": canvas.height,
         "full_turn": canvas.full_turn,
+        "cropped": crop.map(|crop| json!({ "lost": crop.lost, "filled": crop.filled })),
         "reference": reference,
         "used": used,
         "left_out": left_out

@@ -83,14 +83,31 @@ fn panorama(lines: &mut LabeledLines, project: &Project, file: Option<&PanoramaF
     if project.canvas.full_turn {
         size.push_str(", a full turn: the ends meet");
     }
-    let Some(file) = file else {
-        lines.entry("panorama", &size);
-        return;
-    };
-    lines.entry("panorama", &format!("{}  {size}, {}", file.panorama.display(), file_size(file.bytes)));
-    if let Some(path) = file.project {
+    match file {
+        None => lines.entry("panorama", &size),
+        Some(file) => {
+            lines.entry("panorama", &format!("{}  {size}, {}", file.panorama.display(), file_size(file.bytes)));
+        }
+    }
+    if let Some(cropped) = cropped(project) {
+        lines.entry("cropped", &cropped);
+    }
+    if let Some(path) = file.and_then(|file| file.project) {
         lines.entry("project", &path.display().to_string());
     }
+}
+
+/// How much of what the photographs show was cut off, and how much of the panorama they do not show; `None` if neither is.
+fn cropped(project: &Project) -> Option<String> {
+    let crop = project.crop.as_ref()?;
+    let percent = |share: f64| match 100.0 * share {
+        few if few < 1.0 => "less than 1 %".to_owned(),
+        percent => format!("{percent:.0} %"),
+    };
+    let lost = (crop.lost > 0.0).then(|| format!("{} of what the photographs cover was cut off", percent(crop.lost)));
+    let filled = (crop.filled > 0.0).then(|| format!("{} of the panorama was filled", percent(crop.filled)));
+    let told: Vec<String> = lost.into_iter().chain(filled).collect();
+    (!told.is_empty()).then(|| format!("{} (--crop none keeps all)", told.join(", ")))
 }
 
 /// How many were used, and each one left out with its reason and what to do about it.

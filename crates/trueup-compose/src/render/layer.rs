@@ -15,6 +15,7 @@ use crate::light::{ByResponse, PhotographLight};
 use crate::look::local_exposure;
 use crate::render_options::RenderOptions;
 use crate::transfer_curve::Encoding;
+use crate::unframed::Unframed;
 use crate::warped::{Resampling, SamplingMemory, WarpedPhotograph, check_photograph};
 use crate::weights::WHOLE;
 use crate::window::Window;
@@ -94,6 +95,7 @@ fn alone(
             "Ask for one of the photographs placed.",
         ));
     };
+    let photographs = &Unframed(photographs);
     let photograph = photographs.photograph(placed.photograph)?;
     check_photograph(placed, &photograph)?;
     let photographs = ByResponse::new(photographs, &corrections.response)?;

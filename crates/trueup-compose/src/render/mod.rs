@@ -32,6 +32,7 @@ use crate::render_options::{Composition, Transition};
 use crate::seam::{self, SeamInput, SeamOptions, Seams};
 use crate::small_views::{self, SmallViews, SmallViewsInput};
 use crate::store::{PixelStore, RootPixel, SumPixel};
+use crate::unframed::Unframed;
 use crate::warped::{Averaging, Resampling};
 use crate::weights::Weighting;
 use average::AverageInput;
@@ -73,6 +74,7 @@ pub fn run(
     check(input, options)?;
     seam_options.check()?;
     let &RenderInput { layout, corrections, photographs } = input;
+    let photographs = &Unframed(photographs);
     let photographs = ByResponse::new(photographs, &corrections.response)?;
     let plan = MemoryPlan::new(&memory_needs(layout, &photographs, options)?, resources)?;
     report_folds(layout, context);

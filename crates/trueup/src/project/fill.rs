@@ -1,5 +1,6 @@
 //! Fills the project: what is recorded of photographs, pairs and geometry.
 
+use trueup_compose::crop::Rectangle;
 use trueup_compose::exposure::{Correction, Corrections, Response};
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_core::diagnostics::{Diagnostic, Subject};
@@ -8,7 +9,8 @@ use trueup_core::lens::PlacedLens;
 use trueup_core::mesh::GridMesh;
 
 use super::record::{
-    Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project,
+    Canvas, CropRecord, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION,
+    PairRecord, Project,
 };
 use crate::options::{MethodForm, StitchOptions};
 use crate::pipeline::align::Geometry;
@@ -87,6 +89,7 @@ pub(crate) fn unfilled(
         color_space: String::new(),
         response: Response::default(),
         projection: None,
+        crop: None,
         mesh_canvas: None,
         by_cameras: None,
         seconds: std::collections::BTreeMap::new(),
@@ -135,11 +138,12 @@ pub(crate) fn place(component: &Component, geometry: Option<&Geometry>) -> Vec<P
 }
 
 /// What is found on the way from the geometry to the panorama, each time anew.
-const FOUND_IN_COMPOSING: [&str; 10] = [
+const FOUND_IN_COMPOSING: [&str; 11] = [
     "canvas-reduced",
     "color-converted",
     "color-profile-damaged",
     "color-profile-ignored",
+    "crop-too-small",
     "exposures-far-apart",
     "gaps-filled",
     "grid-folded",
@@ -217,10 +221,36 @@ fn record_canvas(project: &mut Project, arrangement: &Arrangement) {
         height: layout.height,
         full_turn: layout.period.is_some(),
     };
-    project.canvas = canvas(&arrangement.written);
+    project.canvas = canvas(&arrangement.drawn);
+    project.crop = None;
     project.mesh_canvas = arrangement.projection.map(|_| canvas(&arrangement.plane));
     project.projection = arrangement.projection;
     project.by_cameras = arrangement.by_cameras;
+}
+
+/// What of the canvas that is recorded is kept.
+pub(crate) fn record_crop(project: &mut Project, part: &Rectangle, crop: CropRecord) {
+    let whole = project.canvas;
+    project.crop = Some(crop);
+    if *part == Rectangle::whole([whole.width, whole.height]) {
+        return;
+    }
+    let is_mesh = project.projection.is_none();
+    let [left, top] = part.corner();
+    for image in project.images.iter_mut().filter(|image| image.status == ImageStatus::Used) {
+        let Some(mesh) = &mut image.mesh else { continue };
+        if is_mesh {
+            image.solved_mesh = Some(mesh.clone());
+        }
+        mesh.target.iter_mut().for_each(|vertex| *vertex = [vertex[0] - left, vertex[1] - top]);
+    }
+    if is_mesh {
+        project.mesh_canvas = Some(whole);
+    }
+    let turn = whole.full_turn.then_some(whole.width);
+    project.projection = project.projection.map(|projection| projection.of_part(part, turn));
+    let [width, height] = part.size();
+    project.canvas = Canvas { width, height, ..whole };
 }
 
 /// What was found of a group of photographs.

@@ -110,8 +110,8 @@ pub struct ImageRecord {
     pub vanishing_points: Option<[[f64; 3]; 3]>,
     /// The deformed grid, in the panorama.
     pub mesh: Option<MeshRecord>,
-    /// The same as the method solved it, with [`Project::projection`]: on [`Project::mesh_canvas`]. From its overlaps the
-    /// projection takes how photographs meet.
+    /// The same as the method solved it, on [`Project::mesh_canvas`]: with [`Project::projection`], which takes from its
+    /// overlaps how photographs meet, or where the panorama was cropped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub solved_mesh: Option<MeshRecord>,
 }
@@ -180,6 +180,23 @@ impl Canvas {
     }
 }
 
+/// The part of a canvas that became the panorama.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CropRecord {
+    /// Columns of the canvas left of the panorama.
+    pub left: usize,
+    /// Rows of the canvas above the panorama.
+    pub top: usize,
+    /// Width of the canvas in pixels.
+    pub canvas_width: usize,
+    /// Height of the canvas in pixels.
+    pub canvas_height: usize,
+    /// Share of what the photographs cover that was cut off, 0 to 1.
+    pub lost: f64,
+    /// Share of the panorama that no photograph covers and that was filled for a whole frame, 0 to 1.
+    pub filled: f64,
+}
+
 /// The record of one panorama.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Project {
@@ -219,7 +236,12 @@ pub struct Project {
     /// projections.
     #[serde(default)]
     pub projection: Option<ProjectionRecord>,
-    /// The canvas of the plane in which the grids were solved, where that is not the panorama's: with a projection.
+    /// What of the canvas was kept; `None` where it was not to be cropped, before it is composed, and in files of programs that did
+    /// not record it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crop: Option<CropRecord>,
+    /// The canvas of the plane in which the grids were solved, where that is not the panorama's: with a projection, or where
+    /// the panorama is a part of it.
     #[serde(default)]
     pub mesh_canvas: Option<Canvas>,
     /// Where directions of the level world lie on `mesh_canvas`, if the mesh was worse than the cameras, so that these drew
