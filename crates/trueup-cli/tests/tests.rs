@@ -22,4 +22,5 @@ mod run;
 mod sphere;
 #[cfg(unix)]
 mod stopping;
+mod strangers;
 mod told;
