@@ -23,4 +23,5 @@ mod run;
 mod sphere;
 #[cfg(unix)]
 mod stopping;
+mod strangers;
 mod told;

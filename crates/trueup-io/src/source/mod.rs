@@ -24,6 +24,7 @@ use crate::metadata::orientation::{TagVerdict, judge_orientation};
 use duplicates::Accepted;
 use in_memory::in_memory_source;
 use inputs::Candidate;
+pub use opened::PANORAMA_OF_OTHERS;
 use opened::{Named, OWN_PANORAMA, OpenedPicture, check_size, open_picture};
 use rejection::Rejection;
 
@@ -54,7 +55,8 @@ pub struct RejectedSource {
     pub name: String,
     /// Stable machine-readable reason in kebab case: `file-missing`, `pattern-without-match`, `folder-without-pictures`,
     /// `folder-not-file`, `file-unreadable`, `file-empty`, `not-a-picture`, `format-unsupported`, `picture-damaged`,
-    /// `picture-too-large`, `picture-too-small`, `duplicate`, `own-panorama`, `name-of-a-file`.
+    /// `picture-too-large`, `picture-too-small`, `duplicate`, `own-panorama`,
+    /// `panorama-of-others`, `name-of-a-file`.
     pub code: String,
     /// Why it cannot be used, without a closing full stop.
     pub reason: String,

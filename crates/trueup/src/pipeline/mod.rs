@@ -141,6 +141,7 @@ impl<'a> Stitcher<'a> {
             };
             let matches = context.absorb(matching::run(&input, &self.options.matching, context)?);
             matched.pairs = matches.pairs;
+            matched.strangers = matches.strangers;
             matched.graph = matches.graph;
             self.report_cache(context);
             Ok(matched)
