@@ -146,6 +146,19 @@ impl Seams {
         labels
     }
 
+    /// Labels of `width` x `height` places, evenly over a part of a canvas of `full` pixels (width, height), row by row.
+    pub fn on_places(&self, part: &Rectangle, full: [usize; 2], [width, height]: [usize; 2]) -> Vec<Label> {
+        let (across, down) = (self.width as f64 / full[0] as f64, self.height as f64 / full[1] as f64);
+        let along = |range: &Range<usize>, place: usize, places: usize| {
+            range.start as f64 + (place as f64 + 0.5) / places as f64 * range.len() as f64
+        };
+        let row = |y: usize| {
+            let v = along(&part.rows, y, height) * down;
+            (0..width).map(move |x| self.at(along(&part.columns, x, width) * across, v))
+        };
+        (0..height).flat_map(row).collect()
+    }
+
     /// The photographs that a box of a canvas of `full` pixels (width, height) may show, in order; on a
     /// cylinder columns may run into any further turn.
     pub(crate) fn shown_in(&self, columns: &Range<usize>, rows: &Range<usize>, full: [usize; 2]) -> Vec<Label> {
