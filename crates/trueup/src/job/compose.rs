@@ -1,6 +1,6 @@
 //! From a project to a file: a recorded panorama is composed again.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
@@ -10,7 +10,7 @@ use super::outputs::{Outputs, ReadFile};
 use super::threads::thread_pool;
 use super::write::Written;
 use crate::options::StitchOptions;
-use crate::pipeline::Stitcher;
+use crate::pipeline::{Alignment, Stitcher};
 use crate::pipeline::photographs::FoundPhotographs;
 use crate::project::read::Recorded;
 use crate::project::record::{ImageRecord, Project};
@@ -76,11 +76,7 @@ impl ComposeJob {
         thread_pool(self.threads)?.install(|| {
             let stitcher = Stitcher::new(options, context);
             let images = self.find_photographs(options, context)?;
-            let mut masks = AllMasks::read(&self.masks, &images, &options.measure.source, context)?;
-            let recorded: Vec<&[MaskRecord]> = self.project.used_images().map(|one| one.masks.as_slice()).collect();
-            masks.recall(&recorded, &images, &self.project_folder, &options.measure.source, context)?;
-            let alignment =
-                stitcher.recall(&self.project, FoundPhotographs { images, masks, ..FoundPhotographs::default() })?;
+            let alignment = stitcher.recorded(&self.project, &self.project_folder, images, &self.masks)?;
             self.outputs.write(&stitcher, alignment)
         })
     }
@@ -91,5 +87,39 @@ impl ComposeJob {
             Some(folder) => other_photographs(&records, folder, &options.measure.source, context),
             None => recorded_photographs(&records, &self.project_folder, &options.measure.source, context),
         }
+    }
+}
+
+impl Stitcher<'_> {
+    /// The geometry that `project` records, over its own photographs and masks, ready to be composed or rearranged. Their
+    /// recorded paths are looked up in `project_folder` first, then from the current folder.
+    ///
+    /// # Errors
+    /// [`trueup_core::Error::Options`]; [`trueup_core::Error::Unsupported`] if an option of the geometry differs from the
+    /// recorded one; [`trueup_core::Error::Input`] if the project was damaged, or photographs or masks are missing or have
+    /// other sizes; those of the layout; [`trueup_core::Error::Cancelled`].
+    pub fn reopen(&self, project: &Project, project_folder: &Path) -> Result<Alignment> {
+        self.options().validate()?;
+        self.options().refuse_other_geometry(&project.options)?;
+        Recorded::new(project)?;
+        let records: Vec<&ImageRecord> = project.used_images().collect();
+        let accepted = &self.options().measure.source;
+        let images = recorded_photographs(&records, project_folder, accepted, self.context())?;
+        self.recorded(project, project_folder, images, &[])
+    }
+
+    /// The recorded geometry over `images`, with these masks in place of the recorded ones of the photographs they name.
+    fn recorded(
+        &self,
+        project: &Project,
+        project_folder: &Path,
+        images: Vec<SourceImage>,
+        masks: &[MaskFile],
+    ) -> Result<Alignment> {
+        let accepted = &self.options().measure.source;
+        let mut masks = AllMasks::read(masks, &images, accepted, self.context())?;
+        let recorded: Vec<&[MaskRecord]> = project.used_images().map(|one| one.masks.as_slice()).collect();
+        masks.recall(&recorded, &images, project_folder, accepted, self.context())?;
+        self.recall(project, FoundPhotographs { images, masks, ..FoundPhotographs::default() })
     }
 }

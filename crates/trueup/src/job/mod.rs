@@ -9,6 +9,7 @@ mod outputs;
 mod side_outputs;
 mod stitch;
 mod threads;
+mod thumbnail;
 mod write;
 
 pub use compose::ComposeJob;
@@ -18,4 +19,5 @@ pub use outputs::{Outputs, ReadFile};
 pub use side_outputs::SideOutput;
 pub use stitch::StitchJob;
 pub use threads::thread_pool;
+pub use thumbnail::write_thumbnail;
 pub use write::Written;
