@@ -16,6 +16,7 @@ mod option_list;
 mod outcome;
 mod output;
 mod progress;
+mod serve;
 mod stitch;
 mod stopping;
 mod summary;
@@ -47,6 +48,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Task::Compare(args) => compare::run(*args),
         Task::Inspect(args) => inspect::run(&args),
         Task::Evaluate(args) => evaluate::run(&args),
+        Task::Serve(args) => serve::run(args),
         Task::Options(args) => option_list::run(&args),
         Task::Completions(args) => installing::completions(&args),
         Task::Manual(args) => installing::manual(&args),

@@ -15,7 +15,7 @@ use tokio::io::{AsyncRead, AsyncWriteExt, ReadBuf};
 use tokio::time::Instant;
 
 use crate::limits::{BODY_GRACE, MIN_BODY_RATE};
-use crate::refusal::Refusal;
+use crate::denial::Denial;
 
 /// A body that is read piece by piece.
 struct Pieces {
@@ -30,10 +30,10 @@ impl Pieces {
         Self { body, read: 0, limit, begun: Instant::now() }
     }
 
-    async fn next(&mut self) -> Result<Option<Bytes>, Refusal> {
+    async fn next(&mut self) -> Result<Option<Bytes>, Denial> {
         let allowed = BODY_GRACE + Duration::from_secs(self.read / MIN_BODY_RATE);
-        let slow = |_| Refusal::new(StatusCode::REQUEST_TIMEOUT, "it came too slowly", "Try again.");
-        let cut = |_| Refusal::new(StatusCode::BAD_REQUEST, "it was cut off on the way", "Try again.");
+        let slow = |_| Denial::new(StatusCode::REQUEST_TIMEOUT, "it came too slowly", "Try again.");
+        let cut = |_| Denial::new(StatusCode::BAD_REQUEST, "it was cut off on the way", "Try again.");
         let frame = tokio::time::timeout_at(self.begun + allowed, self.body.frame()).await.map_err(slow)?;
         let Some(frame) = frame.transpose().map_err(cut)? else { return Ok(None) };
         let data = frame.into_data().unwrap_or_default();
@@ -49,7 +49,7 @@ impl Pieces {
 ///
 /// # Errors
 /// If it is larger, slower than [`MIN_BODY_RATE`], or cut off.
-pub(crate) async fn read(body: Body, limit: u64) -> Result<Vec<u8>, Refusal> {
+pub(crate) async fn read(body: Body, limit: u64) -> Result<Vec<u8>, Denial> {
     let mut pieces = Pieces::new(body, limit);
     let mut whole = Vec::new();
     while let Some(piece) = pieces.next().await? {
@@ -62,7 +62,7 @@ pub(crate) async fn read(body: Body, limit: u64) -> Result<Vec<u8>, Refusal> {
 ///
 /// # Errors
 /// As [`read`], and if the file cannot be written.
-pub(crate) async fn save(body: Body, limit: u64, place: &Path) -> Result<u64, Refusal> {
+pub(crate) async fn save(body: Body, limit: u64, place: &Path) -> Result<u64, Denial> {
     let saved = write(body, limit, place).await;
     if saved.is_err() {
         // If it cannot be removed, it goes with its folder.
@@ -71,20 +71,20 @@ pub(crate) async fn save(body: Body, limit: u64, place: &Path) -> Result<u64, Re
     saved
 }
 
-async fn write(body: Body, limit: u64, place: &Path) -> Result<u64, Refusal> {
+async fn write(body: Body, limit: u64, place: &Path) -> Result<u64, Denial> {
     let mut pieces = Pieces::new(body, limit);
-    let mut file = File::create_new(place).await.map_err(Refusal::failure)?;
+    let mut file = File::create_new(place).await.map_err(Denial::failure)?;
     while let Some(piece) = pieces.next().await? {
-        file.write_all(&piece).await.map_err(Refusal::failure)?;
+        file.write_all(&piece).await.map_err(Denial::failure)?;
     }
-    file.flush().await.map_err(Refusal::failure)?;
+    file.flush().await.map_err(Denial::failure)?;
     Ok(pieces.read)
 }
 
-fn too_large(limit: u64) -> Refusal {
+fn too_large(limit: u64) -> Denial {
     let megabytes = (limit / 1_000_000).max(1);
     let message = format!("it is larger than the {megabytes} MB that are allowed");
-    Refusal::new(StatusCode::PAYLOAD_TOO_LARGE, message, "Put it into the folder that was opened instead.")
+    Denial::new(StatusCode::PAYLOAD_TOO_LARGE, message, "Put it into the folder that was opened instead.")
 }
 
 /// Bytes of a file that are in memory at once.

@@ -131,7 +131,7 @@ impl Guard {
         let _one = self.guesses.lock().await;
         let given = match body::read(body, MAX_WISHES_BYTES).await {
             Ok(given) => given,
-            Err(refusal) => return refusal.into_response(),
+            Err(denial) => return denial.into_response(),
         };
         let text = given.strip_prefix(b"password=".as_slice()).map(form_value).unwrap_or_default();
         if blake3::hash(&text) == *password {

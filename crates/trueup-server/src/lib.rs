@@ -10,12 +10,12 @@
 #![forbid(unsafe_code)]
 
 mod body;
+mod denial;
 mod folder;
 mod guard;
 mod limits;
 mod making;
 mod pages;
-mod refusal;
 mod reopening;
 mod routes;
 mod studio;
@@ -25,7 +25,7 @@ mod work;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::Router;
 use hyper::server::conn::http1;
@@ -42,6 +42,9 @@ use studio::Studio;
 
 /// How often it is looked whether the server is to stop: nobody notices so short a wait.
 const STOP_EVERY: Duration = Duration::from_millis(100);
+
+/// How long work that was asked to stop is waited for: people press Ctrl-C again after a second.
+const STOP_WITHIN: Duration = Duration::from_millis(500);
 
 /// What to serve, and to whom.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -112,8 +115,14 @@ pub fn serve(serving: &Serving, cancel: &CancelToken, told: impl FnOnce(&str)) -
         Ok(())
     });
     work::stop(&studio, None);
-    // Work that does not stop at once is not waited for.
+    // Work that does not stop soon is not waited for.
+    let patience = Instant::now() + STOP_WITHIN;
+    while studio.state().work.is_some() && Instant::now() < patience {
+        std::thread::sleep(STOP_EVERY);
+    }
     runtime.shutdown_background();
+    // Whoever still holds the studio holds it for good. What cannot be removed is left to the system.
+    drop(std::fs::remove_dir_all(studio.desk.path()));
     served.map_err(failed)
 }
 

@@ -4,7 +4,7 @@ use axum::extract::Path;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
-use crate::refusal::Refusal;
+use crate::denial::Denial;
 
 /// A file of the page.
 struct File {
@@ -46,6 +46,6 @@ pub(crate) async fn file(Path(name): Path<String>) -> Response {
 fn named(name: &str) -> Response {
     match FILES.iter().find(|file| file.name == name) {
         Some(file) => (StatusCode::OK, [(header::CONTENT_TYPE, file.media_type)], file.bytes).into_response(),
-        None => Refusal::missing("file").into_response(),
+        None => Denial::missing("file").into_response(),
     }
 }

@@ -7,7 +7,7 @@ use trueup::{ImageRecord, ImageStatus, Judgement};
 
 use crate::folder::Folder;
 use crate::making::{Warning, warnings};
-use crate::refusal::Trouble;
+use crate::denial::Trouble;
 use crate::studio::{ExportedFile, Listed, Stage, State, Stitched, Studio, Task};
 
 /// All of it.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use trueup::{CancelToken, Error, Progress, Result, StageContext};
 
-use crate::refusal::{Refusal, Trouble};
+use crate::denial::{Denial, Trouble};
 use crate::studio::{Stage, Studio, Task, Work};
 
 /// Begins a task, if nothing is being done; tiles, which nobody asked for, make way for anything else.
@@ -16,12 +16,12 @@ pub(crate) fn start(
     studio: &Arc<Studio>,
     task: Task,
     work: impl FnOnce(&Studio, &StageContext) -> Result<()> + Send + 'static,
-) -> std::result::Result<(), Refusal> {
+) -> std::result::Result<(), Denial> {
     let cancel = Arc::new(CancelToken::default());
     let begun = Work { task, stages: Vec::new(), cancel: cancel.clone() };
     studio.change(|state| match &state.work {
         Some(busy) if busy.task != Task::Tiles || task == Task::Tiles => {
-            Err(Refusal::not_now("something else is being done", "Wait for it, or stop it."))
+            Err(Denial::not_now("something else is being done", "Wait for it, or stop it."))
         }
         making_way => {
             if let Some(busy) = making_way {

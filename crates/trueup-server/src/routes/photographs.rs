@@ -16,7 +16,7 @@ use crate::folder::plain_name;
 use crate::limits::{
     MAX_DROPPED_BYTES, MAX_MASK_BYTES, MAX_PHOTOGRAPH_BYTES, MAX_PHOTOGRAPHS, PAINTED_PIXELS, THUMBNAIL_PIXELS,
 };
-use crate::refusal::Refusal;
+use crate::denial::Denial;
 use crate::studio::{History, Listed, State as Now, Studio};
 
 /// A folder inside the one that was opened when the program began.
@@ -28,14 +28,14 @@ pub(crate) struct Opened {
 }
 
 /// Opens a folder inside the one that was opened first. What was dropped is forgotten.
-pub(crate) async fn open(State(studio): State<Arc<Studio>>, body: Body) -> Result<StatusCode, Refusal> {
+pub(crate) async fn open(State(studio): State<Arc<Studio>>, body: Body) -> Result<StatusCode, Denial> {
     let Opened { folder } = wishes_of(body).await?;
-    let none = || Refusal::missing("folder");
+    let none = || Denial::missing("folder");
     let opened = studio.root.as_ref().and_then(|root| root.inside(&folder).ok()).ok_or_else(none)?;
     let photographs = opened.photographs().into_iter().map(|path| Listed { path, dropped: false }).collect();
     studio.change(|state| {
         if state.work.is_some() {
-            return Err(Refusal::not_now("something is being done", "Wait for it, or stop it."));
+            return Err(Denial::not_now("something is being done", "Wait for it, or stop it."));
         }
         let (last_number, dropped_bytes) = (state.last_number, state.dropped_bytes);
         *state = Now { folder: Some(opened), photographs, last_number, dropped_bytes, ..Now::default() };
@@ -56,22 +56,22 @@ pub(crate) async fn drop_one(
     Query(Named { name }): Query<Named>,
     headers: HeaderMap,
     body: Body,
-) -> Result<StatusCode, Refusal> {
+) -> Result<StatusCode, Denial> {
     let name = plain_name(&name).filter(|name| names_photograph((*name).as_ref()));
-    let name = name.ok_or_else(|| Refusal::unacceptable("it is not named like a photograph", trueup::readable_formats()))?;
+    let name = name.ok_or_else(|| Denial::unacceptable("it is not named like a photograph", trueup::readable_formats()))?;
     let place = studio.dropped().join(name);
     {
         let state = studio.state();
         if state.photographs.len() >= MAX_PHOTOGRAPHS {
-            return Err(Refusal::unacceptable(format!("there are {MAX_PHOTOGRAPHS} photographs already"), ""));
+            return Err(Denial::unacceptable(format!("there are {MAX_PHOTOGRAPHS} photographs already"), ""));
         }
         if state.photographs.iter().any(|listed| listed.name() == name) {
-            return Err(Refusal::not_now("there is a photograph of this name already", "Give it another name."));
+            return Err(Denial::not_now("there is a photograph of this name already", "Give it another name."));
         }
         let announced = headers.get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok()?.parse::<u64>().ok());
         let room = MAX_PHOTOGRAPH_BYTES.min(MAX_DROPPED_BYTES.saturating_sub(state.dropped_bytes));
         if announced.is_none_or(|length| length > room) {
-            return Err(Refusal::new(
+            return Err(Denial::new(
                 StatusCode::PAYLOAD_TOO_LARGE,
                 format!("photographs of up to {} MB can be dropped here", room / 1_000_000),
                 "Begin with `trueup serve FOLDER`, in the folder that holds it.",
@@ -88,12 +88,12 @@ pub(crate) async fn drop_one(
 }
 
 /// A photograph as small as in a list.
-pub(crate) async fn thumbnail(state: State<Arc<Studio>>, number: Path<usize>) -> Result<Response, Refusal> {
+pub(crate) async fn thumbnail(state: State<Arc<Studio>>, number: Path<usize>) -> Result<Response, Denial> {
     small(state, number, THUMBNAIL_PIXELS).await
 }
 
 /// A photograph as large as it is painted on.
-pub(crate) async fn picture(state: State<Arc<Studio>>, number: Path<usize>) -> Result<Response, Refusal> {
+pub(crate) async fn picture(state: State<Arc<Studio>>, number: Path<usize>) -> Result<Response, Denial> {
     small(state, number, PAINTED_PIXELS).await
 }
 
@@ -102,10 +102,10 @@ async fn small(
     State(studio): State<Arc<Studio>>,
     Path(number): Path<usize>,
     pixels: f64,
-) -> Result<Response, Refusal> {
+) -> Result<Response, Denial> {
     let listed = studio.photograph(number)?;
     if !studio.may_read(&listed.path) {
-        return Err(Refusal::missing("photograph"));
+        return Err(Denial::missing("photograph"));
     }
     let place = studio.pictures().join(format!("photograph-{number}-{pixels}.jpg"));
     let made = move || {
@@ -119,17 +119,17 @@ async fn small(
         let bytes = std::fs::read(&place).map_err(|error| trueup::Error::io("reading", &place, error))?;
         Ok::<_, trueup::Error>((size, bytes))
     };
-    let ([width, height], bytes) = tokio::task::spawn_blocking(made).await.map_err(Refusal::failure)??;
+    let ([width, height], bytes) = tokio::task::spawn_blocking(made).await.map_err(Denial::failure)??;
     let size = [("x-width", width.to_string()), ("x-height", height.to_string())];
     Ok((size, [(header::CONTENT_TYPE, "image/jpeg")], bytes).into_response())
 }
 
 /// Which of its masks.
-fn kind_of(name: &str) -> Result<MaskKind, Refusal> {
+fn kind_of(name: &str) -> Result<MaskKind, Denial> {
     match name {
         "use" => Ok(MaskKind::Use),
         "keep" => Ok(MaskKind::Keep),
-        _ => Err(Refusal::missing("mask")),
+        _ => Err(Denial::missing("mask")),
     }
 }
 
@@ -137,15 +137,15 @@ fn kind_of(name: &str) -> Result<MaskKind, Refusal> {
 pub(crate) async fn mask(
     State(studio): State<Arc<Studio>>,
     Path((number, kind)): Path<(usize, String)>,
-) -> Result<Response, Refusal> {
+) -> Result<Response, Denial> {
     let kind = kind_of(&kind)?;
     let painted = studio.state().history.now().masks.get(&number).cloned().unwrap_or_default();
     let file = match kind {
         MaskKind::Use => painted.used,
         MaskKind::Keep => painted.kept,
     };
-    let file = file.filter(|file| studio.may_read(file)).ok_or_else(|| Refusal::missing("mask"))?;
-    let bytes = tokio::fs::read(&file).await.map_err(Refusal::failure)?;
+    let file = file.filter(|file| studio.may_read(file)).ok_or_else(|| Denial::missing("mask"))?;
+    let bytes = tokio::fs::read(&file).await.map_err(Denial::failure)?;
     Ok(([(header::CONTENT_TYPE, "image/png")], bytes).into_response())
 }
 
@@ -154,7 +154,7 @@ pub(crate) async fn paint(
     State(studio): State<Arc<Studio>>,
     Path((number, kind)): Path<(usize, String)>,
     body: Body,
-) -> Result<StatusCode, Refusal> {
+) -> Result<StatusCode, Denial> {
     let kind = kind_of(&kind)?;
     studio.photograph(number)?;
     let bytes = body::read(body, MAX_MASK_BYTES).await?;
@@ -179,12 +179,12 @@ pub(crate) async fn paint(
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// Writes a mask to a file of its own: older ones stay, so that painting can be undone.
-async fn written(studio: &Studio, bytes: &[u8]) -> Result<PathBuf, Refusal> {
+async fn written(studio: &Studio, bytes: &[u8]) -> Result<PathBuf, Denial> {
     if !bytes.starts_with(PNG) {
-        return Err(Refusal::unacceptable("a mask is a PNG", "Reload the page."));
+        return Err(Denial::unacceptable("a mask is a PNG", "Reload the page."));
     }
     let number = studio.change(Now::number);
     let place = studio.masks().join(format!("{number}.png"));
-    tokio::fs::write(&place, bytes).await.map_err(Refusal::failure)?;
+    tokio::fs::write(&place, bytes).await.map_err(Denial::failure)?;
     Ok(place)
 }

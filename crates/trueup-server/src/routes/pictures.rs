@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::wishing::{Changes, wishes_of};
 use crate::making::{self, Preview};
-use crate::refusal::Refusal;
+use crate::denial::Denial;
 use crate::studio::{Drawn, Studio, Task};
 use crate::work;
 
@@ -24,7 +24,7 @@ pub(crate) struct ToldPreview {
 }
 
 /// Draws the panorama small, as is wished but for the changes in the body, which are not kept.
-pub(crate) async fn preview(State(studio): State<Arc<Studio>>, body: Body) -> Result<Json<ToldPreview>, Refusal> {
+pub(crate) async fn preview(State(studio): State<Arc<Studio>>, body: Body) -> Result<Json<ToldPreview>, Denial> {
     let changes: Changes = wishes_of(body).await?;
     let options = changes.options()?;
     let told = tokio::task::spawn_blocking(move || {
@@ -33,23 +33,23 @@ pub(crate) async fn preview(State(studio): State<Arc<Studio>>, body: Body) -> Re
         let number = studio.keep_drawn(drawn);
         Ok::<_, trueup::Error>(ToldPreview { number, preview })
     });
-    Ok(Json(told.await.map_err(Refusal::failure)??))
+    Ok(Json(told.await.map_err(Denial::failure)??))
 }
 
 /// A preview that was drawn.
-pub(crate) async fn drawn(State(studio): State<Arc<Studio>>, Path(number): Path<u64>) -> Result<Response, Refusal> {
-    let Drawn { bytes, media_type } = studio.drawn(number).ok_or_else(|| Refusal::missing("preview"))?;
+pub(crate) async fn drawn(State(studio): State<Arc<Studio>>, Path(number): Path<u64>) -> Result<Response, Denial> {
+    let Drawn { bytes, media_type } = studio.drawn(number).ok_or_else(|| Denial::missing("preview"))?;
     Ok(([(header::CONTENT_TYPE, media_type)], bytes).into_response())
 }
 
 /// Begins to cut the whole panorama into tiles.
-pub(crate) async fn cut(State(studio): State<Arc<Studio>>) -> Result<StatusCode, Refusal> {
+pub(crate) async fn cut(State(studio): State<Arc<Studio>>) -> Result<StatusCode, Denial> {
     work::start(&studio, Task::Tiles, making::cut_tiles)?;
     Ok(StatusCode::ACCEPTED)
 }
 
 /// What describes the tiles.
-pub(crate) async fn description(State(studio): State<Arc<Studio>>, Path(number): Path<u64>) -> Result<Response, Refusal> {
+pub(crate) async fn description(State(studio): State<Arc<Studio>>, Path(number): Path<u64>) -> Result<Response, Denial> {
     file_of(&studio, number, "panorama.dzi", "application/xml").await
 }
 
@@ -57,8 +57,8 @@ pub(crate) async fn description(State(studio): State<Arc<Studio>>, Path(number):
 pub(crate) async fn tile(
     State(studio): State<Arc<Studio>>,
     Path((number, level, tile)): Path<(u64, u32, String)>,
-) -> Result<Response, Refusal> {
-    let missing = || Refusal::missing("tile");
+) -> Result<Response, Denial> {
+    let missing = || Denial::missing("tile");
     let (place, extension) = tile.split_once('.').ok_or_else(missing)?;
     let (column, row) = place.split_once('_').ok_or_else(missing)?;
     let media_type = match extension {
@@ -71,8 +71,8 @@ pub(crate) async fn tile(
     file_of(&studio, number, &name, media_type).await
 }
 
-async fn file_of(studio: &Studio, number: u64, name: &str, media_type: &'static str) -> Result<Response, Refusal> {
-    let missing = || Refusal::missing("tile");
+async fn file_of(studio: &Studio, number: u64, name: &str, media_type: &'static str) -> Result<Response, Denial> {
+    let missing = || Denial::missing("tile");
     let folder = studio.state().tiles.as_ref().filter(|tiles| tiles.number == number).map(|tiles| tiles.folder.clone());
     let bytes = tokio::fs::read(folder.ok_or_else(missing)?.join(name)).await.map_err(|_| missing())?;
     Ok(([(header::CONTENT_TYPE, media_type)], bytes).into_response())

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde::de::DeserializeOwned;
 
 use crate::limits::{MAX_WISHES_BYTES, NEWS_EVERY, NEWS_TIME};
-use crate::refusal::Refusal;
+use crate::denial::Denial;
 use crate::studio::{Offered, Studio, Task, is_offered, offered};
 use crate::told::{Told, told};
 use crate::{body, making, work};
@@ -70,22 +70,22 @@ pub(crate) struct Changes {
 
 impl Changes {
     /// The options, all of which the page offers.
-    pub(crate) fn options(self) -> Result<Vec<(String, String)>, Refusal> {
+    pub(crate) fn options(self) -> Result<Vec<(String, String)>, Denial> {
         match self.options.keys().find(|name| !is_offered(name)) {
-            Some(name) => Err(Refusal::unacceptable(format!("there is no option \"{name}\" on this page"), "Reload the page.")),
+            Some(name) => Err(Denial::unacceptable(format!("there is no option \"{name}\" on this page"), "Reload the page.")),
             None => Ok(self.options.into_iter().collect()),
         }
     }
 }
 
 /// A request's wishes.
-pub(crate) async fn wishes_of<T: DeserializeOwned>(body: Body) -> Result<T, Refusal> {
+pub(crate) async fn wishes_of<T: DeserializeOwned>(body: Body) -> Result<T, Denial> {
     let bytes = body::read(body, MAX_WISHES_BYTES).await?;
-    serde_json::from_slice(&bytes).map_err(|error| Refusal::unacceptable(format!("not understood: {error}"), "Reload the page."))
+    serde_json::from_slice(&bytes).map_err(|error| Denial::unacceptable(format!("not understood: {error}"), "Reload the page."))
 }
 
 /// Wishes for something else, to be undone as one step.
-pub(crate) async fn wish(State(studio): State<Arc<Studio>>, body: Body) -> Result<StatusCode, Refusal> {
+pub(crate) async fn wish(State(studio): State<Arc<Studio>>, body: Body) -> Result<StatusCode, Denial> {
     let changes: Changes = wishes_of(body).await?;
     let left_out = changes.left_out.clone();
     let options = changes.options()?;
@@ -122,7 +122,7 @@ pub(crate) async fn redo(State(studio): State<Arc<Studio>>) -> StatusCode {
 }
 
 /// Begins to stitch.
-pub(crate) async fn stitch(State(studio): State<Arc<Studio>>) -> Result<StatusCode, Refusal> {
+pub(crate) async fn stitch(State(studio): State<Arc<Studio>>) -> Result<StatusCode, Denial> {
     work::start(&studio, Task::Stitch, making::stitch)?;
     Ok(StatusCode::ACCEPTED)
 }

@@ -13,7 +13,7 @@ use super::wishing::wishes_of;
 use crate::folder::plain_name;
 use crate::limits::MAX_PROJECT_BYTES;
 use crate::making::{self, ExportOrder};
-use crate::refusal::Refusal;
+use crate::denial::Denial;
 use crate::reopening::reopen as reopen_text;
 use crate::studio::{Studio, Task};
 use crate::{body, work};
@@ -33,13 +33,13 @@ pub(crate) struct Asked {
 }
 
 impl Asked {
-    fn order(self) -> Result<ExportOrder, Refusal> {
+    fn order(self) -> Result<ExportOrder, Denial> {
         let hint = "Give it a name without slashes and the like, which ends in the format: panorama.jpg.";
         let stem = plain_name(&self.name).and_then(|name| name.rsplit_once('.')).map(|(stem, _)| stem.to_owned());
-        let stem = stem.ok_or_else(|| Refusal::unacceptable("that is no name for a file", hint))?;
+        let stem = stem.ok_or_else(|| Denial::unacceptable("that is no name for a file", hint))?;
         let beside = self.beside.iter().map(|flag| {
             let kind = SideOutput::ALL.iter().find(|kind| kind.flag() == flag);
-            let kind = *kind.ok_or_else(|| Refusal::missing("kind of file"))?;
+            let kind = *kind.ok_or_else(|| Denial::missing("kind of file"))?;
             let (_, extension) = kind.value_name().rsplit_once('.').unwrap_or_default();
             // What it is called beside a panorama: pano.json, but pano-seams.png.
             let name = match kind {
@@ -48,17 +48,17 @@ impl Asked {
             };
             Ok((kind, name))
         });
-        let beside = beside.collect::<Result<_, Refusal>>()?;
+        let beside = beside.collect::<Result<_, Denial>>()?;
         Ok(ExportOrder { name: self.name, beside, into_folder: self.into_folder })
     }
 }
 
 /// Begins to write files.
-pub(crate) async fn export(State(studio): State<Arc<Studio>>, body: Body) -> Result<StatusCode, Refusal> {
+pub(crate) async fn export(State(studio): State<Arc<Studio>>, body: Body) -> Result<StatusCode, Denial> {
     let asked: Asked = wishes_of(body).await?;
     let order = asked.order()?;
     if order.into_folder && studio.state().folder.is_none() {
-        return Err(Refusal::unacceptable("no folder is open", "Fetch the files instead."));
+        return Err(Denial::unacceptable("no folder is open", "Fetch the files instead."));
     }
     work::start(&studio, Task::Export, move |studio, context| making::export(studio, &order, context))?;
     Ok(StatusCode::ACCEPTED)
@@ -68,8 +68,8 @@ pub(crate) async fn export(State(studio): State<Arc<Studio>>, body: Body) -> Res
 pub(crate) async fn fetch(
     State(studio): State<Arc<Studio>>,
     Path((number, file)): Path<(u64, usize)>,
-) -> Result<Response, Refusal> {
-    let missing = || Refusal::missing("file");
+) -> Result<Response, Denial> {
+    let missing = || Denial::missing("file");
     let found = {
         let state = studio.state();
         let export = state.exports.iter().find(|export| export.number == number);
@@ -94,14 +94,14 @@ fn attachment(name: &str) -> [(header::HeaderName, String); 2] {
 }
 
 /// The record of the panorama as is wished now.
-pub(crate) async fn project(State(studio): State<Arc<Studio>>) -> Result<Response, Refusal> {
+pub(crate) async fn project(State(studio): State<Arc<Studio>>) -> Result<Response, Denial> {
     let made = tokio::task::spawn_blocking(move || making::record(&studio));
-    let text = made.await.map_err(Refusal::failure)??;
+    let text = made.await.map_err(Denial::failure)??;
     Ok((attachment("panorama.json"), text).into_response())
 }
 
 /// Begins to open a project that was dropped on the page.
-pub(crate) async fn reopen(State(studio): State<Arc<Studio>>, body: Body) -> Result<StatusCode, Refusal> {
+pub(crate) async fn reopen(State(studio): State<Arc<Studio>>, body: Body) -> Result<StatusCode, Denial> {
     let bytes = body::read(body, MAX_PROJECT_BYTES).await?;
     begin(&studio, bytes, "the project".to_owned())
 }
@@ -114,20 +114,20 @@ pub(crate) struct Here {
 }
 
 /// Begins to open a project of the folder that is open.
-pub(crate) async fn reopen_here(State(studio): State<Arc<Studio>>, body: Body) -> Result<StatusCode, Refusal> {
+pub(crate) async fn reopen_here(State(studio): State<Arc<Studio>>, body: Body) -> Result<StatusCode, Denial> {
     let Here { name } = wishes_of(body).await?;
-    let missing = || Refusal::missing("project");
+    let missing = || Denial::missing("project");
     let folder = studio.state().folder.clone().filter(|folder| folder.projects().contains(&name)).ok_or_else(missing)?;
     let path = folder.path().join(&name);
     if !folder.holds(&path) {
         return Err(missing());
     }
-    let bytes = tokio::fs::read(path).await.map_err(Refusal::failure)?;
+    let bytes = tokio::fs::read(path).await.map_err(Denial::failure)?;
     begin(&studio, bytes, name)
 }
 
-fn begin(studio: &Arc<Studio>, bytes: Vec<u8>, name: String) -> Result<StatusCode, Refusal> {
-    let text = String::from_utf8(bytes).map_err(|_| Refusal::unacceptable("it is no project file", "Give another file."))?;
+fn begin(studio: &Arc<Studio>, bytes: Vec<u8>, name: String) -> Result<StatusCode, Denial> {
+    let text = String::from_utf8(bytes).map_err(|_| Denial::unacceptable("it is no project file", "Give another file."))?;
     work::start(studio, Task::Reopen, move |studio, context| reopen_text(studio, &text, &name, context))?;
     Ok(StatusCode::ACCEPTED)
 }

@@ -16,7 +16,7 @@ use tokio::sync::watch;
 use trueup::{Alignment, CancelToken, StitchOptions, thread_pool};
 
 use crate::folder::Folder;
-use crate::refusal::{Refusal, Trouble};
+use crate::denial::{Denial, Trouble};
 
 pub(crate) use history::History;
 pub(crate) use listed::Listed;
@@ -240,7 +240,7 @@ impl Studio {
     ///
     /// # Errors
     /// If there is none.
-    pub(crate) fn photograph(&self, number: usize) -> Result<Listed, Refusal> {
-        self.state().photographs.get(number).cloned().ok_or_else(|| Refusal::missing("photograph"))
+    pub(crate) fn photograph(&self, number: usize) -> Result<Listed, Denial> {
+        self.state().photographs.get(number).cloned().ok_or_else(|| Denial::missing("photograph"))
     }
 }

@@ -16,12 +16,12 @@ pub(crate) struct Trouble {
 
 /// A request that is not served.
 #[derive(Debug)]
-pub(crate) struct Refusal {
+pub(crate) struct Denial {
     pub status: StatusCode,
     pub trouble: Trouble,
 }
 
-impl Refusal {
+impl Denial {
     pub(crate) fn new(status: StatusCode, message: impl Into<String>, hint: impl Into<String>) -> Self {
         Self { status, trouble: Trouble { message: message.into(), hint: hint.into() } }
     }
@@ -69,13 +69,13 @@ impl From<Error> for Trouble {
     }
 }
 
-impl From<Error> for Refusal {
+impl From<Error> for Denial {
     fn from(error: Error) -> Self {
         Self { status: StatusCode::UNPROCESSABLE_ENTITY, trouble: error.into() }
     }
 }
 
-impl IntoResponse for Refusal {
+impl IntoResponse for Denial {
     fn into_response(self) -> Response {
         (self.status, Json(self.trouble)).into_response()
     }
