@@ -8,7 +8,6 @@ use trueup_server::{Network, Serving, serve};
 use crate::arguments::ServeArgs;
 use crate::failure::Failure;
 use crate::output;
-use crate::stopping::cancel_token;
 
 pub(crate) fn run(args: ServeArgs) -> Result<(), Failure> {
     let network = match (args.listen, args.password_file) {
@@ -19,9 +18,14 @@ pub(crate) fn run(args: ServeArgs) -> Result<(), Failure> {
     let port = args.port.unwrap_or(0);
     let serving = Serving { folder: args.folder, port, network };
     let mut printed = Ok(());
-    serve(&serving, &cancel_token(), |address| {
+    // Nothing is at work most of the time, and what is stops with the server: there is nothing that a last resort would save.
+    let cancel = trueup_terminal::cancel_token("trueup", "", None);
+    let served = serve(&serving, &cancel, |address| {
         printed = output::print(&format!("Open {address}\nStop with Ctrl-C.\n"));
-    })?;
+    });
+    // Work that did not stop in time ends with the program.
+    trueup::abandon_unfinished();
+    served?;
     printed
 }
 

@@ -19,6 +19,8 @@ mod options;
 mod pictures;
 mod references;
 mod run;
+#[cfg(unix)]
+mod serving;
 mod sphere;
 #[cfg(unix)]
 mod stopping;

@@ -1,6 +1,6 @@
 //! Who is let in: one person, by a secret that the terminal printed or a password, from a page that this program served.
 //!
-//! Every request passes here before anything else looks at it. Whoever holds no session gets nothing but a refusal.
+//! Every request passes here before anything else looks at it. Whoever holds no session gets nothing but a denial.
 
 use std::fmt::Write;
 use std::net::{IpAddr, SocketAddr};
@@ -25,7 +25,7 @@ const CONTENT_POLICY: &str = "default-src 'none'; script-src 'self'; style-src '
     img-src 'self' blob: data:; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
 
 /// What every answer says to the browser.
-const PROTECTION: [(HeaderName, &str); 7] = [
+static PROTECTION: [(HeaderName, &str); 7] = [
     (header::CONTENT_SECURITY_POLICY, CONTENT_POLICY),
     (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
     (header::REFERRER_POLICY, "same-origin"),
@@ -154,7 +154,7 @@ impl Guard {
 /// Lets a request through, or not.
 pub(crate) async fn check(State(guard): State<Arc<Guard>>, request: Request, next: Next) -> Response {
     let mut response = decide(&guard, request, next).await;
-    for (name, value) in PROTECTION {
+    for (name, value) in &PROTECTION {
         response.headers_mut().insert(name, HeaderValue::from_static(value));
     }
     response
@@ -203,7 +203,7 @@ fn refused(status: StatusCode) -> Response {
 /// A random word of [`SECRET_BYTES`], in hexadecimal.
 fn secret() -> std::io::Result<String> {
     let mut bytes = [0; SECRET_BYTES];
-    SysRng.try_fill_bytes(&mut bytes).map_err(std::io::Error::other)?;
+    SysRng.try_fill_bytes(&mut bytes).map_err(|error| std::io::Error::other(error.to_string()))?;
     Ok(bytes.iter().fold(String::new(), |mut text, byte| {
         // Writing into a text never fails.
         let _ = write!(text, "{byte:02x}");

@@ -4,9 +4,9 @@
 //! declare; it asks this server, and this server asks the library. No algorithm and no default lives in either.
 //!
 //! **Nobody else gets in.** The server listens on this machine alone, unless a password is given. Every request passes the
-//! [`guard`]: it must name the server as the browser was told to, come from the page itself, and hold the session that only
+//! guard: it must name the server as the browser was told to, come from the page itself, and hold the session that only
 //! the address printed in the terminal, or the password, opens. Requests name no paths; what is read lies in the folder opened
-//! or was dropped on the page; and all that is sent has a [limit](limits).
+//! or was dropped on the page; and all that is sent has a limit.
 #![forbid(unsafe_code)]
 
 mod body;

@@ -58,7 +58,7 @@ pub(crate) async fn drop_one(
     body: Body,
 ) -> Result<StatusCode, Denial> {
     let name = plain_name(&name).filter(|name| names_photograph((*name).as_ref()));
-    let name = name.ok_or_else(|| Denial::unacceptable("it is not named like a photograph", trueup::readable_formats()))?;
+    let name = name.ok_or_else(|| Denial::unacceptable("it is not named like a photograph", format!("Give {}.", trueup::readable_formats())))?;
     let place = studio.dropped().join(name);
     {
         let state = studio.state();
