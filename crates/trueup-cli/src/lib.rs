@@ -17,6 +17,7 @@ mod outcome;
 mod output;
 mod progress;
 mod report;
+mod serve;
 mod stitch;
 mod stopping;
 mod summary;
@@ -49,6 +50,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Task::Inspect(args) => inspect::run(&args),
         Task::Evaluate(args) => evaluate::run(&args),
         Task::Report(args) => report::run(&args),
+        Task::Serve(args) => serve::run(args),
         Task::Options(args) => option_list::run(&args),
         Task::Completions(args) => installing::completions(&args),
         Task::Manual(args) => installing::manual(&args),

@@ -27,7 +27,8 @@ fn is_left_out(desk: &Desk, stranger: &str, reason: &str) {
 #[test]
 fn a_panorama_made_of_the_photographs_is_left_out() {
     let desk = street_desk();
-    desk.stitch(&["a.jpg", "b.jpg", "c.jpg", "d.jpg", "--projection", "cylindrical", "-o", "made.png"]).expect_success();
+    desk.stitch(&["a.jpg", "b.jpg", "c.jpg", "d.jpg", "--projection", "cylindrical", "-o", "made.png"])
+        .expect_success();
     bare_copy(&desk, "made.png", "earlier.png", 0.8);
     is_left_out(&desk, "earlier.png", "it is a panorama that shows all of");
     // Whoever knows better names the overlaps.

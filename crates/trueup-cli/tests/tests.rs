@@ -20,6 +20,8 @@ mod pictures;
 mod references;
 mod report;
 mod run;
+#[cfg(unix)]
+mod serving;
 mod sphere;
 #[cfg(unix)]
 mod stopping;

@@ -29,7 +29,7 @@ mod report;
 
 pub use job::{
     ComposeJob, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, ReadFile, RecordedPanorama, Reference, SideOutput,
-    StitchJob, Written, thread_pool,
+    StitchJob, Written, thread_pool, write_thumbnail,
 };
 pub use memo::{CacheUse, PhotographCache};
 pub use options::{

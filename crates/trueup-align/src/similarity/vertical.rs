@@ -71,7 +71,9 @@ mod tests {
     /// Cameras from the level world by turns, pitches and rolls in degrees.
     fn cameras(angles: &[[f64; 3]]) -> Vec<Matrix3<f64>> {
         let camera = |&[yaw, pitch, roll]: &[f64; 3]| {
-            rotation_about_z(roll.to_radians()) * rotation_about_x(pitch.to_radians()) * rotation_about_y(yaw.to_radians())
+            rotation_about_z(roll.to_radians())
+                * rotation_about_x(pitch.to_radians())
+                * rotation_about_y(yaw.to_radians())
         };
         angles.iter().map(camera).collect()
     }

@@ -205,8 +205,11 @@ mod tests {
 
     /// Frames of pictures of these sizes in full pixels, measured at half of them.
     fn frames(sizes: &[[f64; 2]]) -> Vec<WorkingFrame> {
-        let frame =
-            |[width, height]: &[f64; 2]| WorkingFrame { width: width / 2.0, height: height / 2.0, working_from_full: 0.5 };
+        let frame = |[width, height]: &[f64; 2]| WorkingFrame {
+            width: width / 2.0,
+            height: height / 2.0,
+            working_from_full: 0.5,
+        };
         sizes.iter().map(frame).collect()
     }
 

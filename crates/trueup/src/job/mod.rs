@@ -11,6 +11,7 @@ mod reopen;
 mod side_outputs;
 mod stitch;
 mod threads;
+mod thumbnail;
 mod write;
 
 pub use compose::ComposeJob;
@@ -21,4 +22,5 @@ pub use reopen::RecordedPanorama;
 pub use side_outputs::SideOutput;
 pub use stitch::StitchJob;
 pub use threads::thread_pool;
+pub use thumbnail::write_thumbnail;
 pub use write::Written;

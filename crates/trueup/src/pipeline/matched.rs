@@ -17,7 +17,9 @@ use super::photographs::PhotographSet;
 use crate::job::inputs::{Inputs, Reference};
 use crate::job::names::reference_named;
 use crate::memo::{Key, KeyMaker};
-use crate::report::left_out::{LeftOut, counts, explain, no_photograph, none_usable, not_in_graph, reason_of_rejected, strength};
+use crate::report::left_out::{
+    LeftOut, counts, explain, no_photograph, none_usable, not_in_graph, reason_of_rejected, strength,
+};
 use crate::report::several::several;
 
 /// Everything known of the photographs after matching.
