@@ -135,7 +135,7 @@ fn a_crop_changes_nothing_but_the_frame() {
                 let off = [place[0] + f64::from(left) - there[0], place[1] + f64::from(top) - there[1]];
                 assert!(off.iter().all(|off| off.abs() < 1e-9), "{crop}: {off:?}");
             }
-            assert_eq!(project["images"][1]["solved_mesh"].is_object(), true);
+            assert!(project["images"][1]["solved_mesh"].is_object());
         }
         let from_a_part = ["compose", "auto.json", "-o", "again.png", "--crop", "none", "--depth", "8"];
         finish(trueup(desk.path(), &from_a_part)).expect_success();

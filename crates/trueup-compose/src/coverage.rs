@@ -114,8 +114,9 @@ impl Coverage {
         let of_rows = |rows: &[Vec<Range<usize>>]| {
             let mut counts = vec![0; columns];
             for stretch in rows.iter().flatten() {
-                for cell in stretch.start / side..stretch.end.div_ceil(side) {
-                    counts[cell] += common_length(stretch, &(cell * side..(cell + 1) * side));
+                let cells = stretch.start / side..stretch.end.div_ceil(side);
+                for (cell, count) in cells.clone().zip(&mut counts[cells]) {
+                    *count += common_length(stretch, &(cell * side..(cell + 1) * side));
                 }
             }
             counts
