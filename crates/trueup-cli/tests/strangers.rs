@@ -1,24 +1,30 @@
 //! Pictures among the photographs that are none.
 
+use image::RgbImage;
 use image::imageops::FilterType;
 
-use crate::pictures::street_desk;
-use crate::run::Desk;
+use crate::pictures::{HEIGHT, WIDTH, street_desk, street_pixels};
+use crate::run::{Desk, finish, trueup};
 
-/// The picture `from`, `scale` times as large, as a PNG file without a word of where it is from.
-fn bare_copy(desk: &Desk, from: &str, to: &str, scale: f64) {
-    let picture = image::open(desk.join(from)).expect("a picture").to_rgb8();
+const STREET: [&str; 4] = ["a.jpg", "b.jpg", "c.jpg", "d.jpg"];
+
+/// `picture`, `scale` times as large, as a PNG file without a word of where it is from.
+fn bare_copy(desk: &Desk, picture: &RgbImage, to: &str, scale: f64) {
     let side = |side: u32| (f64::from(side) * scale).round() as u32;
     let (width, height) = (side(picture.width()), side(picture.height()));
-    image::imageops::resize(&picture, width, height, FilterType::Triangle).save(desk.join(to)).expect("written");
+    image::imageops::resize(picture, width, height, FilterType::Triangle).save(desk.join(to)).expect("written");
+}
+
+/// Stitches these photographs to a PNG file of this name; what was said.
+fn stitch(desk: &Desk, photographs: &[&str], output: &str) -> String {
+    let arguments = [&["stitch", "--scale", "0.5", "-o", output], photographs].concat();
+    finish(trueup(desk.path(), &arguments)).expect_success().to_owned()
 }
 
 /// Stitches the desk's photographs, among them `stranger`, which is left out for `reason` and changes nothing.
 fn is_left_out(desk: &Desk, stranger: &str, reason: &str) {
-    let photographs = ["a.jpg", "b.jpg", "c.jpg", "d.jpg", "-o", "alone.png"];
-    desk.stitch(&photographs).expect_success();
-    let run = desk.stitch(&["a.jpg", "b.jpg", "c.jpg", "d.jpg", stranger, "-o", "among.png"]);
-    let said = run.expect_success();
+    stitch(desk, &STREET, "alone.png");
+    let said = stitch(desk, &[&STREET[..], &[stranger]].concat(), "among.png");
     assert!(said.contains("4 of 5 used"), "{said}");
     assert!(said.contains(&format!("{stranger}: {reason}")), "{said}");
     assert!(image::open(desk.join("alone.png")).expect("one") == image::open(desk.join("among.png")).expect("other"));
@@ -27,19 +33,21 @@ fn is_left_out(desk: &Desk, stranger: &str, reason: &str) {
 #[test]
 fn a_panorama_made_of_the_photographs_is_left_out() {
     let desk = street_desk();
-    desk.stitch(&["a.jpg", "b.jpg", "c.jpg", "d.jpg", "--projection", "cylindrical", "-o", "made.png"])
-        .expect_success();
-    bare_copy(&desk, "made.png", "earlier.png", 0.8);
+    stitch(&desk, &[&STREET[..], &["--projection", "cylindrical"]].concat(), "made.png");
+    let made = image::open(desk.join("made.png")).expect("a picture").to_rgb8();
+    bare_copy(&desk, &made, "earlier.png", 1.0);
     is_left_out(&desk, "earlier.png", "it is a panorama that shows all of");
     // Whoever knows better names the overlaps.
     desk.put("graph.txt", "a.jpg earlier.png\nb.jpg earlier.png\n");
-    let run = desk.stitch(&["a.jpg", "b.jpg", "earlier.png", "--graph", "graph.txt", "-o", "all.png"]);
-    assert!(run.expect_success().contains("3 of 3 used"));
+    let said = stitch(&desk, &["a.jpg", "b.jpg", "earlier.png", "--graph", "graph.txt"], "all.png");
+    assert!(said.contains("3 of 3 used"), "{said}");
 }
 
 #[test]
 fn a_reduced_copy_is_left_out() {
     let desk = street_desk();
-    bare_copy(&desk, "b.jpg", "small.png", 0.6);
+    let pixels = street_pixels()[1].clone();
+    let photograph = RgbImage::from_raw(WIDTH as u32, HEIGHT as u32, pixels).expect("its size");
+    bare_copy(&desk, &photograph, "small.png", 0.6);
     is_left_out(&desk, "small.png", "it is a smaller copy of b.jpg");
 }

@@ -84,10 +84,10 @@ mod tests {
         let mut options = StitchOptions::default();
         assert!(differing(&options).expect("written").is_empty());
         options.set("mesh.cell_px=30").expect("an option");
-        options.set("canvas.crop=auto").expect("an option");
+        options.set("canvas.crop=none").expect("an option");
         let found = differing(&options).expect("written");
         let told: Vec<[&Value; 2]> = found.iter().map(|one| [&one["name"], &one["value"]]).collect();
-        assert_eq!(told, [["mesh.cell_px", "30.0"], ["canvas.crop", "auto"]]);
+        assert_eq!(told, [["mesh.cell_px", "30.0"], ["canvas.crop", "none"]]);
         assert!(found.iter().all(|one| one["meaning"] != "" && one["default"] != one["value"]));
     }
 }
