@@ -36,7 +36,7 @@ fn a_panorama_made_of_the_photographs_is_left_out() {
     stitch(&desk, &[&STREET[..], &["--projection", "cylindrical"]].concat(), "made.png");
     let made = image::open(desk.join("made.png")).expect("a picture").to_rgb8();
     bare_copy(&desk, &made, "earlier.png", 1.0);
-    is_left_out(&desk, "earlier.png", "it is a panorama that shows all of");
+    is_left_out(&desk, "earlier.png", "it is a panorama of");
     // Whoever knows better names the overlaps.
     desk.put("graph.txt", "a.jpg earlier.png\nb.jpg earlier.png\n");
     let said = stitch(&desk, &["a.jpg", "b.jpg", "earlier.png", "--graph", "graph.txt"], "all.png");

@@ -45,9 +45,15 @@ const REDUCED: f64 = 0.9;
 /// Share of a photograph's area from which a panorama shows it whole: a panorama may be cropped, and a homography tells where
 /// the corners lie on a bent one to a few hundredths.
 const WHOLE: f64 = 0.9;
-/// Photographs that a picture must show whole to be taken for a panorama of them.
+/// Share of a photograph's area that a panorama shows of it whose ragged borders were cut off.
+const MOSTLY: f64 = 0.6;
+/// Share of such a panorama that its photographs cover together, at least, and one alone, at most: a photograph that its neighbors
+/// overlap as far is covered by each of them.
+const CROPPED_COVERED: f64 = 0.85;
+const COVERED_BY_ONE: f64 = 0.7;
+/// Photographs that a picture must show to be taken for a panorama of them.
 const MIN_SHOWN: usize = 2;
-/// Share of a panorama that the photographs it was made of cover. Its empty corners are not covered; what a wider lens has seen
+/// Share of a whole panorama that the photographs it was made of cover. Its empty corners are not covered; what a wider lens has seen
 /// beyond the others is not, either.
 const MIN_COVERED: f64 = 0.6;
 /// Width by height of what cameras write, lying: square, large format, four thirds, 35 mm, high definition.
@@ -66,7 +72,7 @@ pub fn find_strangers(frames: &[WorkingFrame], pairs: &[PairMatches]) -> Vec<Str
     let views: Vec<SharedView> = pairs.iter().filter_map(|pair| SharedView::of(pair, frames)).collect();
     let copies = reduced_copies(&views, frames);
     let panorama = |photograph: &usize| {
-        let of = shown_whole(*photograph, &views, &copies, frames)?;
+        let of = shown_of(*photograph, &views, &copies, frames)?;
         Some(Stranger { photograph: *photograph, kind: StrangerKind::Panorama { of } })
     };
     let copy = |(&photograph, &of): (&usize, &usize)| Stranger { photograph, kind: StrangerKind::ReducedCopy { of } };
@@ -153,8 +159,8 @@ fn reduced_copies(views: &[SharedView], frames: &[WorkingFrame]) -> BTreeMap<usi
     copies
 }
 
-/// The photographs that `picture` shows whole, if it is a panorama made of them.
-fn shown_whole(
+/// The photographs that `picture` shows, if it is a panorama made of them.
+fn shown_of(
     picture: usize,
     views: &[SharedView],
     copies: &BTreeMap<usize, usize>,
@@ -166,7 +172,7 @@ fn shown_whole(
         return None;
     }
     let mut covered = vec![false; GRID * GRID];
-    let mut shown = BTreeSet::new();
+    let (mut whole, mut mostly) = (BTreeSet::new(), BTreeSet::new());
     for (other, of_picture_shown, of_other_shown) in views.iter().filter_map(|view| view.seen_from(picture)) {
         let of_other = sides(&frames[other]);
         if copies.contains_key(&other) || (0..2).all(|side| alike(of_picture[side], of_other[side], SAME_SIDE)) {
@@ -174,12 +180,22 @@ fn shown_whole(
         }
         covered.iter_mut().zip(of_picture_shown).for_each(|(covered, shown)| *covered |= shown);
         if share(of_other_shown) >= WHOLE {
-            shown.insert(other);
+            whole.insert(other);
+        }
+        if share(of_other_shown) >= MOSTLY && share(of_picture_shown) <= COVERED_BY_ONE {
+            mostly.insert(other);
         }
     }
-    let same = |view: &&SharedView| shown.contains(&view.a) && shown.contains(&view.b) && view.is_same();
-    let views_shown = shown.len() - views.iter().filter(same).count().min(shown.len());
-    (views_shown >= MIN_SHOWN && share(&covered) >= MIN_COVERED).then(|| shown.into_iter().collect())
+    // What shows the same view counts once.
+    let several = |shown: &BTreeSet<usize>| {
+        let same = |view: &&SharedView| shown.contains(&view.a) && shown.contains(&view.b) && view.is_same();
+        shown.len() >= MIN_SHOWN + views.iter().filter(same).count()
+    };
+    let covered = share(&covered);
+    if several(&whole) && covered >= MIN_COVERED {
+        return Some(whole.into_iter().collect());
+    }
+    (several(&mostly) && covered >= CROPPED_COVERED).then(|| mostly.into_iter().collect())
 }
 
 #[cfg(test)]
@@ -231,6 +247,29 @@ mod tests {
     fn a_panorama_of_the_others_is_found() {
         let expected = Stranger { photograph: 3, kind: StrangerKind::Panorama { of: vec![0, 1, 2] } };
         assert_eq!(row_and([1240.0, 420.0], 10.0), [expected]);
+    }
+
+    /// Its rows above and below are cut off: 300 of the photographs' 400.
+    #[test]
+    fn a_cropped_panorama_of_the_others_is_found() {
+        let frames = frames(&[[600.0, 400.0], [600.0, 400.0], [600.0, 400.0], [1180.0, 300.0]]);
+        let pairs = [
+            pair(0, 1, 1.0, -150.0, 0.0),
+            pair(1, 2, 1.0, -150.0, 0.0),
+            pair(0, 3, 1.0, -5.0, -25.0),
+            pair(1, 3, 1.0, 145.0, -25.0),
+            pair(2, 3, 1.0, 295.0, -25.0),
+        ];
+        let expected = Stranger { photograph: 3, kind: StrangerKind::Panorama { of: vec![0, 1, 2] } };
+        assert_eq!(find_strangers(&frames, &pairs), [expected]);
+    }
+
+    /// Larger than its neighbors, which show most of it, each.
+    #[test]
+    fn a_photograph_of_another_size_in_a_dense_row_is_one() {
+        let frames = frames(&[[600.0, 400.0], [600.0, 400.0], [660.0, 390.0]]);
+        let pairs = [pair(0, 1, 1.0, -120.0, 0.0), pair(0, 2, 1.0, -45.0, 0.0), pair(1, 2, 1.0, 75.0, 0.0)];
+        assert_eq!(find_strangers(&frames, &pairs), []);
     }
 
     /// 1,215 x 810 is a camera's format: a camera with a wider lens may have seen all of them.

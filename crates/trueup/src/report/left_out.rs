@@ -69,7 +69,7 @@ pub(crate) fn no_photograph(stranger: &Stranger, names: &[String]) -> LeftOut {
                 [first, .., last] => format!("{first}, {last} and {} more", of.len() - 2),
                 _ => String::new(),
             };
-            (PANORAMA_OF_OTHERS, format!("it is a panorama that shows all of {shown}"))
+            (PANORAMA_OF_OTHERS, format!("it is a panorama of {shown}"))
         }
     };
     LeftOut { code, reason, hint: HINT.to_owned() }
@@ -159,8 +159,8 @@ mod tests {
         let reason = |kind| no_photograph(&Stranger { photograph: 3, kind }, &names()).reason;
         assert_eq!(reason(StrangerKind::ReducedCopy { of: 1 }), "it is a smaller copy of 1.jpg");
         let panorama = |of: &[usize]| reason(StrangerKind::Panorama { of: of.to_vec() });
-        assert_eq!(panorama(&[0, 2]), "it is a panorama that shows all of 0.jpg and 2.jpg");
-        assert_eq!(panorama(&[0, 1, 2]), "it is a panorama that shows all of 0.jpg, 2.jpg and 1 more");
+        assert_eq!(panorama(&[0, 2]), "it is a panorama of 0.jpg and 2.jpg");
+        assert_eq!(panorama(&[0, 1, 2]), "it is a panorama of 0.jpg, 2.jpg and 1 more");
     }
 
     #[test]
