@@ -38,7 +38,7 @@ fn a_panorama_made_of_the_photographs_is_left_out() {
     bare_copy(&desk, &made, "earlier.png", 1.0);
     is_left_out(&desk, "earlier.png", "it is a panorama of");
     // Whoever knows better names the overlaps.
-    desk.put("graph.txt", "a.jpg earlier.png\nb.jpg earlier.png\n");
+    desk.put("graph.txt", "a.jpg -- earlier.png\nb.jpg -- earlier.png\n");
     let said = stitch(&desk, &["a.jpg", "b.jpg", "earlier.png", "--graph", "graph.txt"], "all.png");
     assert!(said.contains("3 of 3 used"), "{said}");
 }

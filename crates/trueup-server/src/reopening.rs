@@ -21,6 +21,7 @@ pub(crate) fn reopen(studio: &Studio, text: &str, name: &str, context: &StageCon
     // What a file of somebody else says of this machine is not heeded: where scratch files lie, how much memory is taken.
     project.options.run = RunOptions::default();
     let listed = studio.state().photographs.clone();
+    let reference = project.images.iter().position(|image| image.path == project.reference);
     let mut masks = BTreeMap::new();
     for image in &mut project.images {
         let number = place(image, &listed);
@@ -33,6 +34,10 @@ pub(crate) fn reopen(studio: &Studio, text: &str, name: &str, context: &StageCon
         if let Some(painted) = painted(studio, image)? {
             masks.extend(number.map(|number| (number, painted)));
         }
+    }
+    // It is named by its path.
+    if let Some(reference) = reference {
+        project.reference = project.images[reference].path.clone();
     }
     let options = project.options.clone();
     let stitcher = Stitcher::new(&options, context);

@@ -217,7 +217,7 @@ async function save(page) {
     assert.match(await readFile(join(room, "of the room.dzi"), "utf8"), /TileSize/);
     const [download] = await Promise.all([page.waitForEvent("download"), page.locator("#save-files a", { hasText: ".json" }).first().click()]);
     await download.saveAs(join(desk, "saved.json"));
-    await page.getByRole("button", { name: "Close" }).click();
+    await page.getByRole("button", { name: "Close", exact: true }).click();
     step(`saved as ${formats.join(" ")}, with the project`);
 }
 
