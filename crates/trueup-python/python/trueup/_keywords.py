@@ -60,7 +60,8 @@ class ComposeKeywords(SaveKeywords, total=False):
     """Horizontal field of view that may be shown; 0 shows what is there, as far as the projection carries well. Lower
     it to leave stretched sides out, raise it to see them (default 0.0)."""
     crop: Literal["auto", "rectangle", "none"]
-    """What of the canvas is kept. Choose `none` for all that the photographs show, with ragged borders (default auto)."""
+    """What of the canvas is kept. Choose `none` for all that the photographs show, with ragged borders (default
+    auto)."""
     fill: float
     """Gaps between and beside the photographs of up to twice this width, as a share of a photograph's side, are filled
     with a smooth surface over their borders' colors. 0 fills nothing; raise it to 0.1 where ragged borders lie in an
