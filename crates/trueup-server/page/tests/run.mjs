@@ -190,6 +190,9 @@ async function paint(page) {
         await page.locator("#strip .badge").waitFor({ state: left ? "attached" : "detached", timeout: 20_000 });
         await settled(page);
     }
+    // What is saved is what was stitched: without what was painted.
+    await page.getByRole("button", { name: "Stitch again" }).click();
+    await page.waitForFunction(() => document.querySelector("#told .note") === null && document.getElementById("work").hidden);
 }
 
 async function save(page) {
