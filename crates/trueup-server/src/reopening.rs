@@ -9,7 +9,7 @@ use trueup::{
 };
 
 use crate::making::{Kept, keep};
-use crate::studio::{History, Listed, PaintedMasks, Studio, Wishes, offered};
+use crate::studio::{History, Listed, PaintedMasks, Studio, Wishes, is_offered};
 
 /// Opens the project in `text`, of a file called `name`.
 ///
@@ -44,7 +44,7 @@ pub(crate) fn reopen(studio: &Studio, text: &str, name: &str, context: &StageCon
     let nowhere = studio.desk.path().join("none");
     let recorded = RecordedPanorama { project: &project, project_folder: &nowhere, photographs: None, masks: &[] };
     let alignment = stitcher.reopen(&recorded)?;
-    let wishes = Wishes { options: differing(&options), masks, ..Wishes::default() };
+    let wishes = Wishes { options: differing(&options)?, masks, ..Wishes::default() };
     // What the page offers is a wish, all else is laid below.
     studio.change(|state| {
         state.base = options.clone();
@@ -86,17 +86,9 @@ fn painted(studio: &Studio, image: &ImageRecord) -> Result<Option<PaintedMasks>>
 }
 
 /// The options offered on the page that are not as usual, as one writes them.
-fn differing(options: &StitchOptions) -> BTreeMap<String, String> {
-    let tables = |options: &StitchOptions| serde_json::to_value(options).unwrap_or_default();
-    let (own, usual) = (tables(options), tables(&StitchOptions::default()));
-    let differing = offered().into_iter().filter_map(|option| {
-        let name = option.description.name;
-        let pointer = format!("/{}", name.replace('.', "/"));
-        let value = own.pointer(&pointer)?;
-        let written = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-        (usual.pointer(&pointer) != Some(value)).then_some((name, written))
-    });
-    differing.collect()
+fn differing(options: &StitchOptions) -> Result<BTreeMap<String, String>> {
+    let offered = options.changed()?.into_iter().filter(|option| is_offered(&option.description.name));
+    Ok(offered.map(|option| (option.description.name, option.value)).collect())
 }
 
 #[cfg(test)]
@@ -110,7 +102,7 @@ mod tests {
         {
             options.set(assignment).expect("an option");
         }
-        let wishes = differing(&options);
+        let wishes = differing(&options).expect("written");
         let expected = [("exposure.enabled", "false"), ("projection.kind", "panini"), ("projection.yaw", "7.5")];
         assert_eq!(wishes, expected.map(|(name, value)| (name.to_owned(), value.to_owned())).into());
     }

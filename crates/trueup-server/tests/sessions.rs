@@ -78,6 +78,13 @@ fn a_panorama_and_its_project_are_those_of_the_command() {
         one["diagnostics"] = Value::Null;
     }
     assert_eq!(reopened, recorded);
+
+    // Recorded from within the folder, photographs and reference are told by their names.
+    let folder = format!("{}/", desk.path().display());
+    let within = String::from_utf8(project).expect("text").replace(&folder, "./");
+    let third = Server::of(desk.path());
+    assert_eq!(third.with_body("PUT", "/api/project", within.as_bytes()).status, 202);
+    assert_eq!(third.settled()["trouble"], Value::Null);
 }
 
 #[test]

@@ -33,8 +33,8 @@ pub use job::{
 };
 pub use memo::{CacheUse, PhotographCache};
 pub use options::{
-    AlignOptions, ArrangeOptions, ComposeOptions, Evidence, MatchOptions, MeasureOptions, Method, Phase, RandomOptions,
-    ResourceOptions, RunOptions, ShapeOptions, StitchOptions, Structure, WorkingOptions,
+    AlignOptions, ArrangeOptions, ChangedOption, ComposeOptions, Evidence, MatchOptions, MeasureOptions, Method, Phase,
+    RandomOptions, ResourceOptions, RunOptions, ShapeOptions, StitchOptions, Structure, WorkingOptions,
 };
 pub use pipeline::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use project::{

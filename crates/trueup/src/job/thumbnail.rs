@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use trueup_core::raster::{Raster, RowSource};
+use trueup_core::raster::OpaqueRgb;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::encode::{self, Metadata, OutputOptions};
@@ -29,50 +29,9 @@ pub fn write_thumbnail(
         return Err(found.rejected.first().map_or_else(none, |rejected| rejected.to_error()));
     };
     let frame = WorkingFrame::new(image.width, image.height, max_pixels);
-    let picture = Rgb(decode::working(image, &frame, max_pixels)?.thumbnail);
+    let picture = OpaqueRgb(decode::working(image, &frame, max_pixels)?.thumbnail);
     encode::write(place, &picture, &Metadata::default(), &OutputOptions::default(), context)?;
     Ok([image.width, image.height])
-}
-
-/// An opaque picture of three 8-bit channels.
-struct Rgb(Raster<u8>);
-
-impl RowSource for Rgb {
-    fn width(&self) -> usize {
-        self.0.width()
-    }
-
-    fn height(&self) -> usize {
-        self.0.height()
-    }
-
-    fn is_opaque(&self) -> bool {
-        true
-    }
-
-    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
-        for (pixel, color) in row.chunks_exact_mut(4).zip(self.0.row(y).chunks_exact(3)) {
-            pixel[..3].copy_from_slice(color);
-            pixel[3] = u8::MAX;
-        }
-        Ok(())
-    }
-
-    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
-        for (pixel, color) in row.chunks_exact_mut(4).zip(self.0.row(y).chunks_exact(3)) {
-            // 257 * 255 = 65535.
-            for (sample, &color) in pixel.iter_mut().zip(color) {
-                *sample = u16::from(color) * 257;
-            }
-            pixel[3] = u16::MAX;
-        }
-        Ok(())
-    }
-
-    fn linear_row(&self, _: usize, _: &mut [f32]) -> Result<()> {
-        let hint = "Write it with 8 or 16 bits.".to_owned();
-        Err(Error::Unsupported { what: "a thumbnail in floating point".to_owned(), hint })
-    }
 }
 
 #[cfg(test)]

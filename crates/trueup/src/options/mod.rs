@@ -27,6 +27,8 @@ use trueup_vision::lines::LineOptions;
 use trueup_vision::matching::MatchingOptions;
 use trueup_vision::pairing::PairingOptions;
 
+pub use text::ChangedOption;
+
 pub(crate) use method::MethodForm;
 pub use method::{Evidence, Method, Structure};
 

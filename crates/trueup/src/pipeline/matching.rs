@@ -50,10 +50,9 @@ pub(crate) fn run(input: &MatchInput, options: &MatchOptions, context: &StageCon
         let strangers =
             if input.wished.is_empty() { matching::find_strangers(input.frames, &pairs) } else { Vec::new() };
         let is_stranger = |photograph| strangers.iter().any(|stranger| stranger.photograph == photograph);
-        let known: Vec<PairMatches> =
-            pairs.iter().filter(|pair| !is_stranger(pair.a) && !is_stranger(pair.b)).cloned().collect();
-        matching::report_near_duplicates(&known, context);
-        let graph = StitchGraph::new(input.features.len(), &known);
+        let known = || pairs.iter().filter(|pair| !is_stranger(pair.a) && !is_stranger(pair.b));
+        matching::report_near_duplicates(known(), context);
+        let graph = StitchGraph::new(input.features.len(), known());
         Ok(Matches { pairs, strangers, graph })
     })
 }
