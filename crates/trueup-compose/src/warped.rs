@@ -168,8 +168,8 @@ impl<'a> WarpedPhotograph<'a> {
         accumulate(contribution, positions, samples, sums);
     }
 
-    /// Fills `out`, the pixels of `window` row by row, with the square root of corrected linear light and the share of the
-    /// pixel that is covered; zeros where nothing is.
+    /// Sets in `out`, the pixels of `window` row by row, which are zeros, the square root of corrected linear light and the share
+    /// of the pixel that is covered, where anything is.
     pub(crate) fn sample(
         &self,
         window: Window<'_>,
@@ -193,7 +193,6 @@ impl<'a> WarpedPhotograph<'a> {
         let width = window.columns.len();
         let within = |a: &Range<usize>, b: &Range<usize>| a.start.max(b.start)..a.end.min(b.end);
         let (columns, rows) = (within(window.columns, &self.grid.columns), within(window.rows, &self.grid.rows));
-        out.fill([0.0; 4]);
         if columns.is_empty() || rows.is_empty() {
             return;
         }

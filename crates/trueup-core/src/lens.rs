@@ -240,6 +240,7 @@ impl Lens {
     fn undistorted(&self, place: Vector2<f64>) -> Vector2<f64> {
         const MOST_STEPS: usize = 30;
         const SETTLED: f64 = 1e-14;
+        const NEARLY_SETTLED: f64 = 1e-8;
         let wanted = place.norm();
         if wanted == 0.0 && self.terms.tangential == [0.0; 2] || !wanted.is_finite() {
             return place;
@@ -255,8 +256,10 @@ impl Lens {
                 low = r
             }
             let step = r - excess / slope;
-            let next = if step > low && step < high { step } else { 0.5 * (low + high.min(2.0 * low + 1.0)) };
-            let settled = (next - r).abs() <= SETTLED * (1.0 + r);
+            let inside = step > low && step < high;
+            let next = if inside { step } else { 0.5 * (low + high.min(2.0 * low + 1.0)) };
+            // The error after one of Newton's steps is about the square of the step.
+            let settled = inside && (next - r).abs() <= NEARLY_SETTLED * (1.0 + r);
             r = next;
             if settled {
                 break;

@@ -29,7 +29,7 @@ use crate::memory_plan::MemoryPlan;
 use crate::pyramid::{first_level, tile_side};
 use crate::seam::Seams;
 use crate::small_views::{CoarseLevels, DecodedPhotographs};
-use crate::store::{PixelStore, RootPixel};
+use crate::store::{Block, PixelStore, RootPixel};
 use crate::warped::{Resampling, SamplingMemory};
 use loaded::{LoadedPhotographs, PhotographLoader};
 use shown::ShownWhere;
@@ -98,10 +98,14 @@ pub(crate) fn run(input: BlendInput<'_>, context: &StageContext) -> Result<Pixel
             };
             let finished: Vec<Vec<RootPixel>> =
                 tiles.par_iter().map_init(SamplingMemory::default, finish).collect::<Result<_>>()?;
-            for (tile, finished) in tiles.iter().zip(finished) {
-                let columns = tile.columns.start - unrolled.lead()..tile.columns.end - unrolled.lead();
-                pixels.put(&columns, &tile.rows, &finished)?;
-            }
+            let block = |(tile, pixels)| {
+                let BlendTile { columns, rows, .. }: &BlendTile = tile;
+                let columns = columns.start - unrolled.lead()..columns.end - unrolled.lead();
+                Block { columns, rows: rows.clone(), pixels }
+            };
+            let blocks: Vec<Block<'_, RootPixel>> =
+                tiles.iter().zip(finished.iter().map(Vec::as_slice)).map(block).collect();
+            pixels.put(&blocks)?;
         }
     }
     Ok(pixels)

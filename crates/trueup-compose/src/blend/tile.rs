@@ -8,6 +8,7 @@ use super::work::BlendWork;
 use crate::ignored::in_mask;
 use crate::label::{Label, NOBODY};
 use crate::pyramid::{PyramidPlane, add_detail, collapse, color, level_shares, mask_margin, tile_margin};
+use crate::simd::{VectorLoop, with_vector_instructions};
 use crate::small_views::CoarseLevel;
 use crate::store::RootPixel;
 use crate::warped::{SamplingMemory, WarpedPhotograph};
@@ -85,9 +86,13 @@ impl BlendTile {
             .levels
             .as_ref()
             .and_then(|levels| self.offset(&levels.blended, levels.own.at(label), work.first_level));
-        let offsets = offset.iter().flat_map(|plane| &plane.texels).map(|texel| color(*texel).unwrap_or_default());
-        let offsets = offsets.chain(std::iter::repeat([0.0; 3]));
-        pixels.iter().zip(offsets).map(|(pixel, offset)| finished(*pixel, offset)).collect()
+        if let Some(offset) = offset {
+            for (pixel, offset) in pixels.iter_mut().zip(&offset.texels) {
+                // The last is the offset's own share.
+                (0..3).for_each(|channel| pixel[channel] += offset[channel]);
+            }
+        }
+        finished_all(&pixels)
     }
 
     /// What the coarse levels change of a photograph, on the pixels of the tile; `None` if nothing.
@@ -157,7 +162,7 @@ impl BlendTile {
                     let claim = pixels[at][3] * if *own == work.shown.label(*label) { 2.0 } else { 1.0 };
                     if claim > taken[at] {
                         taken[at] = claim;
-                        out[at] = finished(pixels[at], [0.0; 3]);
+                        out[at] = finished(pixels[at]);
                     }
                 }
             }
@@ -218,7 +223,7 @@ impl BlendTile {
         for (y, opacity) in self.rows.clone().zip(opacity.chunks_exact(self.columns.len())) {
             for (texel, &opacity) in blended.row(y)[shift..].iter().zip(opacity) {
                 let opacity = if texel[3] > 0.0 { opacity } else { 0.0 };
-                out.push(finished([texel[0], texel[1], texel[2], opacity], [0.0; 3]));
+                out.push(finished([texel[0], texel[1], texel[2], opacity]));
             }
         }
         out
@@ -278,9 +283,30 @@ fn hide_ignored(
 /// A change of the square root of linear light too small for 16 bits.
 const NO_CHANGE: f32 = 1e-6;
 
+/// Pixels of the panorama.
+fn finished_all(pixels: &[[f32; 4]]) -> Vec<RootPixel> {
+    let mut out = vec![[0; 4]; pixels.len()];
+    with_vector_instructions(Finishing { pixels, out: &mut out });
+    out
+}
+
+struct Finishing<'a> {
+    pixels: &'a [[f32; 4]],
+    out: &'a mut [RootPixel],
+}
+
+impl VectorLoop for Finishing<'_> {
+    #[inline(always)]
+    fn run(self) {
+        for (out, pixel) in self.out.iter_mut().zip(self.pixels) {
+            *out = finished(*pixel);
+        }
+    }
+}
+
 /// A pixel of the panorama from the square root of linear light and the share covered.
-fn finished([r, g, b, share]: [f32; 4], offset: [f32; 3]) -> RootPixel {
+#[inline(always)]
+fn finished(pixel: [f32; 4]) -> RootPixel {
     // The casts saturate; NaN becomes 0.
-    let whole = |value: f32| (value * 65535.0 + 0.5) as u16;
-    [whole(r + offset[0]), whole(g + offset[1]), whole(b + offset[2]), whole(share)]
+    pixel.map(|value| (value * 65535.0 + 0.5) as u16)
 }

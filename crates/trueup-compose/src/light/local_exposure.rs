@@ -18,26 +18,16 @@ pub(crate) struct ExposureMap {
     pub(crate) factors: Vec<f32>,
 }
 
-/// What lies around a place along one axis: two cells, and how far it is on the way to the second.
-#[derive(Clone, Copy)]
-struct Between {
-    cells: [usize; 2],
-    fraction: f32,
-}
-
 impl ExposureMap {
-    /// The cells around a canvas position along an axis; beyond the outer ones they hold on, or go round.
-    fn between(&self, axis: usize, position: f64) -> Between {
+    /// The two cells between whose middles places of `first..first + 1` lie along an axis, counted in cells from the first
+    /// one's middle; beyond the outer ones they hold on, or go round.
+    fn cells_beside(&self, axis: usize, first: f64) -> [usize; 2] {
         let count = self.cells[axis];
-        let place = (position - self.corner[axis]) / self.cell_px[axis] - 0.5;
-        if axis == 0 && self.around {
-            let place = place.rem_euclid(count as f64);
-            let first = (place as usize).min(count - 1);
-            return Between { cells: [first, (first + 1) % count], fraction: (place - first as f64) as f32 };
-        }
-        let place = place.clamp(0.0, (count - 1) as f64);
-        let first = place as usize;
-        Between { cells: [first, (first + 1).min(count - 1)], fraction: (place - first as f64) as f32 }
+        // The casts saturate.
+        [first, first + 1.0].map(|cell| match axis == 0 && self.around {
+            true => (cell.rem_euclid(count as f64) as usize).min(count - 1),
+            false => (cell.max(0.0) as usize).min(count - 1),
+        })
     }
 }
 
@@ -77,15 +67,33 @@ impl LocalExposure {
     /// Fills `out` with the factors at the middles of the pixels `columns` of row `y`.
     pub(crate) fn factors(&self, y: usize, columns: Range<usize>, out: &mut Vec<f32>) {
         let map = self.map.as_ref();
-        let place = |axis: usize, pixel: usize| self.scale[axis] * (pixel as f64 + 0.5) + self.shift[axis];
-        let down = map.between(1, place(1, y));
-        let [upper, lower] = down.cells.map(|row| &map.factors[row * map.cells[0]..(row + 1) * map.cells[0]]);
+        let down = self.in_cells(1, y);
+        let [upper, lower] =
+            map.cells_beside(1, down.floor()).map(|row| &map.factors[row * map.cells[0]..(row + 1) * map.cells[0]]);
+        let below = (down - down.floor()) as f32;
+        let pixels_per_cell = map.cell_px[0] / self.scale[0];
         out.clear();
-        out.extend(columns.map(|x| {
-            let Between { cells: [left, right], fraction } = map.between(0, place(0, x));
-            let [left, right] = [left, right].map(|at| upper[at] + down.fraction * (lower[at] - upper[at]));
-            left + fraction * (right - left)
-        }));
+        let mut x = columns.start;
+        // Between the middles of two cells the factor is a straight line.
+        while x < columns.end {
+            let place = self.in_cells(0, x);
+            let first = place.floor();
+            let to_next = ((first + 1.0 - place) * pixels_per_cell) as usize;
+            let mut end = x.saturating_add(to_next).clamp(x + 1, columns.end);
+            while end > x + 1 && self.in_cells(0, end - 1) >= first + 1.0 {
+                end -= 1;
+            }
+            let [left, right] = map.cells_beside(0, first).map(|at| upper[at] + below * (lower[at] - upper[at]));
+            out.extend((x..end).map(|x| left + (self.in_cells(0, x) - first) as f32 * (right - left)));
+            x = end;
+        }
+    }
+
+    /// Where the middle of a pixel lies along an axis, in cells from the first one's middle.
+    #[inline(always)]
+    fn in_cells(&self, axis: usize, pixel: usize) -> f64 {
+        let place = self.scale[axis] * (pixel as f64 + 0.5) + self.shift[axis];
+        (place - self.map.corner[axis]) / self.map.cell_px[axis] - 0.5
     }
 }
 

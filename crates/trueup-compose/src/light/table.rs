@@ -39,8 +39,9 @@ pub(crate) struct PhotographLight<'a> {
 pub(crate) struct LightTable {
     pub(crate) linearize: Arc<Linearize>,
     pub(crate) gain: [f32; 3],
-    /// Factor at r^2 = index / (length - 2), one entry beyond the corner; empty without vignetting.
-    falloff: Vec<f32>,
+    /// The factor at r^2 = index / [`STEPS`], and the difference to the next; `None` without vignetting. All beyond the corner
+    /// is as at the corner.
+    falloff: Option<Arc<[[f32; 2]; ENTRIES]>>,
     center: [f32; 2],
     /// Table steps per squared pixel.
     steps_per_px2: f32,
@@ -50,18 +51,21 @@ pub(crate) struct LightTable {
 /// is off by a thousandth of that.
 const STEPS: usize = 256;
 
+/// Length of the table: the entries up to the corner, filled up to a power of two.
+const ENTRIES: usize = 512;
+
 impl LightTable {
     /// For a photograph of `size` pixels.
     pub(crate) fn new(light: PhotographLight<'_>, size: [f64; 2]) -> Self {
         let PhotographLight { curve, correction, .. } = light;
         let plain = correction.vignetting.iter().all(|&coefficient| coefficient == 0.0);
-        let last = if plain { 0 } else { STEPS + 2 };
-        let factor = |index: usize| correction.at_radius((index as f64 / STEPS as f64).min(1.0)) as f32;
+        let factor = |index: usize| correction.at_radius((index as f64 / STEPS as f64).min(1.0));
+        let entry = |index: usize| [factor(index) as f32, (factor(index + 1) - factor(index)) as f32];
         let corner = 0.25 * (size[0] * size[0] + size[1] * size[1]);
         Self {
             linearize: Linearize::of(curve),
             gain: correction.gain.map(|gain| gain as f32),
-            falloff: (0..last).map(factor).collect(),
+            falloff: (!plain).then(|| Arc::new(std::array::from_fn(entry))),
             center: size.map(|length| 0.5 * length as f32),
             steps_per_px2: (STEPS as f64 / corner) as f32,
         }
@@ -69,19 +73,21 @@ impl LightTable {
 
     /// Whether the factor depends on the place.
     pub(crate) fn varies(&self) -> bool {
-        !self.falloff.is_empty()
+        self.falloff.is_some()
     }
 
     /// The factor against vignetting at a position in the photograph, pixels; only where [`Self::varies`].
     #[inline(always)]
     pub(crate) fn at(&self, x: f32, y: f32) -> f32 {
+        // Adding 1.5 * 2^23 rounds to a whole number and leaves it in the low bits: cheaper than a checked cast.
+        const ROUNDING: f32 = 12_582_912.0;
+        let Some(falloff) = &self.falloff else { return 1.0 };
         let (dx, dy) = (x - self.center[0], y - self.center[1]);
-        let step = ((dx * dx + dy * dy) * self.steps_per_px2).min(STEPS as f32);
-        let index = step as usize;
-        match self.falloff.get(index..index + 2) {
-            Some(pair) => pair[0] + (step - index as f32) * (pair[1] - pair[0]),
-            None => 1.0,
-        }
+        let position = ((dx * dx + dy * dy) * self.steps_per_px2).min(STEPS as f32);
+        // Half a step lower, rounding gives the entry at or below; at an entry itself either side of it will do.
+        let rounded = (position - 0.5) + ROUNDING;
+        let [factor, step] = falloff[rounded.to_bits() as usize % ENTRIES];
+        factor + (position - (rounded - ROUNDING)) * step
     }
 }
 

@@ -17,7 +17,7 @@ use crate::light::{Correction, LocalExposure, PhotographLight};
 use crate::memory_plan::{MemoryPlan, WorkBytes};
 use crate::render_options::RenderOptions;
 use crate::small_views::small_size;
-use crate::store::{Pixel, PixelStore, SumPixel};
+use crate::store::{Block, Pixel, PixelStore, SumPixel};
 use crate::warped::{Averaging, SamplingMemory, WarpedPhotograph, check_photograph};
 
 const STAGE: &str = RenderOptions::STAGE;
@@ -68,10 +68,17 @@ pub(super) fn run(input: &AverageInput<'_>, context: &StageContext) -> Result<Pi
             // All rows at once.
             None => store = Some(PixelStore::of_pixels(width, sums)),
             Some(store) => {
-                for (band, sums) in sums.chunks(width * BAND_ROWS).enumerate() {
-                    let first = part.start + band * BAND_ROWS;
-                    store.put(&(0..width), &(first..first + sums.len() / width), sums)?;
-                }
+                let rows = |band: usize| part.start + band * BAND_ROWS;
+                let bands: Vec<Block<'_, SumPixel>> = sums
+                    .chunks(width * BAND_ROWS)
+                    .enumerate()
+                    .map(|(band, sums)| Block {
+                        columns: 0..width,
+                        rows: rows(band)..rows(band) + sums.len() / width,
+                        pixels: sums,
+                    })
+                    .collect();
+                store.put(&bands)?;
             }
         }
     }

@@ -15,39 +15,64 @@ pub(crate) fn reduce_by_two(photograph: &Photograph) -> Photograph {
 fn halve<T: Copy + Default + Send + Sync>(
     raster: &Raster<T>,
     value: impl Fn(T) -> u32 + Sync,
-    sample: impl Fn(u64) -> T + Sync,
+    sample: impl Fn(u32) -> T + Sync,
 ) -> Raster<T> {
-    let channels = raster.channels();
+    match raster.channels() {
+        1 => halve_rows::<T, 1>(raster, |quad| mean(quad, &value, &sample)),
+        3 => halve_rows::<T, 3>(raster, |quad| mean(quad, &value, &sample)),
+        _ => halve_rows::<T, 4>(raster, |quad| mean_by_alpha(quad, &value, &sample)),
+    }
+}
+
+/// The picture of the means of every 2 x 2 pixels of `C` channels: upper left, upper right, lower left, lower right.
+fn halve_rows<T: Copy + Default + Send + Sync, const C: usize>(
+    raster: &Raster<T>,
+    mean: impl Fn([&[T; C]; 4]) -> [T; C] + Sync,
+) -> Raster<T> {
     let (width, height) = (raster.width().div_ceil(2), raster.height().div_ceil(2));
-    let mut reduced = Raster::new(width, height, channels);
-    let row_length = (width * channels).max(1);
-    reduced.data_mut().par_chunks_mut(row_length).enumerate().for_each(|(y, row)| {
-        let rows = [raster.row(2 * y), raster.row((2 * y + 1).min(raster.height() - 1))];
-        for (x, pixel) in row.chunks_exact_mut(channels).enumerate() {
-            let columns = [2 * x, (2 * x + 1).min(raster.width() - 1)];
-            if channels != 4 {
-                let [left, right] = columns.map(|column| column * channels);
-                for (channel, out) in pixel.iter_mut().enumerate() {
-                    let at = |row: usize, column: usize| value(rows[row][column + channel]);
-                    *out = sample(u64::from((at(0, left) + at(0, right) + at(1, left) + at(1, right) + 2) / 4));
-                }
-                continue;
-            }
-            let quad = [0, 1, 2, 3].map(|i| &rows[i / 2][columns[i % 2] * channels..][..channels]);
-            let weights = quad.map(|source| u64::from(value(source[3])));
-            let total: u64 = weights.iter().sum();
-            for (channel, out) in pixel.iter_mut().enumerate() {
-                let levels = quad.map(|source| u64::from(value(source[channel])));
-                let (sum, count): (u64, u64) = if channel == 3 || total == 0 {
-                    (levels.iter().sum(), 4)
-                } else {
-                    (levels.iter().zip(weights).map(|(level, weight)| level * weight).sum(), total)
-                };
-                *out = sample((sum + count / 2) / count);
-            }
+    let mut reduced = Raster::new(width, height, C);
+    reduced.data_mut().par_chunks_mut((width * C).max(1)).enumerate().for_each(|(y, row)| {
+        let [upper, lower] =
+            [2 * y, (2 * y + 1).min(raster.height() - 1)].map(|row| raster.row(row).as_chunks::<C>().0);
+        let pairs = upper.chunks(2).zip(lower.chunks(2));
+        for (out, (upper, lower)) in row.as_chunks_mut::<C>().0.iter_mut().zip(pairs) {
+            // Of an odd width the last column stands for two.
+            let last = upper.len() - 1;
+            *out = mean([&upper[0], &upper[last], &lower[0], &lower[last]]);
         }
     });
     reduced
+}
+
+#[inline(always)]
+fn mean<T: Copy + Default, const C: usize>(
+    [a, b, c, d]: [&[T; C]; 4],
+    value: impl Fn(T) -> u32,
+    sample: impl Fn(u32) -> T,
+) -> [T; C] {
+    std::array::from_fn(|channel| {
+        let sum = value(a[channel]) + value(b[channel]) + value(c[channel]) + value(d[channel]);
+        sample((sum + 2) / 4)
+    })
+}
+
+fn mean_by_alpha<T: Copy + Default, const C: usize>(
+    quad: [&[T; C]; 4],
+    value: impl Fn(T) -> u32,
+    sample: impl Fn(u32) -> T,
+) -> [T; C] {
+    let weights = quad.map(|pixel| u64::from(value(pixel[C - 1])));
+    let total: u64 = weights.iter().sum();
+    std::array::from_fn(|channel| {
+        let levels = quad.map(|pixel| u64::from(value(pixel[channel])));
+        let (sum, count): (u64, u64) = if channel == C - 1 || total == 0 {
+            (levels.iter().sum(), 4)
+        } else {
+            (levels.iter().zip(weights).map(|(level, weight)| level * weight).sum(), total)
+        };
+        // The cast is of a mean of samples.
+        sample(((sum + count / 2) / count) as u32)
+    })
 }
 
 #[cfg(test)]

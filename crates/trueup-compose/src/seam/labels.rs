@@ -25,7 +25,7 @@ impl Seams {
         for view in views {
             for (index, pixel) in view.pixels.iter().enumerate() {
                 if pixel[3] & WHOLLY != 0 {
-                    whole[place(view, index, width)] = true;
+                    whole[index_of(view, index, width)] = true;
                 }
             }
         }
@@ -33,7 +33,7 @@ impl Seams {
             .iter()
             .map(|view| {
                 let touched = |(index, pixel): (usize, &[u8; 4])| {
-                    let at = place(view, index, width);
+                    let at = index_of(view, index, width);
                     (pixel[3] & PARTLY != 0 && !whole[at]).then_some(at as u32)
                 };
                 let mut partial: Vec<u32> = view.pixels.iter().enumerate().filter_map(touched).collect();
@@ -88,51 +88,77 @@ impl Seams {
 
     /// Label of the point (x, y), in pixels of this canvas: that of the four pixels around it with the most weight.
     /// On a cylinder x lies in the first turn.
-    #[inline]
     fn at(&self, x: f64, y: f64) -> Label {
+        let place = self.place(x, y);
+        let corners = self.corners(place.pixel);
+        same(corners).unwrap_or_else(|| prevailing(corners, place.beyond))
+    }
+
+    /// Where a point lies between the middles of four pixels.
+    #[inline]
+    fn place(&self, x: f64, y: f64) -> Place {
         let before_first = self.turn > 0 && x < 0.5;
         let x = if before_first { x + self.width as f64 } else { x };
         let (x, y) = ((x - 0.5).max(0.0), (y - 0.5).max(0.0));
-        let (left, top) = ((x as usize).min(self.width - 1), (y as usize).min(self.height - 1));
+        let pixel = [(x as usize).min(self.width - 1), (y as usize).min(self.height - 1)];
+        Place { pixel, beyond: [(x - pixel[0] as f64).min(1.0), (y - pixel[1] as f64).min(1.0)] }
+    }
+
+    /// Labels of a pixel and those right, below, and right below of it.
+    #[inline]
+    fn corners(&self, [left, top]: [usize; 2]) -> [Label; 4] {
         let beyond_last = self.turn > 0 && left + 1 == self.width;
         let right = if beyond_last { 0 } else { (left + 1).min(self.width - 1) };
         let bottom = (top + 1).min(self.height - 1);
         let label = |x: usize, y: usize| self.labels[y * self.width + x];
-        let corners = [label(left, top), label(right, top), label(left, bottom), label(right, bottom)];
-        if corners.iter().all(|&one| one == corners[0]) {
-            return corners[0];
-        }
-        let (u, v) = ((x - left as f64).min(1.0), (y - top as f64).min(1.0));
-        let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
-        let mut best = (NOBODY, -1.0);
-        for &candidate in corners.iter().filter(|&&one| one != NOBODY) {
-            let weight: f64 =
-                corners.iter().zip(weights).filter(|(one, _)| **one == candidate).map(|(_, weight)| weight).sum();
-            // Ties go to the lower label, whatever their order.
-            if weight > best.1 || weight == best.1 && candidate < best.0 {
-                best = (candidate, weight);
+        [label(left, top), label(right, top), label(left, bottom), label(right, bottom)]
+    }
+
+    /// Labels of the points of row `v`, in pixels of this canvas, that lie `across` beside each other: `u` says where those of
+    /// `columns` are. Replaces `out`.
+    fn along(&self, columns: &Range<usize>, u: impl Fn(usize) -> f64, across: f64, v: f64, out: &mut Vec<Label>) {
+        out.clear();
+        let mut x = columns.start;
+        while x < columns.end {
+            let place = self.place(u(x), v);
+            let corners = self.corners(place.pixel);
+            let Some(label) = same(corners) else {
+                out.push(prevailing(corners, place.beyond));
+                x += 1;
+                continue;
+            };
+            // As far as both rows of pixels have this label, all points between them have it.
+            let first = place.pixel[0];
+            let last = self.place(u(columns.end - 1), v).pixel[0].max(first);
+            let mut beyond = first + 1;
+            while beyond <= last && same(self.corners([beyond, place.pixel[1]])) == Some(label) {
+                beyond += 1;
             }
+            let more = ((beyond as f64 - first as f64 - place.beyond[0]) / across) as usize;
+            let mut end = x.saturating_add(more).clamp(x + 1, columns.end);
+            while end > x + 1 && !(first..beyond).contains(&self.place(u(end - 1), v).pixel[0]) {
+                end -= 1;
+            }
+            out.resize(out.len() + end - x, label);
+            x = end;
         }
-        best.0
     }
 
     /// Labels of the pixels `columns` of row `y` of a canvas of `full` pixels (width, height), replacing `out`; [`NOBODY`]
     /// where nothing is.
     pub fn row(&self, y: usize, columns: &Range<usize>, full: [usize; 2], out: &mut Vec<Label>) {
         let (across, down) = (self.width as f64 / full[0] as f64, self.height as f64 / full[1] as f64);
-        out.clear();
         let v = (y as f64 + 0.5) * down;
-        out.extend(columns.clone().map(|x| self.at((x as f64 + 0.5) * across, v)));
+        self.along(columns, |x| (x as f64 + 0.5) * across, across, v, out);
     }
 
     /// Labels of the points `columns` of row `y` of a cylinder of `full` points (around, down), of which the first lies
     /// `lead` points left of the first turn.
     pub(crate) fn row_around(&self, y: usize, columns: &Range<usize>, lead: f64, full: [f64; 2], out: &mut Vec<Label>) {
         let (across, down) = (self.width as f64 / full[0], self.height as f64 / full[1]);
-        out.clear();
         let v = (y as f64 + 0.5) * down;
         // The remainder is exact, so that every turn gives the same.
-        out.extend(columns.clone().map(|x| self.at((x as f64 + 0.5 - lead).rem_euclid(full[0]) * across, v)));
+        self.along(columns, |x| (x as f64 + 0.5 - lead).rem_euclid(full[0]) * across, across, v, out);
     }
 
     /// Labels of all pixels of a part of a canvas of `full` pixels (width, height), row by row.
@@ -213,7 +239,34 @@ impl Seams {
     }
 }
 
-fn place(view: &SmallView, index: usize, width: usize) -> usize {
+/// A pixel, and how far beyond its middle a point lies along x and y, 0 to 1.
+struct Place {
+    pixel: [usize; 2],
+    beyond: [f64; 2],
+}
+
+/// The label that all four pixels have, if they do.
+#[inline]
+fn same(corners: [Label; 4]) -> Option<Label> {
+    corners.iter().all(|&one| one == corners[0]).then_some(corners[0])
+}
+
+/// Of the labels of four pixels that with the most weight at a point between their middles.
+fn prevailing(corners: [Label; 4], [u, v]: [f64; 2]) -> Label {
+    let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
+    let mut best = (NOBODY, -1.0);
+    for &candidate in corners.iter().filter(|&&one| one != NOBODY) {
+        let weight: f64 =
+            corners.iter().zip(weights).filter(|(one, _)| **one == candidate).map(|(_, weight)| weight).sum();
+        // Ties go to the lower label, whatever their order.
+        if weight > best.1 || weight == best.1 && candidate < best.0 {
+            best = (candidate, weight);
+        }
+    }
+    best.0
+}
+
+fn index_of(view: &SmallView, index: usize, width: usize) -> usize {
     let columns = view.columns.len();
     let x = view.columns.start + index % columns;
     (view.rows.start + index / columns) * width + if x < width { x } else { x - width }

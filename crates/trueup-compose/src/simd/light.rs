@@ -1,5 +1,7 @@
 //! From samples of a photograph to corrected linear light.
 
+use std::ops::Range;
+
 use super::positions::Positions;
 use crate::light::{LightTable, exposed};
 use crate::weights::{Feather, Weighting, weight};
@@ -39,34 +41,26 @@ fn accumulate_portable(
     samples: &[[f32; 4]],
     sums: &mut [[f32; 4]],
 ) {
-    const PER_LEVEL: f32 = 1.0 / 255.0;
     let Contribution { feather, light, local, border_footprint, weighting } = contribution;
-    let (gain, varies) = (light.gain, light.varies());
-    let linearize = light.linearize.as_ref();
     let length = sums.len();
-    let (columns, rows) = (&positions.column[..length], &positions.row[..length]);
-    let (fractions_x, fractions_y) = (&positions.fraction_x[..length], &positions.fraction_y[..length]);
-    let (samples, local) = (&samples[..length], local.map(|factors| &factors[..length]));
-    for index in 0..length {
-        let (column, row) = (columns[index], rows[index]);
-        let (fraction_x, fraction_y) = (fractions_x[index], fractions_y[index]);
-        let [r, g, b, opacity] = samples[index];
-        let mut share = (opacity * PER_LEVEL).clamp(0.0, 1.0);
-        if let Some(footprint) = border_footprint {
-            let position = [column as f32 + 0.5 + fraction_x, row as f32 + 0.5 + fraction_y];
-            share *= feather.coverage(position, footprint);
+    let samples = &samples[..length];
+    for start in (0..length).step_by(BLOCK) {
+        let block = start..(start + BLOCK).min(length);
+        let lifts = lifts(light, local, positions, &block);
+        let linear = corrected(light, &samples[block.clone()], &lifts);
+        for (at, index) in block.enumerate() {
+            let (column, row) = (positions.column[index], positions.row[index]);
+            let (fraction_x, fraction_y) = (positions.fraction_x[index], positions.fraction_y[index]);
+            let share = share(samples[index][3], feather, border_footprint, positions, index);
+            let inside = match weighting {
+                Weighting::Equal => 1.0,
+                Weighting::Feathered => feather.at(column, row, fraction_x, fraction_y),
+            };
+            let weight = weight(share, inside);
+            let [r, g, b] = linear.map(|channel| channel[at]);
+            let sum = &mut sums[index];
+            *sum = [sum[0] + r * weight, sum[1] + g * weight, sum[2] + b * weight, sum[3] + weight];
         }
-        let inside = match weighting {
-            Weighting::Equal => 1.0,
-            Weighting::Feathered => feather.at(column, row, fraction_x, fraction_y),
-        };
-        let weight = weight(share, inside);
-        let lift = if varies { light.at(column as f32 + 0.5 + fraction_x, row as f32 + 0.5 + fraction_y) } else { 1.0 };
-        let lift = lift * local.map_or(1.0, |factors| factors[index]);
-        let light = |level: f32, gain: f32| exposed(linearize.linear(level), gain * lift);
-        let (r, g, b) = (light(r, gain[0]), light(g, gain[1]), light(b, gain[2]));
-        let sum = &mut sums[index];
-        *sum = [sum[0] + r * weight, sum[1] + g * weight, sum[2] + b * weight, sum[3] + weight];
     }
 }
 
@@ -95,27 +89,85 @@ pub(crate) fn develop(development: Development<'_>, positions: &Positions, sampl
 
 #[inline(always)]
 fn develop_portable(development: Development<'_>, positions: &Positions, samples: &mut [[f32; 4]]) {
-    const PER_LEVEL: f32 = 1.0 / 255.0;
     let Development { feather, light, local, border_footprint } = development;
-    let (gain, varies) = (light.gain, light.varies());
-    let linearize = light.linearize.as_ref();
     let length = samples.len();
-    let (columns, rows) = (&positions.column[..length], &positions.row[..length]);
-    let (fractions_x, fractions_y) = (&positions.fraction_x[..length], &positions.fraction_y[..length]);
-    let local = local.map(|factors| &factors[..length]);
-    for (index, sample) in samples.iter_mut().enumerate() {
-        let position =
-            [columns[index] as f32 + 0.5 + fractions_x[index], rows[index] as f32 + 0.5 + fractions_y[index]];
-        let [r, g, b, opacity] = *sample;
-        let mut share = (opacity * PER_LEVEL).clamp(0.0, 1.0);
-        if let Some(footprint) = border_footprint {
-            share *= feather.coverage(position, footprint);
+    for start in (0..length).step_by(BLOCK) {
+        let block = start..(start + BLOCK).min(length);
+        let lifts = lifts(light, local, positions, &block);
+        let samples = &mut samples[block.clone()];
+        let mut roots = corrected(light, samples, &lifts);
+        roots.iter_mut().flatten().for_each(|value| *value = value.sqrt());
+        for (at, (index, sample)) in block.zip(samples).enumerate() {
+            let share = share(sample[3], feather, border_footprint, positions, index);
+            *sample = [roots[0][at], roots[1][at], roots[2][at], share];
         }
-        let lift = if varies { light.at(position[0], position[1]) } else { 1.0 };
-        let lift = lift * local.map_or(1.0, |factors| factors[index]);
-        let root = |level: f32, gain: f32| exposed(linearize.linear(level), gain * lift).sqrt();
-        *sample = [root(r, gain[0]), root(g, gain[1]), root(b, gain[2]), share];
     }
+}
+
+/// Samples that are corrected together: their channels lie side by side, as vector instructions want them.
+const BLOCK: usize = 16;
+
+/// The factors on the light of a block of samples that are the same for all channels.
+#[inline(always)]
+fn lifts(light: &LightTable, local: Option<&[f32]>, positions: &Positions, block: &Range<usize>) -> [f32; BLOCK] {
+    let mut lifts = [1.0; BLOCK];
+    if light.varies() {
+        for (lift, index) in lifts.iter_mut().zip(block.clone()) {
+            let [x, y] = center(positions, index);
+            *lift = light.at(x, y);
+        }
+    }
+    if let Some(factors) = local {
+        for (lift, factor) in lifts.iter_mut().zip(&factors[block.clone()]) {
+            *lift *= factor;
+        }
+    }
+    lifts
+}
+
+/// Corrected linear light of a block of samples, channel by channel.
+#[inline(always)]
+fn corrected(light: &LightTable, samples: &[[f32; 4]], lifts: &[f32; BLOCK]) -> [[f32; BLOCK]; 3] {
+    let linearize = light.linearize.as_ref();
+    let mut channels = [[0.0; BLOCK]; 3];
+    for (at, &[r, g, b, _]) in samples.iter().enumerate().take(BLOCK) {
+        channels[0][at] = linearize.linear(r);
+        channels[1][at] = linearize.linear(g);
+        channels[2][at] = linearize.linear(b);
+    }
+    for (channel, gain) in channels.iter_mut().zip(light.gain) {
+        for (value, lift) in channel.iter_mut().zip(lifts) {
+            *value = exposed(*value, gain * lift);
+        }
+    }
+    channels
+}
+
+/// The share of a canvas pixel that a sample covers: what is transparent of it covers nothing, and neither does what lies
+/// beyond the photograph's border.
+#[inline(always)]
+fn share(
+    opacity: f32,
+    feather: &Feather,
+    border_footprint: Option<[f32; 2]>,
+    positions: &Positions,
+    index: usize,
+) -> f32 {
+    const PER_LEVEL: f32 = 1.0 / 255.0;
+    let share = (opacity * PER_LEVEL).clamp(0.0, 1.0);
+    match border_footprint {
+        Some(footprint) => share * feather.coverage(center(positions, index), footprint),
+        None => share,
+    }
+}
+
+/// Position `index` in the photograph's pixels.
+#[inline(always)]
+fn center(positions: &Positions, index: usize) -> [f32; 2] {
+    [
+        positions.column[index] as f32 + 0.5 + positions.fraction_x[index],
+        positions.row[index] as f32 + 0.5 + positions.fraction_y[index],
+    ]
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use trueup_core::Result;
 use trueup_core::scratch::ScratchFile;
 
+use super::Block;
 use super::pixel::{Pixel, read_pixels, to_bytes, translucent};
 
 /// Memory for rows that were read at once: neighboring rows are asked for next.
@@ -64,13 +65,13 @@ impl<P: Pixel> CanvasBlocks<P> {
     }
 
     /// Writes one block; different ones may be written at once.
-    pub(super) fn put(&self, columns: &Range<usize>, rows: &Range<usize>, block: &[P]) -> Result<()> {
+    pub(super) fn put(&self, Block { columns, rows, pixels }: &Block<'_, P>) -> Result<()> {
         debug_assert!(columns.start.is_multiple_of(self.side[0]) && rows.start.is_multiple_of(self.side[1]));
         debug_assert_eq!(columns.len(), self.side[0].min(self.size[0] - columns.start));
         debug_assert_eq!(rows.len(), self.side[1].min(self.size[1] - rows.start));
-        self.translucent.fetch_add(translucent(block), Ordering::Relaxed);
+        self.translucent.fetch_add(translucent(pixels), Ordering::Relaxed);
         let (at, _) = self.place(columns.start, rows.start);
-        self.file.write_at(&to_bytes(block), at)
+        self.file.write_at(&to_bytes(pixels), at)
     }
 
     /// The stretches of row `y` that lie in one block each: first column, length, and place in the file.

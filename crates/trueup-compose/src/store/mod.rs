@@ -21,6 +21,22 @@ pub(crate) enum PixelStore<P> {
     Scratch(CanvasBlocks<P>),
 }
 
+/// A part of a canvas, row by row.
+#[derive(Debug)]
+pub(crate) struct Block<'a, P> {
+    pub(crate) columns: Range<usize>,
+    pub(crate) rows: Range<usize>,
+    pub(crate) pixels: &'a [P],
+}
+
+impl<P> Block<'_, P> {
+    /// The pixels of row `y` of the canvas.
+    fn row(&self, y: usize) -> &[P] {
+        let width = self.columns.len();
+        &self.pixels[(y - self.rows.start) * width..][..width]
+    }
+}
+
 impl<P: Pixel> PixelStore<P> {
     /// Zeros in memory.
     pub(crate) fn in_memory([width, height]: [usize; 2]) -> Self {
@@ -32,16 +48,21 @@ impl<P: Pixel> PixelStore<P> {
         Self::Memory { width, pixels }
     }
 
-    /// Sets the block `columns` x `rows`; in a scratch file, one of its blocks.
-    pub(crate) fn put(&mut self, columns: &Range<usize>, rows: &Range<usize>, block: &[P]) -> Result<()> {
+    /// Sets blocks that do not overlap; in a scratch file, each one of its blocks.
+    pub(crate) fn put(&mut self, blocks: &[Block<P>]) -> Result<()> {
         match self {
             Self::Memory { width, pixels } => {
-                for (y, row) in rows.clone().zip(block.chunks_exact(columns.len().max(1))) {
-                    pixels[y * *width..][columns.clone()].copy_from_slice(row);
-                }
+                let rows =
+                    blocks.iter().map(|block| block.rows.clone()).reduce(|a, b| a.start.min(b.start)..a.end.max(b.end));
+                let Some(rows) = rows.filter(|_| *width > 0) else { return Ok(()) };
+                pixels[rows.start * *width..rows.end * *width].par_chunks_mut(*width).zip(rows).for_each(|(row, y)| {
+                    for block in blocks.iter().filter(|block| block.rows.contains(&y)) {
+                        row[block.columns.clone()].copy_from_slice(block.row(y));
+                    }
+                });
                 Ok(())
             }
-            Self::Scratch(blocks) => blocks.put(columns, rows, block),
+            Self::Scratch(own) => blocks.par_iter().try_for_each(|block| own.put(block)),
         }
     }
 
@@ -117,9 +138,9 @@ mod tests {
                 for top in (0..size[1]).step_by(side[1]) {
                     for left in (0..size[0]).step_by(side[0]) {
                         let (columns, rows) = (left..(left + side[0]).min(size[0]), top..(top + side[1]).min(size[1]));
-                        let block: Vec<[u16; 4]> =
+                        let pixels: Vec<[u16; 4]> =
                             rows.clone().flat_map(|y| columns.clone().map(move |x| pixel(x, y))).collect();
-                        store.put(&columns, &rows, &block).expect("room");
+                        store.put(&[Block { columns, rows, pixels: &pixels }]).expect("room");
                     }
                 }
                 (0..size[1]).into_par_iter().for_each(|y| {

@@ -25,6 +25,9 @@ use crate::pipeline::measure::THUMBNAIL_PIXELS;
 /// Largest tangent of the angle from the axis that is drawn, along each side: 56 degrees. What lies farther out is drawn so
 /// large that its edges are soft.
 const FARTHEST: f64 = 1.5;
+/// Pixels between two places of which the lens is asked where it shows them; straight between them. Where a lens moves the
+/// corners of a photograph of 1000 pixels by 20 %, that is off by less than a hundredth of a pixel.
+const NODE_STEP: usize = 4;
 /// Points along each side of a photograph by which its extent is found.
 const BORDER_POINTS: usize = 33;
 
@@ -68,19 +71,41 @@ fn of_photograph(gray: &Raster<f32>, camera: &Camera, context: &StageContext) ->
     let pinhole = pinhole_view(camera, gray.width() as f64, gray.height() as f64);
     let [width, height] = pinhole.principal_point.map(|middle| 2.0 * middle);
     // The casts are of whole numbers of at most a few thousand.
-    let mut straight = Raster::new(width as usize, height as usize, 1);
-    let columns = straight.width();
-    straight.data_mut().par_chunks_mut(columns.max(1)).enumerate().for_each(|(y, row)| {
-        for (x, value) in row.iter_mut().enumerate() {
-            let ray = pinhole.bearing(Vector2::new(x as f64 + 0.5, y as f64 + 0.5));
-            *value = camera.project(ray).map_or(f32::NAN, |place| sample(gray, place));
-        }
-    });
+    let straight = drawn(gray, camera, &pinhole, [width as usize, height as usize]);
     let found = lines::detect_keeping_frame(&straight, &LineOptions::default(), context)?;
     let back = |end: [f64; 2]| camera.project(pinhole.bearing(end.into())).map(<[f64; 2]>::from);
     let in_photograph =
         |line: &LineSegment| Some(LineSegment { start: back(line.start)?, end: back(line.end)?, ..*line });
     Ok(found.iter().filter_map(in_photograph).collect())
+}
+
+/// What a pinhole in the camera's place would show, `size` pixels across and down; not a number where that is beyond the photograph.
+fn drawn(gray: &Raster<f32>, camera: &Camera, pinhole: &Camera, [width, height]: [usize; 2]) -> Raster<f32> {
+    let nodes = |length: usize| length.div_ceil(NODE_STEP) + 1;
+    let places: Vec<Vec<Vector2<f64>>> = (0..nodes(height))
+        .into_par_iter()
+        .map(|row| {
+            let place = |column: usize| {
+                let pixel = Vector2::new((column * NODE_STEP) as f64 + 0.5, (row * NODE_STEP) as f64 + 0.5);
+                camera.project(pinhole.bearing(pixel)).unwrap_or(Vector2::repeat(f64::NAN))
+            };
+            (0..nodes(width)).map(place).collect()
+        })
+        .collect();
+    let mut straight = Raster::new(width, height, 1);
+    straight.data_mut().par_chunks_mut(width.max(1)).enumerate().for_each(|(y, row)| {
+        let down = (y % NODE_STEP) as f64 / NODE_STEP as f64;
+        let between: Vec<Vector2<f64>> = places[y / NODE_STEP]
+            .iter()
+            .zip(&places[y / NODE_STEP + 1])
+            .map(|(one, next)| one.lerp(next, down))
+            .collect();
+        for (x, value) in row.iter_mut().enumerate() {
+            let across = (x % NODE_STEP) as f64 / NODE_STEP as f64;
+            *value = sample(gray, between[x / NODE_STEP].lerp(&between[x / NODE_STEP + 1], across));
+        }
+    });
+    straight
 }
 
 /// A pinhole of the same focal length that looks the same way, its picture large enough for what is drawn.
