@@ -9,6 +9,7 @@ Examples:
   trueup-bench paper --out paper                    every experiment; about an hour on two cores, and goes on where it stopped
   trueup-bench paper --quick --out quick            claims that small sets can show, in about a minute
   trueup-bench quality --real photos --truth-sets cut --out docs/quality.md
+  trueup-bench speed --peers photos/harbor photos/attic   beside OpenCV and Hugin, where they are installed
 
 Exit status: 0 done, 1 a claim does not hold (with --quick: one that is expected to) or something failed, 2 wrong usage, 130 stopped by Ctrl-C, 143 \
 by a request to terminate.";
@@ -34,6 +35,12 @@ pub(crate) enum BenchCommand {
     /// Each set is stitched by the `trueup` command in a process of its own. The figures go between the markers of the Markdown
     /// file, whose other words stay, and into a CSV file beside it, which the next run compares with.
     Quality(QualityArguments),
+    /// Time `trueup stitch` on folders of photographs, beside other stitchers that are installed
+    ///
+    /// Runs the programs in turn, whole processes from the photographs' files to a JPEG, and prints a Markdown table of medians:
+    /// seconds of the clock and of all processors, peak memory, and trueup's share of the others'. Leave the machine alone
+    /// meanwhile.
+    Speed(SpeedArguments),
 }
 
 #[derive(Debug, Args)]
@@ -109,6 +116,37 @@ pub(crate) struct QualityArguments {
     /// The `trueup` command [default: the one beside this program]
     #[arg(long, value_name = "PATH")]
     pub trueup: Option<PathBuf>,
+
+    /// Print nothing but the outcome
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SpeedArguments {
+    /// Folders of photographs, each a set
+    #[arg(required = true, value_name = "DIR")]
+    pub folders: Vec<PathBuf>,
+
+    /// Run other stitchers on the same photographs: OpenCV's by Python, Hugin's command line programs
+    #[arg(long)]
+    pub peers: bool,
+
+    /// How often each program stitches each set
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub runs: u32,
+
+    /// The Python that has OpenCV
+    #[arg(long, value_name = "PATH", default_value = "python3")]
+    pub python: PathBuf,
+
+    /// The `trueup` command [default: the one beside this program]
+    #[arg(long, value_name = "PATH")]
+    pub trueup: Option<PathBuf>,
+
+    /// Write the table into this file instead of printing it
+    #[arg(long, value_name = "FILE.md")]
+    pub out: Option<PathBuf>,
 
     /// Print nothing but the outcome
     #[arg(short, long)]

@@ -1,8 +1,9 @@
-//! The `trueup-bench` command: experiments on sets with known cameras, and the table of quality.
+//! The `trueup-bench` command: experiments on sets with known cameras, the table of quality, and speed beside other stitchers.
 #![forbid(unsafe_code)]
 
 mod arguments;
 mod build_stamp;
+mod child;
 mod experiments;
 mod figures;
 mod measure;
@@ -19,6 +20,7 @@ mod rows;
 mod runner;
 mod set_work;
 mod sets;
+mod speed;
 mod statistics;
 mod stopping;
 mod store;
@@ -35,6 +37,7 @@ fn main() -> ExitCode {
     let outcome = match Arguments::parse().command {
         BenchCommand::Paper(arguments) => paper::run(&arguments),
         BenchCommand::Quality(arguments) => quality::run(&arguments),
+        BenchCommand::Speed(arguments) => speed::run(&arguments),
     };
     match outcome {
         Ok(status) => status,

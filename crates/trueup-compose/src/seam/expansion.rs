@@ -17,6 +17,8 @@ pub(super) struct Expansions {
     /// For each pixel of the box the difference of the photograph shown and the one that expands; [`FIXED`] where the
     /// pixel does not take part.
     change: Vec<i32>,
+    /// The pixels that take part, row by row: columns as the box has them, and rows.
+    nodes: Vec<[u32; 2]>,
 }
 
 /// A photograph that takes pixels of a box.
@@ -75,14 +77,12 @@ impl Expansions {
         self.add_data_costs(&taking, labels);
         self.add_seam_costs(&taking, labels);
         self.flow.solve();
-        let Window { columns, rows } = window;
         let mut changed = false;
-        for (v, y) in rows.clone().enumerate() {
-            for (u, x) in columns.clone().enumerate() {
-                if self.change[v * columns.len() + u] != FIXED && self.flow.on_sink_side(self.flow.node(u, v)) {
-                    labels[y * energy.width + energy.column(x)] = label as Label;
-                    changed = true;
-                }
+        for &[x, y] in &self.nodes {
+            let (x, y) = (x as usize, y as usize);
+            if self.flow.on_sink_side(self.flow.node(x - window.columns.start, y - window.rows.start)) {
+                labels[y * energy.width + energy.column(x)] = label as Label;
+                changed = true;
             }
         }
         changed
@@ -94,62 +94,66 @@ impl Expansions {
         let width = columns.len();
         self.change.clear();
         self.change.resize(width * rows.len(), FIXED);
-        let mut any = false;
+        self.nodes.clear();
         for y in rows.clone() {
             for x in columns.clone().skip(usize::from(taking.all_round())) {
-                let place = (y - rows.start) * width + x - columns.start;
-                let x = energy.column(x);
-                let at = y * energy.width + x;
+                let on_canvas = energy.column(x);
+                let at = y * energy.width + on_canvas;
                 let old = labels[at];
-                if old != NOBODY && usize::from(old) != label && free(at) && energy.allowed(label, x, y) {
-                    self.change[place] = energy.difference(usize::from(old), label, [x, y]);
-                    any = true;
+                if old != NOBODY && usize::from(old) != label && free(at) && energy.allowed(label, on_canvas, y) {
+                    self.change[(y - rows.start) * width + x - columns.start] =
+                        energy.difference(usize::from(old), label, [on_canvas, y]);
+                    // A small canvas has far fewer than 2^32 columns and rows.
+                    self.nodes.push([x as u32, y as u32]);
                 }
             }
         }
-        any
+        !self.nodes.is_empty()
     }
 
     /// Adds what the pixels that take part cost themselves.
     fn add_data_costs(&mut self, taking: &Taking<'_>, labels: &[Label]) {
         let &Taking { energy, label, window: Window { columns, rows } } = taking;
-        for (v, y) in rows.clone().enumerate() {
-            for (u, x) in columns.clone().enumerate() {
-                if self.change[v * columns.len() + u] != FIXED {
-                    let x = energy.column(x);
-                    let old = usize::from(labels[y * energy.width + x]);
-                    let change = energy.data_cost(label, x, y) - energy.data_cost(old, x, y);
-                    self.flow.add_sink_side_cost(self.flow.node(u, v), change);
-                }
-            }
+        for &[x, y] in &self.nodes {
+            let (x, y) = (x as usize, y as usize);
+            let node = self.flow.node(x - columns.start, y - rows.start);
+            let x = energy.column(x);
+            let old = usize::from(labels[y * energy.width + x]);
+            self.flow.add_sink_side_cost(node, energy.data_cost(label, x, y) - energy.data_cost(old, x, y));
         }
     }
 
-    /// Adds what seams cost within the box and along its border.
+    /// Adds what seams cost between the pixels that take part, and between them and their neighbors.
     fn add_seam_costs(&mut self, taking: &Taking<'_>, labels: &[Label]) {
         let &Taking { energy, window: Window { columns, rows }, .. } = taking;
-        for y in rows.clone() {
-            for x in columns.clone() {
-                for (direction, other) in [(RIGHT, [x + 1, y]), (DOWN, [x, y + 1])] {
-                    if (other[0] < energy.width || energy.turn > 0) && other[1] < energy.height {
-                        self.join(taking, labels, [[x, y], other], direction);
-                    }
-                }
+        let all_round = taking.all_round();
+        let nodes = std::mem::take(&mut self.nodes);
+        for &[x, y] in &nodes {
+            let (x, y) = (x as usize, y as usize);
+            if x + 1 < energy.width || energy.turn > 0 {
+                self.join(taking, labels, [[x, y], [x + 1, y]], RIGHT);
+            }
+            if y + 1 < energy.height {
+                self.join(taking, labels, [[x, y], [x, y + 1]], DOWN);
+            }
+            // A pair of two that take part was joined from its first.
+            let left = match x {
+                0 => (energy.turn > 0 && !all_round).then(|| energy.turn - 1),
+                _ => Some(x - 1),
+            };
+            let takes_part = |x: usize, y: usize| {
+                let inside = columns.contains(&x) && rows.contains(&y);
+                inside && self.change[(y - rows.start) * columns.len() + x - columns.start] != FIXED
+            };
+            let above = y.checked_sub(1).filter(|&above| !takes_part(x, above));
+            if let Some(left) = left.filter(|&left| x == 0 || !takes_part(left, y)) {
+                self.join(taking, labels, [[left, y], [x, y]], RIGHT);
+            }
+            if let Some(above) = above {
+                self.join(taking, labels, [[x, above], [x, y]], DOWN);
             }
         }
-        // Neighbors left of and above the box.
-        for x in columns.clone() {
-            if rows.start > 0 {
-                self.join(taking, labels, [[x, rows.start - 1], [x, rows.start]], DOWN);
-            }
-        }
-        for y in rows.clone() {
-            if columns.start > 0 && !taking.all_round() {
-                self.join(taking, labels, [[columns.start - 1, y], [columns.start, y]], RIGHT);
-            } else if energy.turn > 0 && !taking.all_round() {
-                self.join(taking, labels, [[energy.turn - 1, y], [0, y]], RIGHT);
-            }
-        }
+        self.nodes = nodes;
     }
 
     /// Adds the cost of a seam between neighboring pixels p and q. A node on the sink's side takes the new label.

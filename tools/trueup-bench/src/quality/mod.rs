@@ -1,7 +1,7 @@
 //! `trueup-bench quality`: every set stitched by the `trueup` command, one committed table.
 
-mod child;
 mod discover;
+mod measured;
 mod page;
 mod row;
 mod tables;
@@ -12,10 +12,11 @@ use std::process::ExitCode;
 use trueup::{CancelToken, Error, Result, check_place};
 
 use crate::arguments::QualityArguments;
+use crate::child::{self, ScratchFolder};
 use crate::progress::Tracker;
 use crate::stopping;
-use child::{MeasuredStitch, measure};
 use discover::{StitchSet, find_sets};
+use measured::{MeasuredStitch, measure};
 use row::{QualityRow, read_rows, write_rows};
 
 /// Stitches the sets, then writes the table and its CSV file, whose places are checked before.
@@ -24,7 +25,7 @@ use row::{QualityRow, read_rows, write_rows};
 /// Those of finding the sets and the command, of writing; [`Error::Cancelled`]. A set that cannot be stitched is a row.
 pub(crate) fn run(arguments: &QualityArguments) -> Result<ExitCode> {
     let cancel = stopping::cancel_token();
-    let command = find_command(arguments.trueup.as_deref())?;
+    let command = child::find_trueup(arguments.trueup.as_deref())?;
     let csv_path = arguments.out.with_extension("csv");
     page::check(&arguments.out)?;
     check_place(&csv_path)?;
@@ -34,8 +35,8 @@ pub(crate) fn run(arguments: &QualityArguments) -> Result<ExitCode> {
         None if csv_path.exists() => read_rows(&csv_path)?,
         None => Vec::new(),
     };
-    let scratch = Scratch::new()?;
-    let measured = measure_all(&sets, &command, &scratch.0, &cancel, arguments.quiet)?;
+    let scratch = ScratchFolder::new()?;
+    let measured = measure_all(&sets, &command, scratch.path(), &cancel, arguments.quiet)?;
     // Only now: what this process held while a child was started would count as the child's memory.
     let rows = sets
         .iter()
@@ -75,38 +76,6 @@ fn measure_all(
     }
     tracker.close();
     Ok(measured)
-}
-
-/// The command given, or the one beside this program.
-fn find_command(given: Option<&Path>) -> Result<PathBuf> {
-    let hint = "Build it with `cargo build --release`, or name it with --trueup.";
-    let path = match given {
-        Some(path) => path.to_owned(),
-        None => {
-            let own =
-                std::env::current_exe().map_err(|error| Error::io("finding", Path::new("trueup-bench"), error))?;
-            own.with_file_name(format!("trueup{}", std::env::consts::EXE_SUFFIX))
-        }
-    };
-    if path.is_file() { Ok(path) } else { Err(Error::input(path.display(), "there is no such program", hint)) }
-}
-
-/// A folder for panoramas and records, removed in the end.
-struct Scratch(PathBuf);
-
-impl Scratch {
-    fn new() -> Result<Self> {
-        let path = std::env::temp_dir().join(format!("trueup-quality-{}", std::process::id()));
-        std::fs::create_dir_all(&path).map_err(|error| Error::io("making the folder", &path, error))?;
-        Ok(Self(path))
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        // Nothing depends on it, and the system clears its folder of temporary files.
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use trueup_io::source::scan;
 ///
 /// # Errors
 /// [`Error::Input`] if there is none; those of looking for them.
-pub(super) fn photographs_in(folder: &Path, context: &StageContext) -> Result<Vec<SourceImage>> {
+pub(crate) fn photographs_in(folder: &Path, context: &StageContext) -> Result<Vec<SourceImage>> {
     let mut images = scan(&[folder.display().to_string()], &Default::default(), context)?.photographs;
     images.sort_by(|one, other| one.path.cmp(&other.path));
     match images.is_empty() {
@@ -33,6 +33,6 @@ pub(super) fn folders_in(parent: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// The last part of a path.
-pub(super) fn name_of(folder: &Path) -> String {
+pub(crate) fn name_of(folder: &Path) -> String {
     folder.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

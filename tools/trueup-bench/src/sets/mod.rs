@@ -13,6 +13,7 @@ mod vpg_data;
 
 pub(crate) use catalogue::{Catalogue, GivenFolders};
 pub(crate) use central::central;
+pub(crate) use folders::{name_of, photographs_in};
 pub(crate) use ready::{ReadySet, TRUTH_FILE, read_truth, truth_folders};
 #[cfg(test)]
 pub(crate) use spec::Recipe;
