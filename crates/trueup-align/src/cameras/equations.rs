@@ -133,7 +133,9 @@ mod tests {
             [Some(1), Some(5), Some(2), Some(5)],
             [Some(4), Some(5), Some(0), Some(2)],
         ];
-        let root = |seed: usize| SMatrix::<f64, 4, 4>::from_fn(|row, column| ((row * 5 + column * 3 + seed * 7) % 11) as f64 - 4.0);
+        let root = |seed: usize| {
+            SMatrix::<f64, 4, 4>::from_fn(|row, column| ((row * 5 + column * 3 + seed * 7) % 11) as f64 - 4.0)
+        };
         let terms: Vec<PairTerm<4>> = (0..3)
             .map(|seed| PairTerm {
                 normal: root(seed).transpose() * root(seed),

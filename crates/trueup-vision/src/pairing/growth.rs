@@ -10,9 +10,10 @@ use trueup_core::source::WorkingFrame;
 use crate::matching::PredictedOverlap;
 
 /// Places along each side of a photograph that are asked whether the other shows them.
-const PLACES: usize = 8;
-/// Share of a photograph that another one must be predicted to show: smaller overlaps are hardly ever verified.
-const LEAST_SHARE: f64 = 0.04;
+const PLACES: usize = 10;
+/// Share of a photograph that another one must be predicted to show: smaller overlaps are hardly ever verified. (Of 178 among 60
+/// photographs the smallest was 0.027.)
+const LEAST_SHARE: f64 = 0.02;
 
 /// The overlaps verified so far.
 #[derive(Debug, Default)]
@@ -90,7 +91,8 @@ impl VerifiedOverlaps {
         let nothing = BTreeMap::new();
         let of = |photograph: usize| self.neighbors.get(&photograph).unwrap_or(&nothing);
         let Some(middle_from_from) = of(from).get(&middle) else { return Vec::new() };
-        let untried = of(middle).iter().filter(|&(&to, _)| to != from && !tried.contains(&(from.min(to), from.max(to))));
+        let untried =
+            of(middle).iter().filter(|&(&to, _)| to != from && !tried.contains(&(from.min(to), from.max(to))));
         let predict = |(&to, to_from_middle): (&usize, &Matrix3<f64>)| {
             let to_from_from = Homography(to_from_middle * middle_from_from);
             let share = PredictedOverlap::new(to_from_from, frames.get(from)?, frames.get(to)?)?.share_of_a(PLACES);

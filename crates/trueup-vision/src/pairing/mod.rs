@@ -147,7 +147,9 @@ impl<'a> Proposals<'a> {
         let candidates: Vec<Vec<(usize, usize)>> = outside
             .map(|one| {
                 let is_apart = |&other: &usize| {
-                    self.featured[other] && group_of[other] != group_of[one] && !self.tried.contains(&ordered(one, other))
+                    self.featured[other]
+                        && group_of[other] != group_of[one]
+                        && !self.tried.contains(&ordered(one, other))
                 };
                 let others = likeness.0[one].iter().copied().filter(is_apart);
                 // What does not look alike is tried last.
