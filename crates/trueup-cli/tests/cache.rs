@@ -51,6 +51,7 @@ fn one_more_photograph_costs_its_own_pairs_only() {
     for _ in 0..2 {
         assert!(stitch(&desk, &STREET_NAMES, &cache) == proposed);
     }
+    assert_eq!(entries(&desk, "likeness").len(), 1);
 }
 
 #[test]

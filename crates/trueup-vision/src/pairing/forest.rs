@@ -144,8 +144,10 @@ impl Branch<'_> {
     }
 }
 
+/// At most 128 * 1020 * 255.
 fn projection(direction: &Direction, descriptor: &Descriptor) -> i32 {
-    direction.iter().zip(descriptor).map(|(&along, &entry)| i32::from(along) * i32::from(i16::from(entry))).sum()
+    let product = |(&along, &entry): (&i16, &u8)| i32::from(along).wrapping_mul(i32::from(i16::from(entry)));
+    direction.iter().zip(descriptor).map(product).fold(0, i32::wrapping_add)
 }
 
 /// The squared distance of a descriptor from a cluster's middle, scaled.

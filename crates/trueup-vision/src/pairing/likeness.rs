@@ -1,6 +1,7 @@
 //! Which photographs look alike: those whose features are each other's neighbors.
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use trueup_core::options::StageOptions;
 use trueup_core::{Result, StageContext};
 
@@ -22,8 +23,8 @@ const FULL_VOTE: u32 = 256;
 const LISTED: usize = 256;
 
 /// For each photograph the others that look like it, the most alike first.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Likeness(pub Vec<Vec<usize>>);
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Likeness(pub(super) Vec<Vec<usize>>);
 
 /// How often photographs look alike, by votes of their strongest features: each votes for the photographs that hold its
 /// nearest neighbors, the more the nearer these are, in comparison with the first photograph that it does not vote for.
@@ -36,7 +37,7 @@ pub(super) struct Likeness(pub Vec<Vec<usize>>);
 ///
 /// # Departures
 /// More neighbors than their 4 are taken, and weighed: photographs may overlap many others.
-pub(super) fn of(features: &[Features], context: &StageContext<'_>) -> Result<Likeness> {
+pub fn likeness(features: &[Features], context: &StageContext<'_>) -> Result<Likeness> {
     for (index, features) in features.iter().enumerate() {
         features.check(index)?;
     }

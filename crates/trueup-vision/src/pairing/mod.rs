@@ -14,15 +14,16 @@ mod tests;
 
 use std::collections::BTreeSet;
 
+use trueup_core::Result;
 use trueup_core::matches::PairMatches;
 use trueup_core::options::StageOptions;
 use trueup_core::source::WorkingFrame;
-use trueup_core::{Result, StageContext};
 
 use crate::features::Features;
 use groups::Groups;
 use growth::VerifiedOverlaps;
-use likeness::Likeness;
+
+pub use likeness::{Likeness, likeness};
 
 /// Overlaps of a photograph, in multiples of `pairing.neighbors`, from which no more are looked for: they tell nothing new.
 const PARTNERS_PER_NEIGHBOR: usize = 4;
@@ -69,23 +70,26 @@ pub struct Proposals<'a> {
 }
 
 impl<'a> Proposals<'a> {
-    /// Of photographs with these features and frames, which are as many.
+    /// Of photographs with these features and frames, which are as many; `likeness` is asked how they look like each other where not
+    /// all pairs are proposed.
     ///
     /// # Errors
-    /// [`trueup_core::Error::Options`]; [`trueup_core::Error::Input`] if features contradict themselves;
-    /// [`trueup_core::Error::Cancelled`].
+    /// [`trueup_core::Error::Options`]; those of `likeness`.
     pub fn new(
         features: &[Features],
         frames: &'a [WorkingFrame],
         options: &'a PairingOptions,
-        context: &StageContext<'_>,
+        likeness: impl FnOnce() -> Result<Likeness>,
     ) -> Result<Self> {
         options.check()?;
         let count = features.len();
-        let likeness = match count <= options.exhaustive_up_to {
-            true => None,
-            false => Some(likeness::of(features, context)?),
-        };
+        let likeness = if count <= options.exhaustive_up_to { None } else { Some(likeness()?) };
+        // A photograph that was not there when the looks were compared looks like no other.
+        let likeness = likeness.map(|Likeness(mut alike)| {
+            alike.resize(count, Vec::new());
+            alike.iter_mut().for_each(|others| others.retain(|&other| other < count));
+            Likeness(alike)
+        });
         Ok(Self {
             frames,
             options,

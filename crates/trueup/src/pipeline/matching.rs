@@ -9,9 +9,9 @@ use trueup_core::source::WorkingFrame;
 use trueup_core::{Result, StageContext};
 use trueup_vision::features::Features;
 use trueup_vision::matching::{self, Stranger};
-use trueup_vision::pairing::Proposals;
+use trueup_vision::pairing::{Likeness, Proposals, likeness};
 
-use crate::memo::{Key, KeyMaker, Memo, PAIR};
+use crate::memo::{Key, KeyMaker, LIKENESS, Memo, PAIR};
 use crate::options::MatchOptions;
 
 /// What the phase works on. Photographs are counted 0..N; `features`, `frames`, `usable` and `keys` have N entries.
@@ -43,7 +43,7 @@ pub(crate) struct Matches {
 /// Matches the pairs of photographs that are worth it, or those wished for.
 ///
 /// # Errors
-/// Those of [`Proposals::new`] and [`matching::run`].
+/// Those of [`likeness`], [`Proposals::new`] and [`matching::run`].
 pub(crate) fn run(input: &MatchInput, options: &MatchOptions, context: &StageContext) -> Result<Reported<Matches>> {
     context.gather(|context| {
         let pairs = context.time("matching", || match_pairs(input, options, context))?;
@@ -62,7 +62,8 @@ fn match_pairs(input: &MatchInput, options: &MatchOptions, context: &StageContex
     if !input.wished.is_empty() {
         return match_candidates(input, input.wished, options, context);
     }
-    let mut proposals = Proposals::new(input.features, input.frames, &options.pairing, context)?;
+    let looks = || known_likeness(input, options, context);
+    let mut proposals = Proposals::new(input.features, input.frames, &options.pairing, looks)?;
     let mut all: Vec<PairMatches> = Vec::new();
     let mut candidates = proposals.next(&[]);
     while !candidates.is_empty() {
@@ -72,6 +73,18 @@ fn match_pairs(input: &MatchInput, options: &MatchOptions, context: &StageContex
     }
     all.sort_by_key(|pair| (pair.a, pair.b));
     Ok(all)
+}
+
+/// How the photographs look like each other, kept for the same ones in the same order.
+fn known_likeness(input: &MatchInput, options: &MatchOptions, context: &StageContext) -> Result<Likeness> {
+    let content = input.keys.iter().try_fold(KeyMaker::new(), |maker, key| Some(maker.key(key.as_ref()?)));
+    let key = input.memo.key(LIKENESS, content, options);
+    if let Some(known) = input.memo.load(LIKENESS, key.as_ref()) {
+        return Ok(known);
+    }
+    let found = likeness(input.features, context)?;
+    input.memo.store(LIKENESS, key.as_ref(), &found);
+    Ok(found)
 }
 
 /// These pairs, in their order, without those of photographs that could not be measured.
