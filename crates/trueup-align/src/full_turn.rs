@@ -60,7 +60,7 @@ pub fn find_cut(cameras: &[Camera], edges: &[GraphEdge], level_from_world: &Matr
     let candidates = middles.map(|yaw| {
         let severed = severed_by(yaw, &yaws, edges);
         let weight = severed.iter().map(|edge| edge.weight).sum();
-        CutCandidate { yaw, torn: !stays_connected(cameras.len(), edges, &severed), weight }
+        CutCandidate { yaw, torn: !stays_connected(yaw, &yaws, edges), weight }
     });
     // Of equals the first.
     let CutCandidate { yaw, torn, .. } = candidates.min_by_key(|candidate| (candidate.torn, candidate.weight))?;
@@ -109,6 +109,11 @@ fn from_cut(cut: f64, yaw: f64) -> f64 {
 
 /// Whether going the short way along every edge gives each photograph one consistent direction.
 fn lies_flat(yaws: &[f64], edges: &[GraphEdge]) -> bool {
+    let mut neighbors: Vec<Vec<usize>> = vec![Vec::new(); yaws.len()];
+    for edge in edges {
+        neighbors[edge.a].push(edge.b);
+        neighbors[edge.b].push(edge.a);
+    }
     let mut unwrapped: Vec<Option<f64>> = vec![None; yaws.len()];
     for start in 0..yaws.len() {
         if unwrapped[start].is_some() {
@@ -118,8 +123,7 @@ fn lies_flat(yaws: &[f64], edges: &[GraphEdge]) -> bool {
         let mut queue = std::collections::VecDeque::from([start]);
         while let Some(here) = queue.pop_front() {
             let Some(place) = unwrapped[here] else { continue };
-            for edge in edges.iter().filter(|edge| edge.a == here || edge.b == here) {
-                let other = if edge.a == here { edge.b } else { edge.a };
+            for &other in &neighbors[here] {
                 let expected = place + wrap_angle(yaws[other] - yaws[here]);
                 match unwrapped[other] {
                     Some(known) if (known - expected).abs() > PI => return false,
@@ -137,12 +141,17 @@ fn lies_flat(yaws: &[f64], edges: &[GraphEdge]) -> bool {
 
 /// The edges whose short way crosses the direction `cut`.
 fn severed_by<'a>(cut: f64, yaws: &[f64], edges: &'a [GraphEdge]) -> Vec<&'a GraphEdge> {
-    edges.iter().filter(|edge| (from_cut(cut, yaws[edge.a]) - from_cut(cut, yaws[edge.b])).abs() > PI).collect()
+    edges.iter().filter(|edge| is_severed(cut, yaws, edge)).collect()
 }
 
-fn stays_connected(photographs: usize, edges: &[GraphEdge], severed: &[&GraphEdge]) -> bool {
-    let kept = edges.iter().filter(|edge| !severed.contains(edge));
-    let graph = StitchGraph::from_edges(photographs, kept.copied().collect());
+fn is_severed(cut: f64, yaws: &[f64], edge: &GraphEdge) -> bool {
+    (from_cut(cut, yaws[edge.a]) - from_cut(cut, yaws[edge.b])).abs() > PI
+}
+
+/// Whether the photographs hold together without the edges that cross the direction `cut`.
+fn stays_connected(cut: f64, yaws: &[f64], edges: &[GraphEdge]) -> bool {
+    let kept = edges.iter().filter(|edge| !is_severed(cut, yaws, edge));
+    let graph = StitchGraph::from_edges(yaws.len(), kept.copied().collect());
     graph.components.len() == 1
 }
 

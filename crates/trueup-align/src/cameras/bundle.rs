@@ -1,4 +1,4 @@
-//! Bundle adjustment: rotations and focal lengths that bring all matches together, by Levenberg-Marquardt on block
+//! Bundle adjustment: rotations and focal lengths that bring all matches together, by Levenberg-Marquardt on sparse
 //! normal equations.
 //!
 //! # Source
@@ -14,6 +14,7 @@ use trueup_core::camera::{Camera, INTRINSICS};
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
 use trueup_core::{Result, StageContext};
 
+use super::equations::{Columns, NormalEquations, NormalPattern, Pull};
 use super::intrinsics::{FOCAL, IntrinsicsModel, LensState, standard_deviation};
 use super::observations::{Observations, PairObservations};
 use super::pair_cost::{LENS_LOCAL, PINHOLE_LOCAL, PairTerm, pair_cost};
@@ -68,21 +69,38 @@ pub(super) struct BundleAdjustment<'a> {
 
 impl BundleAdjustment<'_> {
     /// Refines `parameters` until the cost settles; `huber_px` bounds the influence of a single match.
+    ///
+    /// # Errors
+    /// [`trueup_core::Error::Unsolvable`] if memory does not suffice; [`trueup_core::Error::Cancelled`].
     pub(super) fn minimize(
+        &self,
+        parameters: Parameters,
+        model: &IntrinsicsModel,
+        huber_px: f64,
+        context: &StageContext,
+    ) -> Result<Parameters> {
+        match parameters.has_lens() || model.has_lens() {
+            false => self.minimize_by::<PINHOLE_LOCAL>(parameters, model, huber_px, context),
+            true => self.minimize_by::<LENS_LOCAL>(parameters, model, huber_px, context),
+        }
+    }
+
+    fn minimize_by<const LOCAL: usize>(
         &self,
         mut parameters: Parameters,
         model: &IntrinsicsModel,
         huber_px: f64,
         context: &StageContext,
     ) -> Result<Parameters> {
+        let pattern = self.pattern::<LOCAL>(model)?;
         let mut cost = self.cost(&parameters, model, huber_px);
         let mut damping = FIRST_DAMPING;
         for _ in 0..MAX_ITERATIONS {
             context.check_cancelled()?;
-            let (normal, gradient) = self.normal_equations(&parameters, model, huber_px);
+            let Some(equations) = self.normal_equations(&parameters, model, huber_px, &pattern) else { break };
             let mut decrease = 0.0;
             while damping < LARGEST_DAMPING {
-                let Some(step) = solve_damped(&normal, &gradient, damping) else {
+                let Some(step) = solve_damped(&equations, damping) else {
                     damping *= 10.0;
                     continue;
                 };
@@ -124,7 +142,7 @@ impl BundleAdjustment<'_> {
         &self,
         pair: &PairObservations,
         model: &IntrinsicsModel,
-    ) -> [Option<usize>; LOCAL] {
+    ) -> Columns<LOCAL> {
         let rotation = |photograph: usize, axis: usize| (photograph != self.reference).then_some(3 * photograph + axis);
         let of_each = (LOCAL - 6) / 2;
         std::array::from_fn(|local| match local {
@@ -142,7 +160,7 @@ impl BundleAdjustment<'_> {
 
     /// Pull of the focal lengths towards their start values, (ln f - ln f0) / sd, and of lens terms towards 0, one per
     /// photograph with a free one.
-    fn pulls(&self, parameters: &Parameters, model: &IntrinsicsModel) -> Vec<Pull> {
+    pub(super) fn pulls(&self, parameters: &Parameters, model: &IntrinsicsModel) -> Vec<Pull> {
         let of_photograph = |k: usize| {
             let stretch = (parameters.focal_px[k] / self.start_focal_px[k]).ln();
             let focal = self.column(model, k, FOCAL).map(|column| Pull::new(column, stretch, self.focal_sd[k]));
@@ -170,55 +188,24 @@ impl BundleAdjustment<'_> {
     }
 
     /// Those of the data and the pulls.
-    fn normal_equations(
+    /// Which unknowns meet in the pairs.
+    ///
+    /// # Errors
+    /// [`trueup_core::Error::Unsolvable`] if memory does not suffice.
+    pub(super) fn pattern<const LOCAL: usize>(&self, model: &IntrinsicsModel) -> Result<NormalPattern<LOCAL>> {
+        let columns = self.observations.pairs.iter().map(|pair| self.columns(pair, model)).collect();
+        NormalPattern::new(self.unknowns(model), columns)
+    }
+
+    fn normal_equations<const LOCAL: usize>(
         &self,
         parameters: &Parameters,
         model: &IntrinsicsModel,
         huber_px: f64,
-    ) -> (faer::Mat<f64>, faer::Mat<f64>) {
-        match parameters.has_lens() || model.has_lens() {
-            false => self.equations::<PINHOLE_LOCAL>(parameters, model, huber_px),
-            true => self.equations::<LENS_LOCAL>(parameters, model, huber_px),
-        }
-    }
-
-    fn equations<const LOCAL: usize>(
-        &self,
-        parameters: &Parameters,
-        model: &IntrinsicsModel,
-        huber_px: f64,
-    ) -> (faer::Mat<f64>, faer::Mat<f64>) {
-        let terms: Vec<PairTerm<LOCAL>> = self.pair_terms(&parameters.cameras(self.priors), huber_px);
-        self.assembled(&terms, parameters, model)
-    }
-
-    /// The normal equations of the pairs' `terms` and of the pulls at `parameters`.
-    pub(super) fn assembled<const LOCAL: usize>(
-        &self,
-        terms: &[PairTerm<LOCAL>],
-        parameters: &Parameters,
-        model: &IntrinsicsModel,
-    ) -> (faer::Mat<f64>, faer::Mat<f64>) {
-        let unknowns = self.unknowns(model);
-        let mut normal = faer::Mat::<f64>::zeros(unknowns, unknowns);
-        let mut gradient = faer::Mat::<f64>::zeros(unknowns, 1);
-        for (pair, term) in self.observations.pairs.iter().zip(terms) {
-            let columns: [Option<usize>; LOCAL] = self.columns(pair, model);
-            for (local_row, row) in columns.iter().enumerate() {
-                let Some(row) = *row else { continue };
-                gradient[(row, 0)] += term.gradient[local_row];
-                for (local_column, column) in columns.iter().enumerate() {
-                    if let Some(column) = *column {
-                        normal[(row, column)] += term.normal[(local_row, local_column)];
-                    }
-                }
-            }
-        }
-        for Pull { column, residual, slope } in self.pulls(parameters, model) {
-            normal[(column, column)] += slope * slope;
-            gradient[(column, 0)] += slope * residual;
-        }
-        (normal, gradient)
+        pattern: &NormalPattern<LOCAL>,
+    ) -> Option<NormalEquations> {
+        let terms = self.pair_terms(&parameters.cameras(self.priors), huber_px);
+        pattern.equations(&terms, &self.pulls(parameters, model))
     }
 
     fn moved(&self, parameters: &Parameters, model: &IntrinsicsModel, step: &faer::Mat<f64>) -> Parameters {
@@ -240,30 +227,10 @@ impl BundleAdjustment<'_> {
     }
 }
 
-/// A residual that holds one unknown near where it is expected.
-struct Pull {
-    column: usize,
-    residual: f64,
-    /// Its derivative by the unknown.
-    slope: f64,
-}
-
-impl Pull {
-    fn new(column: usize, distance: f64, sd: f64) -> Self {
-        Self { column, residual: distance / sd, slope: 1.0 / sd }
-    }
-}
-
 /// Solves (N + damping diag N) step = -gradient; unknowns without any data stay where they are. `None` if not positive
 /// definite or not finite.
-fn solve_damped(normal: &faer::Mat<f64>, gradient: &faer::Mat<f64>, damping: f64) -> Option<faer::Mat<f64>> {
-    let mut damped = normal.clone();
-    for k in 0..damped.nrows() {
-        let diagonal = damped[(k, k)];
-        damped[(k, k)] = if diagonal > 0.0 { diagonal * (1.0 + damping) } else { 1.0 };
-    }
-    let factor = damped.llt(faer::Side::Lower).ok()?;
-    let step = factor.solve(-gradient);
+fn solve_damped(equations: &NormalEquations, damping: f64) -> Option<faer::Mat<f64>> {
+    let step = equations.factor(damping)?.solve(-&equations.gradient);
     (0..step.nrows()).all(|k| step[(k, 0)].is_finite()).then_some(step)
 }
 

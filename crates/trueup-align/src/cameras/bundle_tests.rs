@@ -29,7 +29,14 @@ fn check_gradient(model: &IntrinsicsModel, lenses: Vec<LensState>) {
         lenses,
     };
     let huge = 1e9;
-    let (_, gradient) = problem.normal_equations(&at, model, huge);
+    let pattern = problem.pattern::<LENS_LOCAL>(model).expect("little memory");
+    let gradient = match at.has_lens() || model.has_lens() {
+        true => problem.normal_equations(&at, model, huge, &pattern).expect("little memory").gradient,
+        false => {
+            let pattern = problem.pattern::<PINHOLE_LOCAL>(model).expect("little memory");
+            problem.normal_equations(&at, model, huge, &pattern).expect("little memory").gradient
+        }
+    };
     for unknown in 3..problem.unknowns(model) {
         let shifted = |amount: f64| {
             let mut step = faer::Mat::<f64>::zeros(problem.unknowns(model), 1);

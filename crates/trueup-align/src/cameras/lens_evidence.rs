@@ -30,15 +30,11 @@ impl LensEvidence {
     ) -> Option<Self> {
         let photographs = problem.priors.len();
         let terms: Vec<PairTerm<LENS_LOCAL>> = problem.pair_terms(&parameters.cameras(problem.priors), huber_px);
-        let (mut normal, gradient) = problem.assembled(&terms, parameters, model);
-        for k in 0..normal.nrows() {
-            if normal[(k, k)] == 0.0 {
-                normal[(k, k)] = 1.0;
-            }
-        }
-        let factor = normal.llt(faer::Side::Lower).ok()?;
-        let step = factor.solve(-&gradient);
-        let selection = faer::Mat::from_fn(normal.nrows(), model.parameters, |row, column| {
+        let pattern = problem.pattern(model).ok()?;
+        let equations = pattern.equations(&terms, &problem.pulls(parameters, model))?;
+        let factor = equations.factor(0.0)?;
+        let step = factor.solve(-&equations.gradient);
+        let selection = faer::Mat::from_fn(problem.unknowns(model), model.parameters, |row, column| {
             f64::from(u8::from(row == 3 * photographs + column))
         });
         let influence = factor.solve(&selection);

@@ -8,6 +8,7 @@
 
 mod bundle;
 mod contradictions;
+mod equations;
 mod focal;
 mod intrinsics;
 mod lens_evidence;

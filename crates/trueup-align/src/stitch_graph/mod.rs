@@ -117,14 +117,16 @@ impl StitchGraph {
             neighbors[step.parent].push(step.child);
             neighbors[step.child].push(step.parent);
         }
-        let weight = |photograph: usize| -> usize {
-            self.edges.iter().filter(|edge| edge.a == photograph || edge.b == photograph).map(|edge| edge.weight).sum()
-        };
+        let mut weights = vec![0_usize; self.photographs];
+        for edge in &self.edges {
+            weights[edge.a] += edge.weight;
+            weights[edge.b] += edge.weight;
+        }
         component
             .iter()
             .copied()
             .min_by_key(|&photograph| {
-                (eccentricity(&neighbors, photograph), usize::MAX - weight(photograph), photograph)
+                (eccentricity(&neighbors, photograph), usize::MAX - weights[photograph], photograph)
             })
             .unwrap_or(root)
     }

@@ -36,6 +36,9 @@ pub use putative::{PutativeMatch, putative_matches};
 pub use search::{Nearest, Neighbor, SearchKernel};
 pub use strangers::{Stranger, StrangerKind, find_strangers};
 
+pub(crate) use overlap::PredictedOverlap;
+pub(crate) use search::squared_distance;
+
 use crate::features::Features;
 use pair::{PairInput, PhotographFeatures, match_pair};
 

@@ -9,7 +9,7 @@ use super::turned::TurnedLens;
 
 /// A map between two photographs' frames, both ways.
 #[derive(Debug, Clone)]
-pub(super) struct PredictedOverlap<'a> {
+pub(crate) struct PredictedOverlap<'a> {
     maps: Maps,
     frame_a: &'a WorkingFrame,
     frame_b: &'a WorkingFrame,
@@ -23,7 +23,7 @@ enum Maps {
 
 impl<'a> PredictedOverlap<'a> {
     /// `b_from_a` signed so that its denominator is positive on the visible side; `None` if it is singular.
-    pub(super) fn new(b_from_a: Homography, frame_a: &'a WorkingFrame, frame_b: &'a WorkingFrame) -> Option<Self> {
+    pub(crate) fn new(b_from_a: Homography, frame_a: &'a WorkingFrame, frame_b: &'a WorkingFrame) -> Option<Self> {
         let a_from_b = b_from_a.inverse()?;
         Some(Self { maps: Maps::Homographies { b_from_a, a_from_b }, frame_a, frame_b })
     }
@@ -47,6 +47,14 @@ impl<'a> PredictedOverlap<'a> {
             Maps::Homographies { a_from_b, .. } => visible(a_from_b, point, self.frame_a),
             Maps::Turn(turned) => turned.in_a(point).filter(|at| self.frame_a.contains(at.x, at.y)),
         }
+    }
+
+    /// The share of a that b shows, by `side` x `side` places spread evenly over it.
+    pub(crate) fn share_of_a(&self, side: usize) -> f64 {
+        let place = |cell: usize, length: f64| (cell as f64 + 0.5) / side as f64 * length;
+        let places = (0..side * side)
+            .map(|cell| Vector2::new(place(cell % side, self.frame_a.width), place(cell / side, self.frame_a.height)));
+        places.filter(|&at| self.point_in_b(at).is_some()).count() as f64 / (side * side) as f64
     }
 
     /// Whether both ends of a match lie in the overlap.
@@ -140,6 +148,7 @@ mod tests {
         assert!(overlap.is_plausible(1.5));
         assert_eq!(overlap.point_in_b(Vector2::new(500.0, 10.0)), Some(Vector2::new(100.0, 10.0)));
         assert_eq!(overlap.point_in_b(Vector2::new(300.0, 10.0)), None);
+        assert_eq!(overlap.share_of_a(8), 0.5);
     }
 
     #[test]

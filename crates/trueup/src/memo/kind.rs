@@ -8,8 +8,8 @@ pub(crate) struct Kind(pub &'static str);
 pub(crate) const MEASURED: Kind = Kind("measured");
 /// A pair's matches.
 pub(crate) const PAIR: Kind = Kind("pair");
-/// How a photograph looks like each of the others.
-pub(crate) const LOOKS: Kind = Kind("looks");
+/// How photographs look like each other, of all at once.
+pub(crate) const LIKENESS: Kind = Kind("likeness");
 /// A panorama's geometry.
 pub(crate) const GEOMETRY: Kind = Kind("geometry");
 /// A panorama's cameras and carried overlaps; in memory only.

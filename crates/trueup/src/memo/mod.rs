@@ -21,7 +21,7 @@ use trueup_core::{Result, StageContext};
 
 pub use folder::{CacheUse, PhotographCache};
 pub(crate) use key::{Key, KeyMaker};
-pub(crate) use kind::{GEOMETRY, Kind, LOOKS, MEASURED, OVERLAPS, PAIR};
+pub(crate) use kind::{GEOMETRY, Kind, LIKENESS, MEASURED, OVERLAPS, PAIR};
 pub(crate) use memory::MemoryStore;
 
 /// Where results are kept; nowhere by default.

@@ -8,10 +8,10 @@ use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Result, StageContext};
 use trueup_vision::features::Features;
-use trueup_vision::matching::Stranger;
-use trueup_vision::{matching, pairing};
+use trueup_vision::matching::{self, Stranger};
+use trueup_vision::pairing::{Likeness, Proposals, likeness};
 
-use crate::memo::{Key, KeyMaker, LOOKS, Memo, PAIR};
+use crate::memo::{Key, KeyMaker, LIKENESS, Memo, PAIR};
 use crate::options::MatchOptions;
 
 /// What the phase works on. Photographs are counted 0..N; `features`, `frames`, `usable` and `keys` have N entries.
@@ -43,7 +43,7 @@ pub(crate) struct Matches {
 /// Matches the pairs of photographs that are worth it, or those wished for.
 ///
 /// # Errors
-/// Those of [`pairing::propose`] and [`matching::run`].
+/// Those of [`likeness`], [`Proposals::new`] and [`matching::run`].
 pub(crate) fn run(input: &MatchInput, options: &MatchOptions, context: &StageContext) -> Result<Reported<Matches>> {
     context.gather(|context| {
         let pairs = context.time("matching", || match_pairs(input, options, context))?;
@@ -57,13 +57,45 @@ pub(crate) fn run(input: &MatchInput, options: &MatchOptions, context: &StageCon
     })
 }
 
+/// Every pair tried: those wished for in their order, or those proposed, ascending.
 fn match_pairs(input: &MatchInput, options: &MatchOptions, context: &StageContext) -> Result<Vec<PairMatches>> {
-    let candidates = match input.wished {
-        [] => propose(input, options, context)?,
-        wished => wished.to_vec(),
-    };
-    let candidates: Vec<(usize, usize)> =
-        candidates.into_iter().filter(|&(a, b)| input.usable[a] && input.usable[b]).collect();
+    if !input.wished.is_empty() {
+        return match_candidates(input, input.wished, options, context);
+    }
+    let looks = || known_likeness(input, options, context);
+    let mut proposals = Proposals::new(input.features, input.frames, &options.pairing, looks)?;
+    let mut all: Vec<PairMatches> = Vec::new();
+    let mut candidates = proposals.next(&[]);
+    while !candidates.is_empty() {
+        let matched = match_candidates(input, &candidates, options, context)?;
+        candidates = proposals.next(&matched);
+        all.extend(matched);
+    }
+    all.sort_by_key(|pair| (pair.a, pair.b));
+    Ok(all)
+}
+
+/// How the photographs look like each other, kept for the same ones in the same order.
+fn known_likeness(input: &MatchInput, options: &MatchOptions, context: &StageContext) -> Result<Likeness> {
+    let content = input.keys.iter().try_fold(KeyMaker::new(), |maker, key| Some(maker.key(key.as_ref()?)));
+    let key = input.memo.key(LIKENESS, content, options);
+    if let Some(known) = input.memo.load(LIKENESS, key.as_ref()) {
+        return Ok(known);
+    }
+    let found = likeness(input.features, context)?;
+    input.memo.store(LIKENESS, key.as_ref(), &found);
+    Ok(found)
+}
+
+/// These pairs, in their order, without those of photographs that could not be measured.
+fn match_candidates(
+    input: &MatchInput,
+    candidates: &[(usize, usize)],
+    options: &MatchOptions,
+    context: &StageContext,
+) -> Result<Vec<PairMatches>> {
+    let is_usable = |&(a, b): &(usize, usize)| input.usable[a] && input.usable[b];
+    let candidates: Vec<(usize, usize)> = candidates.iter().copied().filter(is_usable).collect();
     let forced: BTreeSet<(usize, usize)> = input.wished.iter().copied().collect();
     let content = |a: usize, b: usize| {
         let (of_a, of_b) = (input.keys[a].as_ref()?, input.keys[b].as_ref()?);
@@ -86,32 +118,5 @@ fn match_pairs(input: &MatchInput, options: &MatchOptions, context: &StageContex
         input.memo.store(PAIR, key(pair.a, pair.b).as_ref(), &PairMatches { a: 0, b: 1, ..pair.clone() });
         matched.insert((pair.a, pair.b), pair);
     }
-    Ok(candidates.iter().filter_map(|pair| matched.get(&ordered(pair)).cloned()).collect())
-}
-
-/// The pairs that are worth matching.
-fn propose(input: &MatchInput, options: &MatchOptions, context: &StageContext) -> Result<Vec<(usize, usize)>> {
-    let MatchInput { features, keys, memo, .. } = input;
-    if memo.disk.is_none() || features.len() <= options.pairing.exhaustive_up_to {
-        return Ok(pairing::propose(features, &options.pairing, context)?.pairs);
-    }
-    // How a photograph looks like each one before it, by their keys: it is looked at again with those that are new.
-    let key = |b: usize| memo.key(LOOKS, keys[b].as_ref().map(|key| KeyMaker::new().key(key)), options);
-    let earlier: Vec<Vec<Option<usize>>> = (0..features.len())
-        .map(|b| {
-            let known = memo.load::<Vec<(Key, usize)>>(LOOKS, key(b).as_ref()).unwrap_or_default();
-            let known: BTreeMap<Key, usize> = known.into_iter().collect();
-            keys[..b].iter().map(|key| known.get(key.as_ref()?).copied()).collect()
-        })
-        .collect();
-    let recall = |a: usize, b: usize| earlier[b][a];
-    let looks = pairing::quick_looks(features, &recall, context)?;
-    for (b, looks) in looks.iter().enumerate() {
-        if earlier[b].iter().any(Option::is_none) {
-            let looks: Vec<(Key, usize)> =
-                keys.iter().zip(looks).filter_map(|(key, &look)| Some(((*key)?, look))).collect();
-            memo.store(LOOKS, key(b).as_ref(), &looks);
-        }
-    }
-    Ok(pairing::propose_by(&looks, &options.pairing).pairs)
+    Ok(candidates.iter().filter_map(|pair| matched.remove(&ordered(pair))).collect())
 }

@@ -21,10 +21,10 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::encode;
 
 use super::key::Key;
-use super::kind::{GEOMETRY, Kind, LOOKS, MEASURED, PAIR};
+use super::kind::{GEOMETRY, Kind, LIKENESS, MEASURED, PAIR};
 
 /// The kinds of entries.
-const KINDS: [Kind; 4] = [MEASURED, PAIR, LOOKS, GEOMETRY];
+const KINDS: [Kind; 4] = [MEASURED, PAIR, LIKENESS, GEOMETRY];
 /// How the files of entries end.
 const EXTENSION: &str = "trueup";
 /// How names of files begin and end that are not complete yet.
@@ -93,8 +93,8 @@ impl PhotographCache {
         Ok(Self { folder: folder.to_owned(), max_bytes, uses: Mutex::default(), trouble: Mutex::default() })
     }
 
-    /// How often results were found and made, by what they are: `measured` (a photograph), `pair`, `looks` (which pairs
-    /// are worth matching) and `geometry` (a panorama).
+    /// How often results were found and made, by what they are: `measured` (a photograph), `pair`, `likeness` (how all
+    /// look like each other) and `geometry` (a panorama).
     pub fn uses(&self) -> BTreeMap<&'static str, CacheUse> {
         self.uses.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }

@@ -31,7 +31,7 @@ fn what_was_kept_is_found_by_its_key_alone() {
     let found: Vec<f64> = cache.load(KIND, &key(1)).expect("kept");
     assert!(found.iter().zip(&numbers).all(|(found, number)| found.to_bits() == number.to_bits()));
     assert_eq!(cache.load::<Vec<f64>>(KIND, &key(2)), None);
-    assert_eq!(cache.load::<Vec<f64>>(LOOKS, &key(1)), None);
+    assert_eq!(cache.load::<Vec<f64>>(MEASURED, &key(1)), None);
     assert_eq!(cache.uses()[KIND.0], CacheUse { found: 1, made: 1 });
     assert!(folder.join("CACHEDIR.TAG").is_file());
 }
