@@ -50,7 +50,13 @@ pub(crate) struct Reading {
     /// The pixels as they are stored, before orientation. Refuses what is damaged, incomplete, or no longer of the size that
     /// was found when the photograph was examined.
     pub(crate) pixels: fn(&SourceImage, Input) -> Result<Photograph>,
+    /// Bytes of a pixel on its way into memory: in the decoder, and in the photograph beside it.
+    pub(crate) pixel_bytes: usize,
 }
+
+/// [`Reading::pixel_bytes`] of decoders that write samples as they are handed out: four channels of 8 bits, in the decoder and in the
+/// photograph, or once with 16 bits.
+pub(crate) const PLAIN_PIXEL_BYTES: usize = 8;
 
 /// How many bytes of a file's start [`Reading::has_signature`] sees.
 pub(crate) const SIGNATURE_BYTES: usize = 16;
@@ -95,6 +101,14 @@ impl HeaderError {
     /// A header that the codec cannot make sense of.
     pub(crate) fn damaged(words: impl fmt::Display) -> Self {
         Self::Damaged(words.to_string())
+    }
+
+    /// Why, without more.
+    pub(crate) fn words(&self) -> &str {
+        match self {
+            Self::Damaged(words) | Self::Unsupported(words) => words,
+            Self::Foreign(foreign) => foreign.what,
+        }
     }
 }
 

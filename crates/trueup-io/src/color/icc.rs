@@ -146,7 +146,7 @@ const DATE: std::ops::Range<usize> = 24..36;
 const FIXED_DATE: [u8; 12] = [0x07, 0xd0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0];
 
 /// A profile as bytes that are always the same, without what pictures do not need.
-fn compact(mut profile: ColorProfile, name: &str) -> Arc<[u8]> {
+pub(super) fn compact(mut profile: ColorProfile, name: &str) -> Arc<[u8]> {
     profile.cicp = None;
     // Of a display, version 4 wants the adapted white here; the chromatic adaptation tag tells the unadapted.
     profile.media_white_point = Some(WHITE_POINT_D50.to_xyzd());

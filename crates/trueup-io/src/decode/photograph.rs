@@ -12,9 +12,6 @@ use super::orientation::upright;
 use crate::formats;
 use crate::metadata::header;
 
-/// Bytes of a pixel while it is decoded: four channels of 8 bits, in the decoder and in the photograph, or once with 16 bits.
-const ROOM_PIXEL_BYTES: usize = 8;
-
 /// Decodes a photograph in full size, upright.
 ///
 /// Gray stays one channel; gray with alpha becomes RGBA; palettes, CMYK and one-bit photographs become RGB or gray;
@@ -47,11 +44,6 @@ pub fn sample_bits(source: &SourceImage) -> Result<u16> {
     })
 }
 
-/// Bytes that a photograph takes on its way into memory.
-fn room(source: &SourceImage) -> usize {
-    source.width.saturating_mul(source.height).saturating_mul(ROOM_PIXEL_BYTES)
-}
-
 /// Decodes the pixels as they are stored, before orientation.
 fn stored(source: &SourceImage) -> Result<Photograph> {
     let reading = |error| Error::io("reading", &source.path, error);
@@ -60,6 +52,7 @@ fn stored(source: &SourceImage) -> Result<Photograph> {
         let reason = format!("it is not a {} picture", formats::readable_formats());
         Error::input(&source.name, reason, "Give the photograph again.")
     })?;
-    check_room(format_args!("decoding {}", source.name), room(source))?;
+    let room = source.width.saturating_mul(source.height).saturating_mul(format.pixel_bytes);
+    check_room(format_args!("decoding {}", source.name), room)?;
     (format.pixels)(source, input)
 }
