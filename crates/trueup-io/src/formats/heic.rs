@@ -3,7 +3,7 @@
 use std::io::Read;
 
 use exif::{Field, Tag};
-use heic_decoder::{DecodedImage, HeifError, Metadata, RgbaImage};
+use heic_decoder::{DecodedImage, HeifError, ImageInfo, Metadata, RgbaImage};
 use trueup_core::raster::Photograph;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
@@ -48,9 +48,25 @@ fn contents(input: &mut Input) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// Most coded pixels for one that is shown, beside a tile of them: a crop can be as small as it likes, and what is decoded for it as
+/// large.
+const MOST_CODED: usize = 4;
+const TILE_PIXELS: usize = 1 << 20;
+
+/// What a file says of its picture, before anything as large as that is allocated.
+fn info(bytes: &[u8]) -> heic_decoder::Result<ImageInfo> {
+    let info = heic_decoder::probe(bytes)?;
+    let shown = info.width.saturating_mul(info.height);
+    if info.coded_width.saturating_mul(info.coded_height) > shown.saturating_mul(MOST_CODED).saturating_add(TILE_PIXELS)
+    {
+        return Err(HeifError::LimitExceeded("the picture is a small part of what is coded"));
+    }
+    Ok(info)
+}
+
 fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
     let bytes = contents(input).map_err(HeaderError::damaged)?;
-    let info = heic_decoder::probe(&bytes).map_err(|error| match error {
+    let info = info(&bytes).map_err(|error| match error {
         HeifError::Unsupported(words) => HeaderError::Unsupported(words.to_owned()),
         other => HeaderError::damaged(other),
     })?;
@@ -86,8 +102,7 @@ fn whole_fields(input: &mut Input, wanted: &[Tag]) -> Option<Vec<Field>> {
 fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
     let failed = |error: HeifError| damaged(source, error);
     let bytes = contents(&mut input).map_err(|error| Error::io("reading", &source.path, error))?;
-    // Before anything as large as it says is allocated.
-    let info = heic_decoder::probe(&bytes).map_err(failed)?;
+    let info = info(&bytes).map_err(failed)?;
     check_unchanged(source, info.width, info.height)?;
     let image = heic_decoder::decode(&bytes).map_err(failed)?;
     drop(bytes);

@@ -18,8 +18,8 @@ pub(crate) static OPEN_EXR: Format = Format {
     extensions: &["exr"],
     rare_extensions: &[],
     reading: Some(Reading {
-        kinds: "RGB or Y, with or without alpha, 16 and 32 bits, in lines or tiles, compressed in any way but by JPEG 2000; the first part that has \
-                these channels",
+        kinds: "RGB or Y, with or without alpha, 16 and 32 bits, in lines or tiles, compressed in any way but DWA and JPEG 2000; \
+                the first part that has these channels",
         has_signature: |start| start.starts_with(&MAGIC),
         stored: read::stored,
         icc: read::icc,

@@ -47,8 +47,9 @@ impl Part {
         if header.deep {
             return Err(HeaderError::Unsupported("deep data".to_owned()));
         }
-        if matches!(header.compression, Compression::HTJ2K32 | Compression::HTJ2K256) {
-            return Err(HeaderError::Unsupported("compression by JPEG 2000".to_owned()));
+        use Compression::{DWAA, DWAB, HTJ2K32, HTJ2K256};
+        if matches!(header.compression, DWAA(_) | DWAB(_) | HTJ2K32 | HTJ2K256) {
+            return Err(HeaderError::Unsupported(format!("compressed by {}", header.compression)));
         }
         let is_half = header.channels.list.iter().all(|channel| channel.sample_type == SampleType::F16);
         let Vec2(width, height) = header.layer_size;

@@ -40,7 +40,7 @@ proptest! {
         append_row(&row, &mut bytes);
         read_row(&mut &bytes[..], row.len(), &mut again).expect("a row");
         prop_assert_eq!(&again, &row);
-        for cut in 0..bytes.len() {
+        for cut in (0..bytes.len()).step_by(bytes.len() / 16 + 1) {
             prop_assert!(read_row(&mut &bytes[..cut], row.len(), &mut again).is_err());
         }
     }
