@@ -10,13 +10,19 @@ use crate::failure::Failure;
 use crate::inspect;
 use crate::outcome;
 use crate::progress;
+use crate::report::ReportBeside;
 
 pub(crate) fn run(args: ComposeArgs) -> Result<(), Failure> {
     let messages = args.messages.clone();
+    let report = ReportBeside { file: args.files.report.clone(), threads: chosen::threads(&args.tuning) };
     let (job, options) = checked(args)?;
+    report.check(&job.outputs)?;
     let takes_output = job.outputs.take_standard_output();
-    let written = progress::shown(messages.quiet, |context| job.run(&options, context))?;
-    outcome::tell(&[written], &messages, takes_output)
+    let written = progress::shown(messages.quiet, |context| {
+        let written = [job.run(&options, context)?];
+        report.write(&written, context).map(|()| written)
+    })?;
+    outcome::tell(&written, &messages, takes_output)
 }
 
 /// Arguments that make sense: what the library needs.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde_json::json;
-use trueup::{Error, Evaluation, PixelEvaluation, Project, StatedEvaluation};
+use trueup::{Error, Evaluation, Measures, PixelEvaluation, Project, StatedEvaluation};
 
 use crate::arguments::EvaluateArgs;
 use crate::failure::Failure;
@@ -25,7 +25,7 @@ pub(crate) fn run(args: &EvaluateArgs) -> Result<(), Failure> {
     if args.json {
         let whole = json!({
             "project": args.project.display().to_string(),
-            "measures": project.measures,
+            "measures": project.measures.as_ref().map(Measures::without_places),
             "truth": evaluation,
             "pixels": pixels.as_ref().and_then(|pixels| pixels.as_ref().ok()),
             "pixels_skipped": pixels.as_ref().and_then(|pixels| pixels.as_ref().err()),

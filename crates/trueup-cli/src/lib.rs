@@ -16,6 +16,8 @@ mod option_list;
 mod outcome;
 mod output;
 mod progress;
+mod report;
+mod serve;
 mod stitch;
 mod stopping;
 mod summary;
@@ -47,6 +49,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Task::Compare(args) => compare::run(*args),
         Task::Inspect(args) => inspect::run(&args),
         Task::Evaluate(args) => evaluate::run(&args),
+        Task::Report(args) => report::run(&args),
+        Task::Serve(args) => serve::run(args),
         Task::Options(args) => option_list::run(&args),
         Task::Completions(args) => installing::completions(&args),
         Task::Manual(args) => installing::manual(&args),

@@ -7,12 +7,16 @@ use crate::chosen;
 use crate::failure::Failure;
 use crate::outcome;
 use crate::progress;
+use crate::report::ReportBeside;
 
 pub(crate) fn run(args: StitchArgs) -> Result<(), Failure> {
     let messages = args.messages.clone();
-    let CheckedStitch { job, options } = CheckedStitch::new(args)?;
+    let CheckedStitch { job, options, report } = CheckedStitch::new(args)?;
     let takes_output = job.outputs.take_standard_output();
-    let written = progress::shown(messages.quiet, |context| job.run(&options, context))?;
+    let written = progress::shown(messages.quiet, |context| {
+        let written = job.run(&options, context)?;
+        report.write(&written, context).map(|()| written)
+    })?;
     outcome::tell(&written, &messages, takes_output)
 }
 
@@ -20,25 +24,29 @@ pub(crate) fn run(args: StitchArgs) -> Result<(), Failure> {
 struct CheckedStitch {
     job: StitchJob,
     options: StitchOptions,
+    report: ReportBeside,
 }
 
 impl CheckedStitch {
     fn new(args: StitchArgs) -> Result<Self, Failure> {
         let StitchArgs { photographs, files, geometry, .. } = args;
         let options = chosen::options(StitchOptions::default(), &args.tuning, &args.typed)?;
+        let report = ReportBeside { file: files.report.clone(), threads: chosen::threads(&args.tuning) };
         let outputs = chosen::outputs(files);
         chosen::check_files(&outputs, chosen::configuration(&args.tuning))?;
+        report.check(&outputs)?;
         let inputs = Inputs {
             photographs,
             reference: chosen::reference(geometry.reference),
             graph: geometry.graph,
+            lens_from: geometry.lens_from,
             all: args.all,
             masks: chosen::masks(&args.masks)?,
             require_all: geometry.require_all,
             ..Inputs::default()
         };
         let job = StitchJob { inputs, outputs, cache: geometry.cache, threads: chosen::threads(&args.tuning) };
-        Ok(Self { job, options })
+        Ok(Self { job, options, report })
     }
 }
 
@@ -74,7 +82,7 @@ mod tests {
 
     #[test]
     fn without_flags_every_option_has_its_default() {
-        let CheckedStitch { job, options } = checked(&["--reference", "auto"]).expect("valid");
+        let CheckedStitch { job, options, .. } = checked(&["--reference", "auto"]).expect("valid");
         assert_eq!(options, StitchOptions::default());
         assert_eq!(job.inputs, Inputs::new(["a.jpg"]));
         assert_eq!(job.threads, 0);

@@ -18,8 +18,12 @@ mod masks;
 mod options;
 mod pictures;
 mod references;
+mod report;
 mod run;
+#[cfg(unix)]
+mod serving;
 mod sphere;
 #[cfg(unix)]
 mod stopping;
+mod strangers;
 mod told;

@@ -28,40 +28,44 @@ mod project;
 mod report;
 
 pub use job::{
-    ComposeJob, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, ReadFile, Reference, SideOutput, StitchJob, Written,
-    thread_pool,
+    ComposeJob, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, ReadFile, RecordedPanorama, Reference, SideOutput,
+    StitchJob, Written, thread_pool, write_thumbnail,
 };
 pub use memo::{CacheUse, PhotographCache};
 pub use options::{
-    AlignOptions, ArrangeOptions, ComposeOptions, Evidence, MatchOptions, MeasureOptions, Method, Phase, RandomOptions,
-    ResourceOptions, RunOptions, ShapeOptions, StitchOptions, Structure, WorkingOptions,
+    AlignOptions, ArrangeOptions, ChangedOption, ComposeOptions, Evidence, MatchOptions, MeasureOptions, Method, Phase,
+    RandomOptions, ResourceOptions, RunOptions, ShapeOptions, StitchOptions, Structure, WorkingOptions,
 };
 pub use pipeline::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use project::{
-    Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord,
-    Project, ProjectionRecord, hugin_project,
+    Canvas, CropRecord, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION,
+    PairRecord, Project, ProjectionRecord, hugin_project,
 };
+pub use report::brightness::BrightnessStep;
 pub use report::evaluation::{
     Evaluation, PhotographEvaluation, PixelEvaluation, StatedEvaluation, compare_overlaps, evaluate, evaluate_pixels,
     read_truth, scale_up_to,
 };
 pub use report::judgement::{Judgement, Verdict};
 pub use report::measures::{
-    BentLine, LongLines, Measures, PhotographMeasures, ReprojectionMeasures, UprightMeasures, WorstPair,
+    BentLine, LongLines, MeasuredLine, Measures, PairMeasures, PhotographMeasures, PlaceMeasures, ReprojectionMeasures,
+    UprightMeasures, WorstPair,
 };
+pub use report::shown::ShownPhotographs;
+pub use trueup_align::cameras::{CameraOptions, LensKind};
 pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;
 pub use trueup_compose::render::{Panorama, Rendered};
 pub use trueup_core::context::{CancelToken, Progress, Silent};
 pub use trueup_core::diagnostics::{Diagnostic, Reported, Severity, Subject};
-pub use trueup_core::options::{InvalidOption, OptionDescription, Tier};
+pub use trueup_core::options::{InvalidOption, OptionDescription, OptionValue, Tier};
 pub use trueup_core::raster::{Photograph, Raster, RowSource};
 pub use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 pub use trueup_core::truth::{ImageTruth, Truth};
 pub use trueup_core::{Error, Result, StageContext};
 pub use trueup_io::encode::{
-    Depth, Metadata, OutputOptions, abandon_unfinished, check_place, write as write_picture, write_atomically,
-    written_extensions,
+    Depth, Metadata, OutputOptions, abandon_unfinished, check_place, same_place, write as write_picture,
+    write_atomically, written_extensions,
 };
 pub use trueup_io::source::{InMemory, names_photograph, readable_formats};

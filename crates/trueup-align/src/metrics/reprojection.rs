@@ -33,18 +33,8 @@ pub struct MatchedPair<'a> {
 /// the two photographs' own. `None` without a match that lies in unfolded places of both. On a full turn whose ends
 /// meet, distances are taken modulo its `period`.
 pub fn reprojection(pairs: &[MatchedPair], period: Option<f64>) -> Option<Reprojection> {
-    let mut distances: Vec<f64> = pairs
-        .iter()
-        .flat_map(|pair| {
-            pair.matches.iter().filter_map(|one| {
-                let (p, q) = (Vector2::from(one.in_a), Vector2::from(one.in_b));
-                let scale = ((squared_scale(pair.a, p) + squared_scale(pair.b, q)) / 2.0).sqrt();
-                let way = pair.a.warp(p) - pair.b.warp(q);
-                let distance = wrap_length(way.x, period).hypot(way.y) / scale;
-                distance.is_finite().then_some(distance)
-            })
-        })
-        .collect();
+    let mut distances: Vec<f64> =
+        pairs.iter().flat_map(|pair| match_distances(pair, period)).filter(|distance| distance.is_finite()).collect();
     if distances.is_empty() {
         return None;
     }
@@ -56,6 +46,17 @@ pub fn reprojection(pairs: &[MatchedPair], period: Option<f64>) -> Option<Reproj
         mean_px: distances.iter().sum::<f64>() / count,
         rms_px: (distances.iter().map(|distance| distance * distance).sum::<f64>() / count).sqrt(),
         percentile_95_px: distances[rank.clamp(1, distances.len()) - 1],
+    })
+}
+
+/// How far apart each match of a pair lands, in the order of the matches, measured as by [`reprojection`]; not finite where
+/// that is no number.
+pub fn match_distances(pair: &MatchedPair, period: Option<f64>) -> impl Iterator<Item = f64> {
+    pair.matches.iter().map(move |one| {
+        let (p, q) = (Vector2::from(one.in_a), Vector2::from(one.in_b));
+        let scale = ((squared_scale(pair.a, p) + squared_scale(pair.b, q)) / 2.0).sqrt();
+        let way = pair.a.warp(p) - pair.b.warp(q);
+        wrap_length(way.x, period).hypot(way.y) / scale
     })
 }
 

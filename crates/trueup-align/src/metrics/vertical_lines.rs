@@ -1,6 +1,6 @@
 //! Which lines of a photograph are vertical ones.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use trueup_core::camera::Camera;
 use trueup_core::lines::LineSegment;
 use trueup_core::source::WorkingFrame;
@@ -41,6 +41,24 @@ pub fn vertical_segments(photograph: &VerticalLinesInput) -> Vec<usize> {
     let mut segments: Vec<usize> = (0..planes.len()).filter(points_down).map(|plane| planes.indices[plane]).collect();
     segments.sort_unstable();
     segments
+}
+
+/// Which of three directions each of a photograph's segments points to: the nearest of `directions` (in the camera's frame, of
+/// unit length), within 1.5 degrees of the segment's interpretation plane. An entry for every segment of `lines`, which are
+/// in the working pixels of `camera`; `None` where it points to none of them.
+pub fn directions_of_segments(
+    lines: &[LineSegment],
+    camera: &Camera,
+    directions: &[Vector3<f64>; 3],
+) -> Vec<Option<usize>> {
+    let tolerance = VERTICAL_LINE_DEG.to_radians().sin();
+    let pointed_to = |line: &LineSegment| {
+        let [start, end] = [line.start, line.end].map(|end| camera.bearing(Vector2::from(end)));
+        let normal = start.cross(&end).try_normalize(f64::MIN_POSITIVE)?;
+        let off = |direction: usize| normal.dot(&directions[direction]).abs();
+        (0..3).min_by(|&one, &two| off(one).total_cmp(&off(two))).filter(|&nearest| off(nearest) <= tolerance)
+    };
+    lines.iter().map(pointed_to).collect()
 }
 
 /// The direction that the segments' planes share, near the expected one, down in the camera's frame.
@@ -126,5 +144,21 @@ mod tests {
         };
         assert!(found(&[], Vector3::y()).is_empty());
         assert!(found(&lines, Vector3::z()).is_empty(), "looks straight down");
+    }
+
+    /// A camera of focal length 100 px that looks along z: an upright segment points to y, one that runs to the middle to z,
+    /// one aslant beside it to none, and a point nowhere.
+    #[test]
+    fn segments_point_to_the_nearest_direction_or_to_none() {
+        let camera = Camera::new(100.0, 200.0, 100.0, &Matrix3::identity());
+        let segment = |start: [f64; 2], end: [f64; 2]| LineSegment { start, end, width_px: 1.0, significance: 1.0 };
+        let lines = [
+            segment([20.0, 10.0], [20.0, 90.0]),
+            segment([200.0, 100.0], [150.0, 75.0]),
+            segment([20.0, 30.0], [60.0, 70.0]),
+            segment([5.0, 5.0], [5.0, 5.0]),
+        ];
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+        assert_eq!(directions_of_segments(&lines, &camera, &axes), [Some(1), Some(2), None, None]);
     }
 }

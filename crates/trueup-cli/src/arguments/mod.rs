@@ -3,6 +3,8 @@
 mod compare;
 mod compose;
 mod option_flags;
+mod report;
+mod serve;
 mod shared;
 mod side_outputs;
 mod stitch;
@@ -16,6 +18,8 @@ pub(crate) use compare::CompareArgs;
 pub(crate) use compose::ComposeArgs;
 pub(crate) use option_flags::TypedOptions;
 pub use option_flags::{OPTION_FLAGS, OptionFlag};
+pub(crate) use report::ReportArgs;
+pub(crate) use serve::ServeArgs;
 pub(crate) use shared::{FailOn, FileArgs, MaskArgs, MessageArgs, TuningArgs};
 pub(crate) use stitch::StitchArgs;
 
@@ -25,7 +29,9 @@ Examples:
   trueup stitch IMG_01*.jpg -o pano.png --scale 0.5 --project pano.json
   trueup compose pano.json -o large.tif
   trueup inspect pano.json --verbose
+  trueup serve holiday/
   trueup evaluate pano.json --truth truth.json
+  trueup report pano.json -o pano.html
   trueup compare holiday/ -o holiday-compared
   trueup options --expert";
 
@@ -53,10 +59,18 @@ pub(crate) enum Task {
     /// Photographs are measured and matched once. The folder holds a page to look at (index.html), a page on which people
     /// rank unnamed panoramas (ranking.html), every figure as JSON, the panoramas and their project files.
     Compare(Box<CompareArgs>),
+    /// Show a page to stitch in, for one person on this machine, until Ctrl-C
+    ///
+    /// Prints an address to open in a browser. Photographs stay on this machine, and nobody else is let in.
+    Serve(ServeArgs),
     /// Print what a project file says of its panorama: the summary that `stitch` printed, with each photograph's measures
     Inspect(InspectArgs),
     /// Print every measure of a panorama: its own, against the truth, and of the pixels where photographs overlap
     Evaluate(EvaluateArgs),
+    /// Write a page that shows why a panorama looks as it does: outlines, seams, lines, alignment, light, and what to make of it
+    ///
+    /// One HTML file that loads nothing. The photographs are read again to draw them; nothing is measured again.
+    Report(ReportArgs),
     /// List the options: default, range, unit, meaning
     ///
     /// Those that people have a reason to change for a panorama of their own; with --expert, those of the methods as well.

@@ -11,15 +11,19 @@ const STITCH_AND_COMPOSE: &[&str] = &["stitch", "compose"];
 const STITCH_AND_COMPARE: &[&str] = &["stitch", "compare"];
 const ALL: &[&str] = &["stitch", "compose", "compare"];
 
+const PHOTOGRAPHS: &str = "Photographs";
 const OUTPUT: &str = "Output";
 const VIEW: &str = "View";
 const TUNING: &str = "Tuning";
 
 /// Every flag that sets an option: the flag, the option, the heading in the help, the subcommands that take it.
 pub const OPTION_FLAGS: &[OptionFlag] = &[
+    OptionFlag::new("lens", "cameras.lens", PHOTOGRAPHS, STITCH_AND_COMPARE),
+    OptionFlag::new("lens-fov", "cameras.fov", PHOTOGRAPHS, STITCH_AND_COMPARE),
     OptionFlag::new("scale", "canvas.scale", OUTPUT, STITCH_AND_COMPOSE),
     OptionFlag::new("quality", "output.jpeg_quality", OUTPUT, ALL),
     OptionFlag::new("depth", "output.depth", OUTPUT, STITCH_AND_COMPOSE),
+    OptionFlag::new("look", "render.look", VIEW, STITCH_AND_COMPOSE),
     OptionFlag::new("projection", "projection.kind", VIEW, STITCH_AND_COMPOSE),
     OptionFlag::new("yaw", "projection.yaw", VIEW, STITCH_AND_COMPOSE).of_a_view(),
     OptionFlag::new("pitch", "projection.pitch", VIEW, STITCH_AND_COMPOSE).of_a_view(),

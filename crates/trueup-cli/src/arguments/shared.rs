@@ -19,6 +19,11 @@ fn panorama_help() -> String {
     format!("The panorama; {} chooses the format", trueup::written_extensions())
 }
 
+/// Takes a number of threads.
+pub(crate) fn threads_argument() -> clap::builder::RangedI64ValueParser<u16> {
+    clap::value_parser!(u16).range(0..=MAX_THREADS)
+}
+
 /// What is written.
 #[derive(Debug, Args)]
 pub(crate) struct FileArgs {
@@ -28,6 +33,10 @@ pub(crate) struct FileArgs {
 
     #[command(flatten)]
     pub beside: SideOutputArgs,
+
+    /// Write a page that shows why the panorama looks as it does
+    #[arg(long, value_name = "FILE.html", help_heading = "Output")]
+    pub report: Option<PathBuf>,
 }
 
 /// How the geometry is found where none is recorded.
@@ -44,6 +53,10 @@ pub(crate) struct GeometryArgs {
     /// Match only the pairs in this file, one `NAME -- NAME` a line
     #[arg(long, value_name = "FILE", help_heading = "Photographs")]
     pub graph: Option<PathBuf>,
+
+    /// Take the lens from the project of other photographs through it
+    #[arg(long, value_name = "PROJECT.json", help_heading = "Photographs")]
+    pub lens_from: Option<PathBuf>,
 
     /// Keep what is found in the photographs in this folder, so that later runs need not find it again
     #[arg(long, value_name = "DIR", help_heading = "Photographs")]
@@ -79,7 +92,7 @@ pub(crate) struct TuningArgs {
         long,
         value_name = "N",
         allow_hyphen_values = true,
-        value_parser = clap::value_parser!(u16).range(0..=MAX_THREADS),
+        value_parser = threads_argument(),
         help_heading = "Tuning"
     )]
     pub threads: Option<u16>,

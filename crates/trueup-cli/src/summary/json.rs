@@ -1,7 +1,7 @@
 //! The summary for programs.
 
 use serde_json::{Value, json};
-use trueup::{Diagnostic, ImageStatus, Project, Written};
+use trueup::{Diagnostic, ImageStatus, Measures, Project, Written};
 
 /// The summary of panoramas that were written, as JSON: docs/command-line.md says what its fields mean.
 pub(crate) fn json(written: &[Written]) -> String {
@@ -12,7 +12,7 @@ pub(crate) fn json(written: &[Written]) -> String {
 }
 
 fn panorama(written: &Written) -> Value {
-    let Project { images, canvas, measures, seconds, reference, .. } = &written.project;
+    let Project { images, canvas, crop, measures, seconds, reference, .. } = &written.project;
     let names = written.project.photograph_names();
     let path = |path: &std::path::Path| path.display().to_string();
     let beside: serde_json::Map<String, Value> =
@@ -28,13 +28,14 @@ fn panorama(written: &Written) -> Value {
         "width": canvas.width,
         "height": canvas.height,
         "full_turn": canvas.full_turn,
+        "cropped": crop.map(|crop| json!({ "lost": crop.lost, "filled": crop.filled })),
         "reference": reference,
         "used": used,
         "left_out": left_out
             .map(|image| json!({ "path": image.path, "reason": image.reason, "hint": image.hint }))
             .collect::<Vec<_>>(),
         "judgement": written.project.judgement(),
-        "measures": measures,
+        "measures": measures.as_ref().map(Measures::without_places),
         "warnings": warnings.collect::<Vec<_>>(),
         "seconds": seconds.values().sum::<f64>(),
     })

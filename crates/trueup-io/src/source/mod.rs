@@ -24,6 +24,7 @@ use crate::metadata::orientation::{TagVerdict, judge_orientation};
 use duplicates::Accepted;
 use in_memory::in_memory_source;
 use inputs::Candidate;
+pub use opened::PANORAMA_OF_OTHERS;
 use opened::{Named, OWN_PANORAMA, OpenedPicture, check_size, open_picture};
 use rejection::Rejection;
 
@@ -54,7 +55,8 @@ pub struct RejectedSource {
     pub name: String,
     /// Stable machine-readable reason in kebab case: `file-missing`, `pattern-without-match`, `folder-without-pictures`,
     /// `folder-not-file`, `file-unreadable`, `file-empty`, `not-a-picture`, `format-unsupported`, `picture-damaged`,
-    /// `picture-too-large`, `picture-too-small`, `duplicate`, `own-panorama`, `name-of-a-file`.
+    /// `picture-too-large`, `picture-too-small`, `duplicate`, `own-panorama`,
+    /// `panorama-of-others`, `name-of-a-file`.
     pub code: String,
     /// Why it cannot be used, without a closing full stop.
     pub reason: String,
@@ -210,7 +212,20 @@ fn examine(
     };
     let focal_prior = header.focal_prior();
     let camera_model = header.exif.camera_model();
-    Ok(SourceImage { path, name: name.to_owned(), width, height, orientation, focal_prior, camera_model })
+    let Header { exif, .. } = header;
+    let focal_mm = exif.focal_mm.filter(|focal_mm| focal_mm.is_finite() && *focal_mm > 0.0);
+    Ok(SourceImage {
+        path,
+        name: name.to_owned(),
+        width,
+        height,
+        orientation,
+        focal_prior,
+        camera_model,
+        lens_model: exif.lens_model,
+        focal_mm,
+        lens: None,
+    })
 }
 
 fn stale_tag_note(number: usize, header: &Header) -> Diagnostic {

@@ -2,19 +2,17 @@
 
 use std::path::PathBuf;
 
-use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
 
-use super::masks::{AllMasks, MaskFile, MaskRecord};
+use super::masks::MaskFile;
 use super::outputs::{Outputs, ReadFile};
+use super::reopen::RecordedPanorama;
 use super::threads::thread_pool;
 use super::write::Written;
 use crate::options::StitchOptions;
 use crate::pipeline::Stitcher;
-use crate::pipeline::photographs::FoundPhotographs;
 use crate::project::read::Recorded;
-use crate::project::record::{ImageRecord, Project};
-use crate::project::replace::{other_photographs, recorded_photographs};
+use crate::project::record::Project;
 
 /// Which recorded panorama to compose, of which photographs, and where to put it.
 ///
@@ -75,21 +73,13 @@ impl ComposeJob {
         self.outputs.refuse_over(self.masks.iter().map(|mask| (mask.file.as_path(), ReadFile::Mask)))?;
         thread_pool(self.threads)?.install(|| {
             let stitcher = Stitcher::new(options, context);
-            let images = self.find_photographs(options, context)?;
-            let mut masks = AllMasks::read(&self.masks, &images, &options.measure.source, context)?;
-            let recorded: Vec<&[MaskRecord]> = self.project.used_images().map(|one| one.masks.as_slice()).collect();
-            masks.recall(&recorded, &images, &self.project_folder, &options.measure.source, context)?;
-            let alignment =
-                stitcher.recall(&self.project, FoundPhotographs { images, masks, ..FoundPhotographs::default() })?;
-            self.outputs.write(&stitcher, alignment)
+            let recorded = RecordedPanorama {
+                project: &self.project,
+                project_folder: &self.project_folder,
+                photographs: self.photographs.as_deref(),
+                masks: &self.masks,
+            };
+            self.outputs.write(&stitcher, stitcher.reopen(&recorded)?)
         })
-    }
-
-    fn find_photographs(&self, options: &StitchOptions, context: &StageContext) -> Result<Vec<SourceImage>> {
-        let records: Vec<&ImageRecord> = self.project.used_images().collect();
-        match &self.photographs {
-            Some(folder) => other_photographs(&records, folder, &options.measure.source, context),
-            None => recorded_photographs(&records, &self.project_folder, &options.measure.source, context),
-        }
     }
 }

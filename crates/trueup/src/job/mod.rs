@@ -3,19 +3,24 @@
 mod compose;
 pub(crate) mod inputs;
 mod layers;
+pub(crate) mod lens_from;
 pub(crate) mod masks;
 pub(crate) mod names;
 mod outputs;
+mod reopen;
 mod side_outputs;
 mod stitch;
 mod threads;
+mod thumbnail;
 mod write;
 
 pub use compose::ComposeJob;
 pub use inputs::{Inputs, Reference};
 pub use masks::{MaskFile, MaskKind, MaskRecord};
 pub use outputs::{Outputs, ReadFile};
+pub use reopen::RecordedPanorama;
 pub use side_outputs::SideOutput;
 pub use stitch::StitchJob;
 pub use threads::thread_pool;
+pub use thumbnail::write_thumbnail;
 pub use write::Written;

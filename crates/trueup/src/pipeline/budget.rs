@@ -121,6 +121,9 @@ mod tests {
             orientation: 1,
             focal_prior: None,
             camera_model: None,
+            lens_model: None,
+            focal_mm: None,
+            lens: None,
         };
         (0..count).map(image).collect()
     }

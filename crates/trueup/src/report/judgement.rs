@@ -83,7 +83,9 @@ impl Project {
         }
     }
 
-    fn limits_apart_px(&self) -> [f64; 2] {
+    /// How far apart 95 of 100 matched points may land for the alignment to be good, and to be fair, in the photographs' own
+    /// pixels.
+    pub fn limits_apart_px(&self) -> [f64; 2] {
         let side = self.used_images().map(|image| image.width.max(image.height)).max().unwrap_or(0) as f64;
         [0, 1].map(|limit| (APART[limit] * side).max(LEAST_APART_PX[limit]))
     }
@@ -184,6 +186,7 @@ mod tests {
             ld: 0.0,
             ld_mean: 0.0,
             folds: 0,
+            pairs: Vec::new(),
             photographs: vec![serde_json::from_value(photograph).expect("a photograph")],
         });
         project

@@ -1,6 +1,7 @@
 //! How upright, straight and well aligned a panorama is, by its own lines and matches: what is recorded of every one.
 
 use serde::{Deserialize, Serialize};
+use trueup_align::metrics::Straightness;
 
 /// The paper prints LD in hundredths.
 pub(crate) const HUNDREDTHS: f64 = 100.0;
@@ -26,6 +27,73 @@ pub struct Measures {
     /// Each photograph's own figures, in the order of the photographs used.
     #[serde(rename = "pictures")]
     pub photographs: Vec<PhotographMeasures>,
+    /// Where matched points land how far apart, of every pair whose overlap was to coincide. Empty in projects of earlier
+    /// versions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pairs: Vec<PairMeasures>,
+}
+
+impl Measures {
+    /// The figures alone, without the places that they were measured at: what is told in short.
+    #[must_use]
+    pub fn without_places(&self) -> Self {
+        let figures = |one: &PhotographMeasures| PhotographMeasures { lines: Vec::new(), ..one.clone() };
+        Self { pairs: Vec::new(), photographs: self.photographs.iter().map(figures).collect(), ..self.clone() }
+    }
+}
+
+/// How far apart the matched points of one pair land, in the photographs' own pixels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PairMeasures {
+    /// Position of the first photograph in [`crate::Project::images`].
+    pub a: usize,
+    /// Position of the second photograph.
+    pub b: usize,
+    /// Matches measured.
+    pub matches: usize,
+    /// Mean distance.
+    pub mean_px: f64,
+    /// 95 of 100 are not farther apart.
+    pub percentile_95_px: f64,
+    /// The same by places: squares of a sixteenth of the longer side of the first photograph, as far as there are matches in
+    /// them, row after row.
+    pub places: Vec<PlaceMeasures>,
+}
+
+/// How far apart the matched points around a place land.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PlaceMeasures {
+    /// Their mean place in the first photograph, in its pixels.
+    pub at: [f64; 2],
+    /// How many there are.
+    pub matches: usize,
+    /// Mean distance in the photographs' own pixels.
+    pub mean_px: f64,
+}
+
+/// A long straight line of a photograph, and what became of it in the panorama.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MeasuredLine {
+    /// One end in the photograph, in its pixels.
+    pub start: [f64; 2],
+    /// The other end.
+    pub end: [f64; 2],
+    /// Which of the photograph's vanishing directions it points to, by its position in
+    /// [`crate::ImageRecord::vanishing_points`]; `None` if to none of them, or if there are none.
+    pub direction: Option<usize>,
+    /// Its length in panorama pixels.
+    pub length_px: f64,
+    /// Root mean square distance of its points from straight, in panorama pixels.
+    pub rms_px: f64,
+    /// Largest such distance.
+    pub off_px: f64,
+}
+
+impl MeasuredLine {
+    /// How straight it is in the panorama.
+    pub fn straightness(&self) -> Straightness {
+        Straightness { length_px: self.length_px, rms_px: self.rms_px, largest_px: self.off_px }
+    }
 }
 
 /// How upright the panorama is by the lines of all its photographs, over those whose lean is certain.
@@ -114,4 +182,7 @@ pub struct PhotographMeasures {
     pub gamma_deg: Option<f64>,
     /// Whether the lean is sure to a degree.
     pub certain: bool,
+    /// Its long lines. Empty in projects of earlier versions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lines: Vec<MeasuredLine>,
 }

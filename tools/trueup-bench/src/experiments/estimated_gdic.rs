@@ -1,10 +1,10 @@
 //! GDIC that a panorama's own vertical lines estimate against the true one.
 
 use trueup::Result;
+use trueup_report::charts::{Chart, Series, SeriesMark};
 
 use super::methods_compared;
 use crate::methods::{Family, methods_of};
-use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::Results;
 use crate::sets::Catalogue;

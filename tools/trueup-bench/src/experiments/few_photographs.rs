@@ -1,9 +1,9 @@
 //! Two to six photographs: how often vanishing points are believed, and how upright the panorama is.
 
 use trueup::Result;
+use trueup_report::charts::{Chart, Series, SeriesMark};
 
 use crate::published_forms::DIVERGENCE_GATE;
-use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Section, Table, number};
 use crate::results::Results;
 use crate::sets::Catalogue;

@@ -1,8 +1,8 @@
 //! Metadata that lie about the focal length.
 
 use trueup::Result;
+use trueup_report::charts::{Chart, Series, SeriesMark};
 
-use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Section, Table, number};
 use crate::results::{Results, short_name};
 use crate::sets::{Catalogue, SetSpec};

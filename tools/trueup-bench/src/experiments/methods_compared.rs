@@ -1,6 +1,7 @@
 //! T2: local distortion and direction inconsistency of every method on whole sets, and the prior's error without a mesh.
 
 use trueup::Result;
+use trueup_report::charts::{Chart, Series, SeriesMark};
 
 use super::grid::{GridRow, id_of, table};
 use super::paper_figures::NATURAL;
@@ -8,7 +9,6 @@ use crate::methods::{
     AANAP_PUBLISHED, ComparedMethod, Family, GSP_2D, GSP_2D_PUBLISHED, GSP_3D, GSP_3D_PUBLISHED, METHODS, VIEW, VPG,
     VPG_PUBLISHED, methods_of,
 };
-use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::{Results, short_name};
 use crate::sets::{Catalogue, SetSpec};

@@ -1,10 +1,10 @@
 //! Cameras that look up: where the published relative roll and one similarity per photograph fail.
 
 use trueup::Result;
+use trueup_report::charts::{Chart, Series, SeriesMark};
 
 use crate::methods::{Family, LEVELLED, VPG, VPG_PUBLISHED, method, methods_of};
 use crate::published_forms::{OWN_VANISHING_POINTS, PUBLISHED_MESH, RELATIVE_TWIST};
-use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Section, Table, number};
 use crate::results::Results;
 use crate::sets::{Catalogue, SetSpec};

@@ -1,9 +1,9 @@
 //! T4: every photograph in turn as the reference.
 
 use trueup::Result;
+use trueup_report::charts::{Chart, Series, SeriesMark};
 
 use crate::methods::{Family, GSP_2D_PUBLISHED, GSP_3D_PUBLISHED, VPG, VPG_PUBLISHED, methods_of};
-use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::{Results, short_name};
 use crate::sets::{Catalogue, SetSpec};

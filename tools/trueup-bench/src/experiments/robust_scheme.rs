@@ -1,11 +1,11 @@
 //! T3: outlier rejection and path voting under noise on the vanishing points.
 
 use trueup::Result;
+use trueup_report::charts::{Chart, Point, Series, SeriesMark};
 
 use super::grid::{GridRow, table};
 use super::paper_figures::NOISE;
 use crate::published_forms::VPG_AS_PUBLISHED;
-use crate::report::charts::{Chart, Point, Series, SeriesMark};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::{Results, short_name};
 use crate::sets::{Catalogue, SetSpec};

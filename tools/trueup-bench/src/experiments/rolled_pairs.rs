@@ -1,9 +1,9 @@
 //! Figure 1: two photographs, the second turned about its axis.
 
 use trueup::Result;
+use trueup_report::charts::{Chart, Series, SeriesMark};
 
 use crate::methods::{APAP, GSP_3D_PUBLISHED, SPHP, SPHP_FREE, VPG, VPG_PUBLISHED, method};
-use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Claim, Section, Table, number};
 use crate::results::Results;
 use crate::sets::Catalogue;

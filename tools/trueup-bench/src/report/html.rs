@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use trueup_report::escape;
+
 use super::document::{Block, Document, Table};
 use super::markdown::verdict;
 
@@ -124,11 +126,6 @@ fn between(text: &str, mark: &str, element: &str) -> String {
         };
     }
     html
-}
-
-/// Text with the characters that mean something in HTML replaced.
-pub(crate) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

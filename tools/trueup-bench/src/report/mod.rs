@@ -1,6 +1,5 @@
 //! Writing what was found: Markdown, one HTML page, CSV.
 
-pub(crate) mod charts;
 pub(crate) mod csv;
 pub(crate) mod document;
 pub(crate) mod html;

@@ -1,10 +1,10 @@
 //! What is shown of the gate: counts, divergences, curve, thresholds.
 
 use trueup::StitchOptions;
+use trueup_report::charts::{Chart, Series, SeriesMark};
 
 use super::classes::{Class, FULL, NAME, PAPER, Part, claims, class, families, fitted_threshold};
 use crate::experiments::paper_figures::{MANHATTAN_DIVERGENCES, OTHER_DIVERGENCES, THRESHOLD};
-use crate::report::charts::{Chart, Series, SeriesMark};
 use crate::report::document::{Block, Section, Table, number};
 use crate::results::Results;
 use crate::roc::{self, RocPoint};

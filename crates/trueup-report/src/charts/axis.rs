@@ -14,11 +14,12 @@ pub(super) struct Scale {
 const LABELS: f64 = 6.0;
 
 impl Scale {
-    /// An axis that ends at the label above `high`.
+    /// An axis that begins at the label below `low` and ends at the one above `high`.
     pub(super) fn new(low: f64, high: f64, start: f64, end: f64) -> Self {
         let exact = Self::exact(low, high, start, end);
-        let labels = ((exact.high - exact.low) / exact.step - 1e-9).ceil().max(1.0);
-        Self { high: exact.low + labels * exact.step, ..exact }
+        let low = (exact.low / exact.step + 1e-9).floor() * exact.step;
+        let labels = ((exact.high - low) / exact.step - 1e-9).ceil().max(1.0);
+        Self { low, high: low + labels * exact.step, ..exact }
     }
 
     /// An axis from `low` to `high`. An empty or infinite range becomes one unit wide.

@@ -4,7 +4,7 @@ mod axis;
 
 use std::fmt::Write;
 
-use super::html::escape;
+use crate::text::escape;
 use axis::Scale;
 
 /// Colors that the color-blind can tell apart (Okabe and Ito, Color Universal Design, 2008).
@@ -19,7 +19,7 @@ const BOTTOM: f64 = 56.0;
 
 /// How a series is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum SeriesMark {
+pub enum SeriesMark {
     /// Bars from zero, side by side with those of the other series.
     Bars,
     /// A line with a dot at every point.
@@ -32,7 +32,7 @@ pub(crate) enum SeriesMark {
 
 /// One point of a series.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Point {
+pub struct Point {
     /// Where: a number, or the position of a category.
     pub x: f64,
     /// How much.
@@ -43,7 +43,7 @@ pub(crate) struct Point {
 
 /// Points that belong together.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Series {
+pub struct Series {
     /// Name in the legend.
     pub name: String,
     /// How it is drawn.
@@ -54,7 +54,7 @@ pub(crate) struct Series {
 
 /// A drawing.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Chart {
+pub struct Chart {
     /// Words at the horizontal axis.
     pub x_label: String,
     /// Words at the vertical axis.
@@ -63,6 +63,8 @@ pub(crate) struct Chart {
     pub categories: Vec<String>,
     /// Lower and upper end of the horizontal axis where the points do not say it.
     pub x_range: Option<(f64, f64)>,
+    /// Lower end of the vertical axis; 0 unless told.
+    pub y_min: Option<f64>,
     /// Upper end of the vertical axis where the points do not say it.
     pub y_max: Option<f64>,
     /// What is drawn.
@@ -73,7 +75,7 @@ pub(crate) struct Chart {
 
 impl Series {
     /// A series without deviations.
-    pub(crate) fn plain(name: &str, mark: SeriesMark, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+    pub fn plain(name: &str, mark: SeriesMark, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let points = points.into_iter().map(|(x, y)| Point { x, y, deviation: 0.0 }).collect();
         Self { name: name.to_owned(), mark, points }
     }
@@ -81,12 +83,13 @@ impl Series {
 
 impl Chart {
     /// A chart of these series without further wishes.
-    pub(crate) fn new(x_label: &str, y_label: &str, series: Vec<Series>) -> Self {
+    pub fn new(x_label: &str, y_label: &str, series: Vec<Series>) -> Self {
         Self {
             x_label: x_label.to_owned(),
             y_label: y_label.to_owned(),
             categories: Vec::new(),
             x_range: None,
+            y_min: None,
             y_max: None,
             series,
             rules: Vec::new(),
@@ -94,15 +97,15 @@ impl Chart {
     }
 
     /// Names along the horizontal axis.
-    pub(crate) fn with_categories(self, categories: impl IntoIterator<Item = impl Into<String>>) -> Self {
+    pub fn with_categories(self, categories: impl IntoIterator<Item = impl Into<String>>) -> Self {
         Self { categories: categories.into_iter().map(Into::into).collect(), ..self }
     }
 
     /// The drawing.
-    pub(crate) fn svg(&self) -> String {
+    pub fn svg(&self) -> String {
         let points = || self.series.iter().flat_map(|series| &series.points).filter(|point| drawable(point));
         let highest = points().map(|point| point.y + point.deviation).fold(0.0, f64::max);
-        let y = Scale::new(0.0, self.y_max.unwrap_or(highest), HEIGHT - BOTTOM, TOP);
+        let y = Scale::new(self.y_min.unwrap_or(0.0), self.y_max.unwrap_or(highest), HEIGHT - BOTTOM, TOP);
         let x = match (self.categories.len(), self.x_range) {
             (0, Some((low, high))) => Scale::exact(low, high, LEFT, WIDTH - RIGHT),
             (0, None) => {
@@ -113,8 +116,11 @@ impl Chart {
             (count, _) => Scale::exact(-0.5, count as f64 - 0.5, LEFT, WIDTH - RIGHT),
         };
         let mut svg = format!(
-            "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" role=\"img\" \
-             font-family=\"system-ui, sans-serif\" font-size=\"12\" xmlns=\"http://www.w3.org/2000/svg\">\n"
+            "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" class=\"chart\" role=\"img\" \
+             aria-label=\"Chart: {} by {}\" font-family=\"system-ui, sans-serif\" font-size=\"12\" \
+             xmlns=\"http://www.w3.org/2000/svg\">\n",
+            escape(&self.y_label),
+            escape(&self.x_label)
         );
         self.draw_axes(&mut svg, &x, &y);
         for (index, series) in self.series.iter().enumerate() {
@@ -151,6 +157,13 @@ impl Chart {
             );
         }
         let floor = HEIGHT - BOTTOM;
+        if self.y_min.is_some_and(|low| low < 0.0) {
+            let (zero, right) = (y.place(0.0), WIDTH - RIGHT);
+            let _ = writeln!(
+                svg,
+                "<line x1=\"{LEFT}\" y1=\"{zero:.1}\" x2=\"{right:.1}\" y2=\"{zero:.1}\" stroke=\"#444\"/>"
+            );
+        }
         let named: Vec<(f64, String)> = match self.categories.is_empty() {
             true => x.ticks().into_iter().map(|tick| (tick, x.label(tick))).collect(),
             false => self.categories.iter().enumerate().map(|(k, name)| (k as f64, name.clone())).collect(),
@@ -198,7 +211,8 @@ impl Chart {
             match series.mark {
                 SeriesMark::Bars => {
                     let left = at + (rank - bars / 2.0) * step;
-                    let height = y.place(0.0) - top;
+                    let height = (y.place(0.0) - top).abs();
+                    let top = top.min(y.place(0.0));
                     at = left + step / 2.0;
                     let _ = writeln!(
                         svg,
@@ -212,7 +226,10 @@ impl Chart {
                 }
             }
             if point.deviation > 0.0 {
-                let (low, high) = (y.place((point.y - point.deviation).max(0.0)), y.place(point.y + point.deviation));
+                let (low, high) = (
+                    y.place((point.y - point.deviation).max(self.y_min.unwrap_or(0.0))),
+                    y.place(point.y + point.deviation),
+                );
                 let _ = writeln!(
                     svg,
                     "<line x1=\"{at:.1}\" y1=\"{low:.1}\" x2=\"{at:.1}\" y2=\"{high:.1}\" stroke=\"#1d2430\"/>"
@@ -271,6 +288,16 @@ mod tests {
         assert!(svg.contains("<rect x=\"103.0\""), "{svg}");
         assert!(svg.contains("<rect x=\"259.0\""), "{svg}");
         assert!(!svg.contains("NaN"));
+    }
+
+    /// -1.5 to 1.5 in steps of 0.5 over 234 px: a unit is 78 px, and 0 lies 117 px below the upper end at 40.
+    #[test]
+    fn bars_below_zero_hang_from_it() {
+        let bars = Series::plain("a", SeriesMark::Bars, [(0.0, -1.0), (1.0, 1.5)]);
+        let svg =
+            Chart { y_min: Some(-1.5), ..Chart::new("set", "stops", vec![bars]) }.with_categories(["01", "02"]).svg();
+        assert!(svg.contains("y=\"157.0\" width=\"312.0\" height=\"78.0\""), "{svg}");
+        assert!(svg.contains("y=\"40.0\" width=\"312.0\" height=\"117.0\""), "{svg}");
     }
 
     #[test]
