@@ -2,7 +2,7 @@
 
 use moxcms::{
     Chromaticity, CicpColorPrimaries, CicpProfile, ColorPrimaries, ColorProfile, MatrixCoefficients,
-    TransferCharacteristics, XyY,
+    ToneReprCurve, TransferCharacteristics, XyY,
 };
 
 use super::icc::compact;
@@ -59,9 +59,14 @@ pub(crate) fn profile_of_code_points(primaries: u16, transfer: u16) -> Option<Ve
         matrix_coefficients: MatrixCoefficients::Identity,
         full_range: true,
     };
+    ToneReprCurve::try_from(cicp.transfer_characteristics).ok()?;
     let mut profile = ColorProfile::new_srgb();
+    profile.cicp = None;
+    // What this returns is false whatever it does (moxcms 0.8); the numbers are there when it has taken the primaries.
+    profile.update_rgb_colorimetry_from_cicp(cicp);
+    profile.cicp.as_ref()?;
     let name = format!("primaries {primaries}, transfer {transfer} of H.273");
-    profile.update_rgb_colorimetry_from_cicp(cicp).then(|| compact(profile, &name).to_vec())
+    Some(compact(profile, &name).to_vec())
 }
 
 /// The profile of samples with sRGB's curve and these primaries; `None` if they are sRGB's.

@@ -54,5 +54,5 @@ fn stored(source: &SourceImage) -> Result<Photograph> {
     })?;
     let room = source.width.saturating_mul(source.height).saturating_mul(format.pixel_bytes);
     check_room(format_args!("decoding {}", source.name), room)?;
-    (format.pixels)(source, input)
+    format.pixels(source, input)
 }
