@@ -9,6 +9,7 @@ use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
 
 use super::orientation::upright;
+use crate::format::PLAIN_PIXEL_BYTES;
 use crate::formats;
 use crate::metadata::header;
 
@@ -42,6 +43,17 @@ pub fn sample_bits(source: &SourceImage) -> Result<u16> {
             "Do not change photographs while they are stitched; start again.",
         )
     })
+}
+
+/// Most bytes that decoding one of these takes beyond twice four channels of 8 bits, which every decoder takes: decoders of some formats
+/// hold several planes of 32 bits. A file that cannot be read counts for nothing.
+pub fn decoding_surplus(sources: &[SourceImage]) -> usize {
+    let surplus = |source: &SourceImage| {
+        let pixel_bytes = header::open(&source.path).map_or(0, |(_, format)| format.pixel_bytes);
+        let pixels = source.width.saturating_mul(source.height);
+        pixels.saturating_mul(pixel_bytes.saturating_sub(PLAIN_PIXEL_BYTES))
+    };
+    sources.iter().map(surplus).max().unwrap_or(0)
 }
 
 /// Decodes the pixels as they are stored, before orientation.

@@ -1,7 +1,8 @@
 //! Files that other programs made, and what a file that was cut off says.
 //!
 //! Those in `files` were made by cjxl 0.7 and heif-enc 1.15 of [`level`]; `rotated.heic` has a property that turns it, `turned.jxl` was
-//! a JPEG with an orientation. What djxl and heif-convert of the same versions made of those with loss lies beside them, as PNG.
+//! a JPEG with an orientation. What djxl and heif-convert of the same versions made of those with loss lies beside them, as PNG. Those in
+//! OpenEXR were made by its own library, OpenEXR 3.5, of the light of [`level`]; `tiles.exr` has the alpha of [`opacity`].
 
 use std::io::Cursor;
 
@@ -23,6 +24,11 @@ const HEIGHT: usize = 18;
 /// The level of channel `c` at column x and row y.
 fn level(x: usize, y: usize, c: usize) -> u8 {
     [40 + 3 * x, 60 + 4 * y, 200 - 2 * x - 2 * y][c] as u8
+}
+
+/// The opacity at column x.
+fn opacity(x: usize) -> u8 {
+    5 * x as u8 + 100
 }
 
 fn scanned(bytes: &[u8]) -> (TempDir, Sources) {
@@ -113,7 +119,7 @@ fn opacity_is_kept() {
     for (bytes, most) in [(file!("rgba.jxl"), 0), (file!("alpha.heic"), 3)] {
         let Photograph::Eight(raster) = read(bytes).2 else { panic!("16 bit") };
         for x in 0..WIDTH {
-            assert!(raster.pixel(x, 7)[3].abs_diff(5 * x as u8 + 100) <= most);
+            assert!(raster.pixel(x, 7)[3].abs_diff(opacity(x)) <= most);
         }
     }
 }
@@ -266,6 +272,29 @@ fn exr_files_of_another_writer_are_read() {
     }
 }
 
+/// Samples of half as many bits, whose share of rounding is a twentieth of a level, in every compression; B44 has loss.
+#[test]
+fn exr_files_of_its_own_library_are_read() {
+    let cases: [(&[u8], usize, f64); 6] = [
+        (file!("piz.exr"), 3, 0.1),
+        (file!("pxr24.exr"), 3, 0.1),
+        (file!("rle.exr"), 3, 0.1),
+        (file!("b44.exr"), 3, 2.0),
+        (file!("tiles.exr"), 4, 0.2),
+        (file!("gray.exr"), 1, 0.1),
+    ];
+    for (number, (bytes, channels, most)) in cases.into_iter().enumerate() {
+        let (_folder, source, decoded) = read(bytes);
+        assert_eq!((source.width, source.height), (WIDTH, HEIGHT), "{number}");
+        assert_eq!((decoded.channels(), decoded.sample_bits()), (channels, 16), "{number}");
+        let found = difference(&decoded, |x, y, c| f64::from(level(x, y, c)));
+        assert!(found <= most, "{number}: {found}");
+        if channels == 4 {
+            assert!((0..WIDTH).all(|x| (level_at(&decoded, x, 5, 3) - f64::from(opacity(x))).abs() < 0.1));
+        }
+    }
+}
+
 #[test]
 fn our_exr_is_read_by_another_reader() {
     let image = exr::prelude::read()
@@ -293,6 +322,7 @@ fn files_that_are_cut_off_are_refused() {
         file!("turned.jxl"),
         file!("yuv420.heic"),
         file!("alpha.heic"),
+        file!("tiles.exr"),
         exr.as_slice(),
         hdr.as_slice(),
     ] {

@@ -23,7 +23,7 @@ pub(crate) static TARGETS: [Target; 12] = [
     Target { name: "webp", seeds: || pictures::seeds("webp"), read: pictures::read },
     Target { name: "heic", seeds: pictures::heic, read: pictures::read },
     Target { name: "jxl", seeds: pictures::jpeg_xl, read: pictures::read },
-    Target { name: "exr", seeds: || pictures::seeds("exr"), read: pictures::read },
+    Target { name: "exr", seeds: pictures::open_exr, read: pictures::read },
     Target { name: "hdr", seeds: || pictures::seeds("hdr"), read: pictures::read },
     Target { name: "icc", seeds: pictures::profiles, read: pictures::read_profile },
     Target { name: "project", seeds: texts::projects, read: texts::read_project },

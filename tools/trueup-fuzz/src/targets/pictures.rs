@@ -103,6 +103,12 @@ pub(super) fn heic() -> Vec<Vec<u8>> {
     files.map(<[u8]>::to_vec).into()
 }
 
+/// Pictures in every compression, in lines and in tiles, and those that trueup writes.
+pub(super) fn open_exr() -> Vec<Vec<u8>> {
+    let files = files!("piz.exr", "pxr24.exr", "b44.exr", "rle.exr", "tiles.exr", "gray.exr");
+    seeds("exr").into_iter().chain(files.map(<[u8]>::to_vec)).collect()
+}
+
 /// Pictures with and without loss, of whole numbers and not, bare and in boxes.
 pub(super) fn jpeg_xl() -> Vec<Vec<u8>> {
     let files = files!("rgb.jxl", "rgb16.jxl", "rgba.jxl", "gray.jxl", "lossy.jxl", "float.jxl", "turned.jxl");
