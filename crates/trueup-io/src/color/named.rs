@@ -1,8 +1,8 @@
 //! Profiles of color spaces that files name in numbers.
 
 use moxcms::{
-    Chromaticity, CicpColorPrimaries, CicpProfile, ColorPrimaries, ColorProfile, MatrixCoefficients,
-    ToneReprCurve, TransferCharacteristics, XyY,
+    Chromaticity, CicpColorPrimaries, CicpProfile, ColorPrimaries, ColorProfile, MatrixCoefficients, ToneReprCurve,
+    TransferCharacteristics, XyY,
 };
 
 use super::icc::compact;
@@ -125,6 +125,17 @@ mod tests {
             white: [0.32168, 0.33767],
         };
         assert!(name(profile_of_chromaticities(aces)).is_some());
+    }
+
+    /// Names of any length: readers refuse a profile whose length is none.
+    #[test]
+    fn profiles_are_as_long_as_they_say() {
+        for (primaries, transfer) in [(12, 13), (9, 13), (9, 16), (12, 8), (11, 17)] {
+            let Some(icc) = profile_of_code_points(primaries, transfer) else { continue };
+            assert_eq!(icc[..4], (icc.len() as u32).to_be_bytes(), "{primaries} {transfer}");
+            assert_eq!(icc.len() % 4, 0, "{primaries} {transfer}");
+        }
+        assert!(profile_of_code_points(12, 13).is_some() && profile_of_code_points(9, 13).is_some());
     }
 
     #[test]

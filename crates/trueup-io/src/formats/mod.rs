@@ -11,6 +11,8 @@ mod foreign;
 mod heic;
 mod jpeg;
 mod jxl;
+#[cfg(test)]
+mod light_tests;
 pub(crate) mod linear_light;
 mod open_exr;
 pub(crate) mod png;

@@ -178,12 +178,8 @@ mod tests {
         let grid = [&[0, 8][..], &tiles.to_be_bytes(), &[0, 7].repeat(usize::from(tiles))].concat();
         let references = [vec![0; 4], media_box(b"cdsc", b"?"), media_box(b"dimg", &grid)].concat();
         let properties = media_box(b"ipco", &[media_box(b"ispe", b"?"), media_box(b"hvcC", &[0; 90])].concat());
-        let boxes = [
-            vec![0; 4],
-            media_box(b"iloc", &places),
-            media_box(b"iprp", &properties),
-            media_box(b"iref", &references),
-        ];
+        let boxes =
+            [vec![0; 4], media_box(b"iloc", &places), media_box(b"iprp", &properties), media_box(b"iref", &references)];
         [media_box(b"ftyp", b"heic"), media_box(b"meta", &boxes.concat()), media_box(b"mdat", &[0; 1000])].concat()
     }
 

@@ -19,6 +19,9 @@ pub(super) const PIXEL_BYTES: usize = 12;
 /// Most bytes of a header: each of its lines is a command that someone may have typed.
 const MOST_HEADER_BYTES: u64 = 1 << 20;
 
+/// What tells how samples were made of light; below 1, as ImageMagick writes it, they are those of a curve.
+const GAMMA_KEY: &str = "GAMMA=";
+
 /// Bits that a shared exponent and mantissa make of a sample, as told of floating point samples.
 const BITS: u16 = 32;
 
@@ -55,6 +58,13 @@ fn header(input: &mut Input) -> std::result::Result<Header, HeaderError> {
         }
         if let Some(software) = text.strip_prefix(SOFTWARE_KEY) {
             header.software = Some(software.trim().to_owned());
+        }
+        if text
+            .strip_prefix(GAMMA_KEY)
+            .and_then(|gamma| gamma.trim().parse().ok())
+            .is_some_and(|gamma: f64| gamma < 1.0)
+        {
+            return Err(HeaderError::Unsupported(format!("samples that are no light, by its line {text}")));
         }
         if text.starts_with("FORMAT=") && text != FORMAT {
             return Err(HeaderError::Unsupported(format!("{text} instead of {FORMAT}")));
