@@ -178,6 +178,14 @@ fn color_spaces_are_named() {
     assert_eq!(space(file!("p3.heic")), ("primaries 12, transfer 13 of H.273".to_owned(), true));
 }
 
+/// A tile of 1203 x 1203 pixels of which 24 x 18 are shown: what is decoded for them is not what the picture's size says.
+#[test]
+fn what_is_coded_is_in_proportion_to_what_is_shown() {
+    let (_folder, sources) = scanned(file!("part.heic"));
+    let reasons: Vec<&str> = sources.rejected.iter().map(|rejected| rejected.reason.as_str()).collect();
+    assert!(matches!(reasons[..], [reason] if reason.contains("small part of what is coded")), "{reasons:?}");
+}
+
 /// Wherever it ends, a file is refused with a reason, and never taken for whole.
 pub(super) fn check_cut_off(whole: &[u8]) {
     let step = (whole.len() / 40).max(1);
