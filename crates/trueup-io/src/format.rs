@@ -3,6 +3,7 @@
 use std::fmt;
 use std::fs::File;
 use std::io::{BufReader, Seek, Write};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use exif::{Field, Tag};
@@ -13,6 +14,7 @@ use trueup_core::{Result, StageContext};
 use crate::encode::failure::WriteFailure;
 use crate::encode::metadata::Metadata;
 use crate::encode::options::{Depth, OutputOptions};
+use crate::formats::decoded::damaged;
 use crate::metadata::exif_fields::ExifFields;
 
 /// One file format. Everything that depends on the format of a file asks its declaration.
@@ -32,7 +34,8 @@ pub(crate) struct Format {
 /// A file that is read, from its first byte on.
 pub(crate) type Input = BufReader<File>;
 
-/// How a format is read. Nothing but `pixels` reads pixels.
+/// How a format is read. Nothing but `pixels` reads pixels. What is read goes through the methods of the same names, which contain
+/// panics of decoders.
 pub(crate) struct Reading {
     /// Which photographs are read, for docs/formats.md.
     #[cfg_attr(not(test), expect(dead_code, reason = "for the page of formats, which a test compares"))]
@@ -50,6 +53,47 @@ pub(crate) struct Reading {
     /// The pixels as they are stored, before orientation. Refuses what is damaged, incomplete, or no longer of the size that
     /// was found when the photograph was examined.
     pub(crate) pixels: fn(&SourceImage, Input) -> Result<Photograph>,
+    /// Bytes of a pixel on its way into memory: in the decoder, and in the photograph beside it.
+    pub(crate) pixel_bytes: usize,
+}
+
+/// [`Reading::pixel_bytes`] of decoders that write samples as they are handed out: four channels of 8 bits, in the decoder and in the
+/// photograph, or once with 16 bits.
+pub(crate) const PLAIN_PIXEL_BYTES: usize = 8;
+
+/// What is said of a file at which a decoder panicked.
+const BROKE_DOWN: &str = "its decoder broke down";
+
+/// What `work` makes of a file. A panic, which only a mistake in a decoder makes, costs the file and not the program.
+fn contained<T>(work: impl FnOnce() -> T) -> std::result::Result<T, &'static str> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|_| BROKE_DOWN)
+}
+
+impl Reading {
+    /// What the field `stored` reads.
+    pub(crate) fn stored(&self, input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
+        contained(|| (self.stored)(input)).unwrap_or_else(|words| Err(HeaderError::damaged(words)))
+    }
+
+    /// What the field `icc` reads.
+    pub(crate) fn icc(&self, input: &mut Input) -> Option<Vec<u8>> {
+        contained(|| (self.icc)(input)).unwrap_or_default()
+    }
+
+    /// What the field `exif` reads.
+    pub(crate) fn exif(&self, input: &mut Input) -> Option<ExifFields> {
+        contained(|| (self.exif)(input)).unwrap_or_default()
+    }
+
+    /// What the field `whole_fields` reads.
+    pub(crate) fn whole_fields(&self, input: &mut Input, wanted: &[Tag]) -> Option<Vec<Field>> {
+        contained(|| (self.whole_fields)(input, wanted)).unwrap_or_default()
+    }
+
+    /// What the field `pixels` reads.
+    pub(crate) fn pixels(&self, source: &SourceImage, input: Input) -> Result<Photograph> {
+        contained(|| (self.pixels)(source, input)).unwrap_or_else(|words| Err(damaged(source, words)))
+    }
 }
 
 /// How many bytes of a file's start [`Reading::has_signature`] sees.
@@ -95,6 +139,14 @@ impl HeaderError {
     /// A header that the codec cannot make sense of.
     pub(crate) fn damaged(words: impl fmt::Display) -> Self {
         Self::Damaged(words.to_string())
+    }
+
+    /// Why, without more.
+    pub(crate) fn words(&self) -> &str {
+        match self {
+            Self::Damaged(words) | Self::Unsupported(words) => words,
+            Self::Foreign(foreign) => foreign.what,
+        }
     }
 }
 
@@ -191,5 +243,30 @@ pub(crate) fn lower_extension(path: &Path) -> Option<String> {
 impl fmt::Debug for Format {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(self.name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_decoder_that_panics_costs_its_file_alone() {
+        let file = tempfile::tempfile().expect("a file");
+        let mut input = BufReader::new(file);
+        let broken = Reading {
+            kinds: "none",
+            has_signature: |_| true,
+            stored: |_| panic!("stored"),
+            icc: |_| panic!("icc"),
+            exif: |_| panic!("exif"),
+            whole_fields: |_, _| panic!("fields"),
+            pixels: |_, _| panic!("pixels"),
+            pixel_bytes: PLAIN_PIXEL_BYTES,
+        };
+        let stored = broken.stored(&mut input).map_err(|error| error.words().to_owned());
+        assert_eq!(stored, Err("its decoder broke down".to_owned()));
+        assert!(broken.icc(&mut input).is_none() && broken.exif(&mut input).is_none());
+        assert!(broken.whole_fields(&mut input, &[]).is_none());
     }
 }

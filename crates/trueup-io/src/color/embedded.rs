@@ -30,12 +30,12 @@ pub(crate) fn read(path: &Path) -> Embedded {
 
 fn try_read(path: &Path) -> Option<Embedded> {
     let (mut input, format) = open(path)?;
-    let icc = (format.icc)(&mut input).filter(|icc| !icc.is_empty());
+    let icc = format.icc(&mut input).filter(|icc| !icc.is_empty());
     if icc.is_some() {
         return Some(Embedded { icc, is_adobe_rgb: false });
     }
     input.rewind().ok()?;
-    let exif = (format.exif)(&mut input).unwrap_or_default();
+    let exif = format.exif(&mut input).unwrap_or_default();
     Some(Embedded { icc: None, is_adobe_rgb: names_adobe_rgb(&exif) })
 }
 

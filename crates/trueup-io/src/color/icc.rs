@@ -145,8 +145,12 @@ static SRGB: LazyLock<(Arc<ColorProfile>, Arc<[u8]>)> = LazyLock::new(|| {
 const DATE: std::ops::Range<usize> = 24..36;
 const FIXED_DATE: [u8; 12] = [0x07, 0xd0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0];
 
+/// Where a profile says how many bytes it has, which are so many at a time (ICC.1:2022, sections 7.2.2 and 7.1.2).
+const SIZE: std::ops::Range<usize> = 0..4;
+const ALIGNMENT: usize = 4;
+
 /// A profile as bytes that are always the same, without what pictures do not need.
-fn compact(mut profile: ColorProfile, name: &str) -> Arc<[u8]> {
+pub(super) fn compact(mut profile: ColorProfile, name: &str) -> Arc<[u8]> {
     profile.cicp = None;
     // Of a display, version 4 wants the adapted white here; the chromatic adaptation tag tells the unadapted.
     profile.media_white_point = Some(WHITE_POINT_D50.to_xyzd());
@@ -157,6 +161,12 @@ fn compact(mut profile: ColorProfile, name: &str) -> Arc<[u8]> {
     }
     // Encoding fails for tables only, which these have none of.
     let mut bytes = profile.encode().unwrap_or_default();
+    // The encoder does not pad the last tag; readers refuse what is not aligned.
+    bytes.resize(bytes.len().next_multiple_of(ALIGNMENT), 0);
+    let length = (bytes.len() as u32).to_be_bytes();
+    if let Some(size) = bytes.get_mut(SIZE) {
+        size.copy_from_slice(&length);
+    }
     if let Some(date) = bytes.get_mut(DATE) {
         date.copy_from_slice(&FIXED_DATE);
     }

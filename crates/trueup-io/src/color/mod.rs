@@ -10,6 +10,7 @@
 mod convert;
 mod embedded;
 pub(crate) mod icc;
+mod named;
 mod rows;
 mod sanity;
 #[cfg(test)]
@@ -20,5 +21,6 @@ mod tests;
 
 pub(crate) use convert::Conversion;
 pub use icc::srgb_profile;
+pub(crate) use named::{Chromaticities, profile_of_chromaticities, profile_of_code_points};
 pub(crate) use rows::InSrgb;
 pub use survey::PhotographColors;

@@ -11,5 +11,5 @@ mod working;
 
 pub use files::FilePhotographs;
 pub use mask::mask;
-pub use photograph::{photograph, sample_bits};
+pub use photograph::{decoding_surplus, photograph, sample_bits};
 pub use working::{WorkingPicture, reduce_photograph, working};

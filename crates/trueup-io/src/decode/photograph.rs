@@ -9,11 +9,9 @@ use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
 
 use super::orientation::upright;
+use crate::format::PLAIN_PIXEL_BYTES;
 use crate::formats;
 use crate::metadata::header;
-
-/// Bytes of a pixel while it is decoded: four channels of 8 bits, in the decoder and in the photograph, or once with 16 bits.
-const ROOM_PIXEL_BYTES: usize = 8;
 
 /// Decodes a photograph in full size, upright.
 ///
@@ -47,9 +45,15 @@ pub fn sample_bits(source: &SourceImage) -> Result<u16> {
     })
 }
 
-/// Bytes that a photograph takes on its way into memory.
-fn room(source: &SourceImage) -> usize {
-    source.width.saturating_mul(source.height).saturating_mul(ROOM_PIXEL_BYTES)
+/// Most bytes that decoding one of these takes beyond twice four channels of 8 bits, which every decoder takes: decoders of some formats
+/// hold several planes of 32 bits. A file that cannot be read counts for nothing.
+pub fn decoding_surplus(sources: &[SourceImage]) -> usize {
+    let surplus = |source: &SourceImage| {
+        let pixel_bytes = header::open(&source.path).map_or(0, |(_, format)| format.pixel_bytes);
+        let pixels = source.width.saturating_mul(source.height);
+        pixels.saturating_mul(pixel_bytes.saturating_sub(PLAIN_PIXEL_BYTES))
+    };
+    sources.iter().map(surplus).max().unwrap_or(0)
 }
 
 /// Decodes the pixels as they are stored, before orientation.
@@ -60,6 +64,7 @@ fn stored(source: &SourceImage) -> Result<Photograph> {
         let reason = format!("it is not a {} picture", formats::readable_formats());
         Error::input(&source.name, reason, "Give the photograph again.")
     })?;
-    check_room(format_args!("decoding {}", source.name), room(source))?;
-    (format.pixels)(source, input)
+    let room = source.width.saturating_mul(source.height).saturating_mul(format.pixel_bytes);
+    check_room(format_args!("decoding {}", source.name), room)?;
+    format.pixels(source, input)
 }

@@ -79,11 +79,13 @@ pub(super) fn check_sides(path: &Path, limit: SideLimit, width: usize, height: u
 
 impl OutputOptions {
     /// These options with the depth decided: [`Depth::Auto`] becomes 16 where `photograph_bits`, the most bits a sample of
-    /// the photographs has, is above 8 and the format of `path` can hold it, else 8.
+    /// the photographs has, is above 8 and the format of `path` can hold it, else 8; and floating point where the format has nothing
+    /// else.
     pub fn with_depth_for(&self, path: &Path, photograph_bits: u16) -> Self {
-        let can_hold = || formats::writing_of(path).is_some_and(|writing| writing.depths.contains(&Depth::Sixteen));
+        let depths = formats::writing_of(path).map_or(&[][..], |writing| writing.depths);
         let depth = match self.depth {
-            Depth::Auto if photograph_bits > 8 && can_hold() => Depth::Sixteen,
+            Depth::Auto if depths == [Depth::Float] => Depth::Float,
+            Depth::Auto if photograph_bits > 8 && depths.contains(&Depth::Sixteen) => Depth::Sixteen,
             Depth::Auto => Depth::Eight,
             chosen => chosen,
         };

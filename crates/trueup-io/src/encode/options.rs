@@ -29,13 +29,13 @@ trueup_core::choice! {
 trueup_core::choice! {
     /// Bits of a sample.
     pub enum Depth {
-        /// 16 where a photograph has more than 8 and the format can hold them, else 8.
+        /// 16 where a photograph has more than 8 and the format can hold them, else 8; float where the format has nothing else.
         Auto = "auto",
         /// 8 bits.
         Eight = "8",
         /// 16 bits: PNG and TIFF.
         Sixteen = "16",
-        /// Linear light as 32-bit floating point numbers, 1 for white: TIFF.
+        /// Linear light as 32-bit floating point numbers, 1 for white: TIFF, OpenEXR; rounded, Radiance.
         Float = "float",
     }
 }
@@ -131,11 +131,11 @@ trueup_core::choice! {
 trueup_core::options! {
     /// How panoramas are written. The format follows from the file's extension; WebP is always lossless.
     pub struct OutputOptions("output") {
-        /// Bits of a sample; JPEG, WebP and Deep Zoom have 8. Choose 16 or float when the panorama is to be edited further,
-        /// 8 when 16-bit photographs are to make a small file.
+        /// Bits of a sample; JPEG, WebP and Deep Zoom have 8, OpenEXR and Radiance are float. Choose 16 or float when the panorama
+        /// is to be edited further, 8 when 16-bit photographs are to make a small file.
         depth: Depth = Depth::Auto, Allowed::Any, "", basic;
-        /// Whether PNG, TIFF, WebP and Deep Zoom in PNG have transparency. Drop it for programs that show it wrongly, keep it
-        /// when what a chosen background covers must still be told apart.
+        /// Whether PNG, TIFF, WebP, OpenEXR and Deep Zoom in PNG have transparency. Drop it for programs that show it wrongly,
+        /// keep it when what a chosen background covers must still be told apart.
         alpha: Alpha = Alpha::Auto, Allowed::Any, "", basic;
         /// JPEG quality on the usual scale of the Independent JPEG Group. Raise it for prints, lower it where the file is too
         /// large to send.

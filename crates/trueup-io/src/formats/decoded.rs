@@ -5,7 +5,7 @@ use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
 
 /// Memory a decoder may take beside its pixels, in bytes.
-const DECODER_SLACK_BYTES: u64 = 64 << 20;
+pub(crate) const DECODER_SLACK_BYTES: u64 = 64 << 20;
 
 /// Most bytes a pixel takes in memory while it is decoded: four 32-bit samples.
 pub(crate) const MAX_PIXEL_BYTES: u64 = 16;

@@ -17,9 +17,9 @@ pub(crate) static RAW: Foreign = Foreign {
 /// The formats, the more special before the more general.
 ///
 /// # Source
-/// ISO/IEC 14496-12 and 23008-12 (boxes and their brands), ISO/IEC 18181-2 (JPEG XL), ISO/IEC 15444-1 annex I (JPEG 2000),
-/// OpenEXR File Layout, Radiance's picture files; of camera raw, LibRaw's identification of makers.
-static FOREIGN: [&Foreign; 18] = [
+/// ISO/IEC 14496-12 and 23008-12 (boxes and their brands), ISO/IEC 15444-1 annex I (JPEG 2000); of camera raw, LibRaw's identification
+/// of makers.
+static FOREIGN: [&Foreign; 14] = [
     &RAW,
     &Foreign {
         what: "a camera raw photograph of Canon (CR2)",
@@ -58,22 +58,10 @@ static FOREIGN: [&Foreign; 18] = [
         command: "avifdec photo.avif photo.png",
     },
     &Foreign {
-        what: "a HEIC picture",
-        extensions: &["heic", "heif", "hif"],
-        has_signature: |start| [b"hei", b"hev", b"mif", b"msf"].iter().any(|brand| has_brand(start, brand)),
-        command: "heif-convert photo.heic photo.jpg",
-    },
-    &Foreign {
         what: "a video",
         extensions: &[],
         has_signature: |start| start.get(4..8) == Some(b"ftyp") || start.starts_with(&[0x1a, 0x45, 0xdf, 0xa3]),
         command: "ffmpeg -i clip.mp4 -vf fps=2 frame-%03d.png",
-    },
-    &Foreign {
-        what: "a JPEG XL picture",
-        extensions: &["jxl"],
-        has_signature: |start| start.starts_with(&[0xff, 0x0a]) || start.starts_with(b"\0\0\0\x0cJXL \r\n\x87\n"),
-        command: "djxl photo.jxl photo.png",
     },
     &Foreign {
         what: "a JPEG 2000 picture",
@@ -82,18 +70,6 @@ static FOREIGN: [&Foreign; 18] = [
             start.starts_with(b"\0\0\0\x0cjP  \r\n\x87\n") || start.starts_with(&[0xff, 0x4f, 0xff, 0x51])
         },
         command: "magick photo.jp2 photo.tif",
-    },
-    &Foreign {
-        what: "an OpenEXR picture",
-        extensions: &["exr"],
-        has_signature: |start| start.starts_with(&[0x76, 0x2f, 0x31, 0x01]),
-        command: "magick photo.exr photo.tif",
-    },
-    &Foreign {
-        what: "a Radiance picture",
-        extensions: &["hdr"],
-        has_signature: |start| start.starts_with(b"#?RADIANCE") || start.starts_with(b"#?RGBE"),
-        command: "magick photo.hdr photo.tif",
     },
     &Foreign {
         what: "a GIF picture",
@@ -129,7 +105,7 @@ static FOREIGN: [&Foreign; 18] = [
 ];
 
 /// Whether a box of the kind `ftyp` names a brand that begins so.
-fn has_brand(start: &[u8], brand: &[u8; 3]) -> bool {
+pub(super) fn has_brand(start: &[u8], brand: &[u8; 3]) -> bool {
     start.get(4..8) == Some(b"ftyp") && start.get(8..11) == Some(brand)
 }
 
@@ -162,14 +138,9 @@ mod tests {
             (b"IIRO\x08\0\0\0", "a camera raw photograph of Olympus (ORF)"),
             (b"IIU\0\x08\0\0\0", "a camera raw photograph of Panasonic (RW2)"),
             (b"\0\0\0\x1cftypavif\0\0\0\0", "an AVIF picture"),
-            (b"\0\0\0\x18ftypheic\0\0\0\0", "a HEIC picture"),
-            (b"\0\0\0\x18ftypmif1\0\0\0\0", "a HEIC picture"),
             (b"\0\0\0\x20ftypisom\0\0\x02\0", "a video"),
             (b"\0\0\0\x20ftypmp42\0\0\x02\0", "a video"),
-            (b"\xff\x0a\xfa\x1f", "a JPEG XL picture"),
             (b"\0\0\0\x0cjP  \r\n\x87\n", "a JPEG 2000 picture"),
-            (b"\x76\x2f\x31\x01\x02\0\0\0", "an OpenEXR picture"),
-            (b"#?RADIANCE\nFORMAT", "a Radiance picture"),
             (b"GIF89a", "a GIF picture"),
         ] {
             assert_eq!(foreign_of(start).map(|foreign| foreign.what), Some(what));

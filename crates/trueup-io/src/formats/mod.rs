@@ -3,11 +3,22 @@
 //! A format is a file here with its declaration, its reader and its writer, and a row in [`FORMATS`]; `docs/formats.md` has
 //! a row for it in each of its tables, which a test compares with the declarations.
 
+pub(crate) mod alpha;
+mod boxes;
 pub(crate) mod decoded;
 mod deep_zoom;
 mod foreign;
+mod heic;
 mod jpeg;
+mod jxl;
+#[cfg(test)]
+mod light_tests;
+pub(crate) mod linear_light;
+mod open_exr;
 pub(crate) mod png;
+mod radiance;
+#[cfg(test)]
+mod reading_tests;
 #[cfg(test)]
 pub(crate) mod specimens;
 #[cfg(test)]
@@ -24,7 +35,17 @@ use crate::format::{Format, Input, Reading, SIGNATURE_BYTES, Writing};
 pub(crate) use foreign::{foreign_of, has_foreign_extension};
 
 /// All formats, in the order in which messages and pages name them.
-pub(crate) static FORMATS: [&Format; 5] = [&jpeg::JPEG, &png::PNG, &tiff::TIFF, &webp::WEBP, &deep_zoom::DEEP_ZOOM];
+pub(crate) static FORMATS: [&Format; 9] = [
+    &jpeg::JPEG,
+    &png::PNG,
+    &tiff::TIFF,
+    &webp::WEBP,
+    &heic::HEIC,
+    &jxl::JXL,
+    &open_exr::OPEN_EXR,
+    &radiance::RADIANCE,
+    &deep_zoom::DEEP_ZOOM,
+];
 
 /// The formats that are read.
 fn readable() -> impl Iterator<Item = (&'static Format, &'static Reading)> {

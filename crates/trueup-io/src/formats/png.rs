@@ -18,7 +18,8 @@ use crate::encode::options::{Depth, OutputOptions, PngCompression};
 use crate::encode::samples::{OutputSample, RGBA, flattened};
 use crate::encode::strips::{BUFFER_BYTES, STRIP_ROWS, channels_of, for_each_strip};
 use crate::format::{
-    Format, HeaderError, Input, LOSSLESS_BYTES, Output, Reading, SideLimit, StoredPixels, Transparency, Writer, Writing,
+    Format, HeaderError, Input, LOSSLESS_BYTES, Output, PLAIN_PIXEL_BYTES, Reading, SideLimit, StoredPixels,
+    Transparency, Writer, Writing,
 };
 use crate::metadata::block;
 
@@ -38,6 +39,7 @@ pub(crate) static PNG: Format = Format {
         exif: block::read_exif,
         whole_fields: block::read_fields,
         pixels,
+        pixel_bytes: PLAIN_PIXEL_BYTES,
     }),
     writing: Some(Writing {
         depths: &[Depth::Eight, Depth::Sixteen],

@@ -24,6 +24,13 @@ fn content_decides_not_the_name() {
     assert_eq!(format_of_content(b"MM\x00*"), Some("TIFF"));
     assert_eq!(format_of_content(b"II*\0\x10\0\0\0CR\x02\0"), None);
     assert_eq!(format_of_content(b"\x89PNG\r\n\x1a\n\0"), Some("PNG"));
+    assert_eq!(format_of_content(b"\0\0\0\x18ftypheic\0\0\0\0"), Some("HEIC"));
+    assert_eq!(format_of_content(b"\0\0\0\x18ftypmif1\0\0\0\0"), Some("HEIC"));
+    assert_eq!(format_of_content(b"\0\0\0\x1cftypavif\0\0\0\0"), None);
+    assert_eq!(format_of_content(b"\xff\x0a\xfa\x1f"), Some("JPEG XL"));
+    assert_eq!(format_of_content(b"\0\0\0\x0cJXL \r\n\x87\n"), Some("JPEG XL"));
+    assert_eq!(format_of_content(b"\x76\x2f\x31\x01\x02\0\0\0"), Some("OpenEXR"));
+    assert_eq!(format_of_content(b"#?RADIANCE\nFORMAT"), Some("Radiance"));
     assert_eq!(format_of_content(b""), None);
 }
 
@@ -33,8 +40,13 @@ fn extensions_are_read_in_any_case() {
     assert_eq!(format_of_name("a.JFIF"), Some("JPEG"));
     assert_eq!(format_of_name("a.dzi"), Some("Deep Zoom"));
     assert_eq!(format_of_name("a.txt"), None);
-    assert!(has_foreign_extension(Path::new("IMG_1.HEIC")));
-    assert!(names_photograph(Path::new("IMG_1.HEIC")) && !names_photograph(Path::new("a.dzi")));
+    assert_eq!(format_of_name("IMG_1.HEIC"), Some("HEIC"));
+    assert!(has_foreign_extension(Path::new("IMG_1.AVIF")));
+    assert!(
+        names_photograph(Path::new("IMG_1.AVIF"))
+            && names_photograph(Path::new("IMG_1.HEIC"))
+            && !names_photograph(Path::new("a.dzi"))
+    );
 }
 
 #[test]
@@ -61,7 +73,16 @@ fn formats_do_not_overlap() {
     endings.sort_unstable();
     endings.dedup();
     assert_eq!(endings.len(), count);
-    let starts: [&[u8]; 4] = [b"\xff\xd8\xff\xe0", b"\x89PNG\r\n\x1a\n", b"II*\0", b"RIFF....WEBP"];
+    let starts: [&[u8]; 8] = [
+        b"\xff\xd8\xff\xe0",
+        b"\x89PNG\r\n\x1a\n",
+        b"II*\0",
+        b"RIFF....WEBP",
+        b"\0\0\0\x18ftypheic",
+        b"\xff\x0a",
+        b"\x76\x2f\x31\x01",
+        b"#?RGBE",
+    ];
     for start in starts {
         assert_eq!(readable().filter(|(_, reading)| (reading.has_signature)(start)).count(), 1, "{start:?}");
     }

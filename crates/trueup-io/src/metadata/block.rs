@@ -1,4 +1,4 @@
-//! The EXIF block that a JPEG, PNG or WebP holds.
+//! The EXIF block that a picture file holds.
 
 use exif::{Exif, Field, In, Reader, Tag};
 
@@ -12,11 +12,22 @@ pub(crate) fn read_exif(input: &mut Input) -> Option<ExifFields> {
 
 /// The fields of these tags, of the picture itself.
 pub(crate) fn read_fields(input: &mut Input, wanted: &[Tag]) -> Option<Vec<Field>> {
-    let exif = read(input)?;
-    Some(wanted.iter().filter_map(|&tag| exif.get_field(tag, In::PRIMARY)).cloned().collect())
+    Some(fields_of(&read(input)?, wanted))
 }
 
-/// As much of the block as can be read.
+/// The fields of these tags that a block has, of the picture itself.
+pub(crate) fn fields_of(exif: &Exif, wanted: &[Tag]) -> Vec<Field> {
+    wanted.iter().filter_map(|&tag| exif.get_field(tag, In::PRIMARY)).cloned().collect()
+}
+
+/// As much of a block as can be read, from its byte order mark on.
+pub(crate) fn parsed(block: Vec<u8>) -> Option<Exif> {
+    let mut reader = Reader::new();
+    reader.continue_on_error(true);
+    reader.read_raw(block).or_else(|error| error.distill_partial_result(|_| {})).ok()
+}
+
+/// As much of the block of a JPEG, PNG or WebP as can be read.
 fn read(input: &mut Input) -> Option<Exif> {
     let mut reader = Reader::new();
     reader.continue_on_error(true);

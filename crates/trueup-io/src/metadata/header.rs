@@ -35,8 +35,8 @@ impl Header {
 pub(crate) fn read_header(file: File, format: &Reading) -> Result<Header, HeaderError> {
     let mut input = BufReader::new(file);
     input.rewind().map_err(HeaderError::damaged)?;
-    let stored = (format.stored)(&mut input)?;
-    let exif = input.rewind().ok().and_then(|_| (format.exif)(&mut input)).unwrap_or_default();
+    let stored = format.stored(&mut input)?;
+    let exif = input.rewind().ok().and_then(|_| format.exif(&mut input)).unwrap_or_default();
     Ok(Header { stored, exif })
 }
 
@@ -44,7 +44,7 @@ pub(crate) fn read_header(file: File, format: &Reading) -> Result<Header, Header
 pub(crate) fn sample_bits(file: File) -> Option<u16> {
     let mut input = BufReader::new(file);
     let format = formats::recognize(&mut input).ok()??;
-    (format.stored)(&mut input).ok().map(|stored| stored.bits)
+    format.stored(&mut input).ok().map(|stored| stored.bits)
 }
 
 /// The file at `path` at its first byte, and how to read it; `None` if it cannot be read or is in no format that is.
@@ -57,6 +57,6 @@ pub(crate) fn open(path: &Path) -> Option<(Input, &'static Reading)> {
 /// The EXIF fields of these tags that a file has, of the picture itself. A file that cannot be read has none; damaged fields
 /// are left out.
 pub(crate) fn read_fields(path: &Path, wanted: &[Tag]) -> Vec<Field> {
-    let fields = open(path).and_then(|(mut input, format)| (format.whole_fields)(&mut input, wanted));
+    let fields = open(path).and_then(|(mut input, format)| format.whole_fields(&mut input, wanted));
     fields.unwrap_or_default()
 }

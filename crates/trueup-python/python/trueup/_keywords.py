@@ -15,8 +15,8 @@ class SaveKeywords(TypedDict, total=False):
     """JPEG quality on the usual scale of the Independent JPEG Group. Raise it for prints, lower it where the file is
     too large to send (default 92)."""
     depth: Literal["auto", "8", "16", "float"]
-    """Bits of a sample; JPEG, WebP and Deep Zoom have 8. Choose 16 or float when the panorama is to be edited further,
-    8 when 16-bit photographs are to make a small file (default auto)."""
+    """Bits of a sample; JPEG, WebP and Deep Zoom have 8, OpenEXR and Radiance are float. Choose 16 or float when the
+    panorama is to be edited further, 8 when 16-bit photographs are to make a small file (default auto)."""
     background: str
     """What shows where no photograph is. A color is laid under the panorama in every format, unless alpha is kept:
     choose one to match the page or print that the panorama is put on (default auto)."""

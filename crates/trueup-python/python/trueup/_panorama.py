@@ -52,8 +52,8 @@ class Panorama(Recorded[_trueup.Panorama]):
         progress: Progress = None,
         **keywords: Unpack[SaveKeywords],
     ) -> int:
-        """Writes the panorama in the format that the extension names (JPEG, PNG, TIFF, WebP, Deep Zoom) and returns the file's
-        length in bytes. With the photographs' files at hand, the file is the very one that the command writes.
+        """Writes the panorama in the format that the extension names (JPEG, PNG, TIFF, WebP, OpenEXR, Radiance, Deep Zoom) and returns the
+        file's length in bytes. With the photographs' files at hand, the file is the very one that the command writes.
 
         ``project`` is a file for the record (JSON), ``pto`` one for the Hugin stitcher, ``layers`` for the aligned photographs
         (TIFF), ``seams`` for which photograph is shown where (PNG). Keywords set options of the file, such as ``quality``.

@@ -6,6 +6,7 @@ use trueup_core::memory::{MemoryBudget, bytes_in_words};
 use trueup_core::scratch::ScratchSpace;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
+use trueup_io::decode::{FilePhotographs, decoding_surplus};
 
 use super::machine::{self, MachineMemory};
 use crate::options::ResourceOptions;
@@ -72,7 +73,8 @@ impl Budget {
             return Ok(Measuring { at_once: usize::MAX, kept_bytes: 0 });
         };
         let features = (FEATURE_BYTES * working_pixels) as usize;
-        let one = bytes(largest).saturating_mul(DECODING).saturating_add(features);
+        let decoding = bytes(largest).saturating_mul(DECODING).saturating_add(decoding_surplus(images));
+        let one = decoding.saturating_add(features);
         let least = one.saturating_add(PROGRAM_BYTES);
         if least > self.ceiling {
             let words = |bytes: usize| bytes_in_words(bytes as u64);
@@ -90,10 +92,16 @@ impl Budget {
         Ok(Measuring { at_once: ((memory - kept_bytes) / one).max(1), kept_bytes })
     }
 
-    /// What composing may take while `kept` bytes of photographs are held elsewhere.
-    pub(super) fn composing<'a>(&self, kept: usize, scratch: &'a dyn ScratchSpace) -> Resources<'a> {
-        let left = |bytes: usize| bytes.saturating_sub(PROGRAM_BYTES).saturating_sub(kept);
-        Resources { memory: left(self.memory), ceiling: left(self.ceiling), scratch }
+    /// What composing may take beside what is kept of the photographs, and what the decoders of some of them take: every thread's, or
+    /// where that is too much, one's.
+    pub(super) fn composing<'a>(&self, photographs: &FilePhotographs, scratch: &'a dyn ScratchSpace) -> Resources<'a> {
+        let surplus = decoding_surplus(photographs.sources());
+        let left = |bytes: usize, decoders: usize| {
+            let taken = PROGRAM_BYTES.saturating_add(photographs.kept_bytes());
+            bytes.saturating_sub(taken.saturating_add(surplus.saturating_mul(decoders)))
+        };
+        let memory = left(self.memory, rayon::current_num_threads());
+        Resources { memory, ceiling: left(self.ceiling, 1), scratch }
     }
 }
 

@@ -337,7 +337,7 @@ impl<'a> Stitcher<'a> {
         }
         let input = ComposeInput {
             render: alignment.render_input(),
-            resources: budget.composing(alignment.photographs.kept_bytes(), &scratch),
+            resources: budget.composing(&alignment.photographs, &scratch),
             canvas: &canvas,
             kept: alignment.kept.clone(),
         };

@@ -89,6 +89,32 @@ pub(super) fn seeds(extension: &str) -> Vec<Vec<u8>> {
     seeds
 }
 
+/// Files of a format that is not written, from the tests of its reader.
+macro_rules! files {
+    ($($name:literal),+) => {
+        [$(&include_bytes!(concat!("../../../../crates/trueup-io/src/formats/files/", $name))[..]),+]
+    };
+}
+
+/// Pictures in tiles and whole, with alpha, EXIF, a turn and colors in numbers.
+pub(super) fn heic() -> Vec<Vec<u8>> {
+    let files =
+        files!("lossless.heic", "yuv420.heic", "alpha.heic", "deep.heic", "gray.heic", "rotated.heic", "p3.heic");
+    files.map(<[u8]>::to_vec).into()
+}
+
+/// Pictures in every compression, in lines and in tiles, and those that trueup writes.
+pub(super) fn open_exr() -> Vec<Vec<u8>> {
+    let files = files!("piz.exr", "pxr24.exr", "b44.exr", "rle.exr", "tiles.exr", "gray.exr");
+    seeds("exr").into_iter().chain(files.map(<[u8]>::to_vec)).collect()
+}
+
+/// Pictures with and without loss, of whole numbers and not, bare and in boxes.
+pub(super) fn jpeg_xl() -> Vec<Vec<u8>> {
+    let files = files!("rgb.jxl", "rgb16.jxl", "rgba.jxl", "gray.jxl", "lossy.jxl", "float.jxl", "turned.jxl");
+    files.map(<[u8]>::to_vec).into()
+}
+
 /// Profiles of every kind that is read.
 pub(super) fn profiles() -> Vec<Vec<u8>> {
     let all = [

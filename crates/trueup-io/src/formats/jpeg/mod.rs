@@ -6,7 +6,7 @@ mod segments;
 pub(super) mod write;
 
 use crate::encode::options::Depth;
-use crate::format::{Format, LOSSY_BYTES, Reading, SideLimit, Transparency, Writer, Writing};
+use crate::format::{Format, LOSSY_BYTES, PLAIN_PIXEL_BYTES, Reading, SideLimit, Transparency, Writer, Writing};
 use crate::metadata::block;
 
 /// The declaration.
@@ -26,6 +26,7 @@ pub(crate) static JPEG: Format = Format {
         exif: block::read_exif,
         whole_fields: block::read_fields,
         pixels: read::pixels,
+        pixel_bytes: PLAIN_PIXEL_BYTES,
     }),
     writing: Some(Writing {
         depths: &[Depth::Eight],

@@ -15,7 +15,7 @@ pub(crate) mod write;
 
 use super::foreign::is_cr2;
 use crate::encode::options::{Depth, TiffCompression};
-use crate::format::{Format, LOSSLESS_BYTES, Reading, Transparency, Writer, Writing};
+use crate::format::{Format, LOSSLESS_BYTES, PLAIN_PIXEL_BYTES, Reading, Transparency, Writer, Writing};
 
 /// The declaration.
 ///
@@ -37,6 +37,7 @@ pub(crate) static TIFF: Format = Format {
         exif: read::exif,
         whole_fields: read::whole_fields,
         pixels: read::pixels,
+        pixel_bytes: PLAIN_PIXEL_BYTES,
     }),
     writing: Some(Writing {
         depths: &[Depth::Eight, Depth::Sixteen, Depth::Float],

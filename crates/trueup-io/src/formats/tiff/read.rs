@@ -9,7 +9,7 @@ use trueup_core::raster::Photograph;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
 
-use super::convert::{encoded, rgb_of_cmyk, rgb_of_ycbcr, unpacked};
+use super::convert::{rgb_of_cmyk, rgb_of_ycbcr, unpacked};
 use super::page::{FirstPage, PixelKind};
 use super::palette;
 use super::raw::{failure, is_raw};
@@ -17,6 +17,7 @@ use super::samples::{Samples, TiffInput, not_as_stated, open};
 use crate::format::{HeaderError, Input, StoredPixels};
 use crate::formats::decoded::{check_unchanged, damaged, eight, sixteen};
 use crate::formats::foreign::RAW;
+use crate::formats::linear_light::encoded;
 use crate::metadata::exif_fields::ExifFields;
 use crate::metadata::tiff_fields;
 

@@ -1,0 +1,91 @@
+//! The boxes that files of the ISO base media family are made of.
+//!
+//! # Source
+//! ISO/IEC 14496-12, section 4.2: 32 bits of length, four letters of kind, and 64 bits of length where the 32 say 1. A length of 0
+//! is that up to the end of the file.
+
+use std::io::{self, Read, Seek, SeekFrom};
+use std::ops::Range;
+
+/// Boxes that are looked at; pictures have a few dozen.
+const MOST_BOXES: usize = 4096;
+
+/// One box.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct MediaBox {
+    pub(super) kind: [u8; 4],
+    /// Where its content lies in the file.
+    pub(super) content: Range<u64>,
+}
+
+/// The boxes that a file is made of, in order.
+///
+/// # Errors
+/// If the file cannot be read, or a box reaches beyond its end.
+pub(super) fn boxes(input: &mut (impl Read + Seek)) -> io::Result<Vec<MediaBox>> {
+    let end = input.seek(SeekFrom::End(0))?;
+    let mut found = Vec::new();
+    let mut place = 0;
+    while place < end {
+        if found.len() == MOST_BOXES {
+            return Err(damaged("it has too many boxes"));
+        }
+        input.seek(SeekFrom::Start(place))?;
+        let one = read_box(input, place, end)?;
+        place = one.content.end;
+        found.push(one);
+    }
+    Ok(found)
+}
+
+fn read_box(input: &mut impl Read, place: u64, end: u64) -> io::Result<MediaBox> {
+    let mut head = [0; 8];
+    input.read_exact(&mut head)?;
+    let [a, b, c, d, kind @ ..] = head;
+    let (length, head_bytes) = match u32::from_be_bytes([a, b, c, d]) {
+        0 => (end - place, 8),
+        1 => {
+            let mut long = [0; 8];
+            input.read_exact(&mut long)?;
+            (u64::from_be_bytes(long), 16)
+        }
+        length => (u64::from(length), 8),
+    };
+    let content_end = place.checked_add(length).filter(|&content_end| length >= head_bytes && content_end <= end);
+    let content_end = content_end.ok_or_else(|| damaged("a box reaches beyond its end"))?;
+    Ok(MediaBox { kind, content: place + head_bytes..content_end })
+}
+
+fn damaged(words: &'static str) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, words)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::*;
+
+    #[test]
+    fn all_three_ways_to_say_a_length_are_understood() {
+        let mut bytes = b"\0\0\0\x0aabcd12".to_vec();
+        bytes.extend(b"\0\0\0\x01long\0\0\0\0\0\0\0\x13345");
+        bytes.extend(b"\0\0\0\0rest6789");
+        let found = boxes(&mut Cursor::new(&bytes)).expect("three boxes");
+        let content: Vec<&[u8]> =
+            found.iter().map(|one| &bytes[one.content.start as usize..one.content.end as usize]).collect();
+        assert_eq!(content, [&b"12"[..], b"345", b"6789"]);
+        assert_eq!(found.iter().map(|one| one.kind).collect::<Vec<_>>(), [*b"abcd", *b"long", *b"rest"]);
+    }
+
+    #[test]
+    fn lengths_that_cannot_be_are_refused() {
+        for bytes in
+            [&b"\0\0\0\x07abcd"[..], b"\0\0\0\x09abcd", b"\0\0\0\x01abcd\xff\xff\xff\xff\xff\xff\xff\xff", b"\0\0\0"]
+        {
+            assert!(boxes(&mut Cursor::new(bytes)).is_err(), "{bytes:?}");
+        }
+        assert!(boxes(&mut Cursor::new(b"\0\0\0\x08abcd".repeat(MOST_BOXES + 1))).is_err());
+        assert!(boxes(&mut Cursor::new(b"")).expect("nothing").is_empty());
+    }
+}
