@@ -28,8 +28,8 @@ mod project;
 mod report;
 
 pub use job::{
-    ComposeJob, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, ReadFile, RecordedPanorama, Reference, SideOutput,
-    StitchJob, Written, thread_pool,
+    ComposeJob, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, PhotographsOfFolder, ReadFile, RecordedPanorama,
+    Reference, SideOutput, StitchJob, Written, photograph_sets, thread_pool,
 };
 pub use memo::{CacheUse, PhotographCache};
 pub use options::{

@@ -11,7 +11,8 @@ pub(crate) fn json(written: &[Written]) -> String {
     text
 }
 
-fn panorama(written: &Written) -> Value {
+/// The summary of one panorama.
+pub(crate) fn panorama(written: &Written) -> Value {
     let Project { images, canvas, measures, seconds, reference, .. } = &written.project;
     let names = written.project.photograph_names();
     let path = |path: &std::path::Path| path.display().to_string();
