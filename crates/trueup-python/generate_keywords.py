@@ -32,6 +32,7 @@ STITCHING = [
     ("keep", "Mapping[str, Path]", "Pictures by the names of photographs: what is white in them is shown."),
     ("reference", "str", "The photograph that sets the pixel scale and stays in place; auto takes the one in the middle."),
     ("graph", "Path", "A text file with the pairs to be matched, NAME -- NAME a line."),
+    ("lens_from", "Path", "The project of other photographs through the same lens, which is taken from there."),
     ("require_all", "bool", "Fails unless every photograph is used."),
     ("cache", "Path", "A folder for what is found in the photographs, for later runs."),
 ]

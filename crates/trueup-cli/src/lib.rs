@@ -18,6 +18,7 @@ mod outcome;
 mod output;
 mod progress;
 mod report;
+mod serve;
 mod stitch;
 mod stopping;
 mod summary;
@@ -51,6 +52,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Task::Evaluate(args) => evaluate::run(&args),
         Task::Batch(args) => batch::run(*args),
         Task::Report(args) => report::run(&args),
+        Task::Serve(args) => serve::run(args),
         Task::Options(args) => option_list::run(&args),
         Task::Completions(args) => installing::completions(&args),
         Task::Manual(args) => installing::manual(&args),

@@ -39,6 +39,7 @@ impl CheckedStitch {
             photographs,
             reference: chosen::reference(geometry.reference),
             graph: geometry.graph,
+            lens_from: geometry.lens_from,
             all: args.all,
             masks: chosen::masks(&args.masks)?,
             require_all: geometry.require_all,

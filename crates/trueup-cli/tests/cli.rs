@@ -147,6 +147,28 @@ fn a_graph_limits_the_pairs_and_a_name_chooses_the_reference() {
 }
 
 #[test]
+fn a_lens_is_told_by_a_project_of_other_photographs() {
+    let desk = street_desk();
+    desk.stitch(&["a.jpg", "b.jpg", "c.jpg", "d.jpg", "--project", "all.json"]).expect_success();
+    let told = desk.stitch(&["b.jpg", "c.jpg", "--lens-from", "all.json", "--project", "two.json"]);
+    let summary = told.expect_success();
+    assert!(summary.contains("lens        told: that of all.json, for 2 of 2 photographs"), "{summary}");
+    let (all, two) = (desk.json("all.json"), desk.json("two.json"));
+    assert_eq!((&two["lens_from"], &two["images"][0]["lens_told"]), (&"all.json".into(), &true.into()));
+    let focal = |project: &serde_json::Value| project["images"][1]["focal_px"].as_f64().expect("a focal length");
+    assert!((focal(&two) / focal(&all)).ln().abs() < 1.051_f64.ln(), "{} {}", focal(&two), focal(&all));
+
+    let by_angle = desk.stitch(&["b.jpg", "c.jpg", "--lens", "pinhole", "--lens-fov", "60"]);
+    let summary = by_angle.expect_success();
+    assert!(summary.contains("lens        told: pinhole; 60 degrees across the longer side"), "{summary}");
+    let over_it = desk.stitch(&["b.jpg", "c.jpg", "--lens-from", "all.json", "--project", "all.json"]);
+    assert!(over_it.stderr.contains("the project that tells the lens"), "{}", over_it.stderr);
+    desk.put("none.json", "{}");
+    let none = desk.stitch(&["b.jpg", "c.jpg", "--lens-from", "none.json"]);
+    assert!(none.stderr.contains("none.json: its format is not"), "{}", none.stderr);
+}
+
+#[test]
 fn a_bad_file_among_good_ones_is_left_out_with_its_reason() {
     let desk = street_desk();
     desk.put("broken.jpg", &pictures::street()[0][..4000]);

@@ -96,6 +96,53 @@ fn views_and_what_lies_beside_a_panorama_come_out_as_stitched() {
     assert!(desk.read("again.jpg") == desk.read("third.jpg"), "from the cropped project");
 }
 
+/// A panorama that is cropped shows what the whole one shows there, and of the same photographs: seams, light and geometry are
+/// found before. Its record is that of the part, and holds the whole.
+#[test]
+fn a_crop_changes_nothing_but_the_frame() {
+    let desk = stitched();
+    for projection in ["auto", "mesh"] {
+        let composed = |crop: &str| {
+            let seams = format!("{crop}-seams.png");
+            let arguments = ["--crop", crop, "--projection", projection, "--seams", &seams, "--depth", "8"];
+            let project = format!("{crop}.json");
+            let all = [&["compose", "pano.json", "-o", &format!("{crop}.png"), "--project", &project], &arguments[..]];
+            finish(trueup(desk.path(), &all.concat())).expect_success();
+            let open = |name: &str| image::open(desk.join(name)).expect("a picture");
+            (open(&format!("{crop}.png")).to_rgba8(), open(&seams).to_luma16(), desk.json(&project))
+        };
+        let (whole, whole_seams, whole_project) = composed("none");
+        assert!(whole_project.get("crop").is_none() && whole.pixels().any(|pixel| pixel.0[3] < 255));
+        for crop in ["auto", "rectangle"] {
+            let (part, seams, project) = composed(crop);
+            let [left, top] = ["left", "top"].map(|side| project["crop"][side].as_u64().expect("a place") as u32);
+            assert!(
+                project["crop"]["lost"].as_f64().is_some_and(|lost| lost > 0.0 && lost < 0.5),
+                "{}",
+                project["crop"]
+            );
+            assert_eq!(project["crop"]["canvas_width"], whole_project["canvas"]["width"]);
+            for (x, y, pixel) in part.enumerate_pixels() {
+                let there = whole.get_pixel(left + x, top + y);
+                assert_eq!(pixel.0[3], 255, "{crop}: ({x}, {y}) is empty");
+                assert!(there == pixel || there.0[3] < 255, "{crop}: ({x}, {y})");
+                assert_eq!(seams.get_pixel(x, y), whole_seams.get_pixel(left + x, top + y), "{crop}: ({x}, {y})");
+            }
+            let (grids, _) = recorded_grids(&project);
+            let (all, _) = recorded_grids(&whole_project);
+            let places = grids.iter().flatten().flatten().zip(all.iter().flatten().flatten());
+            for (place, there) in places {
+                let off = [place[0] + f64::from(left) - there[0], place[1] + f64::from(top) - there[1]];
+                assert!(off.iter().all(|off| off.abs() < 1e-9), "{crop}: {off:?}");
+            }
+            assert!(project["images"][1]["solved_mesh"].is_object());
+        }
+        let from_a_part = ["compose", "auto.json", "-o", "again.png", "--crop", "none", "--depth", "8"];
+        finish(trueup(desk.path(), &from_a_part)).expect_success();
+        assert!(desk.read("again.png") == desk.read("none.png"), "from the cropped project");
+    }
+}
+
 /// Rows of vertices.
 type RecordedGrid = Vec<Vec<[f64; 2]>>;
 
@@ -116,7 +163,7 @@ fn recorded_grids(project: &Value) -> (Vec<RecordedGrid>, [f64; 2]) {
 fn recorded_grids_are_those_of_the_panorama() {
     let desk = stitched();
     let composed = |projection: &str| {
-        compose(&desk, &["--projection", projection, "--project", "again.json"]).expect_success();
+        compose(&desk, &["--projection", projection, "--crop", "none", "--project", "again.json"]).expect_success();
         desk.json("again.json")
     };
     let (grids, _) = recorded_grids(&composed("perspective"));
@@ -143,10 +190,10 @@ fn recorded_grids_are_those_of_the_panorama() {
 #[test]
 fn other_options_of_composing_are_heeded_and_others_refused() {
     let desk = stitched();
-    let canvas = desk.json("pano.json")["canvas"]["width"].as_u64().expect("a width");
+    let canvas = desk.json("pano.json")["crop"]["canvas_width"].as_u64().expect("a width");
     compose(&desk, &["--scale", "0.25", "--set", "render.blend=feather", "--project", "small.json"]).expect_success();
     let small = desk.json("small.json");
-    let width = small["canvas"]["width"].as_u64().expect("a width");
+    let width = small["crop"]["canvas_width"].as_u64().expect("a width");
     assert!(width.abs_diff(canvas / 2) <= 1, "{width} is not half of {canvas}");
     assert_eq!((&small["measures"], &small["options"]["canvas"]["scale"]), (&Value::Null, &json!(0.25)));
     // What was written can be composed, too.
@@ -205,7 +252,7 @@ fn photographs_are_found_where_they_moved_and_others_shown_in_their_place() {
 #[test]
 fn projects_edited_to_nonsense_are_refused() {
     let desk = stitched();
-    compose(&desk, &["--projection", "mesh", "--project", "mesh.json"]).expect_success();
+    compose(&desk, &["--projection", "mesh", "--crop", "none", "--project", "mesh.json"]).expect_success();
     let project = desk.json("mesh.json");
     let target = "/images/0/mesh/target";
     let mistakes = [

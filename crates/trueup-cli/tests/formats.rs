@@ -159,7 +159,8 @@ fn deep_zoom_is_a_folder_and_a_file() {
 fn what_is_not_covered_shows_the_background() {
     let desk = street_desk();
     let holes = |name: &str, background: &str| {
-        let arguments = ["stitch", "a.jpg", "b.jpg", "-o", name, "--scale", "0.5", "--background", background];
+        let arguments = ["stitch", "a.jpg", "b.jpg", "-o", name, "--scale", "0.5", "--crop", "none"];
+        let arguments = [&arguments[..], &["--background", background]].concat();
         finish(trueup(desk.path(), &arguments)).expect_success();
         image::open(desk.join(name)).expect("a panorama")
     };

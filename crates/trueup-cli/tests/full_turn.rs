@@ -98,7 +98,7 @@ fn the_ends_meet_however_it_is_composed() {
     compose("rows.png", &["--crop", "rectangle"]);
     let (width, height) = image::image_dimensions(desk.join("rows.png")).expect("a panorama");
     assert_eq!(u64::from(width), project["canvas"]["width"].as_u64().expect("a width"));
-    assert!(u64::from(height) < project["canvas"]["height"].as_u64().expect("a height"));
+    assert!(u64::from(height) < project["crop"]["canvas_height"].as_u64().expect("a height"));
     assert_ends_meet(&desk, "rows.png");
 
     // Each photograph's left third is not to be seen: most of each is shown by its neighbor, across the ends as well.

@@ -114,7 +114,8 @@ fn methods_make_what_their_references_show() {
     let desk = Desk::new();
     let photographs = photographs();
     compare_all("method", &Choice::methods(), &desk, |set| {
-        let mut arguments = vec!["stitch", "-o", "panorama.png", "--scale", SCALE, "--cache", "cache", "--set", set];
+        let mut arguments =
+            vec!["stitch", "-o", "panorama.png", "--scale", SCALE, "--cache", "cache", "--crop", "none", "--set", set];
         arguments.extend(photographs.iter().map(String::as_str));
         finish(trueup(desk.path(), &arguments)).expect_success();
     });
@@ -124,7 +125,9 @@ fn methods_make_what_their_references_show() {
 fn stitched() -> Desk {
     let desk = Desk::new();
     let photographs = photographs();
-    let mut arguments = vec!["stitch", "-o", "small.jpg", "--scale", SCALE, "--project", "project.json"];
+    // Shapes are shown, with all their borders.
+    let mut arguments =
+        vec!["stitch", "-o", "small.jpg", "--scale", SCALE, "--crop", "none", "--project", "project.json"];
     arguments.extend(photographs.iter().map(String::as_str));
     finish(trueup(desk.path(), &arguments)).expect_success();
     desk

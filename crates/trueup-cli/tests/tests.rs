@@ -21,7 +21,10 @@ mod pictures;
 mod references;
 mod report;
 mod run;
+#[cfg(unix)]
+mod serving;
 mod sphere;
 #[cfg(unix)]
 mod stopping;
+mod strangers;
 mod told;

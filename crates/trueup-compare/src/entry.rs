@@ -2,6 +2,7 @@
 
 use trueup::{Method, StitchOptions};
 use trueup_align::projection::Projection;
+use trueup_compose::layout::Crop;
 use trueup_core::options::OptionValue;
 use trueup_core::{Error, Result};
 
@@ -67,6 +68,7 @@ impl ComparisonEntry {
     ///
     /// Shapes are compared: with `projection.kind` at its default, the panorama is the mesh that was solved, unless the entry
     /// itself says `projection.kind=auto`. A view chosen for the scene would show the cameras, which all entries have alike.
+    /// With `canvas.crop` at its default, all of the shape is shown, likewise.
     ///
     /// # Errors
     /// [`Error::Input`] for a departure that cannot be, or that changes how photographs are measured and matched, which all
@@ -75,6 +77,9 @@ impl ComparisonEntry {
         let mut options = common.clone();
         if options.arrange.projection.kind == Projection::Auto {
             options.arrange.projection.kind = Projection::Mesh;
+        }
+        if options.arrange.canvas.crop == Crop::Auto {
+            options.arrange.canvas.crop = Crop::None;
         }
         for assignment in &self.overrides {
             options.set(assignment)?;

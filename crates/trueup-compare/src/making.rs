@@ -68,17 +68,19 @@ impl Common<'_> {
     /// Measures, composes and writes an aligned panorama.
     fn finish(&self, alignment: Alignment, stem: &str, stitcher: &Stitcher, made: &mut Made) -> Result<()> {
         let compared = &mut made.compared;
-        let (anchor, scale) = reference_place(&alignment.project)?;
+        let (_, scale) = reference_place(&alignment.project)?;
         let pixels = overlaps::compare(self.set, &alignment.project, scale, self.overlap_scale, self.context)?;
         (compared.pixels, compared.pixels_skipped) = match pixels {
             Ok(pixels) => (Some(pixels), None),
             Err(why) => (None, Some(why)),
         };
-        made.drawing = drawing::draw(self.set, &alignment.project)?;
         let (file, project_file) = (format!("{stem}.{}", self.format.display()), format!("{stem}.json"));
         let outputs = Outputs::new(self.folder.join(&file)).with(SideOutput::Project, self.folder.join(&project_file));
         let written = outputs.write(stitcher, alignment)?;
+        // Where it was cropped, only now.
         let project = written.project;
+        let (anchor, _) = reference_place(&project)?;
+        made.drawing = drawing::draw(self.set, &project)?;
         compared.diagnostics.clone_from(&project.diagnostics);
         compared.measures = project.measures.as_ref().map(Measures::without_places);
         compared.seconds.clone_from(&project.seconds);

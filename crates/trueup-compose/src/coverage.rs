@@ -21,6 +21,21 @@ impl Rectangle {
     pub fn area(&self) -> usize {
         self.columns.len() * self.rows.len()
     }
+
+    /// All of a canvas of `size` pixels (width, height).
+    pub fn whole([width, height]: [usize; 2]) -> Self {
+        Self { columns: 0..width, rows: 0..height }
+    }
+
+    /// Where its first pixel's corner lies.
+    pub fn corner(&self) -> [f64; 2] {
+        [self.columns.start as f64, self.rows.start as f64]
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> [usize; 2] {
+        [self.columns.len(), self.rows.len()]
+    }
 }
 
 /// Which pixels of a canvas some photograph covers wholly.
@@ -84,6 +99,29 @@ impl Coverage {
     /// Number of pixels covered.
     pub fn area(&self) -> usize {
         self.rows.iter().flatten().map(Range::len).sum()
+    }
+
+    /// Number of pixels covered of a rectangle.
+    pub fn area_within(&self, rectangle: &Rectangle) -> usize {
+        let inside = |stretch: &Range<usize>| common_length(stretch, &rectangle.columns);
+        let rows = self.rows.get(rectangle.rows.clone()).unwrap_or_default();
+        rows.iter().flatten().map(inside).sum()
+    }
+
+    /// Numbers of pixels covered of each cell of `side` x `side` pixels, row by row.
+    pub(crate) fn in_cells(&self, side: usize) -> Vec<usize> {
+        let columns = self.width.div_ceil(side);
+        let of_rows = |rows: &[Vec<Range<usize>>]| {
+            let mut counts = vec![0; columns];
+            for stretch in rows.iter().flatten() {
+                let cells = stretch.start / side..stretch.end.div_ceil(side);
+                for (cell, count) in cells.clone().zip(&mut counts[cells]) {
+                    *count += common_length(stretch, &(cell * side..(cell + 1) * side));
+                }
+            }
+            counts
+        };
+        self.rows.par_chunks(side).flat_map_iter(of_rows).collect()
     }
 
     /// The largest rectangle of covered pixels, the topmost and leftmost of equal ones; empty if nothing is covered.
@@ -159,6 +197,11 @@ fn under_outline(
 fn lies_within(stretch: &Range<usize>, others: &[Range<usize>]) -> bool {
     let next = others.partition_point(|other| other.end < stretch.end);
     others.get(next).is_some_and(|other| other.start <= stretch.start && stretch.end <= other.end)
+}
+
+/// How many numbers two stretches have in common.
+fn common_length(a: &Range<usize>, b: &Range<usize>) -> usize {
+    a.end.min(b.end).saturating_sub(a.start.max(b.start))
 }
 
 /// The pixels of row `y` that lie wholly within the grid.

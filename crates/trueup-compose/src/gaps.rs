@@ -1,18 +1,31 @@
-//! The parts of a canvas that no photograph covers: which of them are small.
+//! The parts of a canvas that no photograph covers: which of them are filled.
 
-use crate::coverage::Coverage;
+use std::ops::Range;
+
+use crate::coverage::{Coverage, Rectangle};
 use crate::distance::border_distances;
 use crate::layout::CanvasLayout;
 
-/// What no photograph covers of a canvas, told apart into small gaps, which may be filled, and voids.
-///
-/// A void is all that a disc of the given radius reaches which lies wholly in what is not covered, with the corners beside it,
-/// and all that lies farther than twice the radius from every photograph; a gap is the rest. So notches, slits and ragged or wavy borders up to
-/// twice as wide as the radius are gaps, whatever they are joined to. Discs do not reach out of the canvas: a strip along
-/// its border is as wide as it is.
+/// What no photograph covers of a canvas, told apart into gaps, which may be filled, and voids.
 #[derive(Debug, Clone)]
 pub struct Gaps {
     coverage: Coverage,
+    size: [usize; 2],
+    extent: Extent,
+    around: bool,
+    radius: f64,
+}
+
+/// What of that is a gap.
+#[derive(Debug, Clone)]
+enum Extent {
+    Small(SmallGaps),
+    Within(Rectangle),
+}
+
+/// A map of small gaps, in cells.
+#[derive(Debug, Clone)]
+struct SmallGaps {
     /// Canvas pixels to the nearest void, at the middles of cells; not above 0 in one.
     margin: Vec<f32>,
     columns: usize,
@@ -20,9 +33,11 @@ pub struct Gaps {
     cell: usize,
     /// Columns of cells that repeat the other end of a full turn, on either side.
     lead: usize,
-    around: bool,
-    radius: f64,
 }
+
+/// Largest distance from all photographs, as a share of a photograph's side, of gaps that are filled for a whole frame
+/// ([`crate::crop`]): a smooth sky or wall goes on as far as another photograph would have shown it.
+pub(crate) const FRAME_REACH: f64 = 1.0;
 
 /// Cells of the small canvas on which voids are sought, at most: their outline is smooth between them.
 const MOST_CELLS: usize = 1 << 20;
@@ -35,8 +50,20 @@ const CORNER: f32 = 1.5;
 const THIRDS: f32 = 3.0;
 
 impl Gaps {
-    /// The gaps of a canvas; `fill` is the radius in photographs' sides, see
+    /// All that is not covered of a rectangle of the canvas.
+    pub fn within(layout: &CanvasLayout, coverage: Coverage, rectangle: Rectangle) -> Self {
+        let size = [layout.width, layout.height];
+        let radius = 0.5 * deepest(&coverage, &rectangle);
+        Self { coverage, size, extent: Extent::Within(rectangle), around: layout.period.is_some(), radius }
+    }
+
+    /// The small gaps of a canvas; `fill` is a radius in photographs' sides, see
     /// [`CanvasOptions::fill`](crate::layout::CanvasOptions).
+    ///
+    /// A void is all that a disc of this radius reaches which lies wholly in what is not covered, with the corners beside it,
+    /// and all that lies farther than twice the radius from every photograph; a gap is the rest. So notches, slits and ragged or wavy borders up to
+    /// twice as wide as the radius are gaps, whatever they are joined to. Discs do not reach out of the canvas: a strip along
+    /// its border is as wide as it is.
     pub fn find(layout: &CanvasLayout, coverage: Coverage, fill: f64) -> Self {
         let (width, height) = (layout.width, layout.height);
         let radius = fill * layout.photograph_side();
@@ -73,7 +100,13 @@ impl Gaps {
         let margin = from_void.iter().zip(&from_photographs);
         let margin =
             margin.map(|(void, photographs)| (void - CORNER * radius_px).min(2.0 * radius_px - photographs)).collect();
-        Self { coverage, margin, columns, cell, lead, around: layout.period.is_some(), radius }
+        let extent = Extent::Small(SmallGaps { margin, columns, cell, lead });
+        Self { coverage, size: [width, height], extent, around: layout.period.is_some(), radius }
+    }
+
+    /// Width and height of the canvas, pixels.
+    pub(crate) fn canvas(&self) -> [usize; 2] {
+        self.size
     }
 
     /// Whether some photograph covers the pixel wholly.
@@ -82,7 +115,65 @@ impl Gaps {
     }
 
     /// Whether a pixel, if no photograph covers it, is part of a gap.
-    pub(crate) fn is_small(&self, x: usize, y: usize) -> bool {
+    pub(crate) fn is_gap(&self, x: usize, y: usize) -> bool {
+        match &self.extent {
+            Extent::Small(gaps) => gaps.holds(x, y),
+            Extent::Within(rectangle) => rectangle.columns.contains(&x) && rectangle.rows.contains(&y),
+        }
+    }
+
+    /// The coverage as it is when the gaps are filled.
+    pub fn filled_coverage(&self) -> Coverage {
+        self.coverage.with(|x, y| self.is_gap(x, y))
+    }
+
+    /// Whether the canvas goes all the way round.
+    pub(crate) fn is_around(&self) -> bool {
+        self.around
+    }
+
+    /// Half of the width of the widest gap, pixels.
+    pub(crate) fn radius(&self) -> f64 {
+        self.radius
+    }
+}
+
+/// Pixels, at most, from what is not covered of a rectangle to what is; 0 if nothing is covered.
+fn deepest(coverage: &Coverage, rectangle: &Rectangle) -> f64 {
+    /// Cells that the rectangle is looked at in, at most: a distance need not be exact.
+    const CELLS: usize = 1 << 14;
+    /// Steps across corners are longer.
+    const DIAGONAL: f64 = std::f64::consts::SQRT_2;
+    let [width, height] = rectangle.size();
+    let cell = (1..).find(|cell| width.div_ceil(*cell) * height.div_ceil(*cell) <= CELLS).unwrap_or(1);
+    let (columns, rows) = (width.div_ceil(cell), height.div_ceil(cell));
+    let middle = |index: usize, range: &Range<usize>| (range.start + index * cell + cell / 2).min(range.end - 1);
+    let is_covered =
+        |at: &usize| coverage.holds(middle(at % columns, &rectangle.columns), middle(at / columns, &rectangle.rows));
+    let mut front: Vec<usize> = (0..columns * rows).filter(is_covered).collect();
+    let mut is_reached = vec![false; columns * rows];
+    front.iter().for_each(|&at| is_reached[at] = true);
+    let mut steps = 0;
+    while !front.is_empty() {
+        let mut next = Vec::new();
+        for at in front {
+            let (x, y) = (at % columns, at / columns);
+            for v in y.saturating_sub(1)..(y + 2).min(rows) {
+                for u in x.saturating_sub(1)..(x + 2).min(columns) {
+                    if !std::mem::replace(&mut is_reached[v * columns + u], true) {
+                        next.push(v * columns + u);
+                    }
+                }
+            }
+        }
+        steps += 1;
+        front = next;
+    }
+    f64::from(steps) * DIAGONAL * cell as f64
+}
+
+impl SmallGaps {
+    fn holds(&self, x: usize, y: usize) -> bool {
         let rows = self.margin.len() / self.columns.max(1);
         let place = |pixel: usize, lead: usize, cells: usize| {
             let at = ((pixel as f64 + 0.5) / self.cell as f64 + lead as f64 - 0.5).clamp(0.0, (cells - 1) as f64);
@@ -97,21 +188,6 @@ impl Gaps {
         let upper = at(left, top) + along * (at(right, top) - at(left, top));
         let lower = at(left, bottom) + along * (at(right, bottom) - at(left, bottom));
         upper + down * (lower - upper) > 0.0
-    }
-
-    /// The coverage as it is when the gaps are filled.
-    pub(crate) fn filled_coverage(&self) -> Coverage {
-        self.coverage.with(|x, y| self.is_small(x, y))
-    }
-
-    /// Whether the canvas goes all the way round.
-    pub(crate) fn is_around(&self) -> bool {
-        self.around
-    }
-
-    /// Half of the width of the widest gap, pixels.
-    pub(crate) fn radius(&self) -> f64 {
-        self.radius
     }
 }
 
@@ -143,11 +219,11 @@ mod tests {
         // Two steps: strips of 10 rows above the second photograph and below the first.
         let steps = layout(190, 70, &[[0.0, 0.0], [90.0, 10.0]], None);
         let all = gaps(&steps, 6.0);
-        assert!(all.is_small(0, 69) && all.is_small(150, 0));
+        assert!(all.is_gap(0, 69) && all.is_gap(150, 0));
         assert_eq!(all.filled_coverage().area(), 190 * 70);
         // A disc of radius 4 has room in them; what is left are the ends of the strips.
         let few = gaps(&steps, 4.0);
-        assert!(!few.is_small(50, 65) && !few.is_small(150, 5));
+        assert!(!few.is_gap(50, 65) && !few.is_gap(150, 5));
         assert!(few.filled_coverage().area() < 190 * 70 - 1500);
     }
 
@@ -156,10 +232,8 @@ mod tests {
         // A slit of 6 columns between two photographs, and an empty half below.
         let slit = layout(206, 160, &[[0.0, 0.0], [106.0, 0.0]], None);
         let gaps = gaps(&slit, 5.0);
-        assert!((0..55).all(|y| gaps.is_small(103, y)));
-        assert!(
-            !gaps.is_small(30, 120) && !gaps.is_small(103, 100) && !gaps.is_small(0, 159) && !gaps.is_small(205, 159)
-        );
+        assert!((0..55).all(|y| gaps.is_gap(103, y)));
+        assert!(!gaps.is_gap(30, 120) && !gaps.is_gap(103, 100) && !gaps.is_gap(0, 159) && !gaps.is_gap(205, 159));
         let filled = gaps.filled_coverage();
         assert!(filled.holds(103, 20) && !filled.holds(30, 120));
     }
@@ -169,9 +243,9 @@ mod tests {
     fn a_full_turn_has_no_ends() {
         let places = [[-50.0, 30.0], [40.0, 30.0], [110.0, 30.0]];
         let around = gaps(&layout(200, 90, &places, Some(200)), 12.0);
-        let within = (0..200).all(|x| around.is_small(x, 5) == around.is_small((x + 77) % 200, 5));
-        assert!(within && !around.is_small(0, 5));
-        assert!(gaps(&layout(200, 90, &places, Some(200)), 16.0).is_small(199, 5));
+        let within = (0..200).all(|x| around.is_gap(x, 5) == around.is_gap((x + 77) % 200, 5));
+        assert!(within && !around.is_gap(0, 5));
+        assert!(gaps(&layout(200, 90, &places, Some(200)), 16.0).is_gap(199, 5));
     }
 
     #[test]

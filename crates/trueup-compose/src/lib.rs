@@ -2,12 +2,13 @@
 //!
 //! The stages, one module each, in their order:
 //!
-//! * [`layout`]: deformed grids in any common unit to one canvas in pixels; [`crop`]: what of it is kept;
+//! * [`layout`]: deformed grids in any common unit to one canvas in pixels;
 //! * [`exposure`]: reduced photographs to gain, color cast and vignetting of each;
 //! * [`small_views`]: every photograph read once and made small;
 //! * [`seam`]: small views to the seams along which the photographs agree;
 //! * [`render`]: the order of these and, along the seams, full-resolution photographs to a [`render::Panorama`];
-//! * [`gaps`]: what no photograph covers, and what of that is small enough to be filled;
+//! * [`gaps`]: what no photograph covers, and what of that is filled;
+//! * [`crop`]: what of the finished panorama is kept;
 //! * [`fidelity`]: how true a panorama is to its photographs.
 //!
 //! A photograph's samples are resampled exactly once, straight to the canvas.
@@ -29,6 +30,7 @@ mod ignored;
 mod kernel;
 mod label;
 mod light;
+mod look;
 mod memory_plan;
 mod pyramid;
 mod render_options;
@@ -39,6 +41,7 @@ mod store;
 #[cfg(test)]
 mod test_photographs;
 mod transfer_curve;
+mod unframed;
 mod warped;
 mod weights;
 mod window;

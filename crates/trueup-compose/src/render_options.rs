@@ -27,6 +27,19 @@ trueup_core::choice! {
     }
 }
 
+trueup_core::choice! {
+    /// How photographs of very different exposure come together in one picture.
+    pub enum Look {
+        /// Differences that a picture can bear are evened out; beyond, sun stays brighter than shade and each near to how it
+        /// was exposed, with a wide and smooth change between them.
+        Natural = "natural",
+        /// One exposure for the whole panorama: light is in the same proportion everywhere, however dark or bright that is.
+        Linear = "linear",
+        /// Everything nearly as it was exposed: most detail in sun and in shade, and least of the difference between them.
+        Hdr = "hdr",
+    }
+}
+
 /// How a blend makes canvas pixels of photographs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Composition {
@@ -70,6 +83,9 @@ trueup_core::options! {
         /// What a pixel shows where photographs overlap. Choose `none` to finish the seams by hand, `feather` for soft
         /// transitions without seams, `average` to see misalignment.
         blend: Blend = Blend::MultiBand, Allowed::Any, "", basic;
+        /// How photographs of very different exposure come together. Choose `linear` to measure light or to finish tones by
+        /// hand, `hdr` for detail in sun and shade alike. Photographs of like exposure look the same with all of them.
+        look: Look = Look::Natural, Allowed::Any, "", basic;
         /// Widest transition of multi-band blending, as a share of the photographs' shorter side on the canvas. Raise it if
         /// brightness or color still change visibly beside a seam, lower it if light spreads from one photograph to another.
         transition: f64 = 0.1, between(0.0, 1.0), "";

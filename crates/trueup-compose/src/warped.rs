@@ -11,7 +11,7 @@ use crate::deformed_grid::{Cell, CellRun, DeformedGrid};
 use crate::ignored::IgnoredPart;
 use crate::kernel::{Bicubic, Bilinear};
 use crate::layout::Placed;
-use crate::light::{LightTable, PhotographLight};
+use crate::light::{LightTable, LocalExposure, PhotographLight};
 use crate::render_options::Interpolation;
 use crate::sampling::{MAX_STRETCH, interpolate, reduce_by_two};
 use crate::simd::{Contribution, Development, Positions, accumulate, develop, invert_row};
@@ -45,6 +45,7 @@ pub(crate) struct WarpedPhotograph<'a> {
     grid: DeformedGrid,
     feather: Feather,
     light: LightTable,
+    local: Option<LocalExposure>,
     ignored: Option<IgnoredPart>,
 }
 
@@ -57,6 +58,7 @@ pub(crate) struct SamplingMemory {
     positions: Positions,
     samples: Vec<[f32; 4]>,
     at_border: Vec<usize>,
+    factors: Vec<f32>,
 }
 
 /// How a photograph joins a mean of several.
@@ -89,8 +91,9 @@ impl<'a> WarpedPhotograph<'a> {
             grid = grid_of(&mesh);
         }
         let feather = Feather::new(grid.size, FEATHER_EXPONENT);
+        let local = light.local.cloned();
         let light = LightTable::new(light, grid.size);
-        Self { photograph, grid, feather, light, ignored: None }
+        Self { photograph, grid, feather, light, local, ignored: None }
     }
 
     /// The same without what is not to be seen of it.
@@ -152,12 +155,13 @@ impl<'a> WarpedPhotograph<'a> {
         scratch: &mut SamplingMemory,
     ) {
         let cell = &self.grid.cells[run.cell];
-        let SamplingMemory { positions, samples, at_border, .. } = scratch;
+        let SamplingMemory { positions, samples, at_border, factors, .. } = scratch;
         samples.resize(run.columns.len(), [0.0; 4]);
         self.interpolate_run(y, run, &averaging.resampling, positions, samples, at_border);
         let contribution = Contribution {
             feather: &self.feather,
             light: &self.light,
+            local: self.local_factors(y, run, factors),
             border_footprint: cell.near_border.then(|| cell.footprint.map(|pixels| pixels as f32)),
             weighting: averaging.weighting,
         };
@@ -193,7 +197,7 @@ impl<'a> WarpedPhotograph<'a> {
         if columns.is_empty() || rows.is_empty() {
             return;
         }
-        let SamplingMemory { candidates, owner, runs, positions, at_border, .. } = scratch;
+        let SamplingMemory { candidates, owner, runs, positions, at_border, factors, .. } = scratch;
         self.grid.cells_in_window(&columns, &rows, candidates);
         for y in rows {
             self.grid.runs_within(y, &columns, candidates, owner, runs);
@@ -207,11 +211,18 @@ impl<'a> WarpedPhotograph<'a> {
                 let development = Development {
                     feather: &self.feather,
                     light: &self.light,
+                    local: self.local_factors(y, run, factors),
                     border_footprint: cell.near_border.then(|| cell.footprint.map(|pixels| pixels as f32)),
                 };
                 develop(development, positions, samples);
             }
         }
+    }
+
+    /// The factors of the places along one run, made in `factors`; `None` if they are 1.
+    fn local_factors<'f>(&self, y: usize, run: &CellRun, factors: &'f mut Vec<f32>) -> Option<&'f [f32]> {
+        self.local.as_ref()?.factors(y, run.columns.clone(), factors);
+        Some(factors)
     }
 
     /// The photograph's own values (0 to 255) along one run.

@@ -58,6 +58,36 @@ pub struct LensTerms {
     pub tangential: [f64; 2],
 }
 
+/// A lens before a photograph: what it is made of, and where its axis meets the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct PlacedLens {
+    /// Projection, radial and tangential terms, in units of the focal length.
+    #[serde(flatten)]
+    pub terms: LensTerms,
+    /// The principal point from the photograph's middle, in pixels of the photograph.
+    pub center_px: [f64; 2],
+}
+
+impl PlacedLens {
+    /// The same lens before the photograph enlarged by `factor`.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self { center_px: self.center_px.map(|part| part * factor), ..*self }
+    }
+
+    /// The same lens before the photograph turned clockwise by `quarters` of a turn. What a lens does aside turns with the
+    /// picture: its center, and (p2, p1), which is a direction.
+    #[must_use]
+    pub fn turned(&self, quarters: u8) -> Self {
+        let turn = |[x, y]: [f64; 2]| [-y, x];
+        (0..quarters % 4).fold(*self, |lens, _| {
+            let [p2, p1] = turn([lens.terms.tangential[1], lens.terms.tangential[0]]);
+            let terms = LensTerms { tangential: [p1, p2], ..lens.terms };
+            Self { terms, center_px: turn(lens.center_px) }
+        })
+    }
+}
+
 impl From<LensTerms> for Lens {
     fn from(terms: LensTerms) -> Self {
         Self::new(terms)

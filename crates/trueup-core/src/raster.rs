@@ -176,9 +176,62 @@ pub trait RowSource: Sync {
     fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()>;
 }
 
+/// A raster of three 8-bit channels (red, green, blue) as an opaque picture; it has no linear light.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OpaqueRgb(pub Raster<u8>);
+
+impl RowSource for OpaqueRgb {
+    fn width(&self) -> usize {
+        self.0.width()
+    }
+
+    fn height(&self) -> usize {
+        self.0.height()
+    }
+
+    fn is_opaque(&self) -> bool {
+        true
+    }
+
+    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
+        for (pixel, color) in row.chunks_exact_mut(4).zip(self.0.row(y).chunks_exact(3)) {
+            pixel[..3].copy_from_slice(color);
+            pixel[3] = u8::MAX;
+        }
+        Ok(())
+    }
+
+    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
+        for (pixel, color) in row.chunks_exact_mut(4).zip(self.0.row(y).chunks_exact(3)) {
+            // 257 * 255 = 65535.
+            for (sample, &level) in pixel.iter_mut().zip(color) {
+                *sample = u16::from(level) * 257;
+            }
+            pixel[3] = u16::MAX;
+        }
+        Ok(())
+    }
+
+    fn linear_row(&self, _: usize, _: &mut [f32]) -> Result<()> {
+        let hint = "Ask for 8 or 16 bits.".to_owned();
+        Err(Error::Unsupported { what: "linear light of an 8-bit picture".to_owned(), hint })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_opaque_picture_is_its_raster() {
+        let picture = OpaqueRgb(Raster::from_data(2, 1, 3, vec![1_u8, 2, 3, 0, 255, 7]).expect("six samples"));
+        let (mut eight, mut sixteen) = ([0_u8; 8], [0_u16; 8]);
+        picture.rgba8_row(0, &mut eight).expect("a row");
+        picture.rgba16_row(0, &mut sixteen).expect("a row");
+        assert_eq!(eight, [1, 2, 3, 255, 0, 255, 7, 255]);
+        assert_eq!(sixteen, [257, 514, 771, 65535, 0, 65535, 1799, 65535]);
+        assert!(picture.linear_row(0, &mut [0.0; 8]).is_err());
+    }
 
     #[test]
     fn pixels_are_addressed_row_by_row() {

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::color::TransferCurve;
 use crate::error::Result;
+use crate::lens::PlacedLens;
 use crate::mask::Masks;
 use crate::raster::Photograph;
 
@@ -19,6 +20,8 @@ pub enum FocalSource {
     FocalPlaneResolution,
     /// EXIF FocalLength with the sensor's size from the camera's model.
     CameraModel,
+    /// The user, by an earlier project with the same lens.
+    Project,
 }
 
 /// A focal length known before the photographs are compared.
@@ -47,6 +50,12 @@ pub struct SourceImage {
     pub focal_prior: Option<FocalPrior>,
     /// Camera make and model, trimmed, if stated; photographs of one camera share a focal length where none is stated.
     pub camera_model: Option<String>,
+    /// The lens's model, trimmed, if stated; photographs of different lenses share nothing.
+    pub lens_model: Option<String>,
+    /// The lens's focal length in millimeters, if stated; a zoom does not bend alike at different ones.
+    pub focal_mm: Option<f64>,
+    /// The lens, in pixels of the full-resolution photograph, if the user told it by an earlier project.
+    pub lens: Option<PlacedLens>,
 }
 
 /// The reduced frame a photograph is measured in: `working = working_from_full * full` on both axes, corner (0, 0).

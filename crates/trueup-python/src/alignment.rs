@@ -31,8 +31,8 @@ pub(crate) fn align<'py>(
 ) -> PyResult<Vec<Alignment>> {
     let wishes = Wishes::of(keywords, "stitch", StitchOptions::default())?;
     let (photographs, in_memory) = collected(photographs)?;
-    let Wishes { options, reference, graph, require_all, masks, cache, threads } = wishes;
-    let inputs = Inputs { photographs, in_memory, reference, graph, all, masks, require_all };
+    let Wishes { options, reference, graph, lens_from, require_all, masks, cache, threads } = wishes;
+    let inputs = Inputs { photographs, in_memory, reference, graph, lens_from, all, masks, require_all };
     let aligned = run(py, Surroundings { progress, threads }, |context| {
         let max_bytes = options.run.resources.cache_bytes;
         let cache = cache.map(|folder| PhotographCache::open(&folder, max_bytes)).transpose()?;

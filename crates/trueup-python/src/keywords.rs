@@ -19,6 +19,7 @@ pub(crate) struct Wishes {
     pub options: StitchOptions,
     pub reference: Reference,
     pub graph: Option<PathBuf>,
+    pub lens_from: Option<PathBuf>,
     pub require_all: bool,
     pub masks: Vec<MaskFile>,
     pub cache: Option<PathBuf>,
@@ -35,6 +36,7 @@ impl Wishes {
             options,
             reference: Reference::Auto,
             graph: None,
+            lens_from: None,
             require_all: false,
             masks: Vec::new(),
             cache: None,
@@ -73,6 +75,7 @@ impl Wishes {
                 name => self.reference = Reference::Named(name),
             },
             "graph" if is_stitch => self.graph = Some(value.extract()?),
+            "lens_from" if is_stitch => self.lens_from = Some(value.extract()?),
             "require_all" if is_stitch => self.require_all = value.extract()?,
             "cache" if is_stitch => self.cache = Some(value.extract()?),
             _ => {

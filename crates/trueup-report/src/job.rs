@@ -7,9 +7,10 @@ use trueup::{
     Alignment, Error, Project, RecordedPanorama, Result, RowSource, RunOptions, StageContext, StitchOptions, Stitcher,
     thread_pool,
 };
+use trueup_core::raster::OpaqueRgb;
 
 use crate::page::{Page, Pictures};
-use crate::pictures::{EmbeddedPicture, ReducedPhotograph, embedded};
+use crate::pictures::{EmbeddedPicture, embedded};
 
 /// Longer side of the panorama on the page, pixels: sharp on a wide screen.
 const PANORAMA_PX: f64 = 1800.0;
@@ -124,7 +125,7 @@ fn photographs(
     for position in alignment.project.used_positions() {
         context.check_cancelled()?;
         if let Some(reduced) = alignment.reduced(position, PHOTOGRAPH_PIXELS)? {
-            let rows = ReducedPhotograph(reduced);
+            let rows = OpaqueRgb(reduced);
             if rows.width().min(rows.height()) == 0 {
                 return Err(Error::input(&alignment.project.images[position].path, "it is empty", "Leave it out."));
             }

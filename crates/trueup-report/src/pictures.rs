@@ -2,7 +2,7 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use trueup::{Metadata, OutputOptions, Raster, Result, RowSource, StageContext, write_picture};
+use trueup::{Metadata, OutputOptions, Result, RowSource, StageContext, write_picture};
 use trueup_core::Error;
 use trueup_io::encode::{Background, OutputProfile};
 
@@ -39,45 +39,4 @@ pub(crate) fn embedded(
     let bytes = std::fs::read(&path).map_err(|error| Error::io("reading", &path, error))?;
     let address = format!("data:image/jpeg;base64,{}", STANDARD.encode(bytes));
     Ok(EmbeddedPicture { address, width: picture.width(), height: picture.height() })
-}
-
-/// A reduced photograph, handed out in rows.
-#[derive(Debug)]
-pub(crate) struct ReducedPhotograph(pub Raster<u8>);
-
-impl RowSource for ReducedPhotograph {
-    fn width(&self) -> usize {
-        self.0.width()
-    }
-
-    fn height(&self) -> usize {
-        self.0.height()
-    }
-
-    fn is_opaque(&self) -> bool {
-        true
-    }
-
-    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
-        for (pixel, color) in row.chunks_exact_mut(4).zip(self.0.row(y).chunks_exact(3)) {
-            pixel[..3].copy_from_slice(color);
-            pixel[3] = u8::MAX;
-        }
-        Ok(())
-    }
-
-    fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
-        for (pixel, color) in row.chunks_exact_mut(4).zip(self.0.row(y).chunks_exact(3)) {
-            for (sample, &level) in pixel.iter_mut().zip(color) {
-                *sample = u16::from(level) * 257;
-            }
-            pixel[3] = u16::MAX;
-        }
-        Ok(())
-    }
-
-    fn linear_row(&self, _: usize, _: &mut [f32]) -> Result<()> {
-        let hint = "Ask for 8 or 16 bits.".to_owned();
-        Err(Error::Unsupported { what: "linear light of a reduced photograph".to_owned(), hint })
-    }
 }

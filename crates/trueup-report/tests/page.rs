@@ -20,7 +20,7 @@ fn stitched(folder: &Path) -> Project {
     }
     std::fs::write(folder.join("<b>torn.jpg"), "no picture").expect("written");
     let mut options = StitchOptions::default();
-    for choice in ["canvas.scale=0.2", "mesh.cell_px=45"] {
+    for choice in ["canvas.scale=0.2", "canvas.crop=none", "mesh.cell_px=45"] {
         options.set(choice).expect("an option");
     }
     let inputs =

@@ -25,9 +25,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// Exposure model and anchor, and blending: as published panoramas are blended, then with color, then with seams.
 const WAYS: [[&str; 3]; 4] = [
     ["gain", "mean", "feather"],
-    ["full", "reference", "feather"],
-    ["full", "reference", "none"],
-    ["full", "reference", "multiband"],
+    ["full", "scene", "feather"],
+    ["full", "scene", "none"],
+    ["full", "scene", "multiband"],
 ];
 
 fn measure(folder: &str, mut options: StitchOptions) -> Result<(), trueup::Error> {

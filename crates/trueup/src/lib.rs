@@ -20,6 +20,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod batch;
 mod job;
 mod memo;
 mod options;
@@ -27,19 +28,20 @@ mod pipeline;
 mod project;
 mod report;
 
+pub use batch::{Batch, BatchJob, PhotographsOfFolder, SetOutcome, SetRecord, Shard};
 pub use job::{
-    ComposeJob, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, PhotographsOfFolder, ReadFile, RecordedPanorama,
-    Reference, SideOutput, StitchJob, Written, photograph_sets, thread_pool,
+    ComposeJob, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, ReadFile, RecordedPanorama, Reference, SideOutput,
+    StitchJob, Written, thread_pool, write_thumbnail,
 };
 pub use memo::{CacheUse, PhotographCache};
 pub use options::{
-    AlignOptions, ArrangeOptions, ComposeOptions, Evidence, MatchOptions, MeasureOptions, Method, Phase, RandomOptions,
-    ResourceOptions, RunOptions, ShapeOptions, StitchOptions, Structure, WorkingOptions,
+    AlignOptions, ArrangeOptions, ChangedOption, ComposeOptions, Evidence, MatchOptions, MeasureOptions, Method, Phase,
+    RandomOptions, ResourceOptions, RunOptions, ShapeOptions, StitchOptions, Structure, WorkingOptions,
 };
 pub use pipeline::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use project::{
-    Canvas, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord,
-    Project, ProjectionRecord, hugin_project,
+    Canvas, CropRecord, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION,
+    PairRecord, Project, ProjectionRecord, hugin_project,
 };
 pub use report::brightness::BrightnessStep;
 pub use report::evaluation::{
@@ -52,13 +54,14 @@ pub use report::measures::{
     UprightMeasures, WorstPair,
 };
 pub use report::shown::ShownPhotographs;
+pub use trueup_align::cameras::{CameraOptions, LensKind};
 pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;
 pub use trueup_compose::render::{Panorama, Rendered};
 pub use trueup_core::context::{CancelToken, Progress, Silent};
 pub use trueup_core::diagnostics::{Diagnostic, Reported, Severity, Subject};
-pub use trueup_core::options::{InvalidOption, OptionDescription, Tier};
+pub use trueup_core::options::{InvalidOption, OptionDescription, OptionValue, Tier};
 pub use trueup_core::raster::{Photograph, Raster, RowSource};
 pub use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 pub use trueup_core::truth::{ImageTruth, Truth};

@@ -17,6 +17,8 @@ use crate::trial::Trial;
 const FOLDER: &str = "figures";
 /// Panorama pixels per pixel of the reference photograph: wide panoramas fit a page.
 const SCALE: &str = "canvas.scale=0.3";
+/// All of their shape.
+const CROP: &str = "canvas.crop=none";
 /// Bytes per picture matter more than the last of their quality.
 const QUALITY: &str = "output.jpeg_quality=80";
 
@@ -89,7 +91,7 @@ pub(crate) fn section(runner: &Runner, catalogue: &Catalogue, out: &Path) -> Res
         let (mut pictures, mut refused) = (Vec::new(), Vec::new());
         for one in row.methods.iter().filter_map(|name| method(name)) {
             let file = format!("{}-{}.jpg", row.set.replace('/', "-"), one.name);
-            let overrides = [&one.overrides()[..], &[SCALE, QUALITY]].concat();
+            let overrides = [&one.overrides()[..], &[SCALE, CROP, QUALITY]].concat();
             let trial = Trial {
                 photograph_count: row.photographs,
                 central: row.photographs.is_some(),

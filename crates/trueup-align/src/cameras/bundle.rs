@@ -32,9 +32,6 @@ const FIRST_DAMPING: f64 = 1e-4;
 const LARGEST_DAMPING: f64 = 1e12;
 /// Relative decrease of the cost below which a pass has settled.
 const SETTLED: f64 = 1e-8;
-/// Standard deviation of an estimated start value of the focal length, relative: it only keeps a focal length that the
-/// matches leave open from running away.
-const ESTIMATED_FOCAL_SD: f64 = 0.3;
 /// A focal length within this factor of the shortest believed one was stopped there.
 const STOPPED_SHORT: f64 = 1.001;
 
@@ -65,8 +62,8 @@ pub(super) struct BundleAdjustment<'a> {
     pub start_focal_px: Vec<f64>,
     /// The photograph whose rotation is fixed.
     pub reference: usize,
-    /// Standard deviation, relative, of a start focal length that comes from metadata.
-    pub known_focal_sd: f64,
+    /// How strongly: their standard deviations, relative.
+    pub focal_sd: Vec<f64>,
 }
 
 impl BundleAdjustment<'_> {
@@ -110,9 +107,11 @@ impl BundleAdjustment<'_> {
     /// the photographs are merely close to affine, which is harmless.)
     pub(super) fn is_sound(&self, parameters: &Parameters) -> bool {
         parameters.rotations.iter().all(|rotation| rotation.iter().all(|entry| entry.is_finite()))
-            && parameters.focal_px.iter().zip(self.priors).all(|(&focal_px, prior)| {
-                focal_px.is_finite() && focal_px > STOPPED_SHORT * prior.believable_focal_px(0.0)
-            })
+            && parameters
+                .focal_px
+                .iter()
+                .zip(self.priors)
+                .all(|(&focal_px, prior)| focal_px.is_finite() && focal_px > STOPPED_SHORT * prior.shortest_focal_px())
     }
 
     pub(super) fn unknowns(&self, model: &IntrinsicsModel) -> usize {
@@ -145,10 +144,8 @@ impl BundleAdjustment<'_> {
     /// photograph with a free one.
     fn pulls(&self, parameters: &Parameters, model: &IntrinsicsModel) -> Vec<Pull> {
         let of_photograph = |k: usize| {
-            let known = self.priors[k].focal_px.is_some();
-            let sd = if known { self.known_focal_sd } else { ESTIMATED_FOCAL_SD };
             let stretch = (parameters.focal_px[k] / self.start_focal_px[k]).ln();
-            let focal = self.column(model, k, FOCAL).map(|column| Pull::new(column, stretch, sd));
+            let focal = self.column(model, k, FOCAL).map(|column| Pull::new(column, stretch, self.focal_sd[k]));
             let lens = (FOCAL + 1..INTRINSICS).filter_map(move |intrinsic| {
                 let sd = standard_deviation(intrinsic, &self.priors[k].frame);
                 Some(Pull::new(self.column(model, k, intrinsic)?, parameters.lenses[k].term(intrinsic), sd))

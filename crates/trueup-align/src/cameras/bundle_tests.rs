@@ -10,8 +10,7 @@ const FRAME: WorkingFrame = WorkingFrame { width: 640.0, height: 480.0, working_
 
 /// Every unknown but the reference photograph's rotation, at two photographs of these lenses.
 fn check_gradient(model: &IntrinsicsModel, lenses: Vec<LensState>) {
-    let priors: Vec<CameraPrior> =
-        [0, 1].map(|group| CameraPrior { frame: FRAME, focal_px: None, camera_group: group }).to_vec();
+    let priors: Vec<CameraPrior> = [0, 1].map(|group| CameraPrior::unknown(FRAME, group)).to_vec();
     let matches = vec![
         PointMatch { in_a: [400.0, 200.0], in_b: [180.0, 260.0] },
         PointMatch { in_a: [520.0, 410.0], in_b: [300.0, 440.0] },
@@ -22,7 +21,7 @@ fn check_gradient(model: &IntrinsicsModel, lenses: Vec<LensState>) {
         observations: &observations,
         start_focal_px: vec![500.0, 520.0],
         reference: 0,
-        known_focal_sd: 0.1,
+        focal_sd: vec![0.1, 0.3],
     };
     let at = Parameters {
         focal_px: vec![510.0, 505.0],

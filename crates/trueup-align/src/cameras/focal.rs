@@ -7,6 +7,7 @@ use trueup_core::matches::PairMatches;
 
 use super::intrinsics::{InitialIntrinsics, LensState};
 use super::observations::{Observations, PairObservations};
+use super::options::LensKind;
 use super::prior::CameraPrior;
 use super::rotations::fit_rotation;
 
@@ -88,35 +89,49 @@ const MISFIT_PX: f64 = 4.0;
 /// Share of a pinhole's errors that another lens may leave to be believed.
 const LENS_SHARE: f64 = 0.6;
 
-/// A focal length for every photograph, and a lens for all.
+/// A focal length and a lens for every photograph: the lens that was told, and one common to all others, of this kind.
 pub(super) fn initial_intrinsics(
     priors: &[CameraPrior],
     pairs: &[&PairMatches],
     observations: &Observations,
+    kind: LensKind,
 ) -> InitialIntrinsics {
-    let focal_px = initial_focal_lengths(priors, pairs, observations);
-    let pinhole = InitialIntrinsics { focal_px, lens: LensState::default() };
+    let with_others = |lens: LensState| priors.iter().map(|prior| prior.lens.map_or(lens, LensState::from)).collect();
+    let lenses: Vec<LensState> = with_others(LensState::default());
+    let straight = InitialIntrinsics { focal_px: initial_focal_lengths(priors, pairs, observations, &lenses), lenses };
+    let InitialIntrinsics { focal_px, lenses } = &straight;
+    if kind == LensKind::Pinhole || priors.iter().all(|prior| prior.lens.is_some()) {
+        return straight;
+    }
     let matches: usize = observations.pairs.iter().map(|pair| pair.matches.len()).sum();
-    let cost = |start: &InitialIntrinsics| -> f64 {
-        observations.pairs.iter().map(|pair| rotation_cost(priors, &start.focal_px, &start.lens, pair)).sum()
-    };
-    let by_pinhole = cost(&pinhole);
-    if by_pinhole <= MISFIT_PX * matches as f64 {
-        return pinhole;
+    let is_fisheye = kind == LensKind::Fisheye;
+    let by_pinhole = common_cost(priors, observations, focal_px, lenses);
+    if !is_fisheye && by_pinhole <= MISFIT_PX * matches as f64 {
+        return straight;
     }
     let known = known_focal_lengths(priors);
-    let tried = tried_lenses().into_iter().map(|TriedLens { lens, relative_focal }| {
+    let suits = |lens: &TriedLens| match kind {
+        LensKind::Fisheye => lens.lens.is_fisheye(),
+        LensKind::Rectilinear => !lens.lens.is_fisheye(),
+        _ => true,
+    };
+    let tried = tried_lenses().into_iter().filter(suits).map(|TriedLens { lens, relative_focal }| {
         let focal_px = priors.iter().zip(&known).map(|(prior, known)| {
             known.unwrap_or_else(|| {
                 prior.believable_focal_px(relative_focal * prior.frame.width.max(prior.frame.height))
             })
         });
-        let lens = LensState { terms: lens.terms(), ..LensState::default() };
-        let start = InitialIntrinsics { focal_px: focal_px.collect(), lens };
-        (cost(&start), start)
+        let (focal_px, lenses): (Vec<f64>, Vec<LensState>) =
+            (focal_px.collect(), with_others(LensState { terms: lens.terms(), ..LensState::default() }));
+        (common_cost(priors, observations, &focal_px, &lenses), InitialIntrinsics { focal_px, lenses })
     });
     let best = tried.min_by(|one, other| one.0.total_cmp(&other.0));
-    best.filter(|(cost, _)| *cost < LENS_SHARE * by_pinhole).map_or(pinhole, |(_, start)| start)
+    best.filter(|(cost, _)| is_fisheye || *cost < LENS_SHARE * by_pinhole).map_or(straight, |(_, start)| start)
+}
+
+/// How badly rotations of these cameras explain all pairs.
+fn common_cost(priors: &[CameraPrior], observations: &Observations, focal_px: &[f64], lenses: &[LensState]) -> f64 {
+    observations.pairs.iter().map(|pair| rotation_cost(priors, focal_px, lenses, pair)).sum()
 }
 
 /// The focal lengths that metadata state.
@@ -131,9 +146,14 @@ fn known_focal_lengths(priors: &[CameraPrior]) -> Vec<Option<f64>> {
 ///
 /// Photographs without metadata get a common value (relative to their diagonal), found by trying a range of values and
 /// the homographies' own estimates and keeping the one under which rotations explain the matches best.
-fn initial_focal_lengths(priors: &[CameraPrior], pairs: &[&PairMatches], observations: &Observations) -> Vec<f64> {
+fn initial_focal_lengths(
+    priors: &[CameraPrior],
+    pairs: &[&PairMatches],
+    observations: &Observations,
+    lenses: &[LensState],
+) -> Vec<f64> {
     let known = known_focal_lengths(priors);
-    let relative = common_relative_focal(priors, pairs, observations, &known);
+    let relative = common_relative_focal(priors, pairs, observations, &known, lenses);
     filled_in(priors, &known, relative)
 }
 
@@ -152,16 +172,14 @@ fn common_relative_focal(
     pairs: &[&PairMatches],
     observations: &Observations,
     known: &[Option<f64>],
+    lenses: &[LensState],
 ) -> f64 {
     if known.iter().all(Option::is_some) {
         return NORMAL_LENS;
     }
     let mut candidates: Vec<f64> = (0..CANDIDATES).map(|k| SHORTEST * STEP.powi(k)).collect();
     candidates.extend(median_from_homographies(priors, pairs));
-    let cost = |relative: f64| -> f64 {
-        let focal = filled_in(priors, known, relative);
-        observations.pairs.iter().map(|pair| rotation_cost(priors, &focal, &LensState::default(), pair)).sum()
-    };
+    let cost = |relative: f64| common_cost(priors, observations, &filled_in(priors, known, relative), lenses);
     let costs: Vec<f64> = candidates.iter().map(|&candidate| cost(candidate)).collect();
     let best = (0..candidates.len()).min_by(|&one, &other| costs[one].total_cmp(&costs[other]));
     best.filter(|&best| costs[best] > 0.0 && costs[best].is_finite()).map_or(NORMAL_LENS, |best| candidates[best])
@@ -188,12 +206,12 @@ fn median_from_homographies(priors: &[CameraPrior], pairs: &[&PairMatches]) -> O
 }
 
 /// How badly the best rotation explains a pair: Huber-like sum of transfer errors over a subset of the matches.
-fn rotation_cost(priors: &[CameraPrior], focal: &[f64], lens: &LensState, pair: &PairObservations) -> f64 {
+fn rotation_cost(priors: &[CameraPrior], focal: &[f64], lenses: &[LensState], pair: &PairObservations) -> f64 {
     let step = pair.matches.len().div_ceil(SAMPLE).max(1);
     let sample: Vec<_> = pair.matches.iter().copied().step_by(step).collect();
     let (prior_a, prior_b) = (&priors[pair.a], &priors[pair.b]);
-    let camera_a = lens.on(prior_a.unturned_camera(focal[pair.a]));
-    let mut turned = lens.on(prior_b.unturned_camera(focal[pair.b]));
+    let camera_a = lenses[pair.a].on(prior_a.unturned_camera(focal[pair.a]));
+    let mut turned = lenses[pair.b].on(prior_b.unturned_camera(focal[pair.b]));
     turned.set_rotation(&fit_rotation(&camera_a, &turned, &sample));
     let sum: f64 = sample
         .iter()

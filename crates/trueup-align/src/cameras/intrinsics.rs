@@ -1,7 +1,7 @@
 //! What bundle adjustment may change of a camera beside its rotation, and who shares it.
 
 use trueup_core::camera::{Camera, INTRINSICS};
-use trueup_core::lens::{Lens, LensTerms};
+use trueup_core::lens::{Lens, LensTerms, PlacedLens};
 use trueup_core::source::WorkingFrame;
 
 use super::prior::CameraPrior;
@@ -29,8 +29,8 @@ const CENTER_SD: f64 = 0.01;
 /// Where refinement starts from.
 pub(super) struct InitialIntrinsics {
     pub focal_px: Vec<f64>,
-    /// Pinholes, unless they explain the matches badly and another lens does much better.
-    pub lens: LensState,
+    /// One of every photograph: as told; else pinholes, unless they explain the matches badly and another lens much better.
+    pub lenses: Vec<LensState>,
 }
 
 /// How far an intrinsic unknown but the focal length is expected from 0, one standard deviation.
@@ -48,6 +48,12 @@ pub(super) struct LensState {
     pub terms: LensTerms,
     /// The principal point from the photograph's middle, working pixels.
     pub center_px: [f64; 2],
+}
+
+impl From<PlacedLens> for LensState {
+    fn from(PlacedLens { terms, center_px }: PlacedLens) -> Self {
+        Self { terms, center_px }
+    }
 }
 
 impl LensState {

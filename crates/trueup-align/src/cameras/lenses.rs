@@ -5,6 +5,7 @@ use trueup_core::{Result, StageContext};
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
 use super::intrinsics::{CENTER, FreeTerms, IntrinsicsModel, RADIAL, TANGENTIAL, ZOOM_SPREAD, only_focal};
 use super::lens_evidence::LensEvidence;
+use super::options::LensKind;
 
 /// Squared distance from 0, in standard deviations and by dimension, at which a term is believed: 4 standard deviations, since
 /// the deviations rest on a dozen pairs.
@@ -18,6 +19,8 @@ const BLOCKS: [&[usize]; 5] =
 /// The search for lenses.
 pub(super) struct LensSearch<'a> {
     pub problem: &'a BundleAdjustment<'a>,
+    /// What the user says of the lenses.
+    pub kind: LensKind,
     pub context: &'a StageContext<'a>,
 }
 
@@ -27,7 +30,10 @@ impl LensSearch<'_> {
     pub(super) fn find(&self, start: &Parameters, group_of: &[usize]) -> Result<Option<Parameters>> {
         let groups = group_of.iter().max().map_or(0, |last| last + 1);
         let mut free: Vec<FreeTerms> = vec![only_focal(); groups];
-        let mut bent = vec![true; groups];
+        let mut bent = vec![self.kind != LensKind::Pinhole; groups];
+        for (prior, &group) in self.problem.priors.iter().zip(group_of) {
+            bent[group] &= prior.lens.is_none();
+        }
         let mut parameters = start.clone();
         for (block, &terms) in BLOCKS.iter().enumerate() {
             self.context.check_cancelled()?;

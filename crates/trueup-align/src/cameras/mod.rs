@@ -32,7 +32,7 @@ use intrinsics::InitialIntrinsics;
 use observations::Observations;
 use refinement::RefinementInput;
 
-pub use options::{CameraOptions, FocalSharing};
+pub use options::{CameraOptions, FocalSharing, LensKind};
 pub use prior::CameraPrior;
 
 /// What cameras are found from. Photographs are counted 0..N.
@@ -80,6 +80,7 @@ pub struct Cameras {
 /// unless the data contradict it, which keeps short rows from drifting.
 pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageContext) -> Result<Cameras> {
     let CameraInput { priors, pairs, reference } = *input;
+    let priors: &[CameraPrior] = &priors.iter().map(|prior| prior.told_by(options)).collect::<Vec<_>>();
     let everything: Vec<usize> = (0..priors.len()).collect();
     let anchor = graph_of(priors.len(), pairs.iter()).central_photograph(&everything);
     let solve_with = |active: &[usize]| {
@@ -145,12 +146,12 @@ fn solve(
     context: &StageContext,
 ) -> Result<Solution> {
     let observations = Observations::choose(priors, pairs);
-    let intrinsics = focal::initial_intrinsics(priors, pairs, &observations);
+    let intrinsics = focal::initial_intrinsics(priors, pairs, &observations, options.kind_of_lens());
     let relative = rotations::relative_rotations(priors, pairs, &observations, &intrinsics);
     let graph = graph_of(priors.len(), pairs.iter().copied());
     let rotations = rotations::average(&graph, pairs, &relative, anchor);
-    let InitialIntrinsics { focal_px, lens } = intrinsics;
-    let start = Parameters { focal_px, rotations, lenses: vec![lens; priors.len()] };
+    let InitialIntrinsics { focal_px, lenses } = intrinsics;
+    let start = Parameters { focal_px, rotations, lenses };
     let input = RefinementInput { priors, observations: &observations, anchor };
     let refined = refinement::refine(input, &start, options, context)?;
     Ok(Solution {

@@ -44,7 +44,7 @@ pub(super) fn refine(
         observations,
         start_focal_px,
         reference: anchor,
-        known_focal_sd: options.known_focal_sd,
+        focal_sd: priors.iter().map(|prior| prior.focal_sd(options)).collect(),
     };
     // Start values that already differ (metadata of a zoom) keep their ratios inside a shared model.
     let shared = IntrinsicsModel::shared(priors);
@@ -54,7 +54,7 @@ pub(super) fn refine(
 
     let coarse = problem.minimize(start.clone(), first_model, COARSE_HUBER_PX, context)?;
     let mut fine = problem.minimize(coarse, first_model, FINE_HUBER_PX, context)?;
-    let search = LensSearch { problem: &problem, context };
+    let search = LensSearch { problem: &problem, kind: options.kind_of_lens(), context };
     let with_lens = match per_picture_focal {
         false => search.find(&fine, &CameraPrior::lens_groups(priors))?,
         true => None,

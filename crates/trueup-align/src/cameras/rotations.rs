@@ -37,13 +37,13 @@ pub(super) fn relative_rotations(
     observations: &Observations,
     intrinsics: &InitialIntrinsics,
 ) -> Vec<Matrix3<f64>> {
-    let InitialIntrinsics { focal_px, lens } = intrinsics;
+    let InitialIntrinsics { focal_px, lenses } = intrinsics;
     pairs
         .iter()
         .zip(&observations.pairs)
         .map(|(pair, observed)| {
-            let a = lens.on(priors[pair.a].unturned_camera(focal_px[pair.a]));
-            let b = lens.on(priors[pair.b].unturned_camera(focal_px[pair.b]));
+            let a = lenses[pair.a].on(priors[pair.a].unturned_camera(focal_px[pair.a]));
+            let b = lenses[pair.b].on(priors[pair.b].unturned_camera(focal_px[pair.b]));
             fit_rotation(&a, &b, &observed.matches)
         })
         .collect()

@@ -68,7 +68,7 @@ fn matched(truth: &[Camera], noise_px: f64, gross: f64) -> Vec<PairMatches> {
 fn estimate(pairs: &[PairMatches], known_focal: Option<f64>, groups: &[usize]) -> Cameras {
     let priors: Vec<CameraPrior> = groups
         .iter()
-        .map(|&camera_group| CameraPrior { frame: frame(), focal_px: known_focal, camera_group })
+        .map(|&group| CameraPrior { focal_px: known_focal, ..CameraPrior::unknown(frame(), group) })
         .collect();
     solved(&priors, pairs, 0)
 }
@@ -190,7 +190,7 @@ fn a_fisheye_is_recognized() {
 fn another_reference_gives_the_same_shape() {
     let truth: Vec<Camera> = (0..5).map(|k| camera(700.0, 20.0 * f64::from(k), 3.0, f64::from(k))).collect();
     let pairs = matched(&truth, 0.5, 0.05);
-    let priors = vec![CameraPrior { frame: frame(), focal_px: None, camera_group: 0 }; 5];
+    let priors = vec![CameraPrior::unknown(frame(), 0); 5];
     let cameras = |reference| solved(&priors, &pairs, reference).cameras;
     // By rounding only: another start could end in another local minimum.
     assert!(worst_rotation_error(&cameras(0), &cameras(3)) < 1e-6);
@@ -254,3 +254,6 @@ fn a_pair_that_closes_a_full_turn_is_kept_unless_it_is_far_too_bad() {
     rms[short_cut] = 11.0;
     assert_eq!(contradicting_pairs(&row, &pairs, &rms, limit_px), [short_cut]);
 }
+
+#[path = "told_tests.rs"]
+mod told;

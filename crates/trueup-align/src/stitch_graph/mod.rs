@@ -52,9 +52,9 @@ pub struct TreeStep {
 
 impl StitchGraph {
     /// The graph of the joined pairs among `photographs` photographs.
-    pub fn new(photographs: usize, pairs: &[PairMatches]) -> Self {
+    pub fn new<'a>(photographs: usize, pairs: impl IntoIterator<Item = &'a PairMatches>) -> Self {
         let mut edges: Vec<GraphEdge> =
-            pairs.iter().filter(|pair| pair.verdict.is_joined()).map(GraphEdge::of).collect();
+            pairs.into_iter().filter(|pair| pair.verdict.is_joined()).map(GraphEdge::of).collect();
         edges.sort_by_key(|edge| (edge.a, edge.b));
         Self::from_edges(photographs, edges)
     }

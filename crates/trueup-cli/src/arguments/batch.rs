@@ -3,21 +3,25 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use trueup::{BatchJob, Shard};
 
+use super::option_flags::TypedOptions;
 use super::shared::TuningArgs;
 
-/// Seconds without a photograph after which another panorama begins: nobody waits for so long between two frames of one.
-const GAP_SECONDS: &str = "300";
+/// More sets at once than this are a typing mistake.
+const MAX_JOBS: i64 = 256;
 
 const EXAMPLES: &str = "\
 Examples:
   trueup batch archive/ -o panoramas                  every folder's panoramas, with a page: panoramas/index.html
   trueup batch archive/ -o panoramas --dry-run        what would be stitched
-  trueup batch archive/ -o panoramas --shard 2/4      the second of four parts, on a machine of its own
-  trueup batch archive/ -o panoramas --set canvas.scale=0.5 --set resources.memory=2GB
+  trueup batch archive/ -o panoramas --jobs 4 --memory 8GB
+  trueup batch archive/ -o panoramas --shard 2/4      the second of four parts
+  trueup batch archive/ -o panoramas --scale 0.5 --set mesh.cell_px=30
 
-The same command goes on where it was stopped or killed. A set that cannot be stitched is recorded with its reason, and is tried \
-again when its photographs or the options change, or with --retry.
+The same command goes on where it was stopped or killed, and may run several times at once, on one machine or on many that share \
+the folders: a set is made by one of them. A set that cannot be stitched is recorded with its reason, and is tried again when its \
+photographs or the options change, or with --retry.
 
 Exit status: 0 every set made a panorama, 1 the input or the system failed, 2 wrong usage, 3 some sets made none, 130 stopped by \
 Ctrl-C, 143 by a request to terminate.";
@@ -34,24 +38,31 @@ pub(crate) struct BatchArgs {
     pub output: PathBuf,
 
     /// The panoramas' format: jpg, png, tif or webp
-    #[arg(long, value_name = "FORMAT", default_value = "jpg", value_parser = ["jpg", "png", "tif", "webp"], help_heading = "Output")]
+    #[arg(long, value_name = "FORMAT", default_value = BatchJob::EXTENSION, value_parser = ["jpg", "png", "tif", "webp"], help_heading = "Output")]
     pub format: String,
 
     /// Print what would be stitched, and stitch nothing
     #[arg(long, help_heading = "What is stitched")]
     pub dry_run: bool,
 
-    /// Part a folder's photographs where none was taken for longer than this
-    #[arg(long, value_name = "SECONDS", default_value = GAP_SECONDS, value_parser = seconds, help_heading = "What is stitched")]
+    /// Part a folder's photographs where none was taken for longer than this; inf parts nothing
+    #[arg(long, value_name = "SECONDS", default_value_t = BatchJob::GAP_SECONDS, value_parser = seconds, help_heading = "What is stitched")]
     pub gap: f64,
 
-    /// Stitch every N-th set only, beginning with the K-th: for N machines that share a folder
+    /// Stitch every N-th set only, beginning with the K-th
     #[arg(long, value_name = "K/N", value_parser = shard, help_heading = "What is stitched")]
     pub shard: Option<Shard>,
 
     /// Try sets again that made no panorama
     #[arg(long, help_heading = "What is stitched")]
     pub retry: bool,
+
+    #[command(flatten)]
+    pub typed: TypedOptions,
+
+    /// Sets worked at at once; threads and memory are divided among them. More than one is faster where sets are small
+    #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true, value_parser = clap::value_parser!(u16).range(1..=MAX_JOBS), help_heading = "Tuning")]
+    pub jobs: u16,
 
     #[command(flatten)]
     pub tuning: TuningArgs,
@@ -63,21 +74,6 @@ pub(crate) struct BatchArgs {
     /// Print nothing but errors
     #[arg(short, long, help_heading = "Messages")]
     pub quiet: bool,
-}
-
-/// Which of how many parts of the work.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Shard {
-    /// Counted from 1.
-    pub number: usize,
-    pub count: usize,
-}
-
-impl Shard {
-    /// Whether the set at this position, counted from 0, belongs to the part.
-    pub(crate) fn holds(self, position: usize) -> bool {
-        position % self.count + 1 == self.number
-    }
 }
 
 fn shard(typed: &str) -> Result<Shard, String> {
@@ -100,13 +96,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shards_share_all_sets_and_none_twice() {
-        for position in 0..10 {
-            let held = (1..=3).filter(|number| shard(&format!("{number}/3")).expect("a shard").holds(position));
-            assert_eq!(held.count(), 1);
-        }
+    fn what_was_typed_is_read_or_refused() {
+        assert_eq!(shard("2/3"), Ok(Shard { number: 2, count: 3 }));
         for wrong in ["0/3", "4/3", "1", "1/0", "a/b", "-1/2"] {
             assert!(shard(wrong).is_err(), "{wrong}");
         }
+        assert_eq!((seconds("2.5"), seconds("inf")), (Ok(2.5), Ok(f64::INFINITY)));
+        assert!(seconds("-1").is_err() && seconds("NaN").is_err());
     }
 }

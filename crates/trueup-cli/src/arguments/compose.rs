@@ -11,7 +11,7 @@ const EXAMPLES: &str = "\
 Examples:
   trueup compose pano.json -o pano.tif                        the same panorama in another format
   trueup compose pano.json -o small.jpg --scale 0.25
-  trueup compose pano.json -o round.jpg --projection equirectangular --crop auto
+  trueup compose pano.json -o round.jpg --projection equirectangular --crop none
   trueup compose pano.json -o pano.jpg --photos developed/    other photographs of the same names and sizes
 
 The options of the project are overruled by --config, that by --set, and that by the flags of their own. Options of what

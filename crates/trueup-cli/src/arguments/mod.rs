@@ -5,6 +5,7 @@ mod compare;
 mod compose;
 mod option_flags;
 mod report;
+mod serve;
 mod shared;
 mod side_outputs;
 mod stitch;
@@ -14,12 +15,13 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 
-pub(crate) use batch::{BatchArgs, Shard};
+pub(crate) use batch::BatchArgs;
 pub(crate) use compare::CompareArgs;
 pub(crate) use compose::ComposeArgs;
 pub(crate) use option_flags::TypedOptions;
 pub use option_flags::{OPTION_FLAGS, OptionFlag};
 pub(crate) use report::ReportArgs;
+pub(crate) use serve::ServeArgs;
 pub(crate) use shared::{FailOn, FileArgs, MaskArgs, MessageArgs, TuningArgs};
 pub(crate) use stitch::StitchArgs;
 
@@ -29,6 +31,7 @@ Examples:
   trueup stitch IMG_01*.jpg -o pano.png --scale 0.5 --project pano.json
   trueup compose pano.json -o large.tif
   trueup inspect pano.json --verbose
+  trueup serve holiday/
   trueup evaluate pano.json --truth truth.json
   trueup report pano.json -o pano.html
   trueup compare holiday/ -o holiday-compared
@@ -63,6 +66,10 @@ pub(crate) enum Task {
     ///
     /// Goes on where it was stopped, and never stops at one bad set. A line of JSON says of every panorama how it came out.
     Batch(Box<BatchArgs>),
+    /// Show a page to stitch in, for one person on this machine, until Ctrl-C
+    ///
+    /// Prints an address to open in a browser. Photographs stay on this machine, and nobody else is let in.
+    Serve(ServeArgs),
     /// Print what a project file says of its panorama: the summary that `stitch` printed, with each photograph's measures
     Inspect(InspectArgs),
     /// Print every measure of a panorama: its own, against the truth, and of the pixels where photographs overlap

@@ -6,25 +6,31 @@ use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use trueup::{OptionDescription, Projection, StitchOptions};
 
 /// The subcommands that make panoramas, by the names that they are typed with.
-const STITCH: &[&str] = &["stitch"];
-const STITCH_AND_COMPOSE: &[&str] = &["stitch", "compose"];
-const STITCH_AND_COMPARE: &[&str] = &["stitch", "compare"];
-const ALL: &[&str] = &["stitch", "compose", "compare"];
+const STITCH: &[&str] = &["stitch", "batch"];
+const STITCH_AND_COMPOSE: &[&str] = &["stitch", "batch", "compose"];
+const STITCH_AND_COMPARE: &[&str] = &["stitch", "batch", "compare"];
+const ALL: &[&str] = &["stitch", "batch", "compose", "compare"];
+/// What turns and bounds a view suits one panorama, not a tree of folders.
+const ONE_PANORAMA: &[&str] = &["stitch", "compose"];
 
+const PHOTOGRAPHS: &str = "Photographs";
 const OUTPUT: &str = "Output";
 const VIEW: &str = "View";
 const TUNING: &str = "Tuning";
 
 /// Every flag that sets an option: the flag, the option, the heading in the help, the subcommands that take it.
 pub const OPTION_FLAGS: &[OptionFlag] = &[
+    OptionFlag::new("lens", "cameras.lens", PHOTOGRAPHS, STITCH_AND_COMPARE),
+    OptionFlag::new("lens-fov", "cameras.fov", PHOTOGRAPHS, STITCH_AND_COMPARE),
     OptionFlag::new("scale", "canvas.scale", OUTPUT, STITCH_AND_COMPOSE),
     OptionFlag::new("quality", "output.jpeg_quality", OUTPUT, ALL),
     OptionFlag::new("depth", "output.depth", OUTPUT, STITCH_AND_COMPOSE),
+    OptionFlag::new("look", "render.look", VIEW, STITCH_AND_COMPOSE),
     OptionFlag::new("projection", "projection.kind", VIEW, STITCH_AND_COMPOSE),
-    OptionFlag::new("yaw", "projection.yaw", VIEW, STITCH_AND_COMPOSE).of_a_view(),
-    OptionFlag::new("pitch", "projection.pitch", VIEW, STITCH_AND_COMPOSE).of_a_view(),
-    OptionFlag::new("roll", "projection.roll", VIEW, STITCH_AND_COMPOSE).of_a_view(),
-    OptionFlag::new("fov", "projection.fov", VIEW, STITCH_AND_COMPOSE).of_a_view(),
+    OptionFlag::new("yaw", "projection.yaw", VIEW, ONE_PANORAMA).of_a_view(),
+    OptionFlag::new("pitch", "projection.pitch", VIEW, ONE_PANORAMA).of_a_view(),
+    OptionFlag::new("roll", "projection.roll", VIEW, ONE_PANORAMA).of_a_view(),
+    OptionFlag::new("fov", "projection.fov", VIEW, ONE_PANORAMA).of_a_view(),
     OptionFlag::new("crop", "canvas.crop", VIEW, STITCH_AND_COMPOSE),
     OptionFlag::new("fill", "canvas.fill", VIEW, STITCH_AND_COMPOSE).value("SHARE"),
     OptionFlag::new("background", "output.background", VIEW, STITCH_AND_COMPOSE)

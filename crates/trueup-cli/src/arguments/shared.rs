@@ -54,6 +54,10 @@ pub(crate) struct GeometryArgs {
     #[arg(long, value_name = "FILE", help_heading = "Photographs")]
     pub graph: Option<PathBuf>,
 
+    /// Take the lens from the project of other photographs through it
+    #[arg(long, value_name = "PROJECT.json", help_heading = "Photographs")]
+    pub lens_from: Option<PathBuf>,
+
     /// Keep what is found in the photographs in this folder, so that later runs need not find it again
     #[arg(long, value_name = "DIR", help_heading = "Photographs")]
     pub cache: Option<PathBuf>,

@@ -1,201 +1,152 @@
-//! `trueup batch`: the panoramas of a tree of folders, one set of photographs after the other.
+//! `trueup batch`: from arguments to a checked job; what became of the sets, told, listed and shown on a page.
 
+mod lines;
 mod page;
-mod record;
+mod table;
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
-use serde_json::{Value, json};
-use trueup::{Error, Inputs, Outputs, PhotographsOfFolder, SideOutput, StageContext, StitchJob, StitchOptions};
+use trueup::{Batch, BatchJob, Diagnostic, SetRecord, Severity, Shard, StageContext, StitchOptions};
 
-use crate::arguments::{BatchArgs, Shard, TypedOptions};
+use crate::arguments::BatchArgs;
 use crate::chosen;
 use crate::failure::Failure;
 use crate::output;
 use crate::progress;
-use crate::summary;
-
-use record::{FORMAT, SetRecord, VERSION};
+use crate::words::{one_line, printable};
 
 /// The file of all lines.
 const LINES: &str = "batch.jsonl";
+/// The table of all panoramas.
+const TABLE: &str = "batch.csv";
 /// The page of all panoramas.
 const PAGE: &str = "index.html";
-/// What a set's panorama is called in its folder, without extension.
-const PANORAMA: &str = "panorama";
+
+/// How often the files of all sets are written while sets are worked at: each time every record is read.
+const SUM_UP_EVERY: Duration = Duration::from_secs(60);
 
 pub(crate) fn run(args: BatchArgs) -> Result<(), Failure> {
-    let options = chosen::options(StitchOptions::default(), &args.tuning, &TypedOptions::default())?;
-    let failed = progress::shown(args.quiet || args.json, |context| {
-        let sets = trueup::photograph_sets(&args.folder, &args.output, args.gap, context)?;
-        let batch = Batch { args: &args, options: &options, sets: &sets };
-        match args.dry_run {
-            true => batch.tell_plan().map(|()| 0),
-            false => batch.run(context),
+    let options = chosen::options(StitchOptions::default(), &args.tuning, &args.typed)?;
+    progress::shown(args.quiet || args.json, |context| {
+        let batch = Batch::find(job(&args), context)?;
+        warn(&context.findings());
+        if args.dry_run {
+            return output::print(&lines::plan(&batch, args.json));
         }
-    })?;
-    match failed {
-        0 => Ok(()),
-        count => Err(Failure::unsatisfied(
-            format!("{} made no panorama", if count == 1 { "1 set".to_owned() } else { format!("{count} sets") }),
-            format!("{} says why.", args.output.join(LINES).display()),
-        )),
+        let told_before = context.findings().len();
+        let outcome = Run { args: &args, batch: &batch, summed_up: Mutex::default() }.run(&options, context);
+        warn(&context.findings()[told_before..]);
+        outcome
+    })
+}
+
+/// What was typed, as the library takes it.
+fn job(args: &BatchArgs) -> BatchJob {
+    BatchJob {
+        extension: args.format.clone(),
+        gap_seconds: args.gap,
+        shard: args.shard.unwrap_or(Shard::WHOLE),
+        retry: args.retry,
+        at_once: usize::from(args.jobs),
+        threads: chosen::threads(&args.tuning),
+        ..BatchJob::new(&args.folder, &args.output)
     }
 }
 
-/// The work.
-struct Batch<'a> {
+/// Prints warnings, a line each, on standard error.
+fn warn(findings: &[Diagnostic]) {
+    let warnings = findings.iter().filter(|one| one.severity == Severity::Warning);
+    let line = |one: &Diagnostic| {
+        let said = format!("{}: {}. {}", one.subject.named(&[]), one.message, one.hint);
+        format!("trueup: warning: {}\n", one_line(&said))
+    };
+    let lines: String = warnings.map(line).collect();
+    if !lines.is_empty() {
+        trueup_terminal::complain(&printable(&lines));
+    }
+}
+
+/// A batch that is worked at.
+struct Run<'a> {
     args: &'a BatchArgs,
-    options: &'a StitchOptions,
-    sets: &'a [PhotographsOfFolder],
+    batch: &'a Batch,
+    /// When the files of all sets were written last.
+    summed_up: Mutex<Option<Instant>>,
 }
 
-impl Batch<'_> {
-    /// The sets of this part, with their positions.
-    fn mine(&self) -> impl Iterator<Item = &PhotographsOfFolder> {
-        let whole = Shard { number: 1, count: 1 };
-        let shard = self.args.shard.unwrap_or(whole);
-        self.sets.iter().enumerate().filter(move |(position, _)| shard.holds(*position)).map(|(_, set)| set)
+impl Run<'_> {
+    fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<(), Failure> {
+        let outcome = self.batch.run(options, &|record| self.heard(record), context);
+        // Also of a batch that was stopped: what is made is to be seen. Why it stopped counts more than a page that failed.
+        let summed_up = if self.args.output.is_dir() { self.sum_up_all() } else { Ok(()) };
+        outcome?;
+        summed_up?;
+        self.tell_all()
     }
 
-    /// Prints what would be stitched.
-    fn tell_plan(&self) -> Result<(), Failure> {
-        let mut text = String::new();
-        for set in self.mine() {
-            let paths: Vec<String> = set.photographs.iter().map(|path| path.display().to_string()).collect();
-            match (self.args.json, set.is_alone()) {
-                (true, _) => text += &json!({ "format": FORMAT, "version": VERSION, "set": set.name, "status": "planned", "photographs": paths }).to_string(),
-                (false, true) => text += &format!("{}: 1 photograph, which makes no panorama", set.name),
-                (false, false) => text += &format!("{}: {} photographs", set.name, paths.len()),
-            }
-            text.push('\n');
-        }
-        output::print(&text)
-    }
-
-    /// Stitches what is not made yet; returns the number of sets that made no panorama.
-    fn run(&self, context: &StageContext) -> Result<usize, Failure> {
-        let out = &self.args.output;
-        std::fs::create_dir_all(out).map_err(|error| Error::Io {
-            action: "making",
-            path: out.clone(),
-            source: error,
-        })?;
-        for name in [LINES, PAGE] {
-            trueup::check_place(&out.join(name))?;
-        }
-        let mut failed = 0;
-        for set in self.mine() {
-            let known = SetRecord::read(&self.folder_of(set)).filter(|record| self.still_holds(record, set));
-            let record = match known {
-                Some(record) => record,
-                None => {
-                    let record = self.stitch(set, context)?;
-                    record.write(&self.folder_of(set))?;
-                    self.tell(&record)?;
-                    self.sum_up()?;
-                    record
-                }
-            };
-            failed += usize::from(record.has_failed());
-        }
-        self.sum_up()?;
-        Ok(failed)
-    }
-
-    /// The folder of what a set makes.
-    fn folder_of(&self, set: &PhotographsOfFolder) -> PathBuf {
-        self.args.output.join(&set.name)
-    }
-
-    /// Whether a set need not be stitched again: nothing that decides its panoramas is another, and it made some.
-    fn still_holds(&self, record: &SetRecord, set: &PhotographsOfFolder) -> bool {
-        let is_retried = self.args.retry && record.has_failed();
-        !is_retried && record.made_of == self.made_of(set) && record.files_are_there(&self.args.output)
-    }
-
-    /// What decides the panoramas of a set: the program, the options and the photographs as they lie on the disk.
-    fn made_of(&self, set: &PhotographsOfFolder) -> Value {
-        let photograph = |path: &PathBuf| {
-            let metadata = std::fs::metadata(path).ok();
-            let modified = metadata.as_ref().and_then(|metadata| metadata.modified().ok());
-            let since = modified.and_then(|time| time.duration_since(std::time::UNIX_EPOCH).ok());
-            json!({
-                "path": path.display().to_string(),
-                "bytes": metadata.map(|metadata| metadata.len()),
-                "modified_seconds": since.map(|since| since.as_secs_f64()),
-            })
-        };
-        json!({
-            "program": env!("CARGO_PKG_VERSION"),
-            "format": self.args.format,
-            "options": self.options,
-            "photographs": set.photographs.iter().map(photograph).collect::<Vec<_>>(),
-        })
-    }
-
-    /// Stitches a set. What goes wrong with it is recorded; only a request to stop ends the batch.
-    fn stitch(&self, set: &PhotographsOfFolder, context: &StageContext) -> Result<SetRecord, Failure> {
-        let start = SetRecord::of(set, self.made_of(set));
-        if set.is_alone() {
-            return Ok(start.alone());
-        }
-        let folder = self.folder_of(set);
-        let made = std::fs::create_dir_all(&folder);
-        made.map_err(|error| Error::Io { action: "making", path: folder.clone(), source: error })?;
-        let panorama = folder.join(format!("{PANORAMA}.{}", self.args.format));
-        let outputs = Outputs::new(panorama)
-            .with(SideOutput::Project, folder.join(format!("{PANORAMA}.json")))
-            .with(SideOutput::Thumbnail, folder.join("thumbnail.jpg"));
-        let photographs = set.photographs.iter().map(|path| path.display().to_string());
-        let inputs = Inputs { all: true, ..Inputs::new(photographs) };
-        let job = StitchJob { inputs, outputs, cache: None, threads: chosen::threads(&self.args.tuning) };
-        // A defect that one set finds is not to cost the others.
-        let outcome = catch_unwind(AssertUnwindSafe(|| job.run(self.options, context)));
-        match outcome {
-            Ok(Ok(written)) => {
-                let panoramas = written.iter().map(|one| relative(summary::panorama_json(one), &self.args.output));
-                Ok(start.made(panoramas.collect()))
-            }
-            Ok(Err(Error::Cancelled)) => Err(Error::Cancelled.into()),
-            Ok(Err(error)) => Ok(start.failed(&Failure::from(error))),
-            Err(_) => Ok(start.failed(&Failure::usage("the program failed on it", "Report this as a defect."))),
-        }
-    }
-
-    /// Prints what became of a set.
-    fn tell(&self, record: &SetRecord) -> Result<(), Failure> {
+    /// Says what became of a set, and now and then writes what became of all.
+    fn heard(&self, record: &SetRecord) -> Result<(), Failure> {
         match (self.args.json, self.args.quiet) {
-            (true, _) => output::print(&record.lines()),
-            (false, true) => Ok(()),
-            (false, false) => output::print(&record.in_words()),
+            (true, _) => output::print(&lines::json(record))?,
+            (false, true) => {}
+            (false, false) => output::print(&lines::words(record))?,
         }
-    }
-
-    /// Writes all lines and the page, of this part and of others as far as they are made.
-    fn sum_up(&self) -> Result<(), Failure> {
-        let out = &self.args.output;
-        let records: Vec<SetRecord> =
-            self.sets.iter().filter_map(|set| SetRecord::read(&self.folder_of(set))).collect();
-        let lines: String = records.iter().map(SetRecord::lines).collect();
-        trueup::write_atomically(&out.join(LINES), lines.as_bytes())?;
-        trueup::write_atomically(&out.join(PAGE), page::text(&records, self.sets.len())?.as_bytes())?;
+        let mut last = self.summed_up.lock().unwrap_or_else(PoisonError::into_inner);
+        if last.is_none_or(|last| last.elapsed() >= SUM_UP_EVERY) {
+            self.sum_up(&self.records())?;
+            *last = Some(Instant::now());
+        }
         Ok(())
     }
-}
 
-/// A panorama's summary with its files as they lie in the folder `out`: it can be moved.
-fn relative(mut panorama: Value, out: &Path) -> Value {
-    let shorten = |value: &mut Value| {
-        let inside = value.as_str().and_then(|path| Path::new(path).strip_prefix(out).ok());
-        if let Some(inside) = inside.map(|path| path.display().to_string()) {
-            *value = inside.into();
+    /// Writes the files of all sets until they say what the records do: another run that wrote them meanwhile may have known less.
+    fn sum_up_all(&self) -> Result<(), Failure> {
+        for file in [LINES, TABLE, PAGE].map(|name| self.file(name)) {
+            trueup::check_place(&file)?;
         }
-    };
-    shorten(&mut panorama["panorama"]);
-    if let Some(beside) = panorama["beside"].as_object_mut() {
-        beside.values_mut().for_each(shorten);
+        loop {
+            let records = self.records();
+            self.sum_up(&records)?;
+            if self.records() == records {
+                return Ok(());
+            }
+        }
     }
-    panorama
+
+    /// Writes the files of all sets, of this shard and of others, as far as they are done.
+    fn sum_up(&self, records: &[SetRecord]) -> Result<(), Failure> {
+        let lines: String = records.iter().map(lines::json).collect();
+        trueup::write_atomically(&self.file(LINES), lines.as_bytes())?;
+        trueup::write_atomically(&self.file(TABLE), table::text(records).as_bytes())?;
+        trueup::write_atomically(&self.file(PAGE), page::text(records, self.batch.sets().len())?.as_bytes())?;
+        Ok(())
+    }
+
+    /// Says what became of all sets of this shard.
+    ///
+    /// # Errors
+    /// If some of them made no panorama.
+    fn tell_all(&self) -> Result<(), Failure> {
+        let records: Vec<SetRecord> = self.batch.planned_records().collect();
+        if !self.args.json && !self.args.quiet {
+            output::print(&lines::all(&records, &self.file(PAGE)))?;
+        }
+        match records.iter().filter(|record| record.has_failed()).count() {
+            0 => Ok(()),
+            count => Err(Failure::unsatisfied(
+                format!("{} made no panorama", if count == 1 { "1 set".to_owned() } else { format!("{count} sets") }),
+                format!("{} says why.", self.file(LINES).display()),
+            )),
+        }
+    }
+
+    fn records(&self) -> Vec<SetRecord> {
+        self.batch.records().collect()
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.args.output.join(name)
+    }
 }

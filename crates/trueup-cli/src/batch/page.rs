@@ -2,9 +2,7 @@
 
 use minijinja::Environment;
 use serde_json::{Value, json};
-use trueup::Error;
-
-use super::record::{SetOutcome, SetRecord};
+use trueup::{Error, SetOutcome, SetRecord};
 
 /// The page. Its name in the environment ends in `.html`, by which values are escaped.
 const TEMPLATE: &str = include_str!("index.html");
@@ -17,7 +15,7 @@ pub(super) fn text(records: &[SetRecord], planned: usize) -> Result<String, Erro
     let wrong = |error: minijinja::Error| Error::input("page", error, "Report this as a defect.");
     let sets: Vec<Value> = records.iter().map(set).collect();
     let failed = records.iter().filter(|record| record.has_failed()).count();
-    let panoramas: usize = records.iter().map(panoramas).sum();
+    let panoramas: usize = records.iter().map(|record| record.panoramas().len()).sum();
     let values =
         json!({ "sets": sets, "planned": planned, "done": records.len(), "failed": failed, "panoramas": panoramas });
     let mut environment = Environment::new();
@@ -25,17 +23,10 @@ pub(super) fn text(records: &[SetRecord], planned: usize) -> Result<String, Erro
     environment.get_template("index.html").and_then(|page| page.render(minijinja::value::Serde(values))).map_err(wrong)
 }
 
-fn panoramas(record: &SetRecord) -> usize {
-    match &record.outcome {
-        SetOutcome::Made(panoramas) => panoramas.len(),
-        SetOutcome::Failed { .. } | SetOutcome::Alone => 0,
-    }
-}
-
 fn set(record: &SetRecord) -> Value {
     let (panoramas, error, hint): (&[Value], _, _) = match &record.outcome {
         SetOutcome::Made(panoramas) => (panoramas.as_slice(), "", ""),
-        SetOutcome::Failed { error, hint } => (&[], error.as_str(), hint.as_str()),
+        SetOutcome::Failed { error, hint, .. } => (&[], error.as_str(), hint.as_str()),
         SetOutcome::Alone => (&[], "a single photograph makes no panorama", ""),
     };
     let one = |one: &Value| {
@@ -84,9 +75,10 @@ mod tests {
             set: "<script>alert(1)</script>".to_owned(),
             photographs: 2,
             made_of: Value::Null,
+            ended_ms: 0,
             outcome: SetOutcome::Made(vec![panorama]),
         };
-        let failed = SetOutcome::Failed { error: "<b>".to_owned(), hint: String::new() };
+        let failed = SetOutcome::Failed { error: "<b>".to_owned(), hint: String::new(), may_pass: false };
         let page = text(&[record.clone(), SetRecord { outcome: failed, ..record }], 2).expect("a page");
         assert!(!page.contains("<script") && !page.contains("<b>"), "{page}");
         assert_eq!(address(&"a b/#1?.jpg".into()), "./a%20b/%231%3F.jpg");

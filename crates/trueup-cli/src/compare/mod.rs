@@ -56,6 +56,7 @@ fn checked(args: CompareArgs) -> Result<(CompareJob, StitchOptions), Failure> {
         photographs: args.photographs,
         reference: chosen::reference(args.geometry.reference),
         graph: args.geometry.graph,
+        lens_from: args.geometry.lens_from,
         all: false,
         masks: chosen::masks(&args.masks)?,
         require_all: args.geometry.require_all,

@@ -13,14 +13,14 @@ mod tests;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use trueup::{Project, Severity, Written};
+use trueup::{LensKind, OptionValue, Project, Severity, Written};
 
 use crate::words::file_size;
 
 use left_out::{LeftOut, left_out, tells_of_left_out};
 use names::{listed, names};
 
-pub(crate) use json::{json, panorama as panorama_json};
+pub(crate) use json::json;
 pub(crate) use labeled_lines::LabeledLines;
 pub(crate) use quiet::warnings;
 
@@ -42,6 +42,7 @@ pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool
     panorama(&mut lines, project, file);
     let names = names(&project.images);
     photographs(&mut lines, project, &names, verbose);
+    told_lens(&mut lines, project);
     if verbose {
         details::photographs(&mut lines, project, &names);
         details::pairs(&mut lines, project, &names);
@@ -82,14 +83,31 @@ fn panorama(lines: &mut LabeledLines, project: &Project, file: Option<&PanoramaF
     if project.canvas.full_turn {
         size.push_str(", a full turn: the ends meet");
     }
-    let Some(file) = file else {
-        lines.entry("panorama", &size);
-        return;
-    };
-    lines.entry("panorama", &format!("{}  {size}, {}", file.panorama.display(), file_size(file.bytes)));
-    if let Some(path) = file.project {
+    match file {
+        None => lines.entry("panorama", &size),
+        Some(file) => {
+            lines.entry("panorama", &format!("{}  {size}, {}", file.panorama.display(), file_size(file.bytes)));
+        }
+    }
+    if let Some(cropped) = cropped(project) {
+        lines.entry("cropped", &cropped);
+    }
+    if let Some(path) = file.and_then(|file| file.project) {
         lines.entry("project", &path.display().to_string());
     }
+}
+
+/// How much of what the photographs show was cut off, and how much of the panorama they do not show; `None` if neither is.
+fn cropped(project: &Project) -> Option<String> {
+    let crop = project.crop.as_ref()?;
+    let percent = |share: f64| match 100.0 * share {
+        few if few < 1.0 => "less than 1 %".to_owned(),
+        percent => format!("{percent:.0} %"),
+    };
+    let lost = (crop.lost > 0.0).then(|| format!("{} of what the photographs cover was cut off", percent(crop.lost)));
+    let filled = (crop.filled > 0.0).then(|| format!("{} of the panorama was filled", percent(crop.filled)));
+    let told: Vec<String> = lost.into_iter().chain(filled).collect();
+    (!told.is_empty()).then(|| format!("{} (--crop none keeps all)", told.join(", ")))
 }
 
 /// How many were used, and each one left out with its reason and what to do about it.
@@ -106,6 +124,21 @@ fn photographs(lines: &mut LabeledLines, project: &Project, names: &[String], ve
         if !hint.is_empty() && !is_repeated {
             lines.item("", hint);
         }
+    }
+}
+
+/// What the user told of the lens, if anything.
+fn told_lens(lines: &mut LabeledLines, project: &Project) {
+    let cameras = &project.options.align.cameras;
+    let of_project = project.lens_from.as_ref().map(|file| {
+        let told = project.used_images().filter(|image| image.lens_told).count();
+        format!("that of {file}, for {told} of {} photographs", project.used())
+    });
+    let kind = (cameras.lens != LensKind::Auto).then(|| cameras.lens.display());
+    let wide = (cameras.fov > 0.0).then(|| format!("{} degrees across the longer side", cameras.fov));
+    let told: Vec<String> = [of_project, kind, wide].into_iter().flatten().collect();
+    if !told.is_empty() {
+        lines.entry("lens", &format!("told: {}", told.join("; ")));
     }
 }
 

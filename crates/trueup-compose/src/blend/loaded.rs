@@ -12,7 +12,7 @@ use trueup_core::{Result, StageContext};
 use super::order::Batch;
 use crate::label::Label;
 use crate::layout::Unrolled;
-use crate::light::{Correction, PhotographLight};
+use crate::light::{Correction, LocalExposure, PhotographLight};
 use crate::render_options::RenderOptions;
 use crate::warped::{Resampling, WarpedPhotograph, check_photograph};
 
@@ -22,6 +22,8 @@ pub(super) struct PhotographLoader<'a> {
     pub(super) unrolled: &'a Unrolled<'a>,
     pub(super) curve: &'a TransferCurve,
     pub(super) corrections: &'a [Correction],
+    /// What is done to the light of all of them, over the unrolled canvas.
+    pub(super) local: Option<&'a LocalExposure>,
     pub(super) photographs: &'a dyn PhotographSource,
     pub(super) resampling: Resampling,
     pub(super) context: &'a StageContext<'a>,
@@ -131,7 +133,7 @@ impl<'a> PhotographLoader<'a> {
         };
         check_photograph(placed, &photograph)?;
         let correction = &self.corrections[self.unrolled.original(at)];
-        let light = PhotographLight { curve: self.curve, correction };
+        let light = PhotographLight { curve: self.curve, correction, local: self.local };
         let (photograph, size) = (Cow::Owned(photograph), self.unrolled.canvas());
         Ok(WarpedPhotograph::new(photograph, &placed.mesh, size, light, &self.resampling))
     }

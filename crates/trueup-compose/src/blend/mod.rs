@@ -24,7 +24,7 @@ use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 
 use crate::layout::Unrolled;
-use crate::light::Correction;
+use crate::light::{Correction, LocalExposure};
 use crate::memory_plan::MemoryPlan;
 use crate::pyramid::{first_level, tile_side};
 use crate::seam::Seams;
@@ -45,6 +45,8 @@ pub(crate) struct BlendInput<'a> {
     pub(crate) unrolled: &'a Unrolled<'a>,
     /// One for each photograph of the layout that was unrolled.
     pub(crate) corrections: &'a [Correction],
+    /// What is done to the light of all of them, over the layout that was unrolled.
+    pub(crate) local: Option<&'a LocalExposure>,
     pub(crate) photographs: &'a dyn PhotographSource,
     pub(crate) resampling: Resampling,
     pub(crate) seams: &'a Seams,
@@ -79,7 +81,9 @@ pub(crate) fn run(input: BlendInput<'_>, context: &StageContext) -> Result<Pixel
     let kept = (0..placements).map(|at| kept[unrolled.original(at)].take()).collect();
     let batches = order::batches(&work, &bytes, plan.photographs)?;
     let curve = photographs.transfer_curve();
-    let loader = PhotographLoader { unrolled, curve: &curve, corrections, photographs, resampling, context };
+    let local = input.local.map(|local| local.led_by(unrolled.lead()));
+    let local = local.as_ref();
+    let loader = PhotographLoader { unrolled, curve: &curve, corrections, local, photographs, resampling, context };
     let mut loaded = LoadedPhotographs::new(loader, kept, &batches, plan.photographs, plan.at_a_time);
     let mut pixels = plan.store([width, height], [tile_side(first_level); 2]);
     for (index, batch) in batches.iter().enumerate() {

@@ -166,6 +166,7 @@ fn with_work<T>(
     let input = SmallViewsInput {
         unrolled: &unrolled,
         corrections: &corrections,
+        local: None,
         photographs: &memory,
         first_level: Some(first_level),
         plan: &plan,
@@ -179,7 +180,7 @@ fn with_work<T>(
     let ignored = vec![None; unrolled.placed().len()];
     let resampling = Resampling::of(Interpolation::Bicubic);
     let work = BlendWork { resampling, shown, first_level, levels, ignored };
-    let light = PhotographLight { curve: &TransferCurve::SRGB, correction: &Correction::default() };
+    let light = PhotographLight { curve: &TransferCurve::SRGB, correction: &Correction::default(), local: None };
     let warped: Vec<Option<WarpedPhotograph<'_>>> = photographs
         .into_iter()
         .zip(&layout.placed)

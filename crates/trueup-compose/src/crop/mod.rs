@@ -1,59 +1,57 @@
-//! Cropping: the part of the canvas that becomes the panorama.
+//! Cropping: the part of the canvas that becomes the panorama. Chosen last, when the panorama is there to be looked at, so
+//! that neither seams nor light depend on it.
 
+mod auto;
+mod cells;
+mod search;
+mod smooth;
 #[cfg(test)]
 mod tests;
+mod worth;
 
-use nalgebra::Vector2;
+use trueup_core::Result;
+use trueup_core::raster::RowSource;
 
-use crate::gaps::Gaps;
-use crate::layout::{CanvasLayout, CanvasOptions, Placed, reaches_into};
+use crate::layout::{CanvasLayout, CanvasOptions, Placed};
 
 pub use crate::coverage::{Coverage, Rectangle};
 pub use crate::layout::Crop;
 
-/// The rectangle of the canvas that is to be kept; `None` for all of it. Of a full turn, rows alone are cut.
+/// The rectangle of the canvas that is to be kept; `None` for all of it as it is. Of a full turn, rows alone are cut.
 ///
-/// Gaps that will be filled are no holes.
-pub fn choose(layout: &CanvasLayout, options: &CanvasOptions) -> Option<Rectangle> {
-    let &CanvasOptions { crop, min_kept, fill, .. } = options;
-    if crop == Crop::None {
-        return None;
-    }
-    let mut coverage = Coverage::of(layout);
-    if fill > 0.0 {
-        coverage = Gaps::find(layout, coverage, fill).filled_coverage();
-    }
-    let rectangle = match layout.period {
-        None => coverage.largest_rectangle(),
-        Some(_) => coverage.longest_whole_rows(),
+/// `panorama` is all that was composed on the canvas of `layout`, and `coverage` what of it photographs cover, or what was
+/// filled already. What [`Crop::Auto`] keeps may have holes that are to be filled: where the picture beside them is smooth.
+///
+/// # Errors
+/// Those of reading the panorama.
+pub fn choose(
+    panorama: &dyn RowSource,
+    layout: &CanvasLayout,
+    coverage: &Coverage,
+    options: &CanvasOptions,
+) -> Result<Option<Rectangle>> {
+    let is_enough = |rectangle: &Rectangle| match options.crop {
+        Crop::Auto => coverage.area_within(rectangle) as f64 >= options.min_kept * coverage.area() as f64,
+        Crop::None | Crop::Rectangle => true,
     };
-    let enough = match crop {
-        Crop::None => false,
-        Crop::Rectangle => rectangle.area() > 0,
-        Crop::Auto => rectangle.area() > 0 && rectangle.area() as f64 >= min_kept * coverage.area() as f64,
+    let rectangle = match (options.crop, layout.period) {
+        (Crop::None, _) => None,
+        (Crop::Rectangle, None) => Some(coverage.largest_rectangle()),
+        (Crop::Rectangle, Some(_)) => Some(coverage.longest_whole_rows()),
+        (Crop::Auto, _) => auto::rectangle(panorama, layout, coverage)?,
     };
-    let all = rectangle.columns == (0..layout.width) && rectangle.rows == (0..layout.height);
-    (enough && !all).then_some(rectangle)
+    Ok(rectangle.filter(|rectangle| rectangle.area() > 0 && is_enough(rectangle)))
 }
 
-/// The layout of a part of its canvas; photographs that show nothing of it are left out.
+/// The layout of a part of its canvas. Photographs that show nothing of it stay, outside.
 pub fn cropped(layout: CanvasLayout, rectangle: &Rectangle) -> CanvasLayout {
-    let shift = [rectangle.columns.start, rectangle.rows.start].map(|start| start as f64);
-    let size = [rectangle.columns.len(), rectangle.rows.len()];
+    let shift = rectangle.corner();
+    let [width, height] = rectangle.size();
     let moved = |mut placed: Placed| {
-        for vertex in &mut placed.mesh.target {
-            *vertex = [vertex[0] - shift[0], vertex[1] - shift[1]];
-        }
+        placed.mesh.target.iter_mut().for_each(|vertex| *vertex = [vertex[0] - shift[0], vertex[1] - shift[1]]);
         placed
     };
-    let around = layout.period.is_some();
-    let placed = layout.placed.into_iter().map(moved).filter(|placed| shows(placed, around, size)).collect();
+    let placed = layout.placed.into_iter().map(moved).collect();
     let origin = [0, 1].map(|axis| layout.origin[axis] + shift[axis] / layout.canvas_from_target);
-    CanvasLayout { width: size[0], height: size[1], origin, placed, ..layout }
-}
-
-/// Whether a photograph reaches into a canvas of `size` pixels.
-fn shows(placed: &Placed, around: bool, size: [usize; 2]) -> bool {
-    let end = Vector2::new(size[0] as f64, size[1] as f64);
-    reaches_into(&placed.mesh, around, Vector2::zeros(), end)
+    CanvasLayout { width, height, origin, placed, ..layout }
 }

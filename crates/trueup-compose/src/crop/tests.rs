@@ -1,6 +1,8 @@
 //! What is kept of laid out photographs.
 
+use trueup_core::Result;
 use trueup_core::mesh::GridMesh;
+use trueup_core::raster::RowSource;
 
 use super::*;
 
@@ -24,12 +26,54 @@ fn layout(width: usize, height: usize, outlines: &[[[f64; 2]; 4]]) -> CanvasLayo
     CanvasLayout { width, height, canvas_from_target: 2.0, origin: [5.0, 7.0], placed, period: None }
 }
 
-fn options(crop: Crop, min_kept: f64) -> CanvasOptions {
-    CanvasOptions { crop, min_kept, ..CanvasOptions::default() }
+/// A picture of so many pixels, painted by a gray level for every place.
+struct Painted<F>([usize; 2], F);
+
+impl<F: Fn(usize, usize) -> u8 + Sync> RowSource for Painted<F> {
+    fn width(&self) -> usize {
+        self.0[0]
+    }
+
+    fn height(&self) -> usize {
+        self.0[1]
+    }
+
+    fn is_opaque(&self) -> bool {
+        true
+    }
+
+    fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
+        for (x, pixel) in row.chunks_exact_mut(4).enumerate() {
+            let level = (self.1)(x, y);
+            pixel.copy_from_slice(&[level, level, level, 255]);
+        }
+        Ok(())
+    }
+
+    fn rgba16_row(&self, _: usize, _: &mut [u16]) -> Result<()> {
+        unreachable!("eight bits are enough")
+    }
+
+    fn linear_row(&self, _: usize, _: &mut [f32]) -> Result<()> {
+        unreachable!("eight bits are enough")
+    }
+}
+
+/// What is kept of a layout that shows `picture`.
+fn kept(layout: &CanvasLayout, crop: Crop, picture: impl Fn(usize, usize) -> u8 + Sync) -> Option<Rectangle> {
+    let painted = Painted([layout.width, layout.height], picture);
+    let options = CanvasOptions { crop, ..CanvasOptions::default() };
+    choose(&painted, layout, &Coverage::of(layout), &options).expect("a picture in memory")
 }
 
 fn upright(left: f64, top: f64, right: f64, bottom: f64) -> [[f64; 2]; 4] {
     [[left, top], [right, top], [right, bottom], [left, bottom]]
+}
+
+/// Levels without any order: nothing is smooth.
+fn rough(x: usize, y: usize) -> u8 {
+    let mixed = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
+    (mixed.wrapping_mul(0xC2B2_AE3D) >> 24) as u8
 }
 
 #[test]
@@ -37,16 +81,72 @@ fn two_steps_leave_the_common_rows() {
     let steps = layout(190, 70, &[upright(0.0, 0.0, 100.0, 60.0), upright(90.0, 9.5, 190.0, 70.0)]);
     let coverage = Coverage::of(&steps);
     assert_eq!(coverage.area(), 100 * 60 + 100 * 60 - 10 * 50);
-    let largest = coverage.largest_rectangle();
-    assert_eq!(largest, Rectangle { columns: 0..190, rows: 10..60 });
-    let kept = cropped(steps.clone(), &largest);
-    assert_eq!((kept.width, kept.height, kept.origin), (190, 50, [5.0, 12.0]));
-    assert_eq!(kept.placed[0].mesh.target[0], [0.0, -10.0]);
-    // 9500 of 11500 pixels.
-    assert_eq!(choose(&steps, &options(Crop::Auto, 0.8)), Some(largest.clone()));
-    assert_eq!(choose(&steps, &options(Crop::Auto, 0.9)), None);
-    assert_eq!(choose(&steps, &options(Crop::Rectangle, 0.9)), Some(largest));
-    assert_eq!(choose(&steps, &options(Crop::None, 0.0)), None);
+    let largest = Rectangle { columns: 0..190, rows: 10..60 };
+    assert_eq!(coverage.largest_rectangle(), largest);
+    assert_eq!(coverage.area_within(&largest), 190 * 50);
+    let part = cropped(steps.clone(), &largest);
+    assert_eq!((part.width, part.height, part.origin), (190, 50, [5.0, 12.0]));
+    assert_eq!(part.placed[0].mesh.target[0], [0.0, -10.0]);
+    assert_eq!(kept(&steps, Crop::Rectangle, rough), Some(largest.clone()));
+    assert_eq!(kept(&steps, Crop::Auto, rough), Some(largest), "9500 of 11500 pixels, all alike");
+    assert_eq!(kept(&steps, Crop::None, rough), None);
+}
+
+/// A wide photograph, and a narrower one above it that leaves 80 columns empty: to lose these columns costs 20000 pixels, to
+/// lose the rows above 16000.
+fn with_a_tower() -> CanvasLayout {
+    layout(400, 300, &[upright(0.0, 50.0, 400.0, 300.0), upright(80.0, 0.0, 400.0, 200.0)])
+}
+
+#[test]
+fn a_tower_is_worth_more_than_the_columns_beside_it() {
+    // Rough ground up to row 220, a bright sky above it that is not smooth where it is empty, and a tower up to row 20.
+    let scene = |tower: bool| {
+        move |x: usize, y: usize| match (y >= 220, (240..260).contains(&x) && y >= 20) {
+            (true, _) => rough(x, y),
+            (false, true) if tower => 60,
+            _ if x < 120 => 190 + rough(x, y) / 8,
+            _ => 220,
+        }
+    };
+    let without = kept(&with_a_tower(), Crop::Auto, scene(false)).expect("a rectangle");
+    assert_eq!(without, Rectangle { columns: 0..400, rows: 50..300 });
+    let with = kept(&with_a_tower(), Crop::Auto, scene(true)).expect("a rectangle");
+    assert_eq!(with, Rectangle { columns: 80..400, rows: 0..300 });
+    // The largest rectangle cares for neither.
+    assert_eq!(kept(&with_a_tower(), Crop::Rectangle, scene(true)), Some(without));
+}
+
+/// Of photographs of 100 x 60 pixels with a step between them, what is empty is filled where it is smooth.
+#[test]
+fn what_is_missing_of_a_smooth_sky_costs_nothing() {
+    let steps = layout(190, 64, &[upright(0.0, 0.0, 100.0, 60.0), upright(90.0, 4.0, 190.0, 64.0)]);
+    assert_eq!(kept(&steps, Crop::Auto, |_, _| 200), Some(Rectangle { columns: 0..190, rows: 0..64 }));
+    // Smooth above, rough below: the strip at the lower border is cut off.
+    let ground = |x, y| if y < 30 { 200 } else { rough(x, y) };
+    assert_eq!(kept(&steps, Crop::Auto, ground), Some(Rectangle { columns: 0..190, rows: 0..60 }));
+}
+
+/// A narrow photograph 80 pixels above a wide one: farther than a photograph's side, 60 pixels, nothing is filled.
+#[test]
+fn what_is_far_from_all_photographs_is_not_filled() {
+    let layout = layout(120, 140, &[upright(0.0, 80.0, 120.0, 140.0), upright(0.0, 0.0, 60.0, 80.0)]);
+    let found = kept(&layout, Crop::Auto, |_, _| 200).expect("a rectangle");
+    assert!(!(found.columns.contains(&119) && found.rows.contains(&10)), "{found:?}");
+}
+
+#[test]
+fn what_keeps_too_little_is_not_cropped() {
+    // A cross, of which one beam is seven tenths.
+    let cross = layout(300, 300, &[upright(0.0, 120.0, 300.0, 180.0), upright(120.0, 60.0, 180.0, 240.0)]);
+    assert_eq!(kept(&cross, Crop::Auto, rough).map(|found| found.area()), Some(300 * 60));
+    let star = layout(
+        300,
+        300,
+        &[upright(0.0, 130.0, 100.0, 170.0), upright(120.0, 0.0, 180.0, 100.0), upright(200.0, 130.0, 300.0, 170.0)],
+    );
+    assert_eq!(kept(&star, Crop::Auto, rough), None);
+    assert_eq!(kept(&star, Crop::Rectangle, rough).map(|found| found.area()), Some(60 * 100));
 }
 
 /// A square on its corner, 40 in half width: of rectangles inside the largest is a square of side 40.
@@ -62,14 +162,16 @@ fn a_slanted_outline_keeps_whole_pixels_only() {
 fn of_a_full_turn_rows_alone_are_cut() {
     let mut turn = layout(160, 70, &[upright(-20.0, 0.0, 80.0, 60.0), upright(70.0, 9.5, 170.0, 70.0)]);
     turn.period = Some(160);
-    let kept = choose(&turn, &options(Crop::Auto, 0.5)).expect("whole rows");
-    assert_eq!(kept, Rectangle { columns: 0..160, rows: 10..60 });
-    let kept = cropped(turn, &kept);
-    assert_eq!((kept.width, kept.height, kept.period, kept.placed.len()), (160, 50, Some(160), 2));
+    for crop in [Crop::Rectangle, Crop::Auto] {
+        let found = kept(&turn, crop, rough).expect("whole rows");
+        assert_eq!(found, Rectangle { columns: 0..160, rows: 10..60 });
+        let part = cropped(turn.clone(), &found);
+        assert_eq!((part.width, part.height, part.period, part.placed.len()), (160, 50, Some(160), 2));
+    }
 }
 
 #[test]
-fn holes_and_photographs_outside_are_seen() {
+fn holes_are_seen() {
     let hole = layout(
         120,
         60,
@@ -81,8 +183,9 @@ fn holes_and_photographs_outside_are_seen() {
         ],
     );
     let coverage = Coverage::of(&hole);
-    assert_eq!(coverage.largest_rectangle(), Rectangle { columns: 0..50, rows: 0..60 });
+    let left = Rectangle { columns: 0..50, rows: 0..60 };
+    assert_eq!(coverage.largest_rectangle(), left);
     assert_eq!(coverage.longest_whole_rows(), Rectangle { columns: 0..120, rows: 0..20 });
-    let kept = cropped(hole, &coverage.largest_rectangle());
-    assert_eq!(kept.placed.len(), 1);
+    // The hole is 20 x 20 pixels of the second cell; cells at the end are as large as there are pixels.
+    assert_eq!(coverage.in_cells(50), [2500, 2500 - 400, 1000, 500, 500, 200]);
 }

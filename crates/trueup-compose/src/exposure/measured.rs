@@ -15,7 +15,8 @@ pub struct ExposureInput<'a> {
     pub layout: &'a CanvasLayout,
     /// One for each of [`CanvasLayout::placed`], in the same order.
     pub thumbnails: &'a [Thumbnail<'a>],
-    /// Position of the photograph that [`GainAnchor::Reference`](super::GainAnchor::Reference) keeps.
+    /// Position of the photograph that [`GainAnchor::Reference`](super::GainAnchor::Reference) keeps, and whose colors
+    /// [`GainAnchor::Scene`](super::GainAnchor::Scene) does.
     pub reference: usize,
 }
 

@@ -3,11 +3,12 @@
 //! All factors act on linear light, so that they add up as logarithms: what photograph i shows of a place, times its gain,
 //! times its lens's correction there, equals the same of photograph j. The overlaps give one such equation per sample and
 //! channel; moving things and ghosts are weighed down by their residuals, saturated samples do not take part. What is linear
-//! light is estimated, too, as a [`Response`] beside the color profile's curve. What the reference shows stays as it is, but
-//! for its vignetting.
+//! light is estimated, too, as a [`Response`] beside the color profile's curve. The reference keeps its colors, but for its
+//! vignetting; how bright the whole is, all photographs decide.
 
 mod equations;
 mod evidence;
+mod level;
 mod measured;
 mod options;
 mod overlap;
@@ -97,7 +98,7 @@ pub fn run(input: &ExposureInput<'_>, options: &ExposureOptions, context: &Stage
         .first()
         .map(|thumbnail| thumbnail.curve)
         .filter(|&profile| response_asked && thumbnails.iter().all(|thumbnail| thumbnail.curve == profile));
-    let input = SolveInput { cameras: &cameras, observed: &observed, reference, profile };
+    let input = SolveInput { cameras: &cameras, observed: &observed, thumbnails, reference, profile };
     let corrections = solve(&input, options, context)?;
     Ok(Exposure { corrections, pairs: observed.into_iter().map(|observed| observed.pair).collect() })
 }
@@ -118,7 +119,7 @@ fn check(input: &ExposureInput<'_>, options: &ExposureOptions) -> Result<()> {
             "Give one three-channel thumbnail for each photograph.",
         ));
     }
-    if reference >= layout.placed.len() && options.anchor == GainAnchor::Reference {
+    if reference >= layout.placed.len() && options.anchor != GainAnchor::Mean {
         return Err(Error::input(
             STAGE,
             "the reference is not in the panorama",

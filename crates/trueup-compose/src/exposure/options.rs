@@ -7,6 +7,8 @@ trueup_core::choice! {
         Mean = "mean",
         /// The reference's gains are 1.
         Reference = "reference",
+        /// The reference's colors, and the brightness at which least of all photographs turns white or black.
+        Scene = "scene",
     }
 }
 
@@ -29,8 +31,9 @@ trueup_core::options! {
         /// What may differ between the photographs. Choose `gain` if color casts are wanted as they are, or if vignetting was
         /// corrected before and there are few overlaps to tell it from the scene.
         model: ExposureModel = ExposureModel::Full, Allowed::Any, "";
-        /// Which photograph's look the panorama keeps. Choose `mean` if the reference is much brighter or darker than the others.
-        anchor: GainAnchor = GainAnchor::Reference, Allowed::Any, "";
+        /// Which photograph's look the panorama keeps. Choose `reference` to have one photograph stay as it was taken, however
+        /// bright or dark it is, `mean` for the middle of all.
+        anchor: GainAnchor = GainAnchor::Scene, Allowed::Any, "";
         /// Whether the cameras' response is estimated beside the full model, one for all photographs; without, their samples
         /// are taken for light by the color profile's curve. Switch it off for photographs whose samples are known to follow
         /// their profile, such as developed raw files.

@@ -4,6 +4,8 @@ use trueup_core::color::TransferCurve;
 use trueup_core::{Result, StageContext};
 
 use super::equations::LightEquations;
+use super::level::LevelInput;
+use super::measured::Thumbnail;
 use super::options::{ExposureModel, ExposureOptions, GainAnchor};
 use super::overlap::Observed;
 use super::robust::LEAST_DEVIATION;
@@ -19,6 +21,8 @@ pub(super) struct SolveInput<'a> {
     /// The camera of each photograph.
     pub(super) cameras: &'a [usize],
     pub(super) observed: &'a [Observed],
+    /// The photographs.
+    pub(super) thumbnails: &'a [Thumbnail<'a>],
     /// Position of the reference.
     pub(super) reference: usize,
     /// The curve beside which a response is estimated; `None` for none.
@@ -27,7 +31,7 @@ pub(super) struct SolveInput<'a> {
 
 /// The corrections of all photographs.
 pub(super) fn solve(input: &SolveInput<'_>, options: &ExposureOptions, context: &StageContext) -> Result<Corrections> {
-    let &SolveInput { cameras, observed, reference, profile } = input;
+    let &SolveInput { cameras, observed, thumbnails, reference, profile } = input;
     let count = cameras.len();
     let problem = LightEquations::new(cameras, observed, options);
     let mut weights: Vec<Vec<f64>> = observed.iter().map(|one| vec![1.0; one.samples.len()]).collect();
@@ -62,7 +66,7 @@ pub(super) fn solve(input: &SolveInput<'_>, options: &ExposureOptions, context: 
         }
         solution.casts = problem.casts(&weights, &solution);
     }
-    let corrections = problem.corrections(&solution, reference);
+    let corrections = problem.corrections(&solution, thumbnails, reference);
     // Gains grow with a response that stretches the light. At their limit photographs do not fit any longer, which is worse
     // than what a response is good for.
     let limits = [options.max_gain, options.max_gain.recip()];
@@ -85,22 +89,38 @@ fn without_response(
 
 impl LightEquations<'_> {
     /// Gains relative to the anchor, within the limits, the vignetting of each photograph's lens, and the response.
-    fn corrections(&self, solution: &Solution, reference: usize) -> Corrections {
+    fn corrections(&self, solution: &Solution, thumbnails: &[Thumbnail<'_>], reference: usize) -> Corrections {
         let mut compared = vec![false; self.count];
         for one in self.observed {
             compared[one.pair.first] = true;
             compared[one.pair.second] = true;
         }
-        let log_gain = |index: usize, channel: usize| solution.brightness[index] + solution.casts[channel][index];
+        let corrections = self.relative_to(self.anchor(solution, &compared, reference), solution, &compared);
+        let log_factor = match self.options.anchor {
+            GainAnchor::Scene => LevelInput { thumbnails, corrections: &corrections, compared: &compared }.log_factor(),
+            GainAnchor::Reference | GainAnchor::Mean => 0.0,
+        };
+        corrections.at_level(log_factor, &compared, self.options.max_gain)
+    }
+
+    /// Logarithms of the gains that become 1.
+    fn anchor(&self, solution: &Solution, compared: &[bool], reference: usize) -> [f64; 3] {
         let taking_part = compared.iter().filter(|&&compared| compared).count().max(1);
-        let anchor: [f64; 3] = std::array::from_fn(|channel| match self.options.anchor {
-            GainAnchor::Reference => log_gain(reference, channel),
+        std::array::from_fn(|channel| match self.options.anchor {
+            GainAnchor::Reference | GainAnchor::Scene => self.log_gain(solution, reference, channel),
             GainAnchor::Mean => {
                 let all = (0..self.count).filter(|&index| compared[index]);
-                all.map(|index| log_gain(index, channel)).sum::<f64>() / taking_part as f64
+                all.map(|index| self.log_gain(solution, index, channel)).sum::<f64>() / taking_part as f64
             }
-        });
-        let largest = self.options.max_gain;
+        })
+    }
+
+    fn log_gain(&self, solution: &Solution, index: usize, channel: usize) -> f64 {
+        solution.brightness[index] + solution.casts[channel][index]
+    }
+
+    /// The corrections without limits; gains whose logarithms are `anchor` become 1, and those of what was not compared are.
+    fn relative_to(&self, anchor: [f64; 3], solution: &Solution, compared: &[bool]) -> Corrections {
         let correction = |index: usize| {
             let lens = self.count + self.lens_of[index] * self.terms;
             let mut correction = Correction::default();
@@ -108,9 +128,8 @@ impl LightEquations<'_> {
                 correction.vignetting[term] = solution.brightness[lens + term];
             }
             if compared[index] {
-                correction.gain = std::array::from_fn(|channel| {
-                    (log_gain(index, channel) - anchor[channel]).exp().clamp(largest.recip(), largest)
-                });
+                correction.gain =
+                    std::array::from_fn(|channel| (self.log_gain(solution, index, channel) - anchor[channel]).exp());
             }
             correction
         };

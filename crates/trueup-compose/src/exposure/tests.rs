@@ -153,7 +153,8 @@ fn gain_color_and_vignetting_are_recovered_together() {
             rasters[1].pixel_mut(x, y).copy_from_slice(&[20, 60, 20]);
         }
     }
-    let exposure = estimate(&shifts, &rasters, &ExposureOptions::default());
+    let options = ExposureOptions { anchor: GainAnchor::Reference, ..ExposureOptions::default() };
+    let exposure = estimate(&shifts, &rasters, &options);
     assert_eq!(exposure.corrections.photographs.len(), shifts.len());
     let truth = |k: usize, c: usize| lights[0] * casts[0][c] / (lights[k] * casts[k][c]);
     for (k, correction) in exposure.corrections.photographs.iter().enumerate() {
@@ -176,7 +177,7 @@ fn gains_from_a_quarter_to_four_are_recovered() {
     let shifts = [0.0, 150.0, 300.0, 450.0];
     let lights = [1.0, 0.25, 4.0, 1.7];
     let rasters: Vec<_> = shifts.iter().zip(lights).map(|(&shift, light)| photograph(shift, light)).collect();
-    for anchor in [GainAnchor::Mean, GainAnchor::Reference] {
+    for anchor in [GainAnchor::Mean, GainAnchor::Reference, GainAnchor::Scene] {
         let exposure = estimate(&shifts, &rasters, &ExposureOptions { anchor, ..ExposureOptions::default() });
         assert_eq!(exposure.pairs.len(), 3);
         let corrections = exposure.corrections.photographs.iter();
@@ -188,6 +189,8 @@ fn gains_from_a_quarter_to_four_are_recovered() {
         match anchor {
             GainAnchor::Reference => assert_eq!(exposure.corrections.photographs[0].gain, [1.0; 3]),
             GainAnchor::Mean => assert!(corrections.map(|one| one.brightness().ln()).sum::<f64>().abs() < 1e-9),
+            // Nothing is lost, and no photograph is more than two stops from the reference.
+            GainAnchor::Scene => assert!((0.5..=2.0).contains(&exposure.corrections.photographs[0].gain[0])),
         }
     }
 }
@@ -198,8 +201,36 @@ fn exposures_four_stops_apart_are_followed() {
     let lights = [4.0, 1.0, 0.25];
     let shifts = [0.0, 100.0, 200.0];
     let rasters: Vec<_> = shifts.iter().zip(lights).map(|(&shift, light)| photograph(shift, light)).collect();
-    let gains = gains(&estimate(&shifts, &rasters, &ExposureOptions::default()));
+    let options = ExposureOptions { anchor: GainAnchor::Reference, ..ExposureOptions::default() };
+    let gains = gains(&estimate(&shifts, &rasters, &options));
     assert!((gains[1] / 4.0 - 1.0).abs() < 0.02 && (gains[2] / 16.0 - 1.0).abs() < 0.03, "{gains:?}");
+}
+
+/// A reference that is four stops too dark, beside three photographs as they should be.
+#[test]
+fn a_dark_reference_does_not_make_the_panorama_dark() {
+    let shifts = [0.0, 100.0, 200.0, 300.0];
+    let lights = [1.0 / 16.0, 1.0, 1.0, 1.0];
+    let rasters: Vec<_> = shifts.iter().zip(lights).map(|(&shift, light)| photograph(shift, light)).collect();
+    let by_anchor = |anchor: GainAnchor| {
+        let options = ExposureOptions { anchor, model: ExposureModel::Gain, ..ExposureOptions::default() };
+        gains(&estimate(&shifts, &rasters, &options))
+    };
+    let (scene, reference) = (by_anchor(GainAnchor::Scene), by_anchor(GainAnchor::Reference));
+    assert!(reference[1] < 0.08, "{reference:?}");
+    // The others cost nothing from a stop below their exposure on, which is where the stops from the reference are fewest.
+    assert!((scene[1] / 0.5 - 1.0).abs() < 0.1, "{scene:?}");
+    for (one, other) in scene.iter().zip(&reference) {
+        assert!((one / other / (scene[0] / reference[0]) - 1.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn photographs_of_nearly_one_exposure_keep_the_level_of_the_reference() {
+    let shifts = [0.0, 100.0, 200.0];
+    let rasters: Vec<_> = shifts.iter().zip([1.0, 1.4, 0.8]).map(|(&shift, light)| photograph(shift, light)).collect();
+    let exposure = estimate(&shifts, &rasters, &ExposureOptions::default());
+    assert_eq!(exposure.corrections.photographs[0].gain, [1.0; 3]);
 }
 
 #[test]

@@ -3,13 +3,13 @@
 trueup_core::choice! {
     /// What of the canvas is kept.
     pub enum Crop {
+        /// The rectangle without ragged borders that loses least of what matters: sky, lawn and blurred borders before towers,
+        /// people and lines. Small empty corners beside a smooth sky or floor are filled, so that less must go.
+        Auto = "auto",
+        /// The largest rectangle without holes, whatever it cuts through.
+        Rectangle = "rectangle",
         /// All that any photograph covers; what none covers is transparent or background.
         None = "none",
-        /// The largest rectangle without holes if it keeps most of the panorama (canvas.min_kept), otherwise all: no head is lost
-        /// for a straight border.
-        Auto = "auto",
-        /// The largest rectangle without holes, however much it costs.
-        Rectangle = "rectangle",
     }
 }
 
@@ -27,11 +27,11 @@ trueup_core::options! {
         /// than 400 million pixels is reduced evenly: a shape that runs away is not worth its time. Raise it if
         /// `canvas-reduced` is reported for a panorama whose stretched borders you want.
         max_growth: f64 = 8.0, between(1.0, 1e6), "";
-        /// What of the canvas is kept. Choose `auto` or `rectangle` for a panorama without ragged borders.
-        crop: Crop = Crop::None, Allowed::Any, "", basic;
-        /// Share of the covered pixels that the largest rectangle must keep for `crop = auto` to crop to it. Lower it if
-        /// `auto` keeps ragged borders that you would rather lose, raise it if it takes too much.
-        min_kept: f64 = 0.75, between(0.0, 1.0), "";
+        /// What of the canvas is kept. Choose `none` for all that the photographs show, with ragged borders.
+        crop: Crop = Crop::Auto, Allowed::Any, "", basic;
+        /// Share of the covered pixels that `crop = auto` must be able to keep; otherwise it keeps all, ragged borders as well. Lower
+        /// it if ragged borders are kept that you would rather lose.
+        min_kept: f64 = 0.6, between(0.0, 1.0), "";
         /// Gaps between and beside the photographs of up to twice this width, as a share of a photograph's side, are filled with
         /// a smooth surface over their borders' colors. 0 fills nothing; raise it to 0.1 where ragged borders lie in an even sky
         /// or wall, in which small fillings are not noticed.

@@ -2,10 +2,12 @@
 
 mod by_response;
 mod correction;
+mod local_exposure;
 mod response;
 mod table;
 
 pub(crate) use by_response::ByResponse;
 pub use correction::{Correction, Corrections, VIGNETTING_TERMS};
+pub(crate) use local_exposure::{ExposureMap, LocalExposure};
 pub use response::{RESPONSE_TERMS, Response};
 pub(crate) use table::{LightTable, PhotographLight, exposed};

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use trueup_core::color::TransferCurve;
 
 use super::correction::Correction;
+use super::local_exposure::LocalExposure;
 use crate::transfer_curve::Linearize;
 
 /// Smallest factor whose levelling off is undone: highlights are lifted by its inverse at most, since what lies between the
@@ -29,6 +30,8 @@ pub(crate) fn exposed(linear: f32, factor: f32) -> f32 {
 pub(crate) struct PhotographLight<'a> {
     pub(crate) curve: &'a TransferCurve,
     pub(crate) correction: &'a Correction,
+    /// What is done to all photographs alike at a place of the canvas on which it is laid; `None` for nothing.
+    pub(crate) local: Option<&'a LocalExposure>,
 }
 
 /// From a photograph's samples to corrected light, as the inner loops read it: its transfer curve and its [`Correction`].
@@ -50,7 +53,7 @@ const STEPS: usize = 256;
 impl LightTable {
     /// For a photograph of `size` pixels.
     pub(crate) fn new(light: PhotographLight<'_>, size: [f64; 2]) -> Self {
-        let PhotographLight { curve, correction } = light;
+        let PhotographLight { curve, correction, .. } = light;
         let plain = correction.vignetting.iter().all(|&coefficient| coefficient == 0.0);
         let last = if plain { 0 } else { STEPS + 2 };
         let factor = |index: usize| correction.at_radius((index as f64 / STEPS as f64).min(1.0)) as f32;
@@ -89,15 +92,15 @@ mod tests {
     #[test]
     fn the_table_follows_the_formula() {
         let correction = Correction { gain: [1.0, 2.0, 0.5], vignetting: [0.3, -0.2, 0.4] };
-        let table =
-            LightTable::new(PhotographLight { curve: &TransferCurve::SRGB, correction: &correction }, [400.0, 300.0]);
+        let light = PhotographLight { curve: &TransferCurve::SRGB, correction: &correction, local: None };
+        let table = LightTable::new(light, [400.0, 300.0]);
         assert!(table.varies());
         for (x, y) in [(200.0, 150.0), (0.0, 0.0), (37.5, 281.0), (400.0, 300.0), (390.0, 12.0)] {
             let r2 = ((x - 200.0) * (x - 200.0) + (y - 150.0) * (y - 150.0)) / (200.0 * 200.0 + 150.0 * 150.0);
             let expected = f64::exp(0.3 * r2 - 0.2 * r2 * r2 + 0.4 * r2 * r2 * r2);
             assert!((f64::from(table.at(x as f32, y as f32)) - expected).abs() < 1e-4, "({x}, {y})");
         }
-        let even = PhotographLight { curve: &TransferCurve::SRGB, correction: &Correction::uniform(3.0) };
+        let even = PhotographLight { correction: &Correction::uniform(3.0), ..light };
         assert!(!LightTable::new(even, [400.0, 300.0]).varies());
         assert!((correction.brightness() - 1.0).abs() < 1e-12);
     }

@@ -13,7 +13,7 @@ use trueup_core::{Result, StageContext};
 use crate::deformed_grid::DeformedGrid;
 use crate::ignored::{IgnoredPart, ShownElsewhere};
 use crate::layout::{CanvasLayout, Placed};
-use crate::light::{Correction, PhotographLight};
+use crate::light::{Correction, LocalExposure, PhotographLight};
 use crate::memory_plan::{MemoryPlan, WorkBytes};
 use crate::render_options::RenderOptions;
 use crate::small_views::small_size;
@@ -37,6 +37,8 @@ pub(super) struct AverageInput<'a> {
     pub(super) layout: &'a CanvasLayout,
     /// One for each of them.
     pub(super) corrections: &'a [Correction],
+    /// What is done to the light of all of them.
+    pub(super) local: Option<&'a LocalExposure>,
     pub(super) photographs: &'a dyn PhotographSource,
     pub(super) averaging: Averaging,
     pub(super) plan: &'a MemoryPlan,
@@ -114,12 +116,12 @@ impl Summing<'_> {
 
     /// The photograph at a position, decoded.
     fn warped(&self, at: usize) -> Result<WarpedPhotograph<'static>> {
-        let &AverageInput { corrections, photographs, averaging, .. } = self.input;
+        let &AverageInput { corrections, local, photographs, averaging, .. } = self.input;
         let placed = &self.layout.placed[at];
         let photograph = photographs.photograph(placed.photograph)?;
         check_photograph(placed, &photograph)?;
         let size = [self.layout.width, self.layout.height];
-        let light = PhotographLight { curve: &self.curve, correction: &corrections[self.originals[at]] };
+        let light = PhotographLight { curve: &self.curve, correction: &corrections[self.originals[at]], local };
         let ignored = IgnoredPart::new(&photographs.masks(placed.photograph), self.elsewhere.as_ref(), size);
         let photograph = Cow::Owned(photograph);
         Ok(WarpedPhotograph::new(photograph, &placed.mesh, size, light, &averaging.resampling).without(ignored))

@@ -6,7 +6,7 @@ use trueup_core::{Error, Result, StageContext};
 
 use super::input::RenderInput;
 use crate::deformed_grid::count_folded_triangles;
-use crate::layout::{CanvasLayout, check_mesh};
+use crate::layout::{CanvasLayout, Placed, check_mesh};
 use crate::light::Correction;
 use crate::render_options::RenderOptions;
 
@@ -34,18 +34,42 @@ pub(super) fn check(input: &RenderInput<'_>, options: &RenderOptions) -> Result<
     Ok(())
 }
 
-/// Reports the grids that are folded.
+/// Share of a grid's triangles from which folds are seen: of fewer, most lie where another photograph is shown.
+const SEEN_FOLDS: f64 = 0.01;
+
+/// Reports the grids that are folded: the worst with a warning if its folds may be seen, the others with notes.
 pub(super) fn report_folds(layout: &CanvasLayout, context: &StageContext) {
-    for placed in &layout.placed {
-        let folded = count_folded_triangles(&placed.mesh);
-        if folded > 0 {
-            let triangles = 2 * (placed.mesh.rows - 1) * (placed.mesh.columns - 1);
-            context.report(Diagnostic::warning(
-                "grid-folded",
-                Subject::Photograph(placed.photograph),
-                format!("{folded} of {triangles} triangles of its grid are folded over"),
-                "The photograph may not fit the others: leave it out, or try another method.",
-            ));
+    let folded = |placed: &Placed| {
+        let triangles = 2 * (placed.mesh.rows - 1) * (placed.mesh.columns - 1);
+        Folds { photograph: placed.photograph, folded: count_folded_triangles(&placed.mesh), triangles }
+    };
+    let mut folds: Vec<Folds> = layout.placed.iter().map(folded).filter(|folds| folds.folded > 0).collect();
+    folds.sort_by(|one, other| other.share().total_cmp(&one.share()));
+    let seen = folds.iter().filter(|folds| folds.share() >= SEEN_FOLDS).count();
+    for (rank, folds) in folds.iter().enumerate() {
+        let subject = Subject::Photograph(folds.photograph);
+        let mut message = format!("{} of {} triangles of its grid are folded over", folds.folded, folds.triangles);
+        if rank > 0 || seen == 0 {
+            context.report(Diagnostic::note("grid-folded", subject, message, ""));
+            continue;
         }
+        if seen > 1 {
+            message += &format!(", and parts of {} other grids", seen - 1);
+        }
+        let hint = "Look at it there. The photograph may not fit the others: leave it out, or try another method.";
+        context.report(Diagnostic::warning("grid-folded", subject, message, hint));
+    }
+}
+
+/// Folds of a photograph's grid.
+struct Folds {
+    photograph: usize,
+    folded: usize,
+    triangles: usize,
+}
+
+impl Folds {
+    fn share(&self) -> f64 {
+        self.folded as f64 / self.triangles.max(1) as f64
     }
 }

@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
-use trueup_core::raster::RowSource;
 use trueup_core::{Result, StageContext};
 
 use super::panorama::{Panorama, PanoramaPixels, linear_of_sum};
@@ -51,7 +50,7 @@ impl Panorama {
     /// # Source
     /// Push-pull: Gortler, Grzeszczuk, Szeliski, Cohen, "The lumigraph", SIGGRAPH 1996, section 3.4.
     pub fn fill(&mut self, gaps: &Gaps, context: &StageContext) -> Result<usize> {
-        let size = [self.width(), self.height()];
+        let size = gaps.canvas();
         match &mut self.pixels {
             PanoramaPixels::Sums(sums) => fill(sums, size, gaps, context),
             PanoramaPixels::Roots(roots) => fill(roots, size, gaps, context),
@@ -130,7 +129,7 @@ impl<'a> Canvas<'a> {
         };
         let has_gap = |tile: &FillTile| {
             let mut pixels = tile.rows.clone().flat_map(|y| tile.columns.clone().map(move |x| (self.column(x), y)));
-            pixels.any(|(x, y)| !self.gaps.is_covered(x, y) && self.gaps.is_small(x, y))
+            pixels.any(|(x, y)| !self.gaps.is_covered(x, y) && self.gaps.is_gap(x, y))
         };
         let gap: Vec<bool> = (0..across * down).into_par_iter().map(|at| has_gap(&tile(at))).collect();
         let reach = (2.0 * self.gaps.radius() / side as f64).ceil() as usize + 1;
@@ -230,7 +229,7 @@ impl<'a> Canvas<'a> {
                 let own = pixel.root();
                 let share = own[3];
                 if share < 1.0
-                    && self.gaps.is_small(x, y)
+                    && self.gaps.is_gap(x, y)
                     && let Some(smooth) = color(texel)
                 {
                     *pixel = P::of_root([0, 1, 2].map(|k| share * own[k] + (1.0 - share) * smooth[k]));

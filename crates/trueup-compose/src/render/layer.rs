@@ -12,8 +12,10 @@ use super::input::RenderInput;
 use crate::deformed_grid::DeformedGrid;
 use crate::layout::{CanvasLayout, TURNS, columns_around};
 use crate::light::{ByResponse, PhotographLight};
+use crate::look::local_exposure;
 use crate::render_options::RenderOptions;
 use crate::transfer_curve::Encoding;
+use crate::unframed::Unframed;
 use crate::warped::{Resampling, SamplingMemory, WarpedPhotograph, check_photograph};
 use crate::weights::WHOLE;
 use crate::window::Window;
@@ -93,11 +95,14 @@ fn alone(
             "Ask for one of the photographs placed.",
         ));
     };
+    let photographs = &Unframed(photographs);
     let photograph = photographs.photograph(placed.photograph)?;
     check_photograph(placed, &photograph)?;
     let photographs = ByResponse::new(photographs, &corrections.response)?;
     let curve = photographs.transfer_curve();
-    let light = PhotographLight { curve: &curve, correction: &corrections.photographs[position] };
+    let local = local_exposure(layout, &corrections.photographs, options.look);
+    let light =
+        PhotographLight { curve: &curve, correction: &corrections.photographs[position], local: local.as_ref() };
     let mesh = &placed.in_first_turn(layout.period).mesh;
     let (size, resampling) = (unrolled_size(layout), Resampling::of(options.interpolation));
     let warped = WarpedPhotograph::new(Cow::Owned(photograph), mesh, size, light, &resampling);

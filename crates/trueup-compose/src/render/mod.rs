@@ -13,7 +13,7 @@ mod layer;
 mod panorama;
 
 pub use crate::memory_plan::Resources;
-pub use crate::render_options::{Blend, Interpolation, RenderOptions};
+pub use crate::render_options::{Blend, Interpolation, Look, RenderOptions};
 pub use input::RenderInput;
 pub use layer::{Layer, LayerRows, layer, layer_rows, layer_size};
 pub use panorama::Panorama;
@@ -24,13 +24,15 @@ use trueup_core::{Result, StageContext};
 
 use crate::blend::{self, BlendInput, WholeLevels};
 use crate::layout::{CanvasLayout, Unrolled};
-use crate::light::{ByResponse, Correction};
+use crate::light::{ByResponse, Correction, LocalExposure};
+use crate::look::{self, local_exposure};
 use crate::memory_plan::{MemoryNeeds, MemoryPlan};
 use crate::pyramid::first_level;
 use crate::render_options::{Composition, Transition};
 use crate::seam::{self, SeamInput, SeamOptions, Seams};
 use crate::small_views::{self, SmallViews, SmallViewsInput};
 use crate::store::{PixelStore, RootPixel, SumPixel};
+use crate::unframed::Unframed;
 use crate::warped::{Averaging, Resampling};
 use crate::weights::Weighting;
 use average::AverageInput;
@@ -72,11 +74,22 @@ pub fn run(
     check(input, options)?;
     seam_options.check()?;
     let &RenderInput { layout, corrections, photographs } = input;
+    let photographs = &Unframed(photographs);
     let photographs = ByResponse::new(photographs, &corrections.response)?;
     let plan = MemoryPlan::new(&memory_needs(layout, &photographs, options)?, resources)?;
     report_folds(layout, context);
     let size = [layout.width, layout.height];
-    let composing = Composing { layout, corrections: &corrections.photographs, photographs: &photographs, plan: &plan };
+    let local = local_exposure(layout, &corrections.photographs, options.look);
+    if local.is_some() {
+        look::report(&corrections.photographs, options.look, context);
+    }
+    let composing = Composing {
+        layout,
+        corrections: &corrections.photographs,
+        local: local.as_ref(),
+        photographs: &photographs,
+        plan: &plan,
+    };
     match composition(layout, options) {
         Composition::AlongSeams(_) => {
             let (pixels, seams) = composing.along_seams(options, seam_options, context)?;
@@ -133,6 +146,7 @@ fn memory_needs(
 struct Composing<'a> {
     layout: &'a CanvasLayout,
     corrections: &'a [Correction],
+    local: Option<&'a LocalExposure>,
     photographs: &'a ByResponse<'a>,
     plan: &'a MemoryPlan,
 }
@@ -145,13 +159,13 @@ impl Composing<'_> {
         seam_options: &SeamOptions,
         context: &StageContext,
     ) -> Result<(PixelStore<RootPixel>, Seams)> {
-        let &Self { layout, corrections, photographs, plan } = self;
+        let &Self { layout, corrections, local, photographs, plan } = self;
         let levels = whole_levels(layout, options);
         let unrolled = &unrolled(layout, levels)?;
         // Small views, and the photographs themselves wherever they are placed.
         context.progress().begin(STAGE, (layout.placed.len() + unrolled.placed().len()) as u64);
         let first_level = levels.map(|levels| levels.first_level);
-        let input = SmallViewsInput { unrolled, corrections, photographs, first_level, plan };
+        let input = SmallViewsInput { unrolled, corrections, local, photographs, first_level, plan };
         let SmallViews { views, size, coarse_levels, decoded } = small_views::run(&input, context)?;
         let seams = match views.len() {
             1 => Seams::of_one(size[0], size[1]),
@@ -165,6 +179,7 @@ impl Composing<'_> {
         let input = BlendInput {
             unrolled,
             corrections,
+            local,
             photographs,
             resampling,
             seams: &seams,
@@ -180,8 +195,8 @@ impl Composing<'_> {
 
     /// Means of all photographs.
     fn averaged(&self, averaging: Averaging, context: &StageContext) -> Result<PixelStore<SumPixel>> {
-        let &Self { layout, corrections, photographs, plan } = self;
-        average::run(&AverageInput { layout, corrections, photographs, averaging, plan }, context)
+        let &Self { layout, corrections, local, photographs, plan } = self;
+        average::run(&AverageInput { layout, corrections, local, photographs, averaging, plan }, context)
     }
 }
 

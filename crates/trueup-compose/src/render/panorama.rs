@@ -1,8 +1,11 @@
 //! The finished panorama.
 
-use trueup_core::Result;
-use trueup_core::raster::RowSource;
+use std::ops::Range;
 
+use trueup_core::raster::RowSource;
+use trueup_core::{Error, Result};
+
+use crate::coverage::Rectangle;
 use crate::store::{PixelStore, RootPixel, SumPixel};
 use crate::transfer_curve::Encoding;
 use crate::weights::alpha;
@@ -10,8 +13,8 @@ use crate::weights::alpha;
 /// The finished panorama: 8 or 16 bytes a pixel in memory or in a scratch file, encoded as its rows are asked for.
 #[derive(Debug)]
 pub struct Panorama {
-    width: usize,
-    height: usize,
+    /// Of the canvas that its pixels hold, what is the panorama.
+    kept: Rectangle,
     pub(super) pixels: PanoramaPixels,
     encoding: Encoding,
 }
@@ -26,12 +29,30 @@ pub(super) enum PanoramaPixels {
 }
 
 impl Panorama {
-    pub(super) fn from_sums([width, height]: [usize; 2], sums: PixelStore<SumPixel>, encoding: Encoding) -> Self {
-        Self { width, height, pixels: PanoramaPixels::Sums(sums), encoding }
+    pub(super) fn from_sums(size: [usize; 2], sums: PixelStore<SumPixel>, encoding: Encoding) -> Self {
+        Self { kept: Rectangle::whole(size), pixels: PanoramaPixels::Sums(sums), encoding }
     }
 
-    pub(super) fn from_roots([width, height]: [usize; 2], roots: PixelStore<RootPixel>, encoding: Encoding) -> Self {
-        Self { width, height, pixels: PanoramaPixels::Roots(roots), encoding }
+    pub(super) fn from_roots(size: [usize; 2], roots: PixelStore<RootPixel>, encoding: Encoding) -> Self {
+        Self { kept: Rectangle::whole(size), pixels: PanoramaPixels::Roots(roots), encoding }
+    }
+
+    /// Leaves of the panorama the `part` that is to be kept. What lies around it stays in memory, but is not shown.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the part is empty or not all of it is in the panorama.
+    pub fn crop(&mut self, part: &Rectangle) -> Result<()> {
+        let [width, height] = self.kept.size();
+        if part.area() == 0 || part.columns.end > width || part.rows.end > height {
+            let [wide, high] = part.size();
+            let reason = format!("a part of {wide} x {high} px is not in the panorama of {width} x {height} px");
+            return Err(Error::input("crop", reason, "Choose a part of the panorama."));
+        }
+        let moved = |range: &Range<usize>, start: usize| range.start + start..range.end + start;
+        let columns = moved(&part.columns, self.kept.columns.start);
+        let rows = moved(&part.rows, self.kept.rows.start);
+        self.kept = Rectangle { columns, rows };
+        Ok(())
     }
 
     /// Linear light (red, green, blue; 1 is white, more is possible) and alpha (0 to 1) of pixel (x, y); all 0 where no
@@ -40,10 +61,16 @@ impl Panorama {
     /// # Errors
     /// [`trueup_core::Error::Io`] if a scratch file cannot be read.
     pub fn linear_pixel(&self, x: usize, y: usize) -> Result<[f32; 4]> {
+        let (x, y) = (x + self.kept.columns.start, y + self.kept.rows.start);
         Ok(self.profile_light(match &self.pixels {
             PanoramaPixels::Sums(sums) => linear_of_sum(sums.pixel(x, y)?),
             PanoramaPixels::Roots(roots) => linear_of_root(roots.pixel(x, y)?),
         }))
+    }
+
+    /// The columns of the canvas that a row of the panorama has, and its own row there.
+    fn on_canvas(&self, y: usize) -> (Range<usize>, usize) {
+        (self.kept.columns.clone(), self.kept.rows.start + y)
     }
 
     /// Linear light by the color profile.
@@ -64,25 +91,26 @@ fn linear_of_root(root: RootPixel) -> [f32; 4] {
 
 impl RowSource for Panorama {
     fn width(&self) -> usize {
-        self.width
+        self.kept.columns.len()
     }
 
     fn height(&self) -> usize {
-        self.height
+        self.kept.rows.len()
     }
 
     fn is_opaque(&self) -> bool {
         match &self.pixels {
-            PanoramaPixels::Sums(sums) => sums.is_opaque(),
-            PanoramaPixels::Roots(roots) => roots.is_opaque(),
+            PanoramaPixels::Sums(sums) => sums.is_opaque(&self.kept),
+            PanoramaPixels::Roots(roots) => roots.is_opaque(&self.kept),
         }
     }
 
     fn rgba8_row(&self, y: usize, row: &mut [u8]) -> Result<()> {
+        let (columns, y) = self.on_canvas(y);
         match &self.pixels {
             PanoramaPixels::Sums(sums) => {
                 let encode = &self.encoding.linear;
-                for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(sums.row(y)?.iter()) {
+                for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(sums.row(y)?[columns].iter()) {
                     let opacity = (alpha(sum) * 255.0 + 0.5) as u8;
                     let scale = if opacity > 0 { 1.0 / sum } else { 0.0 };
                     let levels = [encode.level(r * scale), encode.level(g * scale), encode.level(b * scale), opacity];
@@ -91,7 +119,7 @@ impl RowSource for Panorama {
             }
             PanoramaPixels::Roots(roots) => {
                 let encode = &self.encoding.roots;
-                for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(roots.row(y)?.iter()) {
+                for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(roots.row(y)?[columns].iter()) {
                     let opacity = ((u32::from(opacity) * 255 + 32767) / 65535) as u8;
                     let shown = opacity > 0;
                     let level = |root: u16| if shown { encode.level(root) } else { 0 };
@@ -103,10 +131,11 @@ impl RowSource for Panorama {
     }
 
     fn rgba16_row(&self, y: usize, row: &mut [u16]) -> Result<()> {
+        let (columns, y) = self.on_canvas(y);
         match &self.pixels {
             PanoramaPixels::Sums(sums) => {
                 let encode = self.encoding.linear16();
-                for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(sums.row(y)?.iter()) {
+                for (pixel, &[r, g, b, sum]) in row.chunks_exact_mut(4).zip(sums.row(y)?[columns].iter()) {
                     let opacity = (alpha(sum) * 65535.0 + 0.5) as u16;
                     let scale = if opacity > 0 { 1.0 / sum } else { 0.0 };
                     let levels = [encode.level(r * scale), encode.level(g * scale), encode.level(b * scale), opacity];
@@ -115,7 +144,7 @@ impl RowSource for Panorama {
             }
             PanoramaPixels::Roots(roots) => {
                 let encode = self.encoding.roots16();
-                for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(roots.row(y)?.iter()) {
+                for (pixel, &[r, g, b, opacity]) in row.chunks_exact_mut(4).zip(roots.row(y)?[columns].iter()) {
                     let level = |root: u16| if opacity > 0 { encode.level(root) } else { 0 };
                     pixel.copy_from_slice(&[level(r), level(g), level(b), opacity]);
                 }
@@ -125,14 +154,15 @@ impl RowSource for Panorama {
     }
 
     fn linear_row(&self, y: usize, row: &mut [f32]) -> Result<()> {
+        let (columns, y) = self.on_canvas(y);
         let out = row.chunks_exact_mut(4);
         match &self.pixels {
             PanoramaPixels::Sums(sums) => {
-                out.zip(sums.row(y)?.iter())
+                out.zip(sums.row(y)?[columns].iter())
                     .for_each(|(out, &sum)| out.copy_from_slice(&self.profile_light(linear_of_sum(sum))));
             }
             PanoramaPixels::Roots(roots) => {
-                out.zip(roots.row(y)?.iter())
+                out.zip(roots.row(y)?[columns].iter())
                     .for_each(|(out, &root)| out.copy_from_slice(&self.profile_light(linear_of_root(root))));
             }
         }

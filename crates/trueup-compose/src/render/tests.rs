@@ -102,7 +102,7 @@ fn an_inner_border_leaves_no_trace_on_equal_photographs() {
 fn gains_act_on_linear_light() {
     let layout = canvas(30, 30, vec![moved(0, 30.0, 30.0, |p| p.into())]);
     let photographs = Memory(vec![gradient(30, 30, |_, _| 100.0)]);
-    let options = RenderOptions::default();
+    let options = RenderOptions { look: Look::Linear, ..RenderOptions::default() };
     let context = StageContext::default();
     let panorama =
         compose(&layout, &vec![Correction::uniform(2.0)].into(), &photographs, &options, &context).expect("renders");

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::neighbors::neighbors;
+use crate::coverage::Rectangle;
 use crate::label::{Label, NOBODY};
 use crate::small_views::{PARTLY, SmallView, WHOLLY};
 
@@ -115,8 +116,9 @@ impl Seams {
         best.0
     }
 
-    /// Labels of the pixels `columns` of row `y` of a canvas of `full` pixels (width, height).
-    pub(crate) fn row(&self, y: usize, columns: &Range<usize>, full: [usize; 2], out: &mut Vec<Label>) {
+    /// Labels of the pixels `columns` of row `y` of a canvas of `full` pixels (width, height), replacing `out`; [`NOBODY`]
+    /// where nothing is.
+    pub fn row(&self, y: usize, columns: &Range<usize>, full: [usize; 2], out: &mut Vec<Label>) {
         let (across, down) = (self.width as f64 / full[0] as f64, self.height as f64 / full[1] as f64);
         out.clear();
         let v = (y as f64 + 0.5) * down;
@@ -133,20 +135,28 @@ impl Seams {
         out.extend(columns.clone().map(|x| self.at((x as f64 + 0.5 - lead).rem_euclid(full[0]) * across, v)));
     }
 
-    /// Labels of row `y` of a canvas of `full` pixels (width, height), replacing `out`; [`NOBODY`] where nothing is.
-    pub fn row_on_canvas(&self, y: usize, full: [usize; 2], out: &mut Vec<Label>) {
-        self.row(y, &(0..full[0]), full, out);
-    }
-
-    /// Labels of all pixels of a canvas of `full` pixels (width, height), row by row.
-    pub fn on_canvas(&self, full: [usize; 2]) -> Vec<Label> {
+    /// Labels of all pixels of a part of a canvas of `full` pixels (width, height), row by row.
+    pub fn on_canvas(&self, part: &Rectangle, full: [usize; 2]) -> Vec<Label> {
         let mut row = Vec::new();
-        let mut labels = Vec::with_capacity(full[0] * full[1]);
-        for y in 0..full[1] {
-            self.row(y, &(0..full[0]), full, &mut row);
+        let mut labels = Vec::with_capacity(part.area());
+        for y in part.rows.clone() {
+            self.row(y, &part.columns, full, &mut row);
             labels.extend_from_slice(&row);
         }
         labels
+    }
+
+    /// Labels of `width` x `height` places, evenly over a part of a canvas of `full` pixels (width, height), row by row.
+    pub fn on_places(&self, part: &Rectangle, full: [usize; 2], [width, height]: [usize; 2]) -> Vec<Label> {
+        let (across, down) = (self.width as f64 / full[0] as f64, self.height as f64 / full[1] as f64);
+        let along = |range: &Range<usize>, place: usize, places: usize| {
+            range.start as f64 + (place as f64 + 0.5) / places as f64 * range.len() as f64
+        };
+        let row = |y: usize| {
+            let v = along(&part.rows, y, height) * down;
+            (0..width).map(move |x| self.at(along(&part.columns, x, width) * across, v))
+        };
+        (0..height).flat_map(row).collect()
     }
 
     /// The photographs that a box of a canvas of `full` pixels (width, height) may show, in order; on a

@@ -10,6 +10,8 @@ pub(crate) struct Contribution<'a> {
     pub(crate) feather: &'a Feather,
     /// Factors on linear light.
     pub(crate) light: &'a LightTable,
+    /// A further factor for each sample; `None` for 1.
+    pub(crate) local: Option<&'a [f32]>,
     /// Size of a canvas pixel in photograph pixels where the photograph's border may cut canvas pixels.
     pub(crate) border_footprint: Option<[f32; 2]>,
     pub(crate) weighting: Weighting,
@@ -38,13 +40,13 @@ fn accumulate_portable(
     sums: &mut [[f32; 4]],
 ) {
     const PER_LEVEL: f32 = 1.0 / 255.0;
-    let Contribution { feather, light, border_footprint, weighting } = contribution;
+    let Contribution { feather, light, local, border_footprint, weighting } = contribution;
     let (gain, varies) = (light.gain, light.varies());
     let linearize = light.linearize.as_ref();
     let length = sums.len();
     let (columns, rows) = (&positions.column[..length], &positions.row[..length]);
     let (fractions_x, fractions_y) = (&positions.fraction_x[..length], &positions.fraction_y[..length]);
-    let samples = &samples[..length];
+    let (samples, local) = (&samples[..length], local.map(|factors| &factors[..length]));
     for index in 0..length {
         let (column, row) = (columns[index], rows[index]);
         let (fraction_x, fraction_y) = (fractions_x[index], fractions_y[index]);
@@ -60,6 +62,7 @@ fn accumulate_portable(
         };
         let weight = weight(share, inside);
         let lift = if varies { light.at(column as f32 + 0.5 + fraction_x, row as f32 + 0.5 + fraction_y) } else { 1.0 };
+        let lift = lift * local.map_or(1.0, |factors| factors[index]);
         let light = |level: f32, gain: f32| exposed(linearize.linear(level), gain * lift);
         let (r, g, b) = (light(r, gain[0]), light(g, gain[1]), light(b, gain[2]));
         let sum = &mut sums[index];
@@ -73,6 +76,8 @@ pub(crate) struct Development<'a> {
     pub(crate) feather: &'a Feather,
     /// Factors on linear light.
     pub(crate) light: &'a LightTable,
+    /// A further factor for each sample; `None` for 1.
+    pub(crate) local: Option<&'a [f32]>,
     /// Size of a canvas pixel in photograph pixels where the photograph's border may cut canvas pixels.
     pub(crate) border_footprint: Option<[f32; 2]>,
 }
@@ -91,12 +96,13 @@ pub(crate) fn develop(development: Development<'_>, positions: &Positions, sampl
 #[inline(always)]
 fn develop_portable(development: Development<'_>, positions: &Positions, samples: &mut [[f32; 4]]) {
     const PER_LEVEL: f32 = 1.0 / 255.0;
-    let Development { feather, light, border_footprint } = development;
+    let Development { feather, light, local, border_footprint } = development;
     let (gain, varies) = (light.gain, light.varies());
     let linearize = light.linearize.as_ref();
     let length = samples.len();
     let (columns, rows) = (&positions.column[..length], &positions.row[..length]);
     let (fractions_x, fractions_y) = (&positions.fraction_x[..length], &positions.fraction_y[..length]);
+    let local = local.map(|factors| &factors[..length]);
     for (index, sample) in samples.iter_mut().enumerate() {
         let position =
             [columns[index] as f32 + 0.5 + fractions_x[index], rows[index] as f32 + 0.5 + fractions_y[index]];
@@ -106,6 +112,7 @@ fn develop_portable(development: Development<'_>, positions: &Positions, samples
             share *= feather.coverage(position, footprint);
         }
         let lift = if varies { light.at(position[0], position[1]) } else { 1.0 };
+        let lift = lift * local.map_or(1.0, |factors| factors[index]);
         let root = |level: f32, gain: f32| exposed(linearize.linear(level), gain * lift).sqrt();
         *sample = [root(r, gain[0]), root(g, gain[1]), root(b, gain[2]), share];
     }

@@ -29,6 +29,7 @@ pub(super) struct CoarseLevelInput<'a> {
     /// The photograph as it was reduced for its small view.
     pub(super) larger: &'a WarpedPhotograph<'a>,
     pub(super) placed: &'a Placed,
+    /// Its light on the canvas on which it is placed.
     pub(super) light: PhotographLight<'a>,
     /// Width and height of the canvas on which it is placed.
     pub(super) canvas: [usize; 2],
@@ -49,7 +50,9 @@ impl CoarseLevel {
         let (photograph, [width, height]) = input.larger.photograph();
         let mesh = GridMesh { width, height, ..mesh };
         let size = input.canvas.map(|length| length.div_ceil(1 << level));
-        let warped = WarpedPhotograph::new(Cow::Borrowed(photograph), &mesh, size, input.light, &HALVING)
+        let local = input.light.local.map(|local| local.over([step; 2], [0.5 - 0.5 * step; 2]));
+        let light = PhotographLight { local: local.as_ref(), ..input.light };
+        let warped = WarpedPhotograph::new(Cow::Borrowed(photograph), &mesh, size, light, &HALVING)
             .without(IgnoredPart::new(input.masks, input.elsewhere, size));
         // Room for the interpolated rim, from a sample that every coarser level has.
         let grown = |range: Range<usize>, length: usize| {

@@ -19,7 +19,7 @@ use trueup_core::{Result, StageContext};
 
 use crate::ignored::ShownElsewhere;
 use crate::layout::{Placed, TURNS, Unrolled};
-use crate::light::{Correction, PhotographLight};
+use crate::light::{Correction, LocalExposure, PhotographLight};
 use crate::memory_plan::MemoryPlan;
 use crate::render_options::RenderOptions;
 use crate::warped::{WarpedPhotograph, check_photograph};
@@ -40,6 +40,8 @@ pub(crate) struct SmallViewsInput<'a> {
     pub(crate) unrolled: &'a Unrolled<'a>,
     /// One for each photograph of the layout that was unrolled.
     pub(crate) corrections: &'a [Correction],
+    /// What is done to the light of all of them, over the layout that was unrolled.
+    pub(crate) local: Option<&'a LocalExposure>,
     pub(crate) photographs: &'a dyn PhotographSource,
     /// Log2 of the canvas pixels per sample of the coarse levels; `None` if there are to be none.
     pub(crate) first_level: Option<u32>,
@@ -132,7 +134,7 @@ struct Making<'a> {
 impl Making<'_> {
     /// Makes the photograph at a position of the layout small.
     fn make(&self, position: usize, placed: &Placed, correction: &Correction) -> Result<MadeSmall> {
-        let &SmallViewsInput { unrolled, photographs, first_level, .. } = self.input;
+        let &SmallViewsInput { unrolled, photographs, first_level, local, .. } = self.input;
         let layout = unrolled.original_layout();
         let canvas = [layout.width, layout.height];
         let period = layout.period.map(|_| self.size[0]);
@@ -142,13 +144,17 @@ impl Making<'_> {
         // The larger picture first: the smaller is made from what is left of the photograph then.
         let first = placed.in_first_turn(layout.period);
         let mesh = scaled(&first.mesh, [0, 1].map(|axis| self.size[axis] as f64 / canvas[axis] as f64), 0.0);
-        let light = PhotographLight { curve: self.curve, correction };
+        let canvas_px = [0, 1].map(|axis| canvas[axis] as f64 / self.size[axis] as f64);
+        let local_small = local.map(|local| local.over(canvas_px, [0.0; 2]));
+        let light = PhotographLight { curve: self.curve, correction, local: local_small.as_ref() };
         let warped = WarpedPhotograph::new(Cow::Borrowed(&photograph), &mesh, clip, light, &HALVING);
         let masks = photographs.masks(placed.photograph);
         let view = match layout.placed.len() {
             1 => SmallView::default(),
             _ => small_view(&warped, &masks, period),
         };
+        let local_unrolled = local.map(|local| local.led_by(unrolled.lead()));
+        let light = PhotographLight { local: local_unrolled.as_ref(), ..light };
         let coarse_level = |placement: usize| match first_level {
             Some(first_level) => CoarseLevel::new(&CoarseLevelInput {
                 larger: &warped,

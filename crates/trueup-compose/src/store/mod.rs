@@ -9,6 +9,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 use trueup_core::Result;
 
+use crate::coverage::Rectangle;
+
 pub(crate) use blocks::CanvasBlocks;
 pub(crate) use pixel::{Pixel, RootPixel, SumPixel, read_pixels, to_bytes};
 
@@ -74,11 +76,15 @@ impl<P: Pixel> PixelStore<P> {
         }
     }
 
-    /// Whether no pixel lets anything show through.
-    pub(crate) fn is_opaque(&self) -> bool {
+    /// Whether no pixel of a part lets anything show through; if it cannot be read, that is not known, and false.
+    pub(crate) fn is_opaque(&self, part: &Rectangle) -> bool {
         match self {
-            Self::Memory { pixels, .. } => pixels.par_iter().all(P::is_opaque),
-            Self::Scratch(blocks) => blocks.is_opaque(),
+            Self::Scratch(blocks) if blocks.is_opaque() => true,
+            _ => part
+                .rows
+                .clone()
+                .into_par_iter()
+                .all(|y| self.row(y).is_ok_and(|row| row[part.columns.clone()].iter().all(P::is_opaque))),
         }
     }
 

@@ -16,7 +16,15 @@ const PIXEL_X_DIMENSION: u16 = 0xa002;
 const PIXEL_Y_DIMENSION: u16 = 0xa003;
 const FOCAL_PLANE_X_RESOLUTION: u16 = 0xa20e;
 const FOCAL_PLANE_RESOLUTION_UNIT: u16 = 0xa210;
+const CUSTOM_RENDERED: u16 = 0xa401;
 const FOCAL_LENGTH_IN_35MM_FILM: u16 = 0xa405;
+const LENS_MODEL: u16 = 0xa434;
+
+/// CustomRendered of the panoramas that Apple's cameras make; EXIF 3.0 knows 0 and 1 alone.
+const RENDERED_AS_PANORAMA: u32 = 6;
+/// How what programs that stitch write as Software begins, in lower case; none of them writes photographs.
+const STITCHERS: [&str; 7] =
+    ["hugin", "ptgui", "microsoft ice", "image composite editor", "autopano", "kolor", "panoramastudio"];
 
 /// EXIF fields as written, unjudged: numbers may be zero, infinite or absurd.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -39,8 +47,12 @@ pub(crate) struct ExifFields {
     pub(crate) make: Option<String>,
     /// Model, trimmed.
     pub(crate) model: Option<String>,
+    /// LensModel, trimmed.
+    pub(crate) lens_model: Option<String>,
     /// Software, trimmed.
     pub(crate) software: Option<String>,
+    /// CustomRendered: 0 by the common processing, others by a special one.
+    pub(crate) custom_rendered: Option<u32>,
     /// ColorSpace: 1 sRGB, 65535 uncalibrated, by some cameras 2 for Adobe RGB.
     pub(crate) color_space: Option<u32>,
     /// InteroperabilityIndex, trimmed; not read from a TIFF's own directories.
@@ -66,7 +78,9 @@ impl ExifFields {
             focal_plane_unit: value(Tag::FocalPlaneResolutionUnit).and_then(|value| value.get_uint(0)),
             make: text(Tag::Make),
             model: text(Tag::Model),
+            lens_model: text(Tag::LensModel),
             software: text(Tag::Software),
+            custom_rendered: value(Tag::CustomRendered).and_then(|value| value.get_uint(0)),
             color_space: value(Tag::ColorSpace).and_then(|value| value.get_uint(0)),
             interoperability: text(Tag::InteroperabilityIndex),
         }
@@ -86,6 +100,7 @@ impl ExifFields {
         let Some(pointer) = pointer.and_then(|value| value.into_ifd_pointer().ok()) else { return Some(fields) };
         let Ok(directory) = decoder.read_directory(pointer) else { return Some(fields) };
         let mut tags = decoder.read_directory_tags(&directory);
+        fields.lens_model = text(tags.find_tag(TiffTag::from_u16_exhaustive(LENS_MODEL)).ok().flatten());
         let mut number = |tag| {
             let value = tags.find_tag(TiffTag::from_u16_exhaustive(tag)).ok().flatten()?;
             first_tiff_number(value)
@@ -96,6 +111,7 @@ impl ExifFields {
         fields.focal_35mm = number(FOCAL_LENGTH_IN_35MM_FILM);
         fields.focal_plane_resolution = number(FOCAL_PLANE_X_RESOLUTION);
         fields.color_space = number(COLOR_SPACE).map(|space| space as u32);
+        fields.custom_rendered = number(CUSTOM_RENDERED).map(|rendered| rendered as u32);
         fields.focal_plane_unit = number(FOCAL_PLANE_RESOLUTION_UNIT).map(|unit| unit as u32);
         Some(fields)
     }
@@ -104,6 +120,12 @@ impl ExifFields {
     pub(crate) fn is_by_this_program(&self) -> bool {
         let program = SOFTWARE.split_whitespace().next();
         self.software.as_deref().is_some_and(|software| software.split_whitespace().next() == program)
+    }
+
+    /// Whether the picture names another program, or a camera's own processing, that makes panoramas.
+    pub(crate) fn is_panorama_of_others(&self) -> bool {
+        let software = self.software.as_deref().unwrap_or_default().to_lowercase();
+        self.custom_rendered == Some(RENDERED_AS_PANORAMA) || STITCHERS.iter().any(|name| software.starts_with(name))
     }
 
     /// Make and model in one line. A model that names its maker already ("NIKON CORPORATION", "NIKON D7000") stands alone.

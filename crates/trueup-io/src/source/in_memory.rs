@@ -52,6 +52,9 @@ pub(super) fn in_memory_source(path: PathBuf, name: &str, photograph: &Photograp
         orientation: 1,
         focal_prior: None,
         camera_model: None,
+        lens_model: None,
+        focal_mm: None,
+        lens: None,
     })
 }
 

@@ -18,12 +18,14 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 
+use crate::metadata::exif_fields::ExifFields;
 use crate::metadata::header::{self, Header};
 use crate::metadata::orientation::{TagVerdict, judge_orientation};
 
 use duplicates::Accepted;
 use in_memory::in_memory_source;
 use inputs::Candidate;
+pub use opened::PANORAMA_OF_OTHERS;
 use opened::{Named, OWN_PANORAMA, OpenedPicture, check_size, open_picture};
 use rejection::Rejection;
 
@@ -54,7 +56,8 @@ pub struct RejectedSource {
     pub name: String,
     /// Stable machine-readable reason in kebab case: `file-missing`, `pattern-without-match`, `folder-without-pictures`,
     /// `folder-not-file`, `file-unreadable`, `file-empty`, `not-a-picture`, `format-unsupported`, `picture-damaged`,
-    /// `picture-too-large`, `picture-too-small`, `duplicate`, `own-panorama`, `name-of-a-file`.
+    /// `picture-too-large`, `picture-too-small`, `duplicate`, `own-panorama`,
+    /// `panorama-of-others`, `name-of-a-file`.
     pub code: String,
     /// Why it cannot be used, without a closing full stop.
     pub reason: String,
@@ -164,9 +167,18 @@ pub fn files(inputs: &[String], in_memory: &InMemory) -> Vec<PathBuf> {
 
 /// Whether the file at `path` says that this program made it.
 pub fn is_own_panorama(path: &Path) -> bool {
+    exif_of(path).is_some_and(|exif| exif.is_by_this_program())
+}
+
+/// Whether the file at `path` says that it is a panorama, whoever made it: [`scan`] leaves it out where its folder is named.
+pub fn is_marked_panorama(path: &Path) -> bool {
+    exif_of(path).is_some_and(|exif| exif.is_by_this_program() || exif.is_panorama_of_others())
+}
+
+fn exif_of(path: &Path) -> Option<ExifFields> {
     // Looked at before it is opened: opening a named pipe would wait for its writer.
     let opened = if path.is_file() { header::open(path) } else { None };
-    opened.and_then(|(mut input, format)| (format.exif)(&mut input)).is_some_and(|exif| exif.is_by_this_program())
+    opened.and_then(|(mut input, format)| (format.exif)(&mut input))
 }
 
 /// Decides over one picture, which is to be photograph `number`.
@@ -210,7 +222,20 @@ fn examine(
     };
     let focal_prior = header.focal_prior();
     let camera_model = header.exif.camera_model();
-    Ok(SourceImage { path, name: name.to_owned(), width, height, orientation, focal_prior, camera_model })
+    let Header { exif, .. } = header;
+    let focal_mm = exif.focal_mm.filter(|focal_mm| focal_mm.is_finite() && *focal_mm > 0.0);
+    Ok(SourceImage {
+        path,
+        name: name.to_owned(),
+        width,
+        height,
+        orientation,
+        focal_prior,
+        camera_model,
+        lens_model: exif.lens_model,
+        focal_mm,
+        lens: None,
+    })
 }
 
 fn stale_tag_note(number: usize, header: &Header) -> Diagnostic {

@@ -15,6 +15,9 @@ const MAX_FILE_BYTES: u64 = 4 << 30;
 /// The code of panoramas among the photographs of a folder.
 pub(super) const OWN_PANORAMA: &str = "own-panorama";
 
+/// The code of panoramas that something else made, by what the file says or by what it shows.
+pub const PANORAMA_OF_OTHERS: &str = "panorama-of-others";
+
 /// A picture whose header was read, and whose size is accepted.
 pub(super) struct OpenedPicture {
     pub(super) path: PathBuf,
@@ -58,6 +61,13 @@ pub(super) fn open_picture(
         return Err(Rejection::new(
             OWN_PANORAMA,
             "it is a panorama that this program made",
+            "Name the file itself if it is to be stitched all the same.",
+        ));
+    }
+    if named == Named::ByItsFolder && header.exif.is_panorama_of_others() {
+        return Err(Rejection::new(
+            PANORAMA_OF_OTHERS,
+            "it says that it is a panorama, not a photograph",
             "Name the file itself if it is to be stitched all the same.",
         ));
     }

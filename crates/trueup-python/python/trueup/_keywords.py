@@ -33,6 +33,10 @@ class ComposeKeywords(SaveKeywords, total=False):
     """Size of the panorama relative to the reference photograph's own pixels: 1 keeps every detail the reference has.
     Lower it for a quick preview (0.25) or a smaller file; raise it only if the reference was taken with a shorter lens
     than the others (default 1.0)."""
+    look: Literal["natural", "linear", "hdr"]
+    """How photographs of very different exposure come together. Choose `linear` to measure light or to finish tones by
+    hand, `hdr` for detail in sun and shade alike. Photographs of like exposure look the same with all of them (default
+    natural)."""
     projection: Literal[
         "auto",
         "mesh",
@@ -55,8 +59,9 @@ class ComposeKeywords(SaveKeywords, total=False):
     fov: float
     """Horizontal field of view that may be shown; 0 shows what is there, as far as the projection carries well. Lower
     it to leave stretched sides out, raise it to see them (default 0.0)."""
-    crop: Literal["none", "auto", "rectangle"]
-    """What of the canvas is kept. Choose `auto` or `rectangle` for a panorama without ragged borders (default none)."""
+    crop: Literal["auto", "rectangle", "none"]
+    """What of the canvas is kept. Choose `none` for all that the photographs show, with ragged borders (default
+    auto)."""
     fill: float
     """Gaps between and beside the photographs of up to twice this width, as a share of a photograph's side, are filled
     with a smooth surface over their borders' colors. 0 fills nothing; raise it to 0.1 where ragged borders lie in an
@@ -74,6 +79,13 @@ class ComposeKeywords(SaveKeywords, total=False):
 class StitchKeywords(ComposeKeywords, total=False):
     """Keywords of stitching."""
 
+    lens: Literal["auto", "pinhole", "rectilinear", "fisheye"]
+    """What kind of lens took the photographs. Say it where few photographs overlap, which tell little of a lens, or
+    where a line that is straight comes out bent (default auto)."""
+    lens_fov: float
+    """Field of view of every photograph across its longer side, through the whole lens, by any calibration or
+    specification; the matches may still change the focal length by up to 5 %. Say it where photographs carry no focal
+    length, or a wrong one; 0 leaves it to them (default 0.0)."""
     method: Literal[
         "vpg",
         "gsp-2d",
@@ -111,6 +123,8 @@ class StitchKeywords(ComposeKeywords, total=False):
     """The photograph that sets the pixel scale and stays in place; auto takes the one in the middle."""
     graph: Path
     """A text file with the pairs to be matched, NAME -- NAME a line."""
+    lens_from: Path
+    """The project of other photographs through the same lens, which is taken from there."""
     require_all: bool
     """Fails unless every photograph is used."""
     cache: Path

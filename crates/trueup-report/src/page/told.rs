@@ -1,7 +1,7 @@
 //! What the record tells in words: what was left out, what was found, how long it took, what was asked for.
 
 use serde_json::{Value, json};
-use trueup::{Error, ImageStatus, OptionDescription, Result, Severity, StitchOptions};
+use trueup::{ChangedOption, ImageStatus, Result, Severity, StitchOptions};
 
 use super::Page;
 use super::figures::figure;
@@ -59,20 +59,11 @@ fn time(page: &Page) -> Value {
 
 /// The options that have other values than their defaults, in the order that options are listed in.
 fn differing(options: &StitchOptions) -> Result<Vec<Value>> {
-    let written = |options: &StitchOptions| {
-        serde_json::to_value(options).map_err(|error| Error::input("options", error, "Report this as a defect."))
+    let told = |option: ChangedOption| {
+        let ChangedOption { description, value, default } = option;
+        json!({ "name": description.name, "value": value, "default": default, "meaning": description.meaning })
     };
-    let (own, default) = (written(options)?, written(&StitchOptions::default())?);
-    let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-    let differs = |option: OptionDescription| {
-        let pointer = format!("/{}", option.name.replacen('.', "/", 1));
-        let (value, default) = (own.pointer(&pointer)?, default.pointer(&pointer)?);
-        let told = json!({
-            "name": option.name, "value": text(value), "default": text(default), "meaning": option.meaning
-        });
-        (value != default).then_some(told)
-    };
-    Ok(StitchOptions::describe().into_iter().filter_map(differs).collect())
+    Ok(options.changed()?.into_iter().map(told).collect())
 }
 
 #[cfg(test)]
@@ -84,10 +75,10 @@ mod tests {
         let mut options = StitchOptions::default();
         assert!(differing(&options).expect("written").is_empty());
         options.set("mesh.cell_px=30").expect("an option");
-        options.set("canvas.crop=auto").expect("an option");
+        options.set("canvas.crop=none").expect("an option");
         let found = differing(&options).expect("written");
         let told: Vec<[&Value; 2]> = found.iter().map(|one| [&one["name"], &one["value"]]).collect();
-        assert_eq!(told, [["mesh.cell_px", "30.0"], ["canvas.crop", "auto"]]);
+        assert_eq!(told, [["mesh.cell_px", "30.0"], ["canvas.crop", "none"]]);
         assert!(found.iter().all(|one| one["meaning"] != "" && one["default"] != one["value"]));
     }
 }

@@ -10,8 +10,8 @@ const DUPLICATE_DISPLACEMENT_PX: f64 = 3.0;
 const DUPLICATE_AGREEMENT: f64 = 0.95;
 
 /// Reports the pairs that show the same view, as diagnostics with the code `near-duplicate`.
-pub fn report_near_duplicates(pairs: &[PairMatches], context: &StageContext<'_>) {
-    for pair in pairs.iter().filter(|pair| is_near_duplicate(pair)) {
+pub fn report_near_duplicates<'a>(pairs: impl IntoIterator<Item = &'a PairMatches>, context: &StageContext<'_>) {
+    for pair in pairs.into_iter().filter(|pair| is_near_duplicate(pair)) {
         context.report(near_duplicate(pair));
     }
 }

@@ -3,7 +3,8 @@
 //! Descriptors of the strongest features are compared exhaustively (`putative`), a homography is sought that many matches agree on
 //! (`ransac`), the pair is judged by how many do (`pair`), and the matches of a joined pair are completed by further planes
 //! (`planes`) and by a second look near the predicted places (`guided`). Where a lens bends so that no homography holds, turns
-//! are sought on rays (`turned`), and stand in for homography and planes.
+//! are sought on rays (`turned`), and stand in for homography and planes. What the pairs show of each other tells which pictures are
+//! no photographs of the scene (`strangers`).
 
 mod duplicates;
 mod guided;
@@ -16,6 +17,7 @@ mod planes;
 mod putative;
 mod ransac;
 mod search;
+mod strangers;
 #[cfg(test)]
 mod tests;
 mod turned;
@@ -32,6 +34,7 @@ pub use duplicates::report_near_duplicates;
 pub use options::MatchingOptions;
 pub use putative::{PutativeMatch, putative_matches};
 pub use search::{Nearest, Neighbor, SearchKernel};
+pub use strangers::{Stranger, StrangerKind, find_strangers};
 
 use crate::features::Features;
 use pair::{PairInput, PhotographFeatures, match_pair};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use trueup_align::stitch_graph::{GraphFile, parse_graph_file};
 use trueup_core::{Error, Result};
-use trueup_io::source::InMemory;
+use trueup_io::source::{self, InMemory};
 
 use super::masks::MaskFile;
 
@@ -29,6 +29,8 @@ pub struct Inputs {
     pub reference: Reference,
     /// A stitch graph in a text file: only its pairs are matched.
     pub graph: Option<PathBuf>,
+    /// A project of other photographs through the same lens, which is taken from there.
+    pub lens_from: Option<PathBuf>,
     /// Stitch every group of overlapping photographs, not only the largest.
     pub all: bool,
     /// Pictures that mark what is to be ignored or kept of the photographs.
@@ -46,6 +48,12 @@ impl Inputs {
         let Some(path) = &self.graph else { return Ok(GraphFile::default()) };
         let text = std::fs::read_to_string(path).map_err(|error| Error::io("reading", path, error))?;
         parse_graph_file(&text, names, &path.display().to_string())
+    }
+
+    /// The files that the photographs' names, folders and patterns stand for, in their order, whether or not they are
+    /// photographs. Of folders and patterns, panoramas that this program made are left out.
+    pub fn files(&self) -> Vec<PathBuf> {
+        source::files(&self.photographs, &self.in_memory)
     }
 
     /// Photographs with no further wishes.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use trueup_compose::layout::CanvasLayout;
 use trueup_compose::render::{self, Rendered};
 use trueup_compose::seam::{NOBODY, Seams};
 use trueup_core::{Error, Result};
@@ -45,7 +46,9 @@ impl Stitcher<'_> {
     /// Those of [`encode::write_layers`] and of reading the photographs.
     pub fn write_layers(&self, alignment: &Alignment, path: &Path) -> Result<u64> {
         let options = self.output_options(alignment, path)?;
-        let layers = Layers { stitcher: self, alignment, shown: shown(alignment) };
+        let layout = alignment.kept_layout();
+        let shown = shown(&layout);
+        let layers = Layers { stitcher: self, alignment, layout, shown };
         encode::write_layers(path, &layers, &self.metadata(alignment), &options, self.context())
     }
 
@@ -70,20 +73,21 @@ pub(crate) fn no_seams() -> Error {
 }
 
 /// Positions of the photographs that lie on the canvas.
-fn shown(alignment: &Alignment) -> Vec<usize> {
-    let layout = alignment.layout();
+fn shown(layout: &CanvasLayout) -> Vec<usize> {
     (0..layout.placed.len()).filter(|&position| !render::layer_size(layout, position).contains(&0)).collect()
 }
 
 struct Layers<'a> {
     stitcher: &'a Stitcher<'a>,
     alignment: &'a Alignment,
+    /// That of the panorama.
+    layout: CanvasLayout,
     shown: Vec<usize>,
 }
 
 impl LayerSet for Layers<'_> {
     fn whole(&self) -> [usize; 2] {
-        [self.alignment.layout().width, self.alignment.layout().height]
+        [self.layout.width, self.layout.height]
     }
 
     fn count(&self) -> usize {
@@ -91,14 +95,14 @@ impl LayerSet for Layers<'_> {
     }
 
     fn pixels(&self) -> u64 {
-        let size = |&position: &usize| render::layer_size(self.alignment.layout(), position);
+        let size = |&position: &usize| render::layer_size(&self.layout, position);
         self.shown.iter().map(size).map(|[width, height]| width as u64 * height as u64).sum()
     }
 
     fn open(&self, index: usize) -> Result<LayerPage<'_>> {
         let position = self.shown[index];
         let options = &self.stitcher.options().compose.render;
-        let rows = render::layer_rows(&self.alignment.render_input(), position, options)?;
+        let rows = render::layer_rows(&self.alignment.render_input_on(&self.layout), position, options)?;
         let name = self.alignment.name(position);
         let rows = rows.ok_or_else(|| Error::input(&name, "it lies outside the panorama", "Leave it out."))?;
         Ok(LayerPage { name, corner: [rows.left, rows.top], rows: Box::new(rows) })
@@ -112,7 +116,7 @@ struct Labels<'a> {
 
 impl LabelMap for Labels<'_> {
     fn size(&self) -> [usize; 2] {
-        [self.alignment.layout().width, self.alignment.layout().height]
+        self.alignment.kept().size()
     }
 
     fn names(&self) -> Vec<String> {
@@ -120,7 +124,8 @@ impl LabelMap for Labels<'_> {
     }
 
     fn row(&self, y: usize, row: &mut Vec<u16>) -> Result<()> {
-        self.seams.row_on_canvas(y, self.size(), row);
+        let (layout, kept) = (self.alignment.layout(), self.alignment.kept());
+        self.seams.row(kept.rows.start + y, &kept.columns, [layout.width, layout.height], row);
         // The first photograph is 1; NOBODY is the largest label.
         row.iter_mut().for_each(|label| *label = if *label == NOBODY { encode::NOTHING } else { *label + 1 });
         Ok(())

@@ -19,6 +19,8 @@ pub enum ReadFile {
     Mask,
     /// The pairs to be matched.
     Graph,
+    /// The project that tells the lens.
+    Lens,
     /// The options.
     Configuration,
     /// The record of the panorama that is composed again.
@@ -31,6 +33,7 @@ impl ReadFile {
             Self::Photograph => "one of the photographs to be stitched",
             Self::Mask => "one of the masks",
             Self::Graph => "the graph of the photographs",
+            Self::Lens => "the project that tells the lens",
             Self::Configuration => "the configuration",
             Self::Project => "the project to be composed",
         }

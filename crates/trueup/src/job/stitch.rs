@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::{Result, StageContext};
-use trueup_io::source;
 
 use super::inputs::Inputs;
 use super::outputs::{Outputs, ReadFile};
@@ -82,11 +81,12 @@ impl StitchJob {
     /// Refuses outputs that cannot be written, or are among the inputs, before the inputs are looked into.
     fn check(&self, outputs: &Outputs, options: &StitchOptions) -> Result<()> {
         outputs.check(options)?;
-        let photographs = source::files(&self.inputs.photographs, &self.inputs.in_memory);
+        let photographs = self.inputs.files();
         let photographs = photographs.iter().map(|path| (path.as_path(), ReadFile::Photograph));
         let masks = self.inputs.masks.iter().map(|mask| (mask.file.as_path(), ReadFile::Mask));
         let graph = self.inputs.graph.iter().map(|path| (path.as_path(), ReadFile::Graph));
-        outputs.refuse_over(photographs.chain(masks).chain(graph))
+        let lens = self.inputs.lens_from.iter().map(|path| (path.as_path(), ReadFile::Lens));
+        outputs.refuse_over(photographs.chain(masks).chain(graph).chain(lens))
     }
 }
 

@@ -27,6 +27,8 @@ use trueup_vision::lines::LineOptions;
 use trueup_vision::matching::MatchingOptions;
 use trueup_vision::pairing::PairingOptions;
 
+pub use text::ChangedOption;
+
 pub(crate) use method::MethodForm;
 pub use method::{Evidence, Method, Structure};
 
@@ -249,6 +251,7 @@ impl StitchOptions {
     /// Every option outside its allowed range, and every one that does not go with another; empty when all is well.
     pub fn invalid(&self) -> Vec<InvalidOption> {
         let mut invalid = self.out_of_range();
+        invalid.extend(self.align.cameras.beyond_the_lens());
         invalid.extend(self.arrange.projection.beyond_the_projection());
         invalid.extend(self.contradicting_the_method());
         invalid

@@ -1,9 +1,21 @@
 //! Options from what people write: a TOML file, or one assignment.
 
+use trueup_core::options::OptionDescription;
 use trueup_core::{Error, Result};
 
-use super::StitchOptions;
 use super::retired::Retired;
+use super::{StitchOptions, as_written};
+
+/// An option that has another value than its default.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChangedOption {
+    /// Its declaration.
+    pub description: OptionDescription,
+    /// Its value, as one writes it after `table.option=`.
+    pub value: String,
+    /// The default, written alike.
+    pub default: String,
+}
 
 impl StitchOptions {
     /// Reads a TOML text with tables over the present values; what it does not name stays as it is.
@@ -69,6 +81,23 @@ impl StitchOptions {
         *self =
             merged.map_err(|_: toml::de::Error| wrong(format!("\"{value}\" cannot be (allowed: {})", allowed())))?;
         Ok(())
+    }
+
+    /// The options that have other values than their defaults, in the order that options are listed in.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if options cannot be written (never).
+    pub fn changed(&self) -> Result<Vec<ChangedOption>> {
+        let (own, default) = (self.to_table()?, Self::default().to_table()?);
+        let value = |table: &toml::Table, name: &str| {
+            let (stage, option) = name.split_once('.')?;
+            Some(as_written(table.get(stage)?.get(option)?))
+        };
+        let changed = Self::describe().into_iter().filter_map(|description| {
+            let (value, default) = (value(&own, &description.name)?, value(&default, &description.name)?);
+            (value != default).then_some(ChangedOption { description, value, default })
+        });
+        Ok(changed.collect())
     }
 
     /// Brings options as a project of an earlier version recorded them up to date: those that have another name by now get

@@ -1,4 +1,4 @@
-//! The arrange phase: from the solved mesh to the canvas that is composed: projection, frame, crop.
+//! The arrange phase: from the solved mesh to the canvas that is composed: projection and frame.
 //!
 //! Works from what a stitch has at hand as from what its project records: grids in any plane and levelled cameras.
 
@@ -11,7 +11,6 @@ use trueup_align::metrics::without_torn_cells;
 use trueup_align::projection::{
     self, ParallaxShift, Placement, PosedPhotograph, Projection, ProjectionOptions, ProjectionView,
 };
-use trueup_compose::crop::{self, Crop, Rectangle};
 use trueup_compose::layout::{self, CanvasLayout, CanvasOptions, Frame, Placed};
 use trueup_core::camera::Camera;
 use trueup_core::diagnostics::{Diagnostic, Reported, Subject};
@@ -49,9 +48,9 @@ pub(crate) struct Arrangement {
     /// and the record.
     pub plane: CanvasLayout,
     /// What is composed.
-    pub written: CanvasLayout,
-    /// Every photograph once in pixels of the canvas `written`, in the order of `plane`: the panorama as it is measured and
-    /// recorded. Vertices beyond what a projection can show are NaN.
+    pub drawn: CanvasLayout,
+    /// Every photograph once in pixels of the canvas `drawn`, in the order of `plane`: the panorama as it is measured and, but
+    /// for the crop, recorded. Vertices beyond what a projection can show are NaN.
     pub delivered: Vec<GridMesh>,
     /// How directions were drawn; `None` for the mesh.
     pub projection: Option<ProjectionRecord>,
@@ -60,16 +59,10 @@ pub(crate) struct Arrangement {
 }
 
 impl Arrangement {
-    /// The mesh itself, of which `written` is all, or a part that begins at `shift`, in pixels of `plane`.
-    fn of_mesh(plane: CanvasLayout, written: CanvasLayout, shift: [f64; 2]) -> Self {
-        let delivered = plane.placed.iter().map(|placed| {
-            let mut mesh = placed.mesh.clone();
-            for vertex in &mut mesh.target {
-                *vertex = [vertex[0] - shift[0], vertex[1] - shift[1]];
-            }
-            mesh
-        });
-        Self { delivered: delivered.collect(), plane, written, projection: None, by_cameras: None }
+    /// The mesh itself.
+    fn of_mesh(plane: CanvasLayout) -> Self {
+        let delivered = plane.placed.iter().map(|placed| placed.mesh.clone()).collect();
+        Self { delivered, drawn: plane.clone(), plane, projection: None, by_cameras: None }
     }
 }
 
@@ -120,7 +113,7 @@ impl ArrangeInput {
     }
 }
 
-/// Arranges the photographs as the options ask: projected, laid on a canvas, cropped. Photographs go by their numbers in
+/// Arranges the photographs as the options ask: projected and laid on a canvas. Photographs go by their numbers in
 /// `placed`.
 ///
 /// # Errors
@@ -159,17 +152,11 @@ pub(crate) fn recall(
 ) -> Result<Reported<Arrangement>> {
     context.gather(|context| {
         context.time("canvas", || {
-            let recorded = &project.options.arrange;
-            let may_be_cropped = project.projection.is_none() && recorded.canvas.crop != Crop::None;
-            if may_be_cropped && options == recorded {
-                let whole = Rectangle { columns: 0..plane.width, rows: 0..plane.height };
-                let written = crop::cropped(plane.clone(), &whole);
-                return Ok(Arrangement::of_mesh(plane, written, [0.0; 2]));
-            }
-            let CanvasOptions { crop, min_kept, fill, .. } = recorded.canvas;
-            let same_plane = CanvasOptions { crop, min_kept, fill, ..options.canvas.clone() } == recorded.canvas;
+            // What is kept and filled of a canvas does not change it.
+            let CanvasOptions { crop, min_kept, fill, .. } = project.options.arrange.canvas;
+            let wanted = CanvasOptions { crop, min_kept, fill, ..options.canvas.clone() };
             let input = ArrangeInput::of_project(plane.placed.clone(), reference, project);
-            if may_be_cropped || !same_plane {
+            if wanted != project.options.arrange.canvas {
                 return lay_out(input, options, context);
             }
             let ArrangeInput { cameras, dominant, by_cameras, .. } = input;
@@ -207,8 +194,7 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
                 "Stitch at least two overlapping photographs, or leave the projection to mesh.",
             ));
         }
-        let (written, shift) = framed(plane.clone(), options);
-        return Ok(Arrangement::of_mesh(plane, written, shift));
+        return Ok(Arrangement::of_mesh(plane));
     };
     let photographs: Vec<PosedPhotograph> = cameras
         .iter()
@@ -226,10 +212,9 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
     // The reference keeps its own pixels in the middle of the projection.
     let canvas_from_plane = options.canvas.scale * photographs[reference].camera.focal_px;
     let drawn = scene.draw(&plane, canvas_from_plane, options, context)?;
-    let (written, _) = framed(drawn, options);
-    report_cut(&plane, &written, &view, options, context);
-    let projection = Some(ProjectionRecord::new(&view, &written));
-    Ok(Arrangement { delivered: scene.delivered(&written), plane, written, projection, by_cameras })
+    report_cut(&plane, &drawn, &view, options, context);
+    let projection = Some(ProjectionRecord::new(&view, &drawn));
+    Ok(Arrangement { delivered: scene.delivered(&drawn), plane, drawn, projection, by_cameras })
 }
 
 /// Photographs that a view shows.
@@ -265,9 +250,9 @@ impl Scene<'_> {
         layout::framed(placed, &frame, &options.canvas, context)
     }
 
-    /// Every photograph once on the canvas `written`, see [`Arrangement::delivered`].
-    fn delivered(&self, written: &CanvasLayout) -> Vec<GridMesh> {
-        let (scale, [left, top]) = (written.canvas_from_target, written.origin);
+    /// Every photograph once on the canvas `drawn`, see [`Arrangement::delivered`].
+    fn delivered(&self, drawn: &CanvasLayout) -> Vec<GridMesh> {
+        let (scale, [left, top]) = (drawn.canvas_from_target, drawn.origin);
         let mut meshes = projection::place_once(self.photographs, self.shifts, &self.placement(scale));
         for vertex in meshes.iter_mut().flat_map(|mesh| &mut mesh.target) {
             *vertex = [(vertex[0] - left) * scale, (vertex[1] - top) * scale];
@@ -276,28 +261,17 @@ impl Scene<'_> {
     }
 }
 
-/// The layout as it is cropped, and by how much it moved.
-fn framed(layout: CanvasLayout, options: &ArrangeOptions) -> (CanvasLayout, [f64; 2]) {
-    match crop::choose(&layout, &options.canvas) {
-        None => (layout, [0.0; 2]),
-        Some(kept) => {
-            let shift = [kept.columns.start, kept.rows.start].map(|start| start as f64);
-            (crop::cropped(layout, &kept), shift)
-        }
-    }
-}
-
 /// Says which photographs are not shown, or not wholly though nobody asked for that.
 fn report_cut(
     plane: &CanvasLayout,
-    written: &CanvasLayout,
+    drawn: &CanvasLayout,
     view: &ProjectionView,
     options: &ArrangeOptions,
     context: &StageContext,
 ) {
-    let size = [written.width, written.height].map(|length| length as f64);
+    let size = [drawn.width, drawn.height].map(|length| length as f64);
     for placed in &plane.placed {
-        let shown = || written.placed.iter().filter(|other| other.photograph == placed.photograph);
+        let shown = || drawn.placed.iter().filter(|other| other.photograph == placed.photograph);
         let subject = Subject::Photograph(placed.photograph);
         let hint = "Choose an equirectangular projection, widen projection.fov, or turn the view (yaw, pitch).";
         if shown().next().is_none() {
@@ -360,6 +334,6 @@ mod tests {
         assert!(matches!(refused, Error::NotApplicable { .. }), "{refused}");
         options.projection.kind = Projection::Auto;
         let kept = run(input(None), &options, &StageContext::default()).expect("as it is").value;
-        assert_eq!((kept.written.width, kept.written.height, kept.projection), (40, 30, None));
+        assert_eq!((kept.drawn.width, kept.drawn.height, kept.projection), (40, 30, None));
     }
 }

@@ -1,9 +1,9 @@
 //! The compose phase: light, then seams and the panorama, from the full-resolution photographs.
 
-use trueup_compose::crop::Coverage;
+use trueup_compose::crop::{self, Coverage, Crop, Rectangle};
 use trueup_compose::exposure::{self, Corrections, ExposureInput, Thumbnail};
 use trueup_compose::gaps::Gaps;
-use trueup_compose::layout::CanvasLayout;
+use trueup_compose::layout::{CanvasLayout, CanvasOptions};
 use trueup_compose::render::{self, RenderInput, Rendered, Resources};
 use trueup_core::diagnostics::{Diagnostic, Reported, Subject};
 use trueup_core::raster::Raster;
@@ -60,11 +60,25 @@ pub(crate) struct ComposeInput<'a> {
     pub render: RenderInput<'a>,
     /// What it may take of the machine.
     pub resources: Resources<'a>,
-    /// Largest gap that is filled, `canvas.fill`.
-    pub fill: f64,
+    /// What of the canvas is filled and kept.
+    pub canvas: &'a CanvasOptions,
+    /// What is kept, if that is decided.
+    pub kept: Option<Rectangle>,
 }
 
-/// Renders a panorama.
+/// What comes of composing.
+pub(crate) struct Composed {
+    /// The panorama, cropped.
+    pub rendered: Rendered,
+    /// What of the canvas it is, if it is to be cropped.
+    pub kept: Option<Rectangle>,
+    /// See [`CropRecord::lost`](crate::project::record::CropRecord).
+    pub lost: f64,
+    /// See [`CropRecord::filled`](crate::project::record::CropRecord).
+    pub filled: f64,
+}
+
+/// Renders a panorama on all of its canvas, fills gaps, and crops it.
 ///
 /// # Errors
 /// Those of reading the photographs and of a scratch file; [`trueup_core::Error::Limits`];
@@ -73,17 +87,55 @@ pub(crate) fn run(
     input: &ComposeInput,
     options: &ComposeOptions,
     context: &StageContext,
-) -> Result<Reported<Rendered>> {
-    let ComposeInput { render: photographs, resources, fill } = input;
+) -> Result<Reported<Composed>> {
+    let ComposeInput { render: photographs, resources, canvas, kept } = input;
     context.gather(|context| {
-        let mut rendered = render::run(photographs, resources, &options.render, &options.seam, context)?;
-        if *fill > 0.0 {
-            let gaps = Gaps::find(photographs.layout, Coverage::of(photographs.layout), *fill);
-            let filled = rendered.panorama.fill(&gaps, context)?;
-            report_filled(filled, photographs.layout, context);
-        }
-        Ok(rendered)
+        let rendered =
+            context.time("render", || render::run(photographs, resources, &options.render, &options.seam, context))?;
+        context.time("crop", || framed(rendered, photographs.layout, canvas, kept.as_ref(), context))
     })
+}
+
+/// Fills and crops what was rendered of all of `layout`.
+fn framed(
+    mut rendered: Rendered,
+    layout: &CanvasLayout,
+    options: &CanvasOptions,
+    known: Option<&Rectangle>,
+    context: &StageContext,
+) -> Result<Composed> {
+    if options.fill <= 0.0 && options.crop == Crop::None {
+        return Ok(Composed { rendered, kept: None, lost: 0.0, filled: 0.0 });
+    }
+    let whole = Rectangle::whole([layout.width, layout.height]);
+    let photographed = Coverage::of(layout);
+    let mut coverage = photographed.clone();
+    if options.fill > 0.0 {
+        let gaps = Gaps::find(layout, coverage, options.fill);
+        let filled = rendered.panorama.fill(&gaps, context)?;
+        report_filled(filled, layout, context);
+        coverage = gaps.filled_coverage();
+    }
+    context.check_cancelled()?;
+    let chosen = match known {
+        Some(known) => Some(known.clone()),
+        None => crop::choose(&rendered.panorama, layout, &coverage, options)?,
+    };
+    let Some(kept) = chosen else {
+        report_kept_whole(&photographed, &whole, options, context);
+        let kept = (options.crop != Crop::None).then_some(whole);
+        return Ok(Composed { rendered, kept, lost: 0.0, filled: 0.0 });
+    };
+    let mut filled = 0;
+    let missing = kept.area() - coverage.area_within(&kept);
+    if options.crop == Crop::Auto && missing > 0 {
+        filled = rendered.panorama.fill(&Gaps::within(layout, coverage, kept.clone()), context)?;
+    }
+    rendered.panorama.crop(&kept)?;
+    let share = |part: usize, of: usize| part as f64 / of.max(1) as f64;
+    let lost = 1.0 - share(photographed.area_within(&kept), photographed.area());
+    let filled = share(filled, kept.area());
+    Ok(Composed { rendered, kept: Some(kept), lost, filled })
 }
 
 /// Says how much of a panorama no photograph shows.
@@ -93,5 +145,20 @@ fn report_filled(filled: usize, layout: &CanvasLayout, context: &StageContext) {
         let message = format!("{percent:.2} % of it is shown by no photograph and was filled with a smooth surface");
         let hint = "Leave --fill out to leave it empty.";
         context.report(Diagnostic::note("gaps-filled", Subject::stage("panorama"), message, hint));
+    }
+}
+
+/// Says that a panorama was not cropped though that was wanted.
+fn report_kept_whole(photographed: &Coverage, whole: &Rectangle, options: &CanvasOptions, context: &StageContext) {
+    let empty = whole.area() - photographed.area();
+    if options.crop != Crop::None && empty > 0 {
+        let percent = 100.0 * empty as f64 / whole.area() as f64;
+        let message = format!(
+            "it was not cropped, and {percent:.0} % of it are empty: no rectangle without holes keeps {:.0} % of what the \
+             photographs show",
+            100.0 * options.min_kept
+        );
+        let hint = "Give --crop rectangle to crop it all the same, or another --projection.";
+        context.report(Diagnostic::note("crop-too-small", Subject::stage("panorama"), message, hint));
     }
 }

@@ -7,6 +7,7 @@ use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::RejectedSource;
 use trueup_vision::features::Features;
+use trueup_vision::matching::Stranger;
 
 use super::align::component::Component;
 use super::compose::SmallPhotograph;
@@ -16,7 +17,9 @@ use super::photographs::PhotographSet;
 use crate::job::inputs::{Inputs, Reference};
 use crate::job::names::reference_named;
 use crate::memo::{Key, KeyMaker};
-use crate::report::left_out::{LeftOut, counts, explain, none_usable, not_in_graph, reason_of_rejected, strength};
+use crate::report::left_out::{
+    LeftOut, counts, explain, no_photograph, none_usable, not_in_graph, reason_of_rejected, strength,
+};
 use crate::report::several::several;
 
 /// Everything known of the photographs after matching.
@@ -29,6 +32,8 @@ pub(crate) struct Matched {
     /// What decides the measurements of each photograph; all `None` where nothing is kept.
     pub keys: Vec<Option<Key>>,
     pub pairs: Vec<PairMatches>,
+    /// Pictures that are no photographs of the scene; their pairs are not in the graph.
+    pub strangers: Vec<Stranger>,
     pub graph: StitchGraph,
     pub graph_file: GraphFile,
 }
@@ -57,7 +62,8 @@ impl Matched {
             undecodable.push(error);
         }
         let graph = StitchGraph::new(set.images.len(), &[]);
-        Ok(Self { set, measured, undecodable, keys: measurements.keys, pairs: Vec::new(), graph, graph_file })
+        let keys = measurements.keys;
+        Ok(Self { set, measured, undecodable, keys, pairs: Vec::new(), strangers: Vec::new(), graph, graph_file })
     }
 
     /// Takes the features out, to be matched.
@@ -132,6 +138,9 @@ impl Matched {
         if let Some(position) = stitched.iter().position(|members| members.contains(&index)) {
             let reason = format!("it is in panorama {} of {}", position + 1, stitched.len());
             return LeftOut { code: "other-panorama", reason, hint: String::new() };
+        }
+        if let Some(stranger) = self.strangers.iter().find(|stranger| stranger.photograph == index) {
+            return no_photograph(stranger, &self.set.names());
         }
         let edges = &self.graph_file.edges;
         if !edges.is_empty() && !edges.iter().any(|&(a, b)| a == index || b == index) {

@@ -8,6 +8,7 @@ use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Result, StageContext};
 use trueup_vision::features::Features;
+use trueup_vision::matching::Stranger;
 use trueup_vision::{matching, pairing};
 
 use crate::memo::{Key, KeyMaker, LOOKS, Memo, PAIR};
@@ -33,6 +34,9 @@ pub(crate) struct MatchInput<'a> {
 pub(crate) struct Matches {
     /// Every pair tried, in the order of the candidates.
     pub pairs: Vec<PairMatches>,
+    /// Pictures that are no photographs of the scene; none are looked for among pairs that were wished.
+    pub strangers: Vec<Stranger>,
+    /// The joined pairs without strangers.
     pub graph: StitchGraph,
 }
 
@@ -43,8 +47,13 @@ pub(crate) struct Matches {
 pub(crate) fn run(input: &MatchInput, options: &MatchOptions, context: &StageContext) -> Result<Reported<Matches>> {
     context.gather(|context| {
         let pairs = context.time("matching", || match_pairs(input, options, context))?;
-        let graph = StitchGraph::new(input.features.len(), &pairs);
-        Ok(Matches { pairs, graph })
+        let strangers =
+            if input.wished.is_empty() { matching::find_strangers(input.frames, &pairs) } else { Vec::new() };
+        let is_stranger = |photograph| strangers.iter().any(|stranger| stranger.photograph == photograph);
+        let known = || pairs.iter().filter(|pair| !is_stranger(pair.a) && !is_stranger(pair.b));
+        matching::report_near_duplicates(known(), context);
+        let graph = StitchGraph::new(input.features.len(), known());
+        Ok(Matches { pairs, strangers, graph })
     })
 }
 
@@ -77,9 +86,7 @@ fn match_pairs(input: &MatchInput, options: &MatchOptions, context: &StageContex
         input.memo.store(PAIR, key(pair.a, pair.b).as_ref(), &PairMatches { a: 0, b: 1, ..pair.clone() });
         matched.insert((pair.a, pair.b), pair);
     }
-    let pairs: Vec<PairMatches> = candidates.iter().filter_map(|pair| matched.get(&ordered(pair)).cloned()).collect();
-    matching::report_near_duplicates(&pairs, context);
-    Ok(pairs)
+    Ok(candidates.iter().filter_map(|pair| matched.get(&ordered(pair)).cloned()).collect())
 }
 
 /// The pairs that are worth matching.

@@ -23,8 +23,10 @@ mod scratch;
 use std::path::Path;
 
 use trueup_align::vanishing::TriadOutcome;
+use trueup_compose::crop::{Crop, Rectangle};
 use trueup_compose::exposure::Corrections;
 use trueup_compose::fidelity::{self, Fidelity};
+use trueup_compose::layout::CanvasLayout;
 use trueup_compose::render::{self, Rendered};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::color::PhotographColors;
@@ -34,7 +36,7 @@ use self::align::component::camera_groups;
 use self::align::{AlignInput, Geometry};
 use self::arrange::{ArrangeInput, Arrangement};
 use self::budget::Budget;
-use self::compose::{ComposeInput, LightInput, SmallPhotograph};
+use self::compose::{ComposeInput, Composed, LightInput, SmallPhotograph};
 use self::matched::Matched;
 use self::matching::MatchInput;
 use self::measure::MeasureInput;
@@ -45,9 +47,10 @@ use crate::options::StitchOptions;
 use crate::project::fill::{GeometryRecord, fill_geometry, place, record_composition, unfilled};
 use crate::project::provenance;
 use crate::project::read::Recorded;
-use crate::project::record::Project;
+use crate::project::record::{Canvas, CropRecord, Project};
 use crate::report::{judgement, measuring, sideways};
 
+pub(crate) use budget::memory_of_each;
 pub use results::{Aligned, Alignment, MatchedPhotographs};
 
 /// Runs the phases with one set of options.
@@ -139,6 +142,7 @@ impl<'a> Stitcher<'a> {
             };
             let matches = context.absorb(matching::run(&input, &self.options.matching, context)?);
             matched.pairs = matches.pairs;
+            matched.strangers = matches.strangers;
             matched.graph = matches.graph;
             self.report_cache(context);
             Ok(matched)
@@ -248,11 +252,11 @@ impl<'a> Stitcher<'a> {
             geometry.map(|geometry| context.time("measures", || measuring::run(&component, geometry, &arrangement)));
         let on_side = geometry.and_then(|geometry| sideways::warning(&geometry.cameras.cameras, members));
         judgement::warnings(&project).into_iter().chain(on_side).for_each(|warning| context.report(warning));
-        let layout = arrangement.written;
+        let layout = arrangement.drawn;
         let corrections = corrections.of_placed(&layout, |photograph| members.binary_search(&photograph).ok());
         let directions = geometry.map(|geometry| geometry.triads.clone()).unwrap_or_default();
         let photographs = photographs.clone();
-        Ok(Alignment { project, layout, corrections, photographs, directions, positions: None })
+        Ok(Alignment { project, layout, kept: None, corrections, photographs, directions, positions: None })
     }
 
     /// The geometry that `project` records, over the photographs that were `found`: those used in it, in its order, or others
@@ -275,17 +279,19 @@ impl<'a> Stitcher<'a> {
                 false => self.light_anew(&set, &arrangement, reference, context)?,
             };
             let same_view = fixed.arrange == project.options.arrange;
+            let recorded_crop = project.crop.map(|crop| (crop, project.canvas));
             let mut project = Project { options: fixed, seconds: Default::default(), ..project.clone() };
             record_composition(&mut project, &used, &set, &arrangement, &corrections);
             project.color_space = set.files.colors().map(PhotographColors::name).unwrap_or_default();
             if !same_view {
                 project.measures = None;
             }
-            let layout = arrangement.written;
+            let layout = arrangement.drawn;
+            let kept = if same_view { kept_in_record(recorded_crop, &layout)? } else { None };
             // Photographs are numbered by their place among those used.
             let corrections = corrections.of_placed(&layout, Some);
             let (photographs, directions) = (set.files, Vec::new());
-            Ok(Alignment { project, layout, corrections, photographs, directions, positions: Some(used) })
+            Ok(Alignment { project, layout, kept, corrections, photographs, directions, positions: Some(used) })
         })?;
         let (mut alignment, told) = recalled.split();
         alignment.record(told);
@@ -312,8 +318,9 @@ impl<'a> Stitcher<'a> {
         Ok(context.absorb(compose::light(&light, &self.options.compose, context)?))
     }
 
-    /// Renders an aligned panorama from the full-resolution photographs, within `resources.memory`. What was found on the way
-    /// and how long it took goes into the alignment's record.
+    /// Renders an aligned panorama from the full-resolution photographs, within `resources.memory`, and crops it. What was found
+    /// on the way and how long it took goes into the alignment's record, and so does what of the canvas was kept: an alignment
+    /// that is composed again keeps the same.
     ///
     /// # Errors
     /// Those of reading the photographs and of a scratch file; [`Error::Limits`] with the numbers, before any photograph is
@@ -321,17 +328,27 @@ impl<'a> Stitcher<'a> {
     pub fn compose(&self, alignment: &mut Alignment) -> Result<Rendered> {
         let scratch = scratch::folder(&alignment.layout, self.options, self.output)?;
         let budget = Budget::new(&self.options.run.resources);
+        let mut canvas = self.options.arrange.canvas.clone();
+        let turn = alignment.layout.period;
+        let is_sphere =
+            alignment.project.projection.is_some_and(|one| one.is_whole_sphere(alignment.layout.height, turn));
+        if is_sphere && canvas.crop == Crop::Auto {
+            // Viewers want all of it, whatever is missing at a pole.
+            canvas.crop = Crop::None;
+        }
         let input = ComposeInput {
             render: alignment.render_input(),
             resources: budget.composing(alignment.photographs.kept_bytes(), &scratch),
-            fill: self.options.arrange.canvas.fill,
+            canvas: &canvas,
+            kept: alignment.kept.clone(),
         };
-        let composed = self.context.gather(|context| {
-            let composed = context.time("render", || compose::run(&input, &self.options.compose, context))?;
-            Ok(context.absorb(composed))
-        })?;
-        let (rendered, told) = composed.split();
+        let composed =
+            self.context.gather(|context| Ok(context.absorb(compose::run(&input, &self.options.compose, context)?)))?;
+        let (Composed { rendered, kept, lost, filled }, told) = composed.split();
         alignment.record(told);
+        if let Some(kept) = kept {
+            alignment.keep(kept, lost, filled);
+        }
         Ok(rendered)
     }
 
@@ -346,16 +363,17 @@ impl<'a> Stitcher<'a> {
     /// # Errors
     /// Those of reading the photographs; [`Error::Input`] if the two do not belong together; [`Error::Cancelled`].
     pub fn fidelity(&self, alignment: &Alignment, rendered: &Rendered) -> Result<Fidelity> {
-        let layout = &alignment.layout;
+        let (all, kept) = (&alignment.layout, alignment.kept());
+        let layout = &alignment.kept_layout();
         let layers = (0..layout.placed.len())
             .map(|position| {
                 self.context.check_cancelled()?;
-                render::layer(&alignment.render_input(), position, &self.options.compose.render)
+                render::layer(&alignment.render_input_on(layout), position, &self.options.compose.render)
             })
             .collect::<Result<Vec<_>>>()?;
         let (size, around) = ([layout.width, layout.height], layout.period.is_some());
         let shown = match &rendered.seams {
-            Some(seams) => seams.on_canvas(size),
+            Some(seams) => seams.on_canvas(&kept, [all.width, all.height]),
             None => fidelity::deepest(&layers, size, around)?,
         };
         fidelity::measure(&rendered.panorama, &layers, &shown, around)
@@ -370,6 +388,26 @@ impl<'a> Stitcher<'a> {
         if let Some(cache) = self.cache {
             cache.report(context);
         }
+    }
+}
+
+/// The part of a canvas that a project records.
+///
+/// # Errors
+/// [`Error::Input`] if it is none.
+fn kept_in_record(recorded: Option<(CropRecord, Canvas)>, layout: &CanvasLayout) -> Result<Option<Rectangle>> {
+    let Some((CropRecord { left, top, .. }, Canvas { width, height, .. })) = recorded else { return Ok(None) };
+    let stretch = |start: usize, length: usize, whole: usize| {
+        let end = start.checked_add(length).filter(|&end| length > 0 && end <= whole)?;
+        Some(start..end)
+    };
+    match (stretch(left, width, layout.width), stretch(top, height, layout.height)) {
+        (Some(columns), Some(rows)) => Ok(Some(Rectangle { columns, rows })),
+        _ => Err(Error::input(
+            "the project",
+            format!("its panorama of {width} x {height} px is no part of its canvas"),
+            "Give a project file as `trueup stitch --project` wrote it.",
+        )),
     }
 }
 

@@ -1,5 +1,6 @@
 //! The photographs that a job names: found, checked, with their masks, in one color space, within the memory.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -12,6 +13,7 @@ use trueup_io::source::{self, InMemory, RejectedSource, Sources};
 
 use super::budget::Budget;
 use crate::job::inputs::{Inputs, Reference};
+use crate::job::lens_from::tell_lenses;
 use crate::job::masks::{AllMasks, MaskRecord};
 use crate::job::names::reference_named;
 use crate::memo::KeyMaker;
@@ -40,6 +42,8 @@ pub(crate) struct PhotographSet {
     pub rejected: Vec<RejectedSource>,
     /// The masks of each photograph, as they are recorded.
     pub masks: Vec<Vec<MaskRecord>>,
+    /// The project that told the lenses of some.
+    pub lens_from: Option<PathBuf>,
     /// Their pixels.
     pub files: Arc<FilePhotographs>,
     /// How many of them may be measured at once.
@@ -50,11 +54,11 @@ impl PhotographSet {
     /// Finds what `inputs` name.
     ///
     /// # Errors
-    /// [`Error::Input`] if there is no photograph, or the reference or a mask fits none; [`Error::Limits`];
+    /// [`Error::Input`] if there is no photograph, or the reference, a mask or the project of a lens fits none; [`Error::Limits`];
     /// [`Error::Cancelled`].
     pub(crate) fn find(inputs: &Inputs, options: &StitchOptions, context: &StageContext) -> Result<Self> {
         let accepted = &options.measure.source;
-        let Sources { photographs: images, rejected } =
+        let Sources { photographs: mut images, rejected } =
             context.time("source", || source::scan_with(&inputs.photographs, &inputs.in_memory, accepted, context))?;
         if images.is_empty() {
             return Err(nothing_found(inputs, &rejected));
@@ -62,8 +66,12 @@ impl PhotographSet {
         if let Reference::Named(name) = &inputs.reference {
             reference_named(&images, name)?;
         }
+        if let Some(path) = &inputs.lens_from {
+            tell_lenses(path, &mut images, context)?;
+        }
         let masks = AllMasks::read(&inputs.masks, &images, accepted, context)?;
-        Self::open(FoundPhotographs { images, in_memory: inputs.in_memory.clone(), rejected, masks }, options, context)
+        let found = FoundPhotographs { images, in_memory: inputs.in_memory.clone(), rejected, masks };
+        Ok(Self { lens_from: inputs.lens_from.clone(), ..Self::open(found, options, context)? })
     }
 
     /// Photographs that are found already.
@@ -78,7 +86,8 @@ impl PhotographSet {
             .with_in_memory(in_memory)
             .in_colors(colors)
             .with_masks(masks);
-        Ok(Self { images, rejected, masks: records, files: Arc::new(files), at_once: measuring.at_once })
+        let (files, at_once) = (Arc::new(files), measuring.at_once);
+        Ok(Self { images, rejected, masks: records, lens_from: None, files, at_once })
     }
 
     /// The names by which people know the photographs.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use trueup_align::vanishing::TriadOutcome;
+use trueup_compose::crop::{self, Rectangle};
 use trueup_compose::exposure::Corrections;
 use trueup_compose::layout::CanvasLayout;
 use trueup_compose::render::RenderInput;
@@ -13,7 +14,8 @@ use trueup_io::decode::FilePhotographs;
 
 use super::matched::Matched;
 use crate::memo::MemoryStore;
-use crate::project::record::Project;
+use crate::project::fill::record_crop;
+use crate::project::record::{CropRecord, Project};
 
 /// What [`Stitcher::align`](super::Stitcher::align) found: one alignment per group of
 /// photographs to be stitched, the largest first.
@@ -60,9 +62,13 @@ impl MatchedPhotographs {
 /// The geometry of one panorama, ready to be composed. Copies share the photographs.
 #[derive(Debug, Clone)]
 pub struct Alignment {
-    /// The record so far; complete but for the seconds that composing and writing take.
+    /// The record so far; complete but for what composing finds: what of the canvas is kept (until then, all of it is
+    /// recorded), and the seconds that composing and writing take.
     pub project: Project,
+    /// All of the canvas.
     pub(super) layout: CanvasLayout,
+    /// What of it is the panorama; `None` until that is decided: by the record, or by the first composing.
+    pub(super) kept: Option<Rectangle>,
     pub(super) corrections: Corrections,
     pub(super) photographs: Arc<FilePhotographs>,
     pub(super) directions: Vec<TriadOutcome>,
@@ -71,12 +77,17 @@ pub struct Alignment {
 }
 
 impl Alignment {
-    /// What its panorama is rendered from.
+    /// What its panorama is rendered from, before it is cropped.
     pub(crate) fn render_input(&self) -> RenderInput<'_> {
-        RenderInput { layout: &self.layout, corrections: &self.corrections, photographs: self.photographs.as_ref() }
+        self.render_input_on(&self.layout)
     }
 
-    /// Where the photographs lie on the canvas.
+    /// The same photographs in the same light on another canvas.
+    pub(crate) fn render_input_on<'a>(&'a self, layout: &'a CanvasLayout) -> RenderInput<'a> {
+        RenderInput { layout, corrections: &self.corrections, photographs: self.photographs.as_ref() }
+    }
+
+    /// Where the photographs lie on all of the canvas.
     pub(crate) fn layout(&self) -> &CanvasLayout {
         &self.layout
     }
@@ -89,6 +100,16 @@ impl Alignment {
         }
     }
 
+    /// What of the canvas is the panorama: all of it before it is composed.
+    pub(crate) fn kept(&self) -> Rectangle {
+        self.kept.clone().unwrap_or_else(|| Rectangle::whole([self.layout.width, self.layout.height]))
+    }
+
+    /// Where the photographs lie on the panorama.
+    pub(crate) fn kept_layout(&self) -> CanvasLayout {
+        crop::cropped(self.layout.clone(), &self.kept())
+    }
+
     /// The photographs, in the order of [`Project::images`].
     pub(crate) fn photographs(&self) -> &FilePhotographs {
         &self.photographs
@@ -98,6 +119,17 @@ impl Alignment {
     /// geometry is a recorded one.
     pub fn directions(&self) -> &[TriadOutcome] {
         &self.directions
+    }
+
+    /// Records what of the canvas is the panorama.
+    pub(super) fn keep(&mut self, kept: Rectangle, lost: f64, filled: f64) {
+        let (canvas_width, canvas_height) = (self.layout.width, self.layout.height);
+        if self.project.crop.is_none() {
+            let (left, top) = (kept.columns.start, kept.rows.start);
+            let crop = CropRecord { left, top, canvas_width, canvas_height, lost, filled };
+            record_crop(&mut self.project, &kept, crop);
+        }
+        self.kept = Some(kept);
     }
 
     /// Adds what a later stage told, of photographs as the layout numbers them, to the record.

@@ -1,13 +1,15 @@
 //! Fills the project: what is recorded of photographs, pairs and geometry.
 
+use trueup_compose::crop::Rectangle;
 use trueup_compose::exposure::{Correction, Corrections, Response};
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::geometry::{matrix_from_rows, rows_of};
+use trueup_core::lens::PlacedLens;
 use trueup_core::mesh::GridMesh;
 
 use super::record::{
-    Canvas, ImageRecord, ImageStatus, LensRecord, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION,
+    Canvas, CropRecord, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION,
     PairRecord, Project,
 };
 use crate::options::{MethodForm, StitchOptions};
@@ -43,6 +45,8 @@ pub(crate) fn unfilled(
                 width: image.width,
                 height: image.height,
                 orientation: image.orientation,
+                camera: image.camera_model.clone(),
+                lens_told: image.lens.is_some(),
                 component: component.filter(|_| matched.measured[index].is_some()),
                 masks: matched.set.masks[index].clone(),
                 ..left_out_record(image.path.display().to_string(), reason, hint)
@@ -65,6 +69,7 @@ pub(crate) fn unfilled(
         version: PROJECT_VERSION,
         method: trueup_core::options::OptionValue::display(&options.align.stitch.method),
         options: options.clone(),
+        lens_from: matched.set.lens_from.as_ref().map(|path| path.display().to_string()),
         reference: String::new(),
         images,
         pairs: pairs.collect(),
@@ -84,6 +89,7 @@ pub(crate) fn unfilled(
         color_space: String::new(),
         response: Response::default(),
         projection: None,
+        crop: None,
         mesh_canvas: None,
         by_cameras: None,
         seconds: std::collections::BTreeMap::new(),
@@ -100,6 +106,8 @@ fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
         reason,
         hint,
         component: None,
+        camera: None,
+        lens_told: false,
         focal_px: None,
         lens: None,
         rotation: None,
@@ -130,11 +138,13 @@ pub(crate) fn place(component: &Component, geometry: Option<&Geometry>) -> Vec<P
 }
 
 /// What is found on the way from the geometry to the panorama, each time anew.
-const FOUND_IN_COMPOSING: [&str; 9] = [
+const FOUND_IN_COMPOSING: [&str; 11] = [
     "canvas-reduced",
     "color-converted",
     "color-profile-damaged",
     "color-profile-ignored",
+    "crop-too-small",
+    "exposures-far-apart",
     "gaps-filled",
     "grid-folded",
     "photograph-replaced",
@@ -211,10 +221,36 @@ fn record_canvas(project: &mut Project, arrangement: &Arrangement) {
         height: layout.height,
         full_turn: layout.period.is_some(),
     };
-    project.canvas = canvas(&arrangement.written);
+    project.canvas = canvas(&arrangement.drawn);
+    project.crop = None;
     project.mesh_canvas = arrangement.projection.map(|_| canvas(&arrangement.plane));
     project.projection = arrangement.projection;
     project.by_cameras = arrangement.by_cameras;
+}
+
+/// What of the canvas that is recorded is kept.
+pub(crate) fn record_crop(project: &mut Project, part: &Rectangle, crop: CropRecord) {
+    let whole = project.canvas;
+    project.crop = Some(crop);
+    if *part == Rectangle::whole([whole.width, whole.height]) {
+        return;
+    }
+    let is_mesh = project.projection.is_none();
+    let [left, top] = part.corner();
+    for image in project.images.iter_mut().filter(|image| image.status == ImageStatus::Used) {
+        let Some(mesh) = &mut image.mesh else { continue };
+        if is_mesh {
+            image.solved_mesh = Some(mesh.clone());
+        }
+        mesh.target.iter_mut().for_each(|vertex| *vertex = [vertex[0] - left, vertex[1] - top]);
+    }
+    if is_mesh {
+        project.mesh_canvas = Some(whole);
+    }
+    let turn = whole.full_turn.then_some(whole.width);
+    project.projection = project.projection.map(|projection| projection.of_part(part, turn));
+    let [width, height] = part.size();
+    project.canvas = Canvas { width, height, ..whole };
 }
 
 /// What was found of a group of photographs.
@@ -247,7 +283,7 @@ pub(crate) fn fill_geometry(project: &mut Project, found: &GeometryRecord) {
             let full = camera.scaled(1.0 / component.frames[k].working_from_full);
             let [x, y] = full.principal_point;
             let center_px = [x - record.width as f64 / 2.0, y - record.height as f64 / 2.0];
-            LensRecord { terms: camera.lens.terms(), center_px }
+            PlacedLens { terms: camera.lens.terms(), center_px }
         });
         record.rotation = Some(rows_of(&camera_from_level));
         let upright = matrix_from_rows(&geometry.prior.camera_from_world[k]);

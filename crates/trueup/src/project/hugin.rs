@@ -10,10 +10,10 @@ use std::fmt::Write;
 use nalgebra::{Matrix3, Matrix4, Vector2, Vector3, Vector4};
 use trueup_compose::exposure::Correction;
 use trueup_core::geometry::{matrix_from_rows, wrap_angle};
-use trueup_core::lens::{Lens, LensProjection, LensTerms};
+use trueup_core::lens::{Lens, LensProjection, LensTerms, PlacedLens};
 use trueup_core::{Error, Result};
 
-use super::record::{ImageRecord, LensRecord, Project};
+use super::record::{ImageRecord, Project};
 
 /// A camera's attitude in Hugin's angles, radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -149,7 +149,7 @@ impl HuginLens {
 
     /// The polynomial nearest to the lens over the photograph, by least squares on radii; tangential terms have no place in
     /// the format. The coefficient of r is made what Hugin wants of it by the unit of r, which the focal length takes up.
-    fn of(lens: &LensRecord, focal_px: f64, stored: &StoredPicture) -> Self {
+    fn of(lens: &PlacedLens, focal_px: f64, stored: &StoredPicture) -> Self {
         const SAMPLES: usize = 128;
         const STEPS: usize = 20;
         let LensTerms { projection, radial, .. } = lens.terms;
@@ -258,7 +258,7 @@ mod tests {
             (LensProjection::Equidistant, 310.0, -0.015, 0.002),
         ] {
             let terms = LensTerms { projection, radial: [k1, k2, 0.0, 0.0], tangential: [0.0; 2] };
-            let record = LensRecord { terms, center_px: [5.0, 2.0] };
+            let record = PlacedLens { terms, center_px: [5.0, 2.0] };
             let HuginLens { format, field_of_view, radial: [a, b, c], center_px } =
                 HuginLens::of(&record, focal_px, &stored);
             // The quarter turn took the stored picture's right to down: what is right in the upright one was up.

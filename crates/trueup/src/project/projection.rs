@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use serde::{Deserialize, Serialize};
 use trueup_align::projection::{Fit, FlatKind, ProjectionView};
+use trueup_compose::crop::Rectangle;
 use trueup_compose::layout::CanvasLayout;
 use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 
@@ -34,54 +35,68 @@ pub struct ProjectionRecord {
 }
 
 impl ProjectionRecord {
-    /// How `view` is drawn on the canvas `written`.
-    pub(crate) fn new(view: &ProjectionView, written: &CanvasLayout) -> Self {
-        let px_per_radian = written.canvas_from_target;
-        Self {
+    /// How `view` is drawn on the canvas `drawn`.
+    pub(crate) fn new(view: &ProjectionView, drawn: &CanvasLayout) -> Self {
+        let record = Self {
             kind: view.flat.kind,
             yaw_deg: view.yaw.to_degrees(),
             pitch_deg: view.pitch.to_degrees(),
             roll_deg: view.roll.to_degrees(),
             panini_distance: view.flat.panini_distance,
             fit: (view.flat.kind == FlatKind::Fitted).then_some(view.flat.fit),
-            px_per_radian,
-            origin: written.origin,
-            sphere: sphere(view, written),
-        }
+            px_per_radian: drawn.canvas_from_target,
+            origin: drawn.origin,
+            sphere: None,
+        };
+        let (size, turn) = ([drawn.width, drawn.height], drawn.period);
+        Self { sphere: record.sphere_of(size, turn), ..record }
+    }
+
+    /// How it is drawn on a part of its canvas; `turn` is the width of the canvas if it goes all the way round.
+    pub(crate) fn of_part(&self, part: &Rectangle, turn: Option<usize>) -> Self {
+        let corner = part.corner();
+        let origin = [0, 1].map(|axis| self.origin[axis] + corner[axis] / self.px_per_radian);
+        let moved = Self { origin, ..*self };
+        Self { sphere: moved.sphere_of(part.size(), turn), ..moved }
+    }
+
+    /// Whether a canvas of this height shows a turn from pole to pole, or all but: a whole sphere.
+    pub(crate) fn is_whole_sphere(&self, height: usize, turn: Option<usize>) -> bool {
+        /// Of the half turn from pole to pole: what lies at a pole is often not photographed, where the tripod stands.
+        const WHOLE: f64 = 0.75;
+        let half_turn = PI * self.px_per_radian;
+        turn.is_some() && self.kind == FlatKind::Equirectangular && height as f64 >= WHOLE * half_turn
+    }
+
+    /// Where a canvas of `size` pixels lies on the whole sphere, in whole pixels.
+    fn sphere_of(&self, [width, height]: [usize; 2], turn: Option<usize>) -> Option<SphericalFrame> {
+        let scale = self.px_per_radian;
+        let [x, y] = self.origin;
+        // Rounding may put the last column a pixel beyond the whole.
+        let whole = |length: f64, start: usize, own: usize| (length.round() as usize).max(start + own);
+        let start = |at: f64| (at * scale).round().max(0.0) as usize;
+        let left = start(x + PI);
+        let full_width = turn.unwrap_or_else(|| whole(TAU * scale, left, width));
+        let (projection, top, full_height) = match self.kind {
+            FlatKind::Equirectangular => {
+                let top = start(y + PI / 2.0);
+                (SphericalProjection::Equirectangular, top, whole(PI * scale, top, height))
+            }
+            FlatKind::Cylindrical => {
+                // As high above the horizon as below it.
+                let half = (-y).max(y + height as f64 / scale).max(0.0);
+                let top = start(y + half);
+                (SphericalProjection::Cylindrical, top, whole(2.0 * half * scale, top, height))
+            }
+            _ => return None,
+        };
+        Some(SphericalFrame { projection, full_width, full_height, left, top, middle_yaw: self.yaw_deg.to_radians() })
     }
 
     /// Pixels of the canvas after which directions repeat; `None` on a plane, on which they do not.
     pub(crate) fn turn_px(&self) -> Option<f64> {
         self.kind.turns().then_some(TAU * self.px_per_radian)
     }
-}
-
-/// Where a canvas lies on the whole sphere, in whole pixels.
-fn sphere(view: &ProjectionView, written: &CanvasLayout) -> Option<SphericalFrame> {
-    let scale = written.canvas_from_target;
-    let [x, y] = written.origin;
-    // Rounding may put the last column a pixel beyond the whole.
-    let whole = |length: f64, start: usize, own: usize| (length.round() as usize).max(start + own);
-    let start = |at: f64| (at * scale).round().max(0.0) as usize;
-    let left = start(x + PI);
-    let full_width = match written.period {
-        Some(period) => period,
-        None => whole(TAU * scale, left, written.width),
-    };
-    let (projection, top, full_height) = match view.flat.kind {
-        FlatKind::Equirectangular => {
-            let top = start(y + PI / 2.0);
-            (SphericalProjection::Equirectangular, top, whole(PI * scale, top, written.height))
-        }
-        FlatKind::Cylindrical => {
-            // As high above the horizon as below it.
-            let half = (-y).max(y + written.height as f64 / scale).max(0.0);
-            let top = start(y + half);
-            (SphericalProjection::Cylindrical, top, whole(2.0 * half * scale, top, written.height))
-        }
-        _ => return None,
-    };
-    Some(SphericalFrame { projection, full_width, full_height, left, top, middle_yaw: view.yaw })
 }
 
 #[cfg(test)]
@@ -95,6 +110,10 @@ mod tests {
         ProjectionView { flat, yaw: 0.25, pitch: 0.0, roll: 0.0, half, shown: None, closed: false }
     }
 
+    fn sphere(view: &ProjectionView, canvas: &CanvasLayout) -> Option<SphericalFrame> {
+        ProjectionRecord::new(view, canvas).sphere
+    }
+
     fn canvas(width: usize, height: usize, origin: [f64; 2]) -> CanvasLayout {
         CanvasLayout { width, height, canvas_from_target: 1000.0, origin, placed: Vec::new(), period: None }
     }
@@ -105,7 +124,7 @@ mod tests {
     fn a_cropped_panorama_knows_its_place_on_the_sphere() {
         let frame = sphere(&view(FlatKind::Equirectangular), &canvas(1200, 700, [-0.5, -0.2])).expect("a sphere");
         assert_eq!((frame.full_width, frame.full_height, frame.left, frame.top), (6283, 3142, 2642, 1371));
-        assert!(frame.holds(1200, 700) && frame.middle_yaw == 0.25);
+        assert!(frame.holds(1200, 700) && (frame.middle_yaw - 0.25).abs() < 1e-12);
         // The cylinder reaches 0.5 below the horizon, and as much above it in the whole.
         let frame = sphere(&view(FlatKind::Cylindrical), &canvas(1200, 700, [-0.5, -0.2])).expect("a cylinder");
         assert_eq!((frame.full_height, frame.top), (1000, 300));
@@ -114,5 +133,17 @@ mod tests {
         let corner = [-PI, -PI / 2.0];
         let ending = sphere(&view(FlatKind::Equirectangular), &canvas(6284, 3143, corner));
         assert!(ending.expect("a sphere").holds(6284, 3143));
+    }
+
+    /// What is cut off of a panorama is as if it had never been drawn.
+    #[test]
+    fn a_part_of_a_panorama_lies_where_it_lay() {
+        let whole = ProjectionRecord::new(&view(FlatKind::Equirectangular), &canvas(1200, 700, [-0.5, -0.2]));
+        let part = whole.of_part(&Rectangle { columns: 100..1000, rows: 50..650 }, None);
+        let alone = ProjectionRecord::new(&view(FlatKind::Equirectangular), &canvas(900, 600, [-0.4, -0.15]));
+        assert!((0..2).all(|axis| (part.origin[axis] - alone.origin[axis]).abs() < 1e-12));
+        assert_eq!(ProjectionRecord { origin: alone.origin, ..part }, alone);
+        assert!(!whole.is_whole_sphere(3142, None) && whole.is_whole_sphere(3142, Some(6283)));
+        assert!(!whole.is_whole_sphere(1000, Some(6283)));
     }
 }

@@ -12,7 +12,7 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::{self, RejectedSource, SourceOptions};
 
 use super::projection::ProjectionRecord;
-use super::record::{ImageRecord, MeshRecord, Project};
+use super::record::{Canvas, ImageRecord, MeshRecord, Project};
 
 /// What a project must be to be read again.
 const AS_WRITTEN: &str = "Give a project file as `trueup stitch --project` wrote it.";
@@ -57,24 +57,19 @@ impl Recorded {
             Error::input(&project.reference, "it is the reference, but none of the photographs used", AS_WRITTEN)
         })?;
         records.iter().try_for_each(|record| check_focal(record))?;
-        let meshes = records.iter().map(|record| solved_grid(record)).collect::<Result<Vec<_>>>()?;
+        let mut meshes = records.iter().map(|record| solved_grid(record)).collect::<Result<Vec<_>>>()?;
         let corrections = recorded_corrections(project, &records)?;
         if !project.by_cameras.is_none_or(|plane| plane.is_sound()) {
             return Err(Error::input("the project", "its plane of directions is none", AS_WRITTEN));
         }
-        let canvas = project.solved_canvas();
+        let mut canvas = project.solved_canvas();
+        // Earlier versions recorded a cropped canvas in place of the whole one.
+        let may_be_a_part = project.projection.is_none() && project.mesh_canvas.is_none();
+        if may_be_a_part && project.options.arrange.canvas.crop != Crop::None {
+            canvas = whole_canvas(&mut meshes, canvas);
+        }
         let (width, height) = (canvas.width, canvas.height);
-        // Grids may lie beyond the ends of a full turn by less than a turn, and anywhere around what was cropped.
-        let turn = if canvas.full_turn { width as f64 } else { 0.0 };
-        let may_be_cropped = project.projection.is_none() && project.options.arrange.canvas.crop != Crop::None;
-        let is_stray = |mesh: &GridMesh| {
-            let (low, high) = mesh.bounds();
-            let is_aside = low.x < -ROUNDED_PX - turn || high.x > width as f64 + ROUNDED_PX + turn;
-            match may_be_cropped {
-                true => turn > 0.0 && is_aside,
-                false => is_aside || low.y < -ROUNDED_PX || high.y > height as f64 + ROUNDED_PX,
-            }
-        };
+        let is_stray = |mesh: &GridMesh| is_stray(mesh, canvas);
         let pixels = width as f64 * height as f64;
         let strays = meshes.iter().any(is_stray);
         // No canvas reaches beyond all grids by more than a part of a pixel.
@@ -90,6 +85,37 @@ impl Recorded {
         let layout = CanvasLayout { width, height, canvas_from_target: 1.0, origin: [0.0; 2], placed, period };
         Ok(Self { used, layout, corrections, reference })
     }
+}
+
+/// Whether a grid lies beyond the canvas; on a full turn, it may lie beyond its ends by less than a turn.
+fn is_stray(mesh: &GridMesh, canvas: Canvas) -> bool {
+    let (width, height) = (canvas.width as f64, canvas.height as f64);
+    let turn = canvas.period().unwrap_or(0.0);
+    let (low, high) = mesh.bounds();
+    low.x < -ROUNDED_PX - turn
+        || high.x > width + ROUNDED_PX + turn
+        || low.y < -ROUNDED_PX
+        || high.y > height + ROUNDED_PX
+}
+
+/// All that grids cover of which `part` is recorded, and the grids moved there; of a full turn, rows alone were cut off.
+fn whole_canvas(meshes: &mut [GridMesh], part: Canvas) -> Canvas {
+    if !meshes.iter().any(|mesh| is_stray(mesh, part)) {
+        return part;
+    }
+    let bounds: Vec<_> = meshes.iter().map(GridMesh::bounds).collect();
+    let axes = |axis: usize, length: usize| {
+        let low = bounds.iter().map(|(low, _)| low[axis]).fold(0.0, f64::min).floor();
+        let high = bounds.iter().map(|(_, high)| high[axis]).fold(length as f64, f64::max).ceil();
+        // The casts saturate.
+        (-low, (high - low) as usize)
+    };
+    let (left, width) = if part.full_turn { (0.0, part.width) } else { axes(0, part.width) };
+    let (top, height) = axes(1, part.height);
+    for vertex in meshes.iter_mut().flat_map(|mesh| &mut mesh.target) {
+        *vertex = [vertex[0] + left, vertex[1] + top];
+    }
+    Canvas { width, height, ..part }
 }
 
 /// Refuses a focal length that no photograph can have: projections would become of any size.

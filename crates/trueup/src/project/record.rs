@@ -9,7 +9,7 @@ use trueup_compose::exposure::{Correction, Response};
 use trueup_core::camera::Camera;
 use trueup_core::diagnostics::{Diagnostic, Severity};
 use trueup_core::geometry::matrix_from_rows;
-use trueup_core::lens::{Lens, LensTerms};
+use trueup_core::lens::{Lens, PlacedLens};
 use trueup_core::matches::PairVerdict;
 use trueup_io::source::unique_names;
 
@@ -57,16 +57,6 @@ fn places_or_nowhere<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[
     Ok(places.into_iter().map(|place| place.map(|coordinate| coordinate.unwrap_or(f64::NAN))).collect())
 }
 
-/// A lens that is no pinhole. Its terms are in units of the focal length.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct LensRecord {
-    /// Projection, radial and tangential terms.
-    #[serde(flatten)]
-    pub terms: LensTerms,
-    /// The principal point in pixels of the original photograph after orientation, from its middle.
-    pub center_px: [f64; 2],
-}
-
 /// What became of one photograph. The geometry of a left-out one is `None`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ImageRecord {
@@ -87,11 +77,17 @@ pub struct ImageRecord {
     pub hint: String,
     /// Group of overlapping photographs it belongs to, the largest first; `None` if it could not be read.
     pub component: Option<usize>,
+    /// Make and model of its camera, if the file states them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<String>,
+    /// Whether its lens was told by [`Project::lens_from`].
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub lens_told: bool,
     /// Focal length in pixels of the original photograph.
     pub focal_px: Option<f64>,
     /// What the lens does beside that; nothing recorded of a pinhole.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lens: Option<LensRecord>,
+    pub lens: Option<PlacedLens>,
     /// Rows of the rotation from the levelled world (y down) to the camera.
     pub rotation: Option<[[f64; 3]; 3]>,
     /// The same as the photograph's own lines correct it, which projections are drawn by; `None` in files of programs that
@@ -114,8 +110,8 @@ pub struct ImageRecord {
     pub vanishing_points: Option<[[f64; 3]; 3]>,
     /// The deformed grid, in the panorama.
     pub mesh: Option<MeshRecord>,
-    /// The same as the method solved it, with [`Project::projection`]: on [`Project::mesh_canvas`]. From its overlaps the
-    /// projection takes how photographs meet.
+    /// The same as the method solved it, on [`Project::mesh_canvas`]: with [`Project::projection`], which takes from its
+    /// overlaps how photographs meet, or where the panorama was cropped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub solved_mesh: Option<MeshRecord>,
 }
@@ -184,6 +180,23 @@ impl Canvas {
     }
 }
 
+/// The part of a canvas that became the panorama.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CropRecord {
+    /// Columns of the canvas left of the panorama.
+    pub left: usize,
+    /// Rows of the canvas above the panorama.
+    pub top: usize,
+    /// Width of the canvas in pixels.
+    pub canvas_width: usize,
+    /// Height of the canvas in pixels.
+    pub canvas_height: usize,
+    /// Share of what the photographs cover that was cut off, 0 to 1.
+    pub lost: f64,
+    /// Share of the panorama that no photograph covers and that was filled for a whole frame, 0 to 1.
+    pub filled: f64,
+}
+
 /// The record of one panorama.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Project {
@@ -195,6 +208,9 @@ pub struct Project {
     pub method: String,
     /// Every option of every stage as used.
     pub options: StitchOptions,
+    /// The project that told the lenses, as it was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lens_from: Option<String>,
     /// Path of the reference photograph.
     pub reference: String,
     /// Every photograph given, in the order given: used, left out, and unreadable.
@@ -220,7 +236,12 @@ pub struct Project {
     /// projections.
     #[serde(default)]
     pub projection: Option<ProjectionRecord>,
-    /// The canvas of the plane in which the grids were solved, where that is not the panorama's: with a projection.
+    /// What of the canvas was kept; `None` where it was not to be cropped, before it is composed, and in files of programs that did
+    /// not record it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crop: Option<CropRecord>,
+    /// The canvas of the plane in which the grids were solved, where that is not the panorama's: with a projection, or where
+    /// the panorama is a part of it.
     #[serde(default)]
     pub mesh_canvas: Option<Canvas>,
     /// Where directions of the level world lie on `mesh_canvas`, if the mesh was worse than the cameras, so that these drew
@@ -245,7 +266,7 @@ impl ImageRecord {
         let (width, height) = (self.width as f64, self.height as f64);
         let pinhole = Camera::new(self.focal_px?, width, height, &matrix_from_rows(camera_from_world));
         Some(match self.lens {
-            Some(LensRecord { terms, center_px: [x, y] }) => {
+            Some(PlacedLens { terms, center_px: [x, y] }) => {
                 Camera { lens: Lens::new(terms), principal_point: [width / 2.0 + x, height / 2.0 + y], ..pinhole }
             }
             None => pinhole,

@@ -2,7 +2,8 @@
 
 use trueup_core::Error;
 use trueup_core::matches::{PairMatches, PairVerdict};
-use trueup_io::source::RejectedSource;
+use trueup_io::source::{PANORAMA_OF_OTHERS, RejectedSource};
+use trueup_vision::matching::{Stranger, StrangerKind};
 
 use super::several::several;
 
@@ -54,6 +55,24 @@ pub(crate) fn not_in_graph() -> LeftOut {
         reason: "the graph has no pair with it".to_owned(),
         hint: "Add a line that joins it to another photograph, or stitch without --graph.".to_owned(),
     }
+}
+
+/// Why a picture that is no photograph of the scene is left out.
+pub(crate) fn no_photograph(stranger: &Stranger, names: &[String]) -> LeftOut {
+    const HINT: &str = "If it is to be used all the same, name the overlaps in a --graph file.";
+    let (code, reason) = match &stranger.kind {
+        StrangerKind::ReducedCopy { of } => ("reduced-copy", format!("it is a smaller copy of {}", names[*of])),
+        StrangerKind::Panorama { of } => {
+            let of: Vec<&str> = of.iter().map(|&photograph| names[photograph].as_str()).collect();
+            let shown = match of.as_slice() {
+                [one, other] => format!("{one} and {other}"),
+                [first, .., last] => format!("{first}, {last} and {} more", of.len() - 2),
+                _ => String::new(),
+            };
+            (PANORAMA_OF_OTHERS, format!("it is a panorama of {shown}"))
+        }
+    };
+    LeftOut { code, reason, hint: HINT.to_owned() }
 }
 
 /// "9 of 24 matches agree (15 needed)".
@@ -133,6 +152,15 @@ mod tests {
         let left_out = explain(2, &[0, 1], &pairs, &names());
         assert_eq!(left_out.code, "no-overlap");
         assert_eq!(left_out.reason, "no overlap found: best neighbor 1.jpg, 9 of 24 matches agree (15 needed)");
+    }
+
+    #[test]
+    fn what_is_no_photograph_is_told_so() {
+        let reason = |kind| no_photograph(&Stranger { photograph: 3, kind }, &names()).reason;
+        assert_eq!(reason(StrangerKind::ReducedCopy { of: 1 }), "it is a smaller copy of 1.jpg");
+        let panorama = |of: &[usize]| reason(StrangerKind::Panorama { of: of.to_vec() });
+        assert_eq!(panorama(&[0, 2]), "it is a panorama of 0.jpg and 2.jpg");
+        assert_eq!(panorama(&[0, 1, 2]), "it is a panorama of 0.jpg, 2.jpg and 1 more");
     }
 
     #[test]

@@ -44,7 +44,7 @@ impl Lean {
 
 /// Measures a panorama as it is delivered, whatever it is drawn on.
 pub(crate) fn run(component: &Component, geometry: &Geometry, arrangement: &Arrangement) -> Measures {
-    let period = arrangement.written.period.map(|columns| columns as f64);
+    let period = arrangement.drawn.period.map(|columns| columns as f64);
     let turn = arrangement.projection.as_ref().and_then(|projection| projection.turn_px());
     let whole: Vec<GridMesh> =
         arrangement.delivered.iter().map(|mesh| metrics::without_torn_cells(mesh, turn)).collect();

@@ -23,7 +23,8 @@ impl Alignment {
     /// Which photograph what was `rendered` of this shows where, on a raster of `width` x `height` places over the whole
     /// panorama; `None` where photographs were averaged.
     pub fn shown(&self, rendered: &Rendered, [width, height]: [usize; 2]) -> Option<ShownPhotographs> {
-        let labels = rendered.seams.as_ref()?.on_canvas([width, height]);
+        let canvas = [self.layout().width, self.layout().height];
+        let labels = rendered.seams.as_ref()?.on_places(&self.kept(), canvas, [width, height]);
         let position = |label: u16| {
             let placed = self.layout().placed.get(usize::from(label)).filter(|_| label != NOBODY)?;
             Some(self.position_of(placed.photograph))

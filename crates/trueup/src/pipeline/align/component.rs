@@ -7,7 +7,7 @@ use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
-use trueup_core::source::{SourceImage, WorkingFrame};
+use trueup_core::source::{FocalSource, SourceImage, WorkingFrame};
 
 use crate::pipeline::measured::Measured;
 
@@ -75,35 +75,97 @@ impl<'a> Component<'a> {
         camera_groups(&self.images)
     }
 
-    /// What metadata say of the cameras, in working pixels.
+    /// Which photographs one lens took at one focal length: [`lens_groups`].
+    pub(super) fn lens_groups(&self) -> Vec<usize> {
+        lens_groups(&self.images)
+    }
+
+    /// What metadata and the user say of the cameras, in working pixels.
     pub(super) fn camera_priors(&self) -> Vec<CameraPrior> {
-        self.images
-            .iter()
-            .zip(&self.frames)
-            .zip(self.camera_groups())
-            .map(|((image, frame), camera_group)| CameraPrior {
+        let groups = self.camera_groups().into_iter().zip(self.lens_groups());
+        let photographs = self.images.iter().zip(&self.frames).zip(groups);
+        photographs
+            .map(|((image, frame), (camera_group, lens_group))| CameraPrior {
                 frame: *frame,
                 focal_px: image.focal_prior.map(|prior| prior.focal_px * frame.working_from_full),
+                focal_told: image.focal_prior.is_some_and(|prior| prior.source == FocalSource::Project),
+                lens: image.lens.map(|lens| lens.scaled(frame.working_from_full)),
                 camera_group,
+                lens_group,
             })
             .collect()
     }
 }
 
-/// Which photographs one camera took, as far as models and sizes tell: a number for each.
+/// Which photographs one camera took, as far as models of camera and lens and sizes tell: a number for each.
 pub(crate) fn camera_groups(images: &[&SourceImage]) -> Vec<usize> {
-    let key = |image: &SourceImage| {
+    let key = |image: &&SourceImage| {
         let (short, long) = (image.width.min(image.height), image.width.max(image.height));
-        (image.camera_model.clone(), short, long)
+        (image.camera_model.clone(), image.lens_model.clone(), short, long)
     };
-    let mut keys: Vec<_> = images.iter().map(|image| key(image)).collect();
-    keys.sort();
-    keys.dedup();
-    images.iter().map(|image| keys.binary_search(&key(image)).unwrap_or(0)).collect()
+    numbered(images.iter().map(key).collect())
+}
+
+/// Which of these were taken at one focal length: what a zoom bends differs from one to the next.
+fn lens_groups(images: &[&SourceImage]) -> Vec<usize> {
+    let cameras = camera_groups(images);
+    // By what the file states, to the micrometer: positive numbers, which their bits order.
+    let setting = |image: &SourceImage| image.focal_mm.map(|focal_mm| (1e3 * focal_mm).round().to_bits());
+    let keys: Vec<_> = images.iter().zip(cameras).map(|(image, camera)| (camera, setting(image))).collect();
+    numbered(keys)
+}
+
+/// A number for each key, the same for the same keys.
+fn numbered<K: Ord>(keys: Vec<K>) -> Vec<usize> {
+    let mut order: Vec<&K> = keys.iter().collect();
+    order.sort();
+    order.dedup();
+    keys.iter().map(|key| order.binary_search(&key).unwrap_or(0)).collect()
 }
 
 /// A number for a file name, the same whatever folder it lies in and wherever it stands among the inputs.
 pub(super) fn name_seed(path: &Path) -> u64 {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.bytes().fold(0, |hash: u64, byte| hash.wrapping_mul(31).wrapping_add(u64::from(byte)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(lens_model: Option<&str>, focal_mm: Option<f64>) -> SourceImage {
+        SourceImage {
+            path: "a.jpg".into(),
+            name: "a.jpg".to_owned(),
+            width: 600,
+            height: 400,
+            orientation: 1,
+            focal_prior: None,
+            camera_model: Some("Camera".to_owned()),
+            lens_model: lens_model.map(str::to_owned),
+            focal_mm,
+            lens: None,
+        }
+    }
+
+    #[test]
+    fn another_lens_is_another_camera_and_another_focal_length_another_lens() {
+        let images = [
+            image(Some("A"), Some(24.0)),
+            image(Some("B"), Some(24.0)),
+            image(Some("A"), Some(35.0)),
+            image(Some("A"), Some(24.0)),
+            image(None, None),
+        ];
+        let images: Vec<&SourceImage> = images.iter().collect();
+        let cameras = camera_groups(&images);
+        assert_eq!([cameras[0], cameras[0]], [cameras[2], cameras[3]]);
+        assert!(cameras[0] != cameras[1] && cameras[0] != cameras[4]);
+        let lenses = lens_groups(&images);
+        assert_eq!(lenses[0], lenses[3]);
+        let mut distinct = vec![lenses[0], lenses[1], lenses[2], lenses[4]];
+        distinct.sort_unstable();
+        distinct.dedup();
+        assert_eq!(distinct.len(), 4);
+    }
 }

@@ -78,11 +78,12 @@ fn geometry_key(input: &AlignInput, options: &AlignOptions) -> Option<Key> {
     let AlignInput { component, key, memo, directions, .. } = input;
     let file_name = |image: &&SourceImage| image.path.file_name().map(|file| file.to_string_lossy().into_owned());
     let images: Vec<_> =
-        component.images.iter().map(|image| (&image.name, file_name(image), image.focal_prior)).collect();
+        component.images.iter().map(|image| (&image.name, file_name(image), image.focal_prior, image.lens)).collect();
     let own = key.clone().filter(|_| directions.is_none())?;
     let own = own
         .part(&images)
         .part(&component.camera_groups())
+        .part(&component.lens_groups())
         .part(&component.pairs)
         .part(&(component.reference, component.reference_rotation));
     memo.key(GEOMETRY, Some(own), options)

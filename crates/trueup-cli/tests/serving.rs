@@ -1,0 +1,34 @@
+//! `trueup serve` as it is started and ended; what it serves is tested where it is made.
+
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
+
+use crate::run::{Desk, finish, trueup};
+
+#[test]
+fn it_prints_an_address_and_leaves_nothing_behind() {
+    let desk = Desk::new();
+    let mut command = trueup(desk.path(), &["serve", "."]);
+    command.env("TMPDIR", desk.path()).stdout(Stdio::piped());
+    let mut child = command.spawn().expect("the command starts");
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("UTF-8");
+    assert!(line.starts_with("Open http://127.0.0.1:") && line.contains("/?token="), "{line}");
+    assert_eq!(desk.files().len(), 1, "its temporary files");
+    let kill = format!("kill -INT {}", child.id());
+    assert!(Command::new("sh").args(["-c", &kill]).status().expect("sh runs").success());
+    assert_eq!(child.wait().expect("it ends").code(), Some(0), "that is how it is ended");
+    assert!(desk.files().is_empty(), "{:?}", desk.files());
+}
+
+#[test]
+fn others_are_let_in_by_a_long_password_only() {
+    let desk = Desk::new();
+    desk.put("short.txt", "secret\nand more");
+    finish(trueup(desk.path(), &["serve", "--listen", "127.0.0.1"])).expect_failure(2, &["--password-file"]);
+    let short = ["serve", "--listen", "127.0.0.1", "--password-file", "short.txt"];
+    finish(trueup(desk.path(), &short)).expect_failure(1, &["password: it is shorter than 12 characters"]);
+    let none = ["serve", "--listen", "127.0.0.1", "--password-file", "none.txt"];
+    finish(trueup(desk.path(), &none)).expect_failure(1, &["none.txt"]);
+    finish(trueup(desk.path(), &["serve", "nowhere"])).expect_failure(1, &["nowhere"]);
+}

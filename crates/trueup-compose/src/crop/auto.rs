@@ -1,0 +1,117 @@
+//! The rectangle that loses least of what matters.
+
+use trueup_core::Result;
+use trueup_core::raster::RowSource;
+
+use super::cells::Cells;
+use super::search::{Best, Worths};
+use super::smooth::Fillable;
+use super::worth::{UpperEnd, Worth};
+use crate::coverage::{Coverage, Rectangle};
+use crate::gaps::FRAME_REACH;
+use crate::layout::CanvasLayout;
+
+/// What a cell of a thing that stands out is worth beside a calm one, which is worth 1.
+const THING: f32 = 4.0;
+/// Cost of a cell that no photograph covers and that is filled: it is filled only where that saves more than as many calm
+/// cells.
+const FILLED: f32 = 1.0;
+/// Further cost of a filled cell if what is nearest to it were not smooth at all; a share of it for a share.
+const FILLED_BESIDE_ROUGH: f32 = 6.0;
+/// Cost of cutting through a thing, for each cell of the cut: calm cells as a share of the panorama's longer side.
+const CUT: f32 = 0.1;
+/// Of that, what cutting it to the left or right costs: things that stand on the ground are expected to go on to the sides.
+const CUT_ASIDE: f32 = 0.5;
+/// Cost of cutting off the upper end of a thing that ends within the picture, for each column of cells: calm cells as a share
+/// of the panorama's longer side.
+const BEHEADED: f32 = 0.3;
+/// How much more it costs if the end rises above most of what is beside it, for each part of the panorama's longer side by
+/// which it does: a tower that rises by a tenth counts four times as much as a roof among roofs.
+const PROMINENT: f32 = 30.0;
+/// Half the width of the thing that an upper end belongs to, as a share of the panorama's longer side: a spire counts as much
+/// as the tower that bears it.
+const BEARER: f64 = 0.02;
+/// The rectangle of a canvas that loses least of what matters and has no holes but smooth ones; of a full turn, of all its
+/// width. `None` if there is none.
+///
+/// # Errors
+/// Those of reading the panorama.
+pub(super) fn rectangle(
+    picture: &dyn RowSource,
+    layout: &CanvasLayout,
+    coverage: &Coverage,
+) -> Result<Option<Rectangle>> {
+    let around = layout.period.is_some();
+    let cells = Cells::of(picture, coverage, around)?;
+    let reach = (FRAME_REACH * layout.photograph_side() / cells.side as f64) as usize;
+    let fillable = Fillable::of(&cells, reach.min(cells.columns + cells.rows));
+    let Some(best) = worths(&cells, &fillable).best(around) else { return Ok(None) };
+    let is_open = |x: usize, y: usize| {
+        coverage.holds(x, y) || fillable.smooth[y / cells.side * cells.columns + x / cells.side].is_some()
+    };
+    Ok(Some(grown(&best, cells.side, [layout.width, layout.height], is_open)))
+}
+
+/// What every cell and every cut is worth.
+fn worths(cells: &Cells, fillable: &Fillable) -> Worths {
+    let (columns, rows) = (cells.columns, cells.rows);
+    let Worth { salience, ends } = Worth::of(cells);
+    let longer = columns.max(rows) as f32;
+    let ends = widened(&ends, (BEARER * f64::from(longer)).round() as usize);
+    let beheaded = |end: &UpperEnd| BEHEADED * (longer + PROMINENT * end.prominence as f32);
+    let cell = |at: usize| match cells.covered[at] {
+        true => Some(1.0 + THING * salience[at]),
+        false => fillable.smooth[at].map(|smooth| -FILLED - FILLED_BESIDE_ROUGH * (1.0 - smooth)),
+    };
+    // What two cells have of one thing.
+    let joined = |a: usize, b: usize| CUT * longer * salience[a].min(salience[b]);
+    let between_rows = |x: usize, y: usize| match y > 0 && y < rows {
+        true => joined((y - 1) * columns + x, y * columns + x),
+        false => 0.0,
+    };
+    let above =
+        |x: usize, y: usize| between_rows(x, y) + ends[x].as_ref().filter(|end| y > end.row).map_or(0.0, beheaded);
+    let beside = |x: usize, y: usize| match x > 0 && x < columns {
+        true => CUT_ASIDE * joined(y * columns + x - 1, y * columns + x),
+        false => 0.0,
+    };
+    Worths {
+        columns,
+        rows,
+        cells: (0..columns * rows).map(cell).collect(),
+        above: (0..columns * (rows + 1)).map(|at| above(at % columns, at / columns)).collect(),
+        below: (0..columns * (rows + 1)).map(|at| between_rows(at % columns, at / columns)).collect(),
+        beside: (0..(columns + 1) * rows).map(|at| beside(at % (columns + 1), at / (columns + 1))).collect(),
+    }
+}
+
+/// The highest end within `reach` columns of each.
+fn widened(ends: &[Option<UpperEnd>], reach: usize) -> Vec<Option<UpperEnd>> {
+    let near = |x: usize| ends[x.saturating_sub(reach)..(x + reach + 1).min(ends.len())].iter().flatten();
+    (0..ends.len()).map(|x| near(x).min_by_key(|end| end.row).copied()).collect()
+}
+
+/// A rectangle of cells in pixels, with the rows and columns of pixels around it that are open all along.
+fn grown(best: &Best, side: usize, [width, height]: [usize; 2], is_open: impl Fn(usize, usize) -> bool) -> Rectangle {
+    let mut columns = best.columns.start * side..(best.columns.end * side).min(width);
+    let mut rows = best.rows.start * side..(best.rows.end * side).min(height);
+    // What lies farther is another row or column of cells, which the search has left out.
+    for _ in 0..side {
+        let row_is_open = |y: usize, columns: &std::ops::Range<usize>| columns.clone().all(|x| is_open(x, y));
+        if rows.start > 0 && row_is_open(rows.start - 1, &columns) {
+            rows.start -= 1;
+        }
+        if rows.end < height && row_is_open(rows.end, &columns) {
+            rows.end += 1;
+        }
+        let column_is_open = |x: usize| rows.clone().all(|y| is_open(x, y));
+        let (left, right) = (columns.start, columns.end);
+        if left > 0 && column_is_open(left - 1) {
+            columns.start -= 1;
+        }
+        if right < width && column_is_open(right) {
+            columns.end += 1;
+        }
+    }
+    Rectangle { columns, rows }
+}

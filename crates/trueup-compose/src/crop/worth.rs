@@ -1,0 +1,130 @@
+//! What of a panorama matters: what is lost with a cell, and what is broken by cutting between two.
+
+use super::cells::Cells;
+
+/// Contrast of neighboring cells from which on an edge is a full one, levels: that of a gray stone wall beside a gray sky.
+const FULL_EDGE: f32 = 40.0;
+/// Half the side of the square over which edges make a thing, as a share of the panorama's longer side: that of a head in a
+/// street.
+const THING: f64 = 0.006;
+/// Half the side of a thing's surroundings, as a share of the panorama's longer side.
+const SURROUNDINGS: f64 = 0.05;
+/// How much edges all around take of a thing's salience: with 2, a lawn or a tree's crown has a third of what the same
+/// edges have by themselves.
+const CROWDED: f32 = 2.0;
+
+/// Salience from which on there is a thing, and up to which there is none: what rises from the one to the other within
+/// [`HEADROOM`] ends there.
+const THERE: f32 = 0.2;
+const CALM: f32 = 0.1;
+/// Calm above a thing that shows that it ends there, as a share of the panorama's longer side; half of it is to be kept.
+const HEADROOM: f64 = 0.012;
+/// Half the width of the skyline over which a thing stands out, as a share of the panorama's longer side.
+const SKYLINE: f64 = 0.1;
+
+/// What of a panorama matters.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Worth {
+    /// How far a cell is part of a thing that stands out, 0 to 1; 0 where nothing is covered.
+    pub(super) salience: Vec<f32>,
+    /// For every column, where the thing that is highest there ends within the picture.
+    pub(super) ends: Vec<Option<UpperEnd>>,
+}
+
+/// The upper end of a thing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct UpperEnd {
+    /// The first row of cells that is to be kept for it.
+    pub(super) row: usize,
+    /// Rows of cells by which it rises above most of what ends beside it.
+    pub(super) prominence: usize,
+}
+
+impl Worth {
+    pub(super) fn of(cells: &Cells) -> Self {
+        let longer = cells.columns.max(cells.rows) as f64;
+        let reach = |share: f64| (share * longer).round().max(1.0) as usize;
+        let edges: Vec<f32> = (0..cells.covered.len()).map(|at| edge(cells, at)).collect();
+        let things = box_means(&edges, cells, reach(THING));
+        let around = box_means(&edges, cells, reach(SURROUNDINGS));
+        let salience: Vec<f32> = things
+            .iter()
+            .zip(&around)
+            .zip(&cells.covered)
+            .map(|((&thing, &around), &covered)| match covered && thing > 0.0 {
+                true => thing * thing / (thing + CROWDED * around),
+                false => 0.0,
+            })
+            .collect();
+        let ends = ends(cells, &salience, longer);
+        Self { salience, ends }
+    }
+}
+
+/// Strength of the edge at a cell, 0 to 1: how its covered neighbors differ from it.
+fn edge(cells: &Cells, at: usize) -> f32 {
+    if !cells.covered[at] {
+        return 0.0;
+    }
+    let (x, y) = (at % cells.columns, at / cells.columns);
+    let near = [
+        (x > 0).then(|| at - 1),
+        (x + 1 < cells.columns).then_some(at + 1),
+        (y > 0).then(|| at - cells.columns),
+        (y + 1 < cells.rows).then_some(at + cells.columns),
+    ];
+    let contrasts = near.into_iter().flatten().filter(|&other| cells.covered[other]);
+    let strongest = contrasts.map(|other| cells.contrast(at, other)).fold(0.0, f32::max);
+    (strongest / FULL_EDGE).min(1.0)
+}
+
+/// Means over the covered cells of a square of `2 * reach + 1` cells around each.
+fn box_means(values: &[f32], cells: &Cells, reach: usize) -> Vec<f32> {
+    let (columns, rows) = (cells.columns, cells.rows);
+    // Sums over all cells above and left of a corner.
+    let mut sums = vec![[0.0_f64; 2]; (columns + 1) * (rows + 1)];
+    for y in 0..rows {
+        let mut row = [0.0_f64; 2];
+        for x in 0..columns {
+            let at = y * columns + x;
+            if cells.covered[at] {
+                row = [row[0] + f64::from(values[at]), row[1] + 1.0];
+            }
+            let above = sums[y * (columns + 1) + x + 1];
+            sums[(y + 1) * (columns + 1) + x + 1] = [above[0] + row[0], above[1] + row[1]];
+        }
+    }
+    let mean = |at: usize| {
+        let (x, y) = (at % columns, at / columns);
+        let (left, right) = (x.saturating_sub(reach), (x + reach + 1).min(columns));
+        let (top, bottom) = (y.saturating_sub(reach), (y + reach + 1).min(rows));
+        let corner = |x: usize, y: usize| sums[y * (columns + 1) + x];
+        let [sum, count] = [0, 1]
+            .map(|k| corner(right, bottom)[k] - corner(left, bottom)[k] - corner(right, top)[k] + corner(left, top)[k]);
+        (sum / count.max(1.0)) as f32
+    };
+    (0..columns * rows).map(mean).collect()
+}
+
+/// See [`Worth::ends`].
+fn ends(cells: &Cells, salience: &[f32], longer: f64) -> Vec<Option<UpperEnd>> {
+    let headroom = (HEADROOM * longer).round().max(2.0) as usize;
+    let end = |x: usize| {
+        let column = |y: usize| y * cells.columns + x;
+        let first = (0..cells.rows).find(|&y| cells.covered[column(y)])?;
+        let rising = (first..cells.rows).find(|&y| salience[column(y)] >= CALM)?;
+        let thing = (rising..cells.rows).find(|&y| salience[column(y)] >= THERE)?;
+        (rising >= first + headroom && thing <= rising + headroom).then_some(thing)
+    };
+    let rows: Vec<Option<usize>> = (0..cells.columns).map(end).collect();
+    let reach = (SKYLINE * longer).round() as usize;
+    let with_prominence = |x: usize| {
+        let row = rows[x]?;
+        let mut beside: Vec<usize> =
+            rows[x.saturating_sub(reach)..(x + reach + 1).min(rows.len())].iter().copied().flatten().collect();
+        beside.sort_unstable();
+        let prominence = beside[beside.len() / 2].saturating_sub(row);
+        Some(UpperEnd { row: row - headroom / 2, prominence })
+    };
+    (0..rows.len()).map(with_prominence).collect()
+}

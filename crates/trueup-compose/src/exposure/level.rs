@@ -1,0 +1,162 @@
+//! How bright the panorama is as a whole: the level at which least of its photographs is lost.
+
+use trueup_core::color::TransferCurve;
+
+use super::measured::Thumbnail;
+use crate::light::{Correction, Corrections, LightTable, PhotographLight, exposed};
+
+/// Pixels of a photograph that are looked at, about.
+const SAMPLES: usize = 1_000;
+
+/// 8-bit levels of the brightest channel from which on nothing is told from white, and up to which nothing from black.
+const WHITE: u8 = 250;
+const BLACK: u8 = 8;
+
+/// Levels that are tried per stop.
+const TRIED_PER_STOP: f64 = 8.0;
+
+/// Share of the photographs' pixels that must be saved for every stop that the panorama is brighter or darker than its
+/// reference: enough that photographs of nearly one exposure are shown as they were taken.
+const STOP_FROM_REFERENCE: f64 = 0.01;
+
+/// Stops by which a photograph may be shown brighter or darker than it was taken at no cost; a camera's own choice of
+/// exposure is no surer.
+const STOPS_FREE: f64 = 1.0;
+
+/// Share of a photograph's pixels that a further stop is worth: the tones of a photograph fill some five stops, of which
+/// cameras choose those that matter.
+const FURTHER_STOP: f64 = 0.05;
+
+/// What decides the level of a panorama.
+pub(super) struct LevelInput<'a> {
+    pub(super) thumbnails: &'a [Thumbnail<'a>],
+    /// Corrections that leave the reference as bright as it was taken.
+    pub(super) corrections: &'a Corrections,
+    /// Which photographs were compared with others: the rest has no level of its own.
+    pub(super) compared: &'a [bool],
+}
+
+/// The brightest channel of a pixel: its light, and the factor on it.
+struct Sample {
+    light: f32,
+    factor: f32,
+}
+
+impl LevelInput<'_> {
+    /// Natural logarithm of a factor on all photographs, so that the least of them is lost: of their pixels as few as can be
+    /// turn white or black that were not when they were taken, and few photographs are shown much brighter or darker than
+    /// they were taken; each counts the same. The level lies between those of the photographs, so that photographs of one
+    /// exposure stay as they are, and it is that of the reference if another gains next to nothing.
+    pub(super) fn log_factor(&self) -> f64 {
+        let compared = self.corrections.photographs.iter().zip(self.compared).filter(|(_, compared)| **compared);
+        let own: Vec<f64> = compared.map(|(correction, _)| -correction.brightness().log2()).collect();
+        let [low, high] = own.iter().fold([0.0_f64; 2], |[low, high], &stops| [low.min(stops), high.max(stops)]);
+        let tried = (low * TRIED_PER_STOP).ceil() as i64..=(high * TRIED_PER_STOP).floor() as i64;
+        let Some(curve) = self.curve().filter(|_| tried.clone().count() > 1) else { return 0.0 };
+        let ends = [BLACK, WHITE].map(|level| curve.linear(f64::from(level) / 255.0) as f32);
+        let photographs = 0..self.thumbnails.len();
+        let photographs: Vec<Vec<Sample>> = photographs.map(|index| self.samples(index, &curve)).collect();
+        let cost = |stops: f64| {
+            let moved = own.iter().map(|own| ((stops - own).abs() - STOPS_FREE).max(0.0));
+            let moved = moved.sum::<f64>() / own.len().max(1) as f64;
+            lost(&photographs, stops, ends) + FURTHER_STOP * moved + STOP_FROM_REFERENCE * stops.abs()
+        };
+        // Nearest to the reference first: of equal ones the nearest is taken.
+        let mut tried: Vec<f64> = tried.map(|step| step as f64 / TRIED_PER_STOP).collect();
+        tried.sort_by(|one, other| one.abs().total_cmp(&other.abs()).then(one.total_cmp(other)));
+        let costs = tried.iter().map(|&stops| (cost(stops), stops));
+        let best = costs.reduce(|best, other| if other.0 < best.0 { other } else { best });
+        best.map_or(0.0, |(_, stops)| stops * std::f64::consts::LN_2)
+    }
+
+    /// The curve by which the samples of all photographs are read: that of their profile if the response makes none.
+    fn curve(&self) -> Option<TransferCurve> {
+        let profile = self.thumbnails.first()?.curve;
+        Some(self.corrections.response.curve(profile).unwrap_or_else(|_| profile.clone()))
+    }
+
+    /// The pixels of a photograph that tell something.
+    fn samples(&self, index: usize, curve: &TransferCurve) -> Vec<Sample> {
+        let (thumbnail, correction) = (&self.thumbnails[index], &self.corrections.photographs[index]);
+        if !self.compared[index] {
+            return Vec::new();
+        }
+        let raster = thumbnail.raster;
+        let size = [raster.width() as f64, raster.height() as f64];
+        let light = LightTable::new(PhotographLight { curve, correction, local: None }, size);
+        let step = ((raster.width() * raster.height() / SAMPLES) as f64).sqrt().max(1.0) as usize;
+        let mut samples = Vec::new();
+        for y in (step / 2..raster.height()).step_by(step) {
+            for x in (step / 2..raster.width()).step_by(step) {
+                samples.extend(brightest(&light, raster.pixel(x, y), [x as f32 + 0.5, y as f32 + 0.5]));
+            }
+        }
+        samples
+    }
+}
+
+/// The brightest channel of a pixel after correction; `None` if it was white or black as it was taken.
+fn brightest(light: &LightTable, pixel: &[u8], [x, y]: [f32; 2]) -> Option<Sample> {
+    let lift = if light.varies() { light.at(x, y) } else { 1.0 };
+    let channels = pixel.iter().zip(light.gain).map(|(&level, gain)| (level, gain * lift));
+    let (level, factor) = channels.max_by(|one, other| {
+        let value = |&(level, factor): &(u8, f32)| exposed(light.linearize.linear(f32::from(level)), factor);
+        value(one).total_cmp(&value(other))
+    })?;
+    (level > BLACK && level < WHITE).then(|| Sample { light: light.linearize.linear(f32::from(level)), factor })
+}
+
+/// The share of the photographs' pixels beyond the ends of light, `black` and `white`, if all are brightened by `stops`.
+fn lost(photographs: &[Vec<Sample>], stops: f64, [black, white]: [f32; 2]) -> f64 {
+    let factor = stops.exp2() as f32;
+    let beyond = |sample: &&Sample| {
+        let light = exposed(sample.light, sample.factor * factor);
+        light <= black || light >= white
+    };
+    let shares = photographs.iter().filter(|samples| !samples.is_empty());
+    let shares = shares.map(|samples| samples.iter().filter(beyond).count() as f64 / samples.len() as f64);
+    shares.clone().sum::<f64>() / shares.count().max(1) as f64
+}
+
+impl Corrections {
+    /// With a factor on all photographs that were compared, and no gain beyond `largest` or its inverse.
+    pub(super) fn at_level(mut self, log_factor: f64, compared: &[bool], largest: f64) -> Self {
+        let compared = self.photographs.iter_mut().zip(compared).filter(|(_, compared)| **compared);
+        for (Correction { gain, .. }, _) in compared {
+            *gain = gain.map(|gain| (gain * log_factor.exp()).clamp(largest.recip(), largest));
+        }
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn corrections(gains: &[f64]) -> Corrections {
+        gains.iter().map(|&gain| Correction::uniform(gain)).collect::<Vec<_>>().into()
+    }
+
+    #[test]
+    fn the_limit_holds_at_the_level_that_was_chosen() {
+        let at_level = corrections(&[1.0, 20.0, 1.0]).at_level(0.25_f64.ln(), &[true, true, false], 8.0);
+        // A quarter, 20 / 4 = 5; the last was compared with none.
+        for (correction, gain) in at_level.photographs.iter().zip([0.25, 5.0, 1.0]) {
+            assert!((correction.brightness() / gain - 1.0).abs() < 1e-12, "{at_level:?}");
+        }
+        let bounded = corrections(&[0.1, 20.0]).at_level(0.0, &[true; 2], 8.0);
+        assert_eq!(bounded, corrections(&[0.125, 8.0]));
+    }
+
+    #[test]
+    fn pixels_count_as_lost_by_what_they_become() {
+        let samples = |lights: &[f32]| lights.iter().map(|&light| Sample { light, factor: 2.0 }).collect::<Vec<_>>();
+        // Of the first, 0.6 and 0.8 become 1.2 / (1 + 15 * 0.1296)^(1/4) = 0.916 and 1.6 / (1 + 15 * 0.4096)^(1/4) = 0.978,
+        // and 0.001 becomes 0.002. The second loses nothing, the third is none.
+        let photographs = [samples(&[0.001, 0.1, 0.6, 0.8]), samples(&[0.1, 0.2]), Vec::new()];
+        assert_eq!(lost(&photographs, 0.0, [0.0025, 0.95]), 0.25);
+        // Two stops darker, factors of 1/2: only the first is lost.
+        assert_eq!(lost(&photographs, -2.0, [0.0025, 0.95]), 0.125);
+        assert_eq!(lost(&[], 0.0, [0.0, 1.0]), 0.0);
+    }
+}

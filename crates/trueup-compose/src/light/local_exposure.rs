@@ -1,0 +1,139 @@
+//! A factor on light that changes from place to place of the canvas, slowly.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Factors on linear light at the middles of a grid of cells that lie over a canvas.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ExposureMap {
+    /// Cells along x and y, at least 1 each.
+    pub(crate) cells: [usize; 2],
+    /// Size of a cell, canvas pixels.
+    pub(crate) cell_px: [f64; 2],
+    /// The map's upper left corner, canvas pixels.
+    pub(crate) corner: [f64; 2],
+    /// Whether the last column of cells lies beside the first, as on a cylinder.
+    pub(crate) around: bool,
+    /// The factors, row by row.
+    pub(crate) factors: Vec<f32>,
+}
+
+/// What lies around a place along one axis: two cells, and how far it is on the way to the second.
+#[derive(Clone, Copy)]
+struct Between {
+    cells: [usize; 2],
+    fraction: f32,
+}
+
+impl ExposureMap {
+    /// The cells around a canvas position along an axis; beyond the outer ones they hold on, or go round.
+    fn between(&self, axis: usize, position: f64) -> Between {
+        let count = self.cells[axis];
+        let place = (position - self.corner[axis]) / self.cell_px[axis] - 0.5;
+        if axis == 0 && self.around {
+            let place = place.rem_euclid(count as f64);
+            let first = (place as usize).min(count - 1);
+            return Between { cells: [first, (first + 1) % count], fraction: (place - first as f64) as f32 };
+        }
+        let place = place.clamp(0.0, (count - 1) as f64);
+        let first = place as usize;
+        Between { cells: [first, (first + 1).min(count - 1)], fraction: (place - first as f64) as f32 }
+    }
+}
+
+/// An [`ExposureMap`] as it lies over a canvas of any scale.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct LocalExposure {
+    map: Arc<ExposureMap>,
+    /// Pixels of the map's own canvas per pixel of this one.
+    scale: [f64; 2],
+    /// Where this canvas's corner (0, 0) lies on the map's own.
+    shift: [f64; 2],
+}
+
+impl From<ExposureMap> for LocalExposure {
+    /// Over the map's own canvas.
+    fn from(map: ExposureMap) -> Self {
+        Self { map: Arc::new(map), scale: [1.0; 2], shift: [0.0; 2] }
+    }
+}
+
+impl LocalExposure {
+    /// The same over another canvas, whose place p is `scale * p + shift` of this one.
+    pub(crate) fn over(&self, scale: [f64; 2], shift: [f64; 2]) -> Self {
+        let of = |axis: usize| self.scale[axis] * shift[axis] + self.shift[axis];
+        Self {
+            map: Arc::clone(&self.map),
+            scale: [self.scale[0] * scale[0], self.scale[1] * scale[1]],
+            shift: [of(0), of(1)],
+        }
+    }
+
+    /// The same over a canvas that begins so many columns farther left.
+    pub(crate) fn led_by(&self, columns: usize) -> Self {
+        self.over([1.0; 2], [-(columns as f64), 0.0])
+    }
+
+    /// Fills `out` with the factors at the middles of the pixels `columns` of row `y`.
+    pub(crate) fn factors(&self, y: usize, columns: Range<usize>, out: &mut Vec<f32>) {
+        let map = self.map.as_ref();
+        let place = |axis: usize, pixel: usize| self.scale[axis] * (pixel as f64 + 0.5) + self.shift[axis];
+        let down = map.between(1, place(1, y));
+        let [upper, lower] = down.cells.map(|row| &map.factors[row * map.cells[0]..(row + 1) * map.cells[0]]);
+        out.clear();
+        out.extend(columns.map(|x| {
+            let Between { cells: [left, right], fraction } = map.between(0, place(0, x));
+            let [left, right] = [left, right].map(|at| upper[at] + down.fraction * (lower[at] - upper[at]));
+            left + fraction * (right - left)
+        }));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn map(around: bool) -> ExposureMap {
+        let factors = vec![1.0, 2.0, 4.0, 3.0, 4.0, 6.0];
+        ExposureMap { cells: [3, 2], cell_px: [10.0, 20.0], corner: [100.0, 0.0], around, factors }
+    }
+
+    fn factor(local: &LocalExposure, x: usize, y: usize) -> f32 {
+        let mut out = Vec::new();
+        local.factors(y, x..x + 1, &mut out);
+        out[0]
+    }
+
+    #[test]
+    fn between_cells_it_is_bilinear_and_beyond_them_it_holds_on() {
+        let local = LocalExposure::from(map(false));
+        // The pixel's middle is 110.5, 0.55 of the way between the first two cells' middles, 105 and 115; both rows lie below 10.
+        assert!((factor(&local, 110, 3) - 1.55).abs() < 1e-6);
+        // Row 19: middle 19.5, 0.475 of the way from 10 to 30.
+        assert!((factor(&local, 110, 19) - (1.55 + 0.475 * (3.55 - 1.55))).abs() < 1e-6);
+        assert_eq!(factor(&local, 0, 0), 1.0);
+        assert_eq!(factor(&local, 500, 500), 6.0);
+    }
+
+    #[test]
+    fn around_a_cylinder_the_last_cell_lies_beside_the_first() {
+        let local = LocalExposure::from(map(true));
+        // 129.5 is 0.45 of the way from the last cell's middle, 125, to the first one's, 135 = 105 + 30.
+        assert!((factor(&local, 129, 0) - (4.0 - 0.45 * 3.0)).abs() < 1e-6);
+        for x in [100, 117, 129] {
+            assert!((factor(&local, x, 0) - factor(&local, x + 30, 0)).abs() < 1e-6);
+            assert!((factor(&local, x, 0) - factor(&local, x - 90, 0)).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn other_canvases_show_the_same_places() {
+        let local = LocalExposure::from(map(false));
+        let half = local.over([2.0, 2.0], [0.0; 2]);
+        // Its pixel 55 reaches from 110 to 112.
+        let mean = 0.5 * (factor(&local, 110, 0) + factor(&local, 111, 0));
+        assert!((factor(&half, 55, 0) - mean).abs() < 1e-6);
+        assert_eq!(factor(&local.led_by(40), 150, 7), factor(&local, 110, 7));
+        assert_eq!(factor(&half.led_by(3), 58, 7), factor(&half, 55, 7));
+    }
+}

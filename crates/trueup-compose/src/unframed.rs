@@ -1,0 +1,176 @@
+//! Photographs without the hairlines that some programs leave around them: a white or black row or column of their own at the
+//! border, which would run through the panorama wherever the photograph ends.
+
+use trueup_core::Result;
+use trueup_core::color::TransferCurve;
+use trueup_core::mask::Masks;
+use trueup_core::raster::{Photograph, Raster};
+use trueup_core::source::PhotographSource;
+
+/// Widest frame that is a hairline, as a share of the photograph's shorter side. What is wider was meant.
+const WIDEST: f64 = 0.005;
+/// Rows at a border that are looked at in any case: a small copy of a photograph may have its frame doubled by scaling.
+const FEWEST_ROWS: usize = 3;
+/// Largest distance of a frame's samples from black or white, as a share of white: compression moves them so far.
+const PLAIN: f32 = 0.05;
+/// Least difference of the picture from the frame beside it, as a share of white, at [`MOST_PLACES`] of it: a black sky or a
+/// blown one goes on behind its border.
+const STEP: f32 = 0.1;
+/// Share of a border at which its samples must be a frame's, and the picture beside them must not.
+const MOST_PLACES: f64 = 0.95;
+
+/// The same photographs, the rows and columns of a frame painted over with those beside them.
+pub(crate) struct Unframed<'a>(pub(crate) &'a dyn PhotographSource);
+
+impl PhotographSource for Unframed<'_> {
+    fn photograph(&self, index: usize) -> Result<Photograph> {
+        Ok(match self.0.photograph(index)? {
+            Photograph::Eight(raster) => Photograph::Eight(unframed(raster, f32::from(u8::MAX))),
+            Photograph::Sixteen(raster) => Photograph::Sixteen(unframed(raster, f32::from(u16::MAX))),
+        })
+    }
+
+    fn masks(&self, index: usize) -> Masks {
+        self.0.masks(index)
+    }
+
+    fn bytes(&self, index: usize) -> Option<usize> {
+        self.0.bytes(index)
+    }
+
+    fn transfer_curve(&self) -> TransferCurve {
+        self.0.transfer_curve()
+    }
+}
+
+/// A border of a photograph.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Left,
+    Top,
+    Right,
+    Bottom,
+}
+
+impl Side {
+    /// Pixel number `along` of the line that is `depth` lines away from the border, as its column and row.
+    fn place(self, depth: usize, along: usize, [width, height]: [usize; 2]) -> [usize; 2] {
+        match self {
+            Self::Left => [depth, along],
+            Self::Top => [along, depth],
+            Self::Right => [width - 1 - depth, along],
+            Self::Bottom => [along, height - 1 - depth],
+        }
+    }
+
+    /// Pixels along it, and lines from it to the other side.
+    fn lengths(self, [width, height]: [usize; 2]) -> [usize; 2] {
+        match self {
+            Self::Left | Self::Right => [height, width],
+            Self::Top | Self::Bottom => [width, height],
+        }
+    }
+}
+
+/// The photograph with the lines of each border's frame painted over.
+fn unframed<T: Copy + Default + Into<f32>>(mut raster: Raster<T>, white: f32) -> Raster<T> {
+    let size = [raster.width(), raster.height()];
+    // A border's frame ends where the others' begin: these go first.
+    for side in [Side::Left, Side::Right, Side::Top, Side::Bottom] {
+        let lines = frame_lines(&raster, side, white);
+        let [along, _] = side.lengths(size);
+        for (depth, at) in (0..lines).flat_map(|depth| (0..along).map(move |at| (depth, at))) {
+            let [from_x, from_y] = side.place(lines, at, size);
+            let [x, y] = side.place(depth, at, size);
+            for channel in 0..raster.channels() {
+                let sample = raster.pixel(from_x, from_y)[channel];
+                raster.pixel_mut(x, y)[channel] = sample;
+            }
+        }
+    }
+    raster
+}
+
+/// Lines at a border that are a frame's, and the one beside them, into which compression and scaling carry it; 0 if there is
+/// no frame.
+fn frame_lines<T: Copy + Default + Into<f32>>(raster: &Raster<T>, side: Side, white: f32) -> usize {
+    let size = [raster.width(), raster.height()];
+    let [along, across] = side.lengths(size);
+    let widest = ((WIDEST * size[0].min(size[1]) as f64) as usize).max(FEWEST_ROWS);
+    let margin = widest + 2;
+    if along <= 2 * margin || across <= 2 * margin {
+        return 0;
+    }
+    // In the corners lie the frames of the other borders.
+    let places = || margin..along - margin;
+    let colors = raster.channels().min(3);
+    let most = (MOST_PLACES * places().len() as f64).ceil() as usize;
+    // How far a place of a line is from the frame's color, as a share of white.
+    let off = |depth: usize, at: usize, frame: f32| distance(raster, side.place(depth, at, size), colors, frame, white);
+    let is_frame = |depth: usize, frame: f32| places().filter(|&at| off(depth, at, frame) <= PLAIN).count() >= most;
+    let differs = |depth: usize, frame: f32| places().filter(|&at| off(depth, at, frame) >= STEP).count() >= most;
+    for frame in [0.0, white] {
+        let lines = (0..=widest).take_while(|&depth| is_frame(depth, frame)).count();
+        if lines > 0 && lines <= widest && differs(lines + 1, frame) {
+            return lines + 1;
+        }
+    }
+    0
+}
+
+/// The largest difference of a pixel's channels from a gray level, as a share of white.
+fn distance<T: Copy + Default + Into<f32>>(
+    raster: &Raster<T>,
+    [x, y]: [usize; 2],
+    colors: usize,
+    level: f32,
+    white: f32,
+) -> f32 {
+    let samples = &raster.pixel(x, y)[..colors];
+    samples.iter().map(|&sample| (sample.into() - level).abs()).fold(0.0, f32::max) / white
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A picture of 90 x 70 pixels, darker to the right, and `frame` lines of a level around it.
+    fn framed(frame: usize, level: u8, picture: impl Fn(usize, usize) -> u8) -> Raster<u8> {
+        let (width, height) = (90 + 2 * frame, 70 + 2 * frame);
+        let inside = |at: usize, length: usize| at.checked_sub(frame).filter(|&at| at < length);
+        let sample = |at: usize| match (inside(at % width, 90), inside(at / width, 70)) {
+            (Some(x), Some(y)) => picture(x, y),
+            _ => level,
+        };
+        let samples = (0..width * height).flat_map(|at| [sample(at); 3]).collect();
+        Raster::from_data(width, height, 3, samples).expect("as many samples")
+    }
+
+    #[test]
+    fn hairlines_take_up_the_picture_beside_them() {
+        let picture = |x: usize, y: usize| 60 + x as u8 + y as u8 / 2;
+        for (level, frame) in [(255, 1), (0, 1), (250, 2), (4, 3)] {
+            let cleaned = unframed(framed(frame, level, picture), 255.0);
+            for (x, y) in [(0_usize, 0_usize), (0, 30), (40, 0), (91, 35), (45, 71), (91, 71)] {
+                let [expected_x, expected_y] =
+                    [(x, 88), (y, 68)].map(|(at, last)| at.saturating_sub(frame).clamp(1, last));
+                assert_eq!(cleaned.pixel(x, y)[0], picture(expected_x, expected_y), "{level}: ({x}, {y})");
+            }
+            assert_eq!(cleaned.pixel(frame + 20, frame + 20)[0], picture(20, 20));
+        }
+    }
+
+    #[test]
+    fn what_is_no_hairline_stays() {
+        let dark = framed(0, 0, |_, _| 3);
+        assert_eq!(unframed(dark.clone(), 255.0), dark, "a black night");
+        let blown = framed(0, 0, |_, y| if y < 20 { 255 } else { 90 });
+        assert_eq!(unframed(blown.clone(), 255.0), blown, "a blown sky");
+        let wide = framed(12, 255, |x, _| 60 + x as u8);
+        assert_eq!(unframed(wide.clone(), 255.0), wide, "a frame that was meant");
+        let gray = framed(1, 128, |x, _| x as u8);
+        assert_eq!(unframed(gray.clone(), 255.0), gray, "a gray border");
+        let tiny = Raster::from_data(2, 2, 1, vec![255_u8; 4]).expect("four samples");
+        assert_eq!(unframed(tiny.clone(), 255.0), tiny);
+    }
+}

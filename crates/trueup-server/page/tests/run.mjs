@@ -1,0 +1,325 @@
+// The page in a real browser, as a person uses it: `npm test`, with the built command and Chromium.
+//
+// TRUEUP is the command (target/release/trueup otherwise), CHROMIUM the browser. With SCREENSHOTS=DIR, pictures of the page are
+// written there.
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import { cp, mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { chromium } from "playwright-core";
+
+const here = (path) => new URL(path, import.meta.url).pathname;
+const command = process.env.TRUEUP ?? here("../../../../target/release/trueup");
+const browserPath = process.env.CHROMIUM ?? "/usr/bin/chromium";
+const pictures = process.env.SCREENSHOTS;
+const axe = await readFile(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+
+const flags = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader"];
+/** Longest a step may take, in milliseconds: a machine may be busy with other things. */
+const PATIENCE = 60_000;
+/** Largest median of a preview's time, in milliseconds: what still feels like an answer. It is told; a quiet machine is wanted to do with 300. */
+const PREVIEW_MS = Number(process.env.PREVIEW_MS ?? 1000);
+
+const desk = await mkdtemp(join(tmpdir(), "trueup-page-"));
+const room = join(desk, "room");
+for (const number of [0, 1, 2, 3, 4]) await cp(here(`../../../../examples/room/0${number}.jpg`), join(room, `0${number}.jpg`));
+/** A name that would be markup, on a file that is a photograph of nothing else here. */
+const script = "<img src=x onerror=window.harmed=1>.jpg";
+
+const children = [];
+/** Starts the server; resolves with the address it prints. */
+function serve(...folders) {
+    return new Promise((resolve, reject) => {
+        const child = spawn(command, ["serve", ...folders], { stdio: ["ignore", "pipe", "inherit"] });
+        children.push(child);
+        child.stdout.on("data", (text) => {
+            const address = /http:\S+/.exec(String(text));
+            if (address) resolve(address[0]);
+        });
+        child.on("exit", (status) => reject(new Error(`the server ended with ${status}`)));
+    });
+}
+
+const browser = await chromium.launch({ executablePath: browserPath, headless: true, args: flags });
+const complaints = [];
+async function open(address, options = {}) {
+    const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, acceptDownloads: true, ...options });
+    const page = await context.newPage();
+    page.setDefaultTimeout(PATIENCE);
+    page.on("console", (message) => { if (message.type() === "error") complaints.push(message.text()); });
+    page.on("pageerror", (error) => complaints.push(String(error)));
+    page.on("request", (request) => {
+        const url = request.url();
+        if (!/^(blob:|data:)/.test(url) && new URL(url).hostname !== "127.0.0.1") complaints.push(`asked elsewhere: ${url}`);
+    });
+    await page.goto(address);
+    return page;
+}
+
+let last = Date.now();
+function step(words) {
+    console.log(`${((Date.now() - last) / 1000).toFixed(1).padStart(6)} s  ${words}`);
+    last = Date.now();
+}
+
+/** No violation of accessibility, whatever is shown. */
+async function accessible(page, where) {
+    // Evaluated by the browser's own tools, not by the page, whose policy lets no other script in.
+    // A color on its way to another is none that stays.
+    await page.emulateMedia({ reducedMotion: "reduce" });
+    await page.evaluate(axe);
+    const found = await page.evaluate(() => window.axe.run(document, { resultTypes: ["violations"] }));
+    const violations = found.violations.map((one) => `${one.id}: ${one.nodes.map((node) => node.html).join(" | ")}`);
+    assert.deepEqual(violations, [], where);
+}
+
+async function picture(page, name) {
+    if (pictures) await page.screenshot({ path: join(pictures, `${name}.jpg`), type: "jpeg", quality: 70 });
+}
+
+const drawn = (page) => page.locator("#preview").getAttribute("data-number");
+/** Resolves when another preview than `before` is shown. */
+async function redrawn(page, before) {
+    await page.waitForFunction((number) => {
+        const shown = document.getElementById("preview")?.dataset.number;
+        return shown !== undefined && shown !== number;
+    }, before);
+}
+const settled = (page) => page.waitForFunction(() => document.getElementById("work").hidden);
+const tiled = (page) => page.waitForFunction(() => !document.getElementById("tiles").hidden);
+
+async function stitchAndLook() {
+    const page = await open(await serve(room));
+    assert.ok(!page.url().includes("token"), "the key is not left in the address");
+    await page.locator("#strip li").nth(4).waitFor();
+    await accessible(page, "before stitching");
+    await page.locator("#strip img").first().evaluate((image) => image.decode());
+    await picture(page, "page-photographs");
+    step("five photographs are shown");
+
+    await page.getByRole("button", { name: "Stitch", exact: true }).click();
+    await page.locator("#work").waitFor();
+    assert.notEqual(await page.locator("#work-words").textContent(), "");
+    await page.getByRole("button", { name: "Stop" }).click();
+    await settled(page);
+    step("stopped, unless it was done before");
+
+    await page.getByRole("button", { name: /^Stitch( again)?$/ }).click();
+    await redrawn(page, null);
+    assert.match(await page.locator("#strip h2").first().textContent(), /In the panorama: 5/);
+    await tiled(page);
+    await settled(page);
+    await accessible(page, "stitched");
+    await page.waitForTimeout(800);
+    await picture(page, "page");
+    step("stitched, and shown whole in tiles");
+    return page;
+}
+
+async function choose(page) {
+    let before = await drawn(page);
+    await page.getByLabel("View", { exact: true }).selectOption("cylindrical");
+    await redrawn(page, before);
+    before = await drawn(page);
+    await page.getByLabel("Crop", { exact: true }).selectOption("rectangle");
+    await redrawn(page, before);
+    step("another view, cropped");
+
+    const before_turn = await page.locator("#option-projection-yaw-number").inputValue();
+    await page.getByRole("button", { name: "Turn", exact: true }).click();
+    const box = await page.locator("#preview").boundingBox();
+    await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    await page.mouse.down();
+    await page.mouse.move(box.x + box.width / 2 - 60, box.y + box.height / 2, { steps: 4 });
+    await page.mouse.up();
+    await page.waitForFunction((value) => document.getElementById("option-projection-yaw-number").value !== value, before_turn);
+    const turned = Number(await page.locator("#option-projection-yaw-number").inputValue());
+    assert.ok(turned > 1 && turned < 60, `turned by ${turned} degrees`);
+    await page.keyboard.press("ArrowLeft");
+    await page.waitForFunction((value) => Math.abs(Number(document.getElementById("option-projection-yaw-number").value) - value) < 0.02, turned - 1);
+    await page.keyboard.press("Control+z");
+    await page.waitForFunction((value) => Math.abs(Number(document.getElementById("option-projection-yaw-number").value) - value) < 0.02, turned);
+    step(`turned by dragging, by ${turned} degrees, and by a key; undone`);
+}
+
+/** Time from a wish to its preview, decoded, as the page asks for them. */
+async function timePreviews(page) {
+    await settled(page);
+    const times = await page.evaluate(async () => {
+        const times = [];
+        for (let number = 0; number < 9; number += 1) {
+            const begun = performance.now();
+            const body = JSON.stringify({ options: { "projection.yaw": String(number) } });
+            const told = await (await fetch("/api/preview", { method: "POST", body })).json();
+            const blob = await (await fetch(`/api/preview/${told.number}`)).blob();
+            (await createImageBitmap(blob)).close();
+            times.push(performance.now() - begun);
+        }
+        return times.sort((a, b) => a - b);
+    });
+    step(`previews in ${times[4].toFixed(0)} ms (median of ${times.length}; ${times[0].toFixed(0)} to ${times[8].toFixed(0)})`);
+    assert.ok(times[4] <= PREVIEW_MS, `the median is ${times[4]} ms`);
+}
+
+async function paint(page) {
+    await page.getByRole("button", { name: "Paint on 02.jpg" }).click();
+    const canvas = page.locator("#paint-canvas");
+    await canvas.waitFor();
+    const box = await canvas.boundingBox();
+    await page.mouse.move(box.x + 60, box.y + 60);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 200, box.y + 100, { steps: 5 });
+    await page.mouse.up();
+    await page.getByRole("button", { name: "Keep" }).click();
+    await canvas.focus();
+    for (const key of ["ArrowRight", "ArrowDown", "Space", "Shift+ArrowRight", "Shift+ArrowRight"]) await page.keyboard.press(key);
+    await accessible(page, "painting");
+    await picture(page, "page-painting");
+    await page.getByRole("button", { name: "Done" }).click();
+    await page.locator("#strip .badge").waitFor();
+    await page.getByRole("button", { name: "Stitch again" }).click();
+    await page.waitForFunction(() => document.querySelector("#told .note") === null && document.getElementById("work").hidden);
+    assert.match(await page.locator("#strip h2").first().textContent(), /In the panorama: 5/);
+    step("painted by mouse and keys, stitched again");
+    // What is to be ignored and what is to be kept are a step each.
+    for (const left of [1, 0]) {
+        await page.getByRole("button", { name: "Undo" }).click();
+        await page.locator("#strip .badge").waitFor({ state: left ? "attached" : "detached", timeout: 20_000 });
+        await settled(page);
+    }
+    // What is saved is what was stitched: without what was painted.
+    await page.getByRole("button", { name: "Stitch again" }).click();
+    await page.waitForFunction(() => document.querySelector("#told .note") === null && document.getElementById("work").hidden);
+}
+
+async function save(page) {
+    await settled(page);
+    const formats = await page.locator("#save-format option").allTextContents();
+    assert.ok(formats.length >= 6, `${formats}`);
+    await page.getByRole("button", { name: "Save", exact: true }).first().click();
+    await accessible(page, "saving");
+    await page.getByLabel("Name").fill("of the room");
+    await page.locator("input[name=beside][value=project]").check();
+    for (const format of formats.filter((one) => one !== ".dzi")) {
+        await page.getByLabel("Format").selectOption(format);
+        await page.locator("#save-go").click();
+        const link = page.locator("#save-files a", { hasText: `of the room${format}` });
+        await link.waitFor();
+        await page.waitForFunction(() => !document.getElementById("save-go").disabled);
+        const [download] = await Promise.all([page.waitForEvent("download"), link.click()]);
+        await download.saveAs(join(desk, `saved${format}`));
+        assert.ok((await readFile(join(desk, `saved${format}`))).length > 10_000, format);
+    }
+    await page.getByLabel("Format").selectOption(".dzi");
+    await page.locator("#save-go").click();
+    await page.locator("#save-files li", { hasText: "of the room.dzi" }).waitFor();
+    assert.match(await readFile(join(room, "of the room.dzi"), "utf8"), /TileSize/);
+    const [download] = await Promise.all([page.waitForEvent("download"), page.locator("#save-files a", { hasText: ".json" }).first().click()]);
+    await download.saveAs(join(desk, "saved.json"));
+    await page.getByRole("button", { name: "Close", exact: true }).click();
+    step(`saved as ${formats.join(" ")}, with the project`);
+}
+
+async function reopen() {
+    const page = await open(await serve(room), { colorScheme: "dark" });
+    await page.locator("#strip li").nth(4).waitFor();
+    await page.getByRole("button", { name: "Open" }).click();
+    await accessible(page, "opening");
+    await page.locator("#choose-project").setInputFiles(join(desk, "saved.json"));
+    await redrawn(page, null);
+    assert.equal(await page.getByLabel("View", { exact: true }).inputValue(), "cylindrical");
+    assert.equal(await page.getByLabel("Crop", { exact: true }).inputValue(), "rectangle");
+    const project = await page.evaluate(async () => (await fetch("/api/project")).json());
+    const saved = JSON.parse(await readFile(join(desk, "saved.json"), "utf8"));
+    // What is cut off, and so where the rest lies, is found as the panorama is composed.
+    const composed = { canvas: null, mesh_canvas: null, crop: null, projection: null };
+    for (const one of [project, saved]) {
+        Object.assign(one, { ...composed, seconds: null, diagnostics: null, measures: null });
+        for (const image of one.images) Object.assign(image, { mesh: null, solved_mesh: null });
+    }
+    assert.deepEqual(project, saved);
+    await tiled(page);
+    await settled(page);
+    await accessible(page, "dark");
+    await page.waitForTimeout(800);
+    await picture(page, "page-dark");
+    step("opened again, in the dark: the same project");
+
+    await page.getByLabel("View", { exact: true }).selectOption("equirectangular");
+    await page.getByRole("button", { name: "Look around" }).click();
+    await page.locator("#sphere canvas, #sphere .pnlm-error-msg").first().waitFor({ state: "attached" });
+    await page.waitForTimeout(1500);
+    assert.equal(await page.locator("#sphere .pnlm-error-msg").isVisible(), false, "the sphere is shown");
+    await accessible(page, "around");
+    await picture(page, "page-around");
+    step("looked around on the sphere");
+}
+
+async function phone() {
+    await cp(join(room, "00.jpg"), join(desk, script));
+    const page = await open(await serve(), { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
+    await page.getByText("Drop photographs here").waitFor();
+    await accessible(page, "empty, on a phone");
+    const files = [0, 1, 2].map((number) => join(room, `0${number}.jpg`));
+    await page.locator("#choose").setInputFiles(files);
+    await page.locator("#strip li").nth(2).waitFor();
+    await page.getByRole("button", { name: "Stitch", exact: true }).click();
+    await redrawn(page, null);
+    await tiled(page);
+    await settled(page);
+    await accessible(page, "on a phone");
+    const wide = await page.evaluate(() => document.documentElement.scrollWidth > window.innerWidth);
+    assert.equal(wide, false, "nothing is wider than the phone");
+    await page.waitForTimeout(800);
+    await picture(page, "page-phone");
+    step("dropped on a phone, and stitched");
+}
+
+/** A name with markup, in a folder whose photographs cannot be used: all that is said of it is text. */
+async function names() {
+    const folder = join(desk, "names");
+    await cp(join(room, "00.jpg"), join(folder, script));
+    await cp(join(room, "03.jpg"), join(folder, "b&lt;b.jpg"));
+    await writeFile(join(folder, "text<script>window.harmed=1<\u002fscript>.jpg".replace("/", "")), "no photograph");
+    const page = await open(await serve(folder));
+    await page.locator("#strip li").nth(2).waitFor();
+    assert.equal(await page.locator("#strip .name").first().textContent(), script);
+    await page.getByRole("button", { name: "Stitch", exact: true }).click();
+    await settled(page);
+    await page.waitForTimeout(300);
+    assert.equal(await page.evaluate(() => window.harmed), undefined);
+    assert.equal(await page.locator("#strip img[src=x]").count(), 0);
+    const refused = complaints.splice(0).filter((text) => !text.includes("422"));
+    complaints.push(...refused);
+    step("markup in names is text");
+}
+
+let failure;
+try {
+    const page = await stitchAndLook();
+    await choose(page);
+    await timePreviews(page);
+    await paint(page);
+    await save(page);
+    await reopen();
+    await phone();
+    await names();
+    assert.deepEqual(complaints, [], "the browser complains of nothing");
+    step("done");
+} catch (error) {
+    failure = error;
+} finally {
+    await browser.close();
+    for (const child of children) {
+        child.removeAllListeners("exit");
+        child.kill("SIGINT");
+    }
+    await rm(desk, { recursive: true, force: true });
+}
+if (failure) {
+    console.error(failure, complaints);
+    process.exit(1);
+}

@@ -1,0 +1,189 @@
+//! Photographs: opened, dropped, shown and painted on.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use axum::body::Body;
+use axum::extract::{Path, Query, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
+use trueup::{MaskKind, StageContext, StitchOptions, names_photograph, write_thumbnail};
+
+use super::wishing::wishes_of;
+use crate::body;
+use crate::denial::Denial;
+use crate::folder::plain_name;
+use crate::limits::{
+    MAX_DROPPED_BYTES, MAX_MASK_BYTES, MAX_PHOTOGRAPH_BYTES, MAX_PHOTOGRAPHS, PAINTED_PIXELS, THUMBNAIL_PIXELS,
+};
+use crate::studio::{Listed, State as Now, Studio};
+
+/// A folder inside the one that was opened when the program began.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Opened {
+    /// Its path from there.
+    folder: String,
+}
+
+/// Opens a folder inside the one that was opened first. What was dropped is forgotten.
+pub(crate) async fn open(State(studio): State<Arc<Studio>>, body: Body) -> Result<StatusCode, Denial> {
+    let Opened { folder } = wishes_of(body).await?;
+    let none = || Denial::missing("folder");
+    let opened = studio.root.as_ref().and_then(|root| root.inside(&folder).ok()).ok_or_else(none)?;
+    let photographs = opened.photographs().into_iter().map(|path| Listed { path, dropped: false }).collect();
+    studio.change(|state| {
+        if state.work.is_some() {
+            return Err(Denial::not_now("something is being done", "Wait for it, or stop it."));
+        }
+        let (last_number, dropped_bytes) = (state.last_number, state.dropped_bytes);
+        *state = Now { folder: Some(opened), photographs, last_number, dropped_bytes, ..Now::default() };
+        Ok(())
+    })?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// What a dropped photograph is called.
+#[derive(Debug, Deserialize)]
+pub(crate) struct Named {
+    name: String,
+}
+
+/// Takes a photograph that was dropped on the page.
+pub(crate) async fn drop_one(
+    State(studio): State<Arc<Studio>>,
+    Query(Named { name }): Query<Named>,
+    headers: HeaderMap,
+    body: Body,
+) -> Result<StatusCode, Denial> {
+    let name = plain_name(&name).filter(|name| names_photograph((*name).as_ref()));
+    let name = name.ok_or_else(|| {
+        Denial::unacceptable("it is not named like a photograph", format!("Give {}.", trueup::readable_formats()))
+    })?;
+    let place = studio.dropped().join(name);
+    {
+        let state = studio.state();
+        if state.photographs.len() >= MAX_PHOTOGRAPHS {
+            return Err(Denial::unacceptable(format!("there are {MAX_PHOTOGRAPHS} photographs already"), ""));
+        }
+        if state.photographs.iter().any(|listed| listed.name() == name) {
+            return Err(Denial::not_now("there is a photograph of this name already", "Give it another name."));
+        }
+        let announced =
+            headers.get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok()?.parse::<u64>().ok());
+        let room = MAX_PHOTOGRAPH_BYTES.min(MAX_DROPPED_BYTES.saturating_sub(state.dropped_bytes));
+        if announced.is_none_or(|length| length > room) {
+            return Err(Denial::new(
+                StatusCode::PAYLOAD_TOO_LARGE,
+                format!("photographs of up to {} MB can be dropped here", room / 1_000_000),
+                "Begin with `trueup serve FOLDER`, in the folder that holds it.",
+            ));
+        }
+        drop(state);
+    }
+    let bytes = body::save(body, MAX_PHOTOGRAPH_BYTES, &place).await?;
+    studio.change(|state| {
+        state.dropped_bytes += bytes;
+        state.photographs.push(Listed { path: place, dropped: true });
+    });
+    Ok(StatusCode::CREATED)
+}
+
+/// A photograph as small as in a list.
+pub(crate) async fn thumbnail(state: State<Arc<Studio>>, number: Path<usize>) -> Result<Response, Denial> {
+    small(state, number, THUMBNAIL_PIXELS).await
+}
+
+/// A photograph as large as it is painted on.
+pub(crate) async fn picture(state: State<Arc<Studio>>, number: Path<usize>) -> Result<Response, Denial> {
+    small(state, number, PAINTED_PIXELS).await
+}
+
+/// A photograph made small, with its own size in two headers: masks have that.
+async fn small(State(studio): State<Arc<Studio>>, Path(number): Path<usize>, pixels: f64) -> Result<Response, Denial> {
+    let listed = studio.photograph(number)?;
+    if !studio.may_read(&listed.path) {
+        return Err(Denial::missing("photograph"));
+    }
+    let place = studio.pictures().join(format!("photograph-{number}-{pixels}.jpg"));
+    let made = move || {
+        // Decoding takes most of the memory there may be: one at a time.
+        let _one = studio.drawing.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let photograph = listed.path.display().to_string();
+        let context = StageContext::default();
+        let size = studio
+            .pool
+            .install(|| write_thumbnail(&photograph, pixels, &place, &StitchOptions::default(), &context))?;
+        let bytes = std::fs::read(&place).map_err(|error| trueup::Error::io("reading", &place, error))?;
+        Ok::<_, trueup::Error>((size, bytes))
+    };
+    let ([width, height], bytes) = tokio::task::spawn_blocking(made).await.map_err(Denial::failure)??;
+    let size = [("x-width", width.to_string()), ("x-height", height.to_string())];
+    Ok((size, [(header::CONTENT_TYPE, "image/jpeg")], bytes).into_response())
+}
+
+/// Which of its masks.
+fn kind_of(name: &str) -> Result<MaskKind, Denial> {
+    match name {
+        "use" => Ok(MaskKind::Use),
+        "keep" => Ok(MaskKind::Keep),
+        _ => Err(Denial::missing("mask")),
+    }
+}
+
+/// A mask that was painted.
+pub(crate) async fn mask(
+    State(studio): State<Arc<Studio>>,
+    Path((number, kind)): Path<(usize, String)>,
+) -> Result<Response, Denial> {
+    let kind = kind_of(&kind)?;
+    let painted = studio.state().history.now().masks.get(&number).cloned().unwrap_or_default();
+    let file = match kind {
+        MaskKind::Use => painted.used,
+        MaskKind::Keep => painted.kept,
+    };
+    let file = file.filter(|file| studio.may_read(file)).ok_or_else(|| Denial::missing("mask"))?;
+    let bytes = tokio::fs::read(&file).await.map_err(Denial::failure)?;
+    Ok(([(header::CONTENT_TYPE, "image/png")], bytes).into_response())
+}
+
+/// Takes a mask that was painted, a PNG in the size of the photograph; an empty body takes the mask away.
+pub(crate) async fn paint(
+    State(studio): State<Arc<Studio>>,
+    Path((number, kind)): Path<(usize, String)>,
+    body: Body,
+) -> Result<StatusCode, Denial> {
+    let kind = kind_of(&kind)?;
+    studio.photograph(number)?;
+    let bytes = body::read(body, MAX_MASK_BYTES).await?;
+    let file = match bytes.is_empty() {
+        true => None,
+        false => Some(written(&studio, &bytes).await?),
+    };
+    studio.change(|state| {
+        let mut wishes = state.history.now().clone();
+        let painted = wishes.masks.entry(number).or_default();
+        match kind {
+            MaskKind::Use => painted.used = file,
+            MaskKind::Keep => painted.kept = file,
+        }
+        wishes.masks.retain(|_, painted| *painted != Default::default());
+        state.history.go_on(wishes);
+    });
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// The first bytes of every PNG (W3C, "Portable Network Graphics", section 5.2).
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+/// Writes a mask to a file of its own: older ones stay, so that painting can be undone.
+async fn written(studio: &Studio, bytes: &[u8]) -> Result<PathBuf, Denial> {
+    if !bytes.starts_with(PNG) {
+        return Err(Denial::unacceptable("a mask is a PNG", "Reload the page."));
+    }
+    let number = studio.change(Now::number);
+    let place = studio.masks().join(format!("{number}.png"));
+    tokio::fs::write(&place, bytes).await.map_err(Denial::failure)?;
+    Ok(place)
+}

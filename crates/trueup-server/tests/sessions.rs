@@ -1,0 +1,221 @@
+//! One person's way through: stitched, turned, undone, saved and opened again, and all of it what the command makes.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+use trueup::{Inputs, Outputs, SideOutput, StageContext, StitchJob, StitchOptions};
+
+use crate::server::Server;
+
+/// A folder with copies of the photographs of the example.
+fn room() -> tempfile::TempDir {
+    let desk = tempfile::tempdir().expect("a folder");
+    let room = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room"));
+    for number in 0..5 {
+        let name = format!("0{number}.jpg");
+        std::fs::copy(room.join(&name), desk.path().join(&name)).expect("copied");
+    }
+    desk
+}
+
+/// A size at which composing takes a moment.
+const SMALL: &str = r#"{"options":{"canvas.scale":"0.1"}}"#;
+
+fn stitched(server: &Server) -> Value {
+    assert_eq!(server.post("/api/stitch", "").status, 202);
+    let told = server.settled();
+    assert_eq!((&told["trouble"], &told["stitched"]["used"]), (&Value::Null, &json!(5)), "{told}");
+    told
+}
+
+/// The project without what differs from run to run, or by where files lie.
+fn comparable(text: &[u8]) -> Value {
+    let mut project: Value = serde_json::from_slice(text).expect("a project");
+    project["seconds"] = Value::Null;
+    project
+}
+
+#[test]
+fn a_panorama_and_its_project_are_those_of_the_command() {
+    let (desk, elsewhere) = (room(), tempfile::tempdir().expect("a folder"));
+    let server = Server::of(desk.path());
+    // Uncropped, for what is cut off is found as a panorama is composed.
+    let wishes = json!({ "canvas.crop": "none", "canvas.scale": "0.1" });
+    assert_eq!(server.post("/api/wishes", &json!({ "options": wishes }).to_string()).status, 204);
+    stitched(&server);
+    let order = json!({ "name": "pano.png", "beside": ["project"], "into_folder": false }).to_string();
+    assert_eq!(server.post("/api/exports", &order).status, 202);
+    let told = server.settled();
+    let export = &told["exports"][0];
+    let fetch = |file: usize| server.get(&format!("/api/exports/{}/{file}", export["number"]));
+    assert_eq!(export["files"].as_array().map(Vec::len), Some(2), "{told}");
+
+    let mut options = StitchOptions::default();
+    for choice in ["canvas.scale=0.1", "canvas.crop=none"] {
+        options.set(choice).expect("an option");
+    }
+    let place = |name: &str| -> PathBuf { elsewhere.path().join(name) };
+    let outputs = Outputs::new(place("pano.png")).with(SideOutput::Project, place("pano.json"));
+    let inputs = Inputs::new([desk.path().display().to_string()]);
+    let job = StitchJob { inputs, outputs, cache: None, threads: 0 };
+    job.run(&options, &StageContext::default()).expect("stitched");
+    let picture = std::fs::read(place("pano.png")).expect("a picture");
+    let served = fetch(0);
+    assert!(served.head.contains("content-disposition: attachment; filename*=UTF-8''pano.png"), "{}", served.head);
+    assert!(unchunked(&served.body) == picture, "the same bytes");
+    let project = std::fs::read(place("pano.json")).expect("a project");
+    assert_eq!(comparable(&unchunked(&fetch(1).body)), comparable(&project));
+
+    // Opened again by a server that knows nothing of it, the record is the same.
+    let other = Server::of(desk.path());
+    assert_eq!(other.with_body("PUT", "/api/project", &project).status, 202);
+    let told = other.settled();
+    assert_eq!((&told["trouble"], &told["wishes"]), (&Value::Null, &wishes));
+    let mut reopened = comparable(&other.get("/api/project").body);
+    let mut recorded = comparable(&project);
+    for one in [&mut reopened, &mut recorded] {
+        // What composing tells is told when it composes.
+        one["diagnostics"] = Value::Null;
+    }
+    assert_eq!(reopened, recorded);
+
+    // Recorded from within the folder, photographs and reference are told by their names.
+    let folder = format!("{}/", desk.path().display());
+    let within = String::from_utf8(project).expect("text").replace(&folder, "./");
+    let third = Server::of(desk.path());
+    assert_eq!(third.with_body("PUT", "/api/project", within.as_bytes()).status, 202);
+    assert_eq!(third.settled()["trouble"], Value::Null);
+}
+
+#[test]
+fn wishes_are_drawn_kept_and_undone() {
+    let desk = room();
+    let server = Server::of(desk.path());
+    let nothing = server.post("/api/preview", "{}");
+    assert_eq!(nothing.status, 422, "there is no panorama yet: {nothing:?}");
+    stitched(&server);
+    let drawn = |wishes: &str| {
+        let answer = server.post("/api/preview", wishes);
+        assert_eq!(answer.status, 200, "{answer:?}");
+        let told = answer.json();
+        let picture = server.get(&format!("/api/preview/{}", told["number"]));
+        assert!(picture.body.starts_with(b"\xff\xd8"), "a JPEG");
+        let pixels = told["canvas"]["width"].as_f64().zip(told["canvas"]["height"].as_f64());
+        assert!(pixels.is_some_and(|(width, height)| width * height <= 500_000.0), "{told}");
+        told
+    };
+    let straight = drawn("{}");
+    let turned = drawn(r#"{"options":{"projection.yaw":"10"}}"#);
+    let yaw = |told: &Value| told["projection"]["yaw_deg"].as_f64().expect("a view");
+    assert!((yaw(&turned) - yaw(&straight) - 10.0).abs() < 1e-6, "{turned}");
+    assert_eq!(server.get("/api/news").json()["can_undo"], false, "trying is no wish");
+
+    assert_eq!(
+        server.post("/api/wishes", r#"{"options":{"projection.yaw":"10","canvas.crop":"rectangle"}}"#).status,
+        204
+    );
+    assert!((yaw(&drawn("{}")) - yaw(&turned)).abs() < 1e-9);
+    assert_eq!(server.post("/api/undo", "").status, 204);
+    assert_eq!(drawn("{}")["canvas"], straight["canvas"]);
+    assert_eq!(server.post("/api/wishes", r#"{"options":{"stitch.method":"autostitch"}}"#).status, 204);
+    assert_eq!(server.get("/api/news").json()["stitched"]["stale"], true, "another geometry is to be stitched");
+    server.post("/api/undo", "");
+    assert_eq!(server.get("/api/news").json()["stitched"]["stale"], false);
+
+    assert_eq!(server.post("/api/tiles", "").status, 202);
+    let told = server.settled();
+    let tiles = told["tiles"].as_u64().unwrap_or_else(|| panic!("{told}"));
+    assert!(server.get(&format!("/api/tiles/{tiles}/panorama.dzi")).text().contains("TileSize"));
+    assert!(server.get(&format!("/api/tiles/{tiles}/panorama_files/0/0_0.jpg")).body.starts_with(b"\xff\xd8"));
+    assert_eq!(server.get(&format!("/api/tiles/{tiles}/panorama_files/0/5_0.jpg")).status, 404);
+}
+
+#[test]
+fn work_is_told_and_stopped() {
+    let desk = room();
+    let server = Server::of(desk.path());
+    assert_eq!(server.post("/api/stitch", "").status, 202);
+    assert_eq!(server.post("/api/stitch", "").status, 409, "one at a time");
+    let told = server.get("/api/news").json();
+    assert_eq!(told["work"]["task"], "stitch", "{told}");
+    assert_eq!(server.post("/api/stop", "").status, 204);
+    let told = server.settled();
+    assert_eq!((&told["stitched"], &told["trouble"]), (&Value::Null, &Value::Null), "{told}");
+}
+
+#[test]
+fn photographs_are_shown_dropped_left_out_and_painted_on() {
+    let desk = room();
+    let server = Server::of(desk.path());
+    let small = server.get("/api/photographs/2/thumbnail");
+    assert!(
+        small.status == 200 && small.head.contains("x-width: 1200") && small.head.contains("x-height: 900"),
+        "{}",
+        small.head
+    );
+    let mask = std::fs::read(desk.path().join("00.jpg")).expect("a photograph");
+    assert_eq!(server.with_body("PUT", "/api/photographs?name=again.jpg", &mask).status, 201);
+    assert_eq!(server.post("/api/wishes", r#"{"left_out":{"5":true,"4":true}}"#).status, 204);
+    assert_eq!(server.post("/api/wishes", SMALL).status, 204);
+    assert_eq!(server.post("/api/stitch", "").status, 202);
+    let told = server.settled();
+    assert_eq!(told["stitched"]["used"], 4, "{told}");
+    let listed = |told: &Value, number: usize| told["photographs"][number].clone();
+    assert_eq!((&listed(&told, 4)["left_out"], &listed(&told, 4)["verdict"]), (&json!(true), &Value::Null));
+    assert_eq!(listed(&told, 0)["verdict"]["used"], true);
+
+    // Any PNG of another size is told by the library when it is used.
+    let png = b"\x89PNG\r\n\x1a\n";
+    assert_eq!(server.with_body("PUT", "/api/photographs/0/mask/use", png).status, 204);
+    let painted = server.get("/api/news").json();
+    assert!(painted["stitched"]["stale"] == true && listed(&painted, 0)["used_mask"].is_string(), "{painted}");
+    assert_eq!(server.get("/api/photographs/0/mask/use").body, png);
+    assert_eq!(server.post("/api/stitch", "").status, 202);
+    assert!(server.settled()["trouble"]["message"].is_string(), "it is no picture");
+    assert_eq!(server.with_body("PUT", "/api/photographs/0/mask/use", b"").status, 204);
+    assert_eq!(listed(&server.get("/api/news").json(), 0)["used_mask"], Value::Null);
+}
+
+/// A project that names files elsewhere reads none of them.
+#[test]
+fn a_project_reads_only_what_is_here() {
+    let desk = room();
+    let server = Server::of(desk.path());
+    assert_eq!(server.post("/api/wishes", SMALL).status, 204);
+    stitched(&server);
+    let project: Value = server.get("/api/project").json();
+    let secret = tempfile::tempdir().expect("a folder");
+    let secret_file = secret.path().join("secret.jpg");
+    std::fs::copy(desk.path().join("02.jpg"), &secret_file).expect("copied");
+    let told_of = |change: &dyn Fn(&mut Value)| {
+        let mut changed = project.clone();
+        change(&mut changed);
+        assert_eq!(server.with_body("PUT", "/api/project", changed.to_string().as_bytes()).status, 202);
+        server.settled()["trouble"]["message"].as_str().unwrap_or_default().to_owned()
+    };
+    let elsewhere = secret_file.display().to_string();
+    let told = told_of(&|project| project["images"][2]["path"] = json!(elsewhere));
+    assert!(told.contains("secret.jpg: this photograph of the project is not here"), "{told}");
+    let told = told_of(&|project| project["images"][2]["masks"] = json!([{ "path": elsewhere, "kind": "use" }]));
+    assert!(told.contains("this mask of the project is not here"), "{told}");
+    let told = told_of(&|project| project["options"]["resources"]["scratch"] = json!(secret.path().join("none")));
+    assert_eq!(told, "", "it is not heeded");
+    let told = told_of(&|project| project["images"][2]["path"] = json!("/elsewhere/02.jpg"));
+    assert_eq!(told, "", "a photograph of this name is here");
+    assert!(told_of(&|project| project["format"] = json!("other")).contains("format"));
+}
+
+/// An answer's body without the lengths of its pieces (RFC 9112, section 7.1), if it has them.
+fn unchunked(body: &[u8]) -> Vec<u8> {
+    let mut whole = Vec::new();
+    let mut rest = body;
+    loop {
+        let line = rest.windows(2).position(|two| two == b"\r\n").expect("a length");
+        let length = usize::from_str_radix(std::str::from_utf8(&rest[..line]).expect("text"), 16).expect("a length");
+        if length == 0 {
+            return whole;
+        }
+        whole.extend_from_slice(&rest[line + 2..line + 2 + length]);
+        rest = &rest[line + 4 + length..];
+    }
+}

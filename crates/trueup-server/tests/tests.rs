@@ -1,0 +1,5 @@
+//! The server as others meet it: those who are meant to, and those who are not.
+
+mod attacks;
+mod server;
+mod sessions;
