@@ -43,16 +43,6 @@ impl Failure {
         }
     }
 
-    /// What went wrong.
-    pub(crate) fn message(&self) -> &str {
-        &self.message
-    }
-
-    /// What to do about it; empty when there is nothing to say.
-    pub(crate) fn hint(&self) -> &str {
-        &self.hint
-    }
-
     /// The status that the command ends with.
     pub(crate) fn status(&self) -> u8 {
         self.status

@@ -1,7 +1,8 @@
 //! `trueup batch`: a tree of folders, stopped and gone on with.
 
 #[cfg(unix)]
-use std::process::{Child, Command};
+use std::process::Child;
+use std::process::Command;
 #[cfg(unix)]
 use std::time::{Duration, Instant};
 
@@ -30,7 +31,7 @@ fn tree(streets: usize) -> Desk {
 
 const QUICK: [&str; 4] = ["--set", "canvas.scale=0.5", "--threads", "1"];
 
-fn batch(desk: &Desk, more: &[&str]) -> std::process::Command {
+fn batch(desk: &Desk, more: &[&str]) -> Command {
     trueup(desk.path(), &[&["batch", "in", "-o", "out"], &QUICK[..], more].concat())
 }
 

@@ -40,7 +40,10 @@ pub(super) fn words(record: &SetRecord) -> String {
             let one = |one: &Value| {
                 let used = one["used"].as_array().map_or(0, Vec::len);
                 let file = one["panorama"].as_str().unwrap_or_default();
-                format!("{set}: {file}  {} x {} px, {used} of {} photographs\n", one["width"], one["height"], record.photographs)
+                format!(
+                    "{set}: {file}  {} x {} px, {used} of {} photographs\n",
+                    one["width"], one["height"], record.photographs
+                )
             };
             panoramas.iter().map(one).collect()
         }
@@ -68,11 +71,8 @@ pub(super) fn all(records: &[SetRecord], page: &Path) -> String {
     let failed = records.iter().filter(|record| record.has_failed()).count();
     let alone = records.iter().filter(|record| record.outcome == SetOutcome::Alone).count();
     let counted = |count: usize, one: &str, many: &str| format!("{count} {}", if count == 1 { one } else { many });
-    let mut parts = vec![format!(
-        "{} of {}",
-        counted(panoramas, "panorama", "panoramas"),
-        counted(records.len(), "set", "sets")
-    )];
+    let mut parts =
+        vec![format!("{} of {}", counted(panoramas, "panorama", "panoramas"), counted(records.len(), "set", "sets"))];
     if failed > 0 {
         parts.push(counted(failed, "set made none", "sets made none"));
     }
@@ -94,10 +94,12 @@ mod tests {
     fn every_panorama_has_a_line_and_all_are_counted() {
         let panorama = |file: &str| json!({ "panorama": file, "width": 30, "height": 20, "used": ["x", "y"] });
         let made = record("a", SetOutcome::Made(vec![panorama("a/1.jpg"), panorama("a/2.jpg")]));
-        let failure =
-            SetOutcome::Failed { error: "no overlap".to_owned(), hint: "Look.".to_owned(), may_pass: false };
+        let failure = SetOutcome::Failed { error: "no overlap".to_owned(), hint: "Look.".to_owned(), may_pass: false };
         let (failed, alone) = (record("b", failure), record("c", SetOutcome::Alone));
-        assert_eq!(words(&made), "a: a/1.jpg  30 x 20 px, 2 of 3 photographs\na: a/2.jpg  30 x 20 px, 2 of 3 photographs\n");
+        assert_eq!(
+            words(&made),
+            "a: a/1.jpg  30 x 20 px, 2 of 3 photographs\na: a/2.jpg  30 x 20 px, 2 of 3 photographs\n"
+        );
         assert_eq!(words(&failed), "b: no panorama: no overlap\n");
         let lines: Vec<Value> =
             json(&made).lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect();

@@ -55,11 +55,14 @@ fn job(args: &BatchArgs) -> BatchJob {
     }
 }
 
+/// Findings before there are photographs name none.
+const NAMELESS: &[&str] = &[];
+
 /// Prints warnings, a line each, on standard error.
 fn warn(findings: &[Diagnostic]) {
     let warnings = findings.iter().filter(|one| one.severity == Severity::Warning);
     let line = |one: &Diagnostic| {
-        let said = format!("{}: {}. {}", one.subject.named(&[]), one.message, one.hint);
+        let said = format!("{}: {}. {}", one.subject.named(NAMELESS), one.message, one.hint);
         format!("trueup: warning: {}\n", one_line(&said))
     };
     let lines: String = warnings.map(line).collect();

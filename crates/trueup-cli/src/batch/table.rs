@@ -41,7 +41,9 @@ fn rows(record: &SetRecord) -> Vec<[String; COLUMNS.len()]> {
     };
     match &record.outcome {
         SetOutcome::Made(panoramas) => panoramas.iter().map(|one| row(record, one)).collect(),
-        SetOutcome::Failed { error, hint, .. } => vec![without("failed", format!("{error}. {hint}").trim_end().to_owned())],
+        SetOutcome::Failed { error, hint, .. } => {
+            vec![without("failed", format!("{error}. {hint}").trim_end().to_owned())]
+        }
         SetOutcome::Alone => vec![without("alone", String::new())],
     }
 }

@@ -221,8 +221,9 @@ fn threads_of_each(threads: usize, at_once: usize) -> usize {
 fn deadly(unended: u64) -> SetOutcome {
     SetOutcome::Failed {
         error: format!("the program was ended {unended} times while it worked at this set"),
-        hint: "If nobody stopped it, memory is short: set --memory, or give smaller photographs. --retry tries it again."
-            .to_owned(),
+        hint:
+            "If nobody stopped it, memory is short: set --memory, or give smaller photographs. --retry tries it again."
+                .to_owned(),
         may_pass: false,
     }
 }
