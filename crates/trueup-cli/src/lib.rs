@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod batch;
 mod chosen;
 mod compare;
 mod compose;
@@ -49,6 +50,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Task::Compare(args) => compare::run(*args),
         Task::Inspect(args) => inspect::run(&args),
         Task::Evaluate(args) => evaluate::run(&args),
+        Task::Batch(args) => batch::run(*args),
         Task::Report(args) => report::run(&args),
         Task::Serve(args) => serve::run(args),
         Task::Options(args) => option_list::run(&args),

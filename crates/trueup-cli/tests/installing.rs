@@ -4,8 +4,19 @@ use std::process::Command;
 
 use crate::run::{Desk, finish, trueup};
 
-const SUBCOMMANDS: [&str; 10] =
-    ["stitch", "compose", "compare", "serve", "inspect", "evaluate", "report", "options", "completions", "manual"];
+const SUBCOMMANDS: [&str; 11] = [
+    "stitch",
+    "compose",
+    "compare",
+    "batch",
+    "serve",
+    "inspect",
+    "evaluate",
+    "report",
+    "options",
+    "completions",
+    "manual",
+];
 
 #[test]
 fn every_shell_completes_commands_flags_and_choices() {

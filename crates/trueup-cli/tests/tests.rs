@@ -1,5 +1,6 @@
 //! The `trueup` command as users run it: its messages, its exit status, and what it leaves on the disk.
 
+mod batch;
 mod cache;
 mod cli;
 mod color;

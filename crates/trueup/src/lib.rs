@@ -20,6 +20,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod batch;
 mod job;
 mod memo;
 mod options;
@@ -27,6 +28,7 @@ mod pipeline;
 mod project;
 mod report;
 
+pub use batch::{Batch, BatchJob, PhotographsOfFolder, SetOutcome, SetRecord, Shard};
 pub use job::{
     ComposeJob, Inputs, MaskFile, MaskKind, MaskRecord, Outputs, ReadFile, RecordedPanorama, Reference, SideOutput,
     StitchJob, Written, thread_pool, write_thumbnail,

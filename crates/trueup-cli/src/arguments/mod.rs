@@ -1,5 +1,6 @@
 //! What may be typed, before any of it is checked against the options' ranges or the disk.
 
+mod batch;
 mod compare;
 mod compose;
 mod option_flags;
@@ -14,6 +15,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 
+pub(crate) use batch::BatchArgs;
 pub(crate) use compare::CompareArgs;
 pub(crate) use compose::ComposeArgs;
 pub(crate) use option_flags::TypedOptions;
@@ -33,6 +35,7 @@ Examples:
   trueup evaluate pano.json --truth truth.json
   trueup report pano.json -o pano.html
   trueup compare holiday/ -o holiday-compared
+  trueup batch archive/ -o panoramas
   trueup options --expert";
 
 /// Panoramas that stand upright: photographs in, a natural panorama out, and the reasons why it looks as it does.
@@ -59,6 +62,10 @@ pub(crate) enum Task {
     /// Photographs are measured and matched once. The folder holds a page to look at (index.html), a page on which people
     /// rank unnamed panoramas (ranking.html), every figure as JSON, the panoramas and their project files.
     Compare(Box<CompareArgs>),
+    /// Stitch a tree of folders: every folder's panoramas, with a page of all of them
+    ///
+    /// Goes on where it was stopped, and never stops at one bad set. A line of JSON says of every panorama how it came out.
+    Batch(Box<BatchArgs>),
     /// Show a page to stitch in, for one person on this machine, until Ctrl-C
     ///
     /// Prints an address to open in a browser. Photographs stay on this machine, and nobody else is let in.

@@ -6,10 +6,12 @@ use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use trueup::{OptionDescription, Projection, StitchOptions};
 
 /// The subcommands that make panoramas, by the names that they are typed with.
-const STITCH: &[&str] = &["stitch"];
-const STITCH_AND_COMPOSE: &[&str] = &["stitch", "compose"];
-const STITCH_AND_COMPARE: &[&str] = &["stitch", "compare"];
-const ALL: &[&str] = &["stitch", "compose", "compare"];
+const STITCH: &[&str] = &["stitch", "batch"];
+const STITCH_AND_COMPOSE: &[&str] = &["stitch", "batch", "compose"];
+const STITCH_AND_COMPARE: &[&str] = &["stitch", "batch", "compare"];
+const ALL: &[&str] = &["stitch", "batch", "compose", "compare"];
+/// What turns and bounds a view suits one panorama, not a tree of folders.
+const ONE_PANORAMA: &[&str] = &["stitch", "compose"];
 
 const PHOTOGRAPHS: &str = "Photographs";
 const OUTPUT: &str = "Output";
@@ -25,10 +27,10 @@ pub const OPTION_FLAGS: &[OptionFlag] = &[
     OptionFlag::new("depth", "output.depth", OUTPUT, STITCH_AND_COMPOSE),
     OptionFlag::new("look", "render.look", VIEW, STITCH_AND_COMPOSE),
     OptionFlag::new("projection", "projection.kind", VIEW, STITCH_AND_COMPOSE),
-    OptionFlag::new("yaw", "projection.yaw", VIEW, STITCH_AND_COMPOSE).of_a_view(),
-    OptionFlag::new("pitch", "projection.pitch", VIEW, STITCH_AND_COMPOSE).of_a_view(),
-    OptionFlag::new("roll", "projection.roll", VIEW, STITCH_AND_COMPOSE).of_a_view(),
-    OptionFlag::new("fov", "projection.fov", VIEW, STITCH_AND_COMPOSE).of_a_view(),
+    OptionFlag::new("yaw", "projection.yaw", VIEW, ONE_PANORAMA).of_a_view(),
+    OptionFlag::new("pitch", "projection.pitch", VIEW, ONE_PANORAMA).of_a_view(),
+    OptionFlag::new("roll", "projection.roll", VIEW, ONE_PANORAMA).of_a_view(),
+    OptionFlag::new("fov", "projection.fov", VIEW, ONE_PANORAMA).of_a_view(),
     OptionFlag::new("crop", "canvas.crop", VIEW, STITCH_AND_COMPOSE),
     OptionFlag::new("fill", "canvas.fill", VIEW, STITCH_AND_COMPOSE).value("SHARE"),
     OptionFlag::new("background", "output.background", VIEW, STITCH_AND_COMPOSE)

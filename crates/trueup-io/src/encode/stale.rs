@@ -16,6 +16,12 @@ pub(super) fn mark_in_use(file: &File) {
     drop(file.try_lock());
 }
 
+/// Takes away the temporary files in `folder` that programs which were killed left behind, however lately: for a folder that nobody
+/// else writes into now. What cannot be taken away stays.
+pub fn clear_parts(folder: &Path) {
+    clear_stale(folder, Duration::ZERO);
+}
+
 /// Takes away the temporary files in `folder` that no living program has marked, once nothing was written to them for
 /// `age`. What cannot be looked at or taken away stays.
 pub(super) fn clear_stale(folder: &Path, age: Duration) {

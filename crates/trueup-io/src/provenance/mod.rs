@@ -49,6 +49,12 @@ impl Told {
     }
 }
 
+/// When a photograph was taken by its camera's clock, as its EXIF has it: seconds since the beginning of the year 1970 in
+/// local time; `None` if it does not say.
+pub fn seconds_taken(path: &Path) -> Option<f64> {
+    Moment::of(&read_fields(path, &record::read()))?.seconds()
+}
+
 /// The metadata of a panorama but for its color profile. Photographs whose EXIF cannot be read tell nothing.
 pub fn describe(panorama: &PanoramaDescription<'_>, kept: MetadataKept) -> Metadata {
     if kept == MetadataKept::None {

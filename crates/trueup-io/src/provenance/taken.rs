@@ -55,6 +55,23 @@ impl Moment {
         (minutes, second as f64 + fraction.unwrap_or(0.0))
     }
 
+    /// Seconds since 1970 in local time, with their fraction.
+    ///
+    /// # Source
+    /// Days of the proleptic Gregorian calendar: Fliegel and Van Flandern, A Machine Algorithm for Processing Calendar Dates,
+    /// Communications of the ACM 11 (10), 1968; 2440588 is the Julian day of 1970-01-01.
+    pub(super) fn seconds(&self) -> Option<f64> {
+        const JULIAN_1970: i64 = 2_440_588;
+        let [year, month, day, hour, minute, second] = self.parts()?;
+        // -1 in January and February, which count to the year before; divisions truncate towards zero.
+        let early = (month - 14) / 12;
+        let julian = day - 32_075 + 1461 * (year + 4800 + early) / 4 + 367 * (month - 2 - early * 12) / 12
+            - 3 * ((year + 4900 + early) / 100) / 4;
+        let whole = (((julian - JULIAN_1970) * 24 + hour) * 60 + minute) * 60 + second;
+        let fraction = self.subseconds.as_ref().and_then(|digits| format!("0.{digits}").parse::<f64>().ok());
+        Some(whole as f64 + fraction.unwrap_or(0.0))
+    }
+
     /// As ISO 8601 has it, for XMP.
     pub(super) fn iso(&self) -> Option<String> {
         let [year, month, day, hour, minute, second] = self.parts()?;
@@ -110,6 +127,17 @@ mod tests {
         assert_eq!(span([&late, &early].into_iter()).0, Some(early.clone()));
         assert_eq!(early.iso().as_deref(), Some("2024-05-04T01:00:00.05"));
         assert_eq!(span(std::iter::empty()), (None, None));
+    }
+
+    /// By `date -u +%s`.
+    #[test]
+    fn seconds_are_counted_across_months_and_leap_days() {
+        let seconds = |local: &str| moment(local, None, None).seconds();
+        assert_eq!(seconds("1970:01:01 00:00:00"), Some(0.0));
+        assert_eq!(seconds("2024:05:04 10:00:01"), Some(1_714_816_801.0));
+        assert_eq!(seconds("2023:12:31 23:59:59"), Some(1_704_067_199.0));
+        assert_eq!(seconds("2024:03:01 00:00:00"), Some(1_709_251_200.0));
+        assert_eq!(moment("1970:01:01 00:00:02", Some("25"), None).seconds(), Some(2.25));
     }
 
     #[test]

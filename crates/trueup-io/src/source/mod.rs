@@ -18,6 +18,7 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 
+use crate::metadata::exif_fields::ExifFields;
 use crate::metadata::header::{self, Header};
 use crate::metadata::orientation::{TagVerdict, judge_orientation};
 
@@ -166,9 +167,18 @@ pub fn files(inputs: &[String], in_memory: &InMemory) -> Vec<PathBuf> {
 
 /// Whether the file at `path` says that this program made it.
 pub fn is_own_panorama(path: &Path) -> bool {
+    exif_of(path).is_some_and(|exif| exif.is_by_this_program())
+}
+
+/// Whether the file at `path` says that it is a panorama, whoever made it: [`scan`] leaves it out where its folder is named.
+pub fn is_marked_panorama(path: &Path) -> bool {
+    exif_of(path).is_some_and(|exif| exif.is_by_this_program() || exif.is_panorama_of_others())
+}
+
+fn exif_of(path: &Path) -> Option<ExifFields> {
     // Looked at before it is opened: opening a named pipe would wait for its writer.
     let opened = if path.is_file() { header::open(path) } else { None };
-    opened.and_then(|(mut input, format)| format.exif(&mut input)).is_some_and(|exif| exif.is_by_this_program())
+    opened.and_then(|(mut input, format)| format.exif(&mut input))
 }
 
 /// Decides over one picture, which is to be photograph `number`.

@@ -49,6 +49,7 @@ class Panorama(Recorded[_trueup.Panorama]):
         pto: str | os.PathLike[str] | None = None,
         layers: str | os.PathLike[str] | None = None,
         seams: str | os.PathLike[str] | None = None,
+        thumbnail: str | os.PathLike[str] | None = None,
         progress: Progress = None,
         **keywords: Unpack[SaveKeywords],
     ) -> int:
@@ -56,12 +57,12 @@ class Panorama(Recorded[_trueup.Panorama]):
         file's length in bytes. With the photographs' files at hand, the file is the very one that the command writes.
 
         ``project`` is a file for the record (JSON), ``pto`` one for the Hugin stitcher, ``layers`` for the aligned photographs
-        (TIFF), ``seams`` for which photograph is shown where (PNG). Keywords set options of the file, such as ``quality``.
+        (TIFF), ``seams`` for which photograph is shown where (PNG), ``thumbnail`` for a small copy. Keywords set options of the file, such as ``quality``.
 
         Raises :class:`trueup.InputError`, :class:`trueup.UnsupportedError`, :class:`trueup.LimitsError`,
         :class:`trueup.OptionsError` or :class:`trueup.IoError`; a file appears whole or not at all.
         """
-        wanted = {"project": project, "pto": pto, "layers": layers, "seams": seams}
+        wanted = {"project": project, "pto": pto, "layers": layers, "seams": seams, "thumbnail": thumbnail}
         beside = {flag: os.fspath(file) for flag, file in wanted.items() if file is not None}
         with Heard(progress) as heard:
             return self._native.save(os.fspath(path), beside, dict(keywords), heard)

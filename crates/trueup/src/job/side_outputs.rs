@@ -7,6 +7,7 @@ use trueup_core::Result;
 use trueup_io::encode;
 
 use super::layers::no_seams;
+use super::small_panorama;
 use crate::options::StitchOptions;
 use crate::pipeline::{Alignment, Stitcher};
 use crate::project::hugin::hugin_project;
@@ -85,4 +86,8 @@ side_outputs! {
         written by SideOutputWriter::Panorama(|stitcher, alignment, rendered, path| {
             stitcher.write_seams(alignment, rendered, path).map(drop)
         });
+    /// Write a small copy of the panorama, at most 480 pixels wide and high; the extension chooses the format
+    Thumbnail("thumbnail", "FILE")
+        checked by |path, _| small_panorama::check(path),
+        written by SideOutputWriter::Panorama(small_panorama::write);
 }

@@ -18,6 +18,10 @@ const PROGRAM_BYTES: usize = 96_000_000;
 /// The share of the machine's memory that is taken without being asked for less or more: 1 / 4.
 const AUTOMATIC_SHARE: u64 = 4;
 
+/// The share of the machine's memory that is divided among pieces of work that are done at once, without being asked for less or
+/// more: 1 / 2. Each may take no more than its part, while a single one may where less is too little.
+const SHARE_OF_SEVERAL: u64 = 2;
+
 /// Bytes that finding features takes per working pixel: the levels of the scale space of a photograph of twice the size.
 const FEATURE_BYTES: f64 = 240.0;
 
@@ -30,6 +34,18 @@ const DECODING: usize = 2;
 
 /// What to do where it is the option that allows too little.
 const RAISE_OPTION: &str = "Raise --memory (resources.memory), or give smaller photographs.";
+
+/// What each of `at_once` pieces of work may take of `memory`.
+pub(crate) fn memory_of_each(memory: MemoryBudget, at_once: usize) -> MemoryBudget {
+    if at_once < 2 {
+        return memory;
+    }
+    let whole = match memory {
+        MemoryBudget::Bytes(bytes) => bytes,
+        MemoryBudget::Auto => machine::memory(rayon::current_num_threads()).total / SHARE_OF_SEVERAL,
+    };
+    MemoryBudget::Bytes(whole / at_once as u64)
+}
 
 /// Memory to be divided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,6 +158,15 @@ mod tests {
         let mut options = StitchOptions::default();
         options.set(&format!("resources.memory={memory}")).expect("an amount");
         Budget::of(&options.run.resources, MachineMemory { total: 8_000_000_000, free: 3_000_000_000, hard: None })
+    }
+
+    #[test]
+    fn work_at_once_shares_the_memory_and_a_single_piece_keeps_it() {
+        let each = |memory: MemoryBudget, at_once| memory_of_each(memory, at_once);
+        assert_eq!(each(MemoryBudget::Bytes(4_000_000_000), 4), MemoryBudget::Bytes(1_000_000_000));
+        assert_eq!(each(MemoryBudget::Auto, 1), MemoryBudget::Auto);
+        let MemoryBudget::Bytes(two) = each(MemoryBudget::Auto, 2) else { panic!("a part of the machine's") };
+        assert!(two <= machine::memory(1).total / 4, "{two}");
     }
 
     #[test]

@@ -50,6 +50,7 @@ use crate::project::read::Recorded;
 use crate::project::record::{Canvas, CropRecord, Project};
 use crate::report::{judgement, measuring, sideways};
 
+pub(crate) use budget::memory_of_each;
 pub use results::{Aligned, Alignment, MatchedPhotographs};
 
 /// Runs the phases with one set of options.

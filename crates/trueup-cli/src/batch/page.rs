@@ -1,0 +1,87 @@
+//! The page of all panoramas of a batch.
+
+use minijinja::Environment;
+use serde_json::{Value, json};
+use trueup::{Error, SetOutcome, SetRecord};
+
+/// The page. Its name in the environment ends in `.html`, by which values are escaped.
+const TEMPLATE: &str = include_str!("index.html");
+
+/// The page of the sets that are done, of `planned` in all.
+///
+/// # Errors
+/// [`Error::Input`] if it cannot be made (never).
+pub(super) fn text(records: &[SetRecord], planned: usize) -> Result<String, Error> {
+    let wrong = |error: minijinja::Error| Error::input("page", error, "Report this as a defect.");
+    let sets: Vec<Value> = records.iter().map(set).collect();
+    let failed = records.iter().filter(|record| record.has_failed()).count();
+    let panoramas: usize = records.iter().map(|record| record.panoramas().len()).sum();
+    let values =
+        json!({ "sets": sets, "planned": planned, "done": records.len(), "failed": failed, "panoramas": panoramas });
+    let mut environment = Environment::new();
+    environment.add_template("index.html", TEMPLATE).map_err(wrong)?;
+    environment.get_template("index.html").and_then(|page| page.render(minijinja::value::Serde(values))).map_err(wrong)
+}
+
+fn set(record: &SetRecord) -> Value {
+    let (panoramas, error, hint): (&[Value], _, _) = match &record.outcome {
+        SetOutcome::Made(panoramas) => (panoramas.as_slice(), "", ""),
+        SetOutcome::Failed { error, hint, .. } => (&[], error.as_str(), hint.as_str()),
+        SetOutcome::Alone => (&[], "a single photograph makes no panorama", ""),
+    };
+    let one = |one: &Value| {
+        json!({
+            "file": address(&one["panorama"]),
+            "thumbnail": address(&one["beside"]["thumbnail"]),
+            "width": one["width"],
+            "height": one["height"],
+            "used": one["used"].as_array().map_or(0, Vec::len),
+            "judgement": one["judgement"],
+            "warnings": one["warnings"].as_array().map_or(0, Vec::len),
+        })
+    };
+    json!({
+        "name": record.set,
+        "photographs": record.photographs,
+        "error": error,
+        "hint": hint,
+        "panoramas": panoramas.iter().map(one).collect::<Vec<_>>(),
+    })
+}
+
+/// The address of a file beside the page.
+///
+/// # Source
+/// RFC 3986, section 2.3: what is neither unreserved nor a separator of folders is written as its bytes.
+fn address(path: &Value) -> String {
+    let text = path.as_str().unwrap_or_default();
+    let letter = |byte: u8| match byte {
+        b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' | b'/' => char::from(byte).to_string(),
+        _ => format!("%{byte:02X}"),
+    };
+    // A name with a colon in it is no scheme.
+    format!("./{}", text.bytes().map(letter).collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_escaped_and_addresses_lead_to_files() {
+        let panorama = json!({"panorama": "a b/#1?.jpg", "beside": {"thumbnail": "a b/thumbnail.jpg"}, "width": 3, "height": 2,
+            "used": ["x", "y"], "judgement": {"upright": "good"}, "warnings": []});
+        let record = SetRecord {
+            set: "<script>alert(1)</script>".to_owned(),
+            photographs: 2,
+            made_of: Value::Null,
+            ended_ms: 0,
+            outcome: SetOutcome::Made(vec![panorama]),
+        };
+        let failed = SetOutcome::Failed { error: "<b>".to_owned(), hint: String::new(), may_pass: false };
+        let page = text(&[record.clone(), SetRecord { outcome: failed, ..record }], 2).expect("a page");
+        assert!(!page.contains("<script") && !page.contains("<b>"), "{page}");
+        assert_eq!(address(&"a b/#1?.jpg".into()), "./a%20b/%231%3F.jpg");
+        assert!(page.contains("a%20b") && page.contains("%231%3F.jpg"), "{page}");
+    }
+}

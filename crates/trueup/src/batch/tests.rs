@@ -1,0 +1,203 @@
+//! Batches of the example's photographs: shared, stopped, begun again.
+
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+use trueup_core::context::{CancelToken, Silent};
+
+use super::*;
+use crate::job::inputs::Inputs;
+use crate::job::{Outputs, StitchJob};
+
+/// A tree of folders, each with three photographs of the room.
+fn tree(folders: &[&str]) -> TempDir {
+    let desk = tempfile::tempdir().expect("a folder");
+    let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/room");
+    for folder in folders {
+        let folder = desk.path().join("in").join(folder);
+        fs::create_dir_all(&folder).expect("a folder");
+        for name in ["00.jpg", "01.jpg", "02.jpg"] {
+            fs::copy(room.join(name), folder.join(name)).expect("copied");
+        }
+    }
+    desk
+}
+
+fn job(desk: &TempDir) -> BatchJob {
+    BatchJob { threads: 1, ..BatchJob::new(desk.path().join("in"), desk.path().join("out")) }
+}
+
+fn options() -> StitchOptions {
+    let mut options = StitchOptions::default();
+    for assignment in ["canvas.scale=0.2", "working.pixels=60000"] {
+        options.set(assignment).expect("an option");
+    }
+    options
+}
+
+/// Runs a job; returns the names of the sets that it did, in that order.
+fn run(job: BatchJob, options: &StitchOptions) -> Result<Vec<String>> {
+    let context = StageContext::default();
+    let told = Mutex::new(Vec::new());
+    let tell = |record: &SetRecord| -> Result<()> {
+        told.lock().expect("whole").push(record.set.clone());
+        Ok(())
+    };
+    Batch::find(job, &context)?.run(options, &tell, &context)?;
+    Ok(told.into_inner().expect("whole"))
+}
+
+fn bytes(desk: &TempDir, set: &str) -> Vec<u8> {
+    fs::read(desk.path().join("out").join(set).join("panorama.jpg")).expect("a panorama")
+}
+
+#[test]
+fn runs_that_share_a_folder_make_every_set_once_and_as_it_is_made_alone() {
+    let folders = ["a", "b", "c", "d", "e", "f"];
+    let desk = tree(&folders);
+    let several = BatchJob { at_once: 2, threads: 2, ..job(&desk) };
+    let mut done: Vec<String> = std::thread::scope(|scope| {
+        let runs = [job(&desk), job(&desk), several].map(|job| scope.spawn(|| run(job, &options()).expect("done")));
+        runs.into_iter().flat_map(|run| run.join().expect("no panic")).collect()
+    });
+    done.sort();
+    assert_eq!(done, folders, "each of them once");
+    let alone = desk.path().join("alone.jpg");
+    let inputs = Inputs::new([desk.path().join("in/a").display().to_string()]);
+    let job = StitchJob { inputs, outputs: Outputs::new(&alone), cache: None, threads: 0 };
+    job.run(&options(), &StageContext::default()).expect("a panorama");
+    let alone = fs::read(alone).expect("a panorama");
+    for folder in folders {
+        assert!(bytes(&desk, folder) == alone, "{folder} has other bytes");
+    }
+}
+
+#[test]
+fn a_set_that_another_program_is_at_is_waited_for_and_taken_over_when_that_one_is_killed() {
+    let desk = tree(&["a", "b"]);
+    let folder = desk.path().join("out/a");
+    let elsewhere = Claim::take(&folder).expect("possible").expect("nobody has it");
+    std::thread::scope(|scope| {
+        let running = scope.spawn(|| run(job(&desk), &options()).expect("done"));
+        let patience = Instant::now() + Duration::from_secs(300);
+        while !desk.path().join("out/b/record.json").exists() && Instant::now() < patience {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        assert!(!running.is_finished(), "it waits for the other");
+        assert!(!folder.join("panorama.jpg").exists());
+        // As when it is killed: the lock goes, the file stays.
+        drop(elsewhere);
+        assert_eq!(running.join().expect("no panic"), ["b", "a"]);
+    });
+    assert!(!Claim::is_begun(&folder));
+}
+
+#[test]
+fn a_set_that_kills_the_program_comes_last_and_is_given_up() {
+    let desk = tree(&["a", "b"]);
+    let out = desk.path().join("out");
+    for _ in 0..4 {
+        drop(Claim::take(&out.join("a")).expect("possible").expect("nobody has it"));
+    }
+    assert_eq!(run(job(&desk), &options()).expect("done"), ["b", "a"]);
+    let made = bytes(&desk, "a");
+    let read = |set: &str| SetRecord::read(&out.join(set)).expect("a record");
+    assert!(!read("a").has_failed());
+
+    fs::remove_file(out.join("a/record.json")).expect("removed");
+    for _ in 0..5 {
+        drop(Claim::take(&out.join("a")).expect("possible").expect("nobody has it"));
+    }
+    assert_eq!(run(job(&desk), &options()).expect("done"), ["a"]);
+    let SetOutcome::Failed { error, hint, .. } = read("a").outcome else { panic!("it is given up") };
+    assert!(error.contains("ended 5 times") && hint.contains("--retry"), "{error} {hint}");
+    // It is not tried again but on request, from the beginning.
+    assert!(run(job(&desk), &options()).expect("done").is_empty());
+    assert_eq!(run(BatchJob { retry: true, ..job(&desk) }, &options()).expect("done"), ["a"]);
+    assert!(bytes(&desk, "a") == made);
+}
+
+#[test]
+fn what_may_have_passed_is_tried_again_once_a_run() {
+    let desk = tree(&["a"]);
+    let little = {
+        let mut options = options();
+        options.set("resources.memory=100MB").expect("an option");
+        options
+    };
+    let record = || SetRecord::read(&desk.path().join("out/a")).expect("a record");
+    for _ in 0..2 {
+        assert_eq!(run(job(&desk), &little).expect("done"), ["a"]);
+        assert!(record().may_pass(), "{:?}", record());
+    }
+    // The memory decides no panorama: it is tried because memory may be had by now.
+    assert_eq!(run(job(&desk), &options()).expect("done"), ["a"]);
+    assert!(!record().has_failed());
+    assert!(run(job(&desk), &little).expect("done").is_empty(), "it is made");
+}
+
+#[test]
+fn a_set_is_made_anew_when_what_decides_it_changes() {
+    let desk = tree(&["a"]);
+    let again = |job: BatchJob, options: &StitchOptions| run(job, options).expect("done").len();
+    assert_eq!((again(job(&desk), &options()), again(job(&desk), &options())), (1, 0));
+    let threads = BatchJob { threads: 2, gap_seconds: 5.0, ..job(&desk) };
+    assert_eq!(again(threads, &options()), 0, "how the work is done decides nothing");
+    let mut other = options();
+    other.set("canvas.scale=0.1").expect("an option");
+    assert_eq!((again(job(&desk), &other), again(job(&desk), &other)), (1, 0));
+    fs::remove_file(desk.path().join("out/a/panorama.jpg")).expect("removed");
+    assert_eq!(again(job(&desk), &other), 1);
+    fs::remove_file(desk.path().join("in/a/02.jpg")).expect("removed");
+    assert_eq!(again(job(&desk), &other), 1);
+    assert_eq!(again(BatchJob { extension: "png".to_owned(), ..job(&desk) }, &other), 1);
+    // Mounted elsewhere, the tree is the same.
+    let moved = tempfile::tempdir().expect("a folder");
+    fs::rename(desk.path().join("in"), moved.path().join("in")).expect("moved");
+    fs::rename(desk.path().join("out"), moved.path().join("out")).expect("moved");
+    assert_eq!(again(BatchJob { extension: "png".to_owned(), ..job(&moved) }, &other), 0);
+}
+
+#[test]
+fn a_request_to_stop_ends_the_batch_and_leaves_the_set_to_the_next_run() {
+    let desk = tree(&["a", "b"]);
+    let (silent, token) = (Silent, CancelToken::default());
+    let context = StageContext::new(&silent, &token);
+    let batch = Batch::find(job(&desk), &context).expect("sets");
+    let tell = |_: &SetRecord| -> Result<()> {
+        token.cancel();
+        Ok(())
+    };
+    assert!(matches!(batch.run(&options(), &tell, &context), Err(Error::Cancelled)));
+    assert_eq!(batch.records().map(|record| record.set).collect::<Vec<_>>(), ["a"]);
+    assert!(!Claim::is_begun(&desk.path().join("out/b")));
+    assert_eq!(run(job(&desk), &options()).expect("done"), ["b"]);
+}
+
+#[test]
+fn what_could_never_come_to_panoramas_is_refused_at_once() {
+    let desk = tree(&["a"]);
+    let refused = |job: BatchJob| match run(job, &options()) {
+        Err(error) => error.to_string(),
+        Ok(done) => panic!("{done:?}"),
+    };
+    let same = BatchJob { output: desk.path().join("in/."), ..job(&desk) };
+    assert!(refused(same).contains("it is the folder of the photographs"));
+    let unknown = BatchJob { extension: "gif".to_owned(), ..job(&desk) };
+    assert!(refused(unknown).contains("not supported"));
+    fs::create_dir(desk.path().join("none")).expect("a folder");
+    let empty = BatchJob { folder: desk.path().join("none"), ..job(&desk) };
+    assert!(refused(empty).contains("there are no photographs in it"));
+    assert!(!desk.path().join("out").exists());
+}
+
+#[test]
+fn shards_share_all_sets_and_none_twice() {
+    for position in 0..10 {
+        let holding = (1..=3).filter(|&number| Shard { number, count: 3 }.holds(position));
+        assert_eq!(holding.count(), 1);
+    }
+    assert!((0..10).all(|position| Shard::WHOLE.holds(position)));
+}
