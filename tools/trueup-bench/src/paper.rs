@@ -209,7 +209,7 @@ mod tests {
         let words = ["trueup-bench", "paper", "--quick", "--out", "x"].into_iter().chain(more.iter().copied());
         match Arguments::parse_from(words).command {
             BenchCommand::Paper(arguments) => arguments,
-            BenchCommand::Quality(_) => unreachable!("paper was asked for"),
+            BenchCommand::Quality(_) | BenchCommand::Speed(_) => unreachable!("paper was asked for"),
         }
     }
 

@@ -6,7 +6,7 @@ mod page;
 mod row;
 mod tables;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use trueup::{CancelToken, Error, Result, check_place};

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use trueup::{Error, Evaluation, Measures, Project, Result, names_photograph, write_atomically};
 
-use super::child::MeasuredStitch;
 use super::discover::{Part, StitchSet};
+use super::measured::MeasuredStitch;
 use crate::report::csv;
 use crate::sets::read_truth;
 

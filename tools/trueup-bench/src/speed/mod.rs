@@ -70,7 +70,7 @@ pub(crate) fn run(arguments: &SpeedArguments) -> Result<ExitCode> {
 
 fn speed_set(folder: &Path) -> Result<SpeedSet> {
     let images = photographs_in(folder, &StageContext::default())?;
-    let pixels: f64 = images.iter().map(|image| f64::from(image.width) * f64::from(image.height)).sum();
+    let pixels: f64 = images.iter().map(|image| image.width as f64 * image.height as f64).sum();
     Ok(SpeedSet {
         name: name_of(folder),
         megapixels: pixels / images.len() as f64 / 1e6,
