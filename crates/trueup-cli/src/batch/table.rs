@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn every_panorama_and_every_failure_has_a_row_that_spreadsheets_read() {
-        let panorama = json!({"panorama": "a/p.jpg", "width": 30, "height": 20, "used": ["x", "y"], "seconds": 1.25,
+        let panorama = json!({"panorama": "a/p.jpg", "width": 30, "height": 20, "used": ["x", "y"], "seconds": 1.24,
             "judgement": {"upright": "good", "alignment": null}, "warnings": []});
         let record = SetRecord {
             set: "=cmd|\"a\"".to_owned(),
