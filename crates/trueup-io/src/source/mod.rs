@@ -168,7 +168,7 @@ pub fn files(inputs: &[String], in_memory: &InMemory) -> Vec<PathBuf> {
 pub fn is_own_panorama(path: &Path) -> bool {
     // Looked at before it is opened: opening a named pipe would wait for its writer.
     let opened = if path.is_file() { header::open(path) } else { None };
-    opened.and_then(|(mut input, format)| format.exif(&mut input)).is_some_and(|exif| exif.is_by_this_program())
+    opened.and_then(|(mut input, format)| (format.exif)(&mut input)).is_some_and(|exif| exif.is_by_this_program())
 }
 
 /// Decides over one picture, which is to be photograph `number`.
