@@ -88,20 +88,32 @@ fn pictures_without_loss_are_what_they_were_made_of() {
     }
 }
 
-/// The file, what the program that made it reads from it, samples of a pixel, bits, and most levels of difference: none but where
-/// that program rounds otherwise, or fills 10 bits up to 16 with zeros.
+/// The file, and what the program that made it reads from it.
+struct Pair {
+    file: &'static [u8],
+    elsewhere: &'static [u8],
+}
+
+macro_rules! pair {
+    ($name:literal) => {
+        Pair { file: file!($name), elsewhere: include_bytes!(concat!("files/", $name, ".png")) }
+    };
+}
+
+/// The pair, samples of a pixel, bits, and most levels of difference: none but where that program rounds otherwise, or fills 10 bits up
+/// to 16 with zeros.
 #[test]
 fn pictures_with_loss_are_what_other_programs_make_of_them() {
-    let cases: [(&[u8], &[u8], usize, u16, f64); 5] = [
-        (file!("lossy.jxl"), file!("lossy.jxl.png"), 3, 8, 1.0),
-        (file!("alpha.heic"), file!("alpha.heic.png"), 4, 8, 0.0),
-        (file!("deep.heic"), file!("deep.heic.png"), 3, 16, 0.5),
-        (file!("gray.heic"), file!("gray.heic.png"), 3, 8, 0.0),
-        (file!("p3.heic"), file!("p3.heic.png"), 3, 8, 0.0),
+    let cases: [(Pair, usize, u16, f64); 5] = [
+        (pair!("lossy.jxl"), 3, 8, 1.0),
+        (pair!("alpha.heic"), 4, 8, 0.0),
+        (pair!("deep.heic"), 3, 16, 0.5),
+        (pair!("gray.heic"), 3, 8, 0.0),
+        (pair!("p3.heic"), 3, 8, 0.0),
     ];
-    for (number, (bytes, other, channels, bits, most)) in cases.into_iter().enumerate() {
-        let (_folder, _, decoded) = read(bytes);
-        let (_folder, _, expected) = read(other);
+    for (number, (pair, channels, bits, most)) in cases.into_iter().enumerate() {
+        let (_folder, _, decoded) = read(pair.file);
+        let (_folder, _, expected) = read(pair.elsewhere);
         assert_eq!((decoded.width(), decoded.height()), (WIDTH, HEIGHT), "{number}");
         assert_eq!((decoded.channels(), decoded.sample_bits()), (channels, bits), "{number}");
         let found = difference(&decoded, |x, y, c| level_at(&expected, x, y, c));
@@ -132,15 +144,12 @@ fn opacity_is_kept() {
 #[test]
 fn what_the_codec_says_of_orientation_counts() {
     // A quarter turn clockwise, and one anticlockwise: the first pixel was the first of the last row, or the last of the first.
-    let (turned, rotated): (fn(usize, usize) -> [usize; 2], fn(usize, usize) -> [usize; 2]) =
-        (|x, y| [y, HEIGHT - 1 - x], |x, y| [WIDTH - 1 - y, x]);
-    let cases: [(&[u8], &[u8], _); 2] = [
-        (file!("turned.jxl"), file!("turned.jxl.png"), turned),
-        (file!("rotated.heic"), file!("rotated.heic.png"), rotated),
-    ];
-    for (bytes, other, place) in cases {
-        let (_folder, source, decoded) = read(bytes);
-        let (_folder, _, expected) = read(other);
+    type Place = fn(usize, usize) -> [usize; 2];
+    let turned: Place = |x, y| [y, HEIGHT - 1 - x];
+    let rotated: Place = |x, y| [WIDTH - 1 - y, x];
+    for (pair, place) in [(pair!("turned.jxl"), turned), (pair!("rotated.heic"), rotated)] {
+        let (_folder, source, decoded) = read(pair.file);
+        let (_folder, _, expected) = read(pair.elsewhere);
         assert_eq!((source.width, source.height, source.orientation), (HEIGHT, WIDTH, 1));
         let found = difference(&decoded, |x, y, c| level_at(&expected, x, y, c));
         assert!(found == 0.0, "{found}");

@@ -38,7 +38,7 @@ impl<'a, R: Read + Seek> Codestream<'a, R> {
         input.by_ref().take(CODESTREAM_START.len() as u64).read_to_end(&mut start)?;
         if start == CODESTREAM_START {
             let end = input.seek(SeekFrom::End(0))?;
-            return Ok(Self { input, parts: vec![0..end] });
+            return Ok(Self { input, parts: std::iter::once(0..end).collect() });
         }
         let part = |MediaBox { kind, content }: MediaBox| match &kind {
             b"jxlc" => Some(content),
