@@ -30,6 +30,7 @@ mod ignored;
 mod kernel;
 mod label;
 mod light;
+mod linear_table;
 mod look;
 mod memory_plan;
 mod pyramid;

@@ -6,6 +6,7 @@ use trueup_core::color::TransferCurve;
 
 use super::correction::Correction;
 use super::local_exposure::LocalExposure;
+use crate::linear_table::LinearTable;
 use crate::transfer_curve::Linearize;
 
 /// Smallest factor whose levelling off is undone: highlights are lifted by its inverse at most, since what lies between the
@@ -39,9 +40,8 @@ pub(crate) struct PhotographLight<'a> {
 pub(crate) struct LightTable {
     pub(crate) linearize: Arc<Linearize>,
     pub(crate) gain: [f32; 3],
-    /// The factor at r^2 = index / [`STEPS`], and the difference to the next; `None` without vignetting. All beyond the corner
-    /// is as at the corner.
-    falloff: Option<Arc<[[f32; 2]; ENTRIES]>>,
+    /// The factor at r^2 = index / [`STEPS`]; `None` without vignetting. All beyond the corner is as at the corner.
+    falloff: Option<Arc<LinearTable<ENTRIES>>>,
     center: [f32; 2],
     /// Table steps per squared pixel.
     steps_per_px2: f32,
@@ -60,12 +60,11 @@ impl LightTable {
         let PhotographLight { curve, correction, .. } = light;
         let plain = correction.vignetting.iter().all(|&coefficient| coefficient == 0.0);
         let factor = |index: usize| correction.at_radius((index as f64 / STEPS as f64).min(1.0));
-        let entry = |index: usize| [factor(index) as f32, (factor(index + 1) - factor(index)) as f32];
         let corner = 0.25 * (size[0] * size[0] + size[1] * size[1]);
         Self {
             linearize: Linearize::of(curve),
             gain: correction.gain.map(|gain| gain as f32),
-            falloff: (!plain).then(|| Arc::new(std::array::from_fn(entry))),
+            falloff: (!plain).then(|| Arc::new(LinearTable::new(factor))),
             center: size.map(|length| 0.5 * length as f32),
             steps_per_px2: (STEPS as f64 / corner) as f32,
         }
@@ -79,15 +78,9 @@ impl LightTable {
     /// The factor against vignetting at a position in the photograph, pixels; only where [`Self::varies`].
     #[inline(always)]
     pub(crate) fn at(&self, x: f32, y: f32) -> f32 {
-        // Adding 1.5 * 2^23 rounds to a whole number and leaves it in the low bits: cheaper than a checked cast.
-        const ROUNDING: f32 = 12_582_912.0;
         let Some(falloff) = &self.falloff else { return 1.0 };
         let (dx, dy) = (x - self.center[0], y - self.center[1]);
-        let position = ((dx * dx + dy * dy) * self.steps_per_px2).min(STEPS as f32);
-        // Half a step lower, rounding gives the entry at or below; at an entry itself either side of it will do.
-        let rounded = (position - 0.5) + ROUNDING;
-        let [factor, step] = falloff[rounded.to_bits() as usize % ENTRIES];
-        factor + (position - (rounded - ROUNDING)) * step
+        falloff.at(((dx * dx + dy * dy) * self.steps_per_px2).min(STEPS as f32))
     }
 }
 

@@ -125,7 +125,7 @@ impl Expansions {
 
     /// Adds what seams cost between the pixels that take part, and between them and their neighbors.
     fn add_seam_costs(&mut self, taking: &Taking<'_>, labels: &[Label]) {
-        let &Taking { energy, window: Window { columns, rows }, .. } = taking;
+        let energy = taking.energy;
         let all_round = taking.all_round();
         let nodes = std::mem::take(&mut self.nodes);
         for &[x, y] in &nodes {
@@ -141,12 +141,8 @@ impl Expansions {
                 0 => (energy.turn > 0 && !all_round).then(|| energy.turn - 1),
                 _ => Some(x - 1),
             };
-            let takes_part = |x: usize, y: usize| {
-                let inside = columns.contains(&x) && rows.contains(&y);
-                inside && self.change[(y - rows.start) * columns.len() + x - columns.start] != FIXED
-            };
-            let above = y.checked_sub(1).filter(|&above| !takes_part(x, above));
-            if let Some(left) = left.filter(|&left| x == 0 || !takes_part(left, y)) {
+            let above = y.checked_sub(1).filter(|&above| self.node_at(taking, [x, above]).is_none());
+            if let Some(left) = left.filter(|&left| x == 0 || self.node_at(taking, [left, y]).is_none()) {
                 self.join(taking, labels, [[left, y], [x, y]], RIGHT);
             }
             if let Some(above) = above {
@@ -156,18 +152,21 @@ impl Expansions {
         self.nodes = nodes;
     }
 
+    /// The node of a pixel, by its column as the box has them, and its difference; `None` if it does not take part.
+    fn node_at(&self, taking: &Taking<'_>, [x, y]: [usize; 2]) -> Option<(usize, i32)> {
+        let Window { columns, rows } = taking.window;
+        if !(columns.contains(&x) && rows.contains(&y)) {
+            return None;
+        }
+        let (u, v) = (x - columns.start, y - rows.start);
+        let change = self.change[v * columns.len() + u];
+        (change != FIXED).then(|| (self.flow.node(u, v), change))
+    }
+
     /// Adds the cost of a seam between neighboring pixels p and q. A node on the sink's side takes the new label.
     fn join(&mut self, taking: &Taking<'_>, labels: &[Label], [p, q]: [[usize; 2]; 2], direction: usize) {
-        let &Taking { energy, label, window: Window { columns, rows } } = taking;
-        let node = |[x, y]: [usize; 2]| {
-            if !(columns.contains(&x) && rows.contains(&y)) {
-                return None;
-            }
-            let (u, v) = (x - columns.start, y - rows.start);
-            let change = self.change[v * columns.len() + u];
-            (change != FIXED).then(|| (self.flow.node(u, v), change))
-        };
-        let (node_p, node_q) = (node(p), node(q));
+        let &Taking { energy, label, .. } = taking;
+        let (node_p, node_q) = (self.node_at(taking, p), self.node_at(taking, q));
         if node_p.is_none() && node_q.is_none() {
             return;
         }

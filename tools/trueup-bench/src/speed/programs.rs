@@ -89,27 +89,26 @@ impl Program {
 
     /// The commands it takes.
     fn steps(&self, photographs: &[PathBuf], panorama: &Path, scratch: &Path) -> Vec<Command> {
-        let command = |program: &Path| Command::new(program);
         match self {
             Self::Trueup(trueup) => {
-                let mut stitch = command(trueup);
+                let mut stitch = Command::new(trueup);
                 stitch.arg("stitch").args(photographs).arg("--output").arg(panorama).arg("--quiet");
                 vec![stitch]
             }
             Self::OpenCv(python) => {
-                let mut stitch = command(python);
+                let mut stitch = Command::new(python);
                 stitch.args(["-c", BY_OPENCV]).arg(panorama).args(photographs);
                 vec![stitch]
             }
             Self::Hugin => {
                 let project = scratch.join("project.pto");
-                let mut new = command(Path::new("pto_gen"));
+                let mut new = Command::new("pto_gen");
                 new.arg("-o").arg(&project).args(photographs);
-                let mut assistant = command(Path::new("hugin_executor"));
+                let mut assistant = Command::new("hugin_executor");
                 assistant.arg("--assistant").arg(&project);
-                let mut format = command(Path::new("pano_modify"));
+                let mut format = Command::new("pano_modify");
                 format.args(["--ldr-file=JPG", "-o"]).arg(&project).arg(&project);
-                let mut stitch = command(Path::new("hugin_executor"));
+                let mut stitch = Command::new("hugin_executor");
                 stitch.arg("--stitching").arg("--prefix").arg(panorama.with_extension("")).arg(&project);
                 vec![new, assistant, format, stitch]
             }
