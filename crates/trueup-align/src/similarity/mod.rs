@@ -86,7 +86,8 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     let unguided = || Guidance::none(input.cameras.len(), gate::allowed_divergence(input.cameras.len(), options));
     let (guidance, upright) = match input.method {
         PriorMethod::VanishingPoints => {
-            let vertical = CameraVertical { rotations: &rotations, straightened, level };
+            let level_deviation = straighten::level_deviation(&rotations, options.pitch_prior, &level);
+            let vertical = CameraVertical { rotations: &rotations, straightened, level, level_deviation };
             vpg::guide(input, &vertical, options, context)?
         }
         PriorMethod::Straightening => (unguided(), None),

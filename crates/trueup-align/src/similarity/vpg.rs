@@ -29,9 +29,12 @@ const MAX_REFINEMENT_TOLERANCES: f64 = 2.0;
 /// Root mean square misorientation of the photographs' directions that is detection noise, degrees; beyond, the
 /// horizontal directions lose weight in the joint refinement.
 const ORDINARY_MISORIENTATION_DEG: f64 = 1.0;
-/// Largest standard deviation of the vertical, by asking different photographs, degrees: straightening is wrong by 1 to
-/// 2 degrees. Measured: chosen on the 130 sets of the gate's experiment and on real sets.
-const MAX_VERTICAL_DEVIATION_DEG: f64 = 1.5;
+/// Standard deviation of the vertical, by asking different photographs, that is always believed, degrees: straightening is
+/// wrong by 1 to 2 degrees. Measured: chosen on the 130 sets of the gate's experiment and on real sets.
+const BELIEVED_VERTICAL_DEVIATION_DEG: f64 = 1.5;
+/// Largest that is believed where straightening leaves more doubt still, degrees. Reasoned: beyond twice the above, so few
+/// photographs have lines that their scatter tells little.
+const MAX_VERTICAL_DEVIATION_DEG: f64 = 2.0 * BELIEVED_VERTICAL_DEVIATION_DEG;
 /// The same for the pooled search in place of directions that the photographs agree on, degrees.
 const MAX_POOLED_DEVIATION_DEG: f64 = 1.0;
 
@@ -41,6 +44,8 @@ struct SceneDirections<'a> {
     options: &'a SimilarityOptions,
     rotations: &'a [Matrix3<f64>],
     straightened: Straightened,
+    /// How far the level that straightening falls back to may be off, radians; `None` if it cannot tell.
+    level_deviation: Option<f64>,
     /// Per photograph its directions in the cameras' world.
     triads: Vec<Option<Matrix3<f64>>>,
     vote: LineVote,
@@ -88,7 +93,7 @@ pub(super) fn guide(
 
 impl<'a> SceneDirections<'a> {
     fn new(input: &'a PriorInput<'a>, cameras: &CameraVertical<'a>, options: &'a SimilarityOptions) -> Self {
-        let CameraVertical { rotations, straightened, .. } = *cameras;
+        let CameraVertical { rotations, straightened, level_deviation, .. } = *cameras;
         let planes = InterpretationPlanes::of_all(input.lines, input.cameras, input.frames);
         let triads = rotations
             .iter()
@@ -99,7 +104,7 @@ impl<'a> SceneDirections<'a> {
             })
             .collect();
         let vote = LineVote::new(rotations, planes);
-        Self { input, options, rotations, straightened, triads, vote }
+        Self { input, options, rotations, straightened, level_deviation, triads, vote }
     }
 
     /// The vertical among the directions of `frame`.
@@ -207,8 +212,8 @@ impl<'a> SceneDirections<'a> {
         Some(self.solve(&down, &own, rotations, guidance))
     }
 
-    /// Whether the vertical of a frame that all segments voted for hardly depends on which photographs are asked; says
-    /// why not as the failed clause.
+    /// Whether the vertical of a frame that all segments voted for hardly depends on which photographs are asked, or less than
+    /// the level that takes its place is in doubt; says why not as the failed clause.
     fn is_certain(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights, guidance: &mut Guidance) -> bool {
         let down = self.vertical(frame);
         let deviation = axis_deviations(&self.vote, frame, axis_weights)[frame.tr_mul(&down).iamax()];
@@ -216,7 +221,7 @@ impl<'a> SceneDirections<'a> {
         let allowed = match guidance.pooled {
             true => MAX_POOLED_DEVIATION_DEG,
             false if self.options.gate == GateMode::Paper => f64::INFINITY,
-            false => MAX_VERTICAL_DEVIATION_DEG,
+            false => believed_deviation(self.level_deviation).to_degrees(),
         };
         if deviation.to_degrees() > allowed {
             guidance.pooled = false;
@@ -305,6 +310,13 @@ impl<'a> SceneDirections<'a> {
     }
 }
 
+/// The largest standard deviation in radians at which the lines' vertical is believed rather than the level of straightening,
+/// which itself deviates by `level_deviation`.
+fn believed_deviation(level_deviation: Option<f64>) -> f64 {
+    let always = BELIEVED_VERTICAL_DEVIATION_DEG.to_radians();
+    level_deviation.map_or(always, |level| level.clamp(always, MAX_VERTICAL_DEVIATION_DEG.to_radians()))
+}
+
 /// Full weight for the vertical; for the horizontals as much as the photographs' directions agree: where buildings stand
 /// at several angles, what passes for one horizontal direction would pull the vertical along. `down` is the frame's
 /// vertical.
@@ -321,4 +333,17 @@ pub(super) fn axis_weights(frame: &Matrix3<f64>, down: &Vector3<f64>, guidance: 
 /// Each photograph's roll by the common vertical: after the joint refinement no photograph's own triad knows better.
 fn common_rolls(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> Vec<Option<f64>> {
     rotations.iter().map(|rotation| roll_of(&(rotation * down))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_believed_as_far_as_straightening_is_in_doubt() {
+        let believed = |level: Option<f64>| believed_deviation(level.map(f64::to_radians)).to_degrees();
+        for (level, expected) in [(None, 1.5), (Some(0.2), 1.5), (Some(2.16), 2.16), (Some(40.0), 3.0)] {
+            assert!((believed(level) - expected).abs() < 1e-12, "{level:?}");
+        }
+    }
 }
