@@ -90,6 +90,7 @@ fn prior(bencher: divan::Bencher<'_, '_>, count: usize) {
         triads: &triads,
         lines: &lines,
         frames: &frames,
+        gravity: &[],
         edges: &edges,
         overlaps: &[],
         cell_px: 40.0,

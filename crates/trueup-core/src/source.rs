@@ -33,6 +33,27 @@ pub struct FocalPrior {
     pub source: FocalSource,
 }
 
+/// Where a recorded vertical came from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GravitySource {
+    /// The acceleration vector in the maker note of Apple's telephones.
+    AppleAcceleration,
+    /// The angles of the gimbal in the XMP of DJI's drones and hand cameras.
+    DjiGimbal,
+    /// PosePitchDegrees and PoseRollDegrees of Google's photo sphere XMP.
+    PhotoSpherePose,
+}
+
+/// Which way was down when a photograph was taken, as its camera recorded it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RecordedGravity {
+    /// Unit vector toward the ground in the camera frame of the photograph as it is shown: x right, y down, z forward.
+    pub down: [f64; 3],
+    /// Where it came from.
+    pub source: GravitySource,
+}
+
 /// A photograph the user gave: file, size and what its metadata say. The paper's I_i.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SourceImage {
@@ -54,6 +75,9 @@ pub struct SourceImage {
     pub lens_model: Option<String>,
     /// The lens's focal length in millimeters, if stated; a zoom does not bend alike at different ones.
     pub focal_mm: Option<f64>,
+    /// Which way was down, if the camera recorded it.
+    #[serde(default)]
+    pub gravity: Option<RecordedGravity>,
     /// The lens, in pixels of the full-resolution photograph, if the user told it by an earlier project.
     pub lens: Option<PlacedLens>,
 }

@@ -89,6 +89,7 @@ mod tests {
             triads: &triads,
             lines: &lines,
             frames: &frames,
+            gravity: &[],
             edges,
             overlaps: &[],
             cell_px: 40.0,

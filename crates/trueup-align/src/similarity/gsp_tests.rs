@@ -64,6 +64,7 @@ impl Graph {
             triads: &self.triads,
             lines: &self.lines,
             frames: &self.frames,
+            gravity: &[],
             edges: &self.edges,
             overlaps: &self.overlaps,
             cell_px: CELL_PX,

@@ -4,14 +4,14 @@ use trueup_core::camera::Camera;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::options::StageOptions;
-use trueup_core::source::WorkingFrame;
+use trueup_core::source::{RecordedGravity, WorkingFrame};
 use trueup_core::{Error, Result};
 
 use super::options::{PriorMethod, SimilarityOptions};
 use crate::match_points::OverlapWarp;
 use crate::vanishing::{TriadOutcome, VanishingOptions};
 
-/// What the prior is made from. Photographs are counted 0..N; all lists but `edges` and `overlaps` have N entries.
+/// What the prior is made from. Photographs are counted 0..N; all lists but `gravity`, `edges` and `overlaps` have N entries.
 #[derive(Debug, Clone, Copy)]
 pub struct PriorInput<'a> {
     /// Which prior is wanted.
@@ -24,6 +24,8 @@ pub struct PriorInput<'a> {
     pub lines: &'a [Vec<LineSegment>],
     /// Each photograph's working frame.
     pub frames: &'a [WorkingFrame],
+    /// Which way each photograph's camera recorded as down, if it did. May be empty: then none did.
+    pub gravity: &'a [Option<RecordedGravity>],
     /// The joined pairs.
     pub edges: &'a [PairMatches],
     /// Grid vertices carried across the pairs, both directions. May be empty: then overlaps correct nothing.
@@ -53,8 +55,10 @@ impl PriorInput<'_> {
         if count == 0 {
             return unsolvable("there are no photographs".to_owned());
         }
-        if [input.triads.len(), input.lines.len(), input.frames.len()].iter().any(|&length| length != count) {
-            return unsolvable(format!("cameras, triads, segments and frames differ in number from {count}"));
+        let gravity = if input.gravity.is_empty() { count } else { input.gravity.len() };
+        let lengths = [input.triads.len(), input.lines.len(), input.frames.len(), gravity];
+        if lengths.iter().any(|&length| length != count) {
+            return unsolvable(format!("cameras, triads, segments, frames and gravity differ in number from {count}"));
         }
         if let Some(edge) = input.edges.iter().find(|edge| edge.a >= count || edge.b >= count || edge.a == edge.b) {
             return unsolvable(format!("there is no pair {} - {} among {count} photographs", edge.a, edge.b));

@@ -6,7 +6,7 @@
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::joint::{AxisWeights, LineVote, Refinement};
+use super::joint::{LineVote, Refinement};
 
 /// Most groups that photographs are left out in to learn how sure the refinement is.
 const MAX_GROUPS: usize = 8;
@@ -33,16 +33,15 @@ impl Sectors {
 }
 
 /// Standard deviation in radians, by a delete-a-group jackknife over the photographs, of each axis (a column) of a
-/// frame that [`LineVote::refine_frame`] found: how much it depends on which photographs are asked. Infinite for a
+/// frame that a refinement found, from which it starts again: how much it depends on which photographs are asked. Infinite for a
 /// single photograph.
 ///
 /// Photographs, not segments, are left out, because the segments of one photograph err together.
-pub(super) fn axis_deviations(vote: &LineVote, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> [f64; 3] {
+pub(super) fn axis_deviations(vote: &LineVote, refinement: Refinement<'_>) -> [f64; 3] {
     let groups = vote.photographs().min(MAX_GROUPS);
     if groups < 2 {
         return [f64::INFINITY; 3];
     }
-    let refinement = Refinement { start: frame, axes_used: 3, axis_weights };
     let frames: Vec<Matrix3<f64>> = (0..groups)
         .into_par_iter()
         .map(|group| vote.refine_again(refinement, |one| one.photograph % groups != group))

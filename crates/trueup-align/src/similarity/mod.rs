@@ -9,11 +9,13 @@ mod dominant;
 mod edge_range;
 mod frame_search;
 mod gate;
+mod gravity;
 mod gsp_2d;
 mod gsp_3d;
 mod input;
 mod jackknife;
 mod joint;
+mod level;
 mod options;
 mod path_voting;
 mod posterior;
@@ -49,10 +51,13 @@ use trueup_core::geometry::{matrix_from_rows, rows_of, wrap_angle};
 use trueup_core::options::StageOptions;
 use trueup_core::{Result, StageContext};
 
-use straighten::CameraVertical;
+use gravity::MeanGravity;
+use level::CameraLevel;
 use upright::{Upright, rolls};
+use vpg::Guided;
 
 pub use input::PriorInput;
+pub use level::{LevelEvidence, LevelSource};
 pub use options::{BetaMode, Fallback, GateMode, PriorMethod, SimilarityOptions};
 pub use posterior::{EstimatedRoll, RollsInput, estimated_rolls};
 pub use printed::PrintedEquations;
@@ -62,7 +67,7 @@ pub(crate) use straighten::level_by_cameras;
 
 /// What a user can do when lines do not guide the panorama.
 const REFUSED_HINT: &str =
-    "The panorama is levelled by the cameras alone; photographs that show upright edges level it better";
+    "The panorama is levelled by how its cameras were held; photographs that show upright edges level it better";
 
 /// Finds the similarity prior of a connected set of photographs.
 ///
@@ -81,19 +86,20 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
     context.check_cancelled()?;
     let rotations: Vec<Matrix3<f64>> = input.cameras.iter().map(Camera::rotation).collect();
     let focals: Vec<f64> = input.cameras.iter().map(|camera| camera.focal_px).collect();
-    let straightened = straighten::straighten(&rotations);
-    let level = straighten::straighten_with_pitch(&rotations, options.pitch_prior);
-    let unguided = || Guidance::none(input.cameras.len(), gate::allowed_divergence(input.cameras.len(), options));
-    let (guidance, upright) = match input.method {
-        PriorMethod::VanishingPoints => {
-            let level_deviation = straighten::level_deviation(&rotations, options.pitch_prior, &level);
-            let vertical = CameraVertical { rotations: &rotations, straightened, level, level_deviation };
-            vpg::guide(input, &vertical, options, context)?
-        }
-        PriorMethod::Straightening => (unguided(), None),
-        PriorMethod::Gsp2d => (unguided(), Some(gsp_2d::upright(input, straightened.down))),
-        PriorMethod::Gsp3d => (unguided(), Some(gsp_3d::upright(input, &rotations, straightened.down))),
-        PriorMethod::Aanap => (unguided(), Some(aanap::upright(input, &rotations, straightened.down, context))),
+    let gravity = options.gravity.then(|| MeanGravity::of(&rotations, input.gravity)).flatten();
+    let level = CameraLevel::new(&rotations, options.pitch_prior, gravity);
+    let straightened = level.straightened.down;
+    let unguided = |told: Vec<LevelEvidence>| {
+        Guidance::none(input.cameras.len(), gate::allowed_divergence(input.cameras.len(), options), told)
+    };
+    let by_overlaps =
+        |upright: Upright| Guided { guidance: unguided(Vec::new()), upright: Some(upright), level: level.down };
+    let Guided { mut guidance, upright, level: down } = match input.method {
+        PriorMethod::VanishingPoints => vpg::guide(input, &level, options, context)?,
+        PriorMethod::Straightening => Guided { guidance: unguided(level.evidence()), upright: None, level: level.down },
+        PriorMethod::Gsp2d => by_overlaps(gsp_2d::upright(input, straightened)),
+        PriorMethod::Gsp3d => by_overlaps(gsp_3d::upright(input, &rotations, straightened)),
+        PriorMethod::Aanap => by_overlaps(aanap::upright(input, &rotations, straightened, context)),
     };
     if let Some(clause) = guidance.failed_clause.as_ref().filter(|_| !guidance.used) {
         context.report(Diagnostic::note(
@@ -104,11 +110,10 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
         ));
     }
     let upright = upright.unwrap_or_else(|| match (input.method, options.fallback) {
-        (PriorMethod::VanishingPoints, Fallback::Gsp3d) => gsp_3d::upright(input, &rotations, straightened.down),
-        _ => straightening(&rotations, &level),
+        (PriorMethod::VanishingPoints, Fallback::Gsp3d) => gsp_3d::upright(input, &rotations, straightened),
+        _ => straightening(&rotations, &down),
     });
     let level_from_world = straighten::level_from_world(&upright.down, &rotations);
-    let mut guidance = guidance;
     guidance.dominant = guidance.dominant.map(|world| rows_of(&(level_from_world * matrix_from_rows(&world))));
     Ok(SimilarityPrior {
         theta: upright.theta.iter().map(|theta| wrap_angle(theta + input.turn)).collect(),

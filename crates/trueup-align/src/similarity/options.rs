@@ -90,6 +90,9 @@ trueup_core::options! {
         /// Whether a vertical alone may guide where the horizontal directions do not agree. Turn it off where what
         /// looks vertical is not, as leaning trees or masts.
         vertical_only: bool = true, Allowed::Any, "";
+        /// Whether gravity that cameras recorded takes part in the vertical. Turn it off where a camera was tilted on purpose, or its
+        /// sensor is wrong.
+        gravity: bool = true, Allowed::Any, "";
         /// What stands in for vanishing directions that are not believed. `gsp-3d` to compare with the published method.
         fallback: Fallback = Fallback::Straightening, Allowed::Any, "";
         /// Equations of the paper that are taken as they are printed, joined by +, where this program corrects them; `all`

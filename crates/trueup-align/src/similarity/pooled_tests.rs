@@ -6,7 +6,7 @@ use trueup_core::geometry::rotation_about_z;
 use super::SimilarityOptions;
 use super::frame_search::GUIDING_SIGNIFICANCE;
 use super::jackknife::axis_deviations;
-use super::joint::LineVote;
+use super::joint::{LineVote, Refinement};
 use super::synthetic::{Sweep, SyntheticScene, World};
 use super::tests::{missing, with_lines};
 use crate::vanishing::InterpretationPlanes;
@@ -57,7 +57,8 @@ fn photographs_that_contradict_each_other_leave_the_vertical_uncertain() {
         let vote = LineVote::new(&rotations, (0..rotations.len()).map(planes).collect());
         // The true frame in the cameras' world.
         let frame = rotations[0].transpose() * scene.world_from_camera[0].transpose();
-        axis_deviations(&vote, &vote.refine_frame(&frame, &[1.0; 3]), &[1.0; 3])[1]
+        let start = vote.refine_frame(&frame, &[1.0; 3]);
+        axis_deviations(&vote, Refinement { start: &start, axes_used: 3, axis_weights: &[1.0; 3] })[1]
     };
     let agreed = deviation(&scene);
     assert!(agreed < 0.1_f64.to_radians(), "{agreed}");

@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
 use trueup_core::geometry::matrix_from_rows;
 
+use super::level::LevelEvidence;
+
 /// How the vanishing directions took part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Guidance {
@@ -43,11 +45,14 @@ pub struct Guidance {
     pub vertical_rivalry: Option<f64>,
     /// Share of the segments' weight that supports the vertical; `None` as above.
     pub vertical_share: Option<f64>,
+    /// What told of the vertical, and of how much; empty for priors that ask nothing but the overlaps.
+    pub level: Vec<LevelEvidence>,
 }
 
 impl Guidance {
-    /// No line takes part in a prior of `count` photographs; `threshold` is the divergence that would be allowed.
-    pub(super) fn none(count: usize, threshold: f64) -> Self {
+    /// No line takes part in a prior of `count` photographs; `threshold` is the divergence that would be allowed, `level` what told of
+    /// the vertical.
+    pub(super) fn none(count: usize, threshold: f64, level: Vec<LevelEvidence>) -> Self {
         Self {
             used: false,
             pooled: false,
@@ -64,6 +69,7 @@ impl Guidance {
             weights: vec![0.0; count],
             vertical_rivalry: None,
             vertical_share: None,
+            level,
         }
     }
 }

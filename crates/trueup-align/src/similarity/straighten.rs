@@ -17,19 +17,6 @@ pub(super) struct Straightened {
     pub conditioned: bool,
 }
 
-/// What the cameras alone say of the vertical.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct CameraVertical<'a> {
-    /// The cameras' rotations, from the common frame to each camera.
-    pub rotations: &'a [Matrix3<f64>],
-    /// By [`straighten`], as published.
-    pub straightened: Straightened,
-    /// By [`straighten_with_pitch`]: down, in the common frame.
-    pub level: Vector3<f64>,
-    /// By [`level_deviation`]: how far `level` may be off, radians.
-    pub level_deviation: Option<f64>,
-}
-
 /// The vertical that makes the cameras' x axes horizontal.
 ///
 /// # Source
@@ -40,10 +27,8 @@ pub(super) struct CameraVertical<'a> {
 /// With parallel x axes (one photograph, a tiny pan, a vertical sweep) that eigenvector is arbitrary; the mean of the y
 /// axes, made orthogonal to the mean x axis, takes its place.
 pub(super) fn straighten(rotations: &[Matrix3<f64>]) -> Straightened {
-    let x_axes = || rotations.iter().map(|rotation| rotation.row(0).transpose());
     let y_sum: Vector3<f64> = rotations.iter().map(|rotation| rotation.row(1).transpose()).sum();
-    let moment: Matrix3<f64> = x_axes().map(|x| x * x.transpose()).sum();
-    let eigen = moment.symmetric_eigen();
+    let eigen = level_moment(rotations, 0.0).symmetric_eigen();
     let least = eigen.eigenvalues.imin();
     let second = eigen.eigenvalues.iter().enumerate().filter(|&(k, _)| k != least).map(|(_, &value)| value);
     let second = second.fold(f64::INFINITY, f64::min) / rotations.len().max(1) as f64;
@@ -74,27 +59,12 @@ pub(super) fn straighten_with_pitch(rotations: &[Matrix3<f64>], pitch_prior: f64
 }
 
 /// sum x_i x_i^T + `pitch_prior` z_i z_i^T over the cameras' x and viewing axes, in the common frame.
-fn level_moment(rotations: &[Matrix3<f64>], pitch_prior: f64) -> Matrix3<f64> {
+pub(super) fn level_moment(rotations: &[Matrix3<f64>], pitch_prior: f64) -> Matrix3<f64> {
     let moments = rotations.iter().map(|rotation| {
         let (x, z) = (rotation.row(0).transpose(), rotation.row(2).transpose());
         x * x.transpose() + z * z.transpose() * pitch_prior
     });
     moments.sum()
-}
-
-/// Standard deviation in radians of `level` about the axis that the cameras fix it worst about, as their own rolls about it tell:
-/// the least squares of [`straighten_with_pitch`] with the variance sum (x_i . level)^2 / (n - 2) of a roll.
-///
-/// `None` for two photographs or fewer, which leave no roll to judge by, and where nothing fixes the vertical.
-pub(super) fn level_deviation(rotations: &[Matrix3<f64>], pitch_prior: f64, level: &Vector3<f64>) -> Option<f64> {
-    /// The two angles of a vertical are fitted to the rolls.
-    const FITTED: usize = 2;
-    let free = rotations.len().checked_sub(FITTED).filter(|&free| free > 0)?;
-    let squares: f64 = rotations.iter().map(|rotation| rotation.row(0).transpose().dot(level).powi(2)).sum();
-    let mut information = level_moment(rotations, pitch_prior.max(0.0)).symmetric_eigenvalues();
-    information.as_mut_slice().sort_by(f64::total_cmp);
-    let deviation = (squares / free as f64 / information[1]).sqrt();
-    deviation.is_finite().then_some(deviation)
 }
 
 /// The rotation from the common frame to the level world: `down` becomes y, and the mean viewing direction lies in the
@@ -122,33 +92,4 @@ pub(super) fn level_from_world(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) 
 pub(crate) fn level_by_cameras(cameras: &[Camera]) -> Matrix3<f64> {
     let rotations: Vec<Matrix3<f64>> = cameras.iter().map(|camera| camera.rotation()).collect();
     level_from_world(&straighten(&rotations).down, &rotations)
-}
-
-#[cfg(test)]
-mod tests {
-    use nalgebra::Rotation3;
-
-    use super::*;
-
-    /// Four cameras that look in all directions, rolled by turns to the left and to the right: by symmetry the level is y. The
-    /// variance of a roll is 4 sin^2 r / 2, and either horizontal axis is fixed by 2 cos^2 r + 2 p.
-    #[test]
-    fn the_level_is_as_certain_as_rolls_let_it_be() {
-        let (roll, pitch_prior) = (0.1_f64, 0.1);
-        let rotations: Vec<Matrix3<f64>> = (0..4)
-            .map(|quarter| {
-                let yaw =
-                    Rotation3::from_axis_angle(&Vector3::y_axis(), f64::from(quarter) * std::f64::consts::FRAC_PI_2);
-                let turned = if quarter % 2 == 0 { roll } else { -roll };
-                (Rotation3::from_axis_angle(&Vector3::z_axis(), turned) * yaw).into_inner()
-            })
-            .collect();
-        let level = straighten_with_pitch(&rotations, pitch_prior);
-        assert!(level.angle(&Vector3::y()) < 1e-12, "{level}");
-        let expected = roll.sin() / (roll.cos().powi(2) + pitch_prior).sqrt();
-        let found = level_deviation(&rotations, pitch_prior, &level).expect("four photographs tell");
-        assert!((found - expected).abs() < 1e-12, "{found} instead of {expected}");
-        assert_eq!(level_deviation(&rotations[..2], pitch_prior, &level), None);
-        assert_eq!(level_deviation(&[], pitch_prior, &level), None);
-    }
 }

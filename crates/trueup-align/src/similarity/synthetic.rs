@@ -101,6 +101,7 @@ impl SyntheticScene {
             triads: &self.triads,
             lines: &self.lines,
             frames: &self.frames,
+            gravity: &[],
             edges: &self.edges,
             overlaps: &[],
             cell_px: 40.0,

@@ -6,6 +6,7 @@ use trueup_core::geometry::{
     wrap_angle,
 };
 use trueup_core::matches::{PairMatches, PointMatch};
+use trueup_core::source::{GravitySource, RecordedGravity};
 
 use super::synthetic::{Sweep, SyntheticScene, World, joined, noise_rotation, photograph_lines};
 use super::*;
@@ -339,6 +340,88 @@ fn the_fallback_does_not_roll_steep_rows() {
     for (theta, roll) in prior.theta.iter().zip(&prior.roll) {
         assert!((theta - roll).abs() < 1e-12);
     }
+}
+
+/// Gravity that every camera of `scene` recorded, off by `noise_deg`, of cameras turned by `turn` about their axes.
+fn recorded_gravity(scene: &SyntheticScene, noise_deg: f64, seed: u64) -> Vec<Option<RecordedGravity>> {
+    let mut generator = StageContext::default().generator("gravity", seed);
+    let of = |world_from_camera: &Matrix3<f64>| {
+        let down = noise_rotation(noise_deg, &mut generator) * world_from_camera.transpose() * Vector3::y();
+        Some(RecordedGravity { down: down.into(), source: GravitySource::AppleAcceleration })
+    };
+    scene.world_from_camera.iter().map(of).collect()
+}
+
+/// Eight photographs that look up and lean by 8 degrees, of a scene without lines: straightening is off by degrees, gravity that is off by 1.5
+/// degrees in each is not; lines that are seen outweigh both.
+#[test]
+fn recorded_gravity_levels_what_has_no_lines() {
+    let vanishing = VanishingOptions::default();
+    let sweep = Sweep { pitch_base_deg: 15.0, ..Sweep::default() };
+    let (mut with, mut without, mut with_both) = (Vec::new(), Vec::new(), Vec::new());
+    for seed in 0..8 {
+        let scene = SyntheticScene::new(sweep, World::Random, 0.0, seed);
+        let gravity = recorded_gravity(&scene, 1.5, seed);
+        let errors = |options: &SimilarityOptions| {
+            let input = PriorInput { gravity: &gravity, ..scene.input(&vanishing) };
+            let prior = run(&input, options, &StageContext::default()).expect("a well-formed scene");
+            assert!(!prior.guidance.used);
+            mean(&scene.errors_deg(&prior))
+        };
+        with.push(errors(&SimilarityOptions::default()));
+        without.push(errors(&SimilarityOptions { gravity: false, ..SimilarityOptions::default() }));
+        let seen = with_lines(SyntheticScene::new(sweep, CLEAN, 0.0, seed), 40, 0.3);
+        let input = PriorInput { gravity: &gravity, ..seen.input(&vanishing) };
+        let prior = run(&input, &SimilarityOptions::default(), &StageContext::default()).expect("a well-formed scene");
+        assert!(prior.guidance.used);
+        let sources: Vec<LevelSource> = prior.guidance.level.iter().map(|one| one.source).collect();
+        assert_eq!(sources, [LevelSource::Lines, LevelSource::Cameras, LevelSource::Gravity]);
+        with_both.push(mean(&seen.errors_deg(&prior)));
+    }
+    assert!(mean(&with) < 1.0 && mean(&without) > 2.0 * mean(&with), "{with:?} and {without:?}");
+    assert!(mean(&with_both) < 0.25, "{with_both:?}");
+}
+
+/// All photographs lie on their sides, because a program lost their orientation: gravity stands them up, and the lines of the scene make it
+/// exact.
+#[test]
+fn photographs_on_their_sides_are_stood_up_by_gravity() {
+    let vanishing = VanishingOptions::default();
+    let mut scene = SyntheticScene::new(Sweep { roll_sd_deg: 1.0, ..Sweep::default() }, CLEAN, 0.0, 4);
+    let on_side = rotation_about_z(std::f64::consts::FRAC_PI_2);
+    for (camera, triad) in scene.cameras.iter_mut().zip(&mut scene.triads) {
+        camera.set_rotation(&(on_side * camera.rotation()));
+        if let TriadOutcome::Found(triad) = triad {
+            triad.camera_from_triad = rows_of(&(on_side * triad.matrix()));
+        }
+    }
+    for (world_from_camera, roll) in scene.world_from_camera.iter_mut().zip(&mut scene.roll) {
+        *world_from_camera *= on_side.transpose();
+        *roll = wrap_angle(*roll - std::f64::consts::FRAC_PI_2);
+    }
+    let gravity = recorded_gravity(&scene, 1.0, 4);
+    let input = PriorInput { gravity: &gravity, ..scene.input(&vanishing) };
+    let prior = run(&input, &SimilarityOptions::default(), &StageContext::default()).expect("a well-formed scene");
+    assert!(prior.guidance.used, "{:?}", prior.guidance.failed_clause);
+    assert!(max(&scene.errors_deg(&prior)) < 1e-6, "{:?}", scene.errors_deg(&prior));
+}
+
+/// Lines that lean by 12 degrees in the whole scene, as a hillside's fences may, do not outvote eight sensors.
+#[test]
+fn lines_that_gravity_contradicts_do_not_guide() {
+    let vanishing = VanishingOptions::default();
+    let scene = with_lines(SyntheticScene::new(Sweep::default(), CLEAN, 0.0, 5), 40, 0.3);
+    let lean = rotation_about_x(12_f64.to_radians());
+    let mut leaning = scene.clone();
+    for world_from_camera in &mut leaning.world_from_camera {
+        *world_from_camera = lean * *world_from_camera;
+    }
+    let gravity = recorded_gravity(&leaning, 1.0, 5);
+    let input = PriorInput { gravity: &gravity, ..scene.input(&vanishing) };
+    let prior = run(&input, &SimilarityOptions::default(), &StageContext::default()).expect("a well-formed scene");
+    assert!(!prior.guidance.used);
+    let clause = prior.guidance.failed_clause.expect("a reason");
+    assert!(clause.contains("from the one that the cameras recorded"), "{clause}");
 }
 
 #[test]

@@ -37,6 +37,13 @@ pub(super) fn vertical_of(frame: &Matrix3<f64>, rotations: &[Matrix3<f64>]) -> V
     frame.column(vertical) * if signed_y[vertical] > 0.0 { 1.0 } else { -1.0 }
 }
 
+/// The column of `frame` that lies nearest to `expected`, or its opposite, whichever points the same way.
+pub(super) fn vertical_near(frame: &Matrix3<f64>, expected: &Vector3<f64>) -> Vector3<f64> {
+    let along = frame.tr_mul(expected);
+    let nearest = along.iamax();
+    frame.column(nearest) * along[nearest].signum()
+}
+
 /// The column of `frame` that lies nearest to the y axis of the `reference` camera, pointing down: the paper's eq. 5.
 ///
 /// # Departures

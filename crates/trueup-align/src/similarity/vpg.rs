@@ -1,7 +1,7 @@
 //! The vanishing point guided prior: dominant directions, gate, joint refinement, weighted solve.
 
 use nalgebra::{Matrix3, Vector3};
-use trueup_core::geometry::rows_of;
+use trueup_core::geometry::{exp_rotation, orthonormal_complement, rows_of};
 use trueup_core::options::StageOptions;
 use trueup_core::{Result, StageContext};
 
@@ -11,14 +11,14 @@ use super::frame_search::{GUIDING_SIGNIFICANCE, PooledFrame, search_frame};
 use super::gate::{GateEvidence, MAX_STRAIGHTENING_ANGLE_DEG, allowed_divergence, divergence, failed_clause};
 use super::input::PriorInput;
 use super::jackknife::axis_deviations;
-use super::joint::{self, AxisWeights, LineVote};
+use super::joint::{self, AxisWeights, LineVote, Refinement};
+use super::level::CameraLevel;
 use super::options::{GateMode, SimilarityOptions};
 use super::prior::Guidance;
 use super::signed_permutation::{match_triad, triad_residual};
-use super::straighten::{CameraVertical, Straightened};
 use super::turns::{RollEvidence, solve_turns};
 use super::upright::Upright;
-use super::vertical::{roll_of, vertical_by_reference, vertical_of};
+use super::vertical::{roll_of, vertical_by_reference, vertical_near, vertical_of};
 use super::vertical_vote::vertical_peak;
 use crate::vanishing::{InterpretationPlanes, RefinedTriad};
 
@@ -29,46 +29,55 @@ const MAX_REFINEMENT_TOLERANCES: f64 = 2.0;
 /// Root mean square misorientation of the photographs' directions that is detection noise, degrees; beyond, the
 /// horizontal directions lose weight in the joint refinement.
 const ORDINARY_MISORIENTATION_DEG: f64 = 1.0;
-/// Standard deviation of the vertical, by asking different photographs, that is always believed, degrees: straightening is
-/// wrong by 1 to 2 degrees. Measured: chosen on the 130 sets of the gate's experiment and on real sets.
-const BELIEVED_VERTICAL_DEVIATION_DEG: f64 = 1.5;
-/// Largest that is believed where straightening leaves more doubt still, degrees. Reasoned: beyond twice the above, so few
-/// photographs have lines that their scatter tells little.
-const MAX_VERTICAL_DEVIATION_DEG: f64 = 2.0 * BELIEVED_VERTICAL_DEVIATION_DEG;
-/// The same for the pooled search in place of directions that the photographs agree on, degrees.
+/// Largest standard deviation of the vertical, by asking different photographs, at which the pooled search guides in place of
+/// directions that the photographs agree on, degrees: wrong frames that stand out by chance scatter by more. Measured: chosen on the
+/// 130 sets of the gate's experiment and on real sets.
 const MAX_POOLED_DEVIATION_DEG: f64 = 1.0;
+/// Least share of the information on the vertical that makes lines its guide; with less they are one voice among others.
+const GUIDING_SHARE: f64 = 0.5;
+/// Lines whose vertical is farther than this from the one that cameras recorded are not those of what stands upright, degrees, unless
+/// both are less certain. Reasoned: no sensor errs by as much, and roofs lean by more.
+const MAX_GRAVITY_ANGLE_DEG: f64 = 5.0;
+/// The same in deviations of both.
+const MAX_GRAVITY_DEVIATIONS: f64 = 4.0;
 
 /// Everything known about the scene's directions.
 struct SceneDirections<'a> {
     input: &'a PriorInput<'a>,
     options: &'a SimilarityOptions,
-    rotations: &'a [Matrix3<f64>],
-    straightened: Straightened,
-    /// How far the level that straightening falls back to may be off, radians; `None` if it cannot tell.
-    level_deviation: Option<f64>,
+    /// What is known of the vertical without lines.
+    level: &'a CameraLevel<'a>,
     /// Per photograph its directions in the cameras' world.
     triads: Vec<Option<Matrix3<f64>>>,
     vote: LineVote,
 }
 
+/// What came of the lines.
+pub(super) struct Guided {
+    pub guidance: Guidance,
+    /// The prior that lines guide; `None` where they are not believed.
+    pub upright: Option<Upright>,
+    /// Down in the common frame, by all that tells of it: what lines that do not guide say takes part.
+    pub level: Vector3<f64>,
+}
+
 /// Finds the vertical and the turns that the lines mean, if they are believed. The gate compares with what
-/// straightening finds of the `cameras`; near their level the vertical is sought where the gate refuses.
+/// straightening finds of the cameras; near their `level` the vertical is sought where the gate refuses.
 pub(super) fn guide(
     input: &PriorInput<'_>,
-    cameras: &CameraVertical<'_>,
+    level: &CameraLevel<'_>,
     options: &SimilarityOptions,
     context: &StageContext<'_>,
-) -> Result<(Guidance, Option<Upright>)> {
+) -> Result<Guided> {
     let count = input.cameras.len();
-    let level = &cameras.level;
-    let mut scene = SceneDirections::new(input, cameras, options);
+    let mut scene = SceneDirections::new(input, level, options);
     context.check_cancelled()?;
-    let mut guidance = Guidance::none(count, allowed_divergence(count, options));
+    let mut guidance = Guidance::none(count, allowed_divergence(count, options), level.evidence());
     let mut generator = context.generator(SimilarityOptions::STAGE, 0);
     let cut = if options.as_printed.dominant { f64::INFINITY } else { options.rejection };
     let dominant = dominant_frame(&scene.triads, cut, &mut generator);
     context.check_cancelled()?;
-    let pooled = options.pooled_search.then(|| search_frame(&scene.vote, level)).flatten();
+    let pooled = options.pooled_search.then(|| search_frame(&scene.vote, &level.down)).flatten();
     guidance.significance = pooled.map(|pooled| pooled.significance);
     guidance.failed_clause = match &dominant {
         Some(dominant) => scene.judge(dominant, &mut guidance),
@@ -81,19 +90,20 @@ pub(super) fn guide(
         Some(_) if options.gate == GateMode::Paper => None,
         Some(_) => pooled.and_then(|pooled| scene.pooled(&pooled, &mut guidance)),
     };
+    let mut down = level.down;
     if let Some(dominant) = accepted {
-        let upright = scene.solve_dominant(dominant, &mut guidance);
-        if upright.is_some() {
-            return Ok((guidance, upright));
+        match scene.solve_dominant(dominant, &mut guidance) {
+            Ok(upright) => return Ok(Guided { guidance, upright: Some(upright), level: down }),
+            Err(level) => down = level,
         }
     }
-    let upright = scene.vertical_alone(level, &mut guidance);
-    Ok((guidance, upright))
+    let upright = scene.vertical_alone(&mut guidance);
+    Ok(Guided { guidance, upright, level: down })
 }
 
 impl<'a> SceneDirections<'a> {
-    fn new(input: &'a PriorInput<'a>, cameras: &CameraVertical<'a>, options: &'a SimilarityOptions) -> Self {
-        let CameraVertical { rotations, straightened, level_deviation, .. } = *cameras;
+    fn new(input: &'a PriorInput<'a>, level: &'a CameraLevel<'a>, options: &'a SimilarityOptions) -> Self {
+        let rotations = level.rotations;
         let planes = InterpretationPlanes::of_all(input.lines, input.cameras, input.frames);
         let triads = rotations
             .iter()
@@ -104,21 +114,22 @@ impl<'a> SceneDirections<'a> {
             })
             .collect();
         let vote = LineVote::new(rotations, planes);
-        Self { input, options, rotations, straightened, level_deviation, triads, vote }
+        Self { input, options, level, triads, vote }
     }
 
     /// The vertical among the directions of `frame`.
     fn vertical(&self, frame: &Matrix3<f64>) -> Vector3<f64> {
         match self.options.as_printed.vertical {
-            true => vertical_by_reference(frame, &self.rotations[self.input.reference]),
-            false => vertical_of(frame, self.rotations),
+            true => vertical_by_reference(frame, &self.level.rotations[self.input.reference]),
+            false if self.level.has_gravity => vertical_near(frame, &self.level.down),
+            false => vertical_of(frame, self.level.rotations),
         }
     }
 
     /// Photographs whose directions agree with `dominant`.
     fn inliers(&self, dominant: &Dominant) -> Vec<usize> {
         let agrees = |index: &usize| dominant.residuals[*index].is_some_and(|r| r <= self.options.rejection);
-        (0..self.rotations.len()).filter(agrees).collect()
+        (0..self.level.rotations.len()).filter(agrees).collect()
     }
 
     /// The roll of each agreeing photograph by its own direction that matches the vertical: the paper's alpha_i.
@@ -127,14 +138,14 @@ impl<'a> SceneDirections<'a> {
     /// Eq. 6 is printed with directions already moved to the common frame, the reference camera's, which gives every
     /// photograph about the same roll (`similarity.as_printed`); those of the camera's own frame are meant.
     fn own_rolls(&self, frame: &Matrix3<f64>, down: &Vector3<f64>, inliers: &[usize]) -> Vec<Option<f64>> {
-        let mut own = vec![None; self.rotations.len()];
+        let mut own = vec![None; self.level.rotations.len()];
         let in_frame = frame.tr_mul(down);
         let column = in_frame.iamax();
         for &index in inliers {
             if let Some(triad) = &self.triads[index] {
                 let matched = match_triad(frame, triad).0.column(column) * in_frame[column].signum();
                 let camera = if self.options.as_printed.alpha { self.input.reference } else { index };
-                own[index] = roll_of(&(self.rotations[camera] * matched));
+                own[index] = roll_of(&(self.level.rotations[camera] * matched));
             }
         }
         own
@@ -148,14 +159,18 @@ impl<'a> SceneDirections<'a> {
             self.own_rolls(&dominant.frame, &down, &inliers).into_iter().flatten().map(f64::abs).collect();
         magnitudes.sort_by(f64::total_cmp);
         let residuals: Vec<f64> = inliers.iter().filter_map(|&index| dominant.residuals[index]).collect();
-        let photographs = self.rotations.len();
+        let photographs = self.level.rotations.len();
         let evidence = GateEvidence {
             photographs,
             inliers: inliers.len(),
             divergence: divergence(&residuals, photographs, self.options.as_printed.divergence),
             straightening_angle: self.straightening_angle(&down),
             significance: guidance.significance,
-            median_roll: magnitudes.get(magnitudes.len() / 2).copied().unwrap_or(f64::INFINITY),
+            // Photographs may lie on their sides where gravity says so.
+            median_roll: match self.level.has_gravity {
+                true => 0.0,
+                false => magnitudes.get(magnitudes.len() / 2).copied().unwrap_or(f64::INFINITY),
+            },
         };
         guidance.divergence = Some(evidence.divergence).filter(|divergence| divergence.is_finite());
         guidance.inlier_ratio = inliers.len() as f64 / photographs as f64;
@@ -164,9 +179,14 @@ impl<'a> SceneDirections<'a> {
         failed_clause(&evidence, self.options)
     }
 
-    /// Angle in radians between a vertical and the straightened one, if the cameras fix that.
+    /// Angle in radians between a vertical and the straightened one, if the cameras fix that; where gravity was recorded, the one that
+    /// it tells.
     fn straightening_angle(&self, down: &Vector3<f64>) -> Option<f64> {
-        self.straightened.conditioned.then(|| down.angle(&self.straightened.down))
+        if self.level.has_gravity {
+            return Some(down.angle(&self.level.down));
+        }
+        let straightened = self.level.straightened;
+        straightened.conditioned.then(|| down.angle(&straightened.down))
     }
 
     /// The frame of the pooled search in place of one that the photographs agree on, if it stands out far enough.
@@ -186,8 +206,12 @@ impl<'a> SceneDirections<'a> {
         Some(dominant)
     }
 
-    /// The prior of accepted dominant directions.
-    fn solve_dominant(&mut self, mut dominant: Dominant, guidance: &mut Guidance) -> Option<Upright> {
+    /// The prior of accepted dominant directions; where they are not sure enough to guide, the vertical that they take part in.
+    fn solve_dominant(
+        &mut self,
+        mut dominant: Dominant,
+        guidance: &mut Guidance,
+    ) -> std::result::Result<Upright, Vector3<f64>> {
         let axis_weights = axis_weights(&dominant.frame, &self.vertical(&dominant.frame), guidance);
         if self.options.guided_redetection {
             self.redetect(&mut dominant);
@@ -197,46 +221,72 @@ impl<'a> SceneDirections<'a> {
         let has_lines = self.vote.total_weight() > 0.0;
         let joint = has_lines && self.options.joint_refinement;
         let frame = if joint { self.refined(&dominant.frame, &axis_weights) } else { dominant.frame };
-        let down = self.vertical(&frame);
-        if joint && !self.is_certain(&frame, &axis_weights, guidance) {
-            return None;
+        let mut down = self.vertical(&frame);
+        if joint {
+            let refinement = Refinement { start: &frame, axes_used: 3, axis_weights: &axis_weights };
+            let deviation = axis_deviations(&self.vote, refinement)[frame.tr_mul(&down).iamax()];
+            down = self.weighed(&down, deviation, guidance)?;
         }
-        guidance.dominant = Some(rows_of(&frame));
+        guidance.dominant = Some(rows_of(&(turn_between(&self.vertical(&frame), &down) * frame)));
         guidance.used = true;
         let rotations = match joint && self.options.camera_correction {
             true => self.corrected(&frame, &axis_weights),
-            false => self.rotations.to_vec(),
+            false => self.level.rotations.to_vec(),
         };
         let own =
             if joint { common_rolls(&down, &rotations) } else { self.own_rolls(&frame, &down, &guidance.inliers) };
-        Some(self.solve(&down, &own, rotations, guidance))
+        Ok(self.solve(&down, &own, rotations, guidance))
     }
 
-    /// Whether the vertical of a frame that all segments voted for hardly depends on which photographs are asked, or less than
-    /// the level that takes its place is in doubt; says why not as the failed clause.
-    fn is_certain(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights, guidance: &mut Guidance) -> bool {
-        let down = self.vertical(frame);
-        let deviation = axis_deviations(&self.vote, frame, axis_weights)[frame.tr_mul(&down).iamax()];
+    /// The vertical of lines weighed against what else is known of it; an error with that vertical if lines do not guide it, with the
+    /// failed clause. `deviation` is the lines', in radians, by asking different photographs.
+    fn weighed(
+        &self,
+        lines: &Vector3<f64>,
+        deviation: f64,
+        guidance: &mut Guidance,
+    ) -> std::result::Result<Vector3<f64>, Vector3<f64>> {
         guidance.vertical_deviation = Some(deviation).filter(|deviation| deviation.is_finite());
-        let allowed = match guidance.pooled {
-            true => MAX_POOLED_DEVIATION_DEG,
-            false if self.options.gate == GateMode::Paper => f64::INFINITY,
-            false => believed_deviation(self.level_deviation).to_degrees(),
-        };
-        if deviation.to_degrees() > allowed {
+        if self.options.gate == GateMode::Paper {
+            return Ok(*lines);
+        }
+        let degrees = deviation.to_degrees();
+        if guidance.pooled && degrees > MAX_POOLED_DEVIATION_DEG {
             guidance.pooled = false;
             guidance.failed_clause = Some(format!(
-                "the lines leave the vertical uncertain by {:.1} degrees ({allowed:.1} allowed)",
-                deviation.to_degrees()
+                "the lines leave the vertical uncertain by {degrees:.1} degrees ({MAX_POOLED_DEVIATION_DEG:.1} allowed)"
             ));
-            return false;
+            return Err(self.level.down);
         }
-        true
+        let angle = lines.angle(&self.level.down);
+        let allowed = MAX_GRAVITY_DEVIATIONS * deviation.hypot(self.level.deviation());
+        let allowed = allowed.max(MAX_GRAVITY_ANGLE_DEG.to_radians());
+        if self.level.has_gravity && angle > allowed {
+            guidance.pooled = false;
+            guidance.failed_clause = Some(format!(
+                "the lines' vertical is {:.1} degrees from the one that the cameras recorded ({:.1} allowed)",
+                angle.to_degrees(),
+                allowed.to_degrees()
+            ));
+            return Err(self.level.down);
+        }
+        let (down, evidence) = self.level.with_lines(lines, deviation, guidance.inliers.len());
+        let guides = evidence.first().is_some_and(|lines| lines.share >= GUIDING_SHARE);
+        guidance.level = evidence;
+        if guides {
+            return Ok(down);
+        }
+        guidance.pooled = false;
+        guidance.failed_clause = Some(format!(
+            "the lines leave the vertical uncertain by {degrees:.1} degrees, more than without them ({:.1})",
+            self.level.deviation().to_degrees()
+        ));
+        Err(down)
     }
 
     fn corrected(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> Vec<Matrix3<f64>> {
         let certainties = relative_certainties(self.input.cameras, self.input.edges);
-        corrected_rotations(self.rotations, &certainties, &self.vote, frame, axis_weights)
+        corrected_rotations(self.level.rotations, &certainties, &self.vote, frame, axis_weights)
     }
 
     /// The frame that all segments vote for, unless it left the neighborhood of the photographs' own.
@@ -248,25 +298,34 @@ impl<'a> SceneDirections<'a> {
         if before.angle(&after) <= limit { refined } else { *frame }
     }
 
-    /// The prior of a vertical alone, sought near `level`, if the segments leave no doubt about it.
-    fn vertical_alone(&self, level: &Vector3<f64>, guidance: &mut Guidance) -> Option<Upright> {
-        let peak = vertical_peak(&self.vote, level).filter(|_| self.options.vertical_only)?;
+    /// The prior of a vertical alone, sought near the level of the cameras, if the segments leave no doubt about it.
+    fn vertical_alone(&self, guidance: &mut Guidance) -> Option<Upright> {
+        let peak = vertical_peak(&self.vote, &self.level.down).filter(|_| self.options.vertical_only)?;
         let total_weight = self.vote.total_weight();
         guidance.vertical_rivalry = Some(peak.rivalry);
         guidance.vertical_share = Some(peak.share(total_weight));
-        if !peak.is_clear(total_weight, self.rotations.len()) {
+        if !peak.is_clear(total_weight, self.level.rotations.len()) {
             return None;
         }
+        let (first, second) = orthonormal_complement(&peak.down);
+        let frame = Matrix3::from_columns(&[peak.down, first, second]);
+        let refinement = Refinement { start: &frame, axes_used: 1, axis_weights: &[1.0; 3] };
+        let deviation = axis_deviations(&self.vote, refinement)[0];
+        let refused = guidance.clone();
+        let Ok(down) = self.weighed(&peak.down, deviation, guidance) else {
+            *guidance = refused;
+            return None;
+        };
         guidance.used = true;
         guidance.vertical_only = true;
-        let own = common_rolls(&peak.down, self.rotations);
-        Some(self.solve(&peak.down, &own, self.rotations.to_vec(), guidance))
+        let own = common_rolls(&down, self.level.rotations);
+        Some(self.solve(&down, &own, self.level.rotations.to_vec(), guidance))
     }
 
     /// Searches photographs that disagree, or have no triad, again near the dominant directions.
     fn redetect(&mut self, dominant: &mut Dominant) {
         let frame = dominant.frame;
-        for index in 0..self.rotations.len() {
+        for index in 0..self.level.rotations.len() {
             if dominant.residuals[index].is_some_and(|residual| residual <= self.options.rejection) {
                 continue;
             }
@@ -274,14 +333,14 @@ impl<'a> SceneDirections<'a> {
             if planes.len() < self.input.vanishing.min_lines {
                 continue;
             }
-            let start = self.rotations[index] * frame;
+            let start = self.level.rotations[index] * frame;
             let near = RefinedTriad::refine(&start, planes, self.input.vanishing);
             let enough = match self.input.triads[index].triad() {
                 Some(own) => near.score >= REDETECTION_SHARE * own.quality * planes.total_weight,
                 None => near.score >= self.input.vanishing.min_quality * planes.total_weight,
             };
             if enough {
-                let triad = self.rotations[index].tr_mul(&near.triad);
+                let triad = self.level.rotations[index].tr_mul(&near.triad);
                 dominant.residuals[index] = Some(triad_residual(&frame, &triad));
                 self.triads[index] = Some(triad);
             }
@@ -300,7 +359,7 @@ impl<'a> SceneDirections<'a> {
         let evidence = RollEvidence {
             down,
             own,
-            given_rotations: self.rotations,
+            given_rotations: self.level.rotations,
             corrected_rotations: &rotations,
             edges: self.input.edges,
         };
@@ -310,11 +369,11 @@ impl<'a> SceneDirections<'a> {
     }
 }
 
-/// The largest standard deviation in radians at which the lines' vertical is believed rather than the level of straightening,
-/// which itself deviates by `level_deviation`.
-fn believed_deviation(level_deviation: Option<f64>) -> f64 {
-    let always = BELIEVED_VERTICAL_DEVIATION_DEG.to_radians();
-    level_deviation.map_or(always, |level| level.clamp(always, MAX_VERTICAL_DEVIATION_DEG.to_radians()))
+/// The smallest rotation that takes the direction `from` to `to`.
+fn turn_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Matrix3<f64> {
+    let axis = from.cross(to);
+    let angle = from.angle(to);
+    axis.try_normalize(f64::EPSILON).map_or_else(Matrix3::identity, |axis| exp_rotation(&(axis * angle)))
 }
 
 /// Full weight for the vertical; for the horizontals as much as the photographs' directions agree: where buildings stand
@@ -333,17 +392,4 @@ pub(super) fn axis_weights(frame: &Matrix3<f64>, down: &Vector3<f64>, guidance: 
 /// Each photograph's roll by the common vertical: after the joint refinement no photograph's own triad knows better.
 fn common_rolls(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> Vec<Option<f64>> {
     rotations.iter().map(|rotation| roll_of(&(rotation * down))).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lines_are_believed_as_far_as_straightening_is_in_doubt() {
-        let believed = |level: Option<f64>| believed_deviation(level.map(f64::to_radians)).to_degrees();
-        for (level, expected) in [(None, 1.5), (Some(0.2), 1.5), (Some(2.16), 2.16), (Some(40.0), 3.0)] {
-            assert!((believed(level) - expected).abs() < 1e-12, "{level:?}");
-        }
-    }
 }

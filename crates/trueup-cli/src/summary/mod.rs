@@ -48,6 +48,9 @@ pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool
         details::pairs(&mut lines, project, &names);
     }
     lines.entry("upright", &upright(project));
+    if let Some(told) = project.manhattan.level_in_words() {
+        lines.entry("level by", &told);
+    }
     measures::short(&mut lines, project, &names);
     measures::judged(&mut lines, project);
     if verbose || file.is_none() {

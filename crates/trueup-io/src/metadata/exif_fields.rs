@@ -7,6 +7,8 @@ use tiff::decoder::Decoder;
 use tiff::decoder::ifd::Value as TiffValue;
 use tiff::tags::Tag as TiffTag;
 
+use super::maker_note;
+use super::pose::StatedPose;
 use crate::provenance::description::SOFTWARE;
 
 /// EXIF 3.0 tag numbers read from a TIFF's EXIF directory (section 4.6).
@@ -57,6 +59,10 @@ pub(crate) struct ExifFields {
     pub(crate) color_space: Option<u32>,
     /// InteroperabilityIndex, trimmed; not read from a TIFF's own directories.
     pub(crate) interoperability: Option<String>,
+    /// The acceleration vector of Apple's maker note, in g; not read from a TIFF's own directories.
+    pub(crate) apple_acceleration: Option<[f64; 3]>,
+    /// How the camera was held, as XMP beside the EXIF has it; read from JPEG alone.
+    pub(crate) pose: Option<StatedPose>,
 }
 
 impl ExifFields {
@@ -83,6 +89,11 @@ impl ExifFields {
             custom_rendered: value(Tag::CustomRendered).and_then(|value| value.get_uint(0)),
             color_space: value(Tag::ColorSpace).and_then(|value| value.get_uint(0)),
             interoperability: text(Tag::InteroperabilityIndex),
+            apple_acceleration: match value(Tag::MakerNote) {
+                Some(Value::Undefined(note, _)) => maker_note::apple_acceleration(note),
+                _ => None,
+            },
+            pose: None,
         }
     }
 

@@ -5,10 +5,11 @@ use std::io::{BufReader, Seek};
 use std::path::Path;
 
 use exif::{Field, Tag};
-use trueup_core::source::FocalPrior;
+use trueup_core::source::{FocalPrior, RecordedGravity};
 
 use super::exif_fields::ExifFields;
 use super::focal::focal_prior;
+use super::gravity::{PixelOrder, recorded_gravity};
 use crate::format::{HeaderError, Input, Reading, StoredPixels};
 use crate::formats;
 
@@ -25,6 +26,13 @@ impl Header {
     /// The focal length that EXIF tells, in pixels of this photograph.
     pub(crate) fn focal_prior(&self) -> Option<FocalPrior> {
         focal_prior(&self.exif, self.stored.width as f64, self.stored.height as f64)
+    }
+
+    /// Which way the camera recorded as down, in the picture as it is shown: the file states orientation `stated`, and
+    /// `applied` is what it is decoded with, 1 to 8 each.
+    pub(crate) fn gravity(&self, stated: u8, applied: u8) -> Option<RecordedGravity> {
+        let stored = [self.stored.width, self.stored.height];
+        recorded_gravity(&self.exif, PixelOrder { stored, stated, applied })
     }
 }
 

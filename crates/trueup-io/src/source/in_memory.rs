@@ -54,6 +54,7 @@ pub(super) fn in_memory_source(path: PathBuf, name: &str, photograph: &Photograp
         camera_model: None,
         lens_model: None,
         focal_mm: None,
+        gravity: None,
         lens: None,
     })
 }

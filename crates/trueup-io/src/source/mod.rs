@@ -221,6 +221,8 @@ fn examine(
         _ => (stored.width, stored.height),
     };
     let focal_prior = header.focal_prior();
+    let stated = tag.and_then(|tag| u8::try_from(tag).ok()).filter(|tag| (1..=8).contains(tag)).unwrap_or(1);
+    let gravity = header.gravity(stated, orientation);
     let camera_model = header.exif.camera_model();
     let Header { exif, .. } = header;
     let focal_mm = exif.focal_mm.filter(|focal_mm| focal_mm.is_finite() && *focal_mm > 0.0);
@@ -234,6 +236,7 @@ fn examine(
         camera_model,
         lens_model: exif.lens_model,
         focal_mm,
+        gravity,
         lens: None,
     })
 }

@@ -8,7 +8,7 @@ use jpeg_encoder::{ColorType, Encoder};
 use proptest::prelude::*;
 use tempfile::TempDir;
 use trueup_core::raster::{Photograph, Raster};
-use trueup_core::source::{FocalSource, PhotographSource, WorkingFrame};
+use trueup_core::source::{FocalSource, GravitySource, PhotographSource, WorkingFrame};
 
 use super::*;
 use crate::decode::FilePhotographs;
@@ -226,6 +226,45 @@ fn focal_length_and_camera_come_from_exif() {
     assert_eq!(prior.source, FocalSource::Equivalent35mm);
     // 157 mm * 500 px / 43.2666 mm.
     assert!((prior.focal_px - 1814.3).abs() < 0.1, "{prior:?}");
+}
+
+/// A telephone held upright, its camera up by 30 degrees, and a drone's that looks down by 10, rolled by 20: down in the pictures as they are shown.
+#[test]
+fn gravity_comes_from_the_maker_note_and_from_xmp() {
+    let mut note = b"Apple iOS\0\0\x01MM\0\x01\0\x08\0\x0a\0\0\0\x03\0\0\0\x20\0\0\0\0".to_vec();
+    for numerator in [0_i32, -866_025, 500_000] {
+        note.extend(numerator.to_be_bytes());
+        note.extend(1_000_000_i32.to_be_bytes());
+    }
+    let telephone = [
+        (Tag::Orientation, Value::Short(vec![6])),
+        (Tag::Make, Value::Ascii(vec![b"Apple".to_vec()])),
+        (Tag::MakerNote, Value::Undefined(note, 0)),
+    ];
+    let packet = "<x:xmpmeta xmlns:x=\"adobe:ns:meta/\"><rdf:RDF xmlns:rdf=\"http://www.w3.org/1999/02/22-rdf-syntax-ns#\">\
+                  <rdf:Description xmlns:drone-dji=\"http://www.dji.com/drone-dji/1.0/\" drone-dji:GimbalPitchDegree=\"-10.0\" \
+                  drone-dji:GimbalRollDegree=\"+20.0\"/></rdf:RDF></x:xmpmeta>";
+    let mut segment = b"http://ns.adobe.com/xap/1.0/\0".to_vec();
+    segment.extend_from_slice(packet.as_bytes());
+    let mut drone = jpeg(32, 24, 2, &[]);
+    let length = u16::try_from(segment.len() + 2).expect("a short packet").to_be_bytes();
+    drone.splice(2..2, [&[0xff, 0xe1], &length[..], &segment].concat());
+    let files =
+        Files::new(&[("a.jpg", jpeg(32, 24, 1, &telephone)), ("b.jpg", drone), ("c.jpg", jpeg(32, 24, 3, &[]))]);
+    let found: Vec<_> =
+        files.scan(&["a.jpg", "b.jpg", "c.jpg"]).photographs.iter().map(|source| source.gravity).collect();
+    let (sine, cosine) = 10_f64.to_radians().sin_cos();
+    let (roll_sine, roll_cosine) = 20_f64.to_radians().sin_cos();
+    let expected = [
+        (GravitySource::AppleAcceleration, [0.0, 0.75_f64.sqrt(), -0.5]),
+        (GravitySource::DjiGimbal, [roll_sine * cosine, roll_cosine * cosine, sine]),
+    ];
+    for (found, (source, down)) in found.iter().zip(expected) {
+        let found = found.expect("it was recorded");
+        assert_eq!(found.source, source);
+        assert!(found.down.iter().zip(down).all(|(one, other)| (one - other).abs() < 1e-5), "{found:?}");
+    }
+    assert_eq!(found[2], None);
 }
 
 #[test]

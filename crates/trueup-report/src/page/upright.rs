@@ -22,6 +22,7 @@ pub(super) fn values(page: &Page) -> Value {
     });
     json!({
         "guidance": guidance(page.project),
+        "level": found.level_in_words(),
         "divergence": found.divergence.map(|divergence| figure("/manhattan/divergence", divergence, 3)),
         "threshold": figure("/manhattan/threshold", found.threshold, 3),
         "figures": figures,

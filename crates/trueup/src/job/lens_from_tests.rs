@@ -13,6 +13,7 @@ fn image(width: usize, height: usize, orientation: u8) -> SourceImage {
         camera_model: None,
         lens_model: None,
         focal_mm: None,
+        gravity: None,
         lens: None,
     }
 }

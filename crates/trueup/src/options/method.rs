@@ -74,6 +74,7 @@ fn fix_published_guidance(options: &mut AlignOptions) {
     similarity.camera_correction = false;
     similarity.pooled_search = false;
     similarity.vertical_only = false;
+    similarity.gravity = false;
     similarity.pitch_prior = 0.0;
 }
 

@@ -405,6 +405,7 @@ mod tests {
             "similarity.camera_correction",
             "similarity.fallback",
             "similarity.gate",
+            "similarity.gravity",
             "similarity.guided_redetection",
             "similarity.joint_refinement",
             "similarity.pitch_prior",

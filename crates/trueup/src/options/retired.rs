@@ -7,6 +7,8 @@ pub(super) enum Retired {
     Renamed(&'static str),
     /// Nobody had a reason to change it: value and unit that hold now.
     Fixed(&'static str),
+    /// Nothing has taken its place: the value that held unless it was set.
+    Gone(&'static str),
     /// It is a command and its flag; no panorama depends on it.
     Flag(&'static str),
 }
@@ -21,15 +23,15 @@ impl Retired {
     pub(super) fn reason(self, name: &str) -> String {
         match self {
             Self::Renamed(new) => format!("\"{name}\" is now \"{new}\""),
-            Self::Fixed("") => format!("\"{name}\" is no option any more"),
+            Self::Gone(_) => format!("\"{name}\" is no option any more"),
             Self::Fixed(value) => format!("\"{name}\" is now fixed at {value}"),
             Self::Flag(flag) => format!("\"{name}\" is now `{flag}`"),
         }
     }
 
-    /// Whether `value`, as a file of an earlier version has it, is what holds now.
+    /// Whether `value`, as a file of an earlier version has it, is what holds now, or what nobody chose.
     pub(super) fn is_now(self, value: &toml::Value) -> bool {
-        let Self::Fixed(now) = self else { return false };
+        let (Self::Fixed(now) | Self::Gone(now)) = self else { return false };
         let now = now.split_whitespace().next().unwrap_or_default();
         match value {
             toml::Value::Float(value) => now.parse() == Ok(*value),
@@ -41,7 +43,7 @@ impl Retired {
     }
 }
 
-use Retired::{Fixed, Flag, Renamed};
+use Retired::{Fixed, Flag, Gone, Renamed};
 
 /// Options of version 0.1, sorted by name.
 const RETIRED: [(&str, Retired); 181] = [
@@ -178,7 +180,7 @@ const RETIRED: [(&str, Retired); 181] = [
     ("similarity.max_pooled_deviation_deg", Fixed("1 degrees")),
     ("similarity.max_pooled_lines", Fixed("1200 segments")),
     ("similarity.max_straightening_angle_deg", Fixed("20 degrees")),
-    ("similarity.max_vertical_deviation_deg", Fixed("1.5 degrees")),
+    ("similarity.max_vertical_deviation_deg", Gone("1.5")),
     ("similarity.max_vertical_rivalry", Fixed("0.5")),
     ("similarity.min_inlier_share", Fixed("0.4")),
     ("similarity.min_inlier_share_few", Fixed("0.6")),

@@ -118,8 +118,9 @@ impl StitchOptions {
                 match retired {
                     Retired::Renamed(new) => renamed.push((new, value)),
                     Retired::Flag(_) => {}
-                    Retired::Fixed(_) if toml::Value::try_from(&value).is_ok_and(|value| retired.is_now(&value)) => {}
-                    Retired::Fixed(_) => {
+                    Retired::Fixed(_) | Retired::Gone(_)
+                        if toml::Value::try_from(&value).is_ok_and(|value| retired.is_now(&value)) => {}
+                    Retired::Fixed(_) | Retired::Gone(_) => {
                         let reason = format!("it is of an earlier version: {}", retired.reason(&name));
                         return Err(Error::input(file, reason, "Stitch the photographs again."));
                     }

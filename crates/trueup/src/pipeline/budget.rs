@@ -147,6 +147,7 @@ mod tests {
             camera_model: None,
             lens_model: None,
             focal_mm: None,
+            gravity: None,
             lens: None,
         };
         (0..count).map(image).collect()

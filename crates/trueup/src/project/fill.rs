@@ -1,5 +1,6 @@
 //! Fills the project: what is recorded of photographs, pairs and geometry.
 
+use trueup_align::similarity::LevelEvidence;
 use trueup_compose::crop::Rectangle;
 use trueup_compose::exposure::{Correction, Corrections, Response};
 use trueup_compose::layout::{CanvasLayout, Placed};
@@ -9,8 +10,8 @@ use trueup_core::lens::PlacedLens;
 use trueup_core::mesh::GridMesh;
 
 use super::record::{
-    Canvas, CropRecord, ImageRecord, ImageStatus, ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION,
-    PairRecord, Project,
+    Canvas, CropRecord, ImageRecord, ImageStatus, LevelRecord, ManhattanRecord, MeshRecord, PROJECT_FORMAT,
+    PROJECT_VERSION, PairRecord, Project,
 };
 use crate::options::{MethodForm, StitchOptions};
 use crate::pipeline::align::Geometry;
@@ -83,6 +84,7 @@ pub(crate) fn unfilled(
             failed_clause: Some("a single photograph is left as it is".to_owned()),
             dominant: None,
             inliers: Vec::new(),
+            level: Vec::new(),
         },
         measures: None,
         canvas: Canvas { width: 0, height: 0, full_turn: false },
@@ -313,6 +315,17 @@ pub(crate) fn fill_geometry(project: &mut Project, found: &GeometryRecord) {
             },
             dominant: guidance.dominant,
             inliers: guidance.inliers.iter().map(|&k| component.images[k].path.display().to_string()).collect(),
+            level: if is_warp { Vec::new() } else { guidance.level.iter().map(level_record).collect() },
         };
+    }
+}
+
+fn level_record(evidence: &LevelEvidence) -> LevelRecord {
+    LevelRecord {
+        source: evidence.source,
+        photographs: evidence.photographs,
+        angle_deg: evidence.angle.to_degrees(),
+        deviation_deg: evidence.deviation.to_degrees(),
+        share: evidence.share,
     }
 }

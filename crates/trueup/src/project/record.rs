@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Deserializer, Serialize};
 use trueup_align::mesh::CameraPlane;
+use trueup_align::similarity::LevelSource;
 use trueup_compose::exposure::{Correction, Response};
 use trueup_core::camera::Camera;
 use trueup_core::diagnostics::{Diagnostic, Severity};
@@ -158,6 +159,53 @@ pub struct ManhattanRecord {
     pub dominant: Option<[[f64; 3]; 3]>,
     /// Paths of the photographs whose vanishing points agree with the dominant directions.
     pub inliers: Vec<String>,
+    /// What told of the vertical, and of how much; empty for methods that ask nothing but the overlaps.
+    #[serde(default)]
+    pub level: Vec<LevelRecord>,
+}
+
+/// What one source said of the vertical, and what it came to count for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LevelRecord {
+    /// Who says it: "lines", "gravity" that cameras recorded, or "cameras", that are expected to be held level.
+    pub source: LevelSource,
+    /// How many photographs it rests on.
+    pub photographs: usize,
+    /// Angle between its own vertical and the panorama's, degrees.
+    pub angle_deg: f64,
+    /// Standard deviation of its vertical about the axis that it tells least of, degrees.
+    pub deviation_deg: f64,
+    /// Its share of what the vertical rests on, 0 to 1.
+    pub share: f64,
+}
+
+impl LevelRecord {
+    /// Smallest share that is worth a word.
+    const WORTH_NAMING: f64 = 0.005;
+
+    fn in_words(&self) -> String {
+        let who = match self.source {
+            LevelSource::Lines => format!("lines in {}", count_of_photographs(self.photographs)),
+            LevelSource::Gravity => format!("gravity that {} recorded", count_of_photographs(self.photographs)),
+            LevelSource::Cameras => "cameras held level".to_owned(),
+        };
+        // Up to the next tenth: what is sure to less is not told so surely.
+        let deviation_deg = (10.0 * self.deviation_deg).ceil() / 10.0;
+        format!("{who} {:.0} % (to {deviation_deg:.1} degrees)", 100.0 * self.share)
+    }
+}
+
+fn count_of_photographs(count: usize) -> String {
+    if count == 1 { "one photograph".to_owned() } else { format!("{count} photographs") }
+}
+
+impl ManhattanRecord {
+    /// What told of the vertical, and of how much, in words; `None` where nothing was asked.
+    pub fn level_in_words(&self) -> Option<String> {
+        let worth_naming = self.level.iter().filter(|one| one.share >= LevelRecord::WORTH_NAMING);
+        let told: Vec<String> = worth_naming.map(LevelRecord::in_words).collect();
+        (!told.is_empty()).then(|| told.join(", "))
+    }
 }
 
 /// Size of the written panorama.

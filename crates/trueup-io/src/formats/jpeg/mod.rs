@@ -23,7 +23,7 @@ pub(crate) static JPEG: Format = Format {
         has_signature: |start| start.starts_with(&[0xff, 0xd8, 0xff]),
         stored: read::stored,
         icc: read::icc,
-        exif: block::read_exif,
+        exif: read::exif,
         whole_fields: block::read_fields,
         pixels: read::pixels,
         pixel_bytes: PLAIN_PIXEL_BYTES,

@@ -1,6 +1,6 @@
 //! Photographs in JPEG.
 
-use std::io::Read;
+use std::io::{Read, Seek};
 
 use trueup_core::raster::{Photograph, Raster};
 use trueup_core::source::SourceImage;
@@ -13,6 +13,9 @@ use zune_jpeg::JpegDecoder;
 use super::scans::has_separate_subsampled_scans;
 use crate::format::{HeaderError, Input, StoredPixels};
 use crate::formats::decoded::{MAX_PIXEL_BYTES, check_unchanged, damaged};
+use crate::metadata::block;
+use crate::metadata::exif_fields::ExifFields;
+use crate::metadata::pose::stated_pose;
 
 /// Largest width and height a JPEG can state (ITU-T T.81 table B.2).
 const JPEG_MAX_SIDE: usize = 65_535;
@@ -35,6 +38,23 @@ pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
     let mut decoder = JpegDecoder::new_with_options(input, options());
     decoder.decode_headers().ok()?;
     decoder.icc_profile()
+}
+
+/// The fields of the EXIF block, and what the XMP packet beside it states of how the camera was held.
+pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
+    let fields = block::read_exif(input);
+    let pose = input.rewind().ok().and_then(|()| xmp(input)).and_then(|packet| stated_pose(&packet));
+    match (fields, pose) {
+        (None, None) => None,
+        (fields, pose) => Some(ExifFields { pose, ..fields.unwrap_or_default() }),
+    }
+}
+
+/// The XMP packet.
+fn xmp(input: &mut Input) -> Option<Vec<u8>> {
+    let mut decoder = JpegDecoder::new_with_options(input, options());
+    decoder.decode_headers().ok()?;
+    decoder.xmp().cloned()
 }
 
 /// Decodes the pixels as they are stored.

@@ -7,7 +7,7 @@ use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
-use trueup_core::source::{FocalSource, SourceImage, WorkingFrame};
+use trueup_core::source::{FocalSource, RecordedGravity, SourceImage, WorkingFrame};
 
 use crate::pipeline::measured::Measured;
 
@@ -68,6 +68,11 @@ impl<'a> Component<'a> {
     /// A number for each photograph that depends neither on its folder nor on the order of the inputs.
     pub(super) fn seeds(&self) -> Vec<u64> {
         self.images.iter().map(|image| name_seed(&image.path)).collect()
+    }
+
+    /// Which way each photograph's camera recorded as down, if it did.
+    pub(super) fn gravity(&self) -> Vec<Option<RecordedGravity>> {
+        self.images.iter().map(|image| image.gravity).collect()
     }
 
     /// Which photographs one camera took: [`camera_groups`].
@@ -144,6 +149,7 @@ mod tests {
             camera_model: Some("Camera".to_owned()),
             lens_model: lens_model.map(str::to_owned),
             focal_mm,
+            gravity: None,
             lens: None,
         }
     }

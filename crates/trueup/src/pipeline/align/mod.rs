@@ -161,6 +161,7 @@ fn find_prior(
         triads,
         lines,
         frames: &component.frames,
+        gravity: &component.gravity(),
         edges: &overlaps.pairs,
         overlaps: &overlaps.warps,
         cell_px: options.mesh.cell_px,

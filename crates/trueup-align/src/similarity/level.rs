@@ -1,0 +1,286 @@
+//! One vertical of everything that tells of it, each by how sure it is.
+//!
+//! The cameras expect to be held level, sensors recorded gravity, lines point down. Each gives a direction and a
+//! covariance; the vertical is the direction of least summed squares, each in units of its own deviation, so that none is
+//! believed altogether or not at all.
+
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
+use trueup_core::geometry::orthonormal_complement;
+
+use super::gravity::MeanGravity;
+use super::straighten::{Straightened, level_moment, straighten, straighten_with_pitch};
+
+/// Roll that photographers leave, degrees: what is expected before the photographs show their own. Reasoned: hand-held
+/// photographs of level scenes scatter by 1 to 3 degrees.
+const EXPECTED_ROLL_DEG: f64 = 2.0;
+/// How many photographs that expectation counts for.
+const EXPECTED_COUNT: f64 = 2.0;
+/// The two angles of a vertical are fitted to the rolls.
+const FITTED: f64 = 2.0;
+/// How many of its deviations the cameras' level lies from the vertical when it counts for a quarter (Geman-McClure): nothing
+/// keeps photographers from tilting all photographs alike.
+const HELD_SCALE: f64 = 2.0;
+/// Steps toward the vertical of least squares. Where the cameras' level is far off, it takes several to do without it.
+const STEPS: usize = 20;
+
+/// What tells of the vertical.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LevelSource {
+    /// The directions of lines in the photographs.
+    Lines,
+    /// Gravity that the cameras recorded.
+    Gravity,
+    /// The expectation that cameras are held level.
+    Cameras,
+}
+
+/// What one source said of the vertical, and what it came to count for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LevelEvidence {
+    /// Who says it.
+    pub source: LevelSource,
+    /// How many photographs it rests on.
+    pub photographs: usize,
+    /// Angle in radians between its own vertical and the one that was used.
+    pub angle: f64,
+    /// Standard deviation in radians, about the axis it tells least of.
+    pub deviation: f64,
+    /// Its share of the information that the vertical rests on, 0 to 1.
+    pub share: f64,
+}
+
+/// A source before it is weighed: squares of a direction d are d^T `moment` d + (d - `down`)^T `information` (d - `down`).
+#[derive(Debug, Clone, Copy)]
+struct Say {
+    source: LevelSource,
+    photographs: usize,
+    down: Vector3<f64>,
+    /// Of what a vertical is orthogonal to, rad^-2.
+    moment: Matrix3<f64>,
+    /// Of the vertical itself, rad^-2 about every axis.
+    information: f64,
+}
+
+impl Say {
+    /// What is left of this say if the vertical is `down`: all of what was seen, less of what was only expected.
+    fn heeded(&self, down: &Vector3<f64>) -> Self {
+        let squares = |direction: &Vector3<f64>| direction.dot(&(self.moment * direction));
+        let beyond = (squares(down) - squares(&self.down)).max(0.0) / HELD_SCALE.powi(2);
+        Self { moment: self.moment * (1.0 + beyond).powi(-2), ..*self }
+    }
+
+    /// Information about turns of `down` along the columns of `basis`.
+    fn information(&self, basis: &Matrix3x2<f64>) -> Matrix2<f64> {
+        basis.tr_mul(&(self.moment * basis)) + Matrix2::identity() * self.information
+    }
+
+    /// Half the gradient of the squares at `down` along the columns of `basis`.
+    fn gradient(&self, down: &Vector3<f64>, basis: &Matrix3x2<f64>) -> Vector2<f64> {
+        basis.tr_mul(&(self.moment * down - self.down * self.information))
+    }
+
+    /// Standard deviation in radians about the axis it tells least of.
+    fn deviation(&self) -> f64 {
+        greatest_deviation(&self.information(&tangent(&self.down)))
+    }
+}
+
+/// What is known of the vertical without lines.
+#[derive(Debug, Clone)]
+pub(super) struct CameraLevel<'a> {
+    /// The cameras' rotations, from the common frame to each camera.
+    pub rotations: &'a [Matrix3<f64>],
+    /// By [`straighten`], as published.
+    pub straightened: Straightened,
+    /// Down in the common frame, by the cameras and by recorded gravity.
+    pub down: Vector3<f64>,
+    /// Whether recorded gravity takes part.
+    pub has_gravity: bool,
+    says: Vec<Say>,
+}
+
+impl<'a> CameraLevel<'a> {
+    /// Of the cameras with what [`straighten_with_pitch`] expects of them, and of the mean of recorded gravity, if there is any.
+    pub(super) fn new(rotations: &'a [Matrix3<f64>], pitch_prior: f64, gravity: Option<MeanGravity>) -> Self {
+        let level = straighten_with_pitch(rotations, pitch_prior);
+        let cameras = Say {
+            source: LevelSource::Cameras,
+            photographs: rotations.len(),
+            down: level,
+            moment: level_moment(rotations, pitch_prior) / roll_variance(rotations, &level),
+            information: 0.0,
+        };
+        let gravity = gravity.map(|gravity| Say {
+            source: LevelSource::Gravity,
+            photographs: gravity.photographs,
+            down: gravity.down,
+            moment: Matrix3::zeros(),
+            information: gravity.deviation.powi(-2),
+        });
+        let says: Vec<Say> = [Some(cameras), gravity].into_iter().flatten().collect();
+        let has_gravity = gravity.is_some();
+        let start = gravity.map_or(level, |gravity| gravity.down);
+        let down = if has_gravity { combined(&says, &start) } else { level };
+        Self { rotations, straightened: straighten(rotations), down, has_gravity, says }
+    }
+
+    /// Standard deviation in radians of `down`, about the axis that is known worst.
+    pub(super) fn deviation(&self) -> f64 {
+        let heeded: Vec<Say> = self.says.iter().map(|say| say.heeded(&self.down)).collect();
+        greatest_deviation(&information(&heeded, &self.down))
+    }
+
+    /// What told of `down`, and of how much.
+    pub(super) fn evidence(&self) -> Vec<LevelEvidence> {
+        evidence(&self.says, &self.down)
+    }
+
+    /// The vertical with what lines say of it, which deviates by `deviation` radians in `photographs` photographs, weighed in; and
+    /// what told of it.
+    pub(super) fn with_lines(
+        &self,
+        lines: &Vector3<f64>,
+        deviation: f64,
+        photographs: usize,
+    ) -> (Vector3<f64>, Vec<LevelEvidence>) {
+        let mut says = vec![Say {
+            source: LevelSource::Lines,
+            photographs,
+            down: *lines,
+            moment: Matrix3::zeros(),
+            information: deviation.powi(-2),
+        }];
+        says.extend_from_slice(&self.says);
+        let down = combined(&says, lines);
+        let evidence = evidence(&says, &down);
+        (down, evidence)
+    }
+}
+
+/// Variance of the cameras' rolls about `level`, of which two angles were fitted; with what is expected of photographers, which few
+/// photographs do not refute.
+fn roll_variance(rotations: &[Matrix3<f64>], level: &Vector3<f64>) -> f64 {
+    let squares: f64 = rotations.iter().map(|rotation| rotation.row(0).transpose().dot(level).powi(2)).sum();
+    let free = (rotations.len() as f64 - FITTED).max(0.0);
+    (squares + EXPECTED_COUNT * EXPECTED_ROLL_DEG.to_radians().powi(2)) / (free + EXPECTED_COUNT)
+}
+
+/// The direction of least squares, from `start`.
+fn combined(says: &[Say], start: &Vector3<f64>) -> Vector3<f64> {
+    let mut down = *start;
+    for _ in 0..STEPS {
+        let basis = tangent(&down);
+        let says: Vec<Say> = says.iter().map(|say| say.heeded(&down)).collect();
+        let gradient: Vector2<f64> = says.iter().map(|say| say.gradient(&down, &basis)).sum();
+        let Some(covariance) = information(&says, &down).try_inverse() else { break };
+        down = (down - basis * (covariance * gradient)).normalize();
+    }
+    if down.iter().all(|part| part.is_finite()) { down } else { *start }
+}
+
+/// What the sources tell together of turns of `down` about its two tangents.
+fn information(says: &[Say], down: &Vector3<f64>) -> Matrix2<f64> {
+    let basis = tangent(down);
+    says.iter().map(|say| say.information(&basis)).sum()
+}
+
+fn tangent(down: &Vector3<f64>) -> Matrix3x2<f64> {
+    let (first, second) = orthonormal_complement(down);
+    Matrix3x2::from_columns(&[first, second])
+}
+
+fn greatest_deviation(information: &Matrix2<f64>) -> f64 {
+    information.symmetric_eigenvalues().min().max(0.0).sqrt().recip()
+}
+
+/// Shares are of the trace of the information.
+fn evidence(says: &[Say], down: &Vector3<f64>) -> Vec<LevelEvidence> {
+    let basis = tangent(down);
+    let traces: Vec<f64> = says.iter().map(|say| say.heeded(down).information(&basis).trace()).collect();
+    let total: f64 = traces.iter().sum();
+    let of_say = |(say, trace): (&Say, &f64)| LevelEvidence {
+        source: say.source,
+        photographs: say.photographs,
+        angle: say.down.angle(down),
+        deviation: say.deviation(),
+        share: if total > 0.0 { trace / total } else { 0.0 },
+    };
+    says.iter().zip(&traces).map(of_say).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z};
+
+    use super::*;
+
+    const PITCH_PRIOR: f64 = 0.1;
+
+    /// Four cameras that look in all directions, rolled by turns to the left and to the right.
+    fn all_round(roll: f64) -> Vec<Matrix3<f64>> {
+        let turn = |quarter: i32| rotation_about_y(f64::from(quarter) * std::f64::consts::FRAC_PI_2);
+        (0..4).map(|quarter| rotation_about_z(if quarter % 2 == 0 { roll } else { -roll }) * turn(quarter)).collect()
+    }
+
+    fn gravity(down: Vector3<f64>, deviation: f64) -> Option<MeanGravity> {
+        Some(MeanGravity { down, deviation, photographs: 4 })
+    }
+
+    /// By symmetry the level is y. The variance of a roll is (4 sin^2 r + 2 e^2) / (2 + 2) with e the expected roll, and either
+    /// horizontal axis is fixed by 2 cos^2 r + 2 p.
+    #[test]
+    fn the_level_of_cameras_is_as_certain_as_rolls_let_it_be() {
+        let roll = 0.1_f64;
+        let rotations = all_round(roll);
+        let level = CameraLevel::new(&rotations, PITCH_PRIOR, None);
+        assert!(level.down.angle(&Vector3::y()) < 1e-12, "{}", level.down);
+        let variance = (4.0 * roll.sin().powi(2) + 2.0 * EXPECTED_ROLL_DEG.to_radians().powi(2)) / 4.0;
+        let expected = (variance / (2.0 * roll.cos().powi(2) + 2.0 * PITCH_PRIOR)).sqrt();
+        assert!((level.deviation() - expected).abs() < 1e-12, "{} instead of {expected}", level.deviation());
+        let [cameras] = level.evidence()[..] else { panic!("one source") };
+        assert_eq!((cameras.source, cameras.share), (LevelSource::Cameras, 1.0));
+    }
+
+    /// Two directions a small angle apart, of deviations 1 and 2: the mean lies at a fifth of the angle from the surer.
+    #[test]
+    fn lines_and_gravity_meet_by_their_variances() {
+        let rotations = all_round(0.0);
+        let tilted = rotation_about_x(0.02) * Vector3::y();
+        let level = CameraLevel::new(&rotations, 0.0, gravity(tilted, 0.002));
+        // The cameras, sure to a degree, move gravity a little; what remains lies between.
+        let (down, evidence) = level.with_lines(&Vector3::y(), 0.001, 4);
+        let cameras = CameraLevel::new(&rotations, 0.0, None).deviation().powi(-2);
+        let (lines, gravity) = (1e6, 0.25e6);
+        let expected = 0.02 * gravity / (gravity + lines + cameras);
+        assert!((down.angle(&Vector3::y()) - expected).abs() < 1e-4 * expected, "{}", down.angle(&Vector3::y()));
+        let shares: Vec<f64> = evidence.iter().map(|one| one.share).collect();
+        let total = lines + gravity + cameras;
+        for (share, expected) in shares.iter().zip([lines / total, cameras / total, gravity / total]) {
+            assert!((share - expected).abs() < 1e-3, "{shares:?}");
+        }
+        assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+
+    /// A telephone laid on its side for every photograph: its cameras expect another level, gravity knows.
+    #[test]
+    fn gravity_outweighs_how_cameras_are_held() {
+        let rotations: Vec<Matrix3<f64>> =
+            all_round(0.0).iter().map(|rotation| rotation_about_z(std::f64::consts::FRAC_PI_2) * rotation).collect();
+        let level = CameraLevel::new(&rotations, PITCH_PRIOR, gravity(Vector3::y(), 0.02));
+        assert!(level.down.angle(&Vector3::y()) < 1e-3, "{}", level.down);
+        let shares: Vec<f64> = level.evidence().iter().map(|one| one.share).collect();
+        assert!(shares[0] < 1e-3 && shares[1] > 0.999, "{shares:?}");
+    }
+
+    #[test]
+    fn a_single_photograph_has_a_level() {
+        let rotations = [Matrix3::identity()];
+        let level = CameraLevel::new(&rotations, PITCH_PRIOR, None);
+        assert!(level.down.angle(&Vector3::y()) < 1e-12);
+        // sqrt(e^2 / p): its pitch is what it tells least of.
+        let expected = EXPECTED_ROLL_DEG / PITCH_PRIOR.sqrt();
+        assert!((level.deviation().to_degrees() - expected).abs() < 1e-9, "{}", level.deviation().to_degrees());
+    }
+}
