@@ -11,12 +11,32 @@ pub(super) struct GateEvidence {
     pub inliers: usize,
     /// The divergence epsilon.
     pub divergence: f64,
-    /// Angle in radians between the dominant and the straightened vertical, if the latter is well conditioned.
-    pub straightening_angle: Option<f64>,
+    /// Angle in radians between the dominant vertical and the cameras' own, and the same in deviations of the latter; `None` where the
+    /// cameras do not fix one.
+    pub from_cameras: Option<CameraAngle>,
     /// How far the best frame of the pooled search stands out, standard deviations; `None` without that search.
     pub significance: Option<f64>,
     /// Median over the inliers of |alpha_i|, radians.
     pub median_roll: f64,
+}
+
+/// How far a vertical lies from the one that the cameras tell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CameraAngle {
+    /// Radians.
+    pub angle: f64,
+    /// In standard deviations of the cameras' own vertical, as their rolls leave it.
+    pub deviations: f64,
+}
+
+impl CameraAngle {
+    /// Whether it is farther than the cameras allow: where their rolls contradict each other, as with one photograph on its corner, they
+    /// know little.
+    pub(super) fn is_too_wide(self) -> bool {
+        // Not-a-number is too wide.
+        let is_near = self.angle.to_degrees() <= MAX_CAMERA_ANGLE_DEG || self.deviations <= MAX_CAMERA_DEVIATIONS;
+        !is_near
+    }
 }
 
 /// Largest number of photographs among which unrelated directions can agree by chance.
@@ -30,8 +50,10 @@ const MIN_INLIER_SHARE: f64 = 0.4;
 /// How far the best frame must stand out in the pooled search to confirm the photographs' own directions, standard
 /// deviations. Measured: chosen on the 130 sets of the gate's experiment and on real sets.
 const CONFIRMING_SIGNIFICANCE: f64 = 5.0;
-/// Largest angle between the dominant vertical and the one that straightening finds, degrees.
-pub(super) const MAX_STRAIGHTENING_ANGLE_DEG: f64 = 20.0;
+/// Largest angle between the dominant vertical and the one that the cameras tell, degrees ...
+const MAX_CAMERA_ANGLE_DEG: f64 = 20.0;
+/// ... unless it is this few of the cameras' own deviations.
+const MAX_CAMERA_DEVIATIONS: f64 = 2.0;
 /// Largest median roll of the agreeing photographs, degrees.
 const MAX_MEDIAN_ROLL_DEG: f64 = 45.0;
 
@@ -73,7 +95,7 @@ pub(super) fn divergence(inlier_residuals: &[f64], photographs: usize, as_printe
 /// The paper has clause (a) alone, which cannot tell with few photographs: one photograph always fits its own triad.
 /// [`GateMode::Paper`] keeps to it.
 pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions) -> Option<String> {
-    let GateEvidence { photographs, inliers, divergence, straightening_angle, significance, median_roll } = *evidence;
+    let GateEvidence { photographs, inliers, divergence, from_cameras, significance, median_roll } = *evidence;
     // Not-a-number fails.
     let allowed = allowed_divergence(photographs, options);
     if divergence.is_nan() || divergence > allowed {
@@ -95,10 +117,10 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
             "the lines of all photographs together prefer no direction clearly ({significance:.1} standard deviations, {needed:.1} needed)"
         ));
     }
-    let allowed = MAX_STRAIGHTENING_ANGLE_DEG;
-    if let Some(angle) = straightening_angle.map(f64::to_degrees).filter(|&angle| angle.is_nan() || angle > allowed) {
+    if let Some(wide) = from_cameras.filter(|found| found.is_too_wide()) {
         return Some(format!(
-            "the dominant vertical is {angle:.1} degrees from the vertical of the cameras ({allowed:.1} allowed)"
+            "the dominant vertical is {:.1} degrees from the vertical of the cameras ({MAX_CAMERA_ANGLE_DEG:.1} allowed)",
+            wide.angle.to_degrees()
         ));
     }
     let (roll, allowed) = (median_roll.to_degrees(), MAX_MEDIAN_ROLL_DEG);

@@ -8,6 +8,7 @@ use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use trueup_core::geometry::orthonormal_complement;
 
+use super::gate::CameraAngle;
 use super::gravity::MeanGravity;
 use super::straighten::{Straightened, level_moment, straighten, straighten_with_pitch};
 
@@ -64,10 +65,16 @@ struct Say {
 }
 
 impl Say {
+    /// What the squares of `down` are beyond those of its own vertical.
+    fn squares_beyond(&self, down: &Vector3<f64>) -> f64 {
+        let squares = |direction: &Vector3<f64>| direction.dot(&(self.moment * direction));
+        (squares(down) - squares(&self.down)).max(0.0) + (down - self.down).norm_squared() * self.information
+    }
+
     /// What is left of this say if the vertical is `down`: all of what was seen, less of what was only expected.
     fn heeded(&self, down: &Vector3<f64>) -> Self {
-        let squares = |direction: &Vector3<f64>| direction.dot(&(self.moment * direction));
-        let beyond = (squares(down) - squares(&self.down)).max(0.0) / HELD_SCALE.powi(2);
+        let expected = Self { information: 0.0, ..*self };
+        let beyond = expected.squares_beyond(down) / HELD_SCALE.powi(2);
         Self { moment: self.moment * (1.0 + beyond).powi(-2), ..*self }
     }
 
@@ -130,6 +137,18 @@ impl<'a> CameraLevel<'a> {
     pub(super) fn deviation(&self) -> f64 {
         let heeded: Vec<Say> = self.says.iter().map(|say| say.heeded(&self.down)).collect();
         greatest_deviation(&information(&heeded, &self.down))
+    }
+
+    /// How far a vertical lies from the one that the cameras tell: by recorded gravity, or by straightening as published if the cameras fix
+    /// that.
+    pub(super) fn angle_to(&self, down: &Vector3<f64>) -> Option<CameraAngle> {
+        let own = match (self.has_gravity, self.straightened.conditioned) {
+            (true, _) => self.down,
+            (false, true) => self.straightened.down,
+            (false, false) => return None,
+        };
+        let squares: f64 = self.says.iter().map(|say| say.squares_beyond(down)).sum();
+        Some(CameraAngle { angle: own.angle(down), deviations: squares.sqrt() })
     }
 
     /// What told of `down`, and of how much.

@@ -8,7 +8,7 @@ use trueup_core::{Result, StageContext};
 use super::camera_correction::{corrected_rotations, relative_certainties};
 use super::dominant::{Dominant, dominant_frame};
 use super::frame_search::{GUIDING_SIGNIFICANCE, PooledFrame, search_frame};
-use super::gate::{GateEvidence, MAX_STRAIGHTENING_ANGLE_DEG, allowed_divergence, divergence, failed_clause};
+use super::gate::{CameraAngle, GateEvidence, allowed_divergence, divergence, failed_clause};
 use super::input::PriorInput;
 use super::jackknife::axis_deviations;
 use super::joint::{self, AxisWeights, LineVote, Refinement};
@@ -164,7 +164,7 @@ impl<'a> SceneDirections<'a> {
             photographs,
             inliers: inliers.len(),
             divergence: divergence(&residuals, photographs, self.options.as_printed.divergence),
-            straightening_angle: self.straightening_angle(&down),
+            from_cameras: self.level.angle_to(&down),
             significance: guidance.significance,
             // Photographs may lie on their sides where gravity says so.
             median_roll: match self.level.has_gravity {
@@ -179,22 +179,11 @@ impl<'a> SceneDirections<'a> {
         failed_clause(&evidence, self.options)
     }
 
-    /// Angle in radians between a vertical and the straightened one, if the cameras fix that; where gravity was recorded, the one that
-    /// it tells.
-    fn straightening_angle(&self, down: &Vector3<f64>) -> Option<f64> {
-        if self.level.has_gravity {
-            return Some(down.angle(&self.level.down));
-        }
-        let straightened = self.level.straightened;
-        straightened.conditioned.then(|| down.angle(&straightened.down))
-    }
-
     /// The frame of the pooled search in place of one that the photographs agree on, if it stands out far enough.
     fn pooled(&self, pooled: &PooledFrame, guidance: &mut Guidance) -> Option<Dominant> {
         let down = self.vertical(&pooled.frame);
-        let limit = MAX_STRAIGHTENING_ANGLE_DEG.to_radians();
         let stands_out = pooled.significance >= GUIDING_SIGNIFICANCE;
-        if !stands_out || self.straightening_angle(&down).is_some_and(|angle| angle > limit) {
+        if !stands_out || self.level.angle_to(&down).is_some_and(CameraAngle::is_too_wide) {
             return None;
         }
         let residuals =
