@@ -139,11 +139,12 @@ impl<'a> CameraLevel<'a> {
         greatest_deviation(&information(&heeded, &self.down))
     }
 
-    /// How far a vertical lies from the one that the cameras tell: by recorded gravity, or by straightening as published if the cameras fix
-    /// that.
+    /// How far a vertical lies from the one that the cameras tell: by recorded gravity; of two photographs, whose x axes contradict nothing, by
+    /// `down`; or by straightening as published if the cameras fix that.
     pub(super) fn angle_to(&self, down: &Vector3<f64>) -> Option<CameraAngle> {
         let own = match (self.has_gravity, self.straightened.conditioned) {
             (true, _) => self.down,
+            (false, _) if self.rotations.len() == 2 => self.down,
             (false, true) => self.straightened.down,
             (false, false) => return None,
         };
