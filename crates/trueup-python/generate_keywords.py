@@ -16,6 +16,8 @@ import os
 from collections.abc import Mapping
 from typing import Literal, TypeAlias, TypedDict
 
+from trueup._photographs import Picture
+
 Path: TypeAlias = str | os.PathLike[str]
 Value: TypeAlias = bool | int | float | str | os.PathLike[str]
 '''
@@ -28,8 +30,8 @@ COMPOSING = [
     ("threads", "int", "Number of threads; 0 for one per core. The panorama is the same for any number."),
 ]
 STITCHING = [
-    ("masks", "Mapping[str, Path]", "Pictures by the names of photographs: what is black or transparent in them is ignored."),
-    ("keep", "Mapping[str, Path]", "Pictures by the names of photographs: what is white in them is shown."),
+    ("masks", "Mapping[str, Picture]", "Files or arrays by the names of photographs: what is black or transparent in them is ignored."),
+    ("keep", "Mapping[str, Picture]", "Files or arrays by the names of photographs: what is white in them is shown."),
     ("reference", "str", "The photograph that sets the pixel scale and stays in place; auto takes the one in the middle."),
     ("graph", "Path", "A text file with the pairs to be matched, NAME -- NAME a line."),
     ("lens_from", "Path", "The project of other photographs through the same lens, which is taken from there."),
@@ -89,11 +91,13 @@ def module() -> str:
     save = [row for row in compose if tables[row[0]] == "output"]
     composing = [row for row in compose if row not in save]
     stitching = [row for row in stitch if row not in compose]
+    batch = [row for row in options_of("batch") if row not in save]
     return (
         HEAD
         + dictionary("SaveKeywords", "TypedDict", "Keywords of a panorama's file.", save + SHARED)
         + dictionary("ComposeKeywords", "SaveKeywords", "Keywords of composing.", composing + COMPOSING)
         + dictionary("StitchKeywords", "ComposeKeywords", "Keywords of stitching.", stitching + STITCHING)
+        + dictionary("BatchKeywords", "SaveKeywords", "Keywords of a batch.", batch + COMPOSING)
     )
 
 

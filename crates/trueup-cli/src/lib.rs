@@ -1,7 +1,7 @@
 //! The `trueup` command: reads arguments, calls the `trueup` library, prints what it decided and why.
 //!
 //! No algorithm and no default lives here; [`trueup::StitchOptions`] holds every default. The command is a library too, so that
-//! other fronts can run it as it is ([`run`]) and say the same in the same words: [`summary_text`], [`OPTION_FLAGS`].
+//! other fronts can run it as it is ([`run`]) and say the same in the same words: [`summary_text`], [`batch_lines`], [`OPTION_FLAGS`].
 #![forbid(unsafe_code)]
 
 mod arguments;
@@ -32,6 +32,7 @@ use trueup::Project;
 use arguments::{CommandLine, Task};
 
 pub use arguments::{OPTION_FLAGS, OptionFlag};
+pub use batch::{batch_lines, batch_plan, run_batch};
 
 /// Runs the command with these arguments, of which the first is its own name, and returns its exit status. To be called once
 /// in a program: it catches Ctrl-C.

@@ -1,6 +1,7 @@
 //! The `trueup` command as users run it: its messages, its exit status, and what it leaves on the disk.
 
 mod batch;
+mod book;
 mod cache;
 mod cli;
 mod color;

@@ -53,9 +53,16 @@ pub(crate) struct Reading {
     /// The pixels as they are stored, before orientation. Refuses what is damaged, incomplete, or no longer of the size that
     /// was found when the photograph was examined.
     pub(crate) pixels: fn(&SourceImage, Input) -> Result<Photograph>,
+    /// The pixels as they are stored, made smaller by the decoder itself, for people to look at; `None` if decoders of this format
+    /// cannot do that.
+    pub(crate) reduced: Option<ReducedPixels>,
     /// Bytes of a pixel on its way into memory: in the decoder, and in the photograph beside it.
     pub(crate) pixel_bytes: usize,
 }
+
+/// Decodes a photograph as it is stored, with both sides divided by the same 1, 2, 4 or 8 and rounded up, of at least the given columns
+/// and rows.
+pub(crate) type ReducedPixels = fn(&SourceImage, Input, [usize; 2]) -> Result<Photograph>;
 
 /// [`Reading::pixel_bytes`] of decoders that write samples as they are handed out: four channels of 8 bits, in the decoder and in the
 /// photograph, or once with 16 bits.
@@ -93,6 +100,12 @@ impl Reading {
     /// What the field `pixels` reads.
     pub(crate) fn pixels(&self, source: &SourceImage, input: Input) -> Result<Photograph> {
         contained(|| (self.pixels)(source, input)).unwrap_or_else(|words| Err(damaged(source, words)))
+    }
+
+    /// What the field `reduced` reads of at least `least` columns and rows; all pixels where decoders make nothing smaller.
+    pub(crate) fn reduced(&self, source: &SourceImage, input: Input, least: [usize; 2]) -> Result<Photograph> {
+        let Some(reduced) = self.reduced else { return self.pixels(source, input) };
+        contained(|| reduced(source, input, least)).unwrap_or_else(|words| Err(damaged(source, words)))
     }
 }
 
@@ -262,6 +275,7 @@ mod tests {
             exif: |_| panic!("exif"),
             whole_fields: |_, _| panic!("fields"),
             pixels: |_, _| panic!("pixels"),
+            reduced: None,
             pixel_bytes: PLAIN_PIXEL_BYTES,
         };
         let stored = broken.stored(&mut input).map_err(|error| error.words().to_owned());

@@ -1,8 +1,10 @@
 //! The geometry of a panorama, to be composed once or often.
 
+use std::path::{Path, PathBuf};
+
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use trueup::{Error, Inputs, PhotographCache, StitchOptions, Stitcher};
+use trueup::{Error, Inputs, PhotographCache, Project, RecordedPanorama, StitchOptions, Stitcher};
 
 use crate::errors::exception;
 use crate::keywords::Wishes;
@@ -30,8 +32,11 @@ pub(crate) fn align<'py>(
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Vec<Alignment>> {
     let wishes = Wishes::of(keywords, "stitch", StitchOptions::default())?;
-    let (photographs, in_memory) = collected(photographs)?;
-    let Wishes { options, reference, graph, lens_from, require_all, masks, cache, threads } = wishes;
+    let (photographs, mut in_memory) = collected(photographs)?;
+    let Wishes { options, reference, graph, lens_from, require_all, masks, mask_pictures, cache, threads } = wishes;
+    for (name, picture) in mask_pictures {
+        in_memory.insert(name, picture);
+    }
     let inputs = Inputs { photographs, in_memory, reference, graph, lens_from, all, masks, require_all };
     let aligned = run(py, Surroundings { progress, threads }, |context| {
         let max_bytes = options.run.resources.cache_bytes;
@@ -40,6 +45,35 @@ pub(crate) fn align<'py>(
     })?;
     let one = |alignment| Alignment { alignment, options: options.clone(), threads };
     Ok(aligned.alignments.into_iter().map(one).collect())
+}
+
+/// The geometry of the panorama that the project file at `path` records, over its photographs, or those of the same names in the
+/// folder `photographs`.
+#[pyfunction]
+pub(crate) fn open_project<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    photographs: Option<PathBuf>,
+    keywords: &Bound<'py, PyDict>,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Alignment> {
+    let read = || {
+        let text = std::fs::read_to_string(&path).map_err(|error| Error::io("reading", &path, error))?;
+        Project::from_json(&text, &path.display().to_string())
+    };
+    let project = read().map_err(|error| exception(py, error))?;
+    let Wishes { options, threads, .. } = Wishes::of(keywords, "compose", project.options.clone())?;
+    let project_folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    let alignment = run(py, Surroundings { progress, threads }, |context| {
+        let recorded = RecordedPanorama {
+            project: &project,
+            project_folder: &project_folder,
+            photographs: photographs.as_deref(),
+            masks: &[],
+        };
+        Stitcher::new(&options, context).reopen(&recorded)
+    })?;
+    Ok(Alignment { alignment, options, threads })
 }
 
 #[pymethods]

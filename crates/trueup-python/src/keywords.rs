@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyMapping, PyString};
-use trueup::{Error, MaskFile, MaskKind, Reference, StitchOptions};
+use trueup::{Error, MaskFile, MaskKind, Photograph, Reference, StitchOptions};
 use trueup_cli::{OPTION_FLAGS, OptionFlag};
 
 use crate::errors::exception;
+use crate::photographs::collected;
 
 /// The reference that leaves the choice to the program.
 const AUTO: &str = "auto";
@@ -22,6 +23,8 @@ pub(crate) struct Wishes {
     pub lens_from: Option<PathBuf>,
     pub require_all: bool,
     pub masks: Vec<MaskFile>,
+    /// The pixels of masks that are no files, by the names that [`Self::masks`] has for them.
+    pub mask_pictures: Vec<(String, Photograph)>,
     pub cache: Option<PathBuf>,
     /// Number of threads; 0 for one per core.
     pub threads: usize,
@@ -39,6 +42,7 @@ impl Wishes {
             lens_from: None,
             require_all: false,
             masks: Vec::new(),
+            mask_pictures: Vec::new(),
             cache: None,
             threads: 0,
         };
@@ -68,8 +72,8 @@ impl Wishes {
         match name {
             "config" | "set" => {}
             "threads" => self.threads = value.extract::<u16>()?.into(),
-            "masks" if is_stitch => self.masks.extend(masks(value, MaskKind::Use)?),
-            "keep" if is_stitch => self.masks.extend(masks(value, MaskKind::Keep)?),
+            "masks" if is_stitch => self.add_masks(value, MaskKind::Use)?,
+            "keep" if is_stitch => self.add_masks(value, MaskKind::Keep)?,
             "reference" if is_stitch => match value.extract::<String>()? {
                 name if name == AUTO => {}
                 name => self.reference = Reference::Named(name),
@@ -82,6 +86,21 @@ impl Wishes {
                 let flag = flag_of(command, name).ok_or_else(|| unexpected(command, name))?;
                 let assignment = format!("{}={}", flag.option, text(value)?);
                 self.options.set(&assignment).map_err(|error| exception(value.py(), error))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Wishes {
+    /// Adds masks by the names of photographs: files, or names with pixels.
+    fn add_masks(&mut self, given: &Bound<'_, PyAny>, kind: MaskKind) -> PyResult<()> {
+        for (photograph, mask) in pairs(given)? {
+            let (names, in_memory) = collected(vec![mask.extract()?])?;
+            let photograph: String = photograph.extract()?;
+            for name in names {
+                self.mask_pictures.extend(in_memory.get(&name).map(|picture| (name.clone(), picture.as_ref().clone())));
+                self.masks.push(MaskFile { photograph: photograph.clone(), file: name.into(), kind });
             }
         }
         Ok(())
@@ -131,12 +150,6 @@ fn text(value: &Bound<'_, PyAny>) -> PyResult<String> {
         // Numbers, as Python writes them; those of NumPy are written alike.
         Err(_) => Ok(value.str()?.to_string()),
     }
-}
-
-fn masks(files: &Bound<'_, PyAny>, kind: MaskKind) -> PyResult<Vec<MaskFile>> {
-    let mask =
-        |(photograph, file): Pair| Ok(MaskFile { photograph: photograph.extract()?, file: file.extract()?, kind });
-    pairs(files)?.into_iter().map(mask).collect()
 }
 
 fn read_config(options: &mut StitchOptions, path: &std::path::Path) -> trueup::Result<()> {

@@ -4,6 +4,7 @@
 //! either.
 
 mod alignment;
+mod batch;
 mod errors;
 mod keywords;
 mod options;
@@ -17,7 +18,9 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _trueup {
     #[pymodule_export]
-    use super::alignment::{Alignment, align};
+    use super::alignment::{Alignment, align, open_project};
+    #[pymodule_export]
+    use super::batch::{batch, plan};
     #[pymodule_export]
     use super::options::{option_flags, options};
     #[pymodule_export]

@@ -18,7 +18,12 @@ enum Event {
     Begin(String, u64),
     Advance(String, u64),
     Finish(String),
+    /// Lines of JSON that are to be heard at once.
+    Told(String),
 }
+
+/// Says something to the thread that waits, in lines of JSON.
+pub(crate) type Teller<'a> = &'a (dyn Fn(String) + Sync);
 
 /// Hands progress to the thread that waits. Nobody listens any more where that fails.
 struct Telling(Sender<Event>);
@@ -40,12 +45,18 @@ impl Progress for Telling {
 /// Calls Python with the progress of every stage: its name, the steps done, and how many there are.
 struct Listener<'py> {
     callback: Option<Bound<'py, PyAny>>,
+    /// Called with what is told.
+    told: Option<Bound<'py, PyAny>>,
     /// Done and total of every stage begun.
     stages: BTreeMap<String, (u64, u64)>,
 }
 
 impl Listener<'_> {
     fn hear(&mut self, event: Event) -> PyResult<()> {
+        let event = match (event, &self.told) {
+            (Event::Told(lines), Some(told)) => return told.call1((lines,)).map(drop),
+            (event, _) => event,
+        };
         let Some(callback) = &self.callback else { return Ok(()) };
         let (stage, done, total) = match event {
             Event::Begin(stage, total) => (stage, 0, total),
@@ -61,6 +72,7 @@ impl Listener<'_> {
                 }
                 (stage, total, total)
             }
+            Event::Told(_) => return Ok(()),
         };
         callback.call1((&stage, done, total))?;
         self.stages.insert(stage, (done, total));
@@ -83,6 +95,16 @@ pub(crate) fn run<T: Send>(
     surroundings: Surroundings<'_>,
     work: impl FnOnce(&StageContext) -> Result<T> + Send,
 ) -> PyResult<T> {
+    run_telling(py, surroundings, None, |context, _| work(context))
+}
+
+/// The same, where the work also says something as it goes on, which `told` is called with.
+pub(crate) fn run_telling<'py, T: Send>(
+    py: Python<'py>,
+    surroundings: Surroundings<'py>,
+    told: Option<Bound<'py, PyAny>>,
+    work: impl FnOnce(&StageContext, Teller<'_>) -> Result<T> + Send,
+) -> PyResult<T> {
     let Surroundings { progress, threads } = surroundings;
     let cancel = CancelToken::default();
     let (sender, receiver) = mpsc::channel();
@@ -93,9 +115,10 @@ pub(crate) fn run<T: Send>(
             // Dropped when the work is over, which the receiver notices at once.
             let telling = Telling(sender);
             let context = StageContext::new(&telling, cancelled);
-            thread_pool(threads)?.install(|| work(&context))
+            let tell = |lines| drop(telling.0.send(Event::Told(lines)));
+            thread_pool(threads)?.install(|| work(&context, &tell))
         });
-        let mut listener = Listener { callback: progress, stages: BTreeMap::new() };
+        let mut listener = Listener { callback: progress, told, stages: BTreeMap::new() };
         let interruption = wait(py, &receiver, &mut listener, &cancel);
         let outcome = py.detach(|| worker.join()).unwrap_or_else(|panic| std::panic::resume_unwind(panic));
         match interruption {

@@ -9,6 +9,7 @@ use trueup::{
 };
 use trueup_core::raster::OpaqueRgb;
 
+use crate::drawings::seams_size;
 use crate::page::{Page, Pictures};
 use crate::pictures::{EmbeddedPicture, embedded};
 
@@ -16,8 +17,6 @@ use crate::pictures::{EmbeddedPicture, embedded};
 const PANORAMA_PX: f64 = 1800.0;
 /// Pixels of each photograph on the page.
 const PHOTOGRAPH_PIXELS: f64 = 200_000.0;
-/// Longer side of the raster that seams are drawn on: as fine as is seen over the panorama.
-const SEAMS_PX: usize = 900;
 /// Smallest size of a panorama relative to its photographs, as the option `canvas.scale` has it.
 const LEAST_SCALE: f64 = 1e-4;
 
@@ -76,9 +75,8 @@ impl ReportJob {
         let mut alignment = stitcher.reopen(&recorded)?;
         let rendered = stitcher.compose(&mut alignment)?;
         let icc = stitcher.metadata(&alignment).icc;
-        let canvas = alignment.project.canvas;
         let panorama = embedded(&rendered.panorama, icc.clone(), context)?;
-        let shown = alignment.shown(&rendered, within(SEAMS_PX, [canvas.width, canvas.height]));
+        let shown = alignment.shown(&rendered, seams_size(alignment.project.canvas));
         drop(rendered);
         let pictures = Pictures { panorama, photographs: photographs(&alignment, icc.as_ref(), context)? };
         let brightness = stitcher.brightness_steps(&alignment)?;
@@ -109,12 +107,6 @@ fn small(project: &Project) -> StitchOptions {
     options
 }
 
-/// The largest size of the same shape whose longer side is at most `longest`.
-fn within(longest: usize, [width, height]: [usize; 2]) -> [usize; 2] {
-    let scale = (longest as f64 / width.max(height).max(1) as f64).min(1.0);
-    [width, height].map(|side| ((side as f64 * scale).round() as usize).max(1))
-}
-
 /// The photographs in use, by their positions in the project.
 fn photographs(
     alignment: &Alignment,
@@ -133,16 +125,4 @@ fn photographs(
         }
     }
     Ok(pictures)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sizes_keep_their_shape_and_are_never_enlarged() {
-        assert_eq!(within(900, [3600, 600]), [900, 150]);
-        assert_eq!(within(900, [300, 200]), [300, 200]);
-        assert_eq!(within(10, [4000, 1]), [10, 1]);
-    }
 }

@@ -13,6 +13,8 @@ mod body;
 mod denial;
 mod folder;
 mod guard;
+mod keeping;
+mod layers;
 mod limits;
 mod making;
 mod pages;

@@ -6,10 +6,12 @@ use std::sync::{Arc, PoisonError};
 
 use serde::Serialize;
 use trueup::{
-    Alignment, Canvas, Error, Inputs, OutputOptions, Outputs, PhotographCache, ProjectionRecord, Result, SideOutput,
-    StageContext, StitchOptions, Stitcher, write_picture,
+    Alignment, Canvas, Error, Inputs, OutputOptions, Outputs, PhotographCache, ProjectionRecord, Rendered, Result,
+    SideOutput, StageContext, StitchOptions, Stitcher, write_picture,
 };
 
+use crate::keeping::Companions;
+use crate::layers::Underlay;
 use crate::limits::PREVIEW_PIXELS;
 use crate::studio::{Export, ExportedFile, Stitched, Studio, Tiles, Wishes};
 
@@ -88,6 +90,11 @@ impl Order {
         }
     }
 
+    /// What drawings over a picture are made from that was `rendered` of `alignment`.
+    fn underlay(&self, alignment: &Alignment, rendered: &Rendered) -> Underlay {
+        Underlay::of(alignment, rendered, &self.stitched.alignment.project)
+    }
+
     /// How pictures for the page are written: with the background that is wished, all else as is usual.
     fn picture_options(&self) -> Result<OutputOptions> {
         let mut options = StitchOptions::default();
@@ -110,6 +117,8 @@ pub(crate) struct Preview {
     pub bytes: Vec<u8>,
     #[serde(skip)]
     pub media_type: &'static str,
+    #[serde(skip)]
+    pub underlay: Arc<Underlay>,
     /// The geometry that it shows.
     pub stitched: u64,
     pub canvas: Canvas,
@@ -156,10 +165,11 @@ pub(crate) fn preview(studio: &Studio, changes: &[(String, String)]) -> Result<P
         let metadata = stitcher.metadata(&alignment);
         write_picture(&place, &rendered.panorama, &metadata, &order.picture_options()?, &context)?;
         let bytes = std::fs::read(&place).map_err(|error| Error::io("reading", &place, error))?;
+        let underlay = Arc::new(order.underlay(&alignment, &rendered));
         let warnings = warnings(&alignment);
         let project = alignment.project;
         let (canvas, projection) = (project.canvas, project.projection);
-        Ok(Preview { bytes, media_type, stitched: order.stitched.number, canvas, projection, warnings })
+        Ok(Preview { bytes, media_type, underlay, stitched: order.stitched.number, canvas, projection, warnings })
     })
 }
 
@@ -177,8 +187,10 @@ pub(crate) fn cut_tiles(studio: &Studio, context: &StageContext) -> Result<()> {
     let rendered = stitcher.compose(&mut alignment)?;
     let metadata = stitcher.metadata(&alignment);
     write_picture(&folder.join("panorama.dzi"), &rendered.panorama, &metadata, &order.picture_options()?, context)?;
+    let underlay = Arc::new(order.underlay(&alignment, &rendered));
     let stitched = order.stitched.number;
-    let older = studio.change(|state| state.tiles.replace(Tiles { number, folder, stitched, wishes: order.wishes }));
+    let tiles = Tiles { number, folder, underlay, stitched, wishes: order.wishes };
+    let older = studio.change(|state| state.tiles.replace(tiles));
     if let Some(older) = older {
         // What cannot be removed goes with the desk.
         drop(std::fs::remove_dir_all(older.folder));
@@ -195,6 +207,13 @@ pub(crate) struct ExportOrder {
     pub beside: Vec<(SideOutput, String)>,
     /// Whether they are to be put into the folder that is open, and not to be fetched.
     pub into_folder: bool,
+}
+
+impl ExportOrder {
+    /// Whether one of them is a record that names photographs and masks.
+    fn has_record(&self) -> bool {
+        self.beside.iter().any(|(kind, _)| matches!(kind, SideOutput::Project | SideOutput::HuginProject))
+    }
 }
 
 /// Writes the panorama, and what is wanted beside it, as is wished now.
@@ -227,9 +246,20 @@ pub(crate) fn export(studio: &Studio, ordered: &ExportOrder, context: &StageCont
     }
     outputs.check(&order.options)?;
     let stitcher = Stitcher::new(&order.options, context);
-    outputs.write(&stitcher, order.alignment(&stitcher)?)?;
+    let mut alignment = order.alignment(&stitcher)?;
+    let companions = match ordered.has_record() {
+        true => {
+            let among = open.is_some().then_some(folder.as_path());
+            Companions::of(&alignment.project, &ordered.name, &studio.dropped(), among)
+        }
+        false => Companions::default(),
+    };
+    alignment.project.rename_files(companions.renamed());
+    companions.copy_to(&folder)?;
+    outputs.write(&stitcher, alignment).inspect_err(|_| companions.remove_from(&folder))?;
     let length = |name: &String| std::fs::metadata(folder.join(name)).map_or(0, |facts| facts.len());
-    let files = names.iter().map(|&name| ExportedFile { name: name.clone(), bytes: length(name) }).collect();
+    let names = names.into_iter().chain(companions.names());
+    let files = names.map(|name| ExportedFile { name: name.clone(), bytes: length(name) }).collect();
     let to_fetch = open.is_none().then_some(folder);
     let forgotten = studio.change(|state| {
         state.exports.push(Export { number, folder: to_fetch, files });

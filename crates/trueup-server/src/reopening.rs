@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use trueup::{
-    Error, ImageRecord, ImageStatus, MaskKind, Project, RecordedPanorama, Result, RunOptions, StageContext,
+    Error, ImageRecord, ImageStatus, MaskKind, MaskRecord, Project, RecordedPanorama, Result, RunOptions, StageContext,
     StitchOptions, Stitcher,
 };
 
 use crate::making::{Kept, keep};
 use crate::studio::{History, Listed, PaintedMasks, Studio, Wishes, is_offered};
 
-/// Opens the project in `text`, of a file called `name`.
+/// Opens the project in `text`, of a file called `name`, in the folder that is open if there is one. What was dropped and is a mask of
+/// the project is no photograph from then on.
 ///
 /// # Errors
 /// [`Error::Input`] if it is none, or names photographs that are neither in the folder opened nor dropped; those of
@@ -20,25 +21,36 @@ pub(crate) fn reopen(studio: &Studio, text: &str, name: &str, context: &StageCon
     let mut project = Project::from_json(text, name)?;
     // What a file of somebody else says of this machine is not heeded: where scratch files lie, how much memory is taken.
     project.options.run = RunOptions::default();
-    let listed = studio.state().photographs.clone();
-    let reference = project.images.iter().position(|image| image.path == project.reference);
-    let mut masks = BTreeMap::new();
-    for image in &mut project.images {
+    let (listed, folder) = {
+        let state = studio.state();
+        (state.photographs.clone(), state.folder.as_ref().map(|folder| folder.path().to_owned()))
+    };
+    let (dropped_masks, listed) = masks_among(listed, &project);
+    let places = Places { studio, folder: folder.as_deref(), dropped: &dropped_masks };
+    let (mut masks, mut moved) = (BTreeMap::new(), BTreeMap::new());
+    for image in &project.images {
         let number = place(image, &listed);
-        match number {
-            Some(number) => image.path = listed[number].path.display().to_string(),
+        let path = match number {
+            Some(number) => listed[number].path.display().to_string(),
             None if image.status == ImageStatus::Used => return Err(not_there(image)),
             // Left out then, and not here now: only its name is told.
-            None => image.path = image.file_name().to_owned(),
+            None => image.file_name().to_owned(),
+        };
+        moved.insert(image.path.clone(), path);
+        let mut painted = PaintedMasks::default();
+        for record in &image.masks {
+            let path = places.mask(record)?;
+            moved.insert(record.path.clone(), path.display().to_string());
+            match record.kind {
+                MaskKind::Use => painted.used = Some(path),
+                MaskKind::Keep => painted.kept = Some(path),
+            }
         }
-        if let Some(painted) = painted(studio, image)? {
+        if !image.masks.is_empty() {
             masks.extend(number.map(|number| (number, painted)));
         }
     }
-    // It is named by its path.
-    if let Some(reference) = reference {
-        project.reference = project.images[reference].path.clone();
-    }
+    project.rename_files(&moved);
     let options = project.options.clone();
     let stitcher = Stitcher::new(&options, context);
     let nowhere = studio.desk.path().join("none");
@@ -47,6 +59,7 @@ pub(crate) fn reopen(studio: &Studio, text: &str, name: &str, context: &StageCon
     let wishes = Wishes { options: differing(&options)?, masks, ..Wishes::default() };
     // What the page offers is a wish, all else is laid below.
     studio.change(|state| {
+        state.photographs.retain(|one| !dropped_masks.contains(one));
         state.base = options.clone();
         state.history = History::beginning_with(wishes.clone());
     });
@@ -68,21 +81,38 @@ fn not_there(image: &ImageRecord) -> Error {
     Error::input(image.file_name(), "this photograph of the project is not here", hint)
 }
 
-/// The masks that a record names.
-fn painted(studio: &Studio, image: &ImageRecord) -> Result<Option<PaintedMasks>> {
-    let mut painted = PaintedMasks::default();
-    for record in &image.masks {
-        let path = PathBuf::from(&record.path);
-        if !studio.may_read(&path) {
-            let hint = "Put it into the folder that was opened, and let the project name it there.";
-            return Err(Error::input(&record.path, "this mask of the project is not here", hint));
-        }
-        match record.kind {
-            MaskKind::Use => painted.used = Some(path),
-            MaskKind::Keep => painted.kept = Some(path),
-        }
+/// The dropped pictures that the project names as masks and not as photographs, and all else.
+fn masks_among(listed: Vec<Listed>, project: &Project) -> (Vec<Listed>, Vec<Listed>) {
+    let is_mask = |one: &Listed| {
+        let name = one.name();
+        let masks = project.images.iter().flat_map(|image| &image.masks);
+        one.dropped
+            && masks.into_iter().any(|mask| mask.file_name() == name)
+            && project.images.iter().all(|image| image.file_name() != name)
+    };
+    listed.into_iter().partition(is_mask)
+}
+
+/// Where masks are looked for.
+struct Places<'a> {
+    studio: &'a Studio,
+    folder: Option<&'a Path>,
+    dropped: &'a [Listed],
+}
+
+impl Places<'_> {
+    /// The file of a mask: beside the project as recorded, as recorded, beside the project by its name alone, as the command looks for
+    /// it, or among what was dropped.
+    fn mask(&self, record: &MaskRecord) -> Result<PathBuf> {
+        let beside = |name: &str| Some(self.folder?.join(name));
+        let places = [beside(&record.path), Some(PathBuf::from(&record.path)), beside(record.file_name())];
+        let dropped = self.dropped.iter().filter(|one| one.name() == record.file_name()).map(|one| one.path.clone());
+        let mut places = places.into_iter().flatten().chain(dropped);
+        places.find(|path| path.is_file() && self.studio.may_read(path)).ok_or_else(|| {
+            let hint = "Put it beside the project in the folder that was opened, or drop it on the page first.";
+            Error::input(&record.path, "this mask of the project is not here", hint)
+        })
     }
-    Ok((!image.masks.is_empty()).then_some(painted))
 }
 
 /// The options offered on the page that are not as usual, as one writes them.

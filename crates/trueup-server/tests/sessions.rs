@@ -3,7 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use trueup::{Inputs, Outputs, SideOutput, StageContext, StitchJob, StitchOptions};
+use trueup::{
+    ComposeJob, Inputs, Outputs, Project, SideOutput, StageContext, StitchJob, StitchOptions, names_photograph,
+    write_thumbnail,
+};
+use trueup_report::drawings::Layer;
 
 use crate::server::Server;
 
@@ -174,6 +178,204 @@ fn photographs_are_shown_dropped_left_out_and_painted_on() {
     assert!(server.settled()["trouble"]["message"].is_string(), "it is no picture");
     assert_eq!(server.with_body("PUT", "/api/photographs/0/mask/use", b"").status, 204);
     assert_eq!(listed(&server.get("/api/news").json(), 0)["used_mask"], Value::Null);
+}
+
+#[test]
+fn every_format_that_is_read_can_be_chosen() {
+    let desk = room();
+    let told = Server::of(desk.path()).get("/api/options").json();
+    let extensions: Vec<&str> =
+        told["photographs"].as_array().expect("a list").iter().filter_map(Value::as_str).collect();
+    for wanted in [".jpg", ".jpeg", ".heic", ".jxl", ".exr", ".hdr", ".tif", ".webp"] {
+        assert!(extensions.contains(&wanted), "{wanted} of {extensions:?}");
+    }
+    assert!(extensions.iter().all(|extension| names_photograph(Path::new(&format!("photograph{extension}")))));
+}
+
+#[test]
+fn drawings_lie_over_previews_and_tiles_as_the_report_has_them() {
+    let desk = room();
+    let server = Server::of(desk.path());
+    let wishes = json!({ "options": { "canvas.scale": "0.2", "canvas.crop": "none" } }).to_string();
+    assert_eq!(server.post("/api/wishes", &wishes).status, 204);
+    stitched(&server);
+    let possible = server.get("/api/options").json();
+    let names: Vec<&str> =
+        possible["layers"].as_array().expect("a list").iter().filter_map(|one| one["name"].as_str()).collect();
+    assert_eq!(names, Layer::ALL.map(Layer::name));
+
+    // As large as it was stitched: what is drawn is what the record says.
+    assert_eq!(server.post("/api/tiles", "").status, 202);
+    let tiles = server.settled()["tiles"].as_u64().expect("tiles");
+    let project = Project::from_json(&server.get("/api/project").text(), "panorama.json").expect("a project");
+    let layer = |over: &str, name: &str| server.get(&format!("/api/{over}/layers/{name}"));
+    for one in [Layer::Outlines, Layer::Lines, Layer::Alignment, Layer::Overlaps] {
+        let told = layer(&format!("tiles/{tiles}"), one.name()).json();
+        let expected = one.drawn(&project, None).expect("drawn");
+        assert!(expected.is_some() && told["drawing"].as_str() == expected.as_deref(), "{one:?}");
+        assert_eq!(told["legend"].as_array().map(Vec::len), Some(one.legend(&project).len()), "{one:?}");
+        assert_eq!(told["is_measured_elsewhere"], false);
+    }
+    let seams = layer(&format!("tiles/{tiles}"), "seams").json();
+    assert!(seams["drawing"].as_str().is_some_and(|svg| svg.contains("Seams between the 5 photographs")), "{seams}");
+
+    // In another view, what was measured lies where that shows it.
+    let turned = server.post("/api/preview", r#"{"options":{"projection.yaw":"10"}}"#).json();
+    let over = format!("preview/{}", turned["number"]);
+    let canvas = format!("viewBox=\"0 0 {} {}\"", turned["canvas"]["width"], turned["canvas"]["height"]);
+    for name in ["outlines", "lines", "alignment", "overlaps"] {
+        let told = layer(&over, name).json();
+        assert!(told["drawing"].as_str().is_some_and(|svg| svg.contains(&canvas)), "{name}: {told}");
+        assert_eq!(told["is_measured_elsewhere"], matches!(name, "lines" | "alignment"), "{name}");
+    }
+    // Where photographs are averaged there are no seams.
+    let averaged = server.post("/api/preview", r#"{"options":{"render.blend":"average"}}"#).json();
+    assert_eq!(layer(&format!("preview/{}", averaged["number"]), "seams").json()["drawing"], Value::Null);
+    for missing in
+        [format!("{over}/layers/none"), "preview/999999/layers/seams".into(), "tiles/999999/layers/seams".into()]
+    {
+        assert_eq!(server.get(&format!("/api/{missing}")).status, 404, "{missing}");
+    }
+}
+
+/// A picture in the size of the photographs, to be taken as a mask: what is bright in it is marked.
+fn mask(photograph: &Path, desk: &Path) -> Vec<u8> {
+    let place = desk.join("mask.png");
+    let photograph = photograph.display().to_string();
+    let size = write_thumbnail(&photograph, 1e9, &place, &StitchOptions::default(), &StageContext::default());
+    assert_eq!(size.expect("written"), [1200, 900]);
+    std::fs::read(place).expect("a mask")
+}
+
+/// The panorama of the project in this file, as the command composes it.
+fn composed(project: &Path, elsewhere: &Path) -> Vec<u8> {
+    let text = std::fs::read_to_string(project).expect("a project");
+    let project_folder = project.parent().expect("a folder").to_owned();
+    let recorded = Project::from_json(&text, "project").expect("a project");
+    let options = recorded.options.clone();
+    let outputs = Outputs::new(elsewhere.join("composed.png"));
+    let job =
+        ComposeJob { project: recorded, project_folder, photographs: None, masks: Vec::new(), outputs, threads: 0 };
+    job.run(&options, &StageContext::default()).expect("composed");
+    std::fs::read(elsewhere.join("composed.png")).expect("a picture")
+}
+
+fn export(server: &Server, order: &Value) -> Value {
+    assert_eq!(server.post("/api/exports", &order.to_string()).status, 202);
+    let told = server.settled();
+    assert_eq!(told["trouble"], Value::Null, "{told}");
+    told["exports"].as_array().expect("exports").last().expect("an export").clone()
+}
+
+fn names(export: &Value) -> Vec<&str> {
+    export["files"].as_array().expect("files").iter().filter_map(|file| file["name"].as_str()).collect()
+}
+
+/// What was painted outlives the program: a saved project finds it, opened by the command and by the page.
+#[test]
+fn masks_lie_beside_the_project_that_names_them() {
+    let (desk, elsewhere) = (room(), tempfile::tempdir().expect("a folder"));
+    let mask = mask(&desk.path().join("02.jpg"), elsewhere.path());
+    let server = Server::of(desk.path());
+    assert_eq!(server.post("/api/wishes", SMALL).status, 204);
+    stitched(&server);
+    let plain = export(&server, &json!({ "name": "plain.png", "beside": ["project"], "into_folder": true }));
+    assert_eq!(names(&plain), ["plain.png", "plain.json"], "nothing was painted");
+    assert_eq!(server.with_body("PUT", "/api/photographs/1/mask/use", &mask).status, 204);
+    assert_eq!(server.with_body("PUT", "/api/photographs/3/mask/keep", &mask).status, 204);
+    stitched(&server);
+    let order = json!({ "name": "pano.png", "beside": ["project"], "into_folder": true });
+    let saved = export(&server, &order);
+    let masks = ["pano-masks/pano-01.jpg-use.png", "pano-masks/pano-03.jpg-keep.png"];
+    assert_eq!(names(&saved), ["pano.png", "pano.json", masks[0], masks[1]]);
+    assert!(masks.iter().all(|name| std::fs::read(desk.path().join(name)).is_ok_and(|bytes| bytes == mask)));
+    assert_eq!(server.post("/api/exports", &order.to_string()).status, 202);
+    assert!(server.settled()["trouble"]["message"].as_str().is_some_and(|text| text.contains("already")));
+    drop(server);
+
+    let read = |name: &str| std::fs::read(desk.path().join(name)).expect("a file");
+    let picture = read("pano.png");
+    assert!(picture != read("plain.png"), "the masks show");
+    assert!(composed(&desk.path().join("pano.json"), elsewhere.path()) == picture, "the command makes the same");
+
+    let other = Server::of(desk.path());
+    assert_eq!(other.post("/api/project", r#"{"name":"pano.json"}"#).status, 202);
+    let told = other.settled();
+    assert_eq!(told["trouble"], Value::Null);
+    let painted = |number: usize| ["used_mask", "kept_mask"].map(|kind| told["photographs"][number][kind].is_string());
+    assert_eq!([1, 2, 3].map(painted), [[true, false], [false, false], [false, true]]);
+    let again = export(&other, &json!({ "name": "again.png", "beside": ["project"], "into_folder": true }));
+    assert_eq!(names(&again).len(), 4);
+    assert!(read("again.png") == picture, "so does the page");
+    assert!(composed(&desk.path().join("again.json"), elsewhere.path()) == picture);
+    assert_eq!(Server::of(desk.path()).get("/api/news").json()["photographs"].as_array().map(Vec::len), Some(5));
+}
+
+/// The same of photographs that were dropped: in a folder they are copied beside the project; of a project that is fetched, they are
+/// looked for beside it.
+#[test]
+fn dropped_photographs_outlive_the_program() {
+    let (source, opened, elsewhere) =
+        (room(), tempfile::tempdir().expect("a folder"), tempfile::tempdir().expect("a folder"));
+    let photograph = |number: usize| std::fs::read(source.path().join(format!("0{number}.jpg"))).expect("a photograph");
+    let mask = mask(&source.path().join("02.jpg"), elsewhere.path());
+    let drop_all = |server: &Server| {
+        for number in 0..3 {
+            let address = format!("/api/photographs?name=0{number}.jpg");
+            assert_eq!(server.with_body("PUT", &address, &photograph(number)).status, 201);
+        }
+    };
+    let server = Server::of(opened.path());
+    drop_all(&server);
+    assert_eq!(server.post("/api/wishes", SMALL).status, 204);
+    assert_eq!(server.with_body("PUT", "/api/photographs/1/mask/use", &mask).status, 204);
+    assert_eq!(server.post("/api/stitch", "").status, 202);
+    assert_eq!(server.settled()["stitched"]["used"], 3);
+    let order =
+        |name: &str, into_folder: bool| json!({ "name": name, "beside": ["project"], "into_folder": into_folder });
+    let saved = export(&server, &order("pano.png", true));
+    let copies = ["00.jpg", "01.jpg", "02.jpg"];
+    assert!(names(&saved).iter().filter(|name| copies.contains(name)).count() == 3, "{saved}");
+    // A second time they are there.
+    let second = export(&server, &order("second.png", true));
+    assert_eq!(names(&second), ["second.png", "second.json", "second-masks/second-01.jpg-use.png"]);
+    let fetched = export(&server, &order("fetched.png", false));
+    assert_eq!(names(&fetched), ["fetched.png", "fetched.json", "fetched-01.jpg-use.png"]);
+    let fetch = |file: usize| unchunked(&server.get(&format!("/api/exports/{}/{file}", fetched["number"])).body);
+    let (picture, project, fetched_mask) = (fetch(0), fetch(1), fetch(2));
+    assert!(fetched_mask == mask);
+    drop(server);
+    for name in ["pano.json", "second.json"] {
+        assert!(composed(&opened.path().join(name), elsewhere.path()) == picture, "{name}");
+    }
+
+    // What was fetched, side by side with the photographs.
+    let beside = tempfile::tempdir().expect("a folder");
+    for name in copies {
+        std::fs::copy(source.path().join(name), beside.path().join(name)).expect("copied");
+    }
+    std::fs::write(beside.path().join("fetched.json"), &project).expect("written");
+    std::fs::write(beside.path().join("fetched-01.jpg-use.png"), &fetched_mask).expect("written");
+    assert!(composed(&beside.path().join("fetched.json"), elsewhere.path()) == picture);
+
+    // Dropped on the page again, the mask before the project that names it: it is no photograph then.
+    let empty = tempfile::tempdir().expect("a folder");
+    let other = Server::of(empty.path());
+    drop_all(&other);
+    assert_eq!(other.with_body("PUT", "/api/project", &project).status, 202);
+    let told = other.settled();
+    assert!(
+        told["trouble"]["message"].as_str().is_some_and(|text| text.contains("mask of the project is not here")),
+        "{told}"
+    );
+    assert_eq!(other.with_body("PUT", "/api/photographs?name=fetched-01.jpg-use.png", &mask).status, 201);
+    assert_eq!(other.with_body("PUT", "/api/project", &project).status, 202);
+    let told = other.settled();
+    assert_eq!(told["trouble"], Value::Null, "{told}");
+    assert_eq!(told["photographs"].as_array().map(Vec::len), Some(3));
+    assert!(told["photographs"][1]["used_mask"].is_string());
+    let again = export(&other, &order("again.png", false));
+    assert!(unchunked(&other.get(&format!("/api/exports/{}/0", again["number"])).body) == picture);
 }
 
 /// A project that names files elsewhere reads none of them.

@@ -70,4 +70,4 @@ pub use trueup_io::encode::{
     Depth, Metadata, OutputOptions, abandon_unfinished, check_place, same_place, write as write_picture,
     write_atomically, written_extensions,
 };
-pub use trueup_io::source::{InMemory, names_photograph, readable_formats};
+pub use trueup_io::source::{InMemory, names_photograph, read_extensions, readable_formats};

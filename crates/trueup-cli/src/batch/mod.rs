@@ -1,14 +1,11 @@
 //! `trueup batch`: from arguments to a checked job; what became of the sets, told, listed and shown on a page.
 
+mod files;
 mod lines;
 mod page;
 mod table;
 
-use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
-
-use trueup::{Batch, BatchJob, Diagnostic, SetRecord, Severity, Shard, StageContext, StitchOptions};
+use trueup::{Batch, BatchJob, Diagnostic, SetRecord, Severity, Shard, StitchOptions};
 
 use crate::arguments::BatchArgs;
 use crate::chosen;
@@ -17,15 +14,18 @@ use crate::output;
 use crate::progress;
 use crate::words::{one_line, printable};
 
-/// The file of all lines.
-const LINES: &str = "batch.jsonl";
-/// The table of all panoramas.
-const TABLE: &str = "batch.csv";
-/// The page of all panoramas.
-const PAGE: &str = "index.html";
+pub use files::run_batch;
 
-/// How often the files of all sets are written while sets are worked at: each time every record is read.
-const SUM_UP_EVERY: Duration = Duration::from_secs(60);
+/// The lines of JSON of what became of a set, as `trueup batch --json` prints them: one for every panorama, or one that says why there
+/// is none.
+pub fn batch_lines(record: &SetRecord) -> String {
+    lines::json(record)
+}
+
+/// The lines of JSON of the sets that are to be stitched, as `trueup batch --dry-run --json` prints them.
+pub fn batch_plan(batch: &Batch) -> String {
+    lines::plan(batch, true)
+}
 
 pub(crate) fn run(args: BatchArgs) -> Result<(), Failure> {
     let options = chosen::options(StitchOptions::default(), &args.tuning, &args.typed)?;
@@ -36,9 +36,9 @@ pub(crate) fn run(args: BatchArgs) -> Result<(), Failure> {
             return output::print(&lines::plan(&batch, args.json));
         }
         let told_before = context.findings().len();
-        let outcome = Run { args: &args, batch: &batch, summed_up: Mutex::default() }.run(&options, context);
+        let outcome = run_batch(&batch, &args.output, &options, &|record| tell(record, &args), context);
         warn(&context.findings()[told_before..]);
-        outcome
+        outcome.and_then(|()| tell_all(&batch, &args))
     })
 }
 
@@ -71,85 +71,29 @@ fn warn(findings: &[Diagnostic]) {
     }
 }
 
-/// A batch that is worked at.
-struct Run<'a> {
-    args: &'a BatchArgs,
-    batch: &'a Batch,
-    /// When the files of all sets were written last.
-    summed_up: Mutex<Option<Instant>>,
+/// Says what became of a set.
+fn tell(record: &SetRecord, args: &BatchArgs) -> Result<(), Failure> {
+    match (args.json, args.quiet) {
+        (true, _) => output::print(&lines::json(record)),
+        (false, true) => Ok(()),
+        (false, false) => output::print(&lines::words(record)),
+    }
 }
 
-impl Run<'_> {
-    fn run(&self, options: &StitchOptions, context: &StageContext) -> Result<(), Failure> {
-        let outcome = self.batch.run(options, &|record| self.heard(record), context);
-        // Also of a batch that was stopped: what is made is to be seen. Why it stopped counts more than a page that failed.
-        let summed_up = if self.args.output.is_dir() { self.sum_up_all() } else { Ok(()) };
-        outcome?;
-        summed_up?;
-        self.tell_all()
+/// Says what became of all sets of this shard.
+///
+/// # Errors
+/// If some of them made no panorama.
+fn tell_all(batch: &Batch, args: &BatchArgs) -> Result<(), Failure> {
+    let records: Vec<SetRecord> = batch.planned_records().collect();
+    if !args.json && !args.quiet {
+        output::print(&lines::all(&records, &args.output.join(files::PAGE)))?;
     }
-
-    /// Says what became of a set, and now and then writes what became of all.
-    fn heard(&self, record: &SetRecord) -> Result<(), Failure> {
-        match (self.args.json, self.args.quiet) {
-            (true, _) => output::print(&lines::json(record))?,
-            (false, true) => {}
-            (false, false) => output::print(&lines::words(record))?,
-        }
-        let mut last = self.summed_up.lock().unwrap_or_else(PoisonError::into_inner);
-        if last.is_none_or(|last| last.elapsed() >= SUM_UP_EVERY) {
-            self.sum_up(&self.records())?;
-            *last = Some(Instant::now());
-        }
-        Ok(())
-    }
-
-    /// Writes the files of all sets until they say what the records do: another run that wrote them meanwhile may have known less.
-    fn sum_up_all(&self) -> Result<(), Failure> {
-        for file in [LINES, TABLE, PAGE].map(|name| self.file(name)) {
-            trueup::check_place(&file)?;
-        }
-        loop {
-            let records = self.records();
-            self.sum_up(&records)?;
-            if self.records() == records {
-                return Ok(());
-            }
-        }
-    }
-
-    /// Writes the files of all sets, of this shard and of others, as far as they are done.
-    fn sum_up(&self, records: &[SetRecord]) -> Result<(), Failure> {
-        let lines: String = records.iter().map(lines::json).collect();
-        trueup::write_atomically(&self.file(LINES), lines.as_bytes())?;
-        trueup::write_atomically(&self.file(TABLE), table::text(records).as_bytes())?;
-        trueup::write_atomically(&self.file(PAGE), page::text(records, self.batch.sets().len())?.as_bytes())?;
-        Ok(())
-    }
-
-    /// Says what became of all sets of this shard.
-    ///
-    /// # Errors
-    /// If some of them made no panorama.
-    fn tell_all(&self) -> Result<(), Failure> {
-        let records: Vec<SetRecord> = self.batch.planned_records().collect();
-        if !self.args.json && !self.args.quiet {
-            output::print(&lines::all(&records, &self.file(PAGE)))?;
-        }
-        match records.iter().filter(|record| record.has_failed()).count() {
-            0 => Ok(()),
-            count => Err(Failure::unsatisfied(
-                format!("{} made no panorama", if count == 1 { "1 set".to_owned() } else { format!("{count} sets") }),
-                format!("{} says why.", self.file(LINES).display()),
-            )),
-        }
-    }
-
-    fn records(&self) -> Vec<SetRecord> {
-        self.batch.records().collect()
-    }
-
-    fn file(&self, name: &str) -> PathBuf {
-        self.args.output.join(name)
+    match records.iter().filter(|record| record.has_failed()).count() {
+        0 => Ok(()),
+        count => Err(Failure::unsatisfied(
+            format!("{} made no panorama", if count == 1 { "1 set".to_owned() } else { format!("{count} sets") }),
+            format!("{} says why.", args.output.join(files::LINES).display()),
+        )),
     }
 }

@@ -31,11 +31,23 @@ pub fn mask(file: &Path, source: &SourceImage, options: &SourceOptions, context:
             RejectedSource::to_error,
         ));
     };
-    let size = (picture.width, picture.height);
+    marks(&photograph(&picture)?, &path, source)
+}
+
+/// The same of a picture in memory, which messages call `name`.
+///
+/// # Errors
+/// [`Error::Input`] if it has another size.
+pub fn mask_in_memory(picture: &Photograph, name: &str, source: &SourceImage) -> Result<Mask> {
+    marks(picture, name, source)
+}
+
+fn marks(picture: &Photograph, name: &str, source: &SourceImage) -> Result<Mask> {
+    let size = (picture.width(), picture.height());
     let turned = source.orientation >= 5 && source.width != source.height && size == (source.height, source.width);
     if size != (source.width, source.height) && !turned {
         return Err(Error::input(
-            &path,
+            name,
             format!(
                 "the mask has {} x {} px, the photograph {} has {} x {} px",
                 size.0, size.1, source.name, source.width, source.height
@@ -43,7 +55,7 @@ pub fn mask(file: &Path, source: &SourceImage, options: &SourceOptions, context:
             "Save the mask in the size of the photograph as it is shown.",
         ));
     }
-    let white = white(&photograph(&picture)?)?;
+    let white = white(picture)?;
     let white = if turned { orientation::upright(white, source.orientation) } else { white };
     Ok(Mask::from_fn(white.width(), white.height(), |x, y| white.pixel(x, y)[0]))
 }

@@ -9,7 +9,7 @@ use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
 
 use super::orientation::upright;
-use crate::format::PLAIN_PIXEL_BYTES;
+use crate::format::{Input, PLAIN_PIXEL_BYTES, Reading};
 use crate::formats;
 use crate::metadata::header;
 
@@ -58,6 +58,19 @@ pub fn decoding_surplus(sources: &[SourceImage]) -> usize {
 
 /// Decodes the pixels as they are stored, before orientation.
 fn stored(source: &SourceImage) -> Result<Photograph> {
+    let (format, input) = opened(source)?;
+    format.pixels(source, input)
+}
+
+/// The same, made smaller by the decoder where it can do that, but of at least so many columns and rows once it is upright.
+pub(super) fn stored_of_at_least(source: &SourceImage, [width, height]: [usize; 2]) -> Result<Photograph> {
+    let (format, input) = opened(source)?;
+    let least = if source.orientation >= 5 { [height, width] } else { [width, height] };
+    format.reduced(source, input, least)
+}
+
+/// A photograph's file with how it is read; there is room for its pixels.
+fn opened(source: &SourceImage) -> Result<(&'static Reading, Input)> {
     let reading = |error| Error::io("reading", &source.path, error);
     let mut input = BufReader::new(File::open(&source.path).map_err(reading)?);
     let format = formats::recognize(&mut input).map_err(reading)?.ok_or_else(|| {
@@ -66,5 +79,5 @@ fn stored(source: &SourceImage) -> Result<Photograph> {
     })?;
     let room = source.width.saturating_mul(source.height).saturating_mul(format.pixel_bytes);
     check_room(format_args!("decoding {}", source.name), room)?;
-    format.pixels(source, input)
+    Ok((format, input))
 }

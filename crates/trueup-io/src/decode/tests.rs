@@ -260,3 +260,71 @@ fn the_cache_changes_nothing_but_the_work() {
         assert!(files.photograph(2).is_err());
     }
 }
+
+/// The decoder of JPEG makes photographs smaller itself; what comes out is what area averaging makes of all pixels, nearly.
+#[test]
+fn small_photographs_are_nearly_the_means_of_their_pixels() {
+    let folder = TempDir::new().expect("a temporary folder");
+    // Of a size that eight does not divide, a photograph that is turned may be off by a part of a pixel.
+    small_is_near_to_means(&folder, [437, 291], &[1]);
+    small_is_near_to_means(&folder, [440, 288], &[1, 3, 6, 8]);
+}
+
+fn small_is_near_to_means(folder: &TempDir, [width, height]: [u16; 2], orientations: &[u8]) {
+    // Soft colors, by which means are told from single samples.
+    let soft = |x: u16, y: u16, c: u16| {
+        let wave = (f64::from(x + 17 * c) / 23.0).sin() * (f64::from(y) / 17.0).cos();
+        (128.0 + 90.0 * wave) as u8
+    };
+    let row = |y: u16| (0..width).flat_map(move |x| [0, 1, 2].map(|c| soft(x, y, c)));
+    let pixels: Vec<u8> = (0..height).flat_map(row).collect();
+    let path = folder.path().join(format!("{width}.jpg"));
+    let encoder = jpeg_encoder::Encoder::new_file(&path, 95).expect("an encoder");
+    encoder.encode(&pixels, width, height, jpeg_encoder::ColorType::Rgb).expect("written");
+    let source = examine(path);
+    for &orientation in orientations {
+        let turned = match orientation {
+            1 | 3 => SourceImage { orientation, ..source.clone() },
+            _ => SourceImage { orientation, width: source.height, height: source.width, ..source.clone() },
+        };
+        for max_pixels in [1_500.0, 9_000.0, 60_000.0, 1e9] {
+            let small = small(&turned, max_pixels).expect("decoded");
+            let frame = WorkingFrame::new(turned.width, turned.height, max_pixels);
+            let exact = working(&turned, &frame, max_pixels).expect("decoded").thumbnail;
+            assert_eq!((small.width(), small.height()), (exact.width(), exact.height()));
+            let apart = small.data().iter().zip(exact.data()).map(|(one, other)| f64::from(one.abs_diff(*other)));
+            let mean = apart.sum::<f64>() / small.data().len() as f64;
+            // A twentieth of what neighboring pixels of the smallest size differ by where it is steepest.
+            assert!(mean < 2.0, "orientation {orientation}, {max_pixels}: {mean}");
+        }
+    }
+}
+
+/// Formats whose decoders make nothing smaller come out by exact averaging.
+#[test]
+fn small_photographs_of_other_formats_are_the_means_of_their_pixels() {
+    let folder = TempDir::new().expect("a temporary folder");
+    for (name, specimen) in [("eight.png", rgb8()), ("sixteen.png", rgb16())] {
+        let source = examine(write(&folder, name, &specimen.file(Container::Png)));
+        let small = small(&source, 300.0).expect("decoded");
+        let exact = working(&source, &WorkingFrame::new(source.width, source.height, 300.0), 300.0).expect("decoded");
+        assert!(
+            small.data().iter().zip(exact.thumbnail.data()).all(|(one, other)| one.abs_diff(*other) <= 1),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn a_small_photograph_of_a_damaged_file_is_an_error() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let whole =
+        std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room/00.jpg")).expect("a photograph");
+    let path = write(&folder, "damaged.jpg", &whole);
+    let source = examine(path.clone());
+    // As it is on a disk that fails: the header is whole, the rest is not.
+    let mut damaged = whole.clone();
+    damaged.truncate(whole.len() / 3);
+    std::fs::write(&path, damaged).expect("written");
+    assert!(matches!(small(&source, 60_000.0), Err(Error::Input { .. })));
+}

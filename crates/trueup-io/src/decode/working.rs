@@ -70,7 +70,7 @@ fn average_to_frame(photograph: &Photograph, frame: &WorkingFrame) -> Raster<f32
 }
 
 /// The whole pixels inside a frame.
-fn whole_size(frame: &WorkingFrame) -> (usize, usize) {
+pub(super) fn whole_size(frame: &WorkingFrame) -> (usize, usize) {
     (reduce::whole_pixels(frame.width), reduce::whole_pixels(frame.height))
 }
 
@@ -85,7 +85,7 @@ fn luma(colors: Raster<f32>) -> Result<Raster<f32>> {
 }
 
 /// A gray or RGB picture as rounded 8-bit RGB.
-fn rgb8(colors: &Raster<f32>) -> Result<Raster<u8>> {
+pub(super) fn rgb8(colors: &Raster<f32>) -> Result<Raster<u8>> {
     // The addition rounds; the conversion truncates and saturates.
     let rounded = |value: f32| (value + 0.5) as u8;
     let data = if colors.channels() == 1 {

@@ -98,6 +98,12 @@ pub fn readable_formats() -> String {
     alternatives(readable().map(|(format, _)| format.name.to_owned()))
 }
 
+/// The extensions of photographs that are read, with their dots: ".jpg".
+pub fn read_extensions() -> Vec<String> {
+    let extensions = readable().flat_map(|(format, _)| format.extensions.iter().chain(format.rare_extensions));
+    extensions.map(|extension| format!(".{extension}")).collect()
+}
+
 /// The extensions to propose of the formats that `which` accepts, for messages: ".png or .tif".
 pub(crate) fn extensions(which: impl Fn(&Writing) -> bool) -> String {
     alternatives(

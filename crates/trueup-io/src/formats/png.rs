@@ -39,6 +39,7 @@ pub(crate) static PNG: Format = Format {
         exif: block::read_exif,
         whole_fields: block::read_fields,
         pixels,
+        reduced: None,
         pixel_bytes: PLAIN_PIXEL_BYTES,
     }),
     writing: Some(Writing {

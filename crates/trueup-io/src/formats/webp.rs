@@ -35,6 +35,7 @@ pub(crate) static WEBP: Format = Format {
         exif: block::read_exif,
         whole_fields: block::read_fields,
         pixels,
+        reduced: None,
         pixel_bytes: PLAIN_PIXEL_BYTES,
     }),
     writing: Some(Writing {

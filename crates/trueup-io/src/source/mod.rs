@@ -29,7 +29,7 @@ pub use opened::PANORAMA_OF_OTHERS;
 use opened::{Named, OWN_PANORAMA, OpenedPicture, check_size, open_picture};
 use rejection::Rejection;
 
-pub use crate::formats::{names_photograph, readable_formats};
+pub use crate::formats::{names_photograph, read_extensions, readable_formats};
 pub use in_memory::InMemory;
 pub use inputs::natural_order;
 pub use names::unique_names;

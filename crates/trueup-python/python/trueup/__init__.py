@@ -4,7 +4,8 @@
 >>> panorama.save("holiday.jpg")
 """
 
-from trueup._alignment import Alignment, align, align_all, stitch, stitch_all
+from trueup._alignment import Alignment, align, align_all, open_project, stitch, stitch_all
+from trueup._batch import BatchLine, batch, batch_plan
 from trueup._errors import (
     Error,
     InputError,
@@ -24,6 +25,7 @@ __version__ = _version()
 
 __all__ = [
     "Alignment",
+    "BatchLine",
     "Error",
     "Finding",
     "InputError",
@@ -39,6 +41,9 @@ __all__ = [
     "UnsupportedError",
     "align",
     "align_all",
+    "batch",
+    "batch_plan",
+    "open_project",
     "options",
     "stitch",
     "stitch_all",

@@ -1,11 +1,12 @@
 """From photographs to panoramas."""
 
+import os
 from typing import Any, Unpack
 
 from trueup import _trueup
 from trueup._keywords import ComposeKeywords, StitchKeywords
 from trueup._panorama import Panorama
-from trueup._photographs import Photographs, native
+from trueup._photographs import Photographs, native, native_masks
 from trueup._progress import Heard, Progress
 from trueup._record import Recorded
 
@@ -56,7 +57,7 @@ def stitch(photographs: Photographs, *, progress: Progress = None, **keywords: U
     profile, time and place.
 
     Keywords are the command's flags: ``method``, ``projection``, ``crop``, ``scale`` and so on; ``set={"table.option": value}`` sets
-    any option that :func:`trueup.options` lists. ``progress`` is ``True`` for bars, or a callback that is called with a stage's
+    any option that :func:`trueup.options` lists; ``masks`` and ``keep`` are files or arrays by the names of photographs. ``progress`` is ``True`` for bars, or a callback that is called with a stage's
     name, the steps done and how many there are. Ctrl-C stops the work.
 
     Photographs that do not fit are left out, with a reason in :attr:`Panorama.photographs`. Raises :class:`trueup.InputError` if none
@@ -64,7 +65,7 @@ def stitch(photographs: Photographs, *, progress: Progress = None, **keywords: U
     :class:`trueup.NotApplicableError`, :class:`trueup.LimitsError`.
     """
     with Heard(progress) as heard:
-        [alignment] = _trueup.align(native(photographs), dict(keywords), False, heard)
+        [alignment] = _trueup.align(native(photographs), _native_keywords(keywords), False, heard)
         return Panorama(alignment.compose(None, {}, heard))
 
 
@@ -73,7 +74,7 @@ def stitch_all(
 ) -> list[Panorama]:
     """A panorama of every group of photographs that overlap, the largest group first. Otherwise as :func:`stitch`."""
     with Heard(progress) as heard:
-        alignments = _trueup.align(native(photographs), dict(keywords), True, heard)
+        alignments = _trueup.align(native(photographs), _native_keywords(keywords), True, heard)
         return [Panorama(alignment.compose(None, {}, heard)) for alignment in alignments]
 
 
@@ -83,7 +84,7 @@ def align(photographs: Photographs, *, progress: Progress = None, **keywords: Un
     Raises what :func:`stitch` raises.
     """
     with Heard(progress) as heard:
-        [alignment] = _trueup.align(native(photographs), dict(keywords), False, heard)
+        [alignment] = _trueup.align(native(photographs), _native_keywords(keywords), False, heard)
         return Alignment(alignment)
 
 
@@ -92,4 +93,34 @@ def align_all(
 ) -> list[Alignment]:
     """The geometry of every group of photographs that overlap, the largest group first. Otherwise as :func:`align`."""
     with Heard(progress) as heard:
-        return [Alignment(one) for one in _trueup.align(native(photographs), dict(keywords), True, heard)]
+        return [Alignment(one) for one in _trueup.align(native(photographs), _native_keywords(keywords), True, heard)]
+
+
+def open_project(
+    path: str | os.PathLike[str],
+    *,
+    photographs: str | os.PathLike[str] | None = None,
+    progress: Progress = None,
+    **keywords: Unpack[ComposeKeywords],
+) -> Alignment:
+    """The geometry that a project file records, ready to be composed: nothing is measured, matched or aligned again.
+
+    Composed without keywords, it is the very panorama that was stitched. Photographs and masks are looked for where the project says,
+    from its folder and from the current one, and beside it by their names; ``photographs`` is a folder of others of the same names and
+    sizes to be shown instead. Keywords are those of :meth:`Alignment.compose`, for all that is composed of it.
+
+    Raises :class:`trueup.InputError` if it is no project, or photographs or masks are missing or have other sizes;
+    :class:`trueup.UnsupportedError` for options of the geometry; :class:`trueup.OptionsError`, :class:`trueup.IoError`.
+    """
+    folder = None if photographs is None else os.fspath(photographs)
+    with Heard(progress) as heard:
+        return Alignment(_trueup.open_project(os.fspath(path), folder, dict(keywords), heard))
+
+
+def _native_keywords(keywords: StitchKeywords) -> dict[str, Any]:
+    """Keywords as the native part takes them: masks that are arrays have names."""
+    taken: dict[str, Any] = dict(keywords)
+    for argument in ("masks", "keep"):
+        if taken.get(argument) is not None:
+            taken[argument] = native_masks(taken[argument], argument)
+    return taken

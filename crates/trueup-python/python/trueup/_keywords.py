@@ -4,6 +4,8 @@ import os
 from collections.abc import Mapping
 from typing import Literal, TypeAlias, TypedDict
 
+from trueup._photographs import Picture
+
 Path: TypeAlias = str | os.PathLike[str]
 Value: TypeAlias = bool | int | float | str | os.PathLike[str]
 
@@ -115,10 +117,10 @@ class StitchKeywords(ComposeKeywords, total=False):
     seed: int
     """Every random choice, from the verification of pairs on, derives from this number. Change it to see how much of a
     result is chance (default 0)."""
-    masks: Mapping[str, Path]
-    """Pictures by the names of photographs: what is black or transparent in them is ignored."""
-    keep: Mapping[str, Path]
-    """Pictures by the names of photographs: what is white in them is shown."""
+    masks: Mapping[str, Picture]
+    """Files or arrays by the names of photographs: what is black or transparent in them is ignored."""
+    keep: Mapping[str, Picture]
+    """Files or arrays by the names of photographs: what is white in them is shown."""
     reference: str
     """The photograph that sets the pixel scale and stays in place; auto takes the one in the middle."""
     graph: Path
@@ -129,3 +131,79 @@ class StitchKeywords(ComposeKeywords, total=False):
     """Fails unless every photograph is used."""
     cache: Path
     """A folder for what is found in the photographs, for later runs."""
+
+
+class BatchKeywords(SaveKeywords, total=False):
+    """Keywords of a batch."""
+
+    lens: Literal["auto", "pinhole", "rectilinear", "fisheye"]
+    """What kind of lens took the photographs. Say it where few photographs overlap, which tell little of a lens, or
+    where a line that is straight comes out bent (default auto)."""
+    lens_fov: float
+    """Field of view of every photograph across its longer side, through the whole lens, by any calibration or
+    specification; the matches may still change the focal length by up to 5 %. Say it where photographs carry no focal
+    length, or a wrong one; 0 leaves it to them (default 0.0)."""
+    scale: float
+    """Size of the panorama relative to the reference photograph's own pixels: 1 keeps every detail the reference has.
+    Lower it for a quick preview (0.25) or a smaller file; raise it only if the reference was taken with a shorter lens
+    than the others (default 1.0)."""
+    look: Literal["natural", "linear", "hdr"]
+    """How photographs of very different exposure come together. Choose `linear` to measure light or to finish tones by
+    hand, `hdr` for detail in sun and shade alike. Photographs of like exposure look the same with all of them (default
+    natural)."""
+    projection: Literal[
+        "auto",
+        "mesh",
+        "equirectangular",
+        "cylindrical",
+        "perspective",
+        "mercator",
+        "panini",
+        "stereographic",
+    ]
+    """What the panorama is drawn on. Choose equirectangular for viewers of spherical panoramas, the mesh where
+    photographs that were taken from several places do not meet, and any other as you like it (default auto)."""
+    crop: Literal["auto", "rectangle", "none"]
+    """What of the canvas is kept. Choose `none` for all that the photographs show, with ragged borders (default
+    auto)."""
+    fill: float
+    """Gaps between and beside the photographs of up to twice this width, as a share of a photograph's side, are filled
+    with a smooth surface over their borders' colors. 0 fills nothing; raise it to 0.1 where ragged borders lie in an
+    even sky or wall, in which small fillings are not noticed (default 0.0)."""
+    method: Literal[
+        "vpg",
+        "gsp-2d",
+        "gsp-3d",
+        "vpg-published",
+        "vpg-literal",
+        "gsp-2d-published",
+        "gsp-3d-published",
+        "aanap-published",
+        "straightening",
+        "homography",
+        "autostitch",
+        "apap",
+        "sphp",
+        "sphp-free",
+        "aanap",
+        "quasi-homography",
+    ]
+    """How the panorama's shape is found. Choose another one to compare, or for photographs that it serves better
+    (default vpg)."""
+    align: Literal["points", "lines", "photometric", "lines+photometric"]
+    """What draws overlapping photographs together. Where things stand twice or lines break at seams, take more: it is
+    slower and shows fewer ghosts (default points)."""
+    structure: Literal["none", "lines"]
+    """What of the photographs' structure is kept, beyond the neighborhoods of grid vertices. Choose lines where long
+    edges bend (default none)."""
+    seed: int
+    """Every random choice, from the verification of pairs on, derives from this number. Change it to see how much of a
+    result is chance (default 0)."""
+    memory: str
+    """Memory that the work may take; auto is a quarter of the machine's, or more where less is too little. With less,
+    the canvas goes to a scratch file and photographs are decoded again. Set it where other programs need theirs
+    (default auto)."""
+    scratch: str
+    """Folder for the scratch file; empty for the folder of the panorama. Set it where that disk is slow or full."""
+    threads: int
+    """Number of threads; 0 for one per core. The panorama is the same for any number."""

@@ -54,6 +54,11 @@ def native(photographs: Photographs) -> list[str | tuple[str, Any]]:
     return [_named(f"photographs[{number}]", picture) for number, picture in enumerate(photographs)]
 
 
+def native_masks(masks: Mapping[str, Picture], argument: str) -> dict[str, str | tuple[str, Any]]:
+    """Masks as the native part takes them, by the photographs' names."""
+    return {name: _named(f"{argument}[{name!r}]", mask) for name, mask in masks.items()}
+
+
 def _is_stack(pictures: object) -> bool:
     """Whether an array is one of pictures: photographs x height x width x colors."""
     return getattr(pictures, "ndim", 0) == 4
@@ -87,7 +92,10 @@ def _array(picture: Any) -> "npt.NDArray[np.uint8 | np.uint16 | np.float32]":
     import numpy as np
 
     array = np.asarray(picture)
-    if array.dtype.kind == "f":
+    if array.dtype.kind == "b":
+        # A mask.
+        array = array.astype(np.uint8) * 255
+    elif array.dtype.kind == "f":
         array = array.astype(np.float32, copy=False)
     elif array.dtype.kind == "u" and array.dtype.itemsize == 2:
         # Whatever the order of its bytes.

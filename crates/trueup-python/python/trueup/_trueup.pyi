@@ -6,7 +6,19 @@ from typing import Any, final
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Alignment", "Panorama", "align", "command", "option_flags", "options", "png", "version"]
+__all__ = [
+    "Alignment",
+    "Panorama",
+    "align",
+    "batch",
+    "command",
+    "open_project",
+    "option_flags",
+    "options",
+    "plan",
+    "png",
+    "version",
+]
 
 def align(
     photographs: list[str | tuple[str, Any]],
@@ -14,9 +26,22 @@ def align(
     all: bool,
     progress: Callable[[str, int, int], object] | None,
 ) -> list[Alignment]: ...
+def batch(
+    wishes: dict[str, Any],
+    keywords: dict[str, Any],
+    told: Callable[[str], object] | None,
+    progress: Callable[[str, int, int], object] | None,
+) -> str: ...
 def command(arguments: list[str]) -> int: ...
+def open_project(
+    path: str,
+    photographs: str | None,
+    keywords: dict[str, Any],
+    progress: Callable[[str, int, int], object] | None,
+) -> Alignment: ...
 def option_flags() -> list[tuple[str, str, list[str]]]: ...
 def options() -> tuple[str, str]: ...
+def plan(wishes: dict[str, Any]) -> str: ...
 def png(picture: npt.NDArray[np.uint8]) -> bytes: ...
 def version() -> str: ...
 @final

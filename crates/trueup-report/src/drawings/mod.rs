@@ -5,6 +5,7 @@
 //! [`trueup::Alignment::project`] has it for a canvas of another size. What is written in them is escaped.
 
 mod alignment;
+mod layer;
 mod lines;
 mod matches;
 mod outlines;
@@ -13,6 +14,7 @@ mod seams;
 mod svg;
 
 pub use alignment::{alignment_error, alignment_legend};
+pub use layer::{Layer, LegendEntry, seams_size};
 pub use lines::{LineDirection, lines_of_panorama, lines_of_photograph};
 pub use matches::overlaps;
 pub use outlines::outlines;

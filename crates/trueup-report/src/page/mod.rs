@@ -14,8 +14,7 @@ use minijinja::Environment;
 use serde_json::{Value, json};
 use trueup::{BrightnessStep, Error, Judgement, Project, Result, ShownPhotographs, Verdict};
 
-use crate::drawings;
-use crate::drawings::LineDirection;
+use crate::drawings::{Layer, LineDirection};
 use crate::pictures::EmbeddedPicture;
 use figures::count;
 
@@ -85,16 +84,9 @@ impl Page<'_> {
 
     /// What lies over the panorama.
     fn drawings(&self) -> Result<Value> {
-        let measures = self.drawn.measures.as_ref();
-        let has_places = measures.is_some_and(|measures| !measures.pairs.is_empty());
-        let has_lines = measures.is_some_and(|measures| measures.photographs.iter().any(|one| !one.lines.is_empty()));
-        Ok(json!({
-            "outlines": drawings::outlines(self.drawn)?,
-            "seams": self.shown.map(drawings::seams),
-            "alignment": has_places.then(|| drawings::alignment_error(self.drawn)).transpose()?,
-            "overlaps": drawings::overlaps(self.drawn)?,
-            "lines": has_lines.then(|| drawings::lines_of_panorama(self.drawn)).transpose()?,
-        }))
+        let drawn = Layer::ALL.iter().map(|layer| Ok((layer.name(), layer.drawn(self.drawn, self.shown)?)));
+        let drawn: BTreeMap<&str, Option<String>> = drawn.collect::<Result<_>>()?;
+        Ok(json!(drawn))
     }
 
     /// The first words: what was made, and how good it is.

@@ -168,6 +168,96 @@ var Choices = class {
   }
 };
 
+// src/layers.ts
+var SVG = "http://www.w3.org/2000/svg";
+var Layers = class {
+  constructor(possible2, trouble2) {
+    this.trouble = trouble2;
+    for (const { name, title } of possible2.layers) {
+      const detail = el("div", { class: "layer-detail", role: "status" });
+      const input = el("input", { type: "checkbox", name: "layer", value: name, onchange: () => this.choose(name, input.checked) });
+      this.details.set(name, detail);
+      this.panel.append(el("label", { class: "check" }, input, title), detail);
+    }
+    this.button.addEventListener("click", () => this.open(this.panel.hidden));
+    this.panel.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape") return;
+      this.open(false);
+      this.button.focus();
+    });
+  }
+  button = byId("layers-button");
+  panel = byId("layers-panel");
+  chosen = /* @__PURE__ */ new Set();
+  details = /* @__PURE__ */ new Map();
+  under = null;
+  shown = "";
+  /** Draws what is chosen over this from now on. */
+  over(under) {
+    const same = under?.number === this.under?.number && under?.kind === this.under?.kind && under?.element === this.under?.element;
+    this.button.disabled = under === null;
+    if (under === null) this.open(false);
+    if (same) return;
+    this.under?.element.replaceChildren();
+    this.under = under;
+    this.shown = "";
+    void this.draw();
+  }
+  open(isOpen) {
+    this.panel.hidden = !isOpen;
+    this.button.setAttribute("aria-expanded", String(isOpen));
+  }
+  choose(name, isChosen) {
+    if (isChosen) this.chosen.add(name);
+    else this.chosen.delete(name);
+    void this.draw();
+  }
+  /** Fetches and shows the drawings; what was chosen otherwise, or lies over something else by then, is not shown. */
+  async draw() {
+    const { under } = this;
+    const wanted = JSON.stringify([under?.kind, under?.number, [...this.chosen]]);
+    if (wanted === this.shown) return;
+    this.shown = wanted;
+    const names = [...this.details.keys()].filter((name) => this.chosen.has(name));
+    try {
+      const asked = under === null ? [] : names.map((name) => told(`/api/${under.kind}/${under.number}/layers/${name}`));
+      const layers2 = await Promise.all(asked);
+      if (wanted !== this.shown) return;
+      under?.element.replaceChildren(...layers2.flatMap((layer) => drawing(layer, under.kind)));
+      for (const [name, detail] of this.details) {
+        const layer = layers2[names.indexOf(name)];
+        detail.replaceChildren(...layer ? described(layer) : []);
+      }
+    } catch (error) {
+      if (!(error instanceof Refused)) throw error;
+      if (wanted === this.shown) this.trouble(error);
+    }
+  }
+};
+function drawing(layer, kind) {
+  if (layer.drawing === null) return [];
+  const svg = document.importNode(new DOMParser().parseFromString(layer.drawing, "image/svg+xml").documentElement, true);
+  if (kind === "preview") svg.setAttribute("preserveAspectRatio", "xMidYMid meet");
+  return [svg];
+}
+function described(layer) {
+  if (layer.drawing === null) return [el("p", { class: "small" }, "There is nothing of that to see here.")];
+  const entries = layer.legend.map((one) => el("li", {}, swatch(one.color, one.dashes), one.words));
+  const elsewhere = "Measured in the view that was stitched, drawn where this view shows it.";
+  const note = layer.is_measured_elsewhere ? [el("p", { class: "small" }, elsewhere)] : [];
+  return [...entries.length > 0 ? [el("ul", { class: "legend small" }, ...entries)] : [], ...note];
+}
+function swatch(color, dashes) {
+  const svg = document.createElementNS(SVG, "svg");
+  const line = document.createElementNS(SVG, "path");
+  for (const [name, value] of [["viewBox", "0 0 38 12"], ["aria-hidden", "true"]]) svg.setAttribute(name, value);
+  for (const [name, value] of [["d", "M1 6h36"], ["stroke", color], ["stroke-width", "6"], ["stroke-dasharray", dashes]]) {
+    if (value !== "") line.setAttribute(name, value);
+  }
+  svg.append(line);
+  return svg;
+}
+
 // src/paint.ts
 var COLORS = { ignore: [214, 48, 49], keep: [39, 160, 90] };
 var KEY_STEP = 0.02;
@@ -349,7 +439,11 @@ var Saving = class {
       return el("li", {}, one.to_fetch ? el("a", { href: address, download: file.name }, said2) : `${said2}, in the folder`);
     }));
     const list = byId("save-files");
-    if (list.childElementCount !== files.length) list.replaceChildren(...files);
+    const key = JSON.stringify(now2.exports.map((one) => one.number));
+    if (list.dataset["key"] !== key) {
+      list.dataset["key"] = key;
+      list.replaceChildren(...files);
+    }
     const busy = now2.work?.task === "export";
     byId("save-go").disabled = busy;
     if (busy) byId("save-told").textContent = "Writing …";
@@ -381,10 +475,11 @@ var Saving = class {
   }
 };
 var Opening = class {
-  constructor(trouble2) {
+  constructor(possible2, trouble2) {
     this.trouble = trouble2;
     for (const id of ["choose", "choose-more"]) {
       const input = byId(id);
+      input.accept = ["image/*", ...possible2.photographs].join(",");
       input.addEventListener("change", () => void this.take([...input.files ?? []]).then(() => {
         input.value = "";
       }));
@@ -448,7 +543,8 @@ var Opening = class {
 // src/stage.ts
 var KEY_DEGREES = 1;
 var Stage = class {
-  constructor(turned) {
+  constructor(layers2, turned) {
+    this.layers = layers2;
     this.turned = turned;
     for (const mode of ["look", "turn", "around"]) byId(mode).addEventListener("click", () => this.show(mode));
     byId("closer").addEventListener("click", () => this.zoom(1.4));
@@ -470,6 +566,8 @@ var Stage = class {
   viewer = null;
   tiles = null;
   sphere = null;
+  overPreview = byId("layers");
+  overTiles = null;
   get preview() {
     return this.drawn;
   }
@@ -518,8 +616,10 @@ var Stage = class {
     this.tiles = number;
     this.viewer?.destroy();
     this.viewer = null;
+    this.overTiles = null;
     if (number !== null) {
-      this.viewer = OpenSeadragon({
+      const over = el("div", { class: "layers" });
+      const viewer = OpenSeadragon({
         element: this.tilesElement,
         tileSources: `/api/tiles/${number}/panorama.dzi`,
         drawer: "canvas",
@@ -530,6 +630,9 @@ var Stage = class {
         animationTime: 0.4,
         gestureSettingsMouse: { clickToZoom: false, dblClickToZoom: true }
       });
+      viewer.addOnceHandler("open", () => viewer.addOverlay({ element: over, location: viewer.world.getItemAt(0).getBounds() }));
+      this.viewer = viewer;
+      this.overTiles = over;
     }
     this.arrange();
   }
@@ -555,6 +658,10 @@ var Stage = class {
     if (this.mode === "turn") this.picture.tabIndex = 0;
     else this.picture.removeAttribute("tabindex");
     for (const id of ["closer", "farther", "whole"]) byId(id).disabled = !(showTiles || this.mode === "around");
+    this.overPreview.hidden = this.picture.hidden;
+    if (showTiles && this.overTiles && this.tiles !== null) this.layers.over({ kind: "tiles", number: this.tiles, element: this.overTiles });
+    else if (!this.picture.hidden && this.drawn) this.layers.over({ kind: "preview", number: this.drawn.number, element: this.overPreview });
+    else this.layers.over(null);
     this.lookAround();
   }
   lookAround() {
@@ -738,7 +845,8 @@ var heard = {
   chosen: (wishes) => doing(wish(wishes))
 };
 var choices = new Choices(possible, heard);
-var stage = new Stage({
+var layers = new Layers(possible, trouble);
+var stage = new Stage(layers, {
   ...heard,
   trouble,
   now: () => {
@@ -752,7 +860,7 @@ var strip = new Strip({
   paint: (photograph) => doing(painting.open(photograph))
 });
 var saving = new Saving(possible, trouble);
-var opening = new Opening(trouble);
+var opening = new Opening(possible, trouble);
 byId("stitch").addEventListener("click", () => doing(post("/api/stitch")));
 byId("stop").addEventListener("click", () => doing(post("/api/stop")));
 byId("undo").addEventListener("click", () => doing(post("/api/undo")));

@@ -45,8 +45,17 @@ export interface Option {
 }
 export interface Possible {
     options: Option[];
+    /** Extensions of photographs that are read, with their dots. */
+    photographs: string[];
     extensions: string;
     side_outputs: { flag: string; meaning: string }[];
+    layers: { name: string; title: string }[];
+}
+/** A drawing over a preview or tiles; none where there is nothing to draw. */
+export interface Layer {
+    drawing: string | null;
+    legend: { color: string; dashes: string; words: string }[];
+    is_measured_elsewhere: boolean;
 }
 export interface Sphere { full_width: number; full_height: number; left: number; top: number; projection: string }
 export interface Preview {

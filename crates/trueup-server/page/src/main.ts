@@ -4,6 +4,7 @@ import type { Possible, Told, Wishes } from "./api.js";
 import { post, Refused, told, wish } from "./api.js";
 import { Choices } from "./choices.js";
 import { byId, el } from "./dom.js";
+import { Layers } from "./layers.js";
 import { Painting } from "./paint.js";
 import { Opening, Saving } from "./save.js";
 import { cutTiles, Stage } from "./stage.js";
@@ -58,7 +59,8 @@ const heard = {
     chosen: (wishes: Wishes) => doing(wish(wishes)),
 };
 const choices = new Choices(possible, heard);
-const stage = new Stage({
+const layers = new Layers(possible, trouble);
+const stage = new Stage(layers, {
     ...heard,
     trouble,
     now: () => {
@@ -72,7 +74,7 @@ const strip = new Strip({
     paint: (photograph) => doing(painting.open(photograph)),
 });
 const saving = new Saving(possible, trouble);
-const opening = new Opening(trouble);
+const opening = new Opening(possible, trouble);
 
 byId("stitch").addEventListener("click", () => doing(post("/api/stitch")));
 byId("stop").addEventListener("click", () => doing(post("/api/stop")));

@@ -34,7 +34,12 @@ export class Saving {
             return el("li", {}, one.to_fetch ? el("a", { href: address, download: file.name }, said) : `${said}, in the folder`);
         }));
         const list = byId("save-files");
-        if (list.childElementCount !== files.length) list.replaceChildren(...files);
+        const key = JSON.stringify(now.exports.map((one) => one.number));
+        // Links that are there are not replaced: one of them may have the focus.
+        if (list.dataset["key"] !== key) {
+            list.dataset["key"] = key;
+            list.replaceChildren(...files);
+        }
         const busy = now.work?.task === "export";
         byId<HTMLButtonElement>("save-go").disabled = busy;
         if (busy) byId("save-told").textContent = "Writing …";
@@ -71,9 +76,11 @@ export class Saving {
 export class Opening {
     private readonly dialog = byId<HTMLDialogElement>("opening");
 
-    constructor(private readonly trouble: (refused: Refused) => void) {
+    constructor(possible: Possible, private readonly trouble: (refused: Refused) => void) {
         for (const id of ["choose", "choose-more"]) {
             const input = byId<HTMLInputElement>(id);
+            // Systems do not know all of them for pictures; telephones offer their gallery for pictures only.
+            input.accept = ["image/*", ...possible.photographs].join(",");
             input.addEventListener("change", () => void this.take([...(input.files ?? [])]).then(() => { input.value = ""; }));
         }
         const project = byId<HTMLInputElement>("choose-project");

@@ -2,7 +2,8 @@
 
 import type { Preview, Wishes } from "./api.js";
 import { ask, post, Refused, told } from "./api.js";
-import { byId } from "./dom.js";
+import { byId, el } from "./dom.js";
+import type { Layers } from "./layers.js";
 
 type Mode = "look" | "turn" | "around";
 
@@ -28,8 +29,10 @@ export class Stage {
     private viewer: OpenSeadragonViewer | null = null;
     private tiles: number | null = null;
     private sphere: PannellumViewer | null = null;
+    private readonly overPreview = byId("layers");
+    private overTiles: HTMLElement | null = null;
 
-    constructor(private readonly turned: Turned) {
+    constructor(private readonly layers: Layers, private readonly turned: Turned) {
         for (const mode of ["look", "turn", "around"] as const) byId(mode).addEventListener("click", () => this.show(mode));
         byId("closer").addEventListener("click", () => this.zoom(1.4));
         byId("farther").addEventListener("click", () => this.zoom(1 / 1.4));
@@ -89,8 +92,10 @@ export class Stage {
         this.tiles = number;
         this.viewer?.destroy();
         this.viewer = null;
+        this.overTiles = null;
         if (number !== null) {
-            this.viewer = OpenSeadragon({
+            const over = el("div", { class: "layers" });
+            const viewer = OpenSeadragon({
                 element: this.tilesElement,
                 tileSources: `/api/tiles/${number}/panorama.dzi`,
                 drawer: "canvas",
@@ -101,6 +106,9 @@ export class Stage {
                 animationTime: 0.4,
                 gestureSettingsMouse: { clickToZoom: false, dblClickToZoom: true },
             });
+            viewer.addOnceHandler("open", () => viewer.addOverlay({ element: over, location: viewer.world.getItemAt(0).getBounds() }));
+            this.viewer = viewer;
+            this.overTiles = over;
         }
         this.arrange();
     }
@@ -128,6 +136,10 @@ export class Stage {
         if (this.mode === "turn") this.picture.tabIndex = 0;
         else this.picture.removeAttribute("tabindex");
         for (const id of ["closer", "farther", "whole"]) byId<HTMLButtonElement>(id).disabled = !(showTiles || this.mode === "around");
+        this.overPreview.hidden = this.picture.hidden;
+        if (showTiles && this.overTiles && this.tiles !== null) this.layers.over({ kind: "tiles", number: this.tiles, element: this.overTiles });
+        else if (!this.picture.hidden && this.drawn) this.layers.over({ kind: "preview", number: this.drawn.number, element: this.overPreview });
+        else this.layers.over(null);
         this.lookAround();
     }
 

@@ -5,6 +5,8 @@ interface OpenSeadragonViewer {
     close(): void;
     destroy(): void;
     addOnceHandler(name: string, handler: () => void): void;
+    addOverlay(overlay: { element: HTMLElement; location: unknown }): void;
+    world: { getItemAt(index: number): { getBounds(): unknown } };
     viewport: {
         zoomBy(factor: number): OpenSeadragonViewer["viewport"];
         applyConstraints(): void;

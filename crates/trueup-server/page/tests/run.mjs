@@ -145,6 +145,62 @@ async function choose(page) {
     step(`turned by dragging, by ${turned} degrees, and by a key; undone`);
 }
 
+/** The report's drawings over the panorama, chosen by keys: over the preview and over the tiles. */
+async function drawOver(page) {
+    await settled(page);
+    const button = page.getByRole("button", { name: "Layers" });
+    await button.focus();
+    await page.keyboard.press("Enter");
+    assert.equal(await button.getAttribute("aria-expanded"), "true");
+    const panel = page.getByRole("group", { name: "Drawings over the panorama" });
+    const names = { "Outlines of the photographs": /^Outlines of 5 photographs/, Seams: /^Seams between/, "Lines by vanishing point": /long lines of the photographs/, "Alignment error": /^Heat map/, Overlaps: /joined by/ };
+    for (const mode of ["Turn", "Look closer"]) {
+        await page.getByRole("button", { name: mode, exact: true }).click();
+        const over = page.locator(mode === "Turn" ? "#layers" : "#tiles .layers");
+        if (mode !== "Turn") await tiled(page);
+        for (const [title, label] of Object.entries(names)) {
+            const box = panel.getByRole("checkbox", { name: title });
+            await box.focus();
+            await page.keyboard.press("Space");
+            await over.getByRole("img", { name: label }).waitFor();
+            await accessible(page, `${title} over ${mode}`);
+            await page.waitForTimeout(200);
+            await picture(page, `page-layers-${mode === "Turn" ? "preview" : "tiles"}-${title.split(" ")[0].toLowerCase()}`);
+            await box.focus();
+            await page.keyboard.press("Space");
+            await over.getByRole("img").waitFor({ state: "detached" });
+        }
+    }
+    // The drawing covers the panorama, however it is zoomed: its outlines are where the photographs are.
+    await panel.getByRole("checkbox", { name: "Outlines of the photographs" }).check();
+    const drawing = page.locator("#tiles .layers svg");
+    await drawing.waitFor();
+    const before = await drawing.boundingBox();
+    await page.getByRole("button", { name: "Zoom in" }).click();
+    await page.waitForTimeout(900);
+    const after = await drawing.boundingBox();
+    assert.ok(Math.abs(after.width / before.width - 1.4) < 0.03, `${before.width} to ${after.width}`);
+    assert.ok(Math.abs(after.height / before.height - 1.4) < 0.03, `${before.height} to ${after.height}`);
+    await page.getByRole("button", { name: "Whole" }).click();
+    // What is wished next is drawn with its own drawing.
+    const number = await drawn(page);
+    await page.getByRole("button", { name: "Turn", exact: true }).click();
+    const canvas = await page.locator("#layers svg").getAttribute("viewBox");
+    await page.keyboard.press("Shift+ArrowUp");
+    await redrawn(page, number);
+    await page.waitForFunction((older) => ![null, undefined, older].includes(document.querySelector("#layers svg")?.getAttribute("viewBox")), canvas);
+    const [picture_box, drawing_box] = [await page.locator("#preview").boundingBox(), await page.locator("#layers svg").boundingBox()];
+    assert.ok(drawing_box.x >= picture_box.x && drawing_box.x + drawing_box.width <= picture_box.x + picture_box.width, "within the picture");
+    await page.getByRole("button", { name: "Undo" }).click();
+    await page.getByRole("checkbox", { name: "Outlines of the photographs" }).focus();
+    await page.keyboard.press("Space");
+    await page.keyboard.press("Escape");
+    assert.equal(await panel.isVisible(), false);
+    assert.equal(await button.evaluate((element) => element === document.activeElement), true, "back at the button");
+    await page.getByRole("button", { name: "Look closer" }).click();
+    step("drawings over the preview and the tiles, by keys, named for screen readers");
+}
+
 /** Time from a wish to its preview, decoded, as the page asks for them. */
 async function timePreviews(page) {
     await settled(page);
@@ -204,7 +260,7 @@ async function save(page) {
     await page.getByLabel("Name").fill("of the room");
     await page.locator("input[name=beside][value=project]").check();
     for (const format of formats.filter((one) => one !== ".dzi")) {
-        await page.getByLabel("Format").selectOption(format);
+        await page.getByRole("combobox", { name: "Format" }).selectOption(format);
         await page.locator("#save-go").click();
         const link = page.locator("#save-files a", { hasText: `of the room${format}` });
         await link.waitFor();
@@ -213,7 +269,7 @@ async function save(page) {
         await download.saveAs(join(desk, `saved${format}`));
         assert.ok((await readFile(join(desk, `saved${format}`))).length > 10_000, format);
     }
-    await page.getByLabel("Format").selectOption(".dzi");
+    await page.getByRole("combobox", { name: "Format" }).selectOption(".dzi");
     await page.locator("#save-go").click();
     await page.locator("#save-files li", { hasText: "of the room.dzi" }).waitFor();
     assert.match(await readFile(join(room, "of the room.dzi"), "utf8"), /TileSize/);
@@ -258,10 +314,47 @@ async function reopen() {
     step("looked around on the sphere");
 }
 
+/** A mask that was painted, saved with its project in the folder, is there when that is opened by another program. */
+async function keepMasks() {
+    const page = await open(await serve(room));
+    await page.locator("#strip li").nth(4).waitFor();
+    await page.getByRole("button", { name: "Paint on 02.jpg" }).click();
+    await page.locator("#paint-canvas").waitFor();
+    await page.locator("#paint-canvas").focus();
+    for (const key of ["Space", "Shift+ArrowRight", "Shift+ArrowRight"]) await page.keyboard.press(key);
+    await page.getByRole("button", { name: "Done" }).click();
+    await page.locator("#strip .badge").waitFor();
+    await page.getByRole("button", { name: "Stitch", exact: true }).click();
+    await redrawn(page, null);
+    await tiled(page);
+    await settled(page);
+    await page.getByRole("button", { name: "Save", exact: true }).first().click();
+    await page.getByLabel("Name").fill("painted");
+    await page.getByRole("combobox", { name: "Format" }).selectOption(".png");
+    await page.locator("input[name=beside][value=project]").check();
+    await page.getByRole("radio", { name: "In the folder of the photographs" }).check();
+    await page.locator("#save-go").click();
+    await page.locator("#save-files li", { hasText: "painted-masks/painted-02.jpg-use.png" }).waitFor();
+    await picture(page, "page-saved-masks");
+    const mask = await readFile(join(room, "painted-masks", "painted-02.jpg-use.png"));
+    assert.ok(mask.length > 100);
+
+    const other = await open(await serve(room));
+    await other.locator("#strip li").nth(4).waitFor();
+    await other.getByRole("button", { name: "Open" }).click();
+    await other.getByRole("button", { name: "painted.json" }).click();
+    await redrawn(other, null);
+    await other.locator("#strip .badge").waitFor();
+    assert.equal(await other.locator("#strip li").count(), 5, "masks are no photographs");
+    step("a painted mask is saved beside its project, and found again");
+}
+
 async function phone() {
     await cp(join(room, "00.jpg"), join(desk, script));
     const page = await open(await serve(), { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
     await page.getByText("Drop photographs here").waitFor();
+    const accepted = await page.locator("#choose").getAttribute("accept");
+    for (const wanted of ["image/*", ".exr", ".hdr", ".jxl", ".heic", ".tif"]) assert.ok(accepted.split(",").includes(wanted), accepted);
     await accessible(page, "empty, on a phone");
     const files = [0, 1, 2].map((number) => join(room, `0${number}.jpg`));
     await page.locator("#choose").setInputFiles(files);
@@ -300,11 +393,13 @@ async function names() {
 let failure;
 try {
     const page = await stitchAndLook();
+    await drawOver(page);
     await choose(page);
     await timePreviews(page);
     await paint(page);
     await save(page);
     await reopen();
+    await keepMasks();
     await phone();
     await names();
     assert.deepEqual(complaints, [], "the browser complains of nothing");

@@ -106,21 +106,34 @@ async fn small(State(studio): State<Arc<Studio>>, Path(number): Path<usize>, pix
     if !studio.may_read(&listed.path) {
         return Err(Denial::missing("photograph"));
     }
-    let place = studio.pictures().join(format!("photograph-{number}-{pixels}.jpg"));
     let made = move || {
         // Decoding takes most of the memory there may be: one at a time.
         let _one = studio.drawing.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let photograph = listed.path.display().to_string();
-        let context = StageContext::default();
-        let size = studio
-            .pool
-            .install(|| write_thumbnail(&photograph, pixels, &place, &StitchOptions::default(), &context))?;
+        let name = name_of_small(&listed.path, pixels);
+        let place = studio.pictures().join(format!("{name}.jpg"));
+        let size = match studio.small_size(&name) {
+            Some(size) => size,
+            None => {
+                let photograph = listed.path.display().to_string();
+                let (options, context) = (StitchOptions::default(), StageContext::default());
+                let size = studio.pool.install(|| write_thumbnail(&photograph, pixels, &place, &options, &context))?;
+                studio.keep_small(name, size);
+                size
+            }
+        };
         let bytes = std::fs::read(&place).map_err(|error| trueup::Error::io("reading", &place, error))?;
         Ok::<_, trueup::Error>((size, bytes))
     };
     let ([width, height], bytes) = tokio::task::spawn_blocking(made).await.map_err(Denial::failure)??;
     let size = [("x-width", width.to_string()), ("x-height", height.to_string())];
     Ok((size, [(header::CONTENT_TYPE, "image/jpeg")], bytes).into_response())
+}
+
+/// What a photograph made small is called: by its file as it lies on the disk now, so that it is made once, and anew when that changes.
+fn name_of_small(path: &std::path::Path, pixels: f64) -> String {
+    let facts = std::fs::metadata(path).ok();
+    let stamp = facts.map(|facts| (facts.len(), facts.modified().ok()));
+    blake3::hash(format!("{path:?} {stamp:?} {pixels}").as_bytes()).to_hex().to_string()
 }
 
 /// Which of its masks.

@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::wishing::{Changes, wishes_of};
 use crate::denial::Denial;
+use crate::layers::{ToldLayer, Underlay, layer_named};
 use crate::making::{self, Preview};
 use crate::studio::{Drawn, Studio, Task};
 use crate::work;
@@ -29,7 +30,11 @@ pub(crate) async fn preview(State(studio): State<Arc<Studio>>, body: Body) -> Re
     let options = changes.options()?;
     let told = tokio::task::spawn_blocking(move || {
         let mut preview = making::preview(&studio, &options)?;
-        let drawn = Drawn { bytes: std::mem::take(&mut preview.bytes), media_type: preview.media_type };
+        let drawn = Drawn {
+            bytes: std::mem::take(&mut preview.bytes),
+            media_type: preview.media_type,
+            underlay: preview.underlay.clone(),
+        };
         let number = studio.keep_drawn(drawn);
         Ok::<_, trueup::Error>(ToldPreview { number, preview })
     });
@@ -38,8 +43,33 @@ pub(crate) async fn preview(State(studio): State<Arc<Studio>>, body: Body) -> Re
 
 /// A preview that was drawn.
 pub(crate) async fn drawn(State(studio): State<Arc<Studio>>, Path(number): Path<u64>) -> Result<Response, Denial> {
-    let Drawn { bytes, media_type } = studio.drawn(number).ok_or_else(|| Denial::missing("preview"))?;
+    let Drawn { bytes, media_type, .. } = studio.drawn(number).ok_or_else(|| Denial::missing("preview"))?;
     Ok(([(header::CONTENT_TYPE, media_type)], bytes).into_response())
+}
+
+/// A drawing over a preview.
+pub(crate) async fn layer_of_preview(
+    State(studio): State<Arc<Studio>>,
+    Path((number, layer)): Path<(u64, String)>,
+) -> Result<Json<ToldLayer>, Denial> {
+    draw(studio.drawn(number).map(|drawn| drawn.underlay), &layer).await
+}
+
+/// A drawing over the tiles.
+pub(crate) async fn layer_of_tiles(
+    State(studio): State<Arc<Studio>>,
+    Path((number, layer)): Path<(u64, String)>,
+) -> Result<Json<ToldLayer>, Denial> {
+    let underlay =
+        studio.state().tiles.as_ref().filter(|tiles| tiles.number == number).map(|tiles| tiles.underlay.clone());
+    draw(underlay, &layer).await
+}
+
+async fn draw(underlay: Option<Arc<Underlay>>, layer: &str) -> Result<Json<ToldLayer>, Denial> {
+    let missing = || Denial::missing("drawing");
+    let (underlay, layer) = (underlay.ok_or_else(missing)?, layer_named(layer).ok_or_else(missing)?);
+    let told = tokio::task::spawn_blocking(move || underlay.draw(layer));
+    Ok(Json(told.await.map_err(Denial::failure)??))
 }
 
 /// Begins to cut the whole panorama into tiles.

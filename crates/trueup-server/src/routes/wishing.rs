@@ -11,6 +11,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::denial::Denial;
+use crate::layers::{self, PossibleLayer};
 use crate::limits::{MAX_WISHES_BYTES, NEWS_EVERY, NEWS_TIME};
 use crate::studio::{Offered, Studio, Task, is_offered, offered};
 use crate::told::{Told, told};
@@ -40,9 +41,12 @@ pub(crate) async fn news(State(studio): State<Arc<Studio>>, Query(known): Query<
 #[derive(Debug, Serialize)]
 pub(crate) struct Possible {
     options: Vec<Offered>,
-    /// In words: ".jpg, .png or .tif".
+    /// The extensions of photographs: ".jpg".
+    photographs: Vec<String>,
+    /// Of panoramas, in words: ".jpg, .png or .tif".
     extensions: String,
     side_outputs: Vec<PossibleFile>,
+    layers: Vec<PossibleLayer>,
 }
 
 #[derive(Debug, Serialize)]
@@ -54,7 +58,13 @@ struct PossibleFile {
 /// What can be wished for.
 pub(crate) async fn options() -> Json<Possible> {
     let files = trueup::SideOutput::ALL.iter().map(|kind| PossibleFile { flag: kind.flag(), meaning: kind.meaning() });
-    Json(Possible { options: offered(), extensions: trueup::written_extensions(), side_outputs: files.collect() })
+    Json(Possible {
+        options: offered(),
+        photographs: trueup::read_extensions(),
+        extensions: trueup::written_extensions(),
+        side_outputs: files.collect(),
+        layers: layers::possible(),
+    })
 }
 
 /// Other wishes; what is not named stays as it is.

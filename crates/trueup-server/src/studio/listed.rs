@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 /// A photograph that the page shows.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Listed {
     /// Its file, as the command would name it.
     pub path: PathBuf,

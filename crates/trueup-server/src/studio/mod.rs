@@ -7,7 +7,7 @@ mod history;
 mod listed;
 mod wishes;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -17,6 +17,7 @@ use trueup::{Alignment, CancelToken, StitchOptions, thread_pool};
 
 use crate::denial::{Denial, Trouble};
 use crate::folder::Folder;
+use crate::layers::Underlay;
 
 pub(crate) use history::History;
 pub(crate) use listed::Listed;
@@ -69,6 +70,8 @@ pub(crate) struct Work {
 pub(crate) struct Tiles {
     pub number: u64,
     pub folder: PathBuf,
+    /// What drawings over them are made from.
+    pub underlay: Arc<Underlay>,
     /// Which panorama, and what was wished when it was composed.
     pub stitched: u64,
     pub wishes: Wishes,
@@ -96,6 +99,8 @@ pub(crate) struct ExportedFile {
 pub(crate) struct Drawn {
     pub bytes: Vec<u8>,
     pub media_type: &'static str,
+    /// What drawings over it are made from.
+    pub underlay: Arc<Underlay>,
 }
 
 /// Previews that are kept: the page fetches each at once.
@@ -146,6 +151,8 @@ pub(crate) struct Studio {
     /// Held while a preview is drawn.
     pub drawing: Mutex<()>,
     state: Mutex<State>,
+    /// The sizes of photographs that were made small, by the names of their small pictures.
+    small: Mutex<BTreeMap<String, [usize; 2]>>,
     /// By number, the oldest first. No news: the page knows what it asked for.
     drawn: Mutex<VecDeque<(u64, Drawn)>>,
     news: watch::Sender<u64>,
@@ -172,6 +179,7 @@ impl Studio {
             pool,
             drawing: Mutex::default(),
             drawn: Mutex::default(),
+            small: Mutex::default(),
             state,
             news: watch::Sender::new(1),
         })
@@ -234,6 +242,16 @@ impl Studio {
     pub(crate) fn drawn(&self, number: u64) -> Option<Drawn> {
         let kept = self.drawn.lock().unwrap_or_else(PoisonError::into_inner);
         kept.iter().find(|(known, _)| *known == number).map(|(_, drawn)| drawn.clone())
+    }
+
+    /// The size of the photograph whose small picture has this name, if it was made.
+    pub(crate) fn small_size(&self, name: &str) -> Option<[usize; 2]> {
+        self.small.lock().unwrap_or_else(PoisonError::into_inner).get(name).copied()
+    }
+
+    /// Keeps the size of a photograph whose small picture of this name was made.
+    pub(crate) fn keep_small(&self, name: String, size: [usize; 2]) {
+        self.small.lock().unwrap_or_else(PoisonError::into_inner).insert(name, size);
     }
 
     /// Whether a file is one of those that this session may read: in the folder opened, or on the desk.

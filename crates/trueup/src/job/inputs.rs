@@ -23,7 +23,7 @@ pub enum Reference {
 pub struct Inputs {
     /// Files, folders, glob patterns, and names of photographs in memory, in the user's order.
     pub photographs: Vec<String>,
-    /// The photographs that are no files.
+    /// The photographs that are no files, and the masks.
     pub in_memory: InMemory,
     /// Which photograph is the reference.
     pub reference: Reference,

@@ -10,7 +10,7 @@ use trueup_core::raster::Raster;
 use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::decode;
-use trueup_io::source::SourceOptions;
+use trueup_io::source::{InMemory, SourceOptions};
 use trueup_vision::features::Features;
 
 use super::names::photograph_named;
@@ -31,7 +31,8 @@ pub enum MaskKind {
 pub struct MaskFile {
     /// The photograph's name, or path as given.
     pub photograph: String,
-    /// The picture, in the size of the photograph as it is shown.
+    /// The picture, in the size of the photograph as it is shown: a file, or the name of one in memory
+    /// ([`Inputs::in_memory`](crate::Inputs::in_memory)).
     pub file: PathBuf,
     /// What it means.
     pub kind: MaskKind,
@@ -46,6 +47,13 @@ pub struct MaskRecord {
     pub kind: MaskKind,
 }
 
+impl MaskRecord {
+    /// The file's name without folders; paths written on another system are understood.
+    pub fn file_name(&self) -> &str {
+        self.path.rsplit(['/', '\\']).next().unwrap_or(&self.path)
+    }
+}
+
 /// The masks of every photograph.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct AllMasks {
@@ -56,12 +64,14 @@ pub(crate) struct AllMasks {
 }
 
 impl AllMasks {
-    /// Reads the masks that `files` name, of any of `images`. Several of one kind on one photograph count together.
+    /// Reads the masks that `files` name, of any of `images`; names of pictures in memory come before files. Several of one kind on
+    /// one photograph count together.
     ///
     /// # Errors
     /// [`Error::Input`] if a photograph is not there or a mask cannot be read or has another size; [`Error::Cancelled`].
     pub(crate) fn read(
         files: &[MaskFile],
+        in_memory: &InMemory,
         images: &[SourceImage],
         options: &SourceOptions,
         context: &StageContext,
@@ -69,14 +79,18 @@ impl AllMasks {
         let mut all = Self { masks: vec![Masks::default(); images.len()], records: vec![Vec::new(); images.len()] };
         for one in files {
             let position = photograph_named(images, &one.photograph, "so nothing of it can be masked")?;
-            let record = MaskRecord { path: one.file.display().to_string(), kind: one.kind };
-            all.add(position, &images[position], &one.file, record, options, context)?;
+            let path = one.file.display().to_string();
+            let white = match in_memory.get(&path) {
+                Some(picture) => decode::mask_in_memory(picture, &path, &images[position])?,
+                None => decode::mask(&one.file, &images[position], options, context)?,
+            };
+            all.add(position, white, MaskRecord { path, kind: one.kind });
         }
         Ok(all)
     }
 
-    /// Reads the masks that a project recorded of the photographs `images`, in their order; relative paths are looked up
-    /// in the project's folder first.
+    /// Reads the masks that a project recorded of the photographs `images`, in their order; they are looked up as photographs are:
+    /// beside the project file as recorded, as recorded from the current folder, or beside the project file by their names alone.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -94,7 +108,11 @@ impl AllMasks {
                 continue;
             }
             for record in *records {
-                let places = [project_folder.join(&record.path), PathBuf::from(&record.path)];
+                let places = [
+                    project_folder.join(&record.path),
+                    PathBuf::from(&record.path),
+                    project_folder.join(record.file_name()),
+                ];
                 let file = places.iter().find(|path| path.is_file()).ok_or_else(|| {
                     Error::input(
                         &record.path,
@@ -102,30 +120,20 @@ impl AllMasks {
                         "Put it back, or give another mask of this photograph with --mask or --keep.",
                     )
                 })?;
-                let record = MaskRecord { path: file.display().to_string(), kind: record.kind };
-                self.add(position, image, file, record, options, context)?;
+                let white = decode::mask(file, image, options, context)?;
+                self.add(position, white, MaskRecord { path: file.display().to_string(), kind: record.kind });
             }
         }
         Ok(())
     }
 
-    fn add(
-        &mut self,
-        position: usize,
-        image: &SourceImage,
-        file: &Path,
-        record: MaskRecord,
-        options: &SourceOptions,
-        context: &StageContext,
-    ) -> Result<()> {
-        let white = decode::mask(file, image, options, context)?;
+    fn add(&mut self, position: usize, white: Mask, record: MaskRecord) {
         let masks = &mut self.masks[position];
         match record.kind {
             MaskKind::Use => merge(&mut masks.ignored, white.inverted()),
             MaskKind::Keep => merge(&mut masks.kept, white),
         }
         self.records[position].push(record);
-        Ok(())
     }
 }
 

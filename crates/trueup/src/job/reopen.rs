@@ -4,6 +4,7 @@ use std::path::Path;
 
 use trueup_core::Result;
 use trueup_core::source::SourceImage;
+use trueup_io::source::InMemory;
 
 use super::masks::{AllMasks, MaskFile, MaskRecord};
 use crate::pipeline::photographs::FoundPhotographs;
@@ -37,7 +38,8 @@ impl Stitcher<'_> {
         let project = recorded.project;
         options.refuse_other_geometry(&project.options)?;
         let images = find_photographs(recorded, self)?;
-        let mut masks = AllMasks::read(recorded.masks, &images, &options.measure.source, context)?;
+        let mut masks =
+            AllMasks::read(recorded.masks, &InMemory::default(), &images, &options.measure.source, context)?;
         let known: Vec<&[MaskRecord]> = project.used_images().map(|one| one.masks.as_slice()).collect();
         masks.recall(&known, &images, recorded.project_folder, &options.measure.source, context)?;
         self.recall(project, FoundPhotographs { images, masks, ..FoundPhotographs::default() })

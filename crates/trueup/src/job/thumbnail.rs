@@ -3,16 +3,15 @@
 use std::path::Path;
 
 use trueup_core::raster::OpaqueRgb;
-use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::encode::{self, Metadata, OutputOptions};
 use trueup_io::{decode, source};
 
 use crate::options::StitchOptions;
 
-/// Writes `photograph`, upright and reduced by exact area averaging to at most `max_pixels`, to `place`, whose extension
-/// chooses the format; returns its own width and height after orientation. Of `options`, those of reading photographs are
-/// heeded. Colors are written as the photograph has them, without its profile.
+/// Writes `photograph`, upright and reduced to at most `max_pixels`, to `place`, whose extension chooses the format; returns its
+/// own width and height after orientation. Of `options`, those of reading photographs are heeded. Colors are written as the
+/// photograph has them, without its profile. Of a JPEG, no more is decoded than that takes.
 ///
 /// # Errors
 /// [`Error::Input`] if it is no photograph that can be read; those of writing; [`Error::Cancelled`].
@@ -28,8 +27,7 @@ pub fn write_thumbnail(
         let none = || Error::input(photograph, "it is no photograph", "Give a photograph.");
         return Err(found.rejected.first().map_or_else(none, |rejected| rejected.to_error()));
     };
-    let frame = WorkingFrame::new(image.width, image.height, max_pixels);
-    let picture = OpaqueRgb(decode::working(image, &frame, max_pixels)?.thumbnail);
+    let picture = OpaqueRgb(decode::small(image, max_pixels)?);
     encode::write(place, &picture, &Metadata::default(), &OutputOptions::default(), context)?;
     Ok([image.width, image.height])
 }

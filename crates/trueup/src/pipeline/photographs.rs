@@ -69,7 +69,7 @@ impl PhotographSet {
         if let Some(path) = &inputs.lens_from {
             tell_lenses(path, &mut images, context)?;
         }
-        let masks = AllMasks::read(&inputs.masks, &images, accepted, context)?;
+        let masks = AllMasks::read(&inputs.masks, &inputs.in_memory, &images, accepted, context)?;
         let found = FoundPhotographs { images, in_memory: inputs.in_memory.clone(), rejected, masks };
         Ok(Self { lens_from: inputs.lens_from.clone(), ..Self::open(found, options, context)? })
     }

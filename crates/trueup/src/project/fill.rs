@@ -1,5 +1,7 @@
 //! Fills the project: what is recorded of photographs, pairs and geometry.
 
+use std::collections::BTreeMap;
+
 use trueup_align::similarity::LevelEvidence;
 use trueup_compose::crop::Rectangle;
 use trueup_compose::exposure::{Correction, Corrections, Response};
@@ -94,7 +96,7 @@ pub(crate) fn unfilled(
         crop: None,
         mesh_canvas: None,
         by_cameras: None,
-        seconds: std::collections::BTreeMap::new(),
+        seconds: BTreeMap::new(),
         diagnostics: Vec::new(),
     }
 }
@@ -181,10 +183,27 @@ pub(crate) fn record_composition(
         record.masks.clone_from(&set.masks[k]);
         renamed.push((std::mem::replace(&mut record.path, path.clone()), path));
     }
-    for known in paths(project) {
-        if let Some((_, path)) = renamed.iter().find(|(old, _)| old == known) {
-            known.clone_from(path);
+    rename(paths(project), &renamed.into_iter().collect());
+}
+
+/// Puts the names that `renamed` has in place of those it has them by.
+fn rename<'a>(names: impl Iterator<Item = &'a mut String>, renamed: &BTreeMap<String, String>) {
+    for known in names {
+        if let Some(name) = renamed.get(known) {
+            known.clone_from(name);
         }
+    }
+}
+
+impl Project {
+    /// Names photographs and masks by other paths, where they are to be found from now on: those that `moved` has by the paths that
+    /// are recorded.
+    pub fn rename_files(&mut self, moved: &BTreeMap<String, String>) {
+        for image in &mut self.images {
+            let masks = image.masks.iter_mut().map(|mask| &mut mask.path);
+            rename(std::iter::once(&mut image.path).chain(masks), moved);
+        }
+        rename(paths(self), moved);
     }
 }
 

@@ -7,7 +7,7 @@ use trueup_core::raster::RowSource;
 use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 use trueup_io::color::PhotographColors;
-use trueup_io::decode::{FilePhotographs, mask};
+use trueup_io::decode::{FilePhotographs, mask, small};
 use trueup_io::encode::{Depth, Metadata, MetadataKept, OutputOptions, write};
 use trueup_io::provenance::{PanoramaDescription, describe};
 use trueup_io::source::{SourceOptions, scan};
@@ -20,6 +20,9 @@ const SIDE: usize = 20;
 
 /// Largest picture that is decoded, in megapixels: headers claim any size.
 const MOST_MEGAPIXELS: f64 = 1.0;
+
+/// Pixels of a picture made small: fewer than the seeds have, so that decoders make them smaller.
+const SMALL_PIXELS: f64 = 30.0;
 
 /// A picture of many colors.
 struct Colors;
@@ -153,6 +156,7 @@ fn read_file(path: &Path) {
         assert_eq!((photograph.width(), photograph.height()), size, "a photograph is as large as its header says");
     }
     let _ = mask(path, source, &options, &context);
+    let _ = small(source, SMALL_PIXELS);
     let description = PanoramaDescription {
         photographs: &[path],
         reference: 0,

@@ -1,6 +1,7 @@
 //! JPEG.
 
 mod read;
+mod reduced;
 mod scans;
 mod segments;
 pub(super) mod write;
@@ -26,6 +27,7 @@ pub(crate) static JPEG: Format = Format {
         exif: read::exif,
         whole_fields: block::read_fields,
         pixels: read::pixels,
+        reduced: Some(reduced::pixels),
         pixel_bytes: PLAIN_PIXEL_BYTES,
     }),
     writing: Some(Writing {

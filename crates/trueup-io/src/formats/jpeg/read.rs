@@ -64,7 +64,7 @@ pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograp
     decode(source, &bytes)
 }
 
-fn decode(source: &SourceImage, bytes: &[u8]) -> Result<Photograph> {
+pub(super) fn decode(source: &SourceImage, bytes: &[u8]) -> Result<Photograph> {
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options());
     decoder.decode_headers().map_err(|error| damaged(source, format!("{error:?}")))?;
     let (width, height) = decoder.dimensions().ok_or_else(|| damaged(source, "no frame header"))?;

@@ -26,6 +26,7 @@ pub(crate) static OPEN_EXR: Format = Format {
         exif: read::exif,
         whole_fields: |_, _| None,
         pixels: read::pixels,
+        reduced: None,
         pixel_bytes: read::PIXEL_BYTES,
     }),
     writing: Some(Writing {

@@ -35,6 +35,7 @@ pub(crate) static RADIANCE: Format = Format {
         exif: read::exif,
         whole_fields: |_, _| None,
         pixels: read::pixels,
+        reduced: None,
         pixel_bytes: read::PIXEL_BYTES,
     }),
     writing: Some(Writing {

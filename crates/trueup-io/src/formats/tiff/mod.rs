@@ -37,6 +37,7 @@ pub(crate) static TIFF: Format = Format {
         exif: read::exif,
         whole_fields: read::whole_fields,
         pixels: read::pixels,
+        reduced: None,
         pixel_bytes: PLAIN_PIXEL_BYTES,
     }),
     writing: Some(Writing {
