@@ -96,8 +96,8 @@ impl Reading {
     }
 }
 
-/// How many bytes of a file's start [`Reading::has_signature`] sees.
-pub(crate) const SIGNATURE_BYTES: usize = 16;
+/// How many bytes of a file's start [`Reading::has_signature`] sees: a dozen brands of a HEIF.
+pub(crate) const SIGNATURE_BYTES: usize = 64;
 
 /// What a header states of the pixels, before orientation.
 #[derive(Debug, Clone, Copy, PartialEq)]

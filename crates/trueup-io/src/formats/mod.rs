@@ -4,6 +4,7 @@
 //! a row for it in each of its tables, which a test compares with the declarations.
 
 pub(crate) mod alpha;
+mod avif;
 mod boxes;
 pub(crate) mod decoded;
 mod deep_zoom;
@@ -35,12 +36,13 @@ use crate::format::{Format, Input, Reading, SIGNATURE_BYTES, Writing};
 pub(crate) use foreign::{foreign_of, has_foreign_extension};
 
 /// All formats, in the order in which messages and pages name them.
-pub(crate) static FORMATS: [&Format; 9] = [
+pub(crate) static FORMATS: [&Format; 10] = [
     &jpeg::JPEG,
     &png::PNG,
     &tiff::TIFF,
     &webp::WEBP,
     &heic::HEIC,
+    &avif::AVIF,
     &jxl::JXL,
     &open_exr::OPEN_EXR,
     &radiance::RADIANCE,
