@@ -227,6 +227,11 @@ pub(crate) enum Writer {
 }
 
 impl Format {
+    /// Whether this is how its photographs are read.
+    pub(crate) fn is_read_by(&self, reading: &Reading) -> bool {
+        self.reading.as_ref().is_some_and(|own| std::ptr::eq(own, reading))
+    }
+
     /// Whether the extension of `path` names this format, in any case.
     pub(crate) fn names(&self, path: &Path) -> bool {
         lower_extension(path).is_some_and(|found| {

@@ -9,9 +9,9 @@ use crate::format::{Foreign, lower_extension};
 /// Its signature is a TIFF's; what tells them apart is found by [`super::tiff`].
 pub(crate) static RAW: Foreign = Foreign {
     what: "a camera raw photograph, or another file that begins with a small copy",
-    extensions: &["dng", "nef", "nrw", "arw", "srf", "sr2", "pef", "srw", "erf", "3fr", "iiq", "rwl", "kdc", "dcr"],
+    extensions: &["nef", "nrw", "arw", "srf", "sr2", "pef", "srw", "erf", "3fr", "iiq", "rwl", "kdc", "dcr"],
     has_signature: |_| false,
-    command: "darktable-cli photo.dng photo.tif",
+    command: "darktable-cli photo.nef photo.tif",
 };
 
 /// The formats, the more special before the more general.

@@ -103,6 +103,11 @@ pub(super) fn heic() -> Vec<Vec<u8>> {
     files.map(<[u8]>::to_vec).into()
 }
 
+/// Mosaics, of packed bits and of lossless JPEG.
+pub(super) fn digital_negatives() -> Vec<Vec<u8>> {
+    files!("lossless.dng", "packed.dng").map(<[u8]>::to_vec).into()
+}
+
 /// Pictures in tiles and whole, of every depth, with alpha, EXIF, a turn and colors in numbers.
 pub(super) fn avif() -> Vec<Vec<u8>> {
     let files = files!(
