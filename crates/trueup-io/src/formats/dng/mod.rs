@@ -8,6 +8,7 @@ mod color;
 mod corrections;
 mod described;
 mod directory;
+mod lossless_jpeg;
 mod mosaic;
 mod read;
 #[cfg(test)]

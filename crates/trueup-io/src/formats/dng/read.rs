@@ -9,9 +9,10 @@ use trueup_core::raster::Photograph;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
 
-use super::blocks::{of_jpeg, unpacked};
+use super::blocks::unpacked;
 use super::color::{Development, of_vector};
 use super::described::{Described, described};
+use super::lossless_jpeg;
 use super::mosaic::Mosaic;
 use crate::format::{HeaderError, Input, StoredPixels};
 use crate::formats::decoded::{check_unchanged, damaged, sixteen};
@@ -19,9 +20,9 @@ use crate::formats::linear_light::level;
 use crate::metadata::block;
 use crate::metadata::exif_fields::ExifFields;
 
-/// Bytes a pixel takes in memory while it is developed: what the decoder of lossless JPEG makes of one block of all of it; or the sensor's
-/// numbers, shares, greens and colors.
-pub(super) const PIXEL_BYTES: usize = 48;
+/// Bytes a pixel takes in memory while it is developed, of three colors: the sensor's numbers, their shares of white, greens, and what is
+/// handed out.
+pub(super) const PIXEL_BYTES: usize = 3 * (size_of::<u16>() + size_of::<f32>() + size_of::<u16>()) + size_of::<f32>();
 
 /// Bits of what is developed.
 const BITS: u16 = 16;
@@ -109,7 +110,7 @@ fn numbers(source: &SourceImage, input: &mut Input, described: &Described) -> Re
         let block_numbers = blocks.width * samples;
         let count = block_numbers * block_height;
         let block = match described.is_jpeg {
-            true => of_jpeg(&coded, count).map_err(|words| damaged(source, words))?,
+            true => lossless_jpeg::decode(&coded, count).map_err(|words| damaged(source, words))?,
             false => unpacked(&coded, *bits, block_numbers, described.is_little, count)
                 .ok_or_else(|| damaged(source, "a part of it is cut off"))?,
         };
