@@ -28,7 +28,7 @@ const MISTAKES: &[Mistake] = &[
     mistake("another format", &["stitch", "movie.gif", "-o", "pano.jpg"]),
     mistake("camera raw", &["stitch", "raw.dng", "-o", "pano.jpg"]),
     mistake("damaged HEIC", &["stitch", "phone.heic", "-o", "pano.jpg"]),
-    mistake("AVIF", &["stitch", "phone.avif", "-o", "pano.jpg"]),
+    mistake("damaged AVIF", &["stitch", "phone.avif", "-o", "pano.jpg"]),
     mistake("truncated JPEG XL", &["stitch", "photo.jxl", "-o", "pano.jpg"]),
     mistake("video", &["stitch", "clip.mp4", "-o", "pano.jpg"]),
     mistake("empty file", &["stitch", "empty.jpg", "-o", "pano.jpg"]),

@@ -12,6 +12,8 @@ mod determinism;
 mod documented;
 mod evaluate;
 mod failures;
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+mod faults;
 mod formats;
 mod full_turn;
 mod installing;

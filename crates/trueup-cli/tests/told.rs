@@ -128,7 +128,7 @@ fn raw_files_are_never_stitched_from_their_thumbnails() {
     for name in ["one.dng", "two.dng"] {
         desk.put(name, pictures::digital_negative());
     }
-    let raw = "one.dng: it is a camera raw photograph, or another file that begins with a small copy";
+    let raw = "one.dng: it is a Digital Negative (DNG) without a picture of the sensor";
     finish(trueup(desk.path(), &["stitch", "one.dng", "-o", "pano.jpg"])).expect_failure(1, &[raw, "darktable-cli"]);
     let run = desk.stitch(&["."]);
     assert!(run.expect_success().contains("photographs 4 of 6 used"), "{}", run.stdout);

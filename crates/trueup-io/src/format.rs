@@ -109,8 +109,8 @@ impl Reading {
     }
 }
 
-/// How many bytes of a file's start [`Reading::has_signature`] sees.
-pub(crate) const SIGNATURE_BYTES: usize = 16;
+/// How many bytes of a file's start [`Reading::has_signature`] sees: a dozen brands of a HEIF.
+pub(crate) const SIGNATURE_BYTES: usize = 64;
 
 /// What a header states of the pixels, before orientation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -240,6 +240,11 @@ pub(crate) enum Writer {
 }
 
 impl Format {
+    /// Whether this is how its photographs are read.
+    pub(crate) fn is_read_by(&self, reading: &Reading) -> bool {
+        self.reading.as_ref().is_some_and(|own| std::ptr::eq(own, reading))
+    }
+
     /// Whether the extension of `path` names this format, in any case.
     pub(crate) fn names(&self, path: &Path) -> bool {
         lower_extension(path).is_some_and(|found| {

@@ -2,7 +2,7 @@
 
 mod files;
 mod mask;
-mod orientation;
+pub(crate) mod orientation;
 mod photograph;
 mod reduce;
 mod small;

@@ -9,9 +9,9 @@ use crate::format::{Foreign, lower_extension};
 /// Its signature is a TIFF's; what tells them apart is found by [`super::tiff`].
 pub(crate) static RAW: Foreign = Foreign {
     what: "a camera raw photograph, or another file that begins with a small copy",
-    extensions: &["dng", "nef", "nrw", "arw", "srf", "sr2", "pef", "srw", "erf", "3fr", "iiq", "rwl", "kdc", "dcr"],
+    extensions: &["nef", "nrw", "arw", "srf", "sr2", "pef", "srw", "erf", "3fr", "iiq", "rwl", "kdc", "dcr"],
     has_signature: |_| false,
-    command: "darktable-cli photo.dng photo.tif",
+    command: "darktable-cli photo.nef photo.tif",
 };
 
 /// The formats, the more special before the more general.
@@ -19,7 +19,7 @@ pub(crate) static RAW: Foreign = Foreign {
 /// # Source
 /// ISO/IEC 14496-12 and 23008-12 (boxes and their brands), ISO/IEC 15444-1 annex I (JPEG 2000); of camera raw, LibRaw's identification
 /// of makers.
-static FOREIGN: [&Foreign; 14] = [
+static FOREIGN: [&Foreign; 13] = [
     &RAW,
     &Foreign {
         what: "a camera raw photograph of Canon (CR2)",
@@ -50,12 +50,6 @@ static FOREIGN: [&Foreign; 14] = [
         extensions: &["rw2"],
         has_signature: |start| start.starts_with(b"IIU\0"),
         command: "darktable-cli photo.rw2 photo.tif",
-    },
-    &Foreign {
-        what: "an AVIF picture",
-        extensions: &["avif", "avifs"],
-        has_signature: |start| has_brand(start, b"avi"),
-        command: "avifdec photo.avif photo.png",
     },
     &Foreign {
         what: "a video",
@@ -109,6 +103,19 @@ pub(super) fn has_brand(start: &[u8], brand: &[u8; 3]) -> bool {
     start.get(4..8) == Some(b"ftyp") && start.get(8..11) == Some(brand)
 }
 
+/// Whether a box of the kind `ftyp` that begins a file names, beside its brand, a compatible one that begins so, as far as can be seen.
+///
+/// # Source
+/// ISO/IEC 14496-12, section 4.3: the brand, its version, and compatible brands up to the end of the box.
+pub(super) fn has_compatible_brand(start: &[u8], brand: &[u8; 3]) -> bool {
+    let Some((length, _)) = start.split_first_chunk().filter(|_| start.get(4..8) == Some(b"ftyp")) else {
+        return false;
+    };
+    let end = (u32::from_be_bytes(*length) as usize).min(start.len());
+    let compatible = start.get(16..end).unwrap_or_default();
+    compatible.as_chunks::<4>().0.iter().any(|found| found.starts_with(brand))
+}
+
 /// Whether a file that begins so, as a TIFF does, is camera raw of Canon, whose first picture is a reduced copy.
 pub(crate) fn is_cr2(start: &[u8]) -> bool {
     start.starts_with(b"II*\0") && start.get(8..10) == Some(b"CR")
@@ -137,7 +144,6 @@ mod tests {
             (b"FUJIFILMCCD-RAW 0201", "a camera raw photograph of Fujifilm (RAF)"),
             (b"IIRO\x08\0\0\0", "a camera raw photograph of Olympus (ORF)"),
             (b"IIU\0\x08\0\0\0", "a camera raw photograph of Panasonic (RW2)"),
-            (b"\0\0\0\x1cftypavif\0\0\0\0", "an AVIF picture"),
             (b"\0\0\0\x20ftypisom\0\0\x02\0", "a video"),
             (b"\0\0\0\x20ftypmp42\0\0\x02\0", "a video"),
             (b"\0\0\0\x0cjP  \r\n\x87\n", "a JPEG 2000 picture"),

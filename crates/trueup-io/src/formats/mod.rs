@@ -4,9 +4,11 @@
 //! a row for it in each of its tables, which a test compares with the declarations.
 
 pub(crate) mod alpha;
+mod avif;
 mod boxes;
 pub(crate) mod decoded;
 mod deep_zoom;
+mod dng;
 mod foreign;
 mod heic;
 mod jpeg;
@@ -30,17 +32,19 @@ use std::io::{Read, Seek};
 use std::path::Path;
 
 use crate::encode::place::is_standard_output;
-use crate::format::{Format, Input, Reading, SIGNATURE_BYTES, Writing};
+use crate::format::{Format, Reading, SIGNATURE_BYTES, Writing};
 
 pub(crate) use foreign::{foreign_of, has_foreign_extension};
 
 /// All formats, in the order in which messages and pages name them.
-pub(crate) static FORMATS: [&Format; 9] = [
+pub(crate) static FORMATS: [&Format; 11] = [
     &jpeg::JPEG,
     &png::PNG,
     &tiff::TIFF,
+    &dng::DNG,
     &webp::WEBP,
     &heic::HEIC,
+    &avif::AVIF,
     &jxl::JXL,
     &open_exr::OPEN_EXR,
     &radiance::RADIANCE,
@@ -58,7 +62,7 @@ pub(crate) fn writable() -> impl Iterator<Item = (&'static Format, &'static Writ
 }
 
 /// How to read a file that begins with `start`: the content tells, never the name.
-pub(crate) fn reading_of(start: &[u8]) -> Option<&'static Reading> {
+fn reading_of(start: &[u8]) -> Option<&'static Reading> {
     readable().map(|(_, reading)| reading).find(|reading| (reading.has_signature)(start))
 }
 
@@ -66,10 +70,13 @@ pub(crate) fn reading_of(start: &[u8]) -> Option<&'static Reading> {
 ///
 /// # Errors
 /// If the file cannot be read.
-pub(crate) fn recognize(input: &mut Input) -> std::io::Result<Option<&'static Reading>> {
-    let start = read_start(input)?;
+pub(crate) fn recognize(input: &mut (impl Read + Seek)) -> std::io::Result<Option<&'static Reading>> {
+    let mut reading = reading_of(&read_start(input)?);
+    if reading.is_some_and(|found| tiff::TIFF.is_read_by(found)) && dng::is_digital_negative(input) {
+        reading = dng::DNG.reading.as_ref();
+    }
     input.rewind()?;
-    Ok(reading_of(&start))
+    Ok(reading)
 }
 
 /// What [`reading_of`] needs to see of a file, or all of a shorter one.

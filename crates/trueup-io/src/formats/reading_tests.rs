@@ -60,8 +60,8 @@ pub(super) fn difference(decoded: &Photograph, expected: impl Fn(usize, usize, u
 }
 
 macro_rules! file {
-    ($name:literal) => {
-        &include_bytes!(concat!("files/", $name))[..]
+    ($name:expr) => {
+        &include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/formats/files/", $name))[..]
     };
 }
 pub(super) use file;

@@ -26,7 +26,9 @@ fn content_decides_not_the_name() {
     assert_eq!(format_of_content(b"\x89PNG\r\n\x1a\n\0"), Some("PNG"));
     assert_eq!(format_of_content(b"\0\0\0\x18ftypheic\0\0\0\0"), Some("HEIC"));
     assert_eq!(format_of_content(b"\0\0\0\x18ftypmif1\0\0\0\0"), Some("HEIC"));
-    assert_eq!(format_of_content(b"\0\0\0\x1cftypavif\0\0\0\0"), None);
+    assert_eq!(format_of_content(b"\0\0\0\x1cftypavif\0\0\0\0"), Some("AVIF"));
+    assert_eq!(format_of_content(b"\0\0\0\x1cftypmif1\0\0\0\0mif1avif...."), Some("AVIF"));
+    assert_eq!(format_of_content(b"\0\0\0\x18ftypmif1\0\0\0\0mif1heicavif"), Some("HEIC"));
     assert_eq!(format_of_content(b"\xff\x0a\xfa\x1f"), Some("JPEG XL"));
     assert_eq!(format_of_content(b"\0\0\0\x0cJXL \r\n\x87\n"), Some("JPEG XL"));
     assert_eq!(format_of_content(b"\x76\x2f\x31\x01\x02\0\0\0"), Some("OpenEXR"));
@@ -41,9 +43,9 @@ fn extensions_are_read_in_any_case() {
     assert_eq!(format_of_name("a.dzi"), Some("Deep Zoom"));
     assert_eq!(format_of_name("a.txt"), None);
     assert_eq!(format_of_name("IMG_1.HEIC"), Some("HEIC"));
-    assert!(has_foreign_extension(Path::new("IMG_1.AVIF")));
+    assert!(has_foreign_extension(Path::new("IMG_1.CR3")));
     assert!(
-        names_photograph(Path::new("IMG_1.AVIF"))
+        names_photograph(Path::new("IMG_1.CR3"))
             && names_photograph(Path::new("IMG_1.HEIC"))
             && !names_photograph(Path::new("a.dzi"))
     );
@@ -73,12 +75,13 @@ fn formats_do_not_overlap() {
     endings.sort_unstable();
     endings.dedup();
     assert_eq!(endings.len(), count);
-    let starts: [&[u8]; 8] = [
+    let starts: [&[u8]; 9] = [
         b"\xff\xd8\xff\xe0",
         b"\x89PNG\r\n\x1a\n",
         b"II*\0",
         b"RIFF....WEBP",
         b"\0\0\0\x18ftypheic",
+        b"\0\0\0\x18ftypavif",
         b"\xff\x0a",
         b"\x76\x2f\x31\x01",
         b"#?RGBE",

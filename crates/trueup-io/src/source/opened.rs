@@ -113,12 +113,13 @@ fn recognize(file: &mut File, length: u64) -> Result<&'static Reading, Rejection
             "Copy it again from the camera or leave it out.",
         ));
     }
-    let start = formats::read_start(file).map_err(|error| {
+    let unreadable = |error: std::io::Error| {
         Rejection::new("file-unreadable", format!("it cannot be read ({error})"), "Check the file and its permissions.")
-    })?;
-    if let Some(format) = formats::reading_of(&start) {
+    };
+    if let Some(format) = formats::recognize(file).map_err(unreadable)? {
         return Ok(format);
     }
+    let start = formats::read_start(file).map_err(unreadable)?;
     let readable = formats::readable_formats();
     Err(match formats::foreign_of(&start) {
         Some(foreign) => not_read(foreign),

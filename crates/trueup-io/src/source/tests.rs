@@ -123,7 +123,7 @@ fn every_bad_file_is_named_and_the_good_ones_are_used() {
         ("huge.jpg", huge, "picture-too-large"),
         ("tiny.jpg", jpeg(8, 8, 0, &[]), "picture-too-small"),
         ("same.jpg", good.clone(), "duplicate"),
-        ("phone.avif", b"\0\0\0\x18ftypavif\0\0\0\0".to_vec(), "format-unsupported"),
+        ("scan.jp2", b"\0\0\0\x0cjP  \r\n\x87\n".to_vec(), "format-unsupported"),
         ("broken.png", b"\x89PNG\r\n\x1a\n\0\0".to_vec(), "picture-damaged"),
     ];
     for (name, bytes, code) in cases {

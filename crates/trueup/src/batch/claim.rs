@@ -44,7 +44,13 @@ impl Claim {
         }
         // A byte for every beginning.
         let unended = file.metadata().map_err(wrong)?.len();
-        file.write_all(b".").map_err(wrong)?;
+        if let Err(error) = file.write_all(b".") {
+            // Nothing is to tell of work that never began.
+            if is_locked && unended == 0 {
+                drop(std::fs::remove_file(&path));
+            }
+            return Err(wrong(error));
+        }
         Ok(Some(Self { path, file, unended, is_locked }))
     }
 

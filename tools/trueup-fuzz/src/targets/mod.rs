@@ -16,12 +16,14 @@ pub(crate) struct Target {
 }
 
 /// All targets.
-pub(crate) static TARGETS: [Target; 12] = [
+pub(crate) static TARGETS: [Target; 14] = [
     Target { name: "jpeg", seeds: || pictures::seeds("jpg"), read: pictures::read },
     Target { name: "png", seeds: || pictures::seeds("png"), read: pictures::read },
     Target { name: "tiff", seeds: || pictures::seeds("tif"), read: pictures::read },
+    Target { name: "dng", seeds: pictures::digital_negatives, read: pictures::read },
     Target { name: "webp", seeds: || pictures::seeds("webp"), read: pictures::read },
     Target { name: "heic", seeds: pictures::heic, read: pictures::read },
+    Target { name: "avif", seeds: pictures::avif, read: pictures::read },
     Target { name: "jxl", seeds: pictures::jpeg_xl, read: pictures::read },
     Target { name: "exr", seeds: pictures::open_exr, read: pictures::read },
     Target { name: "hdr", seeds: || pictures::seeds("hdr"), read: pictures::read },

@@ -106,6 +106,29 @@ pub(super) fn heic() -> Vec<Vec<u8>> {
     files.map(<[u8]>::to_vec).into()
 }
 
+/// Mosaics, of packed bits and of lossless JPEG.
+pub(super) fn digital_negatives() -> Vec<Vec<u8>> {
+    files!("lossless.dng", "packed.dng").map(<[u8]>::to_vec).into()
+}
+
+/// Pictures in tiles and whole, of every depth, with alpha, EXIF, a turn and colors in numbers.
+pub(super) fn avif() -> Vec<Vec<u8>> {
+    let files = files!(
+        "lossless.avif",
+        "yuv420.avif",
+        "alpha.avif",
+        "deep10.avif",
+        "deep12.avif",
+        "gray.avif",
+        "grid.avif",
+        "premultiplied.avif",
+        "turned.avif",
+        "p3.avif",
+        "ycgco.avif"
+    );
+    files.map(<[u8]>::to_vec).into()
+}
+
 /// Pictures in every compression, in lines and in tiles, and those that trueup writes.
 pub(super) fn open_exr() -> Vec<Vec<u8>> {
     let files = files!("piz.exr", "pxr24.exr", "b44.exr", "rle.exr", "tiles.exr", "gray.exr");

@@ -10,6 +10,8 @@ use std::collections::BTreeMap;
 
 use heic_decoder::{HeifError, Result};
 
+use crate::formats::boxes::{Fields, children};
+
 /// Most bytes that the pieces of one picture may have together for one of the file. Writers share none, or a few flat tiles.
 const MOST_COPIES: u64 = 4;
 
@@ -36,41 +38,6 @@ pub(super) fn check_copies(file: &[u8]) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// The contents of the boxes of this kind among those that follow each other in `bytes`, up to the first that is none.
-fn children<'a>(bytes: &'a [u8], wanted: &'static [u8; 4]) -> impl Iterator<Item = &'a [u8]> {
-    let mut rest = bytes;
-    std::iter::from_fn(move || next_box(&mut rest)).filter(move |(kind, _)| kind == wanted).map(|(_, content)| content)
-}
-
-fn next_box<'a>(rest: &mut &'a [u8]) -> Option<([u8; 4], &'a [u8])> {
-    let bytes: &'a [u8] = rest;
-    let mut reader = Fields(bytes);
-    let short = reader.number(4)?;
-    let kind = (reader.number(4)? as u32).to_be_bytes();
-    let length = match short {
-        0 => bytes.len() as u64,
-        1 => reader.number(8)?,
-        length => length,
-    };
-    let head = bytes.len() - reader.0.len();
-    let end = usize::try_from(length).unwrap_or(usize::MAX).min(bytes.len());
-    let content = bytes.get(head..end)?;
-    *rest = &bytes[end..];
-    Some((kind, content))
-}
-
-/// Fields of a box that are still to be read.
-struct Fields<'a>(&'a [u8]);
-
-impl Fields<'_> {
-    /// A number of so many bytes, at most 8; none are 0.
-    fn number(&mut self, bytes: usize) -> Option<u64> {
-        let (field, rest) = self.0.split_at_checked(bytes)?;
-        self.0 = rest;
-        Some(field.iter().fold(0, |number, &byte| number << 8 | u64::from(byte)))
-    }
 }
 
 /// An item of a file.

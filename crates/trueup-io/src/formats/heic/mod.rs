@@ -3,6 +3,7 @@
 mod container;
 mod read;
 
+use super::avif::is_avif;
 use super::foreign::has_brand;
 use crate::format::{Format, Reading};
 
@@ -17,7 +18,9 @@ pub(crate) static HEIC: Format = Format {
     reading: Some(Reading {
         kinds: "8 to 12 bits, color and gray, whole or in tiles, with or without alpha, as telephones and cameras write it; the primary \
                 picture",
-        has_signature: |start| [b"hei", b"hev", b"mif", b"msf"].iter().any(|brand| has_brand(start, brand)),
+        has_signature: |start| {
+            !is_avif(start) && [b"hei", b"hev", b"mif", b"msf"].iter().any(|brand| has_brand(start, brand))
+        },
         stored: read::stored,
         icc: read::icc,
         exif: read::exif,

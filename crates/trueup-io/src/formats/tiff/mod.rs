@@ -11,6 +11,7 @@ mod read;
 mod samples;
 #[cfg(test)]
 mod tests;
+mod texts;
 pub(crate) mod write;
 
 use super::foreign::is_cr2;

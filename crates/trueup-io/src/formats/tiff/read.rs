@@ -3,7 +3,6 @@
 use std::io::{Read, Seek};
 
 use exif::{Field, Tag as ExifTag};
-use tiff::decoder::Decoder;
 use tiff::tags::Tag;
 use trueup_core::raster::Photograph;
 use trueup_core::source::SourceImage;
@@ -13,7 +12,7 @@ use super::convert::{rgb_of_cmyk, rgb_of_ycbcr, unpacked};
 use super::page::{FirstPage, PixelKind};
 use super::palette;
 use super::raw::{failure, is_raw};
-use super::samples::{Samples, TiffInput, not_as_stated, open};
+use super::samples::{Samples, decoder, not_as_stated, open};
 use crate::format::{HeaderError, Input, StoredPixels};
 use crate::formats::decoded::{check_unchanged, damaged, eight, sixteen};
 use crate::formats::foreign::RAW;
@@ -25,7 +24,7 @@ use crate::metadata::tiff_fields;
 const YCBCR_COEFFICIENTS: Tag = Tag::Unknown(529);
 
 pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
-    let mut decoder = Decoder::new(input as &mut dyn TiffInput).map_err(failure)?;
+    let mut decoder = decoder(input).map_err(failure)?;
     if is_raw(&mut decoder) {
         return Err(HeaderError::Foreign(&RAW));
     }
@@ -34,23 +33,23 @@ pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, Hea
 }
 
 pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
-    let profile = Decoder::new(input as &mut dyn TiffInput).ok()?.find_tag(Tag::IccProfile).ok().flatten()?;
+    let profile = decoder(input).ok()?.find_tag(Tag::IccProfile).ok().flatten()?;
     profile.into_u8_vec().ok()
 }
 
 /// The EXIF library would read the whole file, pixels and all.
 pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
-    ExifFields::from_tiff(&mut Decoder::new(input as &mut dyn TiffInput).ok()?)
+    ExifFields::from_tiff(&mut decoder(input).ok()?)
 }
 
 pub(super) fn whole_fields(input: &mut Input, wanted: &[ExifTag]) -> Option<Vec<Field>> {
-    tiff_fields::read(&mut Decoder::new(input as &mut dyn TiffInput).ok()?, wanted)
+    tiff_fields::read(&mut decoder(input).ok()?, wanted)
 }
 
 /// Decodes the first page.
 pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
     let reading = |error| Error::io("reading", &source.path, error);
-    let page = Decoder::new(&mut input as &mut dyn TiffInput).and_then(|mut decoder| FirstPage::of(&mut decoder));
+    let page = decoder(&mut input).and_then(|mut decoder| FirstPage::of(&mut decoder));
     let page = page.map_err(|error| damaged(source, error))?;
     input.rewind().map_err(reading)?;
     let FirstPage { width, height, .. } = page;

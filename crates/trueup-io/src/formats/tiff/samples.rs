@@ -2,11 +2,13 @@
 
 use std::io::{Read, Seek};
 
+use tiff::TiffResult;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
 
 use super::page::{FirstPage, PixelKind};
+use super::texts::WithoutAbsurdTexts;
 use crate::formats::decoded::{damaged, decoding_limit};
 
 /// What a decoder reads from.
@@ -14,13 +16,21 @@ pub(super) trait TiffInput: Read + Seek {}
 
 impl<R: Read + Seek> TiffInput for R {}
 
+/// A decoder of a file as it can be read.
+pub(super) type TiffDecoder<'a> = Decoder<WithoutAbsurdTexts<'a>>;
+
+/// A decoder.
+pub(super) fn decoder(input: &mut dyn TiffInput) -> TiffResult<TiffDecoder<'_>> {
+    Decoder::new(WithoutAbsurdTexts::of(input)?)
+}
+
 /// A decoder that takes no more memory than the photograph needs.
-pub(super) fn open<'a>(source: &SourceImage, input: &'a mut dyn TiffInput) -> Result<Decoder<&'a mut dyn TiffInput>> {
+pub(super) fn open<'a>(source: &SourceImage, input: &'a mut dyn TiffInput) -> Result<TiffDecoder<'a>> {
     let bytes = usize::try_from(decoding_limit(source)).unwrap_or(usize::MAX);
     let mut limits = Limits::default();
     limits.decoding_buffer_size = bytes;
     limits.intermediate_buffer_size = bytes;
-    Ok(Decoder::new(input).map_err(|error| damaged(source, error))?.with_limits(limits))
+    Ok(decoder(input).map_err(|error| damaged(source, error))?.with_limits(limits))
 }
 
 /// All samples of a photograph, channels interleaved; bits below 8 packed.
@@ -35,11 +45,7 @@ impl Samples {
     ///
     /// # Errors
     /// If they are damaged, incomplete or of a kind that no page has.
-    pub(super) fn read(
-        source: &SourceImage,
-        decoder: &mut Decoder<&mut dyn TiffInput>,
-        page: FirstPage,
-    ) -> Result<Self> {
+    pub(super) fn read(source: &SourceImage, decoder: &mut TiffDecoder<'_>, page: FirstPage) -> Result<Self> {
         let mut buffer = DecodingResult::U8(Vec::new());
         let layout = decoder.read_image_to_buffer(&mut buffer).map_err(|error| damaged(source, error))?;
         let pixels = page.width * page.height;

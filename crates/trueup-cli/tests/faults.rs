@@ -1,0 +1,318 @@
+//! Faults on purpose: every call that makes, writes or renames a file fails once, memory is refused, and the command is killed at any
+//! moment. What was there before is there or replaced as a whole, and nothing is left behind.
+//!
+//! A library that is loaded before the command has the kernel hand back the calls (`faults.c`). Of many calls some are tried here,
+//! spread over all; with `TRUEUP_FAULTS=1000` as many of each command.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant, SystemTime};
+
+use crate::pictures::street;
+use crate::run::{Desk, FinishedRun, finish, trueup};
+
+/// The golden ratio less one.
+const GOLDEN: f64 = 0.618_034;
+
+/// Calls of each command that are made to fail, unless the environment says how many.
+const TRIED: usize = 6;
+
+fn tried() -> usize {
+    std::env::var("TRUEUP_FAULTS").ok().and_then(|count| count.parse().ok()).unwrap_or(TRIED)
+}
+
+/// The library, built once; what links Rust's programs builds it, too.
+fn library() -> &'static Path {
+    static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
+    LIBRARY.get_or_init(|| {
+        let library = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("faults-{}.so", std::process::id()));
+        let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/faults.c");
+        let built = Command::new("cc").args(["-O1", "-shared", "-fPIC", "-o"]).args([&library]).arg(source).status();
+        assert!(built.expect("a C compiler").success());
+        library
+    })
+}
+
+/// Runs a command whose call of this number fails, none if it is 0; `count` is a file that gets a letter for each.
+fn run(desk: &Desk, arguments: &[&str], kind: &str, fault: usize, count: Option<&Path>) -> FinishedRun {
+    let mut command = command(desk, arguments, kind, fault);
+    if let Some(count) = count {
+        command.env("TRUEUP_FAULT_COUNT", count);
+    }
+    finish(command)
+}
+
+/// A command whose call of this number fails.
+fn command(desk: &Desk, arguments: &[&str], kind: &str, fault: usize) -> Command {
+    let mut command = trueup(desk.path(), arguments);
+    command.env("LD_PRELOAD", library()).env("TRUEUP_FAULT_KIND", kind).env("TRUEUP_FAULT", fault.to_string());
+    command.env("TMPDIR", desk.path());
+    command
+}
+
+/// A command with what it needs, and with older files where it is to write.
+struct Trial {
+    arguments: &'static [&'static str],
+    prepare: fn(&Desk),
+}
+
+const OLD: [&str; 4] = ["pano.png", "project.json", "seams.png", "report.html"];
+
+fn photographs(desk: &Desk) {
+    for (name, bytes) in ["a.jpg", "b.jpg"].iter().zip(street()) {
+        desk.put(name, bytes);
+    }
+}
+
+const STITCH: Trial = Trial {
+    arguments: &[
+        "stitch",
+        "a.jpg",
+        "b.jpg",
+        "-o",
+        "pano.png",
+        "--project",
+        "project.json",
+        "--seams",
+        "seams.png",
+        "--report",
+        "report.html",
+        "--scale",
+        "0.5",
+        "--quiet",
+    ],
+    prepare: |desk| {
+        photographs(desk);
+        OLD.iter().for_each(|name| desk.put(name, name));
+    },
+};
+
+const TILES: Trial = Trial {
+    arguments: &["stitch", "a.jpg", "b.jpg", "-o", "pano.dzi", "--scale", "0.5", "--quiet"],
+    prepare: photographs,
+};
+
+const CACHE: Trial = Trial {
+    arguments: &["stitch", "a.jpg", "b.jpg", "-o", "pano.png", "--scale", "0.5", "--quiet", "--cache", "cache"],
+    prepare: STITCH.prepare,
+};
+
+const COMPOSE: Trial = Trial {
+    arguments: &["compose", "made.json", "-o", "pano.png", "--project", "project.json", "--quiet"],
+    prepare: |desk| {
+        (STITCH.prepare)(desk);
+        desk.put("made.json", project());
+    },
+};
+
+const COMPARE: Trial = Trial {
+    arguments: &["compare", "a.jpg", "b.jpg", "-o", "compared", "--methods", "vpg,homography", "--quiet"],
+    prepare: photographs,
+};
+
+const BATCH: Trial = Trial {
+    arguments: &["batch", "in", "-o", "out", "--set", "canvas.scale=0.5", "--quiet"],
+    prepare: |desk| {
+        std::fs::create_dir_all(desk.join("in/street")).expect("a folder");
+        for (name, bytes) in ["in/street/a.jpg", "in/street/b.jpg"].iter().zip(street()) {
+            desk.put(name, bytes);
+        }
+    },
+};
+
+/// The project of the two photographs.
+fn project() -> &'static [u8] {
+    static PROJECT: OnceLock<Vec<u8>> = OnceLock::new();
+    PROJECT.get_or_init(|| {
+        let desk = Desk::new();
+        (STITCH.prepare)(&desk);
+        finish(trueup(desk.path(), STITCH.arguments)).expect_success();
+        desk.read("project.json")
+    })
+}
+
+impl Trial {
+    fn desk(&self) -> Desk {
+        let desk = Desk::new();
+        (self.prepare)(&desk);
+        desk
+    }
+
+    /// The letters of its calls, and what is there afterwards.
+    #[track_caller]
+    fn whole(&self, kind: &str) -> (String, BTreeMap<String, Vec<u8>>) {
+        let (desk, counts) = (self.desk(), Desk::new());
+        let whole = run(&desk, self.arguments, kind, 0, Some(&counts.join("count")));
+        assert_eq!((whole.status, whole.stderr.as_str()), (0, ""));
+        let letters = String::from_utf8(counts.read("count")).expect("letters");
+        assert!(!letters.is_empty(), "calls are counted");
+        (letters, files(&desk))
+    }
+}
+
+/// All files below a desk, by their paths.
+fn files(desk: &Desk) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![desk.path().to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).expect("readable") {
+            let path = entry.expect("readable").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(desk.path()).expect("below").display().to_string();
+                found.insert(name, std::fs::read(&path).expect("readable"));
+            }
+        }
+    }
+    found
+}
+
+/// What a file says may depend on the run: times, and what is said of them.
+fn tells_times(name: &str) -> bool {
+    [".json", ".jsonl", ".html", ".csv", ".md"].iter().any(|end| name.ends_with(end))
+}
+
+/// Fails the test unless each file is as it was or as it should be, and none is left that should not be.
+#[track_caller]
+fn check_files(
+    before: &BTreeMap<String, Vec<u8>>,
+    after: &BTreeMap<String, Vec<u8>>,
+    whole: &BTreeMap<String, Vec<u8>>,
+    said: &str,
+) {
+    assert!(before.keys().all(|name| after.contains_key(name)), "{said}: lost of {:?}", before.keys());
+    for (name, bytes) in after {
+        let Some(wanted) = whole.get(name) else {
+            assert_eq!(before.get(name), Some(bytes), "{said}: {name} is left behind");
+            continue;
+        };
+        let is_whole = match name.rsplit_once('.') {
+            // Entries of a cache hold the times of the work.
+            Some((_, "trueup")) => bytes.starts_with(b"trueup cache "),
+            Some((_, "json")) => serde_json::from_slice::<serde_json::Value>(bytes).is_ok(),
+            _ => bytes == wanted || (tells_times(name) && !bytes.is_empty()),
+        };
+        assert!(is_whole || before.get(name) == Some(bytes), "{said}: {name} is not whole");
+    }
+}
+
+/// Makes calls for files fail, each in a run of its own. `bears` are the statuses beside that of an error with which a run may end that
+/// does without the file.
+#[track_caller]
+fn check_files_fail(trial: &Trial, bears: &[i32]) {
+    let (letters, whole) = trial.whole("files");
+    let step = letters.len().div_ceil(tried()).max(1);
+    for fault in (1..=letters.len()).step_by(step) {
+        let desk = trial.desk();
+        let before = files(&desk);
+        let ended = run(&desk, trial.arguments, "files", fault, None);
+        let said = format!("call {fault} of {letters}: {} {}", ended.status, ended.stderr);
+        let is_named = ended.status == 1
+            && ended.stderr.contains("trueup: error: ")
+            && ["(os error 28)", "(os error 5)"].iter().any(|reason| ended.stderr.contains(reason));
+        assert!(is_named || bears.contains(&ended.status), "{said}");
+        check_files(&before, &files(&desk), &whole, &said);
+    }
+}
+
+#[test]
+fn a_stitch_bears_every_failure_of_a_file() {
+    check_files_fail(&STITCH, &[]);
+}
+
+#[test]
+fn tiles_bear_every_failure_of_a_file() {
+    check_files_fail(&TILES, &[]);
+}
+
+#[test]
+fn a_cache_that_takes_nothing_stops_no_stitch() {
+    check_files_fail(&CACHE, &[0]);
+}
+
+#[test]
+fn composing_bears_every_failure_of_a_file() {
+    check_files_fail(&COMPOSE, &[]);
+}
+
+#[test]
+fn a_comparison_bears_every_failure_of_a_file() {
+    check_files_fail(&COMPARE, &[]);
+}
+
+/// A set that could not be written is a set that failed: the batch goes on, and says so by its status.
+#[test]
+fn a_batch_bears_every_failure_of_a_file() {
+    check_files_fail(&BATCH, &[0, 3]);
+}
+
+/// A megabyte or more of memory is refused once: unless a library bears it, the command ends at once, by an error or as Rust's programs
+/// end without memory. Files are as they were or whole; what was not complete stays under its own name until the next run.
+#[test]
+fn memory_that_is_refused_costs_no_file() {
+    for trial in [STITCH, COMPOSE] {
+        let (letters, whole) = trial.whole("memory");
+        for fault in (1..=letters.len()).step_by(letters.len().div_ceil(tried()).max(1)) {
+            let desk = trial.desk();
+            let before = files(&desk);
+            let ended = command(&desk, trial.arguments, "memory", fault).output().expect("the command starts");
+            let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+            let is_told = ["trueup: error: ", "trueup: warning: ", "memory allocation of "];
+            let is_told = is_told.iter().any(|words| said.contains(words));
+            assert!(is_told || (ended.status.success() && said.is_empty()), "call {fault}: {said}");
+            let mut after = files(&desk);
+            after.retain(|name, _| !name.ends_with(".part"));
+            // A photograph that could not be decoded is left out, with a warning; the panorama is that of the other then.
+            if !said.contains("left out") {
+                check_files(&before, &after, &whole, &format!("call {fault} of {}: {said}", letters.len()));
+            }
+        }
+    }
+}
+
+/// Kills after which a run has to finish what is left to it.
+const KILLS_IN_A_ROW: usize = 4;
+
+/// Killed at moments spread over a whole run: each file is the old or the new one, the cache goes on to the same bytes, and what was not
+/// complete is gone.
+#[test]
+fn what_is_killed_leaves_no_half_file_and_goes_on_to_the_same_bytes() {
+    let (_, whole) = CACHE.whole("files");
+    let started = Instant::now();
+    finish(trueup(CACHE.desk().path(), CACHE.arguments)).expect_success();
+    let whole_run = started.elapsed().as_secs_f64();
+    for row in 0..tried().div_ceil(KILLS_IN_A_ROW) {
+        let desk = CACHE.desk();
+        for number in (0..KILLS_IN_A_ROW).map(|kill| row * KILLS_IN_A_ROW + kill) {
+            // Multiples of the golden ratio are spread evenly, however many there are.
+            let share = (number as f64 * GOLDEN).fract();
+            let mut command = trueup(desk.path(), CACHE.arguments);
+            let mut running = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("started");
+            std::thread::sleep(Duration::from_secs_f64(whole_run * share));
+            running.kill().expect("killed, or done");
+            running.wait().expect("it ends");
+            let panorama = desk.read("pano.png");
+            assert!(panorama == OLD[0].as_bytes() || panorama == whole["pano.png"], "half a panorama at {share}");
+        }
+        check_goes_on(&desk, &whole["pano.png"]);
+    }
+}
+
+#[track_caller]
+fn check_goes_on(desk: &Desk, wanted: &[u8]) {
+    for name in files(desk).keys().filter(|name| name.ends_with(".part")) {
+        // As if a minute had passed: younger ones may be of a program that has not marked them yet.
+        let part = std::fs::File::options().write(true).open(desk.join(name)).expect("writable");
+        part.set_modified(SystemTime::now() - Duration::from_secs(120)).expect("its time can be set");
+    }
+    let mut arguments = CACHE.arguments.to_vec();
+    arguments.retain(|argument| *argument != "--quiet");
+    let run = finish(trueup(desk.path(), &arguments));
+    assert!(!run.expect_success().contains("damaged"), "{}", run.stdout);
+    assert!(desk.read("pano.png") == wanted, "other bytes from what was kept");
+    let left: Vec<String> = desk.files().into_iter().filter(|name| name.ends_with(".part")).collect();
+    assert!(left.is_empty(), "{left:?}");
+}
