@@ -23,6 +23,7 @@ pub(crate) static AVIF: Format = Format {
         exif: read::exif,
         whole_fields: read::whole_fields,
         pixels: read::pixels,
+        reduced: None,
         pixel_bytes: read::PIXEL_BYTES,
     }),
     writing: None,

@@ -33,6 +33,7 @@ pub(crate) static DNG: Format = Format {
         exif: read::exif,
         whole_fields: read::whole_fields,
         pixels: read::pixels,
+        reduced: None,
         pixel_bytes: read::PIXEL_BYTES,
     }),
     writing: None,
