@@ -53,7 +53,7 @@ fn compose(layout: &CanvasLayout, photographs: &Memory, options: &RenderOptions)
     let corrections = vec![Correction::uniform(0.9), Correction::uniform(1.1)].into();
     let input = RenderInput { layout, corrections: &corrections, photographs };
     let (seams, context) = (SeamOptions::default(), StageContext::default());
-    Ok(render(&input, &Resources::unlimited(), options, &seams, &context)?.panorama)
+    Ok(render(&input, &Resources::unlimited(), options, &seams, None, &context)?.panorama)
 }
 
 fn bench_render(bencher: Bencher, scale: f64, threads: usize, options: RenderOptions) {

@@ -84,6 +84,11 @@ impl Coverage {
         stretches.get(next).is_some_and(|stretch| stretch.start <= x)
     }
 
+    /// Whether all of `columns` of row `y` are covered.
+    pub(crate) fn holds_all(&self, columns: &Range<usize>, y: usize) -> bool {
+        columns.is_empty() || self.rows.get(y).is_some_and(|stretches| lies_within(columns, stretches))
+    }
+
     /// The coverage with those of the other pixels that `as_well` names.
     pub(crate) fn with(&self, as_well: impl Fn(usize, usize) -> bool + Sync) -> Self {
         let filled = |(y, stretches): (usize, &Vec<Range<usize>>)| {

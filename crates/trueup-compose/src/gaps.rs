@@ -122,6 +122,20 @@ impl Gaps {
         }
     }
 
+    /// Whether any pixel of a box is part of a gap.
+    pub(crate) fn any_within(&self, columns: &Range<usize>, rows: &Range<usize>) -> bool {
+        let within = |a: &Range<usize>, b: &Range<usize>| a.start.max(b.start)..a.end.min(b.end);
+        let (columns, rows) = match &self.extent {
+            Extent::Small(_) => (columns.clone(), rows.clone()),
+            Extent::Within(rectangle) => (within(columns, &rectangle.columns), within(rows, &rectangle.rows)),
+        };
+        let has_gap = |y: usize| {
+            !self.coverage.holds_all(&columns, y)
+                && columns.clone().any(|x| !self.is_covered(x, y) && self.is_gap(x, y))
+        };
+        rows.into_iter().any(has_gap)
+    }
+
     /// The coverage as it is when the gaps are filled.
     pub fn filled_coverage(&self) -> Coverage {
         self.coverage.with(|x, y| self.is_gap(x, y))

@@ -103,6 +103,10 @@ impl MemoryPlan {
         let total = on_disk + if hold_levels { 0 } else { work.coarse_levels as u64 };
         let file: Option<Arc<dyn ScratchFile>> =
             if total > 0 { Some(Arc::from(resources.scratch.create(total)?)) } else { None };
+        if let Some(file) = file.as_deref().filter(|_| on_disk > 0) {
+            // Its last tiles may never be finished, and are read all the same.
+            file.write_at(&[0], on_disk - 1)?;
+        }
         let place = file.clone().map(|file| SpillPlace { file, offset: on_disk });
         Ok(Self {
             coarse_levels: place.filter(|_| !hold_levels),

@@ -6,7 +6,9 @@ use trueup_core::Result;
 use super::levels::WholeLevels;
 use super::shown::ShownWhere;
 use crate::label::{Label, NOBODY};
-use crate::pyramid::{LEAST_SHARE, NEXT_TO_NOTHING, PyramidPlane, add_base, add_detail, collapse};
+use crate::pyramid::{
+    LEAST_SHARE, LEAST_WEIGHT, NEXT_TO_NOTHING, PyramidPlane, add_base, add_detail, collapse, level_shares,
+};
 use crate::small_views::{CoarseLevel, CoarseLevels};
 
 /// Points along each axis of a sample at which labels are asked for.
@@ -71,7 +73,11 @@ impl CoarseBlend<'_> {
             sums.par_iter_mut().enumerate().for_each(|(level, sum)| {
                 let (own, weights) = &pyramid[level];
                 match pyramid.get(level + 1) {
-                    Some((coarser, _)) => add_detail(sum, own, coarser, weights),
+                    Some((coarser, _)) => {
+                        let mut coarser = coarser.clone();
+                        level_shares(&mut coarser);
+                        add_detail(sum, own, &coarser, weights, LEAST_WEIGHT);
+                    }
                     None => add_base(sum, own, weights),
                 }
             });

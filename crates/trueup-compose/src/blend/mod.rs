@@ -23,6 +23,8 @@ use rayon::prelude::*;
 use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 
+use crate::coverage::Rectangle;
+use crate::label::Label;
 use crate::layout::Unrolled;
 use crate::light::{Correction, LocalExposure};
 use crate::memory_plan::MemoryPlan;
@@ -59,54 +61,98 @@ pub(crate) struct BlendInput<'a> {
     pub(crate) plan: &'a MemoryPlan,
 }
 
-/// Finishes the canvas. Progress counts placements of photographs, of a stage that the caller begins.
-///
-/// # Errors
-/// [`trueup_core::Error::Limits`] if more photographs meet at one place than there is memory for;
-/// [`trueup_core::Error::Cancelled`]; what the photographs and a scratch file return.
-pub(crate) fn run(input: BlendInput<'_>, context: &StageContext) -> Result<PixelStore<RootPixel>> {
-    let BlendInput { unrolled, corrections, photographs, resampling, seams, plan, .. } = input;
-    let [width, height] = unrolled.finished();
-    let first_level = first_level([width, height]);
-    let shown = ShownWhere { unrolled, seams };
-    let coarse_levels = input.coarse_levels;
-    let levels = input.levels.map(|levels| BlendedLevels::new(coarse_levels, shown, levels)).transpose()?;
-    let ignored = unrolled.placed().iter().map(|placed| photographs.masks(placed.photograph).ignored).collect();
-    let mut work = BlendWork { resampling, shown, first_level, levels, ignored };
+/// Photographs whose coarse levels are blended: what is left is to finish the canvas.
+pub(crate) struct Blending<'a> {
+    input: BlendInput<'a>,
+    work: BlendWork<'a>,
+}
 
-    let placements = unrolled.placed().len();
-    let DecodedPhotographs { mut kept, bytes } = input.decoded;
-    let bytes: Vec<usize> = (0..placements).map(|at| bytes[unrolled.original(at)]).collect();
-    // Of several placements, the first takes what was kept.
-    let kept = (0..placements).map(|at| kept[unrolled.original(at)].take()).collect();
-    let batches = order::batches(&work, &bytes, plan.photographs)?;
-    let curve = photographs.transfer_curve();
-    let local = input.local.map(|local| local.led_by(unrolled.lead()));
-    let local = local.as_ref();
-    let loader = PhotographLoader { unrolled, curve: &curve, corrections, local, photographs, resampling, context };
-    let mut loaded = LoadedPhotographs::new(loader, kept, &batches, plan.photographs, plan.at_a_time);
-    let mut pixels = plan.store([width, height], [tile_side(first_level); 2]);
-    for (index, batch) in batches.iter().enumerate() {
-        loaded.prepare(index, batch, &bytes)?;
-        if let Some(levels) = &mut work.levels {
-            levels.own.hold(|at| loaded.warped()[at].is_some())?;
-        }
-        for tiles in batch.tiles.chunks(TILES_AT_ONCE * rayon::current_num_threads().max(1)) {
-            let finish = |memory: &mut SamplingMemory, tile: &BlendTile| {
-                context.check_cancelled()?;
-                Ok(tile.finish(&work, loaded.warped(), memory))
-            };
-            let finished: Vec<Vec<RootPixel>> =
-                tiles.par_iter().map_init(SamplingMemory::default, finish).collect::<Result<_>>()?;
-            let block = |(tile, pixels)| {
-                let BlendTile { columns, rows, .. }: &BlendTile = tile;
-                let columns = columns.start - unrolled.lead()..columns.end - unrolled.lead();
-                Block { columns, rows: rows.clone(), pixels }
-            };
-            let blocks: Vec<Block<'_, RootPixel>> =
-                tiles.iter().zip(finished.iter().map(Vec::as_slice)).map(block).collect();
-            pixels.put(&blocks)?;
-        }
+impl<'a> Blending<'a> {
+    /// Blends the coarse levels.
+    ///
+    /// # Errors
+    /// Those of a scratch file.
+    pub(crate) fn new(mut input: BlendInput<'a>) -> Result<Self> {
+        let BlendInput { unrolled, photographs, resampling, seams, .. } = input;
+        let first_level = first_level(unrolled.finished());
+        let shown = ShownWhere { unrolled, seams };
+        let coarse_levels = std::mem::take(&mut input.coarse_levels);
+        let levels = input.levels.map(|levels| BlendedLevels::new(coarse_levels, shown, levels)).transpose()?;
+        let ignored = unrolled.placed().iter().map(|placed| photographs.masks(placed.photograph).ignored).collect();
+        Ok(Self { input, work: BlendWork { resampling, shown, first_level, levels, ignored } })
     }
-    Ok(pixels)
+
+    /// What the coarse levels change of photographs at places of the canvas, pixels from its corner: square roots of linear
+    /// light.
+    ///
+    /// # Errors
+    /// Those of a scratch file.
+    pub(crate) fn changes(&self, places: &[(Label, [f64; 2])]) -> Result<Vec<[f32; 3]>> {
+        let mut changes = vec![[0.0; 3]; places.len()];
+        let Some(levels) = &self.work.levels else { return Ok(changes) };
+        let unrolled = self.input.unrolled;
+        let step = f64::from(1 << self.work.first_level);
+        for placement in 0..levels.own.len() {
+            let own = levels.own.read(placement)?;
+            let original = unrolled.original(placement);
+            changes.par_iter_mut().zip(places).for_each(|(change, &(label, [x, y]))| {
+                // Sample i lies on the middle of pixel i * step.
+                let at = [(x + unrolled.lead() as f64 - 0.5) / step, (y - 0.5) / step];
+                if usize::from(label) == original
+                    && let (Some(own), Some(all)) = (own.plane.color_at(at), levels.blended.color_at(at))
+                {
+                    *change = [all[0] - own[0], all[1] - own[1], all[2] - own[2]];
+                }
+            });
+        }
+        Ok(changes)
+    }
+
+    /// Finishes `parts` of the canvas, and maybe more; what is not finished is empty. Progress counts placements of photographs,
+    /// of a stage that the caller begins.
+    ///
+    /// # Errors
+    /// [`trueup_core::Error::Limits`] if more photographs meet at one place than there is memory for;
+    /// [`trueup_core::Error::Cancelled`]; what the photographs and a scratch file return.
+    pub(crate) fn finish(self, parts: &[Rectangle], context: &StageContext) -> Result<PixelStore<RootPixel>> {
+        let Self { input, mut work } = self;
+        let BlendInput { unrolled, corrections, photographs, resampling, plan, .. } = input;
+        let [width, height] = unrolled.finished();
+        let side = tile_side(work.first_level);
+        let placements = unrolled.placed().len();
+        let DecodedPhotographs { mut kept, bytes } = input.decoded;
+        let bytes: Vec<usize> = (0..placements).map(|at| bytes[unrolled.original(at)]).collect();
+        // Of several placements, the first takes what was kept.
+        let kept = (0..placements).map(|at| kept[unrolled.original(at)].take()).collect();
+        let batches = order::batches(&work, parts, &bytes, plan.photographs)?;
+        let curve = photographs.transfer_curve();
+        let local = input.local.map(|local| local.led_by(unrolled.lead()));
+        let local = local.as_ref();
+        let loader = PhotographLoader { unrolled, curve: &curve, corrections, local, photographs, resampling, context };
+        let mut loaded = LoadedPhotographs::new(loader, kept, &batches, plan.photographs, plan.at_a_time);
+        let mut pixels = plan.store([width, height], [side; 2]);
+        for (index, batch) in batches.iter().enumerate() {
+            loaded.prepare(index, batch, &bytes)?;
+            if let Some(levels) = &mut work.levels {
+                levels.own.hold(|at| loaded.warped()[at].is_some())?;
+            }
+            for tiles in batch.tiles.chunks(TILES_AT_ONCE * rayon::current_num_threads().max(1)) {
+                let finish = |memory: &mut SamplingMemory, tile: &BlendTile| {
+                    context.check_cancelled()?;
+                    Ok(tile.finish(&work, loaded.warped(), memory))
+                };
+                let finished: Vec<Vec<RootPixel>> =
+                    tiles.par_iter().map_init(SamplingMemory::default, finish).collect::<Result<_>>()?;
+                let block = |(tile, pixels)| {
+                    let BlendTile { columns, rows, .. }: &BlendTile = tile;
+                    let columns = columns.start - unrolled.lead()..columns.end - unrolled.lead();
+                    Block { columns, rows: rows.clone(), pixels }
+                };
+                let blocks: Vec<Block<'_, RootPixel>> =
+                    tiles.iter().zip(finished.iter().map(Vec::as_slice)).map(block).collect();
+                pixels.put(&blocks)?;
+            }
+        }
+        Ok(pixels)
+    }
 }

@@ -8,6 +8,7 @@ use trueup_core::{Error, Result};
 
 use super::tile::BlendTile;
 use super::work::BlendWork;
+use crate::coverage::Rectangle;
 use crate::label::Label;
 use crate::pyramid::tile_side;
 
@@ -21,12 +22,12 @@ pub(super) struct Batch {
     pub(super) shown: Vec<Label>,
 }
 
-/// The canvas in batches whose photographs, of these sizes in `bytes`, take no more than `room` bytes. Strips run across
-/// that side of the canvas which leaves fewer photographs in memory from one strip to the next.
+/// The tiles of all `parts` of the canvas in batches whose photographs, of these sizes in `bytes`, take no more than `room` bytes.
+/// Strips run across that side of the canvas which leaves fewer photographs in memory from one strip to the next.
 ///
 /// # Errors
 /// [`Error::Limits`] if a single tile is made of more.
-pub(super) fn batches(work: &BlendWork<'_>, bytes: &[usize], room: usize) -> Result<Vec<Batch>> {
+pub(super) fn batches(work: &BlendWork<'_>, parts: &[Rectangle], bytes: &[usize], room: usize) -> Result<Vec<Batch>> {
     let [width, height] = work.shown.unrolled.finished();
     let side = tile_side(work.first_level);
     let cut = |first: usize, length: usize| -> Vec<Range<usize>> {
@@ -34,12 +35,24 @@ pub(super) fn batches(work: &BlendWork<'_>, bytes: &[usize], room: usize) -> Res
         (first..end).step_by(side).map(|start| start..(start + side).min(end)).collect()
     };
     let (columns, rows) = (cut(work.shown.unrolled.lead(), width), cut(0, height));
-    let tiles: Vec<BlendTile> = (0..rows.len() * columns.len())
-        .into_par_iter()
-        .map(|at| BlendTile::new(work, columns[at % columns.len()].clone(), rows[at / columns.len()].clone()))
-        .collect();
-    let along_x = strips(columns.len(), rows.len(), side, |along, across| across * columns.len() + along);
-    let along_y = strips(rows.len(), columns.len(), side, |along, across| along * columns.len() + across);
+    let mut wanted = vec![false; rows.len() * columns.len()];
+    for part in parts {
+        let across = part.columns.start / side..part.columns.end.div_ceil(side).min(columns.len());
+        for row in part.rows.start / side..part.rows.end.div_ceil(side).min(rows.len()) {
+            wanted[row * columns.len()..][across.clone()].fill(true);
+        }
+    }
+    let tile = |at: usize| {
+        let (columns, rows) = (columns[at % columns.len()].clone(), rows[at / columns.len()].clone());
+        if wanted[at] { BlendTile::new(work, columns, rows) } else { BlendTile { columns, rows, shown: Vec::new() } }
+    };
+    let tiles: Vec<BlendTile> = (0..wanted.len()).into_par_iter().map(tile).collect();
+    let of_wanted = |strips: Vec<Vec<usize>>| -> Vec<Vec<usize>> {
+        let wanted = |strip: Vec<usize>| strip.into_iter().filter(|&at| wanted[at]).collect();
+        strips.into_iter().map(wanted).collect()
+    };
+    let along_x = of_wanted(strips(columns.len(), rows.len(), side, |along, across| across * columns.len() + along));
+    let along_y = of_wanted(strips(rows.len(), columns.len(), side, |along, across| along * columns.len() + across));
     let (x, y) = (most_alive(&along_x, &tiles, bytes), most_alive(&along_y, &tiles, bytes));
     let strips = if x < y || x == y && width >= height { along_x } else { along_y };
     let mut batches = Vec::new();

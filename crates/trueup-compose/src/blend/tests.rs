@@ -169,6 +169,7 @@ fn with_work<T>(
         local: None,
         photographs: &memory,
         first_level: Some(first_level),
+        border: None,
         plan: &plan,
     };
     let small = small_views::run(&input, &context).expect("small");

@@ -1,5 +1,6 @@
 //! One tile of the canvas, finished.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use trueup_core::mask::Mask;
@@ -7,7 +8,7 @@ use trueup_core::mask::Mask;
 use super::work::BlendWork;
 use crate::ignored::in_mask;
 use crate::label::{Label, NOBODY};
-use crate::pyramid::{PyramidPlane, add_detail, collapse, color, level_shares, mask_margin, tile_margin};
+use crate::pyramid::{LEAST_WEIGHT, PyramidPlane, add_detail, collapse, color, level_shares, mask_margin, tile_margin};
 use crate::simd::{VectorLoop, with_vector_instructions};
 use crate::small_views::CoarseLevel;
 use crate::store::RootPixel;
@@ -177,47 +178,76 @@ impl BlendTile {
         shown: &[(Label, &WarpedPhotograph<'_>)],
         scratch: &mut SamplingMemory,
     ) -> Vec<RootPixel> {
-        let Some(levels) = &work.levels else { return Vec::new() };
+        let (columns, rows) = Self::with_margin(&self.columns, &self.rows, work);
+        let masks = self.masks(work, shown, &columns, &rows);
+        self.blended_by(Claim::OwnersAlone, &masks, work, shown, scratch)
+            .or_else(|| self.blended_by(Claim::Everyone, &masks, work, shown, scratch))
+            .unwrap_or_default()
+    }
+
+    /// [`Self::blended`] of photographs that are shown by `masks`; `None` if the claim does not do.
+    fn blended_by(
+        &self,
+        claim: Claim,
+        masks: &[PyramidPlane<f32>],
+        work: &BlendWork<'_>,
+        shown: &[(Label, &WarpedPhotograph<'_>)],
+        scratch: &mut SamplingMemory,
+    ) -> Option<Vec<RootPixel>> {
+        let levels = work.levels.as_ref()?;
         let (columns, rows) = grown([&self.columns, &self.rows], tile_margin(work.first_level), work);
+        let mut sums = zero_levels(&columns, &rows, work.first_level);
         let mut opacity = vec![0.0_f32; self.columns.len() * self.rows.len()];
-        let mut sums: Vec<PyramidPlane<[f32; 4]>> = Vec::new();
-        let (mask_columns, mask_rows) = Self::with_margin(&self.columns, &self.rows, work);
-        let masks = self.masks(work, shown, &mask_columns, &mask_rows);
+        let mut owned = match claim {
+            Claim::OwnersAlone => columns.len() * rows.len(),
+            Claim::Everyone => 0,
+        };
         for ((label, photograph), mask) in shown.iter().zip(masks) {
+            let (columns, rows) = match claim {
+                Claim::OwnersAlone => felt(mask, work.first_level, [&columns, &rows]),
+                Claim::Everyone => (columns.clone(), rows.clone()),
+            };
             let mut plane = PyramidPlane::new(columns.clone(), rows.clone());
             photograph.sample(self.window(&columns, &rows), &mut plane.texels, &work.resampling, scratch);
+            // Contours at the finest level change at the seam itself.
+            let mut weights = mask.part(&columns, &rows);
+            if claim == Claim::OwnersAlone {
+                let mut shown = weights.texels.iter().zip(&plane.texels).filter(|(weight, _)| **weight > 0.0);
+                owned = shown.try_fold(owned, |left, (_, texel)| (texel[3] >= 1.0).then(|| left.wrapping_sub(1)))?;
+            }
             for texel in &mut plane.texels {
                 let [r, g, b, share] = *texel;
                 *texel = [r * share, g * share, b * share, share];
             }
             self.add_opacity(&plane, &mut opacity);
-            let mut mask = mask;
-            // Contours at the finest level change at the seam itself.
-            let mut weights = mask.part(&columns, &rows);
             hide_ignored(&mut plane, &weights, photograph, work.ignored[usize::from(*label)].as_deref());
-            for level in 0..work.first_level {
-                if sums.len() <= level as usize {
-                    sums.push(PyramidPlane::new(plane.columns.clone(), plane.rows.clone()));
-                }
-                let last = level + 1 == work.first_level;
-                let reduced = if last { PyramidPlane::default() } else { plane.reduced() };
-                let coarser = if last { &levels.own.at(usize::from(*label)).plane } else { &reduced };
-                mask = mask.reduced();
+            let mut mask: Cow<'_, PyramidPlane<f32>> = Cow::Borrowed(mask);
+            for (level, sum) in sums.iter_mut().enumerate() {
+                mask = Cow::Owned(mask.reduced());
                 if level > 0 {
                     weights = mask.expanded(&plane.columns, &plane.rows);
                 }
-                add_detail(&mut sums[level as usize], &plane, coarser, &weights);
-                if !last {
+                if level + 1 == work.first_level as usize {
+                    let coarser = &levels.own.at(usize::from(*label)).plane;
+                    add_detail(sum, &plane, coarser, &weights, claim.least_weight());
+                } else {
+                    let reduced = plane.reduced();
+                    let mut coarser = reduced.clone();
+                    level_shares(&mut coarser);
+                    add_detail(sum, &plane, &coarser, &weights, claim.least_weight());
                     plane = reduced;
                 }
             }
+        }
+        if owned != 0 {
+            return None;
         }
         let mut blended: Option<PyramidPlane<[f32; 4]>> = None;
         while let Some(mut sum) = sums.pop() {
             collapse(&mut sum, Some(blended.as_ref().unwrap_or(&levels.blended)));
             blended = Some(sum);
         }
-        let Some(blended) = blended else { return vec![[0; 4]; opacity.len()] };
+        let blended = blended?;
         let shift = self.columns.start - columns.start;
         let mut out = Vec::with_capacity(opacity.len());
         for (y, opacity) in self.rows.clone().zip(opacity.chunks_exact(self.columns.len())) {
@@ -226,7 +256,7 @@ impl BlendTile {
                 out.push(finished([texel[0], texel[1], texel[2], opacity]));
             }
         }
-        out
+        Some(out)
     }
 
     /// Where each photograph is shown, 0 or 1.
@@ -252,14 +282,79 @@ impl BlendTile {
         masks
     }
 
+    /// Adds what a photograph's `plane` covers of the tile.
     fn add_opacity(&self, plane: &PyramidPlane<[f32; 4]>, opacity: &mut [f32]) {
-        let shift = self.columns.start - plane.columns.start;
-        for (y, opacity) in self.rows.clone().zip(opacity.chunks_exact_mut(self.columns.len())) {
-            for (opacity, texel) in opacity.iter_mut().zip(&plane.row(y)[shift..]) {
+        let within = |a: &Range<usize>, b: &Range<usize>| a.start.max(b.start)..a.end.min(b.end);
+        let (columns, rows) = (within(&self.columns, &plane.columns), within(&self.rows, &plane.rows));
+        if columns.is_empty() {
+            return;
+        }
+        for y in rows {
+            let start = (y - self.rows.start) * self.columns.len() + columns.start - self.columns.start;
+            let texels = &plane.row(y)[columns.start - plane.columns.start..];
+            for (opacity, texel) in opacity[start..start + columns.len()].iter_mut().zip(texels) {
                 *opacity += texel[3];
             }
         }
     }
+}
+
+/// Which photographs count at a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Claim {
+    /// The one that is shown there, and what blending brings over the seams from others. It does where all pixels are covered
+    /// wholly by the one they show: then the others are only read as far as they are felt.
+    OwnersAlone,
+    /// All that cover it, those that are not shown hardly: where the one that is shown ends, they show.
+    Everyone,
+}
+
+impl Claim {
+    /// How much a photograph counts at least.
+    fn least_weight(self) -> f32 {
+        match self {
+            Self::OwnersAlone => 0.0,
+            Self::Everyone => LEAST_WEIGHT,
+        }
+    }
+}
+
+/// The part of a window in which a photograph shown by `mask` is felt at the levels below the first, from and to samples that all
+/// of these have.
+fn felt(
+    mask: &PyramidPlane<f32>,
+    first_level: u32,
+    [columns, rows]: [&Range<usize>; 2],
+) -> (Range<usize>, Range<usize>) {
+    let is_shown = |weights: &[f32]| weights.iter().any(|&weight| weight > 0.0);
+    let of_columns = |y: usize| {
+        let row = mask.row(y);
+        let first = row.iter().position(|&weight| weight > 0.0)?;
+        let last = row.iter().rposition(|&weight| weight > 0.0)?;
+        Some(mask.columns.start + first..mask.columns.start + last + 1)
+    };
+    let joined = |a: Range<usize>, b: Range<usize>| a.start.min(b.start)..a.end.max(b.end);
+    let across = mask.rows.clone().filter_map(of_columns).reduce(joined).unwrap_or(0..0);
+    let first = mask.rows.clone().find(|&y| is_shown(mask.row(y))).unwrap_or(0);
+    let last = mask.rows.clone().rfind(|&y| is_shown(mask.row(y))).map_or(0, |last| last + 1);
+    // Weights reach 3 2^first_level - 2 pixels beyond what is shown ([`mask_margin`]); what they weigh is made of 2^first_level - 2
+    // pixels farther away.
+    let reach = 4 << first_level;
+    let grown = |shown: Range<usize>, window: &Range<usize>| {
+        if shown.is_empty() {
+            return window.start..window.start;
+        }
+        let start = (shown.start.saturating_sub(reach) >> first_level << first_level).max(window.start);
+        let end = (shown.end + reach).next_multiple_of(1 << first_level).min(window.end);
+        start..end.max(start)
+    };
+    (grown(across, columns), grown(first..last, rows))
+}
+
+/// Zeros at all levels below the first that is blended as a whole.
+fn zero_levels(columns: &Range<usize>, rows: &Range<usize>, first_level: u32) -> Vec<PyramidPlane<[f32; 4]>> {
+    let at = |range: &Range<usize>, level: u32| range.start.div_ceil(1 << level)..range.end.div_ceil(1 << level);
+    (0..first_level).map(|level| PyramidPlane::new(at(columns, level), at(rows, level))).collect()
 }
 
 /// Takes from a photograph's `plane` what its photographer ignores and another photograph is shown for, so that nothing

@@ -1,8 +1,5 @@
 //! The rectangle that loses least of what matters.
 
-use trueup_core::Result;
-use trueup_core::raster::RowSource;
-
 use super::cells::Cells;
 use super::search::{Best, Worths};
 use super::smooth::Fillable;
@@ -31,25 +28,17 @@ const PROMINENT: f32 = 30.0;
 /// Half the width of the thing that an upper end belongs to, as a share of the panorama's longer side: a spire counts as much
 /// as the tower that bears it.
 const BEARER: f64 = 0.02;
-/// The rectangle of a canvas that loses least of what matters and has no holes but smooth ones; of a full turn, of all its
-/// width. `None` if there is none.
-///
-/// # Errors
-/// Those of reading the panorama.
-pub(super) fn rectangle(
-    picture: &dyn RowSource,
-    layout: &CanvasLayout,
-    coverage: &Coverage,
-) -> Result<Option<Rectangle>> {
-    let around = layout.period.is_some();
-    let cells = Cells::of(picture, coverage, around)?;
+
+/// The rectangle of a canvas, seen in `cells`, that loses least of what matters and has no holes but smooth ones; of a full turn,
+/// of all its width. `None` if there is none.
+pub(super) fn rectangle(cells: &Cells, layout: &CanvasLayout, coverage: &Coverage) -> Option<Rectangle> {
     let reach = (FRAME_REACH * layout.photograph_side() / cells.side as f64) as usize;
-    let fillable = Fillable::of(&cells, reach.min(cells.columns + cells.rows));
-    let Some(best) = worths(&cells, &fillable).best(around) else { return Ok(None) };
+    let fillable = Fillable::of(cells, reach.min(cells.columns + cells.rows));
+    let best = worths(cells, &fillable).best(cells.around)?;
     let is_open = |x: usize, y: usize| {
         coverage.holds(x, y) || fillable.smooth[y / cells.side * cells.columns + x / cells.side].is_some()
     };
-    Ok(Some(grown(&best, cells.side, [layout.width, layout.height], is_open)))
+    Some(grown(&best, cells.side, [layout.width, layout.height], is_open))
 }
 
 /// What every cell and every cut is worth.

@@ -1,5 +1,7 @@
 //! The panorama in cells: as much of it as deciding about its frame takes.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use trueup_core::Result;
 use trueup_core::raster::{LUMA, RowSource};
@@ -15,7 +17,7 @@ const ROWS_READ: usize = 4;
 
 /// The panorama, reduced.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Cells {
+pub(crate) struct Cells {
     /// Panorama pixels a side.
     pub(super) side: usize,
     pub(super) columns: usize,
@@ -30,9 +32,48 @@ pub(super) struct Cells {
     pub(super) around: bool,
 }
 
+/// A canvas cut into cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct CellGrid {
+    /// Width and height of the canvas, pixels.
+    pub(super) canvas: [usize; 2],
+    /// Pixels a side; cells at the right and lower end may be smaller.
+    pub(super) side: usize,
+    pub(super) columns: usize,
+    pub(super) rows: usize,
+}
+
+impl CellGrid {
+    /// As fine as [`MOST_CELLS`] allow.
+    pub(super) fn of([width, height]: [usize; 2]) -> Self {
+        let side = (1..).find(|side| width.div_ceil(*side) * height.div_ceil(*side) <= MOST_CELLS).unwrap_or(1);
+        Self { canvas: [width, height], side, columns: width.div_ceil(side), rows: height.div_ceil(side) }
+    }
+
+    /// Which cells photographs cover wholly.
+    pub(super) fn covered(&self, coverage: &Coverage) -> Vec<bool> {
+        let length = |index: usize, axis: usize| self.pixels(index, axis).len();
+        let full = |at: usize| length(at % self.columns, 0) * length(at / self.columns, 1);
+        coverage.in_cells(self.side).iter().enumerate().map(|(at, &count)| count == full(at)).collect()
+    }
+
+    /// The columns (`axis` 0) or rows (1) of pixels of a column or row of cells.
+    pub(super) fn pixels(&self, index: usize, axis: usize) -> Range<usize> {
+        index * self.side..((index + 1) * self.side).min(self.canvas[axis])
+    }
+
+    /// The rows of pixels that are read of a row of cells: at most [`ROWS_READ`], evenly.
+    pub(super) fn rows_read(&self, row: usize) -> impl Iterator<Item = usize> + use<> {
+        let pixels = self.pixels(row, 1);
+        let (top, high) = (pixels.start, pixels.len());
+        let lines = high.min(ROWS_READ);
+        (0..lines).map(move |line| top + (2 * line + 1) * high / (2 * lines))
+    }
+}
+
 /// Sums over the pixels of a cell.
 #[derive(Clone, Copy, Default)]
-struct Sums {
+pub(super) struct Sums {
     count: f32,
     colors: [f32; 3],
     luma: f32,
@@ -45,31 +86,29 @@ impl Cells {
     /// # Errors
     /// Those of reading its rows.
     pub(super) fn of(picture: &dyn RowSource, coverage: &Coverage, around: bool) -> Result<Self> {
-        let (width, height) = (picture.width(), picture.height());
-        let side = (1..).find(|side| width.div_ceil(*side) * height.div_ceil(*side) <= MOST_CELLS).unwrap_or(1);
-        let (columns, rows) = (width.div_ceil(side), height.div_ceil(side));
-        let length = |index: usize, whole: usize| ((index + 1) * side).min(whole) - index * side;
-        let full = |at: usize| length(at % columns, width) * length(at / columns, height);
-        let covered = coverage.in_cells(side).iter().enumerate().map(|(at, &count)| count == full(at)).collect();
+        let grid = CellGrid::of([picture.width(), picture.height()]);
+        let CellGrid { side, columns, rows, .. } = grid;
+        let covered = grid.covered(coverage);
         let sums: Vec<Vec<Sums>> = (0..rows)
             .into_par_iter()
             .map(|row| {
-                let top = row * side;
-                let high = length(row, height);
-                let lines = high.min(ROWS_READ);
                 let mut sums = vec![Sums::default(); columns];
-                let mut pixels = vec![0; 4 * width];
-                for line in 0..lines {
-                    picture.rgba8_row(top + (2 * line + 1) * high / (2 * lines), &mut pixels)?;
+                let mut pixels = vec![0; 4 * picture.width()];
+                for y in grid.rows_read(row) {
+                    picture.rgba8_row(y, &mut pixels)?;
                     for (sums, pixels) in sums.iter_mut().zip(pixels.chunks(4 * side)) {
-                        pixels.chunks_exact(4).filter(|pixel| pixel[3] == u8::MAX).for_each(|pixel| sums.add(pixel));
+                        for &[r, g, b, alpha] in pixels.as_chunks::<4>().0 {
+                            if alpha == u8::MAX {
+                                sums.add([r, g, b].map(f32::from));
+                            }
+                        }
                     }
                 }
                 Ok(sums)
             })
             .collect::<Result<_>>()?;
         let sums = || sums.iter().flatten();
-        let colors = sums().map(|one| one.colors.map(|sum| sum / one.count.max(1.0))).collect();
+        let colors = sums().map(Sums::color).collect();
         let deviations = sums().map(Sums::deviation).collect();
         Ok(Self { side, columns, rows, covered, colors, deviations, around })
     }
@@ -82,18 +121,30 @@ impl Cells {
 }
 
 impl Sums {
-    fn add(&mut self, pixel: &[u8]) {
+    /// Adds a pixel's red, green and blue.
+    pub(super) fn add(&mut self, pixel: [f32; 3]) {
         let mut luma = 0.0;
-        for ((sum, &level), share) in self.colors.iter_mut().zip(pixel).zip(LUMA) {
-            *sum += f32::from(level);
-            luma += share * f32::from(level);
+        for ((sum, level), share) in self.colors.iter_mut().zip(pixel).zip(LUMA) {
+            *sum += level;
+            luma += share * level;
         }
         self.count += 1.0;
         self.luma += luma;
         self.luma_squared += luma * luma;
     }
 
-    fn deviation(&self) -> f32 {
+    /// How many pixels were added.
+    pub(super) fn count(&self) -> usize {
+        self.count as usize
+    }
+
+    /// Mean red, green and blue; 0 without any.
+    pub(super) fn color(&self) -> [f32; 3] {
+        self.colors.map(|sum| sum / self.count.max(1.0))
+    }
+
+    /// Standard deviation of the luma.
+    pub(super) fn deviation(&self) -> f32 {
         let count = self.count.max(1.0);
         let mean = self.luma / count;
         (self.luma_squared / count - mean * mean).max(0.0).sqrt()

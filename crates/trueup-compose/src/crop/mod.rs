@@ -1,6 +1,7 @@
-//! Cropping: the part of the canvas that becomes the panorama. Chosen last, when the panorama is there to be looked at, so
-//! that neither seams nor light depend on it.
+//! Cropping: the part of the canvas that becomes the panorama. Chosen by what the panorama shows, or is going to show, so that neither
+//! seams nor light depend on it; what lies outside of it need not be composed then.
 
+mod ahead;
 mod auto;
 mod cells;
 mod search;
@@ -12,35 +13,77 @@ mod worth;
 use trueup_core::Result;
 use trueup_core::raster::RowSource;
 
+use crate::gaps::Gaps;
 use crate::layout::{CanvasLayout, CanvasOptions, Placed};
 
 pub use crate::coverage::{Coverage, Rectangle};
 pub use crate::layout::Crop;
+pub(crate) use ahead::{BorderDeviations, CellsAhead};
+pub(crate) use cells::Cells;
 
-/// The rectangle of the canvas that is to be kept; `None` for all of it as it is. Of a full turn, rows alone are cut.
-///
-/// `panorama` is all that was composed on the canvas of `layout`, and `coverage` what of it photographs cover, or what was
-/// filled already. What [`Crop::Auto`] keeps may have holes that are to be filled: where the picture beside them is smooth.
-///
-/// # Errors
-/// Those of reading the panorama.
-pub fn choose(
-    panorama: &dyn RowSource,
-    layout: &CanvasLayout,
-    coverage: &Coverage,
-    options: &CanvasOptions,
-) -> Result<Option<Rectangle>> {
-    let is_enough = |rectangle: &Rectangle| match options.crop {
-        Crop::Auto => coverage.area_within(rectangle) as f64 >= options.min_kept * coverage.area() as f64,
-        Crop::None | Crop::Rectangle => true,
-    };
-    let rectangle = match (options.crop, layout.period) {
-        (Crop::None, _) => None,
-        (Crop::Rectangle, None) => Some(coverage.largest_rectangle()),
-        (Crop::Rectangle, Some(_)) => Some(coverage.longest_whole_rows()),
-        (Crop::Auto, _) => auto::rectangle(panorama, layout, coverage)?,
-    };
-    Ok(rectangle.filter(|rectangle| rectangle.area() > 0 && is_enough(rectangle)))
+/// What of a canvas becomes the panorama.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Frame {
+    /// All of it, as it is.
+    Whole,
+    /// A rectangle of it.
+    Part(Rectangle),
+}
+
+/// By what a frame is chosen.
+#[derive(Debug, Clone, Copy)]
+pub struct Framing<'a> {
+    /// What of the canvas photographs cover, or what was filled already.
+    pub coverage: &'a Coverage,
+    /// What is wanted.
+    pub options: &'a CanvasOptions,
+    /// The part that is kept, if that is decided.
+    pub known: Option<&'a Rectangle>,
+}
+
+impl Framing<'_> {
+    /// The frame of a panorama, which is all that was composed on the canvas of `layout`. Of a full turn, rows alone are cut.
+    ///
+    /// What [`Crop::Auto`] keeps may have holes that are to be filled ([`Self::gaps`]): where the picture beside them is
+    /// smooth.
+    ///
+    /// # Errors
+    /// Those of reading the panorama.
+    pub fn of_panorama(&self, panorama: &dyn RowSource, layout: &CanvasLayout) -> Result<Frame> {
+        match self.without_panorama(layout) {
+            Some(frame) => Ok(frame),
+            None => Ok(self.of_cells(&Cells::of(panorama, self.coverage, layout.period.is_some())?, layout)),
+        }
+    }
+
+    /// The frame, if what the panorama shows does not count.
+    pub(crate) fn without_panorama(&self, layout: &CanvasLayout) -> Option<Frame> {
+        match (self.known, self.options.crop, layout.period) {
+            (Some(known), _, _) => Some(Frame::Part(known.clone())),
+            (None, Crop::None, _) => Some(Frame::Whole),
+            (None, Crop::Rectangle, None) => Some(self.frame(Some(self.coverage.largest_rectangle()))),
+            (None, Crop::Rectangle, Some(_)) => Some(self.frame(Some(self.coverage.longest_whole_rows()))),
+            (None, Crop::Auto, _) => None,
+        }
+    }
+
+    /// The frame of a panorama that is seen in `cells`.
+    pub(crate) fn of_cells(&self, cells: &Cells, layout: &CanvasLayout) -> Frame {
+        let rectangle = auto::rectangle(cells, layout, self.coverage);
+        let enough = self.options.min_kept * self.coverage.area() as f64;
+        self.frame(rectangle.filter(|rectangle| self.coverage.area_within(rectangle) as f64 >= enough))
+    }
+
+    fn frame(&self, rectangle: Option<Rectangle>) -> Frame {
+        rectangle.filter(|rectangle| rectangle.area() > 0).map_or(Frame::Whole, Frame::Part)
+    }
+
+    /// What is to be filled of the part that is kept; `None` for nothing.
+    pub fn gaps(&self, layout: &CanvasLayout, kept: &Rectangle) -> Option<Gaps> {
+        let missing = kept.area() - self.coverage.area_within(kept);
+        let wanted = self.options.crop == Crop::Auto && missing > 0;
+        wanted.then(|| Gaps::within(layout, self.coverage.clone(), kept.clone()))
+    }
 }
 
 /// The layout of a part of its canvas. Photographs that show nothing of it stay, outside.

@@ -63,7 +63,11 @@ impl<F: Fn(usize, usize) -> u8 + Sync> RowSource for Painted<F> {
 fn kept(layout: &CanvasLayout, crop: Crop, picture: impl Fn(usize, usize) -> u8 + Sync) -> Option<Rectangle> {
     let painted = Painted([layout.width, layout.height], picture);
     let options = CanvasOptions { crop, ..CanvasOptions::default() };
-    choose(&painted, layout, &Coverage::of(layout), &options).expect("a picture in memory")
+    let framing = Framing { coverage: &Coverage::of(layout), options: &options, known: None };
+    match framing.of_panorama(&painted, layout).expect("a picture in memory") {
+        Frame::Whole => None,
+        Frame::Part(kept) => Some(kept),
+    }
 }
 
 fn upright(left: f64, top: f64, right: f64, bottom: f64) -> [[f64; 2]; 4] {

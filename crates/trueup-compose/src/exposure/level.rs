@@ -97,7 +97,7 @@ impl LevelInput<'_> {
 
 /// The brightest channel of a pixel after correction; `None` if it was white or black as it was taken.
 fn brightest(light: &LightTable, pixel: &[u8], [x, y]: [f32; 2]) -> Option<Sample> {
-    let lift = if light.varies() { light.at(x, y) } else { 1.0 };
+    let [lift] = if light.varies() { light.at([x], [y]) } else { [1.0] };
     let channels = pixel.iter().zip(light.gain).map(|(&level, gain)| (level, gain * lift));
     let (level, factor) = channels.max_by(|one, other| {
         let value = |&(level, factor): &(u8, f32)| exposed(light.linearize.linear(f32::from(level)), factor);

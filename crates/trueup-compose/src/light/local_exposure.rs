@@ -3,6 +3,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use crate::simd::{VectorLoop, with_vector_instructions};
+
 /// Factors on linear light at the middles of a grid of cells that lie over a canvas.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ExposureMap {
@@ -84,7 +86,15 @@ impl LocalExposure {
                 end -= 1;
             }
             let [left, right] = map.cells_beside(0, first).map(|at| upper[at] + below * (lower[at] - upper[at]));
-            out.extend((x..end).map(|x| left + (self.in_cells(0, x) - first) as f32 * (right - left)));
+            let filled = out.len();
+            out.resize(filled + end - x, 0.0);
+            with_vector_instructions(Straight {
+                local: self,
+                x,
+                first,
+                factors: [left, right],
+                out: &mut out[filled..],
+            });
             x = end;
         }
     }
@@ -94,6 +104,31 @@ impl LocalExposure {
     fn in_cells(&self, axis: usize, pixel: usize) -> f64 {
         let place = self.scale[axis] * (pixel as f64 + 0.5) + self.shift[axis];
         (place - self.map.corner[axis]) / self.map.cell_px[axis] - 0.5
+    }
+}
+
+/// The factors between two cells: pixels from column `x` on, and the first of the cells.
+struct Straight<'a> {
+    local: &'a LocalExposure,
+    x: usize,
+    first: f64,
+    factors: [f32; 2],
+    out: &'a mut [f32],
+}
+
+impl VectorLoop for Straight<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { local, x, first, factors: [left, right], out } = self;
+        let (scale, shift) = (local.scale[0], local.shift[0]);
+        let (corner, cell) = (local.map.corner[0], local.map.cell_px[0]);
+        let start = x as f64;
+        // Whole numbers of 32 bits are what is turned into floating point side by side. A cell is not so wide that they do not do.
+        for (index, out) in (0_i32..).zip(out) {
+            // As `in_cells` has it: a column is a whole number, of which sums are exact.
+            let place = scale * (start + f64::from(index) + 0.5) + shift;
+            *out = left + ((place - corner) / cell - 0.5 - first) as f32 * (right - left);
+        }
     }
 }
 

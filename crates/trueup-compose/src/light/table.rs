@@ -75,12 +75,14 @@ impl LightTable {
         self.falloff.is_some()
     }
 
-    /// The factor against vignetting at a position in the photograph, pixels; only where [`Self::varies`].
+    /// The factors against vignetting at positions in the photograph, pixels; only where [`Self::varies`].
     #[inline(always)]
-    pub(crate) fn at(&self, x: f32, y: f32) -> f32 {
-        let Some(falloff) = &self.falloff else { return 1.0 };
-        let (dx, dy) = (x - self.center[0], y - self.center[1]);
-        falloff.at(((dx * dx + dy * dy) * self.steps_per_px2).min(STEPS as f32))
+    pub(crate) fn at<const COUNT: usize>(&self, x: [f32; COUNT], y: [f32; COUNT]) -> [f32; COUNT] {
+        let Some(falloff) = &self.falloff else { return [1.0; COUNT] };
+        falloff.at_all(std::array::from_fn(|at| {
+            let (dx, dy) = (x[at] - self.center[0], y[at] - self.center[1]);
+            ((dx * dx + dy * dy) * self.steps_per_px2).min(STEPS as f32)
+        }))
     }
 }
 
@@ -97,7 +99,7 @@ mod tests {
         for (x, y) in [(200.0, 150.0), (0.0, 0.0), (37.5, 281.0), (400.0, 300.0), (390.0, 12.0)] {
             let r2 = ((x - 200.0) * (x - 200.0) + (y - 150.0) * (y - 150.0)) / (200.0 * 200.0 + 150.0 * 150.0);
             let expected = f64::exp(0.3 * r2 - 0.2 * r2 * r2 + 0.4 * r2 * r2 * r2);
-            assert!((f64::from(table.at(x as f32, y as f32)) - expected).abs() < 1e-4, "({x}, {y})");
+            assert!((f64::from(table.at([x as f32], [y as f32])[0]) - expected).abs() < 1e-4, "({x}, {y})");
         }
         let even = PhotographLight { correction: &Correction::uniform(3.0), ..light };
         assert!(!LightTable::new(even, [400.0, 300.0]).varies());

@@ -152,6 +152,29 @@ impl<T: Texel> PyramidPlane<T> {
     }
 }
 
+impl PyramidPlane<[f32; 4]> {
+    /// The color at a place, in samples, between the four around it that the plane holds and that something covers; `None` without
+    /// any.
+    pub(crate) fn color_at(&self, [x, y]: [f64; 2]) -> Option<[f32; 3]> {
+        let (left, top) = (x.floor(), y.floor());
+        let (u, v) = ((x - left) as f32, (y - top) as f32);
+        let mut sum = [0.0_f32; 4];
+        for (down, along) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let (column, row) = (left + f64::from(along), top + f64::from(down));
+            let is_held = column >= self.columns.start as f64
+                && column < self.columns.end as f64
+                && row >= self.rows.start as f64
+                && row < self.rows.end as f64;
+            // A sample beside the place counts a little where none around it does.
+            let weight = |far: f32, second: i32| if second == 1 { far } else { 1.0 - far }.max(LEAST_SHARE);
+            if is_held && let Some([r, g, b]) = color(self.row(row as usize)[column as usize - self.columns.start]) {
+                sum = sum.plus([r, g, b, 1.0], weight(u, along) * weight(v, down));
+            }
+        }
+        (sum[3] > 0.0).then(|| [sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3]])
+    }
+}
+
 #[inline(always)]
 fn five<T: Texel>(a: T, b: T, c: T, d: T, e: T) -> T {
     const OUTER: f32 = 1.0 / 16.0;

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use trueup_core::{Result, StageContext};
 
 use super::panorama::{Panorama, PanoramaPixels, linear_of_sum};
+use crate::coverage::Rectangle;
 use crate::gaps::Gaps;
 use crate::pyramid::{PyramidPlane, color, first_level, tile_margin, tile_side};
 use crate::store::{Pixel, PixelStore, RootPixel, SumPixel};
@@ -56,6 +57,16 @@ impl Panorama {
             PanoramaPixels::Roots(roots) => fill(roots, size, gaps, context),
         }
     }
+}
+
+/// The parts of the canvas that [`Panorama::fill`] reads.
+pub(super) fn read_for(gaps: &Gaps) -> Vec<Rectangle> {
+    let canvas = Canvas::new(gaps.canvas(), gaps);
+    let of_tile = |tile: FillTile| {
+        let (columns, rows) = canvas.with_margin(&tile);
+        canvas.stretches(&columns).into_iter().map(move |(_, columns)| Rectangle { columns, rows: rows.clone() })
+    };
+    canvas.tiles().1.into_iter().flat_map(of_tile).collect()
 }
 
 /// Tiles that are finished before they are put on the canvas; a number of threads must not show in the panorama.
@@ -128,8 +139,7 @@ impl<'a> Canvas<'a> {
             FillTile { columns: left..right, rows: top..(top + side).min(self.height) }
         };
         let has_gap = |tile: &FillTile| {
-            let mut pixels = tile.rows.clone().flat_map(|y| tile.columns.clone().map(move |x| (self.column(x), y)));
-            pixels.any(|(x, y)| !self.gaps.is_covered(x, y) && self.gaps.is_gap(x, y))
+            self.stretches(&tile.columns).iter().any(|(_, columns)| self.gaps.any_within(columns, &tile.rows))
         };
         let gap: Vec<bool> = (0..across * down).into_par_iter().map(|at| has_gap(&tile(at))).collect();
         let reach = (2.0 * self.gaps.radius() / side as f64).ceil() as usize + 1;
@@ -147,28 +157,43 @@ impl<'a> Canvas<'a> {
         (wanted, sources)
     }
 
-    /// Colors times the share covered of a tile with its margin; nothing where the gaps are.
-    fn known<P: Shade>(&self, store: &PixelStore<P>, tile: &FillTile) -> Result<PyramidPlane<[f32; 4]>> {
+    /// A tile with what its levels are made of beside it.
+    fn with_margin(&self, tile: &FillTile) -> (Range<usize>, Range<usize>) {
         let margin = tile_margin(self.first_level);
-        let columns =
-            tile.columns.start.saturating_sub(margin)..(tile.columns.end + margin).min(self.width + 2 * self.lead);
-        let rows = tile.rows.start.saturating_sub(margin)..(tile.rows.end + margin).min(self.height);
-        let mut plane = PyramidPlane::new(columns.clone(), rows.clone());
+        let grown =
+            |range: &Range<usize>, length: usize| range.start.saturating_sub(margin)..(range.end + margin).min(length);
+        (grown(&tile.columns, self.width + 2 * self.lead), grown(&tile.rows, self.height))
+    }
+
+    /// Columns of this canvas in stretches that lie beside each other in the panorama: the first of each, and the
+    /// panorama's columns.
+    fn stretches(&self, columns: &Range<usize>) -> Vec<(usize, Range<usize>)> {
+        let mut stretches = Vec::new();
         let mut first = columns.start;
         while first < columns.end {
             let start = self.column(first);
             let count = (columns.end - first).min(self.width - start);
-            let pixels = store.window(&(start..start + count), &rows)?;
-            for (y, pixels) in rows.clone().zip(pixels.chunks_exact(count)) {
-                let texels = &mut plane.row_mut(y)[first - columns.start..][..count];
-                for (x, (texel, &pixel)) in (start..).zip(texels.iter_mut().zip(pixels)) {
+            stretches.push((first, start..start + count));
+            first += count;
+        }
+        stretches
+    }
+
+    /// Colors times the share covered of a tile with its margin; nothing where the gaps are.
+    fn known<P: Shade>(&self, store: &PixelStore<P>, tile: &FillTile) -> Result<PyramidPlane<[f32; 4]>> {
+        let (columns, rows) = self.with_margin(tile);
+        let mut plane = PyramidPlane::new(columns.clone(), rows.clone());
+        for (first, own) in self.stretches(&columns) {
+            let pixels = store.window(&own, &rows)?;
+            for (y, pixels) in rows.clone().zip(pixels.chunks_exact(own.len())) {
+                let texels = &mut plane.row_mut(y)[first - columns.start..][..own.len()];
+                for (x, (texel, &pixel)) in own.clone().zip(texels.iter_mut().zip(pixels)) {
                     if self.gaps.is_covered(x, y) {
                         let [r, g, b, share] = pixel.root();
                         *texel = [r * share, g * share, b * share, share];
                     }
                 }
             }
-            first += count;
         }
         Ok(plane)
     }

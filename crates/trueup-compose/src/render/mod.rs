@@ -22,7 +22,9 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 
-use crate::blend::{self, BlendInput, WholeLevels};
+use crate::blend::{self, BlendInput, Blending, WholeLevels};
+use crate::coverage::Rectangle;
+use crate::crop::{CellsAhead, Frame, Framing};
 use crate::layout::{CanvasLayout, Unrolled};
 use crate::light::{ByResponse, Correction, LocalExposure};
 use crate::look::{self, local_exposure};
@@ -30,7 +32,7 @@ use crate::memory_plan::{MemoryNeeds, MemoryPlan};
 use crate::pyramid::first_level;
 use crate::render_options::{Composition, Transition};
 use crate::seam::{self, SeamInput, SeamOptions, Seams};
-use crate::small_views::{self, SmallViews, SmallViewsInput};
+use crate::small_views::{self, BorderInput, SmallViews, SmallViewsInput, small_size};
 use crate::store::{PixelStore, RootPixel, SumPixel};
 use crate::unframed::Unframed;
 use crate::warped::{Averaging, Resampling};
@@ -47,9 +49,14 @@ pub struct Rendered {
     pub panorama: Panorama,
     /// The seams along which it was composed; `None` where photographs were averaged.
     pub seams: Option<Seams>,
+    /// What of the canvas becomes the panorama, if that was decided: nothing else need be composed. `None` if all of it was.
+    pub frame: Option<Frame>,
 }
 
 /// Renders the panorama: every photograph warped by its grid, corrected and blended.
+///
+/// With a `framing`, what becomes of the canvas is decided as soon as the seams are known, if it can be, and what lies outside of
+/// it, and is not read to fill its gaps, is not composed: it stays empty. What is composed is the same as without.
 ///
 /// What does not fit into the memory of `resources` goes to a scratch file, and photographs are decoded again where they
 /// cannot be kept; the panorama is the same to the last bit. A canvas pixel sees the photograph at exactly one position, found by
@@ -69,6 +76,7 @@ pub fn run(
     resources: &Resources<'_>,
     options: &RenderOptions,
     seam_options: &SeamOptions,
+    framing: Option<&Framing<'_>>,
     context: &StageContext,
 ) -> Result<Rendered> {
     check(input, options)?;
@@ -92,14 +100,15 @@ pub fn run(
     };
     match composition(layout, options) {
         Composition::AlongSeams(_) => {
-            let (pixels, seams) = composing.along_seams(options, seam_options, context)?;
+            let (pixels, seams, frame) = composing.along_seams(options, seam_options, framing, context)?;
             let panorama = Panorama::from_roots(size, pixels, photographs.encoding());
-            Ok(Rendered { panorama, seams: Some(seams) })
+            Ok(Rendered { panorama, seams: Some(seams), frame })
         }
         Composition::Averaged(weighting) => {
             let averaging = Averaging { resampling: Resampling::of(options.interpolation), weighting };
             let sums = composing.averaged(averaging, context)?;
-            Ok(Rendered { panorama: Panorama::from_sums(size, sums, photographs.encoding()), seams: None })
+            let panorama = Panorama::from_sums(size, sums, photographs.encoding());
+            Ok(Rendered { panorama, seams: None, frame: None })
         }
     }
 }
@@ -119,6 +128,23 @@ fn whole_levels(layout: &CanvasLayout, options: &RenderOptions) -> Option<WholeL
         Composition::AlongSeams(Transition::Cut) | Composition::Averaged(_) => false,
     };
     bands.then(|| WholeLevels::of(layout, options.transition))
+}
+
+/// The cells in which a frame is chosen before anything is composed; `None` if it cannot be.
+fn ahead(layout: &CanvasLayout, framing: &Framing<'_>) -> Option<CellsAhead> {
+    // Of a single photograph there is no small view.
+    let several = layout.placed.len() > 1;
+    let small = small_size([layout.width, layout.height], layout.period.is_some());
+    several.then(|| CellsAhead::new(layout, framing.coverage, small)).flatten()
+}
+
+/// The parts of a canvas that are to be finished.
+fn to_finish(layout: &CanvasLayout, framing: Option<&Framing<'_>>, frame: Option<&Frame>) -> Vec<Rectangle> {
+    let (Some(framing), Some(Frame::Part(kept))) = (framing, frame) else {
+        return vec![Rectangle::whole([layout.width, layout.height])];
+    };
+    let beside_gaps = framing.gaps(layout, kept).map(|gaps| fill::read_for(&gaps)).unwrap_or_default();
+    std::iter::once(kept.clone()).chain(beside_gaps).collect()
 }
 
 /// The canvas on which the photographs of a layout are made small and blended.
@@ -152,21 +178,28 @@ struct Composing<'a> {
 }
 
 impl Composing<'_> {
-    /// Small views, seams, blend.
+    /// Small views, seams, frame, blend.
     fn along_seams(
         &self,
         options: &RenderOptions,
         seam_options: &SeamOptions,
+        framing: Option<&Framing<'_>>,
         context: &StageContext,
-    ) -> Result<(PixelStore<RootPixel>, Seams)> {
+    ) -> Result<(PixelStore<RootPixel>, Seams, Option<Frame>)> {
         let &Self { layout, corrections, local, photographs, plan } = self;
         let levels = whole_levels(layout, options);
         let unrolled = &unrolled(layout, levels)?;
+        let resampling = Resampling::of(options.interpolation);
+        let encoding = photographs.encoding();
+        let mut frame = framing.and_then(|framing| framing.without_panorama(layout));
+        let ahead = framing.filter(|_| frame.is_none()).and_then(|framing| ahead(layout, framing));
         // Small views, and the photographs themselves wherever they are placed.
         context.progress().begin(STAGE, (layout.placed.len() + unrolled.placed().len()) as u64);
         let first_level = levels.map(|levels| levels.first_level);
-        let input = SmallViewsInput { unrolled, corrections, local, photographs, first_level, plan };
-        let SmallViews { views, size, coarse_levels, decoded } = small_views::run(&input, context)?;
+        let border =
+            ahead.as_ref().map(|cells| BorderInput { cells, resampling: &resampling, encode: &encoding.roots });
+        let input = SmallViewsInput { unrolled, corrections, local, photographs, first_level, border, plan };
+        let SmallViews { views, size, coarse_levels, border, decoded } = small_views::run(&input, context)?;
         let seams = match views.len() {
             1 => Seams::of_one(size[0], size[1]),
             _ => {
@@ -174,8 +207,8 @@ impl Composing<'_> {
                 seam::run(&input, seam_options, context)?
             }
         };
+        let cells = ahead.map(|ahead| ahead.cut(&views, &border, &seams));
         drop(views);
-        let resampling = Resampling::of(options.interpolation);
         let input = BlendInput {
             unrolled,
             corrections,
@@ -188,9 +221,14 @@ impl Composing<'_> {
             decoded,
             plan,
         };
-        let pixels = blend::run(input, context)?;
+        let blending = Blending::new(input)?;
+        if let Some((framing, cells)) = framing.zip(cells) {
+            let changes = blending.changes(&cells.places())?;
+            frame = Some(framing.of_cells(&cells.blended(&changes, &encoding), layout));
+        }
+        let pixels = blending.finish(&to_finish(layout, framing, frame.as_ref()), context)?;
         context.progress().finish(STAGE);
-        Ok((pixels, seams))
+        Ok((pixels, seams, frame))
     }
 
     /// Means of all photographs.
@@ -200,6 +238,8 @@ impl Composing<'_> {
     }
 }
 
+#[cfg(test)]
+mod frame_tests;
 #[cfg(test)]
 mod grid_tests;
 #[cfg(test)]

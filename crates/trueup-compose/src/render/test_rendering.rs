@@ -20,7 +20,7 @@ pub(crate) fn compose(
     context: &StageContext,
 ) -> Result<Panorama> {
     let input = RenderInput { layout, corrections, photographs };
-    let rendered = run(&input, &Resources::unlimited(), options, &SeamOptions::default(), context)?;
+    let rendered = run(&input, &Resources::unlimited(), options, &SeamOptions::default(), None, context)?;
     Ok(rendered.panorama)
 }
 

@@ -15,7 +15,7 @@ use crate::light::{Correction, Corrections};
 use crate::test_photographs::{Memory, RamDisk, canvas, moved, noise};
 
 /// Counts how often photographs are decoded.
-struct Counting(Memory, AtomicUsize);
+pub(super) struct Counting(Memory, AtomicUsize);
 
 impl PhotographSource for Counting {
     fn photograph(&self, index: usize) -> Result<trueup_core::raster::Photograph> {
@@ -27,7 +27,7 @@ impl PhotographSource for Counting {
 const COUNT: usize = 10;
 
 /// Two rows of photographs, over many tiles.
-fn scene() -> (CanvasLayout, Corrections, Counting) {
+pub(super) fn scene() -> (CanvasLayout, Corrections, Counting) {
     let placed = (0..COUNT)
         .map(|i| {
             let (left, top) = ((i / 2) as f64 * 310.0, (i % 2) as f64 * 190.0);
@@ -52,7 +52,7 @@ fn composed(blend: Blend, memory: usize, disk: &RamDisk, threads: usize) -> Resu
     let context = StageContext::default();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     let input = RenderInput { layout: &layout, corrections: &corrections, photographs: &photographs };
-    let rendered = pool.install(|| run(&input, &resources, &options, &seams, &context))?;
+    let rendered = pool.install(|| run(&input, &resources, &options, &seams, None, &context))?;
     Ok((rendered, photographs.1.load(Ordering::Relaxed)))
 }
 
@@ -99,7 +99,7 @@ fn gaps_take_up_the_colors_beside_them() {
     let layout = canvas(300, 320, vec![moved(0, 300.0, 200.0, |p| [p.x, p.y + 20.0])]);
     let (options, seams, context) = (RenderOptions::default(), SeamOptions::default(), StageContext::default());
     let input = RenderInput { layout: &layout, corrections: &Corrections::plain(1), photographs: &source };
-    let rendered = run(&input, &Resources::unlimited(), &options, &seams, &context).expect("one photograph");
+    let rendered = run(&input, &Resources::unlimited(), &options, &seams, None, &context).expect("one photograph");
     let mut panorama = rendered.panorama;
     let before = rows(&panorama);
     let gaps = Gaps::find(&layout, Coverage::of(&layout), 0.1);

@@ -68,10 +68,12 @@ impl<'a> SeamEnergy<'a> {
         options: &SeamOptions,
     ) -> Self {
         let mut anyone = vec![0_u8; width * height];
-        for view in views {
-            for (y, row) in view.rows.clone().zip(view.pixels.chunks_exact(view.columns.len().max(1))) {
+        anyone.par_chunks_exact_mut(width).enumerate().for_each(|(y, anyone)| {
+            for view in views.iter().filter(|view| view.rows.contains(&y)) {
+                let across = view.columns.len();
+                let row = &view.pixels[(y - view.rows.start) * across..][..across];
                 for (x, pixel) in view.columns.clone().zip(row) {
-                    let anyone = &mut anyone[y * width + if x < width { x } else { x - width }];
+                    let anyone = &mut anyone[if x < width { x } else { x - width }];
                     let flags = pixel[3];
                     let whole = flags & WHOLLY != 0;
                     let shown = whole && flags & (CLIPPED | IGNORED) == 0;
@@ -80,7 +82,7 @@ impl<'a> SeamEnergy<'a> {
                         | (u8::from(whole && flags & KEPT != 0) * ANY_KEPT);
                 }
             }
-        }
+        });
         Self {
             width,
             height,

@@ -5,6 +5,8 @@
 //! the network of one expansion is that of Kolmogorov, Zabih, "What energy functions can be minimized via graph cuts?",
 //! IEEE TPAMI 26(2), 2004, section 4.
 
+use rayon::prelude::*;
+
 use super::energy::SeamEnergy;
 use super::max_flow::{DOWN, GridFlow, RIGHT};
 use crate::label::{Label, NOBODY};
@@ -41,19 +43,18 @@ const FIXED: i32 = -1;
 /// The labelling that shows everywhere the photograph that lies deepest.
 pub(super) fn deepest(energy: &SeamEnergy<'_>) -> Vec<Label> {
     let mut labels = vec![NOBODY; energy.width * energy.height];
-    let mut best = vec![-1_i16; labels.len()];
-    for (label, view) in energy.views.iter().enumerate() {
-        for y in view.rows.clone() {
+    labels.par_chunks_exact_mut(energy.width).enumerate().for_each(|(y, labels)| {
+        let mut best = vec![-1_i16; labels.len()];
+        for (label, view) in energy.views.iter().enumerate().filter(|(_, view)| view.rows.contains(&y)) {
             for x in view.columns.clone() {
                 let x = energy.column(x);
-                let at = y * energy.width + x;
-                if energy.allowed(label, x, y) && i16::from(energy.depth(label, x, y)) > best[at] {
-                    best[at] = i16::from(energy.depth(label, x, y));
-                    labels[at] = label as Label;
+                if energy.allowed(label, x, y) && i16::from(energy.depth(label, x, y)) > best[x] {
+                    best[x] = i16::from(energy.depth(label, x, y));
+                    labels[x] = label as Label;
                 }
             }
         }
-    }
+    });
     labels
 }
 

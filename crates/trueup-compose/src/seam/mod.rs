@@ -15,6 +15,7 @@ mod shading;
 
 use std::borrow::Cow;
 
+use rayon::prelude::*;
 use trueup_core::options::StageOptions;
 use trueup_core::{Error, Result, StageContext};
 
@@ -87,7 +88,7 @@ fn coarse_to_fine(
         if (width * height) as f64 <= coarse_pixels || finest.len() < 2 || !halves {
             break;
         }
-        let half = (finest.iter().map(SmallView::halved).collect(), [width.div_ceil(2), height.div_ceil(2)]);
+        let half = (finest.par_iter().map(SmallView::halved).collect(), [width.div_ceil(2), height.div_ceil(2)]);
         levels.push(half);
     }
     let mut expansions = Expansions::default();
@@ -205,46 +206,37 @@ fn follow(
 
 /// Pixels within `reach` of a change of labels, on a cylinder of `turn` columns or with 0 on a plane.
 fn band(labels: &[Label], [width, height]: [usize; 2], turn: usize, reach: usize) -> Vec<bool> {
-    let mut edge = vec![false; labels.len()];
-    for at in 0..labels.len() {
-        if at % width + 1 < width && labels[at] != labels[at + 1] {
-            edge[at] = true;
-            edge[at + 1] = true;
-        }
-        if at + width < labels.len() && labels[at] != labels[at + width] {
-            edge[at] = true;
-            edge[at + width] = true;
-        }
-        let next_turn = at + 1 - turn.min(at + 1);
-        if turn > 0 && at % width + 1 == width && labels[at] != labels[next_turn] {
-            edge[at] = true;
-            edge[next_turn] = true;
-        }
-    }
+    let is_edge = |at: usize| {
+        let differs = |other: usize| labels[other] != labels[at];
+        let x = at % width;
+        let left = if x > 0 { Some(at - 1) } else { (turn > 0).then(|| at + turn - 1) };
+        let right = if x + 1 < width { Some(at + 1) } else { (turn > 0).then(|| at + 1 - turn) };
+        let above = at.checked_sub(width);
+        let below = Some(at + width).filter(|&below| below < labels.len());
+        [left, right, above, below].into_iter().flatten().any(differs)
+    };
     // A square dilation: along rows, then along columns.
     let mut wide = vec![false; labels.len()];
-    for (row, wide) in edge.chunks_exact(width).zip(wide.chunks_exact_mut(width)) {
-        for x in (0..width).filter(|&x| row[x]) {
+    wide.par_chunks_exact_mut(width).enumerate().for_each(|(y, wide)| {
+        for x in (0..width).filter(|x| is_edge(y * width + x)) {
             wide[x.saturating_sub(reach)..(x + reach + 1).min(width)].fill(true);
             if turn > 0 && (x < reach || x + reach >= width) {
                 (x + turn - reach.min(turn)..=x + turn + reach).for_each(|x| wide[x % turn] = true);
             }
         }
-    }
+    });
     let mut band = vec![false; labels.len()];
-    for y in 0..height {
+    band.par_chunks_exact_mut(width).enumerate().for_each(|(y, band)| {
         for v in y.saturating_sub(reach)..(y + reach + 1).min(height) {
-            for x in 0..width {
-                band[y * width + x] |= wide[v * width + x];
-            }
+            band.iter_mut().zip(&wide[v * width..]).for_each(|(band, &wide)| *band |= wide);
         }
-    }
+    });
     band
 }
 
 /// A map of a canvas of half the size, every pixel four times.
-fn doubled<T: Copy>(map: &[T], [coarse_width, _]: [usize; 2], [width, height]: [usize; 2]) -> Vec<T> {
-    (0..width * height).map(|at| map[(at / width / 2) * coarse_width + at % width / 2]).collect()
+fn doubled<T: Copy + Send + Sync>(map: &[T], [coarse_width, _]: [usize; 2], [width, height]: [usize; 2]) -> Vec<T> {
+    (0..width * height).into_par_iter().map(|at| map[(at / width / 2) * coarse_width + at % width / 2]).collect()
 }
 
 #[cfg(test)]

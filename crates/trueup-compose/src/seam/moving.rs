@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use rayon::prelude::*;
+
 use super::neighbors::neighbors;
 use crate::small_views::{SmallView, WHOLLY};
 
@@ -19,10 +21,10 @@ const MOVING_LOW: f64 = 14.0;
 /// `turn` is the width of a canvas that is a cylinder, 0 on a plane.
 pub(super) fn moving_things(views: &[SmallView], [width, height]: [usize; 2], turn: usize) -> Vec<u32> {
     let mut difference = vec![0_u8; width * height];
-    for y in 0..height {
+    difference.par_chunks_exact_mut(width).enumerate().for_each(|(y, difference)| {
         // Photographs whose box meets the row; neighbors in their order are compared.
         let met: Vec<&SmallView> = views.iter().filter(|view| view.rows.contains(&y)).collect();
-        for x in 0..width {
+        for (x, place) in difference.iter_mut().enumerate() {
             let mut last: Option<&SmallView> = None;
             for &view in &met {
                 if view.flags(x, y, turn) & WHOLLY == 0 {
@@ -30,13 +32,12 @@ pub(super) fn moving_things(views: &[SmallView], [width, height]: [usize; 2], tu
                 }
                 if let Some(last) = last {
                     let level = unlike(last, view, [x, y], turn).min(unlike(view, last, [x, y], turn));
-                    let place = &mut difference[y * width + x];
                     *place = level.max(*place);
                 }
                 last = Some(view);
             }
         }
-    }
+    });
     label_parts(&difference, [width, height], turn)
 }
 

@@ -112,10 +112,11 @@ const BLOCK: usize = 16;
 fn lifts(light: &LightTable, local: Option<&[f32]>, positions: &Positions, block: &Range<usize>) -> [f32; BLOCK] {
     let mut lifts = [1.0; BLOCK];
     if light.varies() {
-        for (lift, index) in lifts.iter_mut().zip(block.clone()) {
-            let [x, y] = center(positions, index);
-            *lift = light.at(x, y);
+        let (mut x, mut y) = ([0.0; BLOCK], [0.0; BLOCK]);
+        for ((x, y), index) in x.iter_mut().zip(&mut y).zip(block.clone()) {
+            [*x, *y] = center(positions, index);
         }
+        lifts = light.at(x, y);
     }
     if let Some(factors) = local {
         for (lift, factor) in lifts.iter_mut().zip(&factors[block.clone()]) {
@@ -128,13 +129,11 @@ fn lifts(light: &LightTable, local: Option<&[f32]>, positions: &Positions, block
 /// Corrected linear light of a block of samples, channel by channel.
 #[inline(always)]
 fn corrected(light: &LightTable, samples: &[[f32; 4]], lifts: &[f32; BLOCK]) -> [[f32; BLOCK]; 3] {
-    let linearize = light.linearize.as_ref();
-    let mut channels = [[0.0; BLOCK]; 3];
+    let mut levels = [[0.0; BLOCK]; 3];
     for (at, &[r, g, b, _]) in samples.iter().enumerate().take(BLOCK) {
-        channels[0][at] = linearize.linear(r);
-        channels[1][at] = linearize.linear(g);
-        channels[2][at] = linearize.linear(b);
+        (levels[0][at], levels[1][at], levels[2][at]) = (r, g, b);
     }
+    let mut channels = levels.map(|levels| light.linearize.linear_all(levels));
     for (channel, gain) in channels.iter_mut().zip(light.gain) {
         for (value, lift) in channel.iter_mut().zip(lifts) {
             *value = exposed(*value, gain * lift);

@@ -17,12 +17,14 @@ use trueup_core::raster::Photograph;
 use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 
+use crate::crop::{BorderDeviations, CellsAhead};
 use crate::ignored::ShownElsewhere;
 use crate::layout::{Placed, TURNS, Unrolled};
 use crate::light::{Correction, LocalExposure, PhotographLight};
 use crate::memory_plan::MemoryPlan;
 use crate::render_options::RenderOptions;
-use crate::warped::{WarpedPhotograph, check_photograph};
+use crate::transfer_curve::EncodeRoots;
+use crate::warped::{Resampling, WarpedPhotograph, check_photograph};
 use coarse_level::CoarseLevelInput;
 use making::small_view;
 use sampling::{HALVING, scaled};
@@ -45,7 +47,18 @@ pub(crate) struct SmallViewsInput<'a> {
     pub(crate) photographs: &'a dyn PhotographSource,
     /// Log2 of the canvas pixels per sample of the coarse levels; `None` if there are to be none.
     pub(crate) first_level: Option<u32>,
+    /// The border at which a frame is chosen; `None` if none is.
+    pub(crate) border: Option<BorderInput<'a>>,
     pub(crate) plan: &'a MemoryPlan,
+}
+
+/// How the photographs are looked at for a frame.
+#[derive(Clone, Copy)]
+pub(crate) struct BorderInput<'a> {
+    pub(crate) cells: &'a CellsAhead,
+    /// How they will be read for the panorama, and how that is written.
+    pub(crate) resampling: &'a Resampling,
+    pub(crate) encode: &'a EncodeRoots,
 }
 
 /// What comes of reading every photograph once.
@@ -56,6 +69,8 @@ pub(crate) struct SmallViews {
     pub(crate) size: [usize; 2],
     /// For the blend; empty boxes without coarse levels.
     pub(crate) coarse_levels: CoarseLevels,
+    /// Of each photograph, for the frame; empty if none is chosen.
+    pub(crate) border: Vec<BorderDeviations>,
     /// Decoded photographs.
     pub(crate) decoded: DecodedPhotographs,
 }
@@ -73,6 +88,7 @@ struct MadeSmall {
     view: SmallView,
     /// One for each of its placements.
     coarse_levels: Vec<CoarseLevel>,
+    border: BorderDeviations,
     photograph: Photograph,
 }
 
@@ -93,7 +109,8 @@ pub(crate) fn run(input: &SmallViewsInput<'_>, context: &StageContext) -> Result
         elsewhere: elsewhere.map(Arc::new),
     };
     let mut coarse_levels = CoarseLevels::new(plan.coarse_levels.clone());
-    let (mut views, mut decoded) = (Vec::new(), DecodedPhotographs { kept: Vec::new(), bytes: Vec::new() });
+    let (mut views, mut border) = (Vec::new(), Vec::new());
+    let mut decoded = DecodedPhotographs { kept: Vec::new(), bytes: Vec::new() };
     let mut room = plan.photographs;
     let at_a_time = plan.at_a_time;
     for (chunk, (placed, corrections)) in layout.placed.chunks(at_a_time).zip(corrections.chunks(at_a_time)).enumerate()
@@ -111,6 +128,7 @@ pub(crate) fn run(input: &SmallViewsInput<'_>, context: &StageContext) -> Result
             .collect::<Result<_>>()?;
         for made in made {
             views.push(made.view);
+            border.push(made.border);
             made.coarse_levels.into_iter().try_for_each(|level| coarse_levels.push(level))?;
             let bytes = made.photograph.bytes();
             let fits = bytes <= room;
@@ -119,7 +137,7 @@ pub(crate) fn run(input: &SmallViewsInput<'_>, context: &StageContext) -> Result
             decoded.kept.push(fits.then_some(made.photograph));
         }
     }
-    Ok(SmallViews { views, size: making.size, coarse_levels, decoded })
+    Ok(SmallViews { views, size: making.size, coarse_levels, border, decoded })
 }
 
 /// What is the same for all photographs.
@@ -169,6 +187,17 @@ impl Making<'_> {
         };
         let coarse_levels = unrolled.placements(position).map(coarse_level).collect();
         drop(warped);
-        Ok(MadeSmall { view, coarse_levels, photograph })
+        let border = self.border(&first, &photograph, correction);
+        Ok(MadeSmall { view, coarse_levels, border, photograph })
+    }
+
+    /// What the photograph, placed in the first turn, alone shows at the border.
+    fn border(&self, placed: &Placed, photograph: &Photograph, correction: &Correction) -> BorderDeviations {
+        let Some(BorderInput { cells, resampling, encode }) = self.input.border else { return Vec::new() };
+        let layout = self.input.unrolled.original_layout();
+        let clip = [layout.width * if layout.period.is_some() { TURNS } else { 1 }, layout.height];
+        let light = PhotographLight { curve: self.curve, correction, local: self.input.local };
+        let photograph = Cow::Borrowed(photograph);
+        cells.border(&WarpedPhotograph::new(photograph, &placed.mesh, clip, light, resampling), resampling, encode)
     }
 }

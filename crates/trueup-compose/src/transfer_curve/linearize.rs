@@ -37,9 +37,21 @@ impl Linearize {
     /// Linear light, 0 to 1, of a sample on the scale of 0 to 255; values outside are clamped, NaN gives 0.
     #[inline(always)]
     pub(crate) fn linear(&self, level: f32) -> f32 {
-        // `max` first: unlike `clamp`, it turns NaN into a number.
-        #[allow(clippy::manual_clamp)]
-        let level = level.max(0.0).min(255.0);
-        self.values.at(level * STEPS_PER_LEVEL as f32)
+        self.values.at(position(level))
     }
+
+    /// [`Self::linear`] of `COUNT` samples.
+    #[inline(always)]
+    pub(crate) fn linear_all<const COUNT: usize>(&self, levels: [f32; COUNT]) -> [f32; COUNT] {
+        self.values.at_all(levels.map(position))
+    }
+}
+
+/// Where a sample lies in the table.
+#[inline(always)]
+fn position(level: f32) -> f32 {
+    // `max` first: unlike `clamp`, it turns NaN into a number.
+    #[allow(clippy::manual_clamp)]
+    let level = level.max(0.0).min(255.0);
+    level * STEPS_PER_LEVEL as f32
 }

@@ -1,6 +1,6 @@
 //! The compose phase: light, then seams and the panorama, from the full-resolution photographs.
 
-use trueup_compose::crop::{self, Coverage, Crop, Rectangle};
+use trueup_compose::crop::{Coverage, Crop, Frame, Framing, Rectangle};
 use trueup_compose::exposure::{self, Corrections, ExposureInput, Thumbnail};
 use trueup_compose::gaps::Gaps;
 use trueup_compose::layout::{CanvasLayout, CanvasOptions};
@@ -78,7 +78,7 @@ pub(crate) struct Composed {
     pub filled: f64,
 }
 
-/// Renders a panorama on all of its canvas, fills gaps, and crops it.
+/// Renders a panorama, fills gaps, and crops it.
 ///
 /// # Errors
 /// Those of reading the photographs and of a scratch file; [`trueup_core::Error::Limits`];
@@ -89,48 +89,56 @@ pub(crate) fn run(
     context: &StageContext,
 ) -> Result<Reported<Composed>> {
     let ComposeInput { render: photographs, resources, canvas, kept } = input;
+    let layout = photographs.layout;
     context.gather(|context| {
-        let rendered =
-            context.time("render", || render::run(photographs, resources, &options.render, &options.seam, context))?;
-        context.time("crop", || framed(rendered, photographs.layout, canvas, kept.as_ref(), context))
+        let render = |framing: Option<&Framing>| {
+            context.time("render", || {
+                render::run(photographs, resources, &options.render, &options.seam, framing, context)
+            })
+        };
+        let fills = canvas.fill > 0.0;
+        if !fills && canvas.crop == Crop::None {
+            return Ok(Composed { rendered: render(None)?, kept: None, lost: 0.0, filled: 0.0 });
+        }
+        let photographed = context.time("crop", || Coverage::of(layout));
+        let framing = Framing { coverage: &photographed, options: canvas, known: kept.as_ref() };
+        // What is filled counts as covered: where all gaps are, the frame is chosen last.
+        let mut rendered = render((!fills).then_some(&framing))?;
+        context.time("crop", || {
+            if !fills {
+                return framed(rendered, layout, &framing, &photographed, context);
+            }
+            let gaps = Gaps::find(layout, photographed.clone(), canvas.fill);
+            report_filled(rendered.panorama.fill(&gaps, context)?, layout, context);
+            let coverage = gaps.filled_coverage();
+            framed(rendered, layout, &Framing { coverage: &coverage, ..framing }, &photographed, context)
+        })
     })
 }
 
-/// Fills and crops what was rendered of all of `layout`.
+/// Crops what was rendered on the canvas of `layout`, and fills what is missing of what is kept.
 fn framed(
     mut rendered: Rendered,
     layout: &CanvasLayout,
-    options: &CanvasOptions,
-    known: Option<&Rectangle>,
+    framing: &Framing,
+    photographed: &Coverage,
     context: &StageContext,
 ) -> Result<Composed> {
-    if options.fill <= 0.0 && options.crop == Crop::None {
-        return Ok(Composed { rendered, kept: None, lost: 0.0, filled: 0.0 });
-    }
-    let whole = Rectangle::whole([layout.width, layout.height]);
-    let photographed = Coverage::of(layout);
-    let mut coverage = photographed.clone();
-    if options.fill > 0.0 {
-        let gaps = Gaps::find(layout, coverage, options.fill);
-        let filled = rendered.panorama.fill(&gaps, context)?;
-        report_filled(filled, layout, context);
-        coverage = gaps.filled_coverage();
-    }
     context.check_cancelled()?;
-    let chosen = match known {
-        Some(known) => Some(known.clone()),
-        None => crop::choose(&rendered.panorama, layout, &coverage, options)?,
+    let frame = match rendered.frame.take() {
+        Some(frame) => frame,
+        None => framing.of_panorama(&rendered.panorama, layout)?,
     };
-    let Some(kept) = chosen else {
-        report_kept_whole(&photographed, &whole, options, context);
-        let kept = (options.crop != Crop::None).then_some(whole);
+    let Frame::Part(kept) = frame else {
+        let whole = Rectangle::whole([layout.width, layout.height]);
+        report_kept_whole(photographed, &whole, framing.options, context);
+        let kept = (framing.options.crop != Crop::None).then_some(whole);
         return Ok(Composed { rendered, kept, lost: 0.0, filled: 0.0 });
     };
-    let mut filled = 0;
-    let missing = kept.area() - coverage.area_within(&kept);
-    if options.crop == Crop::Auto && missing > 0 {
-        filled = rendered.panorama.fill(&Gaps::within(layout, coverage, kept.clone()), context)?;
-    }
+    let filled = match framing.gaps(layout, &kept) {
+        Some(gaps) => rendered.panorama.fill(&gaps, context)?,
+        None => 0,
+    };
     rendered.panorama.crop(&kept)?;
     let share = |part: usize, of: usize| part as f64 / of.max(1) as f64;
     let lost = 1.0 - share(photographed.area_within(&kept), photographed.area());

@@ -417,7 +417,8 @@ mod tests {
             let (layout, corrections) = (&recorded.layout, &recorded.corrections);
             let input = render::RenderInput { layout, corrections, photographs: &photographs };
             let resources = render::Resources::unlimited();
-            drop(render::run(&input, &resources, &options.compose.render, &options.compose.seam, &context));
+            let compose = &options.compose;
+            drop(render::run(&input, &resources, &compose.render, &compose.seam, None, &context));
             drop(layout::run(recorded.layout.placed, recorded.reference, &options.arrange.canvas, &context));
         }
     }

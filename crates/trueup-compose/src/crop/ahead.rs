@@ -1,0 +1,252 @@
+//! The panorama in cells before it is composed: what the small views show along the seams, and at the border of what is
+//! covered the photographs themselves.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::cells::{CellGrid, Cells, Sums};
+use crate::coverage::Coverage;
+use crate::label::{Label, NOBODY};
+use crate::layout::CanvasLayout;
+use crate::seam::Seams;
+use crate::small_views::{SmallView, WHOLLY};
+use crate::transfer_curve::{EncodeRoots, Encoding};
+use crate::warped::{Resampling, SamplingMemory, WarpedPhotograph};
+use crate::weights::WHOLE;
+use crate::window::Window;
+
+/// Pixels of the small views along a cell's side, at least: fewer, and some cell has none.
+const LEAST_PIXELS: f64 = 2.0;
+
+/// Steps from an empty cell to the farthest whose deviation is asked for: to the one beside it, and from there once more.
+const BORDER_STEPS: usize = 2;
+
+/// The cells of a canvas of which nothing is composed yet.
+#[derive(Debug)]
+pub(crate) struct CellsAhead {
+    grid: CellGrid,
+    around: bool,
+    covered: Vec<bool>,
+    /// Whether a cell's deviation may be asked for.
+    at_border: Vec<bool>,
+}
+
+/// Deviations of what one photograph covers of the cells of which they may be asked for, in order of the cells.
+pub(crate) type BorderDeviations = Vec<(usize, f32)>;
+
+impl CellsAhead {
+    /// Those of a layout whose small views lie on a canvas of `small` pixels; `None` if that is too coarse for them.
+    pub(crate) fn new(layout: &CanvasLayout, coverage: &Coverage, small: [usize; 2]) -> Option<Self> {
+        let grid = CellGrid::of([layout.width, layout.height]);
+        let is_fine = |axis: usize| (grid.side * small[axis]) as f64 >= LEAST_PIXELS * grid.canvas[axis] as f64;
+        if !(is_fine(0) && is_fine(1)) {
+            return None;
+        }
+        let around = layout.period.is_some();
+        let covered = grid.covered(coverage);
+        let at_border = near(&grid, around, covered.iter().map(|&covered| !covered).collect());
+        Some(Self { grid, around, covered, at_border })
+    }
+
+    /// What a photograph alone shows at the border; its grid may run into further turns of a cylinder.
+    pub(crate) fn border(
+        &self,
+        photograph: &WarpedPhotograph<'_>,
+        resampling: &Resampling,
+        encode: &EncodeRoots,
+    ) -> BorderDeviations {
+        let CellGrid { canvas: [width, _], side, columns, .. } = self.grid;
+        let (across, down) = (photograph.columns(), photograph.rows());
+        let rows = down.start / side..down.end.div_ceil(side);
+        let turns = if across.is_empty() { 0..0 } else { across.start / width..(across.end - 1) / width + 1 };
+        let of_row = |memory: &mut SamplingMemory, row: usize| {
+            let border = &self.at_border[row * columns..(row + 1) * columns];
+            let mut found = Vec::new();
+            for turn in turns.clone() {
+                let mut first = 0;
+                for same in border.chunk_by(|a, b| a == b) {
+                    let cells = first..first + same.len();
+                    first = cells.end;
+                    if same[0] {
+                        self.stretch([row, turn], cells, (photograph, resampling, encode), memory, &mut found);
+                    }
+                }
+            }
+            found
+        };
+        let mut found: BorderDeviations =
+            rows.into_par_iter().map_init(SamplingMemory::default, of_row).flatten_iter().collect();
+        found.sort_unstable_by_key(|(cell, _)| *cell);
+        found.dedup_by_key(|(cell, _)| *cell);
+        found
+    }
+
+    /// [`Self::border`] of neighboring `cells` of a row, in a turn.
+    fn stretch(
+        &self,
+        [row, turn]: [usize; 2],
+        cells: Range<usize>,
+        (photograph, resampling, encode): (&WarpedPhotograph<'_>, &Resampling, &EncodeRoots),
+        memory: &mut SamplingMemory,
+        found: &mut BorderDeviations,
+    ) {
+        let grid = &self.grid;
+        let shift = turn * grid.canvas[0];
+        let place = |cell: usize| {
+            let pixels = grid.pixels(cell, 0);
+            pixels.start + shift..pixels.end + shift
+        };
+        let inside = photograph.columns();
+        let is_inside = |cell: &usize| inside.start < place(*cell).end && place(*cell).start < inside.end;
+        let (Some(first), Some(last)) = (cells.clone().find(is_inside), cells.rev().find(is_inside)) else { return };
+        let columns = place(first).start.max(inside.start)..place(last).end.min(inside.end);
+        let mut sums = vec![Sums::default(); last + 1 - first];
+        let mut pixels = vec![[0.0_f32; 4]; columns.len()];
+        for y in grid.rows_read(row) {
+            pixels.fill([0.0; 4]);
+            photograph.sample(Window { columns: &columns, rows: &(y..y + 1) }, &mut pixels, resampling, memory);
+            for (cell, sums) in (first..=last).zip(&mut sums) {
+                let own = place(cell);
+                let own =
+                    &pixels[own.start.max(columns.start) - columns.start..own.end.min(columns.end) - columns.start];
+                // The casts saturate.
+                let level = |root: f32| f32::from(encode.level((root * f32::from(u16::MAX) + 0.5) as u16));
+                own.iter().filter(|pixel| pixel[3] >= WHOLE).for_each(|&[r, g, b, _]| sums.add([r, g, b].map(level)));
+            }
+        }
+        for (cell, sums) in (first..=last).zip(&sums).filter(|(_, sums)| sums.count() > 0) {
+            found.push((row * grid.columns + cell, sums.deviation()));
+        }
+    }
+
+    /// What the photographs show of the cells along the seams; `border` is one for each of the views.
+    pub(crate) fn cut(self, views: &[SmallView], border: &[BorderDeviations], seams: &Seams) -> CutCells {
+        let CellGrid { side, columns, rows, canvas } = self.grid;
+        let [width, height] = [seams.width(), seams.height()];
+        let turn = if self.around { width } else { 0 };
+        // Pixels of the small canvas belong to the cell in which their middles lie.
+        let pixels = |cell: usize, axis: usize, small: usize| {
+            let first = |cell: usize| ((cell * side) as f64 / canvas[axis] as f64 * small as f64 - 0.5).ceil();
+            // The casts saturate.
+            (first(cell) as usize).min(small)..(first(cell + 1) as usize).min(small)
+        };
+        let parts_of = |cell: usize| {
+            let mut shown: Vec<(Label, Sums)> = Vec::new();
+            for y in pixels(cell / columns, 1, height) {
+                for x in pixels(cell % columns, 0, width) {
+                    let label = seams.labels()[y * width + x];
+                    if label != NOBODY
+                        && let view = &views[usize::from(label)]
+                        && let Some(index) = view.index_around(x, y, turn)
+                        && let [r, g, b, flags] = view.pixels[index]
+                        && flags & WHOLLY != 0
+                    {
+                        let at = shown.iter().position(|(one, _)| *one == label).unwrap_or_else(|| {
+                            shown.push((label, Sums::default()));
+                            shown.len() - 1
+                        });
+                        shown[at].1.add([r, g, b].map(f32::from));
+                    }
+                }
+            }
+            let part = |(label, sums): (Label, Sums)| {
+                let border = &border[usize::from(label)];
+                let deviation = match border.binary_search_by_key(&cell, |(cell, _)| *cell) {
+                    Ok(found) => border[found].1,
+                    Err(_) => sums.deviation(),
+                };
+                CutPart { cell, label, pixels: sums.count() as f32, root: sums.color(), deviation }
+            };
+            shown.into_iter().map(part).collect::<Vec<_>>()
+        };
+        let parts = (0..columns * rows).into_par_iter().flat_map_iter(parts_of).collect();
+        CutCells { ahead: self, parts }
+    }
+}
+
+/// What a photograph shows of a cell.
+#[derive(Debug, Clone, Copy)]
+struct CutPart {
+    cell: usize,
+    label: Label,
+    /// How many pixels of the small views it is.
+    pixels: f32,
+    /// Square roots of linear light; 255 is white.
+    root: [f32; 3],
+    /// Standard deviation of the luma, levels.
+    deviation: f32,
+}
+
+/// The cells of a canvas, cut along the seams.
+#[derive(Debug)]
+pub(crate) struct CutCells {
+    ahead: CellsAhead,
+    /// In order of the cells.
+    parts: Vec<CutPart>,
+}
+
+impl CutCells {
+    /// For each part the photograph, and the cell's middle in pixels from the canvas's corner.
+    pub(crate) fn places(&self) -> Vec<(Label, [f64; 2])> {
+        let grid = &self.ahead.grid;
+        let middle = |index: usize, axis: usize| {
+            let pixels = grid.pixels(index, axis);
+            0.5 * (pixels.start + pixels.end) as f64
+        };
+        let place =
+            |part: &CutPart| (part.label, [middle(part.cell % grid.columns, 0), middle(part.cell / grid.columns, 1)]);
+        self.parts.iter().map(place).collect()
+    }
+
+    /// The cells as they will be when blending makes these `changes` of [`Self::places`]. Steps at seams, which blending takes
+    /// away, count as no deviation.
+    pub(crate) fn blended(self, changes: &[[f32; 3]], encoding: &Encoding) -> Cells {
+        const WHITE: f32 = 255.0;
+        let CellGrid { side, columns, rows, .. } = self.ahead.grid;
+        let encode = encoding.linear16();
+        let mut pixels = vec![0.0_f32; columns * rows];
+        let mut colors = vec![[0.0_f32; 3]; columns * rows];
+        let mut variances = vec![0.0_f32; columns * rows];
+        for (part, change) in self.parts.iter().zip(changes) {
+            pixels[part.cell] += part.pixels;
+            variances[part.cell] += part.pixels * part.deviation * part.deviation;
+            for ((sum, root), change) in colors[part.cell].iter_mut().zip(part.root).zip(change) {
+                let root = (root / WHITE + change).max(0.0);
+                *sum += part.pixels * f32::from(encode.level(root * root)) * (WHITE / f32::from(u16::MAX));
+            }
+        }
+        for ((pixels, color), variance) in pixels.iter().zip(&mut colors).zip(&mut variances) {
+            *color = color.map(|sum| sum / pixels.max(1.0));
+            *variance /= pixels.max(1.0);
+        }
+        let deviations = variances.into_iter().map(f32::sqrt).collect();
+        let CellsAhead { covered, around, .. } = self.ahead;
+        Cells { side, columns, rows, covered, colors, deviations, around }
+    }
+}
+
+/// The cells up to [`BORDER_STEPS`] from one of those that are `marked`, in squares.
+fn near(grid: &CellGrid, around: bool, marked: Vec<bool>) -> Vec<bool> {
+    let CellGrid { columns, rows, .. } = *grid;
+    let mut wide = marked.clone();
+    for (from, wide) in marked.chunks_exact(columns).zip(wide.chunks_exact_mut(columns)) {
+        for x in (0..columns).filter(|&x| from[x]) {
+            for step in 0..=2 * BORDER_STEPS {
+                let at = x + columns + step - BORDER_STEPS.min(columns);
+                if around || (columns..2 * columns).contains(&at) {
+                    wide[at % columns] = true;
+                }
+            }
+        }
+    }
+    let mut near = wide.clone();
+    for y in 0..rows {
+        for from in y.saturating_sub(BORDER_STEPS)..(y + BORDER_STEPS + 1).min(rows) {
+            for x in 0..columns {
+                near[y * columns + x] |= wide[from * columns + x];
+            }
+        }
+    }
+    near
+}
