@@ -16,7 +16,7 @@ pub(super) struct GateEvidence {
     pub from_cameras: Option<CameraAngle>,
     /// How far the best frame of the pooled search stands out, standard deviations; `None` without that search.
     pub significance: Option<f64>,
-    /// Median over the inliers of |alpha_i|, radians.
+    /// Median over the inliers of |alpha_i|, of two the lesser, radians.
     pub median_roll: f64,
 }
 
@@ -124,6 +124,7 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
         ));
     }
     let (roll, allowed) = (median_roll.to_degrees(), MAX_MEDIAN_ROLL_DEG);
-    (roll.is_nan() || roll > allowed)
-        .then(|| format!("half of the photographs would be rolled by {roll:.1} degrees or more ({allowed:.1} allowed)"))
+    (roll.is_nan() || roll > allowed).then(|| {
+        format!("more than half of the photographs would be rolled by {roll:.1} degrees or more ({allowed:.1} allowed)")
+    })
 }

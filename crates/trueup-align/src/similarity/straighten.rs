@@ -7,9 +7,9 @@ use trueup_core::geometry::orthonormal_complement;
 /// Second eigenvalue of the mean moment of the x axes below which the photographs do not fix a vertical.
 const CONDITIONED: f64 = 0.05;
 
-/// Farthest that two photographs' level may lie from the mean of their y axes, degrees. Reasoned: people who look up or down as steeply do
-/// not take two photographs beside each other.
-const MAX_PAIR_ANGLE_DEG: f64 = 40.0;
+/// Farthest that two photographs' level may lie from the mean of their y axes, degrees. Reasoned: the prior on the pitch takes the level of two
+/// that look up by 40 degrees, a third of a quarter turn apart, but half of the way from there.
+const MAX_PAIR_ANGLE_DEG: f64 = 25.0;
 
 /// The vertical that the cameras' x axes span a plane orthogonal to.
 #[derive(Debug, Clone, Copy)]

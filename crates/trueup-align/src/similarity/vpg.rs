@@ -169,7 +169,7 @@ impl<'a> SceneDirections<'a> {
             // Photographs may lie on their sides where gravity says so.
             median_roll: match self.level.has_gravity {
                 true => 0.0,
-                false => magnitudes.get(magnitudes.len() / 2).copied().unwrap_or(f64::INFINITY),
+                false => magnitudes.get(magnitudes.len().saturating_sub(1) / 2).copied().unwrap_or(f64::INFINITY),
             },
         };
         guidance.divergence = Some(evidence.divergence).filter(|divergence| divergence.is_finite());
