@@ -35,6 +35,9 @@ const ORDINARY_MISORIENTATION_DEG: f64 = 1.0;
 const MAX_POOLED_DEVIATION_DEG: f64 = 1.0;
 /// Least share of the information on the vertical that makes lines its guide; with less they are one voice among others.
 const GUIDING_SHARE: f64 = 0.5;
+/// Largest standard deviation of the vertical at which lines guide, degrees: so few photographs have lines beyond that what their scatter says of
+/// single cameras is little. Reasoned.
+const MAX_GUIDING_DEVIATION_DEG: f64 = 3.0;
 /// Lines whose vertical is farther than this from the one that cameras recorded are not those of what stands upright, degrees, unless
 /// both are less certain. Reasoned: no sensor errs by as much, and roofs lean by more.
 const MAX_GRAVITY_ANGLE_DEG: f64 = 5.0;
@@ -260,16 +263,18 @@ impl<'a> SceneDirections<'a> {
             return Err(self.level.down);
         }
         let (down, evidence) = self.level.with_lines(lines, deviation, guidance.inliers.len());
-        let guides = evidence.first().is_some_and(|lines| lines.share >= GUIDING_SHARE);
+        let outweigh = evidence.first().is_some_and(|lines| lines.share >= GUIDING_SHARE);
         guidance.level = evidence;
-        if guides {
+        if outweigh && degrees <= MAX_GUIDING_DEVIATION_DEG {
             return Ok(down);
         }
         guidance.pooled = false;
-        guidance.failed_clause = Some(format!(
-            "the lines leave the vertical uncertain by {degrees:.1} degrees, more than without them ({:.1})",
-            self.level.deviation().to_degrees()
-        ));
+        let limit = match outweigh {
+            true => format!("({MAX_GUIDING_DEVIATION_DEG:.1} allowed)"),
+            false => format!("and more than what is known without them ({:.1})", self.level.deviation().to_degrees()),
+        };
+        guidance.failed_clause =
+            Some(format!("the lines leave the vertical uncertain by {degrees:.1} degrees {limit}"));
         Err(down)
     }
 
