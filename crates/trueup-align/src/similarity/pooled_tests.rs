@@ -33,6 +33,7 @@ fn the_segments_of_all_photographs_guide_where_no_photograph_has_directions() {
     let scene = without_triads(6, 30);
     let prior = scene.prior(&SimilarityOptions::default());
     assert!(prior.guidance.used && prior.guidance.pooled && !prior.guidance.vertical_only);
+    assert!(prior.guidance.level[0].photographs > 0, "{:?}", prior.guidance.level);
     assert!(max(&scene.errors_deg(&prior)) < 0.2, "{:?}", scene.errors_deg(&prior));
     assert!(prior.guidance.vertical_deviation.is_some_and(|deviation| deviation < 0.2_f64.to_radians()));
     let alone = SimilarityOptions { pooled_search: false, vertical_only: false, ..SimilarityOptions::default() };

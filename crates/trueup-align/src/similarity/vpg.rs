@@ -262,7 +262,9 @@ impl<'a> SceneDirections<'a> {
             ));
             return Err(self.level.down);
         }
-        let (down, evidence) = self.level.with_lines(lines, deviation, guidance.inliers.len());
+        // Also of photographs whose own directions do not agree, lines may.
+        let telling = self.vote.support(lines, joint::TOLERANCE_DEG.to_radians()).photographs;
+        let (down, evidence) = self.level.with_lines(lines, deviation, telling);
         let outweigh = evidence.first().is_some_and(|lines| lines.share >= GUIDING_SHARE);
         guidance.level = evidence;
         if outweigh && degrees <= MAX_GUIDING_DEVIATION_DEG {
