@@ -11,6 +11,7 @@ use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
 use crate::simd::{InverseBilinear, Positions, invert_row};
+use crate::window::common;
 
 /// Marks a canvas pixel that no cell covers.
 pub(crate) const NO_CELL: u32 = u32::MAX;
@@ -224,8 +225,7 @@ impl DeformedGrid {
         rows: &Range<usize>,
         mut found: impl FnMut([usize; 2], [f64; 2], [f64; 2]),
     ) {
-        let within = |a: &Range<usize>, b: &Range<usize>| a.start.max(b.start)..a.end.min(b.end);
-        let (columns, rows) = (within(columns, &self.columns), within(rows, &self.rows));
+        let (columns, rows) = (common(columns, &self.columns), common(rows, &self.rows));
         if columns.is_empty() || rows.is_empty() {
             return;
         }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use crate::coverage::{Coverage, Rectangle};
 use crate::distance::border_distances;
 use crate::layout::CanvasLayout;
+use crate::window::common;
 
 /// What no photograph covers of a canvas, told apart into gaps, which may be filled, and voids.
 #[derive(Debug, Clone)]
@@ -124,10 +125,9 @@ impl Gaps {
 
     /// Whether any pixel of a box is part of a gap.
     pub(crate) fn any_within(&self, columns: &Range<usize>, rows: &Range<usize>) -> bool {
-        let within = |a: &Range<usize>, b: &Range<usize>| a.start.max(b.start)..a.end.min(b.end);
         let (columns, rows) = match &self.extent {
             Extent::Small(_) => (columns.clone(), rows.clone()),
-            Extent::Within(rectangle) => (within(columns, &rectangle.columns), within(rows, &rectangle.rows)),
+            Extent::Within(rectangle) => (common(columns, &rectangle.columns), common(rows, &rectangle.rows)),
         };
         let has_gap = |y: usize| {
             !self.coverage.holds_all(&columns, y)

@@ -16,7 +16,7 @@ use crate::render_options::Interpolation;
 use crate::sampling::{MAX_STRETCH, interpolate, reduce_by_two};
 use crate::simd::{Contribution, Development, Positions, accumulate, develop, invert_row};
 use crate::weights::{FEATHER_EXPONENT, Feather, Weighting};
-use crate::window::Window;
+use crate::window::{Window, common};
 
 /// Photograph pixels per canvas pixel above which a photograph is averaged instead of interpolated. Lower is softer, higher
 /// lets fine patterns shimmer.
@@ -191,8 +191,7 @@ impl<'a> WarpedPhotograph<'a> {
         mut look: impl FnMut(usize, &[[f32; 4]]),
     ) {
         let width = window.columns.len();
-        let within = |a: &Range<usize>, b: &Range<usize>| a.start.max(b.start)..a.end.min(b.end);
-        let (columns, rows) = (within(window.columns, &self.grid.columns), within(window.rows, &self.grid.rows));
+        let (columns, rows) = (common(window.columns, &self.grid.columns), common(window.rows, &self.grid.rows));
         if columns.is_empty() || rows.is_empty() {
             return;
         }

@@ -13,7 +13,7 @@ use crate::simd::{VectorLoop, with_vector_instructions};
 use crate::small_views::CoarseLevel;
 use crate::store::RootPixel;
 use crate::warped::{SamplingMemory, WarpedPhotograph};
-use crate::window::Window;
+use crate::window::{Window, common};
 
 /// A box with so many pixels more on all sides, cut at the canvas.
 fn grown([columns, rows]: [&Range<usize>; 2], margin: usize, work: &BlendWork<'_>) -> (Range<usize>, Range<usize>) {
@@ -284,8 +284,7 @@ impl BlendTile {
 
     /// Adds what a photograph's `plane` covers of the tile.
     fn add_opacity(&self, plane: &PyramidPlane<[f32; 4]>, opacity: &mut [f32]) {
-        let within = |a: &Range<usize>, b: &Range<usize>| a.start.max(b.start)..a.end.min(b.end);
-        let (columns, rows) = (within(&self.columns, &plane.columns), within(&self.rows, &plane.rows));
+        let (columns, rows) = (common(&self.columns, &plane.columns), common(&self.rows, &plane.rows));
         if columns.is_empty() {
             return;
         }

@@ -10,6 +10,7 @@ use crate::deformed_grid::{CellRun, DeformedGrid};
 use crate::layout::{Placed, TURNS};
 use crate::simd::{Positions, invert_row};
 use crate::transfer_curve::Linearize;
+use crate::window::common;
 
 /// Natural logarithms of the light of one photograph on the grid of samples; NaN where it says nothing.
 pub(super) struct Patch {
@@ -128,8 +129,8 @@ pub(super) fn shared(first: &Patch, second: &Patch, turn: Option<usize>) -> Vec<
 
 /// The places where both photographs tell their light if the second is moved to the right by some columns.
 fn shared_ahead(first: &Patch, second: &Patch, by: usize) -> Vec<Shared> {
-    let rows = intersect(&first.rows, &second.rows);
-    let columns = intersect(&first.columns, &(second.columns.start + by..second.columns.end + by));
+    let rows = common(&first.rows, &second.rows);
+    let columns = common(&first.columns, &(second.columns.start + by..second.columns.end + by));
     if rows.is_empty() || columns.is_empty() {
         return Vec::new();
     }
@@ -142,10 +143,6 @@ fn shared_ahead(first: &Patch, second: &Patch, by: usize) -> Vec<Shared> {
         })
         .filter(|shared| shared.log_ratio().iter().all(|ratio| ratio.is_finite()))
         .collect()
-}
-
-fn intersect(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
-    a.start.max(b.start)..a.end.min(b.end)
 }
 
 /// Natural logarithm of the mean linear light of blocks of `block` x `block` pixels, by channel; NaN where a sample lies

@@ -7,8 +7,24 @@
 use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
 
+use trueup_core::memory::check_room;
+
+use crate::format::Input;
+
 /// Boxes that are looked at; pictures have a few dozen.
 const MOST_BOXES: usize = 4096;
+
+/// All of a file, of which decoders of its boxes take no less; `purpose` is what memory is asked for, for messages.
+///
+/// # Errors
+/// If there is no room for it, or it cannot be read.
+pub(super) fn contents(input: &mut Input, purpose: &'static str) -> io::Result<Vec<u8>> {
+    let length = usize::try_from(input.get_ref().metadata()?.len()).unwrap_or(usize::MAX);
+    check_room(purpose, length).map_err(|error| io::Error::other(error.to_string()))?;
+    let mut bytes = Vec::new();
+    input.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
 
 /// One box.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -203,14 +203,14 @@ fn examine(
     accepted.admit(&path, name, length)?;
 
     let tag = header.exif.orientation;
+    let stated = tag.and_then(|tag| u8::try_from(tag).ok()).filter(|tag| (1..=8).contains(tag)).unwrap_or(1);
     let verdict = match options.trust_orientation {
         OrientationTrust::Auto => judge_orientation(tag, stored.width, stored.height),
-        OrientationTrust::Always => TagVerdict::Applied(tag.and_then(|tag| u8::try_from(tag).ok()).unwrap_or(1)),
+        OrientationTrust::Always => TagVerdict::Applied(stated),
         OrientationTrust::Never => TagVerdict::Applied(1),
     };
     let orientation = match verdict {
-        TagVerdict::Applied(tag) if (1..=8).contains(&tag) => tag,
-        TagVerdict::Applied(_) => 1,
+        TagVerdict::Applied(tag) => tag,
         TagVerdict::Stale => {
             context.report(stale_tag_note(number, &header));
             1
@@ -221,7 +221,6 @@ fn examine(
         _ => (stored.width, stored.height),
     };
     let focal_prior = header.focal_prior();
-    let stated = tag.and_then(|tag| u8::try_from(tag).ok()).filter(|tag| (1..=8).contains(tag)).unwrap_or(1);
     let gravity = header.gravity(stated, orientation);
     let camera_model = header.exif.camera_model();
     let Header { exif, .. } = header;

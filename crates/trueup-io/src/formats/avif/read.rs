@@ -2,10 +2,7 @@
 //!
 //! What would be allocated is judged first, by the sizes that the file states; the decoder refuses pictures that are larger than that.
 
-use std::io::{self, Read};
-
 use exif::{Field, Tag};
-use trueup_core::memory::check_room;
 use trueup_core::raster::{Photograph, Raster};
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
@@ -17,10 +14,13 @@ use crate::color::profile_of_code_points;
 use crate::decode::orientation::upright;
 use crate::format::{HeaderError, Input, StoredPixels};
 use crate::formats::alpha::{Share, straight};
-use crate::formats::boxes::Fields;
+use crate::formats::boxes::{Fields, contents};
 use crate::formats::decoded::{check_unchanged, damaged, eight, sixteen};
 use crate::metadata::block;
 use crate::metadata::exif_fields::ExifFields;
+
+/// What memory is asked for.
+const READING: &str = "reading an AVIF file";
 
 /// Bytes a pixel takes in memory while it is decoded, for [`MOST_CODED`] coded ones: three planes of 16 bits in the decoder and out of
 /// it, one of alpha; what is handed out, and turned, comes when the decoder is done.
@@ -100,15 +100,6 @@ struct CodePoints {
     transfer: u16,
     matrix: u16,
     is_full: bool,
-}
-
-/// All of a file.
-fn contents(input: &mut Input) -> io::Result<Vec<u8>> {
-    let length = usize::try_from(input.get_ref().metadata()?.len()).unwrap_or(usize::MAX);
-    check_room("reading an AVIF file", length).map_err(|error| io::Error::other(error.to_string()))?;
-    let mut bytes = Vec::new();
-    input.read_to_end(&mut bytes)?;
-    Ok(bytes)
 }
 
 fn described(file: &[u8]) -> std::result::Result<Described<'_>, Refusal> {
@@ -328,7 +319,7 @@ impl Described<'_> {
 }
 
 pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
-    let bytes = contents(input).map_err(HeaderError::damaged)?;
+    let bytes = contents(input, READING).map_err(HeaderError::damaged)?;
     let described = described(&bytes)?;
     let [width, height] = described.shown_size();
     let bits = described.coded.bits as u16;
@@ -337,25 +328,25 @@ pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, Hea
 
 /// The profile; or one made of what the file says of its primaries and its curve in numbers.
 pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
-    let bytes = contents(input).ok()?;
+    let bytes = contents(input, READING).ok()?;
     let (icc, code_points) = colors(&Items::of(&bytes)?);
     icc.or_else(|| code_points.and_then(|points| profile_of_code_points(points.primaries, points.transfer)))
 }
 
 /// The pixels are turned upright as the file itself says, which outranks the orientation of EXIF.
 pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
-    let bytes = contents(input).ok()?;
+    let bytes = contents(input, READING).ok()?;
     let fields = ExifFields::from_exif(&block::parsed(described(&bytes).ok()?.exif()?)?);
     Some(ExifFields { orientation: None, ..fields })
 }
 
 pub(super) fn whole_fields(input: &mut Input, wanted: &[Tag]) -> Option<Vec<Field>> {
-    let bytes = contents(input).ok()?;
+    let bytes = contents(input, READING).ok()?;
     Some(block::fields_of(&block::parsed(described(&bytes).ok()?.exif()?)?, wanted))
 }
 
 pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
-    let bytes = contents(&mut input).map_err(|error| Error::io("reading", &source.path, error))?;
+    let bytes = contents(&mut input, READING).map_err(|error| Error::io("reading", &source.path, error))?;
     let described = described(&bytes).map_err(|refusal| damaged(source, refusal.words()))?;
     let [width, height] = described.shown_size();
     check_unchanged(source, width, height)?;

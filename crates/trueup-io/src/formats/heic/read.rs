@@ -2,15 +2,12 @@
 //!
 //! What the decoder would allocate is judged first: it has limits of its own, but they are those of the largest machine.
 
-use std::io::{self, Read};
-
 use exif::{Field, Tag};
 use heic_decoder::bitreader::strip_emulation_prevention;
 use heic_decoder::hevc::nal::{NAL_SPS, parse_nal_header};
 use heic_decoder::hevc::params::parse_sps;
 use heic_decoder::isobmff::{self, HevcDecoderConfig, ParsedHeif};
 use heic_decoder::{DecodedImage, HeifError, ImageInfo, Metadata, RgbaImage};
-use trueup_core::memory::check_room;
 use trueup_core::raster::Photograph;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
@@ -19,9 +16,13 @@ use super::container::check_copies;
 use crate::color::profile_of_code_points;
 use crate::format::{HeaderError, Input, StoredPixels};
 use crate::formats::alpha::{Share, straight};
+use crate::formats::boxes::contents;
 use crate::formats::decoded::{check_unchanged, damaged, eight, sixteen};
 use crate::metadata::block;
 use crate::metadata::exif_fields::ExifFields;
+
+/// What memory is asked for.
+const READING: &str = "reading a HEIC file";
 
 /// Bytes a pixel takes in memory while it is decoded: three planes of 32 bits, twice where tiles are put together, for
 /// [`MOST_CODED`] coded ones. The samples handed out come when the tiles are gone.
@@ -31,15 +32,6 @@ pub(super) const PIXEL_BYTES: usize = 2 * 3 * size_of::<i32>() * MOST_CODED;
 /// large.
 const MOST_CODED: usize = 2;
 const TILE_PIXELS: usize = 1 << 20;
-
-/// All of a file, of which the decoder takes no less.
-fn contents(input: &mut Input) -> io::Result<Vec<u8>> {
-    let length = usize::try_from(input.get_ref().metadata()?.len()).unwrap_or(usize::MAX);
-    check_room("reading a HEIC file", length).map_err(|error| io::Error::other(error.to_string()))?;
-    let mut bytes = Vec::new();
-    input.read_to_end(&mut bytes)?;
-    Ok(bytes)
-}
 
 /// The boxes of a file, if what is copied of them is no more than the file.
 fn parsed(bytes: &[u8]) -> heic_decoder::Result<ParsedHeif> {
@@ -80,7 +72,7 @@ fn coded_pixels_of_tile(config: &HevcDecoderConfig) -> heic_decoder::Result<usiz
 }
 
 pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, HeaderError> {
-    let bytes = contents(input).map_err(HeaderError::damaged)?;
+    let bytes = contents(input, READING).map_err(HeaderError::damaged)?;
     let info = info(&bytes).map_err(|error| match error {
         HeifError::Unsupported(words) => HeaderError::Unsupported(words.to_owned()),
         other => HeaderError::damaged(other),
@@ -91,7 +83,7 @@ pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, Hea
 }
 
 fn metadata(input: &mut Input) -> Option<Metadata> {
-    Some(parsed(&contents(input).ok()?).ok()?.metadata)
+    Some(parsed(&contents(input, READING).ok()?).ok()?.metadata)
 }
 
 /// The profile; or one made of what the file says of its primaries and its curve in numbers.
@@ -116,7 +108,7 @@ pub(super) fn whole_fields(input: &mut Input, wanted: &[Tag]) -> Option<Vec<Fiel
 
 pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograph> {
     let failed = |error: HeifError| damaged(source, error);
-    let bytes = contents(&mut input).map_err(|error| Error::io("reading", &source.path, error))?;
+    let bytes = contents(&mut input, READING).map_err(|error| Error::io("reading", &source.path, error))?;
     let info = info(&bytes).map_err(failed)?;
     check_unchanged(source, info.width, info.height)?;
     let image = heic_decoder::decode(&bytes).map_err(failed)?;
