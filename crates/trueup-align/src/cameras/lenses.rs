@@ -18,7 +18,10 @@ const BLOCKS: [&[usize]; 5] =
 
 /// The search for lenses.
 pub(super) struct LensSearch<'a> {
+    /// With matches enough to see which terms there are.
     pub problem: &'a BundleAdjustment<'a>,
+    /// With those that tell how large they are, and whether there is the last.
+    pub precise: &'a BundleAdjustment<'a>,
     /// What the user says of the lenses.
     pub kind: LensKind,
     pub context: &'a StageContext<'a>,
@@ -37,7 +40,13 @@ impl LensSearch<'_> {
         let mut parameters = start.clone();
         for (block, &terms) in BLOCKS.iter().enumerate() {
             self.context.check_cancelled()?;
-            let believed = self.believed(&parameters, group_of, &free, terms, &bent);
+            let mut problem = self.problem;
+            if block + 1 == BLOCKS.len() {
+                problem = self.precise;
+                let model = IntrinsicsModel::grouped(group_of, &free);
+                parameters = problem.minimize(parameters, &model, FINE_HUBER_PX, self.context)?;
+            }
+            let believed = self.believed(problem, &parameters, group_of, &free, terms, &bent);
             if block == 0 {
                 bent.clone_from(&believed);
             }
@@ -52,9 +61,9 @@ impl LensSearch<'_> {
             }
             let model = IntrinsicsModel::grouped(group_of, &free);
             if block == 0 {
-                parameters = self.problem.minimize(parameters, &model, COARSE_HUBER_PX, self.context)?;
+                parameters = problem.minimize(parameters, &model, COARSE_HUBER_PX, self.context)?;
             }
-            parameters = self.problem.minimize(parameters, &model, FINE_HUBER_PX, self.context)?;
+            parameters = problem.minimize(parameters, &model, FINE_HUBER_PX, self.context)?;
         }
         Ok(self.problem.is_sound(&parameters).then_some(parameters))
     }
@@ -62,6 +71,7 @@ impl LensSearch<'_> {
     /// For every group whether the `terms` are wanted of it beside those that are free.
     fn believed(
         &self,
+        problem: &BundleAdjustment<'_>,
         parameters: &Parameters,
         group_of: &[usize],
         free: &[FreeTerms],
@@ -75,7 +85,7 @@ impl LensSearch<'_> {
             .collect();
         let model = IntrinsicsModel::grouped(group_of, &wished);
         let nothing = vec![false; free.len()];
-        let Some(evidence) = LensEvidence::at(self.problem, parameters, &model, FINE_HUBER_PX) else { return nothing };
+        let Some(evidence) = LensEvidence::at(problem, parameters, &model, FINE_HUBER_PX) else { return nothing };
         (0..free.len())
             .map(|group| {
                 let Some(member) = group_of.iter().position(|&of| of == group) else { return false };

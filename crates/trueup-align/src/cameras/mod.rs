@@ -30,7 +30,7 @@ use crate::stitch_graph::{GraphEdge, StitchGraph};
 use bundle::Parameters;
 use contradictions::contradicting_pairs;
 use intrinsics::InitialIntrinsics;
-use observations::Observations;
+use observations::{MATCHES_PER_PAIR, MATCHES_PER_PAIR_FOR_LENSES, Observations};
 use refinement::RefinementInput;
 
 pub use options::{CameraOptions, FocalSharing, LensKind};
@@ -146,14 +146,15 @@ fn solve(
     options: &CameraOptions,
     context: &StageContext,
 ) -> Result<Solution> {
-    let observations = Observations::choose(priors, pairs);
+    let observations = Observations::choose(priors, pairs, MATCHES_PER_PAIR);
+    let for_lenses = Observations::choose(priors, pairs, MATCHES_PER_PAIR_FOR_LENSES);
     let intrinsics = focal::initial_intrinsics(priors, pairs, &observations, options.kind_of_lens());
     let relative = rotations::relative_rotations(priors, pairs, &observations, &intrinsics);
     let graph = graph_of(priors.len(), pairs.iter().copied());
     let rotations = rotations::average(&graph, pairs, &relative, anchor);
     let InitialIntrinsics { focal_px, lenses } = intrinsics;
     let start = Parameters { focal_px, rotations, lenses };
-    let input = RefinementInput { priors, observations: &observations, anchor };
+    let input = RefinementInput { priors, observations: &observations, for_lenses: &for_lenses, anchor };
     let refined = refinement::refine(input, &start, options, context)?;
     Ok(Solution {
         cameras: refined.parameters.cameras(priors),

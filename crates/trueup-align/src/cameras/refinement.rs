@@ -14,6 +14,8 @@ use super::prior::CameraPrior;
 pub(super) struct RefinementInput<'a> {
     pub priors: &'a [CameraPrior],
     pub observations: &'a Observations,
+    /// More of the same matches, from which lenses are told.
+    pub for_lenses: &'a Observations,
     /// The photograph whose rotation stays.
     pub anchor: usize,
 }
@@ -37,15 +39,15 @@ pub(super) fn refine(
     options: &CameraOptions,
     context: &StageContext,
 ) -> Result<Refined> {
-    let RefinementInput { priors, observations, anchor } = input;
-    let start_focal_px = start.focal_px.clone();
-    let problem = BundleAdjustment {
+    let priors = input.priors;
+    let problem_of = |observations| BundleAdjustment {
         priors,
         observations,
-        start_focal_px,
-        reference: anchor,
+        start_focal_px: start.focal_px.clone(),
+        reference: input.anchor,
         focal_sd: priors.iter().map(|prior| prior.focal_sd(options)).collect(),
     };
+    let (problem, for_lenses) = (problem_of(input.observations), problem_of(input.for_lenses));
     // Start values that already differ (metadata of a zoom) keep their ratios inside a shared model.
     let shared = IntrinsicsModel::shared(priors);
     let own = IntrinsicsModel::per_photograph(priors.len());
@@ -54,7 +56,7 @@ pub(super) fn refine(
 
     let coarse = problem.minimize(start.clone(), first_model, COARSE_HUBER_PX, context)?;
     let mut fine = problem.minimize(coarse, first_model, FINE_HUBER_PX, context)?;
-    let search = LensSearch { problem: &problem, kind: options.kind_of_lens(), context };
+    let search = LensSearch { problem: &problem, precise: &for_lenses, kind: options.kind_of_lens(), context };
     let with_lens = match per_picture_focal {
         false => search.find(&fine, &CameraPrior::lens_groups(priors))?,
         true => None,
