@@ -1,5 +1,9 @@
 //! The alignment energy E_a: match points of overlapping photographs fall on each other.
 
+use std::collections::BTreeMap;
+
+use faer::linalg::solvers::Solve;
+use faer::sparse::{SparseColMat, Triplet};
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
@@ -85,6 +89,37 @@ impl AlignmentEnergy {
     pub(super) fn apart(&self, meshes: &[GridMesh]) -> Vec<Vector2<f64>> {
         let across = self.points.iter().filter(|point| point.turns != 0.0);
         across.map(|point| point.distance(meshes) * point.turns).collect()
+    }
+
+    /// The grids moved as wholes, photograph `reference` not at all, until their match points meet as well as they then
+    /// can, those across the cut of a full turn aside; `None` if the others leave a photograph's place open.
+    pub(super) fn shifted(&self, meshes: &[GridMesh], reference: usize) -> Option<Vec<GridMesh>> {
+        let mut couplings: BTreeMap<(usize, usize), f64> = (0..meshes.len()).map(|k| ((k, k), 0.0)).collect();
+        let mut right = faer::Mat::<f64>::zeros(meshes.len(), 2);
+        let mut couple = |column: usize, row: usize, value: f64| {
+            *couplings.entry((column, row)).or_default() += value;
+        };
+        couple(reference, reference, 1.0);
+        for point in self.points.iter().filter(|point| point.turns == 0.0 && point.from != point.to) {
+            let (from, to, apart) = (point.from, point.to, point.distance(meshes));
+            couple(from, from, 1.0);
+            couple(to, to, 1.0);
+            couple(from.min(to), from.max(to), -1.0);
+            for axis in 0..2 {
+                right[(from, axis)] -= apart[axis];
+                right[(to, axis)] += apart[axis];
+            }
+        }
+        let lower: Vec<Triplet<usize, usize, f64>> =
+            couplings.into_iter().map(|((column, row), value)| Triplet::new(row, column, value)).collect();
+        let matrix = SparseColMat::try_new_from_triplets(meshes.len(), meshes.len(), &lower).ok()?;
+        let shifts = matrix.sp_cholesky(faer::Side::Lower).ok()?.solve(&right);
+        let shifted = meshes.iter().enumerate().map(|(k, mesh)| {
+            let by = [shifts[(k, 0)], shifts[(k, 1)]];
+            let target = mesh.target.iter().map(|place| [place[0] + by[0], place[1] + by[1]]).collect();
+            GridMesh { target, ..mesh.clone() }
+        });
+        Some(shifted.collect())
     }
 
     /// Adds the energy, each match point weighted by `weight` squared.

@@ -165,6 +165,27 @@ mod tests {
         }
     }
 
+    /// Photographs of one ring that only shift lie side by side, so that the ends tell the turn without a mesh.
+    #[test]
+    fn photographs_that_shift_show_how_far_the_ends_are_apart() {
+        let ring = Ring::new();
+        let options = MeshOptions::default();
+        let on_sphere = |(camera, grid)| BaseMap::on_level_sphere(camera, grid, FOCAL_PX, &options);
+        let bases: Vec<BaseMap> = ring.cameras.iter().zip(&ring.grids).map(on_sphere).collect();
+        let places: Vec<Vec<Vector2<f64>>> =
+            bases.iter().zip(&ring.grids).map(|(base, grid)| base.places(grid)).collect();
+        let mut alignment = AlignmentEnergy::new(&ring.grids, &ring.within, &bases, &places);
+        let closure = Closure { warps: &ring.across, turns: &ring.turns, expected: TAU * FOCAL_PX };
+        alignment.join(&closure, &ring.grids, &bases, &places);
+        let shifted = alignment.shifted(&placed(&ring.grids, &places), 3).expect("all photographs are joined");
+        let stayed = shifted[3].warp(Vector2::zeros()) - places[3][0];
+        assert!(stayed.norm() < 1e-9, "{stayed}");
+        for way in alignment.apart(&shifted) {
+            assert!((way - Vector2::new(TAU * FOCAL_PX, 0.0)).norm() < 1e-6, "{way}");
+        }
+        assert!(AlignmentEnergy::new(&ring.grids, &ring.within[2..], &bases, &places).shifted(&shifted, 3).is_none());
+    }
+
     #[test]
     fn ends_that_contradict_leave_the_turn_open_and_say_so() {
         let context = StageContext::default();

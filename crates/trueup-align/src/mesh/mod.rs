@@ -34,6 +34,7 @@ mod warped_mesh;
 
 use nalgebra::Vector2;
 use trueup_core::diagnostics::{Diagnostic, Subject};
+use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
 use alignment::AlignmentEnergy;
@@ -76,11 +77,22 @@ pub fn run(input: &MeshInput, options: &MeshOptions, context: &StageContext) -> 
     let mut alignment = alignment.clone();
     alignment.join(closure, grids, bases, &places);
     let closed = MeshProblem { alignment: &alignment, closing: closure.warps, ..open };
+    // Ends that lie a turn apart where the photographs only shift need no look at how they lie in an open mesh, unless
+    // closing folds it.
+    let mut warped = None;
+    let undeformed = alignment.shifted(&placed(grids, &places), input.reference);
+    if undeformed.is_some_and(|grids| closure.contradiction(&alignment.apart(&grids)).is_none()) {
+        let at_once = closed.deform(refinements)?;
+        if at_once.folds == 0 {
+            return Ok(at_once);
+        }
+        warped = Some(at_once);
+    }
     let plain = open.solve_refined(open.equations(), &Refinements::default())?;
     let contradiction = match closure.contradiction(&alignment.apart(&plain.meshes)) {
         Some(contradiction) => contradiction,
         None => {
-            let warped = closed.deform(refinements)?;
+            let warped = warped.map_or_else(|| closed.deform(refinements), Ok)?;
             if warped.folds <= total_folds(&open.delivered(&plain.meshes)) {
                 return Ok(warped);
             }
@@ -94,6 +106,15 @@ pub fn run(input: &MeshInput, options: &MeshOptions, context: &StageContext) -> 
         "Look whether the photographs beside the cut show the same; --graph names the pairs to be matched.",
     ));
     open.deform(refinements)
+}
+
+/// The grids as their bases place them.
+fn placed(grids: &[GridMesh], places: &[Vec<Vector2<f64>>]) -> Vec<GridMesh> {
+    let one = |(grid, places): (&GridMesh, &Vec<Vector2<f64>>)| GridMesh {
+        target: places.iter().map(|&place| place.into()).collect(),
+        ..grid.clone()
+    };
+    grids.iter().zip(places).map(one).collect()
 }
 
 #[cfg(test)]
