@@ -11,6 +11,7 @@ mod options;
 mod panorama;
 mod photographs;
 mod work;
+mod workers;
 
 use pyo3::prelude::*;
 
@@ -25,6 +26,8 @@ mod _trueup {
     use super::options::{option_flags, options};
     #[pymodule_export]
     use super::panorama::{Panorama, png};
+    #[pymodule_export]
+    use super::workers::Worker;
     #[pymodule_export]
     use super::{command, version};
 }
