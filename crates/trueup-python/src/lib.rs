@@ -15,8 +15,9 @@ mod workers;
 
 use pyo3::prelude::*;
 
-/// The native part of the package trueup.
-#[pymodule]
+/// The native part of the package trueup. What it shares between threads is locked or never changed: the lock of the interpreter is not
+/// asked for.
+#[pymodule(gil_used = false)]
 mod _trueup {
     #[pymodule_export]
     use super::alignment::{Alignment, align, open_project};
