@@ -1,12 +1,18 @@
-//! Tells the program a number that changes with the stages whose results it may keep between runs.
+//! Tells the program a number that changes with the stages whose results it may keep between runs or have from other programs.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The sources that decide what is measured, matched and aligned. Of a published crate, the others' are not beside it: there
-/// the version that they have in common tells them apart.
-const SOURCES: [&str; 5] =
-    ["../trueup-core/src", "../trueup-vision/src", "../trueup-align/src", "../trueup-io/src", "src"];
+/// The sources that decide what is measured, matched and aligned, and what is handed to workers. Of a published crate, the others'
+/// are not beside it: there the version that they have in common tells them apart.
+const SOURCES: [&str; 6] = [
+    "../trueup-core/src",
+    "../trueup-vision/src",
+    "../trueup-align/src",
+    "../trueup-compose/src",
+    "../trueup-io/src",
+    "src",
+];
 
 fn main() -> std::io::Result<()> {
     let mut files = Vec::new();

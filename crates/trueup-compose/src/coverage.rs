@@ -3,12 +3,13 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::deformed_grid::DeformedGrid;
 use crate::layout::CanvasLayout;
 
 /// A rectangle of canvas pixels.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rectangle {
     /// Columns.
     pub columns: Range<usize>,

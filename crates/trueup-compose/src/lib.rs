@@ -23,6 +23,7 @@ pub mod seam;
 pub mod small_views;
 
 mod blend;
+mod bulk;
 mod coverage;
 mod deformed_grid;
 mod distance;

@@ -9,6 +9,7 @@ use trueup_core::source::PhotographSource;
 use trueup_core::{Error, Result};
 
 use crate::layout::{CanvasLayout, Placed};
+use crate::render::RenderHelpers;
 use crate::store::{CanvasBlocks, Pixel, PixelStore, SumPixel};
 
 /// What composing may take.
@@ -20,6 +21,8 @@ pub struct Resources<'a> {
     pub ceiling: usize,
     /// Where the canvas goes if it does not fit.
     pub scratch: &'a dyn ScratchSpace,
+    /// Others who do a part of the work, if there are any.
+    pub helpers: Option<&'a dyn RenderHelpers>,
 }
 
 impl std::fmt::Debug for Resources<'_> {
@@ -32,7 +35,7 @@ impl std::fmt::Debug for Resources<'_> {
 impl Resources<'static> {
     /// Everything is held in memory, however much that is.
     pub fn unlimited() -> Self {
-        Self { memory: usize::MAX, ceiling: usize::MAX, scratch: &NoScratch }
+        Self { memory: usize::MAX, ceiling: usize::MAX, scratch: &NoScratch, helpers: None }
     }
 }
 
@@ -175,6 +178,11 @@ impl MemoryNeeds {
         let largest = bytes.first().copied().unwrap_or(0);
         let at_one_place = bytes.iter().take(AT_ONE_PLACE).sum();
         Self { size: [layout.width, layout.height], work, largest, at_one_place }
+    }
+
+    /// Where neither the canvas nor all of the photographs' own levels are held: others have them.
+    pub(crate) fn of_a_part(self) -> Self {
+        Self { work: WorkBytes { pixel_bytes: 0, coarse_levels: 0, ..self.work }, ..self }
     }
 
     /// Of the whole canvas.

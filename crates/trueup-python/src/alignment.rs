@@ -11,6 +11,7 @@ use crate::keywords::Wishes;
 use crate::panorama::Panorama;
 use crate::photographs::{GivenPhotograph, collected};
 use crate::work::{Surroundings, run};
+use crate::workers::Handing;
 
 /// The geometry of one panorama, ready to be composed.
 #[pyclass(frozen, module = "trueup._trueup")]
@@ -22,7 +23,8 @@ pub(crate) struct Alignment {
 }
 
 /// Finds, measures, matches and aligns photographs: one alignment for the largest group of photographs that overlap, or with
-/// `all` one for each, the largest first. `progress` is called with a stage's name, the steps done, and how many there are.
+/// `all` one for each, the largest first. `progress` is called with a stage's name, the steps done, and how many there are;
+/// `workers` with what tasks have in common and with these, and gives their numbers and results.
 #[pyfunction]
 pub(crate) fn align<'py>(
     py: Python<'py>,
@@ -30,6 +32,7 @@ pub(crate) fn align<'py>(
     keywords: &Bound<'py, PyDict>,
     all: bool,
     progress: Option<Bound<'py, PyAny>>,
+    workers: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Vec<Alignment>> {
     let wishes = Wishes::of(keywords, "stitch", StitchOptions::default())?;
     let (photographs, mut in_memory) = collected(photographs)?;
@@ -38,11 +41,14 @@ pub(crate) fn align<'py>(
         in_memory.insert(name, picture);
     }
     let inputs = Inputs { photographs, in_memory, reference, graph, lens_from, all, masks, require_all };
+    let handing = Handing::new(workers);
     let aligned = run(py, Surroundings { progress, threads }, |context| {
         let max_bytes = options.run.resources.cache_bytes;
         let cache = cache.map(|folder| PhotographCache::open(&folder, max_bytes)).transpose()?;
-        Stitcher::new(&options, context).with_cache(cache.as_ref()).align(&inputs)
-    })?;
+        let stitcher = Stitcher::new(&options, context).with_cache(cache.as_ref());
+        stitcher.with_workers(Handing::workers(handing.as_ref())).align(&inputs)
+    });
+    let aligned = Handing::outcome(handing, aligned)?;
     let one = |alignment| Alignment { alignment, options: options.clone(), threads };
     Ok(aligned.alignments.into_iter().map(one).collect())
 }
@@ -85,13 +91,15 @@ impl Alignment {
         photographs: Option<Vec<GivenPhotograph<'py>>>,
         keywords: &Bound<'py, PyDict>,
         progress: Option<Bound<'py, PyAny>>,
+        workers: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Panorama> {
         let Wishes { options, threads, .. } = Wishes::of(keywords, "compose", self.options.clone())?;
         let threads = if threads == 0 { self.threads } else { threads };
         let shown = photographs.map(collected).transpose()?;
         let shown = shown.map(|(photographs, in_memory)| Inputs { photographs, in_memory, ..Inputs::default() });
-        let (alignment, rendered, depth) = run(py, Surroundings { progress, threads }, |context| {
-            let stitcher = Stitcher::new(&options, context);
+        let handing = Handing::new(workers);
+        let composed = run(py, Surroundings { progress, threads }, |context| {
+            let stitcher = Stitcher::new(&options, context).with_workers(Handing::workers(handing.as_ref()));
             let mut alignment = match &shown {
                 None if options == self.options => self.alignment.clone(),
                 shown => stitcher.rearrange(&self.alignment, shown.as_ref())?,
@@ -100,7 +108,8 @@ impl Alignment {
             // Asked for now: the files may be gone when the pixels are.
             let depth = Panorama::depth_of(&options, &alignment)?;
             Ok((alignment, rendered, depth))
-        })?;
+        });
+        let (alignment, rendered, depth) = Handing::outcome(handing, composed)?;
         Ok(Panorama { alignment, rendered, options, depth, threads })
     }
 

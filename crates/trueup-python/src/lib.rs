@@ -11,11 +11,13 @@ mod options;
 mod panorama;
 mod photographs;
 mod work;
+mod workers;
 
 use pyo3::prelude::*;
 
-/// The native part of the package trueup.
-#[pymodule]
+/// The native part of the package trueup. What it shares between threads is locked or never changed: the lock of the interpreter is not
+/// asked for.
+#[pymodule(gil_used = false)]
 mod _trueup {
     #[pymodule_export]
     use super::alignment::{Alignment, align, open_project};
@@ -25,6 +27,8 @@ mod _trueup {
     use super::options::{option_flags, options};
     #[pymodule_export]
     use super::panorama::{Panorama, png};
+    #[pymodule_export]
+    use super::workers::Worker;
     #[pymodule_export]
     use super::{command, version};
 }

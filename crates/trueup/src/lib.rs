@@ -27,6 +27,7 @@ mod options;
 mod pipeline;
 mod project;
 mod report;
+mod workers;
 
 pub use batch::{Batch, BatchJob, PhotographsOfFolder, SetOutcome, SetRecord, Shard};
 pub use job::{
@@ -71,3 +72,4 @@ pub use trueup_io::encode::{
     write_atomically, written_extensions,
 };
 pub use trueup_io::source::{InMemory, names_photograph, read_extensions, readable_formats};
+pub use workers::{TakeResult, Worker, Workers};

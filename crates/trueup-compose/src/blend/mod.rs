@@ -19,7 +19,10 @@ mod tests;
 mod tile;
 mod work;
 
+use std::collections::BTreeSet;
+
 use rayon::prelude::*;
+use trueup_core::options::StageOptions;
 use trueup_core::source::PhotographSource;
 use trueup_core::{Result, StageContext};
 
@@ -28,9 +31,11 @@ use crate::label::Label;
 use crate::layout::Unrolled;
 use crate::light::{Correction, LocalExposure};
 use crate::memory_plan::MemoryPlan;
-use crate::pyramid::{first_level, tile_side};
+use crate::pyramid::{PyramidPlane, first_level, tile_side};
+use crate::render::{FinishedRegion, FinishedTile, Region, RegionWork, RenderHelpers, not_asked_for};
+use crate::render_options::RenderOptions;
 use crate::seam::Seams;
-use crate::small_views::{CoarseLevels, DecodedPhotographs};
+use crate::small_views::{CoarseLevels, DecodedPhotographs, small_size};
 use crate::store::{Block, PixelStore, RootPixel};
 use crate::warped::{Resampling, SamplingMemory};
 use loaded::{LoadedPhotographs, PhotographLoader};
@@ -115,13 +120,97 @@ impl<'a> Blending<'a> {
     /// [`trueup_core::Error::Limits`] if more photographs meet at one place than there is memory for;
     /// [`trueup_core::Error::Cancelled`]; what the photographs and a scratch file return.
     pub(crate) fn finish(self, parts: &[Rectangle], context: &StageContext) -> Result<PixelStore<RootPixel>> {
+        let mut pixels = self.canvas();
+        self.finish_each(parts, &mut |blocks| pixels.put(blocks), context)?;
+        Ok(pixels)
+    }
+
+    /// The same, where `helpers` finish regions of the canvas.
+    ///
+    /// # Errors
+    /// Those of `helpers`; [`trueup_core::Error::Input`] if what they give cannot be; those of a scratch file.
+    pub(crate) fn finish_elsewhere(
+        self,
+        parts: &[Rectangle],
+        helpers: &dyn RenderHelpers,
+        context: &StageContext,
+    ) -> Result<PixelStore<RootPixel>> {
+        let Self { input, work } = &self;
+        let BlendInput { unrolled, seams, .. } = input;
+        let mut pixels = self.canvas();
+        let bytes = self.placement_bytes();
+        let regions = order::regions(unrolled, work.first_level, parts);
+        let common = RegionWork {
+            seams: (*seams).clone(),
+            blended: work.levels.as_ref().map(|levels| levels.blended.clone()),
+            bytes: input.decoded.bytes.clone(),
+        };
+        let mut counted = vec![false; bytes.len()];
+        let mut done = vec![false; regions.len()];
+        let region = |number: usize| {
+            context.check_cancelled()?;
+            let parts = &regions[number];
+            let batches = order::batches(work, parts, &bytes, usize::MAX)?;
+            let shown: BTreeSet<Label> = batches.into_iter().flat_map(|batch| batch.shown).collect();
+            let own = |&label: &Label| {
+                let at = usize::from(label);
+                Ok((at, work.levels.as_ref().map(|levels| levels.own.ready(at)).transpose()?.unwrap_or_default()))
+            };
+            Ok(Region { parts: parts.clone(), own: shown.iter().map(own).collect::<Result<_>>()? })
+        };
+        helpers.finish(&common, regions.len(), &region, &mut |number, finished: FinishedRegion| {
+            context.check_cancelled()?;
+            if done.get(number) != Some(&false) {
+                return Err(not_asked_for());
+            }
+            done[number] = true;
+            let side = tile_side(work.first_level);
+            for tile in finished.tiles {
+                let block = Block { columns: tile.columns, rows: tile.rows, pixels: &tile.pixels };
+                let in_region = regions[number].iter().any(|part| block.is_tile_of(part, side, unrolled.finished()));
+                if !in_region {
+                    return Err(not_asked_for());
+                }
+                pixels.put(&[block])?;
+            }
+            for at in finished.shown {
+                if let Some(counted @ false) = counted.get_mut(at) {
+                    *counted = true;
+                    context.progress().advance(RenderOptions::STAGE, 1);
+                }
+            }
+            Ok(())
+        })?;
+        match done.iter().all(|&done| done) {
+            true => Ok(pixels),
+            false => Err(not_asked_for()),
+        }
+    }
+
+    /// What is to be finished, empty.
+    fn canvas(&self) -> PixelStore<RootPixel> {
+        let side = tile_side(self.work.first_level);
+        self.input.plan.store(self.input.unrolled.finished(), [side; 2])
+    }
+
+    /// Bytes of the photograph of each placement.
+    fn placement_bytes(&self) -> Vec<usize> {
+        let BlendInput { unrolled, decoded, .. } = &self.input;
+        (0..unrolled.placed().len()).map(|at| decoded.bytes[unrolled.original(at)]).collect()
+    }
+
+    /// [`Self::finish`], where `put` takes the tiles.
+    fn finish_each(
+        self,
+        parts: &[Rectangle],
+        put: &mut dyn FnMut(&[Block<'_, RootPixel>]) -> Result<()>,
+        context: &StageContext,
+    ) -> Result<()> {
+        let bytes = self.placement_bytes();
         let Self { input, mut work } = self;
         let BlendInput { unrolled, corrections, photographs, resampling, plan, .. } = input;
-        let [width, height] = unrolled.finished();
-        let side = tile_side(work.first_level);
         let placements = unrolled.placed().len();
-        let DecodedPhotographs { mut kept, bytes } = input.decoded;
-        let bytes: Vec<usize> = (0..placements).map(|at| bytes[unrolled.original(at)]).collect();
+        let mut kept = input.decoded.kept;
         // Of several placements, the first takes what was kept.
         let kept = (0..placements).map(|at| kept[unrolled.original(at)].take()).collect();
         let batches = order::batches(&work, parts, &bytes, plan.photographs)?;
@@ -130,7 +219,6 @@ impl<'a> Blending<'a> {
         let local = local.as_ref();
         let loader = PhotographLoader { unrolled, curve: &curve, corrections, local, photographs, resampling, context };
         let mut loaded = LoadedPhotographs::new(loader, kept, &batches, plan.photographs, plan.at_a_time);
-        let mut pixels = plan.store([width, height], [side; 2]);
         for (index, batch) in batches.iter().enumerate() {
             loaded.prepare(index, batch, &bytes)?;
             if let Some(levels) = &mut work.levels {
@@ -150,9 +238,96 @@ impl<'a> Blending<'a> {
                 };
                 let blocks: Vec<Block<'_, RootPixel>> =
                     tiles.iter().zip(finished.iter().map(Vec::as_slice)).map(block).collect();
-                pixels.put(&blocks)?;
+                put(&blocks)?;
             }
         }
-        Ok(pixels)
+        Ok(())
     }
+}
+
+/// What a region is finished from.
+pub(crate) struct RegionInput<'a> {
+    /// Where the photographs lie.
+    pub(crate) unrolled: &'a Unrolled<'a>,
+    /// One for each photograph of the layout that was unrolled.
+    pub(crate) corrections: &'a [Correction],
+    /// What is done to the light of all of them, over the layout that was unrolled.
+    pub(crate) local: Option<&'a LocalExposure>,
+    pub(crate) photographs: &'a dyn PhotographSource,
+    pub(crate) resampling: Resampling,
+    pub(crate) levels: Option<WholeLevels>,
+    pub(crate) plan: &'a MemoryPlan,
+}
+
+/// Finishes one region, for [`Blending::finish_elsewhere`].
+///
+/// # Errors
+/// [`trueup_core::Error::Input`] if the region is none of this panorama; those of [`Blending::finish`].
+pub(crate) fn finish_region(
+    input: RegionInput<'_>,
+    common: &RegionWork,
+    region: Region,
+    context: &StageContext,
+) -> Result<FinishedRegion> {
+    let RegionInput { unrolled, corrections, local, photographs, resampling, levels, plan } = input;
+    let RegionWork { seams, blended, bytes } = common;
+    let Region { parts, own } = region;
+    let (layout, placements) = (unrolled.original_layout(), unrolled.placed().len());
+    let [width, height] = unrolled.finished();
+    let small = small_size([layout.width, layout.height], layout.period.is_some());
+    let lies_within = |part: &Rectangle| part.area() > 0 && part.columns.end <= width && part.rows.end <= height;
+    let first_level = first_level(unrolled.finished());
+    let whole = unrolled.canvas().map(|length| 0..length.div_ceil(1 << first_level));
+    let is_blended =
+        |plane: &PyramidPlane<[f32; 4]>| plane.is_whole() && [&plane.columns, &plane.rows] == [&whole[0], &whole[1]];
+    let fits = seams.fit(layout.placed.len(), small, layout.period.is_some())
+        && bytes.len() == layout.placed.len()
+        && parts.iter().all(lies_within)
+        && blended.is_some() == levels.is_some()
+        && blended.as_ref().is_none_or(is_blended)
+        && own.iter().all(|(at, level)| *at < placements && level.plane.is_whole());
+    if !fits {
+        return Err(not_asked_for());
+    }
+    let has_own: BTreeSet<usize> = own.iter().map(|(at, _)| *at).collect();
+    let decoded = DecodedPhotographs { kept: layout.placed.iter().map(|_| None).collect(), bytes: bytes.clone() };
+    let shown = ShownWhere { unrolled, seams };
+    let levels_blended = blended
+        .as_ref()
+        .map(|blended| BlendedLevels { blended: blended.clone(), own: CoarseLevels::of_some(placements, own) });
+    let ignored = unrolled.placed().iter().map(|placed| photographs.masks(placed.photograph).ignored).collect();
+    let work = BlendWork { resampling, shown, first_level, levels: levels_blended, ignored };
+    let coarse_levels = CoarseLevels::default();
+    let input = BlendInput {
+        unrolled,
+        corrections,
+        local,
+        photographs,
+        resampling,
+        seams,
+        coarse_levels,
+        levels,
+        decoded,
+        plan,
+    };
+    let blending = Blending { input, work };
+    let placement_bytes = blending.placement_bytes();
+    let batches = order::batches(&blending.work, &parts, &placement_bytes, usize::MAX)?;
+    if !batches.iter().flat_map(|batch| &batch.shown).all(|&label| has_own.contains(&usize::from(label))) {
+        return Err(not_asked_for());
+    }
+    let mut tiles = Vec::new();
+    blending.finish_each(
+        &parts,
+        &mut |blocks| {
+            let tile = |block: &Block<'_, RootPixel>| {
+                let Block { columns, rows, pixels } = block;
+                FinishedTile { columns: columns.clone(), rows: rows.clone(), pixels: pixels.to_vec() }
+            };
+            tiles.extend(blocks.iter().map(tile));
+            Ok(())
+        },
+        context,
+    )?;
+    Ok(FinishedRegion { tiles, shown: has_own.into_iter().collect() })
 }

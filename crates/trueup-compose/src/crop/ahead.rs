@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::cells::{CellGrid, Cells, Sums};
 use crate::coverage::Coverage;
@@ -23,7 +24,7 @@ const LEAST_PIXELS: f64 = 2.0;
 const BORDER_STEPS: usize = 2;
 
 /// The cells of a canvas of which nothing is composed yet.
-#[derive(Debug)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct CellsAhead {
     grid: CellGrid,
     around: bool,
@@ -47,6 +48,15 @@ impl CellsAhead {
         let covered = grid.covered(coverage);
         let at_border = near(&grid, around, covered.iter().map(|&covered| !covered).collect());
         Some(Self { grid, around, covered, at_border })
+    }
+
+    /// Whether they are those of a layout: of others, places lie elsewhere.
+    pub(crate) fn are_of(&self, layout: &CanvasLayout) -> bool {
+        let Self { grid, around, covered, at_border } = self;
+        let cells = grid.columns * grid.rows;
+        *grid == CellGrid::of([layout.width, layout.height])
+            && *around == layout.period.is_some()
+            && [covered.len(), at_border.len()] == [cells; 2]
     }
 
     /// What a photograph alone shows at the border; its grid may run into further turns of a cylinder.

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use trueup_core::Result;
 use trueup_core::raster::{LUMA, RowSource};
 
@@ -33,7 +34,7 @@ pub(crate) struct Cells {
 }
 
 /// A canvas cut into cells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct CellGrid {
     /// Width and height of the canvas, pixels.
     pub(super) canvas: [usize; 2],

@@ -2,6 +2,10 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
+use crate::bulk::Bulk;
+
 /// Something that can be summed with weights.
 pub(crate) trait Texel: Copy + Default {
     /// `self + weight * other`.
@@ -28,11 +32,20 @@ impl Texel for [f32; 4] {
 }
 
 /// A part of one level; all outside is zero. Four channels are three of color times the share, and the share.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "T: Bulk")]
 pub(crate) struct PyramidPlane<T> {
     pub(crate) columns: Range<usize>,
     pub(crate) rows: Range<usize>,
+    #[serde(with = "crate::bulk")]
     pub(crate) texels: Vec<T>,
+}
+
+impl<T> PyramidPlane<T> {
+    /// Whether it holds a sample for each of its places.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.columns.len().checked_mul(self.rows.len()) == Some(self.texels.len())
+    }
 }
 
 impl<T: Texel> PyramidPlane<T> {

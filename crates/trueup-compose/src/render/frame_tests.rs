@@ -21,7 +21,7 @@ fn framed_and_whole(
     let framing = Framing { coverage: &coverage, options, known };
     let (look, seams, context) = (RenderOptions::default(), SeamOptions::default(), StageContext::default());
     [Some(&framing), None].map(|framing| {
-        let resources = Resources { memory, ceiling: usize::MAX, scratch: &RamDisk::default() };
+        let resources = Resources { memory, ceiling: usize::MAX, scratch: &RamDisk::default(), helpers: None };
         run(input, &resources, &look, &seams, framing, &context).expect("room for all of it")
     })
 }

@@ -7,6 +7,7 @@
 
 mod average;
 mod checked;
+mod divided;
 mod fill;
 mod input;
 mod layer;
@@ -14,9 +15,15 @@ mod panorama;
 
 pub use crate::memory_plan::Resources;
 pub use crate::render_options::{Blend, Interpolation, Look, RenderOptions};
+pub use divided::{
+    FinishedRegion, Region, RegionOf, RegionWork, RenderHelpers, SmallWork, TakeRegion, TakeSmall, finish_region,
+    make_small,
+};
 pub use input::RenderInput;
 pub use layer::{Layer, LayerRows, layer, layer_rows, layer_size};
 pub use panorama::Panorama;
+
+pub(crate) use divided::{FinishedTile, not_asked_for};
 
 use trueup_core::options::StageOptions;
 use trueup_core::source::PhotographSource;
@@ -79,38 +86,29 @@ pub fn run(
     framing: Option<&Framing<'_>>,
     context: &StageContext,
 ) -> Result<Rendered> {
-    check(input, options)?;
     seam_options.check()?;
-    let &RenderInput { layout, corrections, photographs } = input;
-    let photographs = &Unframed(photographs);
-    let photographs = ByResponse::new(photographs, &corrections.response)?;
-    let plan = MemoryPlan::new(&memory_needs(layout, &photographs, options)?, resources)?;
-    report_folds(layout, context);
+    let &RenderInput { layout, corrections, .. } = input;
     let size = [layout.width, layout.height];
-    let local = local_exposure(layout, &corrections.photographs, options.look);
-    if local.is_some() {
-        look::report(&corrections.photographs, options.look, context);
-    }
-    let composing = Composing {
-        layout,
-        corrections: &corrections.photographs,
-        local: local.as_ref(),
-        photographs: &photographs,
-        plan: &plan,
-    };
-    match composition(layout, options) {
-        Composition::AlongSeams(_) => {
-            let (pixels, seams, frame) = composing.along_seams(options, seam_options, framing, context)?;
-            let panorama = Panorama::from_roots(size, pixels, photographs.encoding());
-            Ok(Rendered { panorama, seams: Some(seams), frame })
+    Composing::within(input, resources, options, Holding::Everything, |composing| {
+        report_folds(layout, context);
+        if composing.local.is_some() {
+            look::report(&corrections.photographs, options.look, context);
         }
-        Composition::Averaged(weighting) => {
-            let averaging = Averaging { resampling: Resampling::of(options.interpolation), weighting };
-            let sums = composing.averaged(averaging, context)?;
-            let panorama = Panorama::from_sums(size, sums, photographs.encoding());
-            Ok(Rendered { panorama, seams: None, frame: None })
+        match composition(layout, options) {
+            Composition::AlongSeams(_) => {
+                let helpers = resources.helpers.filter(|_| layout.placed.len() > 1);
+                let (pixels, seams, frame) = composing.along_seams(options, seam_options, framing, helpers, context)?;
+                let panorama = Panorama::from_roots(size, pixels, composing.photographs.encoding());
+                Ok(Rendered { panorama, seams: Some(seams), frame })
+            }
+            Composition::Averaged(weighting) => {
+                let averaging = Averaging { resampling: Resampling::of(options.interpolation), weighting };
+                let sums = composing.averaged(averaging, context)?;
+                let panorama = Panorama::from_sums(size, sums, composing.photographs.encoding());
+                Ok(Rendered { panorama, seams: None, frame: None })
+            }
         }
-    }
+    })
 }
 
 /// How the photographs of a layout are composed: as the blend says, but for an empty canvas, which has no seams.
@@ -177,13 +175,46 @@ struct Composing<'a> {
     plan: &'a MemoryPlan,
 }
 
+/// What composing holds of the panorama.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Holding {
+    /// The canvas, and all photographs' own coarse levels.
+    Everything,
+    /// A few tiles.
+    APart,
+}
+
 impl Composing<'_> {
-    /// Small views, seams, frame, blend.
+    /// What `work` makes of photographs that are composed within a plan.
+    ///
+    /// # Errors
+    /// Those of [`run`] before photographs are read; those of `work`.
+    fn within<T>(
+        input: &RenderInput<'_>,
+        resources: &Resources<'_>,
+        options: &RenderOptions,
+        holding: Holding,
+        work: impl FnOnce(&Composing<'_>) -> Result<T>,
+    ) -> Result<T> {
+        check(input, options)?;
+        let &RenderInput { layout, corrections, photographs } = input;
+        let photographs = &Unframed(photographs);
+        let photographs = &ByResponse::new(photographs, &corrections.response)?;
+        let needs = memory_needs(layout, photographs, options)?;
+        let needs = if holding == Holding::APart { needs.of_a_part() } else { needs };
+        let plan = &MemoryPlan::new(&needs, resources)?;
+        let local = local_exposure(layout, &corrections.photographs, options.look);
+        let corrections = &corrections.photographs;
+        work(&Composing { layout, corrections, local: local.as_ref(), photographs, plan })
+    }
+
+    /// Small views, seams, frame, blend; with `helpers`, these make the photographs small and finish the canvas.
     fn along_seams(
         &self,
         options: &RenderOptions,
         seam_options: &SeamOptions,
         framing: Option<&Framing<'_>>,
+        helpers: Option<&dyn RenderHelpers>,
         context: &StageContext,
     ) -> Result<(PixelStore<RootPixel>, Seams, Option<Frame>)> {
         let &Self { layout, corrections, local, photographs, plan } = self;
@@ -199,7 +230,11 @@ impl Composing<'_> {
         let border =
             ahead.as_ref().map(|cells| BorderInput { cells, resampling: &resampling, encode: &encoding.roots });
         let input = SmallViewsInput { unrolled, corrections, local, photographs, first_level, border, plan };
-        let SmallViews { views, size, coarse_levels, border, decoded } = small_views::run(&input, context)?;
+        let small = match helpers {
+            None => small_views::run(&input, context)?,
+            Some(helpers) => small_views::run_elsewhere(&input, helpers, context)?,
+        };
+        let SmallViews { views, size, coarse_levels, border, decoded } = small;
         let seams = match views.len() {
             1 => Seams::of_one(size[0], size[1]),
             _ => {
@@ -226,7 +261,11 @@ impl Composing<'_> {
             let changes = blending.changes(&cells.places())?;
             frame = Some(framing.of_cells(&cells.blended(&changes, &encoding), layout));
         }
-        let pixels = blending.finish(&to_finish(layout, framing, frame.as_ref()), context)?;
+        let parts = to_finish(layout, framing, frame.as_ref());
+        let pixels = match helpers {
+            None => blending.finish(&parts, context)?,
+            Some(helpers) => blending.finish_elsewhere(&parts, helpers, context)?,
+        };
         context.progress().finish(STAGE);
         Ok((pixels, seams, frame))
     }
@@ -238,6 +277,8 @@ impl Composing<'_> {
     }
 }
 
+#[cfg(test)]
+mod divided_tests;
 #[cfg(test)]
 mod frame_tests;
 #[cfg(test)]

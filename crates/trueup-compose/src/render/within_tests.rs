@@ -46,7 +46,7 @@ pub(super) fn scene() -> (CanvasLayout, Corrections, Counting) {
 
 fn composed(blend: Blend, memory: usize, disk: &RamDisk, threads: usize) -> Result<(Rendered, usize)> {
     let (layout, corrections, photographs) = scene();
-    let resources = Resources { memory, ceiling: usize::MAX, scratch: disk };
+    let resources = Resources { memory, ceiling: usize::MAX, scratch: disk, helpers: None };
     let options = RenderOptions { blend, ..RenderOptions::default() };
     let seams = SeamOptions::default();
     let context = StageContext::default();

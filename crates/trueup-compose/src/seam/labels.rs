@@ -2,13 +2,15 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use super::neighbors::neighbors;
 use crate::coverage::Rectangle;
 use crate::label::{Label, NOBODY};
 use crate::small_views::{PARTLY, SmallView, WHOLLY};
 
 /// Which photograph the panorama shows where.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Seams {
     width: usize,
     height: usize,
@@ -49,6 +51,18 @@ impl Seams {
     /// Everything shows photograph 0.
     pub fn of_one(width: usize, height: usize) -> Self {
         Self { width, height, turn: 0, labels: vec![0; width * height], partial: vec![Vec::new()] }
+    }
+
+    /// Whether they are seams between so many photographs on a canvas of `size` pixels, that of the small views.
+    pub(crate) fn fit(&self, photographs: usize, size: [usize; 2], around: bool) -> bool {
+        let Self { width, height, turn, labels, partial } = self;
+        let is_known = |&label: &Label| label == NOBODY || usize::from(label) < photographs;
+        [*width, *height] == size
+            && *turn == if around { *width } else { 0 }
+            && width.checked_mul(*height) == Some(labels.len())
+            && labels.iter().all(is_known)
+            && partial.len() == photographs
+            && partial.iter().flatten().all(|&at| (at as usize) < labels.len())
     }
 
     /// Width of the canvas the seams were found on.

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
 use trueup_core::mask::Masks;
 use trueup_core::mesh::GridMesh;
 
@@ -16,7 +17,7 @@ use crate::warped::{SamplingMemory, WarpedPhotograph};
 use crate::window::Window;
 
 /// A photograph at the first level that is blended as a whole.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct CoarseLevel {
     pub(crate) plane: PyramidPlane<[f32; 4]>,
 }

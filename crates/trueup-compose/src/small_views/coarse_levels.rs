@@ -83,6 +83,26 @@ impl CoarseLevels {
         Ok(())
     }
 
+    /// A copy of that of photograph `at`, ready for tiles, after [`Self::level_all`].
+    pub(crate) fn ready(&self, at: usize) -> Result<CoarseLevel> {
+        let mut level = self.read(at)?.into_owned();
+        if self.spilled.is_some() {
+            level_shares(&mut level.plane);
+        }
+        Ok(level)
+    }
+
+    /// Those of some placements, ready for tiles; the others are empty.
+    pub(crate) fn of_some(count: usize, some: impl IntoIterator<Item = (usize, CoarseLevel)>) -> Self {
+        let mut held = vec![CoarseLevel::default(); count];
+        for (at, level) in some {
+            if let Some(held) = held.get_mut(at) {
+                *held = level;
+            }
+        }
+        Self { held, spilled: None }
+    }
+
     /// That of photograph `at`, which is in memory.
     pub(crate) fn at(&self, at: usize) -> &CoarseLevel {
         &self.held[at]

@@ -11,6 +11,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use trueup_core::color::TransferCurve;
 use trueup_core::options::StageOptions;
 use trueup_core::raster::Photograph;
@@ -22,6 +23,7 @@ use crate::ignored::ShownElsewhere;
 use crate::layout::{Placed, TURNS, Unrolled};
 use crate::light::{Correction, LocalExposure, PhotographLight};
 use crate::memory_plan::MemoryPlan;
+use crate::render::{RenderHelpers, SmallWork, not_asked_for};
 use crate::render_options::RenderOptions;
 use crate::transfer_curve::EncodeRoots;
 use crate::warped::{Resampling, WarpedPhotograph, check_photograph};
@@ -84,12 +86,21 @@ pub(crate) struct DecodedPhotographs {
 }
 
 /// What is made of one photograph.
-struct MadeSmall {
+#[derive(Debug, Serialize, Deserialize)]
+pub struct MadeSmall {
     view: SmallView,
     /// One for each of its placements.
     coarse_levels: Vec<CoarseLevel>,
     border: BorderDeviations,
-    photograph: Photograph,
+    /// Bytes of the decoded photograph.
+    bytes: usize,
+}
+
+impl MadeSmall {
+    /// Whether it can have been made of a photograph that is placed so often.
+    fn fits(&self, placements: usize) -> bool {
+        self.coarse_levels.len() == placements && self.coarse_levels.iter().all(|level| level.plane.is_whole())
+    }
 }
 
 /// Makes the small views. Progress counts photographs, of a stage that the caller begins.
@@ -98,46 +109,109 @@ struct MadeSmall {
 /// [`trueup_core::Error::Input`] if a photograph does not fit its grid; [`trueup_core::Error::Cancelled`]; what the
 /// photographs and a scratch file return.
 pub(crate) fn run(input: &SmallViewsInput<'_>, context: &StageContext) -> Result<SmallViews> {
+    let mut all = SmallViews::none(input);
+    let mut room = input.plan.photographs;
+    let positions: Vec<usize> = (0..input.unrolled.original_layout().placed.len()).collect();
+    make_each(input, &positions, context, |_, made, photograph| {
+        let bytes = made.bytes;
+        let fits = bytes <= room;
+        room -= if fits { bytes } else { 0 };
+        all.push(made, fits.then_some(photograph))
+    })?;
+    Ok(all)
+}
+
+/// The same, where the photographs are made small by others.
+///
+/// # Errors
+/// Those of `helpers`; [`trueup_core::Error::Input`] if what they give cannot be; those of a scratch file.
+pub(crate) fn run_elsewhere(
+    input: &SmallViewsInput<'_>,
+    helpers: &dyn RenderHelpers,
+    context: &StageContext,
+) -> Result<SmallViews> {
+    let unrolled = input.unrolled;
+    let mut all = SmallViews::none(input);
+    let positions: Vec<usize> = (0..unrolled.original_layout().placed.len()).collect();
+    let mut waiting: Vec<Option<MadeSmall>> = positions.iter().map(|_| None).collect();
+    let mut next = 0;
+    let work = SmallWork { border: input.border.map(|border| border.cells.clone()) };
+    helpers.make_small(&work, &positions, &mut |position, made| {
+        context.check_cancelled()?;
+        let is_wanted = waiting.get(position).is_some_and(Option::is_none) && position >= next;
+        if !(is_wanted && made.fits(unrolled.placements(position).count())) {
+            return Err(not_asked_for());
+        }
+        context.progress().advance(RenderOptions::STAGE, 1);
+        waiting[position] = Some(made);
+        // In their order, so that no more than those that others are ahead by wait.
+        while let Some(made) = waiting.get_mut(next).and_then(Option::take) {
+            all.push(made, None)?;
+            next += 1;
+        }
+        Ok(())
+    })?;
+    if next < positions.len() {
+        return Err(not_asked_for());
+    }
+    Ok(all)
+}
+
+/// Makes photographs at these positions small, for [`run_elsewhere`]; `made` is called in their order.
+///
+/// # Errors
+/// Those of [`run`].
+pub(crate) fn make_each(
+    input: &SmallViewsInput<'_>,
+    positions: &[usize],
+    context: &StageContext,
+    mut made: impl FnMut(usize, MadeSmall, Photograph) -> Result<()>,
+) -> Result<()> {
     let &SmallViewsInput { unrolled, corrections, photographs, plan, .. } = input;
     let layout = unrolled.original_layout();
     let curve = photographs.transfer_curve();
     let elsewhere = ShownElsewhere::find(unrolled.layout(), photographs, small_size(unrolled.canvas(), false));
-    let making = Making {
-        input,
-        curve: &curve,
-        size: small_size([layout.width, layout.height], layout.period.is_some()),
-        elsewhere: elsewhere.map(Arc::new),
-    };
-    let mut coarse_levels = CoarseLevels::new(plan.coarse_levels.clone());
-    let (mut views, mut border) = (Vec::new(), Vec::new());
-    let mut decoded = DecodedPhotographs { kept: Vec::new(), bytes: Vec::new() };
-    let mut room = plan.photographs;
-    let at_a_time = plan.at_a_time;
-    for (chunk, (placed, corrections)) in layout.placed.chunks(at_a_time).zip(corrections.chunks(at_a_time)).enumerate()
-    {
+    let size = small_size([layout.width, layout.height], layout.period.is_some());
+    let making = Making { input, curve: &curve, size, elsewhere: elsewhere.map(Arc::new) };
+    for positions in positions.chunks(plan.at_a_time) {
         context.check_cancelled()?;
-        let made: Vec<MadeSmall> = placed
+        let all: Vec<(MadeSmall, Photograph)> = positions
             .par_iter()
-            .zip(corrections)
-            .enumerate()
-            .map(|(index, (placed, correction))| {
-                let made = making.make(chunk * at_a_time + index, placed, correction)?;
+            .map(|&position| {
+                let made = making.make(position, &layout.placed[position], &corrections[position])?;
                 context.progress().advance(RenderOptions::STAGE, 1);
                 Ok(made)
             })
             .collect::<Result<_>>()?;
-        for made in made {
-            views.push(made.view);
-            border.push(made.border);
-            made.coarse_levels.into_iter().try_for_each(|level| coarse_levels.push(level))?;
-            let bytes = made.photograph.bytes();
-            let fits = bytes <= room;
-            room -= if fits { bytes } else { 0 };
-            decoded.bytes.push(bytes);
-            decoded.kept.push(fits.then_some(made.photograph));
+        for (&position, (small, photograph)) in positions.iter().zip(all) {
+            made(position, small, photograph)?;
         }
     }
-    Ok(SmallViews { views, size: making.size, coarse_levels, border, decoded })
+    Ok(())
+}
+
+impl SmallViews {
+    /// None so far.
+    fn none(input: &SmallViewsInput<'_>) -> Self {
+        let layout = input.unrolled.original_layout();
+        Self {
+            views: Vec::new(),
+            size: small_size([layout.width, layout.height], layout.period.is_some()),
+            coarse_levels: CoarseLevels::new(input.plan.coarse_levels.clone()),
+            border: Vec::new(),
+            decoded: DecodedPhotographs { kept: Vec::new(), bytes: Vec::new() },
+        }
+    }
+
+    /// Adds the next photograph, with its pixels if these are kept.
+    fn push(&mut self, made: MadeSmall, photograph: Option<Photograph>) -> Result<()> {
+        self.views.push(made.view);
+        self.border.push(made.border);
+        made.coarse_levels.into_iter().try_for_each(|level| self.coarse_levels.push(level))?;
+        self.decoded.bytes.push(made.bytes);
+        self.decoded.kept.push(photograph);
+        Ok(())
+    }
 }
 
 /// What is the same for all photographs.
@@ -151,7 +225,7 @@ struct Making<'a> {
 
 impl Making<'_> {
     /// Makes the photograph at a position of the layout small.
-    fn make(&self, position: usize, placed: &Placed, correction: &Correction) -> Result<MadeSmall> {
+    fn make(&self, position: usize, placed: &Placed, correction: &Correction) -> Result<(MadeSmall, Photograph)> {
         let &SmallViewsInput { unrolled, photographs, first_level, local, .. } = self.input;
         let layout = unrolled.original_layout();
         let canvas = [layout.width, layout.height];
@@ -188,7 +262,8 @@ impl Making<'_> {
         let coarse_levels = unrolled.placements(position).map(coarse_level).collect();
         drop(warped);
         let border = self.border(&first, &photograph, correction);
-        Ok(MadeSmall { view, coarse_levels, border, photograph })
+        let bytes = photograph.bytes();
+        Ok((MadeSmall { view, coarse_levels, border, bytes }, photograph))
     }
 
     /// What the photograph, placed in the first turn, alone shows at the border.

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use crate::distance::border_distances;
 
 /// What is known of one pixel of a [`SmallView`] beside its color.
@@ -26,7 +28,7 @@ pub(crate) fn luma(pixel: &SmallPixel) -> u32 {
 }
 
 /// A photograph on a small canvas: the box it lies in.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SmallView {
     /// Columns of the small canvas; on a cylinder they may run past its width into the next turn, but not meet
     /// themselves.
@@ -34,6 +36,7 @@ pub struct SmallView {
     /// Rows of the small canvas.
     pub rows: Range<usize>,
     /// Row-major pixels of the box.
+    #[serde(with = "crate::bulk")]
     pub pixels: Vec<SmallPixel>,
 }
 

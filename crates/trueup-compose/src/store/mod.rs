@@ -30,6 +30,19 @@ pub(crate) struct Block<'a, P> {
 }
 
 impl<P> Block<'_, P> {
+    /// Whether it is one of the tiles of this `side`, on a canvas of this size, that have something in common with a part of it.
+    pub(crate) fn is_tile_of(&self, part: &Rectangle, side: usize, canvas: [usize; 2]) -> bool {
+        let is_one = |range: &Range<usize>, part: &Range<usize>, length: usize| {
+            range.start.is_multiple_of(side)
+                && range.start < part.end
+                && range.end == (range.start.saturating_add(side)).min(length)
+                && range.end > part.start
+        };
+        is_one(&self.columns, &part.columns, canvas[0])
+            && is_one(&self.rows, &part.rows, canvas[1])
+            && self.columns.len() * self.rows.len() == self.pixels.len()
+    }
+
     /// The pixels of row `y` of the canvas.
     fn row(&self, y: usize) -> &[P] {
         let width = self.columns.len();

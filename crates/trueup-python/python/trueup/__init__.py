@@ -20,6 +20,7 @@ from trueup._options import Option, options
 from trueup._panorama import Panorama
 from trueup._record import Finding, Photograph, Report
 from trueup._trueup import version as _version
+from trueup._workers import Workers, do_task
 
 __version__ = _version()
 
@@ -39,10 +40,12 @@ __all__ = [
     "Report",
     "UnsolvableError",
     "UnsupportedError",
+    "Workers",
     "align",
     "align_all",
     "batch",
     "batch_plan",
+    "do_task",
     "open_project",
     "options",
     "stitch",

@@ -9,6 +9,7 @@ from trueup._panorama import Panorama
 from trueup._photographs import Photographs, native, native_masks
 from trueup._progress import Heard, Progress
 from trueup._record import Recorded
+from trueup._workers import Workers
 
 
 class Alignment(Recorded[_trueup.Alignment]):
@@ -19,6 +20,7 @@ class Alignment(Recorded[_trueup.Alignment]):
         photographs: Photographs | None = None,
         *,
         progress: Progress = None,
+        workers: Workers | None = None,
         **keywords: Unpack[ComposeKeywords],
     ) -> Panorama:
         """The panorama of the photographs that were aligned, or of others in their places: one alignment serves every moment of
@@ -26,7 +28,7 @@ class Alignment(Recorded[_trueup.Alignment]):
 
         ``photographs`` are as many as were used, or as were given, in that order and of the same sizes. Keywords set options
         of the view, the canvas, the light and the file: ``projection``, ``crop``, ``scale`` and so on; those of the geometry are
-        refused.
+        refused. With ``workers``, other programs make the photographs small and finish the canvas, region by region.
 
         Raises :class:`trueup.InputError` for photographs that do not fit, :class:`trueup.UnsupportedError` for options of the
         geometry, :class:`trueup.LimitsError` if the panorama is too large for the memory or the disk,
@@ -34,7 +36,7 @@ class Alignment(Recorded[_trueup.Alignment]):
         """
         shown = None if photographs is None else self._of_those_used(native(photographs))
         with Heard(progress) as heard:
-            return Panorama(self._native.compose(shown, dict(keywords), heard))
+            return Panorama(self._native.compose(shown, dict(keywords), heard, workers))
 
     def _of_those_used(self, shown: list[str | tuple[str, Any]]) -> list[str | tuple[str, Any]]:
         """Of as many photographs as were given, those in the places of the used ones."""
@@ -49,7 +51,13 @@ class Alignment(Recorded[_trueup.Alignment]):
         return f"<trueup.Alignment of {used} photographs on {canvas['width']} x {canvas['height']} px>"
 
 
-def stitch(photographs: Photographs, *, progress: Progress = None, **keywords: Unpack[StitchKeywords]) -> Panorama:
+def stitch(
+    photographs: Photographs,
+    *,
+    progress: Progress = None,
+    workers: Workers | None = None,
+    **keywords: Unpack[StitchKeywords],
+) -> Panorama:
     """The panorama of the largest group of photographs that overlap.
 
     ``photographs`` is a folder, a file pattern, or a list of files, arrays (height x width x 3, RGB; ``uint8``, ``uint16``, or
@@ -58,42 +66,57 @@ def stitch(photographs: Photographs, *, progress: Progress = None, **keywords: U
 
     Keywords are the command's flags: ``method``, ``projection``, ``crop``, ``scale`` and so on; ``set={"table.option": value}`` sets
     any option that :func:`trueup.options` lists; ``masks`` and ``keep`` are files or arrays by the names of photographs. ``progress`` is ``True`` for bars, or a callback that is called with a stage's
-    name, the steps done and how many there are. Ctrl-C stops the work.
+    name, the steps done and how many there are. Ctrl-C stops the work. ``workers`` do most of it in other programs or on other machines:
+    :func:`trueup.ray.workers`.
 
     Photographs that do not fit are left out, with a reason in :attr:`Panorama.photographs`. Raises :class:`trueup.InputError` if none
     can be used, :class:`trueup.UnsolvableError` if no two overlap, :class:`trueup.OptionsError`,
     :class:`trueup.NotApplicableError`, :class:`trueup.LimitsError`.
     """
     with Heard(progress) as heard:
-        [alignment] = _trueup.align(native(photographs), _native_keywords(keywords), False, heard)
-        return Panorama(alignment.compose(None, {}, heard))
+        [alignment] = _trueup.align(native(photographs), _native_keywords(keywords), False, heard, workers)
+        return Panorama(alignment.compose(None, {}, heard, workers))
 
 
 def stitch_all(
-    photographs: Photographs, *, progress: Progress = None, **keywords: Unpack[StitchKeywords]
+    photographs: Photographs,
+    *,
+    progress: Progress = None,
+    workers: Workers | None = None,
+    **keywords: Unpack[StitchKeywords],
 ) -> list[Panorama]:
     """A panorama of every group of photographs that overlap, the largest group first. Otherwise as :func:`stitch`."""
     with Heard(progress) as heard:
-        alignments = _trueup.align(native(photographs), _native_keywords(keywords), True, heard)
-        return [Panorama(alignment.compose(None, {}, heard)) for alignment in alignments]
+        alignments = _trueup.align(native(photographs), _native_keywords(keywords), True, heard, workers)
+        return [Panorama(alignment.compose(None, {}, heard, workers)) for alignment in alignments]
 
 
-def align(photographs: Photographs, *, progress: Progress = None, **keywords: Unpack[StitchKeywords]) -> Alignment:
+def align(
+    photographs: Photographs,
+    *,
+    progress: Progress = None,
+    workers: Workers | None = None,
+    **keywords: Unpack[StitchKeywords],
+) -> Alignment:
     """The geometry of the panorama that :func:`stitch` makes with the same arguments, ready to be composed.
 
     Raises what :func:`stitch` raises.
     """
     with Heard(progress) as heard:
-        [alignment] = _trueup.align(native(photographs), _native_keywords(keywords), False, heard)
+        [alignment] = _trueup.align(native(photographs), _native_keywords(keywords), False, heard, workers)
         return Alignment(alignment)
 
 
 def align_all(
-    photographs: Photographs, *, progress: Progress = None, **keywords: Unpack[StitchKeywords]
+    photographs: Photographs,
+    *,
+    progress: Progress = None,
+    workers: Workers | None = None,
+    **keywords: Unpack[StitchKeywords],
 ) -> list[Alignment]:
     """The geometry of every group of photographs that overlap, the largest group first. Otherwise as :func:`align`."""
     with Heard(progress) as heard:
-        return [Alignment(one) for one in _trueup.align(native(photographs), _native_keywords(keywords), True, heard)]
+        return [Alignment(one) for one in _trueup.align(native(photographs), _native_keywords(keywords), True, heard, workers)]
 
 
 def open_project(

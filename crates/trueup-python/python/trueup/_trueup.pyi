@@ -1,6 +1,6 @@
 """The native part."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, final
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy.typing as npt
 __all__ = [
     "Alignment",
     "Panorama",
+    "Worker",
     "align",
     "batch",
     "command",
@@ -25,6 +26,7 @@ def align(
     keywords: dict[str, Any],
     all: bool,
     progress: Callable[[str, int, int], object] | None,
+    workers: Callable[[bytes, list[bytes]], Iterable[tuple[int, bytes]]] | None,
 ) -> list[Alignment]: ...
 def batch(
     wishes: dict[str, Any],
@@ -51,6 +53,7 @@ class Alignment:
         photographs: list[str | tuple[str, Any]] | None,
         keywords: dict[str, Any],
         progress: Callable[[str, int, int], object] | None,
+        workers: Callable[[bytes, list[bytes]], Iterable[tuple[int, bytes]]] | None,
     ) -> Panorama: ...
     def photograph_names(self) -> list[str]: ...
     def project_json(self) -> str: ...
@@ -69,3 +72,8 @@ class Panorama:
         progress: Callable[[str, int, int], object] | None,
     ) -> int: ...
     def summary(self, verbose: bool) -> str: ...
+
+@final
+class Worker:
+    def __new__(cls, common: bytes, threads: int) -> Worker: ...
+    def run(self, task: bytes) -> bytes: ...

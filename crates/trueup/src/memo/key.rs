@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use trueup_core::raster::Photograph;
 
 /// Name and version of the program, and the number of its stages: results of other stages are never found.
-const PROGRAM: &str = concat!("trueup ", env!("CARGO_PKG_VERSION"), " ", env!("TRUEUP_STAGES"));
+pub(crate) const PROGRAM: &str = concat!("trueup ", env!("CARGO_PKG_VERSION"), " ", env!("TRUEUP_STAGES"));
 
 /// The hash of everything that decides a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

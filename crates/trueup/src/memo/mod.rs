@@ -20,7 +20,7 @@ use trueup_core::diagnostics::Reported;
 use trueup_core::{Result, StageContext};
 
 pub use folder::{CacheUse, PhotographCache};
-pub(crate) use key::{Key, KeyMaker};
+pub(crate) use key::{Key, KeyMaker, PROGRAM};
 pub(crate) use kind::{GEOMETRY, Kind, LIKENESS, MEASURED, OVERLAPS, PAIR};
 pub(crate) use memory::MemoryStore;
 
@@ -65,11 +65,33 @@ impl Memo<'_> {
         work: fn(&I, &O, &StageContext) -> Result<T>,
         context: &StageContext,
     ) -> Result<Reported<T>> {
-        if let Some(mut known) = self.load::<Reported<T>>(kind, key) {
-            // Times are those of this run.
-            known.seconds.clear();
-            return Ok(known);
+        match self.recall(kind, key) {
+            Some(known) => Ok(known),
+            None => self.make(kind, key, input, options, work, context),
         }
+    }
+
+    /// The result that the disk holds under `key`, with its findings, as [`Self::run`] keeps it.
+    pub(crate) fn recall<T: DeserializeOwned>(&self, kind: Kind, key: Option<&Key>) -> Option<Reported<T>> {
+        let mut known = self.load::<Reported<T>>(kind, key)?;
+        // Times are those of this run.
+        known.seconds.clear();
+        Some(known)
+    }
+
+    /// [`Self::run`] without looking for what is known already.
+    ///
+    /// # Errors
+    /// Those of `work`.
+    pub(crate) fn make<I: ?Sized, O: ?Sized, T: Serialize>(
+        &self,
+        kind: Kind,
+        key: Option<&Key>,
+        input: &I,
+        options: &O,
+        work: fn(&I, &O, &StageContext) -> Result<T>,
+        context: &StageContext,
+    ) -> Result<Reported<T>> {
         let made = context.gather(|context| work(input, options, context))?;
         self.store(kind, key, &made);
         Ok(made)

@@ -117,7 +117,7 @@ impl Budget {
             bytes.saturating_sub(taken.saturating_add(surplus.saturating_mul(decoders)))
         };
         let memory = left(self.memory, rayon::current_num_threads());
-        Resources { memory, ceiling: left(self.ceiling, 1), scratch }
+        Resources { memory, ceiling: left(self.ceiling, 1), scratch, helpers: None }
     }
 }
 

@@ -13,6 +13,7 @@ use trueup_vision::pairing::{Likeness, Proposals, likeness};
 
 use crate::memo::{Key, KeyMaker, LIKENESS, Memo, PAIR};
 use crate::options::MatchOptions;
+use crate::workers::Division;
 
 /// What the phase works on. Photographs are counted 0..N; `features`, `frames`, `usable` and `keys` have N entries.
 #[derive(Debug)]
@@ -27,6 +28,8 @@ pub(crate) struct MatchInput<'a> {
     pub keys: &'a [Option<Key>],
     /// Where pairs that earlier runs matched are found.
     pub memo: Memo<'a>,
+    /// Who matches pairs elsewhere.
+    pub workers: Option<Division<'a>>,
 }
 
 /// What the phase makes of them.
@@ -111,9 +114,15 @@ fn match_candidates(
     let mut matched: BTreeMap<(usize, usize), PairMatches> = candidates.iter().filter_map(recall).collect();
     let missing: Vec<(usize, usize)> =
         candidates.iter().copied().filter(|pair| !matched.contains_key(&ordered(pair))).collect();
-    let unmatched =
-        matching::MatchingInput { features: input.features, frames: input.frames, pairs: &missing, forced: &forced };
-    for pair in matching::run(&unmatched, &options.matching, context)? {
+    let (features, frames) = (input.features, input.frames);
+    let found = match input.workers {
+        Some(workers) => workers.matched(features, frames, &missing, &forced, context)?,
+        None => {
+            let unmatched = matching::MatchingInput { features, frames, pairs: &missing, forced: &forced };
+            matching::run(&unmatched, &options.matching, context)?
+        }
+    };
+    for pair in found {
         // Numbers of photographs belong to this run.
         input.memo.store(PAIR, key(pair.a, pair.b).as_ref(), &PairMatches { a: 0, b: 1, ..pair.clone() });
         matched.insert((pair.a, pair.b), pair);

@@ -17,6 +17,7 @@ use super::photographs::PhotographSet;
 use crate::job::masks::{blacken, lines_outside, outside};
 use crate::memo::{Key, MEASURED, Memo};
 use crate::options::MeasureOptions;
+use crate::workers::Division;
 
 const STAGE: &str = "measuring";
 
@@ -35,6 +36,8 @@ pub(crate) struct MeasureInput<'a> {
     pub memo: Memo<'a>,
     /// Whether the gray values are handed on, for a mesh that is refined by pixels.
     pub keep_grays: bool,
+    /// Who measures photographs elsewhere.
+    pub workers: Option<Division<'a>>,
 }
 
 /// What the phase makes of the photographs, in their order.
@@ -69,7 +72,7 @@ pub(crate) fn run(
     context: &StageContext,
 ) -> Result<Reported<Measurements>> {
     context.gather(|context| {
-        let MeasureInput { set, memo, keep_grays } = input;
+        let MeasureInput { set, memo, keep_grays, workers } = input;
         let contents = match memo.disk {
             Some(_) => context.time("source", || set.keys(context))?,
             None => vec![None; set.images.len()],
@@ -78,9 +81,22 @@ pub(crate) fn run(
         let count = set.images.len();
         context.progress().begin(STAGE, count as u64);
         let start = Instant::now();
-        let measured_one = |index: usize| {
+        let mut known: Vec<Option<Reported<Measured>>> =
+            keys.par_iter().map(|key| memo.recall(MEASURED, key.as_ref())).collect();
+        if let Some(workers) = workers {
+            let missing: Vec<usize> = (0..count).filter(|&index| known[index].is_none()).collect();
+            workers.measured(&set.files, &missing, *keep_grays, context, |index, measured| {
+                memo.store(MEASURED, keys[index].as_ref(), &measured);
+                known[index] = Some(measured);
+                context.progress().advance(STAGE, 1);
+            })?;
+        }
+        let measured_one = |(index, known): (usize, Option<Reported<Measured>>)| {
+            if let Some(known) = known {
+                return Ok(known);
+            }
             let one = OnePhotograph { files: &set.files, index, keep_grays: *keep_grays };
-            let measured = memo.run(MEASURED, keys[index].as_ref(), &one, options, measure, context);
+            let measured = memo.make(MEASURED, keys[index].as_ref(), &one, options, measure, context);
             context.progress().advance(STAGE, 1);
             measured
         };
@@ -88,7 +104,10 @@ pub(crate) fn run(
         // them.
         let mut measured: Vec<Result<Reported<Measured>>> = Vec::with_capacity(count);
         for group in groups(count, set.at_once) {
-            measured.par_extend(group.into_par_iter().map(measured_one));
+            let first = group.start;
+            let known: Vec<_> = known.drain(..group.len()).collect();
+            let numbered = known.into_par_iter().enumerate().map(|(index, known)| (first + index, known));
+            measured.par_extend(numbered.map(measured_one));
         }
         context.progress().finish(STAGE);
         context.check_cancelled()?;
@@ -108,6 +127,33 @@ pub(crate) fn run(
             .collect();
         Ok(Measurements { photographs, keys })
     })
+}
+
+/// What some photographs of a set are measured as, in their order, for somebody else; `None` for those that are in trouble, which is
+/// found out again, and told, by who asked.
+///
+/// # Errors
+/// [`Error::Cancelled`]; [`Error::Options`].
+pub(crate) fn of_some(
+    input: &MeasureInput,
+    photographs: &[usize],
+    options: &MeasureOptions,
+    context: &StageContext,
+) -> Result<Vec<Option<Reported<Measured>>>> {
+    let MeasureInput { set, keep_grays, .. } = *input;
+    let measured_one = |&index: &usize| {
+        let one = OnePhotograph { files: &set.files, index, keep_grays };
+        match context.gather(|context| measure(&one, options, context)) {
+            Ok(measured) => Ok(Some(measured)),
+            Err(error) if concerns_one_photograph(&error) => Ok(None),
+            Err(error) => Err(error),
+        }
+    };
+    let mut measured = Vec::with_capacity(photographs.len());
+    for group in photographs.chunks(set.at_once.max(1)) {
+        measured.extend(group.par_iter().map(measured_one).collect::<Result<Vec<_>>>()?);
+    }
+    Ok(measured)
 }
 
 fn measure(one: &OnePhotograph, options: &MeasureOptions, context: &StageContext) -> Result<Measured> {

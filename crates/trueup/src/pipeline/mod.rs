@@ -27,9 +27,11 @@ use trueup_compose::crop::{Crop, Rectangle};
 use trueup_compose::exposure::Corrections;
 use trueup_compose::fidelity::{self, Fidelity};
 use trueup_compose::layout::CanvasLayout;
-use trueup_compose::render::{self, Rendered};
+use trueup_compose::render::{self, RenderHelpers, Rendered, Resources};
+use trueup_core::scratch::ScratchSpace;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::color::PhotographColors;
+use trueup_io::decode::FilePhotographs;
 use trueup_io::encode::Metadata;
 
 use self::align::component::camera_groups;
@@ -49,9 +51,11 @@ use crate::project::provenance;
 use crate::project::read::Recorded;
 use crate::project::record::{Canvas, CropRecord, Project};
 use crate::report::{judgement, measuring, sideways};
+use crate::workers::{Division, Workers};
 
 pub(crate) use budget::memory_of_each;
 pub use results::{Aligned, Alignment, MatchedPhotographs};
+pub(crate) use scratch::folder as scratch_folder;
 
 /// Runs the phases with one set of options.
 ///
@@ -73,13 +77,15 @@ pub struct Stitcher<'a> {
     context: StageContext<'a>,
     cache: Option<&'a PhotographCache>,
     output: Option<&'a Path>,
+    workers: Option<Division<'a>>,
 }
 
 impl<'a> Stitcher<'a> {
     /// A stitcher with these options, whose progress goes where that of `context` goes and which stops with it. Parallel work
     /// runs on the current thread pool.
     pub fn new(options: &'a StitchOptions, context: &StageContext<'a>) -> Self {
-        Self { options, context: context.seeded(options.matching.random.seed), cache: None, output: None }
+        let context = context.seeded(options.matching.random.seed);
+        Self { options, context, cache: None, output: None, workers: None }
     }
 
     /// The same stitcher, which finds results of earlier runs in `cache` and keeps its own there. They decide how long the
@@ -87,6 +93,13 @@ impl<'a> Stitcher<'a> {
     #[must_use]
     pub fn with_cache(self, cache: Option<&'a PhotographCache>) -> Self {
         Self { cache, ..self }
+    }
+
+    /// The same stitcher, which has `workers` measure and match photographs, make them small and finish the canvas, as far as the
+    /// photographs are files without masks; and of blends those along seams. The panorama is the same.
+    #[must_use]
+    pub fn with_workers(self, workers: Option<&'a dyn Workers>) -> Self {
+        Self { workers: workers.map(|workers| Division::new(workers, self.options)), ..self }
     }
 
     /// The same stitcher for panoramas that will be written to `output`: scratch files go into the same folder, unless
@@ -97,8 +110,8 @@ impl<'a> Stitcher<'a> {
     where
         'a: 'b,
     {
-        let Self { options, cache, .. } = *self;
-        Stitcher { options, context: self.context.seeded(self.context.seed()), cache, output: Some(output) }
+        let Self { options, cache, workers, .. } = *self;
+        Stitcher { options, context: self.context.seeded(self.context.seed()), cache, output: Some(output), workers }
     }
 
     /// The options of all phases.
@@ -128,7 +141,7 @@ impl<'a> Stitcher<'a> {
             let set = PhotographSet::find(inputs, self.options, context)?;
             let graph_file = inputs.graph_file(&set.names())?;
             let keep_grays = align::needs_pixels(&self.options.align);
-            let input = MeasureInput { set: &set, memo, keep_grays };
+            let input = MeasureInput { set: &set, memo, keep_grays, workers: self.workers };
             let measurements = context.absorb(measure::run(&input, &self.options.measure, context)?);
             let mut matched = Matched::unmatched(set, measurements, graph_file)?;
             let looked_at = matched.take_features();
@@ -139,6 +152,7 @@ impl<'a> Stitcher<'a> {
                 wished: &matched.graph_file.edges,
                 keys: &matched.keys,
                 memo,
+                workers: self.workers,
             };
             let matches = context.absorb(matching::run(&input, &self.options.matching, context)?);
             matched.pairs = matches.pairs;
@@ -327,7 +341,9 @@ impl<'a> Stitcher<'a> {
     /// read, if the canvas is too large for the memory or the disk; [`Error::Cancelled`].
     pub fn compose(&self, alignment: &mut Alignment) -> Result<Rendered> {
         let scratch = scratch::folder(&alignment.layout, self.options, self.output)?;
-        let budget = Budget::new(&self.options.run.resources);
+        let divided = self
+            .workers
+            .and_then(|workers| workers.rendering(&alignment.photographs, &alignment.layout, &alignment.corrections));
         let mut canvas = self.options.arrange.canvas.clone();
         let turn = alignment.layout.period;
         let is_sphere =
@@ -338,7 +354,10 @@ impl<'a> Stitcher<'a> {
         }
         let input = ComposeInput {
             render: alignment.render_input(),
-            resources: budget.composing(&alignment.photographs, &scratch),
+            resources: Resources {
+                helpers: divided.as_ref().map(|divided| divided as &dyn RenderHelpers),
+                ..composing_resources(self.options, &alignment.photographs, &scratch)
+            },
             canvas: &canvas,
             kept: alignment.kept.clone(),
         };
@@ -389,6 +408,15 @@ impl<'a> Stitcher<'a> {
             cache.report(context);
         }
     }
+}
+
+/// What composing these photographs may take of this machine.
+pub(crate) fn composing_resources<'a>(
+    options: &StitchOptions,
+    photographs: &FilePhotographs,
+    scratch: &'a dyn ScratchSpace,
+) -> Resources<'a> {
+    Budget::new(&options.run.resources).composing(photographs, scratch)
 }
 
 /// The part of a canvas that a project records.

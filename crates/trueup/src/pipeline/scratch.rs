@@ -13,7 +13,7 @@ use crate::options::StitchOptions;
 ///
 /// # Errors
 /// [`trueup_core::Error::Limits`] if there is no room for the panorama.
-pub(super) fn folder(layout: &CanvasLayout, options: &StitchOptions, output: Option<&Path>) -> Result<ScratchFolder> {
+pub(crate) fn folder(layout: &CanvasLayout, options: &StitchOptions, output: Option<&Path>) -> Result<ScratchFolder> {
     let named = Some(&options.run.resources.scratch).filter(|named| !named.is_empty()).map(PathBuf::from);
     let Some(output) = output.filter(|output| !encode::passes_through(output)) else {
         return Ok(ScratchFolder::new(named.unwrap_or_else(std::env::temp_dir)));

@@ -1,0 +1,198 @@
+//! How a stitcher divides measuring and matching.
+
+use std::collections::BTreeSet;
+use std::fmt;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use trueup_compose::exposure::Corrections;
+use trueup_compose::layout::CanvasLayout;
+use trueup_core::diagnostics::Reported;
+use trueup_core::mask::Masks;
+use trueup_core::matches::PairMatches;
+use trueup_core::options::StageOptions;
+use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
+use trueup_core::{Result, StageContext};
+use trueup_io::decode::FilePhotographs;
+use trueup_vision::features::Features;
+use trueup_vision::matching::MatchingOptions;
+
+use super::Workers;
+use super::rendering::DividedRendering;
+use super::tasks::{
+    Common, FeaturesOfOne, Kind, MatchResult, MatchTask, MeasureResult, MeasureTask, Placement, damaged, read, written,
+};
+use crate::options::StitchOptions;
+use crate::pipeline::measured::Measured;
+
+/// Photographs that a task measures or makes small. One of 12 million pixels takes a thread about half a second: the task lasts long
+/// enough that handing it over is nothing beside it, and little is lost with a worker that is killed.
+pub(super) const PHOTOGRAPHS_PER_TASK: usize = 8;
+
+/// Pairs that a task matches. One takes a thread a few hundredths of a second; neighboring pairs have photographs in common, which are
+/// handed over once for all of them.
+const PAIRS_PER_TASK: usize = 64;
+
+/// Bytes of tasks that are held at once: enough for hundreds of workers, and a small part of the memory of who hands them out.
+pub(super) const BYTES_HELD: usize = 256_000_000;
+
+/// The workers of a stitcher, with its options.
+#[derive(Clone, Copy)]
+pub(crate) struct Division<'a> {
+    workers: &'a dyn Workers,
+    options: &'a StitchOptions,
+}
+
+impl fmt::Debug for Division<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("Division").finish_non_exhaustive()
+    }
+}
+
+impl<'a> Division<'a> {
+    pub(crate) fn new(workers: &'a dyn Workers, options: &'a StitchOptions) -> Self {
+        Self { workers, options }
+    }
+
+    /// What workers measure of `photographs`, with their numbers; those of which they find nothing are left out, as are those that
+    /// only this program holds.
+    ///
+    /// # Errors
+    /// Those of the workers; [`trueup_core::Error::Cancelled`].
+    pub(crate) fn measured(
+        &self,
+        files: &FilePhotographs,
+        photographs: &[usize],
+        keep_grays: bool,
+        context: &StageContext,
+        mut take: impl FnMut(usize, Reported<Measured>),
+    ) -> Result<()> {
+        let Some(images) = elsewhere(files) else { return Ok(()) };
+        let common = Common::new(self.options, images, Kind::Measure { keep_grays });
+        let tasks: Vec<MeasureTask> = photographs.chunks(PHOTOGRAPHS_PER_TASK).map(<[usize]>::to_vec).collect();
+        run(
+            self.workers,
+            &common,
+            tasks.len(),
+            |number| Ok(tasks[number].clone()),
+            |number, result: MeasureResult| {
+                context.check_cancelled()?;
+                if result.len() != tasks[number].len() {
+                    return Err(damaged("photographs are missing"));
+                }
+                for (&photograph, measured) in tasks[number].iter().zip(result) {
+                    measured.into_iter().for_each(|measured| take(photograph, measured));
+                }
+                Ok(())
+            },
+        )
+    }
+
+    /// What workers find of `pairs`, in their order, the smaller number first.
+    ///
+    /// # Errors
+    /// Those of the workers; [`trueup_core::Error::Cancelled`].
+    pub(crate) fn matched(
+        &self,
+        features: &[Features],
+        frames: &[WorkingFrame],
+        pairs: &[(usize, usize)],
+        forced: &BTreeSet<(usize, usize)>,
+        context: &StageContext,
+    ) -> Result<Vec<PairMatches>> {
+        const STAGE: &str = MatchingOptions::STAGE;
+        context.progress().begin(STAGE, pairs.len() as u64);
+        let common = Common::new(self.options, Vec::new(), Kind::Match);
+        let ordered: Vec<(usize, usize)> = pairs.iter().map(|&(a, b)| (a.min(b), a.max(b))).collect();
+        let tasks: Vec<&[(usize, usize)]> = ordered.chunks(PAIRS_PER_TASK).collect();
+        let photographs_of = |number: usize| -> Vec<usize> {
+            let both: BTreeSet<usize> = tasks[number].iter().flat_map(|&(a, b)| [a, b]).collect();
+            both.into_iter().collect()
+        };
+        let task = |number: usize| {
+            let photographs = photographs_of(number);
+            // Ascending: which of a pair comes first is the same as here.
+            let place = |photograph: usize| photographs.partition_point(|&other| other < photograph);
+            let pair = |&(a, b): &(usize, usize)| (place(a), place(b), forced.contains(&(a, b)));
+            Ok(MatchTask {
+                pairs: tasks[number].iter().map(pair).collect(),
+                photographs: photographs.iter().map(|&one| FeaturesOfOne::new(&features[one], frames[one])).collect(),
+            })
+        };
+        let mut found: Vec<MatchResult> = tasks.iter().map(|_| Vec::new()).collect();
+        run(self.workers, &common, tasks.len(), task, |number, result: MatchResult| {
+            context.check_cancelled()?;
+            let photographs = photographs_of(number);
+            let named = |pair: PairMatches| {
+                Some(PairMatches { a: *photographs.get(pair.a)?, b: *photographs.get(pair.b)?, ..pair })
+            };
+            let result: Option<MatchResult> = result.into_iter().map(named).collect();
+            let is_asked_for =
+                |result: &MatchResult| result.iter().map(|pair| (pair.a, pair.b)).eq(tasks[number].iter().copied());
+            found[number] = result.filter(is_asked_for).ok_or_else(|| damaged("other pairs"))?;
+            context.progress().advance(STAGE, tasks[number].len() as u64);
+            Ok(())
+        })?;
+        context.progress().finish(STAGE);
+        Ok(found.concat())
+    }
+
+    /// Who renders photographs that lie on `layout` in this light; `None` if only this program holds the photographs.
+    pub(crate) fn rendering(
+        &self,
+        files: &FilePhotographs,
+        layout: &CanvasLayout,
+        corrections: &Corrections,
+    ) -> Option<DividedRendering<'a>> {
+        let panorama = Placement { layout: layout.clone(), corrections: corrections.clone() };
+        Some(DividedRendering::new(self.workers, self.options, elsewhere(files)?, panorama))
+    }
+}
+
+/// The photographs as other programs find them; `None` if they cannot: pixels in memory, and marked parts, are only here.
+fn elsewhere(files: &FilePhotographs) -> Option<Vec<SourceImage>> {
+    let is_only_here = |number: usize| {
+        let Masks { ignored, kept } = files.masks(number);
+        files.in_memory(number).is_some() || ignored.is_some() || kept.is_some()
+    };
+    let image = |(number, image): (usize, &SourceImage)| {
+        let path = std::path::absolute(&image.path).ok().filter(|_| !is_only_here(number))?;
+        Some(SourceImage { path, ..image.clone() })
+    };
+    files.sources().iter().enumerate().map(image).collect()
+}
+
+/// Has `count` tasks done, as many held at a time as [`BYTES_HELD`] allow, and hands what each gave to `take`.
+pub(super) fn run<T: Serialize, R: DeserializeOwned>(
+    workers: &dyn Workers,
+    common: &Common,
+    count: usize,
+    task: impl Fn(usize) -> Result<T>,
+    mut take: impl FnMut(usize, R) -> Result<()>,
+) -> Result<()> {
+    if count == 0 {
+        return Ok(());
+    }
+    let common = written(common)?;
+    let mut first = 0;
+    while first < count {
+        let (mut tasks, mut bytes) = (Vec::new(), 0);
+        while first + tasks.len() < count && (tasks.is_empty() || bytes < BYTES_HELD) {
+            tasks.push(written(&task(first + tasks.len())?)?);
+            bytes += tasks.last().map_or(0, Vec::len);
+        }
+        let mut done = vec![false; tasks.len()];
+        workers.run(&common, tasks, &mut |number, result| {
+            match done.get_mut(number) {
+                Some(done) if !*done => *done = true,
+                _ => return Err(damaged("a task that was done already")),
+            }
+            take(first + number, read(&result)?)
+        })?;
+        if !done.iter().all(|&done| done) {
+            return Err(damaged("tasks that were not done"));
+        }
+        first += done.len();
+    }
+    Ok(())
+}
