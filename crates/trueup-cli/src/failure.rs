@@ -6,7 +6,7 @@ use trueup::{Error, InvalidOption};
 use trueup_terminal::status_of_stopping;
 
 /// The input or the system failed.
-const STATUS_FAILURE: u8 = 1;
+pub(crate) const STATUS_FAILURE: u8 = 1;
 /// Wrong usage: arguments or options that cannot be.
 const STATUS_USAGE: u8 = 2;
 /// A panorama was written, and is not as good as was asked for.

@@ -33,6 +33,7 @@ use arguments::{CommandLine, Task};
 
 pub use arguments::{OPTION_FLAGS, OptionFlag};
 pub use batch::{batch_lines, batch_plan, run_batch};
+pub use stopping::end_without_memory;
 
 /// Runs the command with these arguments, of which the first is its own name, and returns its exit status. To be called once
 /// in a program: it catches Ctrl-C.

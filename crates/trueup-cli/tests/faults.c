@@ -1,16 +1,18 @@
 /* Makes one call of a program fail: loaded into it by tests/faults.rs, before all else.
  *
- * TRUEUP_FAULT_KIND says which calls are counted: "files", those that make, write, keep and rename regular files, or "memory", those
- * for a megabyte of memory or more. TRUEUP_FAULT is the number of the one that fails, from 1 on; TRUEUP_FAULT_COUNT names a file that
- * gets a letter for each.
+ * TRUEUP_FAULT_KIND says which calls are counted: "files", those that make, write, keep and rename regular files; "kill", the same,
+ * but the program is killed instead; "memory", those for a megabyte of memory or more; "threads", those that start one. TRUEUP_FAULT is
+ * the number of the one that fails, from 1 on; TRUEUP_FAULT_COUNT names a file that gets a letter for each.
  *
  * The kernel hands calls for files back (seccomp, SIGSYS), and they are made here: some libraries do not ask the C library. */
 #define _GNU_SOURCE
+#include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/audit.h>
 #include <linux/filter.h>
 #include <linux/seccomp.h>
+#include <pthread.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <stddef.h>
@@ -27,7 +29,7 @@
 
 static atomic_long calls;
 static long wanted;
-static int counted = -1, is_memory;
+static int counted = -1, is_memory, is_threads, is_kill;
 
 /* A call that the filter lets through, known by where it is made. */
 __asm__(".text\n"
@@ -91,6 +93,7 @@ static void handed_back(int signal, siginfo_t *info, void *context) {
     int reason, before = errno;
     char what = letter(info->si_syscall, arguments, &reason);
     if (what && is_wanted(what)) {
+        if (is_kill) passed(SYS_kill, getpid(), SIGKILL, 0, 0, 0, 0);
         registers[REG_RAX] = -reason;
     } else {
         registers[REG_RAX] = passed(info->si_syscall, arguments[0], arguments[1], arguments[2], arguments[3], arguments[4],
@@ -131,13 +134,21 @@ int posix_memalign(void **place, size_t alignment, size_t bytes) {
     return *place ? 0 : ENOMEM;
 }
 
+int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*work)(void *), void *argument) {
+    int (*next)(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *) = dlsym(RTLD_NEXT, "pthread_create");
+    if (is_threads && is_wanted('t')) return EAGAIN;
+    return next(thread, attributes, work, argument);
+}
+
 __attribute__((constructor)) static void begin(void) {
     const char *kind = getenv("TRUEUP_FAULT_KIND"), *number = getenv("TRUEUP_FAULT"), *count = getenv("TRUEUP_FAULT_COUNT");
     if (!kind) return;
     wanted = number ? atol(number) : 0;
     if (count) counted = open(count, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0600);
     is_memory = !strcmp(kind, "memory");
-    if (is_memory) return;
+    is_threads = !strcmp(kind, "threads");
+    is_kill = !strcmp(kind, "kill");
+    if (is_memory || is_threads) return;
     const int many = sizeof FILES / sizeof *FILES;
     struct sigaction action = {.sa_sigaction = handed_back, .sa_flags = SA_SIGINFO | SA_NODEFER | SA_RESTART};
     uint64_t place = (uint64_t)passed_end;

@@ -1,5 +1,5 @@
-//! Faults on purpose: every call that makes, writes or renames a file fails once, memory is refused, and the command is killed at any
-//! moment. What was there before is there or replaced as a whole, and nothing is left behind.
+//! Faults on purpose: every call that makes, writes or renames a file fails once, memory and threads are refused, and the command is
+//! killed at any moment. What was there before is there or replaced as a whole, and nothing is left behind.
 //!
 //! A library that is loaded before the command has the kernel hand back the calls (`faults.c`). Of many calls some are tried here,
 //! spread over all; with `TRUEUP_FAULTS=1000` as many of each command.
@@ -249,27 +249,122 @@ fn a_batch_bears_every_failure_of_a_file() {
     check_files_fail(&BATCH, &[0, 3]);
 }
 
-/// A megabyte or more of memory is refused once: unless a library bears it, the command ends at once, by an error or as Rust's programs
-/// end without memory. Files are as they were or whole; what was not complete stays under its own name until the next run.
+/// What becomes of runs in which one call is refused each: how many ended by an error, and how many did without.
+#[derive(Default)]
+struct Tally {
+    points: usize,
+    runs: usize,
+    failed: usize,
+    borne: usize,
+}
+
+/// Refuses calls of a kind that has nothing to do with files, each in a run of its own. A run ends by an error with status 1, or with one
+/// of `bears` if it does without; nothing is lost, half or left behind, but what a batch tells of work that did not come to an end.
+#[track_caller]
+fn check_refusals(trial: &Trial, kind: &str, bears: &[i32]) {
+    let (letters, whole) = trial.whole(kind);
+    let mut tally = Tally { points: letters.len(), ..Tally::default() };
+    for fault in (1..=letters.len()).step_by(letters.len().div_ceil(tried()).max(1)) {
+        let desk = trial.desk();
+        let before = files(&desk);
+        let ended = run(&desk, trial.arguments, kind, fault, None);
+        let said = format!("{kind} {fault} of {}: {} {}", letters.len(), ended.status, ended.stderr);
+        let is_named = ended.status == 1 && ended.stderr.contains("trueup: error: ");
+        assert!(is_named || bears.contains(&ended.status), "{said}");
+        tally.runs += 1;
+        *if is_named { &mut tally.failed } else { &mut tally.borne } += 1;
+        let mut after = files(&desk);
+        after.retain(|name, _| !name.ends_with("/at-work"));
+        if ended.status != 1 {
+            // A photograph that could not be decoded is left out, which the record says; the panorama is that of the other then.
+            after.retain(|_, bytes| !is_picture(bytes));
+            let lost = before.keys().find(|name| !desk.join(name).exists());
+            assert_eq!(lost, None, "{said}");
+        }
+        let kept = before.iter().filter(|(name, _)| after.contains_key(*name) || ended.status == 1);
+        let kept = kept.map(|(name, bytes)| (name.clone(), bytes.clone())).collect();
+        check_files(&kept, &after, &whole, &said);
+    }
+    let Tally { points, runs, failed, borne } = tally;
+    println!("{} {kind}: {points} points, {runs} runs, {failed} ended by an error, {borne} borne", trial.arguments[0]);
+}
+
+/// Whether these are all bytes of a JPEG or a PNG.
+fn is_picture(bytes: &[u8]) -> bool {
+    let is_jpeg = bytes.starts_with(b"\xff\xd8") && bytes.ends_with(b"\xff\xd9");
+    is_jpeg || image::load_from_memory(bytes).is_ok()
+}
+
+/// A megabyte or more of memory is refused once: the command ends by an error, wherever that was, unless a library does without.
 #[test]
-fn memory_that_is_refused_costs_no_file() {
-    for trial in [STITCH, COMPOSE] {
-        let (letters, whole) = trial.whole("memory");
+fn a_stitch_that_is_refused_memory_ends_by_an_error() {
+    check_refusals(&STITCH, "memory", &[0]);
+}
+
+#[test]
+fn composing_that_is_refused_memory_ends_by_an_error() {
+    check_refusals(&COMPOSE, "memory", &[0]);
+}
+
+#[test]
+fn a_comparison_that_is_refused_memory_ends_by_an_error() {
+    check_refusals(&COMPARE, "memory", &[0]);
+}
+
+#[test]
+fn a_batch_that_is_refused_memory_ends_by_an_error() {
+    check_refusals(&BATCH, "memory", &[0, 3]);
+}
+
+/// A thread does not start: the command ends by an error, or does with fewer.
+#[test]
+fn threads_that_do_not_start_cost_no_file() {
+    for (trial, bears) in [(&STITCH, &[0][..]), (&COMPOSE, &[0]), (&COMPARE, &[0]), (&BATCH, &[0, 3])] {
+        check_refusals(trial, "threads", bears);
+    }
+}
+
+/// Killed at a call for a file: each file is the old or the new one, and the next run comes to the same with nothing left behind.
+#[test]
+fn what_is_killed_at_a_call_for_a_file_is_made_again_as_it_would_have_been() {
+    for trial in [&STITCH, &TILES] {
+        let (letters, whole) = trial.whole("files");
+        let mut runs = 0;
         for fault in (1..=letters.len()).step_by(letters.len().div_ceil(tried()).max(1)) {
             let desk = trial.desk();
             let before = files(&desk);
-            let ended = command(&desk, trial.arguments, "memory", fault).output().expect("the command starts");
-            let said = String::from_utf8_lossy(&ended.stderr).into_owned();
-            let is_told = ["trueup: error: ", "trueup: warning: ", "memory allocation of "];
-            let is_told = is_told.iter().any(|words| said.contains(words));
-            assert!(is_told || (ended.status.success() && said.is_empty()), "call {fault}: {said}");
-            let mut after = files(&desk);
-            after.retain(|name, _| !name.ends_with(".part"));
-            // A photograph that could not be decoded is left out, with a warning; the panorama is that of the other then.
-            if !said.contains("left out") {
-                check_files(&before, &after, &whole, &format!("call {fault} of {}: {said}", letters.len()));
-            }
+            // What a program that is killed leaves in the system's folder for temporary files is the system's to clear away.
+            let temporary = Desk::new();
+            let mut killed = command(&desk, trial.arguments, "kill", fault);
+            let killed = killed.env("TMPDIR", temporary.path()).stderr(Stdio::null()).status().expect("it ends");
+            let said = format!("{} killed at call {fault} of {}", trial.arguments[0], letters.len());
+            assert_eq!(killed.code(), None, "{said}");
+            let mut left = files(&desk);
+            left.retain(|name, _| !name.contains(PART) && !name.ends_with("/at-work"));
+            check_files(&before, &left, &whole, &said);
+            age_parts(&desk);
+            let again = run(&desk, trial.arguments, "files", 0, None);
+            assert_eq!(again.status, 0, "{said}: {}", again.stderr);
+            let made = files(&desk);
+            assert!(made.keys().eq(whole.keys()), "{said}: {:?}", made.keys());
+            check_files(&before, &made, &whole, &said);
+            runs += 1;
         }
+        println!("{}: {} points, {runs} kills", trial.arguments[0], letters.len());
+    }
+}
+
+/// How temporary names end.
+const PART: &str = ".part";
+
+/// As if a minute had passed: younger ones may be of a program that has not marked them yet.
+fn age_parts(desk: &Desk) {
+    let files = files(desk);
+    let parts = files.keys().filter_map(|name| Some(&name[..name.find(PART)? + PART.len()]));
+    for path in parts.map(|name| desk.join(name)) {
+        // Folders are opened for reading only.
+        let part = std::fs::File::options().read(true).write(!path.is_dir()).open(&path).expect("it can be opened");
+        part.set_modified(SystemTime::now() - Duration::from_secs(120)).expect("its time can be set");
     }
 }
 
@@ -303,16 +398,12 @@ fn what_is_killed_leaves_no_half_file_and_goes_on_to_the_same_bytes() {
 
 #[track_caller]
 fn check_goes_on(desk: &Desk, wanted: &[u8]) {
-    for name in files(desk).keys().filter(|name| name.ends_with(".part")) {
-        // As if a minute had passed: younger ones may be of a program that has not marked them yet.
-        let part = std::fs::File::options().write(true).open(desk.join(name)).expect("writable");
-        part.set_modified(SystemTime::now() - Duration::from_secs(120)).expect("its time can be set");
-    }
+    age_parts(desk);
     let mut arguments = CACHE.arguments.to_vec();
     arguments.retain(|argument| *argument != "--quiet");
     let run = finish(trueup(desk.path(), &arguments));
     assert!(!run.expect_success().contains("damaged"), "{}", run.stdout);
     assert!(desk.read("pano.png") == wanted, "other bytes from what was kept");
-    let left: Vec<String> = desk.files().into_iter().filter(|name| name.ends_with(".part")).collect();
+    let left: Vec<String> = desk.files().into_iter().filter(|name| name.ends_with(PART)).collect();
     assert!(left.is_empty(), "{left:?}");
 }

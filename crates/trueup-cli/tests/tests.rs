@@ -26,6 +26,7 @@ mod report;
 mod run;
 #[cfg(unix)]
 mod serving;
+mod soak;
 mod sphere;
 #[cfg(unix)]
 mod stopping;

@@ -15,6 +15,8 @@ pub mod decode;
 pub mod encode;
 mod format;
 mod formats;
+#[doc(hidden)]
+pub mod fuzzing;
 mod metadata;
 pub mod provenance;
 pub mod scratch;

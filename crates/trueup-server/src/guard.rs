@@ -88,6 +88,12 @@ impl Guard {
         }
     }
 
+    /// What a browser that was let in sends along, as lines of a request's head.
+    pub(crate) fn credentials(&self) -> String {
+        let Self { address, cookie, session_text, .. } = self;
+        format!("Host: {address}\r\nOrigin: http://{address}\r\nCookie: {cookie}={session_text}\r\n")
+    }
+
     /// Whether a request names this server: another name for its address is that of a page elsewhere which had its own
     /// name point here. Addresses in numbers cannot be made to point anywhere.
     fn is_host(&self, headers: &HeaderMap) -> Option<String> {

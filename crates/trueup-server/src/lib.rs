@@ -12,6 +12,8 @@
 mod body;
 mod denial;
 mod folder;
+#[doc(hidden)]
+pub mod fuzzing;
 mod guard;
 mod keeping;
 mod layers;
@@ -33,7 +35,8 @@ use axum::Router;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
-use tokio::net::{TcpListener, TcpStream};
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 use trueup::{CancelToken, Error, Result};
 
@@ -149,7 +152,7 @@ async fn accept(listener: &TcpListener, router: Router, cancel: &CancelToken) {
 }
 
 /// Answers what comes over a connection.
-async fn answer(stream: TcpStream, router: Router) {
+pub(crate) async fn answer(stream: impl AsyncRead + AsyncWrite + Unpin + 'static, router: Router) {
     let mut server = http1::Builder::new();
     server.timer(TokioTimer::new()).header_read_timeout(HEAD_TIME);
     let served = server.serve_connection(TokioIo::new(stream), TowerToHyperService::new(router));

@@ -1,8 +1,8 @@
-//! What trueup's commands share at the terminal: how they are asked to stop. The first Ctrl-C asks the work to stop, the
-//! second ends the program; so do, on Unix, the requests to terminate and the end of the terminal.
-#![forbid(unsafe_code)]
+//! What trueup's commands share at the terminal: how they are asked to stop, and how they end where memory is refused. The first
+//! Ctrl-C asks the work to stop, the second ends the program; so do, on Unix, the requests to terminate and the end of the terminal.
 
 mod complaint;
+mod memory;
 mod request;
 #[cfg(unix)]
 mod signals;
@@ -14,6 +14,7 @@ use trueup_core::context::CancelToken;
 use request::StopRequest;
 
 pub use complaint::complain;
+pub use memory::{NotingAllocator, WithoutMemory, end_without_memory};
 pub use request::{LastResort, status_of_stopping};
 
 /// A token that the first request to stop cancels, to be asked for once in a program; `said` is then printed on standard

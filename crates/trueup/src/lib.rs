@@ -21,6 +21,8 @@
 #![forbid(unsafe_code)]
 
 mod batch;
+#[doc(hidden)]
+pub mod fuzzing;
 mod job;
 mod memo;
 mod options;
@@ -68,8 +70,8 @@ pub use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 pub use trueup_core::truth::{ImageTruth, Truth};
 pub use trueup_core::{Error, Result, StageContext};
 pub use trueup_io::encode::{
-    Depth, Metadata, OutputOptions, abandon_unfinished, check_place, same_place, write as write_picture,
-    write_atomically, written_extensions,
+    Depth, Metadata, OutputOptions, abandon_unfinished, abandon_unfinished_soon, check_place, same_place,
+    write as write_picture, write_atomically, written_extensions,
 };
 pub use trueup_io::source::{InMemory, names_photograph, read_extensions, readable_formats};
 pub use workers::{TakeResult, Worker, Workers};

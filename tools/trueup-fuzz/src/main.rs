@@ -2,9 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod mutation;
-mod png;
 mod run;
-mod targets;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -13,7 +11,7 @@ use std::time::Duration;
 use clap::Parser;
 
 use run::{Findings, Length, fuzz};
-use targets::TARGETS;
+use trueup_fuzz::TARGETS;
 
 /// Changes valid inputs at random and reads them. What panics is kept as a file and ends the command with status 1.
 ///
@@ -64,7 +62,7 @@ fn main() -> ExitCode {
         let corpus = arguments.corpus.as_ref().map(|folder| folder.join(target.name));
         match fuzz(target, arguments.seed, length, corpus.as_deref(), &arguments.findings) {
             Ok(Findings { executions, panics, slowest }) => {
-                println!("{:10} {executions:>9} executions, {panics} findings, slowest {slowest:.1?}", target.name);
+                println!("{:18} {executions:>9} executions, {panics} findings, slowest {slowest:.1?}", target.name);
                 found += panics;
             }
             Err(error) => {

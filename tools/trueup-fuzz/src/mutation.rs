@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use crate::png;
+use trueup_fuzz::mend_checksums;
 
 /// Changes of one input, at most.
 const MOST_CHANGES: usize = 6;
@@ -67,7 +67,7 @@ pub(crate) fn mutated(seeds: &[Vec<u8>], random: &mut ChaCha8Rng) -> Vec<u8> {
     input.truncate(MOST_BYTES);
     // Behind checksums that are wrong nothing is read.
     if random.random() {
-        png::mend_checksums(&mut input);
+        mend_checksums(&mut input);
     }
     input
 }

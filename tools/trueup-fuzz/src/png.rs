@@ -8,7 +8,7 @@ const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 ///
 /// # Source
 /// PNG, third edition, sections 5.2 to 5.5: length, type, data, and the checksum over type and data.
-pub(crate) fn mend_checksums(bytes: &mut [u8]) {
+pub fn mend_checksums(bytes: &mut [u8]) {
     if !bytes.starts_with(SIGNATURE) {
         return;
     }

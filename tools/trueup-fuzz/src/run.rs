@@ -10,8 +10,9 @@ use std::time::{Duration, Instant};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use trueup_fuzz::{Target, Work};
+
 use crate::mutation::mutated;
-use crate::targets::{Target, Work};
 
 /// How long a target is tried: until the first of the two is reached.
 #[derive(Debug, Clone, Copy)]
@@ -102,7 +103,7 @@ pub(crate) fn fuzz(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::targets::TARGETS;
+    use trueup_fuzz::TARGETS;
 
     fn executions(executions: u64) -> Length {
         Length { time: Duration::MAX, executions }

@@ -1,12 +1,13 @@
 //! A folder that appears complete or not at all.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 use trueup_core::{Error, Result};
 
 use super::pending::{allow_umask, require_folder, takes_nothing};
-use super::stale::{PART, PREFIX};
+use super::stale::{PART, PREFIX, mark_in_use};
 use super::unfinished::{UNFINISHED, UnfinishedEntry};
 
 /// Permissions that any new folder asks for.
@@ -19,6 +20,8 @@ pub struct PendingFolder {
     target: PathBuf,
     /// After the folder, which is gone before it leaves the list.
     entry: UnfinishedEntry<'static>,
+    /// Marks the folder as that of a living program, where folders can be opened.
+    _mark: Option<File>,
 }
 
 impl PendingFolder {
@@ -45,7 +48,9 @@ impl PendingFolder {
         allow_umask(&mut builder, NEW_FOLDER);
         let make = || builder.tempdir_in(parent).map_err(|error| takes_nothing(parent, &error));
         let (temporary, entry) = UNFINISHED.begin(make, TempDir::path)?;
-        Ok(Self { temporary, target, entry })
+        let mark = File::open(temporary.path()).ok();
+        mark.iter().for_each(mark_in_use);
+        Ok(Self { temporary, target, entry, _mark: mark })
     }
 
     /// Where files are to be written until the folder has its name.
@@ -59,7 +64,7 @@ impl PendingFolder {
     /// # Errors
     /// [`Error::Io`] if the operating system refuses.
     pub fn commit(self) -> Result<()> {
-        let Self { temporary, target, entry } = self;
+        let Self { temporary, target, entry, _mark } = self;
         let committed = UNFINISHED.complete(|| Self::replace(temporary, &target));
         drop(entry);
         committed

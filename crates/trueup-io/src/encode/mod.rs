@@ -51,7 +51,7 @@ pub use options::{
 pub use pending::check_place;
 pub use place::{is_standard_output, passes_through, same_place};
 pub use stale::clear_parts;
-pub use unfinished::abandon_unfinished;
+pub use unfinished::{abandon_unfinished, abandon_unfinished_soon};
 
 /// Writes a panorama to `path`, in the format its extension names; returns the file's length in bytes, for Deep Zoom that
 /// of all files.

@@ -22,14 +22,14 @@ pub fn clear_parts(folder: &Path) {
     clear_stale(folder, Duration::ZERO);
 }
 
-/// Takes away the temporary files in `folder` that no living program has marked, once nothing was written to them for
+/// Takes away the temporary files and folders in `folder` that no living program has marked, once nothing was written to them for
 /// `age`. What cannot be looked at or taken away stays.
 pub(super) fn clear_stale(folder: &Path, age: Duration) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
         let is_part = path.file_name().and_then(|name| name.to_str()).is_some_and(is_temporary);
         if is_part && is_stale(&path, age).unwrap_or(false) {
-            drop(std::fs::remove_file(&path));
+            drop(if path.is_dir() { std::fs::remove_dir_all(&path) } else { std::fs::remove_file(&path) });
         }
     }
 }
@@ -42,13 +42,34 @@ fn is_stale(path: &Path, age: Duration) -> std::io::Result<bool> {
     // Not followed: a link of that name is not of this program's making.
     let metadata = path.symlink_metadata()?;
     let is_old = metadata.modified()?.elapsed().is_ok_and(|elapsed| elapsed >= age);
-    Ok(metadata.is_file() && is_old && File::options().write(true).open(path)?.try_lock().is_ok())
+    let is_of_nobody = || {
+        // A folder, in which the tiles of a panorama were to be, is opened for nothing but its lock.
+        let opened = if metadata.is_dir() { File::open(path) } else { File::options().write(true).open(path) };
+        opened.is_ok_and(|opened| opened.try_lock().is_ok())
+    };
+    Ok((metadata.is_file() || metadata.is_dir()) && is_old && is_of_nobody())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::encode::folder::PendingFolder;
     use crate::encode::pending::PendingFile;
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn folders_of_killed_programs_go_and_those_in_use_stay() {
+        let desk = tempfile::tempdir().expect("a folder");
+        let gone = desk.path().join(".trueup-gone.part");
+        std::fs::create_dir_all(gone.join("0")).expect("a folder");
+        std::fs::write(gone.join("0/0_0.jpg"), "left").expect("written");
+        let pending = PendingFolder::create(&desk.path().join("pano_files")).expect("possible");
+        clear_stale(desk.path(), STALE_AGE);
+        assert!(gone.exists(), "too young to tell");
+        clear_stale(desk.path(), Duration::ZERO);
+        assert!(!gone.exists());
+        pending.commit().expect("it is still there");
+    }
 
     #[test]
     fn parts_of_killed_programs_go_and_those_in_use_stay() {

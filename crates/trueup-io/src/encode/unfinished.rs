@@ -1,7 +1,8 @@
 //! What is not complete yet, known to the whole program: so that one that must end at once leaves nothing half done.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::Duration;
 
 use trueup_core::{Error, Result};
 
@@ -13,6 +14,12 @@ pub(super) static UNFINISHED: Unfinished = Unfinished::new();
 /// program that is about to end without waiting for its work. What is complete stays.
 pub fn abandon_unfinished() {
     UNFINISHED.abandon();
+}
+
+/// The same for a program that cannot wait: what another thread is just beginning or completing is waited for no longer than a
+/// second. What it holds then stays under its temporary name, and the next program clears it away.
+pub fn abandon_unfinished_soon() {
+    UNFINISHED.abandon_soon();
 }
 
 /// Files and folders under their temporary names.
@@ -63,9 +70,25 @@ impl Unfinished {
     }
 
     fn abandon(&self) {
+        Self::abandon_all(&mut self.list());
+    }
+
+    fn abandon_soon(&self) {
+        /// Waits between looks, and how many: a second.
+        const WAIT: Duration = Duration::from_millis(10);
+        const LOOKS: usize = 100;
+        for _ in 0..LOOKS {
+            match self.0.try_lock() {
+                Ok(mut list) => return Self::abandon_all(&mut list),
+                Err(TryLockError::Poisoned(poisoned)) => return Self::abandon_all(&mut poisoned.into_inner()),
+                Err(TryLockError::WouldBlock) => std::thread::sleep(WAIT),
+            }
+        }
+    }
+
+    fn abandon_all(list: &mut List) {
         /// Threads at work may put files into a folder while it is emptied.
         const TRIES: usize = 10;
-        let mut list = self.list();
         list.abandoned = true;
         for path in list.paths.drain(..) {
             if path.is_dir() {
@@ -118,7 +141,11 @@ mod tests {
         let (folder, _folder) = begin("folder", true).expect("begun");
         std::fs::write(folder.join("inside"), "inside").expect("written");
         assert_eq!(unfinished.complete(|| Ok(7)).expect("not abandoned"), 7);
-        unfinished.abandon();
+        let held = unfinished.list();
+        unfinished.abandon_soon();
+        assert!(file.exists(), "who holds the list is waited for in vain");
+        drop(held);
+        unfinished.abandon_soon();
         assert!(done.exists() && !file.exists() && !folder.exists());
         assert!(matches!(begin("late", false), Err(Error::Cancelled)));
         assert!(matches!(unfinished.complete(|| Ok(())), Err(Error::Cancelled)));

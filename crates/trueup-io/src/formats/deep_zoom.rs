@@ -19,7 +19,7 @@ use super::png::{compression, failure};
 use crate::encode::failure::WriteFailure;
 use crate::encode::folder::PendingFolder;
 use crate::encode::options::{DeepZoomFormat, Depth, OutputOptions};
-use crate::encode::pending::PendingFile;
+use crate::encode::pending::{PendingFile, check_place};
 use crate::encode::pyramid::{TilePyramid, TileRow, Tiling, level_sizes};
 use crate::encode::samples::{OutputSample, RGBA, flattened};
 use crate::encode::strips::{STRIP_ROWS, channels_of, for_each_strip};
@@ -68,7 +68,7 @@ fn write(path: &Path, picture: &dyn RowSource, options: &OutputOptions, context:
 
 /// Checks that [`write`] could put its files in their places.
 fn check_places(path: &Path) -> Result<()> {
-    PendingFile::create(path)?;
+    check_place(path)?;
     let folder = tiles_folder(path);
     check_replaceable(&folder)?;
     PendingFolder::create(&folder).map(drop)

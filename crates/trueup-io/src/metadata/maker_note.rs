@@ -15,7 +15,7 @@ const ACCELERATION: Tag = Tag(Context::Tiff, 0x0008);
 ///
 /// # Source
 /// ExifTool, Apple tags, 0x0008 AccelerationVector: three signed rationals.
-pub(super) fn apple_acceleration(note: &[u8]) -> Option<[f64; 3]> {
+pub(crate) fn apple_acceleration(note: &[u8]) -> Option<[f64; 3]> {
     let directory = note.strip_prefix(APPLE)?;
     let exif = block::parsed([TIFF_HEADER, directory].concat())?;
     let Value::SRational(parts) = &exif.get_field(ACCELERATION, In::PRIMARY)?.value else { return None };

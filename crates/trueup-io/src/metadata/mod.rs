@@ -2,10 +2,10 @@
 
 pub(crate) mod block;
 pub(crate) mod exif_fields;
-mod focal;
-mod gravity;
+pub(crate) mod focal;
+pub(crate) mod gravity;
 pub(crate) mod header;
-mod maker_note;
+pub(crate) mod maker_note;
 pub(crate) mod orientation;
 pub(crate) mod pose;
 pub(crate) mod tiff_fields;

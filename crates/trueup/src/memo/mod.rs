@@ -20,6 +20,7 @@ use trueup_core::diagnostics::Reported;
 use trueup_core::{Result, StageContext};
 
 pub use folder::{CacheUse, PhotographCache};
+pub(crate) use folder::{checked_content, entry_with_content};
 pub(crate) use key::{Key, KeyMaker, PROGRAM};
 pub(crate) use kind::{GEOMETRY, Kind, LIKENESS, MEASURED, OVERLAPS, PAIR};
 pub(crate) use memory::MemoryStore;

@@ -1,22 +1,28 @@
 //! What is fuzzed: everything that reads what somebody else wrote.
 
+mod metadata;
 mod pictures;
+mod records;
+mod requests;
+mod structured;
 mod texts;
 mod work;
 
-pub(crate) use work::Work;
+pub use work::Work;
 
 /// Something that reads.
-pub(crate) struct Target {
-    pub(crate) name: &'static str,
+#[derive(Debug)]
+pub struct Target {
+    /// What it is called, and the folder of its inputs.
+    pub name: &'static str,
     /// Valid inputs to start from, at least one.
-    pub(crate) seeds: fn() -> Vec<Vec<u8>>,
+    pub seeds: fn() -> Vec<Vec<u8>>,
     /// Reads an input; panics if it must not be read so.
-    pub(crate) read: fn(&Work, &[u8]),
+    pub read: fn(&Work, &[u8]),
 }
 
 /// All targets.
-pub(crate) static TARGETS: [Target; 14] = [
+pub static TARGETS: [Target; 26] = [
     Target { name: "jpeg", seeds: || pictures::seeds("jpg"), read: pictures::read },
     Target { name: "png", seeds: || pictures::seeds("png"), read: pictures::read },
     Target { name: "tiff", seeds: || pictures::seeds("tif"), read: pictures::read },
@@ -27,8 +33,20 @@ pub(crate) static TARGETS: [Target; 14] = [
     Target { name: "jxl", seeds: pictures::jpeg_xl, read: pictures::read },
     Target { name: "exr", seeds: pictures::open_exr, read: pictures::read },
     Target { name: "hdr", seeds: || pictures::seeds("hdr"), read: pictures::read },
+    Target { name: "mask", seeds: pictures::masks, read: pictures::read_mask },
     Target { name: "icc", seeds: pictures::profiles, read: pictures::read_profile },
+    Target { name: "icc-memory", seeds: pictures::profiles, read: metadata::read_profile },
+    Target { name: "exif", seeds: metadata::exif_blocks, read: metadata::read_exif },
+    Target { name: "maker-note", seeds: metadata::maker_notes, read: metadata::read_maker_note },
+    Target { name: "xmp", seeds: metadata::packets, read: metadata::read_xmp },
     Target { name: "project", seeds: texts::projects, read: texts::read_project },
+    Target { name: "project-structured", seeds: structured::projects, read: structured::read_project },
     Target { name: "graph", seeds: texts::graphs, read: texts::read_graph },
     Target { name: "config", seeds: texts::configurations, read: texts::read_configuration },
+    Target { name: "options-structured", seeds: structured::options, read: structured::read_options },
+    Target { name: "rankings", seeds: texts::rankings, read: texts::read_rankings },
+    Target { name: "truth", seeds: texts::truths, read: texts::read_truth },
+    Target { name: "cache-entry", seeds: records::entries, read: records::read_entry },
+    Target { name: "cache-content", seeds: records::contents, read: records::read_content },
+    Target { name: "request", seeds: requests::requests, read: requests::answer },
 ];

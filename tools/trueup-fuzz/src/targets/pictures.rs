@@ -1,6 +1,6 @@
 //! Photographs: headers, EXIF, profiles, pixels, and the same file as a mask.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use moxcms::ColorProfile;
 use trueup_core::raster::RowSource;
@@ -9,6 +9,7 @@ use trueup_core::{Result, StageContext};
 use trueup_io::color::PhotographColors;
 use trueup_io::decode::{FilePhotographs, mask, small};
 use trueup_io::encode::{Depth, Metadata, MetadataKept, OutputOptions, write};
+use trueup_io::fuzzing::read_color_profile;
 use trueup_io::provenance::{PanoramaDescription, describe};
 use trueup_io::source::{SourceOptions, scan};
 
@@ -16,7 +17,7 @@ use super::work::Work;
 
 /// Side of the pictures that are changed, in pixels: little more than photographs must have, so that many are read in a
 /// second.
-const SIDE: usize = 20;
+pub(super) const SIDE: usize = 20;
 
 /// Largest picture that is decoded, in megapixels: headers claim any size.
 const MOST_MEGAPIXELS: f64 = 1.0;
@@ -60,7 +61,7 @@ impl RowSource for Colors {
 
 /// An EXIF block: orientation 6, a focal length of 24 mm, GPS directions; tag, type, number and value of every field (EXIF 3.0
 /// 4.6, TIFF 6.0 section 2).
-fn exif() -> Vec<u8> {
+pub(super) fn exif() -> Vec<u8> {
     let field = |tag: u16, kind: u16, count: u32, value: u32| {
         [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()].concat()
     };
@@ -78,7 +79,7 @@ pub(super) fn seeds(extension: &str) -> Vec<Vec<u8>> {
     let folder = tempfile::tempdir().expect("a folder for the seeds");
     let path = folder.path().join("seed").with_extension(extension);
     let icc = ColorProfile::new_display_p3().encode().ok();
-    let full = Metadata { exif: Some(exif()), icc, xmp: Some("<x:xmpmeta xmlns:x=\"adobe:ns:meta/\"/>".to_owned()) };
+    let full = Metadata { exif: Some(exif()), icc, xmp: Some(super::metadata::POSES.to_owned()) };
     let mut seeds = Vec::new();
     for (depth, metadata) in
         [(Depth::Auto, &full), (Depth::Sixteen, &full), (Depth::Float, &full), (Depth::Eight, &Metadata::default())]
@@ -152,6 +153,36 @@ pub(super) fn profiles() -> Vec<Vec<u8>> {
     all.iter().filter_map(|profile| profile.encode().ok()).collect()
 }
 
+/// Masks: two levels, as people paint them, and with alpha.
+pub(super) fn masks() -> Vec<Vec<u8>> {
+    seeds("png")
+}
+
+/// The path of a photograph of this name, [`SIDE`] pixels a side; written where there is none.
+pub(super) fn photograph(work: &Work, name: &str) -> PathBuf {
+    let path = work.path().join(name);
+    if !path.exists() {
+        let written = write(&path, &Colors, &Metadata::default(), &OutputOptions::default(), &StageContext::default());
+        written.unwrap_or_else(|error| panic!("{error}"));
+    }
+    path
+}
+
+/// Reads a picture as the mask of a photograph of its size, if it has the one of the pictures here.
+pub(super) fn read_mask(work: &Work, input: &[u8]) {
+    let context = StageContext::default();
+    let options = SourceOptions { max_megapixels: MOST_MEGAPIXELS, ..SourceOptions::default() };
+    let Ok(sources) = scan(&[photograph(work, "beside.png").display().to_string()], &options, &context) else { return };
+    let Some(source) = sources.photographs.first() else { panic!("the photograph is read") };
+    if let Ok(found) = mask(&work.file("mask.png", input), source, &options, &context) {
+        assert_eq!(
+            (found.width(), found.height()),
+            (source.width, source.height),
+            "a mask is as large as its photograph"
+        );
+    }
+}
+
 /// Reads a photograph in every way there is.
 pub(super) fn read(work: &Work, input: &[u8]) {
     read_file(&work.file("photograph.jpg", input));
@@ -159,6 +190,7 @@ pub(super) fn read(work: &Work, input: &[u8]) {
 
 /// Reads a photograph with this profile.
 pub(super) fn read_profile(work: &Work, input: &[u8]) {
+    read_color_profile(input);
     let path = work.file("profile.png", &[]);
     let metadata = Metadata { icc: Some(input.to_vec()), ..Metadata::default() };
     // Files with profiles that cannot be are not written.

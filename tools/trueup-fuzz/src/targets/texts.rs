@@ -80,6 +80,36 @@ pub(super) fn read_configuration(_: &Work, input: &[u8]) {
     }
 }
 
+/// Answers to a comparison of two methods.
+pub(super) fn rankings() -> Vec<Vec<u8>> {
+    let text = r#"{"format": "trueup-ranking", "version": 1, "comparison": "ab", "answers": [
+        {"id": "1", "participant": "one", "finished": "2026-01-01", "shown": ["vpg", "apap"], "ranking": ["apap", "vpg"]},
+        {"id": "2", "ranking": ["vpg", "apap"]}]}"#;
+    vec![text.as_bytes().to_vec()]
+}
+
+pub(super) fn read_rankings(work: &Work, input: &[u8]) {
+    if let Ok(results) = trueup_compare::read_rankings(&work.file("rankings.json", input)) {
+        let _ = trueup_compare::tally(&[results.clone(), results]);
+    }
+}
+
+/// Two known cameras and a level.
+pub(super) fn truths() -> Vec<Vec<u8>> {
+    let image = |file: &str| {
+        serde_json::json!({"file": file, "width": 640, "height": 480, "focal_px": 500.0, "gamma_deg": 0.0,
+            "R": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], "center": [0.0, 0.0, 0.0]})
+    };
+    let text = serde_json::json!({"source": "scene", "images": [image("a.jpg"), image("b.jpg")],
+        "level": {"origin": "measured", "down": [0.0, 1.0, 0.0]}})
+    .to_string();
+    vec![text.into_bytes()]
+}
+
+pub(super) fn read_truth(work: &Work, input: &[u8]) {
+    let _ = trueup::read_truth(&work.file("truth.json", input));
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,6 +120,13 @@ mod tests {
         for seed in projects() {
             let text = String::from_utf8(seed).expect("text");
             assert_eq!(Project::from_json(&text, "seed").expect("a project").used(), 2);
+        }
+        let work = Work::new().expect("a folder");
+        for seed in truths() {
+            trueup::read_truth(&work.file("truth.json", &seed)).expect("a truth");
+        }
+        for seed in rankings() {
+            trueup_compare::read_rankings(&work.file("rankings.json", &seed)).expect("rankings");
         }
         for seed in configurations() {
             let text = String::from_utf8(seed).expect("text");

@@ -1,17 +1,26 @@
 //! Where inputs lie as files.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
 /// A folder for files that are read.
 #[derive(Debug)]
-pub(crate) struct Work(TempDir);
+pub struct Work(TempDir);
 
 impl Work {
-    pub(crate) fn new() -> io::Result<Self> {
+    /// An empty folder, which is removed with this.
+    ///
+    /// # Errors
+    /// Those of the file system.
+    pub fn new() -> io::Result<Self> {
         Ok(Self(tempfile::tempdir()?))
+    }
+
+    /// The folder.
+    pub(super) fn path(&self) -> &Path {
+        self.0.path()
     }
 
     /// The input as a file; the one before it is gone.

@@ -4,12 +4,12 @@
 const MARK: &[u8] = b"trueup cache 1\n";
 
 /// The bytes of an entry with this content.
-pub(super) fn with_checksum(content: &[u8]) -> Vec<u8> {
+pub(crate) fn with_checksum(content: &[u8]) -> Vec<u8> {
     [MARK, blake3::hash(content).as_bytes(), content].concat()
 }
 
 /// The content of an entry; `None` if it is none, or damaged.
-pub(super) fn content(entry: &[u8]) -> Option<&[u8]> {
+pub(crate) fn content(entry: &[u8]) -> Option<&[u8]> {
     let (checksum, content) = entry.strip_prefix(MARK)?.split_at_checked(blake3::OUT_LEN)?;
     (blake3::hash(content).as_bytes() == checksum).then_some(content)
 }

@@ -23,6 +23,8 @@ use trueup_io::encode;
 use super::key::Key;
 use super::kind::{GEOMETRY, Kind, LIKENESS, MEASURED, PAIR};
 
+pub(crate) use entry::{content as checked_content, with_checksum as entry_with_content};
+
 /// The kinds of entries.
 const KINDS: [Kind; 4] = [MEASURED, PAIR, LIKENESS, GEOMETRY];
 /// How the files of entries end.
