@@ -327,7 +327,7 @@ fn threads_that_do_not_start_cost_no_file() {
 /// Killed at a call for a file: each file is the old or the new one, and the next run comes to the same with nothing left behind.
 #[test]
 fn what_is_killed_at_a_call_for_a_file_is_made_again_as_it_would_have_been() {
-    for trial in [&STITCH, &TILES] {
+    for trial in [&STITCH, &TILES, &CACHE] {
         let (letters, whole) = trial.whole("files");
         let mut runs = 0;
         for fault in (1..=letters.len()).step_by(letters.len().div_ceil(tried()).max(1)) {

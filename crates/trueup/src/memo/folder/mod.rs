@@ -86,9 +86,10 @@ impl PhotographCache {
     pub fn open(folder: &Path, max_bytes: f64) -> Result<Self> {
         fs::create_dir_all(folder).map_err(|error| Error::io("making the folder", folder, error))?;
         let tag = folder.join(TAG.0);
-        match tag.exists() {
-            true => encode::check_place(&folder.join(EXTENSION))?,
-            false => encode::write_atomically(&tag, TAG.1.as_bytes())?,
+        // What a program left that was killed as it made the folder is cleared away, too.
+        encode::check_place(&folder.join(EXTENSION))?;
+        if !tag.exists() {
+            encode::write_atomically(&tag, TAG.1.as_bytes())?;
         }
         // The cast saturates.
         let max_bytes = max_bytes as u64;
