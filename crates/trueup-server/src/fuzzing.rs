@@ -16,14 +16,12 @@ use crate::studio::Studio;
 /// Bytes that a connection holds that nobody has read yet.
 const CONNECTION_BYTES: usize = 1 << 16;
 
-/// How long an answer is waited for: news are told after seconds.
-const PATIENCE: Duration = Duration::from_millis(20);
-
 /// A server that nobody can reach, without photographs.
 pub struct Unreachable {
     runtime: Runtime,
     router: Router,
     credentials: String,
+    patience: Duration,
     /// Its folder is removed with it.
     _studio: Arc<Studio>,
 }
@@ -35,11 +33,12 @@ impl std::fmt::Debug for Unreachable {
 }
 
 impl Unreachable {
-    /// A server as [`crate::serve`] makes it.
+    /// A server as [`crate::serve`] makes it. An answer is waited for as long as `patience` says: news are told as long
+    /// as somebody listens.
     ///
     /// # Errors
     /// If there can be no temporary folder or no threads.
-    pub fn new() -> Result<Self> {
+    pub fn new(patience: Duration) -> Result<Self> {
         let failed = |error| Error::io("making", "a server".as_ref(), error);
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
         let studio = Arc::new(Studio::new(None)?);
@@ -48,22 +47,34 @@ impl Unreachable {
         let credentials = guard.credentials();
         let checked = axum::middleware::from_fn_with_state(guard, guard::check);
         let router = routes::router(studio.clone()).layer(checked);
-        Ok(Self { runtime, router, credentials, _studio: studio })
+        Ok(Self { runtime, router, credentials, patience, _studio: studio })
     }
 
-    /// Sends bytes as they are, from somebody who was not let in.
+    /// Sends bytes as they are, from somebody who was not let in and who hangs up as soon as something is answered, or after a
+    /// tenth of the patience.
     pub fn send(&self, bytes: &[u8]) -> Vec<u8> {
+        self.talk(bytes, true)
+    }
+
+    fn talk(&self, bytes: &[u8], hang_up: bool) -> Vec<u8> {
         self.runtime.block_on(async {
             let (near, mut far) = duplex(CONNECTION_BYTES);
             let mut answer = Vec::new();
             let talk = async {
                 // What is not taken is not answered, either.
                 let _ = far.write_all(bytes).await;
-                let _ = far.shutdown().await;
+                if hang_up {
+                    // Who hangs up before the answer gets none.
+                    let mut first = [0; 1024];
+                    if let Ok(Ok(length)) = tokio::time::timeout(self.patience / 10, far.read(&mut first)).await {
+                        answer.extend_from_slice(&first[..length]);
+                    }
+                    let _ = far.shutdown().await;
+                }
                 let _ = far.read_to_end(&mut answer).await;
             };
             let served = crate::answer(near, self.router.clone());
-            let _ = tokio::time::timeout(PATIENCE, async { tokio::join!(served, talk) }).await;
+            let _ = tokio::time::timeout(self.patience, async { tokio::join!(served, talk) }).await;
             answer
         })
     }
@@ -72,7 +83,7 @@ impl Unreachable {
     /// `body` is.
     pub fn ask(&self, line: &[u8], body: &[u8]) -> Vec<u8> {
         let head = format!("\r\n{}Connection: close\r\nContent-Length: {}\r\n\r\n", self.credentials, body.len());
-        self.send(&[line, head.as_bytes(), body].concat())
+        self.talk(&[line, head.as_bytes(), body].concat(), false)
     }
 }
 
@@ -82,7 +93,7 @@ mod tests {
 
     #[test]
     fn the_page_is_let_in_and_others_are_not() {
-        let server = Unreachable::new().expect("a server");
+        let server = Unreachable::new(Duration::from_secs(60)).expect("a server");
         let text = |answer: Vec<u8>| String::from_utf8_lossy(&answer).into_owned();
         let options = text(server.ask(b"GET /api/options HTTP/1.1", b""));
         assert!(options.starts_with("HTTP/1.1 200 "), "{options}");

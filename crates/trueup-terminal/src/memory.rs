@@ -156,8 +156,9 @@ mod tests {
         const TOO_MUCH: usize = 1 << 60;
         let layout = Layout::from_size_align(TOO_MUCH, 8).expect("a size");
         // SAFETY: the size is not 0, and nothing is done with the place.
-        let (plain, zeroed) = unsafe { (NotingAllocator.alloc(layout), NotingAllocator.alloc_zeroed(layout)) };
-        assert!(plain.is_null() && zeroed.is_null());
+        let places = unsafe { [NotingAllocator.alloc(layout), NotingAllocator.alloc_zeroed(layout)] };
+        // Unseen, the compiler takes places that nobody uses for granted, and asks for none.
+        assert!(std::hint::black_box(places).iter().all(|place| place.is_null()));
         assert_eq!(REFUSED.get(), TOO_MUCH);
         assert_eq!(std::thread::spawn(|| REFUSED.get()).join().expect("it ends"), 0);
     }

@@ -1,11 +1,14 @@
 //! What browsers, and others, ask of the page.
 
 use std::cell::RefCell;
+use std::time::Duration;
 
 use trueup_server::fuzzing::Unreachable;
 
 use super::work::Work;
 
+/// How long an answer is waited for: news are told as long as somebody listens, and most answers come within a millisecond.
+const PATIENCE: Duration = Duration::from_millis(20);
 /// Requests after which a server is made anew, with an empty folder.
 const REQUESTS: u32 = 2000;
 
@@ -55,7 +58,7 @@ thread_local! {
 
 pub(super) fn answer(_: &Work, input: &[u8]) {
     SERVER.with_borrow_mut(|kept| {
-        let (server, asked) = kept.get_or_insert_with(|| match Unreachable::new() {
+        let (server, asked) = kept.get_or_insert_with(|| match Unreachable::new(PATIENCE) {
             Ok(server) => (server, 0),
             Err(error) => panic!("{error}"),
         });
