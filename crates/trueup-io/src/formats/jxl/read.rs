@@ -5,7 +5,7 @@
 use std::io::{Read, Seek};
 
 use exif::{Field, Tag};
-use jxl_oxide::color::ColourEncoding;
+use jxl_oxide::color::{ColourEncoding, ColourSpace, TransferFunction};
 use jxl_oxide::image::BitDepth;
 use jxl_oxide::{
     AllocTracker, EnumColourEncoding, FrameBufferSample, ImageStream, InitializeResult, JxlImage, RenderingIntent,
@@ -114,11 +114,21 @@ pub(super) fn stored(input: &mut Input) -> std::result::Result<StoredPixels, Hea
 /// The profile of the samples as they are handed out; of floating point samples none, they are sRGB's by then.
 pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
     let image = open(input, DECODER_SLACK_BYTES as usize).ok()?.image;
-    let is_srgb = match &image.image_header().metadata.colour_encoding {
-        ColourEncoding::Enum(encoding) => encoding.is_srgb(),
-        ColourEncoding::IccProfile(_) => false,
+    let is_needed = match &image.image_header().metadata.colour_encoding {
+        ColourEncoding::Enum(encoding) => !encoding.is_srgb() && has_profile(encoding),
+        ColourEncoding::IccProfile(_) => true,
     };
-    (!is_float(&image) && !is_srgb).then(|| image.rendered_icc())
+    (!is_float(&image) && is_needed).then(|| image.rendered_icc())
+}
+
+/// Whether the decoder knows a profile for a color encoding that is named; it panics at others.
+fn has_profile(encoding: &EnumColourEncoding) -> bool {
+    let has_curve = match encoding.tf {
+        TransferFunction::Unknown => false,
+        TransferFunction::Gamma { g, .. } => g > 0,
+        _ => true,
+    };
+    has_curve && matches!(encoding.colour_space, ColourSpace::Rgb | ColourSpace::Grey)
 }
 
 /// The pixels are turned upright with the codestream's own orientation, which outranks that of EXIF (ISO/IEC 18181-2,
@@ -180,4 +190,30 @@ fn samples<S: FrameBufferSample + Copy + Default>(
         return Ok(samples);
     }
     Err(damaged(source, "its samples are not what its header says"))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+    use std::io::{BufReader, Write};
+
+    use super::*;
+
+    /// A file whose header names no curve: its decoder panicked when it was asked for a profile.
+    #[test]
+    fn a_color_encoding_without_a_curve_has_no_profile() {
+        #[rustfmt::skip]
+        const WITHOUT_CURVE: [u8; 99] = [
+            0xff, 0x0a, 0x88, 0x30, 0xb0, 0xa0, 0x08, 0x10, 0x08, 0x08, 0x10, 0x00, 0x54, 0x01, 0x4b, 0x38, 0x40, 0x36, 0x77, 0x05,
+            0x5b, 0x07, 0x6d, 0xfa, 0xb0, 0x21, 0xa1, 0x9e, 0x83, 0xd7, 0x54, 0x90, 0x60, 0x41, 0x05, 0x15, 0x1c, 0xd1, 0x58, 0x4c,
+            0x33, 0x30, 0xcd, 0xcd, 0x4e, 0xa8, 0x2f, 0x5e, 0x8c, 0x31, 0xe6, 0x4c, 0x01, 0xa4, 0x02, 0x19, 0x63, 0x6c, 0x54, 0x18,
+            0xc3, 0x2b, 0x01, 0xc0, 0x00, 0x42, 0x20, 0x01, 0x44, 0x01, 0x03, 0x80, 0x69, 0x01, 0x74, 0x46, 0x00, 0x85, 0xd3, 0x48,
+            0x1c, 0xc0, 0x61, 0x70, 0x0f, 0x6a, 0x9d, 0xf7, 0x09, 0x41, 0x1f, 0x03, 0xb9, 0x2a, 0x62, 0x0d, 0x06, 0xa1, 0x13,
+        ];
+        let mut file = tempfile::NamedTempFile::new().expect("a file");
+        file.write_all(&WITHOUT_CURVE).expect("written");
+        let mut input = BufReader::new(File::open(file.path()).expect("opened"));
+        assert!(stored(&mut input).is_ok(), "the header is read");
+        assert_eq!(icc(&mut input), None);
+    }
 }
