@@ -106,18 +106,19 @@ mod tests {
             Self { cameras, grids, within, across, turns: vec![1.0, -1.0] }
         }
 
+        /// The sphere of cameras whose focal length is `share` of the true one.
+        fn bases(&self, share: f64, options: &MeshOptions) -> Vec<BaseMap> {
+            let on_sphere = |(camera, grid): (&Camera, &GridMesh)| {
+                let wrong = Camera { focal_px: share * camera.focal_px, ..*camera };
+                BaseMap::on_level_sphere(&wrong, grid, FOCAL_PX * share, options)
+            };
+            self.cameras.iter().zip(&self.grids).map(on_sphere).collect()
+        }
+
         /// The mesh on the sphere of cameras whose focal length is `share` of the true one.
         fn deformed(&self, share: f64, expected: f64, context: &StageContext) -> WarpedMesh {
             let options = MeshOptions::default();
-            let bases: Vec<BaseMap> = self
-                .cameras
-                .iter()
-                .zip(&self.grids)
-                .map(|(camera, grid)| {
-                    let wrong = Camera { focal_px: share * camera.focal_px, ..*camera };
-                    BaseMap::on_level_sphere(&wrong, grid, FOCAL_PX * share, &options)
-                })
-                .collect();
+            let bases = self.bases(share, &options);
             let closure = Closure { warps: &self.across, turns: &self.turns, expected };
             let refinements = Refinements { closure: Some(closure), ..Refinements::default() };
             run(&self.input(&bases, refinements), &options, context).expect("solvable")
@@ -170,8 +171,7 @@ mod tests {
     fn photographs_that_shift_show_how_far_the_ends_are_apart() {
         let ring = Ring::new();
         let options = MeshOptions::default();
-        let on_sphere = |(camera, grid)| BaseMap::on_level_sphere(camera, grid, FOCAL_PX, &options);
-        let bases: Vec<BaseMap> = ring.cameras.iter().zip(&ring.grids).map(on_sphere).collect();
+        let bases = ring.bases(1.0, &options);
         let places: Vec<Vec<Vector2<f64>>> =
             bases.iter().zip(&ring.grids).map(|(base, grid)| base.places(grid)).collect();
         let mut alignment = AlignmentEnergy::new(&ring.grids, &ring.within, &bases, &places);
@@ -197,12 +197,7 @@ mod tests {
         assert!(found[0].message.contains("67 %"), "{}", found[0].message);
         // As without any closure.
         let options = MeshOptions::default();
-        let bases: Vec<BaseMap> = ring
-            .cameras
-            .iter()
-            .zip(&ring.grids)
-            .map(|(camera, grid)| BaseMap::on_level_sphere(camera, grid, FOCAL_PX, &options))
-            .collect();
+        let bases = ring.bases(1.0, &options);
         let plain = run(&ring.input(&bases, Refinements::default()), &options, &context).expect("solvable");
         assert_eq!(open, plain);
         let closure = Closure { warps: &[], turns: &[], expected: 100.0 };

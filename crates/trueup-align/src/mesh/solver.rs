@@ -225,9 +225,8 @@ fn conjugate_gradients(system: &System, right: &Bordered, factor: &Factor, start
     let mut solution = start;
     let mut residual = system.residual(right, &solution);
     let first = residual.norm();
-    let mut towards = factor.solve(&residual);
-    let mut direction = towards.clone();
-    let mut slope = residual.dot(&towards);
+    let mut direction = factor.solve(&residual);
+    let mut slope = residual.dot(&direction);
     let mut slowest = 1.0;
     for _ in 0..MAX_STEPS {
         // Written so that a number that is none is not taken for a solution.
@@ -242,11 +241,10 @@ fn conjugate_gradients(system: &System, right: &Bordered, factor: &Factor, start
             return None;
         }
         slowest *= SLOWEST;
-        towards = factor.solve(&residual);
-        let next = residual.dot(&towards);
-        let mut turned = towards.clone();
-        turned.add(next / slope, &direction);
-        (direction, slope) = (turned, next);
+        let mut next = factor.solve(&residual);
+        let next_slope = residual.dot(&next);
+        next.add(next_slope / slope, &direction);
+        (direction, slope) = (next, next_slope);
     }
     (residual.norm() <= goal).then_some(solution)
 }
