@@ -2,7 +2,7 @@
 
 use divan::Bencher;
 use trueup_align::match_points::OverlapWarp;
-use trueup_align::mesh::{self, BaseMap, MeshInput, MeshOptions, Refinements};
+use trueup_align::mesh::{self, BaseMap, MeshInput, MeshOptions};
 use trueup_core::StageContext;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::rotation_about_y;
@@ -38,7 +38,6 @@ fn solve(bencher: Bencher, photographs: usize) {
         (0..photographs - 1).flat_map(|k| [warp(&grids[k], k, 1.0), warp(&grids[k + 1], k + 1, -1.0)]).collect();
     let bases: Vec<BaseMap> = (0..photographs).map(|k| BaseMap::similarity(1.0, 0.02 * (k as f64).sin())).collect();
     let options = MeshOptions::default();
-    let refinements = Refinements::default();
-    let input = MeshInput { grids: &grids, warps: &warps, bases: &bases, reference: 0, refinements };
+    let input = MeshInput { grids: &grids, warps: &warps, bases: &bases, reference: 0, closure: None, structure: None };
     bencher.bench(|| mesh::run(&input, &options, &StageContext::default()).expect("solvable"));
 }

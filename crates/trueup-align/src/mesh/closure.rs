@@ -120,12 +120,11 @@ mod tests {
             let options = MeshOptions::default();
             let bases = self.bases(share, &options);
             let closure = Closure { warps: &self.across, turns: &self.turns, expected };
-            let refinements = Refinements { closure: Some(closure), ..Refinements::default() };
-            run(&self.input(&bases, refinements), &options, context).expect("solvable")
+            run(&self.input(&bases, Some(closure)), &options, context).expect("solvable").into_warped()
         }
 
-        fn input<'a>(&'a self, bases: &'a [BaseMap], refinements: Refinements<'a>) -> MeshInput<'a> {
-            MeshInput { grids: &self.grids, warps: &self.within, bases, reference: 0, refinements }
+        fn input<'a>(&'a self, bases: &'a [BaseMap], closure: Option<Closure<'a>>) -> MeshInput<'a> {
+            MeshInput { grids: &self.grids, warps: &self.within, bases, reference: 0, closure, structure: None }
         }
     }
 
@@ -198,8 +197,8 @@ mod tests {
         // As without any closure.
         let options = MeshOptions::default();
         let bases = ring.bases(1.0, &options);
-        let plain = run(&ring.input(&bases, Refinements::default()), &options, &context).expect("solvable");
-        assert_eq!(open, plain);
+        let plain = run(&ring.input(&bases, None), &options, &context).expect("solvable");
+        assert_eq!(open, plain.into_warped());
         let closure = Closure { warps: &[], turns: &[], expected: 100.0 };
         let lifted = vec![Vector2::new(100.0, 5.0); 9];
         assert!(closure.contradiction(&lifted).expect("too high").contains("5.0 %"));

@@ -75,6 +75,27 @@ impl StraightInput<'_> {
     }
 }
 
+/// How much of the distance at which matched points land in `grids` is common to neighbors: the mean over the points of
+/// the shares that they would have of their weights.
+pub(super) fn misaligned_share(points: &[PairMatches], grids: &CurrentGrids) -> f64 {
+    /// Points of a pair that are asked; more hardly change the mean.
+    const ASKED: usize = 400;
+    let shares = |pair: &PairMatches| {
+        let step = pair.inliers.len().div_ceil(ASKED).max(1);
+        let gaps: Vec<OverlapGap> = matched(pair).step_by(step).map(|(_, ends)| point_gap(pair, ends, grids)).collect();
+        evidence::common_squares(&gaps).into_iter().map(|common| evidence::share(common, FULL_PX)).collect()
+    };
+    let shares: Vec<Vec<f64>> = points.par_iter().map(shares).collect();
+    let counted: usize = shares.iter().map(Vec::len).sum();
+    shares.into_iter().flatten().sum::<f64>() / counted.max(1) as f64
+}
+
+/// What a matched point of `pair` says; distances beyond the robust one count as that.
+fn point_gap(pair: &PairMatches, [p, q]: [Vector2<f64>; 2], grids: &CurrentGrids) -> OverlapGap {
+    let gap = grids.gap(PhotographPixel { photograph: pair.a, at: p }, PhotographPixel { photograph: pair.b, at: q });
+    OverlapGap { place: p, gap: gap * shortening(gap.norm()), known: Matrix2::identity() }
+}
+
 /// Shares of their weights that the matches of all lists have.
 pub(super) struct MatchShares {
     points: Vec<Vec<f64>>,
@@ -131,11 +152,8 @@ impl LineAlignmentInput<'_> {
     /// middles do not meet say nothing.
     fn evidence(&self, a: usize, b: usize, grids: &CurrentGrids) -> Vec<(Match, OverlapGap)> {
         let points = self.points.iter().enumerate().filter(|(_, points)| (points.a, points.b) == (a, b));
-        let points = points.flat_map(|(list, points)| chosen(points).map(move |chosen| (list, chosen)));
-        let points = points.map(|(list, (k, [p, q]))| {
-            let gap = grids.gap(PhotographPixel { photograph: a, at: p }, PhotographPixel { photograph: b, at: q });
-            let evidence = OverlapGap { place: p, gap: gap * shortening(gap.norm()), known: Matrix2::identity() };
-            (Match::Point(list, k), evidence)
+        let points = points.flat_map(|(list, points)| {
+            chosen(points).map(move |(k, ends)| (Match::Point(list, k), point_gap(points, ends, grids)))
         });
         let lines = self.matched.iter().enumerate().filter(|(_, lines)| (lines.a, lines.b) == (a, b));
         let lines = lines.flat_map(|(list, lines)| lines.lines.iter().enumerate().map(move |line| (list, line)));
@@ -208,8 +226,12 @@ impl MatchedLines {
 /// The matched points of a pair that count, as indices with places in both photographs.
 fn chosen(pair: &PairMatches) -> impl Iterator<Item = (usize, [Vector2<f64>; 2])> + use<'_> {
     let step = pair.inliers.len().div_ceil(MAX_POINTS).max(1);
-    let counted = pair.inliers.iter().enumerate().step_by(step).take(MAX_POINTS);
-    counted.map(|(k, one)| (k, [one.in_a, one.in_b].map(Vector2::from)))
+    matched(pair).step_by(step).take(MAX_POINTS)
+}
+
+/// All matched points of a pair, as indices with places in both photographs.
+fn matched(pair: &PairMatches) -> impl Iterator<Item = (usize, [Vector2<f64>; 2])> + use<'_> {
+    pair.inliers.iter().enumerate().map(|(k, one)| (k, [one.in_a, one.in_b].map(Vector2::from)))
 }
 
 /// Factor that shortens a distance to the robust one.

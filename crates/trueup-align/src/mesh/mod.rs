@@ -3,7 +3,8 @@
 //! Energies, one file each: alignment of the overlaps (`alignment`); local similarity of the grid's edges and their
 //! agreement with the similarity prior (`similarity`); and what refines the plain mesh: matched lines and points
 //! (`line_alignment`), pixels (`photometric`), long lines that keep their shape (`structure`). Unknown are the vertices
-//! of all grids in the panorama. `problem` holds the plain mesh, `rounds` the order of the refinements. Where the mesh is
+//! of all grids in the panorama. `plain_mesh` is the mesh that can be refined, `problem` its equations, `rounds` the
+//! order of the refinements. Where the mesh is
 //! worse than the cameras, these draw (`by_cameras`).
 //!
 //! # Source
@@ -21,6 +22,7 @@ mod line_alignment;
 mod normal_equations;
 mod options;
 mod photometric;
+mod plain_mesh;
 mod problem;
 mod refinements;
 mod rounds;
@@ -47,54 +49,54 @@ pub use input::MeshInput;
 pub use line_alignment::{LineAlignmentInput, LineAlignmentOptions, StraightInput};
 pub use options::{BaseShape, MeshOptions};
 pub use photometric::{GrayPyramid, PhotometricInput, PhotometricOptions};
-use problem::MeshProblem;
+use plain_mesh::Layout;
+pub use plain_mesh::PlainMesh;
 pub use refinements::Refinements;
 pub(crate) use sphere_view::is_moderate;
 pub use structure::{StructureInput, StructureOptions};
 pub use subdivision::divided;
 pub use warped_mesh::WarpedMesh;
 pub(crate) use warped_mesh::count_folds;
-use warped_mesh::total_folds;
 
-/// Deforms the undeformed grids so that overlaps align and every edge keeps to its photograph's base, and refines them
-/// as asked.
+/// Deforms the undeformed grids so that overlaps align and every edge keeps to its photograph's base.
 ///
 /// A full turn is closed if its ends can meet; otherwise the warning `full-turn-open` says why not, and it is left
 /// open.
 ///
 /// # Errors
 /// [`trueup_core::Error::Unsolvable`] if the system is not positive definite or the solution is not finite;
-/// [`trueup_core::Error::Input`] if a refinement's lists do not have an entry per photograph;
-/// [`trueup_core::Error::Cancelled`].
-pub fn run(input: &MeshInput, options: &MeshOptions, context: &StageContext) -> Result<WarpedMesh> {
+/// [`trueup_core::Error::Input`] if the chains do not have an entry per photograph; [`trueup_core::Error::Cancelled`].
+pub fn run<'a>(input: &MeshInput<'a>, options: &'a MeshOptions, context: &StageContext) -> Result<PlainMesh<'a>> {
     context.check_cancelled()?;
-    let MeshInput { grids, bases, refinements, .. } = input;
-    refinements.check(grids.len())?;
-    let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(*grids).map(|(base, grid)| base.places(grid)).collect();
-    let alignment = AlignmentEnergy::new(grids, input.warps, bases, &places);
-    let open = MeshProblem::new(input, &places, &alignment, options, context);
-    let Some(closure) = &refinements.closure else { return open.deform(refinements) };
-    let mut alignment = alignment.clone();
-    alignment.join(closure, grids, bases, &places);
-    let closed = MeshProblem { alignment: &alignment, closing: closure.warps, ..open };
+    input.check()?;
+    let MeshInput { grids, bases, reference, .. } = *input;
+    let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(grids).map(|(base, grid)| base.places(grid)).collect();
+    let within = AlignmentEnergy::new(grids, input.warps, bases, &places);
+    let solved = |alignment: &AlignmentEnergy, closing| {
+        let layout = Layout { places: places.clone(), alignment: alignment.clone(), closing };
+        PlainMesh::solve(*input, layout, options, context)
+    };
+    let Some(closure) = &input.closure else { return solved(&within, &[]) };
+    let mut joined = within.clone();
+    joined.join(closure, grids, bases, &places);
     // Ends that lie a turn apart where the photographs only shift need no look at how they lie in an open mesh, unless
     // closing folds it.
-    let mut warped = None;
-    let undeformed = alignment.shifted(&placed(grids, &places), input.reference);
-    if undeformed.is_some_and(|grids| closure.contradiction(&alignment.apart(&grids)).is_none()) {
-        let at_once = closed.deform(refinements)?;
-        if at_once.folds == 0 {
+    let mut closed = None;
+    let undeformed = joined.shifted(&placed(grids, &places), reference);
+    if undeformed.is_some_and(|grids| closure.contradiction(&joined.apart(&grids)).is_none()) {
+        let at_once = solved(&joined, closure.warps)?;
+        if at_once.warped().folds == 0 {
             return Ok(at_once);
         }
-        warped = Some(at_once);
+        closed = Some(at_once);
     }
-    let plain = open.solve_refined(open.equations(), &Refinements::default())?;
-    let contradiction = match closure.contradiction(&alignment.apart(&plain.meshes)) {
+    let open = solved(&within, &[])?;
+    let contradiction = match closure.contradiction(&joined.apart(open.grids())) {
         Some(contradiction) => contradiction,
         None => {
-            let warped = warped.map_or_else(|| closed.deform(refinements), Ok)?;
-            if warped.folds <= total_folds(&open.delivered(&plain.meshes)) {
-                return Ok(warped);
+            let closed = closed.map_or_else(|| solved(&joined, closure.warps), Ok)?;
+            if closed.warped().folds <= open.warped().folds {
+                return Ok(closed);
             }
             "closing the turn would fold the photographs".to_owned()
         }
@@ -105,7 +107,7 @@ pub fn run(input: &MeshInput, options: &MeshOptions, context: &StageContext) -> 
         format!("the photographs go all the way round, but the panorama's ends do not meet: {contradiction}"),
         "Look whether the photographs beside the cut show the same; --graph names the pairs to be matched.",
     ));
-    open.deform(refinements)
+    Ok(open)
 }
 
 /// The grids as their bases place them.

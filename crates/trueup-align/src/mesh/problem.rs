@@ -6,11 +6,9 @@ use trueup_core::{Error, Result, StageContext};
 
 use super::alignment::AlignmentEnergy;
 use super::base::BaseMap;
-use super::input::MeshInput;
 use super::normal_equations::NormalEquations;
 use super::options::MeshOptions;
-use super::refinements::Refinements;
-use super::similarity::{PRIOR_SLOPE, SimilarityEnergy};
+use super::similarity::SimilarityEnergy;
 use super::solver::MeshSolver;
 use super::subdivision::subdivided;
 use super::warped_mesh::{WarpedMesh, total_folds};
@@ -29,7 +27,8 @@ pub(super) struct MeshProblem<'a> {
     pub reference: usize,
     /// Match points across the cut of a full turn that is to be closed.
     pub closing: &'a [OverlapWarp],
-    /// Growth of the prior's weight with the distance from the overlap, see [`PRIOR_SLOPE`].
+    /// Growth of the prior's weight with the distance from the overlap, see
+    /// [`PRIOR_SLOPE`](super::similarity::PRIOR_SLOPE).
     pub prior_slope: f64,
     pub options: &'a MeshOptions,
     pub context: &'a StageContext<'a>,
@@ -42,31 +41,6 @@ pub(super) struct Solved {
     /// Length of a full turn that is closed.
     pub period: Option<f64>,
     pub relative_gradient: f64,
-}
-
-impl<'a> MeshProblem<'a> {
-    /// The plain mesh of `input`; `places` are the bases' places of the grids' vertices.
-    pub(super) fn new(
-        input: &MeshInput<'a>,
-        places: &'a [Vec<Vector2<f64>>],
-        alignment: &'a AlignmentEnergy,
-        options: &'a MeshOptions,
-        context: &'a StageContext<'a>,
-    ) -> Self {
-        let MeshInput { grids, warps, bases, reference, .. } = *input;
-        Self {
-            grids,
-            warps,
-            bases,
-            places,
-            alignment,
-            reference,
-            closing: &[],
-            prior_slope: PRIOR_SLOPE,
-            options,
-            context,
-        }
-    }
 }
 
 impl MeshProblem<'_> {
@@ -87,12 +61,13 @@ impl MeshProblem<'_> {
         equations
     }
 
-    pub(super) fn deform(&self, refinements: &Refinements) -> Result<WarpedMesh> {
-        let Solved { meshes, period, relative_gradient } = self.solve_refined(self.equations(), refinements)?;
-        let alignment_rms = self.alignment.rms(&meshes, period);
-        let meshes = self.delivered(&meshes);
+    /// What a solution makes of the grids.
+    pub(super) fn warped(&self, solved: &Solved) -> WarpedMesh {
+        let &Solved { ref meshes, period, relative_gradient } = solved;
+        let alignment_rms = self.alignment.rms(meshes, period);
+        let meshes = self.delivered(meshes);
         let folds = total_folds(&meshes);
-        Ok(WarpedMesh { meshes, alignment_rms, folds, relative_gradient, period, by_cameras: None })
+        WarpedMesh { meshes, alignment_rms, folds, relative_gradient, period, by_cameras: None }
     }
 
     pub(super) fn solve(&self, solver: &mut MeshSolver, equations: &NormalEquations) -> Result<Solved> {

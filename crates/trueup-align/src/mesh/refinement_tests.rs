@@ -3,12 +3,13 @@
 use nalgebra::Vector2;
 use trueup_core::StageContext;
 use trueup_core::lines::{LineSegment, PairLines};
-use trueup_core::matches::PairMatches;
+use trueup_core::matches::{PairMatches, PointMatch};
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
 
 use super::*;
 use crate::match_points::OverlapWarp;
+use crate::similarity::synthetic::joined;
 
 const WIDTH: usize = 320;
 const HEIGHT: usize = 240;
@@ -66,8 +67,16 @@ fn bases() -> [BaseMap; 2] {
 
 fn refined(refinements: &Refinements) -> WarpedMesh {
     let (grids, warps) = shifted();
-    let input = MeshInput { grids: &grids, warps: &warps, bases: &bases(), reference: 0, refinements: *refinements };
-    run(&input, &MeshOptions::default(), &StageContext::default()).expect("solvable")
+    solved(&input(&grids, &warps, &bases()), refinements).expect("solvable")
+}
+
+fn input<'a>(grids: &'a [GridMesh], warps: &'a [OverlapWarp], bases: &'a [BaseMap]) -> MeshInput<'a> {
+    MeshInput { grids, warps, bases, reference: 0, closure: None, structure: None }
+}
+
+fn solved(input: &MeshInput, refinements: &Refinements) -> Result<WarpedMesh> {
+    let context = StageContext::default();
+    run(input, &MeshOptions::default(), &context)?.refined(refinements, &context)
 }
 
 /// Root mean square distance in the panorama of what both photographs truly show, away from the overlap's border.
@@ -116,6 +125,31 @@ fn pixels_align_alike_on_any_number_of_threads() {
     assert_eq!(on(1), on(4));
 }
 
+/// The bump lies in a sixth of the overlap, and 3.6 px are more than is believed fully.
+#[test]
+fn parallax_is_told_from_noise_by_what_neighbors_share() {
+    let (grids, warps) = shifted();
+    let share = |seen: &dyn Fn(Vector2<f64>) -> Vector2<f64>| {
+        let inliers = (0..400_usize)
+            .map(|k| Vector2::new(120.0 + (k % 20) as f64 * 9.0, 20.0 + (k / 20) as f64 * 10.0))
+            .enumerate()
+            .map(|(k, place)| {
+                // Half a pixel this way and that, by a pattern that neighbors do not have in common.
+                let noise = Vector2::new((k * 7919 % 13) as f64 - 6.0, (k * 104_729 % 11) as f64 - 5.0) / 12.0;
+                PointMatch { in_a: place.into(), in_b: (seen(place) + noise).into() }
+            })
+            .collect();
+        let points = [joined(0, 1, inliers)];
+        let (bases, options) = (bases(), MeshOptions::default());
+        let mesh = run(&input(&grids, &warps, &bases), &options, &StageContext::default()).expect("solvable");
+        mesh.misaligned_share(&points)
+    };
+    let still = share(&|place| place - Vector2::new(SHIFT, 0.0));
+    let bump = share(&second_from_first);
+    assert!(still < 0.05, "{still}");
+    assert!((0.15..0.9).contains(&bump), "{bump}");
+}
+
 #[test]
 fn without_refinements_the_plain_mesh_is_left_as_it_is() {
     let plain = refined(&Refinements::default());
@@ -155,14 +189,13 @@ fn a_bent_line_is_pulled_straight() {
         }
     }
     let lines = vec![vec![segment([200.0, 10.0], [200.0, 230.0])], Vec::new()];
-    let bend = |refinements: &Refinements| {
+    let bend = |structure: Option<StructureInput>, refinements: &Refinements| {
         let bases = bases();
-        let input = MeshInput { grids: &grids, warps: &warps, bases: &bases, reference: 0, refinements: *refinements };
-        let warped = run(&input, &MeshOptions::default(), &StageContext::default());
+        let warped = solved(&MeshInput { structure, ..input(&grids, &warps, &bases) }, refinements);
         let mesh = &warped.expect("solvable").meshes[0];
         crate::metrics::Straightness::of(&lines[0][0], mesh, 3.0).expect("a line").rms_px
     };
-    let plain = bend(&Refinements::default());
+    let plain = bend(None, &Refinements::default());
     let structure = StructureOptions { weight: 100.0 };
     let structure = Some(StructureInput { chains: &lines, options: &structure });
     let strict = LineAlignmentOptions { straightness: 100.0, ..LineAlignmentOptions::default() };
@@ -170,8 +203,8 @@ fn a_bent_line_is_pulled_straight() {
     let no_matches: &[PairMatches] = &[];
     let strict = Some(LineAlignmentInput { matched: &[], points: no_matches, options: &strict });
     assert!(plain > 0.3, "{plain}");
-    let kept = bend(&Refinements { structure, ..Refinements::default() });
-    let straightened = bend(&Refinements { lines: strict, straight, ..Refinements::default() });
+    let kept = bend(structure, &Refinements::default());
+    let straightened = bend(None, &Refinements { lines: strict, straight, ..Refinements::default() });
     assert!(kept < 0.25 * plain, "structure: {plain} px became {kept} px");
     assert!(straightened < 0.25 * plain, "straightness: {plain} px became {straightened} px");
 }
@@ -182,9 +215,17 @@ fn lists_must_have_an_entry_per_photograph() {
     let (pyramids, options) = (pyramids(), PhotometricOptions::default());
     let photometric = Some(PhotometricInput { pyramids: &pyramids[..1], options: &options });
     let refinements = Refinements { photometric, ..Refinements::default() };
-    let input = MeshInput { grids: &grids, warps: &warps, bases: &bases(), reference: 0, refinements };
-    let error = run(&input, &MeshOptions::default(), &StageContext::default());
-    assert!(error.expect_err("too few").to_string().contains("1 are given for 2 photographs"));
+    let bases = bases();
+    let whole = input(&grids, &warps, &bases);
+    let (chains, structure) = (vec![Vec::new(); 3], StructureOptions::default());
+    let structure = Some(StructureInput { chains: &chains, options: &structure });
+    let errors = [
+        (solved(&whole, &refinements), "1 are given for 2 photographs"),
+        (solved(&MeshInput { structure, ..whole }, &Refinements::default()), "3 are given for 2 photographs"),
+    ];
+    for (error, expected) in errors {
+        assert!(error.expect_err("of another number").to_string().contains(expected));
+    }
 }
 
 /// The gradient of the matched-line term against differences of its energy, written down anew: a line of the first
@@ -295,8 +336,9 @@ fn aligned_believing_all(grids: &[GridMesh], warps: &[OverlapWarp], input: &Phot
     let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(grids).map(|(base, grid)| base.places(grid)).collect();
     let alignment = AlignmentEnergy::new(grids, warps, &bases, &places);
     let (options, context) = (MeshOptions::default(), StageContext::default());
-    let mesh_input = MeshInput { grids, warps, bases: &bases, reference: 0, refinements: Refinements::default() };
-    let problem = MeshProblem::new(&mesh_input, &places, &alignment, &options, &context);
+    let layout = Layout { places, alignment, closing: &[] };
+    let mesh_input = self::input(grids, warps, &bases);
+    let problem = layout.problem(&mesh_input, &options, &context);
     let (mut solver, mut equations) = (solver::MeshSolver::default(), problem.equations());
     let plain = problem.solve(&mut solver, &equations).expect("solvable");
     problem.hold_outlines(&mut equations, &plain.meshes, 1.0);

@@ -24,24 +24,25 @@ pub(super) struct PixelAlignment<'a> {
 }
 
 impl MeshProblem<'_> {
-    /// Solves the plain `equations`, then with one refinement after the other.
-    pub(super) fn solve_refined(&self, mut equations: NormalEquations, refinements: &Refinements) -> Result<Solved> {
-        let mut solver = MeshSolver::default();
-        if let Some(structure) = &refinements.structure {
-            structure.add(&mut equations, &self.current(self.grids, self.grids));
-        }
-        let mut solved = self.solve(&mut solver, &equations)?;
+    /// Refines a solution of the plain `equations` by one refinement after the other.
+    pub(super) fn refine(
+        &self,
+        solver: &mut MeshSolver,
+        mut equations: NormalEquations,
+        mut solved: Solved,
+        refinements: &Refinements,
+    ) -> Result<Solved> {
         if refinements.photometric.is_some() || refinements.lines.is_some() {
             self.hold_outlines(&mut equations, &solved.meshes, refinements.outline_weight);
         }
         if let Some(input) = &refinements.lines {
-            (equations, solved) = self.align_lines(&mut solver, equations, input, refinements.straight, solved)?;
+            (equations, solved) = self.align_lines(solver, equations, input, refinements.straight, solved)?;
         }
         if let Some(input) = &refinements.photometric {
             let fine = self.delivered(&solved.meshes);
             let shares = input.shares(self.warps, &self.current(&solved.meshes, &fine), self.context)?;
             let pixels = PixelAlignment { input, shares: &shares, straight: refinements.straight };
-            solved = self.align_pixels(&mut solver, &equations, &pixels, solved)?;
+            solved = self.align_pixels(solver, &equations, &pixels, solved)?;
         }
         Ok(solved)
     }
@@ -147,7 +148,7 @@ impl MeshProblem<'_> {
     }
 
     /// The grids around which the next equations are made.
-    fn current<'b>(&'b self, solved: &'b [GridMesh], fine: &'b [GridMesh]) -> CurrentGrids<'b> {
+    pub(super) fn current<'b>(&'b self, solved: &'b [GridMesh], fine: &'b [GridMesh]) -> CurrentGrids<'b> {
         CurrentGrids { solved, fine, places: self.places }
     }
 

@@ -6,7 +6,10 @@ use trueup_core::camera::Camera;
 use trueup_core::geometry::{rotation_about_y, rotation_about_z};
 use trueup_core::mesh::GridMesh;
 
+use super::problem::MeshProblem;
 use super::similarity::PUBLISHED_CELL_PX;
+use super::solver::MeshSolver;
+use super::warped_mesh::count_folds;
 use super::*;
 use crate::match_points::OverlapWarp;
 
@@ -48,9 +51,11 @@ fn run_evenly(grids: &[GridMesh], warps: &[OverlapWarp], bases: &[BaseMap], refe
     let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(grids).map(|(base, grid)| base.places(grid)).collect();
     let alignment = AlignmentEnergy::new(grids, warps, bases, &places);
     let (options, context) = (options(), StageContext::default());
-    let input = MeshInput { grids, warps, bases, reference, refinements: Refinements::default() };
-    let problem = MeshProblem { prior_slope: 0.0, ..MeshProblem::new(&input, &places, &alignment, &options, &context) };
-    problem.deform(&Refinements::default()).expect("solvable")
+    let input = MeshInput { grids, warps, bases, reference, closure: None, structure: None };
+    let layout = Layout { places, alignment, closing: &[] };
+    let problem = MeshProblem { prior_slope: 0.0, ..layout.problem(&input, &options, &context) };
+    let solved = problem.solve(&mut MeshSolver::default(), &problem.equations()).expect("solvable");
+    problem.warped(&solved)
 }
 
 fn solve(thetas_deg: [f64; 2]) -> WarpedMesh {

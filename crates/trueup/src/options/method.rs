@@ -46,13 +46,16 @@ impl Edition {
 }
 
 /// The mesh of VPG, GSP and the AANAP compared with them: one similarity for each photograph, vertices carried by moving DLT, undivided cells, the weights
-/// of GSP's authors, and outlines that nothing holds.
+/// of GSP's authors, outlines that nothing holds, and no refinement but one that is asked for.
 fn fix_published_mesh(options: &mut AlignOptions) {
     /// Residual weights of the three energies next to an overlap, for cells of 40 working pixels.
     const ALIGNMENT: f64 = 1.0;
     const LOCAL: f64 = 0.75;
     const PRIOR: f64 = 6.0;
     options.match_points.model = TransferModel::MovingDlt;
+    if options.stitch.align == Evidence::Auto {
+        options.stitch.align = Evidence::Points;
+    }
     let mesh = &mut options.mesh;
     mesh.base = BaseShape::Similarity;
     mesh.subdivision = 1;
@@ -149,6 +152,8 @@ methods! {
 trueup_core::choice! {
     /// What draws overlapping photographs together.
     pub enum Evidence {
+        /// What the photographs ask for: matched lines too, where parallax keeps matched points apart. As published: points.
+        Auto = "auto",
         /// Matched points, carried to the whole overlap.
         Points = "points",
         /// And matched lines.

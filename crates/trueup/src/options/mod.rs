@@ -55,9 +55,9 @@ trueup_core::options! {
     pub struct ShapeOptions("stitch") {
         /// How the panorama's shape is found. Choose another one to compare, or for photographs that it serves better.
         method: Method = Method::Vpg, Allowed::Any, "", basic;
-        /// What draws overlapping photographs together. Where things stand twice or lines break at seams, take more: it is
-        /// slower and shows fewer ghosts.
-        align: Evidence = Evidence::Points, Allowed::Any, "", basic;
+        /// What draws overlapping photographs together. Where things stand twice or lines break at seams, take more than
+        /// auto does: it is slower and shows fewer ghosts.
+        align: Evidence = Evidence::Auto, Allowed::Any, "", basic;
         /// What of the photographs' structure is kept, beyond the neighborhoods of grid vertices. Choose lines where long
         /// edges bend.
         structure: Structure = Structure::None, Allowed::Any, "";

@@ -10,7 +10,7 @@ use trueup_core::geometry::{rotation_about_x, rotation_about_y};
 use trueup_core::mesh::GridMesh;
 
 use super::super::camera_plane::CameraPlane;
-use super::super::{BaseMap, MeshInput, Refinements, run};
+use super::super::{BaseMap, MeshInput, run};
 use super::*;
 use crate::match_points::OverlapWarp;
 
@@ -71,9 +71,9 @@ impl Scene {
             .collect();
         let is_within = |warp: &&OverlapWarp| !severed.contains(&(warp.from.min(warp.to), warp.from.max(warp.to)));
         let warps: Vec<OverlapWarp> = self.warps.iter().filter(is_within).cloned().collect();
-        let refinements = Refinements::default();
-        let input = MeshInput { grids: &self.grids, warps: &warps, bases: &bases, reference: 0, refinements };
-        run(&input, &options, &StageContext::default()).expect("solvable")
+        let (grids, closure, structure) = (&self.grids, None, None);
+        let input = MeshInput { grids, warps: &warps, bases: &bases, reference: 0, closure, structure };
+        run(&input, &options, &StageContext::default()).expect("solvable").into_warped()
     }
 
     fn drawn(&self, severed: &[(usize, usize)], context: &StageContext) -> Option<WarpedMesh> {

@@ -10,11 +10,12 @@ mod vanishing;
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_align::cameras::Cameras;
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points::OverlapWarp;
-use trueup_align::mesh::{self, BaseShape, ByCamerasInput, MeshInput, Refinements, WarpedMesh};
+use trueup_align::mesh::{self, BaseShape, ByCamerasInput, MeshInput, PlainMesh, StructureInput, WarpedMesh};
 use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityPrior};
 use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::TriadOutcome;
@@ -27,13 +28,14 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::FilePhotographs;
+use trueup_vision::lines;
 
 use self::component::Component;
 use self::overlaps::Overlaps;
 use self::refinement::RefinementSources;
 use self::turn::{Turn, report_cut};
 use crate::memo::{GEOMETRY, Key, KeyMaker, Memo};
-use crate::options::{AlignOptions, MethodForm};
+use crate::options::{AlignOptions, Evidence, MethodForm, Structure};
 
 pub(crate) use self::refinement::needs_pixels;
 
@@ -190,32 +192,36 @@ struct Deformation<'a> {
 
 impl Deformation<'_> {
     fn by_mesh(&self, options: &AlignOptions, context: &StageContext) -> Result<WarpedMesh> {
-        let AlignInput { component, photographs, .. } = self.input;
+        let component = self.input.component;
         let cameras = &self.cameras.cameras;
         let bases = mesh::bases(cameras, self.grids, self.prior, &options.mesh);
-        let sources = RefinementSources::new(component, self.grids, self.warps, photographs, options, context)?;
+        let chains: Option<Vec<Vec<LineSegment>>> = (options.stitch.structure == Structure::Lines)
+            .then(|| component.lines.par_iter().map(|lines| lines::merged(lines)).collect());
+        let structure = chains.as_ref().map(|chains| StructureInput { chains, options: &options.structure });
         let closure = self.turn.and_then(|turn| turn.closure(mesh::turn_length(cameras, self.prior)));
         // What is turned as a whole does not go round along the panorama's rows.
         let closure = closure.filter(|_| component.reference_rotation == 0.0);
-        let refinements = Refinements { closure, ..sources.refinements(component, self.pairs, options) };
         let (grids, warps, reference) = (self.grids, self.warps, component.reference);
-        let input = MeshInput { grids, warps, bases: &bases, reference, refinements };
+        let input = MeshInput { grids, warps, bases: &bases, reference, closure, structure };
         let solved = context.gather(|context| mesh::run(&input, &options.mesh, context))?;
         // What is turned or tilted as a whole, and the published similarity, want the mesh's own plane.
         let on_sphere = options.mesh.base == BaseShape::Sphere;
-        if !on_sphere || component.reference_rotation != 0.0 || mesh::tilts(cameras, self.prior) {
-            return Ok(context.absorb(solved));
+        if on_sphere && component.reference_rotation == 0.0 && !mesh::tilts(cameras, self.prior) {
+            let by_cameras = self.by_cameras_if_better(solved.value.warped(), options, context)?;
+            if let Some(drawn) = by_cameras {
+                return Ok(drawn);
+            }
         }
-        self.unless_worse(solved, options, context)
+        self.refined(context.absorb(solved), options, context)
     }
 
-    /// The mesh, with what it told, or the cameras where it is worse than they are.
-    fn unless_worse(
+    /// What the cameras draw, where the plain mesh is worse than they are.
+    fn by_cameras_if_better(
         &self,
-        solved: Reported<WarpedMesh>,
+        plain: &WarpedMesh,
         options: &AlignOptions,
         context: &StageContext,
-    ) -> Result<WarpedMesh> {
+    ) -> Result<Option<WarpedMesh>> {
         let cameras = &self.cameras.cameras;
         let level_from_world = self.prior.level_from_world();
         let mut level = self.prior.corrected_cameras(cameras);
@@ -231,10 +237,21 @@ impl Deformation<'_> {
             dominant: dominant.as_ref(),
             units_per_radian: mesh::turn_length(cameras, self.prior) / TAU,
         };
-        match mesh::unless_worse(&solved.value, &input, &options.mesh, context)? {
-            Some(drawn) => Ok(drawn),
-            None => Ok(context.absorb(solved)),
+        mesh::unless_worse(plain, &input, &options.mesh, context)
+    }
+
+    /// The mesh, refined by what the options or the photographs ask for.
+    fn refined(&self, plain: PlainMesh, options: &AlignOptions, context: &StageContext) -> Result<WarpedMesh> {
+        let AlignInput { component, photographs, .. } = *self.input;
+        let evidence = match options.stitch.align {
+            Evidence::Auto => refinement::asked_for(plain.misaligned_share(self.pairs), context),
+            told => told,
+        };
+        if evidence == Evidence::Points {
+            return Ok(plain.into_warped());
         }
+        let sources = RefinementSources::new(evidence, component, self.grids, self.warps, photographs, context)?;
+        plain.refined(&sources.refinements(component, self.pairs, options), context)
     }
 
     fn by_warp(&self, model: WarpModel, options: &AlignOptions, context: &StageContext) -> Result<WarpedMesh> {

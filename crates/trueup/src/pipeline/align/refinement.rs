@@ -4,33 +4,55 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 use trueup_align::match_points::OverlapWarp;
-use trueup_align::mesh::{
-    GrayPyramid, LineAlignmentInput, PhotometricInput, Refinements, StraightInput, StructureInput,
-};
-use trueup_core::lines::{LineSegment, PairLines};
+use trueup_align::mesh::{GrayPyramid, LineAlignmentInput, PhotometricInput, Refinements, StraightInput};
+use trueup_core::diagnostics::{Diagnostic, Subject};
+use trueup_core::lines::PairLines;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::FilePhotographs;
 use trueup_vision::line_matching::{self, PhotographWithLines};
-use trueup_vision::lines;
 
 use super::component::Component;
-use crate::options::{AlignOptions, Structure};
+use crate::options::{AlignOptions, Evidence};
 use crate::pipeline::measure::{THUMBNAIL_PIXELS, eight_bit};
 
-/// Whether the mesh is refined by the photographs' pixels, so that they are worth keeping.
+/// Whether the mesh is to be refined whatever comes, so that the photographs' pixels are worth keeping.
 pub(crate) fn needs_pixels(options: &AlignOptions) -> bool {
     options.stitch.align.uses_lines() || options.stitch.align.uses_pixels()
 }
 
-/// What the refinements that the options ask for are made from.
-#[derive(Debug, Default)]
+/// What draws overlaps together where it is left to the photographs, of whose matched points `misaligned_share` stay apart by
+/// what neighbors have in common.
+///
+/// Pixels are not asked: beside lines, they lower the distance of matches on 50 photographed sets by another 1 % and take as
+/// long as all the rest of a small panorama.
+///
+/// The note `parallax` says so where lines are taken.
+pub(super) fn asked_for(misaligned_share: f64, context: &StageContext) -> Evidence {
+    /// Photographs taken from one point come to 0.02 at most (28 sets with known cameras). Of 55 photographed sets, those below lose
+    /// 1 % of NCC MSE by lines (median), those above 8 %.
+    const WORTH_REFINING: f64 = 0.05;
+    if misaligned_share < WORTH_REFINING {
+        return Evidence::Points;
+    }
+    let percent = 100.0 * misaligned_share;
+    context.report(Diagnostic::note(
+        "parallax",
+        Subject::stage("mesh"),
+        format!("matched lines align it as well: {percent:.0} % of the matched points are kept apart by parallax"),
+        "",
+    ));
+    Evidence::Lines
+}
+
+/// What the refinements by some evidence are made from.
+#[derive(Debug)]
 pub(super) struct RefinementSources {
+    evidence: Evidence,
     pyramids: Vec<GrayPyramid>,
     matched: Vec<PairLines>,
-    chains: Vec<Vec<LineSegment>>,
 }
 
 impl RefinementSources {
@@ -40,20 +62,14 @@ impl RefinementSources {
     /// # Errors
     /// Those of decoding; [`trueup_core::Error::Cancelled`].
     pub(super) fn new(
+        evidence: Evidence,
         component: &Component,
         grids: &[GridMesh],
         warps: &[OverlapWarp],
         photographs: &FilePhotographs,
-        options: &AlignOptions,
         context: &StageContext,
     ) -> Result<Self> {
-        let mut sources = Self::default();
-        if options.stitch.structure == Structure::Lines {
-            sources.chains = component.lines.par_iter().map(|lines| lines::merged(lines)).collect();
-        }
-        if !needs_pixels(options) {
-            return Ok(sources);
-        }
+        let mut sources = Self { evidence, pyramids: Vec::new(), matched: Vec::new() };
         let grays: Vec<Cow<Raster<u8>>> = (0..component.members.len())
             .into_par_iter()
             .map(|k| {
@@ -65,7 +81,7 @@ impl RefinementSources {
                 Ok(Cow::Owned(eight_bit(&picture.gray)))
             })
             .collect::<Result<_>>()?;
-        if options.stitch.align.uses_lines() {
+        if evidence.uses_lines() {
             let each_once: Vec<&OverlapWarp> = warps.iter().filter(|warp| warp.from < warp.to).collect();
             sources.matched = each_once
                 .into_par_iter()
@@ -80,35 +96,27 @@ impl RefinementSources {
                 })
                 .collect::<Result<_>>()?;
         }
-        if options.stitch.align.uses_pixels() {
+        if evidence.uses_pixels() {
             sources.pyramids = grays.par_iter().map(|gray| GrayPyramid::new(gray)).collect();
         }
         Ok(sources)
     }
 
-    /// The refinements that the options ask for. `met` are the pairs whose overlaps are to coincide.
+    /// The refinements by the evidence. `met` are the pairs whose overlaps are to coincide.
     pub(super) fn refinements<'a>(
         &'a self,
         component: &'a Component,
         met: &'a [PairMatches],
         options: &'a AlignOptions,
     ) -> Refinements<'a> {
-        let align = options.stitch.align;
+        let AlignOptions { line_alignment, photometric, mesh, .. } = options;
+        let lines = LineAlignmentInput { matched: &self.matched, points: met, options: line_alignment };
+        let pixels = PhotometricInput { pyramids: &self.pyramids, options: photometric };
         Refinements {
-            closure: None,
-            structure: (options.stitch.structure == Structure::Lines)
-                .then_some(StructureInput { chains: &self.chains, options: &options.structure }),
-            lines: align.uses_lines().then_some(LineAlignmentInput {
-                matched: &self.matched,
-                points: met,
-                options: &options.line_alignment,
-            }),
-            straight: needs_pixels(options)
-                .then_some(StraightInput { lines: &component.lines, options: &options.line_alignment }),
-            photometric: align
-                .uses_pixels()
-                .then_some(PhotometricInput { pyramids: &self.pyramids, options: &options.photometric }),
-            outline_weight: options.mesh.outline_weight,
+            lines: self.evidence.uses_lines().then_some(lines),
+            straight: Some(StraightInput { lines: &component.lines, options: line_alignment }),
+            photometric: self.evidence.uses_pixels().then_some(pixels),
+            outline_weight: mesh.outline_weight,
         }
     }
 }

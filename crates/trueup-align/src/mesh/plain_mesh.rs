@@ -1,0 +1,110 @@
+//! The plain mesh, and what its solution leaves to be refined.
+
+use nalgebra::Vector2;
+use trueup_core::matches::PairMatches;
+use trueup_core::mesh::GridMesh;
+use trueup_core::{Result, StageContext};
+
+use super::alignment::AlignmentEnergy;
+use super::current_grids::CurrentGrids;
+use super::input::MeshInput;
+use super::line_alignment;
+use super::normal_equations::NormalEquations;
+use super::options::MeshOptions;
+use super::problem::{MeshProblem, Solved};
+use super::refinements::Refinements;
+use super::similarity::PRIOR_SLOPE;
+use super::solver::MeshSolver;
+use super::warped_mesh::WarpedMesh;
+use crate::match_points::OverlapWarp;
+
+/// How the grids lie to one another: open, or closed to a full turn.
+#[derive(Debug)]
+pub(super) struct Layout<'a> {
+    /// The bases' places of the grids' vertices.
+    pub places: Vec<Vec<Vector2<f64>>>,
+    pub alignment: AlignmentEnergy,
+    /// Match points across the cut of a full turn that is to be closed.
+    pub closing: &'a [OverlapWarp],
+}
+
+impl Layout<'_> {
+    /// The equations of `input`, laid out so.
+    pub(super) fn problem<'a>(
+        &'a self,
+        input: &MeshInput<'a>,
+        options: &'a MeshOptions,
+        context: &'a StageContext<'a>,
+    ) -> MeshProblem<'a> {
+        let MeshInput { grids, warps, bases, reference, .. } = *input;
+        let Self { places, alignment, closing } = self;
+        let prior_slope = PRIOR_SLOPE;
+        MeshProblem { grids, warps, bases, places, alignment, reference, closing, prior_slope, options, context }
+    }
+}
+
+/// A mesh without refinements, and all that these go on from.
+#[derive(Debug)]
+pub struct PlainMesh<'a> {
+    input: MeshInput<'a>,
+    layout: Layout<'a>,
+    options: &'a MeshOptions,
+    equations: NormalEquations,
+    solver: MeshSolver,
+    solved: Solved,
+    warped: WarpedMesh,
+}
+
+impl<'a> PlainMesh<'a> {
+    /// Solves the mesh of `input` as it is laid out.
+    pub(super) fn solve(
+        input: MeshInput<'a>,
+        layout: Layout<'a>,
+        options: &'a MeshOptions,
+        context: &StageContext,
+    ) -> Result<Self> {
+        let problem = layout.problem(&input, options, context);
+        let mut equations = problem.equations();
+        if let Some(structure) = &input.structure {
+            structure.add(&mut equations, &problem.current(input.grids, input.grids));
+        }
+        let mut solver = MeshSolver::default();
+        let solved = problem.solve(&mut solver, &equations)?;
+        let warped = problem.warped(&solved);
+        Ok(Self { input, layout, options, equations, solver, solved, warped })
+    }
+
+    /// The grids, as they are delivered if nothing refines them.
+    pub fn warped(&self) -> &WarpedMesh {
+        &self.warped
+    }
+
+    /// [`PlainMesh::warped`], for good.
+    pub fn into_warped(self) -> WarpedMesh {
+        self.warped
+    }
+
+    /// The solved grids, before they are subdivided.
+    pub(super) fn grids(&self) -> &[GridMesh] {
+        &self.solved.meshes
+    }
+
+    /// How much of the distance at which matched `points` land is common to neighbors, and so is no noise but parallax
+    /// that a refinement could take up: the mean over the points of the share of its weight that each would have, 0 to 1.
+    pub fn misaligned_share(&self, points: &[PairMatches]) -> f64 {
+        let (solved, fine, places) = (&self.solved.meshes, &self.warped.meshes, &self.layout.places);
+        line_alignment::misaligned_share(points, &CurrentGrids { solved, fine, places })
+    }
+
+    /// The mesh with one refinement after the other.
+    ///
+    /// # Errors
+    /// As those of [`run`](super::run); [`trueup_core::Error::Input`] if a refinement's lists do not have an entry per
+    /// photograph.
+    pub fn refined(self, refinements: &Refinements, context: &StageContext) -> Result<WarpedMesh> {
+        let Self { input, layout, options, equations, mut solver, solved, .. } = self;
+        refinements.check(input.grids.len())?;
+        let problem = layout.problem(&input, options, context);
+        Ok(problem.warped(&problem.refine(&mut solver, equations, solved, refinements)?))
+    }
+}
