@@ -103,7 +103,7 @@ impl RefinementSources {
                 points: met,
                 options: &options.line_alignment,
             }),
-            straight: needs_pixels(options)
+            straight: (needs_pixels(options) && options.line_alignment.straightness > 0.0)
                 .then_some(StraightInput { lines: &component.lines, options: &options.line_alignment }),
             photometric: align
                 .uses_pixels()
