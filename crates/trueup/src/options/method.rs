@@ -46,7 +46,8 @@ impl Edition {
 }
 
 /// The mesh of VPG, GSP and the AANAP compared with them: one similarity for each photograph, vertices carried by moving DLT, undivided cells, the weights
-/// of GSP's authors, outlines that nothing holds, and no refinement but one that is asked for.
+/// of GSP's authors, no refinement but one that is asked for, and outlines and lines that nothing holds while one draws overlaps together: one similarity
+/// for each photograph leaves no room for lines that stay straight where a neighbor lies under another perspective, and photographs would turn to make it.
 fn fix_published_mesh(options: &mut AlignOptions) {
     /// Residual weights of the three energies next to an overlap, for cells of 40 working pixels.
     const ALIGNMENT: f64 = 1.0;
@@ -61,6 +62,7 @@ fn fix_published_mesh(options: &mut AlignOptions) {
     mesh.subdivision = 1;
     (mesh.alignment_weight, mesh.local_weight, mesh.prior_weight) = (ALIGNMENT, LOCAL, PRIOR);
     mesh.outline_weight = 0.0;
+    options.line_alignment.straightness = 0.0;
 }
 
 /// The guidance of VPG: each photograph's own vanishing points, found without intrinsics, against relative rolls, the divergence

@@ -400,7 +400,14 @@ mod tests {
             assert_eq!(fixed.fixed_by_method(), fixed, "{method}");
             fixed.differing_geometry(&options).expect("tables")
         };
-        let mesh = ["match_points.model", "mesh.base", "mesh.outline_weight", "mesh.subdivision"];
+        let mesh = [
+            "line_alignment.straightness",
+            "match_points.model",
+            "mesh.base",
+            "mesh.outline_weight",
+            "mesh.subdivision",
+            "stitch.align",
+        ];
         let guidance = [
             "similarity.camera_correction",
             "similarity.fallback",

@@ -114,7 +114,8 @@ impl RefinementSources {
         let pixels = PhotometricInput { pyramids: &self.pyramids, options: photometric };
         Refinements {
             lines: self.evidence.uses_lines().then_some(lines),
-            straight: Some(StraightInput { lines: &component.lines, options: line_alignment }),
+            straight: (line_alignment.straightness > 0.0)
+                .then_some(StraightInput { lines: &component.lines, options: line_alignment }),
             photometric: self.evidence.uses_pixels().then_some(pixels),
             outline_weight: mesh.outline_weight,
         }
