@@ -13,8 +13,8 @@ const THING: f32 = 4.0;
 /// Cost of a cell that no photograph covers and that is filled: it is filled only where that saves more than as many calm
 /// cells.
 const FILLED: f32 = 1.0;
-/// Further cost of a filled cell if what is nearest to it were not smooth at all; a share of it for a share.
-const FILLED_BESIDE_ROUGH: f32 = 6.0;
+/// Further cost of a filled cell if the border near it were not smooth at all; a share of it for a share.
+const FILLED_BESIDE_ROUGH: f32 = 10.0;
 /// Cost of cutting through a thing, for each cell of the cut: calm cells as a share of the panorama's longer side.
 const CUT: f32 = 0.1;
 /// Of that, what cutting it to the left or right costs: things that stand on the ground are expected to go on to the sides.

@@ -1,29 +1,41 @@
 //! Which empty cells may be filled: those beside which the picture is so smooth that a smooth surface goes on as it would.
 
 use super::cells::Cells;
+use super::worth::box_means;
 
 /// Largest standard deviation of the luma in a smooth cell, levels: noise of a sky, its slope, and soft clouds.
 const SMOOTH_DEVIATION: f32 = 6.0;
 /// Largest contrast between smooth cells beside each other, levels.
 const SMOOTH_CONTRAST: f32 = 10.0;
 
-/// Least share of what is nearest to an empty cell that is smooth: a twig or a wire that runs into the border may be beside it,
-/// a tree may not.
-const LEAST_SMOOTH: f32 = 0.5;
+/// Half the side of the square over which the border of what is covered is judged, as a share of the panorama's longer side: the
+/// colors of what is filled come from as far as it is deep, so that a twig, a wire or the edge of a cloud at one place of a sky's
+/// border alone says nothing of it.
+const BORDER_STRETCH: f64 = 0.05;
+/// Least share of the border near an empty cell that is smooth: twigs that run into it may be beside it, a tree's crown may not.
+/// With a half, the foggy sky over the twigs of CAVE-columbus_circle is not filled, and the tower beside it not kept.
+const LEAST_SMOOTH: f32 = 0.3;
 
 /// What may be filled.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Fillable {
-    /// For every empty cell that may be filled, which share of what is nearest to it is smooth.
+    /// For every empty cell that may be filled, which share of the border of what is covered is smooth there.
     pub(super) smooth: Vec<Option<f32>>,
 }
 
 impl Fillable {
-    /// Empty cells of which what is nearest is smooth, no farther than `reach` cells from it: from the covered cells
-    /// outwards, step by step, each is as smooth as those beside it that were reached before are in the mean.
+    /// Empty cells beside a smooth border, no farther than `reach` cells from it: from the covered cells outwards, step by
+    /// step, each is as smooth as those beside it that were reached before are in the mean. Cells of the border are as smooth as
+    /// the share of it within [`BORDER_STRETCH`] is.
     pub(super) fn of(cells: &Cells, reach: usize) -> Self {
-        let border = |at: usize| smooth_border(cells, at).map(|smooth| if smooth { 1.0 } else { 0.0 });
-        let mut smooth: Vec<Option<f32>> = (0..cells.covered.len()).map(border).collect();
+        let border: Vec<Option<bool>> = (0..cells.covered.len()).map(|at| smooth_border(cells, at)).collect();
+        let is_border: Vec<bool> = border.iter().map(Option::is_some).collect();
+        let is_smooth: Vec<f32> =
+            border.iter().map(|smooth| if smooth.is_some_and(|smooth| smooth) { 1.0 } else { 0.0 }).collect();
+        let stretch = (BORDER_STRETCH * cells.columns.max(cells.rows) as f64).round().max(1.0) as usize;
+        let shares = box_means(&is_smooth, &is_border, cells, stretch);
+        let of_border = |(share, is_border): (f32, &bool)| is_border.then_some(share);
+        let mut smooth: Vec<Option<f32>> = shares.into_iter().zip(&is_border).map(of_border).collect();
         let mut front: Vec<usize> = (0..smooth.len()).filter(|&at| smooth[at].is_some()).collect();
         for _ in 0..reach {
             let mut next: Vec<usize> = front

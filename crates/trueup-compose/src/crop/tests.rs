@@ -131,6 +131,25 @@ fn what_is_missing_of_a_smooth_sky_costs_nothing() {
     assert_eq!(kept(&steps, Crop::Auto, ground), Some(Rectangle { columns: 0..190, rows: 0..60 }));
 }
 
+/// A tower rises into rows that end beside it: over the sky there, in whose border a cloud's edge lies at one place, what is
+/// missing is filled, so that the tower keeps its top; over the crown of a tree it is not.
+#[test]
+fn the_edge_of_a_cloud_costs_no_tower_its_top() {
+    let layout = layout(400, 300, &[upright(0.0, 30.0, 400.0, 300.0), upright(0.0, 0.0, 150.0, 200.0)]);
+    let scene = |rough_part: std::ops::Range<usize>| {
+        move |x: usize, y: usize| match (y >= 220, (90..110).contains(&x) && y >= 8, y < 60 && rough_part.contains(&x))
+        {
+            (true, _, _) | (_, _, true) => rough(x, y),
+            (_, true, _) => 60,
+            _ => 220,
+        }
+    };
+    let cloud = kept(&layout, Crop::Auto, scene(280..288)).expect("a rectangle");
+    assert_eq!((cloud.columns, cloud.rows.start <= 6), (0..400, true), "{:?}", cloud.rows);
+    let tree = kept(&layout, Crop::Auto, scene(200..400)).expect("a rectangle");
+    assert!(tree.rows.start >= 30 || tree.columns.end <= 200, "{tree:?}");
+}
+
 /// A narrow photograph 80 pixels above a wide one: farther than a photograph's side, 60 pixels, nothing is filled.
 #[test]
 fn what_is_far_from_all_photographs_is_not_filled() {

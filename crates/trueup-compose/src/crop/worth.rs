@@ -45,8 +45,8 @@ impl Worth {
         let longer = cells.columns.max(cells.rows) as f64;
         let reach = |share: f64| (share * longer).round().max(1.0) as usize;
         let edges: Vec<f32> = (0..cells.covered.len()).map(|at| edge(cells, at)).collect();
-        let things = box_means(&edges, cells, reach(THING));
-        let around = box_means(&edges, cells, reach(SURROUNDINGS));
+        let things = box_means(&edges, &cells.covered, cells, reach(THING));
+        let around = box_means(&edges, &cells.covered, cells, reach(SURROUNDINGS));
         let salience: Vec<f32> = things
             .iter()
             .zip(&around)
@@ -78,8 +78,8 @@ fn edge(cells: &Cells, at: usize) -> f32 {
     (strongest / FULL_EDGE).min(1.0)
 }
 
-/// Means over the covered cells of a square of `2 * reach + 1` cells around each.
-fn box_means(values: &[f32], cells: &Cells, reach: usize) -> Vec<f32> {
+/// Means over those cells that are `counted` of a square of `2 * reach + 1` cells around each; 0 without any.
+pub(super) fn box_means(values: &[f32], counted: &[bool], cells: &Cells, reach: usize) -> Vec<f32> {
     let (columns, rows) = (cells.columns, cells.rows);
     // Sums over all cells above and left of a corner.
     let mut sums = vec![[0.0_f64; 2]; (columns + 1) * (rows + 1)];
@@ -87,7 +87,7 @@ fn box_means(values: &[f32], cells: &Cells, reach: usize) -> Vec<f32> {
         let mut row = [0.0_f64; 2];
         for x in 0..columns {
             let at = y * columns + x;
-            if cells.covered[at] {
+            if counted[at] {
                 row = [row[0] + f64::from(values[at]), row[1] + 1.0];
             }
             let above = sums[y * (columns + 1) + x + 1];
