@@ -50,6 +50,9 @@ impl Panorama {
     ///
     /// # Source
     /// Push-pull: Gortler, Grzeszczuk, Szeliski, Cohen, "The lumigraph", SIGGRAPH 1996, section 3.4.
+    ///
+    /// # Departures
+    /// Only what lies beside a gap is carried into it, and what is of another kind than the border around it is not.
     pub fn fill(&mut self, gaps: &Gaps, context: &StageContext) -> Result<usize> {
         let size = gaps.canvas();
         match &mut self.pixels {
@@ -78,12 +81,14 @@ fn fill<P: Shade>(store: &mut PixelStore<P>, size: [usize; 2], gaps: &Gaps, cont
     if wanted.is_empty() {
         return Ok(0);
     }
-    let surface = canvas.coarse_surface(store, &sources, context)?;
+    let all = canvas.reduced(store, &sources, &BorderColors::default(), context)?;
+    let around = BorderColors::of(all, canvas.first_level);
+    let surface = surface(canvas.reduced(store, &sources, &around, context)?);
     let mut filled = 0;
     for tiles in wanted.chunks(TILES_AT_ONCE) {
         context.check_cancelled()?;
         let finished: Vec<(usize, Vec<P>)> =
-            tiles.par_iter().map(|tile| canvas.finished(store, tile, &surface)).collect::<Result<_>>()?;
+            tiles.par_iter().map(|tile| canvas.finished(store, tile, &around, &surface)).collect::<Result<_>>()?;
         for (tile, (count, pixels)) in tiles.iter().zip(finished) {
             filled += count;
             let columns = tile.columns.start - canvas.lead..tile.columns.end - canvas.lead;
@@ -179,17 +184,27 @@ impl<'a> Canvas<'a> {
         stretches
     }
 
-    /// Colors times the share covered of a tile with its margin; nothing where the gaps are.
-    fn known<P: Shade>(&self, store: &PixelStore<P>, tile: &FillTile) -> Result<PyramidPlane<[f32; 4]>> {
+    /// Colors times the share covered of a tile with its margin; nothing where the gaps are, nor farther from them than
+    /// [`Canvas::border`].
+    fn known<P: Shade>(
+        &self,
+        store: &PixelStore<P>,
+        tile: &FillTile,
+        around: &BorderColors,
+    ) -> Result<PyramidPlane<[f32; 4]>> {
         let (columns, rows) = self.with_margin(tile);
         let mut plane = PyramidPlane::new(columns.clone(), rows.clone());
+        let beside = self.beside_gaps(&columns, &rows);
         for (first, own) in self.stretches(&columns) {
             let pixels = store.window(&own, &rows)?;
             for (y, pixels) in rows.clone().zip(pixels.chunks_exact(own.len())) {
-                let texels = &mut plane.row_mut(y)[first - columns.start..][..own.len()];
-                for (x, (texel, &pixel)) in own.clone().zip(texels.iter_mut().zip(pixels)) {
-                    if self.gaps.is_covered(x, y) {
+                let from = first - columns.start;
+                let beside = &beside[(y - rows.start) * columns.len() + from..][..own.len()];
+                let texels = &mut plane.row_mut(y)[from..][..own.len()];
+                for ((x, &beside), (texel, &pixel)) in own.clone().zip(beside).zip(texels.iter_mut().zip(pixels)) {
+                    if beside && self.gaps.is_covered(x, y) {
                         let [r, g, b, share] = pixel.root();
+                        let share = share * around.belonging(first + x - own.start, y, [r, g, b]);
                         *texel = [r * share, g * share, b * share, share];
                     }
                 }
@@ -198,11 +213,45 @@ impl<'a> Canvas<'a> {
         Ok(plane)
     }
 
-    /// The surface at the first level and so much of the panorama as gaps need.
-    fn coarse_surface<P: Shade>(
+    /// How far from a gap its colors are taken, pixels: what lies behind the border of a narrow strip of sky is no sky.
+    fn border(&self) -> usize {
+        /// As a share of the half width of the widest gap, which a wider border would tell no more about.
+        const SHARE: f64 = 0.25;
+        /// Fewest and most pixels: so many that noise averages out, and no more than are soon looked through.
+        const WIDTHS: [f64; 2] = [8.0, 64.0];
+        (SHARE * self.gaps.radius()).clamp(WIDTHS[0], WIDTHS[1]).round() as usize
+    }
+
+    /// Whether some gap lies in the square of [`Canvas::border`] pixels to every side of each pixel of a window, row by row.
+    fn beside_gaps(&self, columns: &Range<usize>, rows: &Range<usize>) -> Vec<bool> {
+        let border = self.border();
+        let wide = columns.start.saturating_sub(border)..(columns.end + border).min(self.width + 2 * self.lead);
+        let high = rows.start.saturating_sub(border)..(rows.end + border).min(self.height);
+        // For each row of the high window, whether a gap lies to the left or right of the window's columns.
+        let across: Vec<Vec<bool>> = high
+            .clone()
+            .map(|y| {
+                let is_gap = |x: usize| {
+                    let x = self.column(x);
+                    !self.gaps.is_covered(x, y) && self.gaps.is_gap(x, y)
+                };
+                spread(wide.clone().map(is_gap), border, columns.start - wide.start, columns.len())
+            })
+            .collect();
+        let mut beside = vec![false; columns.len() * rows.len()];
+        for x in 0..columns.len() {
+            let down = spread(across.iter().map(|row| row[x]), border, rows.start - high.start, rows.len());
+            down.into_iter().enumerate().for_each(|(y, found)| beside[y * columns.len() + x] = found);
+        }
+        beside
+    }
+
+    /// What is known at the first level, of so much of the panorama as gaps need.
+    fn reduced<P: Shade>(
         &self,
         store: &PixelStore<P>,
         sources: &[FillTile],
+        around: &BorderColors,
         context: &StageContext,
     ) -> Result<PyramidPlane<[f32; 4]>> {
         let samples = |length: usize| 0..length.div_ceil(1 << self.first_level);
@@ -212,7 +261,7 @@ impl<'a> Canvas<'a> {
             let reduced: Vec<PyramidPlane<[f32; 4]>> = tiles
                 .par_iter()
                 .map(|tile| {
-                    let plane = self.known(store, tile)?;
+                    let plane = self.known(store, tile, around)?;
                     Ok((0..self.first_level).fold(plane, |plane, _| plane.reduced()))
                 })
                 .collect::<Result<_>>()?;
@@ -226,11 +275,7 @@ impl<'a> Canvas<'a> {
                 }
             }
         }
-        let mut levels = vec![known];
-        while let Some(last) = levels.last().filter(|last| last.texels.len() > 1) {
-            levels.push(last.reduced());
-        }
-        Ok(pulled(levels, None))
+        Ok(known)
     }
 
     /// A tile's pixels with its gaps filled, and how many that were.
@@ -238,9 +283,10 @@ impl<'a> Canvas<'a> {
         &self,
         store: &PixelStore<P>,
         tile: &FillTile,
+        around: &BorderColors,
         surface: &PyramidPlane<[f32; 4]>,
     ) -> Result<(usize, Vec<P>)> {
-        let mut levels = vec![self.known(store, tile)?];
+        let mut levels = vec![self.known(store, tile, around)?];
         for _ in 1..self.first_level {
             levels.extend(levels.last().map(PyramidPlane::reduced));
         }
@@ -264,6 +310,61 @@ impl<'a> Canvas<'a> {
         }
         Ok((filled, pixels))
     }
+}
+
+/// The colors of the borders of gaps, each over what lies around it; none known by default.
+#[derive(Debug, Default)]
+struct BorderColors {
+    means: PyramidPlane<[f32; 4]>,
+    /// Log2 of the pixels per sample.
+    level: u32,
+}
+
+impl BorderColors {
+    /// From what is known of the borders at a level.
+    fn of(known: PyramidPlane<[f32; 4]>, level: u32) -> Self {
+        /// Levels above it: samples of 32 pixels on most canvases, which see three times as far, so that a lamp or a twig is the lesser part
+        /// of what they see.
+        const COARSER: u32 = 2;
+        Self { means: (0..COARSER).fold(known, |plane, _| plane.reduced()), level: level + COARSER }
+    }
+
+    /// How much a color at a pixel of the canvas belongs to the border around it: Tukey's biweight of its distance. A lamp that ends
+    /// at the border of a sky is no part of it, and is not carried on.
+    fn belonging(&self, x: usize, y: usize, root: [f32; 3]) -> f32 {
+        /// Distance from which on a color is of another kind, square root of linear light: three times what clouds differ by.
+        const OTHER_KIND: f32 = 0.25;
+        /// What it counts all the same, where the border has no kind.
+        const LEAST: f32 = 0.002;
+        let (x, y) = (x >> self.level, y >> self.level);
+        if !(self.means.columns.contains(&x) && self.means.rows.contains(&y)) {
+            return 1.0;
+        }
+        let Some(mean) = color(self.means.row(y)[x - self.means.columns.start]) else { return 1.0 };
+        let apart = (0..3).map(|k| (root[k] - mean[k]).abs()).fold(0.0, f32::max) / OTHER_KIND;
+        if apart < 1.0 { (1.0 - apart * apart).powi(2).max(LEAST) } else { LEAST }
+    }
+}
+
+/// The surface over the whole of a level, of which some is known.
+fn surface(known: PyramidPlane<[f32; 4]>) -> PyramidPlane<[f32; 4]> {
+    let mut levels = vec![known];
+    while let Some(last) = levels.last().filter(|last| last.texels.len() > 1) {
+        levels.push(last.reduced());
+    }
+    pulled(levels, None)
+}
+
+/// For `count` places of a line from `first` on, whether one that `is` set lies no more than `reach` before or after it.
+fn spread(is: impl Iterator<Item = bool>, reach: usize, first: usize, count: usize) -> Vec<bool> {
+    let mut spread = vec![false; count];
+    let mut done = 0;
+    for at in is.enumerate().filter_map(|(at, is)| is.then_some(at)) {
+        let range = at.saturating_sub(reach + first).max(done)..(at + reach + 1).saturating_sub(first).min(count);
+        done = range.end.max(done);
+        spread.get_mut(range).into_iter().flatten().for_each(|place| *place = true);
+    }
+    spread
 }
 
 /// A sample counts as wholly known if this share of its surroundings is, its inverse: colors reach into a gap as far as the
