@@ -84,7 +84,9 @@ fn scale_sets_the_size_and_quality_the_bytes() {
     stitch("full.png", &[]);
     stitch("half.png", &["--scale", "0.5"]);
     let (full, half) = (picture_size(&desk.join("full.png")), picture_size(&desk.join("half.png")));
-    assert!(half.0.abs_diff(full.0 / 2) <= 1 && half.1.abs_diff(full.1 / 2) <= 1, "{full:?} {half:?}");
+    // What is kept is chosen by cells, which do not lie alike at every size.
+    let is_half = |half: u32, full: u32| half.abs_diff(full / 2) <= 1 + full / 100;
+    assert!(is_half(half.0, full.0) && is_half(half.1, full.1), "{full:?} {half:?}");
     stitch("fine.jpg", &["--quality", "95"]);
     stitch("coarse.jpg", &["--quality", "30"]);
     assert!(desk.read("coarse.jpg").len() * 2 < desk.read("fine.jpg").len());
