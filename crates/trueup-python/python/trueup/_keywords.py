@@ -108,9 +108,9 @@ class StitchKeywords(ComposeKeywords, total=False):
     ]
     """How the panorama's shape is found. Choose another one to compare, or for photographs that it serves better
     (default vpg)."""
-    align: Literal["points", "lines", "photometric", "lines+photometric"]
-    """What draws overlapping photographs together. Where things stand twice or lines break at seams, take more: it is
-    slower and shows fewer ghosts (default points)."""
+    align: Literal["auto", "points", "lines", "photometric", "lines+photometric"]
+    """What draws overlapping photographs together. Where things stand twice or lines break at seams, take more than
+    auto does: it is slower and shows fewer ghosts (default auto)."""
     structure: Literal["none", "lines"]
     """What of the photographs' structure is kept, beyond the neighborhoods of grid vertices. Choose lines where long
     edges bend (default none)."""
@@ -190,9 +190,9 @@ class BatchKeywords(SaveKeywords, total=False):
     ]
     """How the panorama's shape is found. Choose another one to compare, or for photographs that it serves better
     (default vpg)."""
-    align: Literal["points", "lines", "photometric", "lines+photometric"]
-    """What draws overlapping photographs together. Where things stand twice or lines break at seams, take more: it is
-    slower and shows fewer ghosts (default points)."""
+    align: Literal["auto", "points", "lines", "photometric", "lines+photometric"]
+    """What draws overlapping photographs together. Where things stand twice or lines break at seams, take more than
+    auto does: it is slower and shows fewer ghosts (default auto)."""
     structure: Literal["none", "lines"]
     """What of the photographs' structure is kept, beyond the neighborhoods of grid vertices. Choose lines where long
     edges bend (default none)."""
