@@ -50,7 +50,6 @@ pub struct PlainMesh<'a> {
     layout: Layout<'a>,
     options: &'a MeshOptions,
     equations: NormalEquations,
-    solver: MeshSolver,
     solved: Solved,
     warped: WarpedMesh,
 }
@@ -68,10 +67,10 @@ impl<'a> PlainMesh<'a> {
         if let Some(structure) = &input.structure {
             structure.add(&mut equations, &problem.current(input.grids, input.grids));
         }
-        let mut solver = MeshSolver::default();
-        let solved = problem.solve(&mut solver, &equations)?;
+        // Its factor is not kept for refinements: it is the largest thing there is while it is asked whether the cameras draw.
+        let solved = problem.solve(&mut MeshSolver::default(), &equations)?;
         let warped = problem.warped(&solved);
-        Ok(Self { input, layout, options, equations, solver, solved, warped })
+        Ok(Self { input, layout, options, equations, solved, warped })
     }
 
     /// The grids, as they are delivered if nothing refines them.
@@ -102,9 +101,9 @@ impl<'a> PlainMesh<'a> {
     /// As those of [`run`](super::run); [`trueup_core::Error::Input`] if a refinement's lists do not have an entry per
     /// photograph.
     pub fn refined(self, refinements: &Refinements, context: &StageContext) -> Result<WarpedMesh> {
-        let Self { input, layout, options, equations, mut solver, solved, .. } = self;
+        let Self { input, layout, options, equations, solved, .. } = self;
         refinements.check(input.grids.len())?;
         let problem = layout.problem(&input, options, context);
-        Ok(problem.warped(&problem.refine(&mut solver, equations, solved, refinements)?))
+        Ok(problem.warped(&problem.refine(&mut MeshSolver::default(), equations, solved, refinements)?))
     }
 }
