@@ -90,20 +90,25 @@ fn fill(panorama: &mut Panorama) -> usize {
     panorama.fill(&gaps, &StageContext::default()).expect("room")
 }
 
-#[test]
-fn gaps_take_up_the_colors_beside_them() {
-    // A photograph that is dark on the left and bright on the right, below a strip of 20 rows.
-    let halves = (0..300 * 200).flat_map(|at| [if at % 300 < 150 { 40_u8 } else { 200 }; 3]).collect();
-    let raster = trueup_core::raster::Raster::from_data(300, 200, 3, halves).expect("as many samples");
+/// A photograph of 300 x 200 pixels below a strip of 20 empty rows and above 100 more, of the levels at its pixels; and the strip,
+/// as gaps.
+fn below_a_strip(level: impl Fn(usize, usize) -> u8) -> (Panorama, Gaps) {
+    let samples = (0..300 * 200).flat_map(|at| [level(at % 300, at / 300); 3]).collect();
+    let raster = trueup_core::raster::Raster::from_data(300, 200, 3, samples).expect("as many samples");
     let source = Memory(vec![trueup_core::raster::Photograph::Eight(raster)]);
     let layout = canvas(300, 320, vec![moved(0, 300.0, 200.0, |p| [p.x, p.y + 20.0])]);
     let (options, seams, context) = (RenderOptions::default(), SeamOptions::default(), StageContext::default());
     let input = RenderInput { layout: &layout, corrections: &Corrections::plain(1), photographs: &source };
     let rendered = run(&input, &Resources::unlimited(), &options, &seams, None, &context).expect("one photograph");
-    let mut panorama = rendered.panorama;
+    (rendered.panorama, Gaps::find(&layout, Coverage::of(&layout), 0.1))
+}
+
+#[test]
+fn gaps_take_up_the_colors_beside_them() {
+    // A photograph that is dark on the left and bright on the right, below a strip of 20 rows.
+    let (mut panorama, gaps) = below_a_strip(|x, _| if x < 150 { 40 } else { 200 });
     let before = rows(&panorama);
-    let gaps = Gaps::find(&layout, Coverage::of(&layout), 0.1);
-    assert_eq!(panorama.fill(&gaps, &context).expect("in memory"), 300 * 20);
+    assert_eq!(panorama.fill(&gaps, &StageContext::default()).expect("in memory"), 300 * 20);
     let mut row = vec![0; 4 * 300];
     for y in [0, 10, 19] {
         panorama.rgba8_row(y, &mut row).expect("in memory");
@@ -124,20 +129,9 @@ fn gaps_take_up_the_colors_beside_them() {
 /// post and the ground do not.
 #[test]
 fn what_ends_at_the_border_is_not_carried_into_a_gap() {
-    let scene = |at: usize| {
-        let (x, y) = (at % 300, at / 300);
-        if y >= 40 || (145..155).contains(&x) { 30_u8 } else { 200 }
-    };
-    let samples = (0..300 * 200).flat_map(|at| [scene(at); 3]).collect();
-    let raster = trueup_core::raster::Raster::from_data(300, 200, 3, samples).expect("as many samples");
-    let source = Memory(vec![trueup_core::raster::Photograph::Eight(raster)]);
-    let layout = canvas(300, 320, vec![moved(0, 300.0, 200.0, |p| [p.x, p.y + 20.0])]);
-    let (options, seams, context) = (RenderOptions::default(), SeamOptions::default(), StageContext::default());
-    let input = RenderInput { layout: &layout, corrections: &Corrections::plain(1), photographs: &source };
-    let rendered = run(&input, &Resources::unlimited(), &options, &seams, None, &context).expect("one photograph");
-    let mut panorama = rendered.panorama;
-    let gaps = Gaps::find(&layout, Coverage::of(&layout), 0.1);
-    panorama.fill(&gaps, &context).expect("in memory");
+    let scene = |x: usize, y: usize| if y >= 40 || (145..155).contains(&x) { 30 } else { 200 };
+    let (mut panorama, gaps) = below_a_strip(scene);
+    panorama.fill(&gaps, &StageContext::default()).expect("in memory");
     let mut row = vec![0; 4 * 300];
     for y in 0..20 {
         panorama.rgba8_row(y, &mut row).expect("in memory");
