@@ -1,44 +1,21 @@
-//! libFuzzer on the target that `TRUEUP_FUZZ_TARGET` names. A panic is a finding, one that trueup contains as well; so are a
-//! crash, an input that takes longer than the limit, and one that takes more memory.
+//! libFuzzer on the target that `TRUEUP_FUZZ_TARGET` names when this is compiled. A panic is a finding, one that trueup contains as
+//! well; so are a crash, an input that takes longer than the limit, and one that takes more memory.
 #![no_main]
 
 use std::sync::OnceLock;
 
 use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
-use trueup_fuzz::{TARGETS, Target, Work, mend_checksums};
+use trueup_fuzz::{Work, mend_checksums, target_named};
 
-/// Names the target; with [`LIST`], all are printed instead.
-const VARIABLE: &str = "TRUEUP_FUZZ_TARGET";
-const LIST: &str = "list";
+/// Nothing else is in the program: libFuzzer looks at the counters of all its code after every input.
+const READ: fn(&Work, &[u8]) = match target_named(env!("TRUEUP_FUZZ_TARGET")) {
+    Some(target) => target.read,
+    None => panic!("TRUEUP_FUZZ_TARGET names no target"),
+};
 
-/// Names a folder that the target's seeds are written to.
-const SEEDS: &str = "TRUEUP_FUZZ_SEEDS";
-
-fn begin() {
-    if std::env::var(VARIABLE).is_ok_and(|wanted| wanted == LIST) {
-        TARGETS.iter().for_each(|target| println!("{}", target.name));
-        std::process::exit(0);
-    }
-    let Some(folder) = std::env::var_os(SEEDS) else { return };
-    for (number, seed) in (target().0.seeds)().iter().enumerate() {
-        std::fs::write(std::path::Path::new(&folder).join(format!("seed-{number}")), seed).expect("a seed is written");
-    }
-}
-
-fn target() -> &'static (&'static Target, Work) {
-    static TARGET: OnceLock<(&Target, Work)> = OnceLock::new();
-    TARGET.get_or_init(|| {
-        let wanted = std::env::var(VARIABLE).unwrap_or_default();
-        let target = TARGETS.iter().find(|target| target.name == wanted);
-        let names: Vec<&str> = TARGETS.iter().map(|target| target.name).collect();
-        let target = target.unwrap_or_else(|| panic!("{VARIABLE} names none of {}", names.join(", ")));
-        (target, Work::new().expect("a folder for files"))
-    })
-}
-
-fuzz_target!(init: begin(), |input: &[u8]| {
-    let (target, work) = target();
-    (target.read)(work, input);
+fuzz_target!(|input: &[u8]| {
+    static WORK: OnceLock<Work> = OnceLock::new();
+    READ(WORK.get_or_init(|| Work::new().expect("a folder for files")), input);
 });
 
 // Behind checksums that are wrong nothing is read.

@@ -6,4 +6,4 @@ mod png;
 mod targets;
 
 pub use png::mend_checksums;
-pub use targets::{TARGETS, Target, Work};
+pub use targets::{TARGETS, Target, Work, target_named};

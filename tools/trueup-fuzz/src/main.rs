@@ -4,14 +4,15 @@
 mod mutation;
 mod run;
 
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
 
 use run::{Findings, Length, fuzz};
-use trueup_fuzz::TARGETS;
+use trueup_fuzz::{TARGETS, Target};
 
 /// Changes valid inputs at random and reads them. What panics is kept as a file and ends the command with status 1.
 ///
@@ -40,9 +41,26 @@ struct Arguments {
     #[arg(long, value_name = "DIR")]
     corpus: Option<PathBuf>,
 
+    /// Print the names of all targets, and do nothing else
+    #[arg(long)]
+    list: bool,
+
+    /// Write the targets' valid inputs to DIR/TARGET, and do nothing else
+    #[arg(long, value_name = "DIR")]
+    write_seeds: Option<PathBuf>,
+
     /// Where inputs that panic are kept
     #[arg(long, value_name = "DIR", default_value = "target/fuzz")]
     findings: PathBuf,
+}
+
+/// Writes the valid inputs of a target, each to a file of its own.
+fn write_seeds(target: &Target, folder: &Path) -> io::Result<()> {
+    std::fs::create_dir_all(folder)?;
+    for (number, seed) in (target.seeds)().iter().enumerate() {
+        std::fs::write(folder.join(format!("seed-{number}")), seed)?;
+    }
+    Ok(())
 }
 
 fn main() -> ExitCode {
@@ -56,8 +74,19 @@ fn main() -> ExitCode {
     let wanted = TARGETS
         .iter()
         .filter(|target| arguments.targets.is_empty() || arguments.targets.iter().any(|name| name == target.name));
+    if arguments.list {
+        wanted.for_each(|target| println!("{}", target.name));
+        return ExitCode::SUCCESS;
+    }
     let mut found = 0;
     for target in wanted {
+        if let Some(folder) = &arguments.write_seeds {
+            if let Err(error) = write_seeds(target, &folder.join(target.name)) {
+                eprintln!("trueup-fuzz: error: {}: {error}", folder.display());
+                return ExitCode::FAILURE;
+            }
+            continue;
+        }
         let length = Length { time: Duration::from_secs(arguments.seconds), executions: arguments.executions };
         let corpus = arguments.corpus.as_ref().map(|folder| folder.join(target.name));
         match fuzz(target, arguments.seed, length, corpus.as_deref(), &arguments.findings) {

@@ -11,7 +11,7 @@ mod work;
 pub use work::Work;
 
 /// Something that reads.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub struct Target {
     /// What it is called, and the folder of its inputs.
     pub name: &'static str,
@@ -22,7 +22,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub static TARGETS: [Target; 26] = [
+pub const TARGETS: [Target; 26] = [
     Target { name: "jpeg", seeds: || pictures::seeds("jpg"), read: pictures::read },
     Target { name: "png", seeds: || pictures::seeds("png"), read: pictures::read },
     Target { name: "tiff", seeds: || pictures::seeds("tif"), read: pictures::read },
@@ -50,3 +50,40 @@ pub static TARGETS: [Target; 26] = [
     Target { name: "cache-content", seeds: records::contents, read: records::read_content },
     Target { name: "request", seeds: requests::requests, read: requests::answer },
 ];
+
+/// The target of that name. A program that asks while it is compiled consists of no other target's code.
+#[must_use]
+pub const fn target_named(name: &str) -> Option<Target> {
+    let mut index = 0;
+    while index < TARGETS.len() {
+        if is_same(TARGETS[index].name.as_bytes(), name.as_bytes()) {
+            return Some(TARGETS[index]);
+        }
+        index += 1;
+    }
+    None
+}
+
+/// `==` of slices, which a constant may not ask.
+const fn is_same(one: &[u8], other: &[u8]) -> bool {
+    let mut index = 0;
+    while index < one.len() && index < other.len() && one[index] == other[index] {
+        index += 1;
+    }
+    index == one.len() && index == other.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn targets_are_found_by_their_whole_names() {
+        for target in &TARGETS {
+            assert_eq!(target_named(target.name).expect("known").name, target.name);
+        }
+        for unknown in ["", "ic", "iccs", "icc-memor"] {
+            assert!(target_named(unknown).is_none(), "{unknown}");
+        }
+    }
+}
