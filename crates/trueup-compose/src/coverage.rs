@@ -85,17 +85,26 @@ impl Coverage {
         stretches.get(next).is_some_and(|stretch| stretch.start <= x)
     }
 
-    /// Whether all of `columns` of row `y` are covered.
-    pub(crate) fn holds_all(&self, columns: &Range<usize>, y: usize) -> bool {
-        columns.is_empty() || self.rows.get(y).is_some_and(|stretches| lies_within(columns, stretches))
+    /// The stretches of `columns` in row `y` that are covered, in ascending order.
+    pub(crate) fn covered(&self, columns: Range<usize>, y: usize) -> impl Iterator<Item = Range<usize>> {
+        let stretches = self.rows.get(y).map_or(&[][..], Vec::as_slice);
+        let first = stretches.partition_point(|stretch| stretch.end <= columns.start);
+        let Range { start, end } = columns;
+        let inside = move |stretch: &Range<usize>| stretch.start.max(start)..stretch.end.min(end);
+        stretches[first..].iter().take_while(move |stretch| stretch.start < end).map(inside)
+    }
+
+    /// The stretches of `columns` in row `y` that are not covered, in ascending order; some are empty.
+    pub(crate) fn uncovered(&self, columns: Range<usize>, y: usize) -> impl Iterator<Item = Range<usize>> {
+        let starts = std::iter::once(columns.start).chain(self.covered(columns.clone(), y).map(|stretch| stretch.end));
+        let ends = self.covered(columns.clone(), y).map(|stretch| stretch.start).chain([columns.end]);
+        starts.zip(ends).map(|(start, end)| start..end)
     }
 
     /// The coverage with those of the other pixels that `as_well` names.
     pub(crate) fn with(&self, as_well: impl Fn(usize, usize) -> bool + Sync) -> Self {
         let filled = |(y, stretches): (usize, &Vec<Range<usize>>)| {
-            let starts = std::iter::once(0).chain(stretches.iter().map(|stretch| stretch.end));
-            let ends = stretches.iter().map(|stretch| stretch.start).chain([self.width]);
-            let others = starts.zip(ends).flat_map(|(start, end)| start..end);
+            let others = self.uncovered(0..self.width, y).flatten();
             let more = others.filter(|&x| as_well(x, y)).map(|x| x..x + 1);
             united(stretches.iter().cloned().chain(more).collect())
         };

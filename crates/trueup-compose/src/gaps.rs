@@ -110,9 +110,9 @@ impl Gaps {
         self.size
     }
 
-    /// Whether some photograph covers the pixel wholly.
-    pub(crate) fn is_covered(&self, x: usize, y: usize) -> bool {
-        self.coverage.holds(x, y)
+    /// The stretches of `columns` in row `y` that some photograph covers wholly, in ascending order.
+    pub(crate) fn covered(&self, columns: Range<usize>, y: usize) -> impl Iterator<Item = Range<usize>> {
+        self.coverage.covered(columns, y)
     }
 
     /// Whether a pixel, if no photograph covers it, is part of a gap.
@@ -129,11 +129,12 @@ impl Gaps {
             Extent::Small(_) => (columns.clone(), rows.clone()),
             Extent::Within(rectangle) => (common(columns, &rectangle.columns), common(rows, &rectangle.rows)),
         };
-        let has_gap = |y: usize| {
-            !self.coverage.holds_all(&columns, y)
-                && columns.clone().any(|x| !self.is_covered(x, y) && self.is_gap(x, y))
-        };
-        rows.into_iter().any(has_gap)
+        rows.into_iter().any(|y| self.within_row(columns.clone(), y).next().is_some())
+    }
+
+    /// Those of `columns` in row `y` that are part of a gap, in ascending order.
+    pub(crate) fn within_row(&self, columns: Range<usize>, y: usize) -> impl Iterator<Item = usize> {
+        self.coverage.uncovered(columns, y).flatten().filter(move |&x| self.is_gap(x, y))
     }
 
     /// The coverage as it is when the gaps are filled.

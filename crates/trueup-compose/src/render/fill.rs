@@ -194,19 +194,17 @@ impl<'a> Canvas<'a> {
     ) -> Result<PyramidPlane<[f32; 4]>> {
         let (columns, rows) = self.with_margin(tile);
         let mut plane = PyramidPlane::new(columns.clone(), rows.clone());
-        let beside = self.beside_gaps(&columns, &rows);
+        let Some(beside) = self.beside_gaps(&columns, &rows) else { return Ok(plane) };
         for (first, own) in self.stretches(&columns) {
             let pixels = store.window(&own, &rows)?;
             for (y, pixels) in rows.clone().zip(pixels.chunks_exact(own.len())) {
                 let from = first - columns.start;
                 let beside = &beside[(y - rows.start) * columns.len() + from..][..own.len()];
                 let texels = &mut plane.row_mut(y)[from..][..own.len()];
-                for ((x, &beside), (texel, &pixel)) in own.clone().zip(beside).zip(texels.iter_mut().zip(pixels)) {
-                    if beside && self.gaps.is_covered(x, y) {
-                        let [r, g, b, share] = pixel.root();
-                        let share = share * around.belonging(first + x - own.start, y, [r, g, b]);
-                        *texel = [r * share, g * share, b * share, share];
-                    }
+                for x in self.gaps.covered(own.clone(), y).flatten().map(|x| x - own.start).filter(|&x| beside[x]) {
+                    let [r, g, b, share] = pixels[x].root();
+                    let share = share * around.belonging(first + x, y, [r, g, b]);
+                    texels[x] = [r * share, g * share, b * share, share];
                 }
             }
         }
@@ -222,26 +220,30 @@ impl<'a> Canvas<'a> {
         (SHARE * self.gaps.radius()).clamp(WIDTHS[0], WIDTHS[1]).round() as usize
     }
 
-    /// Whether some gap lies in the square of [`Canvas::border`] pixels to every side of each pixel of a window, row by row.
-    fn beside_gaps(&self, columns: &Range<usize>, rows: &Range<usize>) -> Vec<bool> {
+    /// Whether some gap lies in the square of [`Canvas::border`] pixels to every side of each pixel of a window, row by row; none
+    /// where it does nowhere.
+    fn beside_gaps(&self, columns: &Range<usize>, rows: &Range<usize>) -> Option<Vec<bool>> {
         let border = self.border();
         let wide = columns.start.saturating_sub(border)..(columns.end + border).min(self.width + 2 * self.lead);
         let high = rows.start.saturating_sub(border)..(rows.end + border).min(self.height);
-        // For each row of the high window, whether a gap lies to the left or right of the window's columns.
-        let across: Vec<Vec<bool>> = high
-            .clone()
-            .map(|y| {
-                let is_gap = |x: usize| {
-                    let x = self.column(x);
-                    !self.gaps.is_covered(x, y) && self.gaps.is_gap(x, y)
-                };
-                spread(wide.clone().map(is_gap), border, columns.start - wide.start, columns.len())
-            })
-            .collect();
-        let mut beside = vec![false; columns.len() * rows.len()];
-        for x in 0..columns.len() {
-            let down = spread(across.iter().map(|row| row[x]), border, rows.start - high.start, rows.len());
-            down.into_iter().enumerate().for_each(|(y, found)| beside[y * columns.len() + x] = found);
+        let stretches = self.stretches(&wide);
+        let mut beside: Option<Vec<bool>> = None;
+        for y in high {
+            let of_stretch = |(first, own): (usize, Range<usize>)| {
+                let start = own.start;
+                self.gaps.within_row(own, y).map(move |x| first + x - start)
+            };
+            let mut gaps = stretches.iter().cloned().flat_map(of_stretch).peekable();
+            if gaps.peek().is_none() {
+                continue;
+            }
+            let across = spread(gaps, border, columns);
+            let beside = beside.get_or_insert_with(|| vec![false; columns.len() * rows.len()]);
+            let down = y.saturating_sub(border).max(rows.start)..(y + border + 1).min(rows.end);
+            for y in down {
+                let row = &mut beside[(y - rows.start) * columns.len()..][..columns.len()];
+                row.iter_mut().zip(&across).for_each(|(beside, &across)| *beside |= across);
+            }
         }
         beside
     }
@@ -355,14 +357,16 @@ fn surface(known: PyramidPlane<[f32; 4]>) -> PyramidPlane<[f32; 4]> {
     pulled(levels, None)
 }
 
-/// For `count` places of a line from `first` on, whether one that `is` set lies no more than `reach` before or after it.
-fn spread(is: impl Iterator<Item = bool>, reach: usize, first: usize, count: usize) -> Vec<bool> {
-    let mut spread = vec![false; count];
-    let mut done = 0;
-    for at in is.enumerate().filter_map(|(at, is)| is.then_some(at)) {
-        let range = at.saturating_sub(reach + first).max(done)..(at + reach + 1).saturating_sub(first).min(count);
-        done = range.end.max(done);
-        spread.get_mut(range).into_iter().flatten().for_each(|place| *place = true);
+/// Which of `columns` lie no more than `reach` before or after one of `places`, which ascend.
+fn spread(places: impl Iterator<Item = usize>, reach: usize, columns: &Range<usize>) -> Vec<bool> {
+    let mut spread = vec![false; columns.len()];
+    let mut done = columns.start;
+    for at in places {
+        let range = at.saturating_sub(reach).max(done)..(at + reach + 1).min(columns.end);
+        if range.start < range.end {
+            done = range.end;
+            spread[range.start - columns.start..range.end - columns.start].fill(true);
+        }
     }
     spread
 }
