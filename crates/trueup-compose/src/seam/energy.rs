@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::options::SeamOptions;
 use super::shading::{FRACTION, slopes};
+use super::softness::Softness;
 use crate::small_views::{CLIPPED, IGNORED, KEPT, PARTLY, SmallPixel, SmallView, WHOLLY, luma};
 
 /// Cost of a seam for its length alone, gray levels of difference. Higher makes seams shorter.
@@ -40,6 +41,9 @@ pub(super) struct SeamEnergy<'a> {
     /// Slopes of the shading, for every pixel of every view; empty if they do not count.
     slopes: Vec<Vec<[i16; 2]>>,
     depths: Vec<Vec<u8>>,
+    softness: &'a [Softness],
+    /// How often the canvas that the softness is of was halved.
+    halvings: u32,
     /// For every canvas pixel: bit flags of what all photographs say of it, see [`Self::has_whole`].
     anyone: Vec<u8>,
     /// Number of the moving thing that covers a canvas pixel; 0 for none.
@@ -48,6 +52,7 @@ pub(super) struct SeamEnergy<'a> {
     gradient_weight: i32,
     shading_weight: i32,
     depth_weight: i32,
+    sharpness_weight: i32,
     clipped_cost: i32,
     moving_cost: i32,
 }
@@ -65,6 +70,7 @@ impl<'a> SeamEnergy<'a> {
         [width, height]: [usize; 2],
         turn: usize,
         moving: &'a [u32],
+        (softness, halvings): (&'a [Softness], u32),
         options: &SeamOptions,
     ) -> Self {
         let mut anyone = vec![0_u8; width * height];
@@ -91,12 +97,15 @@ impl<'a> SeamEnergy<'a> {
             gradients: views.par_iter().map(gradients).collect(),
             slopes: if options.shading_weight > 0.0 { slopes(views) } else { Vec::new() },
             depths: views.par_iter().map(SmallView::depths).collect(),
+            softness,
+            halvings,
             anyone,
             moving,
             length: in_units(LENGTH),
             gradient_weight: in_units(GRADIENT_WEIGHT),
             shading_weight: in_units(options.shading_weight),
             depth_weight: in_units(options.depth_weight),
+            sharpness_weight: in_units(options.sharpness_weight),
             clipped_cost: in_units(CLIPPED_COST),
             moving_cost: in_units(options.moving_cost),
         }
@@ -125,6 +134,10 @@ impl<'a> SeamEnergy<'a> {
         let flags = self.views[label].flags(x, y, self.turn);
         let anyone = self.anyone[y * self.width + x];
         let mut cost = self.depth_weight * (255 - i32::from(self.depth(label, x, y))) / 255;
+        if let Some(softness) = self.softness.get(label) {
+            let own = if self.views[label].columns.contains(&x) { x } else { x + self.turn };
+            cost += self.sharpness_weight * i32::from(softness.at([own, y], self.halvings)) / 255;
+        }
         if flags & CLIPPED != 0 && anyone & ANY_UNCLIPPED != 0 {
             cost += self.clipped_cost;
         }

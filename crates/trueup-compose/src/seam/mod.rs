@@ -12,6 +12,7 @@ mod moving;
 mod neighbors;
 mod options;
 mod shading;
+mod softness;
 
 use std::borrow::Cow;
 
@@ -28,6 +29,7 @@ use crate::window::Window;
 use energy::SeamEnergy;
 use expansion::{Expansions, deepest};
 use moving::moving_things;
+use softness::Softness;
 
 /// Half width, in pixels, of the band in which a seam may move when it is followed to a canvas of twice the size.
 const BAND_PX: usize = 3;
@@ -65,7 +67,7 @@ struct Labelled {
 ///
 /// # Departures
 /// Coarse to fine as Lombaert, Sun, Grady, Xu, "A multilevel banded graph cuts method for fast image segmentation", ICCV
-/// 2005; things that moved are found first, and their parts kept together; differences of shading count, too.
+/// 2005; things that moved are found first, and their parts kept together; differences of shading count, and the lack of detail, too.
 pub fn run(input: &SeamInput<'_>, options: &SeamOptions, context: &StageContext) -> Result<Seams> {
     coarse_to_fine(input, COARSE_PIXELS, options, context)
 }
@@ -81,6 +83,7 @@ fn coarse_to_fine(
     check(input)?;
     let &SeamInput { views, size, around } = input;
     let turn = |[width, _]: [usize; 2]| if around { width } else { 0 };
+    let softness = if options.sharpness_weight > 0.0 { Softness::of(views, turn(size)) } else { Vec::new() };
     let mut levels = vec![(Cow::Borrowed(views), size)];
     while let Some((finest, [width, height])) = levels.last() {
         // A cylinder stays one only if all its pixels are halved.
@@ -99,7 +102,9 @@ fn coarse_to_fine(
             None => moving_things(&views, size, turn(size)),
             Some(coarse) => doubled(&coarse.moving, coarse.size, size),
         };
-        let energy = SeamEnergy::new(&views, size, turn(size), &moving, options);
+        // The levels that are left are the finer ones.
+        let softness = (softness.as_slice(), levels.len() as u32);
+        let energy = SeamEnergy::new(&views, size, turn(size), &moving, softness, options);
         let labels = match &coarser {
             None => search(&energy, &mut expansions, context)?,
             Some(coarse) => follow(&energy, doubled(&coarse.labels, coarse.size, size), &mut expansions, context)?,

@@ -90,6 +90,24 @@ fn clipped_parts_are_shown_by_who_is_not_clipped() {
 }
 
 #[test]
+fn what_is_in_focus_is_shown() {
+    // Columns of 80 and 120 levels. The first photograph, deeper by far where both show them, has them blurred in a disc.
+    let inside = |x: usize, y: usize| x.abs_diff(70).pow(2) + y.abs_diff(40).pow(2) < 20 * 20;
+    let stripes = |x: usize| if x.is_multiple_of(2) { 80 } else { 120 };
+    let first = view(0..160, 0..80, |x, y| if inside(x, y) { 100 } else { stripes(x) });
+    let second = view(30..110, 0..80, |x, _| stripes(x));
+    let shown = |sharpness_weight: f64| {
+        let options = SeamOptions { sharpness_weight, ..SeamOptions::default() };
+        let seams = find(&[first.clone(), second.clone()], [160, 80], &options);
+        let disc = (0..160 * 80).filter(|at| inside(at % 160, at / 160));
+        disc.filter(|&at| seams.labels()[at] == 1).count()
+    };
+    assert_eq!(shown(0.0), 0);
+    let all = (0..160 * 80).filter(|at| inside(at % 160, at / 160)).count();
+    assert!(shown(SeamOptions::default().sharpness_weight) > all * 9 / 10);
+}
+
+#[test]
 fn wishes_of_the_user_are_obeyed() {
     let mut first = view(0..100, 0..40, texture);
     let second = view(20..120, 0..40, texture);
