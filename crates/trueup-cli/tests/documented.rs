@@ -30,7 +30,7 @@ const MISTAKES: &[Mistake] = &[
     mistake("damaged HEIC", &["stitch", "phone.heic", "-o", "pano.jpg"]),
     mistake("damaged AVIF", &["stitch", "phone.avif", "-o", "pano.jpg"]),
     mistake("truncated JPEG XL", &["stitch", "photo.jxl", "-o", "pano.jpg"]),
-    mistake("video", &["stitch", "clip.mp4", "-o", "pano.jpg"]),
+    mistake("video without frames", &["stitch", "clip.mp4", "-o", "pano.jpg"]),
     mistake("empty file", &["stitch", "empty.jpg", "-o", "pano.jpg"]),
     mistake("truncated JPEG", &["stitch", "cut.jpg", "-o", "pano.jpg"]),
     mistake("header that claims 60000 x 60000", &["stitch", "giant.jpg", "-o", "pano.jpg"]),

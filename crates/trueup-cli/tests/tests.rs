@@ -32,3 +32,4 @@ mod sphere;
 mod stopping;
 mod strangers;
 mod told;
+mod video;

@@ -5,6 +5,7 @@
 //! * [`decode`] reads their pixels: whole photographs, and the reduced pictures that measurement works on.
 //! * [`provenance`] gathers what a panorama tells of its photographs;
 //! * [`encode`] writes a panorama row by row; a file appears complete or not at all.
+//! * [`video`] takes frames out of videos.
 //! * [`scratch`] keeps on disk what does not fit in memory, and knows how much room there is.
 //!
 //! Sizes are checked from the header before pixels are allocated, and no input makes these functions panic.
@@ -21,3 +22,4 @@ mod metadata;
 pub mod provenance;
 pub mod scratch;
 pub mod source;
+pub mod video;

@@ -1,10 +1,11 @@
 #![warn(unreachable_pub)]
-//! Pixels to measurements: SIFT features, matching, pairing and line segments.
+//! Pixels to measurements: SIFT features, matching, pairing and line segments; which frames of a video are needed.
 //!
 //! Positions are in the pixels of the photograph given (working pixels in the pipeline), corner at (0, 0), the center of
 //! the first pixel at (0.5, 0.5).
 
 pub mod features;
+pub mod frames;
 pub mod line_matching;
 pub mod lines;
 pub mod matching;

@@ -14,6 +14,17 @@ pub(crate) static RAW: Foreign = Foreign {
     command: "darktable-cli photo.nef photo.tif",
 };
 
+/// What [`crate::video`] takes frames out of, where it is named itself.
+pub(crate) static VIDEO: Foreign = Foreign {
+    what: "a video",
+    extensions: &[],
+    has_signature: |start| {
+        let is_avi = start.starts_with(b"RIFF") && start.get(8..12) == Some(b"AVI ");
+        is_avi || start.get(4..8) == Some(b"ftyp") || start.starts_with(&[0x1a, 0x45, 0xdf, 0xa3])
+    },
+    command: "ffmpeg -i clip.mp4 -vf fps=2 frame-%03d.png",
+};
+
 /// The formats, the more special before the more general.
 ///
 /// # Source
@@ -51,12 +62,7 @@ static FOREIGN: [&Foreign; 13] = [
         has_signature: |start| start.starts_with(b"IIU\0"),
         command: "darktable-cli photo.rw2 photo.tif",
     },
-    &Foreign {
-        what: "a video",
-        extensions: &[],
-        has_signature: |start| start.get(4..8) == Some(b"ftyp") || start.starts_with(&[0x1a, 0x45, 0xdf, 0xa3]),
-        command: "ffmpeg -i clip.mp4 -vf fps=2 frame-%03d.png",
-    },
+    &VIDEO,
     &Foreign {
         what: "a JPEG 2000 picture",
         extensions: &["jp2", "j2k", "jpx"],
@@ -146,6 +152,7 @@ mod tests {
             (b"IIU\0\x08\0\0\0", "a camera raw photograph of Panasonic (RW2)"),
             (b"\0\0\0\x20ftypisom\0\0\x02\0", "a video"),
             (b"\0\0\0\x20ftypmp42\0\0\x02\0", "a video"),
+            (b"RIFF\x10\0\0\0AVI LIST", "a video"),
             (b"\0\0\0\x0cjP  \r\n\x87\n", "a JPEG 2000 picture"),
             (b"GIF89a", "a GIF picture"),
         ] {

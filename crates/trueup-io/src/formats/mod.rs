@@ -34,7 +34,7 @@ use std::path::Path;
 use crate::encode::place::is_standard_output;
 use crate::format::{Format, Reading, SIGNATURE_BYTES, Writing};
 
-pub(crate) use foreign::{foreign_of, has_foreign_extension};
+pub(crate) use foreign::{VIDEO, foreign_of, has_foreign_extension};
 
 /// All formats, in the order in which messages and pages name them.
 pub(crate) static FORMATS: [&Format; 11] = [

@@ -14,6 +14,7 @@ mod stitch;
 mod summary;
 mod threads;
 mod thumbnail;
+mod video;
 mod write;
 
 pub use compose::ComposeJob;

@@ -8,6 +8,7 @@ use trueup_core::{Result, StageContext};
 use super::inputs::Inputs;
 use super::outputs::{Outputs, ReadFile};
 use super::threads::thread_pool;
+use super::video::{WithFrames, with_frames};
 use super::write::Written;
 use crate::memo::PhotographCache;
 use crate::options::StitchOptions;
@@ -41,7 +42,8 @@ pub struct StitchJob {
 }
 
 impl StitchJob {
-    /// Runs the job. Outputs are checked before work starts, written beside their place and renamed.
+    /// Runs the job. Outputs are checked before work starts, written beside their place and renamed. Of videos that
+    /// [`Inputs::photographs`] names, the frames that are needed are taken out into a folder beside the panorama.
     ///
     /// # Errors
     /// Those of [`Stitcher::align`] and [`Stitcher::compose`], and those of writing; [`trueup_core::Error::Input`] if the
@@ -60,8 +62,13 @@ impl StitchJob {
         cache: Option<&PhotographCache>,
         context: &StageContext,
     ) -> Result<Vec<Written>> {
+        let frames = with_frames(&self.inputs, &self.outputs.panorama, context)?;
+        let (inputs, told) = match &frames {
+            Some(WithFrames { inputs, told }) => (inputs, told.as_slice()),
+            None => (&self.inputs, &[][..]),
+        };
         let stitcher = Stitcher::new(options, context).with_cache(cache);
-        let mut aligned = stitcher.align(&self.inputs)?;
+        let mut aligned = stitcher.align(inputs)?;
         let count = aligned.alignments.len();
         let outputs: Vec<Outputs> =
             (1..=count).map(|number| self.outputs.numbered((count > 1).then_some(number))).collect();
@@ -72,6 +79,7 @@ impl StitchJob {
         }
         let stale = if self.inputs.all { self.outputs.stale(count) } else { Vec::new() };
         if let Some(first) = aligned.alignments.first_mut() {
+            first.project.diagnostics.extend_from_slice(told);
             first.project.diagnostics.extend(stale.iter().map(|path| stale_panorama(path, count)));
         }
         let all = aligned.alignments.into_iter().zip(&outputs);
