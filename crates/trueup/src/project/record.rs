@@ -273,7 +273,7 @@ pub struct Project {
     pub lens_from: Option<String>,
     /// Path of the reference photograph.
     pub reference: String,
-    /// Every photograph given, in the order given: used, left out, and unreadable.
+    /// Every photograph given, in the order given: used, left out, and unreadable. The exposures of a stack are one, by its reference.
     pub images: Vec<ImageRecord>,
     /// Every pair tried, sorted.
     pub pairs: Vec<PairRecord>,
