@@ -3,6 +3,7 @@
 //! The stages, one module each, in their order:
 //!
 //! * [`layout`]: deformed grids in any common unit to one canvas in pixels;
+//! * [`fusion`]: several exposures of one view to one photograph, ahead of all others;
 //! * [`exposure`]: reduced photographs to gain, color cast and vignetting of each;
 //! * [`small_views`]: every photograph read once and made small;
 //! * [`seam`]: small views to the seams along which the photographs agree;
@@ -16,6 +17,7 @@
 pub mod crop;
 pub mod exposure;
 pub mod fidelity;
+pub mod fusion;
 pub mod gaps;
 pub mod layout;
 pub mod render;

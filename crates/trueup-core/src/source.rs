@@ -80,6 +80,39 @@ pub struct SourceImage {
     pub gravity: Option<RecordedGravity>,
     /// The lens, in pixels of the full-resolution photograph, if the user told it by an earlier project.
     pub lens: Option<PlacedLens>,
+    /// The other exposures of the stack whose reference this is: its pixels are those of all, fused. Empty for a photograph of one file.
+    #[serde(default)]
+    pub stack: Vec<StackMember>,
+}
+
+/// A file that shows the same view as another one, the stack's reference, at another exposure.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StackMember {
+    /// The file.
+    pub source: SourceImage,
+    /// Rows of the homography from its full-resolution pixels to those of the reference.
+    pub reference_from_member: [[f64; 3]; 3],
+}
+
+/// The pixels of a [`StackMember`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct AlignedPhotograph {
+    /// Of the same size as the reference, upright.
+    pub photograph: Photograph,
+    /// Rows of the homography from its pixels to those of the reference.
+    pub reference_from_member: [[f64; 3]; 3],
+}
+
+/// Makes one photograph of a stack: what reading files asks of those who know how to compose.
+pub trait StackFusion: std::fmt::Debug + Send + Sync {
+    /// The picture of all exposures, in the frame, depth and channels of the reference.
+    ///
+    /// # Errors
+    /// [`Error::Input`](crate::Error::Input) if a member has another size or a homography that is none.
+    fn fuse(&self, reference: &Photograph, others: &[AlignedPhotograph]) -> Result<Photograph>;
+
+    /// Bytes that fusing takes beside the photographs themselves, for each of a photograph's pixels.
+    fn bytes_per_pixel(&self, photographs: usize) -> usize;
 }
 
 /// The reduced frame a photograph is measured in: `working = working_from_full * full` on both axes, corner (0, 0).

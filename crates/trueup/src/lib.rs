@@ -44,7 +44,7 @@ pub use options::{
 pub use pipeline::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use project::{
     Canvas, CropRecord, ImageRecord, ImageStatus, LevelRecord, ManhattanRecord, MeshRecord, PROJECT_FORMAT,
-    PROJECT_VERSION, PairRecord, Project, ProjectionRecord, hugin_project,
+    PROJECT_VERSION, PairRecord, Project, ProjectionRecord, StackMemberRecord, hugin_project,
 };
 pub use report::brightness::BrightnessStep;
 pub use report::evaluation::{

@@ -22,6 +22,7 @@ const TUNING: &str = "Tuning";
 pub const OPTION_FLAGS: &[OptionFlag] = &[
     OptionFlag::new("lens", "cameras.lens", PHOTOGRAPHS, STITCH_AND_COMPARE),
     OptionFlag::new("lens-fov", "cameras.fov", PHOTOGRAPHS, STITCH_AND_COMPARE),
+    OptionFlag::new("stacks", "stacks.fuse", PHOTOGRAPHS, STITCH_AND_COMPARE),
     OptionFlag::new("scale", "canvas.scale", OUTPUT, STITCH_AND_COMPOSE),
     OptionFlag::new("quality", "output.jpeg_quality", OUTPUT, ALL),
     OptionFlag::new("depth", "output.depth", OUTPUT, STITCH_AND_COMPOSE),

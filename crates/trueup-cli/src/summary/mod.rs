@@ -113,11 +113,28 @@ fn cropped(project: &Project) -> Option<String> {
     (!told.is_empty()).then(|| format!("{} (--crop none keeps all)", told.join(", ")))
 }
 
+/// How many of the photographs in the panorama are fused of how many exposures; `None` if none is.
+fn fused_stacks(project: &Project) -> Option<String> {
+    let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+    for image in project.used_images().filter(|image| !image.stack.is_empty()) {
+        *counts.entry(image.stack.len() + 1).or_default() += 1;
+    }
+    let stacks = |(exposures, count): (&usize, &usize)| match count {
+        1 => format!("one of {exposures} exposures"),
+        _ => format!("{count} of {exposures} exposures each"),
+    };
+    let told: Vec<String> = counts.iter().map(stacks).collect();
+    (!told.is_empty()).then(|| format!("{}, fused (--stacks none stitches each by itself)", told.join(", ")))
+}
+
 /// How many were used, and each one left out with its reason and what to do about it.
 fn photographs(lines: &mut LabeledLines, project: &Project, names: &[String], verbose: bool) {
     let reference = project.images.iter().position(|image| image.path == project.reference);
     let reference = reference.map_or(String::new(), |index| format!("; the reference is {}", names[index]));
     lines.entry("photographs", &format!("{} of {} used{reference}", project.used(), project.images.len()));
+    if let Some(fused) = fused_stacks(project) {
+        lines.entry("stacks", &fused);
+    }
     let groups = left_out(project, names, |_| true);
     for (index, LeftOut { photographs, reason, hint }) in groups.iter().enumerate() {
         let listed = if verbose { photographs.join(", ") } else { listed(photographs) };

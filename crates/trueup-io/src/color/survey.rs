@@ -21,6 +21,8 @@ pub struct PhotographColors {
     space: RgbSpace,
     /// For each photograph; `None` where its samples are in that space already.
     conversions: Vec<Option<Conversion>>,
+    /// For the other exposures of each photograph that is a stack.
+    of_stacks: Vec<Vec<Option<Conversion>>>,
 }
 
 /// What the samples of one photograph mean.
@@ -52,9 +54,14 @@ impl PhotographColors {
         let read: Vec<(Meaning, Option<Diagnostic>)> =
             sources.par_iter().enumerate().map(|(number, source)| meaning(number, source)).collect();
         let (meanings, findings): (Vec<_>, Vec<_>) = read.into_iter().unzip();
+        // What they say of themselves was told where they were found, each as a photograph.
+        let members = |(number, source): (usize, &SourceImage)| -> Vec<Meaning> {
+            source.stack.iter().map(|member| meaning(number, &member.source).0).collect()
+        };
+        let stacks: Vec<Vec<Meaning>> = sources.par_iter().enumerate().map(members).collect();
         findings.into_iter().flatten().for_each(|finding| context.report(finding));
         let mut space: Option<&RgbSpace> = None;
-        for candidate in meanings.iter().filter_map(|meaning| meaning.space.as_ref()) {
+        for candidate in meanings.iter().chain(stacks.iter().flatten()).filter_map(|meaning| meaning.space.as_ref()) {
             let wider = |space: &RgbSpace| candidate.gamut_area() > (1.0 + SAME_AREA) * space.gamut_area();
             if space.is_none_or(wider) {
                 space = Some(candidate);
@@ -62,6 +69,8 @@ impl PhotographColors {
         }
         let space = space.cloned().unwrap_or_else(RgbSpace::srgb);
         let conversions: Vec<_> = meanings.iter().map(|meaning| conversion(meaning, &space)).collect();
+        let of_stack = |stack: &Vec<Meaning>| stack.iter().map(|meaning| conversion(meaning, &space)).collect();
+        let of_stacks = stacks.iter().map(of_stack).collect();
         for (number, (meaning, conversion)) in meanings.iter().zip(&conversions).enumerate() {
             if conversion.as_ref().is_some_and(|conversion| conversion.rgb.is_some()) {
                 context.report(Diagnostic::note(
@@ -72,7 +81,7 @@ impl PhotographColors {
                 ));
             }
         }
-        Self { space, conversions }
+        Self { space, conversions, of_stacks }
     }
 
     /// The profile to embed in the panorama; `None` for sRGB.
@@ -98,6 +107,11 @@ impl PhotographColors {
     /// What has to be done to photograph `index`.
     pub(crate) fn conversion(&self, index: usize) -> Option<&Conversion> {
         self.conversions.get(index)?.as_ref()
+    }
+
+    /// What has to be done to the other exposure `member` of photograph `index`.
+    pub(crate) fn member_conversion(&self, index: usize, member: usize) -> Option<&Conversion> {
+        self.of_stacks.get(index)?.get(member)?.as_ref()
     }
 }
 

@@ -6,10 +6,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use trueup_core::color::TransferCurve;
 use trueup_core::mask::Masks;
 use trueup_core::raster::Photograph;
-use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
+use trueup_core::source::{AlignedPhotograph, PhotographSource, SourceImage, StackFusion, StackMember, WorkingFrame};
 use trueup_core::{Error, Result};
 
-use super::photograph::{photograph, sample_bits};
+use super::photograph::{decoding_surplus, photograph, sample_bits};
 use super::working::{WorkingPicture, reduce_photograph};
 use crate::color::{Conversion, PhotographColors};
 use crate::source::InMemory;
@@ -26,6 +26,8 @@ pub struct FilePhotographs {
     /// By index; those beyond the end have none.
     masks: Vec<Masks>,
     colors: Option<PhotographColors>,
+    /// Who makes one photograph of a stack.
+    fusion: Option<Arc<dyn StackFusion>>,
     kept: Mutex<Kept>,
     /// Bytes that the samples of each took when it was decoded; 0 before.
     bytes: Vec<AtomicUsize>,
@@ -44,7 +46,7 @@ impl FilePhotographs {
         let photographs = sources.iter().map(|_| None).collect();
         let bytes = sources.iter().map(|_| AtomicUsize::new(0)).collect();
         let kept = Mutex::new(Kept { photographs, free_bytes: cache_bytes });
-        Self { sources, in_memory: InMemory::default(), masks: Vec::new(), colors: None, bytes, kept }
+        Self { sources, in_memory: InMemory::default(), masks: Vec::new(), colors: None, fusion: None, bytes, kept }
     }
 
     /// The same with the pixels of those that are no files: they count for nothing in the budget.
@@ -62,6 +64,26 @@ impl FilePhotographs {
     /// In one color space: `colors` are those of the same photographs. Without, samples are handed out as they are.
     pub fn in_colors(self, colors: PhotographColors) -> Self {
         Self { colors: Some(colors), ..self }
+    }
+
+    /// The same, where photographs that are stacks are fused by `fusion`. Without, a stack is its reference.
+    #[must_use]
+    pub fn fused_by(self, fusion: Arc<dyn StackFusion>) -> Self {
+        Self { fusion: Some(fusion), ..self }
+    }
+
+    /// Most bytes that decoding one of them takes beyond twice four channels of 8 bits: what the decoder takes, and of a stack the
+    /// other exposures and what fusing takes.
+    pub fn decoding_surplus(&self) -> usize {
+        let fusing = |source: &SourceImage| stack_surplus(source, self.fusion.as_deref());
+        decoding_surplus(&self.sources).saturating_add(self.sources.iter().map(fusing).max().unwrap_or(0))
+    }
+
+    /// The same, which keeps at most so many bytes of decoded pixels.
+    #[must_use]
+    pub fn keeping(self, cache_bytes: usize) -> Self {
+        let Kept { photographs, .. } = self.kept.into_inner().unwrap_or_else(PoisonError::into_inner);
+        Self { kept: Mutex::new(Kept { photographs, free_bytes: cache_bytes }), ..self }
     }
 
     /// The color space that photographs are handed out in, if it was asked for.
@@ -104,7 +126,8 @@ impl FilePhotographs {
         let source = self.source(index)?;
         let whole = |photograph: &Photograph| reduce_photograph(photograph, &source.name, frame, thumbnail_max_area);
         // As it is, without a copy.
-        if let Some(photograph) = self.in_memory(index).filter(|_| self.conversion(index).is_none()) {
+        let is_as_given = self.conversion(index).is_none() && source.stack.is_empty();
+        if let Some(photograph) = self.in_memory(index).filter(|_| is_as_given) {
             return whole(photograph);
         }
         let photograph = self.photograph(index)?;
@@ -132,10 +155,27 @@ impl FilePhotographs {
         if let Some(conversion) = self.conversion(index) {
             photograph = conversion.apply(photograph, &source.name)?;
         }
+        if let (Some(fusion), false) = (&self.fusion, source.stack.is_empty()) {
+            photograph = fusion.fuse(&photograph, &self.decoded_stack(index, source)?)?;
+        }
         if let Some(bytes) = self.bytes.get(index) {
             bytes.store(photograph.bytes(), Ordering::Relaxed);
         }
         Ok(photograph)
+    }
+
+    /// The other exposures of photograph `index`.
+    fn decoded_stack(&self, index: usize, source: &SourceImage) -> Result<Vec<AlignedPhotograph>> {
+        let decoded = |(number, member): (usize, &StackMember)| {
+            let given = self.in_memory.of(&member.source).map(|photograph| photograph.as_ref().clone());
+            let mut decoded = given.map_or_else(|| photograph(&member.source), Ok)?;
+            if let Some(conversion) = self.colors.as_ref().and_then(|colors| colors.member_conversion(index, number)) {
+                decoded = conversion.apply(decoded, &member.source.name)?;
+            }
+            let reference_from_member = member.reference_from_member;
+            Ok(AlignedPhotograph { photograph: decoded, reference_from_member })
+        };
+        source.stack.iter().enumerate().map(decoded).collect()
     }
 
     fn conversion(&self, index: usize) -> Option<&Conversion> {
@@ -166,6 +206,16 @@ impl FilePhotographs {
         kept.free_bytes += photograph.bytes();
         Some(photograph)
     }
+}
+
+/// Bytes of a pixel as they are counted before it is decoded.
+const PIXEL_BYTES: usize = 4;
+
+/// What fusing a stack takes beside its reference, which is decoded like any photograph.
+fn stack_surplus(source: &SourceImage, fusion: Option<&dyn StackFusion>) -> usize {
+    let (Some(fusion), others @ 1..) = (fusion, source.stack.len()) else { return 0 };
+    let each = others.saturating_mul(PIXEL_BYTES).saturating_add(fusion.bytes_per_pixel(others + 1));
+    source.width.saturating_mul(source.height).saturating_mul(each)
 }
 
 impl PhotographSource for FilePhotographs {

@@ -36,7 +36,7 @@ impl InMemory {
     }
 
     /// The photograph that a source stands for, if it is no file.
-    pub(crate) fn of(&self, source: &SourceImage) -> Option<&Arc<Photograph>> {
+    pub fn of(&self, source: &SourceImage) -> Option<&Arc<Photograph>> {
         self.get(source.path.to_str()?)
     }
 }
@@ -56,6 +56,7 @@ pub(super) fn in_memory_source(path: PathBuf, name: &str, photograph: &Photograp
         focal_mm: None,
         gravity: None,
         lens: None,
+        stack: Vec::new(),
     })
 }
 

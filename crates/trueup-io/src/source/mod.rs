@@ -237,6 +237,7 @@ fn examine(
         focal_mm,
         gravity,
         lens: None,
+        stack: Vec::new(),
     })
 }
 

@@ -88,6 +88,9 @@ class StitchKeywords(ComposeKeywords, total=False):
     """Field of view of every photograph across its longer side, through the whole lens, by any calibration or
     specification; the matches may still change the focal length by up to 5 %. Say it where photographs carry no focal
     length, or a wrong one; 0 leaves it to them (default 0.0)."""
+    stacks: Literal["auto", "none"]
+    """Which photographs are fused before they are stitched: consecutive ones that show one view at several exposures (a
+    bracket). Choose none to have each of them stitched as it is (default auto)."""
     method: Literal[
         "vpg",
         "gsp-2d",
@@ -143,6 +146,9 @@ class BatchKeywords(SaveKeywords, total=False):
     """Field of view of every photograph across its longer side, through the whole lens, by any calibration or
     specification; the matches may still change the focal length by up to 5 %. Say it where photographs carry no focal
     length, or a wrong one; 0 leaves it to them (default 0.0)."""
+    stacks: Literal["auto", "none"]
+    """Which photographs are fused before they are stitched: consecutive ones that show one view at several exposures (a
+    bracket). Choose none to have each of them stitched as it is (default auto)."""
     scale: float
     """Size of the panorama relative to the reference photograph's own pixels: 1 keeps every detail the reference has.
     Lower it for a quick preview (0.25) or a smaller file; raise it only if the reference was taken with a shorter lens

@@ -15,6 +15,7 @@ fn image(width: usize, height: usize, orientation: u8) -> SourceImage {
         focal_mm: None,
         gravity: None,
         lens: None,
+        stack: Vec::new(),
     }
 }
 

@@ -26,6 +26,7 @@ use trueup_vision::features::FeatureOptions;
 use trueup_vision::lines::LineOptions;
 use trueup_vision::matching::MatchingOptions;
 use trueup_vision::pairing::PairingOptions;
+use trueup_vision::stacks::StackOptions;
 
 pub use text::ChangedOption;
 
@@ -177,6 +178,8 @@ phases! {
         source: SourceOptions,
         /// What photographs are measured on.
         working: WorkingOptions,
+        /// What becomes of photographs of one view at several exposures.
+        stacks: StackOptions,
         /// How features are found.
         features: FeatureOptions,
         /// How line segments are found.

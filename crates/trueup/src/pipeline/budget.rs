@@ -6,7 +6,7 @@ use trueup_core::memory::{MemoryBudget, bytes_in_words};
 use trueup_core::scratch::ScratchSpace;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
-use trueup_io::decode::{FilePhotographs, decoding_surplus};
+use trueup_io::decode::FilePhotographs;
 
 use super::machine::{self, MachineMemory};
 use crate::options::ResourceOptions;
@@ -83,13 +83,14 @@ impl Budget {
     ///
     /// # Errors
     /// [`Error::Limits`] with the numbers if the largest is too large to be measured alone.
-    pub(super) fn measuring(&self, images: &[SourceImage], working_pixels: f64) -> Result<Measuring> {
+    pub(super) fn measuring(&self, photographs: &FilePhotographs, working_pixels: f64) -> Result<Measuring> {
+        let images = photographs.sources();
         let bytes = |image: &SourceImage| image.width.saturating_mul(image.height).saturating_mul(PIXEL_BYTES);
         let Some(largest) = images.iter().max_by_key(|image| bytes(image)) else {
             return Ok(Measuring { at_once: usize::MAX, kept_bytes: 0 });
         };
         let features = (FEATURE_BYTES * working_pixels) as usize;
-        let decoding = bytes(largest).saturating_mul(DECODING).saturating_add(decoding_surplus(images));
+        let decoding = bytes(largest).saturating_mul(DECODING).saturating_add(photographs.decoding_surplus());
         let one = decoding.saturating_add(features);
         let least = one.saturating_add(PROGRAM_BYTES);
         if least > self.ceiling {
@@ -111,7 +112,7 @@ impl Budget {
     /// What composing may take beside what is kept of the photographs, and what the decoders of some of them take: every thread's, or
     /// where that is too much, one's.
     pub(super) fn composing<'a>(&self, photographs: &FilePhotographs, scratch: &'a dyn ScratchSpace) -> Resources<'a> {
-        let surplus = decoding_surplus(photographs.sources());
+        let surplus = photographs.decoding_surplus();
         let left = |bytes: usize, decoders: usize| {
             let taken = PROGRAM_BYTES.saturating_add(photographs.kept_bytes());
             bytes.saturating_sub(taken.saturating_add(surplus.saturating_mul(decoders)))
@@ -136,7 +137,7 @@ mod tests {
     use super::*;
     use crate::options::StitchOptions;
 
-    fn images(count: usize, width: usize, height: usize) -> Vec<SourceImage> {
+    fn images(count: usize, width: usize, height: usize) -> FilePhotographs {
         let image = |index: usize| SourceImage {
             path: format!("{index}.jpg").into(),
             name: format!("{index}.jpg"),
@@ -149,8 +150,9 @@ mod tests {
             focal_mm: None,
             gravity: None,
             lens: None,
+            stack: Vec::new(),
         };
-        (0..count).map(image).collect()
+        FilePhotographs::new((0..count).map(image).collect(), 0)
     }
 
     const WORKING_PIXELS: f64 = 480_000.0;

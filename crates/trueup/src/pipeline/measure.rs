@@ -74,7 +74,7 @@ pub(crate) fn run(
     context.gather(|context| {
         let MeasureInput { set, memo, keep_grays, workers } = input;
         let contents = match memo.disk {
-            Some(_) => context.time("source", || set.keys(context))?,
+            Some(_) => context.time("source", || set.keys(&(0..set.images.len()).collect::<Vec<_>>(), context))?,
             None => vec![None; set.images.len()],
         };
         let keys: Vec<Option<Key>> = contents.into_iter().map(|content| memo.key(MEASURED, content, options)).collect();
@@ -154,6 +154,41 @@ pub(crate) fn of_some(
         measured.extend(group.par_iter().map(measured_one).collect::<Result<Vec<_>>>()?);
     }
     Ok(measured)
+}
+
+/// Measures some photographs of a set, in their order, as [`run`] does all of them: each, and what decides it.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub(crate) fn some(
+    input: &MeasureInput,
+    photographs: &[usize],
+    options: &MeasureOptions,
+    context: &StageContext,
+) -> Result<Reported<Measurements>> {
+    context.gather(|context| {
+        let MeasureInput { set, memo, keep_grays, .. } = input;
+        let contents = match memo.disk {
+            Some(_) => context.time("source", || set.keys(photographs, context))?,
+            None => vec![None; photographs.len()],
+        };
+        let numbered: Vec<(usize, Option<Key>)> =
+            photographs.iter().copied().zip(contents.into_iter().map(|one| memo.key(MEASURED, one, options))).collect();
+        let measured_one = |(index, key): &(usize, Option<Key>)| {
+            if let Some(known) = memo.recall(MEASURED, key.as_ref()) {
+                return Ok(known);
+            }
+            let one = OnePhotograph { files: &set.files, index: *index, keep_grays: *keep_grays };
+            memo.make(MEASURED, key.as_ref(), &one, options, measure, context)
+        };
+        let mut measured: Vec<Result<Reported<Measured>>> = Vec::with_capacity(photographs.len());
+        for group in numbered.chunks(set.at_once.max(1)) {
+            measured.par_extend(group.par_iter().map(measured_one));
+        }
+        context.check_cancelled()?;
+        let photographs = measured.into_iter().map(|one| one.map(|one| context.absorb(one))).collect();
+        Ok(Measurements { photographs, keys: numbered.into_iter().map(|(_, key)| key).collect() })
+    })
 }
 
 fn measure(one: &OnePhotograph, options: &MeasureOptions, context: &StageContext) -> Result<Measured> {

@@ -1,6 +1,6 @@
 //! The order of the work, whole, and nowhere else:
 //!
-//! photographs -> [measure] -> [matching] -> [align] -> [arrange] -> [compose] -> panorama
+//! photographs -> [measure] -> [stacking] -> [matching] -> [align] -> [arrange] -> [compose] -> panorama
 //!
 //! A phase is a function of its input, its options and a context; what it told on the way comes beside its product.
 
@@ -19,6 +19,7 @@ pub(crate) mod photographs;
 mod rearrange;
 mod results;
 mod scratch;
+mod stacking;
 
 use std::path::Path;
 
@@ -43,6 +44,7 @@ use self::matched::Matched;
 use self::matching::MatchInput;
 use self::measure::MeasureInput;
 use self::photographs::{FoundPhotographs, PhotographSet};
+use self::stacking::{Stacked, StackingInput};
 use crate::job::inputs::Inputs;
 use crate::memo::{KeyMaker, Memo, PhotographCache};
 use crate::options::StitchOptions;
@@ -138,11 +140,13 @@ impl<'a> Stitcher<'a> {
         self.options.validate()?;
         let found = self.context.gather(|context| {
             let memo = Memo { disk: self.cache, memory: None };
-            let set = PhotographSet::find(inputs, self.options, context)?;
-            let graph_file = inputs.graph_file(&set.names())?;
+            let found = context.gather(|context| PhotographSet::find(inputs, self.options, context))?;
+            let graph_file = inputs.graph_file(&found.value.names())?;
             let keep_grays = align::needs_pixels(&self.options.align);
-            let input = MeasureInput { set: &set, memo, keep_grays, workers: self.workers };
-            let measurements = context.absorb(measure::run(&input, &self.options.measure, context)?);
+            let input = MeasureInput { set: &found.value, memo, keep_grays, workers: self.workers };
+            let measurements = measure::run(&input, &self.options.measure, context)?;
+            let input = StackingInput { found, measurements, graph_file, memo, keep_grays };
+            let Stacked { set, measurements, graph_file } = stacking::run(input, self.options, context)?;
             let mut matched = Matched::unmatched(set, measurements, graph_file)?;
             let looked_at = matched.take_features();
             let input = MatchInput {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use rayon::prelude::*;
+use trueup_compose::fusion::ExposureFusion;
 use trueup_core::mask::Masks;
 use trueup_core::source::{PhotographSource, SourceImage};
 use trueup_core::{Error, Result, StageContext};
@@ -80,12 +81,11 @@ impl PhotographSet {
     /// [`Error::Limits`] if one is too large for the memory.
     pub(crate) fn open(found: FoundPhotographs, options: &StitchOptions, context: &StageContext) -> Result<Self> {
         let FoundPhotographs { images, in_memory, rejected, masks: AllMasks { masks, records } } = found;
-        let measuring = Budget::new(&options.run.resources).measuring(&images, options.measure.working.pixels)?;
+        let files =
+            FilePhotographs::new(images.clone(), 0).with_in_memory(in_memory).fused_by(Arc::new(ExposureFusion));
+        let measuring = Budget::new(&options.run.resources).measuring(&files, options.measure.working.pixels)?;
         let colors = PhotographColors::survey(&images, context);
-        let files = FilePhotographs::new(images.clone(), measuring.kept_bytes)
-            .with_in_memory(in_memory)
-            .in_colors(colors)
-            .with_masks(masks);
+        let files = files.keeping(measuring.kept_bytes).in_colors(colors).with_masks(masks);
         let (files, at_once) = (Arc::new(files), measuring.at_once);
         Ok(Self { images, rejected, masks: records, lens_from: None, files, at_once })
     }
@@ -95,26 +95,33 @@ impl PhotographSet {
         self.images.iter().map(|image| image.name.clone()).collect()
     }
 
-    /// What decides each photograph's pixels: its bytes, how it is turned and masked, the color space that it is brought to.
-    /// `None` for files that cannot be read.
+    /// What decides the pixels of these photographs: their bytes, how they are turned and masked, the color space that they are brought
+    /// to, and of a stack the same of each exposure. `None` for files that cannot be read.
     ///
     /// # Errors
     /// [`Error::Cancelled`].
-    pub(crate) fn keys(&self, context: &StageContext) -> Result<Vec<Option<KeyMaker>>> {
+    pub(crate) fn keys(&self, photographs: &[usize], context: &StageContext) -> Result<Vec<Option<KeyMaker>>> {
         let color_space = self.files.colors().map(|colors| (colors.name(), colors.icc().map(<[u8]>::to_vec)));
-        let key = |index: usize| -> Result<Option<KeyMaker>> {
+        let content = |maker: KeyMaker, image: &SourceImage| -> Option<KeyMaker> {
+            let maker = maker.part(&(image.width, image.height, image.orientation));
+            if let Some(photograph) = self.files.in_memory_photographs().of(image) {
+                return Some(maker.photograph(photograph));
+            }
+            std::fs::File::open(&image.path).and_then(|file| maker.file(file)).ok()
+        };
+        let key = |&index: &usize| -> Result<Option<KeyMaker>> {
             context.check_cancelled()?;
             let image = &self.images[index];
-            let mut maker = KeyMaker::new().part(&color_space).part(&(image.width, image.height, image.orientation));
+            let mut maker = KeyMaker::new().part(&color_space);
             if let Masks { ignored: Some(ignored), .. } = self.files.masks(index) {
                 maker = maker.part(&ignored.words());
             }
-            if let Some(photograph) = self.files.in_memory(index) {
-                return Ok(Some(maker.photograph(photograph)));
-            }
-            Ok(std::fs::File::open(&image.path).and_then(|file| maker.file(file)).ok())
+            let whole = image.stack.iter().try_fold(content(maker, image), |maker, member| {
+                Some(content(maker?.part(&member.reference_from_member), &member.source))
+            });
+            Ok(whole.flatten())
         };
-        (0..self.images.len()).into_par_iter().map(key).collect()
+        photographs.par_iter().map(key).collect()
     }
 }
 

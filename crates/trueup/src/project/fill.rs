@@ -10,10 +10,11 @@ use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::geometry::{matrix_from_rows, rows_of};
 use trueup_core::lens::PlacedLens;
 use trueup_core::mesh::GridMesh;
+use trueup_core::source::{SourceImage, StackMember};
 
 use super::record::{
     Canvas, CropRecord, ImageRecord, ImageStatus, LevelRecord, ManhattanRecord, MeshRecord, PROJECT_FORMAT,
-    PROJECT_VERSION, PairRecord, Project,
+    PROJECT_VERSION, PairRecord, Project, StackMemberRecord,
 };
 use crate::options::{MethodForm, StitchOptions};
 use crate::pipeline::align::Geometry;
@@ -51,6 +52,7 @@ pub(crate) fn unfilled(
                 camera: image.camera_model.clone(),
                 lens_told: image.lens.is_some(),
                 component: component.filter(|_| matched.measured[index].is_some()),
+                stack: stack_record(image),
                 masks: matched.set.masks[index].clone(),
                 ..left_out_record(image.path.display().to_string(), reason, hint)
             }
@@ -100,6 +102,15 @@ pub(crate) fn unfilled(
         diagnostics: Vec::new(),
     }
 }
+
+fn stack_record(image: &SourceImage) -> Vec<StackMemberRecord> {
+    let record = |member: &StackMember| StackMemberRecord {
+        path: member.source.path.display().to_string(),
+        reference_from_member: member.reference_from_member,
+    };
+    image.stack.iter().map(record).collect()
+}
+
 fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
     ImageRecord {
         path,
@@ -120,6 +131,7 @@ fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
         scale: None,
         gain: None,
         correction: None,
+        stack: Vec::new(),
         masks: Vec::new(),
         vanishing_points: None,
         mesh: None,
@@ -181,6 +193,7 @@ pub(crate) fn record_composition(
             ));
         }
         record.masks.clone_from(&set.masks[k]);
+        record.stack = stack_record(&set.images[k]);
         renamed.push((std::mem::replace(&mut record.path, path.clone()), path));
     }
     rename(paths(project), &renamed.into_iter().collect());
@@ -201,7 +214,8 @@ impl Project {
     pub fn rename_files(&mut self, moved: &BTreeMap<String, String>) {
         for image in &mut self.images {
             let masks = image.masks.iter_mut().map(|mask| &mut mask.path);
-            rename(std::iter::once(&mut image.path).chain(masks), moved);
+            let stack = image.stack.iter_mut().map(|member| &mut member.path);
+            rename(std::iter::once(&mut image.path).chain(masks).chain(stack), moved);
         }
         rename(paths(self), moved);
     }

@@ -12,5 +12,5 @@ pub use hugin::hugin_project;
 pub use projection::ProjectionRecord;
 pub use record::{
     Canvas, CropRecord, ImageRecord, ImageStatus, LevelRecord, ManhattanRecord, MeshRecord, PROJECT_FORMAT,
-    PROJECT_VERSION, PairRecord, Project,
+    PROJECT_VERSION, PairRecord, Project, StackMemberRecord,
 };

@@ -6,13 +6,14 @@ use trueup_align::metrics::without_torn_cells;
 use trueup_compose::crop::Crop;
 use trueup_compose::exposure::{Correction, Corrections};
 use trueup_compose::layout::{CanvasLayout, Placed};
+use trueup_core::geometry::Homography;
 use trueup_core::mesh::GridMesh;
-use trueup_core::source::SourceImage;
+use trueup_core::source::{SourceImage, StackMember};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::{self, RejectedSource, SourceOptions};
 
 use super::projection::ProjectionRecord;
-use super::record::{Canvas, ImageRecord, MeshRecord, Project};
+use super::record::{Canvas, ImageRecord, MeshRecord, Project, StackMemberRecord, file_name};
 
 /// What a project must be to be read again.
 const AS_WRITTEN: &str = "Give a project file as `trueup stitch --project` wrote it.";
@@ -56,7 +57,7 @@ impl Recorded {
         let reference = records.iter().position(|record| record.path == project.reference).ok_or_else(|| {
             Error::input(&project.reference, "it is the reference, but none of the photographs used", AS_WRITTEN)
         })?;
-        records.iter().try_for_each(|record| check_focal(record))?;
+        records.iter().try_for_each(|record| check_focal(record).and_then(|()| check_stack(record)))?;
         let mut meshes = records.iter().map(|record| solved_grid(record)).collect::<Result<Vec<_>>>()?;
         let corrections = recorded_corrections(project, &records)?;
         if !project.by_cameras.is_none_or(|plane| plane.is_sound()) {
@@ -217,7 +218,7 @@ pub(crate) fn recorded_corrections(project: &Project, records: &[&ImageRecord]) 
 }
 
 /// The file of a recorded photograph, checked to be of its size: beside the project file as recorded, as recorded from
-/// the current folder, or beside the project file by its name alone.
+/// the current folder, or beside the project file by its name alone. So are the other exposures of its stack.
 ///
 /// # Errors
 /// [`Error::Input`] if there is none, it cannot be read or has another size; [`Error::Options`]; [`Error::Cancelled`].
@@ -227,11 +228,29 @@ pub(crate) fn find_photograph(
     options: &SourceOptions,
     context: &StageContext,
 ) -> Result<SourceImage> {
-    let recorded = Path::new(&record.path);
-    let places = [project_folder.join(recorded), recorded.to_owned(), project_folder.join(record.file_name())];
+    let find = |path: &str| {
+        let image = find_file(path, project_folder, options, context)?;
+        check_size(&image, record).map(|()| image)
+    };
+    let mut image = find(&record.path)?;
+    for member in &record.stack {
+        let source = find(&member.path)?;
+        image.stack.push(StackMember { source, reference_from_member: member.reference_from_member });
+    }
+    Ok(image)
+}
+
+fn find_file(
+    recorded: &str,
+    project_folder: &Path,
+    options: &SourceOptions,
+    context: &StageContext,
+) -> Result<SourceImage> {
+    let path = Path::new(recorded);
+    let places = [project_folder.join(path), path.to_owned(), project_folder.join(file_name(recorded))];
     let Some(path): Option<PathBuf> = places.into_iter().find(|path| path.is_file()) else {
         return Err(Error::input(
-            &record.path,
+            recorded,
             "photograph not found, neither here nor beside the project file",
             "Run the command in the folder that the stitch was made in.",
         ));
@@ -244,8 +263,31 @@ pub(crate) fn find_photograph(
             RejectedSource::to_error,
         ));
     };
-    check_size(&image, record)?;
     Ok(image)
+}
+
+/// Farthest that a recorded homography may take a corner from its place, in longer sides: what is aligned stays within a tenth, so that a
+/// record of any program passes, and one that no camera can have turned by does not.
+const FARTHEST_TURN: f64 = 0.5;
+
+/// Refuses homographies that are none of two exposures of one view.
+fn check_stack(record: &ImageRecord) -> Result<()> {
+    let (width, height) = (record.width as f64, record.height as f64);
+    let is_sound = |member: &StackMemberRecord| {
+        let map = Homography::from_rows(&member.reference_from_member);
+        let is_near = |corner: [f64; 2]| {
+            let corner = corner.into();
+            map.denominator(corner) > 0.0 && (map.apply(corner) - corner).norm() <= FARTHEST_TURN * width.max(height)
+        };
+        [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]].into_iter().all(is_near) && map.inverse().is_some()
+    };
+    match record.stack.iter().find(|member| !is_sound(member)) {
+        Some(member) => {
+            let reason = format!("it does not lie on {} by its recorded homography", record.path);
+            Err(Error::input(&member.path, reason, AS_WRITTEN))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Refuses a photograph of another size than the recorded one's.
@@ -352,6 +394,26 @@ mod tests {
         let grid = again.images[0].grid().expect("a grid");
         assert!(!grid.is_defined(0) && grid.is_defined(1));
         Recorded::new(&again).expect("solved everywhere");
+    }
+
+    #[test]
+    fn exposures_that_do_not_lie_on_their_photograph_are_refused() {
+        let with = |map: Value| {
+            let mut changed = project();
+            changed["images"][1]["stack"] = json!([{"path": "c.jpg", "reference_from_member": map}]);
+            changed
+        };
+        let (project, _) = read(&with(json!([[1.0, 0.0, 0.5], [0.0, 1.0, -0.2], [0.001, 0.0, 1.0]]))).expect("near");
+        assert_eq!(project.images[1].stack[0].path, "c.jpg");
+        for map in [
+            json!([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]),
+            json!([[1.0, 0.0, 90.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+            json!([[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]),
+            json!([[1e308, 1e308, 1e308], [0.0, 1e308, 0.0], [1e308, 0.0, 1.0]]),
+        ] {
+            let refused = read(&with(map)).expect_err("far").to_string();
+            assert!(refused.starts_with("c.jpg: it does not lie on b.jpg"), "{refused}");
+        }
     }
 
     #[test]

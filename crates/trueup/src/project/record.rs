@@ -58,6 +58,15 @@ fn places_or_nowhere<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[
     Ok(places.into_iter().map(|place| place.map(|coordinate| coordinate.unwrap_or(f64::NAN))).collect())
 }
 
+/// Another exposure of the view of a photograph, fused with it. It is of the same size.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StackMemberRecord {
+    /// The file as it was given.
+    pub path: String,
+    /// Rows of the homography from its pixels to those of the reference, both of the original photographs after orientation.
+    pub reference_from_member: [[f64; 3]; 3],
+}
+
 /// What became of one photograph. The geometry of a left-out one is `None`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ImageRecord {
@@ -104,6 +113,9 @@ pub struct ImageRecord {
     /// All that was done to its light; `None` in files of programs that knew gains only.
     #[serde(default)]
     pub correction: Option<Correction>,
+    /// The other exposures of the stack that it is the reference of; empty for a photograph of one file.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stack: Vec<StackMemberRecord>,
     /// The masks it was given.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub masks: Vec<MaskRecord>,
@@ -261,7 +273,7 @@ pub struct Project {
     pub lens_from: Option<String>,
     /// Path of the reference photograph.
     pub reference: String,
-    /// Every photograph given, in the order given: used, left out, and unreadable.
+    /// Every photograph given, in the order given: used, left out, and unreadable. The exposures of a stack are one, by its reference.
     pub images: Vec<ImageRecord>,
     /// Every pair tried, sorted.
     pub pairs: Vec<PairRecord>,
@@ -323,8 +335,13 @@ impl ImageRecord {
 
     /// The file's name without folders; paths written on another system are understood.
     pub fn file_name(&self) -> &str {
-        self.path.rsplit(['/', '\\']).next().unwrap_or(&self.path)
+        file_name(&self.path)
     }
+}
+
+/// The name of the file that a recorded path ends in, whatever system wrote it.
+pub(crate) fn file_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
 impl Project {

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use trueup_core::source::SourceImage;
+use trueup_core::source::{SourceImage, StackMember};
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::source::{self, InMemory, RejectedSource, SourceOptions};
 
 use super::read::{check_size, find_photograph};
-use super::record::ImageRecord;
+use super::record::{self, ImageRecord, StackMemberRecord};
 use crate::report::several::several;
 
 /// The recorded photographs themselves, in the order of `records`.
@@ -81,9 +81,27 @@ pub(crate) fn other_photographs(
             Choice::Several => return Err(missing(format!("several files in {folder_text} have its name"))),
             Choice::None => return Err(missing(why_none(record, &folder_text, &sources.rejected))),
         };
-        check_size(&image, record).map(|()| image)
+        check_size(&image, record)?;
+        let stack = replaced_stack(record, &sources.photographs);
+        Ok(SourceImage { stack, ..image })
     });
     all_of(found, "Give a folder with a photograph of the same name and size for each one of the panorama.")
+}
+
+/// The other exposures of a recorded photograph among others of the same names, or of these without extensions; none where one of them is
+/// not there: the photograph then stands for itself.
+fn replaced_stack(record: &ImageRecord, others: &[SourceImage]) -> Vec<StackMember> {
+    let replaced = |member: &StackMemberRecord| {
+        let name = record::file_name(&member.path);
+        let is_named = |other: &&SourceImage| {
+            let file = file_name(&other.path);
+            (file == name || stem(&file) == stem(name)) && check_size(other, record).is_ok()
+        };
+        let source = others.iter().find(is_named)?.clone();
+        Some(StackMember { source, reference_from_member: member.reference_from_member })
+    };
+    let all: Option<Vec<StackMember>> = record.stack.iter().map(replaced).collect();
+    all.unwrap_or_default()
 }
 
 /// What replaces a photograph.

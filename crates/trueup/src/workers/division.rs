@@ -155,9 +155,17 @@ fn elsewhere(files: &FilePhotographs) -> Option<Vec<SourceImage>> {
         let Masks { ignored, kept } = files.masks(number);
         files.in_memory(number).is_some() || ignored.is_some() || kept.is_some()
     };
-    let image = |(number, image): (usize, &SourceImage)| {
-        let path = std::path::absolute(&image.path).ok().filter(|_| !is_only_here(number))?;
+    let absolute = |image: &SourceImage| {
+        let is_a_file = files.in_memory_photographs().of(image).is_none();
+        let path = std::path::absolute(&image.path).ok().filter(|_| is_a_file)?;
         Some(SourceImage { path, ..image.clone() })
+    };
+    let image = |(number, image): (usize, &SourceImage)| {
+        let mut image = absolute(image).filter(|_| !is_only_here(number))?;
+        for member in &mut image.stack {
+            member.source = absolute(&member.source)?;
+        }
+        Some(image)
     };
     files.sources().iter().enumerate().map(image).collect()
 }

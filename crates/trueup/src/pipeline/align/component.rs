@@ -112,7 +112,7 @@ pub(crate) fn camera_groups(images: &[&SourceImage]) -> Vec<usize> {
 }
 
 /// Which of these were taken at one focal length: what a zoom bends differs from one to the next.
-fn lens_groups(images: &[&SourceImage]) -> Vec<usize> {
+pub(crate) fn lens_groups(images: &[&SourceImage]) -> Vec<usize> {
     let cameras = camera_groups(images);
     // By what the file states, to the micrometer: positive numbers, which their bits order.
     let setting = |image: &SourceImage| image.focal_mm.map(|focal_mm| (1e3 * focal_mm).round().to_bits());
@@ -151,6 +151,7 @@ mod tests {
             focal_mm,
             gravity: None,
             lens: None,
+            stack: Vec::new(),
         }
     }
 

@@ -1,10 +1,12 @@
 //! How alike the photographs look where two of them lie on the panorama.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_align::metrics::{OverlapMeasures, OverlapPixels, mean_over_overlaps};
+use trueup_compose::fusion::ExposureFusion;
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_compose::render::{self, Layer, RenderInput};
 use trueup_core::mesh::GridMesh;
@@ -64,7 +66,7 @@ pub fn evaluate_pixels(project: &Project, project_folder: &Path, context: &Stage
         .map(|record| find_photograph(record, project_folder, &project.options.measure.source, context))
         .collect::<Result<Vec<SourceImage>>>()?;
     let colors = PhotographColors::survey(&images, context);
-    let photographs = FilePhotographs::new(images, 0).in_colors(colors);
+    let photographs = FilePhotographs::new(images, 0).in_colors(colors).fused_by(Arc::new(ExposureFusion));
     let meshes = whole_grids(project, &records)?;
     let scale = scale(&meshes, project.options.run.measures.canvas_pixels);
     let positions: Vec<usize> = (0..records.len()).collect();

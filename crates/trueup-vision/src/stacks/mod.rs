@@ -1,0 +1,198 @@
+//! Which photographs are stacks: the same view at several exposures, to be one photograph.
+//!
+//! Exposures differ in more than a factor: cameras bend their tones, and clip them. Two of one view are alike in that the brighter of two
+//! places is the brighter one in both, so that one relation of tones, which never falls, makes the one of the other. Where the details
+//! that are left agree, within a small shift, the view is the same (`likeness`, `same_view`). Neighbors of a row agree nowhere but
+//! within the overlap, at shifts that are not searched.
+//!
+//! # Source
+//! Debevec and Malik, "Recovering high dynamic range radiance maps from photographs", SIGGRAPH 1997, for what a bracket is; Ward, "Fast,
+//! robust image registration for compositing high dynamic range photographs from handheld exposures", Journal of Graphics Tools 8(2), 2003,
+//! for the search of a small shift in pyramids of pictures that exposures do not change.
+//!
+//! # Departures
+//! Ward compares bitmaps above and below the median, which says nothing where most of an exposure is white. The relation of tones is
+//! fitted instead for every shift tried, and where either exposure says nothing, nothing is compared.
+
+mod alignment;
+mod likeness;
+mod same_view;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use trueup_core::raster::Raster;
+
+pub use alignment::{AlignedMember, MemberPair, Unaligned, align};
+use likeness::{CLIPPED, CRUSHED, gray};
+use same_view::{SameView, SmallCopy, same_view};
+
+/// Exposures of a stack are at least this far apart, in stops: cameras bracket by a third of a stop and more, by less than a whole one hardly
+/// anybody does, and two photographs of one exposure, as well as what an automatic exposure changes between two, are no stack.
+pub const LEAST_STOPS: f64 = 0.5;
+
+/// Farthest that two exposures of one stack lie apart, as a part of the longer side: 3 degrees of 60. Neighbors of a row are farther apart.
+const MOST_SHIFT: f64 = 0.05;
+
+/// A photograph is compared with so many that follow it: cameras take the darkest and the brightest of a bracket one after the other, which
+/// have next to nothing in common, but the one before or after them has something of both.
+const LOOK_AHEAD: usize = 3;
+
+/// Most photographs in a stack: what cameras take of one view at most.
+const MOST_MEMBERS: usize = 9;
+
+trueup_core::choice! {
+    /// Which photographs are fused.
+    pub enum Fuse {
+        /// Consecutive photographs of one view at several exposures become one photograph.
+        Auto = "auto",
+        /// Every photograph stands for itself.
+        None = "none",
+    }
+}
+
+trueup_core::options! {
+    /// What becomes of photographs of one view at several exposures.
+    pub struct StackOptions("stacks") {
+        /// Which photographs are fused before they are stitched: consecutive ones that show one view at several exposures (a bracket).
+        /// Choose none to have each of them stitched as it is.
+        fuse: Fuse = Fuse::Auto, Allowed::Any, "", basic;
+    }
+}
+
+/// A photograph that may be one of a stack.
+#[derive(Debug, Clone, Copy)]
+pub struct StackCandidate<'a> {
+    /// Its small copy, in color; `None` for one that can be in no stack.
+    pub thumbnail: Option<&'a Raster<u8>>,
+    /// Those of one number have one size and lens.
+    pub camera: usize,
+}
+
+/// A stack among the candidates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundStack {
+    /// The photograph that tells most, by its number.
+    pub reference: usize,
+    /// The others, in their order.
+    pub others: Vec<FoundMember>,
+}
+
+/// A photograph of a stack beside its reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FoundMember {
+    /// Its number.
+    pub photograph: usize,
+    /// How much brighter than the reference it is, in stops; negative if it is darker.
+    pub stops: f64,
+    /// Where it shows a thing, minus where the reference does, as parts of the width.
+    pub shift: [f64; 2],
+    /// Whether it shows the same view as another one of the stack whether or not it can be aligned; otherwise, it does if it can.
+    pub is_sure: bool,
+}
+
+/// The stacks among `candidates`, in their order: runs of consecutive photographs by one camera that show the same view at exposures of
+/// which no two are alike.
+pub fn find(candidates: &[StackCandidate]) -> Vec<FoundStack> {
+    let copies: Vec<Option<SmallCopy>> =
+        candidates.par_iter().map(|candidate| SmallCopy::new(candidate.thumbnail?)).collect();
+    let size = |number: usize| candidates[number].thumbnail.map(|one| (one.width(), one.height()));
+    let compared = |a: usize| {
+        let following = a + 1..(a + 1 + LOOK_AHEAD).min(candidates.len());
+        let with = |b: usize| {
+            let alike = candidates[a].camera == candidates[b].camera && size(a) == size(b);
+            let found = if alike { same_view(copies[a].as_ref()?, copies[b].as_ref()?) } else { None };
+            Some(((a, b), found?))
+        };
+        following.filter_map(with).collect::<Vec<_>>()
+    };
+    let same: BTreeMap<(usize, usize), SameView> =
+        (0..candidates.len()).into_par_iter().flat_map_iter(compared).collect::<Vec<_>>().into_iter().collect();
+    runs(candidates.len(), &same).into_iter().flat_map(|run| stacks_of(&run, &same, candidates)).collect()
+}
+
+/// Consecutive photographs that are joined, directly or by others of the run, with where they stand beside the first of them.
+fn runs(count: usize, same: &BTreeMap<(usize, usize), SameView>) -> Vec<Vec<FoundMember>> {
+    let mut runs = Vec::new();
+    let mut first = 0;
+    while first < count {
+        // Whatever the first reaches within the photographs that follow, as long as none between is left out.
+        let mut reached: BTreeMap<usize, FoundMember> =
+            BTreeMap::from([(first, FoundMember { photograph: first, stops: 0.0, shift: [0.0; 2], is_sure: false })]);
+        // The surest links first; every round joins one photograph.
+        while let Some(member) = surest_link(&reached, same) {
+            reached.insert(member.photograph, member);
+        }
+        let run: Vec<FoundMember> = reached
+            .into_values()
+            .enumerate()
+            .take_while(|(k, member)| member.photograph == first + k)
+            .map(|(_, one)| one)
+            .collect();
+        first += run.len();
+        runs.push(run);
+    }
+    runs
+}
+
+/// The photograph that is joined most surely to one that is `reached`, and where it stands.
+fn surest_link(
+    reached: &BTreeMap<usize, FoundMember>,
+    same: &BTreeMap<(usize, usize), SameView>,
+) -> Option<FoundMember> {
+    let link = |(&(a, b), view): (&(usize, usize), &SameView)| {
+        let (known, other, sign) = match (reached.get(&a), reached.get(&b)) {
+            (Some(known), None) => (known, b, 1.0),
+            (None, Some(known)) => (known, a, -1.0),
+            _ => return None,
+        };
+        let shift = [0, 1].map(|axis| known.shift[axis] + sign * view.shift[axis]);
+        let stops = known.stops + sign * view.stops;
+        Some((view.correlation, FoundMember { photograph: other, stops, shift, is_sure: view.is_sure() }))
+    };
+    let surest = same.iter().filter_map(link).max_by(|one, other| one.0.total_cmp(&other.0));
+    surest.map(|(_, member)| member)
+}
+
+/// The stacks that a run of one view holds: where an exposure comes again, another one begins.
+fn stacks_of(
+    run: &[FoundMember],
+    same: &BTreeMap<(usize, usize), SameView>,
+    candidates: &[StackCandidate],
+) -> Vec<FoundStack> {
+    let mut stacks: Vec<Vec<FoundMember>> = Vec::new();
+    for member in run {
+        match stacks.last_mut() {
+            Some(stack)
+                if stack.len() < MOST_MEMBERS
+                    && stack.iter().all(|other| (other.stops - member.stops).abs() >= LEAST_STOPS) =>
+            {
+                stack.push(*member);
+            }
+            _ => stacks.push(vec![*member]),
+        }
+    }
+    let is_joined = |stack: &Vec<FoundMember>| {
+        let numbers: Vec<usize> = stack.iter().map(|member| member.photograph).collect();
+        stack.len() > 1 && same.keys().any(|(a, b)| numbers.contains(a) && numbers.contains(b))
+    };
+    stacks.into_iter().filter(is_joined).filter_map(|stack| with_reference(&stack, candidates)).collect()
+}
+
+/// The stack seen from the member that tells most: least of it is clipped or crushed; of equals the first.
+fn with_reference(stack: &[FoundMember], candidates: &[StackCandidate]) -> Option<FoundStack> {
+    let lost = |member: &FoundMember| {
+        let gray = candidates[member.photograph].thumbnail.and_then(gray)?;
+        Some(gray.data().iter().filter(|&&level| level >= CLIPPED || level <= CRUSHED).count())
+    };
+    let reference = stack.iter().min_by_key(|member| lost(member).unwrap_or(usize::MAX))?;
+    let seen = |member: &FoundMember| FoundMember {
+        stops: member.stops - reference.stops,
+        shift: [0, 1].map(|axis| member.shift[axis] - reference.shift[axis]),
+        ..*member
+    };
+    let others = stack.iter().filter(|member| member.photograph != reference.photograph).map(seen).collect();
+    Some(FoundStack { reference: reference.photograph, others })
+}

@@ -1,0 +1,157 @@
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use trueup_core::raster::Raster;
+
+use super::*;
+
+const WIDTH: usize = 200;
+const HEIGHT: usize = 150;
+
+/// Light, white being 1, with detail of several sizes that repeats nowhere, at a place in focal lengths from the middle of a scene.
+fn light(x: f64, y: f64) -> f64 {
+    let sum: f64 =
+        [(0.02, 0.5), (0.06, 1.0), (0.2, 1.5)].iter().map(|(size, much)| much * noise(x / size, y / size)).sum();
+    0.3 * sum.exp()
+}
+
+/// Smooth between random numbers of -1 to 1 at whole places.
+fn noise(x: f64, y: f64) -> f64 {
+    let at = |x: f64, y: f64| {
+        let mixed = (x as i64 as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+            ^ (y as i64 as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
+        let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        ((mixed ^ (mixed >> 32)) % 2001) as f64 / 1000.0 - 1.0
+    };
+    let smooth = |fraction: f64| fraction * fraction * (3.0 - 2.0 * fraction);
+    let (left, top) = (x.floor(), y.floor());
+    let (u, v) = (smooth(x - left), smooth(y - top));
+    let row = |y: f64| at(left, y) * (1.0 - u) + at(left + 1.0, y) * u;
+    row(top) * (1.0 - v) + row(top + 1.0) * v
+}
+
+/// What a camera of focal length 200 px, turned by these angles, records of it at this exposure: by a power of 1/2.2, clipped.
+fn taken([width, height]: [usize; 2], focal: f64, turn: [f64; 3], exposure: f64) -> Raster<f32> {
+    let camera_from_world = Rotation3::from_scaled_axis(Vector3::from(turn));
+    let mut picture = Raster::new(width, height, 1);
+    for y in 0..height {
+        for x in 0..width {
+            let ray = Vector3::new(
+                (x as f64 + 0.5 - width as f64 / 2.0) / focal,
+                (y as f64 + 0.5 - height as f64 / 2.0) / focal,
+                1.0,
+            );
+            let seen = camera_from_world.inverse() * ray;
+            let level = 255.0 * (exposure * light(seen.x / seen.z, seen.y / seen.z)).powf(1.0 / 2.2);
+            picture.pixel_mut(x, y)[0] = level.clamp(0.0, 255.0).round() as f32;
+        }
+    }
+    picture
+}
+
+fn thumbnail(turn: [f64; 3], exposure: f64) -> Raster<u8> {
+    let gray = taken([WIDTH, HEIGHT], 200.0, turn, exposure);
+    let data = gray.data().iter().flat_map(|&level| [level as u8; 3]).collect();
+    Raster::from_data(WIDTH, HEIGHT, 3, data).expect("three channels")
+}
+
+fn found(shots: &[([f64; 3], f64)]) -> Vec<FoundStack> {
+    let thumbnails: Vec<Raster<u8>> = shots.iter().map(|&(turn, exposure)| thumbnail(turn, exposure)).collect();
+    let candidates: Vec<StackCandidate> =
+        thumbnails.iter().map(|one| StackCandidate { thumbnail: Some(one), camera: 0 }).collect();
+    find(&candidates)
+}
+
+/// Turned by a hand between exposures, and by half the view between directions.
+const DIRECTIONS: [f64; 3] = [0.0, 0.45, 0.9];
+const HAND: [[f64; 3]; 3] = [[0.0; 3], [0.004, -0.006, 0.005], [-0.005, 0.008, -0.004]];
+
+#[test]
+fn brackets_of_a_row_are_stacks_and_neighbors_are_not() {
+    for exposures in [[1.0, 0.2, 5.0], [0.2, 1.0, 5.0], [0.2, 5.0, 1.0]] {
+        let turned = |direction: f64| HAND.map(|[x, y, z]| [x, y + direction, z]);
+        let shots: Vec<([f64; 3], f64)> =
+            DIRECTIONS.into_iter().flat_map(|direction| turned(direction).into_iter().zip(exposures)).collect();
+        let stacks = found(&shots);
+        let numbers: Vec<Vec<usize>> = stacks
+            .iter()
+            .map(|stack| {
+                let mut all: Vec<usize> = stack.others.iter().map(|one| one.photograph).collect();
+                all.push(stack.reference);
+                all.sort_unstable();
+                all
+            })
+            .collect();
+        assert_eq!(numbers, [[0, 1, 2], [3, 4, 5], [6, 7, 8]], "{exposures:?}");
+        for member in stacks.iter().flat_map(|stack| stack.others.iter().map(|one| (stack.reference, one))) {
+            let (reference, FoundMember { photograph, stops, .. }) = member;
+            // Clipped places are brighter than is seen, and the curve of sRGB is not quite a power.
+            let expected = (shots[*photograph].1 / shots[reference].1).log2();
+            assert!((0.5..1.2).contains(&(stops / expected)), "{stops} {expected}");
+        }
+    }
+}
+
+#[test]
+fn equal_exposures_other_views_and_other_cameras_are_no_stack() {
+    let hand = HAND[1];
+    assert!(found(&[([0.0; 3], 1.0), (hand, 1.0)]).is_empty(), "one exposure");
+    assert!(found(&[([0.0; 3], 1.0), (hand, 1.2)]).is_empty(), "less than half a stop");
+    assert!(found(&[([0.0; 3], 1.0), ([0.0, 0.15, 0.0], 4.0)]).is_empty(), "a neighbor in a row");
+    let thumbnails = [thumbnail([0.0; 3], 1.0), thumbnail(hand, 4.0)];
+    let of = |cameras: [usize; 2]| {
+        let candidate = |k: usize| StackCandidate { thumbnail: Some(&thumbnails[k]), camera: cameras[k] };
+        find(&[candidate(0), candidate(1)]).len()
+    };
+    assert_eq!((of([0, 0]), of([0, 1])), (1, 0));
+}
+
+/// Somebody takes the same bracket twice: two stacks of one view, not one with every exposure twice.
+#[test]
+fn where_an_exposure_comes_again_another_stack_begins() {
+    let shots = [1.0, 0.2, 5.0, 1.0, 0.2, 5.0].map(|exposure| ([0.0; 3], exposure));
+    let stacks = found(&shots);
+    assert_eq!(stacks.iter().map(|stack| stack.others.len()).collect::<Vec<_>>(), [2, 2]);
+}
+
+/// The homography of a turn, K R K^-1, with the focal length unknown to the alignment.
+#[test]
+fn a_member_is_aligned_to_a_small_part_of_a_pixel() {
+    let (size, focal) = ([400, 300], 380.0);
+    let turn = [0.006, -0.011, 0.009];
+    for (reference, member) in [(1.0, 0.2), (1.0, 4.0), (0.3, 1.5)] {
+        let pictures = [taken(size, focal, [0.0; 3], reference), taken(size, focal, turn, member)];
+        let pair = MemberPair {
+            reference: &pictures[0],
+            member: &pictures[1],
+            stops: f64::log2(member / reference),
+            shift: [0.0; 2],
+            focal_px: None,
+        };
+        let aligned = align(&pair).expect("aligned");
+        let camera = Matrix3::new(focal, 0.0, 200.0, 0.0, focal, 150.0, 0.0, 0.0, 1.0);
+        let member_from_reference = camera
+            * Rotation3::from_scaled_axis(Vector3::from(turn)).matrix()
+            * camera.try_inverse().expect("a camera");
+        let truth = trueup_core::geometry::Homography(member_from_reference);
+        for place in [[10.0, 10.0], [390.0, 20.0], [200.0, 150.0], [20.0, 280.0], [380.0, 290.0]] {
+            let back = aligned.reference_from_member.apply(truth.apply(place.into()));
+            let off = (back - nalgebra::Vector2::from(place)).norm();
+            assert!(off < 0.1, "{off} px at {place:?} of {reference} and {member}");
+        }
+    }
+}
+
+#[test]
+fn what_shows_something_else_is_not_aligned() {
+    let size = [400, 300];
+    let pictures = [taken(size, 380.0, [0.0; 3], 1.0), taken(size, 380.0, [0.0, 1.2, 0.0], 4.0)];
+    let pair = MemberPair {
+        reference: &pictures[0],
+        member: &pictures[1],
+        stops: 2.0,
+        shift: [0.0; 2],
+        focal_px: Some(380.0),
+    };
+    assert!(matches!(align(&pair), Err(Unaligned::OtherDetails(_) | Unaligned::TooFar(_))));
+    let small = taken([20, 20], 20.0, [0.0; 3], 1.0);
+    assert_eq!(align(&MemberPair { member: &small, ..pair }), Err(Unaligned::NoPicture));
+}

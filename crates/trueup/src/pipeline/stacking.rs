@@ -1,0 +1,411 @@
+//! The stacking phase: photographs of one view at several exposures become one.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use trueup_align::stitch_graph::GraphFile;
+use trueup_core::diagnostics::{Diagnostic, Reported, Subject};
+use trueup_core::geometry::Homography;
+use trueup_core::source::{PhotographSource, SourceImage, StackMember, WorkingFrame};
+use trueup_core::{Result, StageContext};
+use trueup_io::source::RejectedSource;
+use trueup_vision::stacks::{self, FoundMember, FoundStack, Fuse, MemberPair, StackCandidate, Unaligned};
+
+use super::align::component::{camera_groups, lens_groups};
+use super::measure::{self, MeasureInput, Measurements, THUMBNAIL_PIXELS, concerns_one_photograph};
+use super::photographs::{FoundPhotographs, PhotographSet};
+use crate::job::masks::AllMasks;
+use crate::memo::Memo;
+use crate::options::StitchOptions;
+
+const STAGE: &str = "stacks";
+
+/// The code of an exposure that is in no panorama because it does not lie on the others of its stack.
+const NOT_ALIGNED: &str = "stack-member-not-aligned";
+
+/// What the phase works on.
+pub(super) struct StackingInput<'a> {
+    /// The photographs as they were given, and what was told of them.
+    pub found: Reported<PhotographSet>,
+    pub measurements: Reported<Measurements>,
+    pub graph_file: GraphFile,
+    pub memo: Memo<'a>,
+    pub keep_grays: bool,
+}
+
+/// Photographs of which each stack is one.
+pub(super) struct Stacked {
+    pub set: PhotographSet,
+    pub measurements: Measurements,
+    pub graph_file: GraphFile,
+}
+
+/// A stack whose members lie on its reference.
+struct AlignedStack {
+    reference: usize,
+    members: Vec<(FoundMember, StackMember)>,
+    left_out: Vec<(FoundMember, Unaligned)>,
+}
+
+impl AlignedStack {
+    fn numbers(&self) -> impl Iterator<Item = usize> {
+        let members = self.members.iter().map(|(found, _)| found.photograph);
+        members.chain(self.left_out.iter().map(|(found, _)| found.photograph))
+    }
+}
+
+/// Finds stacks among the photographs, aligns their members, and measures what they are fused to; without any, everything stays as it
+/// was.
+///
+/// # Errors
+/// [`trueup_core::Error::Limits`]; [`trueup_core::Error::Cancelled`].
+pub(super) fn run(input: StackingInput, options: &StitchOptions, context: &StageContext) -> Result<Stacked> {
+    let StackingInput { found, measurements, graph_file, memo, keep_grays } = input;
+    let stacks = match options.measure.stacks.fuse {
+        Fuse::Auto => context.time(STAGE, || aligned_stacks(&found.value, &measurements.value, options, context))?,
+        Fuse::None => Vec::new(),
+    };
+    if stacks.is_empty() {
+        let (set, measurements) = (context.absorb(found), context.absorb(measurements));
+        return Ok(Stacked { set, measurements, graph_file });
+    }
+    let (old, told_of_files) = found.split();
+    let (old_measurements, mut told_of_pixels) = measurements.split();
+    let numbering = Numbering::new(old.images.len(), &stacks);
+    // What was told of an exposure's own features says nothing of the stack.
+    let is_of_a_stack =
+        |one: &Diagnostic| matches!(one.subject, Subject::Photograph(number) if numbering.is_of_a_stack(number));
+    told_of_pixels.findings.retain(|one| !is_of_a_stack(one));
+    context.absorb(told_of_files.renumbered(|number| numbering.new_of(number)));
+    context.absorb(told_of_pixels.renumbered(|number| numbering.new_of(number)));
+    let (set, fused) = stacked_set(old, &stacks, &numbering, options, context)?;
+    for (&number, stack) in fused.iter().zip(&stacks) {
+        context.report(fused_note(number, stack, &set));
+    }
+    let input = MeasureInput { set: &set, memo, keep_grays, workers: None };
+    let measured = context.absorb(measure::some(&input, &fused, &options.measure, context)?);
+    let Measurements { photographs, keys } = old_measurements;
+    let mut new = Measurements::default();
+    for (number, (one, key)) in
+        photographs.into_iter().zip(keys).enumerate().filter(|(number, _)| numbering.stays(*number))
+    {
+        debug_assert_eq!(numbering.new_of(number), new.photographs.len());
+        new.photographs.push(one);
+        new.keys.push(key);
+    }
+    for (number, (one, key)) in fused.into_iter().zip(measured.photographs.into_iter().zip(measured.keys)) {
+        new.photographs[number] = one;
+        new.keys[number] = key;
+    }
+    Ok(Stacked { set, measurements: new, graph_file: numbering.graph_file(graph_file) })
+}
+
+/// Which number the photographs get when those of a stack have one.
+struct Numbering {
+    new: Vec<usize>,
+    stays: Vec<bool>,
+    is_of_a_stack: Vec<bool>,
+}
+
+impl Numbering {
+    fn new(count: usize, stacks: &[AlignedStack]) -> Self {
+        let reference_of: BTreeMap<usize, usize> =
+            stacks.iter().flat_map(|stack| stack.numbers().map(|number| (number, stack.reference))).collect();
+        let stays: Vec<bool> = (0..count).map(|number| !reference_of.contains_key(&number)).collect();
+        let mut own = Vec::with_capacity(count);
+        let mut next = 0;
+        for &stays in &stays {
+            own.push(next);
+            next += usize::from(stays);
+        }
+        let new = (0..count).map(|number| own[reference_of.get(&number).copied().unwrap_or(number)]).collect();
+        let mut is_of_a_stack: Vec<bool> = stays.iter().map(|stays| !stays).collect();
+        stacks.iter().for_each(|stack| is_of_a_stack[stack.reference] = true);
+        Self { new, stays, is_of_a_stack }
+    }
+
+    fn new_of(&self, number: usize) -> usize {
+        self.new.get(number).copied().unwrap_or(number)
+    }
+
+    /// Whether a photograph has a number of its own.
+    fn stays(&self, number: usize) -> bool {
+        self.stays[number]
+    }
+
+    fn is_of_a_stack(&self, number: usize) -> bool {
+        self.is_of_a_stack.get(number).is_some_and(|&is| is)
+    }
+
+    /// The same wishes of stacks in place of their members.
+    fn graph_file(&self, graph_file: GraphFile) -> GraphFile {
+        let edge = |&(a, b): &(usize, usize)| {
+            let (a, b) = (self.new_of(a), self.new_of(b));
+            (a != b).then_some((a.min(b), a.max(b)))
+        };
+        let mut edges: Vec<(usize, usize)> = graph_file.edges.iter().filter_map(edge).collect();
+        edges.sort_unstable();
+        edges.dedup();
+        GraphFile { edges, reference: graph_file.reference.map(|number| self.new_of(number)), ..graph_file }
+    }
+}
+
+/// The stacks, in the order of their references, each with a member at least that lies on it.
+fn aligned_stacks(
+    set: &PhotographSet,
+    measurements: &Measurements,
+    options: &StitchOptions,
+    context: &StageContext,
+) -> Result<Vec<AlignedStack>> {
+    let images: Vec<&SourceImage> = set.images.iter().collect();
+    let cameras = camera_groups(&images).into_iter().zip(lens_groups(&images));
+    let mut known: BTreeMap<(usize, usize), usize> = BTreeMap::new();
+    let candidates: Vec<StackCandidate> = cameras
+        .zip(&measurements.photographs)
+        .enumerate()
+        .map(|(number, (camera, measured))| {
+            let count = known.len();
+            let camera = *known.entry(camera).or_insert(count);
+            // Marks are of one exposure's pixels.
+            let masks = set.files.masks(number);
+            let is_marked = masks.ignored.is_some() || masks.kept.is_some();
+            let thumbnail = measured.as_ref().ok().filter(|_| !is_marked).map(|measured| &measured.thumbnail);
+            StackCandidate { thumbnail, camera }
+        })
+        .collect();
+    let found = stacks::find(&candidates);
+    let mut aligned = Vec::new();
+    // As many as may be measured at once, each of which reads two photographs at a time.
+    for group in found.chunks((set.at_once / 2).max(1)) {
+        context.check_cancelled()?;
+        let stacks: Vec<Option<AlignedStack>> =
+            group.par_iter().map(|stack| aligned_stack(stack, set, options, context)).collect::<Result<_>>()?;
+        aligned.extend(stacks.into_iter().flatten());
+    }
+    aligned.sort_by_key(|stack| stack.reference);
+    Ok(aligned)
+}
+
+/// `None` where no member lies on the reference, or a file can no longer be read: each photograph then stands for itself.
+fn aligned_stack(
+    found: &FoundStack,
+    set: &PhotographSet,
+    options: &StitchOptions,
+    context: &StageContext,
+) -> Result<Option<AlignedStack>> {
+    let image = &set.images[found.reference];
+    let frame = WorkingFrame::new(image.width, image.height, options.measure.working.pixels);
+    let gray = |number: usize| {
+        context.check_cancelled()?;
+        match set.files.working(number, &frame, THUMBNAIL_PIXELS) {
+            Ok(picture) => Ok(Some(picture.gray)),
+            Err(error) if concerns_one_photograph(&error) => Ok(None),
+            Err(error) => Err(error),
+        }
+    };
+    let Some(reference) = gray(found.reference)? else { return Ok(None) };
+    let focal_px = image.focal_prior.map(|prior| prior.focal_px * frame.working_from_full);
+    let (mut members, mut left_out) = (Vec::new(), Vec::new());
+    for member in &found.others {
+        let Some(gray) = gray(member.photograph)? else { return Ok(None) };
+        let FoundMember { stops, shift, photograph, is_sure } = *member;
+        let pair = MemberPair { reference: &reference, member: &gray, stops, shift, focal_px };
+        match stacks::align(&pair) {
+            Ok(aligned) => {
+                let source = set.images[photograph].clone();
+                let full = in_full_pixels(&aligned.reference_from_member, frame.working_from_full);
+                members.push((*member, StackMember { source, reference_from_member: full.to_rows() }));
+            }
+            Err(reason) if is_sure => left_out.push((*member, reason)),
+            // It only looked like an exposure of this view, and stands for itself.
+            Err(_) => {}
+        }
+    }
+    Ok((!members.is_empty()).then_some(AlignedStack { reference: found.reference, members, left_out }))
+}
+
+/// A map between pictures that were both reduced by `scale`, between the whole ones.
+fn in_full_pixels(map: &Homography, scale: f64) -> Homography {
+    let mut full = map.0;
+    for axis in 0..2 {
+        full[(axis, 2)] /= scale;
+        full[(2, axis)] *= scale;
+    }
+    Homography(full)
+}
+
+/// The set in which each stack is one photograph, and the numbers of these.
+fn stacked_set(
+    old: PhotographSet,
+    stacks: &[AlignedStack],
+    numbering: &Numbering,
+    options: &StitchOptions,
+    context: &StageContext,
+) -> Result<(PhotographSet, Vec<usize>)> {
+    let mut images = old.images.clone();
+    let mut rejected = old.rejected.clone();
+    for stack in stacks {
+        images[stack.reference].stack = stack.members.iter().map(|(_, member)| member.clone()).collect();
+        let reference = old.images[stack.reference].name.as_str();
+        rejected.extend(
+            stack.left_out.iter().map(|(found, reason)| not_aligned(&old.images[found.photograph], reference, *reason)),
+        );
+    }
+    let kept: Vec<usize> = (0..images.len()).filter(|&number| numbering.stays(number)).collect();
+    let masks = AllMasks {
+        masks: kept.iter().map(|&number| old.files.masks(number)).collect(),
+        records: kept.iter().map(|&number| old.masks[number].clone()).collect(),
+    };
+    let in_memory = old.files.in_memory_photographs().clone();
+    let images = kept.iter().map(|&number| images[number].clone()).collect();
+    let found = FoundPhotographs { images, in_memory, rejected, masks };
+    // What it says of the photographs' colors was told already.
+    let set = context.gather(|context| PhotographSet::open(found, options, context))?.value;
+    let fused = stacks.iter().map(|stack| numbering.new_of(stack.reference)).collect();
+    Ok((PhotographSet { lens_from: old.lens_from, ..set }, fused))
+}
+
+fn not_aligned(image: &SourceImage, reference: &str, reason: Unaligned) -> RejectedSource {
+    let why = match reason {
+        Unaligned::NoPicture => "it is too small to be aligned".to_owned(),
+        Unaligned::OtherDetails(correlation) => {
+            format!("its details are others once it is aligned (they correlate by {correlation:.2})")
+        }
+        Unaligned::TooFar(share) => format!("it lies {:.0} % of a side away", 100.0 * share),
+    };
+    RejectedSource {
+        path: image.path.clone(),
+        name: image.name.clone(),
+        code: NOT_ALIGNED.to_owned(),
+        reason: format!("it is an exposure of the stack of {reference}, but {why}"),
+        hint: "Give --stacks none to have every photograph stitched by itself.".to_owned(),
+    }
+}
+
+fn fused_note(number: usize, stack: &AlignedStack, set: &PhotographSet) -> Diagnostic {
+    let member =
+        |(found, member): &(FoundMember, StackMember)| format!("{} ({:+.1} stops)", member.source.name, found.stops);
+    let members: Vec<String> = stack.members.iter().map(member).collect();
+    let message = format!(
+        "{} exposures of one view were fused in its frame: itself, {}",
+        set.images[number].stack.len() + 1,
+        members.join(", ")
+    );
+    Diagnostic::note(
+        "stack-fused",
+        Subject::Photograph(number),
+        message,
+        "Give --stacks none to have each of them stitched by itself.",
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use trueup_core::raster::{Photograph, Raster, RowSource};
+    use trueup_io::decode;
+    use trueup_io::source::{InMemory, SourceOptions, scan};
+
+    use super::*;
+    use crate::job::inputs::{Inputs, Reference};
+    use crate::memo::PhotographCache;
+    use crate::pipeline::Stitcher;
+
+    const GAINS: [f32; 3] = [1.0, 0.4, 2.2];
+
+    /// Two photographs of the room, each at three exposures, as if their names were those of files.
+    fn brackets() -> (Vec<String>, InMemory) {
+        let room = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/room"));
+        let (mut names, mut in_memory) = (Vec::new(), InMemory::default());
+        for number in ["02", "03"] {
+            let path = room.join(format!("{number}.jpg")).display().to_string();
+            let file =
+                scan(&[path], &SourceOptions::default(), &StageContext::default()).expect("the room").photographs;
+            let Photograph::Eight(picture) = decode::photograph(&file[0]).expect("decoded") else { panic!("8 bits") };
+            for (exposure, gain) in GAINS.iter().enumerate() {
+                let levels = picture.data().iter().map(|&level| (f32::from(level) * gain + 0.5) as u8).collect();
+                let picture = Raster::from_data(picture.width(), picture.height(), picture.channels(), levels);
+                let name = format!("{number}-{exposure}");
+                in_memory.insert(&name, Photograph::Eight(picture.expect("samples")));
+                names.push(name);
+            }
+        }
+        (names, in_memory)
+    }
+
+    fn rows(panorama: &dyn RowSource) -> Vec<u8> {
+        let mut samples = vec![0; panorama.width() * panorama.height() * 4];
+        for (y, row) in samples.chunks_exact_mut(panorama.width() * 4).enumerate() {
+            panorama.rgba8_row(y, row).expect("a row");
+        }
+        samples
+    }
+
+    #[test]
+    fn brackets_are_stitched_as_two_photographs_and_found_again_in_the_cache() {
+        let (names, in_memory) = brackets();
+        // An exposure is as good a name for its stack as the reference is.
+        let reference = Reference::Named("03-2".to_owned());
+        let inputs = Inputs { in_memory, reference, ..Inputs::new(names) };
+        let mut options = StitchOptions::default();
+        options.set("canvas.scale=0.1").expect("an option");
+        let context = StageContext::default();
+        let desk = tempfile::tempdir().expect("a folder");
+        let cache = PhotographCache::open(desk.path(), 1e9).expect("a cache");
+        let mut pictures = Vec::new();
+        for _ in 0..2 {
+            let stitcher = Stitcher::new(&options, &context).with_cache(Some(&cache));
+            let mut alignment = stitcher.align(&inputs).expect("aligned").alignments.remove(0);
+            let project = &alignment.project;
+            assert_eq!((project.used(), project.images.len()), (2, 2));
+            assert!(project.reference.starts_with("03-"), "{}", project.reference);
+            for image in &project.images {
+                assert_eq!(image.stack.len(), 2);
+                for member in &image.stack {
+                    let map = Homography::from_rows(&member.reference_from_member);
+                    let corner = [image.width as f64, image.height as f64].into();
+                    assert!((map.apply(corner) - corner).norm() < 0.2, "they were not moved: {map:?}");
+                }
+            }
+            let told = project.diagnostics.iter().filter(|one| one.code == "stack-fused").count();
+            assert_eq!(told, 2);
+            assert!(project.diagnostics.iter().all(|one| one.code != "near-duplicate"), "{:?}", project.diagnostics);
+            pictures.push(rows(&stitcher.compose(&mut alignment).expect("composed").panorama));
+            let mut again = stitcher.rearrange(&alignment, None).expect("rearranged");
+            pictures.push(rows(&stitcher.compose(&mut again).expect("composed").panorama));
+        }
+        assert!(pictures.iter().all(|picture| *picture == pictures[0]));
+        let used = cache.uses().get("measured").map_or([0, 0], |one| [one.found, one.made]);
+        assert_eq!(used, [8, 8], "six exposures and two stacks, found the second time");
+
+        options.set("stacks.fuse=none").expect("an option");
+        let alignment = Stitcher::new(&options, &context).align(&inputs).expect("aligned").alignments.remove(0);
+        assert!(alignment.project.used() > 2 && alignment.project.images.len() == 6);
+    }
+
+    #[test]
+    fn photographs_keep_their_order_and_wishes_name_stacks() {
+        let member = |photograph| FoundMember { photograph, stops: 1.0, shift: [0.0; 2], is_sure: true };
+        let stack = AlignedStack {
+            reference: 2,
+            members: Vec::new(),
+            left_out: [1, 3].map(|k| (member(k), Unaligned::NoPicture)).into(),
+        };
+        let numbering = Numbering::new(6, &[stack]);
+        let new: Vec<usize> = (0..6).map(|number| numbering.new_of(number)).collect();
+        assert_eq!(new, [0, 1, 1, 1, 2, 3]);
+        let graph =
+            GraphFile { edges: vec![(0, 1), (0, 3), (1, 2), (3, 5)], reference: Some(3), ..GraphFile::default() };
+        let graph = numbering.graph_file(graph);
+        assert_eq!((graph.edges, graph.reference), (vec![(0, 1), (1, 3)], Some(1)));
+    }
+
+    #[test]
+    fn a_map_of_reduced_pictures_is_one_of_the_whole_ones() {
+        // x' = (x + 3) / (1 + 0.01 x) of pictures at half the size: at 20 whole pixels, 13 / 1.1 of these, 26 / 1.1 whole ones.
+        let small = Homography::from_rows(&[[1.0, 0.0, 3.0], [0.0, 1.0, 0.0], [0.01, 0.0, 1.0]]);
+        let place = in_full_pixels(&small, 0.5).apply([20.0, 0.0].into());
+        assert!((place.x - 26.0 / 1.1).abs() < 1e-12);
+    }
+}
