@@ -14,6 +14,7 @@ mod evaluate;
 mod failures;
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 mod faults;
+mod flat_scene;
 mod formats;
 mod full_turn;
 mod installing;

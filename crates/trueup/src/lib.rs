@@ -43,8 +43,8 @@ pub use options::{
 };
 pub use pipeline::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use project::{
-    Canvas, CropRecord, ImageRecord, ImageStatus, LevelRecord, ManhattanRecord, MeshRecord, PROJECT_FORMAT,
-    PROJECT_VERSION, PairRecord, Project, ProjectionRecord, StackMemberRecord, hugin_project,
+    Canvas, CropRecord, FlatSceneRecord, ImageRecord, ImageStatus, LevelRecord, ManhattanRecord, MeshRecord,
+    PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project, ProjectionRecord, StackMemberRecord, hugin_project,
 };
 pub use report::brightness::BrightnessStep;
 pub use report::evaluation::{
@@ -57,7 +57,7 @@ pub use report::measures::{
     UprightMeasures, WorstPair,
 };
 pub use report::shown::ShownPhotographs;
-pub use trueup_align::cameras::{CameraOptions, LensKind};
+pub use trueup_align::cameras::{CameraOptions, FlatEvidence, LensKind, SceneModel};
 pub use trueup_align::projection::{FlatKind, Projection, ProjectionOptions};
 pub use trueup_align::similarity::PriorMethod;
 pub use trueup_compose::fidelity::Fidelity;

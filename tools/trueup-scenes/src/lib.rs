@@ -2,7 +2,8 @@
 //! panoramas of real places ([`cut`]).
 //!
 //! A [`LitScene`] (a room, a street, or open country) is built from a seed; [`rig`] places the cameras of a hand-held
-//! panorama in it; [`render`] takes the photographs and [`write_set`] stores them with their truth.
+//! panorama in it; [`render`] takes the photographs and [`write_set`] stores them with their truth. [`flat_rig`] moves cameras along
+//! something flat.
 //!
 //! ```
 //! use trueup_scenes::{LightQuality, Quality, RigOptions, LitScene, SceneOptions, render, rig};
@@ -22,6 +23,7 @@ mod catalogue;
 mod color;
 pub mod cut;
 mod dice;
+mod flat;
 mod light;
 mod material;
 mod noise;
@@ -38,6 +40,7 @@ mod tests;
 mod trace;
 
 pub use catalogue::{RECIPE, SetOutcome, SetRequest};
+pub use flat::{FlatSetKind, FlatTexture, flat_picture, flat_rig, write_flat_set};
 pub use render::{Quality, render};
 pub use rig::{PosedCamera, RigOptions, camera_from_world, rig};
 pub use scene::{LightQuality, LitScene, RoomStyle, SceneKind, SceneOptions, Viewpoint};

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use commands::{CutArguments, LevelArguments, SpecsArguments, StudyArguments};
+use commands::{CutArguments, FlatArguments, LevelArguments, SpecsArguments, StudyArguments};
 use trueup_core::{Result, StageContext};
 use trueup_scenes::{
     LightQuality, LitScene, Quality, RigOptions, SceneKind, SceneOptions, SetOutput, example_set, rig, write_set,
@@ -35,6 +35,8 @@ enum Command {
     Study(StudyArguments),
     /// Cuts views of known pose out of a panorama.
     Cut(CutArguments),
+    /// Photographs something flat by cameras that move along it.
+    Flat(FlatArguments),
     /// Measures where the scene's vertical points in panoramas.
     Level(LevelArguments),
     /// Writes specs of views to cut out of panoramas.
@@ -152,6 +154,7 @@ fn main() -> ExitCode {
 fn run(command: &Command) -> Result<()> {
     match command {
         Command::Cut(arguments) => arguments.run(),
+        Command::Flat(arguments) => arguments.run(),
         Command::Level(arguments) => arguments.run(),
         Command::Specs(arguments) => arguments.run(),
         Command::Render(arguments) => {

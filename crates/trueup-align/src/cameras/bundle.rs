@@ -7,7 +7,6 @@
 //! # Departures
 //! The unknown of a focal length is its logarithm, so that steps are relative and the sign is safe.
 
-use faer::linalg::solvers::Solve;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use trueup_core::camera::{Camera, INTRINSICS};
@@ -16,6 +15,7 @@ use trueup_core::{Result, StageContext};
 
 use super::equations::{Columns, NormalEquations, NormalPattern, Pull};
 use super::intrinsics::{FOCAL, IntrinsicsModel, LensState, standard_deviation};
+use super::levenberg_marquardt::{self, LeastSquares};
 use super::observations::{Observations, PairObservations};
 use super::pair_cost::{LENS_LOCAL, PINHOLE_LOCAL, PairTerm, pair_cost};
 use super::prior::CameraPrior;
@@ -25,14 +25,6 @@ use super::prior::CameraPrior;
 pub(super) const COARSE_HUBER_PX: f64 = 20.0;
 /// The same in the final pass, working pixels: a few times the error of a match.
 pub(super) const FINE_HUBER_PX: f64 = 2.0;
-/// Most iterations of one pass; it settles long before, unless the data contradict themselves.
-const MAX_ITERATIONS: usize = 100;
-/// Damping at the start of a pass, relative to the diagonal of the normal matrix.
-const FIRST_DAMPING: f64 = 1e-4;
-/// Damping beyond which no step is tried any more.
-const LARGEST_DAMPING: f64 = 1e12;
-/// Relative decrease of the cost below which a pass has settled.
-const SETTLED: f64 = 1e-8;
 /// A focal length within this factor of the shortest believed one was stopped there.
 const STOPPED_SHORT: f64 = 1.001;
 
@@ -87,38 +79,13 @@ impl BundleAdjustment<'_> {
 
     fn minimize_by<const LOCAL: usize>(
         &self,
-        mut parameters: Parameters,
+        parameters: Parameters,
         model: &IntrinsicsModel,
         huber_px: f64,
         context: &StageContext,
     ) -> Result<Parameters> {
         let pattern = self.pattern::<LOCAL>(model)?;
-        let mut cost = self.cost(&parameters, model, huber_px);
-        let mut damping = FIRST_DAMPING;
-        for _ in 0..MAX_ITERATIONS {
-            context.check_cancelled()?;
-            let Some(equations) = self.normal_equations(&parameters, model, huber_px, &pattern) else { break };
-            let mut decrease = 0.0;
-            while damping < LARGEST_DAMPING {
-                let Some(step) = solve_damped(&equations, damping) else {
-                    damping *= 10.0;
-                    continue;
-                };
-                let moved = self.moved(&parameters, model, &step);
-                let moved_cost = self.cost(&moved, model, huber_px);
-                if moved_cost < cost {
-                    decrease = (cost - moved_cost) / cost;
-                    (parameters, cost) = (moved, moved_cost);
-                    damping = (damping * 0.1).max(f64::EPSILON);
-                    break;
-                }
-                damping *= 10.0;
-            }
-            if decrease < SETTLED {
-                break;
-            }
-        }
-        Ok(parameters)
+        levenberg_marquardt::minimize(&Pass { problem: self, model, huber_px, pattern }, parameters, context)
     }
 
     /// Whether the solution can be used: finite, and no focal length at the short end of its range. (At the long end
@@ -227,11 +194,28 @@ impl BundleAdjustment<'_> {
     }
 }
 
-/// Solves (N + damping diag N) step = -gradient; unknowns without any data stay where they are. `None` if not positive
-/// definite or not finite.
-fn solve_damped(equations: &NormalEquations, damping: f64) -> Option<faer::Mat<f64>> {
-    let step = equations.factor(damping)?.solve(-&equations.gradient);
-    (0..step.nrows()).all(|k| step[(k, 0)].is_finite()).then_some(step)
+/// One pass of minimization.
+struct Pass<'a, const LOCAL: usize> {
+    problem: &'a BundleAdjustment<'a>,
+    model: &'a IntrinsicsModel,
+    huber_px: f64,
+    pattern: NormalPattern<LOCAL>,
+}
+
+impl<const LOCAL: usize> LeastSquares for Pass<'_, LOCAL> {
+    type State = Parameters;
+
+    fn cost(&self, parameters: &Parameters) -> f64 {
+        self.problem.cost(parameters, self.model, self.huber_px)
+    }
+
+    fn equations(&self, parameters: &Parameters) -> Option<NormalEquations> {
+        self.problem.normal_equations(parameters, self.model, self.huber_px, &self.pattern)
+    }
+
+    fn moved(&self, parameters: &Parameters, step: &faer::Mat<f64>) -> Parameters {
+        self.problem.moved(parameters, self.model, step)
+    }
 }
 
 #[cfg(test)]

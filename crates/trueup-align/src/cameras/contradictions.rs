@@ -32,6 +32,18 @@ pub(super) fn contradicting_pairs(
     dropped
 }
 
+/// Pairs (ascending positions) whose residual is above `max_rms_px`, worst first as long as the rest stays connected.
+pub(super) fn not_needed_above(
+    photographs: usize,
+    pairs: &[PairMatches],
+    rms_px: &[f64],
+    max_rms_px: f64,
+) -> Vec<usize> {
+    let mut dropped = not_needed(photographs, pairs, &suspects(rms_px, max_rms_px));
+    dropped.sort_unstable();
+    dropped
+}
+
 /// Positions of the pairs whose residual is too large, the worst first.
 fn suspects(pair_rms_px: &[f64], max_rms_px: f64) -> Vec<usize> {
     let mut suspects: Vec<usize> =

@@ -4,22 +4,29 @@
 //! rotations from the spanning tree and from averaging over all edges (`rotations`); both are refined together by
 //! bundle adjustment (`bundle`), from coarse to fine (`refinement`). Terms of the lenses are added as long as the matches are
 //! sure of them (`lenses`, `lens_evidence`): a pinhole stays one. Pairs that then contradict the others are set
-//! aside (`contradictions`).
+//! aside (`contradictions`). Where rotating cameras fail, or need a lens that nobody has, cameras that move before a plane are tried
+//! (`flat_scene`, by `plane_adjustment`), and lines say how it is turned (`upright_plane`).
 
 mod bundle;
 mod contradictions;
 mod equations;
+mod flat_scene;
 mod focal;
 mod intrinsics;
 mod lens_evidence;
 mod lenses;
+mod levenberg_marquardt;
 mod observations;
 mod options;
 mod pair_cost;
+mod plane_adjustment;
+mod plane_camera;
 mod prior;
 mod refinement;
 mod rotations;
+mod upright_plane;
 
+use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
 use trueup_core::diagnostics::{Diagnostic, Subject};
@@ -29,11 +36,14 @@ use trueup_core::{Result, StageContext};
 use crate::stitch_graph::{GraphEdge, StitchGraph};
 use bundle::Parameters;
 use contradictions::contradicting_pairs;
+use flat_scene::FlatInput;
 use intrinsics::InitialIntrinsics;
 use observations::{MATCHES_PER_PAIR, MATCHES_PER_PAIR_FOR_LENSES, Observations};
 use refinement::RefinementInput;
 
-pub use options::{CameraOptions, FocalSharing, LensKind};
+pub use flat_scene::{FlatEvidence, FlatScene};
+pub use options::{CameraOptions, FocalSharing, LensKind, SceneModel};
+pub use plane_camera::PlaneCamera;
 pub use prior::CameraPrior;
 
 /// What cameras are found from. Photographs are counted 0..N.
@@ -50,7 +60,8 @@ pub struct CameraInput<'a> {
 /// The cameras of one component.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Cameras {
-    /// One camera per photograph, in working pixels; the reference photograph's rotation is the identity.
+    /// One camera per photograph, in working pixels; the reference photograph's rotation is the identity. Before a plane the
+    /// rotations are from the plane's frame.
     pub cameras: Vec<Camera>,
     /// Whether every photograph has a focal length of its own.
     pub per_picture_focal: bool,
@@ -58,6 +69,67 @@ pub struct Cameras {
     pub pair_rms_px: Vec<f64>,
     /// Pairs (positions in the list given) that contradict the others and take no further part.
     pub contradicting: Vec<usize>,
+    /// The plane that the photographs show from places of their own, if the cameras did more than rotate.
+    #[serde(default)]
+    pub flat_scene: Option<FlatScene>,
+}
+
+/// How pixels of one photograph are carried into another.
+#[derive(Debug, Clone, Copy)]
+pub enum CameraTransfer<'a> {
+    /// As by rays of cameras at one place.
+    Rotating(&'a Camera, &'a Camera),
+    /// By way of a plane that both see.
+    Plane(&'a PlaneCamera, &'a PlaneCamera),
+}
+
+impl CameraTransfer<'_> {
+    /// Where a pixel is in the other photograph; `None` if it is not seen there.
+    pub fn at(&self, pixel: Vector2<f64>) -> Option<Vector2<f64>> {
+        match self {
+            Self::Rotating(from, to) => from.transfer(to, pixel),
+            Self::Plane(from, to) => from.transfer(to, pixel),
+        }
+    }
+
+    /// The camera that pixels are carried to.
+    pub fn to(&self) -> &Camera {
+        match self {
+            Self::Rotating(_, to) => to,
+            Self::Plane(_, to) => &to.camera,
+        }
+    }
+}
+
+impl Cameras {
+    /// Those of a flat scene.
+    fn before_plane(flat_scene: FlatScene, pairs: &[PairMatches], options: &CameraOptions) -> Self {
+        let before = &flat_scene.cameras;
+        let transfer = |from: usize, to: usize| CameraTransfer::Plane(&before[from], &before[to]);
+        let pair_rms_px: Vec<f64> = pairs.iter().map(|pair| observations::pair_rms(transfer, pair)).collect();
+        Self {
+            cameras: before.iter().map(|one| one.camera).collect(),
+            per_picture_focal: options.focal_sharing == FocalSharing::PerPicture,
+            contradicting: contradictions::not_needed_above(before.len(), pairs, &pair_rms_px, options.max_pair_rms_px),
+            pair_rms_px,
+            flat_scene: Some(flat_scene),
+        }
+    }
+
+    /// The same with the plane laid otherwise.
+    #[must_use]
+    pub fn on_plane(&self, flat_scene: FlatScene) -> Self {
+        let cameras = flat_scene.cameras.iter().map(|one| one.camera).collect();
+        Self { cameras, flat_scene: Some(flat_scene), ..self.clone() }
+    }
+
+    /// How pixels of photograph `from` are carried into `to`.
+    pub fn transfer(&self, from: usize, to: usize) -> CameraTransfer<'_> {
+        match &self.flat_scene {
+            Some(FlatScene { cameras, .. }) => CameraTransfer::Plane(&cameras[from], &cameras[to]),
+            None => CameraTransfer::Rotating(&self.cameras[from], &self.cameras[to]),
+        }
+    }
 }
 
 /// Finds the cameras of the photographs that the pairs connect.
@@ -88,20 +160,27 @@ pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageCont
         let used: Vec<&PairMatches> = active.iter().map(|&position| &pairs[position]).collect();
         solve(priors, &used, anchor, options, context)
     };
-    let residuals_of =
-        |cameras: &[Camera]| -> Vec<f64> { pairs.iter().map(|pair| observations::pair_rms(cameras, pair)).collect() };
+    let residuals_of = |cameras: &[Camera]| -> Vec<f64> {
+        let transfer = |from: usize, to: usize| CameraTransfer::Rotating(&cameras[from], &cameras[to]);
+        pairs.iter().map(|pair| observations::pair_rms(transfer, pair)).collect()
+    };
     let mut active: Vec<usize> = (0..pairs.len()).collect();
     let mut solution = solve_with(&active)?;
     let mut pair_rms_px = residuals_of(&solution.cameras);
+    let first_rms_px = pair_rms_px.clone();
     let contradicting = contradicting_pairs(&solution.cameras, pairs, &pair_rms_px, options.max_pair_rms_px);
     if !contradicting.is_empty() {
         active.retain(|position| contradicting.binary_search(position).is_err());
-        for &position in &contradicting {
-            context.report(contradicts(&pairs[position], pair_rms_px[position]));
-        }
         solution = solve_with(&active)?;
         pair_rms_px = residuals_of(&solution.cameras);
     }
+    let flat_input = FlatInput { priors, pairs, rotating: &solution.cameras, anchor };
+    if let Some(flat_scene) = flat_scene::find(&flat_input, options, context)? {
+        let cameras = Cameras::before_plane(flat_scene, pairs, options);
+        report_contradicting(pairs, &cameras.contradicting, &cameras.pair_rms_px, context);
+        return Ok(cameras);
+    }
+    report_contradicting(pairs, &contradicting, &first_rms_px, context);
     turn_to(&mut solution.cameras, reference);
     if solution.focal_failed {
         context.report(Diagnostic::warning(
@@ -112,7 +191,14 @@ pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageCont
         ));
     }
     let Solution { cameras, per_picture_focal, .. } = solution;
-    Ok(Cameras { cameras, per_picture_focal, pair_rms_px, contradicting })
+    Ok(Cameras { cameras, per_picture_focal, pair_rms_px, contradicting, flat_scene: None })
+}
+
+/// Names the pairs that are set aside, with their residuals when they were.
+fn report_contradicting(pairs: &[PairMatches], positions: &[usize], rms_px: &[f64], context: &StageContext) {
+    for &position in positions {
+        context.report(contradicts(&pairs[position], rms_px[position]));
+    }
 }
 
 fn contradicts(pair: &PairMatches, rms_px: f64) -> Diagnostic {

@@ -1,9 +1,9 @@
 //! The matches that cameras are estimated from: a bounded number per pair, spread evenly over the overlap.
 
 use nalgebra::Vector2;
-use trueup_core::camera::Camera;
 use trueup_core::matches::{PairMatches, PointMatch};
 
+use super::CameraTransfer;
 use super::prior::CameraPrior;
 
 /// Matches used per pair in bundle adjustment: more hardly sharpen a pair's few unknowns.
@@ -71,12 +71,13 @@ fn spread_evenly(matches: &[PointMatch], prior: &CameraPrior, limit: usize) -> V
 }
 
 /// Root mean square distance, over both directions, between a pair's matches and where the cameras put them; matches
-/// behind a camera count as infinitely far.
-pub(super) fn pair_rms(cameras: &[Camera], pair: &PairMatches) -> f64 {
-    let (a, b) = (&cameras[pair.a], &cameras[pair.b]);
-    let distance = |from: &Camera, to: &Camera, source: [f64; 2], target: [f64; 2]| {
-        from.transfer(to, Vector2::from(source)).map_or(f64::INFINITY, |q| (q - Vector2::from(target)).norm_squared())
+/// behind a camera count as infinitely far. `transfer` carries from the one photograph to the other.
+pub(super) fn pair_rms<'c>(transfer: impl Fn(usize, usize) -> CameraTransfer<'c>, pair: &PairMatches) -> f64 {
+    let (there, back) = (transfer(pair.a, pair.b), transfer(pair.b, pair.a));
+    let distance = |transfer: &CameraTransfer, source: [f64; 2], target: [f64; 2]| {
+        transfer.at(Vector2::from(source)).map_or(f64::INFINITY, |q| (q - Vector2::from(target)).norm_squared())
     };
-    let sum: f64 = pair.inliers.iter().map(|m| distance(a, b, m.in_a, m.in_b) + distance(b, a, m.in_b, m.in_a)).sum();
+    let sum: f64 =
+        pair.inliers.iter().map(|m| distance(&there, m.in_a, m.in_b) + distance(&back, m.in_b, m.in_a)).sum();
     (sum / (2 * pair.inliers.len()).max(1) as f64).sqrt()
 }

@@ -32,9 +32,25 @@ trueup_core::choice! {
     }
 }
 
+trueup_core::choice! {
+    /// What the photographs show, and how their cameras moved.
+    pub enum SceneModel {
+        /// As the matches tell: rotating cameras, unless these explain them much worse than a plane does that moving cameras see.
+        Auto = "auto",
+        /// Anything, by cameras that stayed where they were and turned.
+        Rotating = "rotating",
+        /// Something flat, by cameras that moved along it: scans, murals, the ground from the air. It is drawn as it lies in its
+        /// plane.
+        Plane = "plane",
+    }
+}
+
 trueup_core::options! {
     /// How cameras are found.
     pub struct CameraOptions("cameras") {
+        /// What the photographs show, and how their cameras moved. Say `plane` where a document or a facade that was taken in two
+        /// photographs comes out bent; `rotating` where a flat wall was taken from one place and is drawn as a plane.
+        scene: SceneModel = SceneModel::Auto, Allowed::Any, "", basic;
         /// What kind of lens took the photographs. Say it where few photographs overlap, which tell little of a lens, or where
         /// a line that is straight comes out bent.
         lens: LensKind = LensKind::Auto, Allowed::Any, "", basic;

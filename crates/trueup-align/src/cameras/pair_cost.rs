@@ -20,7 +20,7 @@ pub(super) struct PairTerm<const LOCAL: usize> {
 }
 
 /// Huber's loss, quadratic up to the limit: rho and the weight rho'(e)/(2 e).
-fn huber(error: f64, limit: f64) -> (f64, f64) {
+pub(super) fn huber(error: f64, limit: f64) -> (f64, f64) {
     if error <= limit { (error * error, 1.0) } else { (limit * (2.0 * error - limit), limit / error) }
 }
 

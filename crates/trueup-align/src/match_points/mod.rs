@@ -9,7 +9,6 @@ mod residual;
 
 use nalgebra::Vector2;
 use rayon::prelude::*;
-use trueup_core::camera::Camera;
 use trueup_core::geometry::Homography;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
@@ -19,6 +18,7 @@ use trueup_core::{Result, StageContext};
 pub use moving_dlt::MovingDlt;
 use residual::{CameraResidual, MAX_DEVIATION};
 
+use crate::cameras::{CameraTransfer, Cameras};
 use crate::evidence::{self, FULL_PX, NEGLIGIBLE_SHARE};
 
 /// The vertices of photograph `from`'s grid carried into photograph `to` (working pixels).
@@ -79,7 +79,7 @@ trueup_core::options! {
 pub fn run(
     frames: &[WorkingFrame],
     grids: &[GridMesh],
-    cameras: &[Camera],
+    cameras: &Cameras,
     pairs: &[PairMatches],
     options: &MatchPointOptions,
     context: &StageContext,
@@ -96,7 +96,8 @@ pub fn run(
             let a_from_b = b_from_a.and_then(|homography| homography.inverse());
             let model = options.model;
             let direction = |from: usize, to: usize, source: &[_], target: &[_], global: Option<Homography>| {
-                let transfer = Transfer { from: &cameras[from], to: &cameras[to], source, target, global, model };
+                let cameras = cameras.transfer(from, to);
+                let transfer = Transfer { cameras, source, target, global, model };
                 let vertices = transfer.carry(&grids[from], &frames[to]);
                 OverlapWarp { from, to, vertices }
             };
@@ -114,8 +115,7 @@ pub fn run(
 
 /// One direction of a pair.
 struct Transfer<'a> {
-    from: &'a Camera,
-    to: &'a Camera,
+    cameras: CameraTransfer<'a>,
     source: &'a [Vector2<f64>],
     target: &'a [Vector2<f64>],
     global: Option<Homography>,
@@ -141,7 +141,7 @@ impl Transfer<'_> {
     ///
     /// The noise of matches has nothing in common: photographs taken from one point keep the cameras' consistency.
     fn by_cameras_and_matches(&self, grid: &GridMesh, frame: &WorkingFrame) -> Vec<Option<Vector2<f64>>> {
-        let cameras = CameraResidual::new(self.from, self.to, self.source, self.target);
+        let cameras = CameraResidual::new(self.cameras, self.source, self.target);
         let by_cameras = (0..grid.len()).map(|vertex| cameras.at(grid.source(vertex)));
         let share = evidence::share(cameras.common_square(), FULL_PX);
         if share <= NEGLIGIBLE_SHARE {

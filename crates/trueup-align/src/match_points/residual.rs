@@ -1,9 +1,9 @@
 //! The cameras' transfer corrected by what the matches around a place say.
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
-use trueup_core::camera::Camera;
 
 use super::moving_dlt::DECAY_PX;
+use crate::cameras::CameraTransfer;
 use crate::evidence::{self, OverlapGap};
 
 /// Largest distance of a carried vertex from its place without local corrections, in diagonals of the other photograph.
@@ -20,8 +20,7 @@ pub(super) const MAX_DEVIATION: f64 = 0.1;
 /// The published method carries vertices by moving DLT from the matches alone. On rotating cameras that adds the noise
 /// of a few local matches, and extrapolates it where there are none.
 pub(super) struct CameraResidual<'a> {
-    from: &'a Camera,
-    to: &'a Camera,
+    cameras: CameraTransfer<'a>,
     samples: Vec<Sample>,
     /// Farthest outside the other photograph that a correction could still bring a point in.
     margin: f64,
@@ -33,23 +32,23 @@ struct Sample {
 }
 
 impl<'a> CameraResidual<'a> {
-    pub(super) fn new(from: &'a Camera, to: &'a Camera, source: &[Vector2<f64>], target: &[Vector2<f64>]) -> Self {
+    pub(super) fn new(cameras: CameraTransfer<'a>, source: &[Vector2<f64>], target: &[Vector2<f64>]) -> Self {
         let samples = source
             .iter()
             .zip(target)
             .filter_map(|(&position, target)| {
-                from.transfer(to, position).map(|place| Sample { position, deviation: target - place })
+                cameras.at(position).map(|place| Sample { position, deviation: target - place })
             })
             .collect();
-        let [x, y] = to.principal_point;
+        let [x, y] = cameras.to().principal_point;
         let margin = MAX_DEVIATION * 2.0 * x.hypot(y);
-        Self { from, to, samples, margin }
+        Self { cameras, samples, margin }
     }
 
     /// The place of `point` in the other photograph; `None` behind its camera or far outside.
     pub(super) fn at(&self, point: Vector2<f64>) -> Option<Vector2<f64>> {
-        let place = self.from.transfer(self.to, point)?;
-        let [x, y] = self.to.principal_point;
+        let place = self.cameras.at(point)?;
+        let [x, y] = self.cameras.to().principal_point;
         let near = (place.x - x).abs() <= x + self.margin && (place.y - y).abs() <= y + self.margin;
         if !near {
             return None;

@@ -1,10 +1,21 @@
 //! Carried vertices against cameras and planes that are known.
 
 use nalgebra::Matrix3;
+use trueup_core::camera::Camera;
 use trueup_core::geometry::rotation_about_y;
 use trueup_core::matches::{PairVerdict, PointMatch};
 
 use super::*;
+
+fn rotating(cameras: &[Camera]) -> Cameras {
+    Cameras {
+        cameras: cameras.to_vec(),
+        per_picture_focal: false,
+        pair_rms_px: Vec::new(),
+        contradicting: Vec::new(),
+        flat_scene: None,
+    }
+}
 
 fn example() -> (Vec<WorkingFrame>, Vec<Camera>, PairMatches) {
     let frame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
@@ -45,8 +56,8 @@ fn both_models_carry_vertices_to_their_true_place() {
     for model in [TransferModel::CameraResidual, TransferModel::MovingDlt] {
         let options = MatchPointOptions { model };
         let context = StageContext::default();
-        let warps =
-            run(&frames, &grids, &cameras, std::slice::from_ref(&pair), &options, &context).expect("not cancelled");
+        let warps = run(&frames, &grids, &rotating(&cameras), std::slice::from_ref(&pair), &options, &context)
+            .expect("not cancelled");
         assert_eq!((warps[0].from, warps[0].to, warps[1].from, warps[1].to), (0, 1, 1, 0));
         for warp in &warps {
             let carried = warp.vertices.iter().flatten().count();
@@ -72,7 +83,8 @@ fn beyond_cameras(pair: PairMatches) -> Vec<Vector2<f64>> {
     let (frames, cameras, _) = example();
     let grids = vec![GridMesh::regular(800.0, 600.0, 40.0); 2];
     let options = MatchPointOptions::default();
-    let warps = run(&frames, &grids, &cameras, &[pair], &options, &StageContext::default()).expect("not cancelled");
+    let warps =
+        run(&frames, &grids, &rotating(&cameras), &[pair], &options, &StageContext::default()).expect("not cancelled");
     let carried = warps[0].vertices.iter().enumerate();
     let found: Vec<Vector2<f64>> = carried
         .filter_map(|(vertex, place)| {
@@ -96,7 +108,7 @@ fn vertices_follow_the_few_matches_of_a_plane_that_the_cameras_miss() {
     }
     let (source, target) = ends(&pair);
     pair.b_from_a = Homography::fit(&source, &target, None).map(|homography| homography.to_rows());
-    let corrected = CameraResidual::new(&cameras[0], &cameras[1], &source, &target);
+    let corrected = CameraResidual::new(CameraTransfer::Rotating(&cameras[0], &cameras[1]), &source, &target);
     let corner = corrected.at(source[0]).expect("near") - cameras[0].transfer(&cameras[1], source[0]).expect("near");
     assert!((corner - SHIFT).norm() > 0.1, "the correction alone reaches {corner}");
     for deviation in beyond_cameras(pair) {
@@ -116,7 +128,7 @@ fn a_smaller_parallax_is_followed_in_part() {
     let (source, target) = ends(&pair);
     let homography = Homography::fit(&source, &target, None).expect("regular");
     pair.b_from_a = Some(homography.to_rows());
-    let corrected = CameraResidual::new(&cameras[0], &cameras[1], &source, &target);
+    let corrected = CameraResidual::new(CameraTransfer::Rotating(&cameras[0], &cameras[1]), &source, &target);
     let grid = GridMesh::regular(800.0, 600.0, 40.0);
     let frame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
     let expected: Vec<Vector2<f64>> = (0..grid.len())
@@ -146,11 +158,11 @@ fn noise_of_matches_is_no_parallax() {
         one.in_b = [one.in_b[0] + noise(0.0), one.in_b[1] + noise(78.233)];
     }
     let (source, target) = ends(&pair);
-    let corrected = CameraResidual::new(&cameras[0], &cameras[1], &source, &target);
+    let corrected = CameraResidual::new(CameraTransfer::Rotating(&cameras[0], &cameras[1]), &source, &target);
     let grids = vec![GridMesh::regular(800.0, 600.0, 40.0); 2];
     let options = MatchPointOptions::default();
     let run = |pair: &PairMatches| {
-        run(&frames, &grids, &cameras, std::slice::from_ref(pair), &options, &StageContext::default())
+        run(&frames, &grids, &rotating(&cameras), std::slice::from_ref(pair), &options, &StageContext::default())
     };
     let warps = run(&pair).expect("not cancelled");
     for (vertex, place) in warps[0].vertices.iter().enumerate() {

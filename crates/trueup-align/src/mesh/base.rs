@@ -12,6 +12,7 @@ use trueup_core::mesh::GridMesh;
 use super::complex::{conjugate_product, product};
 use super::options::{BaseShape, MeshOptions};
 use super::sphere_view::{SphereView, derivative_at_center, is_moderate};
+use crate::cameras::{FlatScene, PlaneCamera};
 use crate::similarity::SimilarityPrior;
 
 /// What the prior wants of one photograph.
@@ -90,9 +91,29 @@ pub(crate) fn tilt_from_level(cameras: &[Camera], level_from_world: &Matrix3<f64
 /// similarity.
 #[derive(Debug, Clone)]
 pub struct BaseMap {
-    /// Factor on the unrolled sphere, or on the photograph itself, as a complex number.
+    /// Factor on the plane, the unrolled sphere, or the photograph itself, as a complex number.
     factor: Vector2<f64>,
-    sphere: Option<SphereView>,
+    view: BaseView,
+}
+
+/// What of a photograph is scaled and turned.
+#[derive(Debug, Clone)]
+enum BaseView {
+    /// The photograph itself.
+    Photograph,
+    /// What it shows of the level sphere, unrolled.
+    Sphere(Box<SphereView>),
+    /// What it shows of a flat scene.
+    Plane(PlaneCamera),
+}
+
+/// The bases of photographs of a flat scene: as they lie on its plane, at their median scale.
+///
+/// # Departures
+/// The published prior is one similarity per photograph, which only photographs taken straight on have on a plane.
+pub fn bases_on_plane(scene: &FlatScene) -> Vec<BaseMap> {
+    let factor = Vector2::new(scene.pixels_per_unit(), 0.0);
+    scene.cameras.iter().map(|&camera| BaseMap { factor, view: BaseView::Plane(camera) }).collect()
 }
 
 impl BaseMap {
@@ -107,7 +128,7 @@ impl BaseMap {
         wanted: WantedSimilarity,
     ) -> Self {
         let similarity = Vector2::new(wanted.theta.cos(), wanted.theta.sin()) * wanted.scale;
-        let plain = Self { factor: similarity, sphere: None };
+        let plain = Self { factor: similarity, view: BaseView::Photograph };
         if options.base == BaseShape::Similarity {
             return plain;
         }
@@ -117,7 +138,7 @@ impl BaseMap {
         }
         let at_center = derivative_at_center(options.conformality, &view.level_from_camera, camera.focal_px);
         let turn = conjugate_product(at_center, similarity).normalize();
-        Self { factor: turn * wanted.units_per_radian, sphere: Some(view) }
+        Self { factor: turn * wanted.units_per_radian, view: BaseView::Sphere(Box::new(view)) }
     }
 
     /// The photograph of a camera on the level sphere, upright.
@@ -134,12 +155,18 @@ impl BaseMap {
 
     /// The plain similarity of a photograph.
     pub fn similarity(scale: f64, theta: f64) -> Self {
-        Self { factor: Vector2::new(scale * theta.cos(), scale * theta.sin()), sphere: None }
+        Self { factor: Vector2::new(scale * theta.cos(), scale * theta.sin()), view: BaseView::Photograph }
     }
 
-    /// The place of a pixel.
+    /// The place of a pixel. Not a number where a photograph of a flat scene looks past its plane, which no vertex of those whose
+    /// cameras were found does.
     pub fn at(&self, pixel: Vector2<f64>) -> Vector2<f64> {
-        product(self.factor, self.sphere.as_ref().map_or(pixel, |view| view.unrolled(pixel)))
+        let seen = match &self.view {
+            BaseView::Photograph => pixel,
+            BaseView::Sphere(view) => view.unrolled(pixel),
+            BaseView::Plane(camera) => camera.place(pixel).unwrap_or(Vector2::repeat(f64::NAN)),
+        };
+        product(self.factor, seen)
     }
 
     /// The places of all vertices of a grid, row-major.
@@ -150,7 +177,7 @@ impl BaseMap {
     /// How far the base at `pixel` is from its own bilinear interpolation over the grid's cell, whose `places` are
     /// given.
     pub fn sag(&self, grid: &GridMesh, places: &[Vector2<f64>], pixel: Vector2<f64>) -> Vector2<f64> {
-        if self.sphere.is_none() {
+        if matches!(self.view, BaseView::Photograph) {
             return Vector2::zeros();
         }
         let (corners, shares) = grid.bilinear(pixel);

@@ -7,6 +7,7 @@ mod aanap;
 mod camera_correction;
 mod dominant;
 mod edge_range;
+mod flat;
 mod frame_search;
 mod gate;
 mod gravity;
@@ -56,6 +57,7 @@ use level::CameraLevel;
 use upright::{Upright, rolls};
 use vpg::Guided;
 
+pub use flat::of_flat_scene;
 pub use input::PriorInput;
 pub use level::{LevelEvidence, LevelSource};
 pub use options::{BetaMode, Fallback, GateMode, PriorMethod, SimilarityOptions};

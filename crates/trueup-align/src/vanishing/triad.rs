@@ -34,6 +34,8 @@ impl Triad {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "reason")]
 pub enum MissingTriad {
+    /// The photograph shows a flat scene, which has no depth that lines could lead into: none was looked for.
+    FlatScene,
     /// Fewer usable segments than needed.
     TooFewLines {
         /// Usable segments.

@@ -20,6 +20,7 @@ const TUNING: &str = "Tuning";
 
 /// Every flag that sets an option: the flag, the option, the heading in the help, the subcommands that take it.
 pub const OPTION_FLAGS: &[OptionFlag] = &[
+    OptionFlag::new("scene", "cameras.scene", PHOTOGRAPHS, STITCH_AND_COMPARE),
     OptionFlag::new("lens", "cameras.lens", PHOTOGRAPHS, STITCH_AND_COMPARE),
     OptionFlag::new("lens-fov", "cameras.fov", PHOTOGRAPHS, STITCH_AND_COMPARE),
     OptionFlag::new("stacks", "stacks.fuse", PHOTOGRAPHS, STITCH_AND_COMPARE),

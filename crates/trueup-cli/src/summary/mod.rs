@@ -13,7 +13,7 @@ mod tests;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use trueup::{LensKind, OptionValue, Project, Severity, Written};
+use trueup::{FlatEvidence, FlatSceneRecord, LensKind, OptionValue, Project, Severity, Written};
 
 use crate::words::file_size;
 
@@ -47,7 +47,10 @@ pub(crate) fn text(project: &Project, file: Option<&PanoramaFile>, verbose: bool
         details::photographs(&mut lines, project, &names);
         details::pairs(&mut lines, project, &names);
     }
-    lines.entry("upright", &upright(project));
+    match &project.flat_scene {
+        Some(scene) => flat_scene(&mut lines, scene),
+        None => lines.entry("upright", &upright(project)),
+    }
     if let Some(told) = project.manhattan.level_in_words() {
         lines.entry("level by", &told);
     }
@@ -160,6 +163,35 @@ fn told_lens(lines: &mut LabeledLines, project: &Project) {
     if !told.is_empty() {
         lines.entry("lens", &format!("told: {}", told.join("; ")));
     }
+}
+
+/// That the photographs are drawn as they lie in a plane, by what evidence, and what stands them upright there.
+fn flat_scene(lines: &mut LabeledLines, scene: &FlatSceneRecord) {
+    let FlatEvidence { told, explained, plane_rms_px, rotating_rms_px, rotating_focal, straight_on } = scene.evidence;
+    let cameras = if straight_on {
+        "scanned, or seen straight on, by cameras that moved along it"
+    } else {
+        "seen by moving cameras"
+    };
+    lines.entry("scene", &format!("a flat scene, {cameras}: drawn as a plane"));
+    let told = if told { "told; " } else { "" };
+    // Full width over focal length is twice the tangent of half the angle.
+    let view_deg = 2.0 * (0.5 / rotating_focal).atan().to_degrees();
+    lines.entry(
+        "",
+        &format!(
+            "{told}the plane explains {:.0} % of the matches, to {plane_rms_px:.1} px on average; cameras that only turn, {view_deg:.0} \
+             degrees wide, to {rotating_rms_px:.1}",
+            100.0 * explained
+        ),
+    );
+    lines.entry(
+        "upright",
+        &match scene.turned_by_lines_deg {
+            Some(turned) => format!("by the lines on it, {turned:.1} degrees from how the photographs were held"),
+            None => "as the photographs were held, on average: lines do not agree".to_owned(),
+        },
+    );
 }
 
 /// Whether vanishing points guided the panorama, with the divergence against its threshold.

@@ -81,6 +81,10 @@ class ComposeKeywords(SaveKeywords, total=False):
 class StitchKeywords(ComposeKeywords, total=False):
     """Keywords of stitching."""
 
+    scene: Literal["auto", "rotating", "plane"]
+    """What the photographs show, and how their cameras moved. Say `plane` where a document or a facade that was taken
+    in two photographs comes out bent; `rotating` where a flat wall was taken from one place and is drawn as a plane
+    (default auto)."""
     lens: Literal["auto", "pinhole", "rectilinear", "fisheye"]
     """What kind of lens took the photographs. Say it where few photographs overlap, which tell little of a lens, or
     where a line that is straight comes out bent (default auto)."""
@@ -139,6 +143,10 @@ class StitchKeywords(ComposeKeywords, total=False):
 class BatchKeywords(SaveKeywords, total=False):
     """Keywords of a batch."""
 
+    scene: Literal["auto", "rotating", "plane"]
+    """What the photographs show, and how their cameras moved. Say `plane` where a document or a facade that was taken
+    in two photographs comes out bent; `rotating` where a flat wall was taken from one place and is drawn as a plane
+    (default auto)."""
     lens: Literal["auto", "pinhole", "rectilinear", "fisheye"]
     """What kind of lens took the photographs. Say it where few photographs overlap, which tell little of a lens, or
     where a line that is straight comes out bent (default auto)."""

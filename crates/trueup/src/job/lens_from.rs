@@ -116,6 +116,13 @@ pub(crate) fn tell_lenses(path: &Path, images: &mut [SourceImage], context: &Sta
     let text = std::fs::read_to_string(path).map_err(|error| Error::io("reading", path, error))?;
     let file = path.display().to_string();
     let project = Project::from_json(&text, &file)?;
+    if project.flat_scene.is_some_and(|scene| scene.evidence.straight_on) {
+        return Err(Error::input(
+            &file,
+            "its photographs look straight at a flat scene, as a scanner does, which tells of no lens",
+            "Give a project of photographs through the same lens that a camera took, turning or tilted.",
+        ));
+    }
     let known: Vec<KnownLens> = project.used_images().filter_map(KnownLens::of).collect();
     let mut untold = Vec::new();
     for (photograph, image) in images.iter_mut().enumerate() {

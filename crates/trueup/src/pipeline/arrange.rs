@@ -39,6 +39,8 @@ pub(crate) struct ArrangeInput {
     pub period: Option<f64>,
     /// Where directions lie in the plane of `placed`, if the cameras drew it because the mesh was worse.
     pub by_cameras: Option<CameraPlane>,
+    /// Whether `placed` lie on the plane of a flat scene, which has no directions.
+    pub is_flat_scene: bool,
 }
 
 /// A canvas, and how it came about.
@@ -82,7 +84,9 @@ impl Arrangement {
 impl ArrangeInput {
     /// What a stitch knows of a group of photographs.
     pub(crate) fn of_geometry(placed: Vec<Placed>, component: &Component, geometry: Option<&Geometry>) -> Self {
-        let cameras = geometry.map(|geometry| {
+        let is_flat_scene = geometry.is_some_and(|geometry| geometry.cameras.flat_scene.is_some());
+        let rotating = geometry.filter(|_| !is_flat_scene);
+        let cameras = rotating.map(|geometry| {
             let level_from_world = geometry.prior.level_from_world();
             let corrected = geometry.prior.corrected_cameras(&geometry.cameras.cameras);
             let full = corrected.iter().zip(&component.frames).zip(&placed).map(|((camera, frame), placed)| {
@@ -98,18 +102,20 @@ impl ArrangeInput {
         let dominant = dominant.as_ref().map(matrix_from_rows);
         let period = geometry.and_then(|geometry| geometry.mesh.period);
         let by_cameras = geometry.and_then(|geometry| geometry.mesh.by_cameras);
-        Self { placed, reference: component.reference, cameras, dominant, period, by_cameras }
+        Self { placed, reference: component.reference, cameras, dominant, period, by_cameras, is_flat_scene }
     }
 
     /// What a project knows of the photographs used, whose grids are `placed` in its order: composing from the record starts
     /// here.
     pub(crate) fn of_project(placed: Vec<Placed>, reference: usize, project: &Project) -> Self {
         let camera = |record: &ImageRecord| record.camera(record.level_rotation()?);
-        let cameras = project.used_images().map(camera).collect();
+        let is_flat_scene = project.flat_scene.is_some();
+        let cameras = if is_flat_scene { None } else { project.used_images().map(camera).collect() };
         let dominant = project.manhattan.dominant.as_ref();
         let period = project.solved_canvas().period();
         let by_cameras = project.by_cameras;
-        Self { placed, reference, cameras, dominant: dominant.map(matrix_from_rows), period, by_cameras }
+        let dominant = dominant.map(matrix_from_rows);
+        Self { placed, reference, cameras, dominant, period, by_cameras, is_flat_scene }
     }
 }
 
@@ -128,14 +134,14 @@ pub(crate) fn run(
 }
 
 fn lay_out(input: ArrangeInput, options: &ArrangeOptions, context: &StageContext) -> Result<Arrangement> {
-    let ArrangeInput { placed, reference, cameras, dominant, period, by_cameras } = input;
+    let ArrangeInput { placed, reference, cameras, dominant, period, by_cameras, is_flat_scene } = input;
     let by_mesh = options.projection.kind == Projection::Mesh && by_cameras.is_none();
     let is_drawn = cameras.is_none() || by_mesh;
     let lay = |context: &StageContext| layout::run_around(placed, reference, period, &options.canvas, context);
     // A canvas that is never drawn is of a size that is nobody's concern.
     let plane = if is_drawn { lay(context)? } else { context.gather(lay)?.value };
     let by_cameras = by_cameras.map(|by_cameras| by_cameras.moved(plane.origin, plane.canvas_from_target));
-    on_plane(Plane { layout: plane, reference, cameras, dominant, by_cameras }, options, context)
+    on_plane(Plane { layout: plane, reference, cameras, dominant, by_cameras, is_flat_scene }, options, context)
 }
 
 /// Arranges the photographs of `project`, recorded on `plane`, as the options ask: with the recorded options as they were
@@ -159,8 +165,8 @@ pub(crate) fn recall(
             if wanted != project.options.arrange.canvas {
                 return lay_out(input, options, context);
             }
-            let ArrangeInput { cameras, dominant, by_cameras, .. } = input;
-            on_plane(Plane { layout: plane, reference, cameras, dominant, by_cameras }, options, context)
+            let ArrangeInput { cameras, dominant, by_cameras, is_flat_scene, .. } = input;
+            on_plane(Plane { layout: plane, reference, cameras, dominant, by_cameras, is_flat_scene }, options, context)
         })
     })
 }
@@ -176,10 +182,12 @@ struct Plane {
     dominant: Option<Matrix3<f64>>,
     /// See [`Arrangement::by_cameras`].
     by_cameras: Option<CameraPlane>,
+    /// See [`ArrangeInput::is_flat_scene`].
+    is_flat_scene: bool,
 }
 
 fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> Result<Arrangement> {
-    let Plane { layout: plane, reference, cameras, dominant, by_cameras } = plane;
+    let Plane { layout: plane, reference, cameras, dominant, by_cameras, is_flat_scene } = plane;
     let asked = match (options.projection.kind, by_cameras) {
         // There is no mesh: the view that suits.
         (Projection::Mesh, Some(_)) => ProjectionOptions { kind: Projection::Auto, ..options.projection.clone() },
@@ -188,11 +196,18 @@ fn on_plane(plane: Plane, options: &ArrangeOptions, context: &StageContext) -> R
     let wanted = asked.kind;
     let Some(cameras) = cameras.filter(|_| wanted != Projection::Mesh) else {
         if !matches!(wanted, Projection::Mesh | Projection::Auto) {
-            return Err(Error::not_applicable(
-                format!("projection.kind = {}", trueup_core::options::OptionValue::display(&wanted)),
-                "no cameras are known: there is one photograph alone, or its record lacks them",
-                "Stitch at least two overlapping photographs, or leave the projection to mesh.",
-            ));
+            let (reason, hint) = match is_flat_scene {
+                true => (
+                    "the photographs show a flat scene from many places, and are drawn as they lie in its plane",
+                    "Leave the projection to auto, or stitch with cameras.scene = rotating.",
+                ),
+                false => (
+                    "no cameras are known: there is one photograph alone, or its record lacks them",
+                    "Stitch at least two overlapping photographs, or leave the projection to mesh.",
+                ),
+            };
+            let option = format!("projection.kind = {}", trueup_core::options::OptionValue::display(&wanted));
+            return Err(Error::not_applicable(option, reason, hint));
         }
         return Ok(Arrangement::of_mesh(plane));
     };
@@ -327,6 +342,7 @@ mod tests {
             dominant: None,
             period,
             by_cameras: None,
+            is_flat_scene: false,
         };
         let mut options = ArrangeOptions::default();
         options.projection.kind = Projection::Perspective;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use trueup_align::cameras::FlatScene;
 use trueup_align::similarity::LevelEvidence;
 use trueup_compose::crop::Rectangle;
 use trueup_compose::exposure::{Correction, Corrections, Response};
@@ -13,8 +14,8 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::source::{SourceImage, StackMember};
 
 use super::record::{
-    Canvas, CropRecord, ImageRecord, ImageStatus, LevelRecord, ManhattanRecord, MeshRecord, PROJECT_FORMAT,
-    PROJECT_VERSION, PairRecord, Project, StackMemberRecord,
+    Canvas, CropRecord, FlatSceneRecord, ImageRecord, ImageStatus, LevelRecord, ManhattanRecord, MeshRecord,
+    PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project, StackMemberRecord,
 };
 use crate::options::{MethodForm, StitchOptions};
 use crate::pipeline::align::Geometry;
@@ -98,6 +99,7 @@ pub(crate) fn unfilled(
         crop: None,
         mesh_canvas: None,
         by_cameras: None,
+        flat_scene: None,
         seconds: BTreeMap::new(),
         diagnostics: Vec::new(),
     }
@@ -127,6 +129,7 @@ fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
         lens: None,
         rotation: None,
         upright_rotation: None,
+        place: None,
         theta_deg: None,
         scale: None,
         gain: None,
@@ -334,6 +337,9 @@ pub(crate) fn fill_geometry(project: &mut Project, found: &GeometryRecord) {
         });
     }
     if let Some(geometry) = geometry {
+        if let Some(scene) = &geometry.cameras.flat_scene {
+            record_flat_scene(project, scene, component);
+        }
         let guidance = &geometry.prior.guidance;
         project.manhattan = ManhattanRecord {
             divergence: guidance.divergence,
@@ -350,6 +356,17 @@ pub(crate) fn fill_geometry(project: &mut Project, found: &GeometryRecord) {
             inliers: guidance.inliers.iter().map(|&k| component.images[k].path.display().to_string()).collect(),
             level: if is_warp { Vec::new() } else { guidance.level.iter().map(level_record).collect() },
         };
+    }
+}
+
+/// Why the scene is flat, and where its cameras stand.
+fn record_flat_scene(project: &mut Project, scene: &FlatScene, component: &Component) {
+    let turned_by_lines_deg = scene.turned_by_lines.map(f64::to_degrees);
+    project.flat_scene = Some(FlatSceneRecord { evidence: scene.evidence, turned_by_lines_deg });
+    let reference = &component.frames[component.reference];
+    let px_per_unit = scene.pixels_per_unit() / reference.working_from_full;
+    for (camera, &photograph) in scene.cameras.iter().zip(&component.members) {
+        project.images[photograph].place = Some((camera.center() * px_per_unit).into());
     }
 }
 

@@ -50,10 +50,17 @@ impl Attitude {
 /// the matches, which the record does not hold: `cpfind` of Hugin finds such again.
 ///
 /// # Errors
-/// [`Error::Input`] where the record has no cameras, or a photograph's orientation mirrors it.
+/// [`Error::Input`] where the record has no cameras, they show a flat scene from many places, or a photograph's orientation mirrors it.
 pub fn hugin_project(project: &Project) -> Result<String> {
     let missing =
         || Error::input("Hugin project", "the panorama has no cameras", "Stitch at least two overlapping photographs.");
+    if project.flat_scene.is_some() {
+        return Err(Error::input(
+            "Hugin project",
+            "the photographs show a flat scene from many places, which is written for rotating cameras only",
+            "Stitch with cameras.scene = rotating, or leave the Hugin project out.",
+        ));
+    }
     let mut lines = String::new();
     let mut focal_sum = 0.0;
     for image in project.used_images() {

@@ -11,6 +11,6 @@ pub(crate) mod replace;
 pub use hugin::hugin_project;
 pub use projection::ProjectionRecord;
 pub use record::{
-    Canvas, CropRecord, ImageRecord, ImageStatus, LevelRecord, ManhattanRecord, MeshRecord, PROJECT_FORMAT,
-    PROJECT_VERSION, PairRecord, Project, StackMemberRecord,
+    Canvas, CropRecord, FlatSceneRecord, ImageRecord, ImageStatus, LevelRecord, ManhattanRecord, MeshRecord,
+    PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project, StackMemberRecord,
 };

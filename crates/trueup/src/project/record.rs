@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::{Deserialize, Deserializer, Serialize};
+use trueup_align::cameras::FlatEvidence;
 use trueup_align::mesh::CameraPlane;
 use trueup_align::similarity::LevelSource;
 use trueup_compose::exposure::{Correction, Response};
@@ -104,6 +105,10 @@ pub struct ImageRecord {
     /// knew no projections.
     #[serde(default)]
     pub upright_rotation: Option<[[f64; 3]; 3]>,
+    /// Where the camera stands before a flat scene: x to the right and y down on its plane, z away from the photographer and so
+    /// negative, in pixels of the photographs at their median scale. `None` for rotating cameras.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub place: Option<[f64; 3]>,
     /// Clockwise rotation that the similarity prior wants, in degrees.
     pub theta_deg: Option<f64>,
     /// Scale that the similarity prior wants, relative to the others.
@@ -220,6 +225,17 @@ impl ManhattanRecord {
     }
 }
 
+/// What told that the photographs show a flat scene from places of their own, and how it is laid.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FlatSceneRecord {
+    /// How well a plane and how well rotating cameras explain the matches.
+    #[serde(flatten)]
+    pub evidence: FlatEvidence,
+    /// Clockwise turn that lines on the plane asked for, beyond what the photographs' own up and down say, degrees; `None` where they did
+    /// not agree.
+    pub turned_by_lines_deg: Option<f64>,
+}
+
 /// Size of the written panorama.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Canvas {
@@ -308,6 +324,9 @@ pub struct Project {
     /// the panorama.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub by_cameras: Option<CameraPlane>,
+    /// How the photographs were told to show a flat scene from places of their own; `None` for rotating cameras.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flat_scene: Option<FlatSceneRecord>,
     /// Wall seconds per stage.
     pub seconds: BTreeMap<String, f64>,
     /// What was found on the way.

@@ -113,7 +113,9 @@ fn leans(component: &Component, geometry: &Geometry, working: &[GridMesh]) -> Ve
         frames: &component.frames,
         prior: &geometry.prior,
     };
-    let Some(rolls) = estimated_rolls(&input) else { return vec![None; working.len()] };
+    // Rolls are of rotating cameras.
+    let rolls = if geometry.cameras.flat_scene.is_some() { None } else { estimated_rolls(&input) };
+    let Some(rolls) = rolls else { return vec![None; working.len()] };
     let lean = |(mesh, roll): (&GridMesh, Option<EstimatedRoll>)| {
         let by = roll?;
         let lean = mesh.lean_in_the_middle(by.roll);

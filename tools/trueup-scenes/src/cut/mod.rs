@@ -24,6 +24,7 @@ mod view;
 
 pub use kinds::{SpecKind, SpecOptions, make_spec};
 pub use level::{LevelOptions, measure_level};
+pub(crate) use panorama::to_rgb8;
 pub use panorama::{Panorama360, find_panoramas};
 pub use set::cut_set;
 pub use spec::{CutSpec, ViewSpec, world_from_panorama};

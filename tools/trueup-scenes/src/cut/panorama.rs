@@ -149,7 +149,8 @@ fn check_shape(subject: &str, width: usize, height: usize) -> Result<()> {
     ))
 }
 
-fn to_rgb8(photograph: Photograph) -> Result<Raster<u8>> {
+/// The photograph as 8-bit red, green and blue.
+pub(crate) fn to_rgb8(photograph: Photograph) -> Result<Raster<u8>> {
     let eight = match photograph {
         Photograph::Eight(raster) => raster,
         Photograph::Sixteen(raster) => {

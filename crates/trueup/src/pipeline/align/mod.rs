@@ -12,13 +12,13 @@ use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use trueup_align::cameras::Cameras;
+use trueup_align::cameras::{Cameras, FlatScene};
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points::OverlapWarp;
 use trueup_align::mesh::{self, BaseShape, ByCamerasInput, MeshInput, PlainMesh, StructureInput, WarpedMesh};
 use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityPrior};
 use trueup_align::stitch_graph::GraphEdge;
-use trueup_align::vanishing::TriadOutcome;
+use trueup_align::vanishing::{MissingTriad, TriadOutcome};
 use trueup_align::warps::{self, WarpInput, WarpModel};
 use trueup_core::diagnostics::Reported;
 use trueup_core::geometry::matrix_from_rows;
@@ -96,6 +96,9 @@ fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageCont
     let component = input.component;
     let grids = component.grids(options.mesh.cell_px);
     let overlaps = overlaps::run(component, options, input.memo, context)?;
+    if let Some(scene) = &overlaps.value.cameras.flat_scene {
+        return find_on_plane(input, scene, &overlaps.value, options, context);
+    }
     let Overlaps { cameras, pairs, warps } = &overlaps.value;
     let lines = context
         .time("straightened lines", || straightened::lines(component, &cameras.cameras, input.photographs, context))?;
@@ -135,6 +138,38 @@ fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageCont
     }
     let coinciding = if mesh.period.is_some() { pairs.clone() } else { within_turn };
     Ok(Geometry { cameras: cameras.clone(), triads, prior, mesh, coinciding })
+}
+
+/// The geometry of a flat scene: grids on its plane, which lines and columns of the scene stand upright.
+fn find_on_plane(
+    input: &AlignInput,
+    scene: &FlatScene,
+    overlaps: &Overlaps,
+    options: &AlignOptions,
+    context: &StageContext,
+) -> Result<Geometry> {
+    let component = input.component;
+    let Overlaps { cameras, pairs, warps } = overlaps;
+    let lines = context
+        .time("straightened lines", || straightened::lines(component, &cameras.cameras, input.photographs, context))?;
+    let scene = scene.stood_upright(&lines, component.reference_rotation);
+    let prior = similarity::of_flat_scene(&scene);
+    let cameras = cameras.on_plane(scene);
+    let grids = component.grids(options.mesh.cell_px);
+    let deformation = Deformation {
+        input,
+        grids: &grids,
+        cameras: &cameras,
+        prior: &prior,
+        all_warps: warps,
+        warps,
+        pairs,
+        turn: None,
+        cut: None,
+    };
+    let mesh = context.in_one_step("mesh", || deformation.by_mesh(options, context))?;
+    let triads = vec![TriadOutcome::Missing(MissingTriad::FlatScene); component.frames.len()];
+    Ok(Geometry { triads, prior, mesh, coinciding: pairs.clone(), cameras })
 }
 
 /// What the photographs' lines tell.
@@ -194,7 +229,11 @@ impl Deformation<'_> {
     fn by_mesh(&self, options: &AlignOptions, context: &StageContext) -> Result<WarpedMesh> {
         let component = self.input.component;
         let cameras = &self.cameras.cameras;
-        let bases = mesh::bases(cameras, self.grids, self.prior, &options.mesh);
+        let flat_scene = self.cameras.flat_scene.as_ref();
+        let bases = match flat_scene {
+            Some(scene) => mesh::bases_on_plane(scene),
+            None => mesh::bases(cameras, self.grids, self.prior, &options.mesh),
+        };
         let chains: Option<Vec<Vec<LineSegment>>> = (options.stitch.structure == Structure::Lines)
             .then(|| component.lines.par_iter().map(|lines| lines::merged(lines)).collect());
         let structure = chains.as_ref().map(|chains| StructureInput { chains, options: &options.structure });
@@ -205,7 +244,7 @@ impl Deformation<'_> {
         let input = MeshInput { grids, warps, bases: &bases, reference, closure, structure };
         let solved = context.gather(|context| mesh::run(&input, &options.mesh, context))?;
         // What is turned or tilted as a whole, and the published similarity, want the mesh's own plane.
-        let on_sphere = options.mesh.base == BaseShape::Sphere;
+        let on_sphere = options.mesh.base == BaseShape::Sphere && flat_scene.is_none();
         if on_sphere && component.reference_rotation == 0.0 && !mesh::tilts(cameras, self.prior) {
             let by_cameras = self.by_cameras_if_better(solved.value.warped(), options, context)?;
             if let Some(drawn) = by_cameras {

@@ -3,15 +3,17 @@
 use std::sync::Arc;
 
 use serde::Serialize;
-use trueup_align::cameras::{self, CameraOptions, Cameras};
+use trueup_align::cameras::{self, CameraOptions, Cameras, SceneModel};
 use trueup_align::match_points::{self, MatchPointOptions, OverlapWarp};
+use trueup_align::mesh::BaseShape;
 use trueup_core::diagnostics::Reported;
 use trueup_core::matches::PairMatches;
-use trueup_core::{Result, StageContext};
+use trueup_core::options::OptionValue;
+use trueup_core::{Error, Result, StageContext};
 
 use super::component::Component;
 use crate::memo::{Memo, OVERLAPS};
-use crate::options::AlignOptions;
+use crate::options::{AlignOptions, MethodForm};
 
 /// The options that overlaps depend on.
 #[derive(Debug, Serialize)]
@@ -43,7 +45,7 @@ pub(super) fn run(
     context: &StageContext,
 ) -> Result<Arc<Reported<Overlaps>>> {
     let options = OverlapOptions {
-        cameras: &options.cameras,
+        cameras: &camera_options(options)?,
         match_points: &options.match_points,
         cell_px: options.mesh.cell_px,
     };
@@ -51,6 +53,26 @@ pub(super) fn run(
     let overlaps = memo.run_in_memory(OVERLAPS, &group, component, &options, find, context)?;
     context.absorb(overlaps.told());
     Ok(overlaps)
+}
+
+/// The options of the cameras, which rotate where the method has no place for a flat scene: it draws on its own mesh.
+///
+/// # Errors
+/// [`Error::NotApplicable`] if a flat scene is asked for by such a method.
+fn camera_options(options: &AlignOptions) -> Result<CameraOptions> {
+    let method = options.stitch.method;
+    let draws_planes = matches!(method.form(), MethodForm::Mesh(..)) && options.mesh.base == BaseShape::Sphere;
+    match options.cameras.scene {
+        SceneModel::Plane if !draws_planes => Err(Error::not_applicable(
+            "cameras.scene = plane",
+            format!("the method {} has no place for a flat scene", method.display()),
+            "Leave the method to vpg, or cameras.scene to auto.",
+        )),
+        SceneModel::Auto if !draws_planes => {
+            Ok(CameraOptions { scene: SceneModel::Rotating, ..options.cameras.clone() })
+        }
+        _ => Ok(options.cameras.clone()),
+    }
 }
 
 fn find(component: &Component, options: &OverlapOptions, context: &StageContext) -> Result<Overlaps> {
@@ -65,7 +87,7 @@ fn find(component: &Component, options: &OverlapOptions, context: &StageContext)
         .collect();
     let grids = component.grids(options.cell_px);
     let warps = context.time("match points", || {
-        match_points::run(&component.frames, &grids, &cameras.cameras, &pairs, options.match_points, context)
+        match_points::run(&component.frames, &grids, &cameras, &pairs, options.match_points, context)
     })?;
     Ok(Overlaps { cameras, pairs, warps })
 }
