@@ -175,7 +175,10 @@ impl Running {
         }
         let said = self.said.take().and_then(|said| said.join().ok()).unwrap_or_default();
         let last = said.lines().map(str::trim).rfind(|line| !line.is_empty());
-        Err(self.failed(last.unwrap_or("it says nothing of why")))
+        // It begins with the address of the file, which is named already.
+        let reason = last
+            .map(|line| line.strip_prefix("file:").and_then(|line| line.split_once(": ")).map_or(line, |(_, why)| why));
+        Err(self.failed(reason.unwrap_or("it says nothing of why")))
     }
 
     fn failed(&self, reason: &str) -> Error {

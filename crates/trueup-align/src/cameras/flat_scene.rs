@@ -135,8 +135,12 @@ pub(super) fn find(
     let rotating_focal = median(input.priors.iter().zip(input.rotating).map(relative));
     let is_longer_than =
         |limit: f64| rotating_focal > limit && input.priors.iter().all(|prior| prior.focal_px.is_none());
+    // The search takes longer than the rotating cameras: where nothing recorded holds their focal length, moving ones would have drawn it
+    // out.
+    let is_recorded = input.priors.iter().any(|prior| prior.focal_px.is_some());
     let is_bad = input.priors.len() >= FEWEST
         && rotating.rms_px > MORE_THAN_NOISE_PX
+        && (is_recorded || is_longer_than(LONGEST_BESIDE_SCANS))
         && rotating.rms_px > CLEARLY_BETTER * by_homographies(input).rms_px;
     if !(told || is_bad || is_longer_than(LONGEST_BESIDE_SCANS)) {
         return Ok(None);

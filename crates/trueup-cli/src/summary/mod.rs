@@ -180,8 +180,8 @@ fn flat_scene(lines: &mut LabeledLines, scene: &FlatSceneRecord) {
     lines.entry(
         "",
         &format!(
-            "{told}the plane explains {:.0} % of the matches, to {plane_rms_px:.1} px on average; cameras that only turn, {view_deg:.0} \
-             degrees wide, to {rotating_rms_px:.1}",
+            "{told}the plane explains {:.0} % of the matches, to {plane_rms_px:.1} px on average; cameras that only turn would, \
+             {view_deg:.0} degrees wide, to {rotating_rms_px:.1}",
             100.0 * explained
         ),
     );
