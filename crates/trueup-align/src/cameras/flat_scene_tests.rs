@@ -1,10 +1,11 @@
 //! What is taken for flat, on synthetic photographs with known cameras.
 
+use crate::cameras::tests::joined;
 use nalgebra::Matrix3;
 use rand::RngExt;
 use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z};
 use trueup_core::lens::{Lens, LensProjection, LensTerms};
-use trueup_core::matches::{PairVerdict, PointMatch};
+use trueup_core::matches::PointMatch;
 use trueup_core::source::WorkingFrame;
 
 use super::super::{CameraInput, Cameras, run};
@@ -51,17 +52,7 @@ fn matched(count: usize, transfer: impl Fn(usize, usize, Vector2<f64>) -> Option
                 }
             }
             if inliers.len() >= 40 {
-                pairs.push(PairMatches {
-                    a,
-                    b,
-                    putative: inliers.len(),
-                    in_overlap: inliers.len(),
-                    agreeing: inliers.len(),
-                    needed: 15,
-                    verdict: PairVerdict::Joined,
-                    b_from_a: None,
-                    inliers,
-                });
+                pairs.push(joined(a, b, inliers));
             }
         }
     }

@@ -24,9 +24,9 @@ mod plane_camera;
 mod prior;
 mod refinement;
 mod rotations;
+mod transfer;
 mod upright_plane;
 
-use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
 use trueup_core::diagnostics::{Diagnostic, Subject};
@@ -45,6 +45,7 @@ pub use flat_scene::{FlatEvidence, FlatScene};
 pub use options::{CameraOptions, FocalSharing, LensKind, SceneModel};
 pub use plane_camera::PlaneCamera;
 pub use prior::CameraPrior;
+pub use transfer::CameraTransfer;
 
 /// What cameras are found from. Photographs are counted 0..N.
 #[derive(Debug, Clone, Copy)]
@@ -72,33 +73,6 @@ pub struct Cameras {
     /// The plane that the photographs show from places of their own, if the cameras did more than rotate.
     #[serde(default)]
     pub flat_scene: Option<FlatScene>,
-}
-
-/// How pixels of one photograph are carried into another.
-#[derive(Debug, Clone, Copy)]
-pub enum CameraTransfer<'a> {
-    /// As by rays of cameras at one place.
-    Rotating(&'a Camera, &'a Camera),
-    /// By way of a plane that both see.
-    Plane(&'a PlaneCamera, &'a PlaneCamera),
-}
-
-impl CameraTransfer<'_> {
-    /// Where a pixel is in the other photograph; `None` if it is not seen there.
-    pub fn at(&self, pixel: Vector2<f64>) -> Option<Vector2<f64>> {
-        match self {
-            Self::Rotating(from, to) => from.transfer(to, pixel),
-            Self::Plane(from, to) => from.transfer(to, pixel),
-        }
-    }
-
-    /// The camera that pixels are carried to.
-    pub fn to(&self) -> &Camera {
-        match self {
-            Self::Rotating(_, to) => to,
-            Self::Plane(_, to) => &to.camera,
-        }
-    }
 }
 
 impl Cameras {

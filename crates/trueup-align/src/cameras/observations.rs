@@ -3,8 +3,8 @@
 use nalgebra::Vector2;
 use trueup_core::matches::{PairMatches, PointMatch};
 
-use super::CameraTransfer;
 use super::prior::CameraPrior;
+use super::transfer::CameraTransfer;
 
 /// Matches used per pair in bundle adjustment: more hardly sharpen a pair's few unknowns.
 pub(super) const MATCHES_PER_PAIR: usize = 200;

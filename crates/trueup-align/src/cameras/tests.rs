@@ -48,21 +48,28 @@ fn matched(truth: &[Camera], noise_px: f64, gross: f64) -> Vec<PairMatches> {
                 });
             }
             if inliers.len() >= 40 {
-                pairs.push(PairMatches {
-                    a,
-                    b,
-                    putative: inliers.len(),
-                    in_overlap: inliers.len(),
-                    agreeing: inliers.len(),
-                    needed: 15,
-                    verdict: PairVerdict::Joined,
-                    b_from_a: None,
-                    inliers,
-                });
+                pairs.push(joined(a, b, inliers));
             }
         }
     }
     pairs
+}
+
+/// A pair that was verified, all of whose matches agree.
+pub(super) fn joined(a: usize, b: usize, inliers: Vec<PointMatch>) -> PairMatches {
+    let count = inliers.len();
+    let verdict = PairVerdict::Joined;
+    PairMatches {
+        a,
+        b,
+        putative: count,
+        in_overlap: count,
+        agreeing: count,
+        needed: 15,
+        verdict,
+        b_from_a: None,
+        inliers,
+    }
 }
 
 fn estimate(pairs: &[PairMatches], known_focal: Option<f64>, groups: &[usize]) -> Cameras {

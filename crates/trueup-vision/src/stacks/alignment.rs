@@ -16,8 +16,8 @@ use trueup_core::geometry::Homography;
 use trueup_core::interpolation::cubic_convolution_taps;
 use trueup_core::raster::Raster;
 
-use super::MOST_SHIFT;
 use super::likeness::{CLIPPED, CRUSHED, expected, halved, likeness};
+use super::limits::MOST_SHIFT;
 
 /// Shortest side of the coarsest pictures, in pixels.
 const COARSEST_PX: usize = 48;

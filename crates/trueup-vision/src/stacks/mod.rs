@@ -16,6 +16,7 @@
 
 mod alignment;
 mod likeness;
+mod limits;
 mod same_view;
 #[cfg(test)]
 mod tests;
@@ -27,14 +28,8 @@ use trueup_core::raster::Raster;
 
 pub use alignment::{AlignedMember, MemberPair, Unaligned, align};
 use likeness::{CLIPPED, CRUSHED, gray};
+pub use limits::LEAST_STOPS;
 use same_view::{SameView, SmallCopy, same_view};
-
-/// Exposures of a stack are at least this far apart, in stops: cameras bracket by a third of a stop and more, by less than a whole one hardly
-/// anybody does, and two photographs of one exposure, as well as what an automatic exposure changes between two, are no stack.
-pub const LEAST_STOPS: f64 = 0.5;
-
-/// Farthest that two exposures of one stack lie apart, as a part of the longer side: 3 degrees of 60. Neighbors of a row are farther apart.
-const MOST_SHIFT: f64 = 0.05;
 
 /// A photograph is compared with so many that follow it: cameras take the darkest and the brightest of a bracket one after the other, which
 /// have next to nothing in common, but the one before or after them has something of both.

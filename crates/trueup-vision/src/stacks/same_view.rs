@@ -3,7 +3,7 @@
 use trueup_core::raster::Raster;
 
 use super::likeness::{Likeness, expected, gray, halved, likeness, stops_between};
-use super::{LEAST_STOPS, MOST_SHIFT};
+use super::limits::{LEAST_STOPS, MOST_SHIFT};
 
 /// Longest side, in pixels, of the copies that the search begins with.
 const COARSEST_PX: usize = 64;

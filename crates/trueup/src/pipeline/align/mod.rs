@@ -96,12 +96,13 @@ fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageCont
     let component = input.component;
     let grids = component.grids(options.mesh.cell_px);
     let overlaps = overlaps::run(component, options, input.memo, context)?;
-    if let Some(scene) = &overlaps.value.cameras.flat_scene {
-        return find_on_plane(input, scene, &overlaps.value, options, context);
-    }
     let Overlaps { cameras, pairs, warps } = &overlaps.value;
     let lines = context
         .time("straightened lines", || straightened::lines(component, &cameras.cameras, input.photographs, context))?;
+    if let Some(scene) = &cameras.flat_scene {
+        let scene = scene.stood_upright(&lines, component.reference_rotation);
+        return find_on_plane(input, scene, &grids, &overlaps.value, options, context);
+    }
     let triads = match input.directions {
         Some(known) => known.to_vec(),
         None => vanishing::run(component, &lines, cameras, &options.vanishing, context)?,
@@ -140,25 +141,21 @@ fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageCont
     Ok(Geometry { cameras: cameras.clone(), triads, prior, mesh, coinciding })
 }
 
-/// The geometry of a flat scene: grids on its plane, which lines and columns of the scene stand upright.
+/// The geometry of a flat scene that stands upright: grids on its plane.
 fn find_on_plane(
     input: &AlignInput,
-    scene: &FlatScene,
+    scene: FlatScene,
+    grids: &[GridMesh],
     overlaps: &Overlaps,
     options: &AlignOptions,
     context: &StageContext,
 ) -> Result<Geometry> {
-    let component = input.component;
     let Overlaps { cameras, pairs, warps } = overlaps;
-    let lines = context
-        .time("straightened lines", || straightened::lines(component, &cameras.cameras, input.photographs, context))?;
-    let scene = scene.stood_upright(&lines, component.reference_rotation);
     let prior = similarity::of_flat_scene(&scene);
     let cameras = cameras.on_plane(scene);
-    let grids = component.grids(options.mesh.cell_px);
     let deformation = Deformation {
         input,
-        grids: &grids,
+        grids,
         cameras: &cameras,
         prior: &prior,
         all_warps: warps,
@@ -168,7 +165,7 @@ fn find_on_plane(
         cut: None,
     };
     let mesh = context.in_one_step("mesh", || deformation.by_mesh(options, context))?;
-    let triads = vec![TriadOutcome::Missing(MissingTriad::FlatScene); component.frames.len()];
+    let triads = vec![TriadOutcome::Missing(MissingTriad::FlatScene); grids.len()];
     Ok(Geometry { triads, prior, mesh, coinciding: pairs.clone(), cameras })
 }
 
