@@ -124,7 +124,7 @@ fn all_writes_a_numbered_panorama_of_every_group() {
 
     let largest = desk.stitch(&photographs);
     assert!(largest.expect_success().contains("photographs 4 of 7 used"), "{}", largest.stdout);
-    assert!(largest.stdout.contains("left out  x.jpg: it belongs to another panorama, with "), "{}", largest.stdout);
+    assert!(largest.stdout.contains("left out  x.jpg: part of another panorama, with "), "{}", largest.stdout);
     assert!(largest.stdout.contains("Use --all"), "{}", largest.stdout);
 }
 

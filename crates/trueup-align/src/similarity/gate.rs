@@ -99,7 +99,8 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
     // Not-a-number fails.
     let allowed = allowed_divergence(photographs, options);
     if divergence.is_nan() || divergence > allowed {
-        return Some(format!("the vanishing directions diverge by {divergence:.3} ({allowed:.3} allowed)"));
+        let (divergence, allowed) = told_apart(divergence, allowed, 3);
+        return Some(format!("the vanishing directions diverge by {divergence} ({allowed} allowed)"));
     }
     if options.gate == GateMode::Paper {
         return None;
@@ -113,18 +114,47 @@ pub(super) fn failed_clause(evidence: &GateEvidence, options: &SimilarityOptions
     }
     let needed = CONFIRMING_SIGNIFICANCE;
     if let Some(significance) = significance.filter(|&significance| significance < needed) {
+        let (significance, needed) = told_apart(significance, needed, 1);
         return Some(format!(
-            "the lines of all photographs together prefer no direction clearly ({significance:.1} standard deviations, {needed:.1} needed)"
+            "the lines of all photographs together prefer no direction clearly ({significance} standard deviations, {needed} needed)"
         ));
     }
     if let Some(wide) = from_cameras.filter(|found| found.is_too_wide()) {
+        let (angle, allowed) = told_apart(wide.angle.to_degrees(), MAX_CAMERA_ANGLE_DEG, 1);
         return Some(format!(
-            "the dominant vertical is {:.1} degrees from the vertical of the cameras ({MAX_CAMERA_ANGLE_DEG:.1} allowed)",
-            wide.angle.to_degrees()
+            "the dominant vertical is {angle} degrees from the vertical of the cameras ({allowed} allowed)"
         ));
     }
     let (roll, allowed) = (median_roll.to_degrees(), MAX_MEDIAN_ROLL_DEG);
     (roll.is_nan() || roll > allowed).then(|| {
-        format!("more than half of the photographs would be rolled by {roll:.1} degrees or more ({allowed:.1} allowed)")
+        let (roll, allowed) = told_apart(roll, allowed, 1);
+        format!("more than half of the photographs would be rolled by {roll} degrees or more ({allowed} allowed)")
     })
+}
+
+/// A value and the limit that refused it in words, with `decimals` or as many more as tell them apart: not "20.0 (20.0 allowed)".
+fn told_apart(value: f64, limit: f64, decimals: usize) -> (String, String) {
+    /// Beyond, two numbers are the same to a reader.
+    const MOST_MORE: usize = 4;
+    let words = |decimals: usize| (format!("{value:.decimals$}"), format!("{limit:.decimals$}"));
+    let apart = (decimals..=decimals + MOST_MORE).map(words).find(|(value, limit)| value != limit);
+    apart.unwrap_or_else(|| words(decimals))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refused_value_is_not_told_as_its_limit() {
+        let words = |value, limit, decimals| {
+            let (value, limit) = told_apart(value, limit, decimals);
+            format!("{value} ({limit} allowed)")
+        };
+        assert_eq!(words(22.71, 20.0, 1), "22.7 (20.0 allowed)");
+        assert_eq!(words(20.034, 20.0, 1), "20.03 (20.00 allowed)");
+        assert_eq!(words(0.100_02, 0.1, 3), "0.10002 (0.10000 allowed)");
+        assert_eq!(words(1.0, 1.0, 1), "1.0 (1.0 allowed)");
+        assert_eq!(words(f64::NAN, 1.0, 1), "NaN (1.0 allowed)");
+    }
 }

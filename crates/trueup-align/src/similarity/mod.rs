@@ -24,6 +24,7 @@ mod printed;
 mod prior;
 mod scale;
 mod signed_permutation;
+mod slope;
 mod straighten;
 mod turns;
 mod upright;

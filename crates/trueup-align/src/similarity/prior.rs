@@ -45,6 +45,9 @@ pub struct Guidance {
     pub vertical_rivalry: Option<f64>,
     /// Share of the segments' weight that supports the vertical; `None` as above.
     pub vertical_share: Option<f64>,
+    /// Angle in radians between the vertical of the upright lines and the one that level lines imply, where these lie along a slope
+    /// and do not take part; `None` otherwise.
+    pub slope: Option<f64>,
     /// What told of the vertical, and of how much; empty for priors that ask nothing but the overlaps.
     pub level: Vec<LevelEvidence>,
 }
@@ -69,6 +72,7 @@ impl Guidance {
             weights: vec![0.0; count],
             vertical_rivalry: None,
             vertical_share: None,
+            slope: None,
             level,
         }
     }

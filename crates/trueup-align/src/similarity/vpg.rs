@@ -16,6 +16,7 @@ use super::level::CameraLevel;
 use super::options::{GateMode, SimilarityOptions};
 use super::prior::Guidance;
 use super::signed_permutation::{match_triad, triad_residual};
+use super::slope::slope;
 use super::turns::{RollEvidence, solve_turns};
 use super::upright::Upright;
 use super::vertical::{roll_of, vertical_by_reference, vertical_near, vertical_of};
@@ -204,6 +205,7 @@ impl<'a> SceneDirections<'a> {
         mut dominant: Dominant,
         guidance: &mut Guidance,
     ) -> std::result::Result<Upright, Vector3<f64>> {
+        dominant.frame = in_order(&dominant.frame, &self.level.rotations[self.input.reference]);
         let axis_weights = axis_weights(&dominant.frame, &self.vertical(&dominant.frame), guidance);
         if self.options.guided_redetection {
             self.redetect(&mut dominant);
@@ -212,7 +214,12 @@ impl<'a> SceneDirections<'a> {
         }
         let has_lines = self.vote.total_weight() > 0.0;
         let joint = has_lines && self.options.joint_refinement;
-        let frame = if joint { self.refined(&dominant.frame, &axis_weights) } else { dominant.frame };
+        let (mut start, mut axis_weights) = (dominant.frame, axis_weights);
+        if joint && let Some(upright) = self.without_slope(&start, &axis_weights, guidance) {
+            start = upright;
+            axis_weights = self::axis_weights(&start, &self.vertical(&start), guidance);
+        }
+        let frame = if joint { self.refined(&start, &axis_weights) } else { start };
         let mut down = self.vertical(&frame);
         if joint {
             let refinement = Refinement { start: &frame, axes_used: 3, axis_weights: &axis_weights };
@@ -278,6 +285,19 @@ impl<'a> SceneDirections<'a> {
         guidance.failed_clause =
             Some(format!("the lines leave the vertical uncertain by {degrees:.1} degrees {limit}"));
         Err(down)
+    }
+
+    /// The frame that stands as the upright lines say, where the level ones are those of a slope; that is noted.
+    fn without_slope(
+        &self,
+        frame: &Matrix3<f64>,
+        axis_weights: &AxisWeights,
+        guidance: &mut Guidance,
+    ) -> Option<Matrix3<f64>> {
+        let vertical = frame.tr_mul(&self.vertical(frame)).iamax();
+        let slope = slope(&self.vote, frame, vertical, axis_weights)?;
+        guidance.slope = Some(slope.angle);
+        Some(turn_between(&frame.column(vertical).into_owned(), &slope.vertical) * frame)
     }
 
     fn corrected(&self, frame: &Matrix3<f64>, axis_weights: &AxisWeights) -> Vec<Matrix3<f64>> {
@@ -365,6 +385,16 @@ impl<'a> SceneDirections<'a> {
     }
 }
 
+/// The directions of a frame in the order and with the signs that bring them closest to the axes of the `reference` camera, so that
+/// neither depends on which of many equal hypotheses came first; a rotation.
+fn in_order(frame: &Matrix3<f64>, reference: &Matrix3<f64>) -> Matrix3<f64> {
+    let (mut ordered, _) = match_triad(&reference.transpose(), frame);
+    if ordered.determinant() < 0.0 {
+        ordered.column_mut(2).neg_mut();
+    }
+    ordered
+}
+
 /// The smallest rotation that takes the direction `from` to `to`.
 fn turn_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Matrix3<f64> {
     let axis = from.cross(to);
@@ -373,14 +403,18 @@ fn turn_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// Full weight for the vertical; for the horizontals as much as the photographs' directions agree: where buildings stand
-/// at several angles, what passes for one horizontal direction would pull the vertical along. `down` is the frame's
+/// at several angles, what passes for one horizontal direction would pull the vertical along. None where they lie along a slope. `down` is the frame's
 /// vertical.
 pub(super) fn axis_weights(frame: &Matrix3<f64>, down: &Vector3<f64>, guidance: &Guidance) -> AxisWeights {
     let residuals = guidance.inliers.iter().filter_map(|&index| guidance.residuals[index]);
     let mean = residuals.sum::<f64>() / guidance.inliers.len().max(1) as f64;
     // r = 4 (1 - cos phi) of the misorientation phi that is ordinary detection noise.
     let ordinary = 4.0 * (1.0 - ORDINARY_MISORIENTATION_DEG.to_radians().cos());
-    let horizontal = if mean > ordinary { (ordinary / mean).powi(2) } else { 1.0 };
+    let horizontal = match guidance.slope {
+        Some(_) => 0.0,
+        None if mean > ordinary => (ordinary / mean).powi(2),
+        None => 1.0,
+    };
     let vertical = frame.tr_mul(down).iamax();
     std::array::from_fn(|axis| if axis == vertical { 1.0 } else { horizontal })
 }
@@ -388,4 +422,26 @@ pub(super) fn axis_weights(frame: &Matrix3<f64>, down: &Vector3<f64>, guidance: 
 /// Each photograph's roll by the common vertical: after the joint refinement no photograph's own triad knows better.
 fn common_rolls(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> Vec<Option<f64>> {
     rotations.iter().map(|rotation| roll_of(&(rotation * down))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::StageContext;
+    use trueup_core::geometry::random_rotation;
+
+    use super::*;
+
+    #[test]
+    fn the_directions_of_a_frame_come_in_one_order() {
+        let mut generator = StageContext::default().generator("order", 0);
+        for _ in 0..20 {
+            let (frame, reference) = (random_rotation(&mut generator), random_rotation(&mut generator));
+            let ordered = in_order(&frame, &reference);
+            assert!((ordered.determinant() - 1.0).abs() < 1e-12);
+            let [x, y, z] = [0, 1, 2].map(|column| frame.column(column).into_owned());
+            for other in [[y, z, x], [-y, x, z], [z, -y, x], [-x, -y, z]] {
+                assert!((in_order(&Matrix3::from_columns(&other), &reference) - ordered).norm() < 1e-12);
+            }
+        }
+    }
 }

@@ -30,7 +30,7 @@ pub(super) fn judged(lines: &mut LabeledLines, project: &Project) {
 /// "upright within 0.6 degrees at 95 %, 0.3 expected on average (8 photographs measured, 2 uncertain: 03.jpg, 07.jpg)"
 fn upright(measures: &Measures, project: &Project, names: &[String]) -> String {
     let Some(upright) = &measures.upright else {
-        return "no vertical lines to judge by".to_owned();
+        return "too few vertical lines to judge by".to_owned();
     };
     let uncertain: Vec<&str> = measures
         .photographs

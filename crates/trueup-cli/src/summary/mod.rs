@@ -199,15 +199,18 @@ fn upright(project: &Project) -> String {
     let manhattan = &project.manhattan;
     let trusted = format!("up to {} is trusted", manhattan.threshold);
     let divergence = manhattan.divergence.map(|divergence| format!("divergence {divergence:.3}, {trusted}"));
+    let slope = manhattan
+        .slope_deg
+        .map_or(String::new(), |slope| format!("; lines along a slope of {slope:.1} degrees do not count"));
     match (manhattan.accepted, &manhattan.failed_clause) {
         (true, _) if manhattan.pooled => format!(
-            "guided by the lines of all photographs together{}",
+            "guided by the lines of all photographs together{}{slope}",
             manhattan
                 .vertical_deviation_deg
                 .map_or(String::new(), |deviation| format!(", certain to {deviation:.1} degrees"))
         ),
         (true, _) => format!(
-            "guided by vanishing points ({}; {} of {} photographs agree)",
+            "guided by vanishing points ({}; {} of {} photographs agree){slope}",
             divergence.unwrap_or(trusted),
             manhattan.inliers.len(),
             project.used()

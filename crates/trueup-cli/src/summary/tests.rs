@@ -73,6 +73,8 @@ fn guidance_by_all_lines_together_says_how_certain_it_is() {
     project.manhattan.pooled = true;
     project.manhattan.vertical_deviation_deg = Some(0.34);
     assert_eq!(upright(&project), "guided by the lines of all photographs together, certain to 0.3 degrees");
+    project.manhattan.slope_deg = Some(2.64);
+    assert!(upright(&project).ends_with("0.3 degrees; lines along a slope of 2.6 degrees do not count"));
 }
 
 #[test]
@@ -130,6 +132,6 @@ time ";
 #[test]
 fn without_vertical_lines_the_summary_says_so() {
     let printed = text(&measured(serde_json::Value::Null, serde_json::json!([]), serde_json::Value::Null), None, false);
-    assert!(printed.contains("measured    no vertical lines to judge by\n"), "{printed}");
+    assert!(printed.contains("measured    too few vertical lines to judge by\n"), "{printed}");
     assert!(printed.contains("; none of 12 long lines is bent\n"), "{printed}");
 }

@@ -33,7 +33,10 @@ pub(super) fn values(page: &Page) -> Value {
 /// Whether vanishing points guided the panorama, in words.
 fn guidance(project: &Project) -> String {
     let found = &project.manhattan;
-    match (found.accepted, found.pooled) {
+    let slope = found.slope_deg.map_or(String::new(), |slope| {
+        format!(" Lines along a slope of {slope:.1} degrees, such as those of a pavement, did not count.")
+    });
+    let guidance = match (found.accepted, found.pooled) {
         (true, true) => {
             "The lines of all photographs together told which way is down, since those of single ones did not agree."
                 .to_owned()
@@ -49,7 +52,8 @@ fn guidance(project: &Project) -> String {
                 "Vanishing points did not guide this panorama{why}. It is upright as far as the camera was held level."
             )
         }
-    }
+    };
+    guidance + &slope
 }
 
 /// The chart of leans, if any is known.

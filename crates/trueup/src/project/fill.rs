@@ -86,6 +86,7 @@ pub(crate) fn unfilled(
             vertical_deviation_deg: None,
             accepted: false,
             pooled: false,
+            slope_deg: None,
             failed_clause: Some("a single photograph is left as it is".to_owned()),
             dominant: None,
             inliers: Vec::new(),
@@ -348,6 +349,7 @@ pub(crate) fn fill_geometry(project: &mut Project, found: &GeometryRecord) {
             vertical_deviation_deg: guidance.vertical_deviation.map(f64::to_degrees),
             accepted: guidance.used,
             pooled: guidance.pooled,
+            slope_deg: guidance.slope.filter(|_| guidance.used).map(f64::to_degrees),
             failed_clause: match method.form() {
                 MethodForm::Mesh(..) => guidance.failed_clause.clone(),
                 MethodForm::Warp(_) => Some(format!("the method {} does not ask them", project.method)),

@@ -170,6 +170,9 @@ pub struct ManhattanRecord {
     /// Whether the lines of all photographs together guided it, since the photographs' own vanishing points did not agree.
     #[serde(default)]
     pub pooled: bool,
+    /// By how much the scene's level lines lie along a slope, degrees: these do not count. `None` where they agree with the upright ones.
+    #[serde(default)]
+    pub slope_deg: Option<f64>,
     /// The clause of the gate that failed, in words.
     pub failed_clause: Option<String>,
     /// Dominant directions as columns, in the levelled world.

@@ -24,7 +24,7 @@ pub(crate) fn explain(photograph: usize, component: &[usize], pairs: &[PairMatch
         let neighbor = other(joined, photograph);
         return LeftOut {
             code: "other-panorama",
-            reason: format!("it belongs to another panorama, with {}", names[neighbor]),
+            reason: format!("part of another panorama, with {}", names[neighbor]),
             hint: "Use --all to stitch every group of overlapping photographs.".to_owned(),
         };
     }
