@@ -36,7 +36,10 @@ impl<const ENTRIES: usize> LinearTable<ENTRIES> {
         for ((value, step), index) in values.iter_mut().zip(&mut steps).zip(indices) {
             [*value, *step] = self.entries[index as usize % ENTRIES];
         }
-        std::array::from_fn(|at| values[at] + beyond[at] * steps[at])
+        for ((value, beyond), step) in values.iter_mut().zip(beyond).zip(steps) {
+            *value += beyond * step;
+        }
+        values
     }
 
     /// The entry at or below a position, and how far beyond it that lies.

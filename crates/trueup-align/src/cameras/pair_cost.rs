@@ -65,6 +65,7 @@ impl<const LOCAL: usize> PairTerm<LOCAL> {
             there.accumulate(&mut term, one.in_a, one.in_b, huber_px);
             back.accumulate(&mut term, one.in_b, one.in_a, huber_px);
         }
+        term.normal.fill_lower_triangle_with_upper_triangle();
         term
     }
 }
@@ -87,7 +88,7 @@ struct Transfer<'a> {
 }
 
 impl Transfer<'_> {
-    /// Adds the linearized residual of a match of `source` with `target`.
+    /// Adds the linearized residual of a match of `source` with `target`; to the normal matrix its upper triangle only.
     fn accumulate<const LOCAL: usize>(
         &self,
         term: &mut PairTerm<LOCAL>,
@@ -105,8 +106,14 @@ impl Transfer<'_> {
             _ => self.lens_jacobian(bearing, arrived),
         };
         let Some(jacobian) = jacobian else { return };
-        term.normal += jacobian.transpose() * jacobian * weight;
-        term.gradient += jacobian.transpose() * residual * weight;
+        for (column, derivative) in jacobian.column_iter().enumerate() {
+            let [x, y] = [derivative.x * weight, derivative.y * weight];
+            // The upper triangle tells the rest.
+            for (row, other) in jacobian.column_iter().enumerate().take(column + 1) {
+                term.normal[(row, column)] += x * other.x + y * other.y;
+            }
+            term.gradient[column] += x * residual.x + y * residual.y;
+        }
     }
 
     /// How the residual of two pinholes changes with the rotations and the focal lengths.

@@ -131,7 +131,8 @@ impl Transfer<'_> {
                 places.into_iter().map(|place| place.and_then(inside)).collect()
             }
             TransferModel::MovingDlt => {
-                self.by_matches(grid, frame).into_iter().map(|place| place.and_then(inside)).collect()
+                let by_matches = self.by_matches(frame);
+                (0..grid.len()).map(|vertex| by_matches(grid.source(vertex)).and_then(inside)).collect()
             }
         }
     }
@@ -148,28 +149,31 @@ impl Transfer<'_> {
             return by_cameras.collect();
         }
         // Where the matches determine no homography the cameras alone must do.
-        let mean = |(camera, matches): (Option<Vector2<f64>>, Option<Vector2<f64>>)| {
-            camera.map(|camera| matches.map_or(camera, |matches| camera.lerp(&matches, share)))
+        let by_matches = self.by_matches(frame);
+        let mean = |(vertex, camera): (usize, Option<Vector2<f64>>)| {
+            camera.map(|camera| by_matches(grid.source(vertex)).map_or(camera, |matches| camera.lerp(&matches, share)))
         };
-        by_cameras.zip(self.by_matches(grid, frame)).map(mean).collect()
+        by_cameras.enumerate().map(mean).collect()
     }
 
-    /// By moving DLT, as published.
-    fn by_matches(&self, grid: &GridMesh, frame: &WorkingFrame) -> Vec<Option<Vector2<f64>>> {
-        let Some(global) = self.global else { return vec![None; grid.len()] };
-        let Some(model) = MovingDlt::new(self.source, self.target) else { return vec![None; grid.len()] };
+    /// By moving DLT, as published: where a point of the photograph is in the other.
+    fn by_matches(&self, frame: &WorkingFrame) -> impl Fn(Vector2<f64>) -> Option<Vector2<f64>> {
+        let known = self.global.zip(MovingDlt::new(self.source, self.target));
         let limit = MAX_DEVIATION * frame.diagonal();
-        let place = |vertex: Vector2<f64>| {
+        let frame = *frame;
+        move |vertex: Vector2<f64>| {
+            let (global, model) = known.as_ref()?;
             let expected = global.apply(vertex);
             // Vertices that the global homography sees far outside need no local one.
             let near = (-limit..=frame.width + limit).contains(&expected.x)
                 && (-limit..=frame.height + limit).contains(&expected.y)
                 && global.denominator(vertex) > 0.0;
-            let local = near.then(|| model.at(vertex)).flatten().unwrap_or(global);
-            let place = local.apply(vertex);
-            ((place - expected).norm() <= limit && near).then_some(place)
-        };
-        (0..grid.len()).map(|vertex| place(grid.source(vertex))).collect()
+            if !near {
+                return None;
+            }
+            let place = model.at(vertex).unwrap_or(*global).apply(vertex);
+            ((place - expected).norm() <= limit).then_some(place)
+        }
     }
 }
 

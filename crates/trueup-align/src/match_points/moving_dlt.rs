@@ -57,7 +57,16 @@ impl MovingDlt {
 
     /// The homography around `vertex` (source pixels); `None` where it is not determined.
     pub(super) fn at(&self, vertex: Vector2<f64>) -> Option<Homography> {
-        self.solve(|position| (-(position - vertex).norm() / DECAY_PX).exp().max(WEIGHT_FLOOR))
+        // Beyond this distance the floor is the weight, which most matches have, without an exponential.
+        let floor_px = -WEIGHT_FLOOR.ln() * DECAY_PX;
+        self.solve(|position| {
+            let square = (position - vertex).norm_squared();
+            if square >= floor_px * floor_px {
+                WEIGHT_FLOOR
+            } else {
+                (-square.sqrt() / DECAY_PX).exp().max(WEIGHT_FLOOR)
+            }
+        })
     }
 
     /// The homography for any weights of the match positions.

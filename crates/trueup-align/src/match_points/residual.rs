@@ -74,24 +74,44 @@ impl<'a> CameraResidual<'a> {
         const SHRINKAGE: f64 = 0.5;
         /// The slope is drawn towards zero this many times as strongly as the offset (in units of the decay length).
         const SLOPE_SHRINKAGE: f64 = 4.0;
-        let kernel: Vec<f64> =
-            self.samples.iter().map(|sample| (-(sample.position - point).norm() / DECAY_PX).exp()).collect();
+        // Of every sample its offset, in decay lengths, and its weight by distance.
+        let around: Vec<(Vector2<f64>, f64)> = self
+            .samples
+            .iter()
+            .map(|sample| {
+                let offset = (sample.position - point) / DECAY_PX;
+                (offset, (-offset.norm()).exp())
+            })
+            .collect();
         let mut trend = Matrix3x2::<f64>::zeros();
         for round in 0..ROUNDS {
-            let mut normal = Matrix3::from_diagonal(&(Vector3::new(1.0, SLOPE_SHRINKAGE, SLOPE_SHRINKAGE) * SHRINKAGE));
-            let mut right = Matrix3x2::zeros();
-            for (sample, &near) in self.samples.iter().zip(&kernel) {
-                let offset = (sample.position - point) / DECAY_PX;
-                let row = Vector3::new(1.0, offset.x, offset.y);
+            // Sums of the products of (1, x, y) with one another, and with the deviations.
+            let (mut products, mut deviations) = ([0.0; 6], [0.0; 6]);
+            for (sample, &(offset, near)) in self.samples.iter().zip(&around) {
+                let (x, y) = (offset.x, offset.y);
                 // Without a trend yet, a common deviation would make every match look wrong.
-                let misfit = match round {
-                    0 => 0.0,
-                    _ => (sample.deviation - trend.transpose() * row).norm() / NOISE_PX,
+                let weight = match round {
+                    0 => near,
+                    _ => {
+                        let expected = |axis: usize| trend[(0, axis)] + trend[(1, axis)] * x + trend[(2, axis)] * y;
+                        let misfit = sample.deviation - Vector2::new(expected(0), expected(1));
+                        near / (1.0 + misfit.norm_squared() / (NOISE_PX * NOISE_PX))
+                    }
                 };
-                let weight = near / (1.0 + misfit * misfit);
-                normal += row * row.transpose() * weight;
-                right += row * sample.deviation.transpose() * weight;
+                let row = [weight, weight * x, weight * y];
+                let [of_1, of_x, of_y] = row;
+                for (sum, product) in products.iter_mut().zip([of_1, of_x, of_y, of_x * x, of_x * y, of_y * y]) {
+                    *sum += product;
+                }
+                for (sums, weighed) in deviations.chunks_exact_mut(2).zip(row) {
+                    sums[0] += weighed * sample.deviation.x;
+                    sums[1] += weighed * sample.deviation.y;
+                }
             }
+            let [n, x, y, xx, xy, yy] = products;
+            let shrinkage = Matrix3::from_diagonal(&(Vector3::new(1.0, SLOPE_SHRINKAGE, SLOPE_SHRINKAGE) * SHRINKAGE));
+            let normal = Matrix3::new(n, x, y, x, xx, xy, y, xy, yy) + shrinkage;
+            let right = Matrix3x2::from_row_slice(&deviations);
             let Some(factor) = normal.cholesky() else { break };
             trend = factor.solve(&right);
         }

@@ -36,9 +36,9 @@ pub(super) struct SeamEnergy<'a> {
     /// Columns of a turn on a cylinder, its width; 0 on a plane.
     pub(super) turn: usize,
     pub(super) views: &'a [SmallView],
-    /// Horizontal and vertical differences of the luma, for every pixel of every view.
+    /// Horizontal and vertical differences of the luma, for every pixel of every view that is prepared.
     gradients: Vec<Vec<[i16; 2]>>,
-    /// Slopes of the shading, for every pixel of every view; empty if they do not count.
+    /// Slopes of the shading, for every pixel of every view that is prepared; empty if they do not count.
     slopes: Vec<Vec<[i16; 2]>>,
     depths: Vec<Vec<u8>>,
     softness: &'a [Softness],
@@ -94,8 +94,8 @@ impl<'a> SeamEnergy<'a> {
             height,
             turn,
             views,
-            gradients: views.par_iter().map(gradients).collect(),
-            slopes: if options.shading_weight > 0.0 { slopes(views) } else { Vec::new() },
+            gradients: Vec::new(),
+            slopes: Vec::new(),
             depths: views.par_iter().map(SmallView::depths).collect(),
             softness,
             halvings,
@@ -108,6 +108,20 @@ impl<'a> SeamEnergy<'a> {
             sharpness_weight: in_units(options.sharpness_weight),
             clipped_cost: in_units(CLIPPED_COST),
             moving_cost: in_units(options.moving_cost),
+        }
+    }
+
+    /// Finds what [`Self::seam_cost`] and [`Self::difference`] need, at the canvas pixels that are `wanted`; before that, and
+    /// elsewhere, they are not to be asked.
+    pub(super) fn prepare_differences(&mut self, wanted: impl Fn(usize) -> bool + Sync) {
+        let (width, turn, views) = (self.width, self.turn, self.views);
+        let of_view = |view: &SmallView, [x, y]: [usize; 2]| {
+            let x = x + view.columns.start;
+            wanted((y + view.rows.start) * width + if x < width { x } else { x - turn })
+        };
+        self.gradients = views.par_iter().map(|view| gradients(view, |at| of_view(view, at))).collect();
+        if self.shading_weight > 0 {
+            self.slopes = views.par_iter().map(|view| slopes(view, |at| of_view(view, at))).collect();
         }
     }
 
@@ -191,8 +205,8 @@ fn in_units(levels: f64) -> i32 {
     (levels * f64::from(UNIT)).round() as i32
 }
 
-/// Central differences of the luma over covered pixels; one-sided or zero at the border.
-fn gradients(view: &SmallView) -> Vec<[i16; 2]> {
+/// Central differences of the luma over covered pixels; one-sided or zero at the border. 0 where they are not `wanted`.
+fn gradients(view: &SmallView, wanted: impl Fn([usize; 2]) -> bool) -> Vec<[i16; 2]> {
     let (width, height) = (view.columns.len(), view.rows.len());
     let or_none = |pixel: &SmallPixel| if pixel[3] & PARTLY == 0 { -1 } else { (luma(pixel) >> 8) as i16 };
     let luma: Vec<i16> = view.pixels.iter().map(or_none).collect();
@@ -200,7 +214,7 @@ fn gradients(view: &SmallView) -> Vec<[i16; 2]> {
     for (index, out) in out.iter_mut().enumerate() {
         let (x, y) = (index % width, index / width);
         let middle = luma[index];
-        if middle < 0 {
+        if middle < 0 || !wanted([x, y]) {
             continue;
         }
         let or_middle = |inside: bool, at: usize| if inside && luma[at] >= 0 { luma[at] } else { middle };

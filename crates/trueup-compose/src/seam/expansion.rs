@@ -58,6 +58,17 @@ pub(super) fn deepest(energy: &SeamEnergy<'_>) -> Vec<Label> {
     labels
 }
 
+/// The photograph that lies deepest at one canvas pixel, the first of equals; [`NOBODY`] if none may be shown there.
+pub(super) fn deepest_at(energy: &SeamEnergy<'_>, [x, y]: [usize; 2]) -> Label {
+    let (mut deepest, mut depth) = (NOBODY, -1);
+    for label in (0..energy.views.len()).filter(|&label| energy.views[label].rows.contains(&y)) {
+        if energy.allowed(label, x, y) && i16::from(energy.depth(label, x, y)) > depth {
+            (deepest, depth) = (label as Label, i16::from(energy.depth(label, x, y)));
+        }
+    }
+    deepest
+}
+
 impl Expansions {
     /// Lets photograph `label` take the pixels of the box `columns` x `rows` where that lowers the cost most, all at once;
     /// only pixels that are `free` change. Returns whether any did. Columns may run into the next turn of a cylinder; of a

@@ -27,7 +27,7 @@ pub use options::SeamOptions;
 use crate::small_views::{COARSE_PIXELS, SmallView};
 use crate::window::Window;
 use energy::SeamEnergy;
-use expansion::{Expansions, deepest};
+use expansion::{Expansions, deepest, deepest_at};
 use moving::moving_things;
 use softness::Softness;
 
@@ -104,10 +104,10 @@ fn coarse_to_fine(
         };
         // The levels that are left are the finer ones.
         let softness = (softness.as_slice(), levels.len() as u32);
-        let energy = SeamEnergy::new(&views, size, turn(size), &moving, softness, options);
+        let mut energy = SeamEnergy::new(&views, size, turn(size), &moving, softness, options);
         let labels = match &coarser {
-            None => search(&energy, &mut expansions, context)?,
-            Some(coarse) => follow(&energy, doubled(&coarse.labels, coarse.size, size), &mut expansions, context)?,
+            None => search(&mut energy, &mut expansions, context)?,
+            Some(coarse) => follow(&mut energy, doubled(&coarse.labels, coarse.size, size), &mut expansions, context)?,
         };
         drop(energy);
         if levels.is_empty() {
@@ -140,7 +140,9 @@ fn check(input: &SeamInput<'_>) -> Result<()> {
 }
 
 /// The labelling of the coarse canvas.
-fn search(energy: &SeamEnergy<'_>, expansions: &mut Expansions, context: &StageContext) -> Result<Vec<Label>> {
+fn search(energy: &mut SeamEnergy<'_>, expansions: &mut Expansions, context: &StageContext) -> Result<Vec<Label>> {
+    energy.prepare_differences(|_| true);
+    let energy = &*energy;
     let mut labels = deepest(energy);
     // A photograph whose surroundings stayed as it left them would take nothing.
     let mut last_change = vec![1_usize; energy.views.len()];
@@ -174,19 +176,24 @@ fn search(energy: &SeamEnergy<'_>, expansions: &mut Expansions, context: &StageC
 
 /// The labelling of a finer canvas from that of a coarser one: seams move within a band.
 fn follow(
-    energy: &SeamEnergy<'_>,
+    energy: &mut SeamEnergy<'_>,
     mut labels: Vec<Label>,
     expansions: &mut Expansions,
     context: &StageContext,
 ) -> Result<Vec<Label>> {
     let (width, height) = (energy.width, energy.height);
-    let best = deepest(energy);
-    for (at, label) in labels.iter_mut().enumerate() {
-        if *label == NOBODY || !energy.allowed(usize::from(*label), at % width, at / width) {
-            *label = best[at];
+    labels.par_chunks_exact_mut(width).enumerate().for_each(|(y, labels)| {
+        for (x, label) in labels.iter_mut().enumerate() {
+            if *label == NOBODY || !energy.allowed(usize::from(*label), x, y) {
+                *label = deepest_at(energy, [x, y]);
+            }
         }
-    }
+    });
     let band = band(&labels, [width, height], energy.turn, BAND_PX);
+    // Costs are asked for within the band, and from there across its border.
+    let beside = with_neighbors(&band, [width, height], energy.turn);
+    energy.prepare_differences(|at| beside[at]);
+    let energy = &*energy;
     let mut boxes = vec![[usize::MAX, usize::MAX, 0, 0]; energy.views.len()];
     for (at, &label) in labels.iter().enumerate() {
         if band[at] && label != NOBODY {
@@ -237,6 +244,21 @@ fn band(labels: &[Label], [width, height]: [usize; 2], turn: usize, reach: usize
         }
     });
     band
+}
+
+/// A part of a canvas with the four neighbors of each of its pixels; `turn` as for [`band`].
+fn with_neighbors(part: &[bool], [width, height]: [usize; 2], turn: usize) -> Vec<bool> {
+    let mut wider = part.to_vec();
+    for at in (0..part.len()).filter(|&at| part[at]) {
+        let (x, y) = (at % width, at / width);
+        let left = if x > 0 { Some(at - 1) } else { (turn > 0).then(|| at + turn - 1) };
+        let right = if x + 1 < width { Some(at + 1) } else { (turn > 0).then(|| at + 1 - turn) };
+        let below = (y + 1 < height).then(|| at + width);
+        for beside in [left, right, at.checked_sub(width), below].into_iter().flatten() {
+            wider[beside] = true;
+        }
+    }
+    wider
 }
 
 /// A map of a canvas of half the size, every pixel four times.

@@ -1,7 +1,5 @@
 //! How the brightness of photographs changes over wider places than a contour.
 
-use rayon::prelude::*;
-
 use crate::small_views::{SmallView, WHOLLY, luma};
 
 /// Parts of a gray level in which slopes are counted.
@@ -10,18 +8,15 @@ pub(super) const FRACTION: i32 = 64;
 /// Pixels of the seams' canvas over which shading is averaged to either side; half of it across.
 const SHADING_REACH: usize = 4;
 
-/// For every pixel of every view, across and down: the mean brightness on one side minus that on the other, in
-/// [`FRACTION`]s of a gray level; 0 where one side shows nothing.
+/// For every pixel of a view that is `wanted`, across and down: the mean brightness on one side minus that on the other, in
+/// [`FRACTION`]s of a gray level; 0 where one side shows nothing, and elsewhere.
 ///
 /// The sides are half of [`SHADING_REACH`] pixels deep and reach that many pixels to either side along the line between
 /// them. Where two photographs differ in this, a panorama cannot go over from one to the other without a slope that
 /// neither shows, however wide the transition: it is what the eye takes for a seam in skies and on walls, while differences
 /// of single pixels have both signs along a seam and mean little there.
-pub(super) fn slopes(views: &[SmallView]) -> Vec<Vec<[i16; 2]>> {
-    views.par_iter().map(|view| slopes_of(view, SHADING_REACH)).collect()
-}
-
-fn slopes_of(view: &SmallView, reach: usize) -> Vec<[i16; 2]> {
+pub(super) fn slopes(view: &SmallView, wanted: impl Fn([usize; 2]) -> bool) -> Vec<[i16; 2]> {
+    let reach = SHADING_REACH;
     let (width, height) = (view.columns.len(), view.rows.len());
     let sums = Sums::new(view);
     let deep = (reach / 2).max(1);
@@ -30,17 +25,17 @@ fn slopes_of(view: &SmallView, reach: usize) -> Vec<[i16; 2]> {
         (Some(first), Some(second)) => (second - first) as i16,
         _ => 0,
     };
-    let mut out = Vec::with_capacity(width * height);
-    for y in 0..height {
+    let mut out = vec![[0; 2]; width * height];
+    for (y, out) in out.chunks_exact_mut(width.max(1)).enumerate() {
         let along_y = [y.saturating_sub(reach), (y + reach + 1).min(height)];
         let (above, below) = ([y.saturating_sub(deep), y], [y + 1, (y + 1 + deep).min(height)]);
-        for x in 0..width {
+        for (x, out) in out.iter_mut().enumerate().filter(|&(x, _)| wanted([x, y])) {
             let along_x = [x.saturating_sub(reach), (x + reach + 1).min(width)];
             let (left, right) = ([x.saturating_sub(deep), x], [x + 1, (x + 1 + deep).min(width)]);
-            out.push([
+            *out = [
                 slope(sums.mean(left, along_y), sums.mean(right, along_y)),
                 slope(sums.mean(along_x, above), sums.mean(along_x, below)),
-            ]);
+            ];
         }
     }
     out
@@ -106,18 +101,20 @@ mod tests {
     fn a_ramp_has_the_slope_between_the_middles_of_both_sides() {
         // Three levels a column, two a row. Sides of two pixels: their middles lie three pixels apart.
         let ramp = view(|x, y| (3 * x + 2 * y) as u8, |_, _| true);
-        let slopes = slopes(&[ramp]);
-        assert_eq!(slopes[0][15 * 40 + 20], [9 * FRACTION as i16, 6 * FRACTION as i16]);
+        let slopes = slopes(&ramp, |[x, _]| x != 30);
+        assert_eq!(slopes[15 * 40 + 20], [9 * FRACTION as i16, 6 * FRACTION as i16]);
         // Beside the border the side that is left counts: one pixel, its middle two and a half away.
-        assert_eq!(slopes[0][15 * 40 + 1], [15 * FRACTION as i16 / 2, 6 * FRACTION as i16]);
-        assert_eq!(slopes[0][15 * 40], [0, 6 * FRACTION as i16]);
+        assert_eq!(slopes[15 * 40 + 1], [15 * FRACTION as i16 / 2, 6 * FRACTION as i16]);
+        assert_eq!(slopes[15 * 40], [0, 6 * FRACTION as i16]);
+        // Not wanted.
+        assert_eq!(slopes[15 * 40 + 30], [0, 0]);
     }
 
     #[test]
     fn texture_is_no_slope_and_what_is_not_covered_takes_no_part() {
         let stripes = view(|x, _| if x % 2 == 0 { 90 } else { 110 }, |_, _| true);
-        assert!(slopes(&[stripes])[0].iter().skip(15 * 40 + 5).take(30).all(|slope| *slope == [0, 0]));
+        assert!(slopes(&stripes, |_| true).iter().skip(15 * 40 + 5).take(30).all(|slope| *slope == [0, 0]));
         let half = view(|x, _| if x < 20 { 100 } else { 0 }, |x, _| x < 20);
-        assert!(slopes(&[half])[0].iter().all(|slope| *slope == [0, 0]));
+        assert!(slopes(&half, |_| true).iter().all(|slope| *slope == [0, 0]));
     }
 }

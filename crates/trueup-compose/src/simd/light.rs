@@ -133,13 +133,13 @@ fn corrected(light: &LightTable, samples: &[[f32; 4]], lifts: &[f32; BLOCK]) -> 
     for (at, &[r, g, b, _]) in samples.iter().enumerate().take(BLOCK) {
         (levels[0][at], levels[1][at], levels[2][at]) = (r, g, b);
     }
-    let mut channels = levels.map(|levels| light.linearize.linear_all(levels));
-    for (channel, gain) in channels.iter_mut().zip(light.gain) {
+    for (channel, gain) in levels.iter_mut().zip(light.gain) {
+        *channel = light.linearize.linear_all(*channel);
         for (value, lift) in channel.iter_mut().zip(lifts) {
             *value = exposed(*value, gain * lift);
         }
     }
-    channels
+    levels
 }
 
 /// The share of a canvas pixel that a sample covers: what is transparent of it covers nothing, and neither does what lies

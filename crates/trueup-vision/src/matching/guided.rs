@@ -103,8 +103,8 @@ fn nearest_plane(position: [f64; 2], known: &[PutativeMatch], plane_of_known: &[
     if plane_of_known.iter().all(|&plane| plane == first) {
         return first;
     }
-    let distance = |known: &PutativeMatch| (known.at.in_a[0] - position[0]).hypot(known.at.in_a[1] - position[1]);
-    let nearest = known.iter().zip(plane_of_known).min_by(|(j, _), (k, _)| distance(j).total_cmp(&distance(k)));
+    let square = |known: &PutativeMatch| (Vector2::from(known.at.in_a) - Vector2::from(position)).norm_squared();
+    let nearest = known.iter().zip(plane_of_known).min_by(|(j, _), (k, _)| square(j).total_cmp(&square(k)));
     nearest.map_or(first, |(_, &plane)| plane)
 }
 

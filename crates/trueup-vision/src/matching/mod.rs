@@ -37,7 +37,7 @@ pub use search::{Nearest, Neighbor, SearchKernel};
 pub use strangers::{Stranger, StrangerKind, find_strangers};
 
 pub(crate) use overlap::PredictedOverlap;
-pub(crate) use search::squared_distance;
+pub(crate) use search::squared_distances;
 
 use crate::features::Features;
 use pair::{PairInput, PhotographFeatures, match_pair};

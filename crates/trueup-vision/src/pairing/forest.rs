@@ -40,12 +40,10 @@ pub(super) struct DescriptorForest {
     groups: Vec<Range<usize>>,
 }
 
-/// One tree's groups.
+/// One tree.
 struct Tree {
     /// The descriptors, group by group.
     order: Vec<u32>,
-    /// Each descriptor's group.
-    group_of: Vec<u32>,
 }
 
 type Direction = [i16; DESCRIPTOR_LENGTH];
@@ -58,18 +56,14 @@ impl DescriptorForest {
         let tree = |tree: u64| {
             let mut order: Vec<u32> = (0..descriptors.len() as u32).collect();
             Branch { descriptors, context, tree, node: 1 }.part(&mut order);
-            let mut group_of = vec![0; order.len()];
-            for (number, group) in groups.iter().enumerate() {
-                order[group.clone()].iter().for_each(|&member| group_of[member as usize] = number as u32);
-            }
-            Tree { order, group_of }
+            Tree { order }
         };
         Self { trees: (0..TREES).map(tree).collect(), groups }
     }
 
-    /// The groups of a descriptor, one of each tree; it is in all of them itself.
-    pub(super) fn groups_of(&self, descriptor: usize) -> impl Iterator<Item = &[u32]> {
-        self.trees.iter().map(move |tree| &tree.order[self.groups[tree.group_of[descriptor] as usize].clone()])
+    /// The groups of all trees; each descriptor is in one of every tree.
+    pub(super) fn groups(&self) -> Vec<&[u32]> {
+        self.trees.iter().flat_map(|tree| self.groups.iter().map(|group| &tree.order[group.clone()])).collect()
     }
 }
 
@@ -169,6 +163,11 @@ mod tests {
         descriptors
     }
 
+    /// The groups of a descriptor.
+    fn groups_of(forest: &DescriptorForest, descriptor: u32) -> Vec<&[u32]> {
+        forest.groups().into_iter().filter(|group| group.contains(&descriptor)).collect()
+    }
+
     #[test]
     fn every_descriptor_is_in_one_group_of_each_tree_with_its_equals() {
         let mut descriptors = random_descriptors(500);
@@ -178,9 +177,9 @@ mod tests {
         }
         let forest = DescriptorForest::new(&descriptors.iter().collect::<Vec<_>>(), &StageContext::default());
         for descriptor in 0..500 {
-            let groups: Vec<&[u32]> = forest.groups_of(descriptor).collect();
+            let groups = groups_of(&forest, descriptor);
             assert_eq!(groups.len(), TREES as usize);
-            assert!(groups.iter().all(|group| group.len() <= LEAF && group.contains(&(descriptor as u32))));
+            assert!(groups.iter().all(|group| group.len() <= LEAF));
         }
         for tree in &forest.trees {
             let mut order = tree.order.clone();
@@ -188,7 +187,7 @@ mod tests {
             assert!(order.into_iter().eq(0..500));
         }
         // A median may part equals in a tree, hardly in all.
-        let met = forest.groups_of(0).any(|group| group.contains(&50));
+        let met = groups_of(&forest, 0).iter().any(|group| group.contains(&50));
         assert!(met);
     }
 
@@ -198,7 +197,7 @@ mod tests {
         let alike: Vec<Descriptor> = descriptors.iter().map(|one| one.map(|entry| entry ^ 0x0f)).collect();
         descriptors.extend(alike);
         let forest = DescriptorForest::new(&descriptors.iter().collect::<Vec<_>>(), &StageContext::default());
-        let meet = |one: usize| forest.groups_of(one).any(|group| group.contains(&(one as u32 + 1000)));
+        let meet = |one: u32| groups_of(&forest, one).iter().any(|group| group.contains(&(one + 1000)));
         let met = (0..1000).filter(|&one| meet(one)).count();
         assert!(met > 900, "{met} of 1000");
     }

@@ -1,5 +1,8 @@
 //! Which photographs look alike: those whose features are each other's neighbors.
 
+use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_core::options::StageOptions;
@@ -8,7 +11,7 @@ use trueup_core::{Result, StageContext};
 use super::PairingOptions;
 use super::forest::DescriptorForest;
 use crate::features::{Descriptor, Features};
-use crate::matching::squared_distance;
+use crate::matching::squared_distances;
 
 /// Strongest features of each photograph that take part.
 const COMPARED_FEATURES: usize = 1000;
@@ -21,6 +24,10 @@ const VOTED_FOR: usize = 16;
 const FULL_VOTE: u32 = 256;
 /// Photographs listed as like one, the most alike.
 const LISTED: usize = 256;
+/// Counts of votes that are kept at a time, 4 bytes each: for all of 4096 photographs.
+const COUNTS: usize = 1 << 24;
+/// Groups that one thread takes at a time.
+const GROUPS_PER_TASK: usize = 64;
 
 /// For each photograph the others that look like it, the most alike first.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,22 +49,27 @@ pub fn likeness(features: &[Features], context: &StageContext<'_>) -> Result<Lik
         features.check(index)?;
     }
     let ballot = Ballot::new(features, context);
-    context.check_cancelled()?;
-    context.progress().begin(PairingOptions::STAGE, features.len() as u64);
-    let alike: Result<Vec<Vec<usize>>> = (0..features.len())
-        .into_par_iter()
-        .map_init(
-            || Count::new(features.len()),
-            |count, photograph| {
-                context.check_cancelled()?;
-                let alike = ballot.most_alike(photograph, count);
-                context.progress().advance(PairingOptions::STAGE, 1);
-                Ok(alike)
-            },
-        )
-        .collect();
+    let photographs = features.len();
+    let groups = ballot.forest.groups();
+    // Voters are counted so many photographs at a time.
+    let counted_at_once = (COUNTS / photographs.max(1)).max(1);
+    let passes = photographs.div_ceil(counted_at_once) as u64;
+    context.progress().begin(PairingOptions::STAGE, passes * groups.len() as u64);
+    let mut alike = Vec::with_capacity(photographs);
+    for first in (0..photographs).step_by(counted_at_once) {
+        let voting = first..(first + counted_at_once).min(photographs);
+        let votes: Vec<AtomicU32> = (0..voting.len() * photographs).map(|_| AtomicU32::new(0)).collect();
+        groups.par_chunks(GROUPS_PER_TASK).try_for_each(|groups| {
+            context.check_cancelled()?;
+            let mut scratch = Scratch::default();
+            groups.iter().for_each(|group| ballot.vote(group, &voting, &votes, &mut scratch));
+            context.progress().advance(PairingOptions::STAGE, groups.len() as u64);
+            Ok(())
+        })?;
+        alike.par_extend(votes.par_chunks(photographs).map(winners));
+    }
     context.progress().finish(PairingOptions::STAGE);
-    Ok(Likeness(alike?))
+    Ok(Likeness(alike))
 }
 
 /// The features that vote.
@@ -65,96 +77,90 @@ struct Ballot<'a> {
     descriptors: Vec<&'a Descriptor>,
     /// The photograph of each.
     photograph_of: Vec<u32>,
-    /// The first descriptor of every photograph, and their number at the end.
-    first: Vec<usize>,
     forest: DescriptorForest,
 }
 
-/// Votes that are being counted.
-struct Count {
-    votes: Vec<u32>,
-    /// Photographs with votes.
-    voted: Vec<u32>,
-}
-
-impl Count {
-    fn new(photographs: usize) -> Self {
-        Self { votes: vec![0; photographs], voted: Vec::new() }
-    }
-
-    fn add(&mut self, photograph: u32, votes: u32) {
-        let sum = &mut self.votes[photograph as usize];
-        if *sum == 0 {
-            self.voted.push(photograph);
-        }
-        *sum += votes;
-    }
-
-    /// The photographs with most votes, which are counted anew from here on.
-    fn winners(&mut self) -> Vec<usize> {
-        self.voted.sort_unstable_by_key(|&photograph| (u32::MAX - self.votes[photograph as usize], photograph));
-        let winners = self.voted.iter().take(LISTED).map(|&photograph| photograph as usize).collect();
-        for photograph in self.voted.drain(..) {
-            self.votes[photograph as usize] = 0;
-        }
-        winners
-    }
+/// Room for what is known of one voter at a time.
+#[derive(Default)]
+struct Scratch {
+    distances: Vec<u32>,
+    /// Squared distance and photograph.
+    near: Vec<(u32, u32)>,
 }
 
 impl<'a> Ballot<'a> {
     fn new(features: &'a [Features], context: &StageContext<'_>) -> Self {
-        let (mut descriptors, mut photograph_of, mut first) = (Vec::new(), Vec::new(), vec![0]);
+        let (mut descriptors, mut photograph_of) = (Vec::new(), Vec::new());
         for (photograph, features) in features.iter().enumerate() {
             let strongest = features.descriptor_points.partition_point(|&point| (point as usize) < COMPARED_FEATURES);
             descriptors.extend(&features.descriptors[..strongest]);
             photograph_of.resize(descriptors.len(), photograph as u32);
-            first.push(descriptors.len());
         }
         let forest = DescriptorForest::new(&descriptors, context);
-        Self { descriptors, photograph_of, first, forest }
+        Self { descriptors, photograph_of, forest }
     }
 
-    /// Those that a photograph's features vote for.
-    fn most_alike(&self, photograph: usize, count: &mut Count) -> Vec<usize> {
-        let mut near: Vec<(u32, u32)> = Vec::new();
-        for voter in self.first[photograph]..self.first[photograph + 1] {
-            for group in self.forest.groups_of(voter) {
-                self.neighbors(voter, group, &mut near);
-                vote(&near, count);
+    /// Adds what those of a group vote that are of the photographs `voting`, for each of which `votes` counts the votes for
+    /// every photograph. Numbers are added, so that the order of the groups does not matter.
+    fn vote(&self, group: &[u32], voting: &Range<usize>, votes: &[AtomicU32], scratch: &mut Scratch) {
+        let Scratch { distances, near } = scratch;
+        let photographs = votes.len() / voting.len().max(1);
+        for &voter in group {
+            let own = self.photograph_of[voter as usize];
+            if !voting.contains(&(own as usize)) {
+                continue;
+            }
+            squared_distances(self.descriptors[voter as usize], &self.descriptors, group, distances);
+            let of_other = |(&member, &squared_distance): (&u32, &u32)| {
+                let photograph = self.photograph_of[member as usize];
+                (photograph != own && squared_distance < UNLIKE).then_some((squared_distance, photograph))
+            };
+            near.clear();
+            near.extend(group.iter().zip(distances.iter()).filter_map(of_other));
+            nearest_of_each(near);
+            let row = &votes[(own as usize - voting.start) * photographs..][..photographs];
+            for (photograph, votes) in votes_for(near) {
+                row[photograph as usize].fetch_add(votes, Ordering::Relaxed);
             }
         }
-        count.winners()
-    }
-
-    /// The nearest feature of each other photograph in a group: squared distance and photograph, the nearest first.
-    fn neighbors(&self, voter: usize, group: &[u32], near: &mut Vec<(u32, u32)>) {
-        near.clear();
-        let own = self.photograph_of[voter];
-        for &member in group {
-            let photograph = self.photograph_of[member as usize];
-            if photograph != own {
-                let squared_distance = squared_distance(self.descriptors[voter], self.descriptors[member as usize]);
-                if squared_distance < UNLIKE {
-                    near.push((squared_distance, photograph));
-                }
-            }
-        }
-        near.sort_unstable_by_key(|&(squared_distance, photograph)| (photograph, squared_distance));
-        near.dedup_by_key(|(_, photograph)| *photograph);
-        near.sort_unstable();
     }
 }
 
-/// One feature's votes for the photographs of its nearest neighbors.
-fn vote(near: &[(u32, u32)], count: &mut Count) {
-    let background = near.get(VOTED_FOR).map_or(UNLIKE, |&(squared_distance, _)| squared_distance).max(1);
-    for &(squared_distance, photograph) in &near[..near.len().min(VOTED_FOR)] {
-        // At most 2^17 by 2^8.
-        let votes = (background - squared_distance) * FULL_VOTE / background;
-        if votes > 0 {
-            count.add(photograph, votes);
+/// Leaves of squared distances and their photographs the nearest of each photograph, the nearest first, and of these as many
+/// as [`votes_for`] looks at.
+fn nearest_of_each(near: &mut Vec<(u32, u32)>) {
+    near.sort_unstable();
+    let mut kept = 0;
+    for at in 0..near.len() {
+        let photograph = near[at].1;
+        if near[..kept].iter().all(|&(_, known)| known != photograph) {
+            near[kept] = near[at];
+            kept += 1;
+            if kept > VOTED_FOR {
+                break;
+            }
         }
     }
+    near.truncate(kept);
+}
+
+/// One feature's votes for the photographs of its nearest neighbors, which are given the nearest first.
+fn votes_for(near: &[(u32, u32)]) -> impl Iterator<Item = (u32, u32)> {
+    let background = near.get(VOTED_FOR).map_or(UNLIKE, |&(squared_distance, _)| squared_distance).max(1);
+    // At most 2^17 by 2^8.
+    let votes = move |&(squared_distance, photograph): &(u32, u32)| {
+        (photograph, (background - squared_distance) * FULL_VOTE / background)
+    };
+    near[..near.len().min(VOTED_FOR)].iter().map(votes)
+}
+
+/// The photographs with most votes, and with any, the first of equals first.
+fn winners(votes: &[AtomicU32]) -> Vec<usize> {
+    let mut voted: Vec<(u32, usize)> =
+        votes.iter().enumerate().map(|(photograph, votes)| (votes.load(Ordering::Relaxed), photograph)).collect();
+    voted.retain(|&(votes, _)| votes > 0);
+    voted.sort_unstable_by_key(|&(votes, photograph)| (u32::MAX - votes, photograph));
+    voted.into_iter().take(LISTED).map(|(_, photograph)| photograph).collect()
 }
 
 #[cfg(test)]
@@ -163,14 +169,27 @@ mod tests {
 
     #[test]
     fn nearer_photographs_get_more_votes_and_far_ones_none() {
-        let mut count = Count::new(40);
-        vote(&[(0, 7), (UNLIKE / 2, 3), (UNLIKE - 1, 5)], &mut count);
-        assert_eq!((count.votes[7], count.votes[3], count.votes[5]), (256, 128, 0));
-        assert_eq!(count.winners(), [7, 3]);
-        assert_eq!(count.votes, [0; 40]);
+        let votes: Vec<(u32, u32)> = votes_for(&[(0, 7), (UNLIKE / 2, 3), (UNLIKE - 1, 5)]).collect();
+        assert_eq!(votes, [(7, 256), (3, 128), (5, 0)]);
         // The seventeenth sets the standard.
         let near: Vec<(u32, u32)> = (0..20).map(|k| (if k < 16 { 100 } else { 400 }, k)).collect();
-        vote(&near, &mut count);
-        assert!((0..16).all(|k| count.votes[k] == 192) && (16..40).all(|k| count.votes[k] == 0));
+        let votes: Vec<(u32, u32)> = votes_for(&near).collect();
+        assert_eq!(votes, (0..16).map(|k| (k, 192)).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_photograph_is_voted_for_by_the_nearest_of_its_features() {
+        let mut near = vec![(9, 1), (4, 2), (3, 1), (4, 0), (8, 2)];
+        nearest_of_each(&mut near);
+        assert_eq!(near, [(3, 1), (4, 0), (4, 2)]);
+        let mut many: Vec<(u32, u32)> = (0..60).map(|k| (100 + k, k % 30)).collect();
+        nearest_of_each(&mut many);
+        assert_eq!(many, (0..17).map(|k| (100 + k, k)).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn who_has_more_votes_wins_and_of_equals_the_first() {
+        let votes = [0, 5, 7, 0, 5].map(AtomicU32::new);
+        assert_eq!(winners(&votes), [2, 1, 4]);
     }
 }

@@ -5,6 +5,8 @@
 #![allow(unsafe_code)] // Runtime-dispatched vector instructions; nowhere else in the matching.
 
 use super::keys::{LANES, LaneBest, LaneWords, ROWS, SHIFT};
+use super::squared_distance;
+use crate::features::Descriptor;
 
 /// The instruction set a search runs on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -131,11 +133,40 @@ fn portable(tile: &DistanceTile<'_>, row_best: &mut [LaneBest; ROWS], column_bes
     }
 }
 
+/// Puts the squared distances of `descriptor` from those of `all` whose numbers are `members` into `found`, in their order.
+pub(crate) fn squared_distances(descriptor: &Descriptor, all: &[&Descriptor], members: &[u32], found: &mut Vec<u32>) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { x86::squared_distances(descriptor, all, members, found) };
+    }
+    squared_distances_portable(descriptor, all, members, found);
+}
+
+#[inline(always)]
+fn squared_distances_portable(descriptor: &Descriptor, all: &[&Descriptor], members: &[u32], found: &mut Vec<u32>) {
+    found.clear();
+    found.reserve(members.len());
+    for &member in members {
+        found.push(squared_distance(descriptor, all[member as usize]));
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use std::arch::x86_64::*;
 
-    use super::{DistanceTile, LaneBest, LaneWords, ROWS, SHIFT};
+    use super::{Descriptor, DistanceTile, LaneBest, LaneWords, ROWS, SHIFT};
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn squared_distances(
+        descriptor: &Descriptor,
+        all: &[&Descriptor],
+        members: &[u32],
+        found: &mut Vec<u32>,
+    ) {
+        super::squared_distances_portable(descriptor, all, members, found);
+    }
 
     const DOT_SHIFT: u32 = SHIFT + 1;
     /// Words of a descriptor whose bytes are multiplied four at a time.

@@ -21,6 +21,7 @@ mod packed;
 mod tests;
 
 pub use kernels::SearchKernel;
+pub(crate) use kernels::squared_distances;
 pub use keys::Neighbor;
 
 use crate::features::Descriptor;
@@ -114,6 +115,7 @@ impl<'a> Nearest<'a> {
 }
 
 /// The squared Euclidean distance of two descriptors.
+#[inline(always)] // Compiled with the vector instructions of whoever asks.
 pub(crate) fn squared_distance(a: &Descriptor, b: &Descriptor) -> u32 {
     // Products of 16-bit numbers summed to 32 bits: one instruction on most processors. At most 128 * 255^2.
     let difference = |(&a, &b): (&u8, &u8)| i32::from(i16::from(a).wrapping_sub(i16::from(b)));

@@ -95,3 +95,14 @@ fn nothing_is_nearest_to_nothing() {
     assert!(Nearest::search(&[], &random_descriptors(0, 3)).is_none());
     assert!(Nearest::search(&random_descriptors(0, 3), &[]).is_none());
 }
+
+/// Whatever instructions the processor has: 128 entries that differ by 255, by 3, and by nothing.
+#[test]
+fn distances_of_a_list_are_those_of_each_in_its_order() {
+    let (black, white, dark) = ([0; DESCRIPTOR_LENGTH], [255; DESCRIPTOR_LENGTH], [3; DESCRIPTOR_LENGTH]);
+    let mut found = vec![7; 9];
+    squared_distances(&black, &[&black, &white, &dark], &[2, 0, 1, 2], &mut found);
+    assert_eq!(found, [128 * 9, 0, 128 * 255 * 255, 128 * 9]);
+    squared_distances(&black, &[], &[], &mut found);
+    assert!(found.is_empty());
+}

@@ -131,16 +131,21 @@ fn sample(gray: &Raster<f32>, place: Vector2<f64>) -> f32 {
         return f32::NAN;
     }
     let (x, y) = (place.x - 0.5, place.y - 0.5);
+    // At least -1/2: one higher, the whole part is the next lower number. The casts are of numbers within the picture, and
+    // beyond it by two at most.
+    let below = |position: f64| (position + 1.0) as i64 - 1;
+    let (column, line) = (below(x), below(y));
     let (taps_x, taps_y) =
-        (cubic_convolution_taps((x - x.floor()) as f32), cubic_convolution_taps((y - y.floor()) as f32));
-    // The casts are of numbers within the picture, and beyond it by two at most.
-    let clamped = |position: f64, tap: usize, size: usize| {
-        (position.floor() as i64 + tap as i64 - 1).clamp(0, size as i64 - 1) as usize
-    };
+        (cubic_convolution_taps((x - column as f64) as f32), cubic_convolution_taps((y - line as f64) as f32));
+    let clamped = |first: i64, tap: usize, size: usize| (first + tap as i64 - 1).clamp(0, size as i64 - 1) as usize;
+    let inside = usize::try_from(column - 1).ok().filter(|first| first + 4 <= gray.width());
     (0..4)
         .map(|row| {
-            let samples = gray.row(clamped(y, row, gray.height()));
-            let across: f32 = (0..4).map(|tap| taps_x[tap] * samples[clamped(x, tap, gray.width())]).sum();
+            let samples = gray.row(clamped(line, row, gray.height()));
+            let across: f32 = match inside {
+                Some(first) => taps_x.iter().zip(&samples[first..first + 4]).map(|(tap, sample)| tap * sample).sum(),
+                None => (0..4).map(|tap| taps_x[tap] * samples[clamped(column, tap, gray.width())]).sum(),
+            };
             taps_y[row] * across
         })
         .sum()
