@@ -18,6 +18,7 @@ mod flat_scene;
 mod formats;
 mod full_turn;
 mod installing;
+mod light;
 mod likeness;
 mod masks;
 mod options;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::color::TransferCurve;
+use crate::color::{LightRange, TransferCurve};
 use crate::error::Result;
 use crate::lens::PlacedLens;
 use crate::mask::Masks;
@@ -80,7 +80,15 @@ pub struct SourceImage {
     pub gravity: Option<RecordedGravity>,
     /// The lens, in pixels of the full-resolution photograph, if the user told it by an earlier project.
     pub lens: Option<PlacedLens>,
-    /// The other exposures of the stack whose reference this is: its pixels are those of all, fused. Empty for a photograph of one file.
+    /// Whether its samples are floating point numbers: linear light.
+    #[serde(default)]
+    pub is_float: bool,
+    /// The light that it is handed out in, where its samples are floating point numbers and what is brighter than white is kept; `None`
+    /// where 1 is white.
+    #[serde(default)]
+    pub light: Option<LightRange>,
+    /// The other exposures of the stack whose reference this is: its pixels are those of all, fused or merged. Empty for a photograph of one
+    /// file.
     #[serde(default)]
     pub stack: Vec<StackMember>,
 }
@@ -111,7 +119,20 @@ pub trait StackFusion: std::fmt::Debug + Send + Sync {
     /// [`Error::Input`](crate::Error::Input) if a member has another size or a homography that is none.
     fn fuse(&self, reference: &Photograph, others: &[AlignedPhotograph]) -> Result<Photograph>;
 
-    /// Bytes that fusing takes beside the photographs themselves, for each of a photograph's pixels.
+    /// The light of all exposures, in the frame and channels of the reference, as 16-bit samples of `light`; `samples` is the curve of the
+    /// exposures' own. Light is in the unit in which the reference's samples tell it.
+    ///
+    /// # Errors
+    /// Those of [`Self::fuse`].
+    fn merge(
+        &self,
+        reference: &Photograph,
+        others: &[AlignedPhotograph],
+        samples: &TransferCurve,
+        light: &TransferCurve,
+    ) -> Result<Photograph>;
+
+    /// Bytes that fusing, or merging, takes beside the photographs themselves, for each of a photograph's pixels.
     fn bytes_per_pixel(&self, photographs: usize) -> usize;
 }
 

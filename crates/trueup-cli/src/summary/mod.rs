@@ -127,7 +127,8 @@ fn fused_stacks(project: &Project) -> Option<String> {
         _ => format!("{count} of {exposures} exposures each"),
     };
     let told: Vec<String> = counts.iter().map(stacks).collect();
-    (!told.is_empty()).then(|| format!("{}, fused (--stacks none stitches each by itself)", told.join(", ")))
+    let how = if project.light.is_some() { "merged to light" } else { "fused" };
+    (!told.is_empty()).then(|| format!("{}, {how} (--stacks none stitches each by itself)", told.join(", ")))
 }
 
 /// How many were used, and each one left out with its reason and what to do about it.

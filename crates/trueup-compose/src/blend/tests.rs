@@ -168,6 +168,7 @@ fn with_work<T>(
         corrections: &corrections,
         local: None,
         photographs: &memory,
+        view_levels: None,
         first_level: Some(first_level),
         border: None,
         plan: &plan,

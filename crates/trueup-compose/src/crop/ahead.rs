@@ -166,7 +166,7 @@ impl CellsAhead {
                     Ok(found) => border[found].1,
                     Err(_) => sums.deviation(),
                 };
-                CutPart { cell, label, pixels: sums.count() as f32, root: sums.color(), deviation }
+                CutPart { cell, label, pixels: sums.count() as f32, level: sums.color(), deviation }
             };
             shown.into_iter().map(part).collect::<Vec<_>>()
         };
@@ -182,8 +182,8 @@ struct CutPart {
     label: Label,
     /// How many pixels of the small views it is.
     pixels: f32,
-    /// Square roots of linear light; 255 is white.
-    root: [f32; 3],
+    /// As in a small view.
+    level: [f32; 3],
     /// Standard deviation of the luma, levels.
     deviation: f32,
 }
@@ -221,9 +221,10 @@ impl CutCells {
         for (part, change) in self.parts.iter().zip(changes) {
             pixels[part.cell] += part.pixels;
             variances[part.cell] += part.pixels * part.deviation * part.deviation;
-            for ((sum, root), change) in colors[part.cell].iter_mut().zip(part.root).zip(change) {
-                let root = (root / WHITE + change).max(0.0);
-                *sum += part.pixels * f32::from(encode.level(root * root)) * (WHITE / f32::from(u16::MAX));
+            for ((sum, level), change) in colors[part.cell].iter_mut().zip(part.level).zip(change) {
+                let root = (encoding.root_of_view(level / WHITE) + change).max(0.0);
+                *sum +=
+                    part.pixels * f32::from(encode.level(encoding.light_of_root(root))) * (WHITE / f32::from(u16::MAX));
             }
         }
         for ((pixels, color), variance) in pixels.iter().zip(&mut colors).zip(&mut variances) {

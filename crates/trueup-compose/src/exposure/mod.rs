@@ -93,11 +93,11 @@ pub fn run(input: &ExposureInput<'_>, options: &ExposureOptions, context: &Stage
         .collect();
     let cameras: Vec<usize> = thumbnails.iter().map(|thumbnail| thumbnail.camera).collect();
     let response_asked = options.response && options.model == ExposureModel::Full;
-    // One response is fitted for one color profile.
-    let profile = thumbnails
-        .first()
-        .map(|thumbnail| thumbnail.curve)
-        .filter(|&profile| response_asked && thumbnails.iter().all(|thumbnail| thumbnail.curve == profile));
+    // One response is fitted for one color profile; light has none.
+    let profile = thumbnails.first().map(|thumbnail| thumbnail.curve).filter(|&profile| {
+        let is_of_all = || thumbnails.iter().all(|thumbnail| thumbnail.curve == profile);
+        response_asked && profile.light_range().is_none() && is_of_all()
+    });
     let input = SolveInput { cameras: &cameras, observed: &observed, thumbnails, reference, profile };
     let corrections = solve(&input, options, context)?;
     Ok(Exposure { corrections, pairs: observed.into_iter().map(|observed| observed.pair).collect() })

@@ -96,7 +96,10 @@ impl LightEquations<'_> {
             compared[one.pair.second] = true;
         }
         let corrections = self.relative_to(self.anchor(solution, &compared, reference), solution, &compared);
+        // What is kept of all light needs no level at which least is lost.
+        let keeps_light = thumbnails.iter().any(|thumbnail| thumbnail.curve.light_range().is_some());
         let log_factor = match self.options.anchor {
+            _ if keeps_light => 0.0,
             GainAnchor::Scene => LevelInput { thumbnails, corrections: &corrections, compared: &compared }.log_factor(),
             GainAnchor::Reference | GainAnchor::Mean => 0.0,
         };

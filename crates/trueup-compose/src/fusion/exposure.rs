@@ -15,6 +15,8 @@ use crate::simd::Positions;
 #[derive(Debug)]
 pub(super) struct Exposure<'a> {
     photograph: &'a Photograph,
+    /// Its small copy in the reference's frame.
+    small: Small,
     /// Where it lies; `None` for the reference itself.
     aligned: Option<Aligned>,
 }
@@ -28,18 +30,39 @@ struct Aligned {
 
 impl<'a> Exposure<'a> {
     pub(super) fn reference(photograph: &'a Photograph) -> Self {
-        Self { photograph, aligned: None }
+        let size = [photograph.width(), photograph.height()];
+        let small = Small::new(size, |scale, columns, row| sampled(photograph, None, scale, columns, row));
+        Self { photograph, small, aligned: None }
     }
 
     /// A member on its reference; both have one size.
-    pub(super) fn other(reference: &Photograph, photograph: &'a Photograph, member_from_reference: Homography) -> Self {
-        let size = [reference.width(), reference.height()];
-        let own = Small::new(size, |scale, columns, row| sampled(reference, None, scale, columns, row));
-        let other = Small::new(size, |scale, columns, row| {
+    pub(super) fn other(reference: &Self, photograph: &'a Photograph, member_from_reference: Homography) -> Self {
+        let size = [photograph.width(), photograph.height()];
+        let small = Small::new(size, |scale, columns, row| {
             sampled(photograph, Some(&member_from_reference), scale, columns, row)
         });
-        let expectation = Expectation::new(&own, &other);
-        Self { photograph, aligned: Some(Aligned { member_from_reference, expectation }) }
+        let expectation = Expectation::new(&reference.small, &small);
+        Self { photograph, small, aligned: Some(Aligned { member_from_reference, expectation }) }
+    }
+
+    /// The pixels of its small copy, of every exposure the same ones in the same order; `None` where it is not to be compared with others:
+    /// beyond its border, and where it contradicts the reference.
+    pub(super) fn compared(&self) -> impl Iterator<Item = Option<[f32; 4]>> {
+        let is_exchanged = |index: usize| match &self.aligned {
+            None => false,
+            Some(aligned) => aligned.expectation.as_ref().is_none_or(|one| one.is_exchanged(index)),
+        };
+        self.small.pixels().iter().enumerate().map(move |(index, pixel)| pixel.filter(|_| !is_exchanged(index)))
+    }
+
+    /// Its own colors along a row of the reference, as in [`Self::window`], and how far each is to be trusted, 0 to 1.
+    pub(super) fn trusted_row(&self, columns: Range<usize>, y: usize) -> Vec<(Option<[f32; 4]>, f32)> {
+        let map = self.aligned.as_ref().map(|aligned| &aligned.member_from_reference);
+        let trust = |x: usize| match &self.aligned {
+            None => 1.0,
+            Some(aligned) => aligned.expectation.as_ref().map_or(0.0, |one| 1.0 - one.share_at([x, y])),
+        };
+        sampled(self.photograph, map, 1.0, columns.clone(), y).into_iter().zip(columns.map(trust)).collect()
     }
 
     pub(super) fn has_color(&self) -> bool {

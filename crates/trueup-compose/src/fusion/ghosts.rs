@@ -49,6 +49,11 @@ impl Small {
         let pixels = (0..height).into_par_iter().flat_map_iter(|y| row(scale, 0..width, y)).collect();
         Self { width, height, scale, pixels }
     }
+
+    /// Its pixels, row by row.
+    pub(super) fn pixels(&self) -> &[Option<[f32; 4]>] {
+        &self.pixels
+    }
 }
 
 /// What the reference lets expect of an exposure.
@@ -97,8 +102,13 @@ impl Expectation {
         [mixed[0], mixed[1], mixed[2], 1.0]
     }
 
+    /// Whether a pixel of the small copies is exchanged, if only in part.
+    pub(super) fn is_exchanged(&self, index: usize) -> bool {
+        self.exchanged[index] > 0.0
+    }
+
     /// How much of a pixel of the reference is exchanged, between the small copy's pixels.
-    fn share_at(&self, [x, y]: [usize; 2]) -> f32 {
+    pub(super) fn share_at(&self, [x, y]: [usize; 2]) -> f32 {
         let place = |pixel: usize, length: usize| {
             let at = ((pixel as f64 + 0.5) * self.scale - 0.5).clamp(0.0, (length - 1) as f64);
             let below = at as usize;

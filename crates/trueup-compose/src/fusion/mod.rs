@@ -16,6 +16,7 @@
 
 mod exposure;
 mod ghosts;
+mod radiance;
 #[cfg(test)]
 mod tests;
 mod weights;
@@ -23,6 +24,7 @@ mod weights;
 use std::ops::Range;
 
 use rayon::prelude::*;
+use trueup_core::color::TransferCurve;
 use trueup_core::geometry::Homography;
 use trueup_core::raster::{Photograph, Raster};
 use trueup_core::source::{AlignedPhotograph, StackFusion};
@@ -32,15 +34,26 @@ use crate::pyramid::{
     LEAST_WEIGHT, PyramidPlane, Texel, add_base, add_detail, collapse, first_level, level_shares, mask_margin,
 };
 use exposure::Exposure;
+pub use radiance::merge;
 use weights::normalized_weights;
 
-/// Exposure fusion by Mertens, Kautz and Van Reeth, without ghosts.
+/// Exposure fusion by Mertens, Kautz and Van Reeth, and merging to light, both without ghosts.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ExposureFusion;
 
 impl StackFusion for ExposureFusion {
     fn fuse(&self, reference: &Photograph, others: &[AlignedPhotograph]) -> Result<Photograph> {
         fuse(reference, others)
+    }
+
+    fn merge(
+        &self,
+        reference: &Photograph,
+        others: &[AlignedPhotograph],
+        samples: &TransferCurve,
+        light: &TransferCurve,
+    ) -> Result<Photograph> {
+        merge(reference, others, samples, light)
     }
 
     fn bytes_per_pixel(&self, photographs: usize) -> usize {
@@ -66,21 +79,7 @@ type Part = (Range<usize>, Range<usize>);
 /// [`Error::Input`] if a member has another size or a homography that is none.
 pub fn fuse(reference: &Photograph, others: &[AlignedPhotograph]) -> Result<Photograph> {
     let size = [reference.width(), reference.height()];
-    let mut exposures = vec![Exposure::reference(reference)];
-    for other in others {
-        let from_member = Homography::from_rows(&other.reference_from_member);
-        let member_from_reference = from_member.inverse().filter(|map| map.0.iter().all(|entry| entry.is_finite()));
-        let same_size = [other.photograph.width(), other.photograph.height()] == size;
-        let (Some(map), true) = (member_from_reference, same_size) else {
-            let reason = format!(
-                "a member of {} x {} px does not lie on it",
-                other.photograph.width(),
-                other.photograph.height()
-            );
-            return Err(Error::input("stack", reason, "Stitch the photographs again."));
-        };
-        exposures.push(Exposure::other(reference, &other.photograph, map));
-    }
+    let exposures = aligned_exposures(reference, others)?;
     let first_level = first_level(size);
     let coarse = Coarse::of(&exposures, size, first_level).fused();
     Ok(match reference {
@@ -94,6 +93,30 @@ pub fn fuse(reference: &Photograph, others: &[AlignedPhotograph]) -> Result<Phot
             Photograph::Sixteen(finished(raster, &exposures, &coarse, first_level, sample))
         }
     })
+}
+
+/// The reference, and the others as they lie on it.
+///
+/// # Errors
+/// Those of [`fuse`].
+fn aligned_exposures<'a>(reference: &'a Photograph, others: &'a [AlignedPhotograph]) -> Result<Vec<Exposure<'a>>> {
+    let size = [reference.width(), reference.height()];
+    let mut exposures = vec![Exposure::reference(reference)];
+    for other in others {
+        let from_member = Homography::from_rows(&other.reference_from_member);
+        let member_from_reference = from_member.inverse().filter(|map| map.0.iter().all(|entry| entry.is_finite()));
+        let same_size = [other.photograph.width(), other.photograph.height()] == size;
+        let (Some(map), true) = (member_from_reference, same_size) else {
+            let reason = format!(
+                "a member of {} x {} px does not lie on it",
+                other.photograph.width(),
+                other.photograph.height()
+            );
+            return Err(Error::input("stack", reason, "Stitch the photographs again."));
+        };
+        exposures.push(Exposure::other(&exposures[0], &other.photograph, map));
+    }
+    Ok(exposures)
 }
 
 /// The level that is fused as a whole, of every exposure.

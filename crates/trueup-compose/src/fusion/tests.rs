@@ -1,3 +1,4 @@
+use trueup_core::color::LightRange;
 use trueup_core::geometry::Homography;
 
 use super::*;
@@ -133,4 +134,68 @@ fn members_of_other_sizes_and_without_a_place_are_refused() {
     assert!(matches!(fuse(&reference, &[other]), Err(Error::Input { .. })));
     let nowhere = AlignedPhotograph { reference_from_member: [[0.0; 3]; 3], ..member(taken(1.0, None)) };
     assert!(matches!(fuse(&reference, &[nowhere]), Err(Error::Input { .. })));
+}
+
+/// The curve by which [`taken`] records light.
+fn samples() -> TransferCurve {
+    TransferCurve::gamma(2.2).expect("a curve")
+}
+
+/// The light that is merged of a reference and others, in units in which white is 1 in the reference.
+fn merged_light(reference: &Photograph, others: &[AlignedPhotograph]) -> Raster<f64> {
+    let range = LightRange { white: 1.0, peak: 64.0 };
+    let curve = TransferCurve::light(range).expect("a range");
+    let Photograph::Sixteen(raster) = merge(reference, others, &samples(), &curve).expect("merged") else {
+        panic!("16 bits")
+    };
+    let light = raster.data().iter().map(|&level| range.peak * curve.linear(f64::from(level) / 65535.0)).collect();
+    Raster::from_data(raster.width(), raster.height(), raster.channels(), light).expect("samples")
+}
+
+/// Largest part by which merged light is off within a box.
+fn worst(merged: &Raster<f64>, columns: Range<usize>, rows: Range<usize>, light: impl Fn(usize, usize) -> f32) -> f64 {
+    let colors = [1.0, 0.8, 0.6];
+    let off = |(x, y): (usize, usize)| {
+        let far = |k: usize| (merged.pixel(x, y)[k] / (colors[k] * f64::from(light(x, y))) - 1.0).abs();
+        (0..3).map(far).fold(0.0, f64::max)
+    };
+    rows.flat_map(|y| columns.clone().map(move |x| (x, y))).map(off).fold(0.0, f64::max)
+}
+
+#[test]
+fn light_of_all_exposures_is_that_of_the_scene() {
+    let merged = merged_light(&taken(1.0, None), &[member(taken(0.12, None)), member(taken(8.0, None))]);
+    // The exposures are not told; eight stops of light, up to four times the reference's white.
+    let off = worst(&merged, 0..WIDTH, 0..HEIGHT, light);
+    assert!(merged.pixel(WIDTH - 1, 0)[0] > 2.0 && off < 0.03, "{off}");
+    // What is white in every exposure is as bright as the darkest says.
+    let bright = merged_light(&taken(30.0, None), &[member(taken(8.0, None))]);
+    assert!((bright.pixel(WIDTH - 1, 5)[0] / (30.0 / 8.0) - 1.0).abs() < 0.02, "{:?}", bright.pixel(WIDTH - 1, 5));
+}
+
+#[test]
+fn light_of_what_moved_is_that_of_the_reference() {
+    let thing = |columns: Range<usize>, light: f32| Some(([columns, 60..150], light));
+    let others = [member(taken(0.12, thing(100..140, 3.0))), member(taken(8.0, thing(170..210, 0.002)))];
+    let merged = merged_light(&taken(1.0, None), &others);
+    for columns in [96..144, 166..214] {
+        let off = worst(&merged, columns.clone(), 56..154, light);
+        // One exposure alone, and its noise of rounding.
+        assert!(off < 0.08, "{columns:?}: {off}");
+    }
+    let own = merged_light(&taken(1.0, thing(100..140, 0.2)), &[member(taken(0.12, None)), member(taken(8.0, None))]);
+    assert!(worst(&own, 108..132, 68..142, |_, _| 0.2) < 0.03);
+}
+
+#[test]
+fn merging_wants_a_curve_of_light_and_members_that_fit() {
+    let reference = taken(1.0, None);
+    let light = TransferCurve::light(LightRange { white: 1.0, peak: 8.0 }).expect("a range");
+    let other = [member(Photograph::Eight(Raster::new(WIDTH - 1, HEIGHT, 3)))];
+    assert!(matches!(merge(&reference, &other, &samples(), &light), Err(Error::Input { .. })));
+    assert!(matches!(merge(&reference, &[], &samples(), &samples()), Err(Error::Input { .. })));
+    // An exposure of which nothing can be compared tells nothing.
+    let black = [member(Photograph::Eight(Raster::new(WIDTH, HEIGHT, 3)))];
+    let alone = merge(&reference, &[], &samples(), &light).expect("merged");
+    assert_eq!(merge(&reference, &black, &samples(), &light).expect("merged"), alone);
 }

@@ -43,6 +43,14 @@ impl Correction {
         self.log_at_radius(r2).exp()
     }
 
+    /// The largest factor on any channel anywhere in the photograph.
+    pub(crate) fn most(&self) -> f64 {
+        /// Rings between the middle and the corners that are looked at: vignetting is smooth.
+        const RINGS: u32 = 16;
+        let lifts = (0..=RINGS).map(|ring| self.at_radius(f64::from(ring) / f64::from(RINGS)));
+        lifts.fold(0.0, f64::max) * self.gain.into_iter().fold(0.0, f64::max)
+    }
+
     /// Natural logarithm of [`Self::at_radius`].
     pub fn log_at_radius(&self, r2: f64) -> f64 {
         self.vignetting.iter().rev().fold(0.0, |sum, coefficient| (sum + coefficient) * r2)

@@ -40,6 +40,8 @@ pub(crate) struct PhotographLight<'a> {
 pub(crate) struct LightTable {
     pub(crate) linearize: Arc<Linearize>,
     pub(crate) gain: [f32; 3],
+    /// Whether what is brighter than white is kept: factors are nothing but factors then.
+    pub(crate) keeps_light: bool,
     /// The factor at r^2 = index / [`STEPS`]; `None` without vignetting. All beyond the corner is as at the corner.
     falloff: Option<Arc<LinearTable<ENTRIES>>>,
     center: [f32; 2],
@@ -64,6 +66,7 @@ impl LightTable {
         Self {
             linearize: Linearize::of(curve),
             gain: correction.gain.map(|gain| gain as f32),
+            keeps_light: curve.light_range().is_some(),
             falloff: (!plain).then(|| Arc::new(LinearTable::new(factor))),
             center: size.map(|length| 0.5 * length as f32),
             steps_per_px2: (STEPS as f64 / corner) as f32,

@@ -119,7 +119,9 @@ pub fn make_small(
         let border =
             work.border.as_ref().map(|cells| BorderInput { cells, resampling: &resampling, encode: &encoding.roots });
         let first_level = levels.map(|levels| levels.first_level);
-        let input = SmallViewsInput { unrolled, corrections, local, photographs, first_level, border, plan };
+        let view_levels = encoding.view_levels();
+        let input =
+            SmallViewsInput { unrolled, corrections, local, photographs, view_levels, first_level, border, plan };
         small_views::make_each(&input, positions, context, |position, made, _| take(position, made))
     })
 }

@@ -12,7 +12,6 @@ use super::input::RenderInput;
 use crate::deformed_grid::DeformedGrid;
 use crate::layout::{CanvasLayout, TURNS, columns_around};
 use crate::light::{ByResponse, PhotographLight};
-use crate::look::local_exposure;
 use crate::render_options::RenderOptions;
 use crate::transfer_curve::Encoding;
 use crate::unframed::Unframed;
@@ -54,7 +53,7 @@ pub fn layer(input: &RenderInput<'_>, position: usize, options: &RenderOptions) 
         gray: Raster::new(width, height, 1),
         covered: Raster::new(width, height, 1),
     };
-    let encode = encoding.linear;
+    let encode = &encoding.linear;
     let resampling = Resampling::of(options.interpolation);
     let mut memory = SamplingMemory::default();
     let mut samples = Vec::new();
@@ -68,7 +67,7 @@ pub fn layer(input: &RenderInput<'_>, position: usize, options: &RenderOptions) 
             for ((gray, covered), sample) in gray.iter_mut().zip(covered).zip(samples) {
                 let [r, g, b, share] = *sample;
                 if share > 0.0 {
-                    let levels = [r, g, b].map(|root| f32::from(encode.level(root * root)));
+                    let levels = [r, g, b].map(|root| f32::from(encode.level(encoding.light_of_root(root))));
                     *gray = levels.iter().zip(LUMA).map(|(level, share)| level * share).sum();
                     *covered = share >= WHOLE;
                 }
@@ -98,11 +97,11 @@ fn alone(
     let photographs = &Unframed(photographs);
     let photograph = photographs.photograph(placed.photograph)?;
     check_photograph(placed, &photograph)?;
-    let photographs = ByResponse::new(photographs, &corrections.response)?;
+    let photographs = ByResponse::new(photographs, corrections)?;
     let curve = photographs.transfer_curve();
-    let local = local_exposure(layout, &corrections.photographs, options.look);
+    let local = photographs.local_exposure(layout, options.look);
     let light =
-        PhotographLight { curve: &curve, correction: &corrections.photographs[position], local: local.as_ref() };
+        PhotographLight { curve: &curve, correction: &photographs.corrections()[position], local: local.as_ref() };
     let mesh = &placed.in_first_turn(layout.period).mesh;
     let (size, resampling) = (unrolled_size(layout), Resampling::of(options.interpolation));
     let warped = WarpedPhotograph::new(Cow::Owned(photograph), mesh, size, light, &resampling);
@@ -201,8 +200,9 @@ impl LayerRows {
         alpha: impl Fn(f32) -> T,
     ) -> Result<()> {
         for (pixel, [r, g, b, share]) in row.chunks_exact_mut(4).zip(self.samples(y)) {
+            let [r, g, b] = [r, g, b].map(|root| color(self.encoding.light_of_root(root)));
             match share > 0.0 {
-                true => pixel.copy_from_slice(&[color(r * r), color(g * g), color(b * b), alpha(share.min(1.0))]),
+                true => pixel.copy_from_slice(&[r, g, b, alpha(share.min(1.0))]),
                 false => pixel.fill(T::default()),
             }
         }

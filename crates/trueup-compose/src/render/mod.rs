@@ -34,7 +34,7 @@ use crate::coverage::Rectangle;
 use crate::crop::{CellsAhead, Frame, Framing};
 use crate::layout::{CanvasLayout, Unrolled};
 use crate::light::{ByResponse, Correction, LocalExposure};
-use crate::look::{self, local_exposure};
+use crate::look;
 use crate::memory_plan::{MemoryNeeds, MemoryPlan};
 use crate::pyramid::first_level;
 use crate::render_options::{Composition, Transition};
@@ -199,12 +199,12 @@ impl Composing<'_> {
         check(input, options)?;
         let &RenderInput { layout, corrections, photographs } = input;
         let photographs = &Unframed(photographs);
-        let photographs = &ByResponse::new(photographs, &corrections.response)?;
+        let photographs = &ByResponse::new(photographs, corrections)?;
         let needs = memory_needs(layout, photographs, options)?;
         let needs = if holding == Holding::APart { needs.of_a_part() } else { needs };
         let plan = &MemoryPlan::new(&needs, resources)?;
-        let local = local_exposure(layout, &corrections.photographs, options.look);
-        let corrections = &corrections.photographs;
+        let local = photographs.local_exposure(layout, options.look);
+        let corrections = photographs.corrections();
         work(&Composing { layout, corrections, local: local.as_ref(), photographs, plan })
     }
 
@@ -229,7 +229,9 @@ impl Composing<'_> {
         let first_level = levels.map(|levels| levels.first_level);
         let border =
             ahead.as_ref().map(|cells| BorderInput { cells, resampling: &resampling, encode: &encoding.roots });
-        let input = SmallViewsInput { unrolled, corrections, local, photographs, first_level, border, plan };
+        let view_levels = encoding.view_levels();
+        let input =
+            SmallViewsInput { unrolled, corrections, local, photographs, view_levels, first_level, border, plan };
         let small = match helpers {
             None => small_views::run(&input, context)?,
             Some(helpers) => small_views::run_elsewhere(&input, helpers, context)?,

@@ -24,7 +24,8 @@ pub struct Panorama {
 pub(super) enum PanoramaPixels {
     /// Sums over the photographs of weight * (red, green, blue) in linear light, and of the weights.
     Sums(PixelStore<SumPixel>),
-    /// Square roots of linear light and alpha; 65535 is 1. Fine enough for 16 bits of the usual curves.
+    /// Square roots of linear light, or where what is brighter than white is kept fourth roots, and alpha; 65535 is 1. Fine enough for 16
+    /// bits of the usual curves, and for light of twenty stops to half a percent.
     Roots(PixelStore<RootPixel>),
 }
 
@@ -64,13 +65,20 @@ impl Panorama {
         let (x, y) = (x + self.kept.columns.start, y + self.kept.rows.start);
         Ok(self.profile_light(match &self.pixels {
             PanoramaPixels::Sums(sums) => linear_of_sum(sums.pixel(x, y)?),
-            PanoramaPixels::Roots(roots) => linear_of_root(roots.pixel(x, y)?),
+            PanoramaPixels::Roots(roots) => self.linear_of_root(roots.pixel(x, y)?),
         }))
     }
 
     /// The columns of the canvas that a row of the panorama has, and its own row there.
     fn on_canvas(&self, y: usize) -> (Range<usize>, usize) {
         (self.kept.columns.clone(), self.kept.rows.start + y)
+    }
+
+    /// What a pixel holds as light.
+    fn linear_of_root(&self, root: RootPixel) -> [f32; 4] {
+        let [r, g, b, opacity] = root.map(|value| f32::from(value) / 65535.0);
+        let [r, g, b] = [r, g, b].map(|root| self.encoding.light_of_root(root));
+        [r, g, b, opacity]
     }
 
     /// Linear light by the color profile.
@@ -82,11 +90,6 @@ impl Panorama {
 
 pub(super) fn linear_of_sum([r, g, b, sum]: SumPixel) -> [f32; 4] {
     if sum > 0.0 { [r / sum, g / sum, b / sum, alpha(sum)] } else { [0.0; 4] }
-}
-
-fn linear_of_root(root: RootPixel) -> [f32; 4] {
-    let [r, g, b, opacity] = root.map(|value| f32::from(value) / 65535.0);
-    [r * r, g * g, b * b, opacity]
 }
 
 impl RowSource for Panorama {
@@ -163,7 +166,7 @@ impl RowSource for Panorama {
             }
             PanoramaPixels::Roots(roots) => {
                 out.zip(roots.row(y)?[columns].iter())
-                    .for_each(|(out, &root)| out.copy_from_slice(&self.profile_light(linear_of_root(root))));
+                    .for_each(|(out, &root)| out.copy_from_slice(&self.profile_light(self.linear_of_root(root))));
             }
         }
         Ok(())

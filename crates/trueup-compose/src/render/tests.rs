@@ -2,7 +2,8 @@
 
 use nalgebra::Vector2;
 use trueup_core::Error;
-use trueup_core::raster::{Photograph, Raster};
+use trueup_core::color::{LightRange, TransferCurve};
+use trueup_core::raster::{Photograph, Raster, RowSource};
 
 use super::panorama::PanoramaPixels;
 use super::test_rendering::{bits, compose, linear, render, rows};
@@ -203,5 +204,61 @@ fn any_number_of_threads_gives_the_same_bits() {
     let single = of_threads(1);
     for threads in [2, 3] {
         assert!(single == of_threads(threads));
+    }
+}
+
+/// Photographs whose samples keep what is brighter than white.
+struct Lights(Memory, TransferCurve);
+
+impl PhotographSource for Lights {
+    fn photograph(&self, index: usize) -> Result<Photograph> {
+        self.0.photograph(index)
+    }
+
+    fn transfer_curve(&self) -> TransferCurve {
+        self.1.clone()
+    }
+}
+
+/// Light of 0.01 to 160 times white over two photographs, of which the second was taken with a third of the light: it comes out as it is,
+/// from canvases of any kind, and a picture of it is neither white nor black.
+#[test]
+fn light_above_white_comes_through() {
+    let curve = TransferCurve::light(LightRange { white: 1.0, peak: 200.0 }).expect("a range");
+    let light = |x: f64| 0.01 * 2_f64.powf(x * 14.0 / 140.0);
+    let photograph = |left: f64, factor: f64| {
+        let mut raster = Raster::new(90, 60, 3);
+        for y in 0..60 {
+            for x in 0..90 {
+                let level = curve.encoded(factor * light(left + x as f64 + 0.5) / 200.0);
+                raster.pixel_mut(x, y).fill((level * 65535.0).round() as u16);
+            }
+        }
+        Photograph::Sixteen(raster)
+    };
+    let layout = canvas(140, 60, vec![moved(0, 90.0, 60.0, |p| p.into()), moved(1, 90.0, 60.0, |p| [p.x + 50.0, p.y])]);
+    let photographs = Lights(Memory(vec![photograph(0.0, 1.0), photograph(50.0, 1.0 / 3.0)]), curve.clone());
+    let corrections: Corrections = vec![Correction::uniform(1.0), Correction::uniform(3.0)].into();
+    for blend in [Blend::MultiBand, Blend::Feather, Blend::None] {
+        let options = RenderOptions { blend, ..RenderOptions::default() };
+        let input = RenderInput { layout: &layout, corrections: &corrections, photographs: &photographs };
+        let context = StageContext::default();
+        let rendered = run(&input, &Resources::unlimited(), &options, &SeamOptions::default(), None, &context);
+        let panorama = rendered.expect("renders").panorama;
+        let levels = rows(&panorama);
+        // Near a photograph's border the coarse levels that are blended are one-sided, of so steep a gradient.
+        let most = if blend == Blend::MultiBand { 0.08 } else { 0.01 };
+        for x in 1..139 {
+            let found = f64::from(linear(&panorama, x, 30)[1]);
+            assert!((found / light(x as f64 + 0.5) - 1.0).abs() < most, "{blend:?} at {x}: {found}");
+            assert!((1..255).contains(&levels[(30 * 140 + x) * 4]), "{blend:?} at {x}");
+        }
+        assert!((1..139).all(|x| levels[(30 * 140 + x) * 4] <= levels[(30 * 140 + x + 1) * 4]), "{blend:?}");
+        // A photograph alone is the same.
+        let alone = layer_rows(&input, 1, &options).expect("a layer").expect("on the canvas");
+        let mut row = vec![0.0; alone.width() * 4];
+        alone.linear_row(30, &mut row).expect("a row");
+        let expected = light(alone.left as f64 + 40.5);
+        assert!((f64::from(row[4 * 40]) / expected - 1.0).abs() < 0.01, "{blend:?}: {}", row[4 * 40]);
     }
 }

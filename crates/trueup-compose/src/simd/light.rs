@@ -76,8 +76,8 @@ pub(crate) struct Development<'a> {
     pub(crate) border_footprint: Option<[f32; 2]>,
 }
 
-/// Turns `samples` (red, green, blue, alpha from 0 to 255) in place into square roots of corrected linear light and the
-/// share of the canvas pixel that is covered, 0 to 1.
+/// Turns `samples` (red, green, blue, alpha from 0 to 255) in place into square roots of corrected linear light, or fourth roots where what
+/// is brighter than white is kept, and the share of the canvas pixel that is covered, 0 to 1.
 pub(crate) fn develop(development: Development<'_>, positions: &Positions, samples: &mut [[f32; 4]]) {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
@@ -97,6 +97,9 @@ fn develop_portable(development: Development<'_>, positions: &Positions, samples
         let samples = &mut samples[block.clone()];
         let mut roots = corrected(light, samples, &lifts);
         roots.iter_mut().flatten().for_each(|value| *value = value.sqrt());
+        if light.keeps_light {
+            roots.iter_mut().flatten().for_each(|value| *value = value.sqrt());
+        }
         for (at, (index, sample)) in block.zip(samples).enumerate() {
             let share = share(sample[3], feather, border_footprint, positions, index);
             *sample = [roots[0][at], roots[1][at], roots[2][at], share];
@@ -135,6 +138,12 @@ fn corrected(light: &LightTable, samples: &[[f32; 4]], lifts: &[f32; BLOCK]) -> 
     }
     for (channel, gain) in levels.iter_mut().zip(light.gain) {
         *channel = light.linearize.linear_all(*channel);
+        if light.keeps_light {
+            for (value, lift) in channel.iter_mut().zip(lifts) {
+                *value *= gain * lift;
+            }
+            continue;
+        }
         for (value, lift) in channel.iter_mut().zip(lifts) {
             *value = exposed(*value, gain * lift);
         }

@@ -8,6 +8,7 @@ use super::sampling::SAMPLING;
 use super::view::{CLIPPED, IGNORED, KEPT, PARTLY, SmallPixel, SmallView, WHOLLY};
 use crate::ignored::in_mask;
 use crate::layout::columns_around;
+use crate::transfer_curve::EncodeRoots;
 use crate::warped::{SamplingMemory, WarpedPhotograph};
 use crate::weights::WHOLE;
 use crate::window::Window;
@@ -15,8 +16,14 @@ use crate::window::Window;
 /// Level of the camera's own values (0 to 255) from which on a channel counts as saturated.
 const SATURATED: f32 = 252.0;
 
-/// A photograph as the search for seams sees it; `period` is the width of the small canvas if it is a cylinder.
-pub(super) fn small_view(warped: &WarpedPhotograph<'_>, masks: &Masks, period: Option<usize>) -> SmallView {
+/// A photograph as the search for seams sees it; `period` is the width of the small canvas if it is a cylinder. `view_levels` are those
+/// of [`Encoding::view_levels`](crate::transfer_curve::Encoding::view_levels).
+pub(super) fn small_view(
+    warped: &WarpedPhotograph<'_>,
+    masks: &Masks,
+    period: Option<usize>,
+    view_levels: Option<&EncodeRoots>,
+) -> SmallView {
     let (all, rows) = (warped.columns(), warped.rows());
     let columns = all.start..all.end.min(all.start + period.unwrap_or(all.len()));
     let mut samples = vec![[0.0; 4]; columns.len() * rows.len()];
@@ -32,7 +39,10 @@ pub(super) fn small_view(warped: &WarpedPhotograph<'_>, masks: &Masks, period: O
         .zip(clipped)
         .map(|(&[r, g, b, share], clipped)| {
             // The casts saturate.
-            let level = |root: f32| (root * 255.0 + 0.5) as u8;
+            let level = |root: f32| match view_levels {
+                Some(levels) => levels.level((root * f32::from(u16::MAX) + 0.5) as u16),
+                None => (root * 255.0 + 0.5) as u8,
+            };
             let flags = (u8::from(share > 0.0) * PARTLY)
                 | (u8::from(share >= WHOLE) * WHOLLY)
                 | (u8::from(clipped && share > 0.0) * CLIPPED);

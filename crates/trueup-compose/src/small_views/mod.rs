@@ -47,6 +47,8 @@ pub(crate) struct SmallViewsInput<'a> {
     /// What is done to the light of all of them, over the layout that was unrolled.
     pub(crate) local: Option<&'a LocalExposure>,
     pub(crate) photographs: &'a dyn PhotographSource,
+    /// Levels of the views by their roots, where these are not the levels; see [`Encoding::view_levels`](crate::transfer_curve::Encoding::view_levels).
+    pub(crate) view_levels: Option<&'a EncodeRoots>,
     /// Log2 of the canvas pixels per sample of the coarse levels; `None` if there are to be none.
     pub(crate) first_level: Option<u32>,
     /// The border at which a frame is chosen; `None` if none is.
@@ -243,7 +245,7 @@ impl Making<'_> {
         let masks = photographs.masks(placed.photograph);
         let view = match layout.placed.len() {
             1 => SmallView::default(),
-            _ => small_view(&warped, &masks, period),
+            _ => small_view(&warped, &masks, period, self.input.view_levels),
         };
         let local_unrolled = local.map(|local| local.led_by(unrolled.lead()));
         let light = PhotographLight { local: local_unrolled.as_ref(), ..light };

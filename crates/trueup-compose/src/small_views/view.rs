@@ -19,7 +19,8 @@ pub const IGNORED: u8 = 8;
 /// The user wants this photograph here.
 pub const KEPT: u8 = 16;
 
-/// One pixel of a view: red, green and blue (square root of linear light, 255 is white) and flags.
+/// One pixel of a view: red, green and blue (square root of linear light, 255 is white; where what is brighter than white is kept, as it is
+/// written with 8 bits) and flags.
 pub type SmallPixel = [u8; 4];
 
 /// Brightness of a pixel in 256ths of a level: Rec. 601 luma.

@@ -4,7 +4,8 @@ use std::sync::{Arc, LazyLock};
 
 use trueup_core::color::TransferCurve;
 
-use super::by_curve::table_of;
+use super::ScaledCurve;
+use super::by_curve::scaled_table_of;
 
 /// Steps of [`Encode16`]. Against the square root of linear light sRGB's curve bends by at most 25.8 (twice its slope near
 /// black, 12.92), so that the chord between entries is off by 25.8 / 8 / 4095^2 = 2e-7: an 80th of a 16-bit step. Where
@@ -17,22 +18,24 @@ const ROOT_STEPS: usize = 4095;
 pub(crate) struct Encode16 {
     /// Value, 0 to 65535, where the square root is entry `i` / 4095, and the difference to the next entry.
     entries: [[f32; 2]; ROOT_STEPS + 1],
+    /// Whether entries are by the fourth root of the light.
+    is_fourth_root: bool,
 }
 
 impl Encode16 {
     /// The table of a curve.
-    pub(crate) fn of(curve: &TransferCurve) -> Arc<Self> {
-        static SRGB: LazyLock<Arc<Encode16>> = LazyLock::new(|| Arc::new(Encode16::new(&TransferCurve::SRGB)));
-        table_of(curve, &SRGB, Self::new)
+    pub(crate) fn of<'a>(curve: impl Into<ScaledCurve<'a>>) -> Arc<Self> {
+        static SRGB: LazyLock<Arc<Encode16>> = LazyLock::new(|| Arc::new(Encode16::new((&TransferCurve::SRGB).into())));
+        scaled_table_of(curve.into(), &SRGB, Self::new)
     }
 
-    fn new(curve: &TransferCurve) -> Self {
+    fn new(curve: ScaledCurve) -> Self {
         let value = |index: usize| {
             let root = index.min(ROOT_STEPS) as f64 / ROOT_STEPS as f64;
-            65535.0 * curve.encoded(root * root)
+            65535.0 * curve.encoded(curve.light_of_root(root))
         };
         let entry = |index| [value(index) as f32, (value(index + 1) - value(index)) as f32];
-        Self { entries: std::array::from_fn(entry) }
+        Self { entries: std::array::from_fn(entry), is_fourth_root: curve.keeps_light() }
     }
 
     /// The nearest 16-bit level; values outside 0 to 1 are clamped, NaN gives 0.
@@ -40,7 +43,8 @@ impl Encode16 {
     pub(crate) fn level(&self, linear: f32) -> u16 {
         // `max` first: unlike `clamp`, it turns NaN into a number.
         #[allow(clippy::manual_clamp)]
-        let position = linear.max(0.0).min(1.0).sqrt() * ROOT_STEPS as f32;
+        let root = linear.max(0.0).min(1.0).sqrt();
+        let position = if self.is_fourth_root { root.sqrt() } else { root } * ROOT_STEPS as f32;
         let index = position as usize;
         let [value, step] = self.entries[index.min(ROOT_STEPS)];
         // The addition rounds; the conversion truncates.
@@ -58,16 +62,16 @@ pub(crate) struct EncodeRoots16 {
 
 impl EncodeRoots16 {
     /// The table of a curve.
-    pub(crate) fn of(curve: &TransferCurve) -> Arc<Self> {
+    pub(crate) fn of<'a>(curve: impl Into<ScaledCurve<'a>>) -> Arc<Self> {
         static SRGB: LazyLock<Arc<EncodeRoots16>> =
-            LazyLock::new(|| Arc::new(EncodeRoots16::new(&TransferCurve::SRGB)));
-        table_of(curve, &SRGB, Self::new)
+            LazyLock::new(|| Arc::new(EncodeRoots16::new((&TransferCurve::SRGB).into())));
+        scaled_table_of(curve.into(), &SRGB, Self::new)
     }
 
-    fn new(curve: &TransferCurve) -> Self {
+    fn new(curve: ScaledCurve) -> Self {
         let level = |root: u16| {
             let root = f64::from(root) / 65535.0;
-            (65535.0 * curve.encoded(root * root)).round() as u16
+            (65535.0 * curve.encoded(curve.light_of_root(root))).round() as u16
         };
         Self { levels: (0..=u16::MAX).map(level).collect() }
     }

@@ -4,7 +4,8 @@ use std::sync::{Arc, LazyLock};
 
 use trueup_core::color::TransferCurve;
 
-use super::by_curve::table_of;
+use super::ScaledCurve;
+use super::by_curve::scaled_table_of;
 
 /// 8-bit levels from linear light, exact to rounding.
 #[derive(Debug)]
@@ -29,12 +30,12 @@ const NO_LIGHT: f32 = 1.0 / (1_u64 << 40) as f32;
 
 impl Encode {
     /// The table of a curve.
-    pub(crate) fn of(curve: &TransferCurve) -> Arc<Self> {
-        static SRGB: LazyLock<Arc<Encode>> = LazyLock::new(|| Arc::new(Encode::new(&TransferCurve::SRGB)));
-        table_of(curve, &SRGB, Self::new)
+    pub(crate) fn of<'a>(curve: impl Into<ScaledCurve<'a>>) -> Arc<Self> {
+        static SRGB: LazyLock<Arc<Encode>> = LazyLock::new(|| Arc::new(Encode::new((&TransferCurve::SRGB).into())));
+        scaled_table_of(curve.into(), &SRGB, Self::new)
     }
 
-    fn new(curve: &TransferCurve) -> Self {
+    fn new(curve: ScaledCurve) -> Self {
         let mut threshold = [f32::INFINITY; 256];
         for (level, value) in threshold.iter_mut().enumerate().take(255) {
             // Black stays black where a curve starts level, as tables of 16 bits do.
@@ -86,16 +87,18 @@ pub(crate) struct EncodeRoots {
 
 impl EncodeRoots {
     /// The table of a curve.
-    pub(crate) fn of(curve: &TransferCurve) -> Arc<Self> {
-        static SRGB: LazyLock<Arc<EncodeRoots>> = LazyLock::new(|| Arc::new(EncodeRoots::new(&TransferCurve::SRGB)));
-        table_of(curve, &SRGB, Self::new)
+    pub(crate) fn of<'a>(curve: impl Into<ScaledCurve<'a>>) -> Arc<Self> {
+        static SRGB: LazyLock<Arc<EncodeRoots>> =
+            LazyLock::new(|| Arc::new(EncodeRoots::new((&TransferCurve::SRGB).into())));
+        scaled_table_of(curve.into(), &SRGB, Self::new)
     }
 
-    fn new(curve: &TransferCurve) -> Self {
+    fn new(curve: ScaledCurve) -> Self {
         let encode = Encode::of(curve);
         let level = |root: u16| {
             let root = f32::from(root) / 65535.0;
-            encode.level(root * root)
+            let square = root * root;
+            encode.level(if curve.keeps_light() { square * square } else { square })
         };
         Self { levels: (0..=u16::MAX).map(level).collect() }
     }

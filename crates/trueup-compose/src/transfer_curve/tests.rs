@@ -11,7 +11,7 @@ fn curves() -> Vec<TransferCurve> {
 #[test]
 fn every_level_survives_the_round_trip() {
     for curve in curves() {
-        let (linearize, encoding) = (Linearize::of(&curve), Encoding::new(curve.clone()));
+        let (linearize, encoding) = (Linearize::of(&curve), Encoding::new(curve.clone(), 1.0));
         for level in 0..=255_u8 {
             let linear = linearize.linear(f32::from(level));
             assert_eq!(encoding.linear.level(linear), level, "{curve:?}");
@@ -40,7 +40,7 @@ fn encoding_rounds_as_the_formula_does() {
 #[test]
 fn a_curve_with_a_level_stretch_is_encoded_without_harm() {
     let curve = TransferCurve::table(vec![0.0, 0.0, 0.4, 0.4, 1.0]).expect("a curve");
-    let encoding = Encoding::new(curve);
+    let encoding = Encoding::new(curve, 1.0);
     assert_eq!((encoding.linear.level(0.0), encoding.linear.level(1.0)), (0, 255));
     assert!((127..=192).contains(&encoding.linear.level(0.4)));
 }

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use super::light_range::{LightCurve, LightRange};
+
 /// The transfer curve of a color space: what share of full light an encoded sample stands for.
 ///
 /// Encoded values and light run from 0 to 1; values outside are clamped. Every curve starts at 0, ends at 1 and never
@@ -20,6 +22,8 @@ enum Kind {
     Parametric([f64; 7]),
     /// Light at evenly spaced encoded values, straight between them.
     Table(Arc<[f64]>),
+    /// Light that may be brighter than white.
+    Light(LightCurve),
 }
 
 /// Most that two curves may differ, in encoded values, and be the same for pictures: half an 8-bit level.
@@ -73,6 +77,7 @@ impl TransferCurve {
                 unit((a * x + b).max(0.0).powf(*g) + e).max(c * d + f)
             }
             Kind::Parametric([_, _, _, c, _, _, f]) => unit(c * x + f),
+            Kind::Light(curve) => curve.linear(x, |encoded| Self::SRGB.linear(encoded)),
             Kind::Table(samples) => {
                 let position = x * (samples.len() - 1) as f64;
                 let below = (position as usize).min(samples.len() - 2);
@@ -96,6 +101,7 @@ impl TransferCurve {
                 let straight = if *c > 0.0 { (y - f) / c } else { *d };
                 if straight < *d { unit(straight) } else { curved.max(*d) }
             }
+            Kind::Light(curve) => curve.encoded(y, |linear| Self::SRGB.encoded(linear)),
             Kind::Table(samples) => {
                 // The stretch that may be level: from the last sample below to the first above.
                 let low = samples.partition_point(|&sample| sample < y);
@@ -125,6 +131,20 @@ impl TransferCurve {
     /// sRGB's own form where it is that curve but for rounding, as the tables of most sRGB profiles are.
     pub fn simplified(self) -> Self {
         if self.is_same(&Self::SRGB) { Self::SRGB } else { self }
+    }
+
+    /// The curve of samples that keep what is brighter than white: full light is [`LightRange::peak`]. `None` if the range is not
+    /// [sound](LightRange::is_sound).
+    pub fn light(range: LightRange) -> Option<Self> {
+        LightCurve::new(range).map(|curve| Self(Kind::Light(curve)))
+    }
+
+    /// What full light is, where samples keep what is brighter than white; `None` where it is white.
+    pub fn light_range(&self) -> Option<LightRange> {
+        match &self.0 {
+            Kind::Light(curve) => Some(curve.range),
+            _ => None,
+        }
     }
 
     fn if_usable(self) -> Option<Self> {

@@ -19,7 +19,7 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use convert::Conversion;
+pub(crate) use convert::{Conversion, relit};
 pub use icc::srgb_profile;
 pub(crate) use named::{Chromaticities, profile_of_chromaticities, profile_of_code_points};
 pub(crate) use rows::InSrgb;

@@ -51,6 +51,15 @@ impl PhotographColors {
     /// converted to the one chosen among the others, or to sRGB; gray has no gamut and does not take part in the choice.
     /// A profile that cannot be understood is as good as none; a warning says so.
     pub fn survey(sources: &[SourceImage], context: &StageContext) -> Self {
+        Self::surveyed(sources, None, context)
+    }
+
+    /// The same with sRGB for all: what light beyond white is composed in.
+    pub fn survey_to_srgb(sources: &[SourceImage], context: &StageContext) -> Self {
+        Self::surveyed(sources, Some(RgbSpace::srgb()), context)
+    }
+
+    fn surveyed(sources: &[SourceImage], wanted: Option<RgbSpace>, context: &StageContext) -> Self {
         let read: Vec<(Meaning, Option<Diagnostic>)> =
             sources.par_iter().enumerate().map(|(number, source)| meaning(number, source)).collect();
         let (meanings, findings): (Vec<_>, Vec<_>) = read.into_iter().unzip();
@@ -67,7 +76,7 @@ impl PhotographColors {
                 space = Some(candidate);
             }
         }
-        let space = space.cloned().unwrap_or_else(RgbSpace::srgb);
+        let space = wanted.or_else(|| space.cloned()).unwrap_or_else(RgbSpace::srgb);
         let conversions: Vec<_> = meanings.iter().map(|meaning| conversion(meaning, &space)).collect();
         let of_stack = |stack: &Vec<Meaning>| stack.iter().map(|meaning| conversion(meaning, &space)).collect();
         let of_stacks = stacks.iter().map(of_stack).collect();

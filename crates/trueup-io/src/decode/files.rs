@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use trueup_core::color::TransferCurve;
+use trueup_core::color::{LightRange, TransferCurve};
 use trueup_core::mask::Masks;
 use trueup_core::raster::Photograph;
 use trueup_core::source::{AlignedPhotograph, PhotographSource, SourceImage, StackFusion, StackMember, WorkingFrame};
@@ -11,7 +11,7 @@ use trueup_core::{Error, Result};
 
 use super::photograph::{decoding_surplus, photograph, sample_bits};
 use super::working::{WorkingPicture, reduce_photograph};
-use crate::color::{Conversion, PhotographColors};
+use crate::color::{Conversion, PhotographColors, relit};
 use crate::source::InMemory;
 
 /// Photographs in files and in memory. What [`working`](Self::working) decodes is kept, within a budget of bytes, until
@@ -26,6 +26,8 @@ pub struct FilePhotographs {
     /// By index; those beyond the end have none.
     masks: Vec<Masks>,
     colors: Option<PhotographColors>,
+    /// The light that all are handed out in, where what is brighter than white is kept, and its curve.
+    light: Option<(LightRange, TransferCurve)>,
     /// Who makes one photograph of a stack.
     fusion: Option<Arc<dyn StackFusion>>,
     kept: Mutex<Kept>,
@@ -46,7 +48,16 @@ impl FilePhotographs {
         let photographs = sources.iter().map(|_| None).collect();
         let bytes = sources.iter().map(|_| AtomicUsize::new(0)).collect();
         let kept = Mutex::new(Kept { photographs, free_bytes: cache_bytes });
-        Self { sources, in_memory: InMemory::default(), masks: Vec::new(), colors: None, fusion: None, bytes, kept }
+        Self {
+            sources,
+            in_memory: InMemory::default(),
+            masks: Vec::new(),
+            colors: None,
+            light: None,
+            fusion: None,
+            bytes,
+            kept,
+        }
     }
 
     /// The same with the pixels of those that are no files: they count for nothing in the budget.
@@ -66,7 +77,15 @@ impl FilePhotographs {
         Self { colors: Some(colors), ..self }
     }
 
-    /// The same, where photographs that are stacks are fused by `fusion`. Without, a stack is its reference.
+    /// The same, which hands all of them out as light of a range, 16 bits a sample, in which what is brighter than white is kept:
+    /// stacks are merged to it. Those of floating point numbers have the same [`SourceImage::light`]. A range that is not sound is none.
+    #[must_use]
+    pub fn in_light(self, range: Option<LightRange>) -> Self {
+        let light = range.and_then(|range| Some((range, TransferCurve::light(range)?)));
+        Self { light, ..self }
+    }
+
+    /// The same, where photographs that are stacks are fused, or merged, by `fusion`. Without, a stack is its reference.
     #[must_use]
     pub fn fused_by(self, fusion: Arc<dyn StackFusion>) -> Self {
         Self { fusion: Some(fusion), ..self }
@@ -89,6 +108,11 @@ impl FilePhotographs {
     /// The color space that photographs are handed out in, if it was asked for.
     pub fn colors(&self) -> Option<&PhotographColors> {
         self.colors.as_ref()
+    }
+
+    /// The light that all are handed out in, if what is brighter than white is kept.
+    pub fn light(&self) -> Option<LightRange> {
+        self.light.as_ref().map(|(range, _)| *range)
     }
 
     /// The photographs this hands out, in order.
@@ -126,7 +150,7 @@ impl FilePhotographs {
         let source = self.source(index)?;
         let whole = |photograph: &Photograph| reduce_photograph(photograph, &source.name, frame, thumbnail_max_area);
         // As it is, without a copy.
-        let is_as_given = self.conversion(index).is_none() && source.stack.is_empty();
+        let is_as_given = self.conversion(index).is_none() && source.stack.is_empty() && self.light.is_none();
         if let Some(photograph) = self.in_memory(index).filter(|_| is_as_given) {
             return whole(photograph);
         }
@@ -148,34 +172,69 @@ impl FilePhotographs {
     }
 
     fn decode(&self, index: usize, source: &SourceImage) -> Result<Photograph> {
-        let mut photograph = match self.in_memory(index) {
-            Some(photograph) => photograph.clone(),
-            None => photograph(source)?,
+        let reference = self.decoded(source, self.conversion(index))?;
+        let photograph = match &self.fusion {
+            Some(fusion) if !source.stack.is_empty() => self.of_stack(index, source, reference, fusion.as_ref())?,
+            _ => self.in_common_light(reference, source)?,
         };
-        if let Some(conversion) = self.conversion(index) {
-            photograph = conversion.apply(photograph, &source.name)?;
-        }
-        if let (Some(fusion), false) = (&self.fusion, source.stack.is_empty()) {
-            photograph = fusion.fuse(&photograph, &self.decoded_stack(index, source)?)?;
-        }
         if let Some(bytes) = self.bytes.get(index) {
             bytes.store(photograph.bytes(), Ordering::Relaxed);
         }
         Ok(photograph)
     }
 
-    /// The other exposures of photograph `index`.
-    fn decoded_stack(&self, index: usize, source: &SourceImage) -> Result<Vec<AlignedPhotograph>> {
-        let decoded = |(number, member): (usize, &StackMember)| {
-            let given = self.in_memory.of(&member.source).map(|photograph| photograph.as_ref().clone());
-            let mut decoded = given.map_or_else(|| photograph(&member.source), Ok)?;
-            if let Some(conversion) = self.colors.as_ref().and_then(|colors| colors.member_conversion(index, number)) {
-                decoded = conversion.apply(decoded, &member.source.name)?;
+    /// One file, or what is in memory in its place, in the common color space.
+    fn decoded(&self, source: &SourceImage, conversion: Option<&Conversion>) -> Result<Photograph> {
+        let given = self.in_memory.of(source).map(|photograph| photograph.as_ref().clone());
+        let decoded = given.map_or_else(|| photograph(source), Ok)?;
+        match (conversion, source.light.and_then(TransferCurve::light)) {
+            (None, _) => Ok(decoded),
+            (Some(conversion), None) => conversion.apply(decoded, &source.name),
+            (Some(conversion), Some(curve)) => conversion.apply_to_light(decoded, &curve, &source.name),
+        }
+    }
+
+    /// A photograph in the light that all are handed out in.
+    fn in_common_light(&self, photograph: Photograph, source: &SourceImage) -> Result<Photograph> {
+        match &self.light {
+            Some((range, curve)) if source.light.is_none() => {
+                relit(&photograph, &self.profile_curve(), curve, range.peak)
             }
-            let reference_from_member = member.reference_from_member;
-            Ok(AlignedPhotograph { photograph: decoded, reference_from_member })
+            _ => Ok(photograph),
+        }
+    }
+
+    /// What becomes of the stack whose `reference` is photograph `index`.
+    fn of_stack(
+        &self,
+        index: usize,
+        source: &SourceImage,
+        reference: Photograph,
+        fusion: &dyn StackFusion,
+    ) -> Result<Photograph> {
+        let conversion =
+            |number: usize| self.colors.as_ref().and_then(|colors| colors.member_conversion(index, number));
+        // Files of whole numbers are merged as they are, which know where they end.
+        let is_light = source.light.is_some() || source.stack.iter().any(|member| member.source.light.is_some());
+        let in_light = |photograph: Photograph, source: &SourceImage| match is_light {
+            true => self.in_common_light(photograph, source),
+            false => Ok(photograph),
         };
-        source.stack.iter().enumerate().map(decoded).collect()
+        let member = |(number, member): (usize, &StackMember)| {
+            let photograph = in_light(self.decoded(&member.source, conversion(number))?, &member.source)?;
+            Ok(AlignedPhotograph { photograph, reference_from_member: member.reference_from_member })
+        };
+        let others = source.stack.iter().enumerate().map(member).collect::<Result<Vec<_>>>()?;
+        match &self.light {
+            None => fusion.fuse(&reference, &others),
+            Some((_, light)) if is_light => fusion.merge(&in_light(reference, source)?, &others, light, light),
+            Some((_, light)) => fusion.merge(&reference, &others, &self.profile_curve(), light),
+        }
+    }
+
+    /// How samples in the common color space stand for light.
+    fn profile_curve(&self) -> TransferCurve {
+        self.colors.as_ref().map_or(TransferCurve::SRGB, |colors| colors.transfer_curve().clone())
     }
 
     fn conversion(&self, index: usize) -> Option<&Conversion> {
@@ -237,6 +296,6 @@ impl PhotographSource for FilePhotographs {
     }
 
     fn transfer_curve(&self) -> TransferCurve {
-        self.colors.as_ref().map_or(TransferCurve::SRGB, |colors| colors.transfer_curve().clone())
+        self.light.as_ref().map_or_else(|| self.profile_curve(), |(_, curve)| curve.clone())
     }
 }

@@ -17,7 +17,7 @@ use crate::metadata::header;
 ///
 /// Gray stays one channel; gray with alpha becomes RGBA; palettes, CMYK and one-bit photographs become RGB or gray;
 /// 16 bits a sample stay 16; floating point is taken for linear light, 1 for white, and becomes 16 bits of sRGB, what is
-/// brighter than white becoming white.
+/// brighter than white becoming white; with [`SourceImage::light`], 16 bits of that, in which it stays.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read, [`Error::Input`] if its pixels are damaged or incomplete (no missing part

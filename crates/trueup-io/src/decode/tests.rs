@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use tempfile::TempDir;
+use trueup_core::color::{LightRange, TransferCurve};
 use trueup_core::raster::Photograph;
 use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
 use trueup_core::{Error, StageContext};
@@ -86,6 +87,32 @@ fn floating_point_is_linear_light() {
     // IEC 61966-2-1: 1.055 * 0.5^(1 / 2.4) - 0.055 = 0.735357, of 65535.
     assert_eq!(raster.pixel(0, 0), [48_192, 0, 65_535]);
     assert_eq!(sample_bits(&source).expect("a header"), 32);
+    assert!(source.is_float && source.light.is_none());
+    // What is brighter than white is kept in a range that holds it.
+    let range = LightRange { white: 1.0, peak: 8.0 };
+    let curve = TransferCurve::light(range).expect("a range");
+    let source = SourceImage { light: Some(range), ..source };
+    let Photograph::Sixteen(raster) = photograph(&source).expect("a photograph") else { panic!("8 bit") };
+    for (sample, light) in raster.pixel(3, 4).iter().zip([0.5, 0.0, 7.0]) {
+        assert!((8.0 * curve.linear(f64::from(*sample) / 65535.0) - light).abs() <= 1e-3 * light, "{sample}");
+    }
+}
+
+/// Ordinary photographs beside light stand for the same light as before.
+#[test]
+fn photographs_are_handed_out_in_light() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let source = examine(write(&folder, "picture.png", &rgb8().file(Container::Png)));
+    let Photograph::Eight(own) = photograph(&source).expect("a photograph") else { panic!("16 bit") };
+    let range = LightRange { white: 2.0, peak: 30.0 };
+    let files = FilePhotographs::new(vec![source], 0).in_light(Some(range));
+    assert_eq!(files.light(), Some(range));
+    let Photograph::Sixteen(raster) = files.photograph(0).expect("decoded") else { panic!("8 bit") };
+    for (sample, level) in raster.pixel(11, 5).iter().zip(own.pixel(11, 5)) {
+        let light = 30.0 * files.transfer_curve().linear(f64::from(*sample) / 65535.0);
+        let expected = TransferCurve::SRGB.linear(f64::from(*level) / 255.0);
+        assert!((light - expected).abs() <= 1e-3 * expected, "{light} {expected}");
+    }
 }
 
 #[test]

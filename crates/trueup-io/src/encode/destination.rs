@@ -91,4 +91,9 @@ impl OutputOptions {
         };
         Self { depth, ..self.clone() }
     }
+
+    /// Whether what is written to `path` keeps what is brighter than white: floating point samples do.
+    pub fn keeps_light(&self, path: &Path) -> bool {
+        self.with_depth_for(path, u8::BITS as u16).depth == Depth::Float
+    }
 }

@@ -217,4 +217,6 @@ fn a_depth_that_a_format_has_not_is_refused_with_advice() {
     assert_eq!([depth("a.tif", 8), depth("a.jpg", 16), depth("a.dzi", 16)], [Depth::Eight; 3]);
     let chosen = OutputOptions { depth: Depth::Float, ..OutputOptions::default() };
     assert_eq!(chosen.with_depth_for(Path::new("a.tif"), 8).depth, Depth::Float);
+    assert!(chosen.keeps_light(Path::new("a.tif")) && auto.keeps_light(Path::new("a.exr")));
+    assert!(!auto.keeps_light(Path::new("a.tif")) && !auto.keeps_light(Path::new("a.jpg")));
 }

@@ -56,6 +56,8 @@ pub(super) fn in_memory_source(path: PathBuf, name: &str, photograph: &Photograp
         focal_mm: None,
         gravity: None,
         lens: None,
+        is_float: false,
+        light: None,
         stack: Vec::new(),
     })
 }

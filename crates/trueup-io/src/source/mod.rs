@@ -196,7 +196,7 @@ fn examine(
         context.report(Diagnostic::note(
             "floating-point",
             Subject::Photograph(number),
-            "its samples are floating point numbers, taken for linear light with 1 for white; what is brighter is white",
+            "its samples are floating point numbers, taken for linear light",
             "If it looks wrong, export it with 16 bits a sample.",
         ));
     }
@@ -237,6 +237,8 @@ fn examine(
         focal_mm,
         gravity,
         lens: None,
+        is_float: stored.is_float,
+        light: None,
         stack: Vec::new(),
     })
 }

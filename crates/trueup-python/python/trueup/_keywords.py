@@ -92,7 +92,7 @@ class StitchKeywords(ComposeKeywords, total=False):
     """Field of view of every photograph across its longer side, through the whole lens, by any calibration or
     specification; the matches may still change the focal length by up to 5 %. Say it where photographs carry no focal
     length, or a wrong one; 0 leaves it to them (default 0.0)."""
-    stacks: Literal["auto", "none"]
+    stacks: Literal["auto", "light", "none"]
     """Which photographs are fused before they are stitched: consecutive ones that show one view at several exposures (a
     bracket). Choose none to have each of them stitched as it is (default auto)."""
     method: Literal[
@@ -154,7 +154,7 @@ class BatchKeywords(SaveKeywords, total=False):
     """Field of view of every photograph across its longer side, through the whole lens, by any calibration or
     specification; the matches may still change the focal length by up to 5 %. Say it where photographs carry no focal
     length, or a wrong one; 0 leaves it to them (default 0.0)."""
-    stacks: Literal["auto", "none"]
+    stacks: Literal["auto", "light", "none"]
     """Which photographs are fused before they are stitched: consecutive ones that show one view at several exposures (a
     bracket). Choose none to have each of them stitched as it is (default auto)."""
     scale: float

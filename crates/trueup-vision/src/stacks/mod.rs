@@ -41,8 +41,11 @@ const MOST_MEMBERS: usize = 9;
 trueup_core::choice! {
     /// Which photographs are fused.
     pub enum Fuse {
-        /// Consecutive photographs of one view at several exposures become one photograph.
+        /// Consecutive photographs of one view at several exposures become one photograph: their light where the panorama is written with
+        /// floating point samples, else a picture.
         Auto = "auto",
+        /// The same, always their light: for panoramas of which it is not known how they will be written.
+        Light = "light",
         /// Every photograph stands for itself.
         None = "none",
     }
@@ -52,6 +55,7 @@ trueup_core::options! {
     /// What becomes of photographs of one view at several exposures.
     pub struct StackOptions("stacks") {
         /// Which photographs are fused before they are stitched: consecutive ones that show one view at several exposures (a bracket).
+        /// Choose light for the light of all exposures in a panorama that is not written with floating point samples, or not yet.
         /// Choose none to have each of them stitched as it is.
         fuse: Fuse = Fuse::Auto, Allowed::Any, "", basic;
     }

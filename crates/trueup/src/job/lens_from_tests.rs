@@ -15,6 +15,8 @@ fn image(width: usize, height: usize, orientation: u8) -> SourceImage {
         focal_mm: None,
         gravity: None,
         lens: None,
+        is_float: false,
+        light: None,
         stack: Vec::new(),
     }
 }

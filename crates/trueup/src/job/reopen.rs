@@ -7,6 +7,7 @@ use trueup_core::source::SourceImage;
 use trueup_io::source::InMemory;
 
 use super::masks::{AllMasks, MaskFile, MaskRecord};
+use crate::pipeline::light::WantedLight;
 use crate::pipeline::photographs::FoundPhotographs;
 use crate::pipeline::{Alignment, Stitcher};
 use crate::project::record::{ImageRecord, Project};
@@ -42,7 +43,12 @@ impl Stitcher<'_> {
             AllMasks::read(recorded.masks, &InMemory::default(), &images, &options.measure.source, context)?;
         let known: Vec<&[MaskRecord]> = project.used_images().map(|one| one.masks.as_slice()).collect();
         masks.recall(&known, &images, recorded.project_folder, &options.measure.source, context)?;
-        self.recall(project, FoundPhotographs { images, masks, ..FoundPhotographs::default() })
+        // Other photographs may be of other light.
+        let light = match (project.light, recorded.photographs) {
+            (None, Some(_)) => WantedLight::Surveyed,
+            (light, _) => WantedLight::Known(light),
+        };
+        self.recall(project, FoundPhotographs { images, masks, light, ..FoundPhotographs::default() })
     }
 }
 

@@ -68,6 +68,7 @@ impl StitchJob {
             None => (&self.inputs, &[][..]),
         };
         let stitcher = Stitcher::new(options, context).with_cache(cache);
+        let stitcher = stitcher.writing_to(&self.outputs.panorama);
         let mut aligned = stitcher.align(inputs)?;
         let count = aligned.alignments.len();
         let outputs: Vec<Outputs> =

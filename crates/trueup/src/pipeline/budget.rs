@@ -150,6 +150,8 @@ mod tests {
             focal_mm: None,
             gravity: None,
             lens: None,
+            is_float: false,
+            light: None,
             stack: Vec::new(),
         };
         FilePhotographs::new((0..count).map(image).collect(), 0)

@@ -8,6 +8,7 @@ pub(crate) mod align;
 pub(crate) mod arrange;
 mod budget;
 pub(crate) mod compose;
+pub(crate) mod light;
 mod machine;
 pub(crate) mod matched;
 pub(crate) mod matching;
@@ -104,7 +105,8 @@ impl<'a> Stitcher<'a> {
         Self { workers: workers.map(|workers| Division::new(workers, self.options)), ..self }
     }
 
-    /// The same stitcher for panoramas that will be written to `output`: scratch files go into the same folder, unless
+    /// The same stitcher for panoramas that will be written to `output`: where that keeps light, stacks are merged to light, unless
+    /// `stacks.fuse` says otherwise; scratch files go into the same folder, unless
     /// `resources.scratch` names one, and leave room for them. Without, scratch files go where the system wants temporary
     /// files.
     #[must_use]
@@ -145,7 +147,8 @@ impl<'a> Stitcher<'a> {
             let keep_grays = align::needs_pixels(&self.options.align);
             let input = MeasureInput { set: &found.value, memo, keep_grays, workers: self.workers };
             let measurements = measure::run(&input, &self.options.measure, context)?;
-            let input = StackingInput { found, measurements, graph_file, memo, keep_grays };
+            let keeps_light = self.output.is_some_and(|path| self.options.compose.output.keeps_light(path));
+            let input = StackingInput { found, measurements, graph_file, memo, keep_grays, keeps_light };
             let Stacked { set, measurements, graph_file } = stacking::run(input, self.options, context)?;
             let mut matched = Matched::unmatched(set, measurements, graph_file)?;
             let looked_at = matched.take_features();
@@ -266,6 +269,7 @@ impl<'a> Stitcher<'a> {
             GeometryRecord { component: &component, geometry, arrangement: &arrangement, corrections: &corrections };
         fill_geometry(&mut project, &found);
         project.color_space = photographs.colors().map(PhotographColors::name).unwrap_or_default();
+        project.light = photographs.light();
         project.measures =
             geometry.map(|geometry| context.time("measures", || measuring::run(&component, geometry, &arrangement)));
         let on_side = geometry.and_then(|geometry| sideways::warning(&geometry.cameras.cameras, members));
@@ -301,6 +305,7 @@ impl<'a> Stitcher<'a> {
             let mut project = Project { options: fixed, seconds: Default::default(), ..project.clone() };
             record_composition(&mut project, &used, &set, &arrangement, &corrections);
             project.color_space = set.files.colors().map(PhotographColors::name).unwrap_or_default();
+            project.light = set.files.light();
             if !same_view {
                 project.measures = None;
             }

@@ -13,6 +13,7 @@ use trueup_io::decode::FilePhotographs;
 use trueup_io::source::{self, InMemory, RejectedSource, Sources};
 
 use super::budget::Budget;
+use super::light::{self, WantedLight};
 use crate::job::inputs::{Inputs, Reference};
 use crate::job::lens_from::tell_lenses;
 use crate::job::masks::{AllMasks, MaskRecord};
@@ -32,6 +33,8 @@ pub(crate) struct FoundPhotographs {
     pub rejected: Vec<RejectedSource>,
     /// What is ignored or kept of `images`.
     pub masks: AllMasks,
+    /// In which light they are handed out.
+    pub light: WantedLight,
 }
 
 /// The photographs to be stitched. They are numbered by their place in `images`.
@@ -71,21 +74,35 @@ impl PhotographSet {
             tell_lenses(path, &mut images, context)?;
         }
         let masks = AllMasks::read(&inputs.masks, &inputs.in_memory, &images, accepted, context)?;
-        let found = FoundPhotographs { images, in_memory: inputs.in_memory.clone(), rejected, masks };
+        let light = WantedLight::Surveyed;
+        let found = FoundPhotographs { images, in_memory: inputs.in_memory.clone(), rejected, masks, light };
         Ok(Self { lens_from: inputs.lens_from.clone(), ..Self::open(found, options, context)? })
     }
 
     /// Photographs that are found already.
     ///
     /// # Errors
-    /// [`Error::Limits`] if one is too large for the memory.
+    /// [`Error::Limits`] if one is too large for the memory; [`Error::Cancelled`].
     pub(crate) fn open(found: FoundPhotographs, options: &StitchOptions, context: &StageContext) -> Result<Self> {
-        let FoundPhotographs { images, in_memory, rejected, masks: AllMasks { masks, records } } = found;
-        let files =
-            FilePhotographs::new(images.clone(), 0).with_in_memory(in_memory).fused_by(Arc::new(ExposureFusion));
-        let measuring = Budget::new(&options.run.resources).measuring(&files, options.measure.working.pixels)?;
-        let colors = PhotographColors::survey(&images, context);
-        let files = files.keeping(measuring.kept_bytes).in_colors(colors).with_masks(masks);
+        let FoundPhotographs { images, in_memory, rejected, masks: AllMasks { masks, records }, light } = found;
+        let over = |images: &[SourceImage], cache_bytes: usize| {
+            let files = FilePhotographs::new(images.to_vec(), cache_bytes);
+            files.with_in_memory(in_memory.clone()).fused_by(Arc::new(ExposureFusion))
+        };
+        let budget = Budget::new(&options.run.resources);
+        let measuring = budget.measuring(&over(&images, 0), options.measure.working.pixels)?;
+        let light = match light {
+            WantedLight::Known(light) => light,
+            WantedLight::Surveyed => {
+                context.time("decoding", || light::surveyed(&images, measuring.at_once, context))?
+            }
+        };
+        let images = light::handed_out_in(images, light);
+        let colors = match light {
+            Some(_) => PhotographColors::survey_to_srgb(&images, context),
+            None => PhotographColors::survey(&images, context),
+        };
+        let files = over(&images, measuring.kept_bytes).in_colors(colors).in_light(light).with_masks(masks);
         let (files, at_once) = (Arc::new(files), measuring.at_once);
         Ok(Self { images, rejected, masks: records, lens_from: None, files, at_once })
     }
@@ -95,13 +112,14 @@ impl PhotographSet {
         self.images.iter().map(|image| image.name.clone()).collect()
     }
 
-    /// What decides the pixels of these photographs: their bytes, how they are turned and masked, the color space that they are brought
+    /// What decides the pixels of these photographs: their bytes, how they are turned and masked, the color space and the light that they are brought
     /// to, and of a stack the same of each exposure. `None` for files that cannot be read.
     ///
     /// # Errors
     /// [`Error::Cancelled`].
     pub(crate) fn keys(&self, photographs: &[usize], context: &StageContext) -> Result<Vec<Option<KeyMaker>>> {
         let color_space = self.files.colors().map(|colors| (colors.name(), colors.icc().map(<[u8]>::to_vec)));
+        let color_space = (color_space, self.files.light());
         let content = |maker: KeyMaker, image: &SourceImage| -> Option<KeyMaker> {
             let maker = maker.part(&(image.width, image.height, image.orientation));
             if let Some(photograph) = self.files.in_memory_photographs().of(image) {

@@ -5,6 +5,7 @@ use trueup_core::mask::Masks;
 use trueup_core::source::{PhotographSource, SourceImage};
 
 use super::Stitcher;
+use super::light::WantedLight;
 use super::photographs::FoundPhotographs;
 use super::results::Alignment;
 use crate::job::inputs::Inputs;
@@ -54,7 +55,14 @@ impl Alignment {
         let masks: Vec<Masks> = numbers.iter().map(|&number| self.photographs.masks(number)).collect();
         let records = self.project.used_images().map(|image| image.masks.clone()).collect();
         let in_memory = self.photographs.in_memory_photographs().clone();
-        FoundPhotographs { images, in_memory, rejected: Vec::new(), masks: AllMasks { masks, records } }
+        let masks = AllMasks { masks, records };
+        FoundPhotographs {
+            images,
+            in_memory,
+            rejected: Vec::new(),
+            masks,
+            light: WantedLight::Known(self.photographs.light()),
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 use trueup_align::stitch_graph::GraphFile;
+use trueup_core::color::LightRange;
 use trueup_core::diagnostics::{Diagnostic, Reported, Subject};
 use trueup_core::geometry::Homography;
 use trueup_core::source::{PhotographSource, SourceImage, StackMember, WorkingFrame};
@@ -12,6 +13,7 @@ use trueup_io::source::RejectedSource;
 use trueup_vision::stacks::{self, FoundMember, FoundStack, Fuse, MemberPair, StackCandidate, Unaligned};
 
 use super::align::component::{camera_groups, lens_groups};
+use super::light::{self, WantedLight};
 use super::measure::{self, MeasureInput, Measurements, THUMBNAIL_PIXELS, concerns_one_photograph};
 use super::photographs::{FoundPhotographs, PhotographSet};
 use crate::job::masks::AllMasks;
@@ -31,6 +33,8 @@ pub(super) struct StackingInput<'a> {
     pub graph_file: GraphFile,
     pub memo: Memo<'a>,
     pub keep_grays: bool,
+    /// Whether the panorama will be written with what is brighter than white.
+    pub keeps_light: bool,
 }
 
 /// Photographs of which each stack is one.
@@ -60,9 +64,11 @@ impl AlignedStack {
 /// # Errors
 /// [`trueup_core::Error::Limits`]; [`trueup_core::Error::Cancelled`].
 pub(super) fn run(input: StackingInput, options: &StitchOptions, context: &StageContext) -> Result<Stacked> {
-    let StackingInput { found, measurements, graph_file, memo, keep_grays } = input;
+    let StackingInput { found, measurements, graph_file, memo, keep_grays, keeps_light } = input;
     let stacks = match options.measure.stacks.fuse {
-        Fuse::Auto => context.time(STAGE, || aligned_stacks(&found.value, &measurements.value, options, context))?,
+        Fuse::Auto | Fuse::Light => {
+            context.time(STAGE, || aligned_stacks(&found.value, &measurements.value, options, context))?
+        }
         Fuse::None => Vec::new(),
     };
     if stacks.is_empty() {
@@ -71,19 +77,26 @@ pub(super) fn run(input: StackingInput, options: &StitchOptions, context: &Stage
     }
     let (old, told_of_files) = found.split();
     let (old_measurements, mut told_of_pixels) = measurements.split();
+    let light = old.files.light().or_else(|| {
+        let is_wanted = keeps_light || options.measure.stacks.fuse == Fuse::Light;
+        if is_wanted { range_of_light(&stacks, &old, &old_measurements) } else { None }
+    });
+    // Photographs beside the stacks are handed out in other samples then.
+    let is_new_light = light != old.files.light();
     let numbering = Numbering::new(old.images.len(), &stacks);
     // What was told of an exposure's own features says nothing of the stack.
     let is_of_a_stack =
         |one: &Diagnostic| matches!(one.subject, Subject::Photograph(number) if numbering.is_of_a_stack(number));
-    told_of_pixels.findings.retain(|one| !is_of_a_stack(one));
+    told_of_pixels.findings.retain(|one| !is_new_light && !is_of_a_stack(one));
     context.absorb(told_of_files.renumbered(|number| numbering.new_of(number)));
     context.absorb(told_of_pixels.renumbered(|number| numbering.new_of(number)));
-    let (set, fused) = stacked_set(old, &stacks, &numbering, options, context)?;
+    let (set, fused) = stacked_set(old, &stacks, &numbering, light, options, context)?;
     for (&number, stack) in fused.iter().zip(&stacks) {
         context.report(fused_note(number, stack, &set));
     }
     let input = MeasureInput { set: &set, memo, keep_grays, workers: None };
-    let measured = context.absorb(measure::some(&input, &fused, &options.measure, context)?);
+    let anew: Vec<usize> = if is_new_light { (0..set.images.len()).collect() } else { fused };
+    let measured = context.absorb(measure::some(&input, &anew, &options.measure, context)?);
     let Measurements { photographs, keys } = old_measurements;
     let mut new = Measurements::default();
     for (number, (one, key)) in
@@ -93,7 +106,7 @@ pub(super) fn run(input: StackingInput, options: &StitchOptions, context: &Stage
         new.photographs.push(one);
         new.keys.push(key);
     }
-    for (number, (one, key)) in fused.into_iter().zip(measured.photographs.into_iter().zip(measured.keys)) {
+    for (number, (one, key)) in anew.into_iter().zip(measured.photographs.into_iter().zip(measured.keys)) {
         new.photographs[number] = one;
         new.keys[number] = key;
     }
@@ -234,11 +247,22 @@ fn in_full_pixels(map: &Homography, scale: f64) -> Homography {
     Homography(full)
 }
 
+/// The range of the light that stacks are merged to.
+fn range_of_light(stacks: &[AlignedStack], set: &PhotographSet, measurements: &Measurements) -> Option<LightRange> {
+    let of_stack = |stack: &AlignedStack| {
+        let thumbnail = &measurements.photographs[stack.reference].as_ref().ok()?.thumbnail;
+        let darkest = stack.members.iter().map(|(found, _)| found.stops).fold(0.0, f64::min);
+        Some((thumbnail, darkest))
+    };
+    light::of_stacks(stacks.iter().filter_map(of_stack), &set.files.transfer_curve())
+}
+
 /// The set in which each stack is one photograph, and the numbers of these.
 fn stacked_set(
     old: PhotographSet,
     stacks: &[AlignedStack],
     numbering: &Numbering,
+    light: Option<LightRange>,
     options: &StitchOptions,
     context: &StageContext,
 ) -> Result<(PhotographSet, Vec<usize>)> {
@@ -258,7 +282,8 @@ fn stacked_set(
     };
     let in_memory = old.files.in_memory_photographs().clone();
     let images = kept.iter().map(|&number| images[number].clone()).collect();
-    let found = FoundPhotographs { images, in_memory, rejected, masks };
+    let light = WantedLight::Known(light);
+    let found = FoundPhotographs { images, in_memory, rejected, masks, light };
     // What it says of the photographs' colors was told already.
     let set = context.gather(|context| PhotographSet::open(found, options, context))?.value;
     let fused = stacks.iter().map(|stack| numbering.new_of(stack.reference)).collect();
@@ -287,8 +312,9 @@ fn fused_note(number: usize, stack: &AlignedStack, set: &PhotographSet) -> Diagn
         |(found, member): &(FoundMember, StackMember)| format!("{} ({:+.1} stops)", member.source.name, found.stops);
     let members: Vec<String> = stack.members.iter().map(member).collect();
     let message = format!(
-        "{} exposures of one view were fused in its frame: itself, {}",
+        "{} exposures of one view were {} in its frame: itself, {}",
         set.images[number].stack.len() + 1,
+        if set.files.light().is_some() { "merged to light" } else { "fused" },
         members.join(", ")
     );
     Diagnostic::note(
@@ -382,6 +408,47 @@ mod tests {
         options.set("stacks.fuse=none").expect("an option");
         let alignment = Stitcher::new(&options, &context).align(&inputs).expect("aligned").alignments.remove(0);
         assert!(alignment.project.used() > 2 && alignment.project.images.len() == 6);
+    }
+
+    /// The brightest light of a panorama.
+    fn brightest(panorama: &dyn RowSource) -> f32 {
+        let mut row = vec![0.0; panorama.width() * 4];
+        let mut most = 0.0_f32;
+        for y in 0..panorama.height() {
+            panorama.linear_row(y, &mut row).expect("a row");
+            most = row.chunks_exact(4).flat_map(|pixel| &pixel[..3]).fold(most, |most, &light| most.max(light));
+        }
+        most
+    }
+
+    #[test]
+    fn brackets_are_merged_to_light_where_the_panorama_keeps_it() {
+        let (names, in_memory) = brackets();
+        let inputs = Inputs { in_memory, ..Inputs::new(names) };
+        let mut options = StitchOptions::default();
+        options.set("canvas.scale=0.1").expect("an option");
+        let context = StageContext::default();
+        let picture = Stitcher::new(&options, &context).writing_to(Path::new("pano.jpg"));
+        let mut fused = picture.align(&inputs).expect("aligned").alignments.remove(0);
+        assert_eq!(fused.project.light, None);
+        let fused = picture.compose(&mut fused).expect("composed").panorama;
+        assert!(brightest(&fused) <= 1.0);
+
+        let light = Stitcher::new(&options, &context).writing_to(Path::new("pano.exr"));
+        let mut merged = light.align(&inputs).expect("aligned").alignments.remove(0);
+        let range = merged.project.light.expect("light");
+        assert!(range.peak > range.white && merged.project.used() == 2, "{range:?}");
+        let panorama = light.compose(&mut merged).expect("composed").panorama;
+        // In the unit of the reference, which is the darkest here: what is white in it.
+        assert!((0.9..range.peak as f32).contains(&brightest(&panorama)), "{}", brightest(&panorama));
+        assert_ne!(rows(&panorama), rows(&fused));
+        let mut again = light.rearrange(&merged, None).expect("rearranged");
+        assert_eq!(again.project.light, Some(range));
+        assert_eq!(rows(&light.compose(&mut again).expect("composed").panorama), rows(&panorama));
+        // For a panorama that does not keep it, it must be asked for.
+        options.set("stacks.fuse=light").expect("an option");
+        let asked = Stitcher::new(&options, &context).align(&inputs).expect("aligned").alignments.remove(0);
+        assert_eq!(asked.project.light, Some(range));
     }
 
     #[test]

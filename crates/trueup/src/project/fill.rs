@@ -96,6 +96,7 @@ pub(crate) fn unfilled(
         canvas: Canvas { width: 0, height: 0, full_turn: false },
         color_space: String::new(),
         response: Response::default(),
+        light: None,
         projection: None,
         crop: None,
         mesh_canvas: None,

@@ -60,6 +60,9 @@ impl Recorded {
         records.iter().try_for_each(|record| check_focal(record).and_then(|()| check_stack(record)))?;
         let mut meshes = records.iter().map(|record| solved_grid(record)).collect::<Result<Vec<_>>>()?;
         let corrections = recorded_corrections(project, &records)?;
+        if !project.light.is_none_or(|range| range.is_sound()) {
+            return Err(Error::input("the project", "its range of light is none", AS_WRITTEN));
+        }
         if !project.by_cameras.is_none_or(|plane| plane.is_sound()) {
             return Err(Error::input("the project", "its plane of directions is none", AS_WRITTEN));
         }
@@ -413,6 +416,17 @@ mod tests {
         ] {
             let refused = read(&with(map)).expect_err("far").to_string();
             assert!(refused.starts_with("c.jpg: it does not lie on b.jpg"), "{refused}");
+        }
+    }
+
+    #[test]
+    fn a_range_of_light_that_is_none_is_refused() {
+        for (white, peak, can_be) in
+            [(1.0, 8.0, true), (2.0, 2.0, true), (0.0, 1.0, false), (8.0, 1.0, false), (1e-30, 1e30, false)]
+        {
+            let mut changed = project();
+            changed["light"] = json!({"white": white, "peak": peak});
+            assert_eq!(read(&changed).is_ok(), can_be, "{white} {peak}");
         }
     }
 

@@ -9,6 +9,7 @@ use trueup_align::mesh::CameraPlane;
 use trueup_align::similarity::LevelSource;
 use trueup_compose::exposure::{Correction, Response};
 use trueup_core::camera::Camera;
+use trueup_core::color::LightRange;
 use trueup_core::diagnostics::{Diagnostic, Severity};
 use trueup_core::geometry::matrix_from_rows;
 use trueup_core::lens::{Lens, PlacedLens};
@@ -59,7 +60,7 @@ fn places_or_nowhere<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[
     Ok(places.into_iter().map(|place| place.map(|coordinate| coordinate.unwrap_or(f64::NAN))).collect())
 }
 
-/// Another exposure of the view of a photograph, fused with it. It is of the same size.
+/// Another exposure of the view of a photograph, fused with it, or with [`Project::light`] merged. It is of the same size.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StackMemberRecord {
     /// The file as it was given.
@@ -311,6 +312,9 @@ pub struct Project {
     /// of programs that estimated none.
     #[serde(default)]
     pub response: Response,
+    /// The light that the photographs were handed out in, where what is brighter than white is kept: those of stacks are merged then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light: Option<LightRange>,
     /// How directions were drawn; `None` where the panorama is the mesh itself, and in files of programs that knew no
     /// projections.
     #[serde(default)]

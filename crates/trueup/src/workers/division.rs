@@ -149,8 +149,12 @@ impl<'a> Division<'a> {
     }
 }
 
-/// The photographs as other programs find them; `None` if they cannot: pixels in memory, and marked parts, are only here.
+/// The photographs as other programs find them; `None` if they cannot: pixels in memory, marked parts, and the range of light that is
+/// brighter than white, are only here.
 fn elsewhere(files: &FilePhotographs) -> Option<Vec<SourceImage>> {
+    if files.light().is_some() {
+        return None;
+    }
     let is_only_here = |number: usize| {
         let Masks { ignored, kept } = files.masks(number);
         files.in_memory(number).is_some() || ignored.is_some() || kept.is_some()

@@ -11,6 +11,7 @@ use super::tasks::{
     damaged, read, written,
 };
 use crate::memo::{Memo, PROGRAM};
+use crate::pipeline::light::WantedLight;
 use crate::pipeline::measure::{self, MeasureInput};
 use crate::pipeline::photographs::{FoundPhotographs, PhotographSet};
 use crate::pipeline::{composing_resources, scratch_folder};
@@ -39,7 +40,9 @@ impl Worker {
             ));
         }
         common.options.validate()?;
-        let found = FoundPhotographs { images: common.images.clone(), ..FoundPhotographs::default() };
+        // Only photographs whose light ends at white are handed out.
+        let light = WantedLight::Known(None);
+        let found = FoundPhotographs { images: common.images.clone(), light, ..FoundPhotographs::default() };
         let set = match common.kind {
             Kind::Match => None,
             _ => Some(PhotographSet::open(found, &common.options, context)?),

@@ -167,7 +167,12 @@ pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograp
         image.image_header().metadata.ec_info.iter().any(|extra| extra.alpha_associated() == Some(true));
     if is_float(&image) {
         let samples: Vec<f32> = samples(source, &mut stream)?;
-        return sixteen(width, height, channels, encoded(&straight(samples, channels, is_premultiplied), channels));
+        return sixteen(
+            width,
+            height,
+            channels,
+            encoded(&straight(samples, channels, is_premultiplied), channels, source.light),
+        );
     }
     if bits(&image) > 8 {
         let samples: Vec<u16> = samples(source, &mut stream)?;

@@ -157,7 +157,7 @@ pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograp
     }
     // Colors are stored multiplied by alpha ("OpenEXR File Layout", predefined channel names).
     let samples = straight(samples, channels, true);
-    sixteen(part.width, part.height, channels, encoded(&samples, channels))
+    sixteen(part.width, part.height, channels, encoded(&samples, channels, source.light))
 }
 
 fn colors(input: Input, start: impl Fn(Vec2<usize>) -> Collected) -> exr::error::Result<Collected> {

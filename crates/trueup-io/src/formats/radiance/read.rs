@@ -121,7 +121,7 @@ pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograp
             _ => damaged(source, error),
         })?;
         let lights: Vec<f32> = row.iter().flat_map(|&pixel| light(pixel)).collect();
-        samples.extend(encoded(&lights, 3));
+        samples.extend(encoded(&lights, 3, source.light));
     }
     sixteen(width, height, 3, samples)
 }

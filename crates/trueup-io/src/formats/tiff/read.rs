@@ -85,7 +85,7 @@ pub(super) fn pixels(source: &SourceImage, mut input: Input) -> Result<Photograp
             sixteen(width, height, 3, rgb_of_cmyk(&samples, u16::MAX.into(), |value| value as u16))
         }
         (PixelKind::Float(channels), Samples::Float(samples)) => {
-            sixteen(width, height, channels, encoded(&samples, channels))
+            sixteen(width, height, channels, encoded(&samples, channels, source.light))
         }
         (PixelKind::SmallGray(bits), Samples::Eight(packed)) => {
             let step = u8::MAX / ((1 << bits) - 1);

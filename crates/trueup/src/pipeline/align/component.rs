@@ -151,6 +151,8 @@ mod tests {
             focal_mm,
             gravity: None,
             lens: None,
+            is_float: false,
+            light: None,
             stack: Vec::new(),
         }
     }
