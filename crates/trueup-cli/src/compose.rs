@@ -30,7 +30,10 @@ fn checked(args: ComposeArgs) -> Result<(ComposeJob, StitchOptions), Failure> {
     let outputs = chosen::outputs(args.files);
     chosen::check_files(&outputs, chosen::configuration(&args.tuning))?;
     refuse_over_project(&outputs, &args.recorded)?;
-    let project = inspect::read_to_use(&args.recorded)?;
+    let mut project = inspect::read_to_use(&args.recorded)?;
+    if args.relight {
+        project.forget_light();
+    }
     let options = chosen::options(project.options.clone(), &args.tuning, &args.typed)?;
     let project_folder = args.recorded.parent().unwrap_or(Path::new("")).to_owned();
     let job = ComposeJob {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use trueup::{Error, Project};
+use trueup::{Error, Project, StageContext};
 
 use crate::arguments::InspectArgs;
 use crate::failure::Failure;
@@ -16,17 +16,7 @@ pub(crate) fn run(args: &InspectArgs) -> Result<(), Failure> {
 
 /// Reads a project file.
 pub(crate) fn read(path: &Path) -> Result<Project, Error> {
-    if path.is_dir() {
-        return Err(Error::input(
-            path.display(),
-            "it is a folder",
-            "Give a file that `trueup stitch --project` wrote.",
-        ));
-    }
-    let bytes = std::fs::read(path).map_err(|source| Error::Io { action: "reading", path: path.to_owned(), source })?;
-    // What is no text is no JSON either; the project's own reader says so.
-    let text = String::from_utf8_lossy(&bytes);
-    Project::from_json(&text, &path.display().to_string())
+    trueup::read_project(path, &StageContext::default())
 }
 
 /// Reads a project file that something is to be made of: options that cannot be are the file's fault.

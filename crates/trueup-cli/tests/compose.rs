@@ -56,6 +56,72 @@ fn a_response_is_recorded() {
     assert_eq!(desk.json("again.json")["response"], json!([0.0, 0.0, 0.0, 0.0]));
 }
 
+/// Another shot of the same cameras, half as bright but for one photograph: with the recorded light it would be stripes.
+#[test]
+fn another_shot_of_a_rig_is_lit_anew() {
+    let desk = stitched();
+    std::fs::create_dir(desk.join("shot")).expect("a folder");
+    for (k, (name, pixels)) in STREET_NAMES.iter().zip(street_pixels()).enumerate() {
+        let exposure = if k == 1 { 1.0 } else { 0.5 };
+        let darker = |level: &u8| (f64::from(*level) * exposure) as u8;
+        desk.put(&format!("shot/{name}"), jpeg(&pixels.iter().map(darker).collect::<Vec<u8>>(), WIDTH, HEIGHT));
+    }
+    let brightest = |arguments: &[&str]| {
+        compose(&desk, &[&["--photos", "shot", "--project", "again.json"], arguments].concat()).expect_success();
+        let project = desk.json("again.json");
+        let gains =
+            project["images"].as_array().expect("photographs").iter().map(|one| one["gain"].as_f64().expect("a gain"));
+        gains.clone().fold(0.0, f64::max) / gains.fold(f64::INFINITY, f64::min)
+    };
+    let (recorded, anew) = (brightest(&[]), brightest(&["--relight"]));
+    assert!(recorded < 1.3 && anew > 2.0, "{recorded} {anew}");
+}
+
+/// What `--pto` writes can be composed: the same cameras draw the same view, a little otherwise than the mesh did.
+#[test]
+fn a_hugin_project_is_composed() {
+    let desk = stitched();
+    compose(&desk, &["--pto", "pano.pto"]).expect_success();
+    let composed = |arguments: &[&str]| {
+        let all = [&["compose", "pano.pto", "-o", "again.png", "--project", "again.json"], arguments].concat();
+        finish(trueup(desk.path(), &all))
+    };
+    let run = composed(&[]);
+    assert!(run.expect_success().contains("photographs 4 of 4 used"), "{}", run.stdout);
+    let (project, again) = (desk.json("pano.json"), desk.json("again.json"));
+    // The sphere that the file describes, at the pixel scale of the photographs' middles.
+    assert_eq!(again["projection"]["kind"], "equirectangular");
+    for k in 0..4 {
+        let of = |project: &Value| {
+            let image = &project["images"][k];
+            let rotation = image.get("upright_rotation").filter(|one| one.is_array()).unwrap_or(&image["rotation"]);
+            let numbers: Vec<Vec<f64>> = serde_json::from_value(rotation.clone()).expect("a rotation");
+            (image["focal_px"].as_f64().expect("a focal length"), numbers.concat())
+        };
+        let ((focal, rotation), (focal_again, rotation_again)) = (of(&project), of(&again));
+        assert!((focal / focal_again - 1.0).abs() < 1e-5, "{focal} {focal_again}");
+        let apart = rotation.iter().zip(&rotation_again).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max);
+        assert!(apart < 1e-5, "{apart}");
+    }
+    composed(&["--projection", "perspective"]).expect_success();
+
+    let told = desk.stitch(&[&STREET_NAMES[..2], &["--lens-from", "pano.pto"]].concat());
+    assert!(
+        told.expect_success().contains("lens        told: that of pano.pto, for 2 of 2 photographs"),
+        "{}",
+        told.stdout
+    );
+    let text = String::from_utf8(desk.read("pano.pto")).expect("text");
+    desk.put("masked.pto", format!("{text}k i1 t0 p\"1 1 9 1 9 9\"\n"));
+    let masked = finish(trueup(desk.path(), &["compose", "masked.pto", "-o", "again.png"]));
+    assert!(masked.expect_success().contains("masks parts of it"), "{}", masked.stdout);
+    desk.put("moved.pto", text.replace("TrX0", "TrX0.5"));
+    finish(trueup(desk.path(), &["compose", "moved.pto", "-o", "again.png"]))
+        .expect_failure(1, &["moved.pto", "its camera moved"]);
+    desk.put("a.jpg", plain(WIDTH / 2, HEIGHT, 0));
+    composed(&[]).expect_failure(1, &["the Hugin project has it at"]);
+}
+
 /// Photographs left out of the panorama keep their numbers: a finding names the one that it is about.
 #[test]
 fn findings_of_composing_name_the_photographs_they_are_about() {

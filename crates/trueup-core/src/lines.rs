@@ -23,6 +23,13 @@ impl LineSegment {
     }
 }
 
+/// An edge of a photograph that may be a straight line of the scene behind a lens that bends it: places along it.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct EdgeCurve {
+    /// Places in working pixels, from one end to the other; each is the mean of the edge points around it.
+    pub places: Vec<[f64; 2]>,
+}
+
 /// Segments of two photographs that show the same edge.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairLines {

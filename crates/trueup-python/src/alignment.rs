@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use trueup::{Error, Inputs, PhotographCache, Project, RecordedPanorama, StitchOptions, Stitcher};
+use trueup::{Error, Inputs, PhotographCache, RecordedPanorama, StageContext, StitchOptions, Stitcher};
 
 use crate::errors::exception;
 use crate::keywords::Wishes;
@@ -54,20 +54,20 @@ pub(crate) fn align<'py>(
 }
 
 /// The geometry of the panorama that the project file at `path` records, over its photographs, or those of the same names in the
-/// folder `photographs`.
+/// folder `photographs`. With `relight`, the light of these is evened out anew.
 #[pyfunction]
 pub(crate) fn open_project<'py>(
     py: Python<'py>,
     path: PathBuf,
     photographs: Option<PathBuf>,
+    relight: bool,
     keywords: &Bound<'py, PyDict>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Alignment> {
-    let read = || {
-        let text = std::fs::read_to_string(&path).map_err(|error| Error::io("reading", &path, error))?;
-        Project::from_json(&text, &path.display().to_string())
-    };
-    let project = read().map_err(|error| exception(py, error))?;
+    let mut project = trueup::read_project(&path, &StageContext::default()).map_err(|error| exception(py, error))?;
+    if relight {
+        project.forget_light();
+    }
     let Wishes { options, threads, .. } = Wishes::of(keywords, "compose", project.options.clone())?;
     let project_folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let alignment = run(py, Surroundings { progress, threads }, |context| {

@@ -43,8 +43,9 @@ pub use options::{
 };
 pub use pipeline::{Aligned, Alignment, MatchedPhotographs, Stitcher};
 pub use project::{
-    Canvas, CropRecord, FlatSceneRecord, ImageRecord, ImageStatus, LevelRecord, ManhattanRecord, MeshRecord,
-    PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project, ProjectionRecord, StackMemberRecord, hugin_project,
+    Canvas, CropRecord, FlatSceneRecord, HuginImage, HuginProject, ImageRecord, ImageStatus, LevelRecord,
+    ManhattanRecord, MeshRecord, PROJECT_FORMAT, PROJECT_VERSION, PairRecord, Project, ProjectionRecord,
+    StackMemberRecord, hugin_project, read_project,
 };
 pub use report::brightness::BrightnessStep;
 pub use report::evaluation::{

@@ -7,7 +7,7 @@
 //! # Departures
 //! The unknown of a focal length is its logarithm, so that steps are relative and the sign is safe.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 use trueup_core::camera::{Camera, INTRINSICS};
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
@@ -19,6 +19,7 @@ use super::levenberg_marquardt::{self, LeastSquares};
 use super::observations::{Observations, PairObservations};
 use super::pair_cost::{LENS_LOCAL, PINHOLE_LOCAL, PairTerm, pair_cost};
 use super::prior::CameraPrior;
+use super::straightness::{CurveObservations, CurveTerm, curve_cost};
 
 /// Distance in working pixels beyond which the influence of a match grows only linearly, in the first pass: the start
 /// values are that far off.
@@ -42,7 +43,8 @@ impl Parameters {
         (0..priors.len()).map(|k| self.lenses[k].on(priors[k].camera(self.focal_px[k], &self.rotations[k]))).collect()
     }
 
-    fn has_lens(&self) -> bool {
+    /// Whether any lens bends, or is off center.
+    pub(super) fn has_lens(&self) -> bool {
         self.lenses.iter().any(|lens| !lens.is_pinhole())
     }
 }
@@ -51,6 +53,8 @@ impl Parameters {
 pub(super) struct BundleAdjustment<'a> {
     pub priors: &'a [CameraPrior],
     pub observations: &'a Observations,
+    /// Edges that are to be straight; they take part where there are lenses, since pinholes keep them as they are.
+    pub curves: &'a CurveObservations,
     /// What the focal lengths are drawn towards, working pixels.
     pub start_focal_px: Vec<f64>,
     /// The photograph whose rotation is fixed.
@@ -140,28 +144,65 @@ impl BundleAdjustment<'_> {
         (0..self.priors.len()).flat_map(of_photograph).collect()
     }
 
-    /// The quadratic model of every pair.
-    pub(super) fn pair_terms<const LOCAL: usize>(&self, cameras: &[Camera], huber_px: f64) -> Vec<PairTerm<LOCAL>> {
-        self.observations.pairs.par_iter().map(|pair| PairTerm::new(cameras, pair, huber_px)).collect()
+    /// Columns of what [`Self::terms`] says: the pairs, then, with lenses, the clusters of edges, whose photograph stands for
+    /// the first of a pair.
+    pub(super) fn all_columns<const LOCAL: usize>(&self, model: &IntrinsicsModel) -> Vec<Columns<LOCAL>> {
+        let of_pairs = self.observations.pairs.iter().map(|pair| self.columns(pair, model));
+        let of_curves = self.curves.clusters.iter().map(|cluster| {
+            std::array::from_fn(|local| match local {
+                6.. if local < 6 + INTRINSICS => self.column(model, cluster.photograph, local - 6),
+                _ => None,
+            })
+        });
+        of_pairs.chain(of_curves.filter(|_| LOCAL == LENS_LOCAL)).collect()
     }
 
-    /// The sum of squares that is minimized.
-    pub(super) fn cost(&self, parameters: &Parameters, model: &IntrinsicsModel, huber_px: f64) -> f64 {
+    /// The quadratic model of every pair, and with lenses of every cluster of edges.
+    pub(super) fn terms<const LOCAL: usize>(&self, cameras: &[Camera], huber_px: f64) -> Vec<PairTerm<LOCAL>> {
+        let mut terms: Vec<PairTerm<LOCAL>> =
+            self.observations.pairs.par_iter().map(|pair| PairTerm::new(cameras, pair, huber_px)).collect();
+        if LOCAL == LENS_LOCAL {
+            let of_curves = self.curves.clusters.par_iter().map(|cluster| {
+                let CurveTerm { normal, gradient } = CurveTerm::new(cameras, cluster, huber_px);
+                let mut term = PairTerm::<LOCAL> { normal: SMatrix::zeros(), gradient: SVector::zeros() };
+                term.normal.view_mut((6, 6), (INTRINSICS, INTRINSICS)).copy_from(&normal);
+                term.gradient.rows_mut(6, INTRINSICS).copy_from(&gradient);
+                term
+            });
+            terms.par_extend(of_curves);
+        }
+        terms
+    }
+
+    /// What the matches cost.
+    pub(super) fn matches_cost(&self, parameters: &Parameters, huber_px: f64) -> f64 {
         let cameras = parameters.cameras(self.priors);
         let costs: Vec<f64> =
             self.observations.pairs.par_iter().map(|pair| pair_cost(&cameras, pair, huber_px)).collect();
-        let prior: f64 = self.pulls(parameters, model).iter().map(|pull| pull.residual * pull.residual).sum();
-        costs.iter().sum::<f64>() + prior
+        costs.iter().sum()
     }
 
-    /// Those of the data and the pulls.
-    /// Which unknowns meet in the pairs.
+    /// What the edges cost.
+    pub(super) fn curves_cost(&self, parameters: &Parameters, huber_px: f64) -> f64 {
+        let cameras = parameters.cameras(self.priors);
+        let costs: Vec<f64> =
+            self.curves.clusters.par_iter().map(|cluster| curve_cost(&cameras, cluster, huber_px)).collect();
+        costs.iter().sum()
+    }
+
+    /// The sum of squares that is minimized.
+    fn cost<const LOCAL: usize>(&self, parameters: &Parameters, model: &IntrinsicsModel, huber_px: f64) -> f64 {
+        let prior: f64 = self.pulls(parameters, model).iter().map(|pull| pull.residual * pull.residual).sum();
+        let curves = if LOCAL == LENS_LOCAL { self.curves_cost(parameters, huber_px) } else { 0.0 };
+        self.matches_cost(parameters, huber_px) + curves + prior
+    }
+
+    /// Which unknowns meet.
     ///
     /// # Errors
     /// [`trueup_core::Error::Unsolvable`] if memory does not suffice.
     pub(super) fn pattern<const LOCAL: usize>(&self, model: &IntrinsicsModel) -> Result<NormalPattern<LOCAL>> {
-        let columns = self.observations.pairs.iter().map(|pair| self.columns(pair, model)).collect();
-        NormalPattern::new(self.unknowns(model), columns)
+        NormalPattern::new(self.unknowns(model), self.all_columns(model))
     }
 
     fn normal_equations<const LOCAL: usize>(
@@ -171,7 +212,7 @@ impl BundleAdjustment<'_> {
         huber_px: f64,
         pattern: &NormalPattern<LOCAL>,
     ) -> Option<NormalEquations> {
-        let terms = self.pair_terms(&parameters.cameras(self.priors), huber_px);
+        let terms = self.terms(&parameters.cameras(self.priors), huber_px);
         pattern.equations(&terms, &self.pulls(parameters, model))
     }
 
@@ -206,7 +247,7 @@ impl<const LOCAL: usize> LeastSquares for Pass<'_, LOCAL> {
     type State = Parameters;
 
     fn cost(&self, parameters: &Parameters) -> f64 {
-        self.problem.cost(parameters, self.model, self.huber_px)
+        self.problem.cost::<LOCAL>(parameters, self.model, self.huber_px)
     }
 
     fn equations(&self, parameters: &Parameters) -> Option<NormalEquations> {

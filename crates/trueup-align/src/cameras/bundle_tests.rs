@@ -19,6 +19,7 @@ fn check_gradient(model: &IntrinsicsModel, lenses: Vec<LensState>) {
     let problem = BundleAdjustment {
         priors: &priors,
         observations: &observations,
+        curves: &CurveObservations::default(),
         start_focal_px: vec![500.0, 520.0],
         reference: 0,
         focal_sd: vec![0.1, 0.3],
@@ -41,7 +42,7 @@ fn check_gradient(model: &IntrinsicsModel, lenses: Vec<LensState>) {
         let shifted = |amount: f64| {
             let mut step = faer::Mat::<f64>::zeros(problem.unknowns(model), 1);
             step[(unknown, 0)] = amount;
-            problem.cost(&problem.moved(&at, model, &step), model, huge)
+            problem.cost::<LENS_LOCAL>(&problem.moved(&at, model, &step), model, huge)
         };
         let step = 1e-6;
         let numeric = (shifted(step) - shifted(-step)) / (2.0 * step);

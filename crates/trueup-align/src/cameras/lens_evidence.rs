@@ -2,34 +2,55 @@
 //!
 //! # Source
 //! The cluster-robust (sandwich) covariance of an estimating equation (Liang and Zeger, "Longitudinal data analysis using
-//! generalized linear models", 1986): a pair of photographs is a cluster, whose matches err together where there is parallax.
+//! generalized linear models", 1986): a pair of photographs is a cluster, whose matches err together where there is parallax,
+//! and so are the edges in one part of a photograph, which are bent together where they are of one thing.
 
 use faer::linalg::solvers::Solve;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::bundle::{BundleAdjustment, Parameters};
 use super::intrinsics::{FOCAL, IntrinsicsModel, LensState};
 use super::pair_cost::{LENS_LOCAL, PairTerm};
+
+/// Who is asked. The two are asked apart: parallax bends what matches say, and what is round in the scene what edges say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Witness {
+    /// The matches of the pairs.
+    Matches,
+    /// The edges that are to be straight. They tell of nothing but lenses: focal lengths are to be held.
+    Edges,
+}
+
+/// So many clusters, or fewer, have no spread to speak of.
+const FEWEST_CLUSTERS: usize = 2;
 
 /// Where one step of Gauss and Newton puts the intrinsic unknowns, and how far that may be off.
 pub(super) struct LensEvidence {
     /// One for each parameter of the model.
     estimate: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// For each parameter, the pairs whose photographs it moves.
+    /// For each parameter, the clusters whose photographs it moves.
     clusters: Vec<usize>,
 }
 
 impl LensEvidence {
-    /// At `parameters`, with the unknowns of `model`; `None` where the matches leave an unknown open.
+    /// What `witness` says at `parameters`, with the unknowns of `model`; `None` where an unknown is left open.
     pub(super) fn at(
+        witness: Witness,
         problem: &BundleAdjustment<'_>,
         parameters: &Parameters,
         model: &IntrinsicsModel,
         huber_px: f64,
     ) -> Option<Self> {
         let photographs = problem.priors.len();
-        let terms: Vec<PairTerm<LENS_LOCAL>> = problem.pair_terms(&parameters.cameras(problem.priors), huber_px);
+        let mut terms: Vec<PairTerm<LENS_LOCAL>> = problem.terms(&parameters.cameras(problem.priors), huber_px);
+        let asked = match witness {
+            Witness::Matches => 0..problem.observations.pairs.len(),
+            Witness::Edges => problem.observations.pairs.len()..terms.len(),
+        };
+        for (_, silent) in terms.iter_mut().enumerate().filter(|(place, _)| !asked.contains(place)) {
+            *silent = PairTerm { normal: SMatrix::zeros(), gradient: SVector::zeros() };
+        }
         let pattern = problem.pattern(model).ok()?;
         let equations = pattern.equations(&terms, &problem.pulls(parameters, model))?;
         let factor = equations.factor(0.0)?;
@@ -40,10 +61,10 @@ impl LensEvidence {
         let influence = factor.solve(&selection);
         let mut covariance = DMatrix::zeros(model.parameters, model.parameters);
         let mut clusters = vec![0; model.parameters];
-        for (pair, term) in problem.observations.pairs.iter().zip(&terms) {
-            let columns: [Option<usize>; LENS_LOCAL] = problem.columns(pair, model);
+        let all_columns = problem.all_columns::<LENS_LOCAL>(model);
+        for (columns, term) in all_columns[asked.clone()].iter().zip(&terms[asked]) {
             let moved = term.normal
-                * nalgebra::SVector::<f64, LENS_LOCAL>::from_fn(|local, _| {
+                * SVector::<f64, LENS_LOCAL>::from_fn(|local, _| {
                     columns[local].map_or(0.0, |column| step[(column, 0)])
                 });
             let score = term.gradient + moved;
@@ -70,6 +91,12 @@ impl LensEvidence {
     /// Where the step puts a parameter.
     pub(super) fn estimate(&self, parameter: usize) -> f64 {
         self.estimate[parameter]
+    }
+
+    /// Standard deviation of a parameter; `None` where too few clusters tell of it to have one.
+    pub(super) fn deviation(&self, parameter: usize) -> Option<f64> {
+        let deviation = self.covariance[(parameter, parameter)].sqrt();
+        (self.clusters[parameter] > FEWEST_CLUSTERS && deviation > 0.0).then_some(deviation)
     }
 
     /// How far `parameters` together are from 0: their squared distance in standard deviations, by dimension, after Hotelling's

@@ -1,17 +1,22 @@
-//! Which lenses the matches tell: terms are added as long as the evidence asks for them.
+//! Which lenses matches and straight edges tell: terms are added as long as the evidence asks for them.
 
 use trueup_core::{Result, StageContext};
 
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
-use super::intrinsics::{CENTER, FreeTerms, IntrinsicsModel, RADIAL, TANGENTIAL, ZOOM_SPREAD, only_focal};
-use super::lens_evidence::LensEvidence;
+use super::intrinsics::{CENTER, FOCAL, FreeTerms, IntrinsicsModel, RADIAL, TANGENTIAL, ZOOM_SPREAD, only_focal};
+use super::lens_evidence::{LensEvidence, Witness};
 use super::options::LensKind;
 
-/// Squared distance from 0, in standard deviations and by dimension, at which a term is believed: 4 standard deviations, since
+/// Squared distance from 0, in standard deviations and by dimension, at which matches are believed: 4 standard deviations, since
 /// the deviations rest on a dozen pairs.
-const SIGNIFICANT: f64 = 16.0;
+const SIGNIFICANT_BY_MATCHES: f64 = 16.0;
+/// The same of edges: 5 standard deviations, since what is round in the scene may be so in all photographs alike.
+const SIGNIFICANT_BY_EDGES: f64 = 25.0;
 /// Shift of a photograph's corners, working pixels, below which k1 is not worth a lens: the error of a match.
 const LEAST_SHIFT_PX: f64 = 0.5;
+/// How much more matches, or edges, may cost with lenses than with pinholes: what is told by the ones and denied by the others is
+/// no lens.
+const DENIED: f64 = 1.02;
 /// The terms in the order in which they are asked for.
 const BLOCKS: [&[usize]; 5] =
     [&[RADIAL], &[RADIAL + 1], &[CENTER, CENTER + 1], &[TANGENTIAL, TANGENTIAL + 1], &[RADIAL + 2]];
@@ -25,6 +30,15 @@ pub(super) struct LensSearch<'a> {
     /// What the user says of the lenses.
     pub kind: LensKind,
     pub context: &'a StageContext<'a>,
+}
+
+impl Witness {
+    fn significant(self) -> f64 {
+        match self {
+            Self::Matches => SIGNIFICANT_BY_MATCHES,
+            Self::Edges => SIGNIFICANT_BY_EDGES,
+        }
+    }
 }
 
 impl LensSearch<'_> {
@@ -46,62 +60,170 @@ impl LensSearch<'_> {
                 let model = IntrinsicsModel::grouped(group_of, &free);
                 parameters = problem.minimize(parameters, &model, FINE_HUBER_PX, self.context)?;
             }
-            let believed = self.believed(problem, &parameters, group_of, &free, terms, &bent);
             if block == 0 {
-                bent.clone_from(&believed);
-            }
-            if !believed.contains(&true) {
-                if block == 0 {
+                bent = self.bent(&mut parameters, group_of, &mut free, &bent)?;
+                if !bent.contains(&true) {
                     return Ok(None);
                 }
                 continue;
             }
-            for (free, _) in free.iter_mut().zip(&believed).filter(|(_, believed)| **believed) {
-                terms.iter().for_each(|&term| free[term] = true);
+            let ask = Ask { terms, of: &bent, huber_px: FINE_HUBER_PX };
+            let believed = self.told(problem, &parameters, group_of, &free, &ask).by_either();
+            if !believed.contains(&true) {
+                continue;
             }
+            set(&mut free, terms, &believed);
             let model = IntrinsicsModel::grouped(group_of, &free);
-            if block == 0 {
-                parameters = problem.minimize(parameters, &model, COARSE_HUBER_PX, self.context)?;
-            }
             parameters = problem.minimize(parameters, &model, FINE_HUBER_PX, self.context)?;
         }
         Ok(self.problem.is_sound(&parameters).then_some(parameters))
     }
 
-    /// For every group whether the `terms` are wanted of it beside those that are free.
-    fn believed(
+    /// Which of the groups in `asked` have a lens that bends: those with evidence of k1, which is still there when k1 is found.
+    /// `parameters` are refined with it, `free` has it.
+    fn bent(
+        &self,
+        parameters: &mut Parameters,
+        group_of: &[usize],
+        free: &mut [FreeTerms],
+        asked: &[bool],
+    ) -> Result<Vec<bool>> {
+        let (problem, terms) = (self.problem, BLOCKS[0]);
+        let by_pinholes = self.costs(parameters);
+        let at = |parameters: &Parameters, free: &[FreeTerms], of: &[bool], huber_px: f64| {
+            self.told(problem, parameters, group_of, free, &Ask { terms, of, huber_px })
+        };
+        let first = at(parameters, free, asked, FINE_HUBER_PX);
+        let mut bent = first.by_either();
+        if !bent.contains(&true) {
+            // Edges that a strong lens bends have lost their influence where errors are to be small.
+            bent = at(parameters, free, asked, COARSE_HUBER_PX).by_edges;
+        }
+        let only_edges = !first.by_matches.contains(&true);
+        let mut wished = free.to_vec();
+        while bent.contains(&true) {
+            wished.clone_from_slice(free);
+            set(&mut wished, terms, &bent);
+            let model = IntrinsicsModel::grouped(group_of, &wished);
+            let coarse = problem.minimize(parameters.clone(), &model, COARSE_HUBER_PX, self.context)?;
+            let fine = problem.minimize(coarse, &model, FINE_HUBER_PX, self.context)?;
+            let again = at(&fine, &wished, &bent, FINE_HUBER_PX).by_either();
+            let denied = self.costs(&fine).iter().zip(by_pinholes).any(|(after, before)| *after > DENIED * before);
+            let is_still = |group: usize| first.by_matches[group] || (again[group] && !(only_edges && denied));
+            let still: Vec<bool> = (0..bent.len()).map(|group| bent[group] && is_still(group)).collect();
+            if still == bent {
+                free.clone_from_slice(&wished);
+                *parameters = fine;
+                break;
+            }
+            bent = still;
+        }
+        Ok(bent)
+    }
+
+    /// What matches and edges cost.
+    fn costs(&self, parameters: &Parameters) -> [f64; 2] {
+        let problem = self.problem;
+        [problem.matches_cost(parameters, FINE_HUBER_PX), problem.curves_cost(parameters, FINE_HUBER_PX)]
+    }
+
+    /// For every group who tells of the terms beside those that are free.
+    fn told(
         &self,
         problem: &BundleAdjustment<'_>,
         parameters: &Parameters,
         group_of: &[usize],
         free: &[FreeTerms],
-        terms: &[usize],
-        asked: &[bool],
-    ) -> Vec<bool> {
-        let wished: Vec<FreeTerms> = free
-            .iter()
-            .zip(asked)
-            .map(|(free, asked)| std::array::from_fn(|term| free[term] || (*asked && terms.contains(&term))))
-            .collect();
-        let model = IntrinsicsModel::grouped(group_of, &wished);
-        let nothing = vec![false; free.len()];
-        let Some(evidence) = LensEvidence::at(problem, parameters, &model, FINE_HUBER_PX) else { return nothing };
-        (0..free.len())
-            .map(|group| {
-                let Some(member) = group_of.iter().position(|&of| of == group) else { return false };
-                let columns: Option<Vec<usize>> = terms.iter().map(|&term| model.parameters_of[member][term]).collect();
-                let Some(columns) = columns.filter(|_| asked[group]) else { return false };
-                let visible = terms != [RADIAL]
+        ask: &Ask<'_>,
+    ) -> Told {
+        let by = |witness: Witness| {
+            let wished = free.iter().zip(ask.of).map(|(free, asked)| -> FreeTerms {
+                std::array::from_fn(|term| match (witness, term) {
+                    (Witness::Edges, FOCAL) => false,
+                    _ => free[term] || (*asked && ask.terms.contains(&term)),
+                })
+            });
+            let model = IntrinsicsModel::grouped(group_of, &wished.collect::<Vec<_>>());
+            let evidence = LensEvidence::at(witness, problem, parameters, &model, ask.huber_px);
+            let is_told = |group: usize| {
+                let (Some(evidence), Some(member)) = (&evidence, group_of.iter().position(|&of| of == group)) else {
+                    return false;
+                };
+                let terms = ask.terms.iter().map(|&term| model.parameters_of[member][term]);
+                let Some(columns) = terms.collect::<Option<Vec<usize>>>().filter(|_| ask.of[group]) else {
+                    return false;
+                };
+                let visible = ask.terms != [RADIAL]
                     || self.corner_shift(parameters, member, evidence.estimate(columns[0])) > LEAST_SHIFT_PX;
-                visible && evidence.significance(&columns) > SIGNIFICANT
-            })
-            .collect()
+                visible && evidence.significance(&columns) > witness.significant()
+            };
+            (0..free.len()).map(is_told).collect()
+        };
+        Told { by_matches: by(Witness::Matches), by_edges: by(Witness::Edges) }
+    }
+
+    /// How far lenses may move the corners of photographs that are taken for those of pinholes, working pixels, one standard
+    /// deviation: that of the group of which least is told. Infinite where nothing tells; `None` where no lens is looked for.
+    pub(super) fn doubt_px(&self, pinholes: &Parameters, group_of: &[usize]) -> Option<f64> {
+        if self.kind == LensKind::Pinhole {
+            return None;
+        }
+        let groups = group_of.iter().max().map_or(0, |last| last + 1);
+        let deviations = |witness: Witness| -> Vec<Option<f64>> {
+            let free = std::array::from_fn(|term| term == RADIAL || (term == FOCAL && witness == Witness::Matches));
+            let model = IntrinsicsModel::grouped(group_of, &vec![free; groups]);
+            let evidence = LensEvidence::at(witness, self.problem, pinholes, &model, FINE_HUBER_PX);
+            let of_group = |group: usize| {
+                let member = group_of.iter().position(|&of| of == group)?;
+                let deviation = evidence.as_ref()?.deviation(model.parameters_of[member][RADIAL]?)?;
+                Some(self.corner_shift(pinholes, member, deviation))
+            };
+            (0..groups).map(of_group).collect()
+        };
+        let (by_matches, by_edges) = (deviations(Witness::Matches), deviations(Witness::Edges));
+        let is_asked = |group: &usize| {
+            let mut members = self.problem.priors.iter().zip(group_of).filter(|(_, of)| *of == group);
+            members.all(|(prior, _)| prior.lens.is_none())
+        };
+        let of_group = |group: usize| {
+            let told = by_matches[group].into_iter().chain(by_edges[group]);
+            told.fold(f64::INFINITY, f64::min)
+        };
+        (0..groups).filter(is_asked).map(of_group).max_by(f64::total_cmp)
     }
 
     /// By how many working pixels k1 moves the corners of a photograph.
     fn corner_shift(&self, parameters: &Parameters, photograph: usize, k1: f64) -> f64 {
         let radius_px = 0.5 * self.problem.priors[photograph].frame.diagonal();
         k1.abs() * radius_px * (radius_px / parameters.focal_px[photograph]).powi(2)
+    }
+}
+
+/// Who tells, of every group.
+struct Told {
+    by_matches: Vec<bool>,
+    by_edges: Vec<bool>,
+}
+
+impl Told {
+    fn by_either(&self) -> Vec<bool> {
+        self.by_matches.iter().zip(&self.by_edges).map(|(&matches, &edges)| matches || edges).collect()
+    }
+}
+
+/// What is asked of the evidence.
+struct Ask<'a> {
+    terms: &'a [usize],
+    /// Of which groups.
+    of: &'a [bool],
+    /// Limit of the loss.
+    huber_px: f64,
+}
+
+/// Frees `terms` of the groups for which it is `told`.
+fn set(free: &mut [FreeTerms], terms: &[usize], told: &[bool]) {
+    for (free, _) in free.iter_mut().zip(told).filter(|(_, told)| **told) {
+        terms.iter().for_each(|&term| free[term] = true);
     }
 }
 

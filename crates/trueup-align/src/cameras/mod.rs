@@ -2,8 +2,8 @@
 //!
 //! Start values come from metadata, from the pair homographies and from a search over a common focal length (`focal`);
 //! rotations from the spanning tree and from averaging over all edges (`rotations`); both are refined together by
-//! bundle adjustment (`bundle`), from coarse to fine (`refinement`). Terms of the lenses are added as long as the matches are
-//! sure of them (`lenses`, `lens_evidence`): a pinhole stays one. Pairs that then contradict the others are set
+//! bundle adjustment (`bundle`), from coarse to fine (`refinement`). Terms of the lenses are added as long as the matches, and
+//! edges that are to be straight (`straightness`), are sure of them (`lenses`, `lens_evidence`): a pinhole stays one. Pairs that then contradict the others are set
 //! aside (`contradictions`). Where rotating cameras fail, or need a lens that nobody has, cameras that move before a plane are tried
 //! (`flat_scene`, by `plane_adjustment`), and lines say how it is turned (`upright_plane`).
 
@@ -24,12 +24,14 @@ mod plane_camera;
 mod prior;
 mod refinement;
 mod rotations;
+mod straightness;
 mod transfer;
 mod upright_plane;
 
 use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
 use trueup_core::diagnostics::{Diagnostic, Subject};
+use trueup_core::lines::EdgeCurve;
 use trueup_core::matches::PairMatches;
 use trueup_core::{Result, StageContext};
 
@@ -40,6 +42,7 @@ use flat_scene::FlatInput;
 use intrinsics::InitialIntrinsics;
 use observations::{MATCHES_PER_PAIR, MATCHES_PER_PAIR_FOR_LENSES, Observations};
 use refinement::RefinementInput;
+use straightness::CurveObservations;
 
 pub use flat_scene::{FlatEvidence, FlatScene};
 pub use options::{CameraOptions, FocalSharing, LensKind, SceneModel};
@@ -54,6 +57,8 @@ pub struct CameraInput<'a> {
     pub priors: &'a [CameraPrior],
     /// The joined pairs; they connect all photographs.
     pub pairs: &'a [PairMatches],
+    /// Edges of each photograph that may be straight lines of the scene; none where they are not to tell of lenses.
+    pub curves: &'a [&'a [EdgeCurve]],
     /// The photograph whose rotation is the identity in the end.
     pub reference: usize,
 }
@@ -126,13 +131,15 @@ impl Cameras {
 /// which all cameras can be refined together, at a fraction of the cost. Focal lengths are shared within a camera
 /// unless the data contradict it, which keeps short rows from drifting.
 pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageContext) -> Result<Cameras> {
-    let CameraInput { priors, pairs, reference } = *input;
+    let CameraInput { priors, pairs, curves, reference } = *input;
     let priors: &[CameraPrior] = &priors.iter().map(|prior| prior.told_by(options)).collect::<Vec<_>>();
+    let curves = CurveObservations::new(priors.iter().map(|prior| prior.frame), curves);
     let everything: Vec<usize> = (0..priors.len()).collect();
     let anchor = graph_of(priors.len(), pairs.iter()).central_photograph(&everything);
     let solve_with = |active: &[usize]| {
         let used: Vec<&PairMatches> = active.iter().map(|&position| &pairs[position]).collect();
-        solve(priors, &used, anchor, options, context)
+        let seen = Seen { pairs: &used, curves: &curves };
+        solve(priors, seen, anchor, options, context)
     };
     let residuals_of = |cameras: &[Camera]| -> Vec<f64> {
         let transfer = |from: usize, to: usize| CameraTransfer::Rotating(&cameras[from], &cameras[to]);
@@ -164,6 +171,9 @@ pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageCont
             "Keep the camera's metadata in the files, or overlap the photographs more.",
         ));
     }
+    if let Some(doubt_px) = solution.lens_doubt_px.filter(|doubt_px| *doubt_px > DOUBTFUL_LENS_PX) {
+        context.report(lens_uncertain(pairs.len(), doubt_px));
+    }
     let Solution { cameras, per_picture_focal, .. } = solution;
     Ok(Cameras { cameras, per_picture_focal, pair_rms_px, contradicting, flat_scene: None })
 }
@@ -173,6 +183,21 @@ fn report_contradicting(pairs: &[PairMatches], positions: &[usize], rms_px: &[f6
     for &position in positions {
         context.report(contradicts(&pairs[position], rms_px[position]));
     }
+}
+
+/// Says that a lens is taken for a pinhole because nothing tells.
+fn lens_uncertain(overlaps: usize, doubt_px: f64) -> Diagnostic {
+    let overlaps = if overlaps == 1 { "one overlap".to_owned() } else { format!("{overlaps} overlaps") };
+    let edges = match doubt_px.is_finite() {
+        true => format!("straight edges leave its corners open by {doubt_px:.0} px"),
+        false => "there are too few straight edges".to_owned(),
+    };
+    Diagnostic::note(
+        "lens-uncertain",
+        Subject::stage("cameras"),
+        format!("whether the lens bends cannot be told by {overlaps}, and {edges}; it is taken for a pinhole"),
+        "Overlap more photographs, or tell the lens (--lens-from, --lens).",
+    )
 }
 
 fn contradicts(pair: &PairMatches, rms_px: f64) -> Diagnostic {
@@ -196,12 +221,25 @@ struct Solution {
     cameras: Vec<Camera>,
     per_picture_focal: bool,
     focal_failed: bool,
+    /// See [`refinement::Refined`].
+    lens_doubt_px: Option<f64>,
 }
 
-/// The cameras by `pairs`, relative to photograph `anchor`.
+/// Doubt about the corners of photographs, working pixels, one standard deviation, that is worth a word: a lens that moves them by
+/// five times as much, a hundredth of a photograph, would not be noticed.
+const DOUBTFUL_LENS_PX: f64 = 2.0;
+
+/// What was seen of the photographs.
+#[derive(Clone, Copy)]
+struct Seen<'a> {
+    pairs: &'a [&'a PairMatches],
+    curves: &'a CurveObservations,
+}
+
+/// The cameras by what was seen, relative to photograph `anchor`.
 fn solve(
     priors: &[CameraPrior],
-    pairs: &[&PairMatches],
+    Seen { pairs, curves }: Seen<'_>,
     anchor: usize,
     options: &CameraOptions,
     context: &StageContext,
@@ -214,12 +252,13 @@ fn solve(
     let rotations = rotations::average(&graph, pairs, &relative, anchor);
     let InitialIntrinsics { focal_px, lenses } = intrinsics;
     let start = Parameters { focal_px, rotations, lenses };
-    let input = RefinementInput { priors, observations: &observations, for_lenses: &for_lenses, anchor };
+    let input = RefinementInput { priors, observations: &observations, for_lenses: &for_lenses, curves, anchor };
     let refined = refinement::refine(input, &start, options, context)?;
     Ok(Solution {
         cameras: refined.parameters.cameras(priors),
         per_picture_focal: refined.per_picture_focal,
         focal_failed: refined.focal_failed,
+        lens_doubt_px: refined.lens_doubt_px,
     })
 }
 

@@ -8,6 +8,7 @@ use super::lenses::{LensSearch, settings};
 use super::observations::Observations;
 use super::options::{CameraOptions, FocalSharing};
 use super::prior::CameraPrior;
+use super::straightness::CurveObservations;
 
 /// What to refine: the photographs, what was observed of them and which of them the others turn about.
 #[derive(Clone, Copy)]
@@ -16,6 +17,8 @@ pub(super) struct RefinementInput<'a> {
     pub observations: &'a Observations,
     /// More of the same matches, from which lenses are told.
     pub for_lenses: &'a Observations,
+    /// What tells of lenses beside them.
+    pub curves: &'a CurveObservations,
     /// The photograph whose rotation stays.
     pub anchor: usize,
 }
@@ -27,7 +30,13 @@ pub(super) struct Refined {
     pub per_picture_focal: bool,
     /// Whether no focal length could be found, and a common one was taken.
     pub focal_failed: bool,
+    /// How far lenses may move corners unnoticed, working pixels, one standard deviation; `None` where few overlaps had not to tell
+    /// of them alone, or a lens was found or told.
+    pub lens_doubt_px: Option<f64>,
 }
+
+/// Fewest overlaps whose matches alone tell of a lens.
+const OVERLAPS_FOR_LENSES: usize = 3;
 
 /// Refines `start`.
 ///
@@ -43,6 +52,7 @@ pub(super) fn refine(
     let problem_of = |observations| BundleAdjustment {
         priors,
         observations,
+        curves: input.curves,
         start_focal_px: start.focal_px.clone(),
         reference: input.anchor,
         focal_sd: priors.iter().map(|prior| prior.focal_sd(options)).collect(),
@@ -72,24 +82,26 @@ pub(super) fn refine(
         !per_picture_focal || cost_without_pulls(&problem, lens) < cost_without_pulls(&problem, &fine)
     };
     if let Some(lens) = with_lens.filter(explains_more) {
-        return Ok(Refined { parameters: lens, per_picture_focal: false, focal_failed: false });
+        return Ok(Refined { parameters: lens, per_picture_focal: false, focal_failed: false, lens_doubt_px: None });
     }
     if per_picture_focal && problem.is_sound(&fine) {
         let settings = settings(&fine, &CameraPrior::lens_groups(priors));
         if let Some(parameters) = search.find(&fine, &settings)? {
-            return Ok(Refined { parameters, per_picture_focal, focal_failed: false });
+            return Ok(Refined { parameters, per_picture_focal, focal_failed: false, lens_doubt_px: None });
         }
     }
     if problem.is_sound(&fine) {
-        return Ok(Refined { parameters: fine, per_picture_focal, focal_failed: false });
+        let few = input.observations.pairs.len() < OVERLAPS_FOR_LENSES && !fine.has_lens();
+        let lens_doubt_px = if few { search.doubt_px(&fine, &CameraPrior::lens_groups(priors)) } else { None };
+        return Ok(Refined { parameters: fine, per_picture_focal, focal_failed: false, lens_doubt_px });
     }
     let parameters = with_common_focal(&problem, start, context)?;
-    Ok(Refined { parameters, per_picture_focal: false, focal_failed: true })
+    Ok(Refined { parameters, per_picture_focal: false, focal_failed: true, lens_doubt_px: None })
 }
 
-/// What the matches alone cost.
+/// What matches and edges alone cost.
 fn cost_without_pulls(problem: &BundleAdjustment<'_>, parameters: &Parameters) -> f64 {
-    problem.cost(parameters, &IntrinsicsModel::fixed(problem.priors.len()), FINE_HUBER_PX)
+    problem.matches_cost(parameters, FINE_HUBER_PX) + problem.curves_cost(parameters, FINE_HUBER_PX)
 }
 
 /// The rotations refined from `start` with all focal lengths fixed to the median start value.

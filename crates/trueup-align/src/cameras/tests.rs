@@ -81,7 +81,7 @@ fn estimate(pairs: &[PairMatches], known_focal: Option<f64>, groups: &[usize]) -
 }
 
 fn solved(priors: &[CameraPrior], pairs: &[PairMatches], reference: usize) -> Cameras {
-    let input = CameraInput { priors, pairs, reference };
+    let input = CameraInput { priors, pairs, curves: &[], reference };
     let cameras = run(&input, &CameraOptions::default(), &StageContext::default()).expect("solvable");
     assert_eq!((cameras.cameras.len(), cameras.pair_rms_px.len()), (priors.len(), pairs.len()));
     cameras
@@ -264,3 +264,6 @@ fn a_pair_that_closes_a_full_turn_is_kept_unless_it_is_far_too_bad() {
 
 #[path = "told_tests.rs"]
 mod told;
+
+#[path = "edges_tests.rs"]
+mod edges;

@@ -5,7 +5,9 @@ use trueup_core::lens::PlacedLens;
 use super::*;
 
 fn solved_by(priors: &[CameraPrior], pairs: &[PairMatches], options: &CameraOptions) -> Vec<Camera> {
-    run(&CameraInput { priors, pairs, reference: 0 }, options, &StageContext::default()).expect("solvable").cameras
+    run(&CameraInput { priors, pairs, curves: &[], reference: 0 }, options, &StageContext::default())
+        .expect("solvable")
+        .cameras
 }
 
 /// The same pair is taken for one of pinholes where nothing is told.

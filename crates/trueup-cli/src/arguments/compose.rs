@@ -13,6 +13,8 @@ Examples:
   trueup compose pano.json -o small.jpg --scale 0.25
   trueup compose pano.json -o round.jpg --projection equirectangular --crop none
   trueup compose pano.json -o pano.jpg --photos developed/    other photographs of the same names and sizes
+  trueup compose rig.json -o 0002.jpg --photos shot2/ --relight  the next shot of a rig, by the lenses and places found once
+  trueup compose aligned.pto -o pano.jpg                      what was aligned in Hugin
 
 The options of the project are overruled by --config, that by --set, and that by the flags of their own. Options of what
 comes before composing are recorded with the geometry: to change them, stitch again.
@@ -24,8 +26,8 @@ request to terminate.";
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ComposeArgs {
-    /// A file that `trueup stitch --project` wrote
-    #[arg(value_name = "PROJECT.json")]
+    /// A file that `trueup stitch --project` wrote, or a Hugin project (.pto)
+    #[arg(value_name = "PROJECT")]
     pub recorded: PathBuf,
 
     #[command(flatten)]
@@ -34,6 +36,10 @@ pub(crate) struct ComposeArgs {
     /// The folder of the photographs, if they moved, or of others of the same names and sizes
     #[arg(long, value_name = "DIR", help_heading = "Photographs")]
     pub photos: Option<PathBuf>,
+
+    /// Even out the light of these photographs anew instead of as recorded: for another shot of a rig
+    #[arg(long, help_heading = "Photographs")]
+    pub relight: bool,
 
     #[command(flatten)]
     pub masks: MaskArgs,

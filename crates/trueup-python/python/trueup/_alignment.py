@@ -123,6 +123,7 @@ def open_project(
     path: str | os.PathLike[str],
     *,
     photographs: str | os.PathLike[str] | None = None,
+    relight: bool = False,
     progress: Progress = None,
     **keywords: Unpack[ComposeKeywords],
 ) -> Alignment:
@@ -130,14 +131,15 @@ def open_project(
 
     Composed without keywords, it is the very panorama that was stitched. Photographs and masks are looked for where the project says,
     from its folder and from the current one, and beside it by their names; ``photographs`` is a folder of others of the same names and
-    sizes to be shown instead. Keywords are those of :meth:`Alignment.compose`, for all that is composed of it.
+    sizes to be shown instead; with ``relight`` their light is evened out anew, as another shot of a rig wants it. A project of Hugin's
+    (``.pto``) is drawn by its cameras. Keywords are those of :meth:`Alignment.compose`, for all that is composed of it.
 
     Raises :class:`trueup.InputError` if it is no project, or photographs or masks are missing or have other sizes;
     :class:`trueup.UnsupportedError` for options of the geometry; :class:`trueup.OptionsError`, :class:`trueup.IoError`.
     """
     folder = None if photographs is None else os.fspath(photographs)
     with Heard(progress) as heard:
-        return Alignment(_trueup.open_project(os.fspath(path), folder, dict(keywords), heard))
+        return Alignment(_trueup.open_project(os.fspath(path), folder, relight, dict(keywords), heard))
 
 
 def _native_keywords(keywords: StitchKeywords) -> dict[str, Any]:

@@ -38,6 +38,7 @@ def command(arguments: list[str]) -> int: ...
 def open_project(
     path: str,
     photographs: str | None,
+    relight: bool,
     keywords: dict[str, Any],
     progress: Callable[[str, int, int], object] | None,
 ) -> Alignment: ...

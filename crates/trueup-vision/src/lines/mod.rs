@@ -3,7 +3,8 @@
 //! The steps, a file each: `gradient` reduces the photograph and finds level-line directions, `region` grows connected
 //! pixels of one direction, `rectangle` fits and improves rectangles, `significance` counts false alarms,
 //! `refine` fits the segment again to sub-pixel edge points of the photograph itself, `tidy` drops frame artifacts,
-//! sorts and, for those who ask, merges.
+//! sorts and, for those who ask, merges. `curves` follows the edges under the segments beyond their ends, bent as a lens
+//! may have made them.
 //!
 //! # Source
 //! R. Grompone von Gioi, J. Jakubowicz, J.-M. Morel, G. Randall, "LSD: A Fast Line Segment Detector with a False
@@ -19,11 +20,12 @@
 //! * The border of the photograph is mirrored at the edge of its outermost pixels.
 
 use rayon::prelude::*;
-use trueup_core::lines::LineSegment;
+use trueup_core::lines::{EdgeCurve, LineSegment};
 use trueup_core::options::StageOptions;
 use trueup_core::raster::Raster;
 use trueup_core::{Error, Result, StageContext};
 
+mod curves;
 mod gradient;
 mod rectangle;
 mod refine;
@@ -84,6 +86,16 @@ pub fn detect(picture: &Raster<f32>, options: &LineOptions, context: &StageConte
     let mut segments = refined_segments(picture, options, context)?;
     tidy::drop_frame(&mut segments, picture.width() as f64, picture.height() as f64);
     Ok(tidy::longest_first(segments, options.min_length_px, MAX_SEGMENTS))
+}
+
+/// The edges under `segments` of this picture, longest first, followed as far as they go on smoothly: straight lines of the
+/// scene, as a lens may have bent them, and whatever else is long and smooth.
+///
+/// # Source
+/// Edge points are those of the refinement of segments. That straight lines tell what a lens bends: D. C. Brown, "Close-range
+/// camera calibration", Photogrammetric Engineering 37(8), 1971. How they are followed is ours.
+pub fn edge_curves(picture: &Raster<f32>, segments: &[LineSegment]) -> Vec<EdgeCurve> {
+    curves::follow(picture, segments)
 }
 
 /// As [`detect`], but with the segments along the border: for a picture that was cut out of a larger one, whose border is

@@ -65,7 +65,7 @@ pub(super) struct EdgeProfiles<'a> {
 
 /// The derivative of a Gaussian.
 #[derive(Debug, Clone, Copy)]
-struct Filter {
+pub(super) struct Filter {
     sigma: f64,
     /// Samples on each side.
     reach: usize,
@@ -95,35 +95,35 @@ impl Filter {
 
 /// A line `minor = offset + slope * (major - origin)`.
 #[derive(Debug, Clone, Copy)]
-struct Fit {
+pub(super) struct Fit {
     origin: f64,
     offset: f64,
     slope: f64,
 }
 
 impl Fit {
-    fn at(&self, major: f64) -> f64 {
+    pub(super) fn at(&self, major: f64) -> f64 {
         self.offset + self.slope * (major - self.origin)
     }
 }
 
 /// The pixel rows (or columns, for flat segments) that a segment crosses, by its extent along the major axis.
 #[derive(Debug, Clone, Copy)]
-struct Crossing {
+pub(super) struct Crossing {
     /// 1 if the major axis is y, 0 if it is x.
-    major: usize,
-    from: f64,
+    pub major: usize,
+    pub from: f64,
     /// Not less than `from`.
-    to: f64,
+    pub to: f64,
 }
 
 /// An edge point: where, how much it weighs, and how wide the filtered edge is there.
 #[derive(Debug, Clone, Copy)]
-struct EdgePoint {
-    major: f64,
-    minor: f64,
+pub(super) struct EdgePoint {
+    pub major: f64,
+    pub minor: f64,
     /// The squared slope: positions are the surer the steeper the edge, noise being the same everywhere.
-    weight: f64,
+    pub weight: f64,
     /// Variance of the Gaussian the edge's slope looks like, in squared pixels: the edge's blur and the filter's.
     spread: f64,
 }
@@ -136,6 +136,17 @@ impl<'a> EdgeProfiles<'a> {
     /// Replaces the segment's ends by those of the line through its edge points, at the same rows (or columns). Leaves
     /// the segment alone if it crosses too few edge points or the line would leave its surroundings.
     pub(super) fn refine(&self, segment: &mut LineSegment) {
+        let Some(FittedEdge { first, fit, crossing, .. }) = self.fitted(segment) else { return };
+        let minor = 1 - crossing.major;
+        let (from, to) = (segment.start[crossing.major], segment.end[crossing.major]);
+        if [from, to].iter().all(|&end| (fit.at(end) - first.at(end)).abs() <= MAX_SHIFT_PX) {
+            segment.start[minor] = fit.at(from);
+            segment.end[minor] = fit.at(to);
+        }
+    }
+
+    /// The line through the edge points under a segment; `None` if it crosses too few.
+    pub(super) fn fitted(&self, segment: &LineSegment) -> Option<FittedEdge<'_>> {
         let [dx, dy] = [segment.end[0] - segment.start[0], segment.end[1] - segment.start[1]];
         // Steep segments are measured on rows: their major coordinate is y.
         let (major, minor) = if dy.abs() >= dx.abs() { (1, 0) } else { (0, 1) };
@@ -143,7 +154,7 @@ impl<'a> EdgeProfiles<'a> {
         let origin = 0.5 * (from + to);
         let slope = (segment.end[minor] - segment.start[minor]) / (to - from);
         if !slope.is_finite() {
-            return;
+            return None;
         }
         let first = Fit { origin, offset: 0.5 * (segment.start[minor] + segment.end[minor]), slope };
         // The brighter side is on the right: for larger y that is smaller x; for larger x it is larger y.
@@ -151,28 +162,30 @@ impl<'a> EdgeProfiles<'a> {
         let crossing = Crossing { major, from: from.min(to), to: from.max(to) };
         let mut fit = first;
         let mut points = Vec::with_capacity((to - from).abs() as usize + 2);
-        let (mut filter, mut parabola_share) = (&self.sharp, 0.0);
+        let mut scan = Scan { filter: &self.sharp, sign, search: 0.0, parabola_share: 0.0 };
         for search in SEARCH_PX {
-            let scan = Scan { filter, sign, search, parabola_share };
-            self.edge_points(&fit, &crossing, &scan, &mut points);
+            scan.search = search;
+            points.clear();
+            self.edge_points(|place| fit.at(place), &crossing, &scan, &mut points);
             if points.len() < MIN_POINTS || (points.len() as f64) < MIN_POINT_SHARE * (to - from).abs() {
-                return;
+                return None;
             }
-            let Some(better) = fit_line(&points, &fit) else { return };
-            fit = better;
-            let variance = blur_variance(&points, filter);
-            filter = if variance < BLURRED_FROM_PX.powi(2) { &self.sharp } else { &self.blurred };
-            parabola_share = (-PARABOLA_DECAY * (variance - PIXEL_VARIANCE).max(0.0)).exp();
+            fit = fit_line(&points, &fit)?;
+            let variance = blur_variance(&points, scan.filter);
+            scan.filter = if variance < BLURRED_FROM_PX.powi(2) { &self.sharp } else { &self.blurred };
+            scan.parabola_share = (-PARABOLA_DECAY * (variance - PIXEL_VARIANCE).max(0.0)).exp();
         }
-        if [from, to].iter().all(|&end| (fit.at(end) - first.at(end)).abs() <= MAX_SHIFT_PX) {
-            segment.start[minor] = fit.at(from);
-            segment.end[minor] = fit.at(to);
-        }
+        Some(FittedEdge { first, fit, crossing, scan })
     }
 
-    /// Replaces `points` by the edge point of each row whose center is between the ends.
-    fn edge_points(&self, fit: &Fit, crossing: &Crossing, scan: &Scan, points: &mut Vec<EdgePoint>) {
-        points.clear();
+    /// Appends the edge point of each row whose center is between the ends, near where `expected` has it.
+    pub(super) fn edge_points(
+        &self,
+        expected: impl Fn(f64) -> f64,
+        crossing: &Crossing,
+        scan: &Scan,
+        points: &mut Vec<EdgePoint>,
+    ) {
         let (rows, columns, row_step, column_step) = if crossing.major == 1 {
             (self.picture.height(), self.picture.width(), self.picture.width(), 1)
         } else {
@@ -183,13 +196,24 @@ impl<'a> EdgeProfiles<'a> {
         for row in first..end {
             let center = row as f64 + 0.5;
             let profile = Profile { samples: self.picture.data(), start: row * row_step, step: column_step, columns };
-            points.extend(scan.peak(&profile, center, fit.at(center)));
+            points.extend(scan.peak(&profile, center, expected(center)));
         }
     }
 }
 
+/// What is known of the edge under a segment.
+pub(super) struct FittedEdge<'a> {
+    /// The segment's own line.
+    first: Fit,
+    /// The line through its edge points.
+    pub fit: Fit,
+    pub crossing: Crossing,
+    /// How its edge points are found.
+    pub scan: Scan<'a>,
+}
+
 /// How a profile is searched for its edge point.
-struct Scan<'a> {
+pub(super) struct Scan<'a> {
     filter: &'a Filter,
     /// 1 if the profile rises across the edge, -1 if it falls.
     sign: f32,
@@ -199,7 +223,12 @@ struct Scan<'a> {
     parabola_share: f64,
 }
 
-impl Scan<'_> {
+impl<'a> Scan<'a> {
+    /// The same that searches so far, in pixels.
+    pub(super) fn within(&self, search: f64) -> Scan<'a> {
+        Scan { search, ..*self }
+    }
+
     /// The steepest place of the profile at `major` near `expected`.
     ///
     /// The derivative of a step blurred by a Gaussian is a Gaussian: a parabola through the logarithms of its three

@@ -1,4 +1,4 @@
-//! The lens of other photographs, as an earlier project found it, told of the photographs at hand.
+//! The lens of other photographs, as an earlier project, or one of Hugin's, found it, told of the photographs at hand.
 //!
 //! A lens belongs to a camera and a size: it is told of photographs of the same shape, whatever their pixels, that no metadata
 //! tell to be of another camera. What it does aside turns with a photograph that was held upright.
@@ -10,6 +10,7 @@ use trueup_core::lens::PlacedLens;
 use trueup_core::source::{FocalPrior, FocalSource, SourceImage};
 use trueup_core::{Error, Result, StageContext};
 
+use crate::project::HuginProject;
 use crate::project::record::{ImageRecord, Project};
 
 /// Recorded focal lengths, in longer sides, that are believed: from beyond any fisheye to beyond any telescope.
@@ -115,15 +116,10 @@ fn centered(lens: &PlacedLens) -> PlacedLens {
 pub(crate) fn tell_lenses(path: &Path, images: &mut [SourceImage], context: &StageContext) -> Result<()> {
     let text = std::fs::read_to_string(path).map_err(|error| Error::io("reading", path, error))?;
     let file = path.display().to_string();
-    let project = Project::from_json(&text, &file)?;
-    if project.flat_scene.is_some_and(|scene| scene.evidence.straight_on) {
-        return Err(Error::input(
-            &file,
-            "its photographs look straight at a flat scene, as a scanner does, which tells of no lens",
-            "Give a project of photographs through the same lens that a camera took, turning or tilted.",
-        ));
-    }
-    let known: Vec<KnownLens> = project.used_images().filter_map(KnownLens::of).collect();
+    let known = match HuginProject::is_one(&text, path) {
+        true => HuginProject::parse(&text, &file)?.lens_records().iter().filter_map(KnownLens::of).collect(),
+        false => known_by(&Project::from_json(&text, &file)?, &file)?,
+    };
     let mut untold = Vec::new();
     for (photograph, image) in images.iter_mut().enumerate() {
         match lens_for(&known, image) {
@@ -144,6 +140,18 @@ pub(crate) fn tell_lenses(path: &Path, images: &mut [SourceImage], context: &Sta
         ));
     }
     Ok(())
+}
+
+/// The lenses that a project of ours knows.
+fn known_by(project: &Project, file: &str) -> Result<Vec<KnownLens>> {
+    if project.flat_scene.is_some_and(|scene| scene.evidence.straight_on) {
+        return Err(Error::input(
+            file,
+            "its photographs look straight at a flat scene, as a scanner does, which tells of no lens",
+            "Give a project of photographs through the same lens that a camera took, turning or tilted.",
+        ));
+    }
+    Ok(project.used_images().filter_map(KnownLens::of).collect())
 }
 
 /// The lens among those known that took a photograph, or why none did.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use trueup_core::lines::LineSegment;
+use trueup_core::lines::{EdgeCurve, LineSegment};
 use trueup_core::mask::{Mask, Masks};
 use trueup_core::raster::Raster;
 use trueup_core::source::{SourceImage, WorkingFrame};
@@ -160,6 +160,12 @@ pub(crate) fn lines_outside(lines: Vec<LineSegment>, ignored: &Mask, frame: &Wor
     };
     let mostly_outside = |line: &LineSegment| 2 * (0..POINTS).filter(|&point| is_ignored(line, point)).count() < POINTS;
     lines.into_iter().filter(mostly_outside).collect()
+}
+
+/// The curves none of whose places are ignored.
+pub(crate) fn curves_outside(curves: Vec<EdgeCurve>, ignored: &Mask, frame: &WorkingFrame) -> Vec<EdgeCurve> {
+    let is_ignored = |place: &[f64; 2]| ignored.contains(place.map(|length| length / frame.working_from_full));
+    curves.into_iter().filter(|curve| !curve.places.iter().any(is_ignored)).collect()
 }
 
 /// Blackens the ignored parts of a thumbnail: what is too dark to tell brightness takes no part in evening it out.

@@ -14,7 +14,7 @@ use trueup_vision::lines;
 
 use super::measured::Measured;
 use super::photographs::PhotographSet;
-use crate::job::masks::{blacken, lines_outside, outside};
+use crate::job::masks::{blacken, curves_outside, lines_outside, outside};
 use crate::memo::{Key, MEASURED, Memo};
 use crate::options::MeasureOptions;
 use crate::workers::Division;
@@ -198,15 +198,20 @@ fn measure(one: &OnePhotograph, options: &MeasureOptions, context: &StageContext
     let frame = WorkingFrame::new(image.width, image.height, options.working.pixels);
     let picture = context.time(DECODING, || files.working(index, &frame, THUMBNAIL_PIXELS))?;
     let mut features = context.time(FEATURES, || features::detect(&picture.gray, &options.features, context))?;
-    let mut lines = context.time(LINES, || lines::detect(&picture.gray, &options.lines, context))?;
+    let (mut lines, mut curves) = context.time(LINES, || -> Result<_> {
+        let lines = lines::detect(&picture.gray, &options.lines, context)?;
+        let curves = lines::edge_curves(&picture.gray, &lines);
+        Ok((lines, curves))
+    })?;
     let mut thumbnail = picture.thumbnail;
     if let Some(ignored) = files.masks(index).ignored {
         features = outside(&features, &ignored, &frame);
         lines = lines_outside(lines, &ignored, &frame);
+        curves = curves_outside(curves, &ignored, &frame);
         blacken(&mut thumbnail, &ignored, &picture.thumbnail_frame);
     }
     let gray = keep_grays.then(|| eight_bit(&picture.gray));
-    Ok(Measured { frame, features, lines, gray, thumbnail, thumbnail_frame: picture.thumbnail_frame })
+    Ok(Measured { frame, features, lines, curves, gray, thumbnail, thumbnail_frame: picture.thumbnail_frame })
 }
 
 /// Gray values rounded to eight bits.

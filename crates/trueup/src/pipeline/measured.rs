@@ -2,7 +2,7 @@
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use trueup_core::lines::LineSegment;
+use trueup_core::lines::{EdgeCurve, LineSegment};
 use trueup_core::raster::Raster;
 use trueup_core::source::WorkingFrame;
 use trueup_vision::features::{DESCRIPTOR_LENGTH, FeaturePoint, Features};
@@ -14,6 +14,8 @@ pub(crate) struct Measured {
     pub features: Features,
     /// In working pixels.
     pub lines: Vec<LineSegment>,
+    /// Edges that may be straight lines of the scene, in working pixels.
+    pub curves: Vec<EdgeCurve>,
     /// Gray values at the working size, kept if the mesh is to be refined by pixels.
     pub gray: Option<Raster<u8>>,
     pub thumbnail: Raster<u8>,
@@ -61,6 +63,7 @@ struct StoredMeasured {
     descriptors: Vec<u8>,
     descriptor_points: Vec<u32>,
     lines: Vec<LineSegment>,
+    curves: Vec<EdgeCurve>,
     gray: Option<StoredRaster>,
     thumbnail: StoredRaster,
     thumbnail_frame: WorkingFrame,
@@ -75,6 +78,7 @@ impl StoredMeasured {
             descriptors: descriptors.concat(),
             descriptor_points: descriptor_points.clone(),
             lines: measured.lines.clone(),
+            curves: measured.curves.clone(),
             gray: measured.gray.as_ref().map(StoredRaster::new),
             thumbnail: StoredRaster::new(&measured.thumbnail),
             thumbnail_frame: measured.thumbnail_frame,
@@ -94,6 +98,7 @@ impl StoredMeasured {
                 descriptor_points: self.descriptor_points,
             },
             lines: self.lines,
+            curves: self.curves,
             gray: match self.gray {
                 Some(gray) => Some(gray.restored()?),
                 None => None,

@@ -51,7 +51,7 @@ use crate::memo::{KeyMaker, Memo, PhotographCache};
 use crate::options::StitchOptions;
 use crate::project::fill::{GeometryRecord, fill_geometry, place, record_composition, unfilled};
 use crate::project::provenance;
-use crate::project::read::Recorded;
+use crate::project::read::{Recorded, knows_light};
 use crate::project::record::{Canvas, CropRecord, Project};
 use crate::report::{judgement, measuring, sideways};
 use crate::workers::{Division, Workers};
@@ -296,7 +296,8 @@ impl<'a> Stitcher<'a> {
             let fixed = self.options.fixed_by_method();
             let arrangement = arrange::recall(layout, reference, project, &fixed.arrange, context)?;
             let arrangement: Arrangement = context.absorb(arrangement);
-            let corrections = match self.options.compose.exposure == project.options.compose.exposure {
+            let same_light = self.options.compose.exposure == project.options.compose.exposure && knows_light(project);
+            let corrections = match same_light {
                 true => corrections,
                 false => self.light_anew(&set, &arrangement, reference, context)?,
             };

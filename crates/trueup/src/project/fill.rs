@@ -71,14 +71,24 @@ pub(crate) fn unfilled(
         verdict: pair.verdict,
     });
     Project {
+        lens_from: matched.set.lens_from.as_ref().map(|path| path.display().to_string()),
+        images,
+        pairs: pairs.collect(),
+        ..empty(options)
+    }
+}
+
+/// The record of nothing, by these options.
+pub(crate) fn empty(options: &StitchOptions) -> Project {
+    Project {
         format: PROJECT_FORMAT.to_owned(),
         version: PROJECT_VERSION,
         method: trueup_core::options::OptionValue::display(&options.align.stitch.method),
         options: options.clone(),
-        lens_from: matched.set.lens_from.as_ref().map(|path| path.display().to_string()),
+        lens_from: None,
         reference: String::new(),
-        images,
-        pairs: pairs.collect(),
+        images: Vec::new(),
+        pairs: Vec::new(),
         manhattan: ManhattanRecord {
             divergence: None,
             threshold: options.align.similarity.max_divergence,
@@ -115,7 +125,8 @@ fn stack_record(image: &SourceImage) -> Vec<StackMemberRecord> {
     image.stack.iter().map(record).collect()
 }
 
-fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
+/// The record of a photograph without geometry.
+pub(crate) fn left_out_record(path: String, reason: String, hint: String) -> ImageRecord {
     ImageRecord {
         path,
         width: 0,
@@ -238,7 +249,12 @@ fn paths(project: &mut Project) -> impl Iterator<Item = &mut String> {
 }
 
 /// Where the photograph of that number in the arrangement is shown, and in which light.
-fn record_appearance(record: &mut ImageRecord, arrangement: &Arrangement, number: usize, correction: &Correction) {
+pub(crate) fn record_appearance(
+    record: &mut ImageRecord,
+    arrangement: &Arrangement,
+    number: usize,
+    correction: &Correction,
+) {
     record.gain = Some(correction.brightness());
     record.correction = Some(*correction);
     record.mesh = Some(mesh_record(&arrangement.delivered[number]));
@@ -255,7 +271,7 @@ fn mesh_record(mesh: &GridMesh) -> MeshRecord {
 }
 
 /// What the panorama is drawn on.
-fn record_canvas(project: &mut Project, arrangement: &Arrangement) {
+pub(crate) fn record_canvas(project: &mut Project, arrangement: &Arrangement) {
     let canvas = |layout: &CanvasLayout| Canvas {
         width: layout.width,
         height: layout.height,

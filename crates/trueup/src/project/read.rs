@@ -205,6 +205,11 @@ fn is_whole(mesh: &MeshRecord, width: usize, height: usize) -> bool {
     mesh.source.iter().enumerate().all(is_even)
 }
 
+/// Whether a project says what evens out the light of its photographs.
+pub(crate) fn knows_light(project: &Project) -> bool {
+    project.used_images().any(|record| record.correction.is_some() || record.gain.is_some())
+}
+
 /// What evens out the light of used photographs, the `records` of `project`; gains alone in files of programs that knew no
 /// more.
 ///
@@ -243,7 +248,12 @@ pub(crate) fn find_photograph(
     Ok(image)
 }
 
-fn find_file(
+/// The file of a recorded path: beside the project file as recorded, from the current folder, or beside the project file by its name
+/// alone.
+///
+/// # Errors
+/// [`Error::Input`] if there is none or it cannot be read; [`Error::Options`]; [`Error::Cancelled`].
+pub(crate) fn find_file(
     recorded: &str,
     project_folder: &Path,
     options: &SourceOptions,

@@ -403,6 +403,15 @@ impl Project {
         self.used_images().count()
     }
 
+    /// Forgets what evened out the light of its photographs: composing from it evens out that of the photographs that are shown.
+    /// For those of another shot, whose light is another.
+    pub fn forget_light(&mut self) {
+        self.response = Response::default();
+        for image in &mut self.images {
+            (image.gain, image.correction) = (None, None);
+        }
+    }
+
     /// The project as JSON text.
     ///
     /// # Errors

@@ -22,7 +22,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 26] = [
+pub const TARGETS: [Target; 27] = [
     Target { name: "jpeg", seeds: || pictures::seeds("jpg"), read: pictures::read },
     Target { name: "png", seeds: || pictures::seeds("png"), read: pictures::read },
     Target { name: "tiff", seeds: || pictures::seeds("tif"), read: pictures::read },
@@ -41,6 +41,7 @@ pub const TARGETS: [Target; 26] = [
     Target { name: "xmp", seeds: metadata::packets, read: metadata::read_xmp },
     Target { name: "project", seeds: texts::projects, read: texts::read_project },
     Target { name: "project-structured", seeds: structured::projects, read: structured::read_project },
+    Target { name: "hugin", seeds: texts::hugin_projects, read: texts::read_hugin_project },
     Target { name: "graph", seeds: texts::graphs, read: texts::read_graph },
     Target { name: "config", seeds: texts::configurations, read: texts::read_configuration },
     Target { name: "options-structured", seeds: structured::options, read: structured::read_options },

@@ -1,6 +1,6 @@
 //! Projects, graphs and configurations.
 
-use trueup::{Project, StitchOptions, hugin_project};
+use trueup::{HuginProject, Project, StitchOptions, hugin_project};
 use trueup_align::stitch_graph::parse_graph_file;
 
 use super::work::Work;
@@ -42,6 +42,20 @@ pub(super) fn read_project(_: &Work, input: &[u8]) {
     let _ = hugin_project(&project);
     let written = project.to_json();
     assert!(written.is_ok_and(|text| Project::from_json(&text, "again").is_ok()), "what is written can be read again");
+}
+
+/// Two lenses, links, a mask and a crop.
+pub(super) fn hugin_projects() -> Vec<Vec<u8>> {
+    let text = "# hugin project file\np f2 w3000 h1500 v360 E12.5 R0 n\"TIFF_m c:LZW r:CROP\"\nm i0\n\
+        i w800 h600 f0 v50.5 Ra0 Rb0 Eev12 Er1 Eb1 r-1.5 p2 y-10 TrX0 TrY0 TrZ0 a0.01 b-0.02 c0 d1 e-2 g0 t0 Vm5 n\"a 1.jpg\"\n\
+        i w800 h600 f0 v=0 r0 p1e1 y10 a=0 b=0 c=0 d=0 e=0 S0,800,0,600 n\"b.jpg\"\n\
+        i w800 h600 f3 v170 r90 p0 y120 a0 b-0.02 c0 d0 e0 n\"c.jpg\"\nk i1 t0 p\"1 2 3 4 5 6\"\nv v0 y1 r1\nc n0 N1 x1 y2 X3 Y4 t0\n";
+    vec![text.as_bytes().to_vec()]
+}
+
+pub(super) fn read_hugin_project(_: &Work, input: &[u8]) {
+    let Ok(project) = HuginProject::parse(&String::from_utf8_lossy(input), "project.pto") else { return };
+    assert!(!project.images.is_empty() && project.images.iter().all(|image| image.focal_px.is_finite()));
 }
 
 pub(super) fn graphs() -> Vec<Vec<u8>> {
@@ -117,6 +131,9 @@ mod tests {
     /// A seed that is refused at once leads nowhere behind that.
     #[test]
     fn the_seeds_are_read() {
+        for seed in hugin_projects() {
+            HuginProject::parse(&String::from_utf8_lossy(&seed), "seed.pto").expect("a Hugin project");
+        }
         for seed in projects() {
             let text = String::from_utf8(seed).expect("text");
             assert_eq!(Project::from_json(&text, "seed").expect("a project").used(), 2);

@@ -11,13 +11,15 @@ mod drawing;
 mod input;
 mod judgement;
 
+use trueup_core::camera::Camera;
 use trueup_core::diagnostics::{Diagnostic, Subject};
+use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
 
 use super::options::MeshOptions;
 use super::warped_mesh::WarpedMesh;
 use corrections::CameraCorrections;
-use drawing::Drawing;
+use drawing::{Drawing, Seen};
 pub use input::ByCamerasInput;
 use judgement::{Evidence, Suspicion};
 
@@ -60,6 +62,14 @@ pub fn unless_worse(
         period: drawing.period,
         by_cameras: Some(drawing.plane),
     }))
+}
+
+/// The grids of photographs of which nothing is known but the cameras, in the level world: on a plane of so many units per radian.
+/// `grids` are over the photographs in the cameras' pixels.
+pub fn drawn_by_cameras(cameras: &[Camera], grids: &[GridMesh], units_per_radian: f64) -> WarpedMesh {
+    let seen = Seen { cameras, grids, dominant: None, subdivision: 1 };
+    let Drawing { meshes, period, plane } = Drawing::of(&seen, units_per_radian, |_, pixel| pixel);
+    WarpedMesh { meshes, alignment_rms: 0.0, folds: 0, relative_gradient: 0.0, period, by_cameras: Some(plane) }
 }
 
 #[cfg(test)]

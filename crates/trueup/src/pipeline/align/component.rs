@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use trueup_align::cameras::CameraPrior;
-use trueup_core::lines::LineSegment;
+use trueup_core::lines::{EdgeCurve, LineSegment};
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
@@ -19,6 +19,8 @@ pub(crate) struct Component<'a> {
     pub images: Vec<&'a SourceImage>,
     pub frames: Vec<WorkingFrame>,
     pub lines: Vec<Vec<LineSegment>>,
+    /// Edges of each photograph that may be straight lines of the scene.
+    pub curves: Vec<&'a [EdgeCurve]>,
     /// Gray values at the working size, for those that were kept.
     pub grays: Vec<Option<&'a Raster<u8>>>,
     pub pairs: Vec<PairMatches>,
@@ -49,6 +51,7 @@ impl<'a> Component<'a> {
             images: members.iter().map(|&photograph| &images[photograph]).collect(),
             frames: members.iter().filter_map(known).map(|one| one.frame).collect(),
             lines: members.iter().filter_map(known).map(|one| one.lines.clone()).collect(),
+            curves: members.iter().filter_map(known).map(|one| one.curves.as_slice()).collect(),
             grays: members.iter().filter_map(known).map(|one| one.gray.as_ref()).collect(),
             pairs,
             reference: local(reference).unwrap_or(0),

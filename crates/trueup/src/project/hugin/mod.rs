@@ -1,4 +1,4 @@
-//! The cameras of a panorama as a project of the Hugin stitcher.
+//! The cameras of a panorama as a project of the Hugin stitcher, written and read (`read`, by the lines of `parse`).
 //!
 //! # Source
 //! The format: Hugin's own description of its project files (`doc/nona.txt` of panotools and the manual's page on `.pto`).
@@ -14,6 +14,11 @@ use trueup_core::lens::{Lens, LensProjection, LensTerms, PlacedLens};
 use trueup_core::{Error, Result};
 
 use super::record::{ImageRecord, Project};
+
+mod parse;
+mod read;
+
+pub use read::{HuginImage, HuginProject};
 
 /// A camera's attitude in Hugin's angles, radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -282,6 +287,37 @@ mod tests {
                 let by_lens = focal_px * Lens::new(terms).place(ray).expect("in front").x;
                 assert!((by_hugin - by_lens).abs() < 0.2, "{projection:?} {angle}: {by_hugin} {by_lens}");
             }
+        }
+    }
+
+    /// What is written is read again as it was: angles, field of view, lens and center of a photograph held upright.
+    #[test]
+    fn what_is_written_is_read_again() {
+        let terms = LensTerms { radial: [-0.065, 0.012, 0.0, 0.0], ..LensTerms::default() };
+        let lens = PlacedLens { terms, center_px: [5.0, 2.0] };
+        let level_from_camera = rotation_about_y(0.7) * rotation_about_x(-0.2) * rotation_about_z(0.1);
+        let camera_from_level = level_from_camera.transpose();
+        let record = ImageRecord {
+            width: 600,
+            height: 800,
+            orientation: 6,
+            lens: Some(lens),
+            ..super::super::fill::left_out_record("a b.jpg".to_owned(), String::new(), String::new())
+        };
+        let line = image_line(&record, &camera_from_level, 670.0).expect("a line");
+        let read = HuginProject::parse(&format!("# hugin project file\n{line}\n"), "a.pto").expect("a project");
+        let HuginImage { path, width, height, focal_px, lens: found, attitude } = &read.images[0];
+        assert_eq!((path.as_str(), *width, *height), ("a b.jpg", 800, 600));
+        let upright = found.expect("a lens").turned(1);
+        assert!((upright.center_px[0] - 5.0).abs() < 1e-9 && (upright.center_px[1] - 2.0).abs() < 1e-9, "{upright:?}");
+        let [yaw, pitch, roll] = attitude;
+        let angles = [yaw - 0.7, pitch + 0.2, roll - 0.1 - FRAC_PI_2];
+        assert!(angles.iter().all(|angle| angle.abs() < 1e-6), "{angles:?}");
+        for step in 0..=10 {
+            let ray = Vector3::new(0.07 * f64::from(step), 0.0, 1.0);
+            let [written, read] = [(lens.terms, 670.0), (upright.terms, *focal_px)]
+                .map(|(terms, focal_px)| focal_px * Lens::new(terms).place(ray).expect("in front").x);
+            assert!((written - read).abs() < 0.3, "{step}: {written} {read}");
         }
     }
 

@@ -1,0 +1,164 @@
+//! Straight lines of the scene as evidence for lenses: through the right lens, the rays along an edge lie in one plane.
+//!
+//! # Source
+//! D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37(8), 1971 (the plumb line method). What is
+//! minimized are distances in the photograph, as F. Devernay and O. Faugeras, "Straight lines have to be straight", Machine
+//! Vision and Applications 13(1), 2001, advise.
+//!
+//! # Departures
+//! Nobody chooses the lines. Whatever edge goes on smoothly takes part, and what is not straight in the scene loses its
+//! influence by a loss that forgives (Cauchy).
+
+use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector2, Vector3};
+use trueup_core::camera::{Camera, INTRINSICS};
+use trueup_core::lines::EdgeCurve;
+use trueup_core::source::WorkingFrame;
+
+/// How many square pixels of a match's error a square pixel of the mean square distance of an edge from straight is worth:
+/// such a mean scatters by a tenth of what a match does.
+const WORTH: f64 = 100.0;
+/// Root mean square distance of an edge from straight at which it begins to lose influence, in limits of Huber's loss of the matches.
+const LIMIT_SHARE: f64 = 0.1;
+/// Cells along each side of a photograph whose edges may err together: those of one thing.
+const CELLS: usize = 4;
+/// Fewest places along an edge that tell of its bend.
+const FEWEST_PLACES: usize = 4;
+
+/// The edges of one part of a photograph.
+pub(super) struct CurveCluster {
+    pub photograph: usize,
+    pub curves: Vec<EdgeCurve>,
+}
+
+/// The edges of all photographs, in the order of the photographs.
+#[derive(Default)]
+pub(super) struct CurveObservations {
+    pub clusters: Vec<CurveCluster>,
+}
+
+impl CurveObservations {
+    /// Those of photographs with these frames.
+    pub(super) fn new(frames: impl Iterator<Item = WorkingFrame>, curves: &[&[EdgeCurve]]) -> Self {
+        let mut clusters = Vec::new();
+        for ((photograph, frame), curves) in frames.enumerate().zip(curves) {
+            let mut cells: Vec<Vec<EdgeCurve>> = vec![Vec::new(); CELLS * CELLS];
+            for curve in curves.iter().filter(|curve| curve.places.len() >= FEWEST_PLACES) {
+                let [x, y] = curve.places[curve.places.len() / 2];
+                // The casts saturate.
+                let cell = |place: f64, length: f64| ((place / length * CELLS as f64) as usize).min(CELLS - 1);
+                cells[cell(y, frame.height) * CELLS + cell(x, frame.width)].push(curve.clone());
+            }
+            let filled = cells.into_iter().filter(|curves| !curves.is_empty());
+            clusters.extend(filled.map(|curves| CurveCluster { photograph, curves }));
+        }
+        Self { clusters }
+    }
+}
+
+/// The quadratic model of a cluster's cost.
+pub(super) struct CurveTerm {
+    /// Weighted J^T J of the photograph's intrinsics.
+    pub normal: SMatrix<f64, INTRINSICS, INTRINSICS>,
+    /// Weighted J^T r.
+    pub gradient: SVector<f64, INTRINSICS>,
+}
+
+/// The cost of a cluster; `huber_px` is the limit of the matches' loss.
+pub(super) fn curve_cost(cameras: &[Camera], cluster: &CurveCluster, huber_px: f64) -> f64 {
+    let camera = &cameras[cluster.photograph];
+    let cost = |curve: &EdgeCurve| {
+        let mean_square = Plane::through(camera, curve).map_or(f64::INFINITY, |plane| plane.mean_square());
+        cauchy(mean_square, huber_px).0
+    };
+    cluster.curves.iter().map(cost).sum()
+}
+
+/// Cauchy's loss of a mean square distance, and the weight of its squares. What is not finite costs as much as an edge that
+/// is a photograph off.
+fn cauchy(mean_square: f64, huber_px: f64) -> (f64, f64) {
+    const FARTHEST: f64 = 1e6;
+    let limit = (LIMIT_SHARE * huber_px).powi(2);
+    let relative = mean_square.min(FARTHEST) / limit;
+    (WORTH * limit * relative.ln_1p(), WORTH / (1.0 + relative))
+}
+
+impl CurveTerm {
+    /// Linearized at these cameras.
+    pub(super) fn new(cameras: &[Camera], cluster: &CurveCluster, huber_px: f64) -> Self {
+        let camera = &cameras[cluster.photograph];
+        let mut term = Self { normal: SMatrix::zeros(), gradient: SVector::zeros() };
+        for curve in &cluster.curves {
+            let Some(plane) = Plane::through(camera, curve) else { continue };
+            let Some(jacobian) = plane.jacobian(camera) else { continue };
+            let weight = cauchy(plane.mean_square(), huber_px).1 / curve.places.len() as f64;
+            let transposed = jacobian.transpose();
+            term.normal += &transposed * &jacobian * weight;
+            term.gradient += transposed * &plane.distances_px * weight;
+        }
+        term
+    }
+}
+
+/// The plane through the camera nearest to the rays along an edge.
+struct Plane {
+    /// Unit normal.
+    normal: Vector3<f64>,
+    /// The rays, unit length.
+    rays: Vec<Vector3<f64>>,
+    /// How many pixels a ray's picture moves as the ray moves along the normal.
+    scales_px: Vec<f64>,
+    /// How far each place is from the plane's picture, pixels.
+    distances_px: DVector<f64>,
+}
+
+impl Plane {
+    fn through(camera: &Camera, curve: &EdgeCurve) -> Option<Self> {
+        let rays: Vec<Vector3<f64>> =
+            curve.places.iter().map(|place| camera.bearing(Vector2::from(*place)).normalize()).collect();
+        let spread = |weight: &dyn Fn(usize) -> f64| {
+            let scatter = |k: usize| rays[k] * rays[k].transpose() * weight(k);
+            (0..rays.len()).map(scatter).fold(nalgebra::Matrix3::zeros(), |sum, one| sum + one)
+        };
+        let least = |scatter: nalgebra::Matrix3<f64>| {
+            let eigen = scatter.symmetric_eigen();
+            let smallest = eigen.eigenvalues.imin();
+            let normal: Vector3<f64> = eigen.eigenvectors.column(smallest).into();
+            normal.iter().all(|part| part.is_finite()).then_some(normal)
+        };
+        let scales = |normal: Vector3<f64>| -> Option<Vec<f64>> {
+            let scale = |ray: &Vector3<f64>| Some((camera.projection_derivatives(*ray)?.by_bearing * normal).norm());
+            rays.iter().map(scale).collect()
+        };
+        // Distances in the photograph are those of rays, times a scale that hardly changes along the edge.
+        let scales_px = scales(least(spread(&|_| 1.0))?)?;
+        let normal = least(spread(&|k| scales_px[k] * scales_px[k]))?;
+        let distances_px = DVector::from_fn(rays.len(), |k, _| scales_px[k] * normal.dot(&rays[k]));
+        Some(Self { normal, rays, scales_px, distances_px })
+    }
+
+    fn mean_square(&self) -> f64 {
+        self.distances_px.norm_squared() / self.rays.len() as f64
+    }
+
+    /// How the distances change with the intrinsics while the places stay, and the plane turns after them.
+    fn jacobian(&self, camera: &Camera) -> Option<DMatrix<f64>> {
+        let count = self.rays.len();
+        let mut jacobian = DMatrix::zeros(count, INTRINSICS);
+        let mut turning = DMatrix::zeros(count, 2);
+        let across = self.normal.cross(&self.rays[count / 2]).normalize();
+        let tangents = [across, self.normal.cross(&across)];
+        for (k, ray) in self.rays.iter().enumerate() {
+            let derivatives = camera.projection_derivatives(*ray)?;
+            let by_intrinsics = derivatives.bearing_by_pixel()? * derivatives.by_intrinsics;
+            jacobian.set_row(k, &(-(self.normal.transpose() * by_intrinsics) * self.scales_px[k]));
+            tangents.iter().enumerate().for_each(|(j, tangent)| turning[(k, j)] = self.scales_px[k] * tangent.dot(ray));
+        }
+        let turned = (turning.transpose() * &turning).try_inverse()?;
+        let followed = &turning * (turned * (turning.transpose() * &jacobian));
+        Some(jacobian - followed)
+    }
+}
+
+#[cfg(test)]
+#[path = "straightness_tests.rs"]
+mod tests;

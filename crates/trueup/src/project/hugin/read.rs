@@ -1,0 +1,371 @@
+//! A Hugin project as a panorama that can be composed, or as lenses that are told.
+
+use std::f64::consts::PI;
+use std::path::Path;
+
+use nalgebra::{SMatrix, SVector};
+use trueup_align::mesh;
+use trueup_align::projection::Projection;
+use trueup_compose::exposure::Corrections;
+use trueup_compose::layout::Placed;
+use trueup_core::diagnostics::{Diagnostic, Subject};
+use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z, rows_of};
+use trueup_core::lens::{Lens, LensProjection, LensTerms, PlacedLens};
+use trueup_core::mesh::GridMesh;
+use trueup_core::source::SourceImage;
+use trueup_core::{Error, Result, StageContext};
+
+use super::parse::{Fields, HuginLines};
+use crate::options::StitchOptions;
+use crate::pipeline::arrange::{self, ArrangeInput};
+use crate::project::fill::{empty, left_out_record, record_appearance, record_canvas};
+use crate::project::read::find_file;
+use crate::project::record::{ImageRecord, ImageStatus, Project};
+
+/// Cells of a grid along a photograph's longer side: between its vertices, the picture is carried along bilinearly, to a
+/// tenth of a pixel.
+const CELLS: f64 = 64.0;
+/// Largest error, pixels, of our terms for a lens of Hugin's.
+const MAX_LENS_ERROR_PX: f64 = 1.0;
+/// Widest and tallest photograph that is believed, pixels.
+const MAX_SIDE: f64 = 1e6;
+/// Sizes of the panorama, against the photographs' own pixels, that are taken over.
+const SCALES: std::ops::RangeInclusive<f64> = 1e-3..=16.0;
+
+/// A photograph of a Hugin project.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HuginImage {
+    /// The file, as the project names it.
+    pub path: String,
+    /// As stored in its file, whatever its EXIF orientation.
+    pub width: usize,
+    /// See `width`.
+    pub height: usize,
+    /// Pixels of the stored picture.
+    pub focal_px: f64,
+    /// Before the stored picture; nothing of a pinhole.
+    pub lens: Option<PlacedLens>,
+    /// Yaw to the right, pitch upwards and clockwise roll of the stored picture, radians.
+    pub attitude: [f64; 3],
+}
+
+/// A Hugin project: the cameras, and what the panorama is drawn on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HuginProject {
+    /// In the order of the project.
+    pub images: Vec<HuginImage>,
+    /// The panorama's projection; `None` for one that is not drawn here, and without a panorama.
+    projection: Option<Projection>,
+    /// Pixels of the panorama per radian in its middle, if it says so.
+    px_per_radian: Option<f64>,
+    /// Positions of the photographs of which parts are masked.
+    masked: Vec<usize>,
+}
+
+impl HuginProject {
+    /// Whether a text looks like one, and not like a project of ours.
+    pub fn is_one(text: &str, file: &Path) -> bool {
+        let named = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pto"));
+        named || text.trim_start_matches('\u{feff}').starts_with("# hugin project file")
+    }
+
+    /// Reads the text of `file`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] that names file and photograph if it is no Hugin project, is damaged, or holds what is not read: lenses other
+    /// than rectilinear and fisheye, cameras that moved (mosaic mode), shear.
+    pub fn parse(text: &str, file: &str) -> Result<Self> {
+        let HuginLines { panorama, images, masked } = HuginLines::parse(text, file)?;
+        let images: Vec<HuginImage> =
+            images.iter().map(|fields| HuginImage::new(fields, file)).collect::<Result<_>>()?;
+        let (mut projection, mut px_per_radian) = (None, None);
+        if let Some(panorama) = panorama {
+            let (width, angle) = (panorama.number("w"), panorama.number("v").to_radians());
+            projection = match panorama.number("f") as i64 {
+                0 => Some(Projection::Perspective),
+                1 => Some(Projection::Cylindrical),
+                2 => Some(Projection::Equirectangular),
+                4 => Some(Projection::Stereographic),
+                5 => Some(Projection::Mercator),
+                12 | 19 => Some(Projection::Panini),
+                _ => None,
+            };
+            let radians = match projection {
+                Some(Projection::Perspective) if angle < PI => Some(2.0 * (0.5 * angle).tan()),
+                Some(Projection::Cylindrical | Projection::Equirectangular | Projection::Mercator) => Some(angle),
+                _ => None,
+            };
+            px_per_radian = radians.map(|radians| width / radians).filter(|scale| scale.is_finite() && *scale > 0.0);
+        }
+        Ok(Self { images, projection, px_per_radian, masked })
+    }
+
+    /// The panorama that it describes, of its photographs, which lie as it names them in `folder` or here, ready to be composed: the
+    /// cameras draw it, since the format knows of nothing else, and light is evened out anew.
+    ///
+    /// Projection and pixel scale are the project's, as far as they are drawn here; what is shown is chosen anew.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if a photograph is missing, cannot be read, has another size or a mirroring EXIF orientation; those of the
+    /// layout; [`Error::Cancelled`].
+    pub fn project(&self, folder: &Path, context: &StageContext) -> Result<Project> {
+        let mut options = StitchOptions::default();
+        options.arrange.projection.kind = self.projection.unwrap_or(Projection::Auto);
+        let mut found = Vec::with_capacity(self.images.len());
+        for image in &self.images {
+            let source = find_file(&image.path, folder, &options.measure.source, context)?;
+            found.push(Photograph::new(image, &source)?);
+        }
+        let reference = found.len() / 2;
+        if let Some(scale) = self.px_per_radian.map(|scale| scale / found[reference].focal_px) {
+            options.arrange.canvas.scale = scale.clamp(*SCALES.start(), *SCALES.end());
+        }
+        let cameras = found.iter().map(|photograph| {
+            let rows = photograph.record.rotation.unwrap_or_default();
+            photograph.record.camera(&rows)
+        });
+        let Some(cameras) = cameras.collect::<Option<Vec<_>>>() else {
+            return Err(Error::input(folder.display(), "a photograph has no focal length", ""));
+        };
+        let grids: Vec<GridMesh> = found.iter().map(Photograph::grid).collect();
+        let drawn = mesh::drawn_by_cameras(&cameras, &grids, found[reference].focal_px);
+        let placed = drawn.meshes.into_iter().enumerate();
+        let input = ArrangeInput {
+            placed: placed.map(|(photograph, mesh)| Placed { photograph, mesh }).collect(),
+            reference,
+            cameras: Some(cameras),
+            dominant: None,
+            period: drawn.period,
+            by_cameras: drawn.by_cameras,
+            is_flat_scene: false,
+        };
+        let arrangement = arrange::run(input, &options.arrange, context)?.value;
+        let plain = Corrections::plain(found.len());
+        let mut project = empty(&options);
+        project.manhattan.failed_clause = Some("it was aligned in Hugin".to_owned());
+        project.images = found.into_iter().map(|photograph| photograph.record).collect();
+        project.reference.clone_from(&project.images[reference].path);
+        record_canvas(&mut project, &arrangement);
+        for (k, (record, correction)) in project.images.iter_mut().zip(&plain.photographs).enumerate() {
+            record_appearance(record, &arrangement, k, correction);
+            (record.gain, record.correction) = (None, None);
+        }
+        project.diagnostics = self.masked.iter().map(|&photograph| masks_left_out(photograph)).collect();
+        Ok(project)
+    }
+
+    /// The photographs as a record of their lenses alone, as they are stored: what tells lenses of others.
+    pub(crate) fn lens_records(&self) -> Vec<ImageRecord> {
+        let record = |image: &HuginImage| ImageRecord {
+            width: image.width,
+            height: image.height,
+            orientation: 1,
+            status: ImageStatus::Used,
+            focal_px: Some(image.focal_px),
+            lens: image.lens,
+            ..left_out_record(image.path.clone(), String::new(), String::new())
+        };
+        self.images.iter().map(record).collect()
+    }
+}
+
+fn masks_left_out(photograph: usize) -> Diagnostic {
+    Diagnostic::warning(
+        "hugin-masks-left-out",
+        Subject::Photograph(photograph),
+        "the Hugin project masks parts of it, which are not read",
+        "Paint them into a picture, and give it after --mask.",
+    )
+}
+
+/// A photograph of the panorama, and its record.
+struct Photograph {
+    record: ImageRecord,
+    focal_px: f64,
+}
+
+impl Photograph {
+    /// The camera of `image` before the upright photograph in the file `source`.
+    fn new(image: &HuginImage, source: &SourceImage) -> Result<Self> {
+        let quarters: u8 = match source.orientation {
+            0 | 1 => 0,
+            6 => 1,
+            3 => 2,
+            8 => 3,
+            _ => {
+                let reason = "its EXIF orientation mirrors it, which a Hugin project cannot say";
+                return Err(Error::input(&image.path, reason, "Store it upright and align it again."));
+            }
+        };
+        let is_turned = quarters % 2 == 1;
+        let (width, height) = if is_turned { (source.height, source.width) } else { (source.width, source.height) };
+        if (width, height) != (image.width, image.height) {
+            let reason = format!(
+                "it is {width} x {height} px, the Hugin project has it at {} x {} px",
+                image.width, image.height
+            );
+            return Err(Error::input(&image.path, reason, "Give back the photograph that was aligned."));
+        }
+        let [yaw, pitch, roll] = image.attitude;
+        let roll = roll - f64::from(quarters) * 0.5 * PI;
+        let level_from_camera = rotation_about_y(yaw) * rotation_about_x(pitch) * rotation_about_z(roll);
+        let record = ImageRecord {
+            width: source.width,
+            height: source.height,
+            orientation: source.orientation,
+            status: ImageStatus::Used,
+            component: Some(0),
+            camera: source.camera_model.clone(),
+            focal_px: Some(image.focal_px),
+            lens: image.lens.map(|lens| lens.turned(quarters)),
+            rotation: Some(rows_of(&level_from_camera.transpose())),
+            ..left_out_record(source.path.display().to_string(), String::new(), String::new())
+        };
+        Ok(Self { record, focal_px: image.focal_px })
+    }
+
+    fn grid(&self) -> GridMesh {
+        let (width, height) = (self.record.width as f64, self.record.height as f64);
+        GridMesh::regular(width, height, width.max(height) / CELLS)
+    }
+}
+
+impl HuginImage {
+    fn new(fields: &Fields, file: &str) -> Result<Self> {
+        let name = if fields.name.is_empty() { format!("line {}", fields.line) } else { fields.name.clone() };
+        let wrong = |reason: String, hint: &str| Error::input(format!("{name} in {file}"), reason, hint);
+        let again = "Save the project in Hugin again.";
+        if fields.name.is_empty() {
+            return Err(wrong("the photograph has no name".to_owned(), again));
+        }
+        let [width, height] = ["w", "h"].map(|side| fields.number(side));
+        if ![width, height].iter().all(|side| (1.0..=MAX_SIDE).contains(side) && side.fract() == 0.0) {
+            return Err(wrong(format!("{width} x {height} is no size of a photograph"), again));
+        }
+        let moved = ["TrX", "TrY", "TrZ"].iter().any(|name| fields.number(name) != 0.0);
+        if moved {
+            let hint =
+                "Reset the translations in Hugin and optimise the rotations, or stitch the photographs by trueup.";
+            return Err(wrong("its camera moved (TrX, TrY, TrZ), which is not read".to_owned(), hint));
+        }
+        if fields.number("g") != 0.0 || fields.number("t") != 0.0 {
+            return Err(wrong("it is sheared (g, t), which is not read".to_owned(), "Reset g and t in Hugin."));
+        }
+        let projection = match fields.number("f") {
+            0.0 => LensProjection::Rectilinear,
+            2.0 | 3.0 => LensProjection::Equidistant,
+            other => {
+                let hint = "Rectilinear lenses (0) and fisheyes (2, 3) are read.";
+                return Err(wrong(format!("lenses of type {other} are not read"), hint));
+            }
+        };
+        let angle = fields.number("v").to_radians();
+        let focal_px = match projection {
+            LensProjection::Rectilinear if angle < PI => 0.5 * width / (0.5 * angle).tan(),
+            LensProjection::Rectilinear => f64::NAN,
+            LensProjection::Equidistant => width / angle,
+        };
+        // A record's own limits are narrower still.
+        if !(focal_px > 0.01 * width && focal_px < 1e3 * width) {
+            return Err(wrong(format!("{} degrees is no field of view of such a lens", fields.number("v")), again));
+        }
+        let polynomial = Polynomial {
+            terms: ["a", "b", "c"].map(|name| fields.number(name)),
+            unit_px: 0.5 * width.min(height),
+            farthest_px: 0.5 * width.hypot(height),
+        };
+        let center_px = ["d", "e"].map(|name| fields.number(name));
+        if center_px.iter().any(|offset| offset.abs() > 0.5 * width.max(height)) {
+            return Err(wrong("its center (d, e) lies outside of it".to_owned(), again));
+        }
+        let attitude = ["y", "p", "r"].map(|name| fields.number(name).to_radians());
+        let hint = "Optimise the lens again, with b alone.";
+        let (terms, stretch) = polynomial
+            .as_terms(projection, focal_px)
+            .ok_or_else(|| wrong("its lens (a, b, c) is none that light passes one to one".to_owned(), hint))?;
+        let lens = PlacedLens { terms, center_px };
+        Ok(Self {
+            path: fields.name.clone(),
+            width: width as usize,
+            height: height as usize,
+            focal_px: focal_px * stretch,
+            lens: (lens != PlacedLens::default()).then_some(lens),
+            attitude,
+        })
+    }
+}
+
+/// What a lens of Hugin's makes of a radius: see [`super::HuginLens`].
+struct Polynomial {
+    /// a, b and c.
+    terms: [f64; 3],
+    /// Unit of the radius.
+    unit_px: f64,
+    /// Radius of the corners.
+    farthest_px: f64,
+}
+
+impl Polynomial {
+    /// The radius, pixels, where the projection alone has `alone_px`.
+    fn at(&self, alone_px: f64) -> f64 {
+        let ([a, b, c], r) = (self.terms, alone_px / self.unit_px);
+        alone_px * (1.0 - a - b - c + r * (c + r * (b + r * a)))
+    }
+
+    /// Our terms nearest to it over the photograph, by least squares, and by what the focal length grows with them; `None` if
+    /// it bends light back, or our terms come nowhere near.
+    fn as_terms(&self, projection: LensProjection, focal_px: f64) -> Option<(LensTerms, f64)> {
+        if self.terms == [0.0; 3] {
+            return Some((LensTerms { projection, ..LensTerms::default() }, 1.0));
+        }
+        const SAMPLES: usize = 256;
+        const TERMS: usize = 5;
+        // The tangent of 80 degrees, and half a turn: beyond, no light falls on a photograph.
+        let limit = match projection {
+            LensProjection::Rectilinear => 5.67,
+            LensProjection::Equidistant => PI,
+        };
+        let step = limit * focal_px / 4096.0;
+        let mut end = 0.0;
+        while self.at(end) < self.farthest_px {
+            if end >= limit * focal_px || self.at(end + step) <= self.at(end) {
+                return None;
+            }
+            end += step;
+        }
+        let powers = |alone: f64| SVector::<f64, TERMS>::from_fn(|k, _| alone.powi(2 * k as i32 + 1));
+        let (mut normal, mut right) = (SMatrix::<f64, TERMS, TERMS>::zeros(), SVector::<f64, TERMS>::zeros());
+        // Powers of the share of the way, so that large and small ones weigh alike.
+        for k in 1..=SAMPLES {
+            let share = k as f64 / SAMPLES as f64;
+            let of_share = powers(share);
+            normal += of_share * of_share.transpose();
+            right += of_share * self.at(share * end);
+        }
+        let fitted = normal.cholesky()?.solve(&right);
+        let per_share = end / focal_px;
+        let coefficient = |k: usize| fitted[k] / focal_px / per_share.powi(2 * k as i32 + 1);
+        let stretch = coefficient(0);
+        let terms = LensTerms {
+            projection,
+            radial: std::array::from_fn(|k| coefficient(k + 1) / stretch),
+            tangential: [0.0; 2],
+        };
+        let lens = Lens::new(terms);
+        let worst = (1..=SAMPLES).map(|k| {
+            let alone = per_share * k as f64 / SAMPLES as f64;
+            let ray = match projection {
+                LensProjection::Rectilinear => nalgebra::Vector3::new(alone, 0.0, 1.0),
+                LensProjection::Equidistant => nalgebra::Vector3::new(alone.sin(), 0.0, alone.cos()),
+            };
+            let place = lens.place(ray).map_or(f64::INFINITY, |place| place.x);
+            (place * focal_px * stretch - self.at(alone * focal_px)).abs()
+        });
+        let worst = worst.fold(0.0, f64::max);
+        (stretch > 0.0 && worst <= MAX_LENS_ERROR_PX).then_some((terms, stretch))
+    }
+}
+
+#[cfg(test)]
+#[path = "read_tests.rs"]
+mod tests;
