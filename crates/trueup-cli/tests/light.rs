@@ -84,7 +84,7 @@ fn a_bracket_becomes_a_picture_or_light_as_the_panorama_is_written() {
     let run = stitch(&["-o", "pano.exr", "--project", "light.json", "--crop", "none"]);
     assert!(run.expect_success().contains("2 of 3 exposures each, merged to light"), "{}", run.stdout);
     let range = desk.json("light.json")["light"].clone();
-    assert!(range["peak"].as_f64() > Some(4.0), "{range}");
+    assert!(range["peak"].as_f64() >= Some(4.0), "{range}");
     // The darkest exposure tells of light of up to four times white, of which the street has some.
     let found = open_exr(&desk, "pano.exr");
     let most = means(&found).into_iter().map(|(_, mean)| mean).fold(0.0, f32::max);
