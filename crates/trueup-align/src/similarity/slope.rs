@@ -18,8 +18,12 @@ const LEVEL_SPREAD_DEG: f64 = 0.2;
 const SLOPE_SPREAD_DEG: f64 = 3.0;
 /// Share of scenes whose level lines lie along a slope. Reasoned.
 const SLOPING_SHARE: f64 = 0.2;
-/// Fewest photographs that must show upright lines, three each, to contradict the level ones.
-const MIN_PHOTOGRAPHS: usize = 2;
+/// Fewer photographs tell nothing of how uncertain the verticals are: a jackknife over two or three scatters by its own size.
+const MIN_PHOTOGRAPHS: usize = 4;
+/// Fewest of them that must show upright lines, three each, to contradict the level ones.
+const MIN_UPRIGHT_PHOTOGRAPHS: usize = 2;
+/// Level lines of less weight beside the upright ones tilt nothing, slope or not.
+const MIN_WEIGHT: f64 = 0.1;
 
 /// A vertical that the level lines of a scene contradict.
 #[derive(Debug, Clone, Copy)]
@@ -31,22 +35,25 @@ pub(super) struct Slope {
 }
 
 /// The slope of the level lines of `frame`, whose column `vertical` is the vertical; `None` where they agree with the upright lines as
-/// far as both are sure (by a jackknife over the photographs).
+/// far as both are sure (by a jackknife over the photographs), do not count anyway, or are of too few photographs.
 pub(super) fn slope(
     vote: &LineVote,
     frame: &Matrix3<f64>,
     vertical: usize,
     axis_weights: &AxisWeights,
 ) -> Option<Slope> {
+    let level_weights: AxisWeights =
+        std::array::from_fn(|axis| if axis == vertical { 0.0 } else { axis_weights[axis] });
+    if vote.photographs() < MIN_PHOTOGRAPHS || level_weights.iter().all(|&weight| weight < MIN_WEIGHT) {
+        return None;
+    }
     let start: Vector3<f64> = frame.column(vertical).into_owned();
     let (first, second) = orthonormal_complement(&start);
     let upright = vote.refine_first_axis(&Matrix3::from_columns(&[start, first, second]));
     let upright_vertical: Vector3<f64> = upright.column(0).into_owned();
-    if vote.support(&upright_vertical, TOLERANCE_DEG.to_radians()).photographs < MIN_PHOTOGRAPHS {
+    if vote.support(&upright_vertical, TOLERANCE_DEG.to_radians()).photographs < MIN_UPRIGHT_PHOTOGRAPHS {
         return None;
     }
-    let level_weights: AxisWeights =
-        std::array::from_fn(|axis| if axis == vertical { 0.0 } else { axis_weights[axis] });
     let level = vote.refine_frame(frame, &level_weights);
     let angle = upright_vertical.angle(&level.column(vertical));
     let upright_deviation =
