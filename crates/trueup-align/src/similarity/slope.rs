@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn lines_along_a_slope_do_not_tilt_the_vertical() {
         const SLOPE_DEG: f64 = 2.5;
-        let world = World::Manhattan { noise_deg: 1.0, bad_share: 0.0 };
+        let world = World::Manhattan { noise_deg: 0.5, bad_share: 0.0 };
         let level = with_lines(SyntheticScene::new(Sweep::default(), world, 0.0, 13), 20, 0.5);
         assert_eq!(level.prior(&SimilarityOptions::default()).guidance.slope, None);
         let mut sloping = level.clone();
