@@ -11,7 +11,10 @@ use crate::summary;
 
 pub(crate) fn run(args: &InspectArgs) -> Result<(), Failure> {
     let project = read(&args.project)?;
-    output::print(&summary::text(&project, None, args.verbose))
+    match args.json {
+        true => output::print(&summary::json_of_project(&project)),
+        false => output::print(&summary::text(&project, None, args.verbose)),
+    }
 }
 
 /// Reads a project file.

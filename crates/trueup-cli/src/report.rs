@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use serde_json::json;
 use trueup::{Error, Outputs, Project, ReadFile, StageContext, Written};
 use trueup_report::ReportJob;
 
@@ -28,9 +29,15 @@ pub(crate) fn run(args: &ReportArgs) -> Result<(), Failure> {
     };
     let page = progress::shown(args.quiet, |context| job.run(context))?;
     trueup::write_atomically(&args.output, page.as_bytes())?;
-    match args.quiet {
-        true => Ok(()),
-        false => output::print(&format!("report      {}  {}\n", args.output.display(), file_size(page.len() as u64))),
+    let file = args.output.display();
+    match (args.json, args.quiet) {
+        (true, _) => {
+            let told =
+                json!({ "format": "trueup-report", "version": 1, "report": file.to_string(), "bytes": page.len() });
+            output::print(&format!("{told}\n"))
+        }
+        (false, true) => Ok(()),
+        (false, false) => output::print(&format!("report      {file}  {}\n", file_size(page.len() as u64))),
     }
 }
 

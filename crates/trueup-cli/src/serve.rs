@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use serde_json::json;
 use trueup::Error;
 use trueup_server::{Network, Serving, serve};
 
@@ -17,11 +18,15 @@ pub(crate) fn run(args: ServeArgs) -> Result<(), Failure> {
     // Any port that is free.
     let port = args.port.unwrap_or(0);
     let serving = Serving { folder: args.folder, port, network };
-    let mut printed = Ok(());
+    let (mut printed, json) = (Ok(()), args.json);
     // Nothing is at work most of the time, and what is stops with the server: there is nothing that a last resort would save.
     let cancel = trueup_terminal::cancel_token("trueup", "", None);
     let served = serve(&serving, &cancel, |address| {
-        printed = output::print(&format!("Open {address}\nStop with Ctrl-C.\n"));
+        let told = json!({ "format": "trueup-serve", "version": 1, "address": address });
+        printed = output::print(&match json {
+            true => format!("{told}\n"),
+            false => format!("Open {address}\nStop with Ctrl-C.\n"),
+        });
     });
     // Work that did not stop in time ends with the program.
     trueup::abandon_unfinished();

@@ -36,6 +36,18 @@ fn photographs_become_a_panorama_and_a_summary() {
         assert!(inspected.contains(&line), "\"{line}\" is not in\n{}", inspected.join("\n"));
     }
     assert!(inspected.iter().any(|line| line.trim_start().starts_with("a.jpg: ")), "{}", inspected.join("\n"));
+
+    // For programs, what is said of the panorama is what was said when it was made, but for its files.
+    let composed = finish(trueup(desk.path(), &["compose", "pano.json", "-o", "again.jpg", "--json"]));
+    let mut written: serde_json::Value = serde_json::from_str(composed.expect_success()).expect("JSON");
+    let told = finish(trueup(desk.path(), &["inspect", "pano.json", "--json"]));
+    let mut told: serde_json::Value = serde_json::from_str(told.expect_success()).expect("JSON");
+    assert_eq!((&told["format"], &told["version"]), (&"trueup-summary".into(), &1.into()));
+    for one in [&mut written, &mut told] {
+        let panorama = one["panoramas"][0].as_object_mut().expect("a panorama");
+        ["panorama", "beside", "bytes", "seconds"].map(|field| panorama.remove(field));
+    }
+    assert_eq!(told, written);
 }
 
 #[test]

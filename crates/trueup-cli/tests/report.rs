@@ -14,6 +14,9 @@ fn a_panorama_and_its_project_have_the_same_page() {
     let report = finish(trueup(desk.path(), &["report", "pano.json", "-o", "pano.html"]));
     assert!(report.expect_success().starts_with("report      pano.html  "), "{}", report.stdout);
     assert_eq!(page(&desk, "beside.html"), page(&desk, "pano.html"));
+    let told = finish(trueup(desk.path(), &["report", "pano.json", "-o", "pano.html", "--json"]));
+    let told: serde_json::Value = serde_json::from_str(told.expect_success()).expect("JSON");
+    assert_eq!((&told["report"], &told["bytes"]), (&"pano.html".into(), &page(&desk, "pano.html").len().into()));
     assert!(page(&desk, "pano.html").contains("<title>How pano came about</title>"));
     // The photographs may have moved.
     std::fs::create_dir(desk.join("moved")).expect("a folder");

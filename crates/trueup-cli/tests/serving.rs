@@ -22,6 +22,22 @@ fn it_prints_an_address_and_leaves_nothing_behind() {
 }
 
 #[test]
+fn programs_are_told_the_address_as_json() {
+    let desk = Desk::new();
+    let mut command = trueup(desk.path(), &["serve", "--json"]);
+    command.env("TMPDIR", desk.path()).stdout(Stdio::piped());
+    let mut child = command.spawn().expect("the command starts");
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("UTF-8");
+    let told: serde_json::Value = serde_json::from_str(&line).expect("JSON");
+    assert_eq!((&told["format"], &told["version"]), (&"trueup-serve".into(), &1.into()));
+    assert!(told["address"].as_str().is_some_and(|one| one.starts_with("http://127.0.0.1:")), "{told}");
+    let kill = format!("kill -INT {}", child.id());
+    assert!(Command::new("sh").args(["-c", &kill]).status().expect("sh runs").success());
+    assert_eq!(child.wait().expect("it ends").code(), Some(0));
+}
+
+#[test]
 fn others_are_let_in_by_a_long_password_only() {
     let desk = Desk::new();
     desk.put("short.txt", "secret\nand more");

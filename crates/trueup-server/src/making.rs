@@ -6,8 +6,8 @@ use std::sync::{Arc, PoisonError};
 
 use serde::Serialize;
 use trueup::{
-    Alignment, Canvas, Error, Inputs, OutputOptions, Outputs, PhotographCache, ProjectionRecord, Rendered, Result,
-    SideOutput, StageContext, StitchOptions, Stitcher, write_picture,
+    Alignment, Canvas, Error, Inputs, OutputOptions, Outputs, PhotographCache, Project, ProjectionRecord, Rendered,
+    Result, SideOutput, StageContext, StitchOptions, Stitcher, write_picture,
 };
 
 use crate::keeping::Companions;
@@ -136,9 +136,9 @@ pub(crate) struct Warning {
 }
 
 /// What makes a panorama worse, in words.
-pub(crate) fn warnings(alignment: &Alignment) -> Vec<Warning> {
-    let names = alignment.project.photograph_names();
-    let told = alignment.project.warnings().map(|one| Warning {
+pub(crate) fn warnings(project: &Project) -> Vec<Warning> {
+    let names = project.photograph_names();
+    let told = project.warnings().map(|one| Warning {
         subject: one.subject.named(&names),
         message: one.message.clone(),
         hint: one.hint.clone(),
@@ -166,7 +166,7 @@ pub(crate) fn preview(studio: &Studio, changes: &[(String, String)]) -> Result<P
         write_picture(&place, &rendered.panorama, &metadata, &order.picture_options()?, &context)?;
         let bytes = std::fs::read(&place).map_err(|error| Error::io("reading", &place, error))?;
         let underlay = Arc::new(order.underlay(&alignment, &rendered));
-        let warnings = warnings(&alignment);
+        let warnings = warnings(&alignment.project);
         let project = alignment.project;
         let (canvas, projection) = (project.canvas, project.projection);
         Ok(Preview { bytes, media_type, underlay, stitched: order.stitched.number, canvas, projection, warnings })

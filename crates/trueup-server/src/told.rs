@@ -8,7 +8,7 @@ use trueup::{ImageRecord, ImageStatus, Judgement};
 use crate::denial::Trouble;
 use crate::folder::Folder;
 use crate::making::{Warning, warnings};
-use crate::studio::{ExportedFile, Listed, Stage, State, Stitched, Studio, Task};
+use crate::studio::{ExportedFile, Listed, Stage, State, Stitched, Studio, Task, Tiles};
 
 /// All of it.
 #[derive(Debug, Serialize)]
@@ -84,13 +84,17 @@ struct ToldExport {
     files: Vec<ExportedFile>,
 }
 
+/// Whether tiles show the panorama as it is wished now.
+fn are_shown(tiles: &Tiles, state: &State) -> bool {
+    let stitched = state.stitched.as_ref();
+    tiles.wishes == *state.history.now() && stitched.is_some_and(|stitched| stitched.number == tiles.stitched)
+}
+
 /// What there is now, as number `news`.
 pub(crate) fn told(studio: &Studio, news: u64) -> Told {
     let state = studio.state();
     let wishes = state.history.now();
-    let shown = |tiles: &&crate::studio::Tiles| {
-        tiles.wishes == *wishes && state.stitched.as_ref().is_some_and(|stitched| stitched.number == tiles.stitched)
-    };
+    let shown = |tiles: &&Tiles| are_shown(tiles, &state);
     let exports = state.exports.iter().map(|export| ToldExport {
         number: export.number,
         to_fetch: export.folder.is_some(),
@@ -145,8 +149,11 @@ fn told_photographs(state: &State) -> Vec<ToldPhotograph> {
     told.collect()
 }
 
+/// Of a panorama that is shown whole in another view, what is measured in that.
 fn told_panorama(state: &State, stitched: &Stitched) -> ToldPanorama {
     let project = &stitched.alignment.project;
+    let shown = state.tiles.as_ref().filter(|tiles| are_shown(tiles, state)).map(|tiles| tiles.underlay.project());
+    let shown = shown.filter(|shown| shown.measures.is_some()).unwrap_or(project);
     let same_geometry = state
         .options()
         .is_ok_and(|options| options.differing_geometry(&stitched.options).is_ok_and(|differing| differing.is_empty()));
@@ -154,7 +161,7 @@ fn told_panorama(state: &State, stitched: &Stitched) -> ToldPanorama {
         number: stitched.number,
         stale: !same_geometry || !state.history.now().same_photographs(&stitched.wishes),
         used: project.used(),
-        judgement: project.judgement(),
-        warnings: warnings(&stitched.alignment),
+        judgement: shown.judgement(),
+        warnings: warnings(shown),
     }
 }

@@ -219,14 +219,14 @@ fn drawings_lie_over_previews_and_tiles_as_the_report_has_them() {
     let seams = layer(&format!("tiles/{tiles}"), "seams").json();
     assert!(seams["drawing"].as_str().is_some_and(|svg| svg.contains("Seams between the 5 photographs")), "{seams}");
 
-    // In another view, what was measured lies where that shows it.
+    // Another view is measured by itself.
     let turned = server.post("/api/preview", r#"{"options":{"projection.yaw":"10"}}"#).json();
     let over = format!("preview/{}", turned["number"]);
     let canvas = format!("viewBox=\"0 0 {} {}\"", turned["canvas"]["width"], turned["canvas"]["height"]);
     for name in ["outlines", "lines", "alignment", "overlaps"] {
         let told = layer(&over, name).json();
         assert!(told["drawing"].as_str().is_some_and(|svg| svg.contains(&canvas)), "{name}: {told}");
-        assert_eq!(told["is_measured_elsewhere"], matches!(name, "lines" | "alignment"), "{name}");
+        assert_eq!(told["is_measured_elsewhere"], false, "{name}");
     }
     // Where photographs are averaged there are no seams.
     let averaged = server.post("/api/preview", r#"{"options":{"render.blend":"average"}}"#).json();
@@ -235,6 +235,17 @@ fn drawings_lie_over_previews_and_tiles_as_the_report_has_them() {
         [format!("{over}/layers/none"), "preview/999999/layers/seams".into(), "tiles/999999/layers/seams".into()]
     {
         assert_eq!(server.get(&format!("/api/{missing}")).status, 404, "{missing}");
+    }
+
+    // A record has no matches to measure another view by: what was measured lies where that shows it, which is said.
+    let other = Server::of(desk.path());
+    assert_eq!(other.with_body("PUT", "/api/project", server.get("/api/project").text().as_bytes()).status, 202);
+    other.settled();
+    let turned = other.post("/api/preview", r#"{"options":{"projection.yaw":"10"}}"#).json();
+    for one in Layer::ALL {
+        let told = other.get(&format!("/api/preview/{}/layers/{}", turned["number"], one.name())).json();
+        assert!(told["drawing"].is_string(), "{one:?}: {told}");
+        assert_eq!(told["is_measured_elsewhere"], matches!(one, Layer::Lines | Layer::Alignment), "{one:?}");
     }
 }
 

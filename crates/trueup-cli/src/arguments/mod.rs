@@ -112,6 +112,10 @@ pub(crate) struct InspectArgs {
     /// Print also the pairs' verdicts, each photograph's geometry, notes, and a line per stage's time
     #[arg(short, long)]
     pub verbose: bool,
+
+    /// As a JSON object, as `stitch --json` prints it
+    #[arg(long, conflicts_with = "verbose")]
+    pub json: bool,
 }
 
 #[derive(Debug, Args)]

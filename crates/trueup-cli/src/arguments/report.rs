@@ -34,6 +34,10 @@ pub(crate) struct ReportArgs {
     pub threads: Option<u16>,
 
     /// Print nothing but errors
-    #[arg(short, long)]
+    #[arg(short, long, conflicts_with = "json")]
     pub quiet: bool,
+
+    /// Print which file was written as a JSON object
+    #[arg(long)]
+    pub json: bool,
 }

@@ -24,4 +24,8 @@ pub(crate) struct ServeArgs {
     /// A file with the password for --listen in its first line
     #[arg(long, value_name = "FILE", requires = "listen")]
     pub password_file: Option<PathBuf>,
+
+    /// Print the address as a JSON object
+    #[arg(long)]
+    pub json: bool,
 }

@@ -20,7 +20,7 @@ use crate::words::file_size;
 use left_out::{LeftOut, left_out, tells_of_left_out};
 use names::{listed, names};
 
-pub(crate) use json::json;
+pub(crate) use json::{json, json_of_project};
 pub(crate) use labeled_lines::LabeledLines;
 pub(crate) use quiet::warnings;
 

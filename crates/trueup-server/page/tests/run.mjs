@@ -3,93 +3,16 @@
 // TRUEUP is the command (target/release/trueup otherwise), CHROMIUM the browser. With SCREENSHOTS=DIR, pictures of the page are
 // written there.
 import assert from "node:assert/strict";
-import { spawn } from "node:child_process";
-import { cp, mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
-import { createRequire } from "node:module";
-import { tmpdir } from "node:os";
+import { execFileSync } from "node:child_process";
+import { cp, readFile, writeFile } from "node:fs/promises";
 import { join } from "node:path";
-import { chromium } from "playwright-core";
+import { accessible, clear, command, complaints, desk, drawn, open, picture, redrawn, room, serve, settled, step, tiled } from "./desk.mjs";
+import { timeRedraws } from "./redraws.mjs";
+import { openReport } from "./reports.mjs";
+import { undoEverything } from "./undoing.mjs";
 
-const here = (path) => new URL(path, import.meta.url).pathname;
-const command = process.env.TRUEUP ?? here("../../../../target/release/trueup");
-const browserPath = process.env.CHROMIUM ?? "/usr/bin/chromium";
-const pictures = process.env.SCREENSHOTS;
-const axe = await readFile(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
-
-const flags = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader"];
-/** Longest a step may take, in milliseconds: a machine may be busy with other things. */
-const PATIENCE = 60_000;
-/** Largest median of a preview's time, in milliseconds: what still feels like an answer. It is told; a quiet machine is wanted to do with 300. */
-const PREVIEW_MS = Number(process.env.PREVIEW_MS ?? 1000);
-
-const desk = await mkdtemp(join(tmpdir(), "trueup-page-"));
-const room = join(desk, "room");
-for (const number of [0, 1, 2, 3, 4]) await cp(here(`../../../../examples/room/0${number}.jpg`), join(room, `0${number}.jpg`));
 /** A name that would be markup, on a file that is a photograph of nothing else here. */
 const script = "<img src=x onerror=window.harmed=1>.jpg";
-
-const children = [];
-/** Starts the server; resolves with the address it prints. */
-function serve(...folders) {
-    return new Promise((resolve, reject) => {
-        const child = spawn(command, ["serve", ...folders], { stdio: ["ignore", "pipe", "inherit"] });
-        children.push(child);
-        child.stdout.on("data", (text) => {
-            const address = /http:\S+/.exec(String(text));
-            if (address) resolve(address[0]);
-        });
-        child.on("exit", (status) => reject(new Error(`the server ended with ${status}`)));
-    });
-}
-
-const browser = await chromium.launch({ executablePath: browserPath, headless: true, args: flags });
-const complaints = [];
-async function open(address, options = {}) {
-    const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, acceptDownloads: true, ...options });
-    const page = await context.newPage();
-    page.setDefaultTimeout(PATIENCE);
-    page.on("console", (message) => { if (message.type() === "error") complaints.push(message.text()); });
-    page.on("pageerror", (error) => complaints.push(String(error)));
-    page.on("request", (request) => {
-        const url = request.url();
-        if (!/^(blob:|data:)/.test(url) && new URL(url).hostname !== "127.0.0.1") complaints.push(`asked elsewhere: ${url}`);
-    });
-    await page.goto(address);
-    return page;
-}
-
-let last = Date.now();
-function step(words) {
-    console.log(`${((Date.now() - last) / 1000).toFixed(1).padStart(6)} s  ${words}`);
-    last = Date.now();
-}
-
-/** No violation of accessibility, whatever is shown. */
-async function accessible(page, where) {
-    // Evaluated by the browser's own tools, not by the page, whose policy lets no other script in.
-    // A color on its way to another is none that stays.
-    await page.emulateMedia({ reducedMotion: "reduce" });
-    await page.evaluate(axe);
-    const found = await page.evaluate(() => window.axe.run(document, { resultTypes: ["violations"] }));
-    const violations = found.violations.map((one) => `${one.id}: ${one.nodes.map((node) => node.html).join(" | ")}`);
-    assert.deepEqual(violations, [], where);
-}
-
-async function picture(page, name) {
-    if (pictures) await page.screenshot({ path: join(pictures, `${name}.jpg`), type: "jpeg", quality: 70 });
-}
-
-const drawn = (page) => page.locator("#preview").getAttribute("data-number");
-/** Resolves when another preview than `before` is shown. */
-async function redrawn(page, before) {
-    await page.waitForFunction((number) => {
-        const shown = document.getElementById("preview")?.dataset.number;
-        return shown !== undefined && shown !== number;
-    }, before);
-}
-const settled = (page) => page.waitForFunction(() => document.getElementById("work").hidden);
-const tiled = (page) => page.waitForFunction(() => !document.getElementById("tiles").hidden);
 
 async function stitchAndLook() {
     const page = await open(await serve(room));
@@ -201,25 +124,6 @@ async function drawOver(page) {
     step("drawings over the preview and the tiles, by keys, named for screen readers");
 }
 
-/** Time from a wish to its preview, decoded, as the page asks for them. */
-async function timePreviews(page) {
-    await settled(page);
-    const times = await page.evaluate(async () => {
-        const times = [];
-        for (let number = 0; number < 9; number += 1) {
-            const begun = performance.now();
-            const body = JSON.stringify({ options: { "projection.yaw": String(number) } });
-            const told = await (await fetch("/api/preview", { method: "POST", body })).json();
-            const blob = await (await fetch(`/api/preview/${told.number}`)).blob();
-            (await createImageBitmap(blob)).close();
-            times.push(performance.now() - begun);
-        }
-        return times.sort((a, b) => a - b);
-    });
-    step(`previews in ${times[4].toFixed(0)} ms (median of ${times.length}; ${times[0].toFixed(0)} to ${times[8].toFixed(0)})`);
-    assert.ok(times[4] <= PREVIEW_MS, `the median is ${times[4]} ms`);
-}
-
 async function paint(page) {
     await page.getByRole("button", { name: "Paint on 02.jpg" }).click();
     const canvas = page.locator("#paint-canvas");
@@ -303,6 +207,11 @@ async function reopen() {
     await page.waitForTimeout(800);
     await picture(page, "page-dark");
     step("opened again, in the dark: the same project");
+
+    // The command makes of the saved project the very file that the page saved.
+    execFileSync(command, ["compose", join(desk, "saved.json"), "--photos", room, "-o", join(desk, "composed.png"), "--quiet"]);
+    assert.ok((await readFile(join(desk, "composed.png"))).equals(await readFile(join(desk, "saved.png"))), "the same bytes");
+    step("composed by the command: the same file");
 
     await page.getByLabel("View", { exact: true }).selectOption("equirectangular");
     await page.getByRole("button", { name: "Look around" }).click();
@@ -395,10 +304,12 @@ try {
     const page = await stitchAndLook();
     await drawOver(page);
     await choose(page);
-    await timePreviews(page);
+    await timeRedraws(page);
+    await undoEverything(page);
     await paint(page);
     await save(page);
     await reopen();
+    await openReport(join(desk, "saved.json"));
     await keepMasks();
     await phone();
     await names();
@@ -407,12 +318,7 @@ try {
 } catch (error) {
     failure = error;
 } finally {
-    await browser.close();
-    for (const child of children) {
-        child.removeAllListeners("exit");
-        child.kill("SIGINT");
-    }
-    await rm(desk, { recursive: true, force: true });
+    await clear();
 }
 if (failure) {
     console.error(failure, complaints);

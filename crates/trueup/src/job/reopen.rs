@@ -48,7 +48,7 @@ impl Stitcher<'_> {
             (None, Some(_)) => WantedLight::Surveyed,
             (light, _) => WantedLight::Known(light),
         };
-        self.recall(project, FoundPhotographs { images, masks, light, ..FoundPhotographs::default() })
+        self.recall(project, FoundPhotographs { images, masks, light, ..FoundPhotographs::default() }, None)
     }
 }
 

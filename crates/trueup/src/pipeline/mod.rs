@@ -23,6 +23,7 @@ mod scratch;
 mod stacking;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use trueup_align::vanishing::TriadOutcome;
 use trueup_compose::crop::{Crop, Rectangle};
@@ -53,6 +54,7 @@ use crate::project::fill::{GeometryRecord, fill_geometry, place, record_composit
 use crate::project::provenance;
 use crate::project::read::{Recorded, knows_light};
 use crate::project::record::{Canvas, CropRecord, Project};
+use crate::report::evidence::Evidence;
 use crate::report::{judgement, measuring, sideways};
 use crate::workers::{Division, Workers};
 
@@ -270,25 +272,32 @@ impl<'a> Stitcher<'a> {
         fill_geometry(&mut project, &found);
         project.color_space = photographs.colors().map(PhotographColors::name).unwrap_or_default();
         project.light = photographs.light();
-        project.measures =
-            geometry.map(|geometry| context.time("measures", || measuring::run(&component, geometry, &arrangement)));
+        let evidence = geometry.map(|geometry| context.time("measures", || Evidence::of(&component, geometry)));
+        let measure = |evidence| context.time("measures", || measuring::run(evidence, &arrangement, &project.images));
+        project.measures = evidence.as_ref().map(measure);
         let on_side = geometry.and_then(|geometry| sideways::warning(&geometry.cameras.cameras, members));
         judgement::warnings(&project).into_iter().chain(on_side).for_each(|warning| context.report(warning));
         let layout = arrangement.drawn;
         let corrections = corrections.of_placed(&layout, |photograph| members.binary_search(&photograph).ok());
         let directions = geometry.map(|geometry| geometry.triads.clone()).unwrap_or_default();
         let photographs = photographs.clone();
-        Ok(Alignment { project, layout, kept: None, corrections, photographs, directions, positions: None })
+        let evidence = evidence.map(Arc::new);
+        Ok(Alignment { project, layout, kept: None, corrections, photographs, directions, positions: None, evidence })
     }
 
     /// The geometry that `project` records, over the photographs that were `found`: those used in it, in its order, or others
     /// of their sizes. The canvas is laid out anew if the options ask for another one, and the light evened out anew if they ask
-    /// for that.
+    /// for that. Another view is measured by the `evidence`, or not at all.
     ///
     /// # Errors
     /// [`Error::Options`]; [`Error::Input`] if the project was damaged; [`Error::NotApplicable`] if a projection is asked
     /// for and the project has no cameras; those of the layout; [`Error::Limits`]; [`Error::Cancelled`].
-    pub(crate) fn recall(&self, project: &Project, found: FoundPhotographs) -> Result<Alignment> {
+    pub(crate) fn recall(
+        &self,
+        project: &Project,
+        found: FoundPhotographs,
+        evidence: Option<Arc<Evidence>>,
+    ) -> Result<Alignment> {
         self.options.validate()?;
         let recalled = self.context.gather(|context| {
             let Recorded { used, layout, corrections, reference } = Recorded::new(project)?;
@@ -308,14 +317,15 @@ impl<'a> Stitcher<'a> {
             project.color_space = set.files.colors().map(PhotographColors::name).unwrap_or_default();
             project.light = set.files.light();
             if !same_view {
-                project.measures = None;
+                measure_anew(&mut project, evidence.as_deref(), &arrangement, context);
             }
             let layout = arrangement.drawn;
             let kept = if same_view { kept_in_record(recorded_crop, &layout)? } else { None };
             // Photographs are numbered by their place among those used.
             let corrections = corrections.of_placed(&layout, Some);
             let (photographs, directions) = (set.files, Vec::new());
-            Ok(Alignment { project, layout, kept, corrections, photographs, directions, positions: Some(used) })
+            let positions = Some(used);
+            Ok(Alignment { project, layout, kept, corrections, photographs, directions, positions, evidence })
         })?;
         let (mut alignment, told) = recalled.split();
         alignment.record(told);
@@ -418,6 +428,15 @@ impl<'a> Stitcher<'a> {
             cache.report(context);
         }
     }
+}
+
+/// Measures another view of the panorama that `project` records by the `evidence`, and says anew what of it is to be looked at;
+/// without evidence nothing is known of it.
+fn measure_anew(project: &mut Project, evidence: Option<&Evidence>, arrangement: &Arrangement, context: &StageContext) {
+    project.diagnostics.retain(|told| !judgement::is_of_measures(told));
+    let measure = |evidence| context.time("measures", || measuring::run(evidence, arrangement, &project.images));
+    project.measures = evidence.map(measure);
+    judgement::warnings(project).into_iter().for_each(|warning| context.report(warning));
 }
 
 /// What composing these photographs may take of this machine.

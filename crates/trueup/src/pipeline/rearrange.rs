@@ -37,7 +37,7 @@ impl Stitcher<'_> {
             None => Ok(alignment.found()),
         })?;
         let (found, told) = found.split();
-        let mut rearranged = self.recall(project, found)?;
+        let mut rearranged = self.recall(project, found, alignment.evidence.clone())?;
         rearranged.record(told);
         Ok(rearranged)
     }
@@ -102,7 +102,7 @@ mod tests {
         for (name, source) in names.iter().zip(alignment.photographs.sources()) {
             in_memory.insert(name, decode::photograph(source).expect("decoded"));
         }
-        let frames = Inputs { in_memory, ..Inputs::new(names) };
+        let frames = Inputs { in_memory, ..Inputs::new(names.clone()) };
         let mut others = stitcher.rearrange(&alignment, Some(&frames)).expect("other photographs");
         assert_eq!(rows(&stitcher, &mut others), own, "their pixels are the same");
         assert_eq!(others.project.images[2].path, "frame 2");
@@ -111,6 +111,18 @@ mod tests {
         round.set("projection.kind=equirectangular").expect("an option");
         let rounded = Stitcher::new(&round, &context).rearrange(&others, None).expect("another view");
         assert!(rounded.project.projection.is_some() && rounded.project.images[2].path == "frame 2");
+
+        // Measured as if it had been stitched in that view, by the names that the photographs have there.
+        let stitched =
+            Stitcher::new(&round, &context).align(&Inputs::new([room])).expect("aligned").alignments.remove(0);
+        let mut measured = Stitcher::new(&round, &context).rearrange(&alignment, None).expect("another view").project;
+        assert!(measured.measures.is_some() && measured.measures != alignment.project.measures);
+        assert_eq!(measured.measures, stitched.project.measures);
+        let judged = |project: &Project| project.warnings().cloned().collect::<Vec<_>>();
+        assert_eq!(judged(&measured), judged(&stitched.project));
+        let renamed = (0..5).map(|number| (measured.images[number].path.clone(), names[number].clone())).collect();
+        measured.rename_files(&renamed);
+        assert_eq!(rounded.project.measures, measured.measures);
 
         let few = Inputs { photographs: frames.photographs[1..].to_vec(), ..frames };
         let refused = stitcher.rearrange(&alignment, Some(&few)).expect_err("one is missing");

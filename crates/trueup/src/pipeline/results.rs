@@ -16,6 +16,7 @@ use super::matched::Matched;
 use crate::memo::MemoryStore;
 use crate::project::fill::record_crop;
 use crate::project::record::{CropRecord, Project};
+use crate::report::evidence::Evidence;
 
 /// What [`Stitcher::align`](super::Stitcher::align) found: one alignment per group of
 /// photographs to be stitched, the largest first.
@@ -74,6 +75,8 @@ pub struct Alignment {
     pub(super) directions: Vec<TriadOutcome>,
     /// Positions in [`Project::images`] of the photographs that the layout numbers, where these numbers are others.
     pub(super) positions: Option<Vec<usize>>,
+    /// What another view is measured by; `None` where nothing was matched, or the geometry is read from a record.
+    pub(super) evidence: Option<Arc<Evidence>>,
 }
 
 impl Alignment {

@@ -91,6 +91,16 @@ impl Project {
     }
 }
 
+/// Names of the warnings below.
+const LEANING: &str = "leaning";
+const MISALIGNED: &str = "misaligned";
+const BENT_LINE: &str = "line-bent";
+
+/// Whether a finding is one of [`warnings`], which other measures make obsolete.
+pub(crate) fn is_of_measures(finding: &Diagnostic) -> bool {
+    [LEANING, MISALIGNED, BENT_LINE].contains(&finding.code.as_str())
+}
+
 /// A warning for every figure that is to be looked at, which names the place.
 pub(crate) fn warnings(project: &Project) -> Vec<Diagnostic> {
     let Some(measures) = &project.measures else { return Vec::new() };
@@ -116,7 +126,7 @@ fn leaning(measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Optio
     let (photograph, lean, within) = widest.max_by(|one, two| one.2.total_cmp(&two.2))?;
     let side = if lean < 0.0 { "left" } else { "right" };
     Some(Diagnostic::warning(
-        "leaning",
+        LEANING,
         Subject::Photograph(place(&photograph.path)?),
         format!("what is vertical in it leans to the {side} by {:.1} degrees, up to {within:.1} at 95 %", lean.abs()),
         "Look at it there. If it does lean, try --projection auto, or --roll with it.",
@@ -127,7 +137,7 @@ fn misaligned(measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Op
     let found = measures.reprojection.as_ref()?;
     let worst = found.worst_pair.as_ref()?;
     Some(Diagnostic::warning(
-        "misaligned",
+        MISALIGNED,
         Subject::Pair(place(&worst.a)?, place(&worst.b)?),
         format!(
             "points that both show are up to {:.1} px apart (95 of 100; of all photographs {:.1})",
@@ -141,7 +151,7 @@ fn misaligned(measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Op
 fn bent(measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Option<Diagnostic> {
     let line = measures.long_lines.as_ref()?.longest_bent.as_ref()?;
     Some(Diagnostic::warning(
-        "line-bent",
+        BENT_LINE,
         Subject::Photograph(place(&line.path)?),
         format!("a straight line of {:.0} px strays by {:.1} px", line.length_px, line.off_px),
         "Look at it there. --structure lines keeps long lines straight.",

@@ -2,23 +2,19 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
 use trueup_align::metrics::{
-    self, MatchedPair, Outside, Straightness, VerticalLinesInput, expected_magnitude, folded_cells, mean_relative_turn,
-    rectangle_rotation,
+    self, MatchedPair, Outside, Straightness, expected_magnitude, folded_cells, mean_relative_turn, rectangle_rotation,
 };
-use trueup_align::similarity::{EstimatedRoll, RollsInput, estimated_rolls};
-use trueup_core::lines::LineSegment;
-use trueup_core::matches::{PairMatches, PointMatch};
+use trueup_align::similarity::EstimatedRoll;
 use trueup_core::mesh::GridMesh;
 
+use super::evidence::{Evidence, EvidenceLine, EvidencePair, EvidencePhotograph};
 use super::measures::{
     BentLine, HUNDREDTHS, LongLines, MeasuredLine, Measures, PairMeasures, PhotographMeasures, PlaceMeasures,
     ReprojectionMeasures, UprightMeasures, WorstPair,
 };
-use crate::pipeline::align::Geometry;
-use crate::pipeline::align::component::Component;
 use crate::pipeline::arrange::Arrangement;
+use crate::project::record::ImageRecord;
 
 /// A photograph whose lean is less sure than this, half the width of its 95 % interval, has no figure: a lean of a degree is
 /// seen. Degrees.
@@ -42,31 +38,31 @@ impl Lean {
     }
 }
 
-/// Measures a panorama as it is delivered, whatever it is drawn on.
-pub(crate) fn run(component: &Component, geometry: &Geometry, arrangement: &Arrangement) -> Measures {
+/// Measures a panorama as it is delivered, whatever it is drawn on, by what its photographs show. Of the project's `images` only
+/// their names are asked.
+pub(crate) fn run(evidence: &Evidence, arrangement: &Arrangement, images: &[ImageRecord]) -> Measures {
     let period = arrangement.drawn.period.map(|columns| columns as f64);
     let turn = arrangement.projection.as_ref().and_then(|projection| projection.turn_px());
     let whole: Vec<GridMesh> =
         arrangement.delivered.iter().map(|mesh| metrics::without_torn_cells(mesh, turn)).collect();
-    let meshes: Vec<&GridMesh> = whole.iter().collect();
     // The same grids over the working pictures, in whose pixels lines are.
-    let working: Vec<GridMesh> = meshes
+    let working: Vec<GridMesh> = whole
         .iter()
-        .zip(&component.frames)
-        .map(|(&mesh, frame)| GridMesh { width: frame.width, height: frame.height, ..mesh.clone() })
+        .zip(&evidence.photographs)
+        .map(|(mesh, one)| GridMesh { width: one.frame.width, height: one.frame.height, ..mesh.clone() })
         .collect();
-    let leans = leans(component, geometry, &working);
+    let leans: Vec<Option<Lean>> = working.iter().zip(&evidence.photographs).map(lean).collect();
     let certain: Vec<Option<Lean>> = leans.iter().map(|one| one.filter(Lean::is_certain)).collect();
-    let vertical_lines = vertical_lines(component, geometry);
-    let matched = matched_pairs(component, geometry, &meshes);
-    let pairs = pair_measures(component, geometry, &matched, period);
-    let lines = measured_lines(component, geometry, &working);
+    let matched = matched_pairs(evidence, &whole);
+    let pairs = pair_measures(evidence, &matched, period);
+    let lines: Vec<Vec<MeasuredLine>> = evidence.photographs.iter().zip(&working).map(measured_lines).collect();
+    let path = |photograph: usize| images[evidence.photographs[photograph].position].path.clone();
     let distortion = metrics::local_distortion(&working, Outside::Center, period);
     Measures {
         upright: upright(&certain),
-        estimated_gdic_deg: estimated_inconsistency(&certain, &working, component.reference),
-        reprojection: reprojection(component, &matched, &pairs, period),
-        long_lines: long_lines(component, &lines),
+        estimated_gdic_deg: estimated_inconsistency(&certain, &working, evidence.reference),
+        reprojection: reprojection(&matched, &pairs, period, images),
+        long_lines: long_lines(&lines, path),
         ld: HUNDREDTHS * distortion.worst,
         ld_mean: HUNDREDTHS * distortion.mean,
         folds: working.iter().map(folded_cells).sum(),
@@ -75,8 +71,8 @@ pub(crate) fn run(component: &Component, geometry: &Geometry, arrangement: &Arra
             .into_iter()
             .enumerate()
             .map(|(k, lines)| PhotographMeasures {
-                path: component.images[k].path.display().to_string(),
-                vertical_lines: vertical_lines[k],
+                path: path(k),
+                vertical_lines: evidence.photographs[k].vertical_lines,
                 lean_deg: leans[k].map(|one| one.lean.to_degrees()),
                 standard_error_deg: leans[k].map(|one| one.by.standard_error.to_degrees()),
                 within_deg: leans[k].map(|one| one.by.within.to_degrees()),
@@ -88,41 +84,12 @@ pub(crate) fn run(component: &Component, geometry: &Geometry, arrangement: &Arra
     }
 }
 
-/// How many vertical lines each photograph has.
-fn vertical_lines(component: &Component, geometry: &Geometry) -> Vec<usize> {
-    let down = geometry.prior.level_from_world().row(1).transpose();
-    let count = |k: usize| {
-        let camera = &geometry.cameras.cameras[k];
-        let photograph = VerticalLinesInput {
-            lines: &component.lines[k],
-            frame: &component.frames[k],
-            camera,
-            expected_down: camera.rotation() * down,
-        };
-        metrics::vertical_segments(&photograph).len()
-    };
-    (0..component.lines.len()).into_par_iter().map(count).collect()
-}
-
-/// The lean of every photograph that the lines of all of them tell.
-fn leans(component: &Component, geometry: &Geometry, working: &[GridMesh]) -> Vec<Option<Lean>> {
-    let input = RollsInput {
-        cameras: &geometry.cameras.cameras,
-        edges: &geometry.coinciding,
-        lines: &component.lines,
-        frames: &component.frames,
-        prior: &geometry.prior,
-    };
-    // Rolls are of rotating cameras.
-    let rolls = if geometry.cameras.flat_scene.is_some() { None } else { estimated_rolls(&input) };
-    let Some(rolls) = rolls else { return vec![None; working.len()] };
-    let lean = |(mesh, roll): (&GridMesh, Option<EstimatedRoll>)| {
-        let by = roll?;
-        let lean = mesh.lean_in_the_middle(by.roll);
-        // Where the photograph's middle is not shown, it is no number.
-        (!lean.is_nan()).then_some(Lean { lean, by })
-    };
-    working.iter().zip(rolls).map(lean).collect()
+/// The lean of a photograph whose roll the lines of all of them tell, on its grid.
+fn lean((mesh, photograph): (&GridMesh, &EvidencePhotograph)) -> Option<Lean> {
+    let by = photograph.roll?;
+    let lean = mesh.lean_in_the_middle(by.roll);
+    // Where the photograph's middle is not shown, it is no number.
+    (!lean.is_nan()).then_some(Lean { lean, by })
 }
 
 fn upright(certain: &[Option<Lean>]) -> Option<UprightMeasures> {
@@ -152,37 +119,27 @@ fn estimated_inconsistency(certain: &[Option<Lean>], meshes: &[GridMesh], refere
     mean_relative_turn(&rotations, &gammas, reference).map(f64::to_degrees)
 }
 
-/// The matches that were to coincide, in the photographs' own pixels, on the grids.
-fn matched_pairs<'a>(component: &Component, geometry: &Geometry, meshes: &[&'a GridMesh]) -> Vec<MatchedPair<'a>> {
-    let full = |point: [f64; 2], photograph: usize| {
-        point.map(|coordinate| coordinate / component.frames[photograph].working_from_full)
-    };
-    let matched = |pair: &PairMatches| {
-        let in_full = |one: &PointMatch| PointMatch { in_a: full(one.in_a, pair.a), in_b: full(one.in_b, pair.b) };
-        MatchedPair { a: meshes[pair.a], b: meshes[pair.b], matches: pair.inliers.iter().map(in_full).collect() }
-    };
-    geometry.coinciding.iter().map(matched).collect()
+/// The matches that were to coincide, on the grids.
+fn matched_pairs<'a>(evidence: &Evidence, meshes: &'a [GridMesh]) -> Vec<MatchedPair<'a>> {
+    let matched =
+        |pair: &EvidencePair| MatchedPair { a: &meshes[pair.a], b: &meshes[pair.b], matches: pair.matches.clone() };
+    evidence.pairs.iter().map(matched).collect()
 }
 
 /// How far apart the matches of each pair land, where any can be measured.
-fn pair_measures(
-    component: &Component,
-    geometry: &Geometry,
-    pairs: &[MatchedPair],
-    period: Option<f64>,
-) -> Vec<PairMeasures> {
-    let measured = |(pair, known): (&MatchedPair, &PairMatches)| {
+fn pair_measures(evidence: &Evidence, pairs: &[MatchedPair], period: Option<f64>) -> Vec<PairMeasures> {
+    let measured = |(pair, known): (&MatchedPair, &EvidencePair)| {
         let found = metrics::reprojection(std::slice::from_ref(pair), period)?;
         Some(PairMeasures {
-            a: component.members[known.a],
-            b: component.members[known.b],
+            a: evidence.photographs[known.a].position,
+            b: evidence.photographs[known.b].position,
             matches: found.matches,
             mean_px: found.mean_px,
             percentile_95_px: found.percentile_95_px,
             places: places(pair, period),
         })
     };
-    pairs.iter().zip(&geometry.coinciding).filter_map(measured).collect()
+    pairs.iter().zip(&evidence.pairs).filter_map(measured).collect()
 }
 
 /// The distances of a pair's matches, gathered by squares of the first photograph.
@@ -206,16 +163,13 @@ fn places(pair: &MatchedPair, period: Option<f64>) -> Vec<PlaceMeasures> {
 }
 
 fn reprojection(
-    component: &Component,
     pairs: &[MatchedPair],
     alone: &[PairMeasures],
     period: Option<f64>,
+    images: &[ImageRecord],
 ) -> Option<ReprojectionMeasures> {
     let found = metrics::reprojection(pairs, period)?;
-    let path = |position: usize| {
-        let local = component.members.binary_search(&position).ok()?;
-        Some(component.images[local].path.display().to_string())
-    };
+    let path = |position: usize| Some(images.get(position)?.path.clone());
     let worst_pair = alone.iter().max_by(|one, two| one.percentile_95_px.total_cmp(&two.percentile_95_px));
     let named = |pair: &PairMeasures| {
         let percentile_95_px = pair.percentile_95_px;
@@ -230,38 +184,24 @@ fn reprojection(
     })
 }
 
-/// The long lines of every photograph, as far as the panorama shows them whole.
-fn measured_lines(component: &Component, geometry: &Geometry, working: &[GridMesh]) -> Vec<Vec<MeasuredLine>> {
-    let of_one = |k: usize| {
-        let shortest = metrics::LONG_LINE_DIAGONAL * component.frames[k].diagonal();
-        let long: Vec<LineSegment> =
-            component.lines[k].iter().filter(|line| line.length() >= shortest).copied().collect();
-        let directions = match geometry.triads[k].triad() {
-            Some(triad) => {
-                let matrix = triad.matrix();
-                let columns = std::array::from_fn(|column| matrix.column(column).into_owned());
-                metrics::directions_of_segments(&long, &geometry.cameras.cameras[k], &columns)
-            }
-            None => vec![None; long.len()],
-        };
-        let full = |end: [f64; 2]| end.map(|coordinate| coordinate / component.frames[k].working_from_full);
-        let measured = |(line, direction): (&LineSegment, Option<usize>)| {
-            let found = Straightness::of(line, &working[k], metrics::LINE_STEP_PX)?;
-            Some(MeasuredLine {
-                start: full(line.start),
-                end: full(line.end),
-                direction,
-                length_px: found.length_px,
-                rms_px: found.rms_px,
-                off_px: found.largest_px,
-            })
-        };
-        long.iter().zip(directions).filter_map(measured).collect()
+/// The long lines of a photograph, as far as the panorama shows them whole.
+fn measured_lines((photograph, working): (&EvidencePhotograph, &GridMesh)) -> Vec<MeasuredLine> {
+    let full = |end: [f64; 2]| end.map(|coordinate| coordinate / photograph.frame.working_from_full);
+    let measured = |line: &EvidenceLine| {
+        let found = Straightness::of(&line.segment, working, metrics::LINE_STEP_PX)?;
+        Some(MeasuredLine {
+            start: full(line.segment.start),
+            end: full(line.segment.end),
+            direction: line.direction,
+            length_px: found.length_px,
+            rms_px: found.rms_px,
+            off_px: found.largest_px,
+        })
     };
-    (0..working.len()).map(of_one).collect()
+    photograph.long_lines.iter().filter_map(measured).collect()
 }
 
-fn long_lines(component: &Component, lines: &[Vec<MeasuredLine>]) -> Option<LongLines> {
+fn long_lines(lines: &[Vec<MeasuredLine>], path: impl Fn(usize) -> String) -> Option<LongLines> {
     let measured: Vec<(usize, &MeasuredLine)> =
         lines.iter().enumerate().flat_map(|(k, lines)| lines.iter().map(move |line| (k, line))).collect();
     let bent: Vec<&(usize, &MeasuredLine)> =
@@ -273,7 +213,7 @@ fn long_lines(component: &Component, lines: &[Vec<MeasuredLine>]) -> Option<Long
         mean_bend: mean,
         bent: bent.len(),
         longest_bent: longest.map(|(k, line)| BentLine {
-            path: component.images[*k].path.display().to_string(),
+            path: path(*k),
             length_px: line.length_px,
             off_px: line.off_px,
         }),

@@ -2,6 +2,7 @@
 
 pub(crate) mod brightness;
 pub(crate) mod evaluation;
+pub(crate) mod evidence;
 pub(crate) mod judgement;
 pub(crate) mod left_out;
 pub(crate) mod measures;
