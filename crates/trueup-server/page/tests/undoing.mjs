@@ -44,7 +44,8 @@ export async function undoEverything(page) {
             const another = { "select-one": () => { field.selectedIndex = (field.selectedIndex + 1) % field.options.length; },
                 checkbox: () => { field.checked = !field.checked; },
                 range: () => { field.value = String(Number(field.value) + 1.5); },
-                number: () => { field.value = String(Number(field.value) === 1 ? 0.5 : 1); } }[field.type];
+                // What counts things is whole, and one of them is few; what is a share or a factor may be half.
+                number: () => { field.value = String(Number(field.value) > 1 ? Number(field.value) + 1 : 0.5); } }[field.type];
             // What is written freely has no other value that is sure to be one.
             if (!another) return false;
             another();

@@ -75,6 +75,7 @@ mod tests {
 
     use super::*;
     use crate::options::StitchOptions;
+    use crate::project::record::Project;
 
     fn rows(stitcher: &Stitcher, alignment: &mut Alignment) -> Vec<u8> {
         let panorama = stitcher.compose(alignment).expect("composed").panorama;
