@@ -58,6 +58,27 @@ fn a_wide_gamut_passes_through_unchanged() {
     }
 }
 
+/// Primaries that no picture has would make every photograph beside this one unlike it: the profile is not believed, and all are used.
+#[test]
+fn an_absurd_profile_costs_no_photograph() {
+    let desk = Desk::new();
+    put_street(&desk, Some(display_p3()));
+    let mut absurd = display_p3().to_vec();
+    let green = (0..).map(|tag| 132 + 12 * tag).find(|&at| &absurd[at..at + 4] == b"gXYZ").expect("a matrix");
+    let place = u32::from_be_bytes([0, 1, 2, 3].map(|byte| absurd[green + 4 + byte])) as usize;
+    // Behind the type's name: X, Y and Z with 16 bits before and after the point (ICC.1:2022, 10.31).
+    for (value, at) in [i32::MAX, i32::MIN, 1 << 16].into_iter().zip((place + 8..).step_by(4)) {
+        absurd[at..at + 4].copy_from_slice(&value.to_be_bytes());
+    }
+    let other = Desk::new();
+    put_street(&other, Some(&absurd));
+    std::fs::copy(other.join("b.png"), desk.join("b.png")).expect("copied");
+    let run = desk.stitch(&["a.png", "b.png", "c.png"]);
+    let said = run.expect_success();
+    assert!(said.contains("photographs 3 of 3 used"), "{said}");
+    assert!(said.contains("b.png: its ICC profile cannot be used") && !said.contains("curve"), "{said}");
+}
+
 #[test]
 fn one_photograph_comes_back_within_a_level() {
     let desk = Desk::new();

@@ -115,6 +115,14 @@ fn one_place_is_not_taken_twice_whatever_its_spelling() {
         .expect_failure(1, &["./m.toml: this file is the configuration"]);
     stitch(&["-o", "x.png", "--graph", "graph.txt", "--pto", "./graph.txt"])
         .expect_failure(1, &["./graph.txt: this file is the graph"]);
+    #[cfg(unix)]
+    {
+        // A link to a file that is not there yet: what is written second would be written over what was written first.
+        std::os::unix::fs::symlink("x.png", desk.join("early.png")).expect("linked");
+        stitch(&["-o", "x.png", "--seams", "early.png"]).expect_failure(2, &[twice]);
+        finish(trueup(desk.path(), &["stitch", "a.jpg", "-o", "early.png", "--scale", "0.2", "--quiet"]));
+        assert!(desk.join("early.png").is_symlink() && desk.join("x.png").is_file(), "{:?}", desk.files());
+    }
     assert_eq!(desk.read("m.toml"), b"[canvas]\nscale = 0.5\n");
     assert_eq!(desk.read("graph.txt"), b"a.jpg -- b.jpg\n");
 }

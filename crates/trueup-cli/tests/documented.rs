@@ -95,6 +95,7 @@ const MISTAKES: &[Mistake] = &[
     mistake("another geometry to compose", &["compose", "pano.json", "-o", "pano.jpg", "--set", "mesh.cell_px=30"]),
     mistake("project edited to nonsense", &["compose", "nonsense.json", "-o", "pano.jpg"]),
     mistake("project with a lens that cannot be", &["compose", "lens.json", "-o", "pano.jpg"]),
+    mistake("project with a focal length below zero", &["compose", "minus.json", "-o", "pano.jpg"]),
     mistake("project with an option out of range", &["evaluate", "range.json"]),
     mistake("photograph that is gone", &["compose", "gone.json", "-o", "pano.jpg"]),
     mistake("no project file", &["inspect", "none.json"]),
@@ -149,6 +150,7 @@ fn desk() -> Desk {
         changed.to_string()
     };
     desk.put("lens.json", changed("/images/0/focal_px", 3e8));
+    desk.put("minus.json", changed("/images/0/focal_px", -1.0));
     desk.put("range.json", changed("/options/canvas/scale", -1.0));
     desk.put("gone.json", project.replace("a.jpg", "gone.jpg"));
     let truth = street_truth();
@@ -192,4 +194,33 @@ fn the_table_of_bad_inputs_is_what_is_printed() {
     }
     assert!(missing.is_empty(), "docs/command-line.md lacks these rows:\n{}", missing.join("\n"));
     assert_eq!(desk.files(), files, "nothing is left behind");
+}
+
+/// Rows of the page that other tests show: what takes a signal, a full disk or a file system of its own, and usage, which is told on
+/// several lines.
+const SHOWN_ELSEWHERE: [&str; 9] = [
+    "unreadable file",
+    "socket, pipe or device",
+    "no files named",
+    "`-o` missing",
+    "target takes no files",
+    "disk full",
+    "damaged project file",
+    "Ctrl-C",
+    "`kill`",
+];
+
+/// Fewest kinds of bad input of the page.
+const KINDS: usize = 60;
+
+#[test]
+fn every_row_of_the_table_of_bad_inputs_is_shown_by_a_test() {
+    let table = PAGE.split_once("| Input | `trueup: error: ` |").expect("the table").1;
+    let rows = table.lines().skip(2).take_while(|line| line.starts_with('|'));
+    let kinds: Vec<&str> = rows.map(|row| row.trim_start_matches('|').split('|').next().unwrap_or("").trim()).collect();
+    let is_shown = |kind: &&str| SHOWN_ELSEWHERE.contains(kind) || MISTAKES.iter().any(|mistake| mistake.what == *kind);
+    let others: Vec<&&str> = kinds.iter().filter(|kind| !is_shown(kind)).collect();
+    assert!(others.is_empty(), "{others:?}");
+    assert!(kinds.len() >= KINDS, "{} kinds", kinds.len());
+    assert!(SHOWN_ELSEWHERE.iter().all(|kind| kinds.contains(kind)), "{kinds:?}");
 }

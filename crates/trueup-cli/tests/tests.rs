@@ -23,6 +23,7 @@ mod likeness;
 mod masks;
 mod options;
 mod pictures;
+mod real_folders;
 mod references;
 mod report;
 mod run;

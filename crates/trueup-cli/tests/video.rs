@@ -44,7 +44,8 @@ fn the_frames_that_are_needed_are_stitched_and_kept() {
     assert_eq!(bytes("again.jpg"), bytes("pano.jpg"));
 
     desk.put("pano-frames/letter.txt", "Dear diary");
-    desk.stitch(&["clip.avi"]).expect_failure(1, &["pano-frames: the frames of the video belong there", "letter.txt"]);
+    desk.stitch(&["clip.avi"])
+        .expect_failure(1, &["pano-frames: what is made for the panorama belongs there", "letter.txt"]);
     assert!(desk.join("pano-frames/letter.txt").is_file());
     let mut piped = trueup(desk.path(), &["stitch", "clip.avi", "-o", "-"]);
     piped.env_remove("CI");

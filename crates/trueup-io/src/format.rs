@@ -146,6 +146,8 @@ pub(crate) struct Foreign {
     pub(crate) has_signature: fn(&[u8]) -> bool,
     /// A command that makes a photograph of one that can be read.
     pub(crate) command: &'static str,
+    /// Whether it is what the sensor saw, which [`crate::developing`] has developed by a program that is installed.
+    pub(crate) is_raw: bool,
 }
 
 impl HeaderError {

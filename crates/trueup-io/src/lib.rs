@@ -5,6 +5,7 @@
 //! * [`decode`] reads their pixels: whole photographs, and the reduced pictures that measurement works on.
 //! * [`provenance`] gathers what a panorama tells of its photographs;
 //! * [`encode`] writes a panorama row by row; a file appears complete or not at all.
+//! * [`developing`] has camera raw developed by programs that are installed.
 //! * [`video`] takes frames out of videos.
 //! * [`scratch`] keeps on disk what does not fit in memory, and knows how much room there is.
 //!
@@ -13,7 +14,9 @@
 
 pub mod color;
 pub mod decode;
+pub mod developing;
 pub mod encode;
+mod external;
 mod format;
 mod formats;
 #[doc(hidden)]

@@ -4,13 +4,13 @@
 
 use std::ffi::OsString;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
-use std::thread::{self, JoinHandle};
+use std::process::{Command, Stdio};
 
 use trueup_core::{Error, Result, StageContext};
 
+use crate::external::Running;
 use crate::formats::{VIDEO, read_start, recognize};
 
 /// What `ffmpeg` is called.
@@ -27,9 +27,6 @@ const MAX_HEIGHT: usize = 10 * SMALL_WIDTH;
 
 /// Most frames of a video: ten minutes of it, which no panorama needs.
 const MAX_FRAMES: usize = 20_000;
-
-/// Bytes of what `ffmpeg` says that are kept; the last line is told.
-const SAID_BYTES: u64 = 1 << 16;
 
 /// Any constant rate: frames are numbered in their order, and so none is left out or shown twice to keep time.
 const RATE: &str = "25";
@@ -64,11 +61,11 @@ pub struct SmallFrame {
 pub fn look_through(video: &Path, context: &StageContext, mut each: impl FnMut(&SmallFrame)) -> Result<()> {
     let filters = format!("{RENUMBERED},scale='min({SMALL_WIDTH},iw)':-2,format=gray");
     let output = ["-f", "image2pipe", "-c:v", "pgm", "-"].map(OsString::from);
-    let mut running = Running::start(video, &filters, &output, None)?;
-    let mut pictures = BufReader::new(running.output.take().ok_or_else(|| running.failed("it writes nothing"))?);
+    let mut running = start(video, &filters, &output, None)?;
+    let mut pictures = BufReader::new(running.output.take().ok_or_else(|| failed(video, "it writes nothing"))?);
     context.progress().begin(STAGE, 0);
     let mut count = 0;
-    while let Some(frame) = read_gray(&mut pictures).map_err(|reason| running.failed(&reason))? {
+    while let Some(frame) = read_gray(&mut pictures).map_err(|reason| failed(video, &reason))? {
         context.check_cancelled()?;
         count += 1;
         if count > MAX_FRAMES {
@@ -82,7 +79,7 @@ pub fn look_through(video: &Path, context: &StageContext, mut each: impl FnMut(&
         context.progress().advance(STAGE, 1);
     }
     context.progress().finish(STAGE);
-    running.end(count)
+    end(running, video, count)
 }
 
 /// Writes frames of a video, by their numbers in ascending order, as PNG files into a folder, each under the name that `name` gives.
@@ -101,12 +98,9 @@ pub fn take(
     let wanted: Vec<String> = frames.iter().map(|frame| format!("eq(n\\,{frame})")).collect();
     let filters = format!("select='{}',{RENUMBERED}", wanted.join("+"));
     let output = ["-f", "image2", "-start_number", "0", NUMBERED].map(OsString::from);
-    let mut running = Running::start(video, &filters, &output, Some(folder))?;
-    while running.is_running()? {
-        context.check_cancelled()?;
-        thread::sleep(std::time::Duration::from_millis(20));
-    }
-    running.end(frames.len())?;
+    let mut running = start(video, &filters, &output, Some(folder))?;
+    running.wait_unless_cancelled(context)?;
+    end(running, video, frames.len())?;
     let named = |(number, &frame): (usize, &usize)| {
         let path = folder.join(name(frame));
         let written = folder.join(format!("{number:06}.png"));
@@ -115,87 +109,52 @@ pub fn take(
     frames.iter().enumerate().map(named).collect()
 }
 
-/// The program at work; ended when this is dropped.
-struct Running {
-    video: PathBuf,
-    child: Child,
-    output: Option<ChildStdout>,
-    /// What it says of what is wrong.
-    said: Option<JoinHandle<String>>,
-}
-
-impl Running {
-    fn start(video: &Path, filters: &str, output: &[OsString], folder: Option<&Path>) -> Result<Self> {
-        let path = video.canonicalize().map_err(|error| Error::io("reading", video, error))?;
-        // Its name is no option and no address.
-        let mut input = OsString::from("file:");
-        input.push(path);
-        let mut command = Command::new(PROGRAM);
-        command.args(["-nostdin", "-v", "error", "-protocol_whitelist", "file,pipe", "-i"]).arg(input);
-        command.args(["-map", "0:v:0", "-vf", filters, "-r", RATE]).args(output);
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        if let Some(folder) = folder {
-            command.current_dir(folder);
-        }
-        let mut child = command.spawn().map_err(|error| match error.kind() {
-            std::io::ErrorKind::NotFound => Error::input(
-                video.display(),
-                "it is a video, and ffmpeg, which takes frames out of videos, is not installed",
-                "Install it (`apt install ffmpeg`, `brew install ffmpeg`), or take frames out by another program and give these.",
-            ),
-            _ => Error::io("starting ffmpeg for", video, error),
-        })?;
-        let (output, said) = (child.stdout.take(), child.stderr.take());
-        let mut running = Self { video: video.to_owned(), child, output, said: None };
-        if let Some(mut stderr) = said {
-            // Read beside the frames: who writes more than a pipe holds waits until it is read.
-            let read = move || {
-                let mut text = Vec::new();
-                let _ = stderr.by_ref().take(SAID_BYTES).read_to_end(&mut text);
-                let _ = std::io::copy(&mut stderr, &mut std::io::sink());
-                String::from_utf8_lossy(&text).into_owned()
-            };
-            let reader = thread::Builder::new().spawn(read).map_err(|error| Error::io("reading", video, error))?;
-            running.said = Some(reader);
-        }
-        Ok(running)
+/// Starts `ffmpeg` over a video; in `folder`, if it writes files.
+fn start(video: &Path, filters: &str, output: &[OsString], folder: Option<&Path>) -> Result<Running> {
+    let path = video.canonicalize().map_err(|error| Error::io("reading", video, error))?;
+    // Its name is no option and no address.
+    let mut input = OsString::from("file:");
+    input.push(path);
+    let mut command = Command::new(PROGRAM);
+    command.args(["-nostdin", "-v", "error", "-protocol_whitelist", "file,pipe", "-i"]).arg(input);
+    command.args(["-map", "0:v:0", "-vf", filters, "-r", RATE]).args(output);
+    command.stdout(Stdio::piped());
+    if let Some(folder) = folder {
+        command.current_dir(folder);
     }
-
-    fn is_running(&mut self) -> Result<bool> {
-        let ended = self.child.try_wait().map_err(|error| Error::io("reading", &self.video, error))?;
-        Ok(ended.is_none())
-    }
-
-    /// Waits for its end, which is a good one if it had no complaint and there were frames.
-    fn end(mut self, frames: usize) -> Result<()> {
-        let status = self.child.wait().map_err(|error| Error::io("reading", &self.video, error))?;
-        // A video that is cut off has a complaint at its end, and frames that are good.
-        if frames > 0 && (status.success() || self.output.is_none()) {
-            return Ok(());
-        }
-        let said = self.said.take().and_then(|said| said.join().ok()).unwrap_or_default();
-        let last = said.lines().map(str::trim).rfind(|line| !line.is_empty());
-        // It begins with the address of the file, which is named already.
-        let reason = last
-            .map(|line| line.strip_prefix("file:").and_then(|line| line.split_once(": ")).map_or(line, |(_, why)| why));
-        Err(self.failed(reason.unwrap_or("it says nothing of why")))
-    }
-
-    fn failed(&self, reason: &str) -> Error {
+    Running::start(video, command, || {
         Error::input(
-            self.video.display(),
-            format!("it is a video, and ffmpeg cannot take its frames out ({})", reason.escape_debug()),
-            "Play it to see whether it is whole, or take frames out by another program and give these.",
+            video.display(),
+            "it is a video, and ffmpeg, which takes frames out of videos, is not installed",
+            "Install it (`apt install ffmpeg`, `brew install ffmpeg`), or take frames out by another program and give these.",
         )
-    }
+    })
 }
 
-impl Drop for Running {
-    fn drop(&mut self) {
-        // It may have ended.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+/// Waits for the end of `ffmpeg`, which is a good one if it had no complaint and there were frames.
+fn end(mut running: Running, video: &Path, frames: usize) -> Result<()> {
+    let is_good = running.wait()?;
+    // A video that is cut off has a complaint at its end, and frames that are good.
+    if frames > 0 && (is_good || running.output.is_none()) {
+        return Ok(());
     }
+    let last = running.last_words();
+    // It begins with the address of the file, which is named already.
+    let why = |line: &str| {
+        line.strip_prefix("file:")
+            .and_then(|line| line.split_once(": "))
+            .map_or(line.to_owned(), |(_, why)| why.to_owned())
+    };
+    let reason = last.map(|line| why(&line));
+    Err(failed(video, reason.as_deref().unwrap_or("it says nothing of why")))
+}
+
+fn failed(video: &Path, reason: &str) -> Error {
+    Error::input(
+        video.display(),
+        format!("it is a video, and ffmpeg cannot take its frames out ({})", reason.escape_debug()),
+        "Play it to see whether it is whole, or take frames out by another program and give these.",
+    )
 }
 
 /// The next picture of a stream of binary portable graymaps; `None` at its end.

@@ -40,7 +40,8 @@ pub(crate) fn align<'py>(
     for (name, picture) in mask_pictures {
         in_memory.insert(name, picture);
     }
-    let inputs = Inputs { photographs, in_memory, reference, graph, lens_from, all, masks, require_all };
+    let inputs =
+        Inputs { photographs, in_memory, reference, graph, lens_from, all, masks, require_all, ..Inputs::default() };
     let handing = Handing::new(workers);
     let aligned = run(py, Surroundings { progress, threads }, |context| {
         let max_bytes = options.run.resources.cache_bytes;

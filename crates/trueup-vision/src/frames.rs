@@ -85,6 +85,12 @@ impl FrameChooser {
         (sum / count) as i16
     }
 
+    /// Which share of each frame but the first shows what the one before it does; 0 for those that are not found there.
+    pub fn steps(&self) -> Vec<f64> {
+        let step = |frame: usize| self.those_that_overlap(frame).nth(1).map_or(0.0, |(_, overlap)| overlap);
+        (0..self.frames.len().saturating_sub(1)).map(step).collect()
+    }
+
     /// The numbers of the frames that are needed, in their order.
     pub fn needed(&self) -> Vec<usize> {
         let mut needed = Vec::new();
@@ -236,6 +242,16 @@ mod tests {
         assert_eq!((taken[0], *taken.last().expect("some")), (0, 40));
         assert!(taken.windows(2).all(|two| two[1] > two[0] && two[1] - two[0] <= 10), "{taken:?}");
         assert!((5..=9).contains(&taken.len()), "{taken:?}");
+    }
+
+    #[test]
+    fn steps_are_what_a_frame_has_in_common_with_the_one_before() {
+        let mut chooser = FrameChooser::new(WIDTH, HEIGHT);
+        assert!(chooser.steps().is_empty());
+        // A tenth of the width to the right, then nothing, then a negative, which shows nothing of the same.
+        [0, 24, 24].into_iter().for_each(|x| chooser.push(&frame(x, 0, 1)));
+        chooser.push(&frame(24, 0, 1).iter().map(|level| 255 - level).collect::<Vec<u8>>());
+        assert_eq!(chooser.steps(), [0.9, 1.0, 0.0]);
     }
 
     #[test]

@@ -224,17 +224,19 @@ fn upright(project: &Project) -> String {
     }
 }
 
-/// Warnings, and with `verbose` notes, that are not told elsewhere; always, that another thing was drawn than the method means.
+/// Warnings, and with `verbose` notes, that are not told elsewhere; always, that another thing was drawn than the method means, or of other files
+/// than were named.
 fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool) {
-    /// The note's code.
-    const DRAWN: &str = "drawn-by-cameras";
+    /// The codes of these notes.
+    const ALWAYS: [&str; 4] = ["drawn-by-cameras", "frames-passed-over", "frames-taken", "raw-developed"];
     let names = project.photograph_names();
     for diagnostic in &project.diagnostics {
         let label = match diagnostic.severity {
             Severity::Warning => "warning",
             Severity::Note => "note",
         };
-        let is_detail = diagnostic.severity == Severity::Note && !verbose && diagnostic.code != DRAWN;
+        let is_detail =
+            diagnostic.severity == Severity::Note && !verbose && !ALWAYS.contains(&diagnostic.code.as_str());
         if is_detail || tells_of_left_out(diagnostic, project) {
             continue;
         }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 use trueup_core::{Error, Result};
 
-use super::place::{open_through, passes_through, refuse_disk};
+use super::place::{open_through, passes_through, refuse_disk, resolved};
 use super::stale::{PART, PREFIX, STALE_AGE, clear_stale, mark_in_use};
 use super::unfinished::{UNFINISHED, UnfinishedEntry};
 
@@ -40,7 +40,7 @@ impl PendingFile {
             return Self::create_through(path);
         }
         // A link is followed, so that the file behind it is replaced and not the link.
-        let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let target = resolved(path);
         let folder = folder_of(&target);
         require_folder(folder, path.display())?;
         let existing = target.metadata().ok();

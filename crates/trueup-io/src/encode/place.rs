@@ -26,15 +26,26 @@ pub fn same_place(a: &Path, b: &Path) -> bool {
     }
 }
 
-/// A path free of links, "." and "..", as far as it leads.
-fn resolved(path: &Path) -> PathBuf {
-    path.canonicalize().unwrap_or_else(|_| {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        match (folder.canonicalize(), path.file_name()) {
-            (Ok(folder), Some(name)) => folder.join(name),
-            _ => path.to_owned(),
+/// Most links that are followed one after the other, as Linux has it: more are a circle.
+const MOST_LINKS: usize = 40;
+
+/// A path free of links, "." and "..", as far as it leads: a link to a file that is not there yet is that file's place.
+pub(super) fn resolved(path: &Path) -> PathBuf {
+    let mut path = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        if let Ok(place) = path.canonicalize() {
+            return place;
         }
-    })
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let (Ok(folder), Some(name)) = (folder.canonicalize(), path.file_name()) else { return path };
+        let place = folder.join(name);
+        match place.read_link() {
+            // What it leads to is seen from its own folder.
+            Ok(led_to) => path = folder.join(led_to),
+            Err(_) => return place,
+        }
+    }
+    path
 }
 
 /// Opens what is written through, to be called when all that goes there is known: a pipe waits for its reader.
@@ -124,6 +135,12 @@ mod tests {
         std::fs::write(at("here"), "").expect("written");
         std::os::unix::fs::symlink("here", at("link")).expect("linked");
         assert!(same_place(&at("here"), &at("link")));
+        // What a link leads to need not be there, and may be a link; a circle leads nowhere.
+        std::os::unix::fs::symlink("new", at("early")).expect("linked");
+        std::os::unix::fs::symlink(at("early"), at("earlier")).expect("linked");
+        std::os::unix::fs::symlink("circle", at("circle")).expect("linked");
+        assert!(same_place(&at("new"), &at("early")) && same_place(&at("earlier"), &at("new")));
+        assert!(!same_place(&at("early"), &at("here")) && !same_place(&at("circle"), &at("new")));
         assert!(passes_through(Path::new("/dev/null")));
     }
 }

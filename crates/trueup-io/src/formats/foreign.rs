@@ -12,6 +12,7 @@ pub(crate) static RAW: Foreign = Foreign {
     extensions: &["nef", "nrw", "arw", "srf", "sr2", "pef", "srw", "erf", "3fr", "iiq", "rwl", "kdc", "dcr"],
     has_signature: |_| false,
     command: "darktable-cli photo.nef photo.tif",
+    is_raw: true,
 };
 
 /// What [`crate::video`] takes frames out of, where it is named itself.
@@ -23,6 +24,7 @@ pub(crate) static VIDEO: Foreign = Foreign {
         is_avi || start.get(4..8) == Some(b"ftyp") || start.starts_with(&[0x1a, 0x45, 0xdf, 0xa3])
     },
     command: "ffmpeg -i clip.mp4 -vf fps=2 frame-%03d.png",
+    is_raw: false,
 };
 
 /// The formats, the more special before the more general.
@@ -37,30 +39,35 @@ static FOREIGN: [&Foreign; 13] = [
         extensions: &["cr2"],
         has_signature: is_cr2,
         command: "darktable-cli photo.cr2 photo.tif",
+        is_raw: true,
     },
     &Foreign {
         what: "a camera raw photograph of Canon (CR3)",
         extensions: &["cr3"],
         has_signature: |start| has_brand(start, b"crx"),
         command: "darktable-cli photo.cr3 photo.tif",
+        is_raw: true,
     },
     &Foreign {
         what: "a camera raw photograph of Fujifilm (RAF)",
         extensions: &["raf"],
         has_signature: |start| start.starts_with(b"FUJIFILMCCD-RAW"),
         command: "darktable-cli photo.raf photo.tif",
+        is_raw: true,
     },
     &Foreign {
         what: "a camera raw photograph of Olympus (ORF)",
         extensions: &["orf"],
         has_signature: |start| [b"IIRO", b"IIRS", b"MMOR"].iter().any(|signature| start.starts_with(*signature)),
         command: "darktable-cli photo.orf photo.tif",
+        is_raw: true,
     },
     &Foreign {
         what: "a camera raw photograph of Panasonic (RW2)",
         extensions: &["rw2"],
         has_signature: |start| start.starts_with(b"IIU\0"),
         command: "darktable-cli photo.rw2 photo.tif",
+        is_raw: true,
     },
     &VIDEO,
     &Foreign {
@@ -70,30 +77,35 @@ static FOREIGN: [&Foreign; 13] = [
             start.starts_with(b"\0\0\0\x0cjP  \r\n\x87\n") || start.starts_with(&[0xff, 0x4f, 0xff, 0x51])
         },
         command: "magick photo.jp2 photo.tif",
+        is_raw: false,
     },
     &Foreign {
         what: "a GIF picture",
         extensions: &["gif"],
         has_signature: |start| start.starts_with(b"GIF8"),
         command: "magick photo.gif photo.png",
+        is_raw: false,
     },
     &Foreign {
         what: "a BMP picture",
         extensions: &["bmp"],
         has_signature: |start| start.starts_with(b"BM"),
         command: "magick photo.bmp photo.png",
+        is_raw: false,
     },
     &Foreign {
         what: "a Photoshop document",
         extensions: &["psd", "psb"],
         has_signature: |start| start.starts_with(b"8BPS"),
         command: "magick 'photo.psd[0]' photo.tif",
+        is_raw: false,
     },
     &Foreign {
         what: "a PDF document",
         extensions: &[],
         has_signature: |start| start.starts_with(b"%PDF"),
         command: "pdftoppm -png pages.pdf page",
+        is_raw: false,
     },
     // Without a signature of its own.
     &Foreign {
@@ -101,6 +113,7 @@ static FOREIGN: [&Foreign; 13] = [
         extensions: &["tga"],
         has_signature: |_| false,
         command: "magick photo.tga photo.png",
+        is_raw: false,
     },
 ];
 

@@ -6,6 +6,8 @@
 pub(crate) mod alpha;
 mod avif;
 mod boxes;
+#[cfg(test)]
+mod byte_by_byte_tests;
 pub(crate) mod decoded;
 mod deep_zoom;
 mod dng;
@@ -28,11 +30,12 @@ mod tests;
 pub(crate) mod tiff;
 mod webp;
 
-use std::io::{Read, Seek};
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 use crate::encode::place::is_standard_output;
-use crate::format::{Format, Reading, SIGNATURE_BYTES, Writing};
+use crate::format::{Foreign, Format, HeaderError, Reading, SIGNATURE_BYTES, Writing};
 
 pub(crate) use foreign::{VIDEO, foreign_of, has_foreign_extension};
 
@@ -77,6 +80,19 @@ pub(crate) fn recognize(input: &mut (impl Read + Seek)) -> std::io::Result<Optio
     }
     input.rewind()?;
     Ok(reading)
+}
+
+/// What a file is that is of no format that is read, as far as its start and its header tell.
+pub(crate) fn foreign_file(path: &Path) -> Option<&'static Foreign> {
+    // Looked at before it is opened: opening a named pipe would wait for its writer.
+    let mut input = BufReader::new(if path.is_file() { File::open(path).ok()? } else { return None });
+    match recognize(&mut input).ok()? {
+        Some(reading) => match reading.stored(&mut input) {
+            Err(HeaderError::Foreign(foreign)) => Some(foreign),
+            _ => None,
+        },
+        None => foreign_of(&read_start(&mut input).ok()?),
+    }
 }
 
 /// What [`reading_of`] needs to see of a file, or all of a shorter one.

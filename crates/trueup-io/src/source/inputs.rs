@@ -40,7 +40,7 @@ pub(crate) fn expand(inputs: &[String], in_memory: &InMemory) -> Vec<Candidate> 
     inputs.iter().flat_map(expanded).collect()
 }
 
-fn expand_one(input: &str) -> Vec<Candidate> {
+pub(super) fn expand_one(input: &str) -> Vec<Candidate> {
     let path = PathBuf::from(input);
     match std::fs::metadata(&path) {
         Ok(metadata) if metadata.is_dir() => expand_folder(path),

@@ -10,6 +10,7 @@ mod rejection;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -18,6 +19,7 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result, StageContext};
 
+use crate::formats;
 use crate::metadata::exif_fields::ExifFields;
 use crate::metadata::header::{self, Header};
 use crate::metadata::orientation::{TagVerdict, judge_orientation};
@@ -33,7 +35,7 @@ pub use crate::formats::{names_photograph, read_extensions, readable_formats};
 pub use in_memory::InMemory;
 pub use inputs::natural_order;
 pub use names::unique_names;
-pub use options::{OrientationTrust, SourceOptions};
+pub use options::{FrameUse, OrientationTrust, SourceOptions};
 
 /// Shortest side in pixels that a photograph must have: the features and lines of smaller ones connect nothing.
 const MIN_SIDE_PX: usize = 16;
@@ -163,6 +165,28 @@ pub fn files(inputs: &[String], in_memory: &InMemory) -> Vec<PathBuf> {
         Candidate::InMemory(..) | Candidate::Rejected(..) => None,
     };
     inputs::expand(inputs, in_memory).into_iter().filter_map(file).collect()
+}
+
+/// The files of camera raw that `input` names, in their order: itself, or those of a folder or pattern; of these not such as lie beside a
+/// photograph of the same name, as cameras write both.
+pub fn raw_files(input: &str) -> Vec<PathBuf> {
+    let is_raw = |path: &Path| formats::foreign_file(path).is_some_and(|foreign| foreign.is_raw);
+    let candidates = inputs::expand_one(input);
+    let stem = |path: &Path| path.with_extension("").to_string_lossy().to_lowercase();
+    let photographs: BTreeSet<String> =
+        candidates.iter().map(Candidate::path).filter(|path| is_readable(path)).map(stem).collect();
+    let raw = |candidate: &Candidate| match candidate {
+        Candidate::File(path) => Some(path.clone()).filter(|path| is_raw(path)),
+        Candidate::Found(path) if photographs.contains(&stem(path)) => None,
+        Candidate::Found(path) => Some(path.clone()).filter(|path| is_raw(path)),
+        Candidate::InMemory(..) | Candidate::Rejected(..) => None,
+    };
+    candidates.iter().filter_map(raw).collect()
+}
+
+/// Whether what a file is called and what it says is a photograph in a format that is read.
+fn is_readable(path: &Path) -> bool {
+    names_photograph(path) && path.is_file() && formats::foreign_file(path).is_none() && header::open(path).is_some()
 }
 
 /// Whether the file at `path` says that this program made it.

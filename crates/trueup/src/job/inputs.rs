@@ -1,5 +1,6 @@
 //! What is to be stitched, and what the user wants of it.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use trueup_align::stitch_graph::{GraphFile, parse_graph_file};
@@ -37,6 +38,9 @@ pub struct Inputs {
     pub masks: Vec<MaskFile>,
     /// Fail unless every photograph given is used.
     pub require_all: bool,
+    /// Files that the photographs name and that are passed over, since others among the photographs stand for them: camera raw that was
+    /// developed.
+    pub stood_for: BTreeSet<PathBuf>,
 }
 
 impl Inputs {

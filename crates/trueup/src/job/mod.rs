@@ -1,6 +1,7 @@
 //! Jobs: what is to be stitched, and the files that are to come of it.
 
 mod compose;
+mod developed;
 pub(crate) mod inputs;
 mod layers;
 pub(crate) mod lens_from;

@@ -1,10 +1,12 @@
 //! From photographs to files: the whole job with its outputs.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::{Result, StageContext};
 
+use super::developed::with_developed;
 use super::inputs::Inputs;
 use super::outputs::{Outputs, ReadFile};
 use super::threads::thread_pool;
@@ -43,7 +45,8 @@ pub struct StitchJob {
 
 impl StitchJob {
     /// Runs the job. Outputs are checked before work starts, written beside their place and renamed. Of videos that
-    /// [`Inputs::photographs`] names, the frames that are needed are taken out into a folder beside the panorama.
+    /// [`Inputs::photographs`] names, the frames that are needed are taken out into a folder beside the panorama; camera raw is developed into
+    /// another, where a program that does so is installed.
     ///
     /// # Errors
     /// Those of [`Stitcher::align`] and [`Stitcher::compose`], and those of writing; [`trueup_core::Error::Input`] if the
@@ -62,14 +65,17 @@ impl StitchJob {
         cache: Option<&PhotographCache>,
         context: &StageContext,
     ) -> Result<Vec<Written>> {
-        let frames = with_frames(&self.inputs, &self.outputs.panorama, context)?;
-        let (inputs, told) = match &frames {
-            Some(WithFrames { inputs, told }) => (inputs, told.as_slice()),
-            None => (&self.inputs, &[][..]),
-        };
+        let mut inputs = Cow::Borrowed(&self.inputs);
+        let mut told = Vec::new();
+        for replaced in [with_frames, with_developed] {
+            if let Some(WithFrames { inputs: new, told: said }) = replaced(&inputs, &self.outputs.panorama, context)? {
+                inputs = Cow::Owned(new);
+                told.extend(said);
+            }
+        }
         let stitcher = Stitcher::new(options, context).with_cache(cache);
         let stitcher = stitcher.writing_to(&self.outputs.panorama);
-        let mut aligned = stitcher.align(inputs)?;
+        let mut aligned = stitcher.align(&inputs)?;
         let count = aligned.alignments.len();
         let outputs: Vec<Outputs> =
             (1..=count).map(|number| self.outputs.numbered((count > 1).then_some(number))).collect();
@@ -80,7 +86,7 @@ impl StitchJob {
         }
         let stale = if self.inputs.all { self.outputs.stale(count) } else { Vec::new() };
         if let Some(first) = aligned.alignments.first_mut() {
-            first.project.diagnostics.extend_from_slice(told);
+            first.project.diagnostics.extend(told);
             first.project.diagnostics.extend(stale.iter().map(|path| stale_panorama(path, count)));
         }
         let all = aligned.alignments.into_iter().zip(&outputs);

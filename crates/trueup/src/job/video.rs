@@ -10,11 +10,11 @@ use trueup_vision::frames::FrameChooser;
 
 use super::inputs::Inputs;
 
-/// Inputs without videos, and what is said of those that there were.
+/// Inputs in which files that were made stand for what cannot be read itself, and what is said of them.
 pub(super) struct WithFrames {
-    /// The frames are files like other photographs.
+    /// What was made is files like other photographs.
     pub(super) inputs: Inputs,
-    /// A note for each video.
+    /// Notes and warnings.
     pub(super) told: Vec<Diagnostic>,
 }
 
@@ -35,8 +35,8 @@ pub(super) fn with_frames(inputs: &Inputs, panorama: &Path, context: &StageConte
             "Write the panorama to a file.",
         ));
     }
-    let folder = frames_folder(panorama);
-    refuse_other_files(&folder)?;
+    let folder = folder_beside(panorama, FRAMES);
+    refuse_other_files(&folder, is_frame)?;
     let pending = PendingFolder::create(&folder)?;
     let mut told = Vec::new();
     let mut photographs = Vec::new();
@@ -78,26 +78,31 @@ pub(super) fn with_frames(inputs: &Inputs, panorama: &Path, context: &StageConte
 /// How the names of frames end.
 const FRAME_END: &str = ".png";
 
-/// Where the frames of a panorama are kept.
-fn frames_folder(panorama: &Path) -> PathBuf {
+/// How the name of the folder of frames ends.
+const FRAMES: &str = "-frames";
+
+/// Where what was made for a panorama is kept.
+pub(super) fn folder_beside(panorama: &Path, end: &str) -> PathBuf {
     let mut name = panorama.file_stem().unwrap_or_default().to_owned();
-    name.push("-frames");
+    name.push(end);
     panorama.with_file_name(name)
 }
 
-/// A folder with anything but frames is somebody's own.
-fn refuse_other_files(folder: &Path) -> Result<()> {
-    let is_frame = |name: &str| {
-        let number = name.strip_suffix(FRAME_END).and_then(|name| name.rsplit_once('-')).map(|(_, number)| number);
-        number.is_some_and(|number| number.len() >= 6 && number.bytes().all(|byte| byte.is_ascii_digit()))
-    };
+/// Whether a file of this name is a frame that was taken out of a video.
+fn is_frame(name: &str) -> bool {
+    let number = name.strip_suffix(FRAME_END).and_then(|name| name.rsplit_once('-')).map(|(_, number)| number);
+    number.is_some_and(|number| number.len() >= 6 && number.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
+/// A folder with anything but what is made there is somebody's own.
+pub(super) fn refuse_other_files(folder: &Path, is_made: impl Fn(&str) -> bool) -> Result<()> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
     let mut names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
-    match names.find(|name| !is_frame(name)) {
+    match names.find(|name| !is_made(name)) {
         None => Ok(()),
         Some(other) => Err(Error::input(
             folder.display(),
-            format!("the frames of the video belong there, and it holds other files ({other})"),
+            format!("what is made for the panorama belongs there, and it holds other files ({other})"),
             "Give the panorama another name, or the folder.",
         )),
     }
@@ -109,15 +114,15 @@ mod tests {
 
     #[test]
     fn frames_lie_beside_the_panorama_and_nothing_else_is_replaced() {
-        assert_eq!(frames_folder(Path::new("out/pano.jpg")), Path::new("out/pano-frames"));
+        assert_eq!(folder_beside(Path::new("out/pano.jpg"), FRAMES), Path::new("out/pano-frames"));
         let desk = tempfile::tempdir().expect("a folder");
         let folder = desk.path().join("pano-frames");
-        refuse_other_files(&folder).expect("not there");
+        refuse_other_files(&folder, is_frame).expect("not there");
         std::fs::create_dir(&folder).expect("made");
         std::fs::write(folder.join("my-clip-000123.png"), "").expect("written");
-        refuse_other_files(&folder).expect("frames");
+        refuse_other_files(&folder, is_frame).expect("frames");
         std::fs::write(folder.join("letter.png"), "").expect("written");
-        let refused = refuse_other_files(&folder).expect_err("a letter").to_string();
+        let refused = refuse_other_files(&folder, is_frame).expect_err("a letter").to_string();
         assert!(refused.contains("letter.png"), "{refused}");
     }
 }

@@ -8,6 +8,7 @@ pub(crate) mod align;
 pub(crate) mod arrange;
 mod budget;
 pub(crate) mod compose;
+mod frames;
 pub(crate) mod light;
 mod machine;
 pub(crate) mod matched;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use trueup_compose::fusion::ExposureFusion;
+use trueup_core::diagnostics::Subject;
 use trueup_core::mask::Masks;
 use trueup_core::source::{PhotographSource, SourceImage};
 use trueup_core::{Error, Result, StageContext};
@@ -13,6 +14,7 @@ use trueup_io::decode::FilePhotographs;
 use trueup_io::source::{self, InMemory, RejectedSource, Sources};
 
 use super::budget::Budget;
+use super::frames;
 use super::light::{self, WantedLight};
 use crate::job::inputs::{Inputs, Reference};
 use crate::job::lens_from::tell_lenses;
@@ -62,11 +64,19 @@ impl PhotographSet {
     /// [`Error::Cancelled`].
     pub(crate) fn find(inputs: &Inputs, options: &StitchOptions, context: &StageContext) -> Result<Self> {
         let accepted = &options.measure.source;
-        let Sources { photographs: mut images, rejected } =
-            context.time("source", || source::scan_with(&inputs.photographs, &inputs.in_memory, accepted, context))?;
-        if images.is_empty() {
+        let scan =
+            |context: &StageContext| source::scan_with(&inputs.photographs, &inputs.in_memory, accepted, context);
+        let (sources, mut told) = context.gather(|context| context.time("source", || scan(context)))?.split();
+        let Sources { photographs, mut rejected } = sources;
+        rejected.retain(|one| !inputs.stood_for.contains(&one.path));
+        if photographs.is_empty() {
             return Err(nothing_found(inputs, &rejected));
         }
+        let used = context.time("decoding", || frames::needed(&photographs, inputs, options, context))?;
+        let new_number = |number: usize| used.binary_search(&number);
+        told.findings.retain(|one| !matches!(one.subject, Subject::Photograph(number) if new_number(number).is_err()));
+        context.absorb(told.renumbered(|number| new_number(number).unwrap_or(number)));
+        let mut images: Vec<SourceImage> = used.iter().map(|&number| photographs[number].clone()).collect();
         if let Reference::Named(name) = &inputs.reference {
             reference_named(&images, name)?;
         }

@@ -74,7 +74,8 @@ const COMMAND: &str = "darktable-cli photo.dng photo.tif";
 
 macro_rules! foreign {
     ($name:ident, $what:literal) => {
-        static $name: Foreign = Foreign { what: $what, extensions: &[], has_signature: |_| false, command: COMMAND };
+        static $name: Foreign =
+            Foreign { what: $what, extensions: &[], has_signature: |_| false, command: COMMAND, is_raw: true };
     };
 }
 

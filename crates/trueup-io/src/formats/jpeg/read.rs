@@ -10,7 +10,7 @@ use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
 
-use super::scans::has_separate_subsampled_scans;
+use super::scans::{has_separate_subsampled_scans, is_one_scan};
 use crate::format::{HeaderError, Input, StoredPixels};
 use crate::formats::decoded::{MAX_PIXEL_BYTES, check_unchanged, damaged};
 use crate::metadata::block;
@@ -70,11 +70,13 @@ pub(super) fn decode(source: &SourceImage, bytes: &[u8]) -> Result<Photograph> {
     let (width, height) = decoder.dimensions().ok_or_else(|| damaged(source, "no frame header"))?;
     check_unchanged(source, width, height)?;
     if !has_end_of_image(bytes) {
-        return Err(Error::input(
-            &source.name,
-            "the photograph is cut off: the JPEG ends before its end-of-image marker",
-            "Copy it again from the camera or leave it out.",
-        ));
+        return whole_without_end(source, bytes).ok_or_else(|| {
+            Error::input(
+                &source.name,
+                "the photograph is cut off: the JPEG ends before its end-of-image marker",
+                "Copy it again from the camera or leave it out.",
+            )
+        });
     }
     if has_separate_subsampled_scans(bytes) {
         return decode_separate_scans(source, bytes, width, height);
@@ -86,6 +88,31 @@ pub(super) fn decode(source: &SourceImage, bytes: &[u8]) -> Result<Photograph> {
     decoder.set_options(options().jpeg_set_out_colorspace(space));
     let pixels = decoder.decode().map_err(|error| damaged(source, format!("{error:?}")))?;
     Ok(Photograph::Eight(Raster::from_data(width, height, channels, pixels)?))
+}
+
+/// A JPEG that lacks nothing but its end-of-image marker, as programs leave it that are stopped while they write; `None` if pixels are missing.
+///
+/// Whatever follows the last coded block of a picture changes none of its pixels; where blocks are missing, it stands for them. Of progressive
+/// pictures it cannot be told in this way whether a scan that refines all pixels is missing.
+///
+/// # Source
+/// ITU-T T.81 F.2.2 (decoding of a block takes the bits that its codes tell, and no more).
+fn whole_without_end(source: &SourceImage, bytes: &[u8]) -> Option<Photograph> {
+    /// What may follow, of which no two begin alike for more than a bit.
+    const CONTINUATIONS: [u8; 3] = [0x00, 0x55, 0xaa];
+    /// Bytes of it: more than a block has.
+    const CONTINUED_BYTES: usize = 1024;
+    /// Zeros that no coded picture ends in, but a file does whose room on the disk was taken before it was written.
+    const EMPTY: [u8; 16] = [0; 16];
+    // It may be half of the marker.
+    let coded = bytes.strip_suffix(&[0xff]).unwrap_or(bytes);
+    if !is_one_scan(bytes) || coded.ends_with(&EMPTY) {
+        return None;
+    }
+    let continued = |byte: u8| decode(source, &[coded, &[byte; CONTINUED_BYTES], &[0xff, 0xd9]].concat()).ok();
+    let [first, others @ ..] = CONTINUATIONS;
+    let photograph = continued(first)?;
+    others.into_iter().all(|byte| continued(byte).as_ref() == Some(&photograph)).then_some(photograph)
 }
 
 /// Decodes a sequential JPEG that stores each component in a scan of its own and some at a lower resolution.

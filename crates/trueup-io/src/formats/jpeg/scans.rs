@@ -4,33 +4,58 @@ const START_OF_FRAME_BASELINE: u8 = 0xc0;
 const START_OF_FRAME_EXTENDED: u8 = 0xc1;
 const START_OF_SCAN: u8 = 0xda;
 
+/// The segments of a JPEG up to its first scan header, which is the last: each marker, and what follows its length as far as the file goes.
+///
+/// # Source
+/// ITU-T T.81 B.1.1 (markers and segments).
+fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
+    let mut rest = bytes.get(2..);
+    std::iter::from_fn(move || {
+        loop {
+            let [0xff, marker, after @ ..] = rest? else { return None };
+            match *marker {
+                // Fill bytes may precede a marker; these markers stand alone.
+                0xff => rest = rest.and_then(|rest| rest.get(1..)),
+                0x01 | 0xd0..=0xd8 => rest = Some(after),
+                marker => {
+                    let [high, low, body @ ..] = after else { return None };
+                    rest = after.get(usize::from(u16::from_be_bytes([*high, *low]))..);
+                    rest = rest.filter(|_| marker != START_OF_SCAN);
+                    return Some((marker, body));
+                }
+            }
+        }
+    })
+}
+
 /// Whether a sequential JPEG has components of different resolution and not all of them in its first scan.
 ///
 /// # Source
-/// ITU-T T.81 B.1.1 (markers and segments), B.2.2 (frame header), B.2.3 (scan header).
+/// ITU-T T.81 B.2.2 (frame header), B.2.3 (scan header).
 pub(super) fn has_separate_subsampled_scans(bytes: &[u8]) -> bool {
     let mut frame_components: Option<usize> = None;
-    let mut rest = bytes.get(2..).unwrap_or_default();
-    while let [0xff, marker, after @ ..] = rest {
-        // Fill bytes may precede a marker; these markers stand alone.
-        match *marker {
-            0xff => {
-                rest = &rest[1..];
-                continue;
-            }
-            0x01 | 0xd0..=0xd8 => {
-                rest = after;
-                continue;
-            }
-            _ => {}
-        }
-        let [high, low, body @ ..] = after else { return false };
-        match *marker {
+    for (marker, body) in segments(bytes) {
+        match marker {
             START_OF_FRAME_BASELINE | START_OF_FRAME_EXTENDED => frame_components = subsampled_components(body),
             START_OF_SCAN => return body.first().is_some_and(|&count| frame_components > Some(usize::from(count))),
             _ => {}
         }
-        rest = after.get(usize::from(u16::from_be_bytes([*high, *low]))..).unwrap_or_default();
+    }
+    false
+}
+
+/// Whether a JPEG is sequential with all of its components in one scan.
+///
+/// # Source
+/// As of [`has_separate_subsampled_scans`].
+pub(super) fn is_one_scan(bytes: &[u8]) -> bool {
+    let mut frame_components = None;
+    for (marker, body) in segments(bytes) {
+        match marker {
+            START_OF_FRAME_BASELINE | START_OF_FRAME_EXTENDED => frame_components = body.get(5),
+            START_OF_SCAN => return frame_components.is_some() && body.first() == frame_components,
+            _ => {}
+        }
     }
     false
 }
