@@ -7,25 +7,30 @@
 /// Borgefors, "Distance transformations in digital images", CVGIP 34, 1986.
 pub(crate) fn border_distances(covered: &[bool], width: usize) -> Vec<u32> {
     let mut distance = vec![0_u32; covered.len()];
-    let height = covered.len() / width.max(1);
-    let at = |distance: &[u32], x: isize, y: isize| {
-        let inside = x >= 0 && y >= 0 && (x as usize) < width && (y as usize) < height;
-        if inside { distance[y as usize * width + x as usize] } else { 0 }
-    };
-    for forward in [true, false] {
-        let sign = if forward { -1 } else { 1 };
-        for step in 0..width * height {
-            let index = if forward { step } else { width * height - 1 - step };
-            if !covered[index] {
-                continue;
-            }
-            let (x, y) = ((index % width) as isize, (index / width) as isize);
-            let near = (at(&distance, x + sign, y) + 3)
-                .min(at(&distance, x, y + sign) + 3)
-                .min(at(&distance, x + sign, y + sign) + 4)
-                .min(at(&distance, x - sign, y + sign) + 4);
-            distance[index] = if forward { near } else { near.min(distance[index]) };
+    if width == 0 {
+        return distance;
+    }
+    // A row that is done, with what lies beyond both its ends.
+    let mut done = vec![0_u32; width + 2];
+    for (covered, row) in covered.chunks_exact(width).zip(distance.chunks_exact_mut(width)) {
+        let mut beside = 0;
+        for (x, (&covered, own)) in covered.iter().zip(row.iter_mut()).enumerate() {
+            let near = (beside + 3).min(done[x + 1] + 3).min(done[x] + 4).min(done[x + 2] + 4);
+            beside = if covered { near } else { 0 };
+            *own = beside;
         }
+        done[1..=width].copy_from_slice(row);
+    }
+    done.fill(0);
+    for row in distance.chunks_exact_mut(width).rev() {
+        let mut beside = 0;
+        for (x, own) in row.iter_mut().enumerate().rev() {
+            let near = (beside + 3).min(done[x + 1] + 3).min(done[x] + 4).min(done[x + 2] + 4);
+            // What is not covered has 0 already.
+            beside = near.min(*own);
+            *own = beside;
+        }
+        done[1..=width].copy_from_slice(row);
     }
     distance
 }

@@ -82,10 +82,13 @@ impl LightTable {
     #[inline(always)]
     pub(crate) fn at<const COUNT: usize>(&self, x: [f32; COUNT], y: [f32; COUNT]) -> [f32; COUNT] {
         let Some(falloff) = &self.falloff else { return [1.0; COUNT] };
-        falloff.at_all(std::array::from_fn(|at| {
-            let (dx, dy) = (x[at] - self.center[0], y[at] - self.center[1]);
-            ((dx * dx + dy * dy) * self.steps_per_px2).min(STEPS as f32)
-        }))
+        // A loop: a closure would be compiled without the vector instructions of its caller.
+        let mut positions = [0.0; COUNT];
+        for ((position, x), y) in positions.iter_mut().zip(x).zip(y) {
+            let (dx, dy) = (x - self.center[0], y - self.center[1]);
+            *position = ((dx * dx + dy * dy) * self.steps_per_px2).min(STEPS as f32);
+        }
+        falloff.at_all(positions)
     }
 }
 

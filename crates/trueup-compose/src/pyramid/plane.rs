@@ -140,11 +140,17 @@ impl<T: Texel> PyramidPlane<T> {
             while next <= middle + 1 {
                 self.copy_row(next, first, &mut padded);
                 let row = &mut window[next.rem_euclid(3) as usize];
-                for (index, out) in row.iter_mut().enumerate() {
-                    let x = columns.start + index;
-                    let at = (x / 2) as isize - first;
-                    let taps = &padded[at as usize - 1..at as usize + 2];
-                    *out = if x.is_multiple_of(2) { three(taps[0], taps[1], taps[2]) } else { two(taps[1], taps[2]) };
+                // Columns in pairs that the same taps are for, but for a first odd one.
+                let odd = columns.start % 2;
+                if let Some(out) = row.first_mut().filter(|_| odd == 1) {
+                    *out = two(padded[1], padded[2]);
+                }
+                for (pair, taps) in row[odd..].chunks_mut(2).zip(padded[odd..].windows(3)) {
+                    let [even, rest @ ..] = pair else { continue };
+                    *even = three(taps[0], taps[1], taps[2]);
+                    if let [odd] = rest {
+                        *odd = two(taps[1], taps[2]);
+                    }
                 }
                 next += 1;
             }

@@ -87,9 +87,10 @@ fn fill<P: Shade>(store: &mut PixelStore<P>, size: [usize; 2], gaps: &Gaps, cont
     let mut filled = 0;
     for tiles in wanted.chunks(TILES_AT_ONCE) {
         context.check_cancelled()?;
-        let finished: Vec<(usize, Vec<P>)> =
+        let finished: Vec<Option<(usize, Vec<P>)>> =
             tiles.par_iter().map(|tile| canvas.finished(store, tile, &around, &surface)).collect::<Result<_>>()?;
-        for (tile, (count, pixels)) in tiles.iter().zip(finished) {
+        for (tile, finished) in tiles.iter().zip(finished) {
+            let Some((count, pixels)) = finished else { continue };
             filled += count;
             let columns = tile.columns.start - canvas.lead..tile.columns.end - canvas.lead;
             for (y, row) in tile.rows.clone().zip(pixels.chunks_exact(columns.len())) {
@@ -185,16 +186,16 @@ impl<'a> Canvas<'a> {
     }
 
     /// Colors times the share covered of a tile with its margin; nothing where the gaps are, nor farther from them than
-    /// [`Canvas::border`].
+    /// [`Canvas::border`]; `None` where all of it is.
     fn known<P: Shade>(
         &self,
         store: &PixelStore<P>,
         tile: &FillTile,
         around: &BorderColors,
-    ) -> Result<PyramidPlane<[f32; 4]>> {
+    ) -> Result<Option<PyramidPlane<[f32; 4]>>> {
         let (columns, rows) = self.with_margin(tile);
+        let Some(beside) = self.beside_gaps(&columns, &rows) else { return Ok(None) };
         let mut plane = PyramidPlane::new(columns.clone(), rows.clone());
-        let Some(beside) = self.beside_gaps(&columns, &rows) else { return Ok(plane) };
         for (first, own) in self.stretches(&columns) {
             let pixels = store.window(&own, &rows)?;
             for (y, pixels) in rows.clone().zip(pixels.chunks_exact(own.len())) {
@@ -208,7 +209,7 @@ impl<'a> Canvas<'a> {
                 }
             }
         }
-        Ok(plane)
+        Ok(Some(plane))
     }
 
     /// How far from a gap its colors are taken, pixels: what lies behind the border of a narrow strip of sky is no sky.
@@ -227,25 +228,35 @@ impl<'a> Canvas<'a> {
         let wide = columns.start.saturating_sub(border)..(columns.end + border).min(self.width + 2 * self.lead);
         let high = rows.start.saturating_sub(border)..(rows.end + border).min(self.height);
         let stretches = self.stretches(&wide);
-        let mut beside: Option<Vec<bool>> = None;
-        for y in high {
+        let across = |y: usize| {
             let of_stretch = |(first, own): (usize, Range<usize>)| {
                 let start = own.start;
                 self.gaps.within_row(own, y).map(move |x| first + x - start)
             };
             let mut gaps = stretches.iter().cloned().flat_map(of_stretch).peekable();
-            if gaps.peek().is_none() {
-                continue;
-            }
-            let across = spread(gaps, border, columns);
-            let beside = beside.get_or_insert_with(|| vec![false; columns.len() * rows.len()]);
-            let down = y.saturating_sub(border).max(rows.start)..(y + border + 1).min(rows.end);
-            for y in down {
-                let row = &mut beside[(y - rows.start) * columns.len()..][..columns.len()];
-                row.iter_mut().zip(&across).for_each(|(beside, &across)| *beside |= across);
-            }
+            gaps.peek().is_some().then(|| spread(gaps, border, columns))
+        };
+        let across: Vec<Option<Vec<bool>>> = high.clone().map(across).collect();
+        if across.iter().all(Option::is_none) {
+            return None;
         }
-        beside
+        // For every column, how many of the rows that a row sees have a gap beside it.
+        let mut seen = vec![0_u16; columns.len()];
+        let mut beside = Vec::with_capacity(columns.len() * rows.len());
+        let (mut first, mut end) = (high.start, high.start);
+        for y in rows.clone() {
+            for across in across[end - high.start..(y + border + 1).min(high.end) - high.start].iter().flatten() {
+                seen.iter_mut().zip(across).for_each(|(seen, &across)| *seen += u16::from(across));
+            }
+            end = (y + border + 1).min(high.end);
+            let new_first = y.saturating_sub(border).max(high.start);
+            for across in across[first - high.start..new_first - high.start].iter().flatten() {
+                seen.iter_mut().zip(across).for_each(|(seen, &across)| *seen -= u16::from(across));
+            }
+            first = new_first;
+            beside.extend(seen.iter().map(|&rows| rows > 0));
+        }
+        Some(beside)
     }
 
     /// What is known at the first level, of so much of the panorama as gaps need.
@@ -260,14 +271,15 @@ impl<'a> Canvas<'a> {
         let mut known = PyramidPlane::new(samples(self.width + 2 * self.lead), samples(self.height));
         for tiles in sources.chunks(TILES_AT_ONCE) {
             context.check_cancelled()?;
-            let reduced: Vec<PyramidPlane<[f32; 4]>> = tiles
+            let reduced: Vec<Option<PyramidPlane<[f32; 4]>>> = tiles
                 .par_iter()
                 .map(|tile| {
-                    let plane = self.known(store, tile, around)?;
-                    Ok((0..self.first_level).fold(plane, |plane, _| plane.reduced()))
+                    let known = self.known(store, tile, around)?;
+                    Ok(known.map(|plane| (0..self.first_level).fold(plane, |plane, _| plane.reduced())))
                 })
                 .collect::<Result<_>>()?;
             for (tile, plane) in tiles.iter().zip(reduced) {
+                let Some(plane) = plane else { continue };
                 let own =
                     |range: &Range<usize>| range.start >> self.first_level..range.end.div_ceil(1 << self.first_level);
                 let columns = own(&tile.columns);
@@ -280,21 +292,31 @@ impl<'a> Canvas<'a> {
         Ok(known)
     }
 
-    /// A tile's pixels with its gaps filled, and how many that were.
+    /// A tile's pixels with its gaps filled, and how many that were; `None` if none is to be filled.
     fn finished<P: Shade>(
         &self,
         store: &PixelStore<P>,
         tile: &FillTile,
         around: &BorderColors,
         surface: &PyramidPlane<[f32; 4]>,
-    ) -> Result<(usize, Vec<P>)> {
-        let mut levels = vec![self.known(store, tile, around)?];
+    ) -> Result<Option<(usize, Vec<P>)>> {
+        let columns = tile.columns.start - self.lead..tile.columns.end - self.lead;
+        let mut pixels = store.window(&columns, &tile.rows)?;
+        let lacks = |(y, pixels): (usize, &[P])| {
+            columns.clone().zip(pixels).any(|(x, pixel)| pixel.root()[3] < 1.0 && self.gaps.is_gap(x, y))
+        };
+        if !tile.rows.clone().zip(pixels.chunks_exact(columns.len())).any(lacks) {
+            return Ok(None);
+        }
+        let nothing_known = || {
+            let (columns, rows) = self.with_margin(tile);
+            PyramidPlane::new(columns, rows)
+        };
+        let mut levels = vec![self.known(store, tile, around)?.unwrap_or_else(nothing_known)];
         for _ in 1..self.first_level {
             levels.extend(levels.last().map(PyramidPlane::reduced));
         }
         let surface = pulled(levels, Some(surface));
-        let columns = tile.columns.start - self.lead..tile.columns.end - self.lead;
-        let mut pixels = store.window(&columns, &tile.rows)?;
         let mut filled = 0;
         for (y, pixels) in tile.rows.clone().zip(pixels.chunks_exact_mut(columns.len())) {
             let texels = &surface.row(y)[tile.columns.start - surface.columns.start..];
@@ -310,7 +332,7 @@ impl<'a> Canvas<'a> {
                 }
             }
         }
-        Ok((filled, pixels))
+        Ok(Some((filled, pixels)))
     }
 }
 

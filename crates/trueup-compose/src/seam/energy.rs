@@ -2,10 +2,11 @@
 
 use rayon::prelude::*;
 
+use super::band::Band;
 use super::options::SeamOptions;
 use super::shading::{FRACTION, slopes};
 use super::softness::Softness;
-use crate::small_views::{CLIPPED, IGNORED, KEPT, PARTLY, SmallPixel, SmallView, WHOLLY, luma};
+use crate::small_views::{CLIPPED, Depths, IGNORED, KEPT, PARTLY, SmallPixel, SmallView, WHOLLY, luma};
 
 /// Cost of a seam for its length alone, gray levels of difference. Higher makes seams shorter.
 const LENGTH: f64 = 2.0;
@@ -40,7 +41,7 @@ pub(super) struct SeamEnergy<'a> {
     gradients: Vec<Vec<[i16; 2]>>,
     /// Slopes of the shading, for every pixel of every view that is prepared; empty if they do not count.
     slopes: Vec<Vec<[i16; 2]>>,
-    depths: Vec<Vec<u8>>,
+    depths: Vec<Depths>,
     softness: &'a [Softness],
     /// How often the canvas that the softness is of was halved.
     halvings: u32,
@@ -113,15 +114,11 @@ impl<'a> SeamEnergy<'a> {
 
     /// Finds what [`Self::seam_cost`] and [`Self::difference`] need, at the canvas pixels that are `wanted`; before that, and
     /// elsewhere, they are not to be asked.
-    pub(super) fn prepare_differences(&mut self, wanted: impl Fn(usize) -> bool + Sync) {
-        let (width, turn, views) = (self.width, self.turn, self.views);
-        let of_view = |view: &SmallView, [x, y]: [usize; 2]| {
-            let x = x + view.columns.start;
-            wanted((y + view.rows.start) * width + if x < width { x } else { x - turn })
-        };
-        self.gradients = views.par_iter().map(|view| gradients(view, |at| of_view(view, at))).collect();
+    pub(super) fn prepare_differences(&mut self, wanted: &Band) {
+        let views = self.views;
+        self.gradients = views.par_iter().map(|view| gradients(view, wanted)).collect();
         if self.shading_weight > 0 {
-            self.slopes = views.par_iter().map(|view| slopes(view, |at| of_view(view, at))).collect();
+            self.slopes = views.par_iter().map(|view| slopes(view, wanted)).collect();
         }
     }
 
@@ -140,7 +137,7 @@ impl<'a> SeamEnergy<'a> {
 
     /// How deep inside photograph `label` a canvas pixel lies, 0 to 255.
     pub(super) fn depth(&self, label: usize, x: usize, y: usize) -> u8 {
-        self.views[label].index_around(x, y, self.turn).map_or(0, |index| self.depths[label][index])
+        self.views[label].index_around(x, y, self.turn).map_or(0, |index| self.depths[label].at(index))
     }
 
     /// Cost of showing photograph `label`, which is allowed there, at a canvas pixel.
@@ -206,23 +203,24 @@ fn in_units(levels: f64) -> i32 {
 }
 
 /// Central differences of the luma over covered pixels; one-sided or zero at the border. 0 where they are not `wanted`.
-fn gradients(view: &SmallView, wanted: impl Fn([usize; 2]) -> bool) -> Vec<[i16; 2]> {
+fn gradients(view: &SmallView, wanted: &Band) -> Vec<[i16; 2]> {
     let (width, height) = (view.columns.len(), view.rows.len());
-    let or_none = |pixel: &SmallPixel| if pixel[3] & PARTLY == 0 { -1 } else { (luma(pixel) >> 8) as i16 };
-    let luma: Vec<i16> = view.pixels.iter().map(or_none).collect();
+    let luma = |index: usize| {
+        let pixel: &SmallPixel = &view.pixels[index];
+        (pixel[3] & PARTLY != 0).then(|| (luma(pixel) >> 8) as i16)
+    };
     let mut out = vec![[0; 2]; width * height];
-    for (index, out) in out.iter_mut().enumerate() {
-        let (x, y) = (index % width, index / width);
-        let middle = luma[index];
-        if middle < 0 || !wanted([x, y]) {
-            continue;
+    for (y, row) in view.rows.clone().enumerate() {
+        for x in wanted.within(&view.columns, row).map(|x| x - view.columns.start) {
+            let index = y * width + x;
+            let Some(middle) = luma(index) else { continue };
+            let or_middle = |inside: bool, at: usize| if inside { luma(at).unwrap_or(middle) } else { middle };
+            let left = or_middle(x > 0, index.wrapping_sub(1));
+            let right = or_middle(x + 1 < width, index + 1);
+            let above = or_middle(y > 0, index.wrapping_sub(width));
+            let below = or_middle(y + 1 < height, index + width);
+            out[index] = [right - left, below - above];
         }
-        let or_middle = |inside: bool, at: usize| if inside && luma[at] >= 0 { luma[at] } else { middle };
-        let left = or_middle(x > 0, index.wrapping_sub(1));
-        let right = or_middle(x + 1 < width, index + 1);
-        let above = or_middle(y > 0, index.wrapping_sub(width));
-        let below = or_middle(y + 1 < height, index + width);
-        *out = [right - left, below - above];
     }
     out
 }

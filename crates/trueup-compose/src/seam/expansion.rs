@@ -7,6 +7,7 @@
 
 use rayon::prelude::*;
 
+use super::band::Band;
 use super::energy::SeamEnergy;
 use super::max_flow::{DOWN, GridFlow, RIGHT};
 use crate::label::{Label, NOBODY};
@@ -16,11 +17,12 @@ use crate::window::Window;
 #[derive(Default)]
 pub(super) struct Expansions {
     flow: GridFlow,
-    /// For each pixel of the box the difference of the photograph shown and the one that expands; [`FIXED`] where the
-    /// pixel does not take part.
+    /// For each pixel of the canvas its node of the flow; [`FIXED`] where it does not take part.
+    node_at: Vec<u32>,
+    /// The pixels that take part, row by row, beginning with that of node 1: columns as the box has them, and rows.
+    taking_part: Vec<[u32; 2]>,
+    /// For each of them the difference of the photograph shown and the one that expands.
     change: Vec<i32>,
-    /// The pixels that take part, row by row: columns as the box has them, and rows.
-    nodes: Vec<[u32; 2]>,
 }
 
 /// A photograph that takes pixels of a box.
@@ -37,8 +39,8 @@ impl Taking<'_> {
     }
 }
 
-/// See [`Expansions::change`].
-const FIXED: i32 = -1;
+/// See [`Expansions::node_at`].
+const FIXED: u32 = 0;
 
 /// The labelling that shows everywhere the photograph that lies deepest.
 pub(super) fn deepest(energy: &SeamEnergy<'_>) -> Vec<Label> {
@@ -79,57 +81,59 @@ impl Expansions {
         labels: &mut [Label],
         label: usize,
         window: Window<'_>,
-        free: &dyn Fn(usize) -> bool,
+        free: &Band,
     ) -> bool {
         let taking = Taking { energy, label, window };
-        if !self.find_nodes(&taking, labels, free) {
+        if self.node_at.len() != labels.len() {
+            self.node_at.clear();
+            self.node_at.resize(labels.len(), FIXED);
+        }
+        self.find_nodes(&taking, labels, free);
+        if self.taking_part.is_empty() {
             return false;
         }
-        self.flow.reset(window.columns.len(), window.rows.len());
+        self.flow.reset(self.taking_part.len());
         self.add_data_costs(&taking, labels);
         self.add_seam_costs(&taking, labels);
         self.flow.solve();
         let mut changed = false;
-        for &[x, y] in &self.nodes {
-            let (x, y) = (x as usize, y as usize);
-            if self.flow.on_sink_side(self.flow.node(x - window.columns.start, y - window.rows.start)) {
-                labels[y * energy.width + energy.column(x)] = label as Label;
+        for (node, &[x, y]) in (1..).zip(&self.taking_part) {
+            let at = y as usize * energy.width + energy.column(x as usize);
+            self.node_at[at] = FIXED;
+            if self.flow.on_sink_side(node) {
+                labels[at] = label as Label;
                 changed = true;
             }
         }
         changed
     }
 
-    /// Finds the pixels that take part: those that are `free` and that the photograph may take. Returns whether there are any.
-    fn find_nodes(&mut self, taking: &Taking<'_>, labels: &[Label], free: &dyn Fn(usize) -> bool) -> bool {
+    /// Finds the pixels that take part: those that are `free` and that the photograph may take.
+    fn find_nodes(&mut self, taking: &Taking<'_>, labels: &[Label], free: &Band) {
         let &Taking { energy, label, window: Window { columns, rows } } = taking;
-        let width = columns.len();
+        self.taking_part.clear();
         self.change.clear();
-        self.change.resize(width * rows.len(), FIXED);
-        self.nodes.clear();
+        let columns = columns.start + usize::from(taking.all_round())..columns.end;
         for y in rows.clone() {
-            for x in columns.clone().skip(usize::from(taking.all_round())) {
+            for x in free.within(&columns, y) {
                 let on_canvas = energy.column(x);
                 let at = y * energy.width + on_canvas;
                 let old = labels[at];
-                if old != NOBODY && usize::from(old) != label && free(at) && energy.allowed(label, on_canvas, y) {
-                    self.change[(y - rows.start) * width + x - columns.start] =
-                        energy.difference(usize::from(old), label, [on_canvas, y]);
-                    // A small canvas has far fewer than 2^32 columns and rows.
-                    self.nodes.push([x as u32, y as u32]);
+                if old != NOBODY && usize::from(old) != label && energy.allowed(label, on_canvas, y) {
+                    // A small canvas has far fewer than 2^32 pixels.
+                    self.taking_part.push([x as u32, y as u32]);
+                    self.change.push(energy.difference(usize::from(old), label, [on_canvas, y]));
+                    self.node_at[at] = self.taking_part.len() as u32;
                 }
             }
         }
-        !self.nodes.is_empty()
     }
 
     /// Adds what the pixels that take part cost themselves.
     fn add_data_costs(&mut self, taking: &Taking<'_>, labels: &[Label]) {
-        let &Taking { energy, label, window: Window { columns, rows } } = taking;
-        for &[x, y] in &self.nodes {
-            let (x, y) = (x as usize, y as usize);
-            let node = self.flow.node(x - columns.start, y - rows.start);
-            let x = energy.column(x);
+        let &Taking { energy, label, .. } = taking;
+        for (node, &[x, y]) in (1..).zip(&self.taking_part) {
+            let (x, y) = (energy.column(x as usize), y as usize);
             let old = usize::from(labels[y * energy.width + x]);
             self.flow.add_sink_side_cost(node, energy.data_cost(label, x, y) - energy.data_cost(old, x, y));
         }
@@ -139,8 +143,8 @@ impl Expansions {
     fn add_seam_costs(&mut self, taking: &Taking<'_>, labels: &[Label]) {
         let energy = taking.energy;
         let all_round = taking.all_round();
-        let nodes = std::mem::take(&mut self.nodes);
-        for &[x, y] in &nodes {
+        let taking_part = std::mem::take(&mut self.taking_part);
+        for &[x, y] in &taking_part {
             let (x, y) = (x as usize, y as usize);
             if x + 1 < energy.width || energy.turn > 0 {
                 self.join(taking, labels, [[x, y], [x + 1, y]], RIGHT);
@@ -161,7 +165,7 @@ impl Expansions {
                 self.join(taking, labels, [[x, above], [x, y]], DOWN);
             }
         }
-        self.nodes = nodes;
+        self.taking_part = taking_part;
     }
 
     /// The node of a pixel, by its column as the box has them, and its difference; `None` if it does not take part.
@@ -170,9 +174,8 @@ impl Expansions {
         if !(columns.contains(&x) && rows.contains(&y)) {
             return None;
         }
-        let (u, v) = (x - columns.start, y - rows.start);
-        let change = self.change[v * columns.len() + u];
-        (change != FIXED).then(|| (self.flow.node(u, v), change))
+        let node = self.node_at[y * taking.energy.width + taking.energy.column(x)];
+        (node != FIXED).then(|| (node as usize, self.change[node as usize - 1]))
     }
 
     /// Adds the cost of a seam between neighboring pixels p and q. A node on the sink's side takes the new label.
@@ -190,9 +193,9 @@ impl Expansions {
         }
         let (a, b) = (usize::from(a), usize::from(b));
         match (node_p, node_q) {
-            (Some((at_p, change_p)), Some((_, change_q))) if a == b => {
+            (Some((at_p, change_p)), Some((at_q, change_q))) if a == b => {
                 let seam = energy.cost_of(p, q, change_p + change_q);
-                self.flow.add_arcs(at_p, direction, seam, seam);
+                self.flow.add_arcs([at_p, at_q], direction, seam, seam);
             }
             (Some((at_p, _)), Some((at_q, _))) => {
                 let keep_both = energy.seam_cost(p, a, q, b);
@@ -201,7 +204,7 @@ impl Expansions {
                 self.flow.add_sink_side_cost(at_p, p_changes - keep_both);
                 self.flow.add_sink_side_cost(at_q, -p_changes);
                 // Rounding may miss the triangle inequality by one.
-                self.flow.add_arcs(at_p, direction, (q_changes + p_changes - keep_both).max(0), 0);
+                self.flow.add_arcs([at_p, at_q], direction, (q_changes + p_changes - keep_both).max(0), 0);
             }
             (Some((at_p, _)), None) => {
                 let change = energy.seam_cost(p, label, q, b) - energy.seam_cost(p, a, q, b);

@@ -1,4 +1,4 @@
-//! Minimum cut of a grid whose nodes are joined to their four neighbors and to the two terminals.
+//! Minimum cut of pixels of a grid that are joined to their four neighbors and to the two terminals.
 //!
 //! # Source
 //! Boykov, Kolmogorov, "An experimental comparison of min-cut/max-flow algorithms for energy minimization in vision",
@@ -6,7 +6,7 @@
 //! dissertation (Cornell, 2004), section 3.2.
 //!
 //! # Departures
-//! Arcs are not stored: they follow from the grid. Capacities are whole numbers, so that the cut is exact and the same
+//! Arcs are stored by direction, with their nodes. Capacities are whole numbers, so that the cut is exact and the same
 //! everywhere.
 
 use std::collections::VecDeque;
@@ -19,98 +19,103 @@ const FREE: u8 = 0;
 const SOURCE: u8 = 1;
 const SINK: u8 = 2;
 
-/// What [`GridFlow::parent`] holds beside a direction.
+/// What [`Node::parent`] holds beside a direction.
 const TERMINAL: u8 = 4;
 const ORPHAN: u8 = 5;
 const NOBODY: u8 = 6;
 
-/// A flow network on a grid.
+/// A neighbor that is none: a node without arcs.
+const NOWHERE: u32 = 0;
+
+/// A node of the network.
+#[derive(Debug, Clone)]
+struct Node {
+    /// Residual capacities to the four neighbors.
+    residual: [i32; 4],
+    /// The four neighbors.
+    neighbors: [u32; 4],
+    /// Residual capacity from the source (above zero) or to the sink (below zero).
+    excess: i32,
+    /// When `distance` was last known to be right.
+    stamp: u32,
+    /// Arcs to the terminal.
+    distance: u32,
+    tree: u8,
+    parent: u8,
+    is_active: bool,
+}
+
+/// A flow network on some pixels of a grid.
 #[derive(Debug, Default)]
 pub(super) struct GridFlow {
-    /// Nodes per row with the border; a ring of nodes without arcs surrounds the grid.
-    stride: usize,
-    /// Residual capacity from the source (above zero) or to the sink (below zero).
-    excess: Vec<i32>,
-    /// Residual capacities to the four neighbors.
-    residual: Vec<[i32; 4]>,
-    tree: Vec<u8>,
-    parent: Vec<u8>,
-    /// When `distance` was last known to be right.
-    stamp: Vec<u32>,
-    /// Arcs to the terminal.
-    distance: Vec<u32>,
+    /// The first is [`NOWHERE`].
+    nodes: Vec<Node>,
     clock: u32,
     active: VecDeque<u32>,
-    is_active: Vec<bool>,
     orphans: VecDeque<u32>,
 }
 
 impl GridFlow {
-    /// Empties the network for a grid of `width` x `height` nodes.
-    pub(super) fn reset(&mut self, width: usize, height: usize) {
-        let nodes = (width + 2) * (height + 2);
-        self.stride = width + 2;
+    /// Empties the network; its nodes are numbered from 1 to `count`.
+    pub(super) fn reset(&mut self, count: usize) {
+        const ALONE: Node = Node {
+            residual: [0; 4],
+            neighbors: [NOWHERE; 4],
+            excess: 0,
+            stamp: 0,
+            distance: 0,
+            tree: FREE,
+            parent: NOBODY,
+            is_active: false,
+        };
         self.clock = 0;
         self.active.clear();
         self.orphans.clear();
-        refill(&mut self.excess, nodes, 0);
-        refill(&mut self.residual, nodes, [0; 4]);
-        refill(&mut self.tree, nodes, FREE);
-        refill(&mut self.parent, nodes, NOBODY);
-        refill(&mut self.stamp, nodes, 0);
-        refill(&mut self.distance, nodes, 0);
-        refill(&mut self.is_active, nodes, false);
-    }
-
-    /// The node in column `x` and row `y`.
-    pub(super) fn node(&self, x: usize, y: usize) -> usize {
-        (y + 1) * self.stride + x + 1
+        self.nodes.clear();
+        self.nodes.resize(count + 1, ALONE);
     }
 
     /// Makes it cost `amount` (below zero: gain) to have `node` on the sink's side.
     pub(super) fn add_sink_side_cost(&mut self, node: usize, amount: i32) {
-        self.excess[node] = self.excess[node].saturating_add(amount);
+        self.nodes[node].excess = self.nodes[node].excess.saturating_add(amount);
     }
 
-    /// Makes it cost `there` to have `node` on the source's side and its neighbor in `direction` on the sink's, and `back`
-    /// for the reverse; both at least 0.
-    pub(super) fn add_arcs(&mut self, node: usize, direction: usize, there: i32, back: i32) {
-        let other = self.neighbor(node, direction);
-        self.residual[node][direction] += there;
-        self.residual[other][direction ^ 2] += back;
+    /// Makes it cost `there` to have a node on the source's side and the `other`, its neighbor in `direction`, on the sink's, and
+    /// `back` for the reverse; both at least 0.
+    pub(super) fn add_arcs(&mut self, [node, other]: [usize; 2], direction: usize, there: i32, back: i32) {
+        // Nodes are numbered by 32 bits where pixels are.
+        self.nodes[node].neighbors[direction] = other as u32;
+        self.nodes[node].residual[direction] += there;
+        self.nodes[other].neighbors[direction ^ 2] = node as u32;
+        self.nodes[other].residual[direction ^ 2] += back;
     }
 
     fn neighbor(&self, node: usize, direction: usize) -> usize {
-        match direction {
-            RIGHT => node + 1,
-            DOWN => node + self.stride,
-            2 => node - 1,
-            _ => node - self.stride,
-        }
+        self.nodes[node].neighbors[direction] as usize
     }
 
     /// Residual capacity of the arc along which the tree of `node` grows in `direction`: away from the source, towards
     /// the sink.
     fn growth_capacity(&self, node: usize, direction: usize) -> i32 {
-        match self.tree[node] {
-            SOURCE => self.residual[node][direction],
-            _ => self.residual[self.neighbor(node, direction)][direction ^ 2],
+        match self.nodes[node].tree {
+            SOURCE => self.nodes[node].residual[direction],
+            _ => self.nodes[self.neighbor(node, direction)].residual[direction ^ 2],
         }
     }
 
     /// Finds the minimum cut. Afterwards [`Self::on_sink_side`] tells the sides.
     pub(super) fn solve(&mut self) {
-        for node in 0..self.excess.len() {
-            if self.excess[node] != 0 {
-                self.tree[node] = if self.excess[node] > 0 { SOURCE } else { SINK };
-                self.parent[node] = TERMINAL;
-                self.distance[node] = 1;
+        for node in 1..self.nodes.len() {
+            if self.nodes[node].excess != 0 {
+                self.nodes[node].tree = if self.nodes[node].excess > 0 { SOURCE } else { SINK };
+                self.nodes[node].parent = TERMINAL;
+                self.nodes[node].distance = 1;
                 self.activate(node);
             }
         }
         while let Some(&front) = self.active.front() {
             let node = front as usize;
-            let bridge = if self.tree[node] == FREE { None } else { self.grow(node) };
+            let bridge = if self.nodes[node].tree == FREE { None } else { self.grow(node) };
             match bridge {
                 Some(direction) => {
                     self.clock += 1;
@@ -119,7 +124,7 @@ impl GridFlow {
                 }
                 None => {
                     self.active.pop_front();
-                    self.is_active[node] = false;
+                    self.nodes[node].is_active = false;
                 }
             }
         }
@@ -127,12 +132,12 @@ impl GridFlow {
 
     /// Whether `node` is on the sink's side of the minimum cut that is nearest to the sink.
     pub(super) fn on_sink_side(&self, node: usize) -> bool {
-        self.tree[node] == SINK
+        self.nodes[node].tree == SINK
     }
 
     fn activate(&mut self, node: usize) {
-        if !self.is_active[node] {
-            self.is_active[node] = true;
+        if !self.nodes[node].is_active {
+            self.nodes[node].is_active = true;
             self.active.push_back(node as u32);
         }
     }
@@ -144,13 +149,15 @@ impl GridFlow {
                 continue;
             }
             let other = self.neighbor(node, direction);
-            if self.tree[other] == FREE {
-                self.tree[other] = self.tree[node];
+            if self.nodes[other].tree == FREE {
+                self.nodes[other].tree = self.nodes[node].tree;
                 self.join(other, direction ^ 2, node);
                 self.activate(other);
-            } else if self.tree[other] != self.tree[node] {
+            } else if self.nodes[other].tree != self.nodes[node].tree {
                 return Some(direction);
-            } else if self.stamp[other] <= self.stamp[node] && self.distance[other] > self.distance[node] + 1 {
+            } else if self.nodes[other].stamp <= self.nodes[node].stamp
+                && self.nodes[other].distance > self.nodes[node].distance + 1
+            {
                 // A shorter way to the terminal; trees stay flat.
                 self.join(other, direction ^ 2, node);
             }
@@ -159,9 +166,9 @@ impl GridFlow {
     }
 
     fn join(&mut self, child: usize, direction: usize, parent: usize) {
-        self.parent[child] = direction as u8;
-        self.stamp[child] = self.stamp[parent];
-        self.distance[child] = self.distance[parent] + 1;
+        self.nodes[child].parent = direction as u8;
+        self.nodes[child].stamp = self.nodes[parent].stamp;
+        self.nodes[child].distance = self.nodes[parent].distance + 1;
     }
 
     /// Pushes what fits along the path that the arc from `node` in `direction` closes.
@@ -169,62 +176,62 @@ impl GridFlow {
         let other = self.neighbor(node, direction);
         // The arc runs from the source's tree to the sink's.
         let (from, along, to) =
-            if self.tree[node] == SOURCE { (node, direction, other) } else { (other, direction ^ 2, node) };
-        let mut amount = self.residual[from][along];
+            if self.nodes[node].tree == SOURCE { (node, direction, other) } else { (other, direction ^ 2, node) };
+        let mut amount = self.nodes[from].residual[along];
         let mut at = from;
-        while self.parent[at] < TERMINAL {
-            let up = usize::from(self.parent[at]);
+        while self.nodes[at].parent < TERMINAL {
+            let up = usize::from(self.nodes[at].parent);
             at = self.neighbor(at, up);
-            amount = amount.min(self.residual[at][up ^ 2]);
+            amount = amount.min(self.nodes[at].residual[up ^ 2]);
         }
-        amount = amount.min(self.excess[at]);
+        amount = amount.min(self.nodes[at].excess);
         at = to;
-        while self.parent[at] < TERMINAL {
-            let up = usize::from(self.parent[at]);
-            amount = amount.min(self.residual[at][up]);
+        while self.nodes[at].parent < TERMINAL {
+            let up = usize::from(self.nodes[at].parent);
+            amount = amount.min(self.nodes[at].residual[up]);
             at = self.neighbor(at, up);
         }
-        amount = amount.min(-self.excess[at]);
+        amount = amount.min(-self.nodes[at].excess);
 
         self.push(from, along, amount);
         at = from;
-        while self.parent[at] < TERMINAL {
-            let up = usize::from(self.parent[at]);
+        while self.nodes[at].parent < TERMINAL {
+            let up = usize::from(self.nodes[at].parent);
             let above = self.neighbor(at, up);
             self.push(above, up ^ 2, amount);
-            if self.residual[above][up ^ 2] == 0 {
+            if self.nodes[above].residual[up ^ 2] == 0 {
                 self.orphan(at);
             }
             at = above;
         }
-        self.excess[at] -= amount;
-        if self.excess[at] == 0 {
+        self.nodes[at].excess -= amount;
+        if self.nodes[at].excess == 0 {
             self.orphan(at);
         }
         at = to;
-        while self.parent[at] < TERMINAL {
-            let up = usize::from(self.parent[at]);
+        while self.nodes[at].parent < TERMINAL {
+            let up = usize::from(self.nodes[at].parent);
             self.push(at, up, amount);
             let above = self.neighbor(at, up);
-            if self.residual[at][up] == 0 {
+            if self.nodes[at].residual[up] == 0 {
                 self.orphan(at);
             }
             at = above;
         }
-        self.excess[at] += amount;
-        if self.excess[at] == 0 {
+        self.nodes[at].excess += amount;
+        if self.nodes[at].excess == 0 {
             self.orphan(at);
         }
     }
 
     fn push(&mut self, node: usize, direction: usize, amount: i32) {
         let other = self.neighbor(node, direction);
-        self.residual[node][direction] -= amount;
-        self.residual[other][direction ^ 2] += amount;
+        self.nodes[node].residual[direction] -= amount;
+        self.nodes[other].residual[direction ^ 2] += amount;
     }
 
     fn orphan(&mut self, node: usize) {
-        self.parent[node] = ORPHAN;
+        self.nodes[node].parent = ORPHAN;
         self.orphans.push_back(node as u32);
     }
 
@@ -232,7 +239,7 @@ impl GridFlow {
     fn adopt(&mut self) {
         while let Some(orphan) = self.orphans.pop_front() {
             let node = orphan as usize;
-            let tree = self.tree[node];
+            let tree = self.nodes[node].tree;
             let mut best: Option<(u32, usize)> = None;
             for direction in 0..4 {
                 if self.capacity_from_parent(node, direction) > 0
@@ -243,47 +250,47 @@ impl GridFlow {
                 }
             }
             if let Some((distance, direction)) = best {
-                self.parent[node] = direction as u8;
-                self.stamp[node] = self.clock;
-                self.distance[node] = distance + 1;
+                self.nodes[node].parent = direction as u8;
+                self.nodes[node].stamp = self.clock;
+                self.nodes[node].distance = distance + 1;
                 continue;
             }
             for direction in 0..4 {
                 let other = self.neighbor(node, direction);
-                if self.tree[other] != tree {
+                if self.nodes[other].tree != tree {
                     continue;
                 }
                 if self.capacity_from_parent(node, direction) > 0 {
                     self.activate(other);
                 }
-                if usize::from(self.parent[other]) == direction ^ 2 {
+                if usize::from(self.nodes[other].parent) == direction ^ 2 {
                     self.orphan(other);
                 }
             }
-            self.tree[node] = FREE;
-            self.parent[node] = NOBODY;
+            self.nodes[node].tree = FREE;
+            self.nodes[node].parent = NOBODY;
         }
     }
 
     /// Residual capacity of the tree arc between `node` and a possible parent in `direction`.
     fn capacity_from_parent(&self, node: usize, direction: usize) -> i32 {
-        match self.tree[node] {
-            SOURCE => self.residual[self.neighbor(node, direction)][direction ^ 2],
-            _ => self.residual[node][direction],
+        match self.nodes[node].tree {
+            SOURCE => self.nodes[self.neighbor(node, direction)].residual[direction ^ 2],
+            _ => self.nodes[node].residual[direction],
         }
     }
 
     /// Arcs from `start`, a node of `tree`, to its terminal; `None` if it is of another tree or hangs on an orphan.
     fn distance_to_terminal(&mut self, start: usize, tree: u8) -> Option<u32> {
-        if self.tree[start] != tree {
+        if self.nodes[start].tree != tree {
             return None;
         }
         let (mut at, mut steps) = (start, 0);
         let distance = loop {
-            if self.stamp[at] == self.clock {
-                break self.distance[at];
+            if self.nodes[at].stamp == self.clock {
+                break self.nodes[at].distance;
             }
-            match self.parent[at] {
+            match self.nodes[at].parent {
                 TERMINAL => break 1,
                 ORPHAN | NOBODY => return None,
                 up => at = self.neighbor(at, usize::from(up)),
@@ -293,22 +300,17 @@ impl GridFlow {
         // Remember along the way.
         let mut left = distance + steps;
         at = start;
-        while self.stamp[at] != self.clock {
-            self.stamp[at] = self.clock;
-            self.distance[at] = left;
-            if self.parent[at] >= TERMINAL {
+        while self.nodes[at].stamp != self.clock {
+            self.nodes[at].stamp = self.clock;
+            self.nodes[at].distance = left;
+            if self.nodes[at].parent >= TERMINAL {
                 break;
             }
-            at = self.neighbor(at, usize::from(self.parent[at]));
+            at = self.neighbor(at, usize::from(self.nodes[at].parent));
             left -= 1;
         }
         Some(distance + steps)
     }
-}
-
-fn refill<T: Clone>(values: &mut Vec<T>, length: usize, value: T) {
-    values.clear();
-    values.resize(length, value);
 }
 
 #[cfg(test)]
@@ -349,20 +351,20 @@ mod tests {
     }
 
     fn cut(flow: &mut GridFlow, unary: &[i32], arcs: &[[i32; 4]]) -> u32 {
-        flow.reset(WIDTH, HEIGHT);
+        flow.reset(NODES);
         for node in 0..NODES {
             let (x, y) = (node % WIDTH, node / WIDTH);
-            let at = flow.node(x, y);
+            let at = node + 1;
             flow.add_sink_side_cost(at, unary[node]);
             if x + 1 < WIDTH {
-                flow.add_arcs(at, RIGHT, arcs[node][0], arcs[node][1]);
+                flow.add_arcs([at, at + 1], RIGHT, arcs[node][0], arcs[node][1]);
             }
             if y + 1 < HEIGHT {
-                flow.add_arcs(at, DOWN, arcs[node][2], arcs[node][3]);
+                flow.add_arcs([at, at + WIDTH], DOWN, arcs[node][2], arcs[node][3]);
             }
         }
         flow.solve();
-        let sink_side = |node: usize| flow.on_sink_side(flow.node(node % WIDTH, node / WIDTH));
+        let sink_side = |node: usize| flow.on_sink_side(node + 1);
         (0..NODES).filter(|&node| sink_side(node)).map(|node| 1 << node).sum()
     }
 

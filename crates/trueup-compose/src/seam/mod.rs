@@ -4,6 +4,7 @@
 //! photographs look alike, stay away from the borders of the photographs, and do not cut things that moved. They are found
 //! on a small canvas by graph cuts and followed down to finer ones in a narrow band.
 
+mod band;
 mod energy;
 mod expansion;
 mod labels;
@@ -26,6 +27,7 @@ pub use options::SeamOptions;
 
 use crate::small_views::{COARSE_PIXELS, SmallView};
 use crate::window::Window;
+use band::Band;
 use energy::SeamEnergy;
 use expansion::{Expansions, deepest, deepest_at};
 use moving::moving_things;
@@ -141,7 +143,8 @@ fn check(input: &SeamInput<'_>) -> Result<()> {
 
 /// The labelling of the coarse canvas.
 fn search(energy: &mut SeamEnergy<'_>, expansions: &mut Expansions, context: &StageContext) -> Result<Vec<Label>> {
-    energy.prepare_differences(|_| true);
+    let everywhere = Band::whole([energy.width, energy.height], energy.turn);
+    energy.prepare_differences(&everywhere);
     let energy = &*energy;
     let mut labels = deepest(energy);
     // A photograph whose surroundings stayed as it left them would take nothing.
@@ -161,7 +164,7 @@ fn search(energy: &mut SeamEnergy<'_>, expansions: &mut Expansions, context: &St
                 &mut labels,
                 label,
                 Window { columns: &view.columns, rows: &view.rows },
-                &|_| true,
+                &everywhere,
             ) {
                 for (other, neighbor) in energy.views.iter().enumerate() {
                     if other != label && view.meets(neighbor, energy.turn) {
@@ -181,7 +184,7 @@ fn follow(
     expansions: &mut Expansions,
     context: &StageContext,
 ) -> Result<Vec<Label>> {
-    let (width, height) = (energy.width, energy.height);
+    let width = energy.width;
     labels.par_chunks_exact_mut(width).enumerate().for_each(|(y, labels)| {
         for (x, label) in labels.iter_mut().enumerate() {
             if *label == NOBODY || !energy.allowed(usize::from(*label), x, y) {
@@ -189,15 +192,14 @@ fn follow(
             }
         }
     });
-    let band = band(&labels, [width, height], energy.turn, BAND_PX);
+    let band = Band::around_changes(&labels, width, energy.turn, BAND_PX);
     // Costs are asked for within the band, and from there across its border.
-    let beside = with_neighbors(&band, [width, height], energy.turn);
-    energy.prepare_differences(|at| beside[at]);
+    energy.prepare_differences(&band.with_neighbors());
     let energy = &*energy;
     let mut boxes = vec![[usize::MAX, usize::MAX, 0, 0]; energy.views.len()];
-    for (at, &label) in labels.iter().enumerate() {
-        if band[at] && label != NOBODY {
-            let (x, y) = (at % width, at / width);
+    for [x, y] in band.pixels() {
+        let label = labels[y * width + x];
+        if label != NOBODY {
             let x = if energy.views[usize::from(label)].columns.contains(&x) { x } else { x + energy.turn };
             let [left, top, right, bottom] = boxes[usize::from(label)];
             boxes[usize::from(label)] = [left.min(x), top.min(y), right.max(x + 1), bottom.max(y + 1)];
@@ -211,59 +213,22 @@ fn follow(
         let reach = 2 * BAND_PX + 1;
         let columns = left.saturating_sub(reach).max(view.columns.start)..(right + reach).min(view.columns.end);
         let rows = top.saturating_sub(reach).max(view.rows.start)..(bottom + reach).min(view.rows.end);
-        expansions.expand(energy, &mut labels, label, Window { columns: &columns, rows: &rows }, &|at| band[at]);
+        expansions.expand(energy, &mut labels, label, Window { columns: &columns, rows: &rows }, &band);
     }
     Ok(labels)
 }
 
-/// Pixels within `reach` of a change of labels, on a cylinder of `turn` columns or with 0 on a plane.
-fn band(labels: &[Label], [width, height]: [usize; 2], turn: usize, reach: usize) -> Vec<bool> {
-    let is_edge = |at: usize| {
-        let differs = |other: usize| labels[other] != labels[at];
-        let x = at % width;
-        let left = if x > 0 { Some(at - 1) } else { (turn > 0).then(|| at + turn - 1) };
-        let right = if x + 1 < width { Some(at + 1) } else { (turn > 0).then(|| at + 1 - turn) };
-        let above = at.checked_sub(width);
-        let below = Some(at + width).filter(|&below| below < labels.len());
-        [left, right, above, below].into_iter().flatten().any(differs)
-    };
-    // A square dilation: along rows, then along columns.
-    let mut wide = vec![false; labels.len()];
-    wide.par_chunks_exact_mut(width).enumerate().for_each(|(y, wide)| {
-        for x in (0..width).filter(|x| is_edge(y * width + x)) {
-            wide[x.saturating_sub(reach)..(x + reach + 1).min(width)].fill(true);
-            if turn > 0 && (x < reach || x + reach >= width) {
-                (x + turn - reach.min(turn)..=x + turn + reach).for_each(|x| wide[x % turn] = true);
-            }
-        }
-    });
-    let mut band = vec![false; labels.len()];
-    band.par_chunks_exact_mut(width).enumerate().for_each(|(y, band)| {
-        for v in y.saturating_sub(reach)..(y + reach + 1).min(height) {
-            band.iter_mut().zip(&wide[v * width..]).for_each(|(band, &wide)| *band |= wide);
-        }
-    });
-    band
-}
-
-/// A part of a canvas with the four neighbors of each of its pixels; `turn` as for [`band`].
-fn with_neighbors(part: &[bool], [width, height]: [usize; 2], turn: usize) -> Vec<bool> {
-    let mut wider = part.to_vec();
-    for at in (0..part.len()).filter(|&at| part[at]) {
-        let (x, y) = (at % width, at / width);
-        let left = if x > 0 { Some(at - 1) } else { (turn > 0).then(|| at + turn - 1) };
-        let right = if x + 1 < width { Some(at + 1) } else { (turn > 0).then(|| at + 1 - turn) };
-        let below = (y + 1 < height).then(|| at + width);
-        for beside in [left, right, at.checked_sub(width), below].into_iter().flatten() {
-            wider[beside] = true;
-        }
-    }
-    wider
-}
-
 /// A map of a canvas of half the size, every pixel four times.
-fn doubled<T: Copy + Send + Sync>(map: &[T], [coarse_width, _]: [usize; 2], [width, height]: [usize; 2]) -> Vec<T> {
-    (0..width * height).into_par_iter().map(|at| map[(at / width / 2) * coarse_width + at % width / 2]).collect()
+fn doubled<T: Copy + Default + Send + Sync>(map: &[T], [coarse_width, _]: [usize; 2], size: [usize; 2]) -> Vec<T> {
+    let [width, height] = size;
+    let mut fine = vec![T::default(); width * height];
+    fine.par_chunks_exact_mut(width.max(1)).enumerate().for_each(|(y, fine)| {
+        let coarse = &map[y / 2 * coarse_width..][..coarse_width];
+        for (pair, &value) in fine.chunks_mut(2).zip(coarse) {
+            pair.fill(value);
+        }
+    });
+    fine
 }
 
 #[cfg(test)]

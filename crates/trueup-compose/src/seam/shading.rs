@@ -1,5 +1,6 @@
 //! How the brightness of photographs changes over wider places than a contour.
 
+use super::band::Band;
 use crate::small_views::{SmallView, WHOLLY, luma};
 
 /// Parts of a gray level in which slopes are counted.
@@ -15,7 +16,7 @@ const SHADING_REACH: usize = 4;
 /// them. Where two photographs differ in this, a panorama cannot go over from one to the other without a slope that
 /// neither shows, however wide the transition: it is what the eye takes for a seam in skies and on walls, while differences
 /// of single pixels have both signs along a seam and mean little there.
-pub(super) fn slopes(view: &SmallView, wanted: impl Fn([usize; 2]) -> bool) -> Vec<[i16; 2]> {
+pub(super) fn slopes(view: &SmallView, wanted: &Band) -> Vec<[i16; 2]> {
     let reach = SHADING_REACH;
     let (width, height) = (view.columns.len(), view.rows.len());
     let sums = Sums::new(view);
@@ -29,10 +30,10 @@ pub(super) fn slopes(view: &SmallView, wanted: impl Fn([usize; 2]) -> bool) -> V
     for (y, out) in out.chunks_exact_mut(width.max(1)).enumerate() {
         let along_y = [y.saturating_sub(reach), (y + reach + 1).min(height)];
         let (above, below) = ([y.saturating_sub(deep), y], [y + 1, (y + 1 + deep).min(height)]);
-        for (x, out) in out.iter_mut().enumerate().filter(|&(x, _)| wanted([x, y])) {
+        for x in wanted.within(&view.columns, view.rows.start + y).map(|x| x - view.columns.start) {
             let along_x = [x.saturating_sub(reach), (x + reach + 1).min(width)];
             let (left, right) = ([x.saturating_sub(deep), x], [x + 1, (x + 1 + deep).min(width)]);
-            *out = [
+            out[x] = [
                 slope(sums.mean(left, along_y), sums.mean(right, along_y)),
                 slope(sums.mean(along_x, above), sums.mean(along_x, below)),
             ];
@@ -97,11 +98,16 @@ mod tests {
         SmallView { columns: 3..43, rows: 5..35, pixels: (0..40 * 30).map(pixel).collect() }
     }
 
+    /// All pixels of a canvas but those of a column.
+    fn canvas_but(left_out: usize) -> Band {
+        Band::of_columns((0..60).filter(|&x| x != left_out), [60, 40])
+    }
+
     #[test]
     fn a_ramp_has_the_slope_between_the_middles_of_both_sides() {
         // Three levels a column, two a row. Sides of two pixels: their middles lie three pixels apart.
         let ramp = view(|x, y| (3 * x + 2 * y) as u8, |_, _| true);
-        let slopes = slopes(&ramp, |[x, _]| x != 30);
+        let slopes = slopes(&ramp, &canvas_but(33));
         assert_eq!(slopes[15 * 40 + 20], [9 * FRACTION as i16, 6 * FRACTION as i16]);
         // Beside the border the side that is left counts: one pixel, its middle two and a half away.
         assert_eq!(slopes[15 * 40 + 1], [15 * FRACTION as i16 / 2, 6 * FRACTION as i16]);
@@ -113,8 +119,8 @@ mod tests {
     #[test]
     fn texture_is_no_slope_and_what_is_not_covered_takes_no_part() {
         let stripes = view(|x, _| if x % 2 == 0 { 90 } else { 110 }, |_, _| true);
-        assert!(slopes(&stripes, |_| true).iter().skip(15 * 40 + 5).take(30).all(|slope| *slope == [0, 0]));
+        assert!(slopes(&stripes, &canvas_but(0)).iter().skip(15 * 40 + 5).take(30).all(|slope| *slope == [0, 0]));
         let half = view(|x, _| if x < 20 { 100 } else { 0 }, |x, _| x < 20);
-        assert!(slopes(&half, |_| true).iter().all(|slope| *slope == [0, 0]));
+        assert!(slopes(&half, &canvas_but(0)).iter().all(|slope| *slope == [0, 0]));
     }
 }

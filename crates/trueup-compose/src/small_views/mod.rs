@@ -34,8 +34,8 @@ use sampling::{HALVING, scaled};
 pub(crate) use coarse_level::{CoarseLevel, RIM};
 pub(crate) use coarse_levels::{CoarseLevels, SAMPLE_BYTES};
 pub(crate) use size::{COARSE_PIXELS, small_size};
-pub(crate) use view::luma;
 pub use view::{CLIPPED, IGNORED, KEPT, PARTLY, SmallPixel, SmallView, WHOLLY};
+pub(crate) use view::{Depths, luma};
 
 /// The photographs that are made small.
 #[derive(Clone, Copy)]

@@ -100,12 +100,27 @@ impl SmallView {
         [r, g, b, any & !WHOLLY | all & WHOLLY]
     }
 
-    /// Distance of every pixel to the border of what is covered wholly, relative to the largest, 0 to 255.
-    pub(crate) fn depths(&self) -> Vec<u8> {
+    /// Distance of every pixel to the border of what is covered wholly.
+    pub(crate) fn depths(&self) -> Depths {
         let covered: Vec<bool> = self.pixels.iter().map(|pixel| pixel[3] & WHOLLY != 0).collect();
-        let distance = border_distances(&covered, self.columns.len());
-        let largest = distance.iter().copied().max().unwrap_or(0).max(1);
-        distance.iter().map(|&one| (u64::from(one) * 255 / u64::from(largest)) as u8).collect()
+        let distances = border_distances(&covered, self.columns.len());
+        let largest = distances.iter().copied().max().unwrap_or(0).max(1);
+        Depths { distances, largest }
+    }
+}
+
+/// How deep the pixels of a view lie inside its photograph.
+#[derive(Debug)]
+pub(crate) struct Depths {
+    distances: Vec<u32>,
+    largest: u32,
+}
+
+impl Depths {
+    /// That of a pixel of the box, relative to the deepest, 0 to 255.
+    #[inline]
+    pub(crate) fn at(&self, index: usize) -> u8 {
+        (u64::from(self.distances[index]) * 255 / u64::from(self.largest)) as u8
     }
 }
 
@@ -130,6 +145,6 @@ mod tests {
     fn depth_grows_towards_the_middle() {
         let view = SmallView { columns: 0..5, rows: 0..5, pixels: vec![[0, 0, 0, PARTLY | WHOLLY]; 25] };
         let depths = view.depths();
-        assert_eq!((depths[0], depths[6], depths[12]), (85, 170, 255));
+        assert_eq!((depths.at(0), depths.at(6), depths.at(12)), (85, 170, 255));
     }
 }

@@ -39,15 +39,49 @@ pub struct FilePhotographs {
 #[derive(Debug)]
 struct Kept {
     photographs: Vec<Option<Photograph>>,
+    /// What some of them were last reduced to.
+    reduced: Vec<Option<Reduced>>,
     free_bytes: usize,
+}
+
+/// A photograph as it was reduced.
+#[derive(Debug)]
+struct Reduced {
+    frame: WorkingFrame,
+    thumbnail_max_area: f64,
+    picture: WorkingPicture,
+}
+
+impl Reduced {
+    fn bytes(&self) -> usize {
+        size_of_val(self.picture.gray.data()) + size_of_val(self.picture.thumbnail.data())
+    }
+}
+
+impl Kept {
+    /// Nothing of so many photographs.
+    fn nothing(photographs: usize, free_bytes: usize) -> Self {
+        let nothing = |_| None;
+        let reduced = (0..photographs).map(|_| None).collect();
+        Self { photographs: (0..photographs).map(nothing).collect(), reduced, free_bytes }
+    }
+
+    /// Takes a photograph out. What it was reduced to is let go as well.
+    fn take(&mut self, index: usize) -> Option<Photograph> {
+        if let Some(reduced) = self.reduced.get_mut(index).and_then(Option::take) {
+            self.free_bytes += reduced.bytes();
+        }
+        let photograph = self.photographs.get_mut(index)?.take()?;
+        self.free_bytes += photograph.bytes();
+        Some(photograph)
+    }
 }
 
 impl FilePhotographs {
     /// Over `sources`, keeping at most `cache_bytes` bytes of decoded pixels; 0 keeps none.
     pub fn new(sources: Vec<SourceImage>, cache_bytes: usize) -> Self {
-        let photographs = sources.iter().map(|_| None).collect();
         let bytes = sources.iter().map(|_| AtomicUsize::new(0)).collect();
-        let kept = Mutex::new(Kept { photographs, free_bytes: cache_bytes });
+        let kept = Mutex::new(Kept::nothing(sources.len(), cache_bytes));
         Self {
             sources,
             in_memory: InMemory::default(),
@@ -101,8 +135,8 @@ impl FilePhotographs {
     /// The same, which keeps at most so many bytes of decoded pixels.
     #[must_use]
     pub fn keeping(self, cache_bytes: usize) -> Self {
-        let Kept { photographs, .. } = self.kept.into_inner().unwrap_or_else(PoisonError::into_inner);
-        Self { kept: Mutex::new(Kept { photographs, free_bytes: cache_bytes }), ..self }
+        let kept = self.kept.into_inner().unwrap_or_else(PoisonError::into_inner);
+        Self { kept: Mutex::new(Kept { free_bytes: cache_bytes, ..kept }), ..self }
     }
 
     /// The color space that photographs are handed out in, if it was asked for.
@@ -142,12 +176,15 @@ impl FilePhotographs {
     }
 
     /// Photograph `index`, reduced as [`working`](super::working) does; what had to be decoded or converted for it is kept if it
-    /// fits.
+    /// fits, and so is what it was reduced to.
     ///
     /// # Errors
     /// As [`working`](super::working); [`Error::Input`] if there is no photograph `index`.
     pub fn working(&self, index: usize, frame: &WorkingFrame, thumbnail_max_area: f64) -> Result<WorkingPicture> {
         let source = self.source(index)?;
+        if let Some(known) = self.reduced(index, frame, thumbnail_max_area) {
+            return Ok(known);
+        }
         let whole = |photograph: &Photograph| reduce_photograph(photograph, &source.name, frame, thumbnail_max_area);
         // As it is, without a copy.
         let is_as_given = self.conversion(index).is_none() && source.stack.is_empty() && self.light.is_none();
@@ -155,9 +192,11 @@ impl FilePhotographs {
             return whole(photograph);
         }
         let photograph = self.photograph(index)?;
-        let working = whole(&photograph)?;
-        self.keep(index, photograph);
-        Ok(working)
+        let picture = whole(&photograph)?;
+        if self.keep(index, photograph) {
+            self.keep_reduced(index, Reduced { frame: *frame, thumbnail_max_area, picture: picture.clone() });
+        }
+        Ok(picture)
     }
 
     /// Forgets photograph `index` if it is kept: for those that will not be asked for again.
@@ -165,10 +204,11 @@ impl FilePhotographs {
         drop(self.take(index));
     }
 
-    /// Bytes of the photographs that are kept now.
+    /// Bytes of the photographs that are kept now, and of what they were reduced to.
     pub fn kept_bytes(&self) -> usize {
         let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.photographs.iter().flatten().map(Photograph::bytes).sum()
+        let reduced: usize = kept.reduced.iter().flatten().map(Reduced::bytes).sum();
+        kept.photographs.iter().flatten().map(Photograph::bytes).sum::<usize>() + reduced
     }
 
     fn decode(&self, index: usize, source: &SourceImage) -> Result<Photograph> {
@@ -248,22 +288,39 @@ impl FilePhotographs {
         })
     }
 
-    fn keep(&self, index: usize, photograph: Photograph) {
+    /// What photograph `index` was last reduced to, if that is kept and was asked for the same way.
+    fn reduced(&self, index: usize, frame: &WorkingFrame, thumbnail_max_area: f64) -> Option<WorkingPicture> {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = kept.reduced.get(index)?.as_ref()?;
+        (known.frame == *frame && known.thumbnail_max_area == thumbnail_max_area).then(|| known.picture.clone())
+    }
+
+    fn keep_reduced(&self, index: usize, reduced: Reduced) {
+        let bytes = reduced.bytes();
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let Kept { reduced: all, free_bytes, .. } = &mut *kept;
+        let Some(place) = all.get_mut(index) else { return };
+        if place.is_none() && bytes <= *free_bytes {
+            *free_bytes -= bytes;
+            *place = Some(reduced);
+        }
+    }
+
+    /// Keeps a photograph if there is room; returns whether it is kept.
+    fn keep(&self, index: usize, photograph: Photograph) -> bool {
         let bytes = photograph.bytes();
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        let Kept { photographs, free_bytes } = &mut *kept;
-        let Some(place) = photographs.get_mut(index) else { return };
+        let Kept { photographs, free_bytes, .. } = &mut *kept;
+        let Some(place) = photographs.get_mut(index) else { return false };
         if place.is_none() && bytes <= *free_bytes {
             *free_bytes -= bytes;
             *place = Some(photograph);
         }
+        place.is_some()
     }
 
     fn take(&self, index: usize) -> Option<Photograph> {
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        let photograph = kept.photographs.get_mut(index)?.take()?;
-        kept.free_bytes += photograph.bytes();
-        Some(photograph)
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner).take(index)
     }
 }
 

@@ -101,10 +101,17 @@ fn candidates(
     b_from_a: impl Fn(Vector2<f64>) -> Option<Vector2<f64>>,
 ) -> Vec<Candidate> {
     let long_enough = |line: &&LineSegment| line.length() >= MIN_LENGTH_PX;
+    let lines_b: Vec<(usize, Directed)> = b
+        .lines
+        .iter()
+        .enumerate()
+        .filter(|(_, line)| long_enough(line))
+        .map(|(k, line)| (k, Directed::of(line)))
+        .collect();
     let mut found = Vec::new();
     for (in_a, line_a) in a.lines.iter().enumerate().filter(|(_, line)| long_enough(line)) {
         let Some(carried) = Carried::of(line_a, &b_from_a) else { continue };
-        for (in_b, line_b) in b.lines.iter().enumerate().filter(|(_, line)| long_enough(line)) {
+        for &(in_b, ref line_b) in &lines_b {
             let Some(stretch) = carried.common(line_b) else { continue };
             let Some(likeness) = likeness(a.gray, b.gray, &stretch) else { continue };
             if likeness >= MIN_LIKENESS {
@@ -121,6 +128,22 @@ fn continues(one: &LineSegment, other: &LineSegment) -> bool {
     const BESIDE_PX: f64 = 2.0;
     let (start, along) = (Vector2::from(one.start), (Vector2::from(one.end) - Vector2::from(one.start)).normalize());
     [other.start, other.end].iter().all(|&end| along.perp(&(Vector2::from(end) - start)).abs() <= BESIDE_PX)
+}
+
+/// A segment as it is asked for again and again.
+struct Directed {
+    start: Vector2<f64>,
+    /// Unit length.
+    along: Vector2<f64>,
+    length: f64,
+}
+
+impl Directed {
+    fn of(line: &LineSegment) -> Self {
+        let [start, end] = [line.start, line.end].map(Vector2::from);
+        let length = line.length();
+        Self { start, along: (end - start) / length, length }
+    }
 }
 
 /// The part of a segment that lies in the overlap, in both photographs.
@@ -146,10 +169,8 @@ impl Carried {
     }
 
     /// What the segment has in common with one of the other photograph; `None` if the two cannot be the same edge.
-    fn common(&self, line: &LineSegment) -> Option<Stretch> {
-        let [start, end] = [line.start, line.end].map(Vector2::from);
-        let length = line.length();
-        let along = (end - start) / length;
+    fn common(&self, line: &Directed) -> Option<Stretch> {
+        let &Directed { start, along, length } = line;
         let [from, to] = self.there;
         let (sine, cosine) = ((to - from).perp(&along), (to - from).dot(&along));
         // Segments know their brighter side: the same edge has the same sense.

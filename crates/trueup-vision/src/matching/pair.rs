@@ -126,8 +126,7 @@ fn better_turn(
     }
     // Draws of its own: what the homography draws does not depend on whether lenses are tried.
     let mut generator = context.generator("turned lens", seed);
-    let turn = find_turned_lens(points, [input.a.frame, input.b.frame], options.inlier_px, &mut generator)?;
-    (turn.inliers.len() >= wanted).then_some(turn)
+    find_turned_lens(points, [input.a.frame, input.b.frame], options.inlier_px, wanted, &mut generator)
 }
 
 /// Judges a pair by the turned lens, and completes its matches.

@@ -43,6 +43,9 @@ const RADIAL_SD: f64 = 0.2;
 /// Smallest spread of the agreeing matches across the line they lie along best, in diagonals, one standard deviation: what
 /// lies on one line agrees with many lenses and many turns.
 const LEAST_SPREAD: f64 = 0.02;
+/// Share of the wanted matches that has to agree roughly with a listed lens for it to be refined. Photographs that have nothing
+/// in common stay far below.
+const WORTH_REFINING: f64 = 0.5;
 /// Matches that a lens is judged by at most.
 const JUDGING: usize = 400;
 
@@ -132,11 +135,13 @@ impl TurnedLens {
     }
 }
 
-/// The turned lens that most matches agree with; `None` if the photographs differ in size, or none is found.
+/// The turned lens that most matches agree with; `None` if the photographs differ in size, or none is found that `wanted`
+/// matches agree with.
 pub(super) fn find_turned_lens(
     points: &MatchedPoints,
     frames: [&WorkingFrame; 2],
     inlier_px: f64,
+    wanted: usize,
     generator: &mut impl Rng,
 ) -> Option<TurnConsensus> {
     let [a, b] = frames;
@@ -144,17 +149,23 @@ pub(super) fn find_turned_lens(
         return None;
     }
     let judging = points.select(&(0..points.in_a.len().min(JUDGING)).collect::<Vec<_>>());
-    let mut tried: Vec<(f64, TurnedLens)> = listed_lenses(a)
+    let mut tried: Vec<RoughTurn> = listed_lenses(a)
         .into_iter()
         .filter_map(|camera| RoughSearch::new(&judging, camera, ROUGH * inlier_px).best(generator))
         .collect();
-    tried.sort_by(|one, other| one.0.total_cmp(&other.0));
+    tried.sort_by(|one, other| one.cost.total_cmp(&other.cost));
     tried.truncate(REFINED);
-    let refined = tried.into_iter().map(|(_, turned)| turned.refined(points, inlier_px));
+    // As many of those that judge as of all.
+    let enough = WORTH_REFINING * wanted as f64 * judging.in_a.len() as f64 / points.in_a.len() as f64;
+    let worth_it = tried.into_iter().filter(|rough| rough.agreeing as f64 >= enough);
+    let refined = worth_it.map(|rough| rough.turned.refined(points, inlier_px));
     let costs = refined.map(|turned| (turned.cost(points, inlier_px), turned));
     let (_, turned) = costs.min_by(|one, other| one.0.total_cmp(&other.0))?;
     let agrees = |&k: &usize| turned.squared_error(points.in_a[k], points.in_b[k]) <= inlier_px * inlier_px;
     let inliers: Vec<usize> = (0..points.in_a.len()).filter(agrees).collect();
+    if inliers.len() < wanted {
+        return None;
+    }
     let agreeing = points.select(&inliers);
     let spread = |places: &[Vector2<f64>]| spread_across(places) >= LEAST_SPREAD * a.diagonal();
     (spread(&agreeing.in_a) && spread(&agreeing.in_b)).then_some(TurnConsensus { turned, inliers })
@@ -176,6 +187,14 @@ fn listed_lenses(frame: &WorkingFrame) -> Vec<Camera> {
         ..Camera::new(relative_focal * longer, frame.width, frame.height, &Matrix3::identity())
     };
     tried_lenses().into_iter().map(on).collect()
+}
+
+/// The turn of least cost under one lens.
+struct RoughTurn {
+    cost: f64,
+    turned: TurnedLens,
+    /// Matches within the limit.
+    agreeing: usize,
 }
 
 /// The search for a turn under one lens.
@@ -204,8 +223,8 @@ impl RoughSearch {
         Self { camera, rays_a, rays_b, scales, angle_limit: 2.0 * limit_px / camera.focal_px }
     }
 
-    /// The turn of least cost, and that cost.
-    fn best(&self, generator: &mut impl Rng) -> Option<(f64, TurnedLens)> {
+    /// The turn of least cost.
+    fn best(&self, generator: &mut impl Rng) -> Option<RoughTurn> {
         let mut best: Option<(f64, Matrix3<f64>)> = None;
         for drawn in 0..SAMPLES {
             // The most distinctive matches come first.
@@ -221,7 +240,8 @@ impl RoughSearch {
         let (cost, turn) = best?;
         let mut b = self.camera;
         b.set_rotation(&turn);
-        Some((cost, TurnedLens { a: self.camera, b }))
+        let agreeing = (0..self.rays_a.len()).filter(|&k| self.error(&turn, k) < 1.0).count();
+        Some(RoughTurn { cost, turned: TurnedLens { a: self.camera, b }, agreeing })
     }
 
     /// The turn that takes two rays of a onto those of b; `None` if their angles say that it is none.
@@ -238,11 +258,15 @@ impl RoughSearch {
         Some(frame(&self.rays_b[i], &self.rays_b[j])? * frame(&self.rays_a[i], &self.rays_a[j])?.transpose())
     }
 
+    /// Squared error of a match, over the squared limit.
+    fn error(&self, turn: &Matrix3<f64>, k: usize) -> f64 {
+        (turn * self.rays_a[k] - self.rays_b[k]).norm_squared() * self.scales[k]
+    }
+
     fn cost(&self, turn: &Matrix3<f64>, bound: f64) -> f64 {
         let mut cost = 0.0;
         for k in 0..self.rays_a.len() {
-            let error = (turn * self.rays_a[k] - self.rays_b[k]).norm_squared() * self.scales[k];
-            cost += error.min(1.0);
+            cost += self.error(turn, k).min(1.0);
             if cost >= bound {
                 break;
             }

@@ -46,7 +46,7 @@ fn turns_are_found_under_every_lens_among_wrong_matches() {
         let truth = camera(projection, focal_px, k1);
         let points = matches(&truth, &turn, 150, 150);
         let mut generator = StageContext::default().generator("turned test", 1);
-        let found = find_turned_lens(&points, [&frame; 2], 5.0, &mut generator).expect("found");
+        let found = find_turned_lens(&points, [&frame; 2], 5.0, 100, &mut generator).expect("found");
         // Wrong matches come first; a few of them agree by chance.
         let right = found.inliers.iter().filter(|&&k| k >= 150).count();
         assert!(right >= 147, "{right} of 150 under {truth:?}");
@@ -62,6 +62,22 @@ fn photographs_of_different_sizes_and_no_matches_have_no_common_lens() {
     let other = WorkingFrame { width: 600.0, ..frame };
     let mut generator = StageContext::default().generator("turned test", 1);
     let points = matches(&camera(LensProjection::Rectilinear, 600.0, 0.0), &rotation_about_y(0.3), 20, 0);
-    assert!(find_turned_lens(&points, [&frame, &other], 5.0, &mut generator).is_none());
-    assert!(find_turned_lens(&MatchedPoints::default(), [&frame; 2], 5.0, &mut generator).is_none());
+    assert!(find_turned_lens(&points, [&frame, &other], 5.0, 10, &mut generator).is_none());
+    assert!(find_turned_lens(&MatchedPoints::default(), [&frame; 2], 5.0, 0, &mut generator).is_none());
+}
+
+/// What agrees with a turn only by chance is not refined, however little is wanted of it beside.
+#[test]
+fn matches_without_a_common_turn_have_no_lens() {
+    let frame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
+    let truth = camera(LensProjection::Rectilinear, 600.0, 0.0);
+    let turn = rotation_about_y(0.3);
+    let found = |right: usize, wrong: usize, wanted: usize| {
+        let mut generator = StageContext::default().generator("turned test", 1);
+        find_turned_lens(&matches(&truth, &turn, right, wrong), [&frame; 2], 5.0, wanted, &mut generator)
+    };
+    assert!(found(0, 120, 30).is_none());
+    // As many as are wanted, no more.
+    assert!(found(40, 80, 40).is_some_and(|turn| (40..48).contains(&turn.inliers.len())));
+    assert!(found(40, 80, 60).is_none());
 }

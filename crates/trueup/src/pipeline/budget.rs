@@ -25,6 +25,9 @@ const SHARE_OF_SEVERAL: u64 = 2;
 /// Bytes that finding features takes per working pixel: the levels of the scale space of a photograph of twice the size.
 const FEATURE_BYTES: f64 = 240.0;
 
+/// Bytes of a pixel of a photograph that was reduced to its working size, with what its thumbnail takes.
+const REDUCED_BYTES: f64 = 4.5;
+
 /// Bytes of a photograph's pixel that was not decoded yet.
 const PIXEL_BYTES: usize = 4;
 
@@ -104,7 +107,8 @@ impl Budget {
         }
         let memory = self.memory.max(least) - PROGRAM_BYTES;
         // Keeping some of many saves little; keeping all of a small set saves decoding it twice.
-        let all: usize = images.iter().map(bytes).fold(0, usize::saturating_add);
+        let reduced = (REDUCED_BYTES * working_pixels) as usize;
+        let all = images.iter().map(|image| bytes(image).saturating_add(reduced)).fold(0, usize::saturating_add);
         let kept_bytes = if all <= memory / 4 { all } else { 0 };
         Ok(Measuring { at_once: ((memory - kept_bytes) / one).max(1), kept_bytes })
     }
@@ -179,7 +183,7 @@ mod tests {
         let measuring = |memory: &str, count: usize| {
             budget(memory).measuring(&images(count, 6000, 4000), WORKING_PIXELS).expect("enough")
         };
-        assert_eq!(measuring("4GB", 8).kept_bytes, 8 * 96_000_000);
+        assert_eq!(measuring("4GB", 8).kept_bytes, 8 * (96_000_000 + 2_160_000));
         assert_eq!(measuring("4GB", 60).kept_bytes, 0);
         // One takes 192 MB and 115 MB for its features.
         assert_eq!(measuring("4GB", 60).at_once, 12);

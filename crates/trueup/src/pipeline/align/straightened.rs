@@ -137,18 +137,21 @@ fn sample(gray: &Raster<f32>, place: Vector2<f64>) -> f32 {
     let (column, line) = (below(x), below(y));
     let (taps_x, taps_y) =
         (cubic_convolution_taps((x - column as f64) as f32), cubic_convolution_taps((y - line as f64) as f32));
+    let weighed = |row: usize, samples: [f32; 4]| {
+        let across: f32 = taps_x.iter().zip(samples).map(|(tap, sample)| tap * sample).sum();
+        taps_y[row] * across
+    };
+    let all_inside = |first: i64, size: usize| usize::try_from(first - 1).ok().filter(|first| first + 4 <= size);
+    if let (Some(left), Some(top)) = (all_inside(column, gray.width()), all_inside(line, gray.height())) {
+        let rows = gray.data()[top * gray.width() + left..].chunks(gray.width()).take(4);
+        return rows
+            .enumerate()
+            .map(|(row, samples)| weighed(row, [samples[0], samples[1], samples[2], samples[3]]))
+            .sum();
+    }
     let clamped = |first: i64, tap: usize, size: usize| (first + tap as i64 - 1).clamp(0, size as i64 - 1) as usize;
-    let inside = usize::try_from(column - 1).ok().filter(|first| first + 4 <= gray.width());
-    (0..4)
-        .map(|row| {
-            let samples = gray.row(clamped(line, row, gray.height()));
-            let across: f32 = match inside {
-                Some(first) => taps_x.iter().zip(&samples[first..first + 4]).map(|(tap, sample)| tap * sample).sum(),
-                None => (0..4).map(|tap| taps_x[tap] * samples[clamped(column, tap, gray.width())]).sum(),
-            };
-            taps_y[row] * across
-        })
-        .sum()
+    let at = |row: usize, tap: usize| gray.row(clamped(line, row, gray.height()))[clamped(column, tap, gray.width())];
+    (0..4).map(|row| weighed(row, [0, 1, 2, 3].map(|tap| at(row, tap)))).sum()
 }
 
 #[cfg(test)]
