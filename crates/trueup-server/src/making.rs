@@ -6,8 +6,8 @@ use std::sync::{Arc, PoisonError};
 
 use serde::Serialize;
 use trueup::{
-    Alignment, Canvas, Error, Inputs, OutputOptions, Outputs, PhotographCache, Project, ProjectionRecord, Rendered,
-    Result, SideOutput, StageContext, StitchOptions, Stitcher, write_picture,
+    Alignment, Canvas, Error, Inputs, Metadata, OutputOptions, Outputs, PhotographCache, Project, ProjectionRecord,
+    Rendered, Result, SideOutput, StageContext, StitchOptions, Stitcher, write_picture,
 };
 
 use crate::keeping::Companions;
@@ -110,6 +110,11 @@ impl Order {
     }
 }
 
+/// What pictures for the page tell: how their colors are meant, and nothing that the photographs say of themselves.
+fn colors_alone(metadata: &Metadata) -> Metadata {
+    Metadata { icc: metadata.icc.clone(), ..Metadata::default() }
+}
+
 /// A panorama drawn small.
 #[derive(Debug, Serialize)]
 pub(crate) struct Preview {
@@ -162,7 +167,7 @@ pub(crate) fn preview(studio: &Studio, changes: &[(String, String)]) -> Result<P
         let rendered = stitcher.compose(&mut alignment)?;
         let (extension, media_type) = if order.is_transparent() { ("png", "image/png") } else { ("jpg", "image/jpeg") };
         let place = studio.pictures().join(format!("preview.{extension}"));
-        let metadata = stitcher.metadata(&alignment);
+        let metadata = colors_alone(&stitcher.metadata(&alignment));
         write_picture(&place, &rendered.panorama, &metadata, &order.picture_options()?, &context)?;
         let bytes = std::fs::read(&place).map_err(|error| Error::io("reading", &place, error))?;
         let underlay = Arc::new(order.underlay(&alignment, &rendered));
@@ -185,7 +190,7 @@ pub(crate) fn cut_tiles(studio: &Studio, context: &StageContext) -> Result<()> {
     let stitcher = Stitcher::new(&order.options, context);
     let mut alignment = order.alignment(&stitcher)?;
     let rendered = stitcher.compose(&mut alignment)?;
-    let metadata = stitcher.metadata(&alignment);
+    let metadata = colors_alone(&stitcher.metadata(&alignment));
     write_picture(&folder.join("panorama.dzi"), &rendered.panorama, &metadata, &order.picture_options()?, context)?;
     let underlay = Arc::new(order.underlay(&alignment, &rendered));
     let stitched = order.stitched.number;
