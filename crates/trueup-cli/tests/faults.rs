@@ -332,26 +332,54 @@ fn threads_that_do_not_start_cost_no_file() {
 
 /// Killed at a call for a file: each file is the old or the new one, and the next run comes to the same with nothing left behind. Where there is
 /// a cache, these calls are the end of each phase: before what it found is kept, and after.
-#[test]
-fn what_is_killed_at_a_call_for_a_file_is_made_again_as_it_would_have_been() {
-    for trial in [&STITCH, &TILES, &CACHE, &COMPOSE, &COMPARE, &BATCH] {
-        let (letters, whole) = trial.whole("files");
-        let mut runs = 0;
-        for fault in (1..=letters.len()).step_by(letters.len().div_ceil(tried()).max(1)) {
-            let desk = trial.desk();
-            let before = files(&desk);
-            // What a program that is killed leaves in the system's folder for temporary files is the system's to clear away.
-            let temporary = Desk::new();
-            let mut killed = command(&desk, trial.arguments, "kill", fault);
-            let killed = killed.env("TMPDIR", temporary.path()).stderr(Stdio::null()).status().expect("it ends");
-            let said = format!("{} killed at call {fault} of {}", trial.arguments[0], letters.len());
-            assert_eq!(killed.code(), None, "{said}");
-            check_killed(&desk, &before, &whole, &said);
-            check_made_again(trial, &desk, &before, &whole, &said);
-            runs += 1;
-        }
-        println!("{}: {} points, {runs} kills", trial.arguments[0], letters.len());
+#[track_caller]
+fn check_kills_at_calls(trial: &Trial) {
+    let (letters, whole) = trial.whole("files");
+    let mut runs = 0;
+    for fault in (1..=letters.len()).step_by(letters.len().div_ceil(tried()).max(1)) {
+        let desk = trial.desk();
+        let before = files(&desk);
+        // What a program that is killed leaves in the system's folder for temporary files is the system's to clear away.
+        let temporary = Desk::new();
+        let mut killed = command(&desk, trial.arguments, "kill", fault);
+        let killed = killed.env("TMPDIR", temporary.path()).stderr(Stdio::null()).status().expect("it ends");
+        let said = format!("{} killed at call {fault} of {}", trial.arguments[0], letters.len());
+        assert_eq!(killed.code(), None, "{said}");
+        check_killed(&desk, &before, &whole, &said);
+        check_made_again(trial, &desk, &before, &whole, &said);
+        runs += 1;
     }
+    println!("{}: {} points, {runs} kills", trial.arguments[0], letters.len());
+}
+
+#[test]
+fn a_stitch_killed_at_a_call_for_a_file_is_made_again() {
+    check_kills_at_calls(&STITCH);
+}
+
+#[test]
+fn tiles_killed_at_a_call_for_a_file_are_made_again() {
+    check_kills_at_calls(&TILES);
+}
+
+#[test]
+fn a_stitch_killed_at_the_end_of_a_phase_goes_on_from_its_cache() {
+    check_kills_at_calls(&CACHE);
+}
+
+#[test]
+fn a_composition_killed_at_a_call_for_a_file_is_made_again() {
+    check_kills_at_calls(&COMPOSE);
+}
+
+#[test]
+fn a_comparison_killed_at_a_call_for_a_file_is_made_again() {
+    check_kills_at_calls(&COMPARE);
+}
+
+#[test]
+fn a_batch_killed_at_a_call_for_a_file_is_made_again() {
+    check_kills_at_calls(&BATCH);
 }
 
 /// Nothing is half where a program was killed, but for what it had not given a name.
@@ -404,34 +432,54 @@ fn age_parts(desk: &Desk) {
 /// Kills after which a run has to finish what is left to it.
 const KILLS_IN_A_ROW: usize = 4;
 
-/// Killed at moments spread over a whole run, so many times in all: each file is the old or the new one, a cache goes on to the same bytes,
-/// and what was not complete is gone.
-#[test]
-fn what_is_killed_leaves_no_half_file_and_goes_on_to_the_same_bytes() {
-    let trials = [&CACHE, &COMPOSE, &COMPARE, &BATCH];
-    for trial in trials {
-        let (_, whole) = trial.whole("files");
-        let started = Instant::now();
-        finish(trueup(trial.desk().path(), trial.arguments)).expect_success();
-        let whole_run = started.elapsed().as_secs_f64();
-        let (mut kills, mut moments) = (0, 0);
-        while kills < tried().div_ceil(trials.len()) {
-            let desk = trial.desk();
-            let before = files(&desk);
-            for _ in 0..KILLS_IN_A_ROW {
-                // Multiples of the golden ratio are spread evenly, however many there are.
-                let share = (f64::from(moments) * GOLDEN).fract();
-                moments += 1;
-                let mut command = trueup(desk.path(), trial.arguments);
-                let mut running = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("started");
-                std::thread::sleep(Duration::from_secs_f64(whole_run * share));
-                running.kill().expect("killed, or done");
-                // What was quicker than the first run is done.
-                kills += usize::from(running.wait().expect("it ends").code().is_none());
-                check_killed(&desk, &before, &whole, &format!("{} killed at {share}", trial.arguments[0]));
-            }
-            check_made_again(trial, &desk, &before, &whole, trial.arguments[0]);
+/// Commands that are killed at any moment, which share the kills.
+const KILLED_AT_MOMENTS: usize = 4;
+
+/// Killed at moments spread over a whole run: each file is the old or the new one, a cache goes on to the same bytes, and what was not complete
+/// is gone.
+#[track_caller]
+fn check_kills_at_moments(trial: &Trial) {
+    let (_, whole) = trial.whole("files");
+    let started = Instant::now();
+    finish(trueup(trial.desk().path(), trial.arguments)).expect_success();
+    let whole_run = started.elapsed().as_secs_f64();
+    let (mut kills, mut moments) = (0, 0);
+    while kills < tried().div_ceil(KILLED_AT_MOMENTS) {
+        let desk = trial.desk();
+        let before = files(&desk);
+        for _ in 0..KILLS_IN_A_ROW {
+            // Multiples of the golden ratio are spread evenly, however many there are.
+            let share = (f64::from(moments) * GOLDEN).fract();
+            moments += 1;
+            let mut command = trueup(desk.path(), trial.arguments);
+            let mut running = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("started");
+            std::thread::sleep(Duration::from_secs_f64(whole_run * share));
+            running.kill().expect("killed, or done");
+            // What was quicker than the first run is done.
+            kills += usize::from(running.wait().expect("it ends").code().is_none());
+            check_killed(&desk, &before, &whole, &format!("{} killed at {share}", trial.arguments[0]));
         }
-        println!("{}: {kills} kills at {moments} moments", trial.arguments[0]);
+        check_made_again(trial, &desk, &before, &whole, trial.arguments[0]);
     }
+    println!("{}: {kills} kills at {moments} moments", trial.arguments[0]);
+}
+
+#[test]
+fn a_stitch_killed_at_any_moment_leaves_no_half_file_and_goes_on_to_the_same_bytes() {
+    check_kills_at_moments(&CACHE);
+}
+
+#[test]
+fn a_composition_killed_at_any_moment_leaves_no_half_file() {
+    check_kills_at_moments(&COMPOSE);
+}
+
+#[test]
+fn a_comparison_killed_at_any_moment_leaves_no_half_file() {
+    check_kills_at_moments(&COMPARE);
+}
+
+#[test]
+fn a_batch_killed_at_any_moment_leaves_no_half_file() {
+    check_kills_at_moments(&BATCH);
 }

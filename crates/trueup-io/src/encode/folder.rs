@@ -7,7 +7,7 @@ use tempfile::TempDir;
 use trueup_core::{Error, Result};
 
 use super::pending::{allow_umask, require_folder, takes_nothing};
-use super::stale::{PART, PREFIX, mark_in_use};
+use super::stale::{PART, PREFIX, STALE_AGE, clear_stale, mark_in_use};
 use super::unfinished::{UNFINISHED, UnfinishedEntry};
 
 /// Permissions that any new folder asks for.
@@ -25,7 +25,8 @@ pub struct PendingFolder {
 }
 
 impl PendingFolder {
-    /// Makes an empty folder beside `target`, whose parent folder must exist. What is at `target` stays as it is.
+    /// Makes an empty folder beside `target`, whose parent folder must exist, and clears away what programs that were killed left there. What is
+    /// at `target` stays as it is.
     ///
     /// # Errors
     /// [`Error::Input`] if `target` is a file, has no name, or its parent does not exist or takes nothing; [`Error::Io`] if
@@ -50,6 +51,7 @@ impl PendingFolder {
         let (temporary, entry) = UNFINISHED.begin(make, TempDir::path)?;
         let mark = File::open(temporary.path()).ok();
         mark.iter().for_each(mark_in_use);
+        clear_stale(parent, STALE_AGE);
         Ok(Self { temporary, target, entry, _mark: mark })
     }
 

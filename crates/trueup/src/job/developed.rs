@@ -40,8 +40,7 @@ pub(super) fn with_developed(inputs: &Inputs, panorama: &Path, context: &StageCo
     let folder = folder_beside(panorama, "-developed");
     refuse_other_files(&folder, |name| name.strip_suffix(DEVELOPED_END).is_some_and(|raw| raw.contains('.')))?;
     let pending = PendingFolder::create(&folder)?;
-    let all: Vec<(&PathBuf, String)> =
-        all.into_iter().enumerate().map(|(at, path)| (path, name_of(at, path))).collect();
+    let all = named(all);
     context.progress().begin(STAGE, all.len() as u64);
     let mut told = Vec::new();
     let mut developed = Vec::new();
