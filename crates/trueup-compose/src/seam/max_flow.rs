@@ -19,7 +19,7 @@ const FREE: u8 = 0;
 const SOURCE: u8 = 1;
 const SINK: u8 = 2;
 
-/// What [`Node::parent`] holds beside a direction.
+/// What [`GridFlow::parent`] holds beside a direction.
 const TERMINAL: u8 = 4;
 const ORPHAN: u8 = 5;
 const NOBODY: u8 = 6;
@@ -27,95 +27,91 @@ const NOBODY: u8 = 6;
 /// A neighbor that is none: a node without arcs.
 const NOWHERE: u32 = 0;
 
-/// A node of the network.
-#[derive(Debug, Clone)]
-struct Node {
-    /// Residual capacities to the four neighbors.
-    residual: [i32; 4],
-    /// The four neighbors.
-    neighbors: [u32; 4],
-    /// Residual capacity from the source (above zero) or to the sink (below zero).
-    excess: i32,
-    /// When `distance` was last known to be right.
-    stamp: u32,
-    /// Arcs to the terminal.
-    distance: u32,
-    tree: u8,
-    parent: u8,
-    is_active: bool,
-}
-
 /// A flow network on some pixels of a grid.
+///
+/// What is looked at together lies in arrays of its own: most of the time goes into walking along the trees.
 #[derive(Debug, Default)]
 pub(super) struct GridFlow {
-    /// The first is [`NOWHERE`].
-    nodes: Vec<Node>,
+    /// Residual capacity from the source (above zero) or to the sink (below zero). The first node of this and all that follow is
+    /// [`NOWHERE`].
+    excess: Vec<i32>,
+    /// Residual capacities to the four neighbors.
+    residual: Vec<[i32; 4]>,
+    /// The four neighbors.
+    neighbors: Vec<[u32; 4]>,
+    tree: Vec<u8>,
+    parent: Vec<u8>,
+    /// The neighbor that `parent` leads to, where it is a direction.
+    above: Vec<u32>,
+    /// When `distance` was last known to be right.
+    stamp: Vec<u32>,
+    /// Arcs to the terminal.
+    distance: Vec<u32>,
     clock: u32,
     active: VecDeque<u32>,
+    is_active: Vec<bool>,
     orphans: VecDeque<u32>,
 }
 
 impl GridFlow {
     /// Empties the network; its nodes are numbered from 1 to `count`.
     pub(super) fn reset(&mut self, count: usize) {
-        const ALONE: Node = Node {
-            residual: [0; 4],
-            neighbors: [NOWHERE; 4],
-            excess: 0,
-            stamp: 0,
-            distance: 0,
-            tree: FREE,
-            parent: NOBODY,
-            is_active: false,
-        };
         self.clock = 0;
         self.active.clear();
         self.orphans.clear();
-        self.nodes.clear();
-        self.nodes.resize(count + 1, ALONE);
+        let nodes = count + 1;
+        refill(&mut self.excess, nodes, 0);
+        refill(&mut self.residual, nodes, [0; 4]);
+        refill(&mut self.neighbors, nodes, [NOWHERE; 4]);
+        refill(&mut self.tree, nodes, FREE);
+        refill(&mut self.parent, nodes, NOBODY);
+        refill(&mut self.above, nodes, NOWHERE);
+        refill(&mut self.stamp, nodes, 0);
+        refill(&mut self.distance, nodes, 0);
+        refill(&mut self.is_active, nodes, false);
     }
 
     /// Makes it cost `amount` (below zero: gain) to have `node` on the sink's side.
     pub(super) fn add_sink_side_cost(&mut self, node: usize, amount: i32) {
-        self.nodes[node].excess = self.nodes[node].excess.saturating_add(amount);
+        self.excess[node] = self.excess[node].saturating_add(amount);
     }
 
     /// Makes it cost `there` to have a node on the source's side and the `other`, its neighbor in `direction`, on the sink's, and
     /// `back` for the reverse; both at least 0.
     pub(super) fn add_arcs(&mut self, [node, other]: [usize; 2], direction: usize, there: i32, back: i32) {
         // Nodes are numbered by 32 bits where pixels are.
-        self.nodes[node].neighbors[direction] = other as u32;
-        self.nodes[node].residual[direction] += there;
-        self.nodes[other].neighbors[direction ^ 2] = node as u32;
-        self.nodes[other].residual[direction ^ 2] += back;
+        self.neighbors[node][direction] = other as u32;
+        self.residual[node][direction] += there;
+        self.neighbors[other][direction ^ 2] = node as u32;
+        self.residual[other][direction ^ 2] += back;
     }
 
     fn neighbor(&self, node: usize, direction: usize) -> usize {
-        self.nodes[node].neighbors[direction] as usize
+        self.neighbors[node][direction] as usize
     }
 
     /// Residual capacity of the arc along which the tree of `node` grows in `direction`: away from the source, towards
     /// the sink.
     fn growth_capacity(&self, node: usize, direction: usize) -> i32 {
-        match self.nodes[node].tree {
-            SOURCE => self.nodes[node].residual[direction],
-            _ => self.nodes[self.neighbor(node, direction)].residual[direction ^ 2],
+        match self.tree[node] {
+            SOURCE => self.residual[node][direction],
+            _ => self.residual[self.neighbor(node, direction)][direction ^ 2],
         }
     }
 
     /// Finds the minimum cut. Afterwards [`Self::on_sink_side`] tells the sides.
     pub(super) fn solve(&mut self) {
-        for node in 1..self.nodes.len() {
-            if self.nodes[node].excess != 0 {
-                self.nodes[node].tree = if self.nodes[node].excess > 0 { SOURCE } else { SINK };
-                self.nodes[node].parent = TERMINAL;
-                self.nodes[node].distance = 1;
+        for node in 1..self.excess.len() {
+            if self.excess[node] != 0 {
+                self.tree[node] = if self.excess[node] > 0 { SOURCE } else { SINK };
+                self.parent[node] = TERMINAL;
+                self.distance[node] = 1;
                 self.activate(node);
             }
         }
         while let Some(&front) = self.active.front() {
             let node = front as usize;
-            let bridge = if self.nodes[node].tree == FREE { None } else { self.grow(node) };
+            let bridge = if self.tree[node] == FREE { None } else { self.grow(node) };
             match bridge {
                 Some(direction) => {
                     self.clock += 1;
@@ -124,7 +120,7 @@ impl GridFlow {
                 }
                 None => {
                     self.active.pop_front();
-                    self.nodes[node].is_active = false;
+                    self.is_active[node] = false;
                 }
             }
         }
@@ -132,12 +128,12 @@ impl GridFlow {
 
     /// Whether `node` is on the sink's side of the minimum cut that is nearest to the sink.
     pub(super) fn on_sink_side(&self, node: usize) -> bool {
-        self.nodes[node].tree == SINK
+        self.tree[node] == SINK
     }
 
     fn activate(&mut self, node: usize) {
-        if !self.nodes[node].is_active {
-            self.nodes[node].is_active = true;
+        if !self.is_active[node] {
+            self.is_active[node] = true;
             self.active.push_back(node as u32);
         }
     }
@@ -149,15 +145,13 @@ impl GridFlow {
                 continue;
             }
             let other = self.neighbor(node, direction);
-            if self.nodes[other].tree == FREE {
-                self.nodes[other].tree = self.nodes[node].tree;
+            if self.tree[other] == FREE {
+                self.tree[other] = self.tree[node];
                 self.join(other, direction ^ 2, node);
                 self.activate(other);
-            } else if self.nodes[other].tree != self.nodes[node].tree {
+            } else if self.tree[other] != self.tree[node] {
                 return Some(direction);
-            } else if self.nodes[other].stamp <= self.nodes[node].stamp
-                && self.nodes[other].distance > self.nodes[node].distance + 1
-            {
+            } else if self.stamp[other] <= self.stamp[node] && self.distance[other] > self.distance[node] + 1 {
                 // A shorter way to the terminal; trees stay flat.
                 self.join(other, direction ^ 2, node);
             }
@@ -166,9 +160,10 @@ impl GridFlow {
     }
 
     fn join(&mut self, child: usize, direction: usize, parent: usize) {
-        self.nodes[child].parent = direction as u8;
-        self.nodes[child].stamp = self.nodes[parent].stamp;
-        self.nodes[child].distance = self.nodes[parent].distance + 1;
+        self.parent[child] = direction as u8;
+        self.above[child] = parent as u32;
+        self.stamp[child] = self.stamp[parent];
+        self.distance[child] = self.distance[parent] + 1;
     }
 
     /// Pushes what fits along the path that the arc from `node` in `direction` closes.
@@ -176,62 +171,61 @@ impl GridFlow {
         let other = self.neighbor(node, direction);
         // The arc runs from the source's tree to the sink's.
         let (from, along, to) =
-            if self.nodes[node].tree == SOURCE { (node, direction, other) } else { (other, direction ^ 2, node) };
-        let mut amount = self.nodes[from].residual[along];
+            if self.tree[node] == SOURCE { (node, direction, other) } else { (other, direction ^ 2, node) };
+        let mut amount = self.residual[from][along];
         let mut at = from;
-        while self.nodes[at].parent < TERMINAL {
-            let up = usize::from(self.nodes[at].parent);
-            at = self.neighbor(at, up);
-            amount = amount.min(self.nodes[at].residual[up ^ 2]);
+        while self.parent[at] < TERMINAL {
+            let up = usize::from(self.parent[at]);
+            at = self.above[at] as usize;
+            amount = amount.min(self.residual[at][up ^ 2]);
         }
-        amount = amount.min(self.nodes[at].excess);
+        amount = amount.min(self.excess[at]);
         at = to;
-        while self.nodes[at].parent < TERMINAL {
-            let up = usize::from(self.nodes[at].parent);
-            amount = amount.min(self.nodes[at].residual[up]);
-            at = self.neighbor(at, up);
+        while self.parent[at] < TERMINAL {
+            let up = usize::from(self.parent[at]);
+            amount = amount.min(self.residual[at][up]);
+            at = self.above[at] as usize;
         }
-        amount = amount.min(-self.nodes[at].excess);
+        amount = amount.min(-self.excess[at]);
 
-        self.push(from, along, amount);
+        self.push([from, to], along, amount);
         at = from;
-        while self.nodes[at].parent < TERMINAL {
-            let up = usize::from(self.nodes[at].parent);
-            let above = self.neighbor(at, up);
-            self.push(above, up ^ 2, amount);
-            if self.nodes[above].residual[up ^ 2] == 0 {
+        while self.parent[at] < TERMINAL {
+            let up = usize::from(self.parent[at]);
+            let above = self.above[at] as usize;
+            self.push([above, at], up ^ 2, amount);
+            if self.residual[above][up ^ 2] == 0 {
                 self.orphan(at);
             }
             at = above;
         }
-        self.nodes[at].excess -= amount;
-        if self.nodes[at].excess == 0 {
+        self.excess[at] -= amount;
+        if self.excess[at] == 0 {
             self.orphan(at);
         }
         at = to;
-        while self.nodes[at].parent < TERMINAL {
-            let up = usize::from(self.nodes[at].parent);
-            self.push(at, up, amount);
-            let above = self.neighbor(at, up);
-            if self.nodes[at].residual[up] == 0 {
+        while self.parent[at] < TERMINAL {
+            let up = usize::from(self.parent[at]);
+            let above = self.above[at] as usize;
+            self.push([at, above], up, amount);
+            if self.residual[at][up] == 0 {
                 self.orphan(at);
             }
             at = above;
         }
-        self.nodes[at].excess += amount;
-        if self.nodes[at].excess == 0 {
+        self.excess[at] += amount;
+        if self.excess[at] == 0 {
             self.orphan(at);
         }
     }
 
-    fn push(&mut self, node: usize, direction: usize, amount: i32) {
-        let other = self.neighbor(node, direction);
-        self.nodes[node].residual[direction] -= amount;
-        self.nodes[other].residual[direction ^ 2] += amount;
+    fn push(&mut self, [node, other]: [usize; 2], direction: usize, amount: i32) {
+        self.residual[node][direction] -= amount;
+        self.residual[other][direction ^ 2] += amount;
     }
 
     fn orphan(&mut self, node: usize) {
-        self.nodes[node].parent = ORPHAN;
+        self.parent[node] = ORPHAN;
         self.orphans.push_back(node as u32);
     }
 
@@ -239,7 +233,7 @@ impl GridFlow {
     fn adopt(&mut self) {
         while let Some(orphan) = self.orphans.pop_front() {
             let node = orphan as usize;
-            let tree = self.nodes[node].tree;
+            let tree = self.tree[node];
             let mut best: Option<(u32, usize)> = None;
             for direction in 0..4 {
                 if self.capacity_from_parent(node, direction) > 0
@@ -250,67 +244,73 @@ impl GridFlow {
                 }
             }
             if let Some((distance, direction)) = best {
-                self.nodes[node].parent = direction as u8;
-                self.nodes[node].stamp = self.clock;
-                self.nodes[node].distance = distance + 1;
+                self.parent[node] = direction as u8;
+                self.above[node] = self.neighbors[node][direction];
+                self.stamp[node] = self.clock;
+                self.distance[node] = distance + 1;
                 continue;
             }
             for direction in 0..4 {
                 let other = self.neighbor(node, direction);
-                if self.nodes[other].tree != tree {
+                if self.tree[other] != tree {
                     continue;
                 }
                 if self.capacity_from_parent(node, direction) > 0 {
                     self.activate(other);
                 }
-                if usize::from(self.nodes[other].parent) == direction ^ 2 {
+                if usize::from(self.parent[other]) == direction ^ 2 {
                     self.orphan(other);
                 }
             }
-            self.nodes[node].tree = FREE;
-            self.nodes[node].parent = NOBODY;
+            self.tree[node] = FREE;
+            self.parent[node] = NOBODY;
         }
     }
 
     /// Residual capacity of the tree arc between `node` and a possible parent in `direction`.
     fn capacity_from_parent(&self, node: usize, direction: usize) -> i32 {
-        match self.nodes[node].tree {
-            SOURCE => self.nodes[self.neighbor(node, direction)].residual[direction ^ 2],
-            _ => self.nodes[node].residual[direction],
+        match self.tree[node] {
+            SOURCE => self.residual[self.neighbor(node, direction)][direction ^ 2],
+            _ => self.residual[node][direction],
         }
     }
 
     /// Arcs from `start`, a node of `tree`, to its terminal; `None` if it is of another tree or hangs on an orphan.
     fn distance_to_terminal(&mut self, start: usize, tree: u8) -> Option<u32> {
-        if self.nodes[start].tree != tree {
+        if self.tree[start] != tree {
             return None;
         }
         let (mut at, mut steps) = (start, 0);
         let distance = loop {
-            if self.nodes[at].stamp == self.clock {
-                break self.nodes[at].distance;
+            if self.stamp[at] == self.clock {
+                break self.distance[at];
             }
-            match self.nodes[at].parent {
+            match self.parent[at] {
                 TERMINAL => break 1,
                 ORPHAN | NOBODY => return None,
-                up => at = self.neighbor(at, usize::from(up)),
+                _ => at = self.above[at] as usize,
             }
             steps += 1;
         };
         // Remember along the way.
         let mut left = distance + steps;
         at = start;
-        while self.nodes[at].stamp != self.clock {
-            self.nodes[at].stamp = self.clock;
-            self.nodes[at].distance = left;
-            if self.nodes[at].parent >= TERMINAL {
+        while self.stamp[at] != self.clock {
+            self.stamp[at] = self.clock;
+            self.distance[at] = left;
+            if self.parent[at] >= TERMINAL {
                 break;
             }
-            at = self.neighbor(at, usize::from(self.nodes[at].parent));
+            at = self.above[at] as usize;
             left -= 1;
         }
         Some(distance + steps)
     }
+}
+
+fn refill<T: Clone>(values: &mut Vec<T>, length: usize, value: T) {
+    values.clear();
+    values.resize(length, value);
 }
 
 #[cfg(test)]

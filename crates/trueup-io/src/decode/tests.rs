@@ -313,6 +313,27 @@ fn the_cache_changes_nothing_but_the_work() {
     }
 }
 
+/// A working picture is kept beside its photograph, within the same budget, for as long, and handed out to who asks the same way.
+#[test]
+fn a_working_picture_is_kept_as_long_as_its_photograph() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let source = examine(write(&folder, "a.png", &rgb8().file(Container::Png)));
+    let frame = WorkingFrame::new(source.width, source.height, 300.0);
+    let pictures = [50.0, 20.0].map(|area| working(&source, &frame, area).expect("a working picture"));
+    let whole = photograph(&source).expect("decoded").bytes();
+    let reduced = size_of_val(pictures[0].gray.data()) + size_of_val(pictures[0].thumbnail.data());
+    for (budget, kept) in [(whole + reduced, whole + reduced), (whole + reduced - 1, whole), (whole - 1, 0)] {
+        let files = FilePhotographs::new(vec![source.clone()], budget);
+        for _ in 0..2 {
+            assert_eq!(files.working(0, &frame, 50.0).expect("a working picture"), pictures[0]);
+            assert_eq!(files.kept_bytes(), kept);
+        }
+        assert_eq!(files.working(0, &frame, 20.0).expect("a working picture"), pictures[1]);
+        files.photograph(0).expect("decoded");
+        assert_eq!(files.kept_bytes(), 0);
+    }
+}
+
 /// The decoder of JPEG makes photographs smaller itself; what comes out is what area averaging makes of all pixels, nearly.
 #[test]
 fn small_photographs_are_nearly_the_means_of_their_pixels() {
