@@ -54,6 +54,12 @@ impl GridMesh {
         mesh
     }
 
+    /// The grid with every vertex moved `by` so much in the panorama.
+    pub fn moved_by(&self, by: Vector2<f64>) -> Self {
+        let target = self.target.iter().map(|place| [place[0] + by.x, place[1] + by.y]).collect();
+        Self { target, ..self.clone() }
+    }
+
     /// Number of vertices.
     pub fn len(&self) -> usize {
         self.rows * self.columns

@@ -105,6 +105,8 @@ enum BaseView {
     Sphere(Box<SphereView>),
     /// What it shows of a flat scene.
     Plane(PlaneCamera),
+    /// The photograph as the cameras draw it.
+    Drawn(Box<GridMesh>),
 }
 
 /// The bases of photographs of a flat scene: as they lie on its plane, at their median scale.
@@ -114,6 +116,15 @@ enum BaseView {
 pub fn bases_on_plane(scene: &FlatScene) -> Vec<BaseMap> {
     let factor = Vector2::new(scene.pixels_per_unit(), 0.0);
     scene.cameras.iter().map(|&camera| BaseMap { factor, view: BaseView::Plane(camera) }).collect()
+}
+
+/// The bases of photographs that the cameras draw: as they are drawn in `meshes`, less `origin`.
+pub fn bases_on_drawing(meshes: &[GridMesh], origin: Vector2<f64>) -> Vec<BaseMap> {
+    let base = |mesh: &GridMesh| BaseMap {
+        factor: Vector2::new(1.0, 0.0),
+        view: BaseView::Drawn(Box::new(mesh.moved_by(-origin))),
+    };
+    meshes.iter().map(base).collect()
 }
 
 impl BaseMap {
@@ -164,6 +175,7 @@ impl BaseMap {
         let seen = match &self.view {
             BaseView::Photograph => pixel,
             BaseView::Sphere(view) => view.unrolled(pixel),
+            BaseView::Drawn(mesh) => mesh.warp(pixel),
             BaseView::Plane(camera) => camera.place(pixel).unwrap_or(Vector2::repeat(f64::NAN)),
         };
         product(self.factor, seen)

@@ -41,7 +41,7 @@ use trueup_core::{Result, StageContext};
 
 use alignment::AlignmentEnergy;
 pub(crate) use base::tilt_from_level;
-pub use base::{BaseMap, bases, bases_on_plane, tilts, turn_length};
+pub use base::{BaseMap, bases, bases_on_drawing, bases_on_plane, tilts, turn_length};
 pub use by_cameras::{ByCamerasInput, drawn_by_cameras, unless_worse};
 pub use camera_plane::CameraPlane;
 pub use closure::Closure;
@@ -79,10 +79,11 @@ pub fn run<'a>(input: &MeshInput<'a>, options: &'a MeshOptions, context: &StageC
     let Some(closure) = &input.closure else { return solved(&within, &[]) };
     let mut joined = within.clone();
     joined.join(closure, grids, bases, &places);
-    // Ends that lie a turn apart where the photographs only shift need no look at how they lie in an open mesh, unless
-    // closing folds it.
+    // On the sphere, ends that lie a turn apart where the photographs only shift need no look at how they lie in an open
+    // mesh, unless closing folds it. Similarities of photographs that look up shift to other places than a mesh has.
     let mut closed = None;
-    let undeformed = joined.shifted(&placed(grids, &places), reference);
+    let on_sphere = options.base == BaseShape::Sphere;
+    let undeformed = on_sphere.then(|| joined.shifted(&placed(grids, &places), reference)).flatten();
     if undeformed.is_some_and(|grids| closure.contradiction(&joined.apart(&grids)).is_none()) {
         let at_once = solved(&joined, closure.warps)?;
         if at_once.warped().folds == 0 {

@@ -11,6 +11,7 @@ use super::input::MeshInput;
 use super::line_alignment;
 use super::normal_equations::NormalEquations;
 use super::options::MeshOptions;
+use super::placed;
 use super::problem::{MeshProblem, Solved};
 use super::refinements::Refinements;
 use super::similarity::PRIOR_SLOPE;
@@ -71,6 +72,21 @@ impl<'a> PlainMesh<'a> {
         let solved = problem.solve(&mut MeshSolver::default(), &equations)?;
         let warped = problem.warped(&solved);
         Ok(Self { input, layout, options, equations, solved, warped })
+    }
+
+    /// What the cameras draw, to be refined: the bases of `input` are the drawing, less the first vertex of the reference.
+    ///
+    /// The cameras have decided how the overlaps lie. The match points, which would bend the drawing to the mesh that was worse,
+    /// have no weight; what a refinement finds draws the overlaps together, while the outlines stay.
+    pub fn of_drawing(input: MeshInput<'a>, options: &'a MeshOptions, context: &StageContext) -> Self {
+        let MeshInput { grids, bases, warps, .. } = input;
+        let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(grids).map(|(base, grid)| base.places(grid)).collect();
+        let alignment = AlignmentEnergy::new(grids, warps, bases, &places);
+        let solved = Solved { meshes: placed(grids, &places), period: None, relative_gradient: 0.0 };
+        let layout = Layout { places, alignment, closing: &[] };
+        let problem = layout.problem(&input, options, context);
+        let (equations, warped) = (problem.equations(), problem.warped(&solved));
+        Self { input, layout, options, equations, solved, warped }
     }
 
     /// The grids, as they are delivered if nothing refines them.

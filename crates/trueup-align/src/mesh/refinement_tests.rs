@@ -156,6 +156,39 @@ fn without_refinements_the_plain_mesh_is_left_as_it_is() {
     assert_eq!(refined(&Refinements { outline_weight: 7.0, ..Refinements::default() }), plain);
 }
 
+/// The cameras draw the shift and nothing of the bump. Match points, which are 5 px off in both directions, have no weight.
+#[test]
+fn what_the_cameras_draw_comes_together_between_its_outlines() {
+    let (grids, mut warps) = shifted();
+    for place in warps.iter_mut().flat_map(|warp| warp.vertices.iter_mut()).flatten() {
+        place[1] += 5.0;
+    }
+    let drawn = [40.0, 40.0 + SHIFT].map(|left| divided(&grids[0], 2).moved_by(Vector2::new(left, 30.0)));
+    let bases = bases_on_drawing(&drawn, Vector2::from(drawn[0].target[0]));
+    let (options, context) = (MeshOptions { alignment_weight: 0.0, ..MeshOptions::default() }, StageContext::default());
+    let plain = PlainMesh::of_drawing(input(&grids, &warps, &bases), &options, &context);
+    let farthest = |meshes: &[GridMesh], counts: &dyn Fn(usize, usize) -> bool| {
+        let mut farthest = 0.0_f64;
+        for (mesh, drawn) in meshes.iter().zip(&drawn) {
+            for vertex in (0..mesh.len()).filter(|&vertex| counts(vertex / mesh.columns, vertex % mesh.columns)) {
+                let moved = Vector2::from(drawn.target[vertex]) - Vector2::from(mesh.target[vertex]);
+                farthest = farthest.max((moved - Vector2::new(40.0, 30.0)).norm());
+            }
+        }
+        farthest
+    };
+    assert!(farthest(&plain.warped().meshes, &|_, _| true) < 1e-9);
+    let before = true_distance(&plain.warped().meshes);
+    let (pyramids, pixels) = (pyramids(), PhotometricOptions { weight: 0.1 });
+    let photometric = Some(PhotometricInput { pyramids: &pyramids, options: &pixels });
+    let refinements = Refinements { photometric, outline_weight: 10.0, ..Refinements::default() };
+    let refined = plain.refined(&refinements, &context).expect("solvable");
+    let after = true_distance(&refined.meshes);
+    assert!(before > 1.0 && after < 0.5 * before, "{before} px became {after} px");
+    let outline = farthest(&refined.meshes, &|row, column| row == 0 || column == 0);
+    assert!(outline < 0.5, "{outline} px");
+}
+
 fn segment(start: [f64; 2], end: [f64; 2]) -> LineSegment {
     LineSegment { start, end, width_px: 1.0, significance: 1.0 }
 }

@@ -111,8 +111,9 @@ impl MeshProblem<'_> {
         pixels: &PixelAlignment,
         start: Solved,
     ) -> Result<Solved> {
-        /// Most rounds at a level; each solves the mesh once.
-        const ROUNDS: usize = 4;
+        /// Most rounds at a level; each solves the mesh once. Four lower NCC MSE by another 0.1 % (four pairs and a
+        /// rendered set) and take half as long again.
+        const ROUNDS: usize = 2;
         /// A level ends when the mean difference falls by less than this share in a round.
         const SETTLED: f64 = 0.01;
         /// A round that raises the root mean square distance of match points by more than this is undone, panorama

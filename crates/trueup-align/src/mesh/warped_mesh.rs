@@ -26,6 +26,20 @@ pub struct WarpedMesh {
     pub by_cameras: Option<CameraPlane>,
 }
 
+impl WarpedMesh {
+    /// Whether the photographs lie in one piece each: not round and round, and torn at no pole.
+    pub fn lies_flat(&self) -> bool {
+        /// Cells over a pole reach up to a turn; whole photographs are seldom wider than this, radians.
+        const MOST_OF_A_CELL: f64 = 1.0;
+        let most = self.by_cameras.map_or(f64::INFINITY, |plane| MOST_OF_A_CELL * plane.units_per_radian);
+        let is_whole = |mesh: &GridMesh| {
+            let rows = mesh.target.chunks(mesh.columns);
+            rows.flat_map(|row| row.windows(2)).all(|pair| (pair[1][0] - pair[0][0]).abs() <= most)
+        };
+        self.period.is_none() && self.meshes.iter().all(is_whole)
+    }
+}
+
 /// Triangles of the grid with a signed area that is not positive.
 pub(crate) fn count_folds(mesh: &GridMesh) -> usize {
     let vertex = |row: usize, column: usize| Vector2::from(mesh.target[row * mesh.columns + column]);
@@ -46,4 +60,27 @@ pub(crate) fn count_folds(mesh: &GridMesh) -> usize {
 /// Triangles turned over in all of `meshes`.
 pub(super) fn total_folds(meshes: &[GridMesh]) -> usize {
     meshes.iter().map(count_folds).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ten cells of 40 units: 0.4 radians at 100 units each, 4 at 10.
+    #[test]
+    fn what_goes_round_or_is_torn_does_not_lie_flat() {
+        let plane = |units_per_radian| CameraPlane { yaw: 0.0, units_per_radian, origin: [0.0; 2] };
+        let drawn = |units_per_radian, period| WarpedMesh {
+            meshes: vec![GridMesh::regular(400.0, 300.0, 40.0)],
+            alignment_rms: 0.0,
+            folds: 0,
+            relative_gradient: 0.0,
+            period,
+            by_cameras: Some(plane(units_per_radian)),
+        };
+        assert!(drawn(100.0, None).lies_flat());
+        assert!(!drawn(100.0, Some(628.3)).lies_flat());
+        assert!(!drawn(10.0, None).lies_flat());
+        assert!(WarpedMesh { by_cameras: None, ..drawn(10.0, None) }.lies_flat());
+    }
 }

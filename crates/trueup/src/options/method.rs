@@ -154,7 +154,8 @@ methods! {
 trueup_core::choice! {
     /// What draws overlapping photographs together.
     pub enum Evidence {
-        /// What the photographs ask for: matched lines too, where parallax keeps matched points apart. As published: points.
+        /// What the photographs ask for: matched lines and pixels too, where parallax keeps matched points apart. As
+        /// published: points.
         Auto = "auto",
         /// Matched points, carried to the whole overlap.
         Points = "points",

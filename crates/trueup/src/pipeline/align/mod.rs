@@ -1,6 +1,7 @@
 //! The align phase: from matches to deformed grids for one group of overlapping photographs.
 
 pub(crate) mod component;
+mod deformation;
 mod overlaps;
 mod refinement;
 mod straightened;
@@ -8,34 +9,29 @@ mod turn;
 mod vanishing;
 
 use std::borrow::Cow;
-use std::f64::consts::TAU;
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_align::cameras::{Cameras, FlatScene};
 use trueup_align::full_turn::{self, FullTurnCut};
 use trueup_align::match_points::OverlapWarp;
-use trueup_align::mesh::{self, BaseShape, ByCamerasInput, MeshInput, PlainMesh, StructureInput, WarpedMesh};
+use trueup_align::mesh::WarpedMesh;
 use trueup_align::similarity::{self, PriorInput, PriorMethod, SimilarityPrior};
 use trueup_align::stitch_graph::GraphEdge;
 use trueup_align::vanishing::{MissingTriad, TriadOutcome};
-use trueup_align::warps::{self, WarpInput, WarpModel};
 use trueup_core::diagnostics::Reported;
-use trueup_core::geometry::matrix_from_rows;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::FilePhotographs;
-use trueup_vision::lines;
 
 use self::component::Component;
+use self::deformation::Deformation;
 use self::overlaps::Overlaps;
-use self::refinement::RefinementSources;
 use self::turn::{Turn, report_cut};
 use crate::memo::{GEOMETRY, Key, KeyMaker, Memo};
-use crate::options::{AlignOptions, Evidence, MethodForm, Structure};
+use crate::options::{AlignOptions, MethodForm};
 
 pub(crate) use self::refinement::needs_pixels;
 
@@ -204,109 +200,4 @@ fn find_prior(
         reference: component.reference,
     };
     similarity::run(&input, &options.similarity, context)
-}
-
-/// What the grids are deformed by.
-struct Deformation<'a> {
-    input: &'a AlignInput<'a>,
-    /// Even grids over the working photographs.
-    grids: &'a [GridMesh],
-    cameras: &'a Cameras,
-    prior: &'a SimilarityPrior,
-    /// All overlaps.
-    all_warps: &'a [OverlapWarp],
-    /// The overlaps and pairs that do not lie across the cut of a full turn.
-    warps: &'a [OverlapWarp],
-    pairs: &'a [PairMatches],
-    turn: Option<&'a Turn>,
-    cut: Option<&'a FullTurnCut>,
-}
-
-impl Deformation<'_> {
-    fn by_mesh(&self, options: &AlignOptions, context: &StageContext) -> Result<WarpedMesh> {
-        let component = self.input.component;
-        let cameras = &self.cameras.cameras;
-        let flat_scene = self.cameras.flat_scene.as_ref();
-        let bases = match flat_scene {
-            Some(scene) => mesh::bases_on_plane(scene),
-            None => mesh::bases(cameras, self.grids, self.prior, &options.mesh),
-        };
-        let chains: Option<Vec<Vec<LineSegment>>> = (options.stitch.structure == Structure::Lines)
-            .then(|| component.lines.par_iter().map(|lines| lines::merged(lines)).collect());
-        let structure = chains.as_ref().map(|chains| StructureInput { chains, options: &options.structure });
-        let closure = self.turn.and_then(|turn| turn.closure(mesh::turn_length(cameras, self.prior)));
-        // What is turned as a whole does not go round along the panorama's rows.
-        let closure = closure.filter(|_| component.reference_rotation == 0.0);
-        let (grids, warps, reference) = (self.grids, self.warps, component.reference);
-        let input = MeshInput { grids, warps, bases: &bases, reference, closure, structure };
-        let solved = context.gather(|context| mesh::run(&input, &options.mesh, context))?;
-        // What is turned or tilted as a whole, and the published similarity, want the mesh's own plane.
-        let on_sphere = options.mesh.base == BaseShape::Sphere && flat_scene.is_none();
-        if on_sphere && component.reference_rotation == 0.0 && !mesh::tilts(cameras, self.prior) {
-            let by_cameras = self.by_cameras_if_better(solved.value.warped(), options, context)?;
-            if let Some(drawn) = by_cameras {
-                return Ok(drawn);
-            }
-        }
-        self.refined(context.absorb(solved), options, context)
-    }
-
-    /// What the cameras draw, where the plain mesh is worse than they are.
-    fn by_cameras_if_better(
-        &self,
-        plain: &WarpedMesh,
-        options: &AlignOptions,
-        context: &StageContext,
-    ) -> Result<Option<WarpedMesh>> {
-        let cameras = &self.cameras.cameras;
-        let level_from_world = self.prior.level_from_world();
-        let mut level = self.prior.corrected_cameras(cameras);
-        for camera in &mut level {
-            camera.set_rotation(&(camera.rotation() * level_from_world.transpose()));
-        }
-        let dominant = self.prior.guidance.dominant.as_ref().map(matrix_from_rows);
-        let input = ByCamerasInput {
-            grids: self.grids,
-            cameras: &level,
-            warps: self.all_warps,
-            severed: self.cut.map_or(&[], |cut| &cut.severed),
-            dominant: dominant.as_ref(),
-            units_per_radian: mesh::turn_length(cameras, self.prior) / TAU,
-        };
-        mesh::unless_worse(plain, &input, &options.mesh, context)
-    }
-
-    /// The mesh, refined by what the options or the photographs ask for.
-    fn refined(&self, plain: PlainMesh, options: &AlignOptions, context: &StageContext) -> Result<WarpedMesh> {
-        let AlignInput { component, photographs, .. } = *self.input;
-        let evidence = match options.stitch.align {
-            Evidence::Auto => refinement::asked_for(plain.misaligned_share(self.pairs), context),
-            told => told,
-        };
-        if evidence == Evidence::Points {
-            return Ok(plain.into_warped());
-        }
-        let sources = RefinementSources::new(evidence, component, self.grids, self.warps, photographs, context)?;
-        plain.refined(&sources.refinements(component, self.pairs, options), context)
-    }
-
-    fn by_warp(&self, model: WarpModel, options: &AlignOptions, context: &StageContext) -> Result<WarpedMesh> {
-        let component = self.input.component;
-        let fine: Vec<GridMesh> = self.grids.iter().map(|grid| mesh::divided(grid, options.mesh.subdivision)).collect();
-        let input = WarpInput {
-            cameras: &self.cameras.cameras,
-            frames: &component.frames,
-            grids: &fine,
-            pairs: self.pairs,
-            match_grids: self.grids,
-            overlaps: self.warps,
-            names: &component.names(),
-            seeds: &component.seeds(),
-            reference: component.reference,
-            level_from_world: self.prior.level_from_world(),
-            cut_yaw: self.cut.map(|cut| cut.yaw),
-            turn: component.reference_rotation,
-        };
-        warps::run(model, &input, &options.warps, context)
-    }
 }
