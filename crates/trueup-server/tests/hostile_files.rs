@@ -98,7 +98,7 @@ fn bomb(side: u32) -> Vec<u8> {
     let header = [b"IHDR".as_slice(), &side, &side, b"\x08\x06\0\0\0"].concat();
     // CRC-32 as in PNG, section D: reflected, of 0xedb88320.
     let crc = !header.iter().fold(!0_u32, |crc, &byte| {
-        (0..8).fold(crc ^ u32::from(byte), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xedb8_8320 } else { crc >> 1 })
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0xedb8_8320 } else { crc >> 1 })
     });
     [b"\x89PNG\r\n\x1a\n\0\0\0\x0d".as_slice(), &header, &crc.to_be_bytes()].concat()
 }
