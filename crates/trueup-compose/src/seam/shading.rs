@@ -99,7 +99,7 @@ mod tests {
     }
 
     /// All pixels of a canvas but those of a column.
-    fn canvas_but(left_out: usize) -> Band {
+    fn canvas_but(left_out: u32) -> Band {
         Band::of_columns((0..60).filter(|&x| x != left_out), [60, 40])
     }
 
