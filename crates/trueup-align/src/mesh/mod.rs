@@ -79,11 +79,10 @@ pub fn run<'a>(input: &MeshInput<'a>, options: &'a MeshOptions, context: &StageC
     let Some(closure) = &input.closure else { return solved(&within, &[]) };
     let mut joined = within.clone();
     joined.join(closure, grids, bases, &places);
-    // On the sphere, ends that lie a turn apart where the photographs only shift need no look at how they lie in an open
-    // mesh, unless closing folds it. Similarities of photographs that look up shift to other places than a mesh has.
+    // Ends that lie a turn apart where the photographs only shift need no look at how they lie in an open mesh, unless
+    // closing folds it.
     let mut closed = None;
-    let on_sphere = options.base == BaseShape::Sphere;
-    let undeformed = on_sphere.then(|| joined.shifted(&placed(grids, &places), reference)).flatten();
+    let undeformed = joined.shifted(&placed(grids, &places), reference);
     if undeformed.is_some_and(|grids| closure.contradiction(&joined.apart(&grids)).is_none()) {
         let at_once = solved(&joined, closure.warps)?;
         if at_once.warped().folds == 0 {

@@ -111,8 +111,8 @@ impl MeshProblem<'_> {
         pixels: &PixelAlignment,
         start: Solved,
     ) -> Result<Solved> {
-        /// Most rounds at a level; each solves the mesh once. Four lower NCC MSE by another 0.1 % (four pairs and a
-        /// rendered set) and take half as long again.
+        /// Most rounds at a level; each solves the mesh once. Four lower NCC MSE by another 0.1 to 0.3 % (four pairs
+        /// and a rendered set) and take half as long again.
         const ROUNDS: usize = 2;
         /// A level ends when the mean difference falls by less than this share in a round.
         const SETTLED: f64 = 0.01;
