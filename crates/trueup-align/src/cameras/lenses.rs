@@ -32,6 +32,13 @@ pub(super) struct LensSearch<'a> {
     pub context: &'a StageContext<'a>,
 }
 
+/// Cameras with lenses.
+pub(super) struct FoundLenses {
+    pub parameters: Parameters,
+    /// The terms that were believed.
+    pub model: IntrinsicsModel,
+}
+
 impl Witness {
     fn significant(self) -> f64 {
         match self {
@@ -44,7 +51,7 @@ impl Witness {
 impl LensSearch<'_> {
     /// The cameras refined with lenses, one for every group of photographs with evidence of one; `None` if there is no such
     /// group, or the lenses lead nowhere. A group shares one focal length.
-    pub(super) fn find(&self, start: &Parameters, group_of: &[usize]) -> Result<Option<Parameters>> {
+    pub(super) fn find(&self, start: &Parameters, group_of: &[usize]) -> Result<Option<FoundLenses>> {
         let groups = group_of.iter().max().map_or(0, |last| last + 1);
         let mut free: Vec<FreeTerms> = vec![only_focal(); groups];
         let mut bent = vec![self.kind != LensKind::Pinhole; groups];
@@ -76,7 +83,8 @@ impl LensSearch<'_> {
             let model = IntrinsicsModel::grouped(group_of, &free);
             parameters = problem.minimize(parameters, &model, FINE_HUBER_PX, self.context)?;
         }
-        Ok(self.problem.is_sound(&parameters).then_some(parameters))
+        let model = IntrinsicsModel::grouped(group_of, &free);
+        Ok(self.problem.is_sound(&parameters).then_some(FoundLenses { parameters, model }))
     }
 
     /// Which of the groups in `asked` have a lens that bends: those with evidence of k1, which is still there when k1 is found.

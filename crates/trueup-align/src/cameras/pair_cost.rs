@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use trueup_core::camera::{Camera, INTRINSICS};
 use trueup_core::geometry::cross_matrix;
+use trueup_core::matches::PointMatch;
 
 use super::observations::PairObservations;
 
@@ -39,6 +40,16 @@ pub(super) fn pair_cost(cameras: &[Camera], pair: &PairObservations, huber_px: f
         .iter()
         .map(|m| one_way(a, b, &b_from_a, m.in_a, m.in_b) + one_way(b, a, &a_from_b, m.in_b, m.in_a))
         .sum()
+}
+
+/// How far a pair's matches lie from where the cameras put them, working pixels, both directions; those behind a camera infinitely far.
+pub(super) fn pair_distances(cameras: &[Camera], pair: &PairObservations) -> Vec<f64> {
+    let (a, b) = (&cameras[pair.a], &cameras[pair.b]);
+    let distance = |from: &Camera, to: &Camera, source: [f64; 2], target: [f64; 2]| {
+        from.transfer(to, Vector2::from(source)).map_or(f64::INFINITY, |place| (Vector2::from(target) - place).norm())
+    };
+    let both = |m: &PointMatch| [distance(a, b, m.in_a, m.in_b), distance(b, a, m.in_b, m.in_a)];
+    pair.matches.iter().flat_map(both).collect()
 }
 
 impl<const LOCAL: usize> PairTerm<LOCAL> {

@@ -4,7 +4,7 @@ use trueup_core::{Result, StageContext};
 
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
 use super::intrinsics::{FOCAL, IntrinsicsModel, ZOOM_SPREAD};
-use super::lenses::{LensSearch, settings};
+use super::lenses::{FoundLenses, LensSearch, settings};
 use super::observations::Observations;
 use super::options::{CameraOptions, FocalSharing};
 use super::prior::CameraPrior;
@@ -78,22 +78,25 @@ pub(super) fn refine(
             per_picture_focal = true;
         }
     }
-    let explains_more = |lens: &Parameters| {
-        !per_picture_focal || cost_without_pulls(&problem, lens) < cost_without_pulls(&problem, &fine)
+    let explains_more = |lens: &FoundLenses| {
+        !per_picture_focal || cost_without_pulls(&problem, &lens.parameters) < cost_without_pulls(&problem, &fine)
     };
-    if let Some(lens) = with_lens.filter(explains_more) {
-        return Ok(Refined { parameters: lens, per_picture_focal: false, focal_failed: false, lens_doubt_px: None });
+    if let Some(FoundLenses { parameters, model }) = with_lens.filter(explains_more) {
+        let parameters = for_lenses.sharpened(parameters, &model, context)?;
+        return Ok(Refined { parameters, per_picture_focal: false, focal_failed: false, lens_doubt_px: None });
     }
     if per_picture_focal && problem.is_sound(&fine) {
         let settings = settings(&fine, &CameraPrior::lens_groups(priors));
-        if let Some(parameters) = search.find(&fine, &settings)? {
+        if let Some(FoundLenses { parameters, model }) = search.find(&fine, &settings)? {
+            let parameters = for_lenses.sharpened(parameters, &model, context)?;
             return Ok(Refined { parameters, per_picture_focal, focal_failed: false, lens_doubt_px: None });
         }
     }
     if problem.is_sound(&fine) {
         let few = input.observations.pairs.len() < OVERLAPS_FOR_LENSES && !fine.has_lens();
         let lens_doubt_px = if few { search.doubt_px(&fine, &CameraPrior::lens_groups(priors)) } else { None };
-        return Ok(Refined { parameters: fine, per_picture_focal, focal_failed: false, lens_doubt_px });
+        let parameters = problem.sharpened(fine, if per_picture_focal { &own } else { &shared }, context)?;
+        return Ok(Refined { parameters, per_picture_focal, focal_failed: false, lens_doubt_px });
     }
     let parameters = with_common_focal(&problem, start, context)?;
     Ok(Refined { parameters, per_picture_focal: false, focal_failed: true, lens_doubt_px: None })
