@@ -2,11 +2,11 @@
 //!
 //! Cameras that only turn leave a residual in every overlap where the photographer moved. The solved mesh has aligned
 //! the overlaps as well as it could; which pixel of one photograph meets which pixel of another is read off it, and
-//! both are drawn in the same direction: a mean of the directions in which their cameras see the place. Each photograph
-//! weighs as deep as the place lies in it, so that nothing moves where a photograph is alone, nothing jumps where
-//! another one ends, and directions that need no correction get none. The mesh's own shape, its plane and its drift
-//! over long rows are forgotten by this; only what it knows of overlaps remains, so that any mesh will do, of whatever
-//! method.
+//! both are drawn in the same direction. First photographs step aside as evenly as they can, also where they are alone, so that
+//! lines stay straight ([`smooth_steps`]). What is left is drawn in a mean of the directions in which the photographs then
+//! see the place. Each weighs as deep as the place lies in it, so that nothing jumps where another one ends. The mesh's own
+//! shape, its plane and its drift over long rows are forgotten by this; only what it knows of overlaps remains, so that any
+//! mesh will do, of whatever method.
 //!
 //! Near the poles of its sphere the mesh knows nothing: photographs that look there cannot be unrolled, and pull at
 //! their neighbors. They are drawn as their cameras see.
@@ -149,7 +149,8 @@ impl<'a> Overlaps<'a> {
         let pixel = other.mesh.source_of(place, expected)?;
         let inside = (0..2).all(|axis| (0.0..=size[axis]).contains(&pixel[axis]));
         let direction = other.camera.world_direction(pixel);
-        let seen = Sight { photograph: number, pixel, direction, weight: depth(other, pixel), trust: self.trusts[number] };
+        let seen =
+            Sight { photograph: number, pixel, direction, weight: depth(other, pixel), trust: self.trusts[number] };
         inside.then_some(seen)
     }
 }
@@ -188,7 +189,8 @@ fn common_direction(sights: &[Sight], max_parallax: f64, seen: impl Fn(&Sight) -
     if sights.len() == 1 {
         return own;
     }
-    let (Some(mean), Some(by_cameras)) = (mean_direction(sights, &seen), mean_direction(sights, |sight| sight.direction))
+    let (Some(mean), Some(by_cameras)) =
+        (mean_direction(sights, &seen), mean_direction(sights, |sight| sight.direction))
     else {
         return own;
     };
@@ -203,8 +205,7 @@ fn mean_direction(sights: &[Sight], seen: impl Fn(&Sight) -> Vector3<f64>) -> Op
 /// Which share of the way to their `mean` sights go, as far as they lie from it: 1 up to half of `max_parallax`, 0 from there on.
 fn kept(sights: &[Sight], mean: &Vector3<f64>, max_parallax: f64) -> f64 {
     let counted = sights.iter().filter(|sight| sight.weight > 0.0);
-    let farthest =
-        counted.map(|sight| sight.direction.angle(mean)).fold(sights[0].direction.angle(mean), f64::max);
+    let farthest = counted.map(|sight| sight.direction.angle(mean)).fold(sights[0].direction.angle(mean), f64::max);
     let kept = (2.0 - 2.0 * farthest / max_parallax.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
     kept * kept * (3.0 - 2.0 * kept)
 }
@@ -257,9 +258,9 @@ mod tests {
     }
 
     /// Pixels that the mesh puts at the same place are drawn in the same direction; where a photograph is alone it
-    /// stays.
+    /// goes on evenly, and all but stays far from the overlap.
     #[test]
-    fn overlaps_meet_and_the_rest_stays() {
+    fn overlaps_meet_and_the_rest_goes_on() {
         let photographs = pair([4.0, -3.0]);
         let shifts = parallax_shifts(&photographs, None, 0.03);
         for pixel in [[450.0, 300.0], [600.0, 200.0], [700.0, 450.0]].map(Vector2::from) {
@@ -272,8 +273,12 @@ mod tests {
             let apart = drawn(&photographs, &shifts, 0, pixel).angle(&drawn(&photographs, &shifts, 1, same)) * 700.0;
             assert!(apart < 0.1, "{apart} px at {pixel}");
         }
-        let alone = drawn(&photographs, &shifts, 0, Vector2::new(100.0, 300.0));
-        assert!(alone.angle(&photographs[0].camera.world_direction(Vector2::new(100.0, 300.0))) < 1e-12);
+        let moved = |pixel: [f64; 2]| {
+            let pixel = Vector2::from(pixel);
+            drawn(&photographs, &shifts, 0, pixel).angle(&photographs[0].camera.world_direction(pixel)) * 700.0
+        };
+        let (beside, far) = (moved([300.0, 300.0]), moved([20.0, 300.0]));
+        assert!(beside > 0.2 && beside < 5.0 && far < beside, "{beside} and {far} px");
     }
 
     /// A mesh that contradicts its cameras by 50 pixels (4 degrees) is not believed.
