@@ -2,11 +2,11 @@
 //!
 //! Cameras that only turn leave a residual in every overlap where the photographer moved. The solved mesh has aligned
 //! the overlaps as well as it could; which pixel of one photograph meets which pixel of another is read off it, and
-//! both are drawn in the same direction: a mean of the directions in which their cameras see the place. Each photograph
-//! weighs as deep as the place lies in it, so that nothing moves where a photograph is alone, nothing jumps where
-//! another one ends, and directions that need no correction get none. The mesh's own shape, its plane and its drift
-//! over long rows are forgotten by this; only what it knows of overlaps remains, so that any mesh will do, of whatever
-//! method.
+//! both are drawn in the same direction. First photographs step aside as evenly as they can, also where they are alone, so that
+//! lines stay straight ([`smooth_steps`]). What is left is drawn in a mean of the directions in which the photographs then
+//! see the place. Each weighs as deep as the place lies in it, so that nothing jumps where another one ends. The mesh's own
+//! shape, its plane and its drift over long rows are forgotten by this; only what it knows of overlaps remains, so that any
+//! mesh will do, of whatever method.
 //!
 //! Near the poles of its sphere the mesh knows nothing: photographs that look there cannot be unrolled, and pull at
 //! their neighbors. They are drawn as their cameras see.
@@ -23,7 +23,7 @@ use trueup_core::mesh::GridMesh;
 
 use super::coverage::steepest;
 use super::photograph::PosedPhotograph;
-use crate::mesh::tilt_from_level;
+use crate::mesh::{Meeting, smooth_steps, tilt_from_level};
 
 /// By how many of its own pixels each vertex of a photograph's grid looks aside, row-major.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -46,24 +46,22 @@ impl ParallaxShift {
 /// * `max_parallax`: the largest angle in radians between where a camera sees a place and where it is drawn; from half
 ///   of it on, corrections fade, since a mesh that has to contradict its cameras more than that is torn itself.
 pub fn parallax_shifts(photographs: &[PosedPhotograph], period: Option<f64>, max_parallax: f64) -> Vec<ParallaxShift> {
-    let cameras: Vec<Camera> = photographs.iter().map(|photograph| photograph.camera).collect();
-    let frame = tilt_from_level(&cameras, &Matrix3::identity()).unwrap_or_else(Matrix3::identity);
-    let trusts: Vec<f64> = photographs.iter().map(|photograph| trust(steepest(photograph, &frame))).collect();
-    let bounds: Vec<_> = photographs.iter().map(|photograph| photograph.mesh.bounds()).collect();
+    let overlaps = Overlaps::new(photographs, period, max_parallax);
+    let steps = overlaps.smooth_steps();
     (0..photographs.len())
         .into_par_iter()
         .map(|k| {
             let photograph = &photographs[k];
             let aside = (0..photograph.mesh.len()).map(|vertex| {
                 let pixel = photograph.mesh.source(vertex);
-                let direction = photograph.camera.world_direction(pixel);
-                let own = Sight { direction, weight: depth(photograph, pixel), trust: trusts[k] };
-                let place = Vector2::from(photograph.mesh.target[vertex]);
-                let others = (0..photographs.len()).filter(|&other| other != k).filter_map(|other| {
-                    let seen = sight(&photographs[other], &bounds[other], place, &own.direction, period)?;
-                    Some(Sight { trust: trusts[other], ..seen })
+                let sights = overlaps.sights(k, pixel);
+                let drawn = common_direction(&sights, max_parallax, |sight| match &steps {
+                    Some(steps) => {
+                        let aside = steps[sight.photograph].warp(sight.pixel);
+                        photographs[sight.photograph].camera.world_direction(sight.pixel + aside)
+                    }
+                    None => sight.direction,
                 });
-                let drawn = common_direction(own, others, max_parallax);
                 let back = photograph.camera.project(photograph.camera.rotation() * drawn);
                 back.map_or(Vector2::zeros(), |back| back - pixel)
             });
@@ -72,9 +70,98 @@ pub fn parallax_shifts(photographs: &[PosedPhotograph], period: Option<f64>, max
         .collect()
 }
 
+/// Cells of the lattice of even steps along a photograph's longer side.
+const LATTICE_CELLS: f64 = 16.0;
+
+/// Photographs and what their mesh says of them.
+struct Overlaps<'a> {
+    photographs: &'a [PosedPhotograph],
+    trusts: Vec<f64>,
+    bounds: Vec<(Vector2<f64>, Vector2<f64>)>,
+    period: Option<f64>,
+    max_parallax: f64,
+}
+
+impl<'a> Overlaps<'a> {
+    fn new(photographs: &'a [PosedPhotograph], period: Option<f64>, max_parallax: f64) -> Self {
+        let cameras: Vec<Camera> = photographs.iter().map(|photograph| photograph.camera).collect();
+        let frame = tilt_from_level(&cameras, &Matrix3::identity()).unwrap_or_else(Matrix3::identity);
+        let trusts = photographs.iter().map(|photograph| trust(steepest(photograph, &frame))).collect();
+        let bounds = photographs.iter().map(|photograph| photograph.mesh.bounds()).collect();
+        Self { photographs, trusts, bounds, period, max_parallax }
+    }
+
+    /// Who sees what photograph `k` has at `pixel`: itself first.
+    fn sights(&self, k: usize, pixel: Vector2<f64>) -> Vec<Sight> {
+        let photograph = &self.photographs[k];
+        let direction = photograph.camera.world_direction(pixel);
+        let own = Sight { photograph: k, pixel, direction, weight: depth(photograph, pixel), trust: self.trusts[k] };
+        let place = photograph.mesh.warp(pixel);
+        let others = (0..self.photographs.len()).filter(|&other| other != k);
+        std::iter::once(own).chain(others.filter_map(|other| self.sight(other, place, &direction))).collect()
+    }
+
+    /// How far photographs give way as evenly as they can, see [`smooth_steps`]; `None` if nothing asks for it.
+    fn smooth_steps(&self) -> Option<Vec<GridMesh>> {
+        let lattice = |photograph: &PosedPhotograph| {
+            let GridMesh { width, height, .. } = photograph.mesh;
+            GridMesh::regular(width, height, width.max(height) / LATTICE_CELLS)
+        };
+        let lattices: Vec<GridMesh> = self.photographs.iter().map(lattice).collect();
+        let meetings: Vec<Vec<Meeting>> = lattices
+            .par_iter()
+            .enumerate()
+            .map(|(k, lattice)| {
+                let of_vertex = |vertex: usize| {
+                    let sights = self.sights(k, lattice.source(vertex));
+                    let share = mean_direction(&sights, |sight| sight.direction)
+                        .map_or(0.0, |mean| kept(&sights, &mean, self.max_parallax) * trust_of(&sights));
+                    let met = sights.into_iter().skip(1).filter(move |_| share > 0.0);
+                    met.map(move |sight| Meeting { from: [k, vertex], to: sight.photograph, place: sight.pixel, share })
+                };
+                (0..lattice.len()).flat_map(of_vertex).collect()
+            })
+            .collect();
+        let cameras: Vec<Camera> = self.photographs.iter().map(|photograph| photograph.camera).collect();
+        smooth_steps(&cameras, &lattices, &meetings.concat())
+    }
+
+    /// How another photograph sees the `place` that is expected in `direction`; `None` if it does not show it.
+    fn sight(&self, number: usize, place: Vector2<f64>, direction: &Vector3<f64>) -> Option<Sight> {
+        /// How far outside of the other photograph the camera may expect the place for a look at the mesh, as a share of
+        /// its size.
+        const ASIDE: f64 = 0.25;
+        let other = &self.photographs[number];
+        let expected = other.camera.project(other.camera.rotation() * direction)?;
+        let size = Vector2::new(other.mesh.width, other.mesh.height);
+        let near = |axis: usize| expected[axis] > -ASIDE * size[axis] && expected[axis] < (1.0 + ASIDE) * size[axis];
+        if !(near(0) && near(1)) {
+            return None;
+        }
+        let mut place = place;
+        if let Some(period) = self.period {
+            place.x += period * ((other.mesh.warp(expected).x - place.x) / period).round();
+        }
+        let (low, high) = &self.bounds[number];
+        if (0..2).any(|axis| place[axis] < low[axis] || place[axis] > high[axis]) {
+            return None;
+        }
+        let pixel = other.mesh.source_of(place, expected)?;
+        let inside = (0..2).all(|axis| (0.0..=size[axis]).contains(&pixel[axis]));
+        let direction = other.camera.world_direction(pixel);
+        let seen =
+            Sight { photograph: number, pixel, direction, weight: depth(other, pixel), trust: self.trusts[number] };
+        inside.then_some(seen)
+    }
+}
+
 /// The direction in which a photograph sees a place, and how much it counts.
 #[derive(Debug, Clone, Copy)]
 struct Sight {
+    photograph: usize,
+    /// Where the photograph shows it.
+    pixel: Vector2<f64>,
+    /// By its camera.
     direction: Vector3<f64>,
     weight: f64,
     /// How far its mesh is believed, 0 to 1.
@@ -89,55 +176,44 @@ fn trust(steepest: f64) -> f64 {
     ((NONE_DEG - steepest.to_degrees()) / (NONE_DEG - WHOLE_DEG)).clamp(0.0, 1.0)
 }
 
-/// How another photograph sees the `place` that is expected in `direction`; `None` if it does not show it.
-fn sight(
-    other: &PosedPhotograph,
-    bounds: &(Vector2<f64>, Vector2<f64>),
-    place: Vector2<f64>,
-    direction: &Vector3<f64>,
-    period: Option<f64>,
-) -> Option<Sight> {
-    /// How far outside of the other photograph the camera may expect the place for a look at the mesh, as a share of
-    /// its size.
-    const ASIDE: f64 = 0.25;
-    let expected = other.camera.project(other.camera.rotation() * direction)?;
-    let size = Vector2::new(other.mesh.width, other.mesh.height);
-    let near = |axis: usize| expected[axis] > -ASIDE * size[axis] && expected[axis] < (1.0 + ASIDE) * size[axis];
-    if !(near(0) && near(1)) {
-        return None;
-    }
-    let mut place = place;
-    if let Some(period) = period {
-        place.x += period * ((other.mesh.warp(expected).x - place.x) / period).round();
-    }
-    let (low, high) = bounds;
-    if (0..2).any(|axis| place[axis] < low[axis] || place[axis] > high[axis]) {
-        return None;
-    }
-    let pixel = other.mesh.source_of(place, expected)?;
-    let inside = (0..2).all(|axis| (0.0..=size[axis]).contains(&pixel[axis]));
-    inside.then(|| Sight { direction: other.camera.world_direction(pixel), weight: depth(other, pixel), trust: 1.0 })
-}
-
 /// 1 in the middle of a photograph, 0 on its border.
 fn depth(photograph: &PosedPhotograph, pixel: Vector2<f64>) -> f64 {
     let along = |position: f64, length: f64| (2.0 * position.min(length - position) / length).max(0.0);
     along(pixel.x, photograph.mesh.width) * along(pixel.y, photograph.mesh.height)
 }
 
-/// Where a place is drawn: the mean of all sights, faded towards the own one as they contradict each other. All
-/// photographs that see the place come to the same mean and the same fading.
-fn common_direction(own: Sight, others: impl Iterator<Item = Sight>, max_parallax: f64) -> Vector3<f64> {
-    let sights: Vec<Sight> = std::iter::once(own).chain(others).collect();
-    let sum: Vector3<f64> = sights.iter().map(|sight| sight.direction * sight.weight).sum();
-    let Some(mean) = sum.try_normalize(f64::MIN_POSITIVE).filter(|_| sights.len() > 1) else { return own.direction };
+/// Where a place is drawn that is seen in the directions `seen`: their mean, faded towards the first as the cameras contradict
+/// each other. All photographs that see the place come to the same mean and the same fading.
+fn common_direction(sights: &[Sight], max_parallax: f64, seen: impl Fn(&Sight) -> Vector3<f64>) -> Vector3<f64> {
+    let own = seen(&sights[0]);
+    if sights.len() == 1 {
+        return own;
+    }
+    let (Some(mean), Some(by_cameras)) =
+        (mean_direction(sights, &seen), mean_direction(sights, |sight| sight.direction))
+    else {
+        return own;
+    };
+    own.lerp(&mean, kept(sights, &by_cameras, max_parallax) * trust_of(sights)).normalize()
+}
+
+/// The mean of the directions `seen`; `None` if none of the sights counts.
+fn mean_direction(sights: &[Sight], seen: impl Fn(&Sight) -> Vector3<f64>) -> Option<Vector3<f64>> {
+    sights.iter().map(|sight| seen(sight) * sight.weight).sum::<Vector3<f64>>().try_normalize(f64::MIN_POSITIVE)
+}
+
+/// Which share of the way to their `mean` sights go, as far as they lie from it: 1 up to half of `max_parallax`, 0 from there on.
+fn kept(sights: &[Sight], mean: &Vector3<f64>, max_parallax: f64) -> f64 {
     let counted = sights.iter().filter(|sight| sight.weight > 0.0);
-    let farthest = counted.map(|sight| sight.direction.angle(&mean)).fold(own.direction.angle(&mean), f64::max);
+    let farthest = counted.map(|sight| sight.direction.angle(mean)).fold(sights[0].direction.angle(mean), f64::max);
     let kept = (2.0 - 2.0 * farthest / max_parallax.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    let smooth = kept * kept * (3.0 - 2.0 * kept);
+    kept * kept * (3.0 - 2.0 * kept)
+}
+
+/// How far sights are believed, together.
+fn trust_of(sights: &[Sight]) -> f64 {
     let weights: f64 = sights.iter().map(|sight| sight.weight).sum();
-    let trust = sights.iter().map(|sight| sight.weight * sight.trust).sum::<f64>() / weights;
-    own.direction.lerp(&mean, smooth * trust).normalize()
+    sights.iter().map(|sight| sight.weight * sight.trust).sum::<f64>() / weights
 }
 
 #[cfg(test)]
@@ -182,9 +258,9 @@ mod tests {
     }
 
     /// Pixels that the mesh puts at the same place are drawn in the same direction; where a photograph is alone it
-    /// stays.
+    /// goes on evenly, and all but stays far from the overlap.
     #[test]
-    fn overlaps_meet_and_the_rest_stays() {
+    fn overlaps_meet_and_the_rest_goes_on() {
         let photographs = pair([4.0, -3.0]);
         let shifts = parallax_shifts(&photographs, None, 0.03);
         for pixel in [[450.0, 300.0], [600.0, 200.0], [700.0, 450.0]].map(Vector2::from) {
@@ -197,8 +273,12 @@ mod tests {
             let apart = drawn(&photographs, &shifts, 0, pixel).angle(&drawn(&photographs, &shifts, 1, same)) * 700.0;
             assert!(apart < 0.1, "{apart} px at {pixel}");
         }
-        let alone = drawn(&photographs, &shifts, 0, Vector2::new(100.0, 300.0));
-        assert!(alone.angle(&photographs[0].camera.world_direction(Vector2::new(100.0, 300.0))) < 1e-12);
+        let moved = |pixel: [f64; 2]| {
+            let pixel = Vector2::from(pixel);
+            drawn(&photographs, &shifts, 0, pixel).angle(&photographs[0].camera.world_direction(pixel)) * 700.0
+        };
+        let (beside, far) = (moved([300.0, 300.0]), moved([20.0, 300.0]));
+        assert!(beside > 0.2 && beside < 5.0 && far < beside, "{beside} and {far} px");
     }
 
     /// A mesh that contradicts its cameras by 50 pixels (4 degrees) is not believed.

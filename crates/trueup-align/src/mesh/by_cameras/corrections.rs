@@ -122,12 +122,20 @@ pub(super) struct CarriedPoint {
     pub place: Vector2<f64>,
 }
 
-/// What the other camera has at a place, as the vertex's own camera would see it.
-struct Carried {
-    /// Where, in the vertex's photograph.
-    place: Vector2<f64>,
+/// What one camera has at a place, as another would see it.
+pub(in super::super) struct Carried {
+    /// Where, in the other's photograph.
+    pub place: Vector2<f64>,
     /// How it moves as the place does: the nearest similarity, as a complex factor.
-    factor: Vector2<f64>,
+    pub factor: Vector2<f64>,
+}
+
+/// What `there` has at the pixel `seen`, as `here` would see it; `None` where it does not.
+pub(in super::super) fn carried(there: &Camera, here: &Camera, seen: Vector2<f64>) -> Option<Carried> {
+    let at = |x: f64, y: f64| there.transfer(here, seen + Vector2::new(x, y));
+    let dx = at(0.5, 0.0)? - at(-0.5, 0.0)?;
+    let dy = at(0.0, 0.5)? - at(0.0, -0.5)?;
+    Some(Carried { place: at(0.0, 0.0)?, factor: Vector2::new(dx.x + dy.y, dx.y - dy.x) / 2.0 })
 }
 
 /// All match points.
@@ -142,12 +150,8 @@ pub(super) fn points(warps: &[OverlapWarp]) -> impl Iterator<Item = CarriedPoint
 
 impl CarriedPoint {
     fn carried(&self, input: &ByCamerasInput, corrections: &CameraCorrections) -> Option<Carried> {
-        let (from, to): (&Camera, &Camera) = (&input.cameras[self.from], &input.cameras[self.to]);
         let seen = self.place + corrections.aside(self.to, self.place);
-        let at = |x: f64, y: f64| to.transfer(from, seen + Vector2::new(x, y));
-        let dx = at(0.5, 0.0)? - at(-0.5, 0.0)?;
-        let dy = at(0.0, 0.5)? - at(0.0, -0.5)?;
-        Some(Carried { place: at(0.0, 0.0)?, factor: Vector2::new(dx.x + dy.y, dx.y - dy.x) / 2.0 })
+        carried(&input.cameras[self.to], &input.cameras[self.from], seen)
     }
 
     /// How far apart the cameras alone have the two, in pixels of the vertex's photograph.

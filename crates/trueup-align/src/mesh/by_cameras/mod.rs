@@ -19,6 +19,7 @@ use trueup_core::{Result, StageContext};
 use super::options::MeshOptions;
 use super::warped_mesh::WarpedMesh;
 use corrections::CameraCorrections;
+pub(super) use corrections::carried;
 use drawing::{Drawing, Seen};
 pub use input::ByCamerasInput;
 use judgement::{Evidence, Suspicion};
