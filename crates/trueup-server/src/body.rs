@@ -1,6 +1,7 @@
 //! Bodies of requests: never longer than allowed, never slower than a person's own machine sends them. And files as bodies of
 //! answers, piece by piece.
 
+use std::io::ErrorKind;
 use std::path::Path;
 use std::pin::Pin;
 use std::task::{Context, Poll, ready};
@@ -58,22 +59,38 @@ pub(crate) async fn read(body: Body, limit: u64) -> Result<Vec<u8>, Denial> {
     Ok(whole)
 }
 
-/// Writes a body of at most `limit` bytes to a new file; returns its length. Of a body that is refused nothing is left.
+/// Writes a body of at most `limit` bytes to a new file; returns its length. Of a body that is refused nothing is left, nor of one whose sender
+/// goes away.
 ///
 /// # Errors
-/// As [`read`], and if the file cannot be written.
+/// As [`read`], if the file cannot be written, and if there is one of that name: another request's, which stays as it is.
 pub(crate) async fn save(body: Body, limit: u64, place: &Path) -> Result<u64, Denial> {
-    let saved = write(body, limit, place).await;
-    if saved.is_err() {
-        // If it cannot be removed, it goes with its folder.
-        drop(tokio::fs::remove_file(place).await);
-    }
-    saved
+    let file = File::create_new(place).await.map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => {
+            Denial::not_now("a file of this name is on its way already", "Give it another name.")
+        }
+        _ => Denial::failure(error),
+    })?;
+    let mut begun = Begun { place: Some(place) };
+    let length = write(body, limit, file).await?;
+    begun.place = None;
+    Ok(length)
 }
 
-async fn write(body: Body, limit: u64, place: &Path) -> Result<u64, Denial> {
+/// A file that is not whole: it goes however the work on it ends, also when nobody waits for the answer any more.
+struct Begun<'a> {
+    place: Option<&'a Path>,
+}
+
+impl Drop for Begun<'_> {
+    fn drop(&mut self) {
+        // If it cannot be removed, it goes with its folder.
+        let _ = self.place.map(std::fs::remove_file);
+    }
+}
+
+async fn write(body: Body, limit: u64, mut file: File) -> Result<u64, Denial> {
     let mut pieces = Pieces::new(body, limit);
-    let mut file = File::create_new(place).await.map_err(Denial::failure)?;
     while let Some(piece) = pieces.next().await? {
         file.write_all(&piece).await.map_err(Denial::failure)?;
     }
@@ -117,5 +134,47 @@ impl axum::body::HttpBody for FileBody {
                 Some(Ok(Frame::data(piece.into())))
             }
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A body whose sender has sent one piece and sends no more.
+    struct Halted(bool);
+
+    impl axum::body::HttpBody for Halted {
+        type Data = Bytes;
+        type Error = std::io::Error;
+
+        fn poll_frame(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Option<std::io::Result<Frame<Bytes>>>> {
+            match std::mem::replace(&mut self.0, true) {
+                false => Poll::Ready(Some(Ok(Frame::data(Bytes::from_static(b"half"))))),
+                true => Poll::Pending,
+            }
+        }
+    }
+
+    /// The second of two of one name neither waits for the first nor takes its file away, and that of a sender who went away is gone.
+    #[test]
+    fn a_file_is_one_requests_own_and_goes_with_it() {
+        const SOON: Duration = Duration::from_millis(200);
+        let folder = tempfile::tempdir().expect("a folder");
+        let place = folder.path().join("a.jpg");
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
+        runtime.block_on(async {
+            let mut first = Box::pin(save(Body::new(Halted(false)), 100, &place));
+            assert!(tokio::time::timeout(SOON, &mut first).await.is_err(), "it waits for more");
+            assert!(place.exists());
+            assert!(save(Body::from("whole"), 100, &place).await.is_err());
+            assert!(place.exists(), "the first one's own");
+            drop(first);
+            assert!(!place.exists(), "nobody's");
+            assert_eq!(save(Body::from("whole"), 100, &place).await.ok(), Some(5));
+            assert!(save(Body::from("too large"), 3, &folder.path().join("b.jpg")).await.is_err());
+        });
+        let left: Vec<_> = std::fs::read_dir(folder.path()).expect("readable").collect();
+        assert_eq!(left.len(), 1, "{left:?}");
     }
 }
