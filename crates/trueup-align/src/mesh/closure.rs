@@ -185,6 +185,22 @@ mod tests {
         assert!(AlignmentEnergy::new(&ring.grids, &ring.within[2..], &bases, &places).shifted(&shifted, 3).is_none());
     }
 
+    /// Ends that meet to the left of each other instead of to the right: the length of the turn comes out negative.
+    #[test]
+    fn a_turn_without_a_length_is_left_open_and_said_so() {
+        let context = StageContext::default();
+        let ring = Ring::new();
+        let options = MeshOptions::default();
+        let bases = ring.bases(1.0, &options);
+        let closure = Closure { warps: &ring.across, turns: &[-1.0, 1.0], expected: -TAU * FOCAL_PX };
+        let left_open = run(&ring.input(&bases, Some(closure)), &options, &context).expect("solvable").into_warped();
+        let found = context.findings();
+        assert_eq!((found.len(), found[0].code.as_str()), (1, "full-turn-open"));
+        assert!(found[0].message.contains("no shape"), "{}", found[0].message);
+        let plain = run(&ring.input(&bases, None), &options, &context).expect("solvable");
+        assert_eq!(left_open, plain.into_warped());
+    }
+
     #[test]
     fn ends_that_contradict_leave_the_turn_open_and_say_so() {
         let context = StageContext::default();

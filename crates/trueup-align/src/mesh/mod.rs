@@ -38,7 +38,7 @@ mod warped_mesh;
 use nalgebra::Vector2;
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::mesh::GridMesh;
-use trueup_core::{Result, StageContext};
+use trueup_core::{Error, Result, StageContext};
 
 use alignment::AlignmentEnergy;
 pub(crate) use base::tilt_from_level;
@@ -62,8 +62,8 @@ pub(crate) use warped_mesh::count_folds;
 
 /// Deforms the undeformed grids so that overlaps align and every edge keeps to its photograph's base.
 ///
-/// A full turn is closed if its ends can meet; otherwise the warning `full-turn-open` says why not, and it is left
-/// open.
+/// A full turn is closed if its ends can meet and the closed grid has a solution; otherwise the warning `full-turn-open` says why not,
+/// and it is left open.
 ///
 /// # Errors
 /// [`trueup_core::Error::Unsolvable`] if the system is not positive definite or the solution is not finite;
@@ -81,27 +81,29 @@ pub fn run<'a>(input: &MeshInput<'a>, options: &'a MeshOptions, context: &StageC
     let Some(closure) = &input.closure else { return solved(&within, &[]) };
     let mut joined = within.clone();
     joined.join(closure, grids, bases, &places);
+    // What looks at a pole from all sides can have no length of a turn in a plane.
+    let close = || match solved(&joined, closure.warps) {
+        Err(Error::Unsolvable { .. }) => Ok(None),
+        closed => closed.map(Some),
+    };
     // Ends that lie a turn apart where the photographs only shift need no look at how they lie in an open mesh, unless
     // closing folds it.
     let mut closed = None;
     let undeformed = joined.shifted(&placed(grids, &places), reference);
     if undeformed.is_some_and(|grids| closure.contradiction(&joined.apart(&grids)).is_none()) {
-        let at_once = solved(&joined, closure.warps)?;
-        if at_once.warped().folds == 0 {
-            return Ok(at_once);
+        match close()? {
+            Some(at_once) if at_once.warped().folds == 0 => return Ok(at_once),
+            at_once => closed = Some(at_once),
         }
-        closed = Some(at_once);
     }
     let open = solved(&within, &[])?;
     let contradiction = match closure.contradiction(&joined.apart(open.grids())) {
         Some(contradiction) => contradiction,
-        None => {
-            let closed = closed.map_or_else(|| solved(&joined, closure.warps), Ok)?;
-            if closed.warped().folds <= open.warped().folds {
-                return Ok(closed);
-            }
-            "closing the turn would fold the photographs".to_owned()
-        }
+        None => match closed.map_or_else(close, Ok)? {
+            Some(closed) if closed.warped().folds <= open.warped().folds => return Ok(closed),
+            Some(_) => "closing the turn would fold the photographs".to_owned(),
+            None => "the closed turn has no shape in the panorama's plane".to_owned(),
+        },
     };
     context.report(Diagnostic::warning(
         "full-turn-open",

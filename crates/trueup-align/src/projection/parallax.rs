@@ -202,7 +202,7 @@ fn mean_direction(sights: &[Sight], seen: impl Fn(&Sight) -> Vector3<f64>) -> Op
     sights.iter().map(|sight| seen(sight) * sight.weight).sum::<Vector3<f64>>().try_normalize(f64::MIN_POSITIVE)
 }
 
-/// Which share of the way to their `mean` sights go, as far as they lie from it: 1 up to half of `max_parallax`, 0 from there on.
+/// Which share of the way to their `mean` sights go, as far as they lie from it: 1 up to half of `max_parallax`, falling to 0 at all of it.
 fn kept(sights: &[Sight], mean: &Vector3<f64>, max_parallax: f64) -> f64 {
     let counted = sights.iter().filter(|sight| sight.weight > 0.0);
     let farthest = counted.map(|sight| sight.direction.angle(mean)).fold(sights[0].direction.angle(mean), f64::max);

@@ -12,12 +12,11 @@ use trueup_align::mesh::{
 };
 use trueup_align::similarity::SimilarityPrior;
 use trueup_align::warps::{self, WarpInput, WarpModel};
-use trueup_core::diagnostics::Reported;
 use trueup_core::geometry::matrix_from_rows;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
-use trueup_core::{Error, Result, StageContext};
+use trueup_core::{Result, StageContext};
 use trueup_vision::lines;
 
 use super::AlignInput;
@@ -59,7 +58,7 @@ impl Deformation<'_> {
         let closure = closure.filter(|_| component.reference_rotation == 0.0);
         let (grids, warps, reference) = (self.grids, self.warps, component.reference);
         let input = MeshInput { grids, warps, bases: &bases, reference, closure, structure };
-        let solved = self.solved_open_if_not_closed(&input, options, context)?;
+        let solved = context.gather(|context| mesh::run(&input, &options.mesh, context))?;
         // What is turned or tilted as a whole, and the published similarity, want the mesh's own plane.
         let on_sphere = options.mesh.base == BaseShape::Sphere && flat_scene.is_none();
         if on_sphere && component.reference_rotation == 0.0 && !mesh::tilts(cameras, self.prior) {
@@ -71,21 +70,6 @@ impl Deformation<'_> {
         let plain = context.absorb(solved);
         let evidence = self.evidence(&plain, options, context);
         self.refined(plain, evidence, options, context)
-    }
-
-    /// The plain mesh. One that cannot be solved closed to a full turn is laid out open: what looks at a pole from all sides can have no
-    /// length of a turn in the mesh, where the cameras draw it well.
-    fn solved_open_if_not_closed<'b>(
-        &self,
-        input: &MeshInput<'b>,
-        options: &'b AlignOptions,
-        context: &StageContext,
-    ) -> Result<Reported<PlainMesh<'b>>> {
-        let solve = |input: MeshInput<'b>| context.gather(|context| mesh::run(&input, &options.mesh, context));
-        match solve(*input) {
-            Err(Error::Unsolvable { .. }) if input.closure.is_some() => solve(MeshInput { closure: None, ..*input }),
-            solved => solved,
-        }
     }
 
     /// What the cameras draw, where the plain mesh is worse than they are.
