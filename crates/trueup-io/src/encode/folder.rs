@@ -79,21 +79,50 @@ impl PendingFolder {
             let _ = temporary.keep();
             return Ok(());
         }
-        // The temporary folder makes room for the old one: moved into a second temporary, it goes when that is dropped.
-        let parent = temporary.path().parent().unwrap_or(Path::new("."));
-        let aside = tempfile::Builder::new().prefix(PREFIX).suffix(".old").tempdir_in(parent).map_err(failed)?;
-        let old = aside.path().join("old");
-        std::fs::rename(target, &old).map_err(failed)?;
-        if let Err(error) = std::fs::rename(temporary.path(), target) {
-            // The first failure is the one to tell of; should this fail, too, the old folder must not be dropped.
-            if std::fs::rename(&old, target).is_err() {
-                let _ = aside.keep();
-            }
-            return Err(failed(error));
+        match exchange(temporary.path(), target) {
+            // The temporary name is the old folder's now, which goes with it.
+            Ok(()) => return Ok(()),
+            Err(error) if is_unknown(&error) => {}
+            Err(error) => return Err(failed(error)),
         }
-        let _ = temporary.keep();
-        Ok(())
+        replace_in_two_steps(temporary, target).map_err(failed)
     }
+}
+
+/// Two folders of one file system take each other's names, at once: there is no moment in which one has none.
+#[cfg(any(target_os = "linux", target_os = "android", target_vendor = "apple"))]
+fn exchange(one: &Path, other: &Path) -> std::io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    Ok(renameat_with(CWD, one, CWD, other, RenameFlags::EXCHANGE)?)
+}
+
+/// Elsewhere no operating system does that.
+#[cfg(not(any(target_os = "linux", target_os = "android", target_vendor = "apple")))]
+fn exchange(_one: &Path, _other: &Path) -> std::io::Result<()> {
+    Err(std::io::ErrorKind::Unsupported.into())
+}
+
+/// Whether the kernel, or the file system there, does not know how to exchange names, rather than that it would not.
+fn is_unknown(error: &std::io::Error) -> bool {
+    matches!(error.kind(), std::io::ErrorKind::Unsupported | std::io::ErrorKind::InvalidInput)
+}
+
+/// Moves the old folder into a second temporary one, with which it goes, and the new one to its place. A program that is killed between the two
+/// leaves the old one under that other name.
+fn replace_in_two_steps(temporary: TempDir, target: &Path) -> std::io::Result<()> {
+    let parent = temporary.path().parent().unwrap_or(Path::new("."));
+    let aside = tempfile::Builder::new().prefix(PREFIX).suffix(".old").tempdir_in(parent)?;
+    let old = aside.path().join("old");
+    std::fs::rename(target, &old)?;
+    if let Err(error) = std::fs::rename(temporary.path(), target) {
+        // The first failure is the one to tell of; should this fail, too, the old folder must not be dropped.
+        if std::fs::rename(&old, target).is_err() {
+            let _ = aside.keep();
+        }
+        return Err(error);
+    }
+    let _ = temporary.keep();
+    Ok(())
 }
 
 #[cfg(test)]
@@ -119,6 +148,36 @@ mod tests {
             assert_eq!(names(desk.path()), ["out"]);
             assert_eq!(names(&target), [round]);
         }
+    }
+
+    #[test]
+    fn a_file_system_that_exchanges_no_names_gets_the_new_folder_in_two_steps() {
+        let desk = tempfile::tempdir().expect("a folder");
+        let target = desk.path().join("out");
+        std::fs::create_dir(&target).expect("made");
+        std::fs::write(target.join("old"), "old").expect("written");
+        let new = tempfile::tempdir_in(desk.path()).expect("a folder");
+        std::fs::write(new.path().join("new"), "new").expect("written");
+        replace_in_two_steps(new, &target).expect("replaced");
+        assert_eq!((names(desk.path()), names(&target)), (vec!["out".to_owned()], vec!["new".to_owned()]));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn folders_exchange_their_names_and_what_does_not_exist_is_an_error_of_its_own() {
+        let desk = tempfile::tempdir().expect("a folder");
+        let [one, other] = ["one", "other"].map(|name| desk.path().join(name));
+        for folder in [&one, &other] {
+            std::fs::create_dir(folder).expect("made");
+            std::fs::write(folder.join(folder.file_name().expect("a name")), "").expect("written");
+        }
+        // A kernel older than this, or a file system that does not, is told from a refusal.
+        match exchange(&one, &other) {
+            Ok(()) => assert_eq!((names(&one), names(&other)), (vec!["other".to_owned()], vec!["one".to_owned()])),
+            Err(error) => assert!(is_unknown(&error), "{error}"),
+        }
+        let error = exchange(&one, &desk.path().join("none")).expect_err("there is none");
+        assert!(error.kind() == std::io::ErrorKind::NotFound || is_unknown(&error), "{error}");
     }
 
     #[test]

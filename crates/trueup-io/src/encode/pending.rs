@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 use std::fs::File;
-use std::io::Seek;
+use std::io::{ErrorKind, Seek};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
@@ -137,11 +137,15 @@ pub(super) fn require_folder(folder: &Path, shown: impl Display) -> Result<()> {
     Err(Error::input(shown, reason, "Create it or choose another folder."))
 }
 
-/// Why nothing can be made in `folder`.
+/// Why nothing can be made in `folder`: a disk that is full fails the program and not this one output, a folder that may not be written to is at
+/// fault itself.
 pub(crate) fn takes_nothing(folder: &Path, error: &std::io::Error) -> Error {
     // The name that was tried, which follows, is temporary and nobody's concern.
     let said = error.to_string();
     let cause = said.split(" at path ").next().unwrap_or_default();
+    if matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded) {
+        return Error::io("writing into", folder, std::io::Error::new(error.kind(), cause));
+    }
     let reason = format!("nothing can be written into this folder ({cause})");
     Error::input(folder.display(), reason, "Check its permissions or choose another folder.")
 }
@@ -155,3 +159,18 @@ pub(super) fn allow_umask(builder: &mut tempfile::Builder, mode: u32) {
 
 #[cfg(not(unix))]
 pub(super) fn allow_umask(_builder: &mut tempfile::Builder, _mode: u32) {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_disk_is_told_from_a_folder_that_takes_nothing() {
+        let folder = Path::new("out");
+        let said = |kind: ErrorKind| takes_nothing(folder, &std::io::Error::from(kind));
+        assert!(matches!(said(ErrorKind::PermissionDenied), Error::Input { subject, .. } if subject == "out"));
+        for kind in [ErrorKind::StorageFull, ErrorKind::QuotaExceeded] {
+            assert!(matches!(said(kind), Error::Io { path, source, .. } if path == folder && source.kind() == kind));
+        }
+    }
+}
