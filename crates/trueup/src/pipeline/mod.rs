@@ -37,6 +37,7 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::color::PhotographColors;
 use trueup_io::decode::FilePhotographs;
 use trueup_io::encode::Metadata;
+use trueup_vision::stacks::Fuse;
 
 use self::align::component::camera_groups;
 use self::align::{AlignInput, Geometry};
@@ -160,6 +161,8 @@ impl<'a> Stitcher<'a> {
                 frames: &looked_at.frames,
                 usable: &looked_at.usable,
                 wished: &matched.graph_file.edges,
+                images: &matched.set.images,
+                copies: self.options.measure.stacks.fuse != Fuse::None,
                 keys: &matched.keys,
                 memo,
                 workers: self.workers,

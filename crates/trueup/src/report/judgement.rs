@@ -7,6 +7,8 @@ use trueup_align::metrics::BENT_SHARE;
 use trueup_core::diagnostics::{Diagnostic, Subject};
 
 use super::measures::Measures;
+use crate::options::Evidence;
+use crate::pipeline::align::PARALLAX;
 use crate::project::record::Project;
 
 /// What a measured figure means for people.
@@ -91,6 +93,14 @@ impl Project {
     }
 }
 
+impl Project {
+    /// Whether lines and pixels aligned the overlaps, as asked or because of parallax: nothing more can be asked for.
+    pub fn asked_all_evidence(&self) -> bool {
+        self.options.align.stitch.align == Evidence::LinesPhotometric
+            || self.diagnostics.iter().any(|found| found.code == PARALLAX)
+    }
+}
+
 /// Names of the warnings below.
 const LEANING: &str = "leaning";
 const MISALIGNED: &str = "misaligned";
@@ -109,7 +119,7 @@ pub(crate) fn warnings(project: &Project) -> Vec<Diagnostic> {
     let place = |path: &str| project.images.iter().position(|image| image.path == path);
     [
         leaning(measures, &place).filter(|_| is_bad(judgement.upright)),
-        misaligned(measures, &place).filter(|_| is_bad(judgement.alignment)),
+        misaligned(project, measures, &place).filter(|_| is_bad(judgement.alignment)),
         bent(measures, &place).filter(|_| is_bad(judgement.lines)),
     ]
     .into_iter()
@@ -133,18 +143,28 @@ fn leaning(measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Optio
     ))
 }
 
-fn misaligned(measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Option<Diagnostic> {
+fn misaligned(project: &Project, measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Option<Diagnostic> {
     let found = measures.reprojection.as_ref()?;
     let worst = found.worst_pair.as_ref()?;
+    let all = match project.used() {
+        // The one pair is all there is.
+        2 => String::new(),
+        _ => format!(" (of all photographs {:.1})", found.percentile_95_px),
+    };
     Some(Diagnostic::warning(
         MISALIGNED,
         Subject::Pair(place(&worst.a)?, place(&worst.b)?),
         format!(
-            "points that both show are up to {:.1} px apart (95 of 100; of all photographs {:.1})",
-            worst.percentile_95_px, found.percentile_95_px
+            "95 of 100 points that both show lie within {:.1} px of each other, 5 farther apart{all}",
+            worst.percentile_95_px
         ),
-        "Look at the seam between them. Parallax or a false match may be the reason: leave one out, or try --align \
-         lines+photometric.",
+        if project.asked_all_evidence() {
+            "Look at the seam between them. Parallax or a false match may be the reason: leave one out, or hide with --mask what \
+             stands twice."
+        } else {
+            "Look at the seam between them. Parallax or a false match may be the reason: leave one out, or try --align \
+             lines+photometric."
+        },
     ))
 }
 
@@ -229,9 +249,21 @@ mod tests {
         );
         assert!(found[0].message.contains("to the left by 3.5 degrees, up to 3.7"), "{}", found[0].message);
         assert!(
-            found[1].message.contains("564.0 px apart (95 of 100; of all photographs 282.0)"),
+            found[1].message.ends_with("lie within 564.0 px of each other, 5 farther apart"),
             "{}",
             found[1].message
         );
+        assert!(found[1].hint.contains("--align lines+photometric"), "{}", found[1].hint);
+    }
+
+    #[test]
+    fn what_was_done_is_not_advised() {
+        let mut project = project(0.5, 282.0, 2.9);
+        let third = project.images[1].clone();
+        project.images.push(third);
+        project.diagnostics.push(Diagnostic::note(PARALLAX, Subject::stage("mesh"), "", ""));
+        let found = warnings(&project);
+        assert!(found[0].message.ends_with("5 farther apart (of all photographs 282.0)"), "{}", found[0].message);
+        assert!(found[0].hint.ends_with("hide with --mask what stands twice."), "{}", found[0].hint);
     }
 }
