@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde_json::json;
-use trueup::{Error, Evaluation, Measures, PixelEvaluation, Project, StatedEvaluation};
+use trueup::{Error, Evaluation, MatchEvaluation, Measures, PixelEvaluation, Project, Result, StatedEvaluation};
 
 use crate::arguments::EvaluateArgs;
 use crate::failure::Failure;
@@ -12,31 +12,39 @@ use crate::output;
 use crate::progress;
 use crate::summary::{self, LabeledLines};
 
-/// The pixel measures, or why there are none.
-type PixelOutcome = Result<PixelEvaluation, String>;
+/// What the photographs themselves tell, or why they do not.
+type Outcome<T> = std::result::Result<T, String>;
 
-pub(crate) fn run(args: &EvaluateArgs) -> Result<(), Failure> {
+/// What takes the photographs.
+struct Photographed {
+    matches: Outcome<MatchEvaluation>,
+    pixels: Outcome<PixelEvaluation>,
+}
+
+pub(crate) fn run(args: &EvaluateArgs) -> std::result::Result<(), Failure> {
     let project = inspect::read_to_use(&args.project)?;
     let evaluation = args.truth.as_deref().map(|truth| against(&project, &args.project, truth)).transpose()?;
-    let pixels = match args.no_pixels {
+    let photographed = match args.no_pixels {
         true => None,
-        false => Some(pixels(&project, &args.project)?),
+        false => Some(photographed(&project, &args.project)?),
     };
     if args.json {
         let whole = json!({
             "project": args.project.display().to_string(),
             "measures": project.measures.as_ref().map(Measures::without_places),
             "truth": evaluation,
-            "pixels": pixels.as_ref().and_then(|pixels| pixels.as_ref().ok()),
-            "pixels_skipped": pixels.as_ref().and_then(|pixels| pixels.as_ref().err()),
+            "matches": photographed.as_ref().and_then(|found| found.matches.as_ref().ok()),
+            "matches_skipped": photographed.as_ref().and_then(|found| found.matches.as_ref().err()),
+            "pixels": photographed.as_ref().and_then(|found| found.pixels.as_ref().ok()),
+            "pixels_skipped": photographed.as_ref().and_then(|found| found.pixels.as_ref().err()),
         });
         return output::print(&format!("{whole:#}\n"));
     }
-    output::print(&text(&project, evaluation.as_ref(), pixels.as_ref()))
+    output::print(&text(&project, evaluation.as_ref(), photographed.as_ref()))
 }
 
 /// Measures against a truth file; what does not fit is told of both files.
-fn against(project: &Project, project_file: &Path, truth_file: &Path) -> Result<Evaluation, Error> {
+fn against(project: &Project, project_file: &Path, truth_file: &Path) -> Result<Evaluation> {
     let truth = trueup::read_truth(truth_file)?;
     trueup::evaluate(project, &truth).map_err(|error| match error {
         Error::Input { subject, reason, hint } => {
@@ -48,17 +56,25 @@ fn against(project: &Project, project_file: &Path, truth_file: &Path) -> Result<
 }
 
 /// Photographs that are gone or cannot be compared leave the other measures as they are.
-fn pixels(project: &Project, project_file: &Path) -> Result<PixelOutcome, Error> {
+fn photographed(project: &Project, project_file: &Path) -> Result<Photographed> {
     let folder = project_file.parent().unwrap_or(Path::new(""));
-    match progress::shown(false, |context| trueup::evaluate_pixels(project, folder, context)) {
-        Ok(pixels) => Ok(Ok(pixels)),
+    progress::shown(false, |context| {
+        let matches = outcome(trueup::evaluate_matches(project, folder, context))?;
+        let pixels = outcome(trueup::evaluate_pixels(project, folder, context))?;
+        Ok(Photographed { matches, pixels })
+    })
+}
+
+fn outcome<T>(measured: Result<T>) -> Result<Outcome<T>> {
+    match measured {
+        Ok(found) => Ok(Ok(found)),
         Err(Error::Input { subject, reason, .. }) => Ok(Err(format!("{reason}: {subject}"))),
         Err(Error::Unsolvable { why, .. }) => Ok(Err(why)),
         Err(other) => Err(other),
     }
 }
 
-fn text(project: &Project, evaluation: Option<&Evaluation>, pixels: Option<&PixelOutcome>) -> String {
+fn text(project: &Project, evaluation: Option<&Evaluation>, photographed: Option<&Photographed>) -> String {
     let mut lines = LabeledLines::default();
     summary::measures(&mut lines, project);
     match (&project.measures, project.used()) {
@@ -69,10 +85,15 @@ fn text(project: &Project, evaluation: Option<&Evaluation>, pixels: Option<&Pixe
     if let Some(evaluation) = evaluation {
         truth(&mut lines, evaluation);
     }
-    match pixels {
-        None => {}
-        Some(Err(why)) => lines.entry("pixels", &format!("skipped: {why}")),
-        Some(Ok(found)) => compared(&mut lines, found),
+    if let Some(Photographed { matches, pixels }) = photographed {
+        match matches {
+            Err(why) => lines.entry("matches", &format!("skipped: {why}")),
+            Ok(found) => matched(&mut lines, project, found),
+        }
+        match pixels {
+            Err(why) => lines.entry("pixels", &format!("skipped: {why}")),
+            Ok(found) => compared(&mut lines, found),
+        }
     }
     lines.into_text()
 }
@@ -119,6 +140,22 @@ fn beside_the_truth(stated: &StatedEvaluation) -> String {
     let upright = upright.map(|(stated, found)| format!("upright {stated:.3} stated, {found:.3} true"));
     let gdic = stated.estimated_gdic_deg.map(|degrees| format!("GDIC {degrees:.3} estimated"));
     [Some(intervals), upright, gdic].into_iter().flatten().collect::<Vec<_>>().join("; ")
+}
+
+fn matched(lines: &mut LabeledLines, project: &Project, found: &MatchEvaluation) {
+    let MatchEvaluation { matches, pairs, rms_px, median_px, by_pair } = found;
+    let [overlaps, of_pairs] = match pairs {
+        1 => ["1 overlap".to_owned(), String::new()],
+        _ => [format!("{pairs} overlaps"), " (medians over the overlaps)".to_owned()],
+    };
+    lines.entry("matches", &format!("{matches} that are consistent, in {overlaps}"));
+    lines.item("apart", &format!("root mean square {rms_px:.2}, median {median_px:.2} px of the panorama{of_pairs}"));
+    if let Some(worst) = by_pair.iter().max_by(|one, two| one.rms_px.total_cmp(&two.rms_px)).filter(|_| *pairs > 1) {
+        let names = summary::names(&project.images);
+        let [a, b] = [&worst.a, &worst.b].map(|path| summary::name_of(path, project, &names));
+        let (rms_px, median_px) = (worst.rms_px, worst.median_px);
+        lines.item("farthest", &format!("{a} and {b}: root mean square {rms_px:.2}, median {median_px:.2} px"));
+    }
 }
 
 fn compared(lines: &mut LabeledLines, found: &PixelEvaluation) {

@@ -30,7 +30,7 @@ fn refuse(written: &[Written], messages: &MessageArgs) -> Result<(), Failure> {
     if let Some(allowed) = messages.max_error.filter(|&allowed| widest > allowed) {
         return Err(Failure::unsatisfied(
             format!("95 of 100 matched points land within {widest:.1} px, {allowed} px are allowed (--max-error)"),
-            "Look at the panorama, which is written. Leave photographs out, or try --align lines+photometric.",
+            "Look at the panorama, which is written. Leave out the photographs that its warning names, or allow more.",
         ));
     }
     let warnings = written.iter().flat_map(|one| one.project.warnings());

@@ -54,6 +54,16 @@ pub struct RecordedGravity {
     pub source: GravitySource,
 }
 
+/// What a camera recorded of how a photograph was exposed.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct RecordedExposure {
+    /// How much light the same scene came to, in stops: the logarithm to base 2 of exposure time in seconds times sensitivity (ISO) over the square of
+    /// the f-number. `None` if one of them is missing or impossible.
+    pub stops: Option<f64>,
+    /// When it was taken, to the fraction of a second that is stated: text that differs between two moments.
+    pub taken: Option<String>,
+}
+
 /// A photograph the user gave: file, size and what its metadata say. The paper's I_i.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SourceImage {
@@ -75,6 +85,9 @@ pub struct SourceImage {
     pub lens_model: Option<String>,
     /// The lens's focal length in millimeters, if stated; a zoom does not bend alike at different ones.
     pub focal_mm: Option<f64>,
+    /// How it was exposed, as far as the file says.
+    #[serde(default)]
+    pub exposure: RecordedExposure,
     /// Which way was down, if the camera recorded it.
     #[serde(default)]
     pub gravity: Option<RecordedGravity>,
@@ -91,6 +104,34 @@ pub struct SourceImage {
     /// file.
     #[serde(default)]
     pub stack: Vec<StackMember>,
+}
+
+impl SourceImage {
+    /// A picture of which nothing is known but its file and its size.
+    pub fn unknown(path: impl Into<PathBuf>, name: impl Into<String>, [width, height]: [usize; 2]) -> Self {
+        Self {
+            path: path.into(),
+            name: name.into(),
+            width,
+            height,
+            orientation: 1,
+            focal_prior: None,
+            camera_model: None,
+            lens_model: None,
+            focal_mm: None,
+            exposure: RecordedExposure::default(),
+            gravity: None,
+            lens: None,
+            is_float: false,
+            light: None,
+            stack: Vec::new(),
+        }
+    }
+
+    /// Whether the file says something of the camera that took it.
+    pub fn is_by_camera(&self) -> bool {
+        self.camera_model.is_some() || self.focal_mm.is_some() || self.focal_prior.is_some()
+    }
 }
 
 /// A file that shows the same view as another one, the stack's reference, at another exposure.

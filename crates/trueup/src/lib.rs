@@ -49,8 +49,8 @@ pub use project::{
 };
 pub use report::brightness::BrightnessStep;
 pub use report::evaluation::{
-    Evaluation, PhotographEvaluation, PixelEvaluation, StatedEvaluation, compare_overlaps, evaluate, evaluate_pixels,
-    read_truth, scale_up_to,
+    Evaluation, MatchEvaluation, PairMatchEvaluation, PhotographEvaluation, PixelEvaluation, StatedEvaluation,
+    compare_overlaps, evaluate, evaluate_matches, evaluate_pixels, read_truth, scale_up_to,
 };
 pub use report::judgement::{Judgement, Verdict};
 pub use report::measures::{

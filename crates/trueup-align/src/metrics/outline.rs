@@ -39,6 +39,15 @@ pub fn without_torn_cells(mesh: &GridMesh, turn: Option<f64>) -> GridMesh {
     whole
 }
 
+/// Whether the boxes of two photographs overlap in the panorama, on a full turn of `period` across its ends, too.
+pub fn may_overlap(a: &GridMesh, b: &GridMesh, period: Option<f64>) -> bool {
+    let ((low_a, high_a), (low_b, high_b)) = (a.bounds(), b.bounds());
+    let turns = period.map_or(vec![0.0], |period| vec![-period, 0.0, period]);
+    // A comparison with NaN is false.
+    let meet = |by: f64| low_a.x < high_b.x + by && low_b.x + by < high_a.x && low_a.y < high_b.y && low_b.y < high_a.y;
+    turns.into_iter().any(meet)
+}
+
 /// The deformed border of a photograph, a closed polygon without the vertices that are not defined, ready to be asked for many points.
 #[derive(Debug)]
 pub(super) struct Outline {
@@ -107,6 +116,15 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn boxes_meet_across_the_ends_of_a_turn() {
+        let mut b = GridMesh::regular(100.0, 80.0, 20.0);
+        let a = b.clone();
+        b.target.iter_mut().for_each(|vertex| vertex[0] += 950.0);
+        assert!(may_overlap(&a, &b, Some(1000.0)) && may_overlap(&b, &a, Some(1000.0)));
+        assert!(!may_overlap(&a, &b, None) && may_overlap(&a, &a, None));
+    }
 
     #[test]
     fn the_area_of_a_sheared_photograph_is_its_own() {

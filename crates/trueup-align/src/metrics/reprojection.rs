@@ -52,11 +52,17 @@ pub fn reprojection(pairs: &[MatchedPair], period: Option<f64>) -> Option<Reproj
 /// How far apart each match of a pair lands, in the order of the matches, measured as by [`reprojection`]; not finite where
 /// that is no number.
 pub fn match_distances(pair: &MatchedPair, period: Option<f64>) -> impl Iterator<Item = f64> {
+    let scale = |one: &PointMatch| {
+        ((squared_scale(pair.a, one.in_a.into()) + squared_scale(pair.b, one.in_b.into())) / 2.0).sqrt()
+    };
+    pair.matches.iter().zip(panorama_distances(pair, period)).map(move |(one, distance)| distance / scale(one))
+}
+
+/// How far apart each match of a pair lands, in the order of the matches, in pixels of the panorama; not finite where that is no number.
+pub fn panorama_distances(pair: &MatchedPair, period: Option<f64>) -> impl Iterator<Item = f64> {
     pair.matches.iter().map(move |one| {
-        let (p, q) = (Vector2::from(one.in_a), Vector2::from(one.in_b));
-        let scale = ((squared_scale(pair.a, p) + squared_scale(pair.b, q)) / 2.0).sqrt();
-        let way = pair.a.warp(p) - pair.b.warp(q);
-        wrap_length(way.x, period).hypot(way.y) / scale
+        let way = pair.a.warp(one.in_a.into()) - pair.b.warp(one.in_b.into());
+        wrap_length(way.x, period).hypot(way.y)
     })
 }
 

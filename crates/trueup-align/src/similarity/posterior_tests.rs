@@ -21,21 +21,24 @@ fn scene(seed: u64) -> SyntheticScene {
     with_lines(SyntheticScene::new(Sweep::default(), world, 0.0, seed), 20, 0.5)
 }
 
-/// Exact scenes err by nothing alike, so that the intervals, which allow for it, hold always; they are no wider than a
-/// lean that is seen. With lines that guided and with lines that did not.
+/// Of the true rolls 95 % are to lie within the intervals, which are no wider than a lean that is seen. With lines that guided and with lines that did
+/// not.
 #[test]
-fn true_rolls_lie_within_the_intervals() {
+fn true_rolls_lie_within_the_intervals_as_often_as_these_say() {
     for method in [PriorMethod::VanishingPoints, PriorMethod::Straightening] {
-        for seed in 0..8 {
+        let (mut holding, mut stated) = (0_u32, 0_u32);
+        for seed in 0..24 {
             let scene = scene(seed);
             let found = rolls(&scene, method).expect("vertical lines in every photograph");
             for (roll, truth) in found.iter().zip(&scene.roll) {
                 let roll = roll.expect("level photographs");
-                let error = wrap_angle(roll.roll - truth).abs();
-                assert!(error <= roll.within, "{method:?} {seed}: {error} {roll:?}");
                 assert!(roll.standard_error < roll.within && roll.within.to_degrees() < 1.0, "{roll:?}");
+                holding += u32::from(wrap_angle(roll.roll - truth).abs() <= roll.within);
+                stated += 1;
             }
         }
+        let share = f64::from(holding) / f64::from(stated);
+        assert!((0.9..=1.0).contains(&share) && stated >= 100, "{method:?}: {holding} of {stated}");
     }
 }
 

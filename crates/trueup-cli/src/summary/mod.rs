@@ -18,10 +18,11 @@ use trueup::{FlatEvidence, FlatSceneRecord, LensKind, OptionValue, Project, Seve
 use crate::words::file_size;
 
 use left_out::{LeftOut, left_out, tells_of_left_out};
-use names::{listed, names};
+use names::listed;
 
 pub(crate) use json::{json, json_of_project};
 pub(crate) use labeled_lines::LabeledLines;
+pub(crate) use names::{name_of, names};
 pub(crate) use quiet::warnings;
 
 /// Where a panorama was written; a project file does not say.
@@ -195,7 +196,7 @@ fn flat_scene(lines: &mut LabeledLines, scene: &FlatSceneRecord) {
     );
 }
 
-/// Whether vanishing points guided the panorama, with the divergence against its threshold.
+/// Whether vanishing points guided the panorama, with the divergence against its threshold; or the one reason why not.
 fn upright(project: &Project) -> String {
     let manhattan = &project.manhattan;
     let trusted = format!("up to {} is trusted", manhattan.threshold);
@@ -218,8 +219,7 @@ fn upright(project: &Project) -> String {
         ),
         (false, clause) => {
             let why = clause.as_ref().map_or(String::new(), |clause| format!(": {clause}"));
-            let numbers = divergence.map_or(String::new(), |numbers| format!(" ({numbers})"));
-            format!("not guided by vanishing points{why}{numbers}")
+            format!("not guided by vanishing points{why}")
         }
     }
 }

@@ -9,7 +9,7 @@ use trueup::{ImageRecord, Project};
 const NAMED: usize = 4;
 
 /// The file name of each photograph; the whole path where names collide.
-pub(super) fn names(images: &[ImageRecord]) -> Vec<String> {
+pub(crate) fn names(images: &[ImageRecord]) -> Vec<String> {
     let short = |image: &ImageRecord| match Path::new(&image.path).file_name() {
         Some(name) => name.to_string_lossy().into_owned(),
         None => image.path.clone(),
@@ -25,7 +25,7 @@ pub(super) fn names(images: &[ImageRecord]) -> Vec<String> {
 }
 
 /// The name that stands for a photograph's path.
-pub(super) fn name_of<'a>(path: &'a str, project: &Project, names: &'a [String]) -> &'a str {
+pub(crate) fn name_of<'a>(path: &'a str, project: &Project, names: &'a [String]) -> &'a str {
     project.images.iter().position(|image| image.path == path).map_or(path, |index| &names[index])
 }
 

@@ -32,7 +32,7 @@ fn read_through(file: &File, buffer_bytes: usize) -> Vec<String> {
         format!("{:?}", reading.whole_fields(&mut opened(), &[exif::Tag::Make, exif::Tag::GPSAltitude])),
     ];
     if let Ok(stored) = stored {
-        let source = SourceImage { width: stored.width, height: stored.height, ..nothing_known() };
+        let source = SourceImage::unknown("photograph", "photograph", [stored.width, stored.height]);
         // What is larger is none of the files here: a damaged header claims it.
         if stored.width * stored.height <= 1 << 20 {
             let decoded = reading.pixels(&source, opened());
@@ -40,25 +40,6 @@ fn read_through(file: &File, buffer_bytes: usize) -> Vec<String> {
         }
     }
     read
-}
-
-fn nothing_known() -> SourceImage {
-    SourceImage {
-        path: PathBuf::from("photograph"),
-        name: "photograph".to_owned(),
-        width: 0,
-        height: 0,
-        orientation: 1,
-        focal_prior: None,
-        camera_model: None,
-        lens_model: None,
-        focal_mm: None,
-        gravity: None,
-        lens: None,
-        is_float: false,
-        light: None,
-        stack: Vec::new(),
-    }
 }
 
 /// Files of every format that is read: those that other programs made, and those that are written here.

@@ -6,12 +6,18 @@ use exif::{Exif, In, Tag, Value};
 use tiff::decoder::Decoder;
 use tiff::decoder::ifd::Value as TiffValue;
 use tiff::tags::Tag as TiffTag;
+use trueup_core::source::RecordedExposure;
 
 use super::maker_note;
 use super::pose::StatedPose;
 use crate::provenance::description::SOFTWARE;
 
 /// EXIF 3.0 tag numbers read from a TIFF's EXIF directory (section 4.6).
+const EXPOSURE_TIME: u16 = 0x829a;
+const F_NUMBER: u16 = 0x829d;
+const SENSITIVITY: u16 = 0x8827;
+const DATE_TIME_ORIGINAL: u16 = 0x9003;
+const SUBSECONDS_ORIGINAL: u16 = 0x9291;
 const FOCAL_LENGTH: u16 = 0x920a;
 const COLOR_SPACE: u16 = 0xa001;
 const PIXEL_X_DIMENSION: u16 = 0xa002;
@@ -45,6 +51,16 @@ pub(crate) struct ExifFields {
     pub(crate) focal_plane_resolution: Option<f64>,
     /// FocalPlaneResolutionUnit: 2 inch (also where absent), 3 centimetre, 4 millimetre, 5 micrometre.
     pub(crate) focal_plane_unit: Option<u32>,
+    /// ExposureTime, seconds.
+    pub(crate) exposure_time: Option<f64>,
+    /// FNumber.
+    pub(crate) f_number: Option<f64>,
+    /// PhotographicSensitivity (ISO).
+    pub(crate) sensitivity: Option<f64>,
+    /// DateTimeOriginal, trimmed.
+    pub(crate) taken: Option<String>,
+    /// SubSecTimeOriginal, trimmed: digits behind the seconds' decimal point.
+    pub(crate) taken_subseconds: Option<String>,
     /// Make, trimmed.
     pub(crate) make: Option<String>,
     /// Model, trimmed.
@@ -82,6 +98,11 @@ impl ExifFields {
             focal_35mm: number(Tag::FocalLengthIn35mmFilm),
             focal_plane_resolution: number(Tag::FocalPlaneXResolution),
             focal_plane_unit: value(Tag::FocalPlaneResolutionUnit).and_then(|value| value.get_uint(0)),
+            exposure_time: number(Tag::ExposureTime),
+            f_number: number(Tag::FNumber),
+            sensitivity: number(Tag::PhotographicSensitivity),
+            taken: text(Tag::DateTimeOriginal),
+            taken_subseconds: text(Tag::SubSecTimeOriginal),
             make: text(Tag::Make),
             model: text(Tag::Model),
             lens_model: text(Tag::LensModel),
@@ -111,11 +132,17 @@ impl ExifFields {
         let Some(pointer) = pointer.and_then(|value| value.into_ifd_pointer().ok()) else { return Some(fields) };
         let Ok(directory) = decoder.read_directory(pointer) else { return Some(fields) };
         let mut tags = decoder.read_directory_tags(&directory);
-        fields.lens_model = text(tags.find_tag(TiffTag::from_u16_exhaustive(LENS_MODEL)).ok().flatten());
+        let mut text_of = |tag| text(tags.find_tag(TiffTag::from_u16_exhaustive(tag)).ok().flatten());
+        fields.lens_model = text_of(LENS_MODEL);
+        fields.taken = text_of(DATE_TIME_ORIGINAL);
+        fields.taken_subseconds = text_of(SUBSECONDS_ORIGINAL);
         let mut number = |tag| {
             let value = tags.find_tag(TiffTag::from_u16_exhaustive(tag)).ok().flatten()?;
             first_tiff_number(value)
         };
+        fields.exposure_time = number(EXPOSURE_TIME);
+        fields.f_number = number(F_NUMBER);
+        fields.sensitivity = number(SENSITIVITY);
         fields.pixel_width = number(PIXEL_X_DIMENSION);
         fields.pixel_height = number(PIXEL_Y_DIMENSION);
         fields.focal_mm = number(FOCAL_LENGTH);
@@ -125,6 +152,21 @@ impl ExifFields {
         fields.custom_rendered = number(CUSTOM_RENDERED).map(|rendered| rendered as u32);
         fields.focal_plane_unit = number(FOCAL_PLANE_RESOLUTION_UNIT).map(|unit| unit as u32);
         Some(fields)
+    }
+
+    /// How it was exposed. Moments without a digit other than 0 are those of a clock that was never set.
+    pub(crate) fn exposure(&self) -> RecordedExposure {
+        let positive = |value: Option<f64>| value.filter(|value| value.is_finite() && *value > 0.0);
+        let light = positive(self.exposure_time)
+            .zip(positive(self.sensitivity))
+            .zip(positive(self.f_number))
+            .map(|((seconds, sensitivity), f_number)| (seconds * sensitivity / (f_number * f_number)).log2());
+        let is_set = |text: &&String| text.bytes().any(|byte| (b'1'..=b'9').contains(&byte));
+        let taken = self.taken.as_ref().filter(is_set).map(|second| match &self.taken_subseconds {
+            Some(fraction) => format!("{second}.{fraction}"),
+            None => second.clone(),
+        });
+        RecordedExposure { stops: light.filter(|stops| stops.is_finite()), taken }
     }
 
     /// Whether the picture names this program, of any version, as its maker.
@@ -176,4 +218,27 @@ fn first_tiff_number(value: TiffValue) -> Option<f64> {
 fn trimmed(text: &str) -> Option<String> {
     let text = text.trim_matches(|character: char| character.is_whitespace() || character == '\0');
     (!text.is_empty()).then(|| text.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 1/250 s at ISO 200 and f/4: 0.8 / 16 = 0.05, of which the logarithm to base 2 is -4.3219.
+    #[test]
+    fn an_exposure_is_told_in_stops_and_its_moment_with_its_fraction() {
+        let fields = ExifFields {
+            exposure_time: Some(1.0 / 250.0),
+            sensitivity: Some(200.0),
+            f_number: Some(4.0),
+            taken: Some("2024:05:04 10:00:01".to_owned()),
+            taken_subseconds: Some("25".to_owned()),
+            ..ExifFields::default()
+        };
+        let exposure = fields.exposure();
+        assert!(exposure.stops.is_some_and(|stops| (stops + 4.321_928).abs() < 1e-6), "{exposure:?}");
+        assert_eq!(exposure.taken.as_deref(), Some("2024:05:04 10:00:01.25"));
+        let unset = ExifFields { f_number: Some(0.0), taken: Some("0000:00:00 00:00:00".to_owned()), ..fields };
+        assert_eq!(unset.exposure(), RecordedExposure::default());
+    }
 }

@@ -44,22 +44,7 @@ impl InMemory {
 /// What is known of a photograph in memory that goes by `path`.
 pub(super) fn in_memory_source(path: PathBuf, name: &str, photograph: &Photograph) -> Result<SourceImage, Rejection> {
     refuse_name_of_a_file(&path)?;
-    Ok(SourceImage {
-        path,
-        name: name.to_owned(),
-        width: photograph.width(),
-        height: photograph.height(),
-        orientation: 1,
-        focal_prior: None,
-        camera_model: None,
-        lens_model: None,
-        focal_mm: None,
-        gravity: None,
-        lens: None,
-        is_float: false,
-        light: None,
-        stack: Vec::new(),
-    })
+    Ok(SourceImage::unknown(path, name, [photograph.width(), photograph.height()]))
 }
 
 /// A photograph goes by its name wherever its file is asked for what it says of itself: that of another would answer.

@@ -248,22 +248,18 @@ fn examine(
     let gravity = header.gravity(stated, orientation);
     let camera_model = header.exif.camera_model();
     let Header { exif, .. } = header;
+    let exposure = exif.exposure();
     let focal_mm = exif.focal_mm.filter(|focal_mm| focal_mm.is_finite() && *focal_mm > 0.0);
     Ok(SourceImage {
-        path,
-        name: name.to_owned(),
-        width,
-        height,
         orientation,
         focal_prior,
         camera_model,
         lens_model: exif.lens_model,
         focal_mm,
+        exposure,
         gravity,
-        lens: None,
         is_float: stored.is_float,
-        light: None,
-        stack: Vec::new(),
+        ..SourceImage::unknown(path, name, [width, height])
     })
 }
 

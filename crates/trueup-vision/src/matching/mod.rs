@@ -4,9 +4,12 @@
 //! (`ransac`), the pair is judged by how many do (`pair`), and the matches of a joined pair are completed by further planes
 //! (`planes`) and by a second look near the predicted places (`guided`). Where a lens bends so that no homography holds, turns
 //! are sought on rays (`turned`), and stand in for homography and planes. What the pairs show of each other tells which pictures are
-//! no photographs of the scene (`strangers`).
+//! no photographs of the scene (`strangers`). Whether or not homographies explain it, `consistent` finds what two photographs show alike, to measure
+//! a panorama by (`epipolar`).
 
+mod consistent;
 mod duplicates;
+mod epipolar;
 mod guided;
 mod local;
 mod matched_points;
@@ -30,11 +33,12 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 
+pub use consistent::{SeenFeatures, consistent_matches};
 pub use duplicates::report_near_duplicates;
 pub use options::MatchingOptions;
 pub use putative::{PutativeMatch, putative_matches};
 pub use search::{Nearest, Neighbor, SearchKernel};
-pub use strangers::{Stranger, StrangerKind, find_strangers};
+pub use strangers::{Stranger, StrangerKind, StrangersInput, find_strangers};
 
 pub(crate) use overlap::PredictedOverlap;
 pub(crate) use search::squared_distances;

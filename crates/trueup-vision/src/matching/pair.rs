@@ -18,10 +18,10 @@ use super::turned::{TurnConsensus, find_turned_lens};
 use crate::features::Features;
 
 /// See [`PairInput::compared_features`]. More would find smaller overlaps; the time grows with the square.
-const COMPARED_FEATURES: usize = 4000;
+pub(super) const COMPARED_FEATURES: usize = 4000;
 
 /// Largest number of samples drawn for the global homography. More would find pairs of which fewer matches agree.
-const MAX_SAMPLES: usize = 6000;
+pub(super) const MAX_SAMPLES: usize = 6000;
 
 /// alpha of the Brown-Lowe test: a pair is joined if more than alpha + beta n_f of its n_f matches in the predicted overlap
 /// agree (Brown and Lowe, section 3.2).
@@ -288,7 +288,7 @@ impl JoinedPair<'_> {
 }
 
 /// A number that tells the features of one photograph from those of another.
-fn fingerprint(features: &Features) -> u64 {
+pub(super) fn fingerprint(features: &Features) -> u64 {
     // FNV-1a over whole words, turned so that high bits count.
     const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
     const PRIME: u64 = 0x0000_0100_0000_01b3;
@@ -297,12 +297,12 @@ fn fingerprint(features: &Features) -> u64 {
 }
 
 /// Most distinctive first.
-fn by_distinctiveness(mut putative: Vec<PutativeMatch>) -> Vec<PutativeMatch> {
+pub(super) fn by_distinctiveness(mut putative: Vec<PutativeMatch>) -> Vec<PutativeMatch> {
     putative.sort_by(|j, k| j.ratio.total_cmp(&k.ratio).then(j.point_a.cmp(&k.point_a)));
     putative
 }
 
-fn matched_points(putative: &[PutativeMatch]) -> MatchedPoints {
+pub(super) fn matched_points(putative: &[PutativeMatch]) -> MatchedPoints {
     MatchedPoints {
         in_a: putative.iter().map(|candidate| candidate.at.in_a.into()).collect(),
         in_b: putative.iter().map(|candidate| candidate.at.in_b.into()).collect(),

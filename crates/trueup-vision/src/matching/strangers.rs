@@ -1,13 +1,13 @@
-//! Pictures among the photographs that are none: panoramas made of the others, and reduced copies of one of them.
+//! Pictures among the photographs that are none: panoramas made of the others, and copies of one of them, reduced or edited.
 //!
-//! Both spoil a panorama: the first is bent by its projection and blended already, so that no camera has seen it, the second
-//! adds nothing but its coarse pixels.
+//! They spoil a panorama: the first is bent by its projection and blended already, so that no camera has seen it, copies
+//! add nothing but coarse pixels or other tones.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix3, Vector2};
 use trueup_core::geometry::Homography;
-use trueup_core::matches::PairMatches;
+use trueup_core::matches::{PairMatches, PointMatch};
 use trueup_core::source::WorkingFrame;
 
 use super::overlap::PredictedOverlap;
@@ -29,7 +29,13 @@ pub enum StrangerKind {
         /// The photograph's number.
         of: usize,
     },
-    /// It shows all that each of `of` shows, on a format that no camera has.
+    /// It is the photograph `of` itself with other tones, compression or size: everything lies at the same place to a fraction of a pixel.
+    EditedCopy {
+        /// The photograph's number.
+        of: usize,
+    },
+    /// It shows all that each of `of` shows, on a format that no camera has; or, on any format, nothing but what they show together, with no more
+    /// detail.
     Panorama {
         /// At least two photographs' numbers, ascending.
         of: Vec<usize>,
@@ -62,26 +68,57 @@ const CAMERA_FORMATS: [f64; 5] = [1.0, 5.0 / 4.0, 4.0 / 3.0, 3.0 / 2.0, 16.0 / 9
 const FORMAT_TOLERANCE: f64 = 0.015;
 /// Sides that differ by less, as a part, are the same: lens corrections cost a few pixels.
 const SAME_SIDE: f64 = 0.01;
+/// A picture of a camera's format is a panorama if its photographs lie in it by this share of their area at least, ...
+const INSIDE: f64 = 0.8;
+/// ... each covers this share of it at most: neighbors in a row that overlap as far have the size of their neighbors, ...
+const PART: f64 = 0.5;
+/// ... together they cover this share of it, short of what a homography errs by on a bent one: a wider lens would have seen something beyond them, or
+/// nothing that they do not show, ...
+const NOTHING_ELSE: f64 = 0.95;
+/// ... and none is enlarged in it by more than this, as lengths go: leaving it out loses no detail.
+const MOST_ENLARGED: f64 = 1.25;
+/// Median distance of matches from the same place in both, working pixels, up to which two pictures are of one exposure: hands, and wind on a tripod, move a
+/// camera by more between two.
+const SAME_PLACE_PX: f64 = 0.2;
 /// Points on a side of the grid by which shares of areas are counted.
 const GRID: usize = 16;
 
-/// The pictures that `pairs` show to be none of the scene's photographs; `frames` has one for each, ascending by number.
+/// What strangers are told by. Lists have an entry per photograph.
+#[derive(Debug, Clone, Copy)]
+pub struct StrangersInput<'a> {
+    /// The frames that the photographs were matched in.
+    pub frames: &'a [WorkingFrame],
+    /// Every pair tried.
+    pub pairs: &'a [PairMatches],
+    /// Whether a camera's metadata are in the file: of copies, such a one is the original.
+    pub by_camera: &'a [bool],
+    /// When each was taken, as far as its file says. What was taken at two moments is no copy.
+    pub taken: &'a [Option<String>],
+    /// Whether edited copies are looked for: not where several exposures of a view are to be stitched as they are.
+    pub copies: bool,
+}
+
+/// The pictures that the pairs show to be none of the scene's photographs, ascending by number.
 ///
-/// Overlaps of lenses that bend are not looked at: they have no homography.
-pub fn find_strangers(frames: &[WorkingFrame], pairs: &[PairMatches]) -> Vec<Stranger> {
-    // A stranger is of another size than what it shows; in most sets there is only one.
-    if frames.windows(2).all(|two| sides(&two[0]) == sides(&two[1])) {
-        return Vec::new();
+/// Overlaps of lenses that bend are not looked at: they have no homography. Edited copies are left where nothing else would overlap.
+pub fn find_strangers(input: &StrangersInput) -> Vec<Stranger> {
+    let StrangersInput { frames, pairs, .. } = *input;
+    let views: Vec<SharedView> = pairs.iter().filter_map(|pair| SharedView::of(pair, input)).collect();
+    let mut copies = reduced_copies(&views, frames);
+    if input.copies {
+        let edited = edited_copies(&views, &copies, input);
+        let is_left = |photograph| !edited.contains_key(&photograph) && !copies.contains_key(&photograph);
+        if views.iter().any(|view| is_left(view.a) && is_left(view.b)) {
+            copies.extend(edited);
+        }
     }
-    let views: Vec<SharedView> = pairs.iter().filter_map(|pair| SharedView::of(pair, frames)).collect();
-    let copies = reduced_copies(&views, frames);
     let panorama = |photograph: &usize| {
         let of = shown_of(*photograph, &views, &copies, frames)?;
         Some(Stranger { photograph: *photograph, kind: StrangerKind::Panorama { of } })
     };
-    let copy = |(&photograph, &of): (&usize, &usize)| Stranger { photograph, kind: StrangerKind::ReducedCopy { of } };
     let originals: Vec<usize> = (0..frames.len()).filter(|photograph| !copies.contains_key(photograph)).collect();
-    let mut strangers: Vec<Stranger> = copies.iter().map(copy).chain(originals.iter().filter_map(panorama)).collect();
+    let copied = copies.iter().map(|(&photograph, kind)| Stranger { photograph, kind: kind.clone() });
+    let mut strangers: Vec<Stranger> = copied.chain(originals.iter().filter_map(panorama)).collect();
     strangers.sort_by_key(|stranger| stranger.photograph);
     strangers
 }
@@ -96,21 +133,38 @@ struct SharedView {
     of_b: Vec<bool>,
     /// Share of the matches in the overlap that agree.
     agreeing: f64,
+    /// By how much a enlarges what b shows, as lengths in working pixels go, in the middle of b.
+    enlarged_in_a: f64,
+    /// Whether everything lies at the same place in both, and nothing says that they were taken at two moments.
+    is_one_exposure: bool,
 }
 
 impl SharedView {
-    fn of(pair: &PairMatches, frames: &[WorkingFrame]) -> Option<Self> {
+    fn of(pair: &PairMatches, input: &StrangersInput) -> Option<Self> {
+        let frames = input.frames;
         let (frame_a, frame_b) = (frames.get(pair.a)?, frames.get(pair.b)?);
         let [x, y, w] = pair.b_from_a.filter(|_| pair.verdict.is_joined())?;
         let b_from_a = Homography(Matrix3::from_row_slice(&[x, y, w].concat()));
         let overlap = PredictedOverlap::new(b_from_a, frame_a, frame_b)?;
+        let middle_of_b = Vector2::new(frame_b.width, frame_b.height) / 2.0;
+        let enlarged_in_a = b_from_a.inverse()?.jacobian(middle_of_b).determinant().abs().sqrt();
+        let moments = [pair.a, pair.b].map(|one| input.taken.get(one).and_then(Option::as_ref));
+        let is_one_moment = !matches!(moments, [Some(one), Some(other)] if one != other);
         Some(Self {
+            enlarged_in_a,
+            is_one_exposure: is_one_moment && moved_px(pair, frame_a, frame_b) <= SAME_PLACE_PX,
             a: pair.a,
             b: pair.b,
             of_a: cells(frame_a).map(|at| overlap.point_in_b(at).is_some()).collect(),
             of_b: cells(frame_b).map(|at| overlap.point_in_a(at).is_some()).collect(),
             agreeing: pair.agreeing as f64 / pair.in_overlap.max(1) as f64,
         })
+    }
+
+    /// By how much `photograph` enlarges what the other one shows, as lengths in pixels of the files go.
+    fn enlarged_in(&self, photograph: usize, frames: &[WorkingFrame]) -> f64 {
+        let in_files = frames[self.b].working_from_full / frames[self.a].working_from_full;
+        if photograph == self.a { self.enlarged_in_a * in_files } else { (self.enlarged_in_a * in_files).recip() }
     }
 
     /// The other photograph, the cells of `photograph` that it shows, and its cells that `photograph` shows; `None` if the
@@ -126,6 +180,15 @@ impl SharedView {
     fn is_same(&self) -> bool {
         self.agreeing >= SAME_EXPOSURE && share(&self.of_a) >= SAME_VIEW && share(&self.of_b) >= SAME_VIEW
     }
+}
+
+/// Median distance of a pair's matches from the same place in both, in working pixels of b; infinite without matches.
+fn moved_px(pair: &PairMatches, frame_a: &WorkingFrame, frame_b: &WorkingFrame) -> f64 {
+    let scale = [frame_b.width / frame_a.width, frame_b.height / frame_a.height];
+    let moved = |one: &PointMatch| (one.in_b[0] - scale[0] * one.in_a[0]).hypot(one.in_b[1] - scale[1] * one.in_a[1]);
+    let mut moved: Vec<f64> = pair.inliers.iter().map(moved).collect();
+    moved.sort_by(f64::total_cmp);
+    moved.get(moved.len() / 2).copied().unwrap_or(f64::INFINITY)
 }
 
 /// The middles of a photograph's cells, row by row.
@@ -149,8 +212,8 @@ fn alike(one: f64, other: f64, tolerance: f64) -> bool {
     (one - other).abs() <= tolerance * one.max(other)
 }
 
-/// By the number of each reduced copy that of the largest picture of its view.
-fn reduced_copies(views: &[SharedView], frames: &[WorkingFrame]) -> BTreeMap<usize, usize> {
+/// By the number of each reduced copy the largest picture of its view.
+fn reduced_copies(views: &[SharedView], frames: &[WorkingFrame]) -> BTreeMap<usize, StrangerKind> {
     let mut copies: BTreeMap<usize, usize> = BTreeMap::new();
     for view in views.iter().filter(|view| view.is_same()) {
         let long = |photograph: usize| sides(&frames[photograph])[0];
@@ -160,20 +223,51 @@ fn reduced_copies(views: &[SharedView], frames: &[WorkingFrame]) -> BTreeMap<usi
             *of = if long(large) > long(*of) { large } else { *of };
         }
     }
-    copies
+    copies.into_iter().map(|(small, of)| (small, StrangerKind::ReducedCopy { of })).collect()
+}
+
+/// By the number of each edited copy its original: the picture of that exposure with a camera's metadata, of these the largest, of these the first.
+fn edited_copies(
+    views: &[SharedView],
+    reduced: &BTreeMap<usize, StrangerKind>,
+    input: &StrangersInput,
+) -> BTreeMap<usize, StrangerKind> {
+    let area = |photograph: usize| sides(&input.frames[photograph]).iter().product::<f64>();
+    let by_camera = |photograph: usize| input.by_camera.get(photograph).copied().unwrap_or(false);
+    let mut of: BTreeMap<usize, usize> = BTreeMap::new();
+    let is_reduced = |photograph| reduced.contains_key(&photograph);
+    for view in views.iter().filter(|view| view.is_same() && view.is_one_exposure) {
+        if is_reduced(view.a) || is_reduced(view.b) {
+            continue;
+        }
+        // `a` has the smaller number.
+        let b_is_original =
+            by_camera(view.b).cmp(&by_camera(view.a)).then(area(view.b).total_cmp(&area(view.a))).is_gt();
+        let (copy, original) = if b_is_original { (view.a, view.b) } else { (view.b, view.a) };
+        of.entry(copy).or_insert(original);
+    }
+    let original = |copy: usize| {
+        let mut original = copy;
+        // Each step leads to a better one, so that it ends.
+        while let Some(&next) = of.get(&original) {
+            original = next;
+        }
+        original
+    };
+    of.keys().map(|&copy| (copy, StrangerKind::EditedCopy { of: original(copy) })).collect()
 }
 
 /// The photographs that `picture` shows, if it is a panorama made of them.
 fn shown_of(
     picture: usize,
     views: &[SharedView],
-    copies: &BTreeMap<usize, usize>,
+    copies: &BTreeMap<usize, StrangerKind>,
     frames: &[WorkingFrame],
 ) -> Option<Vec<usize>> {
     let of_picture = sides(&frames[picture]);
     let format = of_picture[0] / of_picture[1];
     if CAMERA_FORMATS.iter().any(|camera| alike(format, *camera, FORMAT_TOLERANCE)) {
-        return None;
+        return superfluous_beside(picture, views, copies, frames);
     }
     let mut covered = vec![false; GRID * GRID];
     let (mut whole, mut mostly) = (BTreeSet::new(), BTreeSet::new());
@@ -202,11 +296,50 @@ fn shown_of(
     (several(&mostly) && covered >= CROPPED_COVERED).then(|| mostly.into_iter().collect())
 }
 
+/// The photographs that together show all that `picture` does, with as much detail, and overlap each other without it: it is a panorama of them, or adds no
+/// more than one would. `None` if there are none.
+fn superfluous_beside(
+    picture: usize,
+    views: &[SharedView],
+    copies: &BTreeMap<usize, StrangerKind>,
+    frames: &[WorkingFrame],
+) -> Option<Vec<usize>> {
+    let mut covered = vec![false; GRID * GRID];
+    let mut inside = BTreeSet::new();
+    for view in views {
+        let Some((other, of_picture_shown, of_other_shown)) = view.seen_from(picture) else { continue };
+        let is_part = share(of_other_shown) >= INSIDE
+            && share(of_picture_shown) <= PART
+            && view.enlarged_in(picture, frames) <= MOST_ENLARGED;
+        if is_part && !copies.contains_key(&other) {
+            covered.iter_mut().zip(of_picture_shown).for_each(|(covered, shown)| *covered |= shown);
+            inside.insert(other);
+        }
+    }
+    // What shows the same view counts once.
+    let among = |view: &&SharedView| inside.contains(&view.a) && inside.contains(&view.b);
+    let same = views.iter().filter(among).filter(|view| view.is_same()).count();
+    let is_all = inside.len() >= MIN_SHOWN + same && share(&covered) >= NOTHING_ELSE;
+    let first = *inside.first()?;
+    let mut reached = BTreeSet::from([first]);
+    while let Some(view) =
+        views.iter().filter(among).find(|view| reached.contains(&view.a) != reached.contains(&view.b))
+    {
+        reached.extend([view.a, view.b]);
+    }
+    (is_all && reached == inside).then(|| inside.into_iter().collect())
+}
+
 #[cfg(test)]
 mod tests {
     use trueup_core::matches::PairVerdict;
 
     use super::*;
+
+    /// Files of which nothing is known.
+    fn found(frames: &[WorkingFrame], pairs: &[PairMatches]) -> Vec<Stranger> {
+        find_strangers(&StrangersInput { frames, pairs, by_camera: &[], taken: &[], copies: true })
+    }
 
     /// Joined by what moves a point of `a` by (`right`, `down`) into `b` and makes it `scale` times as large.
     fn pair(a: usize, b: usize, scale: f64, right: f64, down: f64) -> PairMatches {
@@ -244,7 +377,7 @@ mod tests {
             pair(1, 3, 1.0, left + 150.0, 5.0),
             pair(2, 3, 1.0, left + 300.0, 5.0),
         ];
-        find_strangers(&frames, &pairs)
+        found(&frames, &pairs)
     }
 
     #[test]
@@ -265,7 +398,7 @@ mod tests {
             pair(2, 3, 1.0, 295.0, -25.0),
         ];
         let expected = Stranger { photograph: 3, kind: StrangerKind::Panorama { of: vec![0, 1, 2] } };
-        assert_eq!(find_strangers(&frames, &pairs), [expected]);
+        assert_eq!(found(&frames, &pairs), [expected]);
     }
 
     /// Larger than its neighbors, which show most of it, each.
@@ -273,13 +406,44 @@ mod tests {
     fn a_photograph_of_another_size_in_a_dense_row_is_one() {
         let frames = frames(&[[600.0, 400.0], [600.0, 400.0], [660.0, 390.0]]);
         let pairs = [pair(0, 1, 1.0, -120.0, 0.0), pair(0, 2, 1.0, -45.0, 0.0), pair(1, 2, 1.0, 75.0, 0.0)];
-        assert_eq!(find_strangers(&frames, &pairs), []);
+        assert_eq!(found(&frames, &pairs), []);
     }
 
-    /// 1,215 x 810 is a camera's format: a camera with a wider lens may have seen all of them.
+    /// 1,215 x 810 is a camera's format: a camera with a wider lens may have seen all of them, and what lies above and below.
     #[test]
     fn what_a_camera_can_have_taken_is_a_photograph() {
         assert_eq!(row_and([1215.0, 810.0], 10.0), []);
+    }
+
+    /// Two rows of two, which together show 900 x 600 in full pixels, and as number 4 a picture of that size in which their lengths are `scale` times
+    /// theirs, that begins `left` working pixels left of them.
+    fn block_and(scale: f64, left: f64) -> Vec<Stranger> {
+        let corners = [[0.0, 0.0], [150.0, 0.0], [0.0, 100.0], [150.0, 100.0]];
+        let mut frames = frames(&[[600.0, 400.0]; 4]);
+        frames.push(WorkingFrame { width: 450.0 * scale, height: 300.0 * scale, working_from_full: 0.5 });
+        let mut pairs = Vec::new();
+        for (b, at_b) in corners.iter().enumerate() {
+            pairs.extend((0..b).map(|a| pair(a, b, 1.0, corners[a][0] - at_b[0], corners[a][1] - at_b[1])));
+            pairs.push(pair(b, 4, scale, scale * (at_b[0] + left), scale * at_b[1]));
+        }
+        found(&frames, &pairs)
+    }
+
+    #[test]
+    fn a_panorama_of_a_cameras_format_shows_nothing_but_its_photographs() {
+        let expected = [Stranger { photograph: 4, kind: StrangerKind::Panorama { of: vec![0, 1, 2, 3] } }];
+        assert_eq!(block_and(1.0, 0.0), expected);
+        assert_eq!(block_and(0.5, 0.0), expected);
+        // It shows more detail than they do, or a tenth of it lies beside them.
+        assert_eq!(block_and(1.4, 0.0), []);
+        assert_eq!(block_and(1.0, 45.0), []);
+    }
+
+    /// Without it, the left and the right half would not overlap.
+    #[test]
+    fn what_holds_the_others_together_is_a_photograph() {
+        let frames = frames(&[[600.0, 800.0], [600.0, 800.0], [1200.0, 800.0]]);
+        assert_eq!(found(&frames, &[pair(0, 2, 1.0, 0.0, 0.0), pair(1, 2, 1.0, 300.0, 0.0)]), []);
     }
 
     /// It shows the three, and as much beside them: 600 of 2,600 columns are theirs.
@@ -292,7 +456,7 @@ mod tests {
     fn neighbors_in_a_row_are_photographs() {
         let frames = frames(&[[610.0, 350.0]; 4]);
         let pairs = [pair(0, 1, 1.0, -20.0, 0.0), pair(1, 2, 1.0, -20.0, 0.0), pair(0, 2, 1.0, -10.0, 0.0)];
-        assert_eq!(find_strangers(&frames, &pairs), []);
+        assert_eq!(found(&frames, &pairs), []);
     }
 
     #[test]
@@ -307,13 +471,49 @@ mod tests {
             pair(1, 3, 0.5, 0.0, 0.0),
         ];
         let copy = |photograph, of| Stranger { photograph, kind: StrangerKind::ReducedCopy { of } };
-        assert_eq!(find_strangers(&frames, &pairs), [copy(0, 1), copy(3, 1)]);
+        assert_eq!(found(&frames, &pairs), [copy(0, 1), copy(3, 1)]);
     }
 
     /// A part of the view, enlarged: it may be of a longer lens.
     #[test]
     fn a_part_of_a_view_is_a_photograph() {
         let frames = frames(&[[300.0, 200.0], [600.0, 400.0]]);
-        assert_eq!(find_strangers(&frames, &[pair(0, 1, 1.0, 60.0, 40.0)]), []);
+        assert_eq!(found(&frames, &[pair(0, 1, 1.0, 60.0, 40.0)]), []);
+    }
+
+    /// The same view, with matches `off` working pixels from the same place.
+    fn same_place(a: usize, b: usize, off: f64) -> PairMatches {
+        let matched = |k: usize| {
+            let at = [10.0 + 3.0 * k as f64, 20.0 + 2.0 * k as f64];
+            PointMatch { in_a: at, in_b: [at[0] + off, at[1]] }
+        };
+        PairMatches { inliers: (0..60).map(matched).collect(), ..pair(a, b, 1.0, off, 0.0) }
+    }
+
+    /// A row of three photographs, and as number 3 a picture of the second one's view.
+    fn row_with_copy(off: f64, by_camera: &[bool], taken: &[Option<String>], copies: bool) -> Vec<Stranger> {
+        let frames = frames(&[[600.0, 400.0], [600.0, 400.0], [600.0, 400.0], [620.0, 413.0]]);
+        let mut frames = frames;
+        frames[3] = WorkingFrame { working_from_full: 0.5 / 1.03, ..frames[1] };
+        let mut pairs = vec![pair(0, 1, 1.0, -150.0, 0.0), pair(1, 2, 1.0, -150.0, 0.0), same_place(1, 3, off)];
+        pairs.push(pair(0, 3, 1.0, -150.0, 0.0));
+        find_strangers(&StrangersInput { frames: &frames, pairs: &pairs, by_camera, taken, copies })
+    }
+
+    #[test]
+    fn of_copies_the_one_with_metadata_is_kept_or_the_larger() {
+        let copy = |photograph, of| [Stranger { photograph, kind: StrangerKind::EditedCopy { of } }];
+        assert_eq!(row_with_copy(0.1, &[true, true, true, false], &[], true), copy(3, 1));
+        assert_eq!(row_with_copy(0.1, &[], &[], true), copy(1, 3));
+        // Another photograph of the same view, and what is not to be looked for.
+        assert_eq!(row_with_copy(0.8, &[], &[], true), []);
+        assert_eq!(row_with_copy(0.1, &[], &[], false), []);
+        let taken = ["1", "2", "3", "4"].map(|second| Some(format!("2024:05:04 10:00:0{second}")));
+        assert_eq!(row_with_copy(0.1, &[], &taken, true), []);
+    }
+
+    #[test]
+    fn two_copies_alone_are_both_kept() {
+        assert_eq!(found(&frames(&[[600.0, 400.0]; 2]), &[same_place(0, 1, 0.0)]), []);
     }
 }

@@ -3,7 +3,8 @@
 //! Exposures differ in more than a factor: cameras bend their tones, and clip them. Two of one view are alike in that the brighter of two
 //! places is the brighter one in both, so that one relation of tones, which never falls, makes the one of the other. Where the details
 //! that are left agree, within a small shift, the view is the same (`likeness`, `same_view`). Neighbors of a row agree nowhere but
-//! within the overlap, at shifts that are not searched.
+//! within the overlap, at shifts that are not searched. What cameras recorded of their exposures has a voice: of one exposure there is no stack,
+//! however the pictures differ, and where both say the same, less of a picture must tell.
 //!
 //! # Source
 //! Debevec and Malik, "Recovering high dynamic range radiance maps from photographs", SIGGRAPH 1997, for what a bracket is; Ward, "Fast,
@@ -68,6 +69,8 @@ pub struct StackCandidate<'a> {
     pub thumbnail: Option<&'a Raster<u8>>,
     /// Those of one number have one size and lens.
     pub camera: usize,
+    /// How much light the camera recorded that it took, in stops, if it did.
+    pub recorded_stops: Option<f64>,
 }
 
 /// A stack among the candidates.
@@ -102,7 +105,9 @@ pub fn find(candidates: &[StackCandidate]) -> Vec<FoundStack> {
         let following = a + 1..(a + 1 + LOOK_AHEAD).min(candidates.len());
         let with = |b: usize| {
             let alike = candidates[a].camera == candidates[b].camera && size(a) == size(b);
-            let found = if alike { same_view(copies[a].as_ref()?, copies[b].as_ref()?) } else { None };
+            let recorded = [a, b].map(|one| candidates[one].recorded_stops);
+            let recorded = recorded[1].zip(recorded[0]).map(|(of_b, of_a)| of_b - of_a);
+            let found = if alike { same_view(copies[a].as_ref()?, copies[b].as_ref()?, recorded) } else { None };
             Some(((a, b), found?))
         };
         following.filter_map(with).collect::<Vec<_>>()

@@ -21,6 +21,15 @@ const LEAST_BRIGHTER: f64 = 1.05;
 /// Share of the picture in which both must tell something.
 const LEAST_TOLD: f64 = 0.02;
 
+/// The same where cameras recorded as many stops as the pictures tell: of the brightest of a bracket next to nothing may be left.
+const LEAST_TOLD_RECORDED: f64 = 0.005;
+/// Recorded exposures that differ by less, in stops, are one: what differs between the pictures was made later, or is of the light.
+const ONE_EXPOSURE: f64 = 0.2;
+/// Recorded and seen stops agree if they differ by no more than this ...
+const AGREEING_STOPS: f64 = 1.0;
+/// ... and this part of the recorded ones: the curve of a camera is not known.
+const AGREEING_SHARE: f64 = 0.5;
+
 /// A small copy ready to be compared.
 #[derive(Debug)]
 pub(super) struct SmallCopy {
@@ -64,8 +73,12 @@ impl SameView {
     }
 }
 
-/// `None` if `a` and `b`, of one size, do not show the same view, or at the same exposure.
-pub(super) fn same_view(a: &SmallCopy, b: &SmallCopy) -> Option<SameView> {
+/// `None` if `a` and `b`, of one size, do not show the same view, or at the same exposure. `recorded` are the stops by which `b` took more light, if their
+/// cameras recorded it: what contradicts the pictures is none of a bracket.
+pub(super) fn same_view(a: &SmallCopy, b: &SmallCopy, recorded: Option<f64>) -> Option<SameView> {
+    if recorded.is_some_and(|stops| stops.abs() < ONE_EXPOSURE) {
+        return None;
+    }
     let b_is_bright = b.brightness >= a.brightness;
     let (dark, bright) = if b_is_bright { (a, b) } else { (b, a) };
     if bright.brightness < LEAST_BRIGHTER * dark.brightness {
@@ -92,12 +105,14 @@ pub(super) fn same_view(a: &SmallCopy, b: &SmallCopy) -> Option<SameView> {
     let (dark, bright) = (&dark.levels[0], &bright.levels[0]);
     let found = compared(dark, bright, best)?;
     let stops = stops_between(dark, &shifted(bright, best))?;
+    let sign = if b_is_bright { 1.0 } else { -1.0 };
+    let is_agreed = |recorded: f64| (sign * stops - recorded).abs() <= AGREEING_STOPS + AGREEING_SHARE * recorded.abs();
+    let least_told = if recorded.is_some_and(is_agreed) { LEAST_TOLD_RECORDED } else { LEAST_TOLD };
     let is_same =
-        found.correlation >= MAY_BE_SAME && found.agreeing_tiles >= LEAST_AGREEING_TILES && found.told >= LEAST_TOLD;
-    if !is_same || stops < LEAST_STOPS {
+        found.correlation >= MAY_BE_SAME && found.agreeing_tiles >= LEAST_AGREEING_TILES && found.told >= least_told;
+    if !is_same || stops < LEAST_STOPS || !recorded.is_none_or(is_agreed) {
         return None;
     }
-    let sign = if b_is_bright { 1.0 } else { -1.0 };
     let shift = best.map(|pixels| sign * pixels as f64 / dark.width() as f64);
     Some(SameView { stops: sign * stops, shift, correlation: found.correlation })
 }

@@ -56,7 +56,7 @@ fn thumbnail(turn: [f64; 3], exposure: f64) -> Raster<u8> {
 fn found(shots: &[([f64; 3], f64)]) -> Vec<FoundStack> {
     let thumbnails: Vec<Raster<u8>> = shots.iter().map(|&(turn, exposure)| thumbnail(turn, exposure)).collect();
     let candidates: Vec<StackCandidate> =
-        thumbnails.iter().map(|one| StackCandidate { thumbnail: Some(one), camera: 0 }).collect();
+        thumbnails.iter().map(|one| StackCandidate { thumbnail: Some(one), camera: 0, recorded_stops: None }).collect();
     find(&candidates)
 }
 
@@ -98,10 +98,24 @@ fn equal_exposures_other_views_and_other_cameras_are_no_stack() {
     assert!(found(&[([0.0; 3], 1.0), ([0.0, 0.15, 0.0], 4.0)]).is_empty(), "a neighbor in a row");
     let thumbnails = [thumbnail([0.0; 3], 1.0), thumbnail(hand, 4.0)];
     let of = |cameras: [usize; 2]| {
-        let candidate = |k: usize| StackCandidate { thumbnail: Some(&thumbnails[k]), camera: cameras[k] };
+        let candidate =
+            |k: usize| StackCandidate { thumbnail: Some(&thumbnails[k]), camera: cameras[k], recorded_stops: None };
         find(&[candidate(0), candidate(1)]).len()
     };
     assert_eq!((of([0, 0]), of([0, 1])), (1, 0));
+}
+
+/// Recorded exposures of 2 stops apart agree with pictures that are; one exposure, and one of the other sign, do not.
+#[test]
+fn what_cameras_recorded_has_a_voice() {
+    let thumbnails = [thumbnail([0.0; 3], 1.0), thumbnail(HAND[1], 4.0)];
+    let of = |recorded: Option<f64>| {
+        let stops = [recorded.map(|_| 3.0), recorded.map(|stops| 3.0 + stops)];
+        let candidate =
+            |k: usize| StackCandidate { thumbnail: Some(&thumbnails[k]), camera: 0, recorded_stops: stops[k] };
+        find(&[candidate(0), candidate(1)]).len()
+    };
+    assert_eq!([None, Some(2.0), Some(0.0), Some(-2.0), Some(9.0)].map(of), [1, 1, 0, 0, 0]);
 }
 
 /// Somebody takes the same bracket twice: two stacks of one view, not one with every exposure twice.

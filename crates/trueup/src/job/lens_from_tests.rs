@@ -3,22 +3,7 @@ use trueup_core::lens::LensTerms;
 use super::*;
 
 fn image(width: usize, height: usize, orientation: u8) -> SourceImage {
-    SourceImage {
-        path: "a.jpg".into(),
-        name: "a.jpg".to_owned(),
-        width,
-        height,
-        orientation,
-        focal_prior: None,
-        camera_model: None,
-        lens_model: None,
-        focal_mm: None,
-        gravity: None,
-        lens: None,
-        is_float: false,
-        light: None,
-        stack: Vec::new(),
-    }
+    SourceImage { orientation, ..SourceImage::unknown("a.jpg", "a.jpg", [width, height]) }
 }
 
 fn known(focal: f64) -> KnownLens {

@@ -142,21 +142,9 @@ mod tests {
     use crate::options::StitchOptions;
 
     fn images(count: usize, width: usize, height: usize) -> FilePhotographs {
-        let image = |index: usize| SourceImage {
-            path: format!("{index}.jpg").into(),
-            name: format!("{index}.jpg"),
-            width,
-            height,
-            orientation: 1,
-            focal_prior: None,
-            camera_model: None,
-            lens_model: None,
-            focal_mm: None,
-            gravity: None,
-            lens: None,
-            is_float: false,
-            light: None,
-            stack: Vec::new(),
+        let image = |index: usize| {
+            let name = format!("{index}.jpg");
+            SourceImage::unknown(&name, name.clone(), [width, height])
         };
         FilePhotographs::new((0..count).map(image).collect(), 0)
     }

@@ -5,17 +5,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use trueup_align::stitch_graph::StitchGraph;
 use trueup_core::diagnostics::Reported;
 use trueup_core::matches::PairMatches;
-use trueup_core::source::WorkingFrame;
+use trueup_core::source::{SourceImage, WorkingFrame};
 use trueup_core::{Result, StageContext};
 use trueup_vision::features::Features;
-use trueup_vision::matching::{self, Stranger};
+use trueup_vision::matching::{self, Stranger, StrangersInput};
 use trueup_vision::pairing::{Likeness, Proposals, likeness};
 
 use crate::memo::{Key, KeyMaker, LIKENESS, Memo, PAIR};
 use crate::options::MatchOptions;
 use crate::workers::Division;
 
-/// What the phase works on. Photographs are counted 0..N; `features`, `frames`, `usable` and `keys` have N entries.
+/// What the phase works on. Photographs are counted 0..N; `features`, `frames`, `usable`, `images` and `keys` have N entries.
 #[derive(Debug)]
 pub(crate) struct MatchInput<'a> {
     pub features: &'a [Features],
@@ -24,6 +24,10 @@ pub(crate) struct MatchInput<'a> {
     pub usable: &'a [bool],
     /// The only pairs to be tried, whatever they look like; all that look worth it if there are none.
     pub wished: &'a [(usize, usize)],
+    /// The photographs' files: which a camera took, and when.
+    pub images: &'a [SourceImage],
+    /// Whether copies of photographs are looked for: not where each exposure of a view is to stand for itself.
+    pub copies: bool,
     /// What decides the features of each.
     pub keys: &'a [Option<Key>],
     /// Where pairs that earlier runs matched are found.
@@ -50,14 +54,21 @@ pub(crate) struct Matches {
 pub(crate) fn run(input: &MatchInput, options: &MatchOptions, context: &StageContext) -> Result<Reported<Matches>> {
     context.gather(|context| {
         let pairs = context.time("matching", || match_pairs(input, options, context))?;
-        let strangers =
-            if input.wished.is_empty() { matching::find_strangers(input.frames, &pairs) } else { Vec::new() };
+        let strangers = if input.wished.is_empty() { strangers(input, &pairs) } else { Vec::new() };
         let is_stranger = |photograph| strangers.iter().any(|stranger| stranger.photograph == photograph);
         let known = || pairs.iter().filter(|pair| !is_stranger(pair.a) && !is_stranger(pair.b));
         matching::report_near_duplicates(known(), context);
         let graph = StitchGraph::new(input.features.len(), known());
         Ok(Matches { pairs, strangers, graph })
     })
+}
+
+/// The pictures that pairs and files show to be no photographs of the scene.
+fn strangers(input: &MatchInput, pairs: &[PairMatches]) -> Vec<Stranger> {
+    let by_camera: Vec<bool> = input.images.iter().map(SourceImage::is_by_camera).collect();
+    let taken: Vec<Option<String>> = input.images.iter().map(|image| image.exposure.taken.clone()).collect();
+    let (frames, copies) = (input.frames, input.copies);
+    matching::find_strangers(&StrangersInput { frames, pairs, by_camera: &by_camera, taken: &taken, copies })
 }
 
 /// Every pair tried: those wished for in their order, or those proposed, ascending.

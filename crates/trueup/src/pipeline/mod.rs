@@ -37,6 +37,7 @@ use trueup_core::{Error, Result, StageContext};
 use trueup_io::color::PhotographColors;
 use trueup_io::decode::FilePhotographs;
 use trueup_io::encode::Metadata;
+use trueup_vision::stacks::Fuse;
 
 use self::align::component::camera_groups;
 use self::align::{AlignInput, Geometry};
@@ -160,6 +161,8 @@ impl<'a> Stitcher<'a> {
                 frames: &looked_at.frames,
                 usable: &looked_at.usable,
                 wished: &matched.graph_file.edges,
+                images: &matched.set.images,
+                copies: self.options.measure.stacks.fuse != Fuse::None,
                 keys: &matched.keys,
                 memo,
                 workers: self.workers,
@@ -277,7 +280,8 @@ impl<'a> Stitcher<'a> {
         let measure = |evidence| context.time("measures", || measuring::run(evidence, &arrangement, &project.images));
         project.measures = evidence.as_ref().map(measure);
         let on_side = geometry.and_then(|geometry| sideways::warning(&geometry.cameras.cameras, members));
-        judgement::warnings(&project).into_iter().chain(on_side).for_each(|warning| context.report(warning));
+        let looked_at = judgement::warnings(&project, &context.findings());
+        looked_at.into_iter().chain(on_side).for_each(|warning| context.report(warning));
         let layout = arrangement.drawn;
         let corrections = corrections.of_placed(&layout, |photograph| members.binary_search(&photograph).ok());
         let directions = geometry.map(|geometry| geometry.triads.clone()).unwrap_or_default();
@@ -437,7 +441,7 @@ fn measure_anew(project: &mut Project, evidence: Option<&Evidence>, arrangement:
     project.diagnostics.retain(|told| !judgement::is_of_measures(told));
     let measure = |evidence| context.time("measures", || measuring::run(evidence, arrangement, &project.images));
     project.measures = evidence.map(measure);
-    judgement::warnings(project).into_iter().for_each(|warning| context.report(warning));
+    judgement::warnings(project, &project.diagnostics).into_iter().for_each(|warning| context.report(warning));
 }
 
 /// What composing these photographs may take of this machine.

@@ -183,7 +183,7 @@ fn aligned_stacks(
             let masks = set.files.masks(number);
             let is_marked = masks.ignored.is_some() || masks.kept.is_some();
             let thumbnail = measured.as_ref().ok().filter(|_| !is_marked).map(|measured| &measured.thumbnail);
-            StackCandidate { thumbnail, camera }
+            StackCandidate { thumbnail, camera, recorded_stops: set.images[number].exposure.stops }
         })
         .collect();
     let found = stacks::find(&candidates);

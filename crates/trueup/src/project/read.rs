@@ -57,7 +57,7 @@ impl Recorded {
         let reference = records.iter().position(|record| record.path == project.reference).ok_or_else(|| {
             Error::input(&project.reference, "it is the reference, but none of the photographs used", AS_WRITTEN)
         })?;
-        records.iter().try_for_each(|record| check_focal(record).and_then(|()| check_stack(record)))?;
+        records.iter().try_for_each(|record| record.check_focal().and_then(|()| check_stack(record)))?;
         let mut meshes = records.iter().map(|record| solved_grid(record)).collect::<Result<Vec<_>>>()?;
         let corrections = recorded_corrections(project, &records)?;
         if !project.light.is_none_or(|range| range.is_sound()) {
@@ -122,18 +122,6 @@ fn whole_canvas(meshes: &mut [GridMesh], part: Canvas) -> Canvas {
     Canvas { width, height, ..part }
 }
 
-/// Refuses a focal length that no photograph can have: projections would become of any size.
-fn check_focal(record: &ImageRecord) -> Result<()> {
-    let longer = record.width.max(record.height) as f64;
-    match record.focal_px {
-        Some(focal_px) if !FOCAL.contains(&(focal_px / longer)) => {
-            let reason = format!("its recorded focal length of {focal_px} px cannot be");
-            Err(Error::input(&record.path, reason, AS_WRITTEN))
-        }
-        _ => Ok(()),
-    }
-}
-
 /// The grids of used photographs over the original photographs, in the panorama, without cells that are torn.
 ///
 /// # Errors
@@ -144,6 +132,21 @@ pub(crate) fn whole_grids(project: &Project, records: &[&ImageRecord]) -> Result
 }
 
 impl ImageRecord {
+    /// Refuses a focal length that no photograph can have: projections would become of any size.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if that is recorded.
+    pub(crate) fn check_focal(&self) -> Result<()> {
+        let longer = self.width.max(self.height) as f64;
+        match self.focal_px {
+            Some(focal_px) if !FOCAL.contains(&(focal_px / longer)) => {
+                let reason = format!("its recorded focal length of {focal_px} px cannot be");
+                Err(Error::input(&self.path, reason, AS_WRITTEN))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// The grid of a photograph in use over the original photograph, in the panorama. Vertices for which a projection has no
     /// place are NaN.
     ///

@@ -7,6 +7,8 @@ use trueup_align::metrics::BENT_SHARE;
 use trueup_core::diagnostics::{Diagnostic, Subject};
 
 use super::measures::Measures;
+use crate::options::Evidence;
+use crate::pipeline::align::PARALLAX;
 use crate::project::record::Project;
 
 /// What a measured figure means for people.
@@ -91,6 +93,11 @@ impl Project {
     }
 }
 
+/// Whether lines and pixels aligned the overlaps, as asked or, as was `told`, because of parallax: nothing more can be asked for.
+fn asked_all_evidence(project: &Project, told: &[Diagnostic]) -> bool {
+    project.options.align.stitch.align == Evidence::LinesPhotometric || told.iter().any(|found| found.code == PARALLAX)
+}
+
 /// Names of the warnings below.
 const LEANING: &str = "leaning";
 const MISALIGNED: &str = "misaligned";
@@ -101,15 +108,15 @@ pub(crate) fn is_of_measures(finding: &Diagnostic) -> bool {
     [LEANING, MISALIGNED, BENT_LINE].contains(&finding.code.as_str())
 }
 
-/// A warning for every figure that is to be looked at, which names the place.
-pub(crate) fn warnings(project: &Project) -> Vec<Diagnostic> {
+/// A warning for every figure that is to be looked at, which names the place. `told` is what was found on the way.
+pub(crate) fn warnings(project: &Project, told: &[Diagnostic]) -> Vec<Diagnostic> {
     let Some(measures) = &project.measures else { return Vec::new() };
     let is_bad = |verdict| verdict == Some(Verdict::LookAtIt);
     let judgement = project.judgement();
     let place = |path: &str| project.images.iter().position(|image| image.path == path);
     [
         leaning(measures, &place).filter(|_| is_bad(judgement.upright)),
-        misaligned(measures, &place).filter(|_| is_bad(judgement.alignment)),
+        misaligned(project, told, measures, &place).filter(|_| is_bad(judgement.alignment)),
         bent(measures, &place).filter(|_| is_bad(judgement.lines)),
     ]
     .into_iter()
@@ -133,18 +140,30 @@ fn leaning(measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Optio
     ))
 }
 
-fn misaligned(measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Option<Diagnostic> {
+fn misaligned(
+    project: &Project,
+    told: &[Diagnostic],
+    measures: &Measures,
+    place: &impl Fn(&str) -> Option<usize>,
+) -> Option<Diagnostic> {
     let found = measures.reprojection.as_ref()?;
     let worst = found.worst_pair.as_ref()?;
+    let all = match project.used() {
+        // The one pair is all there is.
+        2 => String::new(),
+        _ => format!("; over all photographs within {:.1}", found.percentile_95_px),
+    };
     Some(Diagnostic::warning(
         MISALIGNED,
         Subject::Pair(place(&worst.a)?, place(&worst.b)?),
-        format!(
-            "points that both show are up to {:.1} px apart (95 of 100; of all photographs {:.1})",
-            worst.percentile_95_px, found.percentile_95_px
-        ),
-        "Look at the seam between them. Parallax or a false match may be the reason: leave one out, or try --align \
-         lines+photometric.",
+        format!("95 of 100 points that both show lie within {:.1} px of each other{all}", worst.percentile_95_px),
+        if asked_all_evidence(project, told) {
+            "Look at the seam between them. Parallax or a false match may be the reason: leave one out, or hide with --mask what \
+             stands twice."
+        } else {
+            "Look at the seam between them. Parallax or a false match may be the reason: leave one out, or try --align \
+             lines+photometric."
+        },
     ))
 }
 
@@ -216,8 +235,8 @@ mod tests {
 
     #[test]
     fn bad_figures_become_warnings_that_name_the_place() {
-        assert!(warnings(&project(2.5, 7.9, 99.0)).is_empty());
-        let found = warnings(&project(3.5, 282.0, 101.0));
+        assert!(warnings(&project(2.5, 7.9, 99.0), &[]).is_empty());
+        let found = warnings(&project(3.5, 282.0, 101.0), &[]);
         let told: Vec<(&str, &Subject)> = found.iter().map(|one| (one.code.as_str(), &one.subject)).collect();
         assert_eq!(
             told,
@@ -228,10 +247,17 @@ mod tests {
             ]
         );
         assert!(found[0].message.contains("to the left by 3.5 degrees, up to 3.7"), "{}", found[0].message);
-        assert!(
-            found[1].message.contains("564.0 px apart (95 of 100; of all photographs 282.0)"),
-            "{}",
-            found[1].message
-        );
+        assert!(found[1].message.ends_with("lie within 564.0 px of each other"), "{}", found[1].message);
+        assert!(found[1].hint.contains("--align lines+photometric"), "{}", found[1].hint);
+    }
+
+    #[test]
+    fn what_was_done_is_not_advised() {
+        let mut project = project(0.5, 282.0, 2.9);
+        let third = project.images[1].clone();
+        project.images.push(third);
+        let found = warnings(&project, &[Diagnostic::note(PARALLAX, Subject::stage("mesh"), "", "")]);
+        assert!(found[0].message.ends_with("of each other; over all photographs within 282.0"), "{}", found[0].message);
+        assert!(found[0].hint.ends_with("hide with --mask what stands twice."), "{}", found[0].hint);
     }
 }

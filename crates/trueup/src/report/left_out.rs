@@ -62,6 +62,9 @@ pub(crate) fn no_photograph(stranger: &Stranger, names: &[String]) -> LeftOut {
     const HINT: &str = "If it is to be used all the same, name the overlaps in a --graph file.";
     let (code, reason) = match &stranger.kind {
         StrangerKind::ReducedCopy { of } => ("reduced-copy", format!("it is a smaller copy of {}", names[*of])),
+        StrangerKind::EditedCopy { of } => {
+            ("edited-copy", format!("it is {} again, with other tones, compression or size", names[*of]))
+        }
         StrangerKind::Panorama { of } => {
             let of: Vec<&str> = of.iter().map(|&photograph| names[photograph].as_str()).collect();
             let shown = match of.as_slice() {
@@ -158,6 +161,8 @@ mod tests {
     fn what_is_no_photograph_is_told_so() {
         let reason = |kind| no_photograph(&Stranger { photograph: 3, kind }, &names()).reason;
         assert_eq!(reason(StrangerKind::ReducedCopy { of: 1 }), "it is a smaller copy of 1.jpg");
+        let edited = reason(StrangerKind::EditedCopy { of: 1 });
+        assert_eq!(edited, "it is 1.jpg again, with other tones, compression or size");
         let panorama = |of: &[usize]| reason(StrangerKind::Panorama { of: of.to_vec() });
         assert_eq!(panorama(&[0, 2]), "it is a panorama of 0.jpg and 2.jpg");
         assert_eq!(panorama(&[0, 1, 2]), "it is a panorama of 0.jpg, 2.jpg and 1 more");

@@ -143,20 +143,10 @@ mod tests {
 
     fn image(lens_model: Option<&str>, focal_mm: Option<f64>) -> SourceImage {
         SourceImage {
-            path: "a.jpg".into(),
-            name: "a.jpg".to_owned(),
-            width: 600,
-            height: 400,
-            orientation: 1,
-            focal_prior: None,
             camera_model: Some("Camera".to_owned()),
             lens_model: lens_model.map(str::to_owned),
             focal_mm,
-            gravity: None,
-            lens: None,
-            is_float: false,
-            light: None,
-            stack: Vec::new(),
+            ..SourceImage::unknown("a.jpg", "a.jpg", [600, 400])
         }
     }
 

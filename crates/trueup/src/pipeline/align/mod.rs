@@ -33,7 +33,7 @@ use self::turn::{Turn, report_cut};
 use crate::memo::{GEOMETRY, Key, KeyMaker, Memo};
 use crate::options::{AlignOptions, MethodForm};
 
-pub(crate) use self::refinement::needs_pixels;
+pub(crate) use self::refinement::{PARALLAX, needs_pixels};
 
 /// What the phase works on.
 #[derive(Debug)]

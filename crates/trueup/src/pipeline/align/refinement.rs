@@ -18,6 +18,9 @@ use super::component::Component;
 use crate::options::{AlignOptions, Evidence};
 use crate::pipeline::measure::{THUMBNAIL_PIXELS, eight_bit};
 
+/// The code of the note that lines and pixels were taken because of parallax.
+pub(crate) const PARALLAX: &str = "parallax";
+
 /// Whether the mesh is to be refined whatever comes, so that the photographs' pixels are worth keeping.
 pub(crate) fn needs_pixels(options: &AlignOptions) -> bool {
     options.stitch.align.uses_lines() || options.stitch.align.uses_pixels()
@@ -35,7 +38,7 @@ pub(super) fn asked_for(misaligned_share: f64, context: &StageContext) -> Eviden
     }
     let percent = 100.0 * misaligned_share;
     context.report(Diagnostic::note(
-        "parallax",
+        PARALLAX,
         Subject::stage("mesh"),
         format!(
             "matched lines and pixels align it as well: {percent:.0} % of the matched points are kept apart by parallax"

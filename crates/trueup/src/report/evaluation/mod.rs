@@ -1,5 +1,6 @@
 //! How good a panorama is, against the exactly known truth of its photographs.
 
+mod matches;
 mod pixels;
 #[cfg(test)]
 mod tests;
@@ -19,6 +20,7 @@ use trueup_core::{Error, Result};
 use super::measures::{HUNDREDTHS, Measures};
 use crate::project::read::whole_grids;
 use crate::project::record::{ImageRecord, Project};
+pub use matches::{MatchEvaluation, PairMatchEvaluation, evaluate_matches};
 pub use pixels::{PixelEvaluation, compare_overlaps, evaluate_pixels, scale_up_to};
 
 /// A panorama measured against the truth. Angles in degrees.
