@@ -4,12 +4,13 @@
 //! rotations from the spanning tree and from averaging over all edges (`rotations`); both are refined together by
 //! bundle adjustment (`bundle`), from coarse to fine (`refinement`). Terms of the lenses are added as long as the matches, and
 //! edges that are to be straight (`straightness`), are sure of them (`lenses`, `lens_evidence`): a pinhole stays one. Pairs that then contradict the others are set
-//! aside (`contradictions`). Where rotating cameras fail, or need a lens that nobody has, cameras that move before a plane are tried
+//! aside (`contradictions`). Focal lengths that parallax leaves open are those that are expected, in part (`expected_focal`). Where rotating cameras fail, or need a lens that nobody has, cameras that move before a plane are tried
 //! (`flat_scene`, by `plane_adjustment`), and lines say how it is turned (`upright_plane`).
 
 mod bundle;
 mod contradictions;
 mod equations;
+mod expected_focal;
 mod flat_scene;
 mod focal;
 mod intrinsics;
@@ -118,7 +119,7 @@ impl Cameras {
 /// several.
 ///
 /// A focal length that metadata or photographs get wrong never ends the run: non-finite or absurd results are replaced
-/// by a solution with the focal lengths fixed to their median, and a diagnostic says so.
+/// by a solution with the focal lengths fixed to those expected, and a diagnostic says so.
 ///
 /// # Errors
 /// [`trueup_core::Error::Cancelled`].
@@ -155,7 +156,7 @@ pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageCont
         solution = solve_with(&active)?;
         pair_rms_px = residuals_of(&solution.cameras);
     }
-    let flat_input = FlatInput { priors, pairs, rotating: &solution.cameras, anchor };
+    let flat_input = FlatInput { priors, pairs, rotating: &solution.by_matches, anchor };
     if let Some(flat_scene) = flat_scene::find(&flat_input, options, context)? {
         let cameras = Cameras::before_plane(flat_scene, pairs, options);
         report_contradicting(pairs, &cameras.contradicting, &cameras.pair_rms_px, context);
@@ -167,9 +168,12 @@ pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageCont
         context.report(Diagnostic::warning(
             "focal-uncertain",
             Subject::stage("cameras"),
-            "the focal length cannot be told from these photographs; a common value was used",
+            "the focal length cannot be told from these photographs; the one that they record, or a usual one, was used",
             "Keep the camera's metadata in the files, or overlap the photographs more.",
         ));
+    }
+    if let Some(factor) = solution.expected_factor {
+        context.report(focal_expected(factor, priors.iter().any(|prior| prior.focal_px.is_some())));
     }
     if let Some(doubt_px) = solution.lens_doubt_px.filter(|doubt_px| *doubt_px > DOUBTFUL_LENS_PX) {
         context.report(lens_uncertain(pairs.len(), doubt_px));
@@ -200,6 +204,21 @@ fn lens_uncertain(overlaps: usize, doubt_px: f64) -> Diagnostic {
     )
 }
 
+/// Says that what is expected of focal lengths took part in them; `is_recorded`: by metadata.
+fn focal_expected(factor: f64, is_recorded: bool) -> Diagnostic {
+    let (change, longer) = (100.0 * (factor - 1.0).abs(), if factor > 1.0 { "longer" } else { "shorter" });
+    let by = if is_recorded { "the photographs record" } else { "is usual" };
+    Diagnostic::note(
+        "focal-expected",
+        Subject::stage("cameras"),
+        format!(
+            "things at several distances, seen from several places, leave the focal length open; with what {by} it is \
+             {change:.0} % {longer} than matches alone say"
+        ),
+        "Tell the field of view (--lens-fov), or take the photographs from one place.",
+    )
+}
+
 fn contradicts(pair: &PairMatches, rms_px: f64) -> Diagnostic {
     Diagnostic::note(
         "pair-contradicts",
@@ -219,6 +238,10 @@ fn turn_to(cameras: &mut [Camera], reference: usize) {
 
 struct Solution {
     cameras: Vec<Camera>,
+    /// As the matches alone have them.
+    by_matches: Vec<Camera>,
+    /// See [`refinement::Refined`].
+    expected_factor: Option<f64>,
     per_picture_focal: bool,
     focal_failed: bool,
     /// See [`refinement::Refined`].
@@ -256,6 +279,8 @@ fn solve(
     let refined = refinement::refine(input, &start, options, context)?;
     Ok(Solution {
         cameras: refined.parameters.cameras(priors),
+        by_matches: refined.by_matches.as_ref().unwrap_or(&refined.parameters).cameras(priors),
+        expected_factor: refined.expected_factor,
         per_picture_focal: refined.per_picture_focal,
         focal_failed: refined.focal_failed,
         lens_doubt_px: refined.lens_doubt_px,

@@ -20,6 +20,12 @@ const ESTIMATED_FOCAL_SD: f64 = 0.3;
 /// Standard deviation of a focal length that the user told, relative: what is engraved on a lens is rounded.
 const TOLD_FOCAL_SD: f64 = 0.02;
 
+/// Focal length that is expected of a photograph of which nothing is known, in its longer sides: telephones' are 0.7 to 0.8, those of
+/// compact cameras and of zoom lenses as they are sold from 0.7 at their shortest to 1.5 and more.
+const USUAL_FOCAL: f64 = 0.85;
+/// Standard deviation of its logarithm: one of twenty is shorter than 0.38 or longer than 1.9.
+pub(super) const USUAL_FOCAL_SD: f64 = 0.4;
+
 /// A fisheye of which nothing more is known.
 const FISHEYE: LensTerms =
     LensTerms { projection: LensProjection::Equidistant, radial: [0.0; 4], tangential: [0.0; 2] };
@@ -73,6 +79,12 @@ impl CameraPrior {
             (false, Some(_)) => options.known_focal_sd,
             (false, None) => ESTIMATED_FOCAL_SD,
         }
+    }
+
+    /// The focal length that is expected, working pixels: by metadata or the user, else a usual one.
+    pub(super) fn expected_focal_px(&self) -> f64 {
+        let known = self.focal_px.filter(|focal_px| focal_px.is_finite() && *focal_px > 0.0);
+        self.believable_focal_px(known.unwrap_or(USUAL_FOCAL * self.longer()))
     }
 
     /// The longer side in working pixels.

@@ -3,6 +3,7 @@
 use trueup_core::{Result, StageContext};
 
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
+use super::expected_focal;
 use super::intrinsics::{FOCAL, IntrinsicsModel, ZOOM_SPREAD};
 use super::lenses::{FoundLenses, LensSearch, settings};
 use super::observations::Observations;
@@ -28,11 +29,29 @@ pub(super) struct Refined {
     pub parameters: Parameters,
     /// Whether every photograph has a focal length of its own.
     pub per_picture_focal: bool,
-    /// Whether no focal length could be found, and a common one was taken.
+    /// Whether no focal length could be found, and those expected were taken.
     pub focal_failed: bool,
     /// How far lenses may move corners unnoticed, working pixels, one standard deviation; `None` where few overlaps had not to tell
     /// of them alone, or a lens was found or told.
     pub lens_doubt_px: Option<f64>,
+    /// The cameras as the matches alone have them, where what is expected of focal lengths took part.
+    pub by_matches: Option<Parameters>,
+    /// By which factor the focal lengths then are those of the matches alone.
+    pub expected_factor: Option<f64>,
+}
+
+impl Refined {
+    /// Of which nothing is to be said.
+    fn of(parameters: Parameters, per_picture_focal: bool) -> Self {
+        Self {
+            parameters,
+            per_picture_focal,
+            focal_failed: false,
+            lens_doubt_px: None,
+            by_matches: None,
+            expected_factor: None,
+        }
+    }
 }
 
 /// Fewest overlaps whose matches alone tell of a lens.
@@ -83,23 +102,42 @@ pub(super) fn refine(
     };
     if let Some(FoundLenses { parameters, model }) = with_lens.filter(explains_more) {
         let parameters = for_lenses.sharpened(parameters, &model, context)?;
-        return Ok(Refined { parameters, per_picture_focal: false, focal_failed: false, lens_doubt_px: None });
+        return Ok(Refined::of(parameters, false));
     }
     if per_picture_focal && problem.is_sound(&fine) {
         let settings = settings(&fine, &CameraPrior::lens_groups(priors));
         if let Some(FoundLenses { parameters, model }) = search.find(&fine, &settings)? {
             let parameters = for_lenses.sharpened(parameters, &model, context)?;
-            return Ok(Refined { parameters, per_picture_focal, focal_failed: false, lens_doubt_px: None });
+            return Ok(Refined::of(parameters, per_picture_focal));
         }
     }
     if problem.is_sound(&fine) {
         let few = input.observations.pairs.len() < OVERLAPS_FOR_LENSES && !fine.has_lens();
         let lens_doubt_px = if few { search.doubt_px(&fine, &CameraPrior::lens_groups(priors)) } else { None };
-        let parameters = problem.sharpened(fine, if per_picture_focal { &own } else { &shared }, context)?;
-        return Ok(Refined { parameters, per_picture_focal, focal_failed: false, lens_doubt_px });
+        let expected = match fine.has_lens() {
+            false => expected_focal::expected(&problem, &fine, options, context)?,
+            true => None,
+        };
+        let model = match (&expected, per_picture_focal) {
+            (Some(_), _) => IntrinsicsModel::fixed(priors.len()),
+            (None, true) => own,
+            (None, false) => shared,
+        };
+        let expected_factor = expected.as_ref().map(|expected| expected.factor);
+        let (settled, by_matches) = match expected {
+            Some(expected) => (expected.parameters, Some(fine)),
+            None => (fine, None),
+        };
+        let parameters = problem.sharpened(settled, &model, context)?;
+        return Ok(Refined {
+            lens_doubt_px,
+            by_matches,
+            expected_factor,
+            ..Refined::of(parameters, per_picture_focal)
+        });
     }
-    let parameters = with_common_focal(&problem, start, context)?;
-    Ok(Refined { parameters, per_picture_focal: false, focal_failed: true, lens_doubt_px: None })
+    let parameters = with_expected_focal(&problem, start, context)?;
+    Ok(Refined { focal_failed: true, ..Refined::of(parameters, false) })
 }
 
 /// What matches and edges alone cost.
@@ -107,13 +145,15 @@ fn cost_without_pulls(problem: &BundleAdjustment<'_>, parameters: &Parameters) -
     problem.matches_cost(parameters, FINE_HUBER_PX) + problem.curves_cost(parameters, FINE_HUBER_PX)
 }
 
-/// The rotations refined from `start` with all focal lengths fixed to the median start value.
-fn with_common_focal(problem: &BundleAdjustment<'_>, start: &Parameters, context: &StageContext) -> Result<Parameters> {
-    let mut sorted = start.focal_px.clone();
-    sorted.sort_by(f64::total_cmp);
-    let common = sorted[sorted.len() / 2];
-    let fixed = Parameters { focal_px: vec![common; sorted.len()], ..start.clone() };
-    let model = IntrinsicsModel::fixed(sorted.len());
+/// The rotations refined from `start` with all focal lengths fixed to those that are expected.
+fn with_expected_focal(
+    problem: &BundleAdjustment<'_>,
+    start: &Parameters,
+    context: &StageContext,
+) -> Result<Parameters> {
+    let focal_px: Vec<f64> = problem.priors.iter().map(CameraPrior::expected_focal_px).collect();
+    let model = IntrinsicsModel::fixed(focal_px.len());
+    let fixed = Parameters { focal_px, ..start.clone() };
     let coarse = problem.minimize(fixed, &model, COARSE_HUBER_PX, context)?;
     problem.minimize(coarse, &model, FINE_HUBER_PX, context)
 }

@@ -79,7 +79,7 @@ pub fn run_around(
             "Choose another reference or another method.",
         ));
     }
-    let frame = Frame { canvas_from_target: options.scale / pixel_scale, window: None, period };
+    let frame = Frame { canvas_from_target: options.scale / pixel_scale, window: None, period, whole_from: None };
     fitted(placed, &frame, options, context)
 }
 
@@ -92,6 +92,9 @@ pub struct Frame {
     pub window: Option<[Vector2<f64>; 2]>,
     /// Places that far apart in x are the same: the canvas is a cylinder of that many units, from the window's left end.
     pub period: Option<f64>,
+    /// Share of the window's height, 0 to 1, from which on, if the grids reach over it, all of the window becomes the canvas; `None`:
+    /// never more than they reach over.
+    pub whole_from: Option<f64>,
 }
 
 /// Lays the grids on one canvas as `frame` wants it: of the window the part that the grids cover. Grids that show nothing in
@@ -131,6 +134,10 @@ fn fitted(
     }
     if let Some([window_low, window_high]) = frame.window {
         (low, high) = (low.sup(&window_low), high.inf(&window_high));
+        let share = (high.y - low.y) / (window_high.y - window_low.y);
+        if frame.whole_from.is_some_and(|least| share >= least) {
+            (low.y, high.y) = (window_low.y, window_high.y);
+        }
         if let Some(period) = frame.period {
             // All of a turn is shown.
             high.x = low.x + period;

@@ -93,7 +93,7 @@ fn a_framed_turn_is_shown_whole_within_the_pixels_allowed() {
     let context = StageContext::default();
     let photographs = || vec![placed(1.0, [-10.0, 3.0]), placed(1.0, [4000.0, 90.2])];
     let window = Some([Vector2::new(-100.0, 10.0), Vector2::new(900.0, 200.0)]);
-    let frame = Frame { canvas_from_target: 1.0, window, period: Some(4380.3) };
+    let frame = Frame { canvas_from_target: 1.0, window, period: Some(4380.3), whole_from: None };
     let layout = framed(photographs(), &frame, &CanvasOptions::default(), &context).expect("two grids");
     assert_eq!((layout.width, layout.height, layout.period), (4352, 189, Some(4352)));
     for max_pixels in [1.0, 5.0, 100.0, 3000.0, 700_000.0] {
@@ -102,6 +102,23 @@ fn a_framed_turn_is_shown_whole_within_the_pixels_allowed() {
         assert!((layout.width * layout.height) as f64 <= max_pixels, "{} x {}", layout.width, layout.height);
         assert_eq!(layout.period, Some(layout.width));
     }
+}
+
+/// Grids that reach over 303 units of a window: of 606 that is half, of 616 less.
+#[test]
+fn a_window_that_is_all_but_shown_is_shown_whole() {
+    let shown = |bottom: f64, whole_from: Option<f64>| {
+        let photographs = vec![placed(1.0, [-10.0, 13.0]), placed(1.0, [3000.0, 10.0])];
+        let window = Some([Vector2::new(-100.0, 10.0), Vector2::new(900.0, bottom)]);
+        let frame = Frame { canvas_from_target: 1.0, window, period: Some(4096.0), whole_from };
+        let options = CanvasOptions::default();
+        let layout = framed(photographs, &frame, &options, &StageContext::default()).expect("two grids");
+        (layout.width, layout.height, layout.origin[1])
+    };
+    assert_eq!(shown(616.0, None), (4096, 303, 10.0));
+    assert_eq!(shown(616.0, Some(0.5)), (4096, 303, 10.0));
+    assert_eq!(shown(616.0, Some(0.49)), (4096, 606, 10.0));
+    assert_eq!(shown(606.0, Some(0.5)), (4096, 596, 10.0));
 }
 
 #[test]

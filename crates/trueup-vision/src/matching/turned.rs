@@ -1,6 +1,6 @@
 //! Matches verified on rays: two photographs by one lens that only turned, where no homography holds.
 //!
-//! The focal length and two radial terms are unknown. Lenses are tried one after the other, from pinholes to fisheyes; under
+//! The focal length, in sides of the photographs, which may differ in size, and two radial terms are unknown. Lenses are tried one after the other, from pinholes to fisheyes; under
 //! each, two matches give the turn. The best are refined on all matches that agree.
 //!
 //! # Source
@@ -123,11 +123,11 @@ impl TurnedLens {
             }
             let Some(change) = normal.cholesky().map(|factor| -factor.solve(&gradient)) else { break };
             let turn: Vector3<f64> = change.fixed_rows::<3>(0).into_owned();
-            let focal_px = self.a.focal_px * change[3].clamp(-LARGEST_FOCAL_STEP, LARGEST_FOCAL_STEP).exp();
+            let longer = change[3].clamp(-LARGEST_FOCAL_STEP, LARGEST_FOCAL_STEP).exp();
             terms.radial[0] += change[4].clamp(-LARGEST_RADIAL_STEP, LARGEST_RADIAL_STEP);
             terms.radial[1] += change[5].clamp(-LARGEST_RADIAL_STEP, LARGEST_RADIAL_STEP);
             let lens = Lens::new(terms);
-            (self.a.focal_px, self.b.focal_px) = (focal_px, focal_px);
+            (self.a.focal_px, self.b.focal_px) = (self.a.focal_px * longer, self.b.focal_px * longer);
             (self.a.lens, self.b.lens) = (lens, lens);
             self.b.set_rotation(&nearest_rotation(&(exp_rotation(&turn) * b_from_a)));
         }
@@ -135,8 +135,7 @@ impl TurnedLens {
     }
 }
 
-/// The turned lens that most matches agree with; `None` if the photographs differ in size, or none is found that `wanted`
-/// matches agree with.
+/// The turned lens that most matches agree with; `None` if none is found that `wanted` matches agree with.
 pub(super) fn find_turned_lens(
     points: &MatchedPoints,
     frames: [&WorkingFrame; 2],
@@ -144,14 +143,13 @@ pub(super) fn find_turned_lens(
     wanted: usize,
     generator: &mut impl Rng,
 ) -> Option<TurnConsensus> {
-    let [a, b] = frames;
-    if (a.width, a.height) != (b.width, b.height) || points.in_a.len() < 2 {
+    if points.in_a.len() < 2 {
         return None;
     }
     let judging = points.select(&(0..points.in_a.len().min(JUDGING)).collect::<Vec<_>>());
-    let mut tried: Vec<RoughTurn> = listed_lenses(a)
+    let mut tried: Vec<RoughTurn> = listed_lenses(frames)
         .into_iter()
-        .filter_map(|camera| RoughSearch::new(&judging, camera, ROUGH * inlier_px).best(generator))
+        .filter_map(|cameras| RoughSearch::new(&judging, cameras, ROUGH * inlier_px).best(generator))
         .collect();
     tried.sort_by(|one, other| one.cost.total_cmp(&other.cost));
     tried.truncate(REFINED);
@@ -167,8 +165,10 @@ pub(super) fn find_turned_lens(
         return None;
     }
     let agreeing = points.select(&inliers);
-    let spread = |places: &[Vector2<f64>]| spread_across(places) >= LEAST_SPREAD * a.diagonal();
-    (spread(&agreeing.in_a) && spread(&agreeing.in_b)).then_some(TurnConsensus { turned, inliers })
+    let is_spread =
+        |places: &[Vector2<f64>], frame: &WorkingFrame| spread_across(places) >= LEAST_SPREAD * frame.diagonal();
+    let [a, b] = frames;
+    (is_spread(&agreeing.in_a, a) && is_spread(&agreeing.in_b, b)).then_some(TurnConsensus { turned, inliers })
 }
 
 /// Standard deviation of places across the line that they lie along best.
@@ -179,12 +179,13 @@ fn spread_across(places: &[Vector2<f64>]) -> f64 {
     (moment.symmetric_eigenvalues().min().max(0.0) / count).sqrt()
 }
 
-/// The lenses that are tried on photographs of this size.
-fn listed_lenses(frame: &WorkingFrame) -> Vec<Camera> {
-    let longer = frame.width.max(frame.height);
-    let on = |TriedLens { lens, relative_focal }| Camera {
-        lens,
-        ..Camera::new(relative_focal * longer, frame.width, frame.height, &Matrix3::identity())
+/// The lenses that are tried, each on both photographs: through one lens, a larger copy has a focal length of as many more pixels.
+fn listed_lenses(frames: [&WorkingFrame; 2]) -> Vec<[Camera; 2]> {
+    let on = |TriedLens { lens, relative_focal }| {
+        frames.map(|frame| {
+            let focal_px = relative_focal * frame.width.max(frame.height);
+            Camera { lens, ..Camera::new(focal_px, frame.width, frame.height, &Matrix3::identity()) }
+        })
     };
     tried_lenses().into_iter().map(on).collect()
 }
@@ -199,7 +200,8 @@ struct RoughTurn {
 
 /// The search for a turn under one lens.
 struct RoughSearch {
-    camera: Camera,
+    /// Unturned.
+    cameras: [Camera; 2],
     rays_a: Vec<Vector3<f64>>,
     rays_b: Vec<Vector3<f64>>,
     /// Squared pixels per squared radian at the places in b, over the squared limit.
@@ -209,18 +211,21 @@ struct RoughSearch {
 }
 
 impl RoughSearch {
-    fn new(points: &MatchedPoints, camera: Camera, limit_px: f64) -> Self {
-        let unit = |place: &Vector2<f64>| camera.bearing(*place).normalize();
-        let rays_b: Vec<Vector3<f64>> = points.in_b.iter().map(unit).collect();
+    fn new(points: &MatchedPoints, cameras: [Camera; 2], limit_px: f64) -> Self {
+        let [a, b] = &cameras;
+        let rays = |camera: &Camera, places: &[Vector2<f64>]| -> Vec<Vector3<f64>> {
+            places.iter().map(|&place| camera.bearing(place).normalize()).collect()
+        };
+        let (rays_a, rays_b) = (rays(a, &points.in_a), rays(b, &points.in_b));
         let scale = |ray: &Vector3<f64>| {
-            let derivatives = camera.projection_derivatives(*ray);
+            let derivatives = b.projection_derivatives(*ray);
             let square =
                 derivatives.map_or(0.0, |one| (one.by_bearing * one.by_bearing.transpose()).determinant().sqrt());
             square / (limit_px * limit_px)
         };
         let scales = rays_b.iter().map(scale).collect();
-        let rays_a = points.in_a.iter().map(unit).collect();
-        Self { camera, rays_a, rays_b, scales, angle_limit: 2.0 * limit_px / camera.focal_px }
+        let angle_limit = 2.0 * limit_px / a.focal_px.min(b.focal_px);
+        Self { cameras, rays_a, rays_b, scales, angle_limit }
     }
 
     /// The turn of least cost.
@@ -238,10 +243,10 @@ impl RoughSearch {
             }
         }
         let (cost, turn) = best?;
-        let mut b = self.camera;
+        let [a, mut b] = self.cameras;
         b.set_rotation(&turn);
         let agreeing = (0..self.rays_a.len()).filter(|&k| self.error(&turn, k) < 1.0).count();
-        Some(RoughTurn { cost, turned: TurnedLens { a: self.camera, b }, agreeing })
+        Some(RoughTurn { cost, turned: TurnedLens { a, b }, agreeing })
     }
 
     /// The turn that takes two rays of a onto those of b; `None` if their angles say that it is none.

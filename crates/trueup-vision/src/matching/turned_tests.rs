@@ -56,13 +56,31 @@ fn turns_are_found_under_every_lens_among_wrong_matches() {
     }
 }
 
+/// Through a lens of 380 px at 800 x 600 px, of which the second photograph has a copy of five eighths, cut to 500 x 350 px.
 #[test]
-fn photographs_of_different_sizes_and_no_matches_have_no_common_lens() {
+fn photographs_of_different_sizes_have_a_common_lens() {
+    let turn = rotation_about_z(0.1) * rotation_about_y(-0.6);
     let frame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
-    let other = WorkingFrame { width: 600.0, ..frame };
+    let reduced = WorkingFrame { width: 500.0, height: 350.0, working_from_full: 1.0 };
+    let mut points = matches(&camera(LensProjection::Rectilinear, 380.0, -0.2), &turn, 200, 100);
+    for place in &mut points.in_b {
+        *place = (*place - Vector2::new(400.0, 300.0)) * 0.625 + Vector2::new(250.0, 175.0);
+    }
+    let kept: Vec<usize> = (0..300).filter(|&k| (0.0..350.0).contains(&points.in_b[k].y)).collect();
+    let right = kept.iter().filter(|&&k| k >= 100).count();
+    let points = points.select(&kept);
     let mut generator = StageContext::default().generator("turned test", 1);
-    let points = matches(&camera(LensProjection::Rectilinear, 600.0, 0.0), &rotation_about_y(0.3), 20, 0);
-    assert!(find_turned_lens(&points, [&frame, &other], 5.0, 10, &mut generator).is_none());
+    let found = find_turned_lens(&points, [&frame, &reduced], 5.0, 100, &mut generator).expect("found");
+    assert!(right > 150 && found.inliers.len() + 4 > right, "{} of {right}", found.inliers.len());
+    let TurnedLens { a, b } = found.turned;
+    assert!((b.focal_px / a.focal_px - 0.625).abs() < 1e-9, "{} {}", a.focal_px, b.focal_px);
+    assert!((b.rotation() * turn.transpose()).trace() > 1.0 + 2.0 * 0.5_f64.to_radians().cos());
+}
+
+#[test]
+fn no_matches_have_no_lens() {
+    let frame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
+    let mut generator = StageContext::default().generator("turned test", 1);
     assert!(find_turned_lens(&MatchedPoints::default(), [&frame; 2], 5.0, 0, &mut generator).is_none());
 }
 

@@ -9,7 +9,7 @@ use nalgebra::Matrix3;
 use trueup_align::mesh::CameraPlane;
 use trueup_align::metrics::without_torn_cells;
 use trueup_align::projection::{
-    self, ParallaxShift, Placement, PosedPhotograph, Projection, ProjectionOptions, ProjectionView,
+    self, FlatKind, ParallaxShift, Placement, PosedPhotograph, Projection, ProjectionOptions, ProjectionView,
 };
 use trueup_compose::layout::{self, CanvasLayout, CanvasOptions, Frame, Placed};
 use trueup_core::camera::Camera;
@@ -21,7 +21,7 @@ use trueup_core::{Error, Result, StageContext};
 use super::align::Geometry;
 use super::align::component::Component;
 use crate::options::ArrangeOptions;
-use crate::project::projection::ProjectionRecord;
+use crate::project::projection::{ProjectionRecord, WHOLE_SPHERE};
 use crate::project::record::{ImageRecord, Project};
 
 /// What the phase works on.
@@ -261,6 +261,8 @@ impl Scene<'_> {
             canvas_from_target: canvas_from_plane,
             window: Some(self.view.window(0.0)),
             period: self.view.flat.period().filter(|_| self.view.closed),
+            // Viewers want all of a sphere, with a hole where the tripod stood.
+            whole_from: (self.view.closed && self.view.flat.kind == FlatKind::Equirectangular).then_some(WHOLE_SPHERE),
         };
         layout::framed(placed, &frame, &options.canvas, context)
     }

@@ -8,6 +8,10 @@ use trueup_compose::crop::Rectangle;
 use trueup_compose::layout::CanvasLayout;
 use trueup_core::spherical::{SphericalFrame, SphericalProjection};
 
+/// Share of the half turn from pole to pole that a whole sphere shows at least: what lies at a pole is often not photographed, where the
+/// tripod stands.
+pub(crate) const WHOLE_SPHERE: f64 = 0.75;
+
 /// How the panorama is drawn from directions. A direction of the level world (x right, y down, z forward) that the rotations
 /// `yaw`, `pitch` and `roll` turn into the viewer's lies at `(plane - origin) * px_per_radian` on the canvas, where `plane` is
 /// its place in the projection.
@@ -62,10 +66,8 @@ impl ProjectionRecord {
 
     /// Whether a canvas of this height shows a turn from pole to pole, or all but: a whole sphere.
     pub(crate) fn is_whole_sphere(&self, height: usize, turn: Option<usize>) -> bool {
-        /// Of the half turn from pole to pole: what lies at a pole is often not photographed, where the tripod stands.
-        const WHOLE: f64 = 0.75;
         let half_turn = PI * self.px_per_radian;
-        turn.is_some() && self.kind == FlatKind::Equirectangular && height as f64 >= WHOLE * half_turn
+        turn.is_some() && self.kind == FlatKind::Equirectangular && height as f64 >= WHOLE_SPHERE * half_turn
     }
 
     /// Where a canvas of `size` pixels lies on the whole sphere, in whole pixels.

@@ -1,0 +1,95 @@
+//! Focal lengths of a photographer who went a step aside.
+
+use super::super::observations::{MATCHES_PER_PAIR, Observations};
+use super::super::straightness::CurveObservations;
+use super::super::tests::joined;
+use super::super::{CameraInput, run};
+use super::*;
+use nalgebra::{Matrix3, Vector3};
+use trueup_core::camera::Camera;
+use trueup_core::geometry::rotation_about_y;
+use trueup_core::matches::{PairMatches, PointMatch};
+use trueup_core::source::WorkingFrame;
+
+const FRAME: WorkingFrame = WorkingFrame { width: 800.0, height: 600.0, working_from_full: 1.0 };
+const FOCAL_PX: f64 = 660.0;
+
+/// A wall 4 m away, whose parts stand out by up to 0.2 m, in two photographs 15 degrees apart; the second from so many meters to the right.
+fn pair(step_m: f64) -> PairMatches {
+    let cameras = [0.0_f64, 15.0]
+        .map(|yaw| Camera::new(FOCAL_PX, FRAME.width, FRAME.height, &rotation_about_y(yaw.to_radians()).transpose()));
+    let mut inliers = Vec::new();
+    for k in 0..400 {
+        let share = |step: f64| (f64::from(k) * step).fract();
+        let place =
+            Vector3::new(5.0 * share(0.618_034) - 1.5, 3.6 * share(0.754_877) - 1.8, 4.0 - 0.2 * share(0.414_213));
+        let seen = |camera: &Camera, from: Vector3<f64>| camera.project(camera.rotation() * (place - from));
+        let (a, b) = (seen(&cameras[0], Vector3::zeros()), seen(&cameras[1], Vector3::new(step_m, 0.0, 0.0)));
+        if let (Some(a), Some(b)) = (a, b)
+            && FRAME.contains(a.x, a.y)
+            && FRAME.contains(b.x, b.y)
+        {
+            inliers.push(PointMatch { in_a: a.into(), in_b: b.into() });
+        }
+    }
+    joined(0, 1, inliers)
+}
+
+/// The relative focal length that comes out, and the codes of what is said.
+fn found(step_m: f64, recorded_px: Option<f64>) -> (f64, Vec<String>) {
+    let priors = [CameraPrior { focal_px: recorded_px, ..CameraPrior::unknown(FRAME, 0) }; 2];
+    let context = StageContext::default();
+    let input = CameraInput { priors: &priors, pairs: &[pair(step_m)], curves: &[], reference: 0 };
+    let cameras = run(&input, &CameraOptions::default(), &context).expect("solvable").cameras;
+    (cameras[0].focal_px / FOCAL_PX, context.findings().into_iter().map(|finding| finding.code.to_string()).collect())
+}
+
+#[test]
+fn a_step_aside_leaves_the_recorded_focal_length() {
+    let (from_one_place, said) = found(0.0, Some(600.0));
+    assert!(
+        (from_one_place - 1.0).abs() < 1e-3 && !said.contains(&"focal-expected".to_owned()),
+        "{from_one_place} {said:?}"
+    );
+    let (recorded, said) = found(0.6, Some(FOCAL_PX));
+    assert!((recorded - 1.0).abs() < 0.1, "{recorded}");
+    assert!(said.contains(&"focal-expected".to_owned()), "{said:?}");
+}
+
+#[test]
+fn a_step_aside_leaves_a_usual_focal_length_where_none_is_recorded() {
+    let priors = [CameraPrior::unknown(FRAME, 0); 2];
+    let observations = Observations::choose(&priors, &[&pair(0.6)], MATCHES_PER_PAIR);
+    let problem = BundleAdjustment {
+        priors: &priors,
+        observations: &observations,
+        curves: &CurveObservations::default(),
+        start_focal_px: vec![FOCAL_PX; 2],
+        reference: 0,
+        focal_sd: vec![0.3; 2],
+    };
+    let start = Parameters {
+        focal_px: vec![FOCAL_PX; 2],
+        rotations: vec![Matrix3::identity(), rotation_about_y(0.2).transpose()],
+        lenses: vec![Default::default(); 2],
+    };
+    let context = StageContext::default();
+    let by_matches =
+        problem.minimize(start, &IntrinsicsModel::shared(&priors), FINE_HUBER_PX, &context).expect("solvable");
+    let expected = expected(&problem, &by_matches, &CameraOptions::default(), &context).expect("solvable");
+    let expected = expected.expect("the wall leaves it open");
+    // 0.85 of 800 px.
+    let off = |focal_px: f64| (focal_px / 680.0).ln().abs();
+    let (before, after) = (off(by_matches.focal_px[0]), off(expected.parameters.focal_px[0]));
+    assert!(before > 0.2 && after < 0.6 * before, "{before} {after}");
+    assert!((expected.parameters.focal_px[0] / by_matches.focal_px[0] / expected.factor - 1.0).abs() < 1e-12);
+}
+
+/// By hand: twice as long as expected is ln 2 = 0.693; with a deviation of 0.4, (0.693 / 0.4)^2 = 3.003, and half as long again
+/// nothing.
+#[test]
+fn what_is_expected_falls_off_as_a_bell() {
+    let expectation = Expectation { off: 2.0_f64.ln(), sd: 0.4 };
+    assert!((expectation.improbable(1.0) - 3.003).abs() < 1e-3);
+    assert!(expectation.improbable(0.5).abs() < 1e-12);
+}
