@@ -3,7 +3,8 @@
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
-use super::normal_equations::{Metric, NormalEquations, WeightedVertex};
+use super::cell_pair::{CellPairs, MEMBERS};
+use super::normal_equations::Metric;
 
 /// Grids around which equations are made.
 #[derive(Debug, Clone, Copy)]
@@ -34,10 +35,13 @@ impl CurrentGrids<'_> {
 
 /// A pixel of one photograph and one of another that should meet.
 pub(super) struct PixelPair {
-    members: [WeightedVertex; 8],
+    /// Their cells, by the first vertices.
+    first: [u32; 2],
+    /// The vertices' shares of the distance.
+    shares: [f64; MEMBERS],
     /// Their distance in the panorama now.
     pub gap: Vector2<f64>,
-    /// What the bilinear sum over the members should come to: minus the difference of the bases' sags.
+    /// What the bilinear sum over the vertices should come to: minus the difference of the bases' sags.
     value: Vector2<f64>,
 }
 
@@ -46,17 +50,14 @@ impl PixelPair {
         let (a, b) = (one.photograph, other.photograph);
         let (corners_a, shares_a) = grids.solved[a].bilinear(one.at);
         let (corners_b, shares_b) = grids.solved[b].bilinear(other.at);
-        let members = std::array::from_fn(|k| match k {
-            0..4 => WeightedVertex { photograph: a, vertex: corners_a[k], weight: shares_a[k] },
-            _ => WeightedVertex { photograph: b, vertex: corners_b[k - 4], weight: -shares_b[k - 4] },
-        });
+        let shares = std::array::from_fn(|k| if k < 4 { shares_a[k] } else { -shares_b[k - 4] });
         let gap = grids.gap(one, other);
         let value = grids.solved[a].warp(one.at) - grids.solved[b].warp(other.at) - gap;
-        Self { members, gap, value }
+        Self { first: [corners_a[0] as u32, corners_b[0] as u32], shares, gap, value }
     }
 
-    /// Adds the squared distance of the two, weighed by `metric`.
-    pub(super) fn add(&self, metric: Metric, equations: &mut NormalEquations) {
-        equations.add_sum(&self.members, metric, self.value);
+    /// Adds the squared distance of the two, weighed by `metric`, to the equations of their photographs.
+    pub(super) fn add(&self, metric: Metric, equations: &mut CellPairs) {
+        equations.of(self.first).add(&self.shares, metric, metric.apply(self.value));
     }
 }

@@ -17,6 +17,7 @@ use trueup_core::lines::{LineSegment, PairLines};
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 
+use super::cell_pair::CellPairs;
 use super::current_grids::{CurrentGrids, PhotographPixel, PixelPair};
 use super::normal_equations::{Metric, NormalEquations};
 use super::straight_line::{DeviationTerm, StraightLine};
@@ -181,20 +182,28 @@ impl LineAlignmentInput<'_> {
         /// Weight of the squared distance of matched points, per working px squared; published: 1, without outlines that
         /// are held and match points that know nothing of parallax.
         const POINT_WEIGHT: f64 = 16.0;
-        for (pair, share) in self.matched.iter().zip(&shares.lines) {
-            for (&[line_a, line_b], share) in pair.lines.iter().zip(share) {
+        let of_lines = |(pair, shares): (&PairLines, &Vec<f64>)| {
+            let mut cells = CellPairs::between([pair.a, pair.b]);
+            for (&[line_a, line_b], share) in pair.lines.iter().zip(shares) {
                 let lines = MatchedLines { a: pair.a, line_a, b: pair.b, line_b };
-                lines.add(share * self.options.weight, robust_px, equations, grids);
+                lines.add(share * self.options.weight, robust_px, &mut cells, grids);
             }
-        }
-        for (pair, share) in self.points.iter().zip(&shares.points) {
+            cells
+        };
+        let of_points = |(pair, shares): (&PairMatches, &Vec<f64>)| {
+            let mut cells = CellPairs::between([pair.a, pair.b]);
             for (k, [p, q]) in chosen(pair) {
                 let one = PhotographPixel { photograph: pair.a, at: p };
                 let pixels = PixelPair::new(one, PhotographPixel { photograph: pair.b, at: q }, grids);
-                let weight = share[k] * POINT_WEIGHT * robust(pixels.gap.norm(), robust_px);
-                pixels.add(Metric::isotropic(weight), equations);
+                let weight = shares[k] * POINT_WEIGHT * robust(pixels.gap.norm(), robust_px);
+                pixels.add(Metric::isotropic(weight), &mut cells);
             }
-        }
+            cells
+        };
+        let lines = self.matched.par_iter().zip(&shares.lines).map(of_lines);
+        let points = self.points.par_iter().zip(&shares.points).map(of_points);
+        let all: Vec<CellPairs> = lines.chain(points).collect();
+        all.iter().for_each(|cells| equations.add_cell_pairs(cells));
     }
 }
 
@@ -208,7 +217,7 @@ struct MatchedLines {
 
 impl MatchedLines {
     /// Draws samples of the first line across the second's image.
-    fn add(&self, weight: f64, robust_px: f64, equations: &mut NormalEquations, grids: &CurrentGrids) {
+    fn add(&self, weight: f64, robust_px: f64, equations: &mut CellPairs, grids: &CurrentGrids) {
         let [start, end] = [self.line_a.start, self.line_a.end].map(Vector2::from);
         let steps = (self.line_a.length() / SPACING_PX).floor().max(1.0) as usize;
         for k in 0..=steps {

@@ -14,6 +14,7 @@ mod alignment;
 mod base;
 mod by_cameras;
 mod camera_plane;
+mod cell_pair;
 mod closure;
 mod complex;
 mod current_grids;

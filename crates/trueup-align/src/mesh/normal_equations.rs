@@ -4,6 +4,7 @@ use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
+use super::cell_pair::{CellPair, CellPairs, MEMBERS};
 use super::complex::conjugate_product;
 
 /// Largest distance, in grid steps along an axis, of two vertices that one energy row couples.
@@ -20,20 +21,47 @@ pub(super) type Coefficient = Vector2<f64>;
 /// A 2 x 2 block [[a, b], [c, d]] of the normal matrix, row-major.
 type Block = [f64; 4];
 
+/// Couplings of one vertex with others, each of which occurs once.
+#[derive(Debug, Clone, Default)]
+struct Couplings {
+    /// The others, in the order in which they were met.
+    vertices: Vec<u32>,
+    blocks: Vec<Block>,
+}
+
+impl Couplings {
+    fn add(&mut self, vertex: u32, block: Block) {
+        match self.vertices.iter().position(|&known| known == vertex) {
+            Some(known) => add_to(&mut self.blocks[known], block),
+            None => {
+                self.vertices.push(vertex);
+                self.blocks.push(block);
+            }
+        }
+    }
+}
+
+fn add_to(sum: &mut Block, block: Block) {
+    for (sum, value) in sum.iter_mut().zip(block) {
+        *sum += value;
+    }
+}
+
+/// A block of the normal matrix with its row and its column, vertices both; the row is not before the column.
+pub(super) type PlacedBlock = (u32, u32, Block);
+
 /// A^T A and A^T b of a least-squares problem in the vertices of several grids.
 ///
 /// Unknown 2 v is the x and 2 v + 1 the y coordinate of vertex v, vertices numbered through all grids, row-major in
-/// each. Couplings of near vertices of a grid live in tables; those farther apart, or between grids, in a list.
+/// each. Couplings of near vertices of a grid live in tables; those farther apart, or between grids, in lists.
 #[derive(Debug, Clone)]
 pub(super) struct NormalEquations {
     /// First vertex of every grid, and the total at the end.
     first: Vec<usize>,
     columns: Vec<usize>,
     inside: Vec<[Block; SLOTS]>,
-    /// (larger vertex, smaller vertex, block), unsorted.
-    between: Vec<(u32, u32, Block)>,
-    /// Whether `between` holds couplings inside a grid, so that its order is not that of the columns.
-    far_inside: bool,
+    /// For every vertex its couplings with earlier ones that are not in the tables.
+    between: Vec<Couplings>,
     pub right: Vec<f64>,
     pub border: Option<Border>,
 }
@@ -135,8 +163,7 @@ impl NormalEquations {
             first,
             columns: grids.iter().map(|grid| grid.columns).collect(),
             inside: vec![[[0.0; 4]; SLOTS]; vertices],
-            between: Vec::new(),
-            far_inside: false,
+            between: vec![Couplings::default(); vertices],
             right: vec![0.0; 2 * vertices],
             border: None,
         }
@@ -183,8 +210,7 @@ impl NormalEquations {
             for &(n, weight_n) in second.members {
                 let product = squared_weight * weight_m * weight_n;
                 let (one, other) = (self.first[first.photograph] + m, self.first[second.photograph] + n);
-                let block = [product, 0.0, 0.0, product];
-                self.between.push((one.max(other) as u32, one.min(other) as u32, block));
+                self.couple(one, other, [product, 0.0, 0.0, product]);
             }
         }
     }
@@ -208,8 +234,7 @@ impl NormalEquations {
             let turned = factor * (-squared_weight * weight_m);
             // The row is the later vertex; seen from there the other turns the opposite way.
             let sine = if one > other { turned.y } else { -turned.y };
-            let block = [turned.x, -sine, sine, turned.x];
-            self.between.push((one.max(other) as u32, one.min(other) as u32, block));
+            self.couple(one, other, [turned.x, -sine, sine, turned.x]);
         }
     }
 
@@ -244,17 +269,22 @@ impl NormalEquations {
         }
     }
 
-    /// Adds the normal equations of several residuals over the same `members` at once: `metrics` holds the lower
-    /// triangle, row by row, of the members' couplings, `right` the right side of each. The members' weights do not
-    /// count.
-    ///
-    /// Slices that are too short leave the rest out.
-    pub(super) fn add_summed(&mut self, members: &[WeightedVertex], metrics: &[Metric], right: &[Vector2<f64>]) {
-        let mut metrics = metrics.iter();
-        for (position, (one, &pull)) in members.iter().zip(right).enumerate() {
-            self.add_right(one.photograph, one.vertex, pull);
-            for (earlier, other) in members[..=position].iter().enumerate() {
-                let Some(metric) = metrics.next() else { return };
+    /// Adds the equations of pixels of two different grids.
+    pub(super) fn add_cell_pairs(&mut self, pairs: &CellPairs) {
+        pairs.iter().for_each(|pair| self.add_cell_pair(pairs.photographs, pair));
+    }
+
+    fn add_cell_pair(&mut self, photographs: [usize; 2], pair: &CellPair) {
+        let members: [WeightedVertex; MEMBERS] = std::array::from_fn(|k| {
+            let photograph = photographs[k / 4];
+            let columns = self.columns[photograph];
+            let vertex = pair.first[k / 4] as usize + [0, 1, columns + 1, columns][k % 4];
+            WeightedVertex { photograph, vertex, weight: 1.0 }
+        });
+        let mut couplings = pair.couplings();
+        for (position, one) in members.iter().enumerate() {
+            self.add_right(one.photograph, one.vertex, pair.pull(position));
+            for (earlier, (other, metric)) in members[..=position].iter().zip(&mut couplings).enumerate() {
                 self.add_coupling(one, other, earlier == position, metric.block(1.0));
             }
         }
@@ -271,7 +301,7 @@ impl NormalEquations {
     fn add_coupling(&mut self, one: &WeightedVertex, other: &WeightedVertex, same_member: bool, block: Block) {
         if one.photograph != other.photograph {
             let (m, n) = (self.first[one.photograph] + one.vertex, self.first[other.photograph] + other.vertex);
-            self.between.push((m.max(n) as u32, m.min(n) as u32, block));
+            self.couple(m, n, block);
             return;
         }
         let (low, high) = (one.vertex.min(other.vertex), one.vertex.max(other.vertex));
@@ -292,74 +322,50 @@ impl NormalEquations {
             .collect()
     }
 
-    /// Adds a block for vertices m >= n of a grid: to the table if they are near each other, else to the list.
+    /// Adds a block for two vertices, numbered through all grids, to the list of the later one, whose row it is.
+    fn couple(&mut self, one: usize, other: usize, block: Block) {
+        self.between[one.max(other)].add(one.min(other) as u32, block);
+    }
+
+    /// Adds a block for vertices m >= n of a grid: to the table if they are near each other, else to the lists.
     fn add_block_inside(&mut self, photograph: usize, m: usize, n: usize, block: Block) {
-        let columns = self.columns[photograph];
-        let (m_row, m_column) = (m / columns, m % columns);
-        let (n_row, n_column) = (n / columns, n % columns);
+        let first = self.first[photograph];
+        // Vertices are fewer than 2^32; short numbers are divided faster.
+        let columns = self.columns[photograph] as u32;
+        let [(m_row, m_column), (n_row, n_column)] = [m, n].map(|vertex| {
+            let vertex = vertex as u32;
+            ((vertex / columns) as usize, (vertex % columns) as usize)
+        });
         if m_row - n_row > REACH || m_column.abs_diff(n_column) > REACH {
-            let first = self.first[photograph];
-            self.between.push(((first + m) as u32, (first + n) as u32, block));
-            self.far_inside = true;
+            self.couple(first + m, first + n, block);
             return;
         }
         let slot = (m_row - n_row) * SPAN + (m_column + REACH - n_column);
-        let entry = &mut self.inside[self.first[photograph] + m][slot];
-        for (sum, value) in entry.iter_mut().zip(block) {
-            *sum += value;
-        }
+        add_to(&mut self.inside[first + m][slot], block);
     }
 
-    /// All blocks (row vertex >= column vertex), sorted by column, then row; couplings between grids merged in the
-    /// order in which they were added.
-    fn blocks(&self) -> Vec<(u32, u32, Block)> {
-        let mut blocks = Vec::with_capacity(self.inside.len() * SLOTS / 2 + self.between.len());
+    /// All blocks, sorted by column, then row.
+    pub(super) fn blocks(&self) -> Vec<PlacedBlock> {
+        let between: usize = self.between.iter().map(|couplings| couplings.vertices.len()).sum();
+        let mut blocks = Vec::with_capacity(self.inside.len() * SLOTS / 2 + between);
         for (photograph, &columns) in self.columns.iter().enumerate() {
-            let first = self.first[photograph];
-            for vertex in first..self.first[photograph + 1] {
+            for vertex in self.first[photograph]..self.first[photograph + 1] {
                 for (slot, block) in self.inside[vertex].iter().enumerate() {
                     if *block != [0.0; 4] {
                         let back = (slot / SPAN) * columns + slot % SPAN;
                         blocks.push((vertex as u32, (vertex + REACH - back) as u32, *block));
                     }
                 }
+                let Couplings { vertices, blocks: between } = &self.between[vertex];
+                let between = vertices.iter().zip(between);
+                blocks.extend(between.map(|(&column, &block)| (vertex as u32, column, block)));
             }
         }
-        for number in self.order_between() {
-            let (row, column, block) = self.between[number as usize];
-            match blocks.last_mut() {
-                Some(last) if (last.0, last.1) == (row, column) => {
-                    for (sum, value) in last.2.iter_mut().zip(block) {
-                        *sum += value;
-                    }
-                }
-                _ => blocks.push((row, column, block)),
-            }
-        }
-        let mut blocks = by_column(&blocks, self.inside.len());
-        if self.far_inside {
-            for column in blocks.chunk_by_mut(|one, other| one.1 == other.1) {
-                column.sort_by_key(|&(row, ..)| row);
-            }
-        }
-        blocks
+        by_column(&blocks, self.inside.len())
     }
 
-    /// The numbers of the couplings in `between` by column, then row, then the order in which they were added: keys are
-    /// sorted instead of blocks, which are five times as large.
-    fn order_between(&self) -> impl Iterator<Item = u32> {
-        // Fewer than 2^32, as the vertices are.
-        let key = |(number, &(row, column, _)): (usize, &(u32, u32, Block))| {
-            ((u64::from(column) << 32) | u64::from(row), number as u32)
-        };
-        let mut keys: Vec<(u64, u32)> = self.between.iter().enumerate().map(key).collect();
-        keys.sort_unstable();
-        keys.into_iter().map(|(_, number)| number)
-    }
-
-    /// The lower triangle as a sparse matrix.
-    pub(super) fn matrix(&self) -> Option<SparseColMat<usize, f64>> {
-        let blocks = self.blocks();
+    /// The lower triangle as a sparse matrix, of its [`Self::blocks`].
+    pub(super) fn matrix(&self, blocks: &[PlacedBlock]) -> Option<SparseColMat<usize, f64>> {
         let unknowns = self.unknowns();
         let mut column_starts = Vec::with_capacity(unknowns + 1);
         let mut rows = Vec::with_capacity(4 * blocks.len());
@@ -387,9 +393,9 @@ impl NormalEquations {
     }
 }
 
-/// Blocks in the order of their columns, in their given order within a column (counting sort). Inside a grid blocks are
-/// listed by rising row; rows in a later grid are larger still: so each column comes out sorted.
-fn by_column(blocks: &[(u32, u32, Block)], columns: usize) -> Vec<(u32, u32, Block)> {
+/// Blocks in the order of their columns, in their given order within a column (counting sort). They are listed by rising
+/// row: so each column comes out sorted.
+fn by_column(blocks: &[PlacedBlock], columns: usize) -> Vec<PlacedBlock> {
     let mut next = vec![0_usize; columns + 1];
     for block in blocks {
         next[block.1 as usize + 1] += 1;

@@ -305,7 +305,7 @@ fn the_matched_lines_equations_are_the_gradient_of_their_energy() {
         }
     }
     input.add(&mut equations, &current, &input.whole_shares(), 2.0);
-    let matrix = equations.matrix().expect("every vertex has a block");
+    let matrix = equations.matrix(&equations.blocks()).expect("every vertex has a block");
     let x: Vec<f64> = meshes.iter().flat_map(|mesh| mesh.target.iter().flatten().copied()).collect();
     let mut gradient: Vec<f64> = equations.right.iter().zip(&x).map(|(right, x)| -2.0 * (right + x)).collect();
     for column in 0..x.len() {

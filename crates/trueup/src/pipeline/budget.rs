@@ -92,9 +92,11 @@ impl Budget {
         let Some(largest) = images.iter().max_by_key(|image| bytes(image)) else {
             return Ok(Measuring { at_once: usize::MAX, kept_bytes: 0 });
         };
-        let features = (FEATURE_BYTES * working_pixels) as usize;
+        // One after the other: what is not kept of a photograph is let go before features are found in its working copy.
+        let reduced = (REDUCED_BYTES * working_pixels) as usize;
+        let features = ((FEATURE_BYTES * working_pixels) as usize).saturating_add(reduced);
         let decoding = bytes(largest).saturating_mul(DECODING).saturating_add(photographs.decoding_surplus());
-        let one = decoding.saturating_add(features);
+        let one = decoding.saturating_add(reduced).max(features);
         let least = one.saturating_add(PROGRAM_BYTES);
         if least > self.ceiling {
             let words = |bytes: usize| bytes_in_words(bytes as u64);
@@ -107,7 +109,6 @@ impl Budget {
         }
         let memory = self.memory.max(least) - PROGRAM_BYTES;
         // Keeping some of many saves little; keeping all of a small set saves decoding it twice.
-        let reduced = (REDUCED_BYTES * working_pixels) as usize;
         let all = images.iter().map(|image| bytes(image).saturating_add(reduced)).fold(0, usize::saturating_add);
         let kept_bytes = if all <= memory / 4 { all } else { 0 };
         Ok(Measuring { at_once: ((memory - kept_bytes) / one).max(1), kept_bytes })
@@ -173,9 +174,9 @@ mod tests {
         };
         assert_eq!(measuring("4GB", 8).kept_bytes, 8 * (96_000_000 + 2_160_000));
         assert_eq!(measuring("4GB", 60).kept_bytes, 0);
-        // One takes 192 MB and 115 MB for its features.
-        assert_eq!(measuring("4GB", 60).at_once, 12);
-        assert_eq!(measuring("500MB", 60).at_once, 1);
+        // One takes 192 MB while it is decoded and reduced to 2 MB; its features, 115 MB, come after.
+        assert_eq!(measuring("4GB", 60).at_once, 20);
+        assert_eq!(measuring("500MB", 60).at_once, 2);
     }
 
     #[test]
@@ -185,10 +186,18 @@ mod tests {
         };
         let message = refused("100MB").expect("too little");
         assert!(
-            message.contains("2.jpg (6000 x 4000 px): at least 403 MB of memory needed, 100 MB allowed"),
+            message.contains("2.jpg (6000 x 4000 px): at least 290 MB of memory needed, 100 MB allowed"),
             "{message}"
         );
-        assert_eq!(refused("404MB"), None);
+        assert_eq!(refused("291MB"), None);
+    }
+
+    /// The features of a small photograph take more than decoding it: 115 MB and 2 MB.
+    #[test]
+    fn photographs_of_eight_megapixels_are_measured_in_a_quarter_of_a_gigabyte() {
+        let measuring = budget("256MB").measuring(&images(5, 3264, 2448), WORKING_PIXELS).expect("enough");
+        assert_eq!((measuring.at_once, measuring.kept_bytes), (1, 0));
+        assert!(budget("200MB").measuring(&images(1, 3264, 2448), WORKING_PIXELS).is_err());
     }
 
     #[test]

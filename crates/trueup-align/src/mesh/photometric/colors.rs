@@ -50,12 +50,12 @@ impl Colors {
     /// # Departures
     /// The gain is the quotient of the standard deviations. The least-squares gain of one photograph on the other
     /// shrinks while the photographs are not yet aligned, and would explain the misalignment as lack of contrast.
-    pub(super) fn of(samples: &[PixelSample], grid: &GridMesh) -> Self {
+    pub(super) fn of(samples: &[Vec<PixelSample>], grid: &GridMesh) -> Self {
         let mut all = Moments::default();
         let mut cells = vec![Moments::default(); grid.len()];
-        for sample in samples {
+        for sample in samples.iter().flatten() {
             all.add(sample);
-            cells[sample.corners[0][0] as usize].add(sample);
+            cells[sample.cells[0] as usize].add(sample);
         }
         let [here, there] = all.deviations();
         let gain = if here > 0.0 && there > 0.0 { (here / there).sqrt() } else { 1.0 };
@@ -81,7 +81,7 @@ impl Colors {
     }
 
     pub(super) fn of_sample(&self, sample: &PixelSample) -> Color {
-        self.cells[sample.corners[0][0] as usize].unwrap_or(self.overall)
+        self.cells[sample.cells[0] as usize].unwrap_or(self.overall)
     }
 
     pub(super) fn residual(&self, sample: &PixelSample) -> f64 {

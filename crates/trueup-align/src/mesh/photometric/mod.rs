@@ -9,11 +9,13 @@
 //! Every number that is not an option's is a reconstruction; gain and bias of a cell come from means and standard
 //! deviations instead of a regression.
 
+mod cell;
 mod colors;
 mod options;
 mod overlap;
 mod pyramid;
 mod sample;
+mod sampler;
 
 use rayon::prelude::*;
 use trueup_core::{Result, StageContext};
@@ -61,9 +63,7 @@ impl PhotometricInput<'_> {
                 .map(|(overlap, &share)| overlap.equations(level, share * self.options.weight))
                 .collect();
             for overlap in found {
-                for cells in &overlap.cells {
-                    equations.add_summed(&cells.members, &cells.metrics, &cells.right);
-                }
+                overlap.cells.iter().for_each(|cells| equations.add_cell_pairs(cells));
                 sum += overlap.misfit[0];
                 count += overlap.misfit[1];
             }
@@ -84,8 +84,15 @@ impl PhotometricInput<'_> {
         /// units per axis; with less their weight falls with its square.
         const FULL_PX: f64 = 0.5;
         let share = |overlap: &PhotometricOverlap| {
-            let most = (0..LEVELS).map(|level| overlap.common_square(level)).fold(0.0, f64::max);
-            evidence::share(most, FULL_PX)
+            // The smallest size first, which costs least: with all of its weight there is no more to be had.
+            let mut share = 0.0_f64;
+            for level in (0..LEVELS).rev() {
+                share = share.max(evidence::share(overlap.common_square(level), FULL_PX));
+                if share >= 1.0 {
+                    break;
+                }
+            }
+            share
         };
         Ok(self.overlaps(warps, grids).par_iter().map(share).collect())
     }
