@@ -21,28 +21,30 @@ fn scene(seed: u64) -> SyntheticScene {
     with_lines(SyntheticScene::new(Sweep::default(), world, 0.0, seed), 20, 0.5)
 }
 
-/// Of the true rolls 95 % are to lie within the intervals, which are no wider than a lean that is seen. With lines that guided and with lines that did
+/// Of the true rolls 95 % are to lie within the intervals, which in the mean are no wider than a lean that is seen. With lines that guided and with lines that did
 /// not.
 #[test]
 fn true_rolls_lie_within_the_intervals_as_often_as_these_say() {
     for method in [PriorMethod::VanishingPoints, PriorMethod::Straightening] {
-        let (mut holding, mut stated) = (0_u32, 0_u32);
+        let (mut holding, mut stated, mut widths) = (0_u32, 0_u32, 0.0);
         for seed in 0..24 {
             let scene = scene(seed);
             let found = rolls(&scene, method).expect("vertical lines in every photograph");
             for (roll, truth) in found.iter().zip(&scene.roll) {
                 let roll = roll.expect("level photographs");
-                assert!(roll.standard_error < roll.within && roll.within.to_degrees() < 1.0, "{roll:?}");
+                assert!(roll.standard_error < roll.within, "{roll:?}");
+                widths += roll.within.to_degrees();
                 holding += u32::from(wrap_angle(roll.roll - truth).abs() <= roll.within);
                 stated += 1;
             }
         }
+        assert!(widths / f64::from(stated) < 1.0, "{method:?}: {widths} degrees of {stated}");
         let share = f64::from(holding) / f64::from(stated);
         assert!((0.9..=1.0).contains(&share) && stated >= 100, "{method:?}: {holding} of {stated}");
     }
 }
 
-/// A line that is found twice tells no more than once.
+/// A line that is found twice tells no more than once: were its pieces independent, intervals would shrink to 0.71.
 #[test]
 fn pieces_of_a_line_are_one_line() {
     let once = scene(3);
@@ -52,7 +54,7 @@ fn pieces_of_a_line_are_one_line() {
     }
     let [once, twice] = [once, twice].map(|scene| rolls(&scene, PriorMethod::VanishingPoints).expect("vertical lines"));
     for (once, twice) in once.into_iter().flatten().zip(twice.into_iter().flatten()) {
-        assert!((once.within - twice.within).abs() < 0.02 * once.within, "{once:?} {twice:?}");
+        assert!((once.within - twice.within).abs() < 0.05 * once.within, "{once:?} {twice:?}");
     }
 }
 

@@ -27,6 +27,9 @@ pub(super) fn judged(lines: &mut LabeledLines, project: &Project) {
     }
 }
 
+/// What is less, in degrees, would be shown as nothing.
+const LEAST_TOLD_DEG: f64 = 0.05;
+
 /// "upright within 0.6 degrees at 95 %, 0.3 expected on average (8 photographs measured, 2 uncertain: 03.jpg, 07.jpg)"
 fn upright(measures: &Measures, project: &Project, names: &[String]) -> String {
     let Some(upright) = &measures.upright else {
@@ -46,7 +49,10 @@ fn upright(measures: &Measures, project: &Project, names: &[String]) -> String {
     let (most, mean) = (upright.max_deg, upright.mean_deg);
     match upright.within_deg {
         Some(within) => {
-            format!("upright within {within:.1} degrees at 95 %, {mean:.1} expected on average ({measured}{uncertain})")
+            let expected = if mean < LEAST_TOLD_DEG { "less than 0.1".to_owned() } else { format!("{mean:.1}") };
+            format!(
+                "upright within {within:.1} degrees at 95 %, {expected} expected on average ({measured}{uncertain})"
+            )
         }
         // A project of an earlier version states no interval.
         None => format!("upright within {most:.1} degrees, {mean:.1} on average ({measured}{uncertain})"),

@@ -127,6 +127,13 @@ time ";
 }
 
 #[test]
+fn a_lean_that_is_next_to_nothing_is_not_told_as_nothing() {
+    let upright = serde_json::json!({"mean_deg": 0.04, "max_deg": 0.05, "within_deg": 0.12, "measured": 2});
+    let printed = text(&measured(upright, serde_json::json!([]), serde_json::Value::Null), None, false);
+    assert!(printed.contains("upright within 0.1 degrees at 95 %, less than 0.1 expected on average ("), "{printed}");
+}
+
+#[test]
 fn without_vertical_lines_the_summary_says_so() {
     let printed = text(&measured(serde_json::Value::Null, serde_json::json!([]), serde_json::Value::Null), None, false);
     assert!(printed.contains("measured    too few vertical lines to judge by\n"), "{printed}");
