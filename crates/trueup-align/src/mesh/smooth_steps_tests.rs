@@ -68,8 +68,8 @@ fn what_grows_evenly_bends_nothing() {
     assert!(moved > 1.0, "{moved}");
 }
 
-/// The second photograph leans by half a degree against the first. Overlaps lean half the way each; where photographs are alone, far
-/// from the overlap, verticals stand.
+/// The second photograph leans by half a degree against the first. Near its border a photograph leans most of the way, since the other one, which
+/// is alone just beyond, hardly does; where photographs are alone, verticals stand.
 #[test]
 fn what_leans_in_an_overlap_stands_beside_it() {
     let turn = 0.5_f64.to_radians();
@@ -82,7 +82,7 @@ fn what_leans_in_an_overlap_stands_beside_it() {
     };
     let columns = steps[0].columns;
     let (alone, overlapping) = (lean(0).abs(), lean(columns - 2).abs());
-    assert!(overlapping > 0.3 * turn && overlapping < 0.7 * turn, "{} of {}", overlapping, turn);
+    assert!(overlapping > 0.5 * turn && overlapping < 0.9 * turn, "{} of {}", overlapping, turn);
     assert!(alone < 0.1 * turn, "{alone} of {turn}");
 }
 

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use trueup_core::{Result, StageContext};
 
 use super::panorama::{Panorama, PanoramaPixels, linear_of_sum};
+use super::poles::Poles;
 use crate::coverage::Rectangle;
 use crate::gaps::Gaps;
 use crate::pyramid::{PyramidPlane, color, first_level, tile_margin, tile_side};
@@ -84,11 +85,14 @@ fn fill<P: Shade>(store: &mut PixelStore<P>, size: [usize; 2], gaps: &Gaps, cont
     let all = canvas.reduced(store, &sources, &BorderColors::default(), context)?;
     let around = BorderColors::of(all, canvas.first_level);
     let surface = surface(canvas.reduced(store, &sources, &around, context)?);
+    let once = [canvas.lead, canvas.lead + canvas.width].map(|column| column >> canvas.first_level);
+    let poles = Poles::of(size, gaps, &surface, once[0]..once[1]);
+    let filling = Filling { around, surface, poles };
     let mut filled = 0;
     for tiles in wanted.chunks(TILES_AT_ONCE) {
         context.check_cancelled()?;
         let finished: Vec<Option<(usize, Vec<P>)>> =
-            tiles.par_iter().map(|tile| canvas.finished(store, tile, &around, &surface)).collect::<Result<_>>()?;
+            tiles.par_iter().map(|tile| canvas.finished(store, tile, &filling)).collect::<Result<_>>()?;
         for (tile, finished) in tiles.iter().zip(finished) {
             let Some((count, pixels)) = finished else { continue };
             filled += count;
@@ -297,8 +301,7 @@ impl<'a> Canvas<'a> {
         &self,
         store: &PixelStore<P>,
         tile: &FillTile,
-        around: &BorderColors,
-        surface: &PyramidPlane<[f32; 4]>,
+        filling: &Filling,
     ) -> Result<Option<(usize, Vec<P>)>> {
         let columns = tile.columns.start - self.lead..tile.columns.end - self.lead;
         let mut pixels = store.window(&columns, &tile.rows)?;
@@ -312,11 +315,11 @@ impl<'a> Canvas<'a> {
             let (columns, rows) = self.with_margin(tile);
             PyramidPlane::new(columns, rows)
         };
-        let mut levels = vec![self.known(store, tile, around)?.unwrap_or_else(nothing_known)];
+        let mut levels = vec![self.known(store, tile, &filling.around)?.unwrap_or_else(nothing_known)];
         for _ in 1..self.first_level {
             levels.extend(levels.last().map(PyramidPlane::reduced));
         }
-        let surface = pulled(levels, Some(surface));
+        let surface = pulled(levels, Some(&filling.surface));
         let mut filled = 0;
         for (y, pixels) in tile.rows.clone().zip(pixels.chunks_exact_mut(columns.len())) {
             let texels = &surface.row(y)[tile.columns.start - surface.columns.start..];
@@ -327,6 +330,7 @@ impl<'a> Canvas<'a> {
                     && self.gaps.is_gap(x, y)
                     && let Some(smooth) = color(texel)
                 {
+                    let smooth = filling.poles.faded(y, smooth);
                     *pixel = P::of_root([0, 1, 2].map(|k| share * own[k] + (1.0 - share) * smooth[k]));
                     filled += 1;
                 }
@@ -334,6 +338,14 @@ impl<'a> Canvas<'a> {
         }
         Ok(Some((filled, pixels)))
     }
+}
+
+/// What gaps are filled with.
+struct Filling {
+    around: BorderColors,
+    /// Over the whole of the canvas, at the first level.
+    surface: PyramidPlane<[f32; 4]>,
+    poles: Poles,
 }
 
 /// The colors of the borders of gaps, each over what lies around it; none known by default.

@@ -12,6 +12,7 @@ mod fill;
 mod input;
 mod layer;
 mod panorama;
+mod poles;
 
 pub use crate::memory_plan::Resources;
 pub use crate::render_options::{Blend, Interpolation, Look, RenderOptions};

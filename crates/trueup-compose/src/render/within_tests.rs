@@ -125,6 +125,36 @@ fn gaps_take_up_the_colors_beside_them() {
     assert!(rows(&panorama)[first..] == before[first..]);
 }
 
+/// A sphere of 320 x 160 pixels, dark on one side and bright on the other, without its lowest 20 rows: beside the hole, both go on, and
+/// at the pole, which is one place, there is one color.
+#[test]
+fn a_hole_at_a_pole_has_one_middle() {
+    let samples = (0..330 * 140).flat_map(|at| [if (5..165).contains(&(at % 330)) { 60_u8 } else { 180 }; 3]).collect();
+    let raster = trueup_core::raster::Raster::from_data(330, 140, 3, samples).expect("as many samples");
+    let source = Memory(vec![trueup_core::raster::Photograph::Eight(raster)]);
+    let around =
+        |period| CanvasLayout { period, ..canvas(320, 160, vec![moved(0, 330.0, 140.0, |p| [p.x - 5.0, p.y])]) };
+    let filled = |layout: CanvasLayout| {
+        let (options, seams, context) = (RenderOptions::default(), SeamOptions::default(), StageContext::default());
+        let input = RenderInput { layout: &layout, corrections: &Corrections::plain(1), photographs: &source };
+        let rendered = run(&input, &Resources::unlimited(), &options, &seams, None, &context).expect("one photograph");
+        let mut panorama = rendered.panorama;
+        let gaps = Gaps::find(&layout, Coverage::of(&layout), 0.1);
+        assert_eq!(panorama.fill(&gaps, &context).expect("in memory"), 320 * 20);
+        let mut row = vec![0; 4 * 320];
+        [140, 159].map(|y| {
+            panorama.rgba8_row(y, &mut row).expect("in memory");
+            [80, 240].map(|x| row[4 * x])
+        })
+    };
+    let [[dark, bright], [dark_end, bright_end]] = filled(around(Some(320)));
+    assert!(dark < 75 && bright > 165, "{dark} {bright}");
+    assert!(bright_end.abs_diff(dark_end) < 12, "{dark_end} {bright_end}");
+    // A strip below something else than a sphere goes on as it is.
+    let [_, [dark_end, bright_end]] = filled(around(None));
+    assert!(bright_end - dark_end > 80, "{dark_end} {bright_end}");
+}
+
 /// A bright sky over dark ground, with a dark post that reaches the upper border: the sky goes on into the strip above, the
 /// post and the ground do not.
 #[test]
