@@ -36,12 +36,15 @@ pub struct Layer {
     pub covered: Raster<bool>,
 }
 
-/// Renders the photograph at `layout.placed[position]` alone, corrected, as [`super::run`] would.
+/// Renders the photograph at `layout.placed[position]` alone, corrected, as [`super::run`] would, but that one drawn smaller is
+/// averaged anew for every pixel.
 ///
 /// # Errors
 /// Those of [`super::run`], and [`trueup_core::Error::Input`] if there is no such position.
 pub fn layer(input: &RenderInput<'_>, position: usize, options: &RenderOptions) -> Result<Layer> {
-    let (warped, encoding) = alone(input, position, options)?;
+    // Measured as it is, without a step between the photograph and the canvas.
+    let resampling = Resampling::of(options.interpolation).in_few_places();
+    let (warped, encoding) = alone(input, position, options, &resampling)?;
     let layout = input.layout;
     let (all, rows) = (warped.columns(), warped.rows());
     let columns = all.start..all.end.min(all.start + layout.period.unwrap_or(all.len()));
@@ -54,7 +57,6 @@ pub fn layer(input: &RenderInput<'_>, position: usize, options: &RenderOptions) 
         covered: Raster::new(width, height, 1),
     };
     let encode = &encoding.linear;
-    let resampling = Resampling::of(options.interpolation);
     let mut memory = SamplingMemory::default();
     let mut samples = Vec::new();
     for first in rows.clone().step_by(BAND_ROWS) {
@@ -84,6 +86,7 @@ fn alone(
     input: &RenderInput<'_>,
     position: usize,
     options: &RenderOptions,
+    resampling: &Resampling,
 ) -> Result<(WarpedPhotograph<'static>, Encoding)> {
     check(input, options)?;
     let &RenderInput { layout, corrections, photographs } = input;
@@ -103,8 +106,8 @@ fn alone(
     let light =
         PhotographLight { curve: &curve, correction: &photographs.corrections()[position], local: local.as_ref() };
     let mesh = &placed.in_first_turn(layout.period).mesh;
-    let (size, resampling) = (unrolled_size(layout), Resampling::of(options.interpolation));
-    let warped = WarpedPhotograph::new(Cow::Owned(photograph), mesh, size, light, &resampling);
+    let size = unrolled_size(layout);
+    let warped = WarpedPhotograph::new(Cow::Owned(photograph), mesh, size, light, resampling);
     Ok((warped, photographs.encoding()))
 }
 
@@ -146,7 +149,8 @@ impl std::fmt::Debug for LayerRows {
 /// # Errors
 /// Those of [`layer`].
 pub fn layer_rows(input: &RenderInput<'_>, position: usize, options: &RenderOptions) -> Result<Option<LayerRows>> {
-    let (warped, encoding) = alone(input, position, options)?;
+    let resampling = Resampling::of(options.interpolation);
+    let (warped, encoding) = alone(input, position, options, &resampling)?;
     let layout = input.layout;
     let (columns, rows) = (warped.columns(), warped.rows());
     if columns.is_empty() || rows.is_empty() {
@@ -160,7 +164,7 @@ pub fn layer_rows(input: &RenderInput<'_>, position: usize, options: &RenderOpti
         turn: layout.width,
         warped,
         encoding,
-        resampling: Resampling::of(options.interpolation),
+        resampling,
     }))
 }
 

@@ -1,7 +1,9 @@
 //! Interpolation of photographs at real positions, in their own encoding, on the scale of 0 to 255.
 
+mod fitted;
 mod reduce;
 
+pub(crate) use fitted::reduce_by;
 pub(crate) use reduce::reduce_by_two;
 
 use std::marker::PhantomData;
@@ -24,6 +26,9 @@ pub(crate) const MAX_STRETCH: f64 = 15.0;
 trait Sample: Copy + Default + Send + Sync {
     /// On the scale of 0 to 255.
     fn level(self) -> f32;
+
+    /// The sample nearest to a level, which may lie outside the scale.
+    fn of_level(level: f32) -> Self;
 }
 
 impl Sample for u8 {
@@ -31,12 +36,23 @@ impl Sample for u8 {
     fn level(self) -> f32 {
         f32::from(self)
     }
+
+    #[inline(always)]
+    fn of_level(level: f32) -> Self {
+        // The addition rounds; the conversion truncates and saturates.
+        (level + 0.5) as u8
+    }
 }
 
 impl Sample for u16 {
     #[inline(always)]
     fn level(self) -> f32 {
         f32::from(self) * (1.0 / 257.0)
+    }
+
+    #[inline(always)]
+    fn of_level(level: f32) -> Self {
+        (level * 257.0 + 0.5) as u16
     }
 }
 

@@ -274,7 +274,7 @@ impl Making<'_> {
         let layout = self.input.unrolled.original_layout();
         let clip = [layout.width * if layout.period.is_some() { TURNS } else { 1 }, layout.height];
         let light = PhotographLight { curve: self.curve, correction, local: self.input.local };
-        let photograph = Cow::Borrowed(photograph);
-        cells.border(&WarpedPhotograph::new(photograph, &placed.mesh, clip, light, resampling), resampling, encode)
+        let (photograph, resampling) = (Cow::Borrowed(photograph), resampling.in_few_places());
+        cells.border(&WarpedPhotograph::new(photograph, &placed.mesh, clip, light, &resampling), &resampling, encode)
     }
 }
