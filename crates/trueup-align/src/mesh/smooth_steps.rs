@@ -152,7 +152,7 @@ fn shape_energy(cameras: &[Camera], lattices: &[GridMesh], asides: &[Vec<f64>]) 
 /// beside it.
 fn add_leans(photograph: usize, camera: &Camera, lattice: &GridMesh, asides: &[f64], equations: &mut NormalEquations) {
     let cell = [lattice.cell_width(), lattice.cell_height()];
-    for vertex in 0..lattice.len() {
+    for (vertex, aside) in asides.iter().enumerate() {
         let Some(down) = down_at(camera, lattice.source(vertex)) else { continue };
         // Differences to the neighbors to the right and below; on the border to those before.
         let (row, column) = (vertex / lattice.columns, vertex % lattice.columns);
@@ -163,7 +163,7 @@ fn add_leans(photograph: usize, camera: &Camera, lattice: &GridMesh, asides: &[f
         let members = [(right + 1, along_x), (right, -along_x), (below + lattice.columns, along_y), (below, -along_y)];
         let members = members.map(|(vertex, weight)| WeightedVertex { photograph, vertex, weight });
         let across = Vector2::new(-down.y, down.x);
-        let share = (asides[vertex] / ALONE).clamp(0.0, 1.0);
+        let share = (aside / ALONE).clamp(0.0, 1.0);
         let lean = LEAN + (LEAN_ALONE - LEAN) * share * share * (3.0 - 2.0 * share);
         equations.add_sum(&members, Metric::along(across, lean * lean), Vector2::zeros());
     }
