@@ -191,7 +191,14 @@ fn a_crop_changes_nothing_but_the_frame() {
             for (x, y, pixel) in part.enumerate_pixels() {
                 let there = whole.get_pixel(left + x, top + y);
                 assert_eq!(pixel.0[3], 255, "{crop}: ({x}, {y}) is empty");
-                assert!(there == pixel || there.0[3] < 255, "{crop}: ({x}, {y})");
+                // What is filled begins in pixels that are covered in part, which may be so much that it rounds to all.
+                let is_filled = || {
+                    let around = (0..9).map(|k| [left + x + k % 3, top + y + k / 3].map(|at| at.saturating_sub(1)));
+                    let mut known = around.filter_map(|[x, y]| whole.get_pixel_checked(x, y));
+                    let is_close = pixel.0.iter().zip(there.0).all(|(own, there)| own.abs_diff(there) <= 1);
+                    is_close && known.any(|pixel| pixel.0[3] < 255)
+                };
+                assert!(there == pixel || there.0[3] < 255 || is_filled(), "{crop}: ({x}, {y})");
                 assert_eq!(seams.get_pixel(x, y), whole_seams.get_pixel(left + x, top + y), "{crop}: ({x}, {y})");
             }
             let (grids, _) = recorded_grids(&project);
