@@ -148,14 +148,14 @@ pub fn run(input: &CameraInput<'_>, options: &CameraOptions, context: &StageCont
     };
     let mut active: Vec<usize> = (0..pairs.len()).collect();
     let mut solution = solve_with(&active)?;
-    let mut pair_rms_px = residuals_of(&solution.cameras);
-    let first_rms_px = pair_rms_px.clone();
-    let contradicting = contradicting_pairs(&solution.cameras, pairs, &pair_rms_px, options.max_pair_rms_px);
+    // A false overlap spoils the cameras as parallax does: with focal lengths that are expected it would show less.
+    let first_rms_px = residuals_of(&solution.by_matches);
+    let contradicting = contradicting_pairs(&solution.by_matches, pairs, &first_rms_px, options.max_pair_rms_px);
     if !contradicting.is_empty() {
         active.retain(|position| contradicting.binary_search(position).is_err());
         solution = solve_with(&active)?;
-        pair_rms_px = residuals_of(&solution.cameras);
     }
+    let pair_rms_px = residuals_of(&solution.cameras);
     let flat_input = FlatInput { priors, pairs, rotating: &solution.by_matches, anchor };
     if let Some(flat_scene) = flat_scene::find(&flat_input, options, context)? {
         let cameras = Cameras::before_plane(flat_scene, pairs, options);
