@@ -240,7 +240,7 @@ struct Solution {
     cameras: Vec<Camera>,
     /// As the matches alone have them.
     by_matches: Vec<Camera>,
-    /// See [`refinement::Refined`].
+    /// See [`refinement::ByMatches`].
     expected_factor: Option<f64>,
     per_picture_focal: bool,
     focal_failed: bool,
@@ -279,8 +279,8 @@ fn solve(
     let refined = refinement::refine(input, &start, options, context)?;
     Ok(Solution {
         cameras: refined.parameters.cameras(priors),
-        by_matches: refined.by_matches.as_ref().unwrap_or(&refined.parameters).cameras(priors),
-        expected_factor: refined.expected_factor,
+        by_matches: refined.by_matches.as_ref().map_or(&refined.parameters, |found| &found.parameters).cameras(priors),
+        expected_factor: refined.by_matches.as_ref().map(|found| found.expected_factor),
         per_picture_focal: refined.per_picture_focal,
         focal_failed: refined.focal_failed,
         lens_doubt_px: refined.lens_doubt_px,

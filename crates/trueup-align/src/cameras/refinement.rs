@@ -3,7 +3,7 @@
 use trueup_core::{Result, StageContext};
 
 use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters};
-use super::expected_focal;
+use super::expected_focal::{self, ExpectedFocal};
 use super::intrinsics::{FOCAL, IntrinsicsModel, ZOOM_SPREAD};
 use super::lenses::{FoundLenses, LensSearch, settings};
 use super::observations::Observations;
@@ -35,22 +35,20 @@ pub(super) struct Refined {
     /// of them alone, or a lens was found or told.
     pub lens_doubt_px: Option<f64>,
     /// The cameras as the matches alone have them, where what is expected of focal lengths took part.
-    pub by_matches: Option<Parameters>,
-    /// By which factor the focal lengths then are those of the matches alone.
-    pub expected_factor: Option<f64>,
+    pub by_matches: Option<ByMatches>,
+}
+
+/// Cameras without what is expected of focal lengths.
+pub(super) struct ByMatches {
+    pub parameters: Parameters,
+    /// By which factor the focal lengths are longer with it.
+    pub expected_factor: f64,
 }
 
 impl Refined {
     /// Of which nothing is to be said.
     fn of(parameters: Parameters, per_picture_focal: bool) -> Self {
-        Self {
-            parameters,
-            per_picture_focal,
-            focal_failed: false,
-            lens_doubt_px: None,
-            by_matches: None,
-            expected_factor: None,
-        }
+        Self { parameters, per_picture_focal, focal_failed: false, lens_doubt_px: None, by_matches: None }
     }
 }
 
@@ -118,23 +116,13 @@ pub(super) fn refine(
             false => expected_focal::expected(&problem, &fine, options, context)?,
             true => None,
         };
-        let model = match (&expected, per_picture_focal) {
-            (Some(_), _) => IntrinsicsModel::fixed(priors.len()),
-            (None, true) => own,
-            (None, false) => shared,
+        let Some(ExpectedFocal { parameters, factor }) = expected else {
+            let parameters = problem.sharpened(fine, if per_picture_focal { &own } else { &shared }, context)?;
+            return Ok(Refined { lens_doubt_px, ..Refined::of(parameters, per_picture_focal) });
         };
-        let expected_factor = expected.as_ref().map(|expected| expected.factor);
-        let (settled, by_matches) = match expected {
-            Some(expected) => (expected.parameters, Some(fine)),
-            None => (fine, None),
-        };
-        let parameters = problem.sharpened(settled, &model, context)?;
-        return Ok(Refined {
-            lens_doubt_px,
-            by_matches,
-            expected_factor,
-            ..Refined::of(parameters, per_picture_focal)
-        });
+        let parameters = problem.sharpened(parameters, &IntrinsicsModel::fixed(priors.len()), context)?;
+        let by_matches = Some(ByMatches { parameters: fine, expected_factor: factor });
+        return Ok(Refined { lens_doubt_px, by_matches, ..Refined::of(parameters, per_picture_focal) });
     }
     let parameters = with_expected_focal(&problem, start, context)?;
     Ok(Refined { focal_failed: true, ..Refined::of(parameters, false) })

@@ -9,7 +9,9 @@
 //! Hartley's normalization does. A wrong focal length is a linear map of the bearings, which the matrix takes over.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
-use rand::{Rng, RngExt};
+use rand::Rng;
+
+use super::ransac::different_indices;
 
 /// Matches in a sample.
 const SAMPLE: usize = 8;
@@ -97,7 +99,7 @@ pub(super) fn epipolar_matches(
         better
     };
     for _ in 0..SAMPLES {
-        let (sample_a, sample_b) = select(&sample(count, generator));
+        let (sample_a, sample_b) = select(&different_indices::<SAMPLE>(count, generator));
         if let Some(found) = EpipolarGeometry::fit(&sample_a, &sample_b)
             && keep(found)
         {
@@ -115,20 +117,6 @@ pub(super) fn epipolar_matches(
         }
     }
     best.map_or_else(Vec::new, |(_, found)| found.agreeing(in_a, in_b, within))
-}
-
-/// Different indices below `count`, which is at least their number.
-fn sample(count: usize, generator: &mut impl Rng) -> [usize; SAMPLE] {
-    let mut sample = [usize::MAX; SAMPLE];
-    for k in 0..SAMPLE {
-        sample[k] = loop {
-            let index = generator.random_range(0..count);
-            if !sample[..k].contains(&index) {
-                break index;
-            }
-        };
-    }
-    sample
 }
 
 #[cfg(test)]

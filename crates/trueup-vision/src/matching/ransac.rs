@@ -150,17 +150,22 @@ impl ProgressivePool {
             let progress = (self.drawn as f64 / self.samples as f64).powf(1.0 / SAMPLE as f64);
             size = ((progress * self.count as f64) as usize).clamp(Self::FIRST.min(self.count), self.count);
         }
-        let mut sample = [usize::MAX; SAMPLE];
-        for k in 0..SAMPLE {
-            sample[k] = loop {
-                let index = generator.random_range(0..size);
-                if !sample[..k].contains(&index) {
-                    break index;
-                }
-            };
-        }
-        sample
+        different_indices(size, generator)
     }
+}
+
+/// `N` different indices below `count`, which is at least as large.
+pub(super) fn different_indices<const N: usize>(count: usize, generator: &mut impl Rng) -> [usize; N] {
+    let mut indices = [usize::MAX; N];
+    for k in 0..N {
+        indices[k] = loop {
+            let index = generator.random_range(0..count);
+            if !indices[..k].contains(&index) {
+                break index;
+            }
+        };
+    }
+    indices
 }
 
 /// The homography through four matches; `None` if three points are collinear or the map would turn a triangle over.

@@ -1,24 +1,21 @@
 //! How far apart what two photographs show alike lies in the panorama, whether or not the panorama was aligned by it.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_align::metrics::{MatchedPair, may_overlap, panorama_distances};
-use trueup_compose::fusion::ExposureFusion;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::rows_of;
 use trueup_core::matches::PointMatch;
-use trueup_core::source::{SourceImage, WorkingFrame};
+use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
-use trueup_io::color::PhotographColors;
-use trueup_io::decode::FilePhotographs;
 use trueup_vision::features::{self, Features};
 use trueup_vision::matching::{SeenFeatures, consistent_matches};
 
-use crate::project::read::{find_photograph, whole_grids};
+use super::photographs;
+use crate::project::read::whole_grids;
 use crate::project::record::{ImageRecord, Project};
 
 /// Progress is reported as this.
@@ -74,7 +71,7 @@ pub fn evaluate_matches(project: &Project, project_folder: &Path, context: &Stag
     project.options.validate()?;
     let records: Vec<&ImageRecord> = project.used_images().collect();
     let meshes = whole_grids(project, &records)?;
-    let period = project.canvas.full_turn.then_some(project.canvas.width as f64);
+    let period = project.canvas.period();
     let seen = seen(project, &records, project_folder, context)?;
     let pairs: Vec<(usize, usize)> = (0..records.len())
         .flat_map(|a| (a + 1..records.len()).map(move |b| (a, b)))
@@ -122,12 +119,7 @@ fn seen(
     context: &StageContext,
 ) -> Result<Vec<Seen>> {
     let options = &project.options.measure;
-    let images = records
-        .iter()
-        .map(|record| find_photograph(record, project_folder, &options.source, context))
-        .collect::<Result<Vec<SourceImage>>>()?;
-    let colors = PhotographColors::survey(&images, context);
-    let photographs = FilePhotographs::new(images, 0).in_colors(colors).fused_by(Arc::new(ExposureFusion));
+    let photographs = photographs(project, records, project_folder, context)?;
     let of_one = |index: usize| {
         context.check_cancelled()?;
         let record = records[index];

@@ -6,22 +6,44 @@ mod pixels;
 mod tests;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use trueup_align::metrics::{
     self, Outside, Uprightness, best_rotation, folded_cells, mean_relative_turn, rectangle_rotation, relative_turns,
 };
+use trueup_compose::fusion::ExposureFusion;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::wrap_angle;
 use trueup_core::mesh::GridMesh;
+use trueup_core::source::SourceImage;
 use trueup_core::truth::{ImageTruth, Truth};
-use trueup_core::{Error, Result};
+use trueup_core::{Error, Result, StageContext};
+use trueup_io::color::PhotographColors;
+use trueup_io::decode::FilePhotographs;
 
 use super::measures::{HUNDREDTHS, Measures};
-use crate::project::read::whole_grids;
+use crate::project::read::{find_photograph, whole_grids};
 use crate::project::record::{ImageRecord, Project};
 pub use matches::{MatchEvaluation, PairMatchEvaluation, evaluate_matches};
 pub use pixels::{PixelEvaluation, compare_overlaps, evaluate_pixels, scale_up_to};
+
+/// The recorded photographs, to be read again from their files, of which the paths are tried as by [`evaluate_pixels`].
+///
+/// # Errors
+/// Those of [`find_photograph`].
+fn photographs(
+    project: &Project,
+    records: &[&ImageRecord],
+    project_folder: &Path,
+    context: &StageContext,
+) -> Result<FilePhotographs> {
+    let options = &project.options.measure.source;
+    let find = |record: &&ImageRecord| find_photograph(record, project_folder, options, context);
+    let images = records.iter().map(find).collect::<Result<Vec<SourceImage>>>()?;
+    let colors = PhotographColors::survey(&images, context);
+    Ok(FilePhotographs::new(images, 0).in_colors(colors).fused_by(Arc::new(ExposureFusion)))
+}
 
 /// A panorama measured against the truth. Angles in degrees.
 ///

@@ -1,22 +1,19 @@
 //! How alike the photographs look where two of them lie on the panorama.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use trueup_align::metrics::{OverlapMeasures, OverlapPixels, mean_over_overlaps};
-use trueup_compose::fusion::ExposureFusion;
 use trueup_compose::layout::{CanvasLayout, Placed};
 use trueup_compose::render::{self, Layer, RenderInput};
 use trueup_core::mesh::GridMesh;
 use trueup_core::raster::Raster;
-use trueup_core::source::{PhotographSource, SourceImage};
+use trueup_core::source::PhotographSource;
 use trueup_core::{Error, Result, StageContext};
-use trueup_io::color::PhotographColors;
-use trueup_io::decode::FilePhotographs;
 
-use crate::project::read::{find_photograph, recorded_corrections, whole_grids};
+use super::photographs;
+use crate::project::read::{recorded_corrections, whole_grids};
 use crate::project::record::{Canvas, ImageRecord, Project};
 
 /// Progress is reported as this.
@@ -61,12 +58,7 @@ pub struct PixelEvaluation {
 pub fn evaluate_pixels(project: &Project, project_folder: &Path, context: &StageContext) -> Result<PixelEvaluation> {
     project.options.validate()?;
     let records: Vec<&ImageRecord> = project.used_images().collect();
-    let images = records
-        .iter()
-        .map(|record| find_photograph(record, project_folder, &project.options.measure.source, context))
-        .collect::<Result<Vec<SourceImage>>>()?;
-    let colors = PhotographColors::survey(&images, context);
-    let photographs = FilePhotographs::new(images, 0).in_colors(colors).fused_by(Arc::new(ExposureFusion));
+    let photographs = photographs(project, &records, project_folder, context)?;
     let meshes = whole_grids(project, &records)?;
     let scale = scale(&meshes, project.options.run.measures.canvas_pixels);
     let positions: Vec<usize> = (0..records.len()).collect();
