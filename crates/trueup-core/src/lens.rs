@@ -237,6 +237,17 @@ impl Lens {
         radial + Matrix2::new(2.0 * p1 * y + 6.0 * p2 * x, cross, cross, 6.0 * p1 * y + 2.0 * p2 * x)
     }
 
+    /// A radius near the one that is distorted to `wanted`: the first terms of the inverse's series, where they change it by
+    /// little.
+    fn roughly_undistorted(&self, wanted: f64) -> f64 {
+        /// Share of the radius.
+        const LITTLE: f64 = 0.3;
+        let ([k1, k2, k3, _], square) = (self.terms.radial, wanted * wanted);
+        let third = 8.0 * k1 * k2 - 12.0 * k1 * k1 * k1 - k3;
+        let change = square * (-k1 + square * (3.0 * k1 * k1 - k2 + square * third));
+        if change.abs() < LITTLE { wanted * (1.0 + change) } else { wanted }
+    }
+
     /// The inverse of [`Self::distorted`], by Newton's method: first of the radius, then of the place.
     fn undistorted(&self, place: Vector2<f64>) -> Vector2<f64> {
         const MOST_STEPS: usize = 30;
@@ -251,7 +262,7 @@ impl Lens {
         }
         let settled = if is_radial { NEARLY_SETTLED } else { ROUGHLY_SETTLED };
         // The radius grows with a slope of at least LEAST_SLOPE, so that a bracket exists and can be kept.
-        let (mut low, mut high, mut r) = (0.0, f64::INFINITY, wanted);
+        let (mut low, mut high, mut r) = (0.0, f64::INFINITY, self.roughly_undistorted(wanted));
         for _ in 0..2 * MOST_STEPS {
             let Radial { factor, slope } = self.radial(r);
             let excess = r * factor - wanted;
