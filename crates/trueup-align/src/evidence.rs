@@ -83,22 +83,32 @@ pub(crate) fn common_squares(evidence: &[OverlapGap]) -> Vec<f64> {
         .collect()
 }
 
-/// Square, per axis, of the misalignment that neighbors have in common, in the mean of all `evidence`, less its standard
-/// error if they had nothing in common. 0 where none has a neighbor.
-pub(crate) fn common_square(evidence: &[OverlapGap]) -> f64 {
-    /// Pieces that are compared with one another; more hardly change the mean.
-    const MOST: usize = 400;
-    let some: Vec<&OverlapGap> = evidence.iter().step_by(evidence.len().div_ceil(MOST).max(1)).collect();
-    let (mut sum, mut squares) = (CommonSum::default(), 0.0);
-    for (k, one) in some.iter().enumerate() {
-        for other in &some[..k] {
-            if (NEAREST_PX..FARTHEST_PX).contains(&(other.place - one.place).norm()) {
-                // Products with a member in common are uncorrelated all the same, so that their squares add up.
-                squares += sum.add(one, other).powi(2);
+/// What neighbors have in common, in the mean of all evidence.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CommonSquare {
+    /// Square, per axis, of the misalignment; not negative, and 0 where none has a neighbor.
+    pub(crate) mean: f64,
+    /// The same less its standard error if they had nothing in common: what is sure.
+    pub(crate) sure: f64,
+}
+
+impl CommonSquare {
+    pub(crate) fn of(evidence: &[OverlapGap]) -> Self {
+        /// Pieces that are compared with one another; more hardly change the mean.
+        const MOST: usize = 400;
+        let some: Vec<&OverlapGap> = evidence.iter().step_by(evidence.len().div_ceil(MOST).max(1)).collect();
+        let (mut sum, mut squares) = (CommonSum::default(), 0.0);
+        for (k, one) in some.iter().enumerate() {
+            for other in &some[..k] {
+                if (NEAREST_PX..FARTHEST_PX).contains(&(other.place - one.place).norm()) {
+                    // Products with a member in common are uncorrelated all the same, so that their squares add up.
+                    squares += sum.add(one, other).powi(2);
+                }
             }
         }
+        let sure = CommonSum { products: sum.products - squares.sqrt(), ..sum };
+        Self { mean: sum.mean_square(), sure: sure.mean_square() }
     }
-    CommonSum { products: sum.products - squares.sqrt(), ..sum }.mean_square()
 }
 
 /// What neighbors say alike, summed.
@@ -172,9 +182,9 @@ mod tests {
         let points = |true_gap| -> Vec<OverlapGap> {
             lattice(true_gap).into_iter().filter(|one| one.known == Matrix2::identity()).collect()
         };
-        assert!(common_square(&points(Vector2::zeros())) < 0.002);
-        let found = common_square(&points(Vector2::new(0.6, -0.8)));
-        assert!((found - 0.5).abs() < 0.06, "{found}");
+        assert!(CommonSquare::of(&points(Vector2::zeros())).sure < 0.002);
+        let found = CommonSquare::of(&points(Vector2::new(0.6, -0.8)));
+        assert!((found.sure - 0.5).abs() < 0.06 && found.mean > found.sure, "{found:?}");
     }
 
     /// Four points 10 px apart in a square, 1 px off to the right: six products of 1, twelve axes, and a standard error of
@@ -187,10 +197,12 @@ mod tests {
             known: Matrix2::identity(),
         };
         let square = [one(0.0, 0.0), one(10.0, 0.0), one(0.0, 10.0), one(10.0, 10.0)];
-        assert!((common_square(&square) - (6.0 - 6.0_f64.sqrt()) / 12.0).abs() < 1e-12);
+        let common = CommonSquare::of(&square);
+        assert!((common.sure - (6.0 - 6.0_f64.sqrt()) / 12.0).abs() < 1e-12);
+        assert!((common.mean - 0.5).abs() < 1e-12);
         // Too near to be told apart by their noise, or too far to be neighbors.
-        assert_eq!(common_square(&[one(0.0, 0.0), one(7.9, 0.0), one(90.0, 0.0)]), 0.0);
-        assert_eq!(common_square(&[]), 0.0);
+        assert_eq!(CommonSquare::of(&[one(0.0, 0.0), one(7.9, 0.0), one(90.0, 0.0)]).mean, 0.0);
+        assert_eq!(CommonSquare::of(&[]).mean, 0.0);
     }
 
     #[test]

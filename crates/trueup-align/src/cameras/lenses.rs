@@ -6,6 +6,7 @@ use super::bundle::{BundleAdjustment, COARSE_HUBER_PX, FINE_HUBER_PX, Parameters
 use super::intrinsics::{CENTER, FOCAL, FreeTerms, IntrinsicsModel, RADIAL, TANGENTIAL, ZOOM_SPREAD, only_focal};
 use super::lens_evidence::{LensEvidence, Witness};
 use super::options::LensKind;
+use super::prior::CameraPrior;
 
 /// Squared distance from 0, in standard deviations and by dimension, at which matches are believed: 4 standard deviations, since
 /// the deviations rest on a dozen pairs.
@@ -68,9 +69,14 @@ impl LensSearch<'_> {
                 parameters = problem.minimize(parameters, &model, FINE_HUBER_PX, self.context)?;
             }
             if block == 0 {
-                bent = self.bent(&mut parameters, group_of, &mut free, &bent)?;
+                let asked = bent;
+                bent = self.bent(&mut parameters, group_of, &mut free, &asked)?;
                 if !bent.contains(&true) {
                     return Ok(None);
+                }
+                if self.add_settings(group_of, &asked, &bent, &mut free) {
+                    let model = IntrinsicsModel::grouped(group_of, &free);
+                    parameters = problem.minimize(parameters, &model, FINE_HUBER_PX, self.context)?;
                 }
                 continue;
             }
@@ -85,6 +91,22 @@ impl LensSearch<'_> {
         }
         let model = IntrinsicsModel::grouped(group_of, &free);
         Ok(self.problem.is_sound(&parameters).then_some(FoundLenses { parameters, model }))
+    }
+
+    /// Frees k1 of groups among those `asked` that one lens with a `bent` one took, at another of its settings; whether there are any. A
+    /// lens that bends at one focal length bends at all of them, by another amount: that is estimated, and needs no evidence of its own.
+    fn add_settings(&self, group_of: &[usize], asked: &[bool], bent: &[bool], free: &mut [FreeTerms]) -> bool {
+        let lens_of = CameraPrior::lens_groups(self.problem.priors);
+        let bending: Vec<usize> =
+            lens_of.iter().zip(group_of).filter(|(_, group)| bent[**group]).map(|(&lens, _)| lens).collect();
+        let mut added = false;
+        for (lens, &group) in lens_of.iter().zip(group_of) {
+            if asked[group] && !bent[group] && bending.contains(lens) {
+                free[group][RADIAL] = true;
+                added = true;
+            }
+        }
+        added
     }
 
     /// Which of the groups in `asked` have a lens that bends: those with evidence of k1, which is still there when k1 is found.

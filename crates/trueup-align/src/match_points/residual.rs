@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 
 use super::moving_dlt::DECAY_PX;
 use crate::cameras::CameraTransfer;
-use crate::evidence::{self, OverlapGap};
+use crate::evidence::{CommonSquare, OverlapGap};
 
 /// Largest distance of a carried vertex from its place without local corrections, in diagonals of the other photograph.
 pub(super) const MAX_DEVIATION: f64 = 0.1;
@@ -12,9 +12,14 @@ pub(super) const MAX_DEVIATION: f64 = 0.1;
 /// Carries points from one photograph to another by the cameras, plus a smooth correction.
 ///
 /// The correction at a place is a local linear regression of the matches' deviations from the cameras, weighted by
-/// distance and robustly, and drawn towards zero. Where the photographs were taken from one point it vanishes and the
+/// distance and robustly, and drawn towards zero: as strongly as the noise of a match exceeds what neighbors have in common
+/// (the ridge of best linear prediction). Where the photographs were taken from one point it vanishes and the
 /// places are as consistent as the cameras. Deviations of several planes it follows only in part, see
 /// [`Self::common_square`].
+///
+/// # Source
+/// A. E. Hoerl and R. W. Kennard, "Ridge regression: biased estimation for nonorthogonal problems" (1970): the best ridge is the
+/// variance of the noise over that of the coefficients.
 ///
 /// # Departures
 /// The published method carries vertices by moving DLT from the matches alone. On rotating cameras that adds the noise
@@ -22,6 +27,10 @@ pub(super) const MAX_DEVIATION: f64 = 0.1;
 pub(super) struct CameraResidual<'a> {
     cameras: CameraTransfer<'a>,
     samples: Vec<Sample>,
+    /// See [`Self::common_square`].
+    common_square: f64,
+    /// Strength, in matches, with which corrections are drawn towards none; infinite where the cameras explain all matches to their noise.
+    shrinkage: f64,
     /// Farthest outside the other photograph that a correction could still bring a point in.
     margin: f64,
 }
@@ -31,9 +40,44 @@ struct Sample {
     deviation: Vector2<f64>,
 }
 
+/// Deviations from the local trend below this are noise of the matches, pixels.
+const NOISE_PX: f64 = 1.5;
+/// Least strength, in matches, with which a correction is drawn towards none.
+const LEAST_SHRINKAGE: f64 = 0.5;
+
+/// Weight of a match that deviates by `misfit` pixels from where it is expected (Cauchy's loss).
+fn robust_weight(misfit: Vector2<f64>) -> f64 {
+    1.0 / (1.0 + misfit.norm_squared() / (NOISE_PX * NOISE_PX))
+}
+
+/// What neighboring matches' deviations have in common, in the mean of all.
+fn common_square(samples: &[Sample]) -> CommonSquare {
+    let gap =
+        |sample: &Sample| OverlapGap { place: sample.position, gap: sample.deviation, known: Matrix2::identity() };
+    CommonSquare::of(&samples.iter().map(gap).collect::<Vec<_>>())
+}
+
+/// Square, per axis, of a match's deviation, in the robust mean.
+fn mean_square(samples: &[Sample]) -> f64 {
+    let sum = samples.iter().fold((0.0, 0.0), |(squares, weights), sample| {
+        let weight = robust_weight(sample.deviation);
+        (squares + weight * sample.deviation.norm_squared(), weights + weight)
+    });
+    if sum.1 > 0.0 { 0.5 * sum.0 / sum.1 } else { 0.0 }
+}
+
+/// The variance of a match's noise over that of what neighbors have in common, not below [`LEAST_SHRINKAGE`]; infinite without anything in
+/// common.
+fn shrinkage(mean_square: f64, common_square: f64) -> f64 {
+    let noise = (mean_square - common_square).max(0.0);
+    let ratio = noise / common_square;
+    // Of deviations that are all 0 the ratio is NaN.
+    if ratio.is_nan() { f64::INFINITY } else { ratio.max(LEAST_SHRINKAGE) }
+}
+
 impl<'a> CameraResidual<'a> {
     pub(super) fn new(cameras: CameraTransfer<'a>, source: &[Vector2<f64>], target: &[Vector2<f64>]) -> Self {
-        let samples = source
+        let samples: Vec<Sample> = source
             .iter()
             .zip(target)
             .filter_map(|(&position, target)| {
@@ -42,7 +86,9 @@ impl<'a> CameraResidual<'a> {
             .collect();
         let [x, y] = cameras.to().principal_point;
         let margin = MAX_DEVIATION * 2.0 * x.hypot(y);
-        Self { cameras, samples, margin }
+        let common = common_square(&samples);
+        let shrinkage = shrinkage(mean_square(&samples), common.mean);
+        Self { cameras, samples, common_square: common.sure, shrinkage, margin }
     }
 
     /// The place of `point` in the other photograph; `None` behind its camera or far outside.
@@ -57,23 +103,20 @@ impl<'a> CameraResidual<'a> {
         (correction.norm() <= self.margin).then(|| place + correction)
     }
 
-    /// Square, per axis, of the deviation that neighboring matches have in common, in the mean of all: parallax, beyond
-    /// what noise explains.
+    /// Square, per axis, of the deviation that neighboring matches have in common, in the mean of all: parallax, as far as noise
+    /// surely does not explain it.
     pub(super) fn common_square(&self) -> f64 {
-        let gap =
-            |sample: &Sample| OverlapGap { place: sample.position, gap: sample.deviation, known: Matrix2::identity() };
-        evidence::common_square(&self.samples.iter().map(gap).collect::<Vec<_>>())
+        self.common_square
     }
 
     fn correction(&self, point: Vector2<f64>) -> Vector2<f64> {
         /// Rounds of reweighting.
         const ROUNDS: usize = 3;
-        /// Deviations from the local trend below this are noise of the matches.
-        const NOISE_PX: f64 = 1.5;
-        /// Strength, in matches, with which the correction is drawn towards none.
-        const SHRINKAGE: f64 = 0.5;
         /// The slope is drawn towards zero this many times as strongly as the offset (in units of the decay length).
         const SLOPE_SHRINKAGE: f64 = 4.0;
+        if self.shrinkage.is_infinite() {
+            return Vector2::zeros();
+        }
         // Of every sample its offset, in decay lengths, and its weight by distance.
         let around: Vec<(Vector2<f64>, f64)> = self
             .samples
@@ -95,7 +138,7 @@ impl<'a> CameraResidual<'a> {
                     _ => {
                         let expected = |axis: usize| trend[(0, axis)] + trend[(1, axis)] * x + trend[(2, axis)] * y;
                         let misfit = sample.deviation - Vector2::new(expected(0), expected(1));
-                        near / (1.0 + misfit.norm_squared() / (NOISE_PX * NOISE_PX))
+                        near * robust_weight(misfit)
                     }
                 };
                 let row = [weight, weight * x, weight * y];
@@ -109,12 +152,52 @@ impl<'a> CameraResidual<'a> {
                 }
             }
             let [n, x, y, xx, xy, yy] = products;
-            let shrinkage = Matrix3::from_diagonal(&(Vector3::new(1.0, SLOPE_SHRINKAGE, SLOPE_SHRINKAGE) * SHRINKAGE));
-            let normal = Matrix3::new(n, x, y, x, xx, xy, y, xy, yy) + shrinkage;
+            let ridge = Matrix3::from_diagonal(&(Vector3::new(1.0, SLOPE_SHRINKAGE, SLOPE_SHRINKAGE) * self.shrinkage));
+            let normal = Matrix3::new(n, x, y, x, xx, xy, y, xy, yy) + ridge;
             let right = Matrix3x2::from_row_slice(&deviations);
             let Some(factor) = normal.cholesky() else { break };
             trend = factor.solve(&right);
         }
         trend.row(0).transpose()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+    use trueup_core::camera::Camera;
+
+    use super::*;
+
+    /// By hand: 1.25 square pixels, of which 0.25 in common, are noise of four times what is in common.
+    #[test]
+    fn corrections_are_drawn_to_zero_as_noise_outweighs_what_is_common() {
+        assert!((shrinkage(1.25, 0.25) - 4.0).abs() < 1e-12);
+        assert_eq!(shrinkage(1.0, 2.0), LEAST_SHRINKAGE);
+        assert_eq!([shrinkage(1.0, 0.0), shrinkage(0.0, 0.0)], [f64::INFINITY; 2]);
+    }
+
+    /// Matches of one camera with itself, 20 px apart, that deviate by `deviation` of the column and row.
+    fn corrected(deviation: impl Fn(usize, usize) -> Vector2<f64>) -> Vector2<f64> {
+        let camera = Camera::new(600.0, 640.0, 480.0, &Matrix3::identity());
+        let places: Vec<(usize, usize)> = (0..24).flat_map(|row| (0..32).map(move |column| (column, row))).collect();
+        let source: Vec<Vector2<f64>> =
+            places.iter().map(|&(column, row)| Vector2::new(column as f64, row as f64) * 20.0).collect();
+        let target: Vec<Vector2<f64>> =
+            source.iter().zip(&places).map(|(place, &(column, row))| place + deviation(column, row)).collect();
+        let residual = CameraResidual::new(CameraTransfer::Rotating(&camera, &camera), &source, &target);
+        let point = Vector2::new(320.0, 240.0);
+        residual.at(point).expect("inside") - point
+    }
+
+    /// Neighbors that deviate to opposite sides have nothing in common: the cameras stay exactly what they are. A shift that all have is
+    /// followed, but for the least shrinkage beside the matches around.
+    #[test]
+    fn noise_corrects_nothing_and_a_common_shift_all() {
+        let side = |column: usize, row: usize| if (column + row).is_multiple_of(2) { 0.4 } else { -0.4 };
+        assert_eq!(corrected(|column, row| Vector2::new(side(column, row), 0.0)), Vector2::zeros());
+        let shift = Vector2::new(0.3, -0.8);
+        let found = corrected(|_, _| shift);
+        assert!((found - shift).norm() < 0.02, "{found}");
     }
 }
