@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
 use trueup_core::geometry::wrap_angle;
 
-use crate::mesh::is_moderate;
 use crate::stitch_graph::{GraphEdge, StitchGraph};
 
 /// Where a full turn is cut.
@@ -89,6 +88,13 @@ struct CutCandidate {
 pub(crate) fn goes_round(cameras: &[Camera], edges: &[GraphEdge], level_from_world: &Matrix3<f64>) -> bool {
     let yaws: Vec<f64> = cameras.iter().map(|camera| viewing_yaw(camera, level_from_world)).collect();
     !lies_flat(&yaws, edges)
+}
+
+/// Whether a direction in the level world is far enough from the poles to be unrolled.
+pub(crate) fn is_moderate(ray: Vector3<f64>) -> bool {
+    /// Sine of the largest latitude that is unrolled, 70 degrees.
+    const STEEPEST: f64 = 0.94;
+    (ray.y / ray.norm()).abs() <= STEEPEST
 }
 
 /// The direction a camera looks in, in the level world.

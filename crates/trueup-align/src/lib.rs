@@ -11,5 +11,6 @@ mod plane_similarity;
 pub mod projection;
 pub mod similarity;
 pub mod stitch_graph;
+mod straightening;
 pub mod vanishing;
 pub mod warps;

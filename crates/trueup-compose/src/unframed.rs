@@ -6,6 +6,7 @@ use trueup_core::color::TransferCurve;
 use trueup_core::mask::Masks;
 use trueup_core::raster::{Photograph, Raster};
 use trueup_core::source::PhotographSource;
+use trueup_core::statistics::median;
 
 /// Widest frame that is a hairline, as a share of the photograph's shorter side. What is wider was meant.
 const WIDEST: f64 = 0.005;
@@ -149,8 +150,7 @@ fn is_veiled<T: Copy + Default + Into<f32>>(
     if 2 * veils.len() < along - 2 * margin {
         return false;
     }
-    let middle = veils.len() / 2;
-    let veil = *veils.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let Some(veil) = median(&mut veils) else { return false };
     let is_alike = |[outer, inner]: &&[f32; 2]| (inner + veil * (frame - inner) - outer).abs() <= 2.0 * PLAIN;
     let alike = seen.iter().filter(is_alike).count();
     veil >= LEAST_VEIL && alike as f64 >= MOST_ALIKE * seen.len() as f64

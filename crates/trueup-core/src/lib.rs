@@ -34,6 +34,7 @@ pub mod raster;
 pub mod scratch;
 pub mod source;
 pub mod spherical;
+pub mod statistics;
 pub mod truth;
 
 pub use context::StageContext;

@@ -8,6 +8,11 @@ use crate::error::{Error, Result};
 /// ITU-R BT.601-7, section 2.5.1.
 pub const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
 
+/// [`LUMA`] of encoded red, green and blue in 256ths of a level, by whole numbers: off by less than half a level.
+pub fn luma_256ths([red, green, blue]: [u8; 3]) -> u32 {
+    77 * u32::from(red) + 150 * u32::from(green) + 29 * u32::from(blue)
+}
+
 /// A picture of `width` x `height` pixels with `channels` interleaved samples each.
 ///
 /// Sample `c` of the pixel whose center is at (x + 0.5, y + 0.5) is `data[(y * width + x) * channels + c]`.
@@ -231,6 +236,14 @@ mod tests {
         assert_eq!(eight, [1, 2, 3, 255, 0, 255, 7, 255]);
         assert_eq!(sixteen, [257, 514, 771, 65535, 0, 65535, 1799, 65535]);
         assert!(picture.linear_row(0, &mut [0.0; 8]).is_err());
+    }
+
+    #[test]
+    fn luma_by_whole_numbers_is_luma() {
+        for pixel in [[0_u8; 3], [255; 3], [255, 0, 0], [0, 255, 0], [0, 0, 255], [17, 200, 99]] {
+            let exact: f32 = (0..3).map(|channel| LUMA[channel] * f32::from(pixel[channel])).sum();
+            assert!((luma_256ths(pixel) as f32 / 256.0 - exact).abs() < 0.5, "{pixel:?}");
+        }
     }
 
     #[test]

@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 use trueup_core::camera::{Camera, INTRINSICS};
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
+use trueup_core::statistics::median;
 use trueup_core::{Result, StageContext};
 
 use super::equations::{Columns, NormalEquations, NormalPattern, Pull};
@@ -123,12 +124,7 @@ impl BundleAdjustment<'_> {
         let cameras = parameters.cameras(self.priors);
         let of_pairs: Vec<Vec<f64>> =
             self.observations.pairs.par_iter().map(|pair| pair_distances(&cameras, pair)).collect();
-        let mut distances = of_pairs.concat();
-        let middle = distances.len() / 2;
-        match distances.is_empty() {
-            true => f64::INFINITY,
-            false => *distances.select_nth_unstable_by(middle, f64::total_cmp).1,
-        }
+        median(&mut of_pairs.concat()).unwrap_or(f64::INFINITY)
     }
 
     /// Whether the solution can be used: finite, and no focal length at the short end of its range. (At the long end

@@ -4,7 +4,7 @@ use trueup_core::camera::Camera;
 use trueup_core::matches::PairMatches;
 
 use crate::stitch_graph::{GraphEdge, StitchGraph};
-use crate::{full_turn, similarity};
+use crate::{full_turn, straightening};
 
 /// Residual up to which a pair that closes a full turn is kept, in units of that of other pairs.
 const KEPT_WHERE_CLOSING: f64 = 2.0;
@@ -20,7 +20,7 @@ pub(super) fn contradicting_pairs(
     max_rms_px: f64,
 ) -> Vec<usize> {
     let mut dropped = not_needed(cameras.len(), pairs, &suspects(pair_rms_px, max_rms_px));
-    let level = similarity::level_by_cameras(cameras);
+    let level = straightening::level_by_cameras(cameras);
     let goes_round =
         |left_out: &dyn Fn(usize) -> bool| full_turn::goes_round(cameras, &edges_without(pairs, left_out), &level);
     if goes_round(&|_| false) && !goes_round(&|position| dropped.contains(&position)) {

@@ -12,6 +12,7 @@ use trueup_core::camera::Camera;
 use trueup_core::geometry::Homography;
 use trueup_core::lines::LineSegment;
 use trueup_core::matches::{PairMatches, PointMatch};
+use trueup_core::statistics::median_of;
 use trueup_core::{Error, Result, StageContext};
 
 use super::bundle::{COARSE_HUBER_PX, FINE_HUBER_PX};
@@ -84,7 +85,7 @@ impl FlatScene {
 
     /// Pixels of the photographs per unit of the plane: the median.
     pub fn pixels_per_unit(&self) -> f64 {
-        median(self.cameras.iter().map(PlaneCamera::pixels_per_unit))
+        median_of(self.cameras.iter().map(PlaneCamera::pixels_per_unit)).unwrap_or_default()
     }
 }
 
@@ -132,7 +133,7 @@ pub(super) fn find(
     }
     let rotating = Residuals::of(input, |from, to, pixel| input.rotating[from].transfer(&input.rotating[to], pixel));
     let relative = |(prior, camera): (&CameraPrior, &Camera)| camera.focal_px / prior.longer();
-    let rotating_focal = median(input.priors.iter().zip(input.rotating).map(relative));
+    let rotating_focal = median_of(input.priors.iter().zip(input.rotating).map(relative)).unwrap_or_default();
     let is_longer_than =
         |limit: f64| rotating_focal > limit && input.priors.iter().all(|prior| prior.focal_px.is_none());
     // The search takes longer than the rotating cameras: where nothing recorded holds their focal length, moving ones would have drawn it
@@ -382,12 +383,6 @@ impl Residuals {
             least_explained: of_each.into_iter().map(Count::share).fold(1.0, f64::min),
         }
     }
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

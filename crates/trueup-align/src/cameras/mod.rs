@@ -48,7 +48,7 @@ use straightness::CurveObservations;
 pub use flat_scene::{FlatEvidence, FlatScene};
 pub use options::{CameraOptions, FocalSharing, LensKind, SceneModel};
 pub use plane_camera::PlaneCamera;
-pub use prior::CameraPrior;
+pub use prior::{CameraPrior, USUAL_FOCAL};
 pub use transfer::CameraTransfer;
 
 /// What cameras are found from. Photographs are counted 0..N.

@@ -22,7 +22,7 @@ const TOLD_FOCAL_SD: f64 = 0.02;
 
 /// Focal length that is expected of a photograph of which nothing is known, in its longer sides: telephones' are 0.7 to 0.8, those of
 /// compact cameras and of zoom lenses as they are sold from 0.7 at their shortest to 1.5 and more.
-const USUAL_FOCAL: f64 = 0.85;
+pub const USUAL_FOCAL: f64 = 0.85;
 /// Standard deviation of its logarithm: one of twenty is shorter than 0.38 or longer than 1.9.
 pub(super) const USUAL_FOCAL_SD: f64 = 0.4;
 

@@ -11,8 +11,9 @@ use trueup_core::mesh::GridMesh;
 
 use super::complex::{conjugate_product, product};
 use super::options::{BaseShape, MeshOptions};
-use super::sphere_view::{SphereView, derivative_at_center, is_moderate};
+use super::sphere_view::{SphereView, derivative_at_center};
 use crate::cameras::{FlatScene, PlaneCamera};
+use crate::full_turn::is_moderate;
 use crate::similarity::SimilarityPrior;
 
 /// What the prior wants of one photograph.

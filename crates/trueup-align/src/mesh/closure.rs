@@ -1,6 +1,7 @@
 //! What closes a full turn: overlaps whose photographs, laid flat, lie a whole turn apart.
 
 use nalgebra::Vector2;
+use trueup_core::statistics::median_of;
 
 use crate::match_points::OverlapWarp;
 
@@ -31,11 +32,11 @@ impl Closure<'_> {
         /// Largest difference of the period from that by the cameras, as its share. Focal lengths may be off by a tenth
         /// and more although all matches agree on the period.
         const MOST_STRETCH: f64 = 0.25;
-        let Some(x) = median(apart.iter().map(|one| one.x)) else {
+        let Some(x) = median_of(apart.iter().map(|one| one.x)) else {
             return Some("no point of their overlap was carried across".to_owned());
         };
-        let middle = Vector2::new(x, median(apart.iter().map(|one| one.y))?);
-        let spread = median(apart.iter().map(|one| (one - middle).norm()))?;
+        let middle = Vector2::new(x, median_of(apart.iter().map(|one| one.y))?);
+        let spread = median_of(apart.iter().map(|one| (one - middle).norm()))?;
         let share = |length: f64| length / self.expected;
         let percent = |length: f64| 100.0 * share(length);
         // Written so that a number that is none is refused, too.
@@ -48,13 +49,6 @@ impl Closure<'_> {
         }
         (!within(spread, MOST_OFF)).then(|| format!("their matches contradict each other by {:.1} %", percent(spread)))
     }
-}
-
-/// The middle value, the upper one of an even count.
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 #[cfg(test)]

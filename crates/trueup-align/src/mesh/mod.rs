@@ -55,7 +55,6 @@ use plain_mesh::Layout;
 pub use plain_mesh::PlainMesh;
 pub use refinements::Refinements;
 pub(crate) use smooth_steps::{Meeting, smooth_steps};
-pub(crate) use sphere_view::is_moderate;
 pub use structure::{StructureInput, StructureOptions};
 pub use subdivision::divided;
 pub use warped_mesh::WarpedMesh;

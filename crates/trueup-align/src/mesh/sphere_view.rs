@@ -4,6 +4,8 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use trueup_core::camera::Camera;
 use trueup_core::mesh::GridMesh;
 
+use crate::full_turn::is_moderate;
+
 /// The unrolled place of a latitude (radians): Mercator's projection of a share of it, stretched back to the whole, so
 /// that the scale at the horizon is 1. A share of 4/5 is Miller's projection; its derivative is 1 / cos(share
 /// latitude).
@@ -88,13 +90,6 @@ impl SphereView {
         let latitude = (horizontal * change.y - ray.y * outward) / ray.norm_squared();
         Vector2::new(longitude, latitude / (self.conformality * ray.y.atan2(horizontal)).cos())
     }
-}
-
-/// Whether a direction in the level world is far enough from the poles to be unrolled.
-pub(crate) fn is_moderate(ray: Vector3<f64>) -> bool {
-    /// Sine of the largest latitude that is unrolled, 70 degrees.
-    const STEEPEST: f64 = 0.94;
-    (ray.y / ray.norm()).abs() <= STEEPEST
 }
 
 /// The similarity closest to the projection's derivative at the photograph's center, per pixel.

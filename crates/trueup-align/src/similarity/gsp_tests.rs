@@ -163,7 +163,7 @@ fn gsp_3d_does_not_depend_on_the_reference_where_overlaps_agree_with_the_cameras
         run(&input, &SimilarityOptions::default(), &StageContext::default()).expect("a well-formed scene")
     };
     let rotations: Vec<Matrix3<f64>> = scene.cameras.iter().map(Camera::rotation).collect();
-    let straightened = rolls(&straighten::straighten(&rotations).down, &rotations);
+    let straightened = rolls(&straightening::straighten(&rotations).down, &rotations);
     assert!(straightened.iter().any(|roll| roll.to_degrees().abs() > 2.0), "rolls to keep: {straightened:?}");
     for reference in 0..4 {
         for (theta, roll) in prior(reference).theta.iter().zip(&straightened) {
@@ -192,7 +192,7 @@ fn gsp_2d_straightens_its_reference_alone() {
         camera.set_rotation(&rotation);
     }
     let rotations: Vec<Matrix3<f64>> = graph.cameras.iter().map(Camera::rotation).collect();
-    let straightened = rolls(&straighten::straighten(&rotations).down, &rotations);
+    let straightened = rolls(&straightening::straighten(&rotations).down, &rotations);
     assert!(straightened.iter().all(|roll| roll.to_degrees().abs() > 1.0), "{straightened:?}");
     for reference in 0..3 {
         let expected = [0, 1, 2].map(|index| if index == reference { straightened[index].to_degrees() } else { 0.0 });

@@ -10,7 +10,7 @@ use trueup_core::geometry::orthonormal_complement;
 
 use super::gate::CameraAngle;
 use super::gravity::MeanGravity;
-use super::straighten::{Straightened, level_moment, straighten, straighten_with_pitch};
+use crate::straightening::{Straightened, level_moment, straighten, straighten_with_pitch};
 
 /// Roll that photographers leave, degrees: what is expected before the photographs show their own. Reasoned: hand-held
 /// photographs of level scenes scatter by 1 to 3 degrees.

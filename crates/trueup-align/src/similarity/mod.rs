@@ -25,7 +25,6 @@ mod prior;
 mod scale;
 mod signed_permutation;
 mod slope;
-mod straighten;
 mod turns;
 mod upright;
 mod vertical;
@@ -58,6 +57,8 @@ use level::CameraLevel;
 use upright::{Upright, rolls};
 use vpg::Guided;
 
+use crate::straightening;
+
 pub use flat::of_flat_scene;
 pub use input::PriorInput;
 pub use level::{LevelEvidence, LevelSource};
@@ -65,8 +66,6 @@ pub use options::{BetaMode, Fallback, GateMode, PriorMethod, SimilarityOptions};
 pub use posterior::{EstimatedRoll, RollsInput, estimated_rolls};
 pub use printed::PrintedEquations;
 pub use prior::{Guidance, SimilarityPrior};
-
-pub(crate) use straighten::level_by_cameras;
 
 /// What a user can do when lines do not guide the panorama.
 const REFUSED_HINT: &str =
@@ -116,7 +115,7 @@ pub fn run(input: &PriorInput<'_>, options: &SimilarityOptions, context: &StageC
         (PriorMethod::VanishingPoints, Fallback::Gsp3d) => gsp_3d::upright(input, &rotations, straightened),
         _ => straightening(&rotations, &down),
     });
-    let level_from_world = straighten::level_from_world(&upright.down, &rotations);
+    let level_from_world = straightening::level_from_world(&upright.down, &rotations);
     guidance.dominant = guidance.dominant.map(|world| rows_of(&(level_from_world * matrix_from_rows(&world))));
     Ok(SimilarityPrior {
         theta: upright.theta.iter().map(|theta| wrap_angle(theta + input.turn)).collect(),

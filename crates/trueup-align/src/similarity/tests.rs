@@ -215,12 +215,12 @@ fn straightening_is_wave_correction() {
     for (seed, sweep) in configurations().into_iter().enumerate() {
         let scene = SyntheticScene::new(sweep, CLEAN, 0.2, 40 + seed as u64);
         let rotations: Vec<Matrix3<f64>> = scene.cameras.iter().map(Camera::rotation).collect();
-        let straightened = straighten::straighten(&rotations);
+        let straightened = straightening::straighten(&rotations);
         assert!(straightened.conditioned);
         for (roll, expected) in rolls(&straightened.down, &rotations).iter().zip(wave_correction(&rotations)) {
             assert!(wrap_angle(roll - expected).abs() < 1e-9);
         }
-        let level = straighten::level_from_world(&straightened.down, &rotations);
+        let level = straightening::level_from_world(&straightened.down, &rotations);
         assert!((level * level.transpose() - Matrix3::identity()).amax() < 1e-9 && level.determinant() > 0.0);
     }
 }

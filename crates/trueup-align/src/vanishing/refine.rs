@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
+use trueup_core::statistics::{SD_PER_MEDIAN_MAGNITUDE, median};
 
 use super::interpretation::InterpretationPlanes;
 use super::options::VanishingOptions;
@@ -16,9 +17,6 @@ const DAMPING: f64 = 1e-9;
 const LOSS_SCALE_DEG: f64 = 1.5;
 /// Largest such angle for a segment to be counted in a direction's cluster, degrees.
 const CLUSTER_DEG: f64 = 6.0;
-/// Standard deviation of a normal distribution over its median absolute deviation.
-const SD_OVER_MAD: f64 = 1.4826;
-
 /// A triad after refinement.
 #[derive(Debug, Clone)]
 pub(crate) struct RefinedTriad {
@@ -133,8 +131,6 @@ impl NormalEquations {
     }
 
     fn residual_sd(&self) -> f64 {
-        let mut sines = self.sines.clone();
-        sines.sort_by(f64::total_cmp);
-        sines.get(sines.len() / 2).map_or(f64::INFINITY, |median| SD_OVER_MAD * median)
+        median(&mut self.sines.clone()).map_or(f64::INFINITY, |median| SD_PER_MEDIAN_MAGNITUDE * median)
     }
 }

@@ -1,6 +1,7 @@
 //! What two photographs that overlap say of each other.
 
 use trueup_core::color::TransferCurve;
+use trueup_core::statistics::{SD_PER_MEDIAN_MAGNITUDE, median, median_of};
 
 use super::measured::PairExposure;
 use super::samples::Shared;
@@ -44,15 +45,14 @@ pub(super) fn compare(
         return None;
     }
     let channel_medians = std::array::from_fn(|channel| {
-        let mut ratios: Vec<f32> = samples.iter().map(|sample| sample.log_ratio()[channel]).collect();
-        median(&mut ratios)
+        median_of(samples.iter().map(|sample| sample.log_ratio()[channel])).unwrap_or_default()
     });
     let mut ratios: Vec<f32> = samples.iter().map(Shared::brightness).collect();
-    let log_ratio = median(&mut ratios);
+    let log_ratio = median(&mut ratios).unwrap_or_default();
     for ratio in &mut ratios {
         *ratio = (*ratio - log_ratio).abs();
     }
-    let deviation = NORMAL * f64::from(median(&mut ratios));
+    let deviation = SD_PER_MEDIAN_MAGNITUDE * f64::from(median(&mut ratios).unwrap_or_default());
     let pair = PairExposure { first, second, log_ratio: f64::from(log_ratio), deviation, samples: samples.len() };
     // Neighboring samples say the same; a few hundred of an overlap settle seven unknowns.
     const KEPT: usize = 600;
@@ -64,13 +64,4 @@ pub(super) fn compare(
     });
     let samples: Vec<Shared> = samples.into_iter().map(|sample| sample.with_variances(curve)).collect();
     Some(Observed::new(pair, channel_medians, samples))
-}
-
-/// Ratio of the standard deviation to the median absolute deviation of a normal distribution.
-pub(super) const NORMAL: f64 = 1.4826;
-
-/// The median of at least one number (the upper one of an even count).
-fn median(values: &mut [f32]) -> f32 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f32::total_cmp).1
 }

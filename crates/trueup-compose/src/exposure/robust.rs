@@ -1,6 +1,6 @@
 //! Weights by residuals.
 
-use super::overlap::NORMAL;
+use trueup_core::statistics::{SD_PER_MEDIAN_MAGNITUDE, median};
 
 /// Residual, in standard deviations of the overlap, at which a sample counts half. Tuning constant of the Cauchy
 /// estimator for 95 % efficiency (Holland, Welsch, "Robust regression using iteratively reweighted least-squares", 1977).
@@ -24,13 +24,8 @@ pub(super) fn weights_of(residuals: &mut [f64], certainties: &[f64]) {
     for (residual, certainty) in residuals.iter_mut().zip(certainties) {
         *residual *= certainty.sqrt();
     }
-    let mut sorted = residuals.to_vec();
-    let middle = sorted.len() / 2;
-    if sorted.is_empty() {
-        return;
-    }
-    let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let scale = CAUCHY * (NORMAL * median).max(LEAST_DEVIATION);
+    let Some(median) = median(&mut residuals.to_vec()) else { return };
+    let scale = CAUCHY * (SD_PER_MEDIAN_MAGNITUDE * median).max(LEAST_DEVIATION);
     for (residual, certainty) in residuals.iter_mut().zip(certainties) {
         *residual = certainty / (1.0 + (*residual / scale).powi(2));
     }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 use trueup_core::color::{ToneRelation, ToneSums};
+use trueup_core::statistics::{SD_PER_MEDIAN_MAGNITUDE, median};
 
 /// Pixels of the small copies that are compared: as many as photographs are measured on, where noise is averaged away and what is off by
 /// a part of a pixel is none.
@@ -137,10 +138,8 @@ fn of_medians(pixels: impl Iterator<Item = (f32, f32)>) -> ToneSums {
     }
     let mut sums = ToneSums::default();
     for (level, mut others) in of_level.into_iter().enumerate() {
-        let (middle, count) = (others.len() / 2, others.len());
-        if count > 0 {
-            let median = *others.select_nth_unstable_by(middle, f32::total_cmp).1;
-            (0..count).for_each(|_| sums.add(level as f32, median));
+        if let Some(median) = median(&mut others) {
+            others.iter().for_each(|_| sums.add(level as f32, median));
         }
     }
     sums
@@ -222,10 +221,7 @@ impl Fitted {
 
 /// From the median of magnitudes, as of a normal distribution.
 fn deviation(mut magnitudes: Vec<f32>) -> f32 {
-    /// Its standard deviation over its median magnitude.
-    const NORMAL: f32 = 1.4826;
-    let middle = magnitudes.len() / 2;
-    if magnitudes.is_empty() { 0.0 } else { NORMAL * *magnitudes.select_nth_unstable_by(middle, f32::total_cmp).1 }
+    median(&mut magnitudes).map_or(0.0, |median| SD_PER_MEDIAN_MAGNITUDE as f32 * median)
 }
 
 /// Where pixels contradict together, and what is around them.

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
+use trueup_core::raster::luma_256ths;
 
 use crate::distance::border_distances;
 
@@ -25,7 +26,8 @@ pub type SmallPixel = [u8; 4];
 
 /// Brightness of a pixel in 256ths of a level: Rec. 601 luma.
 pub(crate) fn luma(pixel: &SmallPixel) -> u32 {
-    77 * u32::from(pixel[0]) + 150 * u32::from(pixel[1]) + 29 * u32::from(pixel[2])
+    let &[red, green, blue, _] = pixel;
+    luma_256ths([red, green, blue])
 }
 
 /// A photograph on a small canvas: the box it lies in.

@@ -21,7 +21,7 @@ use crate::format::{
     Format, HeaderError, Input, LOSSLESS_BYTES, Output, PLAIN_PIXEL_BYTES, Reading, SideLimit, StoredPixels,
     Transparency, Writer, Writing,
 };
-use crate::metadata::block;
+use crate::metadata::embedded;
 
 /// The declaration.
 ///
@@ -36,8 +36,8 @@ pub(crate) static PNG: Format = Format {
         has_signature: |start| start.starts_with(b"\x89PNG\r\n\x1a\n"),
         stored,
         icc,
-        exif: block::read_exif,
-        whole_fields: block::read_fields,
+        exif: embedded::read_exif,
+        whole_fields: embedded::read_fields,
         pixels,
         reduced: None,
         pixel_bytes: PLAIN_PIXEL_BYTES,

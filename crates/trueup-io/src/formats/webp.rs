@@ -17,7 +17,7 @@ use crate::format::{
     Format, HeaderError, Input, LOSSLESS_BYTES, Output, PLAIN_PIXEL_BYTES, Reading, SideLimit, StoredPixels,
     Transparency, Writer, Writing,
 };
-use crate::metadata::block;
+use crate::metadata::embedded;
 
 /// The declaration.
 ///
@@ -32,8 +32,8 @@ pub(crate) static WEBP: Format = Format {
         has_signature: |start| start.starts_with(b"RIFF") && start.get(8..12) == Some(b"WEBP"),
         stored,
         icc: |input| WebPDecoder::new(input).ok()?.icc_profile().ok().flatten(),
-        exif: block::read_exif,
-        whole_fields: block::read_fields,
+        exif: embedded::read_exif,
+        whole_fields: embedded::read_fields,
         pixels,
         reduced: None,
         pixel_bytes: PLAIN_PIXEL_BYTES,

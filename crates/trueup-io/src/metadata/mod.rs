@@ -1,6 +1,7 @@
 //! What a file's header and EXIF say about a photograph, without decoding its pixels.
 
 pub(crate) mod block;
+pub(crate) mod embedded;
 pub(crate) mod exif_fields;
 pub(crate) mod focal;
 pub(crate) mod gravity;

@@ -7,6 +7,7 @@
 use nalgebra::{Matrix3, Vector3};
 use trueup_core::lines::{EdgeCurve, LineSegment};
 use trueup_core::raster::Raster;
+use trueup_core::statistics::{SD_PER_MEDIAN_MAGNITUDE, median_of};
 
 use super::refine::{Crossing, EdgePoint, EdgeProfiles, Scan};
 
@@ -41,7 +42,7 @@ const LOOKS: usize = 5;
 /// Rounds of the reweighted fit.
 const FIT_ROUNDS: usize = 3;
 /// Residuals beyond so many median deviations lose influence: Tukey's constant for 95 % efficiency, of normal errors.
-const TUKEY_MEDIANS: f64 = 4.685 * 1.4826;
+const TUKEY_MEDIANS: f64 = 4.685 * SD_PER_MEDIAN_MAGNITUDE;
 /// Median deviations are not taken to be smaller than this, pixels.
 const MIN_DEVIATION_PX: f64 = 0.03;
 
@@ -160,8 +161,8 @@ impl Grower<'_> {
             if !found || ahead.median_deviation(&step) > MAX_STRAY_PX {
                 return;
             }
-            let factor = median(step.iter().map(|point| point.weight))
-                / median(leading.iter().map(|point| point.weight)).max(f64::MIN_POSITIVE);
+            let factor = median_of(step.iter().map(|point| point.weight)).unwrap_or_default()
+                / median_of(leading.iter().map(|point| point.weight)).unwrap_or_default().max(f64::MIN_POSITIVE);
             if !(1.0 / MAX_WEIGHT_FACTOR..=MAX_WEIGHT_FACTOR).contains(&factor) {
                 return;
             }
@@ -233,18 +234,8 @@ impl Parabola {
     }
 
     fn median_deviation(&self, points: &[EdgePoint]) -> f64 {
-        median(points.iter().map(|point| (point.minor - self.at(point.major)).abs()))
+        median_of(points.iter().map(|point| (point.minor - self.at(point.major)).abs())).unwrap_or_default()
     }
-}
-
-/// The middle one of some values; 0 of none.
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 
 use trueup_core::lines::LineSegment;
 use trueup_core::raster::Raster;
+use trueup_core::statistics::{SD_PER_MEDIAN_MAGNITUDE, median, median_of};
 
 /// Standard deviation, in pixels, of the Gaussian whose derivative is taken across a segment. The first scan measures
 /// with it how blurred the edge is.
@@ -42,9 +43,6 @@ const TUKEY_SIGMAS: f64 = 4.685;
 
 /// Robust standard deviations are not taken to be smaller than this, in pixels.
 const MIN_RESIDUAL_PX: f64 = 0.03;
-
-/// Standard deviation of a normal law over its median absolute deviation.
-const SIGMA_FROM_MAD: f64 = 1.4826;
 
 /// The smallest share of the rows crossed that must show an edge point.
 const MIN_POINT_SHARE: f64 = 0.5;
@@ -290,10 +288,7 @@ impl Profile<'_> {
 
 /// Variance of the edge's own blur, in squared pixels: what the median point is wider than the filter.
 fn blur_variance(points: &[EdgePoint], filter: &Filter) -> f64 {
-    let mut spreads: Vec<f64> = points.iter().map(|point| point.spread).collect();
-    let middle = spreads.len() / 2;
-    let (_, &mut median, _) = spreads.select_nth_unstable_by(middle, f64::total_cmp);
-    median - filter.sigma.powi(2)
+    median_of(points.iter().map(|point| point.spread)).unwrap_or_default() - filter.sigma.powi(2)
 }
 
 /// The line through edge points by reweighted least squares with Tukey's biweight.
@@ -303,9 +298,7 @@ fn fit_line(points: &[EdgePoint], initial: &Fit) -> Option<Fit> {
     for _ in 0..FIT_ROUNDS {
         deviations.clear();
         deviations.extend(points.iter().map(|point| (point.minor - fit.at(point.major)).abs()));
-        let middle = deviations.len() / 2;
-        let (_, &mut median, _) = deviations.select_nth_unstable_by(middle, f64::total_cmp);
-        let cutoff = TUKEY_SIGMAS * (SIGMA_FROM_MAD * median).max(MIN_RESIDUAL_PX);
+        let cutoff = TUKEY_SIGMAS * (SD_PER_MEDIAN_MAGNITUDE * median(&mut deviations)?).max(MIN_RESIDUAL_PX);
         fit = weighted_line(points, &fit, cutoff)?;
     }
     Some(fit)

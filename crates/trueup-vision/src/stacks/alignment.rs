@@ -15,6 +15,7 @@ use trueup_core::color::{ToneRelation, ToneSums};
 use trueup_core::geometry::Homography;
 use trueup_core::interpolation::cubic_convolution_taps;
 use trueup_core::raster::Raster;
+use trueup_core::statistics::{SD_PER_MEDIAN_MAGNITUDE, median};
 
 use super::likeness::{CLIPPED, CRUSHED, expected, halved, likeness};
 use super::limits::MOST_SHIFT;
@@ -294,14 +295,8 @@ impl Turn {
 
 /// Standard deviation of numbers of which some are far off, from the median of their magnitudes; `None` without any.
 fn deviation(residuals: &[f32]) -> Option<f64> {
-    /// Of a normal distribution, over its median magnitude.
-    const NORMAL: f64 = 1.4826;
     let mut magnitudes: Vec<f32> = residuals.iter().filter(|one| !one.is_nan()).map(|one| one.abs()).collect();
-    let middle = magnitudes.len() / 2;
-    (!magnitudes.is_empty()).then(|| {
-        let median = *magnitudes.select_nth_unstable_by(middle, f32::total_cmp).1;
-        (NORMAL * f64::from(median)).max(LEAST_DEVIATION)
-    })
+    median(&mut magnitudes).map(|median| (SD_PER_MEDIAN_MAGNITUDE * f64::from(median)).max(LEAST_DEVIATION))
 }
 
 /// The picture at a place, by cubic convolution; NaN beyond the middles of its outermost pixels but one.

@@ -2,6 +2,7 @@
 
 use trueup_core::color::{ToneRelation, ToneSums, TransferCurve};
 use trueup_core::raster::{LUMA, Raster};
+use trueup_core::statistics::median;
 
 /// Levels from which a sample tells that there is light, but not how much: what cameras and JPEG compression leave of white.
 pub(super) const CLIPPED: f32 = 250.0;
@@ -143,6 +144,5 @@ pub(super) fn stops_between(dark: &Raster<f32>, bright: &[f32]) -> Option<f64> {
         .filter(|(dark, bright)| **dark > CRUSHED && **dark < CLIPPED && **bright > CRUSHED)
         .map(|(&dark, &bright)| stops(dark, bright))
         .collect();
-    let middle = all.len() / 2;
-    (!all.is_empty()).then(|| *all.select_nth_unstable_by(middle, f64::total_cmp).1)
+    median(&mut all)
 }

@@ -8,6 +8,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use trueup_core::diagnostics::{Diagnostic, Subject};
+use trueup_core::raster::luma_256ths;
 use trueup_core::source::SourceImage;
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::{self, FilePhotographs};
@@ -139,7 +140,8 @@ impl Followed {
             let small = some.par_iter().map(small).collect::<Result<Option<Vec<_>>>>()?;
             let Some(small) = small else { return Ok(None) };
             for picture in small {
-                let gray: Vec<u8> = picture.data().as_chunks().0.iter().map(gray_level).collect();
+                let gray: Vec<u8> =
+                    picture.data().as_chunks().0.iter().map(|&pixel| (luma_256ths(pixel) >> 8) as u8).collect();
                 let new = || Self { chooser: FrameChooser::new(picture.width(), picture.height()), levels: Vec::new() };
                 let followed = followed.get_or_insert_with(new);
                 followed.chooser.push(&gray);
@@ -158,11 +160,6 @@ impl Followed {
             steps.iter().zip(changes).filter(|(overlap, change)| **overlap >= LEAST_OVERLAP && *change <= MOST_CHANGE);
         alike.count() as f64 >= share * steps.len() as f64
     }
-}
-
-/// Luma of ITU-R BT.601 in 256ths.
-fn gray_level([red, green, blue]: &[u8; 3]) -> u8 {
-    ((77 * u32::from(*red) + 150 * u32::from(*green) + 29 * u32::from(*blue)) >> 8) as u8
 }
 
 fn told(run: &[SourceImage], used: usize) -> Diagnostic {

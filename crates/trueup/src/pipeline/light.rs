@@ -5,6 +5,7 @@ use trueup_core::color::{LightRange, TransferCurve};
 use trueup_core::diagnostics::{Diagnostic, Subject};
 use trueup_core::raster::{LUMA, Photograph, Raster};
 use trueup_core::source::SourceImage;
+use trueup_core::statistics::median;
 use trueup_core::{Result, StageContext};
 use trueup_io::decode;
 
@@ -102,8 +103,7 @@ pub(super) fn of_stacks<'a>(
         let (pixels, _) = thumbnail.data().as_chunks::<3>();
         levels.extend(pixels.iter().map(|pixel| (0..3).map(|k| LUMA[k] * f32::from(pixel[k])).sum::<f32>()));
     }
-    let middle = levels.len() / 2;
-    let middle = (!levels.is_empty()).then(|| *levels.select_nth_unstable_by(middle, f32::total_cmp).1)?;
+    let middle = median(&mut levels)?;
     // One level at least: of what is black, any tone may be the middle one.
     let middle = curve.linear(f64::from(middle.max(1.0)) / 255.0);
     Some(range_of(middle, ROOM_OF_STACKS * (-darkest).exp2())).filter(LightRange::is_sound)

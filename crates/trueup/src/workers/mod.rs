@@ -7,6 +7,7 @@
 //! code that works without workers, so that the panorama is the same to the last bit.
 
 mod division;
+mod handing_out;
 mod rendering;
 mod tasks;
 #[cfg(test)]

@@ -5,7 +5,7 @@ use trueup_core::Result;
 use trueup_core::source::SourceImage;
 
 use super::Workers;
-use super::division::{PHOTOGRAPHS_PER_TASK, run};
+use super::handing_out::{PHOTOGRAPHS_PER_TASK, run};
 use super::tasks::{Common, Kind, Placement, SmallResult, damaged};
 use crate::options::StitchOptions;
 

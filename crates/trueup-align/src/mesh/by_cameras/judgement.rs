@@ -5,10 +5,10 @@ use trueup_core::camera::Camera;
 use trueup_core::geometry::{roll_from_down, wrap_length};
 use trueup_core::mesh::GridMesh;
 
-use super::super::sphere_view::is_moderate;
 use super::super::warped_mesh::WarpedMesh;
 use super::corrections::{CarriedPoint, points, root_mean};
 use super::input::ByCamerasInput;
+use crate::full_turn::is_moderate;
 
 /// What was measured of a mesh.
 #[derive(Debug, Clone, PartialEq)]

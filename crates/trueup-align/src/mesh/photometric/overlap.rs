@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use trueup_core::mesh::GridMesh;
+use trueup_core::statistics::{SD_PER_MEDIAN_MAGNITUDE, median_of};
 
 use super::super::cell_pair::CellPairs;
 use super::super::normal_equations::Metric;
@@ -15,9 +16,6 @@ use crate::match_points::OverlapWarp;
 
 /// Half the width of a Tukey weight, in standard deviations: 95 % efficient for a Gaussian.
 const TUKEY: f64 = 4.685;
-/// Standard deviation of a Gaussian per median absolute deviation.
-const SIGMA_PER_MAD: f64 = 1.4826;
-
 /// Distance of the samples in the finest photographs, working px; twice as far in each coarser one. Edges are two to three
 /// pixels wide: at 4 px many are passed over, and NCC MSE is 1 % higher on four of five sets.
 const SPACING_PX: f64 = 3.0;
@@ -160,9 +158,7 @@ fn spacing_px(level: usize) -> f64 {
 fn spread(residuals: impl Iterator<Item = f64>) -> f64 {
     /// Least standard deviation: that of rounding both photographs.
     const ROUNDING: f64 = 0.5;
-    let mut sizes: Vec<f64> = residuals.map(f64::abs).collect();
-    let middle = sizes.len() / 2;
-    (SIGMA_PER_MAD * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(ROUNDING)
+    median_of(residuals.map(f64::abs)).map_or(ROUNDING, |median| (SD_PER_MEDIAN_MAGNITUDE * median).max(ROUNDING))
 }
 
 /// Tukey's biweight of a residual in standard deviations.

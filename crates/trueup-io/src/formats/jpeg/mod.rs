@@ -8,7 +8,7 @@ pub(super) mod write;
 
 use crate::encode::options::Depth;
 use crate::format::{Format, LOSSY_BYTES, PLAIN_PIXEL_BYTES, Reading, SideLimit, Transparency, Writer, Writing};
-use crate::metadata::block;
+use crate::metadata::embedded;
 
 /// The declaration.
 ///
@@ -25,7 +25,7 @@ pub(crate) static JPEG: Format = Format {
         stored: read::stored,
         icc: read::icc,
         exif: read::exif,
-        whole_fields: block::read_fields,
+        whole_fields: embedded::read_fields,
         pixels: read::pixels,
         reduced: Some(reduced::pixels),
         pixel_bytes: PLAIN_PIXEL_BYTES,

@@ -13,7 +13,7 @@ use zune_jpeg::JpegDecoder;
 use super::scans::{has_separate_subsampled_scans, is_one_scan};
 use crate::format::{HeaderError, Input, StoredPixels};
 use crate::formats::decoded::{MAX_PIXEL_BYTES, check_unchanged, damaged};
-use crate::metadata::block;
+use crate::metadata::embedded;
 use crate::metadata::exif_fields::ExifFields;
 use crate::metadata::pose::stated_pose;
 
@@ -42,7 +42,7 @@ pub(super) fn icc(input: &mut Input) -> Option<Vec<u8>> {
 
 /// The fields of the EXIF block, and what the XMP packet beside it states of how the camera was held.
 pub(super) fn exif(input: &mut Input) -> Option<ExifFields> {
-    let fields = block::read_exif(input);
+    let fields = embedded::read_exif(input);
     let pose = input.rewind().ok().and_then(|()| xmp(input)).and_then(|packet| stated_pose(&packet));
     match (fields, pose) {
         (None, None) => None,

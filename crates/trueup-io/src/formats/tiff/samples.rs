@@ -1,20 +1,13 @@
 //! All samples of a TIFF's first page.
 
-use std::io::{Read, Seek};
-
 use tiff::TiffResult;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use trueup_core::source::SourceImage;
 use trueup_core::{Error, Result};
 
 use super::page::{FirstPage, PixelKind};
-use super::texts::WithoutAbsurdTexts;
+use super::texts::{TiffInput, WithoutAbsurdTexts};
 use crate::formats::decoded::{damaged, decoding_limit};
-
-/// What a decoder reads from.
-pub(super) trait TiffInput: Read + Seek {}
-
-impl<R: Read + Seek> TiffInput for R {}
 
 /// A decoder of a file as it can be read.
 pub(super) type TiffDecoder<'a> = Decoder<WithoutAbsurdTexts<'a>>;

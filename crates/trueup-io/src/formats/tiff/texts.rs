@@ -5,7 +5,10 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-use super::samples::TiffInput;
+/// What a decoder reads from.
+pub(super) trait TiffInput: Read + Seek {}
+
+impl<R: Read + Seek> TiffInput for R {}
 
 /// Longest text that is read, in bytes; longer ones count as absent.
 const MOST_TEXT_BYTES: u64 = 1 << 20;

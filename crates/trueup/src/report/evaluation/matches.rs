@@ -5,6 +5,7 @@ use std::path::Path;
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use trueup_align::cameras::USUAL_FOCAL;
 use trueup_align::metrics::{MatchedPair, may_overlap, panorama_distances};
 use trueup_core::camera::Camera;
 use trueup_core::geometry::rows_of;
@@ -20,8 +21,6 @@ use crate::project::record::{ImageRecord, Project};
 
 /// Progress is reported as this.
 const STAGE: &str = "matching anew";
-/// Focal length, in longer sides of the photograph, where the project has none: an ordinary lens. Only what is near counts the same by it.
-const USUAL_FOCAL: f64 = 1.0;
 /// Pixels of the small copies that come with working pictures and are not used.
 const NO_THUMBNAIL_PIXELS: f64 = 1.0;
 
@@ -127,6 +126,7 @@ fn seen(
         let frame = WorkingFrame::new(record.width, record.height, options.working.pixels);
         let picture = photographs.working(index, &frame, NO_THUMBNAIL_PIXELS)?;
         let features = features::detect(&picture.gray, &options.features, context)?;
+        // Where the project has no cameras, an ordinary lens: only what is near counts the same by it.
         let camera = record.camera(&rows_of(&Matrix3::identity())).unwrap_or_else(|| {
             let [width, height] = [record.width, record.height].map(|side| side as f64);
             Camera::new(USUAL_FOCAL * width.max(height), width, height, &Matrix3::identity())

@@ -13,7 +13,7 @@ const MAX_PAIR_ANGLE_DEG: f64 = 25.0;
 
 /// The vertical that the cameras' x axes span a plane orthogonal to.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Straightened {
+pub(crate) struct Straightened {
     /// Down, in the common frame.
     pub down: Vector3<f64>,
     /// Whether the x axes point in sufficiently different directions; otherwise `down` is the mean of the y axes,
@@ -30,7 +30,7 @@ pub(super) struct Straightened {
 /// # Departures
 /// With parallel x axes (one photograph, a tiny pan, a vertical sweep) that eigenvector is arbitrary; the mean of the y
 /// axes, made orthogonal to the mean x axis, takes its place.
-pub(super) fn straighten(rotations: &[Matrix3<f64>]) -> Straightened {
+pub(crate) fn straighten(rotations: &[Matrix3<f64>]) -> Straightened {
     let y_sum: Vector3<f64> = rotations.iter().map(|rotation| rotation.row(1).transpose()).sum();
     let eigen = level_moment(rotations, 0.0).symmetric_eigen();
     let least = eigen.eigenvalues.imin();
@@ -55,7 +55,7 @@ pub(super) fn straighten(rotations: &[Matrix3<f64>]) -> Straightened {
 ///
 /// A prior of 0 yields [`straighten`]. On short sweeps with a roll of 5 degrees a prior of 0.1 divides the error of the
 /// vertical by about three; on full circles it changes little, since the pitch is common to all directions.
-pub(super) fn straighten_with_pitch(rotations: &[Matrix3<f64>], pitch_prior: f64) -> Vector3<f64> {
+pub(crate) fn straighten_with_pitch(rotations: &[Matrix3<f64>], pitch_prior: f64) -> Vector3<f64> {
     if pitch_prior <= 0.0 {
         return straighten(rotations).down;
     }
@@ -70,7 +70,7 @@ pub(super) fn straighten_with_pitch(rotations: &[Matrix3<f64>], pitch_prior: f64
 }
 
 /// sum x_i x_i^T + `pitch_prior` z_i z_i^T over the cameras' x and viewing axes, in the common frame.
-pub(super) fn level_moment(rotations: &[Matrix3<f64>], pitch_prior: f64) -> Matrix3<f64> {
+pub(crate) fn level_moment(rotations: &[Matrix3<f64>], pitch_prior: f64) -> Matrix3<f64> {
     let moments = rotations.iter().map(|rotation| {
         let (x, z) = (rotation.row(0).transpose(), rotation.row(2).transpose());
         x * x.transpose() + z * z.transpose() * pitch_prior
@@ -84,7 +84,7 @@ pub(super) fn level_moment(rotations: &[Matrix3<f64>], pitch_prior: f64) -> Matr
 /// # Departures
 /// OpenCV's wave correction chooses x so that the cameras' x axes point to positive x; with `down` signed by the y axes
 /// the mean viewing direction does the same without a case distinction.
-pub(super) fn level_from_world(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> Matrix3<f64> {
+pub(crate) fn level_from_world(down: &Vector3<f64>, rotations: &[Matrix3<f64>]) -> Matrix3<f64> {
     /// Viewing directions that cancel out (a full circle) leave the yaw to the first photograph.
     const CANCELLED: f64 = 1e-6;
     let ahead: Vector3<f64> = rotations.iter().map(|rotation| rotation.row(2).transpose()).sum();
