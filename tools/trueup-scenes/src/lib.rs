@@ -42,7 +42,7 @@ mod trace;
 pub use catalogue::{RECIPE, SetOutcome, SetRequest};
 pub use flat::{FlatSetKind, FlatTexture, flat_picture, flat_rig, write_flat_set};
 pub use render::{Quality, render};
-pub use rig::{PosedCamera, RigOptions, camera_from_world, rig};
+pub use rig::{PosedCamera, RigOptions, Shade, camera_from_world, rig};
 pub use scene::{LightQuality, LitScene, RoomStyle, SceneKind, SceneOptions, Viewpoint};
 pub use set::{SetOutput, truth_of, write_set};
 pub use study::{SetKind, example_set};

@@ -92,6 +92,12 @@ struct RenderArguments {
     /// Reach of the camera's wandering as a share of the scene's depth.
     #[arg(long)]
     translation_fraction: Option<f64>,
+    /// Standard deviation of the exposure, stops.
+    #[arg(long)]
+    exposure_sd: Option<f64>,
+    /// Stops between the half of the world around the middle of a row, which lies in the sun, and the other half.
+    #[arg(long)]
+    shade_stops: Option<f64>,
     /// Folder to write to.
     #[arg(long)]
     out: PathBuf,
@@ -131,6 +137,8 @@ impl RenderArguments {
         set(&mut rig.pitch_deg, self.pitch_deg);
         set(&mut rig.roll_sd_deg, self.roll_sd_deg);
         set(&mut rig.translation_fraction, self.translation_fraction);
+        set(&mut rig.exposure_sd, self.exposure_sd);
+        set(&mut rig.shade_stops, self.shade_stops);
         (scene, rig, quality)
     }
 }

@@ -74,7 +74,8 @@ pub fn render(scene: &LitScene, posed: &PosedCamera, quality: Quality) -> Raster
                 Some(glance) if is_even(&glances, x, y, posed.width, step) => glance.light,
                 _ => eye.pixel(scene, x, y, quality),
             };
-            pixel.copy_from_slice(&develop(light * scene.exposure, posed, x, y));
+            let shade = posed.shade.gain(&eye.direction(x as f64 + 0.5, y as f64 + 0.5));
+            pixel.copy_from_slice(&develop(light * scene.exposure * shade, posed, x, y));
         }
     });
     picture

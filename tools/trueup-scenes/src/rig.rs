@@ -1,5 +1,7 @@
 //! Where a photographer stands and points the camera.
 
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
 use nalgebra::{Matrix3, Vector3};
 use trueup_core::Result;
 use trueup_core::camera::Camera;
@@ -46,6 +48,9 @@ trueup_core::options! {
         translation_fraction: f64 = 0.01, between(0.0, 0.5), "of depth";
         /// Deviation of the exposure.
         exposure_sd: f64 = 0.15, between(0.0, 2.0), "stops";
+        /// How much brighter the half of the world around the viewpoint's own direction is than the other half, as sun is than shade; every
+        /// picture is then exposed for what lies in its middle. 0 for the scene's own light and one exposure.
+        shade_stops: f64 = 0.0, between(0.0, 16.0), "stops";
         /// Deviation of the red and blue gains.
         white_balance_sd: f64 = 0.015, between(0.0, 0.3), "";
         /// Loss of light at the picture's corners.
@@ -68,6 +73,8 @@ pub struct PosedCamera {
     pub center: [f64; 3],
     /// Gain of the exposure; 1 is the scene's own.
     pub exposure: f64,
+    /// What lies in shade.
+    pub shade: Shade,
     /// Gains of red, green and blue.
     pub white_balance: [f64; 3],
     /// Loss of light at the corners, 0 to 1.
@@ -76,6 +83,32 @@ pub struct PosedCamera {
     pub noise: f64,
     /// Seed of the noise.
     pub seed: u64,
+}
+
+/// Light that differs by directions, beside what the scene's own lamps and sun do: the two halves of a turn lie in sun and in shade.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shade {
+    /// Yaw of the middle of the sunlit half, radians, positive to the right of the world's z.
+    pub sun_yaw: f64,
+    /// Stops between sun and shade.
+    pub stops: f64,
+}
+
+impl Shade {
+    /// The same light everywhere.
+    pub const NONE: Self = Self { sun_yaw: 0.0, stops: 0.0 };
+
+    /// Gain of the light that comes from `direction` of the world: half of the stops more in the sun, half less in the shade.
+    pub fn gain(&self, direction: &Vector3<f64>) -> f64 {
+        /// Half of the angle over which sun goes over into shade, radians: about a third of an ordinary photograph.
+        const PENUMBRA: f64 = 0.15;
+        if self.stops == 0.0 {
+            return 1.0;
+        }
+        let off = (direction.x.atan2(direction.z) - self.sun_yaw + PI).rem_euclid(TAU) - PI;
+        let share = ((FRAC_PI_2 - off.abs()) / PENUMBRA).clamp(-1.0, 1.0);
+        (self.stops * 0.5 * share).exp2()
+    }
 }
 
 impl PosedCamera {
@@ -89,6 +122,7 @@ impl PosedCamera {
             height,
             center,
             exposure: 1.0,
+            shade: Shade::NONE,
             white_balance: [1.0; 3],
             vignetting: 0.0,
             noise: 0.0,
@@ -152,7 +186,9 @@ fn posed(options: &RigOptions, viewpoint: &Viewpoint, index: usize, columns: usi
     let second = options.second_hfov_deg >= NO_SECOND_DEG && index % 3 == 2;
     let hfov_deg = if second { options.second_hfov_deg } else { options.hfov_deg };
     let center = Vector3::from(viewpoint.eye) + wander;
-    let exposure = (options.exposure_sd * dice.normal()).exp2();
+    let shade = Shade { sun_yaw: (viewpoint.yaw_deg + options.yaw_deg).to_radians(), stops: options.shade_stops };
+    let metered = shade.gain(&(camera_from_world(yaw, pitch, roll).transpose() * Vector3::z()));
+    let exposure = (options.exposure_sd * dice.normal()).exp2() / metered;
     let white_balance =
         [1.0 + options.white_balance_sd * dice.normal(), 1.0, 1.0 + options.white_balance_sd * dice.normal()];
     let plain = PosedCamera::level(center.into(), 0.0, options.width, options.height, hfov_deg);
@@ -161,6 +197,7 @@ fn posed(options: &RigOptions, viewpoint: &Viewpoint, index: usize, columns: usi
     PosedCamera {
         camera,
         exposure,
+        shade,
         white_balance,
         vignetting: options.vignetting,
         noise: options.noise,
@@ -176,5 +213,31 @@ fn in_ball(dice: &mut Dice) -> Vector3<f64> {
         if point.norm_squared() <= 1.0 {
             return point;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Eight stops: sixteen times as much light in the middle of the sun, a sixteenth opposite, the scene's own at the edge; exposures undo it.
+    #[test]
+    fn sun_and_shade_lie_stops_apart_and_each_picture_is_exposed_for_its_own() {
+        let shade = Shade { sun_yaw: 0.5, stops: 8.0 };
+        let gain = |yaw: f64| shade.gain(&Vector3::new(yaw.sin(), 0.3, yaw.cos()));
+        assert!((gain(0.5) - 16.0).abs() < 1e-12 && (gain(0.5 + PI) - 1.0 / 16.0).abs() < 1e-12);
+        assert!((gain(0.5 + FRAC_PI_2) - 1.0).abs() < 1e-9 && (gain(0.5 - FRAC_PI_2 + 0.075) - 4.0).abs() < 1e-9);
+        assert_eq!(Shade::NONE.gain(&Vector3::x()), 1.0);
+        let viewpoint = Viewpoint { eye: [0.0; 3], yaw_deg: 10.0, depth_m: 5.0 };
+        let options = RigOptions {
+            shade_stops: 8.0,
+            exposure_sd: 0.0,
+            yaw_step_deg: 36.0,
+            pictures: 10,
+            ..RigOptions::default()
+        };
+        let cameras = rig(&options, &viewpoint).expect("options in their ranges");
+        let stops = |k: usize| cameras[k].exposure.log2();
+        assert!((stops(4) + 4.0).abs() < 1e-9 && (stops(0) - 4.0).abs() < 1e-9, "{} {}", stops(4), stops(0));
     }
 }
