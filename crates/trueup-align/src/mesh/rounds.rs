@@ -5,7 +5,7 @@ use trueup_core::Result;
 use trueup_core::mesh::GridMesh;
 
 use super::current_grids::CurrentGrids;
-use super::line_alignment::{LineAlignmentInput, ROBUST_PX, StraightInput};
+use super::line_alignment::{LineAlignmentInput, StraightInput};
 use super::normal_equations::NormalEquations;
 use super::photometric::{LEVELS, PhotometricInput};
 use super::problem::{MeshProblem, Solved};
@@ -48,7 +48,7 @@ impl MeshProblem<'_> {
     }
 
     /// Rounds of line alignment; with the last round's equations. A step that folds the grids is shortened; if that
-    /// does not help it is undone and ends the rounds.
+    /// does not help it is undone, and the next round asks less of what is far apart.
     fn align_lines(
         &self,
         solver: &mut MeshSolver,
@@ -59,15 +59,18 @@ impl MeshProblem<'_> {
     ) -> Result<(NormalEquations, Solved)> {
         /// Times the mesh is solved with lines and weights found on the solution before.
         const ROUNDS: usize = 4;
+        /// Distance at which a match has half its weight in the first round, panorama units: what is near the camera starts as far from where most
+        /// matches meet.
+        const FIRST_ROBUST_PX: f64 = 30.0;
         /// Factor on the robust distance from round to round: where depth differs within a cell, the surface that most
-        /// matches are on wins.
-        const NARROWING: f64 = 0.7;
+        /// matches are on wins. The last round's distance is that of a match's own error, 1 px.
+        const NARROWING: f64 = 0.32;
         let mut best = start;
         let mut fine = self.delivered(&best.meshes);
         let folds = total_folds(&fine);
         let shares = input.shares(&self.current(&best.meshes, &fine));
         let mut last = Vec::new();
-        let mut robust_px = ROBUST_PX;
+        let mut robust_px = FIRST_ROBUST_PX;
         let kept_straight = kept_straight(&equations, straight, &self.current(&best.meshes, &fine));
         for _ in 0..ROUNDS {
             let mut all = kept_straight.clone();
@@ -75,7 +78,7 @@ impl MeshProblem<'_> {
             lines.iter().for_each(|cells| all.add_cell_pairs(cells));
             robust_px *= NARROWING;
             let next = self.solve(solver, &all)?;
-            let Some(step) = self.longest_step(&best, next, |_, fine| total_folds(fine) <= folds) else { break };
+            let Some(step) = self.longest_step(&best, next, |_, fine| total_folds(fine) <= folds) else { continue };
             (best, fine) = step;
             last = lines;
         }
