@@ -170,15 +170,9 @@ impl LineAlignmentInput<'_> {
         points.chain(lines).collect()
     }
 
-    /// Adds the equations of matched lines and matched points around the current grids, with the `shares` of their
-    /// weights; matches `robust_px` apart have half of that.
-    pub(super) fn add(
-        &self,
-        equations: &mut NormalEquations,
-        grids: &CurrentGrids,
-        shares: &MatchShares,
-        robust_px: f64,
-    ) {
+    /// The equations of matched lines and matched points around the current grids, with the `shares` of their weights;
+    /// matches `robust_px` apart have half of that.
+    pub(super) fn cells(&self, grids: &CurrentGrids, shares: &MatchShares, robust_px: f64) -> Vec<CellPairs> {
         /// Weight of the squared distance of matched points, per working px squared; published: 1, without outlines that
         /// are held and match points that know nothing of parallax.
         const POINT_WEIGHT: f64 = 16.0;
@@ -206,8 +200,7 @@ impl LineAlignmentInput<'_> {
         };
         let lines = self.matched.par_iter().zip(&shares.lines).map(of_lines);
         let points = self.points.par_iter().zip(&shares.points).map(of_points);
-        let all: Vec<CellPairs> = lines.chain(points).collect();
-        all.iter().for_each(|cells| equations.add_cell_pairs(cells));
+        lines.chain(points).collect()
     }
 }
 

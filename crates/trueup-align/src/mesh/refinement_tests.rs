@@ -337,7 +337,8 @@ fn the_matched_lines_equations_are_the_gradient_of_their_energy() {
             equations.add_inside(photograph, &[(vertex, Vector2::new(1.0, 0.0))], Vector2::zeros());
         }
     }
-    input.add(&mut equations, &current, &input.whole_shares(), 2.0);
+    let cells = input.cells(&current, &input.whole_shares(), 2.0);
+    cells.iter().for_each(|cells| equations.add_cell_pairs(cells));
     let matrix = equations.matrix(&equations.blocks()).expect("every vertex has a block");
     let x: Vec<f64> = meshes.iter().flat_map(|mesh| mesh.target.iter().flatten().copied()).collect();
     let mut gradient: Vec<f64> = equations.right.iter().zip(&x).map(|(right, x)| -2.0 * (right + x)).collect();
@@ -402,8 +403,8 @@ fn aligned_believing_all(grids: &[GridMesh], warps: &[OverlapWarp], input: &Phot
     let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(grids).map(|(base, grid)| base.places(grid)).collect();
     let alignment = AlignmentEnergy::new(grids, warps, &bases, &places);
     let (options, context) = (MeshOptions::default(), StageContext::default());
-    let layout = Layout { places, alignment, closing: &[] };
     let mesh_input = self::input(grids, warps, &bases);
+    let layout = Layout::new(&mesh_input, places, alignment, &[], &options);
     let problem = layout.problem(&mesh_input, &options, &context);
     let (mut solver, mut equations) = (solver::MeshSolver::default(), problem.equations());
     let plain = problem.solve(&mut solver, &equations).expect("solvable");

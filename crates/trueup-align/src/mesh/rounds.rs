@@ -52,7 +52,7 @@ impl MeshProblem<'_> {
     fn align_lines(
         &self,
         solver: &mut MeshSolver,
-        equations: NormalEquations,
+        mut equations: NormalEquations,
         input: &LineAlignmentInput,
         straight: Option<StraightInput>,
         start: Solved,
@@ -69,23 +69,21 @@ impl MeshProblem<'_> {
         let mut fine = self.delivered(&best.meshes);
         let folds = total_folds(&fine);
         let shares = input.shares(&self.current(&best.meshes, &fine));
-        let mut last = None;
+        let mut last = Vec::new();
         let mut robust_px = FIRST_ROBUST_PX;
+        let kept_straight = kept_straight(&equations, straight, &self.current(&best.meshes, &fine));
         for _ in 0..ROUNDS {
-            let mut with_lines = equations.clone();
-            let grids = self.current(&best.meshes, &fine);
-            input.add(&mut with_lines, &grids, &shares, robust_px);
+            let mut all = kept_straight.clone();
+            let lines = input.cells(&self.current(&best.meshes, &fine), &shares, robust_px);
+            lines.iter().for_each(|cells| all.add_cell_pairs(cells));
             robust_px *= NARROWING;
-            let mut all = with_lines.clone();
-            if let Some(straight) = straight {
-                straight.add(&mut all, &grids);
-            }
             let next = self.solve(solver, &all)?;
             let Some(step) = self.longest_step(&best, next, |_, fine| total_folds(fine) <= folds) else { continue };
             (best, fine) = step;
-            last = Some(with_lines);
+            last = lines;
         }
-        Ok((last.unwrap_or(equations), best))
+        last.iter().for_each(|cells| equations.add_cell_pairs(cells));
+        Ok((equations, best))
     }
 
     /// Keeps the outlines of the photographs where they are in `meshes`.
@@ -126,19 +124,17 @@ impl MeshProblem<'_> {
         let mut best = start;
         let mut fine = self.delivered(&best.meshes);
         let folds = total_folds(&fine);
+        let kept_straight = kept_straight(equations, straight, &self.current(&best.meshes, &fine));
         for level in (0..LEVELS).rev() {
             let mut before = f64::INFINITY;
             for _ in 0..ROUNDS {
-                let mut with_pixels = equations.clone();
+                let mut with_pixels = kept_straight.clone();
                 let grids = self.current(&best.meshes, &fine);
                 let misfit = input.add(&mut with_pixels, self.warps, &grids, level, shares, self.context)?;
                 if misfit >= before * (1.0 - SETTLED) {
                     break;
                 }
                 before = misfit;
-                if let Some(straight) = straight {
-                    straight.add(&mut with_pixels, &grids);
-                }
                 let next = self.solve(solver, &with_pixels)?;
                 let most_rms = self.alignment.rms(&best.meshes, best.period) + MAX_DEPARTURE_PX;
                 let is_sound = |step: &Solved, fine: &[GridMesh]| {
@@ -175,6 +171,21 @@ impl MeshProblem<'_> {
             is_sound(&solved, &fine).then_some((solved, fine))
         })
     }
+}
+
+/// The `equations` with those of straight lines around `grids`.
+///
+/// Of the grids they take the directions of the lines alone, which rounds change by little.
+fn kept_straight(
+    equations: &NormalEquations,
+    straight: Option<StraightInput>,
+    grids: &CurrentGrids,
+) -> NormalEquations {
+    let mut all = equations.clone();
+    if let Some(straight) = straight {
+        straight.add(&mut all, grids);
+    }
+    all
 }
 
 /// A grid part of the way from one to another.
