@@ -238,7 +238,8 @@ fn what_lies_elsewhere_in_depth_meets_where_it_lies() {
     };
     let ([before, still], [after, moved]) = (apart(&alone), apart(&with));
     assert!((before - 12.0).abs() < 0.5 && still < 0.1, "{before} and {still} px");
-    assert!(after < 4.0 && moved < 3.0, "{after} and {moved} px");
+    // Around it cells of 40 px go over from one to the other: a third of the 12 px at most, over all that is behind.
+    assert!(after < 1.0 && moved < 4.0, "{after} and {moved} px");
 }
 
 /// Match points with a bump bend a line that crosses it; straightness and structure each pull it straight again.
