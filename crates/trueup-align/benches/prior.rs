@@ -112,5 +112,6 @@ fn joined(a: usize, b: usize) -> PairMatches {
         verdict: PairVerdict::Joined,
         b_from_a: None,
         inliers: Vec::new(),
+        elsewhere: Vec::new(),
     }
 }

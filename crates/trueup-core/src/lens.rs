@@ -216,13 +216,14 @@ impl Lens {
     }
 
     fn distorted(&self, undistorted: Vector2<f64>) -> Vector2<f64> {
+        undistorted * self.radial(undistorted.norm()).factor + self.aside(undistorted)
+    }
+
+    /// What the tangential terms add.
+    fn aside(&self, undistorted: Vector2<f64>) -> Vector2<f64> {
         let ([x, y], [p1, p2]) = (undistorted.into(), self.terms.tangential);
         let square = undistorted.norm_squared();
-        let aside = Vector2::new(
-            2.0 * p1 * x * y + p2 * (square + 2.0 * x * x),
-            p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y,
-        );
-        undistorted * self.radial(square.sqrt()).factor + aside
+        Vector2::new(2.0 * p1 * x * y + p2 * (square + 2.0 * x * x), p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y)
     }
 
     /// The derivative of [`Self::distorted`].
@@ -236,17 +237,32 @@ impl Lens {
         radial + Matrix2::new(2.0 * p1 * y + 6.0 * p2 * x, cross, cross, 6.0 * p1 * y + 2.0 * p2 * x)
     }
 
+    /// A radius near the one that is distorted to `wanted`: the first terms of the inverse's series, where they change it by
+    /// little.
+    fn roughly_undistorted(&self, wanted: f64) -> f64 {
+        /// Share of the radius.
+        const LITTLE: f64 = 0.3;
+        let ([k1, k2, k3, _], square) = (self.terms.radial, wanted * wanted);
+        let third = 8.0 * k1 * k2 - 12.0 * k1 * k1 * k1 - k3;
+        let change = square * (-k1 + square * (3.0 * k1 * k1 - k2 + square * third));
+        if change.abs() < LITTLE { wanted * (1.0 + change) } else { wanted }
+    }
+
     /// The inverse of [`Self::distorted`], by Newton's method: first of the radius, then of the place.
     fn undistorted(&self, place: Vector2<f64>) -> Vector2<f64> {
         const MOST_STEPS: usize = 30;
-        const SETTLED: f64 = 1e-14;
+        // The error after one of Newton's steps is about the square of the step.
         const NEARLY_SETTLED: f64 = 1e-8;
+        /// Where tangential terms move the place by more than that, and are sought from there.
+        const ROUGHLY_SETTLED: f64 = 1e-3;
         let wanted = place.norm();
-        if wanted == 0.0 && self.terms.tangential == [0.0; 2] || !wanted.is_finite() {
+        let is_radial = self.terms.tangential == [0.0; 2];
+        if wanted == 0.0 && is_radial || !wanted.is_finite() {
             return place;
         }
+        let settled = if is_radial { NEARLY_SETTLED } else { ROUGHLY_SETTLED };
         // The radius grows with a slope of at least LEAST_SLOPE, so that a bracket exists and can be kept.
-        let (mut low, mut high, mut r) = (0.0, f64::INFINITY, wanted);
+        let (mut low, mut high, mut r) = (0.0, f64::INFINITY, self.roughly_undistorted(wanted));
         for _ in 0..2 * MOST_STEPS {
             let Radial { factor, slope } = self.radial(r);
             let excess = r * factor - wanted;
@@ -258,22 +274,22 @@ impl Lens {
             let step = r - excess / slope;
             let inside = step > low && step < high;
             let next = if inside { step } else { 0.5 * (low + high.min(2.0 * low + 1.0)) };
-            // The error after one of Newton's steps is about the square of the step.
-            let settled = inside && (next - r).abs() <= NEARLY_SETTLED * (1.0 + r);
+            let is_settled = inside && (next - r).abs() <= settled * (1.0 + r);
             r = next;
-            if settled {
+            if is_settled {
                 break;
             }
         }
         let mut undistorted = if wanted > 0.0 { place * (r / wanted) } else { place };
-        if self.terms.tangential == [0.0; 2] {
+        if is_radial {
             return undistorted;
         }
+        undistorted -= self.aside(undistorted) / self.radial(r).factor;
         for _ in 0..MOST_STEPS {
             let Some(inverse) = self.by_undistorted(undistorted).try_inverse() else { break };
             let step = inverse * (place - self.distorted(undistorted));
             undistorted += step;
-            if step.norm() <= SETTLED * (1.0 + undistorted.norm()) {
+            if step.norm() <= NEARLY_SETTLED * (1.0 + undistorted.norm()) {
                 break;
             }
         }

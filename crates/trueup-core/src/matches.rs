@@ -55,6 +55,9 @@ pub struct PairMatches {
     pub b_from_a: Option<[[f64; 3]; 3]>,
     /// The matches kept (P_ij): global inliers first, then those of further planes. Empty unless joined.
     pub inliers: Vec<PointMatch>,
+    /// Further matches of which neighbors moved alike and that, with the others, one epipolar geometry explains: the same things, elsewhere in
+    /// depth than the planes that `inliers` lie on. Empty unless joined.
+    pub elsewhere: Vec<PointMatch>,
 }
 
 impl PairMatches {

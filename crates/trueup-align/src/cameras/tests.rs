@@ -69,6 +69,7 @@ pub(super) fn joined(a: usize, b: usize, inliers: Vec<PointMatch>) -> PairMatche
         verdict,
         b_from_a: None,
         inliers,
+        elsewhere: Vec::new(),
     }
 }
 

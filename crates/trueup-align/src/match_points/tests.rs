@@ -39,6 +39,7 @@ fn example() -> (Vec<WorkingFrame>, Vec<Camera>, PairMatches) {
         a: 0,
         b: 1,
         putative: inliers.len(),
+        elsewhere: Vec::new(),
         in_overlap: inliers.len(),
         agreeing: inliers.len(),
         needed: 15,

@@ -18,6 +18,7 @@ mod cell_pair;
 mod closure;
 mod complex;
 mod current_grids;
+mod factor;
 mod input;
 mod line_alignment;
 mod normal_equations;
@@ -75,7 +76,7 @@ pub fn run<'a>(input: &MeshInput<'a>, options: &'a MeshOptions, context: &StageC
     let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(grids).map(|(base, grid)| base.places(grid)).collect();
     let within = AlignmentEnergy::new(grids, input.warps, bases, &places);
     let solved = |alignment: &AlignmentEnergy, closing| {
-        let layout = Layout { places: places.clone(), alignment: alignment.clone(), closing };
+        let layout = Layout::new(input, places.clone(), alignment.clone(), closing, options);
         PlainMesh::solve(*input, layout, options, context)
     };
     let Some(closure) = &input.closure else { return solved(&within, &[]) };

@@ -1,6 +1,7 @@
 //! The plain mesh, and what its solution leaves to be refined.
 
 use nalgebra::Vector2;
+use rayon::prelude::*;
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
 use trueup_core::{Result, StageContext};
@@ -16,6 +17,7 @@ use super::problem::{MeshProblem, Solved};
 use super::refinements::Refinements;
 use super::similarity::PRIOR_SLOPE;
 use super::solver::MeshSolver;
+use super::subdivision::sags;
 use super::warped_mesh::WarpedMesh;
 use crate::match_points::OverlapWarp;
 
@@ -24,23 +26,37 @@ use crate::match_points::OverlapWarp;
 pub(super) struct Layout<'a> {
     /// The bases' places of the grids' vertices.
     pub places: Vec<Vec<Vector2<f64>>>,
+    sags: Vec<Vec<Vector2<f64>>>,
     pub alignment: AlignmentEnergy,
     /// Match points across the cut of a full turn that is to be closed.
     pub closing: &'a [OverlapWarp],
 }
 
-impl Layout<'_> {
+impl<'a> Layout<'a> {
+    /// Of grids whose vertices the bases have at `places`.
+    pub(super) fn new(
+        input: &MeshInput,
+        places: Vec<Vec<Vector2<f64>>>,
+        alignment: AlignmentEnergy,
+        closing: &'a [OverlapWarp],
+        options: &MeshOptions,
+    ) -> Self {
+        let MeshInput { grids, bases, .. } = *input;
+        let of_grid = |k: usize| sags(&grids[k], &bases[k], &places[k], options.subdivision);
+        Self { sags: (0..grids.len()).into_par_iter().map(of_grid).collect(), places, alignment, closing }
+    }
+
     /// The equations of `input`, laid out so.
-    pub(super) fn problem<'a>(
-        &'a self,
-        input: &MeshInput<'a>,
-        options: &'a MeshOptions,
-        context: &'a StageContext<'a>,
-    ) -> MeshProblem<'a> {
-        let MeshInput { grids, warps, bases, reference, .. } = *input;
-        let Self { places, alignment, closing } = self;
+    pub(super) fn problem<'b>(
+        &'b self,
+        input: &MeshInput<'b>,
+        options: &'b MeshOptions,
+        context: &'b StageContext<'b>,
+    ) -> MeshProblem<'b> {
+        let MeshInput { grids, warps, reference, .. } = *input;
+        let Self { places, sags, alignment, closing } = self;
         let prior_slope = PRIOR_SLOPE;
-        MeshProblem { grids, warps, bases, places, alignment, reference, closing, prior_slope, options, context }
+        MeshProblem { grids, warps, places, sags, alignment, reference, closing, prior_slope, options, context }
     }
 }
 
@@ -83,7 +99,7 @@ impl<'a> PlainMesh<'a> {
         let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(grids).map(|(base, grid)| base.places(grid)).collect();
         let alignment = AlignmentEnergy::new(grids, warps, bases, &places);
         let solved = Solved { meshes: placed(grids, &places), period: None, relative_gradient: 0.0 };
-        let layout = Layout { places, alignment, closing: &[] };
+        let layout = Layout::new(&input, places, alignment, &[], options);
         let problem = layout.problem(&input, options, context);
         let (equations, warped) = (problem.equations(), problem.warped(&solved));
         Self { input, layout, options, equations, solved, warped }
@@ -120,6 +136,6 @@ impl<'a> PlainMesh<'a> {
         let Self { input, layout, options, equations, solved, .. } = self;
         refinements.check(input.grids.len())?;
         let problem = layout.problem(&input, options, context);
-        Ok(problem.warped(&problem.refine(&mut MeshSolver::default(), equations, solved, refinements)?))
+        Ok(problem.warped(&problem.refine(&mut MeshSolver::of_rounds(), equations, solved, refinements)?))
     }
 }

@@ -5,7 +5,6 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::{Error, Result, StageContext};
 
 use super::alignment::AlignmentEnergy;
-use super::base::BaseMap;
 use super::normal_equations::NormalEquations;
 use super::options::MeshOptions;
 use super::similarity::SimilarityEnergy;
@@ -19,9 +18,10 @@ use crate::match_points::OverlapWarp;
 pub(super) struct MeshProblem<'a> {
     pub grids: &'a [GridMesh],
     pub warps: &'a [OverlapWarp],
-    pub bases: &'a [BaseMap],
     /// The bases' places of the grids' vertices.
     pub places: &'a [Vec<Vector2<f64>>],
+    /// How far the bases are from their bilinear interpolation, at the vertices of the grids as they are delivered.
+    pub sags: &'a [Vec<Vector2<f64>>],
     pub alignment: &'a AlignmentEnergy,
     /// The photograph that stays in place.
     pub reference: usize,
@@ -94,9 +94,7 @@ impl MeshProblem<'_> {
 
     /// Solved grids with the subdivision that they are delivered with.
     pub(super) fn delivered(&self, solved: &[GridMesh]) -> Vec<GridMesh> {
-        (0..solved.len())
-            .map(|k| subdivided(&solved[k], &self.bases[k], &self.places[k], self.options.subdivision))
-            .collect()
+        solved.iter().zip(self.sags).map(|(grid, sags)| subdivided(grid, sags, self.options.subdivision)).collect()
     }
 }
 

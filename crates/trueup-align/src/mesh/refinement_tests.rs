@@ -208,6 +208,39 @@ fn matched_lines_are_drawn_onto_each_other() {
     assert!((before - 3.0).abs() < 0.2 && after < 0.6, "{before} px became {after} px");
 }
 
+/// A thing before the scene, 80 px wide, lies 12 px beside it; most matches meet where the match points have them.
+#[test]
+fn what_lies_elsewhere_in_depth_meets_where_it_lies() {
+    let options = LineAlignmentOptions::default();
+    let lattice = |k: usize| Vector2::new(110.0 + (k % 20) as f64 * 10.0, 10.0 + (k / 20) as f64 * 11.0);
+    let is_near = |place: &Vector2<f64>| (160.0..=240.0).contains(&place.x) && (80.0..=160.0).contains(&place.y);
+    let at = |place: Vector2<f64>, aside: f64| PointMatch {
+        in_a: place.into(),
+        in_b: (place + Vector2::new(aside - SHIFT, 0.0)).into(),
+    };
+    let (near, far): (Vec<_>, Vec<_>) = (0..400).map(lattice).partition(is_near);
+    let inliers = far.iter().map(|&place| at(place, 0.0)).collect();
+    let alone = [joined(0, 1, inliers)];
+    let elsewhere = near.iter().map(|&place| at(place, 12.0)).collect();
+    let with = [PairMatches { elsewhere, ..alone[0].clone() }];
+    let apart = |points: &[PairMatches]| {
+        let lines = Some(LineAlignmentInput { matched: &[], points, options: &options });
+        let warped = refined(&Refinements { lines, outline_weight: 7.0, ..Refinements::default() });
+        let squares = |places: &[Vector2<f64>], aside: f64| {
+            let gap = |&place: &Vector2<f64>| {
+                let there = place + Vector2::new(aside - SHIFT, 0.0);
+                (warped.meshes[0].warp(place) - warped.meshes[1].warp(there)).norm_squared()
+            };
+            (places.iter().map(gap).sum::<f64>() / places.len() as f64).sqrt()
+        };
+        assert_eq!(warped.folds, 0);
+        [squares(&near, 12.0), squares(&far, 0.0)]
+    };
+    let ([before, still], [after, moved]) = (apart(&alone), apart(&with));
+    assert!((before - 12.0).abs() < 0.5 && still < 0.1, "{before} and {still} px");
+    assert!(after < 4.0 && moved < 3.0, "{after} and {moved} px");
+}
+
 /// Match points with a bump bend a line that crosses it; straightness and structure each pull it straight again.
 #[test]
 fn a_bent_line_is_pulled_straight() {
@@ -304,7 +337,8 @@ fn the_matched_lines_equations_are_the_gradient_of_their_energy() {
             equations.add_inside(photograph, &[(vertex, Vector2::new(1.0, 0.0))], Vector2::zeros());
         }
     }
-    input.add(&mut equations, &current, &input.whole_shares(), 2.0);
+    let cells = input.cells(&current, &input.whole_shares(), 2.0);
+    cells.iter().for_each(|cells| equations.add_cell_pairs(cells));
     let matrix = equations.matrix(&equations.blocks()).expect("every vertex has a block");
     let x: Vec<f64> = meshes.iter().flat_map(|mesh| mesh.target.iter().flatten().copied()).collect();
     let mut gradient: Vec<f64> = equations.right.iter().zip(&x).map(|(right, x)| -2.0 * (right + x)).collect();
@@ -369,8 +403,8 @@ fn aligned_believing_all(grids: &[GridMesh], warps: &[OverlapWarp], input: &Phot
     let places: Vec<Vec<Vector2<f64>>> = bases.iter().zip(grids).map(|(base, grid)| base.places(grid)).collect();
     let alignment = AlignmentEnergy::new(grids, warps, &bases, &places);
     let (options, context) = (MeshOptions::default(), StageContext::default());
-    let layout = Layout { places, alignment, closing: &[] };
     let mesh_input = self::input(grids, warps, &bases);
+    let layout = Layout::new(&mesh_input, places, alignment, &[], &options);
     let problem = layout.problem(&mesh_input, &options, &context);
     let (mut solver, mut equations) = (solver::MeshSolver::default(), problem.equations());
     let plain = problem.solve(&mut solver, &equations).expect("solvable");

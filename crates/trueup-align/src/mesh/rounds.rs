@@ -5,7 +5,7 @@ use trueup_core::Result;
 use trueup_core::mesh::GridMesh;
 
 use super::current_grids::CurrentGrids;
-use super::line_alignment::{LineAlignmentInput, ROBUST_PX, StraightInput};
+use super::line_alignment::{LineAlignmentInput, StraightInput};
 use super::normal_equations::NormalEquations;
 use super::photometric::{LEVELS, PhotometricInput};
 use super::problem::{MeshProblem, Solved};
@@ -48,41 +48,42 @@ impl MeshProblem<'_> {
     }
 
     /// Rounds of line alignment; with the last round's equations. A step that folds the grids is shortened; if that
-    /// does not help it is undone and ends the rounds.
+    /// does not help it is undone, and the next round asks less of what is far apart.
     fn align_lines(
         &self,
         solver: &mut MeshSolver,
-        equations: NormalEquations,
+        mut equations: NormalEquations,
         input: &LineAlignmentInput,
         straight: Option<StraightInput>,
         start: Solved,
     ) -> Result<(NormalEquations, Solved)> {
         /// Times the mesh is solved with lines and weights found on the solution before.
         const ROUNDS: usize = 4;
+        /// Distance at which a match has half its weight in the first round, panorama units: what is near the camera starts as far from where most
+        /// matches meet.
+        const FIRST_ROBUST_PX: f64 = 30.0;
         /// Factor on the robust distance from round to round: where depth differs within a cell, the surface that most
-        /// matches are on wins.
-        const NARROWING: f64 = 0.7;
+        /// matches are on wins. The last round's distance is that of a match's own error, 1 px.
+        const NARROWING: f64 = 0.32;
         let mut best = start;
         let mut fine = self.delivered(&best.meshes);
         let folds = total_folds(&fine);
         let shares = input.shares(&self.current(&best.meshes, &fine));
-        let mut last = None;
-        let mut robust_px = ROBUST_PX;
+        let mut last = Vec::new();
+        let mut robust_px = FIRST_ROBUST_PX;
+        let kept_straight = kept_straight(&equations, straight, &self.current(&best.meshes, &fine));
         for _ in 0..ROUNDS {
-            let mut with_lines = equations.clone();
-            let grids = self.current(&best.meshes, &fine);
-            input.add(&mut with_lines, &grids, &shares, robust_px);
+            let mut all = kept_straight.clone();
+            let lines = input.cells(&self.current(&best.meshes, &fine), &shares, robust_px);
+            lines.iter().for_each(|cells| all.add_cell_pairs(cells));
             robust_px *= NARROWING;
-            let mut all = with_lines.clone();
-            if let Some(straight) = straight {
-                straight.add(&mut all, &grids);
-            }
             let next = self.solve(solver, &all)?;
-            let Some(step) = self.longest_step(&best, next, |_, fine| total_folds(fine) <= folds) else { break };
+            let Some(step) = self.longest_step(&best, next, |_, fine| total_folds(fine) <= folds) else { continue };
             (best, fine) = step;
-            last = Some(with_lines);
+            last = lines;
         }
-        Ok((last.unwrap_or(equations), best))
+        last.iter().for_each(|cells| equations.add_cell_pairs(cells));
+        Ok((equations, best))
     }
 
     /// Keeps the outlines of the photographs where they are in `meshes`.
@@ -123,19 +124,17 @@ impl MeshProblem<'_> {
         let mut best = start;
         let mut fine = self.delivered(&best.meshes);
         let folds = total_folds(&fine);
+        let kept_straight = kept_straight(equations, straight, &self.current(&best.meshes, &fine));
         for level in (0..LEVELS).rev() {
             let mut before = f64::INFINITY;
             for _ in 0..ROUNDS {
-                let mut with_pixels = equations.clone();
+                let mut with_pixels = kept_straight.clone();
                 let grids = self.current(&best.meshes, &fine);
                 let misfit = input.add(&mut with_pixels, self.warps, &grids, level, shares, self.context)?;
                 if misfit >= before * (1.0 - SETTLED) {
                     break;
                 }
                 before = misfit;
-                if let Some(straight) = straight {
-                    straight.add(&mut with_pixels, &grids);
-                }
                 let next = self.solve(solver, &with_pixels)?;
                 let most_rms = self.alignment.rms(&best.meshes, best.period) + MAX_DEPARTURE_PX;
                 let is_sound = |step: &Solved, fine: &[GridMesh]| {
@@ -172,6 +171,21 @@ impl MeshProblem<'_> {
             is_sound(&solved, &fine).then_some((solved, fine))
         })
     }
+}
+
+/// The `equations` with those of straight lines around `grids`.
+///
+/// Of the grids they take the directions of the lines alone, which rounds change by little.
+fn kept_straight(
+    equations: &NormalEquations,
+    straight: Option<StraightInput>,
+    grids: &CurrentGrids,
+) -> NormalEquations {
+    let mut all = equations.clone();
+    if let Some(straight) = straight {
+        straight.add(&mut all, grids);
+    }
+    all
 }
 
 /// A grid part of the way from one to another.

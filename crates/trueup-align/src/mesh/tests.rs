@@ -52,7 +52,7 @@ fn run_evenly(grids: &[GridMesh], warps: &[OverlapWarp], bases: &[BaseMap], refe
     let alignment = AlignmentEnergy::new(grids, warps, bases, &places);
     let (options, context) = (options(), StageContext::default());
     let input = MeshInput { grids, warps, bases, reference, closure: None, structure: None };
-    let layout = Layout { places, alignment, closing: &[] };
+    let layout = Layout::new(&input, places, alignment, &[], &options);
     let problem = MeshProblem { prior_slope: 0.0, ..layout.problem(&input, &options, &context) };
     let solved = problem.solve(&mut MeshSolver::default(), &problem.equations()).expect("solvable");
     problem.warped(&solved)

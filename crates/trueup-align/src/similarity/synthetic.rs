@@ -164,6 +164,7 @@ pub(crate) fn joined(a: usize, b: usize, inliers: Vec<PointMatch>) -> PairMatche
         verdict: PairVerdict::Joined,
         b_from_a: None,
         inliers,
+        elsewhere: Vec::new(),
     }
 }
 

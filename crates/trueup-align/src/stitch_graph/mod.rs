@@ -188,6 +188,7 @@ mod tests {
             verdict: if agreeing >= 15 { PairVerdict::Joined } else { PairVerdict::TooFewInliers },
             b_from_a: None,
             inliers: Vec::new(),
+            elsewhere: Vec::new(),
         }
     }
 

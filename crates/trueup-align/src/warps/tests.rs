@@ -121,6 +121,7 @@ pub(super) fn matched(a: usize, b: usize, b_from_a: impl Fn(Vector2<f64>) -> Opt
         verdict: PairVerdict::Joined,
         b_from_a: None,
         inliers,
+        elsewhere: Vec::new(),
     }
 }
 

@@ -1,9 +1,11 @@
 //! What two photographs show alike by all that their pictures tell, whatever a panorama makes of it.
 //!
 //! The matches that align a panorama are those that agree with homographies, and what is measured by them alone says nothing of things elsewhere in
-//! depth. Here counts every match of which its neighbors say the same and that the geometry of two cameras explains.
+//! depth. Here counts every match of which its neighbors say the same and that the geometry of two cameras explains. What of it no plane of a pair
+//! explains draws the pair's overlap together where it lies.
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
+use rand::Rng;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::Homography;
 use trueup_core::matches::PointMatch;
@@ -91,12 +93,27 @@ pub fn consistent_matches(
     Ok(agreeing.into_iter().map(found).collect())
 }
 
-/// The matches, ascending, of which enough neighbors moved alike beside `b_from_a`, and not farther than `farthest_px`.
-fn supported(points: &MatchedPoints, b_from_a: &Homography, farthest_px: f64) -> Vec<usize> {
-    let moved: Vec<Vector2<f64>> = points.in_a.iter().zip(&points.in_b).map(|(&a, b)| b - b_from_a.apply(a)).collect();
-    // A comparison with NaN is false.
-    let near: Vec<usize> = (0..moved.len()).filter(|&k| moved[k].norm() <= farthest_px).collect();
-    let is_supported = |&k: &usize| {
+/// How matches moved beside a homography, and whether their neighbors moved alike.
+struct Surroundings<'a> {
+    points: &'a MatchedPoints,
+    moved: Vec<Vector2<f64>>,
+    /// Those that moved no farther than asked, ascending.
+    near: Vec<usize>,
+}
+
+impl<'a> Surroundings<'a> {
+    /// Of the matches that moved beside `b_from_a` by no more than `farthest_px`.
+    fn new(points: &'a MatchedPoints, b_from_a: &Homography, farthest_px: f64) -> Self {
+        let moved: Vec<Vector2<f64>> =
+            points.in_a.iter().zip(&points.in_b).map(|(&a, b)| b - b_from_a.apply(a)).collect();
+        // A comparison with NaN is false.
+        let near = (0..moved.len()).filter(|&k| moved[k].norm() <= farthest_px).collect();
+        Self { points, moved, near }
+    }
+
+    /// Whether enough neighbors of match `k` moved alike.
+    fn is_supported(&self, k: usize) -> bool {
+        let Self { points, moved, near } = self;
         let place = points.in_a[k];
         let mut others: Vec<(f64, usize)> =
             near.iter().filter(|&&j| j != k).map(|&j| ((points.in_a[j] - place).norm_squared(), j)).collect();
@@ -107,8 +124,44 @@ fn supported(points: &MatchedPoints, b_from_a: &Homography, farthest_px: f64) ->
         let alike =
             |&&(square, j): &&(f64, usize)| (moved[j] - moved[k]).norm() <= ALIKE_PX + ALIKE_SLOPE * square.sqrt();
         others.iter().filter(alike).count() >= ALIKE
+    }
+}
+
+/// The matches, ascending, of which enough neighbors moved alike beside `b_from_a`, and not farther than `farthest_px`.
+fn supported(points: &MatchedPoints, b_from_a: &Homography, farthest_px: f64) -> Vec<usize> {
+    let surroundings = Surroundings::new(points, b_from_a, farthest_px);
+    surroundings.near.iter().copied().filter(|&k| surroundings.is_supported(k)).collect()
+}
+
+/// The matches, ascending, that no plane of their pair explains (`is_known` says which one does) and that are consistent: of which two of the eight
+/// neighbors moved alike, and that have one epipolar geometry with those on planes.
+///
+/// Focal lengths are taken to be a longer side and lenses to bend nothing: a linear map of the bearings, and a bend within what a match may err by.
+pub(super) fn matches_elsewhere(
+    points: &MatchedPoints,
+    is_known: &[bool],
+    b_from_a: &Homography,
+    frames: [&WorkingFrame; 2],
+    generator: &mut impl Rng,
+) -> Vec<usize> {
+    let surroundings = Surroundings::new(points, b_from_a, FARTHEST_DIAGONAL * frames[1].diagonal());
+    let candidates: Vec<usize> =
+        surroundings.near.iter().copied().filter(|&k| !is_known[k] && surroundings.is_supported(k)).collect();
+    if candidates.is_empty() {
+        return candidates;
+    }
+    let mut all: Vec<usize> = (0..is_known.len()).filter(|&k| is_known[k]).chain(candidates).collect();
+    all.sort_unstable();
+    let points = points.select(&all);
+    let focal = |frame: &WorkingFrame| frame.width.max(frame.height);
+    let bearings = |places: &[Vector2<f64>], frame: &WorkingFrame| -> Vec<Vector3<f64>> {
+        let camera = Camera::new(focal(frame), frame.width, frame.height, &Matrix3::identity());
+        places.iter().map(|&place| camera.bearing(place).normalize()).collect()
     };
-    near.iter().copied().filter(is_supported).collect()
+    let (in_a, in_b) = (bearings(&points.in_a, frames[0]), bearings(&points.in_b, frames[1]));
+    let within = EPIPOLAR_PX / (focal(frames[0]) * focal(frames[1])).sqrt();
+    let agreeing = epipolar_matches(&in_a, &in_b, within, generator);
+    agreeing.into_iter().map(|k| all[k]).filter(|&k| !is_known[k]).collect()
 }
 
 #[cfg(test)]
@@ -135,6 +188,13 @@ mod tests {
         let moved = Homography::from_rows(&[[1.0, 0.0, 5.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
         let kept = supported(&points, &moved, 120.0);
         assert!((0..300).all(|k| kept.contains(&k) != wrong.contains(&k)), "{kept:?}");
+        let frame = WorkingFrame::new(400, 300, 480_000.0);
+        let generator = || StageContext::default().generator("test", 7);
+        let on_plane: Vec<bool> = (0..300).map(|k| k < 291 && !wrong.contains(&k)).collect();
+        let found = matches_elsewhere(&points, &on_plane, &moved, [&frame, &frame], &mut generator());
+        assert_eq!(found, (291..300).collect::<Vec<_>>());
+        let all = vec![true; 300];
+        assert!(matches_elsewhere(&points, &all, &moved, [&frame, &frame], &mut generator()).is_empty());
         // The thing of its own depth is 19 px from where most are.
         assert!(supported(&points, &moved, 15.0).iter().all(|&k| k < 291));
     }

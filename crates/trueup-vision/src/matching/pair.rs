@@ -7,6 +7,7 @@ use trueup_core::options::StageOptions;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Error, Result, StageContext};
 
+use super::consistent::matches_elsewhere;
 use super::guided::{GuidedInput, PlaneMap, PointMap, guided_matches};
 use super::matched_points::MatchedPoints;
 use super::options::MatchingOptions;
@@ -196,6 +197,7 @@ pub(super) fn match_pair(
         verdict: PairVerdict::TooFewMatches,
         b_from_a: None,
         inliers: Vec::new(),
+        elsewhere: Vec::new(),
     };
     if putative.len() < 4 {
         return Ok(pair);
@@ -233,7 +235,12 @@ pub(super) fn match_pair(
     input.judge(&mut pair, options);
     if pair.verdict.is_joined() {
         let joined = JoinedPair { input, putative: &putative, points: &points, global: &global, overlap: &overlap };
-        pair.inliers = joined.all_inliers(options, &mut generator);
+        let (inliers, is_known) = joined.all_inliers(options, &mut generator);
+        pair.inliers = inliers;
+        let mut generator = context.generator("matches elsewhere", seed);
+        let frames = [input.a.frame, input.b.frame];
+        let found = matches_elsewhere(&points, &is_known, &global.b_from_a, frames, &mut generator);
+        pair.elsewhere = found.into_iter().map(|k| putative[k].at).collect();
     }
     Ok(pair)
 }
@@ -250,8 +257,9 @@ struct JoinedPair<'a> {
 }
 
 impl JoinedPair<'_> {
-    /// The final matches: global inliers, those of further planes, those found near predicted places.
-    fn all_inliers(&self, options: &MatchingOptions, generator: &mut impl Rng) -> Vec<PointMatch> {
+    /// The final matches: global inliers, those of further planes, those found near predicted places; and which of the putative ones are among
+    /// them.
+    fn all_inliers(&self, options: &MatchingOptions, generator: &mut impl Rng) -> (Vec<PointMatch>, Vec<bool>) {
         let (a, b, global) = (self.input.a, self.input.b, self.global);
         let is_plausible = |map: &Homography| self.input.is_plausible(map);
         let planes = find_planes(self.points, &global.b_from_a, b.frame.diagonal(), is_plausible, generator);
@@ -283,7 +291,7 @@ impl JoinedPair<'_> {
             });
             inliers.extend(more.iter().map(|found| found.at));
         }
-        inliers
+        (inliers, plane_of.iter().map(Option::is_some).collect())
     }
 }
 

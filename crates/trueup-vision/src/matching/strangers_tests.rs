@@ -19,6 +19,7 @@ fn pair(a: usize, b: usize, scale: f64, right: f64, down: f64) -> PairMatches {
         verdict: PairVerdict::Joined,
         b_from_a: Some([[scale, 0.0, right], [0.0, scale, down], [0.0, 0.0, 1.0]]),
         inliers: Vec::new(),
+        elsewhere: Vec::new(),
     }
 }
 

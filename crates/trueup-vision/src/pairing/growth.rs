@@ -124,6 +124,7 @@ mod tests {
             verdict: PairVerdict::Joined,
             b_from_a: Some([[1.0, 0.0, -shift], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
             inliers: Vec::new(),
+            elsewhere: Vec::new(),
         }
     }
 

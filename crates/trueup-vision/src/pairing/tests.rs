@@ -44,6 +44,7 @@ fn matched((a, b): (usize, usize), joined: bool) -> PairMatches {
         verdict: if joined { PairVerdict::Joined } else { PairVerdict::TooFewInliers },
         b_from_a: joined.then_some([[1.0, 0.0, -shift], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
         inliers: Vec::new(),
+        elsewhere: Vec::new(),
     }
 }
 

@@ -142,6 +142,7 @@ mod tests {
             verdict,
             b_from_a: None,
             inliers: Vec::new(),
+            elsewhere: Vec::new(),
         }
     }
 
