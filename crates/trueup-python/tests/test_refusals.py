@@ -113,6 +113,8 @@ def test_an_exception_in_the_callback_stops_the_work(pictures: list[Array]) -> N
 
 
 def test_ctrl_c_interrupts(room: Path) -> None:
+    # What a shell starts in the background ignores the signal.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     started = threading.Event()
 
     def interrupt() -> None:
