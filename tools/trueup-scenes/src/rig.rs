@@ -1,12 +1,11 @@
 //! Where a photographer stands and points the camera.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Matrix3, Vector3};
 use trueup_core::Result;
 use trueup_core::camera::Camera;
-use trueup_core::geometry::roll_from_down;
-use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z};
+use trueup_core::geometry::{roll_from_down, rotation_about_x, rotation_about_y, rotation_about_z, wrap_angle};
 use trueup_core::options::StageOptions;
 
 use crate::dice::Dice;
@@ -105,7 +104,7 @@ impl Shade {
         if self.stops == 0.0 {
             return 1.0;
         }
-        let off = (direction.x.atan2(direction.z) - self.sun_yaw + PI).rem_euclid(TAU) - PI;
+        let off = wrap_angle(direction.x.atan2(direction.z) - self.sun_yaw);
         let share = ((FRAC_PI_2 - off.abs()) / PENUMBRA).clamp(-1.0, 1.0);
         (self.stops * 0.5 * share).exp2()
     }
@@ -187,13 +186,14 @@ fn posed(options: &RigOptions, viewpoint: &Viewpoint, index: usize, columns: usi
     let hfov_deg = if second { options.second_hfov_deg } else { options.hfov_deg };
     let center = Vector3::from(viewpoint.eye) + wander;
     let shade = Shade { sun_yaw: (viewpoint.yaw_deg + options.yaw_deg).to_radians(), stops: options.shade_stops };
-    let metered = shade.gain(&(camera_from_world(yaw, pitch, roll).transpose() * Vector3::z()));
+    let rotation = camera_from_world(yaw, pitch, roll);
+    let metered = shade.gain(&rotation.row(2).transpose());
     let exposure = (options.exposure_sd * dice.normal()).exp2() / metered;
     let white_balance =
         [1.0 + options.white_balance_sd * dice.normal(), 1.0, 1.0 + options.white_balance_sd * dice.normal()];
     let plain = PosedCamera::level(center.into(), 0.0, options.width, options.height, hfov_deg);
     let mut camera = plain.camera;
-    camera.set_rotation(&camera_from_world(yaw, pitch, roll));
+    camera.set_rotation(&rotation);
     PosedCamera {
         camera,
         exposure,
@@ -218,6 +218,8 @@ fn in_ball(dice: &mut Dice) -> Vector3<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     /// Eight stops: sixteen times as much light in the middle of the sun, a sixteenth opposite, the scene's own at the edge; exposures undo it.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector2;
 
-use super::normal_equations::Metric;
+use super::metric::Metric;
 
 /// Vertices of one cell in each photograph.
 pub(super) const MEMBERS: usize = 8;

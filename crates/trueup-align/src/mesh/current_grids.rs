@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
 
 use super::cell_pair::{CellPairs, MEMBERS};
-use super::normal_equations::Metric;
+use super::metric::Metric;
 
 /// Grids around which equations are made.
 #[derive(Debug, Clone, Copy)]

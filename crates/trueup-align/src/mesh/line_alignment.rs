@@ -19,7 +19,8 @@ use trueup_core::mesh::GridMesh;
 
 use super::cell_pair::CellPairs;
 use super::current_grids::{CurrentGrids, PhotographPixel, PixelPair};
-use super::normal_equations::{Metric, NormalEquations};
+use super::metric::Metric;
+use super::normal_equations::NormalEquations;
 use super::straight_line::{DeviationTerm, StraightLine};
 use crate::evidence::{self, FULL_PX, OverlapGap};
 

@@ -21,6 +21,7 @@ mod current_grids;
 mod factor;
 mod input;
 mod line_alignment;
+mod metric;
 mod normal_equations;
 mod options;
 mod photometric;

@@ -6,6 +6,7 @@ use trueup_core::mesh::GridMesh;
 
 use super::cell_pair::{CellPair, CellPairs, MEMBERS};
 use super::complex::conjugate_product;
+use super::metric::Metric;
 
 /// Largest distance, in grid steps along an axis, of two vertices that one energy row couples.
 const REACH: usize = 3;
@@ -76,42 +77,6 @@ pub(super) struct Border {
     pub own: f64,
     /// The right side.
     pub right: f64,
-}
-
-/// A symmetric 2 x 2 matrix [[xx, xy], [xy, yy]] that weighs a residual of the plane.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Metric {
-    /// Weight of the square of x.
-    pub xx: f64,
-    /// Weight of the product of x and y.
-    pub xy: f64,
-    /// Weight of the square of y.
-    pub yy: f64,
-}
-
-impl Metric {
-    /// All directions alike.
-    pub(super) fn isotropic(weight: f64) -> Self {
-        Self { xx: weight, xy: 0.0, yy: weight }
-    }
-
-    /// Only what goes along `direction`: weight (direction . residual)^2.
-    pub(super) fn along(direction: Vector2<f64>, weight: f64) -> Self {
-        Self {
-            xx: weight * direction.x * direction.x,
-            xy: weight * direction.x * direction.y,
-            yy: weight * direction.y * direction.y,
-        }
-    }
-
-    /// The matrix times a vector.
-    pub(super) fn apply(&self, value: Vector2<f64>) -> Vector2<f64> {
-        Vector2::new(self.xx * value.x + self.xy * value.y, self.xy * value.x + self.yy * value.y)
-    }
-
-    fn block(&self, factor: f64) -> Block {
-        [factor * self.xx, factor * self.xy, factor * self.xy, factor * self.yy]
-    }
 }
 
 /// A vertex by its grid and its index there, with its weight in a sum.

@@ -14,7 +14,8 @@ use trueup_core::mesh::GridMesh;
 
 use super::by_cameras::carried;
 use super::complex::product;
-use super::normal_equations::{CarriedVertex, Metric, NormalEquations, WeightedVertex};
+use super::metric::Metric;
+use super::normal_equations::{CarriedVertex, NormalEquations, WeightedVertex};
 use super::solver::MeshSolver;
 
 /// A vertex of one photograph's lattice and the place in another that shows the same.

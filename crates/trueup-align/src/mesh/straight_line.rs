@@ -5,7 +5,8 @@ use trueup_core::lines::LineSegment;
 use trueup_core::mesh::GridMesh;
 
 use super::current_grids::CurrentGrids;
-use super::normal_equations::{Metric, NormalEquations, WeightedVertex};
+use super::metric::Metric;
+use super::normal_equations::{NormalEquations, WeightedVertex};
 
 /// Largest distance of a line's samples, working px: two or more in every cell of the usual grid.
 const SPACING_PX: f64 = 20.0;

@@ -81,11 +81,7 @@ pub fn consistent_matches(
     context.check_cancelled()?;
     let supported = supported(&points, &most.b_from_a, FARTHEST_DIAGONAL * b.frame.diagonal());
     let points = points.select(&supported);
-    let bearing = |camera: &Camera, place: &Vector2<f64>| camera.bearing(*place).normalize();
-    let in_a: Vec<Vector3<f64>> = points.in_a.iter().map(|place| bearing(a.camera, place)).collect();
-    let in_b: Vec<Vector3<f64>> = points.in_b.iter().map(|place| bearing(b.camera, place)).collect();
-    let within = EPIPOLAR_PX / (a.camera.focal_px * b.camera.focal_px).sqrt();
-    let agreeing = epipolar_matches(&in_a, &in_b, within, &mut generator);
+    let agreeing = of_one_geometry(&points, [a.camera, b.camera], &mut generator);
     if agreeing.len() < options.min_inliers {
         return Ok(Vec::new());
     }
@@ -153,15 +149,22 @@ pub(super) fn matches_elsewhere(
     let mut all: Vec<usize> = (0..is_known.len()).filter(|&k| is_known[k]).chain(candidates).collect();
     all.sort_unstable();
     let points = points.select(&all);
-    let focal = |frame: &WorkingFrame| frame.width.max(frame.height);
-    let bearings = |places: &[Vector2<f64>], frame: &WorkingFrame| -> Vec<Vector3<f64>> {
-        let camera = Camera::new(focal(frame), frame.width, frame.height, &Matrix3::identity());
+    let [a, b] = frames.map(|frame| {
+        let focal_px = frame.width.max(frame.height);
+        Camera::new(focal_px, frame.width, frame.height, &Matrix3::identity())
+    });
+    let agreeing = of_one_geometry(&points, [&a, &b], generator);
+    agreeing.into_iter().map(|k| all[k]).filter(|&k| !is_known[k]).collect()
+}
+
+/// The matches that one epipolar geometry of two cameras explains.
+fn of_one_geometry(points: &MatchedPoints, cameras: [&Camera; 2], generator: &mut impl Rng) -> Vec<usize> {
+    let bearings = |places: &[Vector2<f64>], camera: &Camera| -> Vec<Vector3<f64>> {
         places.iter().map(|&place| camera.bearing(place).normalize()).collect()
     };
-    let (in_a, in_b) = (bearings(&points.in_a, frames[0]), bearings(&points.in_b, frames[1]));
-    let within = EPIPOLAR_PX / (focal(frames[0]) * focal(frames[1])).sqrt();
-    let agreeing = epipolar_matches(&in_a, &in_b, within, generator);
-    agreeing.into_iter().map(|k| all[k]).filter(|&k| !is_known[k]).collect()
+    let [a, b] = cameras;
+    let within = EPIPOLAR_PX / (a.focal_px * b.focal_px).sqrt();
+    epipolar_matches(&bearings(&points.in_a, a), &bearings(&points.in_b, b), within, generator)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::statistics::{SD_PER_MEDIAN_MAGNITUDE, median_of};
 
 use super::super::cell_pair::CellPairs;
-use super::super::normal_equations::Metric;
+use super::super::metric::Metric;
 use super::colors::Colors;
 use super::pyramid::GrayPyramid;
 use super::sample::PixelSample;
