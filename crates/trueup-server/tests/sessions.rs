@@ -140,6 +140,7 @@ fn work_is_told_and_stopped() {
     let server = Server::of(desk.path());
     assert_eq!(server.post("/api/stitch", "").status, 202);
     assert_eq!(server.post("/api/stitch", "").status, 409, "one at a time");
+    assert_eq!(server.post("/api/tiles", "").status, 204, "nobody asked for tiles: they wait");
     let told = server.get("/api/news").json();
     assert_eq!(told["work"]["task"], "stitch", "{told}");
     assert_eq!(server.post("/api/stop", "").status, 204);

@@ -733,7 +733,7 @@ function turnedTo(yaw, pitch) {
   return { "projection.yaw": around.toFixed(2), "projection.pitch": up.toFixed(2) };
 }
 async function cutTiles() {
-  await post("/api/tiles").catch(() => void 0);
+  return (await post("/api/tiles").catch(() => null))?.status === 202;
 }
 
 // src/strip.ts
@@ -823,6 +823,7 @@ var STAGES = {
 var TASKS = { stitch: "Stitching", tiles: "Making the whole panorama", export: "Saving", reopen: "Opening" };
 var now = null;
 var drawnFor = "";
+var tilesAskedFor = "";
 var tilesTimer;
 var said = null;
 function trouble(refused) {
@@ -919,13 +920,21 @@ function showPanorama(state) {
   const wanted = JSON.stringify([stitched.number, state.wishes]);
   if (wanted !== drawnFor) {
     drawnFor = wanted;
+    tilesAskedFor = "";
     void stage.draw({});
-    clearTimeout(tilesTimer);
-    tilesTimer = setTimeout(() => {
-      if (now && now.tiles === null && !now.work) void cutTiles();
-    }, TILES_AFTER);
   }
+  cutTilesSoon(state, wanted);
   stage.showTiles(state.tiles);
+}
+function cutTilesSoon(state, wanted) {
+  if (state.work && state.work.task !== "tiles") tilesAskedFor = "";
+  if (state.work || state.tiles !== null || wanted === tilesAskedFor) return;
+  tilesAskedFor = wanted;
+  clearTimeout(tilesTimer);
+  tilesTimer = setTimeout(async () => {
+    const begun = now !== null && now.tiles === null && !now.work && await cutTiles();
+    if (!begun) tilesAskedFor = "";
+  }, TILES_AFTER);
 }
 function show(state) {
   const { stitched } = state;

@@ -35,6 +35,7 @@ const TASKS = { stitch: "Stitching", tiles: "Making the whole panorama", export:
 
 let now: Told | null = null;
 let drawnFor = "";
+let tilesAskedFor = "";
 let tilesTimer: ReturnType<typeof setTimeout> | undefined;
 let said: { message: string; hint: string } | null = null;
 
@@ -134,11 +135,26 @@ function showPanorama(state: Told): void {
     const wanted = JSON.stringify([stitched.number, state.wishes]);
     if (wanted !== drawnFor) {
         drawnFor = wanted;
+        tilesAskedFor = "";
         void stage.draw({});
-        clearTimeout(tilesTimer);
-        tilesTimer = setTimeout(() => { if (now && now.tiles === null && !now.work) void cutTiles(); }, TILES_AFTER);
     }
+    cutTilesSoon(state, wanted);
     stage.showTiles(state.tiles);
+}
+
+/**
+ * Asks for tiles when what is wished has rested for a while and nothing is being done: once, so that tiles which fail are not begun again and
+ * again, and once more after other work, for which tiles make way.
+ */
+function cutTilesSoon(state: Told, wanted: string): void {
+    if (state.work && state.work.task !== "tiles") tilesAskedFor = "";
+    if (state.work || state.tiles !== null || wanted === tilesAskedFor) return;
+    tilesAskedFor = wanted;
+    clearTimeout(tilesTimer);
+    tilesTimer = setTimeout(async () => {
+        const begun = now !== null && now.tiles === null && !now.work && (await cutTiles());
+        if (!begun) tilesAskedFor = "";
+    }, TILES_AFTER);
 }
 
 function show(state: Told): void {

@@ -214,7 +214,7 @@ function turnedTo(yaw: number, pitch: number): Wishes {
     return { "projection.yaw": around.toFixed(2), "projection.pitch": up.toFixed(2) };
 }
 
-/** Asks for tiles of the whole panorama. */
-export async function cutTiles(): Promise<void> {
-    await post("/api/tiles").catch(() => undefined);
+/** Asks for tiles of the whole panorama; whether they were begun, which they are not while something else is being done. */
+export async function cutTiles(): Promise<boolean> {
+    return (await post("/api/tiles").catch(() => null))?.status === 202;
 }
