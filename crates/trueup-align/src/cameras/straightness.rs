@@ -21,6 +21,11 @@ const WORTH: f64 = 100.0;
 const LIMIT_SHARE: f64 = 0.1;
 /// Cells along each side of a photograph whose edges may err together: those of one thing.
 const CELLS: usize = 4;
+/// Edges used in all, so that time stays bounded; photographs share them evenly when there are many. Fifty photographs have as
+/// many.
+const EDGES_IN_ALL: usize = 8000;
+/// Edges that every photograph may use, however many photographs there are.
+const FEWEST_EDGES: usize = 24;
 /// Fewest places along an edge that tell of its bend.
 const FEWEST_PLACES: usize = 4;
 
@@ -37,8 +42,9 @@ pub(super) struct CurveObservations {
 }
 
 impl CurveObservations {
-    /// Those of photographs with these frames.
+    /// Those of photographs with these frames, a bounded number: of every part of a photograph the longest.
     pub(super) fn new(frames: impl Iterator<Item = WorkingFrame>, curves: &[&[EdgeCurve]]) -> Self {
+        let limit = FEWEST_EDGES.max(EDGES_IN_ALL / curves.len().max(1));
         let mut clusters = Vec::new();
         for ((photograph, frame), curves) in frames.enumerate().zip(curves) {
             let mut cells: Vec<Vec<EdgeCurve>> = vec![Vec::new(); CELLS * CELLS];
@@ -48,10 +54,22 @@ impl CurveObservations {
                 let cell = |place: f64, length: f64| ((place / length * CELLS as f64) as usize).min(CELLS - 1);
                 cells[cell(y, frame.height) * CELLS + cell(x, frame.width)].push(curve.clone());
             }
+            keep_in_turns(&mut cells, limit);
             let filled = cells.into_iter().filter(|curves| !curves.is_empty());
             clusters.extend(filled.map(|curves| CurveCluster { photograph, curves }));
         }
         Self { clusters }
+    }
+}
+
+/// Shortens lists to at most `limit` entries together: the first of each, then the second of each, and so on.
+fn keep_in_turns<T>(lists: &mut [Vec<T>], limit: usize) {
+    let mut kept = vec![0; lists.len()];
+    let turns = (0..).map(|turn| (0..lists.len()).filter(|&list| lists[list].len() > turn).collect::<Vec<_>>());
+    let chosen = turns.take_while(|lists| !lists.is_empty()).flatten().take(limit);
+    chosen.for_each(|list| kept[list] += 1);
+    for (list, kept) in lists.iter_mut().zip(kept) {
+        list.truncate(kept);
     }
 }
 

@@ -96,3 +96,18 @@ fn edges_of_one_part_of_a_photograph_are_together() {
     assert!(found.clusters.len() > 3 && found.clusters.iter().all(|cluster| cluster.photograph == 1));
     assert_eq!(found.clusters.iter().map(|cluster| cluster.curves.len()).sum::<usize>(), seen.len());
 }
+
+/// Lists of 4, 1 and 3 entries: of five, the first turn takes three and the second two.
+#[test]
+fn lists_are_kept_in_turns() {
+    let lists = || vec![vec!['a', 'b', 'c', 'd'], vec!['e'], vec!['f', 'g', 'h']];
+    let kept = |limit: usize| {
+        let mut lists = lists();
+        keep_in_turns(&mut lists, limit);
+        lists
+    };
+    assert_eq!(kept(5), [vec!['a', 'b'], vec!['e'], vec!['f', 'g']]);
+    assert_eq!(kept(2), [vec!['a'], vec!['e'], vec![]]);
+    assert_eq!(kept(8), lists());
+    assert_eq!(kept(100), lists());
+}

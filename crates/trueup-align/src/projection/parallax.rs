@@ -78,6 +78,8 @@ struct Overlaps<'a> {
     photographs: &'a [PosedPhotograph],
     trusts: Vec<f64>,
     bounds: Vec<(Vector2<f64>, Vector2<f64>)>,
+    /// The others whose bounds meet those of each photograph, in their order: no place of it lies in any but these.
+    neighbors: Vec<Vec<usize>>,
     period: Option<f64>,
     max_parallax: f64,
 }
@@ -87,8 +89,11 @@ impl<'a> Overlaps<'a> {
         let cameras: Vec<Camera> = photographs.iter().map(|photograph| photograph.camera).collect();
         let frame = tilt_from_level(&cameras, &Matrix3::identity()).unwrap_or_else(Matrix3::identity);
         let trusts = photographs.iter().map(|photograph| trust(steepest(photograph, &frame))).collect();
-        let bounds = photographs.iter().map(|photograph| photograph.mesh.bounds()).collect();
-        Self { photographs, trusts, bounds, period, max_parallax }
+        let bounds: Vec<_> = photographs.iter().map(|photograph| photograph.mesh.bounds()).collect();
+        let of_each =
+            |k: usize| (0..bounds.len()).filter(|&o| o != k && meet(&bounds[k], &bounds[o], period)).collect();
+        let neighbors = (0..bounds.len()).map(of_each).collect();
+        Self { photographs, trusts, bounds, neighbors, period, max_parallax }
     }
 
     /// Who sees what photograph `k` has at `pixel`: itself first.
@@ -97,8 +102,8 @@ impl<'a> Overlaps<'a> {
         let direction = photograph.camera.world_direction(pixel);
         let own = Sight { photograph: k, pixel, direction, weight: depth(photograph, pixel), trust: self.trusts[k] };
         let place = photograph.mesh.warp(pixel);
-        let others = (0..self.photographs.len()).filter(|&other| other != k);
-        std::iter::once(own).chain(others.filter_map(|other| self.sight(other, place, &direction))).collect()
+        let others = self.neighbors[k].iter();
+        std::iter::once(own).chain(others.filter_map(|&other| self.sight(other, place, &direction))).collect()
     }
 
     /// How far photographs give way as evenly as they can, see [`smooth_steps`]; `None` if nothing asks for it.
@@ -153,6 +158,18 @@ impl<'a> Overlaps<'a> {
             Sight { photograph: number, pixel, direction, weight: depth(other, pixel), trust: self.trusts[number] };
         inside.then_some(seen)
     }
+}
+
+/// Whether two boxes (lowest and highest coordinates) have a place in common, wherever on a plane that repeats after `period` in x.
+fn meet(a: &(Vector2<f64>, Vector2<f64>), b: &(Vector2<f64>, Vector2<f64>), period: Option<f64>) -> bool {
+    /// Pixels of the panorama that rounding cannot move a place by.
+    const ROUNDING: f64 = 1e-3;
+    let mut apart = (b.0 + b.1 - a.0 - a.1) * 0.5;
+    if let Some(period) = period {
+        apart.x -= period * (apart.x / period).round();
+    }
+    let reach = (b.1 - b.0 + a.1 - a.0) * 0.5;
+    (0..2).all(|axis| apart[axis].abs() <= reach[axis] + ROUNDING)
 }
 
 /// The direction in which a photograph sees a place, and how much it counts.
@@ -291,6 +308,20 @@ mod tests {
             assert_eq!(shift.aside.len(), photograph.mesh.len());
             assert!(shift.aside.iter().all(|aside| aside.norm() < 1e-6));
         }
+    }
+
+    #[test]
+    fn boxes_meet_across_the_turn() {
+        let at = |x: f64, y: f64| (Vector2::new(x, y), Vector2::new(x + 10.0, y + 10.0));
+        assert!(meet(&at(0.0, 0.0), &at(9.0, -9.0), None));
+        assert!(!meet(&at(0.0, 0.0), &at(11.0, 0.0), None) && !meet(&at(0.0, 0.0), &at(0.0, 11.0), None));
+        // Of a turn of 100, 295 is 5 to the left of 300.
+        assert!(
+            meet(&at(0.0, 0.0), &at(295.0, 0.0), Some(100.0)) && !meet(&at(0.0, 0.0), &at(250.0, 0.0), Some(100.0))
+        );
+        // A box as wide as the turn is everywhere.
+        let wide = (Vector2::new(0.0, 0.0), Vector2::new(101.0, 10.0));
+        assert!((0..10).all(|step| meet(&wide, &at(f64::from(step) * 37.0, 0.0), Some(100.0))));
     }
 
     /// The same pair with the second mesh a turn farther.
