@@ -206,13 +206,14 @@ impl Lens {
         })
     }
 
-    /// Factor of the radius r by the radial terms, and the slope of the distorted radius.
+    /// Factor of the radius r by the radial terms, slope and curvature of the distorted radius.
     fn radial(&self, r: f64) -> Radial {
         let inside = Radial::of(&self.terms.radial, r.min(self.limit));
         if r <= self.limit {
             return inside;
         }
-        Radial { factor: (inside.factor * self.limit + inside.slope * (r - self.limit)) / r, slope: inside.slope }
+        let factor = (inside.factor * self.limit + inside.slope * (r - self.limit)) / r;
+        Radial { factor, slope: inside.slope, curvature: 0.0 }
     }
 
     fn distorted(&self, undistorted: Vector2<f64>) -> Vector2<f64> {
@@ -230,7 +231,7 @@ impl Lens {
     fn by_undistorted(&self, undistorted: Vector2<f64>) -> Matrix2<f64> {
         let ([x, y], [p1, p2]) = (undistorted.into(), self.terms.tangential);
         let r = undistorted.norm();
-        let Radial { factor, slope } = self.radial(r);
+        let Radial { factor, slope, .. } = self.radial(r);
         let outward = if r > 0.0 { undistorted / r } else { Vector2::zeros() };
         let radial = Matrix2::identity() * factor + outward * outward.transpose() * (slope - factor);
         let cross = 2.0 * (p1 * x + p2 * y);
@@ -248,11 +249,13 @@ impl Lens {
         if change.abs() < LITTLE { wanted * (1.0 + change) } else { wanted }
     }
 
-    /// The inverse of [`Self::distorted`], by Newton's method: first of the radius, then of the place.
+    /// The inverse of [`Self::distorted`]: first of the radius, by Halley's method, then of the place, by Newton's.
     fn undistorted(&self, place: Vector2<f64>) -> Vector2<f64> {
         const MOST_STEPS: usize = 30;
         // The error after one of Newton's steps is about the square of the step.
         const NEARLY_SETTLED: f64 = 1e-8;
+        // After one of Halley's about its cube.
+        const NEARLY_SETTLED_RADIUS: f64 = 2e-6;
         /// Where tangential terms move the place by more than that, and are sought from there.
         const ROUGHLY_SETTLED: f64 = 1e-3;
         let wanted = place.norm();
@@ -260,18 +263,21 @@ impl Lens {
         if wanted == 0.0 && is_radial || !wanted.is_finite() {
             return place;
         }
-        let settled = if is_radial { NEARLY_SETTLED } else { ROUGHLY_SETTLED };
+        let settled = if is_radial { NEARLY_SETTLED_RADIUS } else { ROUGHLY_SETTLED };
         // The radius grows with a slope of at least LEAST_SLOPE, so that a bracket exists and can be kept.
         let (mut low, mut high, mut r) = (0.0, f64::INFINITY, self.roughly_undistorted(wanted));
         for _ in 0..2 * MOST_STEPS {
-            let Radial { factor, slope } = self.radial(r);
+            let Radial { factor, slope, curvature } = self.radial(r);
             let excess = r * factor - wanted;
+            if excess == 0.0 {
+                break;
+            }
             if excess > 0.0 {
                 high = r
             } else {
                 low = r
             }
-            let step = r - excess / slope;
+            let step = r - 2.0 * excess * slope / (2.0 * slope * slope - excess * curvature);
             let inside = step > low && step < high;
             let next = if inside { step } else { 0.5 * (low + high.min(2.0 * low + 1.0)) };
             let is_settled = inside && (next - r).abs() <= settled * (1.0 + r);
@@ -352,6 +358,8 @@ struct Radial {
     factor: f64,
     /// Derivative of the distorted by the undistorted radius.
     slope: f64,
+    /// Derivative of the slope.
+    curvature: f64,
 }
 
 impl Radial {
@@ -361,6 +369,7 @@ impl Radial {
         Self {
             factor: 1.0 + square * (k1 + square * (k2 + square * (k3 + square * k4))),
             slope: 1.0 + square * (3.0 * k1 + square * (5.0 * k2 + square * (7.0 * k3 + square * 9.0 * k4))),
+            curvature: r * (6.0 * k1 + square * (20.0 * k2 + square * (42.0 * k3 + square * 72.0 * k4))),
         }
     }
 }

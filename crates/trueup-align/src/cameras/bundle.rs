@@ -192,10 +192,15 @@ impl BundleAdjustment<'_> {
         of_pairs.chain(of_curves.filter(|_| LOCAL == LENS_LOCAL)).collect()
     }
 
-    /// The quadratic model of every pair, and with lenses of every cluster of edges.
-    pub(super) fn terms<const LOCAL: usize>(&self, cameras: &[Camera], huber_px: f64) -> Vec<PairTerm<LOCAL>> {
-        let mut terms: Vec<PairTerm<LOCAL>> =
-            self.observations.pairs.par_iter().map(|pair| PairTerm::new(cameras, pair, huber_px)).collect();
+    /// The quadratic model of every pair in the unknowns that `model` leaves free, and with lenses of every cluster of edges.
+    pub(super) fn terms<const LOCAL: usize>(
+        &self,
+        cameras: &[Camera],
+        model: &IntrinsicsModel,
+        huber_px: f64,
+    ) -> Vec<PairTerm<LOCAL>> {
+        let of_pair = |pair| PairTerm::new(cameras, pair, &self.columns(pair, model), huber_px);
+        let mut terms: Vec<PairTerm<LOCAL>> = self.observations.pairs.par_iter().map(of_pair).collect();
         if LOCAL == LENS_LOCAL {
             let of_curves = self.curves.clusters.par_iter().map(|cluster| {
                 let CurveTerm { normal, gradient } = CurveTerm::new(cameras, cluster, huber_px);
@@ -247,7 +252,7 @@ impl BundleAdjustment<'_> {
         huber_px: f64,
         pattern: &NormalPattern<LOCAL>,
     ) -> Option<NormalEquations> {
-        let terms = self.terms(&parameters.cameras(self.priors), huber_px);
+        let terms = self.terms(&parameters.cameras(self.priors), model, huber_px);
         pattern.equations(&terms, &self.pulls(parameters, model))
     }
 

@@ -43,7 +43,7 @@ impl LensEvidence {
         huber_px: f64,
     ) -> Option<Self> {
         let photographs = problem.priors.len();
-        let mut terms: Vec<PairTerm<LENS_LOCAL>> = problem.terms(&parameters.cameras(problem.priors), huber_px);
+        let mut terms: Vec<PairTerm<LENS_LOCAL>> = problem.terms(&parameters.cameras(problem.priors), model, huber_px);
         let asked = match witness {
             Witness::Matches => 0..problem.observations.pairs.len(),
             Witness::Edges => problem.observations.pairs.len()..terms.len(),

@@ -5,6 +5,7 @@ use trueup_core::camera::{Camera, INTRINSICS};
 use trueup_core::geometry::cross_matrix;
 use trueup_core::matches::PointMatch;
 
+use super::equations::Columns;
 use super::observations::PairObservations;
 
 /// Unknowns of one pair of pinholes: rotation of a, rotation of b, log focal length of a, of b.
@@ -53,12 +54,13 @@ pub(super) fn pair_distances(cameras: &[Camera], pair: &PairObservations) -> Vec
 }
 
 impl<const LOCAL: usize> PairTerm<LOCAL> {
-    /// Both directions of every match, linearized at these cameras.
-    pub(super) fn new(cameras: &[Camera], pair: &PairObservations, huber_px: f64) -> Self {
+    /// Both directions of every match, linearized at these cameras; of unknowns that are held fixed, those without a column,
+    /// nothing is said.
+    pub(super) fn new(cameras: &[Camera], pair: &PairObservations, columns: &Columns<LOCAL>, huber_px: f64) -> Self {
         let (a, b) = (&cameras[pair.a], &cameras[pair.b]);
         let b_from_a = b.rotation() * a.rotation().transpose();
         let a_from_b = b_from_a.transpose();
-        let mut term = Self { normal: SMatrix::zeros(), gradient: SVector::zeros() };
+        let mut sums = FreeSums::new(columns);
         let second = 6 + (LOCAL - 6) / 2;
         let there = Transfer {
             from: a,
@@ -73,10 +75,59 @@ impl<const LOCAL: usize> PairTerm<LOCAL> {
             columns: TransferColumns { from_rotation: 3, to_rotation: 0, from_intrinsics: second, to_intrinsics: 6 },
         };
         for one in &pair.matches {
-            there.accumulate(&mut term, one.in_a, one.in_b, huber_px);
-            back.accumulate(&mut term, one.in_b, one.in_a, huber_px);
+            there.accumulate(&mut sums, one.in_a, one.in_b, huber_px);
+            back.accumulate(&mut sums, one.in_b, one.in_a, huber_px);
         }
-        term.normal.fill_lower_triangle_with_upper_triangle();
+        sums.term()
+    }
+}
+
+/// The sums of a term over the unknowns that are free, which lie beside each other: often a third of all.
+struct FreeSums<const LOCAL: usize> {
+    /// The free unknowns, those of the first `count` places.
+    free: [usize; LOCAL],
+    count: usize,
+    /// Weighted J^T J, its lower triangle row by row; nothing beyond `count`.
+    normal: [[f64; LOCAL]; LOCAL],
+    /// Weighted J^T r.
+    gradient: [f64; LOCAL],
+}
+
+impl<const LOCAL: usize> FreeSums<LOCAL> {
+    fn new(columns: &Columns<LOCAL>) -> Self {
+        let mut sums = Self { free: [0; LOCAL], count: 0, normal: [[0.0; LOCAL]; LOCAL], gradient: [0.0; LOCAL] };
+        for (local, _) in columns.iter().enumerate().filter(|(_, column)| column.is_some()) {
+            sums.free[sums.count] = local;
+            sums.count += 1;
+        }
+        sums
+    }
+
+    fn add(&mut self, jacobian: &SMatrix<f64, 2, LOCAL>, residual: Vector2<f64>, weight: f64) {
+        let mut rows = [[0.0; LOCAL]; 2];
+        for (place, &local) in self.free[..self.count].iter().enumerate() {
+            [rows[0][place], rows[1][place]] = [jacobian[(0, local)], jacobian[(1, local)]];
+        }
+        for place in 0..self.count {
+            let [x, y] = [rows[0][place] * weight, rows[1][place] * weight];
+            let others = rows[0][..=place].iter().zip(&rows[1][..=place]);
+            for (sum, (other_x, other_y)) in self.normal[place][..=place].iter_mut().zip(others) {
+                *sum += x * other_x + y * other_y;
+            }
+            self.gradient[place] += x * residual.x + y * residual.y;
+        }
+    }
+
+    fn term(&self) -> PairTerm<LOCAL> {
+        let mut term = PairTerm { normal: SMatrix::zeros(), gradient: SVector::zeros() };
+        let free = &self.free[..self.count];
+        for (place, &row) in free.iter().enumerate() {
+            for (&column, &sum) in free.iter().zip(&self.normal[place][..=place]) {
+                term.normal[(row, column)] = sum;
+                term.normal[(column, row)] = sum;
+            }
+            term.gradient[row] = self.gradient[place];
+        }
         term
     }
 }
@@ -99,10 +150,10 @@ struct Transfer<'a> {
 }
 
 impl Transfer<'_> {
-    /// Adds the linearized residual of a match of `source` with `target`; to the normal matrix its upper triangle only.
+    /// Adds the linearized residual of a match of `source` with `target`.
     fn accumulate<const LOCAL: usize>(
         &self,
-        term: &mut PairTerm<LOCAL>,
+        sums: &mut FreeSums<LOCAL>,
         source: [f64; 2],
         target: [f64; 2],
         huber_px: f64,
@@ -116,14 +167,8 @@ impl Transfer<'_> {
             PINHOLE_LOCAL => Some(self.pinhole_jacobian(bearing, arrived, place)),
             _ => self.lens_jacobian(bearing, arrived),
         };
-        let Some(jacobian) = jacobian else { return };
-        for (column, derivative) in jacobian.column_iter().enumerate() {
-            let [x, y] = [derivative.x * weight, derivative.y * weight];
-            // The upper triangle tells the rest.
-            for (row, other) in jacobian.column_iter().enumerate().take(column + 1) {
-                term.normal[(row, column)] += x * other.x + y * other.y;
-            }
-            term.gradient[column] += x * residual.x + y * residual.y;
+        if let Some(jacobian) = jacobian {
+            sums.add(&jacobian, residual, weight);
         }
     }
 

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::neighbors::neighbors;
@@ -24,15 +25,17 @@ pub struct Seams {
 impl Seams {
     pub(super) fn new(labels: Vec<Label>, views: &[SmallView], [width, height]: [usize; 2], turn: usize) -> Self {
         let mut whole = vec![false; labels.len()];
-        for view in views {
-            for (index, pixel) in view.pixels.iter().enumerate() {
-                if pixel[3] & WHOLLY != 0 {
-                    whole[index_of(view, index, width)] = true;
+        whole.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, whole)| {
+            for view in views.iter().filter(|view| view.rows.contains(&y)) {
+                let columns = view.columns.len();
+                let pixels = &view.pixels[(y - view.rows.start) * columns..][..columns];
+                for (x, pixel) in view.columns.clone().zip(pixels) {
+                    whole[if x < width { x } else { x - width }] |= pixel[3] & WHOLLY != 0;
                 }
             }
-        }
+        });
         let partial = views
-            .iter()
+            .par_iter()
             .map(|view| {
                 let touched = |(index, pixel): (usize, &[u8; 4])| {
                     let at = index_of(view, index, width);
@@ -85,18 +88,17 @@ impl Seams {
         // Coverage of a pixel of this canvas is judged at its middle; a finer canvas may reach one pixel further.
         const RINGS: usize = 2;
         for _ in 0..RINGS {
-            let old = self.labels.clone();
-            for at in 0..old.len() {
-                if old[at] != NOBODY {
-                    continue;
+            let (width, height, turn) = (self.width, self.height, self.turn);
+            let before = self.labels.clone();
+            let old = before.as_slice();
+            self.labels.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, labels)| {
+                for (x, label) in labels.iter_mut().enumerate().filter(|(_, label)| **label == NOBODY) {
+                    let near = (y.saturating_sub(1)..(y + 2).min(height))
+                        .flat_map(|v| neighbors(x, width, turn).map(move |u| old[v * width + u]));
+                    // NOBODY is the largest label.
+                    *label = near.min().unwrap_or(NOBODY);
                 }
-                let (x, y) = (at % self.width, at / self.width);
-                let near = (y.saturating_sub(1)..(y + 2).min(self.height))
-                    .flat_map(|v| neighbors(x, self.width, self.turn).map(move |u| (u, v)))
-                    .map(|(u, v)| old[v * self.width + u]);
-                // NOBODY is the largest label.
-                self.labels[at] = near.min().unwrap_or(NOBODY);
-            }
+            });
         }
     }
 
