@@ -35,6 +35,7 @@ pub mod scratch;
 pub mod source;
 pub mod spherical;
 pub mod statistics;
+pub mod told_lens;
 pub mod truth;
 
 pub use context::StageContext;

@@ -7,6 +7,7 @@ use rand::{Rng, RngExt};
 use rayon::ThreadPool;
 use trueup_core::StageContext;
 use trueup_core::source::WorkingFrame;
+use trueup_core::told_lens::ToldLens;
 use trueup_vision::features::{DESCRIPTOR_LENGTH, Descriptor, FeaturePoint, Features};
 use trueup_vision::matching::{MatchingInput, MatchingOptions, Nearest, SearchKernel, putative_matches, run};
 
@@ -79,7 +80,9 @@ fn verify_half_outliers(bencher: Bencher, guided: bool) {
     let options = MatchingOptions { guided, ..MatchingOptions::default() };
     let context = StageContext::default();
     let forced = BTreeSet::new();
-    let input = MatchingInput { features: &features, frames: &[frame; 2], pairs: &[(0, 1)], forced: &forced };
+    let told = [ToldLens::default(); 2];
+    let input =
+        MatchingInput { features: &features, frames: &[frame; 2], told: &told, pairs: &[(0, 1)], forced: &forced };
     let pool = pool(1);
     bencher.bench_local(|| pool.install(|| run(&input, &options, &context)));
 }

@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use trueup_core::camera::Camera;
 use trueup_core::lens::{Lens, LensProjection, LensTerms, PlacedLens};
 use trueup_core::source::WorkingFrame;
+use trueup_core::told_lens::{TOLD_FOCAL_SD, ToldLens};
 
 use super::options::{CameraOptions, LensKind};
 
@@ -17,8 +18,6 @@ const TOLD_FOCAL_REACH: f64 = 1.05;
 /// Standard deviation of an estimated start value of the focal length, relative: it only keeps a focal length that the
 /// matches leave open from running away.
 const ESTIMATED_FOCAL_SD: f64 = 0.3;
-/// Standard deviation of a focal length that the user told, relative: what is engraved on a lens is rounded.
-const TOLD_FOCAL_SD: f64 = 0.02;
 
 /// Focal length that is expected of a photograph of which nothing is known, in its longer sides: telephones' are 0.7 to 0.8, those of
 /// compact cameras and of zoom lenses as they are sold from 0.7 at their shortest to 1.5 and more.
@@ -70,6 +69,21 @@ impl CameraPrior {
             self.focal_px = focal_px.or(self.focal_px);
         }
         self
+    }
+
+    /// What the user told of the lens, by an earlier project or by `options`: all that matching may go by.
+    pub fn told_lens(&self, options: &CameraOptions) -> ToldLens {
+        let told = self.told_by(options);
+        let kind = options.kind_of_lens();
+        ToldLens {
+            lens: told.lens.or((kind == LensKind::Pinhole).then(PlacedLens::default)),
+            projection: match kind {
+                LensKind::Auto => None,
+                LensKind::Pinhole | LensKind::Rectilinear => Some(LensProjection::Rectilinear),
+                LensKind::Fisheye => Some(LensProjection::Equidistant),
+            },
+            focal_px: told.focal_px.filter(|_| told.focal_told),
+        }
     }
 
     /// Standard deviation of the focal length that refinement starts from, relative.

@@ -16,18 +16,22 @@ pub(super) struct SphereCoverage {
     pub span: f64,
     /// Lowest and highest latitude in radians, positive downwards.
     pub latitudes: [f64; 2],
+    /// Whether photographs show directions near the horizon at every longitude.
+    pub goes_round_horizon: bool,
     /// Sum of the viewing directions over their number: short where the photographs look all round.
     pub forward: Vector3<f64>,
 }
 
 /// Longitudes are counted in steps of half a degree.
 const STEPS: usize = 720;
+/// Latitude, radians (20 degrees), up to which a direction is near the horizon.
+const NEAR_HORIZON: f64 = 0.349;
 /// Samples along each side of a photograph.
 const SAMPLES: usize = 9;
 
 impl SphereCoverage {
     pub(super) fn of(photographs: &[PosedPhotograph]) -> Self {
-        let mut covered = [false; STEPS];
+        let (mut covered, mut near_horizon) = ([false; STEPS], [false; STEPS]);
         let mut latitudes = [f64::INFINITY, f64::NEG_INFINITY];
         let mut forward = Vector3::zeros();
         for photograph in photographs {
@@ -49,13 +53,10 @@ impl SphereCoverage {
                 covered = [true; STEPS];
                 continue;
             }
-            let center = ahead.x.atan2(ahead.z);
-            let from_center = directions.iter().map(|direction| wrap_angle(direction.x.atan2(direction.z) - center));
-            let (left, right) =
-                from_center.fold((0.0_f64, 0.0_f64), |(left, right), one| (left.min(one), right.max(one)));
-            let step = |longitude: f64| (longitude / TAU * STEPS as f64).round() as i64;
-            for index in step(center + left)..=step(center + right) {
-                covered[index.rem_euclid(STEPS as i64) as usize] = true;
+            let is_near = |direction: &&Vector3<f64>| direction.y.abs() < NEAR_HORIZON.sin();
+            cover(&mut covered, ahead, directions.iter());
+            if directions.iter().any(|direction| is_near(&direction)) {
+                cover(&mut near_horizon, ahead, directions.iter().filter(is_near));
             }
         }
         let (gap_start, gap) = widest_gap(&covered);
@@ -64,7 +65,8 @@ impl SphereCoverage {
             0 => 0.0,
             _ => wrap_angle((gap_start as f64 + (gap as f64 - 1.0) / 2.0) / STEPS as f64 * TAU + PI),
         };
-        Self { middle, span, latitudes, forward }
+        let goes_round_horizon = near_horizon == [true; STEPS];
+        Self { middle, span, latitudes, goes_round_horizon, forward }
     }
 
     pub(super) fn is_full_turn(&self) -> bool {
@@ -84,6 +86,17 @@ impl SphereCoverage {
     /// The largest angle from the horizon, radians.
     pub(super) fn steepest(&self) -> f64 {
         self.latitudes[0].abs().max(self.latitudes[1].abs())
+    }
+}
+
+/// Covers the longitudes between those of `directions` that are farthest to both sides of `ahead`.
+fn cover<'a>(covered: &mut [bool; STEPS], ahead: Vector3<f64>, directions: impl Iterator<Item = &'a Vector3<f64>>) {
+    let center = ahead.x.atan2(ahead.z);
+    let from_center = directions.map(|direction| wrap_angle(direction.x.atan2(direction.z) - center));
+    let (left, right) = from_center.fold((0.0_f64, 0.0_f64), |(left, right), one| (left.min(one), right.max(one)));
+    let step = |longitude: f64| (longitude / TAU * STEPS as f64).round() as i64;
+    for index in step(center + left)..=step(center + right) {
+        covered[index.rem_euclid(STEPS as i64) as usize] = true;
     }
 }
 

@@ -189,11 +189,12 @@ fn named_kind(projection: Projection) -> Option<FlatKind> {
 }
 
 /// Whether the panorama is one for viewers of spherical panoramas: photographs all around, and no narrower view asked for.
-/// Photographs that look one way and show a pole have all longitudes, too, and do not go round.
+/// Photographs that look one way and show a pole have all longitudes, too, and do not go round, unless they show the horizon all around: those of
+/// a drone look down in the mean, and around as well.
 fn goes_round(coverage: &SphereCoverage, options: &ProjectionOptions) -> bool {
     let is_wanted = options.fov == 0.0 || options.fov >= 360.0;
     let looks_at_a_pole = coverage.shows_a_pole() && smooth(coverage.forward.norm(), ONE_WAY) >= 0.5;
-    is_wanted && coverage.is_full_turn() && !looks_at_a_pole
+    is_wanted && coverage.is_full_turn() && (coverage.goes_round_horizon || !looks_at_a_pole)
 }
 
 /// How far up photographs are looked at that look one way and steeply; 0 where they are drawn level.

@@ -129,3 +129,15 @@ fn photographs_of_a_ceiling_are_looked_up_at() {
     assert!((view.pitch.to_degrees() - 80.0).abs() < 0.5, "{view:?}");
     assert!(ProjectionView::choose(&row(2, 30.0), None, &options).pitch == 0.0);
 }
+
+/// Rings at 20, 50 and 75 degrees down, and straight down, as drones take them: a sphere. Without the first, what is below.
+#[test]
+fn a_drone_looks_round_and_down() {
+    let ring = |count: u32, pitch_deg: f64| (0..count).map(move |k| photograph(f64::from(360 * k / count), pitch_deg));
+    let steep: Vec<PosedPhotograph> = ring(8, -50.0).chain(ring(5, -75.0)).chain(ring(1, -90.0)).collect();
+    let all: Vec<PosedPhotograph> = ring(8, -20.0).chain(steep.iter().cloned()).collect();
+    let around = view(&all);
+    assert!(around.flat.kind == FlatKind::Equirectangular && around.closed && around.pitch == 0.0, "{around:?}");
+    let below = view(&steep);
+    assert!(!below.closed && below.pitch.to_degrees() < -80.0, "{below:?}");
+}

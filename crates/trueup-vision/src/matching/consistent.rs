@@ -4,7 +4,7 @@
 //! depth. Here counts every match of which its neighbors say the same and that the geometry of two cameras explains. What of it no plane of a pair
 //! explains draws the pair's overlap together where it lies.
 
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 use rand::Rng;
 use trueup_core::camera::Camera;
 use trueup_core::geometry::Homography;
@@ -132,15 +132,17 @@ fn supported(points: &MatchedPoints, b_from_a: &Homography, farthest_px: f64) ->
 /// The matches, ascending, that no plane of their pair explains (`is_known` says which one does) and that are consistent: of which two of the eight
 /// neighbors moved alike, and that have one epipolar geometry with those on planes.
 ///
-/// Focal lengths are taken to be a longer side and lenses to bend nothing: a linear map of the bearings, and a bend within what a match may err by.
+/// `cameras` need be no better than pinholes of any focal length where lenses bend little: a linear map of the bearings, and a bend within what a
+/// match may err by.
 pub(super) fn matches_elsewhere(
     points: &MatchedPoints,
     is_known: &[bool],
     b_from_a: &Homography,
-    frames: [&WorkingFrame; 2],
+    cameras: &[Camera; 2],
+    frame_b: &WorkingFrame,
     generator: &mut impl Rng,
 ) -> Vec<usize> {
-    let surroundings = Surroundings::new(points, b_from_a, FARTHEST_DIAGONAL * frames[1].diagonal());
+    let surroundings = Surroundings::new(points, b_from_a, FARTHEST_DIAGONAL * frame_b.diagonal());
     let candidates: Vec<usize> =
         surroundings.near.iter().copied().filter(|&k| !is_known[k] && surroundings.is_supported(k)).collect();
     if candidates.is_empty() {
@@ -149,11 +151,8 @@ pub(super) fn matches_elsewhere(
     let mut all: Vec<usize> = (0..is_known.len()).filter(|&k| is_known[k]).chain(candidates).collect();
     all.sort_unstable();
     let points = points.select(&all);
-    let [a, b] = frames.map(|frame| {
-        let focal_px = frame.width.max(frame.height);
-        Camera::new(focal_px, frame.width, frame.height, &Matrix3::identity())
-    });
-    let agreeing = of_one_geometry(&points, [&a, &b], generator);
+    let [a, b] = cameras;
+    let agreeing = of_one_geometry(&points, [a, b], generator);
     agreeing.into_iter().map(|k| all[k]).filter(|&k| !is_known[k]).collect()
 }
 
@@ -169,6 +168,8 @@ fn of_one_geometry(points: &MatchedPoints, cameras: [&Camera; 2], generator: &mu
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Matrix3;
+
     use super::*;
 
     /// A lattice of 20 px that moved by 5 px to the right; every 17th match is elsewhere by itself, the last 9 are a thing of its own depth.
@@ -194,10 +195,12 @@ mod tests {
         let frame = WorkingFrame::new(400, 300, 480_000.0);
         let generator = || StageContext::default().generator("test", 7);
         let on_plane: Vec<bool> = (0..300).map(|k| k < 291 && !wrong.contains(&k)).collect();
-        let found = matches_elsewhere(&points, &on_plane, &moved, [&frame, &frame], &mut generator());
+        let cameras = [Camera::new(400.0, 400.0, 300.0, &Matrix3::identity()); 2];
+        let elsewhere =
+            |is_known: &[bool]| matches_elsewhere(&points, is_known, &moved, &cameras, &frame, &mut generator());
+        let found = elsewhere(&on_plane);
         assert_eq!(found, (291..300).collect::<Vec<_>>());
-        let all = vec![true; 300];
-        assert!(matches_elsewhere(&points, &all, &moved, [&frame, &frame], &mut generator()).is_empty());
+        assert!(elsewhere(&[true; 300]).is_empty());
         // The thing of its own depth is 19 px from where most are.
         assert!(supported(&points, &moved, 15.0).iter().all(|&k| k < 291));
     }

@@ -2,8 +2,8 @@
 //!
 //! Descriptors of the strongest features are compared exhaustively (`putative`), a homography is sought that many matches agree on
 //! (`ransac`), the pair is judged by how many do (`pair`), and the matches of a joined pair are completed by further planes
-//! (`planes`) and by a second look near the predicted places (`guided`). Where a lens bends so that no homography holds, turns
-//! are sought on rays (`turned`), and stand in for homography and planes. What the pairs show of each other tells which pictures are
+//! (`planes`) and by a second look near the predicted places (`guided`). Where a lens bends so that no homography holds, or is told, turns
+//! are sought on rays (`turned`), and stand in for the homography. What the pairs show of each other tells which pictures are
 //! no photographs of the scene (`strangers`). Whether or not homographies explain it, `consistent` finds what two photographs show alike, to measure
 //! a panorama by (`epipolar`).
 
@@ -31,6 +31,7 @@ use rayon::prelude::*;
 use trueup_core::matches::PairMatches;
 use trueup_core::options::StageOptions;
 use trueup_core::source::WorkingFrame;
+use trueup_core::told_lens::ToldLens;
 use trueup_core::{Error, Result, StageContext};
 
 pub use consistent::{SeenFeatures, consistent_matches};
@@ -53,6 +54,8 @@ pub struct MatchingInput<'a> {
     pub features: &'a [Features],
     /// The frames these are measured in, one a photograph.
     pub frames: &'a [WorkingFrame],
+    /// What the user told of each photograph's lens.
+    pub told: &'a [ToldLens],
     /// The pairs to match, by the photographs' indices.
     pub pairs: &'a [(usize, usize)],
     /// Those (smaller index first) that the user's graph joins.
@@ -61,8 +64,8 @@ pub struct MatchingInput<'a> {
 
 impl<'a> MatchingInput<'a> {
     fn photograph(&self, index: usize) -> Result<PhotographFeatures<'a>> {
-        match (self.features.get(index), self.frames.get(index)) {
-            (Some(features), Some(frame)) => Ok(PhotographFeatures { index, features, frame }),
+        match (self.features.get(index), self.frames.get(index), self.told.get(index)) {
+            (Some(features), Some(frame), Some(&told)) => Ok(PhotographFeatures { index, features, frame, told }),
             _ => Err(Error::input(
                 format!("photograph {index}"),
                 "a pair names it but it is not there",

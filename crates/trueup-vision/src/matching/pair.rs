@@ -1,10 +1,13 @@
 //! One pair: whether its photographs overlap, and all its matches.
 
+use nalgebra::Matrix3;
 use rand::Rng;
+use trueup_core::camera::Camera;
 use trueup_core::geometry::Homography;
 use trueup_core::matches::{PairMatches, PairVerdict, PointMatch};
 use trueup_core::options::StageOptions;
 use trueup_core::source::WorkingFrame;
+use trueup_core::told_lens::ToldLens;
 use trueup_core::{Error, Result, StageContext};
 
 use super::consistent::matches_elsewhere;
@@ -51,6 +54,8 @@ pub(super) struct PhotographFeatures<'a> {
     pub(super) features: &'a Features,
     /// The frame these are measured in.
     pub(super) frame: &'a WorkingFrame,
+    /// What the user told of its lens.
+    pub(super) told: ToldLens,
 }
 
 /// Two photographs to be matched, the smaller index first.
@@ -111,7 +116,8 @@ impl<'a> PairInput<'a> {
     }
 }
 
-/// The turned lens that clearly more matches agree with than with the homography, if there is one.
+/// The turned lens that clearly more matches agree with than with the homography, if there is one; of lenses that are told wholly, and are no
+/// pinholes, the one that as many agree with.
 fn better_turn(
     input: &PairInput<'_>,
     points: &MatchedPoints,
@@ -120,46 +126,22 @@ fn better_turn(
     options: &MatchingOptions,
     context: &StageContext<'_>,
 ) -> Option<TurnConsensus> {
+    let told = [&input.a.told, &input.b.told];
+    if told.iter().all(|told| told.is_pinhole()) {
+        return None;
+    }
     let agreeing = global.map_or(0, |global| global.inliers.len());
-    let wanted = ((TURN_FACTOR * agreeing as f64) as usize).max(agreeing + TURN_MORE).max(options.min_inliers);
+    let wanted = match told.iter().all(|told| told.is_whole()) {
+        true => agreeing,
+        false => ((TURN_FACTOR * agreeing as f64) as usize).max(agreeing + TURN_MORE),
+    };
+    let wanted = wanted.max(options.min_inliers);
     if points.in_a.len() < wanted {
         return None;
     }
     // Draws of its own: what the homography draws does not depend on whether lenses are tried.
     let mut generator = context.generator("turned lens", seed);
-    find_turned_lens(points, [input.a.frame, input.b.frame], options.inlier_px, wanted, &mut generator)
-}
-
-/// Judges a pair by the turned lens, and completes its matches.
-fn judge_turn(
-    pair: &mut PairMatches,
-    input: &PairInput<'_>,
-    putative: &[PutativeMatch],
-    turn: &TurnConsensus,
-    options: &MatchingOptions,
-) {
-    let overlap = PredictedOverlap::of_turn(turn.turned, input.a.frame, input.b.frame);
-    pair.in_overlap = putative.iter().filter(|candidate| overlap.contains(&candidate.at)).count();
-    pair.agreeing = turn.inliers.iter().filter(|&&k| overlap.contains(&putative[k].at)).count();
-    let known: Vec<PutativeMatch> = turn.inliers.iter().map(|&k| putative[k]).collect();
-    let at = matched_points(&known);
-    pair.b_from_a = Homography::fit(&at.in_a, &at.in_b, None).map(|map| scaled_rows(&map));
-    input.judge(pair, options);
-    if !pair.verdict.is_joined() {
-        return;
-    }
-    pair.inliers = known.iter().map(|known| known.at).collect();
-    if options.guided {
-        let more = guided_matches(&GuidedInput {
-            a: input.a.features,
-            b: input.b.features,
-            known: &known,
-            plane_of_known: &vec![0; known.len()],
-            planes: &[PlaneMap { b_from_a: PointMap::Turn(Box::new(turn.turned)), inlier_px: options.inlier_px }],
-            overlap: &overlap,
-        });
-        pair.inliers.extend(more.iter().map(|found| found.at));
-    }
+    find_turned_lens(points, [input.a.frame, input.b.frame], told, options.inlier_px, wanted, &mut generator)
 }
 
 /// Matches two photographs and judges whether they overlap.
@@ -214,35 +196,73 @@ pub(super) fn match_pair(
         start: None,
     };
     let found = find_homography(&points, &search, |map| input.is_plausible(map), &mut generator);
-    if let Some(turn) = better_turn(input, &points, found.as_ref().ok(), seed, options, context) {
-        judge_turn(&mut pair, input, &putative, &turn, options);
-        return Ok(pair);
-    }
-    let global = match found {
-        Ok(global) => global,
-        Err(failure) => {
+    let turn = better_turn(input, &points, found.as_ref().ok(), seed, options, context);
+    let Some(model) = (match (turn, found) {
+        (Some(turn), _) => Model::of_turn(&turn, &points),
+        (None, Ok(global)) => {
+            let Consensus { b_from_a, inliers } = global;
+            Some(Model { map: PointMap::Plane(b_from_a), b_from_a, inliers })
+        }
+        (None, Err(failure)) => {
             pair.verdict = match failure {
                 NoConsensus::NoSample => PairVerdict::TooFewInliers,
                 NoConsensus::Implausible => PairVerdict::ImplausibleHomography,
             };
             return Ok(pair);
         }
+    }) else {
+        return Ok(pair);
     };
-    let Some(overlap) = PredictedOverlap::new(global.b_from_a, a.frame, b.frame) else { return Ok(pair) };
+    let Some(overlap) = model.overlap(a.frame, b.frame) else { return Ok(pair) };
     pair.in_overlap = putative.iter().filter(|candidate| overlap.contains(&candidate.at)).count();
-    pair.agreeing = global.inliers.iter().filter(|&&k| overlap.contains(&putative[k].at)).count();
-    pair.b_from_a = Some(scaled_rows(&global.b_from_a));
+    pair.agreeing = model.inliers.iter().filter(|&&k| overlap.contains(&putative[k].at)).count();
+    pair.b_from_a = Some(scaled_rows(&model.b_from_a));
     input.judge(&mut pair, options);
     if pair.verdict.is_joined() {
-        let joined = JoinedPair { input, putative: &putative, points: &points, global: &global, overlap: &overlap };
+        let joined = JoinedPair { input, putative: &putative, points: &points, model: &model, overlap: &overlap };
         let (inliers, is_known) = joined.all_inliers(options, &mut generator);
         pair.inliers = inliers;
         let mut generator = context.generator("matches elsewhere", seed);
-        let frames = [input.a.frame, input.b.frame];
-        let found = matches_elsewhere(&points, &is_known, &global.b_from_a, frames, &mut generator);
+        let cameras = model.cameras([a.frame, b.frame]);
+        let found = matches_elsewhere(&points, &is_known, &model.b_from_a, &cameras, b.frame, &mut generator);
         pair.elsewhere = found.into_iter().map(|k| putative[k].at).collect();
     }
     Ok(pair)
+}
+
+/// What most matches of a pair agree with.
+struct Model {
+    map: PointMap,
+    /// The homography that says nearly the same of them.
+    b_from_a: Homography,
+    /// Indices of the agreeing matches, ascending.
+    inliers: Vec<usize>,
+}
+
+impl Model {
+    /// Of a turned lens; `None` if its matches fix no homography.
+    fn of_turn(turn: &TurnConsensus, points: &MatchedPoints) -> Option<Self> {
+        let at = points.select(&turn.inliers);
+        let b_from_a = Homography::fit(&at.in_a, &at.in_b, None)?;
+        Some(Self { map: PointMap::Turn(Box::new(turn.turned)), b_from_a, inliers: turn.inliers.clone() })
+    }
+
+    fn overlap<'a>(&self, frame_a: &'a WorkingFrame, frame_b: &'a WorkingFrame) -> Option<PredictedOverlap<'a>> {
+        match &self.map {
+            PointMap::Plane(b_from_a) => PredictedOverlap::new(*b_from_a, frame_a, frame_b),
+            PointMap::Turn(turned) => Some(PredictedOverlap::of_turn(**turned, frame_a, frame_b)),
+        }
+    }
+
+    /// Cameras of about the photographs' lenses: those that turned, else pinholes of a focal length of the longer side.
+    fn cameras(&self, frames: [&WorkingFrame; 2]) -> [Camera; 2] {
+        match &self.map {
+            PointMap::Turn(turned) => [turned.a, turned.b],
+            PointMap::Plane(_) => frames.map(|frame| {
+                Camera::new(frame.width.max(frame.height), frame.width, frame.height, &Matrix3::identity())
+            }),
+        }
+    }
 }
 
 /// A joined pair whose matches are to be completed.
@@ -252,23 +272,20 @@ struct JoinedPair<'a> {
     putative: &'a [PutativeMatch],
     /// Their places.
     points: &'a MatchedPoints,
-    global: &'a Consensus,
+    model: &'a Model,
     overlap: &'a PredictedOverlap<'a>,
 }
 
 impl JoinedPair<'_> {
-    /// The final matches: global inliers, those of further planes, those found near predicted places; and which of the putative ones are among
-    /// them.
+    /// The final matches: those that agree with the model, those of further planes, those found near predicted places; and which of the putative
+    /// ones are among them.
     fn all_inliers(&self, options: &MatchingOptions, generator: &mut impl Rng) -> (Vec<PointMatch>, Vec<bool>) {
-        let (a, b, global) = (self.input.a, self.input.b, self.global);
-        let is_plausible = |map: &Homography| self.input.is_plausible(map);
-        let planes = find_planes(self.points, &global.b_from_a, b.frame.diagonal(), is_plausible, generator);
-        let mut plane_maps =
-            vec![PlaneMap { b_from_a: PointMap::Plane(global.b_from_a), inlier_px: options.inlier_px }];
+        let (a, b, model) = (self.input.a, self.input.b, self.model);
+        let mut plane_maps = vec![PlaneMap { b_from_a: model.map.clone(), inlier_px: options.inlier_px }];
         let mut plane_of: Vec<Option<usize>> = vec![None; self.putative.len()];
-        let mut matches: Vec<usize> = global.inliers.clone();
-        global.inliers.iter().for_each(|&k| plane_of[k] = Some(0));
-        for plane in &planes {
+        let mut matches: Vec<usize> = model.inliers.clone();
+        model.inliers.iter().for_each(|&k| plane_of[k] = Some(0));
+        for plane in &self.further_planes(generator) {
             for &k in &plane.inliers {
                 if plane_of[k].is_none() {
                     matches.push(k);
@@ -292,6 +309,22 @@ impl JoinedPair<'_> {
             inliers.extend(more.iter().map(|found| found.at));
         }
         (inliers, plane_of.iter().map(Option::is_some).collect())
+    }
+
+    /// The planes beside the model. Under a lens that bends, what the turn explains lies on planes only here and there: of such pairs they are
+    /// sought among the other matches.
+    fn further_planes(&self, generator: &mut impl Rng) -> Vec<Consensus> {
+        let is_plausible = |map: &Homography| self.input.is_plausible(map);
+        let (map, diagonal_px) = (&self.model.b_from_a, self.input.b.frame.diagonal());
+        let PointMap::Turn(_) = &self.model.map else {
+            return find_planes(self.points, map, diagonal_px, is_plausible, generator);
+        };
+        let is_left = |k: &usize| self.model.inliers.binary_search(k).is_err();
+        let left: Vec<usize> = (0..self.putative.len()).filter(is_left).collect();
+        let planes = find_planes(&self.points.select(&left), map, diagonal_px, is_plausible, generator);
+        let of_all =
+            |plane: Consensus| Consensus { inliers: plane.inliers.iter().map(|&k| left[k]).collect(), ..plane };
+        planes.into_iter().map(of_all).collect()
     }
 }
 

@@ -55,8 +55,8 @@ impl PhotographPair {
     /// The same, of which the strongest `compared_features` are compared.
     fn matched_by(&self, compared_features: usize, forced: bool, options: &MatchingOptions) -> PairMatches {
         let frame = frame();
-        let a = PhotographFeatures { index: 0, features: &self.a, frame: &frame };
-        let b = PhotographFeatures { index: 1, features: &self.b, frame: &frame };
+        let a = PhotographFeatures { index: 0, features: &self.a, frame: &frame, told: ToldLens::default() };
+        let b = PhotographFeatures { index: 1, features: &self.b, frame: &frame, told: ToldLens::default() };
         let input = PairInput { a, b, forced, compared_features };
         match_pair(&input, options, &StageContext::default()).expect("valid scene")
     }
@@ -332,7 +332,13 @@ fn results_do_not_depend_on_threads_and_follow_the_order_of_pairs() {
         let context = StageContext::default();
         let options = MatchingOptions::default();
         let forced = BTreeSet::new();
-        let input = MatchingInput { features: &features, frames: &frames, pairs: &pairs, forced: &forced };
+        let input = MatchingInput {
+            features: &features,
+            frames: &frames,
+            told: &[ToldLens::default(); 3],
+            pairs: &pairs,
+            forced: &forced,
+        };
         let matched = pool.install(|| run(&input, &options, &context));
         let matched = matched.expect("valid photographs");
         report_near_duplicates(&matched, &context);
@@ -350,7 +356,7 @@ fn results_do_not_depend_on_threads_and_follow_the_order_of_pairs() {
 fn contradictory_input_is_an_error() {
     let (frame, context) = (frame(), StageContext::default());
     let match_with = |features: &Features, index: usize| {
-        let a = PhotographFeatures { index: 0, features, frame: &frame };
+        let a = PhotographFeatures { index: 0, features, frame: &frame, told: ToldLens::default() };
         let pair = PairInput::new(a, PhotographFeatures { index, ..a }, false);
         match_pair(&pair, &MatchingOptions::default(), &context)
     };
@@ -361,7 +367,13 @@ fn contradictory_input_is_an_error() {
     let nowhere = levels(&[(f64::NAN, &[1])]);
     assert!(matches!(match_with(&nowhere, 1), Err(Error::Input { .. })));
     let forced = BTreeSet::new();
-    let input = MatchingInput { features: &[good], frames: &[frame], pairs: &[(0, 1)], forced: &forced };
+    let input = MatchingInput {
+        features: &[good],
+        frames: &[frame],
+        told: &[ToldLens::default()],
+        pairs: &[(0, 1)],
+        forced: &forced,
+    };
     let missing = run(&input, &MatchingOptions::default(), &context);
     assert!(matches!(missing, Err(Error::Input { .. })));
 }

@@ -9,19 +9,25 @@
 //!
 //! # Departures
 //! The lens is taken from a list in place of the roots of a polynomial in three matches: the matches of a pair hardly tell
-//! two neighbors of the list apart, every match judges every lens, and fisheyes need no equation of their own.
+//! two neighbors of the list apart, every match judges every lens, and fisheyes need no equation of their own. What the user told of the
+//! lenses is not tried otherwise, and kept: of a lens that is told wholly the turn alone is unknown, but for a little of the focal length.
 
-use nalgebra::{Matrix2, Matrix3, Matrix6, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix2, Matrix3, Matrix6, SMatrix, Vector2, Vector3, Vector6};
 use rand::{Rng, RngExt};
-use trueup_core::camera::Camera;
+use trueup_core::camera::{Camera, INTRINSICS};
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
-use trueup_core::lens::{Lens, TriedLens, tried_lenses};
+use trueup_core::lens::Lens;
 use trueup_core::source::WorkingFrame;
+use trueup_core::told_lens::{TOLD_FOCAL_SD, ToldLens, tried_cameras};
 
 use super::matched_points::MatchedPoints;
 
-/// Turns drawn under each lens; a third of right matches gives a right turn with a probability of 99.9 %.
+/// Turns drawn under each lens at least; a third of right matches gives a right turn with a probability of 99.9 %.
 const SAMPLES: usize = 60;
+/// Turns drawn under a lens at most; a tenth of right matches gives a right turn with a probability of 99.8 %.
+const MOST_SAMPLES: usize = 600;
+/// Turns drawn under all lenses, as far as the two bounds allow: where lenses are told, fewer are tried, and each with more turns.
+const SAMPLES_IN_ALL: usize = 2400;
 /// Lenses that are refined, the best of those tried.
 const REFINED: usize = 3;
 /// Errors count up to this many times the threshold while a listed lens is judged: it is never quite right.
@@ -53,9 +59,9 @@ const JUDGING: usize = 400;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TurnedLens {
     /// The lens on photograph a, unturned.
-    a: Camera,
+    pub(super) a: Camera,
     /// The lens on photograph b, whose world is the frame of a.
-    b: Camera,
+    pub(super) b: Camera,
 }
 
 /// A turned lens and the matches that agree with it.
@@ -86,11 +92,9 @@ impl TurnedLens {
         pairs.map(|(&a, &b)| (self.squared_error(a, b) / (limit_px * limit_px)).min(1.0)).sum()
     }
 
-    /// Refined on the matches within shrinking multiples of `inlier_px`: the turn, the focal length and k1, k2.
-    fn refined(mut self, points: &MatchedPoints, inlier_px: f64) -> Self {
-        const FOCAL: usize = 0;
-        const RADIAL: usize = 3;
-        let start = self.a.lens.terms();
+    /// Refined on the matches within shrinking multiples of `inlier_px`: the turn, and of the focal length and of k1, k2 what is `free`.
+    fn refined(mut self, points: &MatchedPoints, free: &FreeIntrinsics, inlier_px: f64) -> Self {
+        let start = self;
         for step in 0..STEPS {
             let reach_px = inlier_px * (ROUGH - step as f64 * SHRINKING).max(1.0);
             let (mut normal, mut gradient) = (Matrix6::<f64>::identity() * RIDGE, Vector6::<f64>::zeros());
@@ -106,39 +110,105 @@ impl TurnedLens {
                 let Some(leaving) = self.a.projection_derivatives(bearing) else { continue };
                 let Some(by_pixel) = leaving.bearing_by_pixel() else { continue };
                 let by_turn = arriving.by_bearing * trueup_core::geometry::cross_matrix(&arrived);
-                let by_intrinsics =
-                    arriving.by_bearing * b_from_a * by_pixel * leaving.by_intrinsics - arriving.by_intrinsics;
+                let by_lens_of_a = arriving.by_bearing * b_from_a * by_pixel * leaving.by_intrinsics;
                 let mut jacobian = nalgebra::Matrix2x6::<f64>::zeros();
                 jacobian.fixed_columns_mut::<3>(0).copy_from(&by_turn);
-                jacobian.column_mut(3).copy_from(&by_intrinsics.column(FOCAL));
-                jacobian.column_mut(4).copy_from(&by_intrinsics.column(RADIAL));
-                jacobian.column_mut(5).copy_from(&by_intrinsics.column(RADIAL + 1));
+                let by_free = free.of_a(&by_lens_of_a) - free.of_b(&arriving.by_intrinsics);
+                jacobian.fixed_columns_mut::<3>(3).copy_from(&by_free);
                 normal += jacobian.transpose() * jacobian;
                 gradient += jacobian.transpose() * residual;
             }
-            let mut terms = self.a.lens.terms();
-            for (column, term) in [(4, 0), (5, 1)] {
-                normal[(column, column)] += (inlier_px / RADIAL_SD).powi(2);
-                gradient[column] += (inlier_px / RADIAL_SD).powi(2) * (terms.radial[term] - start.radial[term]);
+            for (column, (change, sd)) in free.changes(&self, &start).into_iter().enumerate() {
+                let weight = (inlier_px / sd).powi(2);
+                normal[(3 + column, 3 + column)] += weight;
+                gradient[3 + column] += weight * change;
             }
             let Some(change) = normal.cholesky().map(|factor| -factor.solve(&gradient)) else { break };
             let turn: Vector3<f64> = change.fixed_rows::<3>(0).into_owned();
-            let longer = change[3].clamp(-LARGEST_FOCAL_STEP, LARGEST_FOCAL_STEP).exp();
-            terms.radial[0] += change[4].clamp(-LARGEST_RADIAL_STEP, LARGEST_RADIAL_STEP);
-            terms.radial[1] += change[5].clamp(-LARGEST_RADIAL_STEP, LARGEST_RADIAL_STEP);
-            let lens = Lens::new(terms);
-            (self.a.focal_px, self.b.focal_px) = (self.a.focal_px * longer, self.b.focal_px * longer);
-            (self.a.lens, self.b.lens) = (lens, lens);
+            free.change(&mut self, &change.fixed_rows::<3>(3).into_owned());
             self.b.set_rotation(&nearest_rotation(&(exp_rotation(&turn) * b_from_a)));
         }
         self
     }
 }
 
-/// The turned lens that most matches agree with; `None` if none is found that `wanted` matches agree with.
+/// What a refinement may change of the lenses on two photographs, of both alike: the focal length's logarithm, k1 and k2.
+#[derive(Debug, Clone, Copy)]
+struct FreeIntrinsics {
+    /// Whose focal length.
+    focal: [bool; 2],
+    /// Standard deviation of its logarithm from where it starts; infinite where nothing is told.
+    focal_sd: f64,
+    /// Whose radial terms.
+    radial: [bool; 2],
+}
+
+impl FreeIntrinsics {
+    /// What is not told; where both focal lengths are, they may change a little, in common.
+    fn beside(told: [&ToldLens; 2]) -> Self {
+        let focal = told.map(|told| told.focal_px.is_none());
+        let are_told = focal == [false; 2];
+        Self {
+            focal: if are_told { [true; 2] } else { focal },
+            focal_sd: if are_told { TOLD_FOCAL_SD } else { f64::INFINITY },
+            radial: told.map(|told| told.lens.is_none()),
+        }
+    }
+
+    fn of(&self, photograph: usize, by_intrinsics: &SMatrix<f64, 2, INTRINSICS>) -> SMatrix<f64, 2, 3> {
+        const FOCAL: usize = 0;
+        const RADIAL: usize = 3;
+        let column = |is_free: bool, intrinsic: usize| match is_free {
+            true => by_intrinsics.column(intrinsic).into_owned(),
+            false => Vector2::zeros(),
+        };
+        let (focal, radial) = (self.focal[photograph], self.radial[photograph]);
+        SMatrix::from_columns(&[column(focal, FOCAL), column(radial, RADIAL), column(radial, RADIAL + 1)])
+    }
+
+    /// Derivatives by what is free, of those by all intrinsics of the first photograph.
+    fn of_a(&self, by_intrinsics: &SMatrix<f64, 2, INTRINSICS>) -> SMatrix<f64, 2, 3> {
+        self.of(0, by_intrinsics)
+    }
+
+    /// The same of the second.
+    fn of_b(&self, by_intrinsics: &SMatrix<f64, 2, INTRINSICS>) -> SMatrix<f64, 2, 3> {
+        self.of(1, by_intrinsics)
+    }
+
+    /// How far each has come from `start`, and the standard deviation of that.
+    fn changes(&self, now: &TurnedLens, start: &TurnedLens) -> [(f64, f64); 3] {
+        let of_both = |turned: &TurnedLens| [turned.a, turned.b];
+        let (now, start) = (of_both(now), of_both(start));
+        let zoomed = usize::from(!self.focal[0]);
+        let bent = usize::from(!self.radial[0]);
+        let radial = |term: usize| now[bent].lens.terms().radial[term] - start[bent].lens.terms().radial[term];
+        let longer = (now[zoomed].focal_px / start[zoomed].focal_px).ln();
+        [(longer, self.focal_sd), (radial(0), RADIAL_SD), (radial(1), RADIAL_SD)]
+    }
+
+    /// Takes a step, if it is too large a shorter one.
+    fn change(&self, turned: &mut TurnedLens, step: &Vector3<f64>) {
+        let longer = step[0].clamp(-LARGEST_FOCAL_STEP, LARGEST_FOCAL_STEP).exp();
+        for (photograph, camera) in [&mut turned.a, &mut turned.b].into_iter().enumerate() {
+            if self.focal[photograph] {
+                camera.focal_px *= longer;
+            }
+            if self.radial[photograph] {
+                let mut terms = camera.lens.terms();
+                terms.radial[0] += step[1].clamp(-LARGEST_RADIAL_STEP, LARGEST_RADIAL_STEP);
+                terms.radial[1] += step[2].clamp(-LARGEST_RADIAL_STEP, LARGEST_RADIAL_STEP);
+                camera.lens = Lens::new(terms);
+            }
+        }
+    }
+}
+
+/// The turned lens that most matches agree with, as far as it is not `told`; `None` if none is found that `wanted` matches agree with.
 pub(super) fn find_turned_lens(
     points: &MatchedPoints,
     frames: [&WorkingFrame; 2],
+    told: [&ToldLens; 2],
     inlier_px: f64,
     wanted: usize,
     generator: &mut impl Rng,
@@ -147,16 +217,19 @@ pub(super) fn find_turned_lens(
         return None;
     }
     let judging = points.select(&(0..points.in_a.len().min(JUDGING)).collect::<Vec<_>>());
-    let mut tried: Vec<RoughTurn> = listed_lenses(frames)
+    let listed = tried_cameras(told, frames);
+    let samples = (SAMPLES_IN_ALL / listed.len().max(1)).clamp(SAMPLES, MOST_SAMPLES);
+    let mut tried: Vec<RoughTurn> = listed
         .into_iter()
-        .filter_map(|cameras| RoughSearch::new(&judging, cameras, ROUGH * inlier_px).best(generator))
+        .filter_map(|cameras| RoughSearch::new(&judging, cameras, ROUGH * inlier_px).best(samples, generator))
         .collect();
     tried.sort_by(|one, other| one.cost.total_cmp(&other.cost));
     tried.truncate(REFINED);
     // As many of those that judge as of all.
     let enough = WORTH_REFINING * wanted as f64 * judging.in_a.len() as f64 / points.in_a.len() as f64;
     let worth_it = tried.into_iter().filter(|rough| rough.agreeing as f64 >= enough);
-    let refined = worth_it.map(|rough| rough.turned.refined(points, inlier_px));
+    let free = FreeIntrinsics::beside(told);
+    let refined = worth_it.map(|rough| rough.turned.refined(points, &free, inlier_px));
     let costs = refined.map(|turned| (turned.cost(points, inlier_px), turned));
     let (_, turned) = costs.min_by(|one, other| one.0.total_cmp(&other.0))?;
     let agrees = |&k: &usize| turned.squared_error(points.in_a[k], points.in_b[k]) <= inlier_px * inlier_px;
@@ -177,17 +250,6 @@ fn spread_across(places: &[Vector2<f64>]) -> f64 {
     let center = places.iter().sum::<Vector2<f64>>() / count;
     let moment: Matrix2<f64> = places.iter().map(|place| (place - center) * (place - center).transpose()).sum();
     (moment.symmetric_eigenvalues().min().max(0.0) / count).sqrt()
-}
-
-/// The lenses that are tried, each on both photographs: through one lens, a larger copy has a focal length of as many more pixels.
-fn listed_lenses(frames: [&WorkingFrame; 2]) -> Vec<[Camera; 2]> {
-    let on = |TriedLens { lens, relative_focal }| {
-        frames.map(|frame| {
-            let focal_px = relative_focal * frame.width.max(frame.height);
-            Camera { lens, ..Camera::new(focal_px, frame.width, frame.height, &Matrix3::identity()) }
-        })
-    };
-    tried_lenses().into_iter().map(on).collect()
 }
 
 /// The turn of least cost under one lens.
@@ -228,10 +290,10 @@ impl RoughSearch {
         Self { cameras, rays_a, rays_b, scales, angle_limit }
     }
 
-    /// The turn of least cost.
-    fn best(&self, generator: &mut impl Rng) -> Option<RoughTurn> {
+    /// The turn of least cost of so many `samples`.
+    fn best(&self, samples: usize, generator: &mut impl Rng) -> Option<RoughTurn> {
         let mut best: Option<(f64, Matrix3<f64>)> = None;
-        for drawn in 0..SAMPLES {
+        for drawn in 0..samples {
             // The most distinctive matches come first.
             let pool = if drawn % 2 == 0 { self.rays_a.len() } else { self.rays_a.len().div_ceil(4).max(2) };
             let (i, j) = (generator.random_range(0..pool), generator.random_range(0..pool));

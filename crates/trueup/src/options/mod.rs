@@ -320,7 +320,8 @@ impl StitchOptions {
     /// Whether photographs are found, measured and matched by these options as by `other`, so that what was matched by the
     /// one can be aligned by the other.
     pub fn matches_alike(&self, other: &Self) -> bool {
-        self.measure == other.measure && self.matching == other.matching
+        let told = |options: &Self| (options.align.cameras.lens, options.align.cameras.fov);
+        self.measure == other.measure && self.matching == other.matching && told(self) == told(other)
     }
 
     /// Refuses to compose what was aligned by `recorded` options if the geometry would be another by these.

@@ -6,6 +6,7 @@ use trueup_align::stitch_graph::StitchGraph;
 use trueup_core::diagnostics::Reported;
 use trueup_core::matches::PairMatches;
 use trueup_core::source::{SourceImage, WorkingFrame};
+use trueup_core::told_lens::ToldLens;
 use trueup_core::{Result, StageContext};
 use trueup_vision::features::Features;
 use trueup_vision::matching::{self, Stranger, StrangersInput};
@@ -15,11 +16,13 @@ use crate::memo::{Key, KeyMaker, LIKENESS, Memo, PAIR};
 use crate::options::MatchOptions;
 use crate::workers::Division;
 
-/// What the phase works on. Photographs are counted 0..N; `features`, `frames`, `usable`, `images` and `keys` have N entries.
+/// What the phase works on. Photographs are counted 0..N; `features`, `frames`, `told`, `usable`, `images` and `keys` have N entries.
 #[derive(Debug)]
 pub(crate) struct MatchInput<'a> {
     pub features: &'a [Features],
     pub frames: &'a [WorkingFrame],
+    /// What the user told of each lens.
+    pub told: &'a [ToldLens],
     /// Whether each could be measured.
     pub usable: &'a [bool],
     /// The only pairs to be tried, whatever they look like; all that look worth it if there are none.
@@ -111,9 +114,10 @@ fn match_candidates(
     let is_usable = |&(a, b): &(usize, usize)| input.usable[a] && input.usable[b];
     let candidates: Vec<(usize, usize)> = candidates.iter().copied().filter(is_usable).collect();
     let forced: BTreeSet<(usize, usize)> = input.wished.iter().copied().collect();
+    let told = input.told;
     let content = |a: usize, b: usize| {
         let (of_a, of_b) = (input.keys[a].as_ref()?, input.keys[b].as_ref()?);
-        Some(KeyMaker::new().key(of_a).key(of_b).part(&forced.contains(&(a, b))))
+        Some(KeyMaker::new().key(of_a).key(of_b).part(&forced.contains(&(a, b))).part(&[told[a], told[b]]))
     };
     let key = |a: usize, b: usize| input.memo.key(PAIR, content(a, b), options);
     let ordered = |&(a, b): &(usize, usize)| (a.min(b), a.max(b));
@@ -126,12 +130,10 @@ fn match_candidates(
     let missing: Vec<(usize, usize)> =
         candidates.iter().copied().filter(|pair| !matched.contains_key(&ordered(pair))).collect();
     let (features, frames) = (input.features, input.frames);
+    let unmatched = matching::MatchingInput { features, frames, told, pairs: &missing, forced: &forced };
     let found = match input.workers {
-        Some(workers) => workers.matched(features, frames, &missing, &forced, context)?,
-        None => {
-            let unmatched = matching::MatchingInput { features, frames, pairs: &missing, forced: &forced };
-            matching::run(&unmatched, &options.matching, context)?
-        }
+        Some(workers) => workers.matched(&unmatched, context)?,
+        None => matching::run(&unmatched, &options.matching, context)?,
     };
     for pair in found {
         // Numbers of photographs belong to this run.

@@ -33,13 +33,15 @@ use trueup_compose::fidelity::{self, Fidelity};
 use trueup_compose::layout::CanvasLayout;
 use trueup_compose::render::{self, RenderHelpers, Rendered, Resources};
 use trueup_core::scratch::ScratchSpace;
+use trueup_core::source::{SourceImage, WorkingFrame};
+use trueup_core::told_lens::ToldLens;
 use trueup_core::{Error, Result, StageContext};
 use trueup_io::color::PhotographColors;
 use trueup_io::decode::FilePhotographs;
 use trueup_io::encode::Metadata;
 use trueup_vision::stacks::Fuse;
 
-use self::align::component::camera_groups;
+use self::align::component::{camera_groups, camera_prior};
 use self::align::{AlignInput, Geometry};
 use self::arrange::{ArrangeInput, Arrangement};
 use self::budget::Budget;
@@ -156,9 +158,13 @@ impl<'a> Stitcher<'a> {
             let Stacked { set, measurements, graph_file } = stacking::run(input, self.options, context)?;
             let mut matched = Matched::unmatched(set, measurements, graph_file)?;
             let looked_at = matched.take_features();
+            let cameras = &self.options.align.cameras;
+            let told = |(image, &frame): (&SourceImage, &WorkingFrame)| camera_prior(image, frame).told_lens(cameras);
+            let told: Vec<ToldLens> = matched.set.images.iter().zip(&looked_at.frames).map(told).collect();
             let input = MatchInput {
                 features: &looked_at.features,
                 frames: &looked_at.frames,
+                told: &told,
                 usable: &looked_at.usable,
                 wished: &matched.graph_file.edges,
                 images: &matched.set.images,

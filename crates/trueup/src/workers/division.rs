@@ -9,11 +9,10 @@ use trueup_core::diagnostics::Reported;
 use trueup_core::mask::Masks;
 use trueup_core::matches::PairMatches;
 use trueup_core::options::StageOptions;
-use trueup_core::source::{PhotographSource, SourceImage, WorkingFrame};
+use trueup_core::source::{PhotographSource, SourceImage};
 use trueup_core::{Result, StageContext};
 use trueup_io::decode::FilePhotographs;
-use trueup_vision::features::Features;
-use trueup_vision::matching::MatchingOptions;
+use trueup_vision::matching::{MatchingInput, MatchingOptions};
 
 use super::Workers;
 use super::handing_out::{PHOTOGRAPHS_PER_TASK, run};
@@ -80,18 +79,12 @@ impl<'a> Division<'a> {
         )
     }
 
-    /// What workers find of `pairs`, in their order, the smaller number first.
+    /// What workers find of the pairs of `input`, in their order, the smaller number first.
     ///
     /// # Errors
     /// Those of the workers; [`trueup_core::Error::Cancelled`].
-    pub(crate) fn matched(
-        &self,
-        features: &[Features],
-        frames: &[WorkingFrame],
-        pairs: &[(usize, usize)],
-        forced: &BTreeSet<(usize, usize)>,
-        context: &StageContext,
-    ) -> Result<Vec<PairMatches>> {
+    pub(crate) fn matched(&self, input: &MatchingInput, context: &StageContext) -> Result<Vec<PairMatches>> {
+        let MatchingInput { features, frames, told, pairs, forced } = *input;
         const STAGE: &str = MatchingOptions::STAGE;
         context.progress().begin(STAGE, pairs.len() as u64);
         let common = Common::new(self.options, Vec::new(), Kind::Match);
@@ -108,7 +101,10 @@ impl<'a> Division<'a> {
             let pair = |&(a, b): &(usize, usize)| (place(a), place(b), forced.contains(&(a, b)));
             Ok(MatchTask {
                 pairs: tasks[number].iter().map(pair).collect(),
-                photographs: photographs.iter().map(|&one| FeaturesOfOne::new(&features[one], frames[one])).collect(),
+                photographs: photographs
+                    .iter()
+                    .map(|&one| FeaturesOfOne::new(&features[one], frames[one], told[one]))
+                    .collect(),
             })
         };
         let mut found: Vec<MatchResult> = tasks.iter().map(|_| Vec::new()).collect();

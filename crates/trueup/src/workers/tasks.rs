@@ -11,6 +11,7 @@ use trueup_compose::small_views::MadeSmall;
 use trueup_core::diagnostics::Reported;
 use trueup_core::matches::PairMatches;
 use trueup_core::source::{SourceImage, WorkingFrame};
+use trueup_core::told_lens::ToldLens;
 use trueup_core::{Error, Result};
 use trueup_vision::features::{DESCRIPTOR_LENGTH, FeaturePoint, Features};
 
@@ -90,6 +91,7 @@ pub(super) type FinishTask = Region;
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct FeaturesOfOne {
     frame: WorkingFrame,
+    told: ToldLens,
     points: Vec<FeaturePoint>,
     #[serde(with = "serde_bytes")]
     descriptors: Vec<u8>,
@@ -97,21 +99,23 @@ pub(super) struct FeaturesOfOne {
 }
 
 impl FeaturesOfOne {
-    pub(super) fn new(features: &Features, frame: WorkingFrame) -> Self {
+    pub(super) fn new(features: &Features, frame: WorkingFrame, told: ToldLens) -> Self {
         let Features { points, descriptors, descriptor_points } = features;
         Self {
             frame,
+            told,
             points: points.clone(),
             descriptors: descriptors.concat(),
             descriptor_points: descriptor_points.clone(),
         }
     }
 
-    /// The features, and the frame they are measured in; `None` if it is damaged.
-    pub(super) fn restored(self) -> Option<(Features, WorkingFrame)> {
+    /// The features, the frame they are measured in, and what is told of the lens; `None` if it is damaged.
+    pub(super) fn restored(self) -> Option<(Features, WorkingFrame, ToldLens)> {
         let (descriptors, rest) = self.descriptors.as_chunks::<DESCRIPTOR_LENGTH>();
         let descriptors = rest.is_empty().then(|| descriptors.to_vec())?;
-        Some((Features { points: self.points, descriptors, descriptor_points: self.descriptor_points }, self.frame))
+        let features = Features { points: self.points, descriptors, descriptor_points: self.descriptor_points };
+        Some((features, self.frame, self.told))
     }
 }
 

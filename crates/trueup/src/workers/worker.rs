@@ -102,11 +102,16 @@ impl Worker {
     fn matched(&self, task: MatchTask, context: &StageContext) -> Result<MatchResult> {
         let MatchTask { photographs, pairs: wanted } = task;
         let restored: Option<Vec<_>> = photographs.into_iter().map(super::tasks::FeaturesOfOne::restored).collect();
-        let (features, frames): (Vec<_>, Vec<_>) = restored.ok_or_else(|| damaged("descriptors"))?.into_iter().unzip();
+        let (mut features, mut frames, mut told) = (Vec::new(), Vec::new(), Vec::new());
+        for (of_one, frame, lens) in restored.ok_or_else(|| damaged("descriptors"))? {
+            features.push(of_one);
+            frames.push(frame);
+            told.push(lens);
+        }
         let pairs: Vec<(usize, usize)> = wanted.iter().map(|&(a, b, _)| (a, b)).collect();
         let forced: BTreeSet<(usize, usize)> =
             wanted.iter().filter(|(.., forced)| *forced).map(|&(a, b, _)| (a.min(b), a.max(b))).collect();
-        let input = MatchingInput { features: &features, frames: &frames, pairs: &pairs, forced: &forced };
+        let input = MatchingInput { features: &features, frames: &frames, told: &told, pairs: &pairs, forced: &forced };
         matching::run(&input, &self.common.options.matching.matching, context)
     }
 

@@ -94,14 +94,21 @@ impl<'a> Component<'a> {
         let photographs = self.images.iter().zip(&self.frames).zip(groups);
         photographs
             .map(|((image, frame), (camera_group, lens_group))| CameraPrior {
-                frame: *frame,
-                focal_px: image.focal_prior.map(|prior| prior.focal_px * frame.working_from_full),
-                focal_told: image.focal_prior.is_some_and(|prior| prior.source == FocalSource::Project),
-                lens: image.lens.map(|lens| lens.scaled(frame.working_from_full)),
                 camera_group,
                 lens_group,
+                ..camera_prior(image, *frame)
             })
             .collect()
+    }
+}
+
+/// What metadata and the user say of the camera of one photograph by itself, in pixels of its working `frame`.
+pub(crate) fn camera_prior(image: &SourceImage, frame: WorkingFrame) -> CameraPrior {
+    CameraPrior {
+        focal_px: image.focal_prior.map(|prior| prior.focal_px * frame.working_from_full),
+        focal_told: image.focal_prior.is_some_and(|prior| prior.source == FocalSource::Project),
+        lens: image.lens.map(|lens| lens.scaled(frame.working_from_full)),
+        ..CameraPrior::unknown(frame, 0)
     }
 }
 
