@@ -33,7 +33,7 @@ const LEAST_TOLD_DEG: f64 = 0.05;
 /// "upright within 0.6 degrees at 95 %, 0.3 expected on average (8 photographs measured, 2 uncertain: 03.jpg, 07.jpg)"
 fn upright(measures: &Measures, project: &Project, names: &[String]) -> String {
     let Some(upright) = &measures.upright else {
-        return "too few vertical lines to judge by".to_owned();
+        return not_measured(measures);
     };
     let uncertain: Vec<&str> = measures
         .photographs
@@ -57,6 +57,14 @@ fn upright(measures: &Measures, project: &Project, names: &[String]) -> String {
         // A project of an earlier version states no interval.
         None => format!("upright within {most:.1} degrees, {mean:.1} on average ({measured}{uncertain})"),
     }
+}
+
+/// Why it is not told how upright: "upright not measured: vertical lines tell it of 1 of 2 photographs (2 needed)". What guided the panorama need
+/// not be vertical.
+fn not_measured(measures: &Measures) -> String {
+    let told = measures.photographs.iter().filter(|photograph| photograph.certain).count();
+    let all = photographs_in_words(measures.photographs.len());
+    format!("upright not measured: vertical lines tell it of {told} of {all} (2 needed)")
 }
 
 fn photographs_in_words(count: usize) -> String {

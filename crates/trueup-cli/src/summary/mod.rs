@@ -225,10 +225,11 @@ fn upright(project: &Project) -> String {
 }
 
 /// Warnings, and with `verbose` notes, that are not told elsewhere; always, that another thing was drawn than the method means, or of other files
-/// than were named.
+/// than were named, and that a panorama is left with its ragged borders.
 fn findings(lines: &mut LabeledLines, project: &Project, verbose: bool) {
     /// The codes of these notes.
-    const ALWAYS: [&str; 4] = ["drawn-by-cameras", "frames-passed-over", "frames-taken", "raw-developed"];
+    const ALWAYS: [&str; 5] =
+        ["crop-too-small", "drawn-by-cameras", "frames-passed-over", "frames-taken", "raw-developed"];
     let names = project.photograph_names();
     for diagnostic in &project.diagnostics {
         let label = match diagnostic.severity {

@@ -2,7 +2,7 @@
 
 use super::cells::Cells;
 use super::search::{Best, Worths};
-use super::smooth::Fillable;
+use super::smooth::{Fillable, near};
 use super::worth::{UpperEnd, Worth};
 use crate::coverage::{Coverage, Rectangle};
 use crate::gaps::FRAME_REACH;
@@ -15,6 +15,12 @@ const THING: f32 = 4.0;
 const FILLED: f32 = 1.0;
 /// Further cost of a filled cell if the border near it were not smooth at all; a share of it for a share.
 const FILLED_BESIDE_ROUGH: f32 = 10.0;
+/// Cost of a thing that ends in front of what is filled, as a wire or a lamp post that ran out of the photograph, for each filled cell at it: calm cells as
+/// a multiple of the panorama's longer side, so many rows of them. A line three cells wide costs a strip of about a twentieth of the longer
+/// side. Times the cube of the share of the border that is smooth there: alone in an even sky it is seen to end, among others it is not.
+const ENDED: f32 = 10.0;
+/// Strength of an edge up to which nothing is seen to end there: noise, and the soft edges of clouds.
+const CALM_EDGE: f32 = 0.2;
 /// Cost of cutting through a thing, for each cell of the cut: calm cells as a share of the panorama's longer side.
 const CUT: f32 = 0.1;
 /// Of that, what cutting it to the left or right costs: things that stand on the ground are expected to go on to the sides.
@@ -30,27 +36,31 @@ const PROMINENT: f32 = 30.0;
 const BEARER: f64 = 0.02;
 
 /// The rectangle of a canvas, seen in `cells`, that loses least of what matters and has no holes but smooth ones; of a full turn,
-/// of all its width. `None` if there is none.
-pub(super) fn rectangle(cells: &Cells, layout: &CanvasLayout, coverage: &Coverage) -> Option<Rectangle> {
+/// of all its width. `None` if there is none. `may_end`: whether things may end in front of what is filled at no cost.
+pub(super) fn rectangle(cells: &Cells, layout: &CanvasLayout, coverage: &Coverage, may_end: bool) -> Option<Rectangle> {
     let reach = (FRAME_REACH * layout.photograph_side() / cells.side as f64) as usize;
     let fillable = Fillable::of(cells, reach.min(cells.columns + cells.rows));
-    let best = worths(cells, &fillable).best(cells.around)?;
+    let ended = if may_end { 0.0 } else { ENDED };
+    let best = worths(cells, &fillable, ended).best(cells.around)?;
     let is_open = |x: usize, y: usize| {
         coverage.holds(x, y) || fillable.smooth[y / cells.side * cells.columns + x / cells.side].is_some()
     };
     Some(grown(&best, cells.side, [layout.width, layout.height], is_open))
 }
 
-/// What every cell and every cut is worth.
-fn worths(cells: &Cells, fillable: &Fillable) -> Worths {
+/// What every cell and every cut is worth; `ended` is [`ENDED`], or 0.
+fn worths(cells: &Cells, fillable: &Fillable, ended: f32) -> Worths {
     let (columns, rows) = (cells.columns, cells.rows);
-    let Worth { salience, ends } = Worth::of(cells);
+    let Worth { edges, salience, ends } = Worth::of(cells);
     let longer = columns.max(rows) as f32;
     let ends = widened(&ends, (BEARER * f64::from(longer)).round() as usize);
     let beheaded = |end: &UpperEnd| BEHEADED * (longer + PROMINENT * end.prominence as f32);
     let cell = |at: usize| match cells.covered[at] {
         true => Some(1.0 + THING * salience[at]),
-        false => fillable.smooth[at].map(|smooth| -FILLED - FILLED_BESIDE_ROUGH * (1.0 - smooth)),
+        false => fillable.smooth[at].map(|smooth| {
+            let edge = near(cells, at).map(|other| edges[other] - CALM_EDGE).fold(0.0, f32::max);
+            -FILLED - FILLED_BESIDE_ROUGH * (1.0 - smooth) - ended * longer * edge * smooth.powi(3)
+        }),
     };
     // What two cells have of one thing.
     let joined = |a: usize, b: usize| CUT * longer * salience[a].min(salience[b]);

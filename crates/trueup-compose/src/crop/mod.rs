@@ -69,9 +69,13 @@ impl Framing<'_> {
 
     /// The frame of a panorama that is seen in `cells`.
     pub(crate) fn of_cells(&self, cells: &Cells, layout: &CanvasLayout) -> Frame {
-        let rectangle = auto::rectangle(cells, layout, self.coverage);
         let enough = self.options.min_kept * self.coverage.area() as f64;
-        self.frame(rectangle.filter(|rectangle| self.coverage.area_within(rectangle) as f64 >= enough))
+        // A thing that ends in the picture is better than ragged borders.
+        let rectangle = [false, true].into_iter().find_map(|may_end| {
+            auto::rectangle(cells, layout, self.coverage, may_end)
+                .filter(|rectangle| self.coverage.area_within(rectangle) as f64 >= enough)
+        });
+        self.frame(rectangle)
     }
 
     fn frame(&self, rectangle: Option<Rectangle>) -> Frame {

@@ -66,7 +66,7 @@ impl Fillable {
 }
 
 /// The cells around one, across the ends of a full turn, too.
-fn near(cells: &Cells, at: usize) -> impl Iterator<Item = usize> {
+pub(super) fn near(cells: &Cells, at: usize) -> impl Iterator<Item = usize> {
     let (columns, rows, around) = (cells.columns, cells.rows, cells.around);
     let (x, y) = (at % columns, at / columns);
     let beside = move |step: usize| {

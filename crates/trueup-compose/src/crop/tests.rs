@@ -61,8 +61,15 @@ impl<F: Fn(usize, usize) -> u8 + Sync> RowSource for Painted<F> {
 
 /// What is kept of a layout that shows `picture`.
 fn kept(layout: &CanvasLayout, crop: Crop, picture: impl Fn(usize, usize) -> u8 + Sync) -> Option<Rectangle> {
+    kept_by(layout, CanvasOptions { crop, ..CanvasOptions::default() }, picture)
+}
+
+fn kept_by(
+    layout: &CanvasLayout,
+    options: CanvasOptions,
+    picture: impl Fn(usize, usize) -> u8 + Sync,
+) -> Option<Rectangle> {
     let painted = Painted([layout.width, layout.height], picture);
-    let options = CanvasOptions { crop, ..CanvasOptions::default() };
     let framing = Framing { coverage: &Coverage::of(layout), options: &options, known: None };
     match framing.of_panorama(&painted, layout).expect("a picture in memory") {
         Frame::Whole => None,
@@ -148,6 +155,28 @@ fn the_edge_of_a_cloud_costs_no_tower_its_top() {
     assert_eq!((cloud.columns, cloud.rows.start <= 6), (0..400, true), "{:?}", cloud.rows);
     let tree = kept(&layout, Crop::Auto, scene(200..400)).expect("a rectangle");
     assert!(tree.rows.start >= 30 || tree.columns.end <= 200, "{tree:?}");
+}
+
+/// Beside an even sky the corner that is missing is filled; where a post runs out of the photograph below, it is not, unless that would keep
+/// too little.
+#[test]
+fn a_post_does_not_end_in_front_of_what_is_filled() {
+    let layout = layout(400, 300, &[upright(0.0, 30.0, 400.0, 300.0), upright(0.0, 0.0, 300.0, 200.0)]);
+    let scene = |post: bool| {
+        move |x: usize, y: usize| match (y >= 220, (350..356).contains(&x) && post) {
+            (true, _) => rough(x, y),
+            (false, true) => 60,
+            _ => 220,
+        }
+    };
+    let whole = Rectangle { columns: 0..400, rows: 0..300 };
+    assert_eq!(kept(&layout, Crop::Auto, scene(false)), Some(whole.clone()));
+    // But for a row of cells at most, two pixels.
+    let found = kept(&layout, Crop::Auto, scene(true)).expect("a rectangle");
+    assert!((28..=30).contains(&found.rows.start) && found.columns == (0..400), "{found:?}");
+    // Without the rows above, 0.923 of what is covered.
+    let most = CanvasOptions { min_kept: 0.95, ..CanvasOptions::default() };
+    assert_eq!(kept_by(&layout, most, scene(true)), Some(whole));
 }
 
 /// A narrow photograph 80 pixels above a wide one: farther than a photograph's side, 60 pixels, nothing is filled.

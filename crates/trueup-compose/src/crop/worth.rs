@@ -25,6 +25,8 @@ const SKYLINE: f64 = 0.1;
 /// What of a panorama matters.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Worth {
+    /// Strength of the edge at a cell, 0 to 1; 0 where nothing is covered.
+    pub(super) edges: Vec<f32>,
     /// How far a cell is part of a thing that stands out, 0 to 1; 0 where nothing is covered.
     pub(super) salience: Vec<f32>,
     /// For every column, where the thing that is highest there ends within the picture.
@@ -57,7 +59,7 @@ impl Worth {
             })
             .collect();
         let ends = ends(cells, &salience, longer);
-        Self { salience, ends }
+        Self { edges, salience, ends }
     }
 }
 

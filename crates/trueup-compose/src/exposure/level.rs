@@ -4,6 +4,7 @@ use trueup_core::color::TransferCurve;
 
 use super::measured::Thumbnail;
 use crate::light::{Correction, Corrections, LightTable, PhotographLight, exposed};
+use crate::render_options::Look;
 
 /// Pixels of a photograph that are looked at, about.
 const SAMPLES: usize = 1_000;
@@ -34,6 +35,8 @@ pub(super) struct LevelInput<'a> {
     pub(super) corrections: &'a Corrections,
     /// Which photographs were compared with others: the rest has no level of its own.
     pub(super) compared: &'a [bool],
+    /// How the panorama shows differences of exposure.
+    pub(super) look: Look,
 }
 
 /// The brightest channel of a pixel: its light, and the factor on it.
@@ -45,7 +48,7 @@ struct Sample {
 impl LevelInput<'_> {
     /// Natural logarithm of a factor on all photographs, so that the least of them is lost: of their pixels as few as can be
     /// turn white or black that were not when they were taken, and few photographs are shown much brighter or darker than
-    /// they were taken; each counts the same. The level lies between those of the photographs, so that photographs of one
+    /// they were taken; each counts the same, as the look shows it. The level lies between those of the photographs, so that photographs of one
     /// exposure stay as they are, and it is that of the reference if another gains next to nothing.
     pub(super) fn log_factor(&self) -> f64 {
         let compared = self.corrections.photographs.iter().zip(self.compared).filter(|(_, compared)| **compared);
@@ -54,12 +57,16 @@ impl LevelInput<'_> {
         let tried = (low * TRIED_PER_STOP).ceil() as i64..=(high * TRIED_PER_STOP).floor() as i64;
         let Some(curve) = self.curve().filter(|_| tried.clone().count() > 1) else { return 0.0 };
         let ends = [BLACK, WHITE].map(|level| curve.linear(f64::from(level) / 255.0) as f32);
-        let photographs = 0..self.thumbnails.len();
-        let photographs: Vec<Vec<Sample>> = photographs.map(|index| self.samples(index, &curve)).collect();
+        let photographs: Vec<Vec<Sample>> =
+            (0..self.thumbnails.len()).map(|index| self.samples(index, &curve)).collect();
+        let gains: Vec<f64> =
+            self.corrections.photographs.iter().map(|correction| correction.brightness().log2()).collect();
         let cost = |stops: f64| {
-            let moved = own.iter().map(|own| ((stops - own).abs() - STOPS_FREE).max(0.0));
+            let moved = own.iter().map(|own| (self.look.borne(stops - own).abs() - STOPS_FREE).max(0.0));
             let moved = moved.sum::<f64>() / own.len().max(1) as f64;
-            lost(&photographs, stops, ends) + FURTHER_STOP * moved + STOP_FROM_REFERENCE * stops.abs()
+            // What a photograph is brightened by beside what makes it fit at the reference's level.
+            let shown = gains.iter().map(|gain| self.look.borne(gain + stops) - gain);
+            lost(photographs.iter().zip(shown), ends) + FURTHER_STOP * moved + STOP_FROM_REFERENCE * stops.abs()
         };
         // Nearest to the reference first: of equal ones the nearest is taken.
         let mut tried: Vec<f64> = tried.map(|step| step as f64 / TRIED_PER_STOP).collect();
@@ -106,16 +113,19 @@ fn brightest(light: &LightTable, pixel: &[u8], [x, y]: [f32; 2]) -> Option<Sampl
     (level > BLACK && level < WHITE).then(|| Sample { light: light.linearize.linear(f32::from(level)), factor })
 }
 
-/// The share of the photographs' pixels beyond the ends of light, `black` and `white`, if all are brightened by `stops`.
-fn lost(photographs: &[Vec<Sample>], stops: f64, [black, white]: [f32; 2]) -> f64 {
-    let factor = stops.exp2() as f32;
-    let beyond = |sample: &&Sample| {
-        let light = exposed(sample.light, sample.factor * factor);
-        light <= black || light >= white
-    };
-    let shares = photographs.iter().filter(|samples| !samples.is_empty());
-    let shares = shares.map(|samples| samples.iter().filter(beyond).count() as f64 / samples.len() as f64);
-    shares.clone().sum::<f64>() / shares.count().max(1) as f64
+/// The share of the photographs' pixels beyond the ends of light, `black` and `white`, if each is brightened by the stops beside it.
+fn lost<'a>(photographs: impl Iterator<Item = (&'a Vec<Sample>, f64)>, [black, white]: [f32; 2]) -> f64 {
+    let (mut shares, mut count) = (0.0, 0.0_f64);
+    for (samples, stops) in photographs.filter(|(samples, _)| !samples.is_empty()) {
+        let factor = stops.exp2() as f32;
+        let beyond = |sample: &&Sample| {
+            let light = exposed(sample.light, sample.factor * factor);
+            light <= black || light >= white
+        };
+        shares += samples.iter().filter(beyond).count() as f64 / samples.len() as f64;
+        count += 1.0;
+    }
+    shares / count.max(1.0)
 }
 
 impl Corrections {
@@ -131,6 +141,9 @@ impl Corrections {
 
 #[cfg(test)]
 mod tests {
+    use trueup_core::raster::Raster;
+    use trueup_core::source::WorkingFrame;
+
     use super::*;
 
     fn corrections(gains: &[f64]) -> Corrections {
@@ -149,14 +162,34 @@ mod tests {
     }
 
     #[test]
+    fn the_level_is_that_at_which_least_is_lost_of_what_the_look_shows() {
+        let plain = |level: u8| Raster::from_data(40, 30, 3, vec![level; 3600]).expect("samples");
+        let (bright, dark) = (plain(188), plain(90));
+        let frame = WorkingFrame::new(40, 30, 1200.0);
+        let thumbnail = |raster| Thumbnail { raster, curve: &TransferCurve::SRGB, frame, camera: 0 };
+        let thumbnails = [thumbnail(&bright), thumbnail(&dark)];
+        // Six stops darker, level 90 (light 0.102) is at 0.0016, level 5; 0.7 stops above that at 0.0026, level 8.5.
+        let corrections = corrections(&[1.0, 1.0 / 64.0]);
+        let level = |look| {
+            let compared = &[true, true];
+            LevelInput { thumbnails: &thumbnails, corrections: &corrections, compared, look }.log_factor()
+        };
+        let stops = level(Look::Linear) / std::f64::consts::LN_2;
+        assert!((0.6..=1.0).contains(&stops), "{stops}");
+        // There, it is shown 1.5 stops darker than it was taken at most, and nothing is lost.
+        assert_eq!(level(Look::Natural), 0.0);
+    }
+
+    #[test]
     fn pixels_count_as_lost_by_what_they_become() {
         let samples = |lights: &[f32]| lights.iter().map(|&light| Sample { light, factor: 2.0 }).collect::<Vec<_>>();
         // Of the first, 0.6 and 0.8 become 1.2 / (1 + 15 * 0.1296)^(1/4) = 0.916 and 1.6 / (1 + 15 * 0.4096)^(1/4) = 0.978,
         // and 0.001 becomes 0.002. The second loses nothing, the third is none.
         let photographs = [samples(&[0.001, 0.1, 0.6, 0.8]), samples(&[0.1, 0.2]), Vec::new()];
-        assert_eq!(lost(&photographs, 0.0, [0.0025, 0.95]), 0.25);
+        let lost_at = |stops: [f64; 3]| lost(photographs.iter().zip(stops), [0.0025, 0.95]);
+        assert_eq!(lost_at([0.0; 3]), 0.25);
         // Two stops darker, factors of 1/2: only the first is lost.
-        assert_eq!(lost(&photographs, -2.0, [0.0025, 0.95]), 0.125);
-        assert_eq!(lost(&[], 0.0, [0.0, 1.0]), 0.0);
+        assert_eq!(lost_at([-2.0, 0.0, 0.0]), 0.125);
+        assert_eq!(lost(std::iter::empty(), [0.0, 1.0]), 0.0);
     }
 }

@@ -7,6 +7,7 @@ use trueup_core::source::WorkingFrame;
 
 use crate::layout::CanvasLayout;
 use crate::light::Corrections;
+use crate::render_options::Look;
 
 /// The photographs whose light is compared.
 #[derive(Debug, Clone, Copy)]
@@ -18,6 +19,9 @@ pub struct ExposureInput<'a> {
     /// Position of the photograph that [`GainAnchor::Reference`](super::GainAnchor::Reference) keeps, and whose colors
     /// [`GainAnchor::Scene`](super::GainAnchor::Scene) does.
     pub reference: usize,
+    /// How much of the differences the panorama evens out: [`GainAnchor::Scene`](super::GainAnchor::Scene) is the level at which least is
+    /// lost of what it shows then.
+    pub look: Look,
 }
 
 /// A photograph reduced to its working size, as the comparison of light reads it.

@@ -55,7 +55,7 @@ const STAGE: &str = ExposureOptions::STAGE;
 /// photographs together say, not off each one's own noisy sample.
 pub fn run(input: &ExposureInput<'_>, options: &ExposureOptions, context: &StageContext) -> Result<Exposure> {
     check(input, options)?;
-    let &ExposureInput { layout, thumbnails, reference } = input;
+    let &ExposureInput { layout, thumbnails, reference, look } = input;
     let count = layout.placed.len();
     if !options.enabled || count < 2 {
         return Ok(Exposure { corrections: Corrections::plain(count), pairs: Vec::new() });
@@ -98,14 +98,14 @@ pub fn run(input: &ExposureInput<'_>, options: &ExposureOptions, context: &Stage
         let is_of_all = || thumbnails.iter().all(|thumbnail| thumbnail.curve == profile);
         response_asked && profile.light_range().is_none() && is_of_all()
     });
-    let input = SolveInput { cameras: &cameras, observed: &observed, thumbnails, reference, profile };
+    let input = SolveInput { cameras: &cameras, observed: &observed, thumbnails, reference, look, profile };
     let corrections = solve(&input, options, context)?;
     Ok(Exposure { corrections, pairs: observed.into_iter().map(|observed| observed.pair).collect() })
 }
 
 fn check(input: &ExposureInput<'_>, options: &ExposureOptions) -> Result<()> {
     options.check()?;
-    let &ExposureInput { layout, thumbnails, reference } = input;
+    let &ExposureInput { layout, thumbnails, reference, .. } = input;
     layout.placed.iter().try_for_each(check_mesh)?;
     let usable = |thumbnail: &Thumbnail| {
         thumbnail.raster.channels() == 3

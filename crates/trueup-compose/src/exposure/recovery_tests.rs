@@ -7,6 +7,7 @@ use trueup_core::source::WorkingFrame;
 
 use super::*;
 use crate::layout::Placed;
+use crate::render_options::Look;
 
 const WIDTH: usize = 300;
 const HEIGHT: usize = 200;
@@ -106,7 +107,7 @@ fn found_beside(
     let frame = WorkingFrame::new(WIDTH, HEIGHT, 480_000.0);
     let thumbnail = |raster| Thumbnail { raster, curve, frame, camera: 0 };
     let thumbnails: Vec<Thumbnail> = rasters.iter().map(thumbnail).collect();
-    let input = ExposureInput { layout: &layout(), thumbnails: &thumbnails, reference: 0 };
+    let input = ExposureInput { layout: &layout(), thumbnails: &thumbnails, reference: 0, look: Look::Linear };
     run(&input, options, &StageContext::default()).expect("estimates").corrections
 }
 

@@ -11,6 +11,7 @@ use super::overlap::Observed;
 use super::robust::LEAST_DEVIATION;
 use super::solution::Solution;
 use crate::light::{Correction, Corrections, Response};
+use crate::render_options::Look;
 
 /// Repetitions of the weighted solution; the weights of real overlaps stand still after six.
 const REPETITIONS: usize = 8;
@@ -25,13 +26,15 @@ pub(super) struct SolveInput<'a> {
     pub(super) thumbnails: &'a [Thumbnail<'a>],
     /// Position of the reference.
     pub(super) reference: usize,
+    /// How the panorama shows differences of exposure.
+    pub(super) look: Look,
     /// The curve beside which a response is estimated; `None` for none.
     pub(super) profile: Option<&'a TransferCurve>,
 }
 
 /// The corrections of all photographs.
 pub(super) fn solve(input: &SolveInput<'_>, options: &ExposureOptions, context: &StageContext) -> Result<Corrections> {
-    let &SolveInput { cameras, observed, thumbnails, reference, profile } = input;
+    let &SolveInput { cameras, observed, profile, .. } = input;
     let count = cameras.len();
     let problem = LightEquations::new(cameras, observed, options);
     let mut weights: Vec<Vec<f64>> = observed.iter().map(|one| vec![1.0; one.samples.len()]).collect();
@@ -66,7 +69,7 @@ pub(super) fn solve(input: &SolveInput<'_>, options: &ExposureOptions, context: 
         }
         solution.casts = problem.casts(&weights, &solution);
     }
-    let corrections = problem.corrections(&solution, thumbnails, reference);
+    let corrections = problem.corrections(&solution, input);
     // Gains grow with a response that stretches the light. At their limit photographs do not fit any longer, which is worse
     // than what a response is good for.
     let limits = [options.max_gain, options.max_gain.recip()];
@@ -89,7 +92,8 @@ fn without_response(
 
 impl LightEquations<'_> {
     /// Gains relative to the anchor, within the limits, the vignetting of each photograph's lens, and the response.
-    fn corrections(&self, solution: &Solution, thumbnails: &[Thumbnail<'_>], reference: usize) -> Corrections {
+    fn corrections(&self, solution: &Solution, input: &SolveInput<'_>) -> Corrections {
+        let &SolveInput { thumbnails, reference, look, .. } = input;
         let mut compared = vec![false; self.count];
         for one in self.observed {
             compared[one.pair.first] = true;
@@ -100,7 +104,9 @@ impl LightEquations<'_> {
         let keeps_light = thumbnails.iter().any(|thumbnail| thumbnail.curve.light_range().is_some());
         let log_factor = match self.options.anchor {
             _ if keeps_light => 0.0,
-            GainAnchor::Scene => LevelInput { thumbnails, corrections: &corrections, compared: &compared }.log_factor(),
+            GainAnchor::Scene => {
+                LevelInput { thumbnails, corrections: &corrections, compared: &compared, look }.log_factor()
+            }
             GainAnchor::Reference | GainAnchor::Mean => 0.0,
         };
         corrections.at_level(log_factor, &compared, self.options.max_gain)

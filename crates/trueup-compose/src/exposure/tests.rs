@@ -5,6 +5,7 @@ use trueup_core::source::WorkingFrame;
 
 use super::*;
 use crate::layout::Placed;
+use crate::render_options::Look;
 
 /// The scene's linear light, smooth with some texture.
 fn scene(x: f64, y: f64) -> f64 {
@@ -45,7 +46,7 @@ fn layout(shifts: &[f64]) -> CanvasLayout {
 }
 
 fn estimate_of(layout: &CanvasLayout, thumbnails: &[Thumbnail<'_>], options: &ExposureOptions) -> Result<Exposure> {
-    run(&ExposureInput { layout, thumbnails, reference: 0 }, options, &StageContext::default())
+    run(&ExposureInput { layout, thumbnails, reference: 0, look: Look::Linear }, options, &StageContext::default())
 }
 
 fn estimate(shifts: &[f64], rasters: &[Raster<u8>], options: &ExposureOptions) -> Exposure {

@@ -25,6 +25,11 @@ struct Bearing {
 }
 
 impl Look {
+    /// The stops by which a photograph is evened out of the `stops` that would make it fit.
+    pub(crate) fn borne(self, stops: f64) -> f64 {
+        self.bearing().map_or(stops, |bearing| bearing.borne(stops))
+    }
+
     /// What it bears; `None` for everything.
     fn bearing(self) -> Option<Bearing> {
         match self {
@@ -82,10 +87,9 @@ pub(crate) fn local_exposure(layout: &CanvasLayout, corrections: &[Correction], 
 
 /// Says how far apart the exposures are that a look brings together in part.
 pub(crate) fn report(corrections: &[Correction], look: Look, context: &StageContext) {
-    let Some(bearing) = look.bearing() else { return };
     let stops = corrections.iter().map(|correction| correction.brightness().log2());
     let (low, high) = stops.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), one| (low.min(one), high.max(one)));
-    let (apart, borne) = (high - low, bearing.borne(high) - bearing.borne(low));
+    let (apart, borne) = (high - low, look.borne(high) - look.borne(low));
     let message = format!("exposures lie {apart:.1} stops apart, of which {borne:.1} are evened out");
     let hint = "Choose --look linear for one exposure everywhere, --look hdr for more detail in sun and shade.";
     context.report(Diagnostic::note("exposures-far-apart", Subject::stage("panorama"), message, hint));

@@ -48,7 +48,8 @@ pub(crate) fn light(
         .iter()
         .map(|one| Thumbnail { raster: one.thumbnail, curve: &curve, frame: one.frame, camera: one.camera })
         .collect();
-    let light = ExposureInput { layout: input.layout, thumbnails: &thumbnails, reference: input.reference };
+    let look = options.render.look;
+    let light = ExposureInput { layout: input.layout, thumbnails: &thumbnails, reference: input.reference, look };
     context.gather(|context| {
         context.time("exposure", || Ok(exposure::run(&light, &options.exposure, context)?.corrections))
     })

@@ -316,7 +316,9 @@ impl<'a> Stitcher<'a> {
             let fixed = self.options.fixed_by_method();
             let arrangement = arrange::recall(layout, reference, project, &fixed.arrange, context)?;
             let arrangement: Arrangement = context.absorb(arrangement);
-            let same_light = self.options.compose.exposure == project.options.compose.exposure && knows_light(project);
+            let [own, recorded] = [&self.options.compose, &project.options.compose];
+            let same_light =
+                own.exposure == recorded.exposure && own.render.look == recorded.render.look && knows_light(project);
             let corrections = match same_light {
                 true => corrections,
                 false => self.light_anew(&set, &arrangement, reference, context)?,

@@ -157,12 +157,22 @@ fn misaligned(
         MISALIGNED,
         Subject::Pair(place(&worst.a)?, place(&worst.b)?),
         format!("95 of 100 points that both show lie within {:.1} px of each other{all}", worst.percentile_95_px),
-        if asked_all_evidence(project, told) {
-            "Look at the seam between them. Parallax or a false match may be the reason: leave one out, or hide with --mask what \
-             stands twice."
-        } else {
-            "Look at the seam between them. Parallax or a false match may be the reason: leave one out, or try --align \
-             lines+photometric."
+        match (asked_all_evidence(project, told), project.used()) {
+            // Without one of two there is no panorama.
+            (true, 2) => {
+                "Look at the seam between them. Parallax or a false match may be the reason: hide with --mask what stands twice."
+            }
+            (true, _) => {
+                "Look at the seam between them. Parallax or a false match may be the reason: leave one out, or hide with --mask what \
+                 stands twice."
+            }
+            (false, 2) => {
+                "Look at the seam between them. Parallax or a false match may be the reason: try --align lines+photometric."
+            }
+            (false, _) => {
+                "Look at the seam between them. Parallax or a false match may be the reason: leave one out, or try --align \
+                 lines+photometric."
+            }
         },
     ))
 }
@@ -249,6 +259,8 @@ mod tests {
         assert!(found[0].message.contains("to the left by 3.5 degrees, up to 3.7"), "{}", found[0].message);
         assert!(found[1].message.ends_with("lie within 564.0 px of each other"), "{}", found[1].message);
         assert!(found[1].hint.contains("--align lines+photometric"), "{}", found[1].hint);
+        // Of two photographs, none can be left out.
+        assert!(!found[1].hint.contains("leave one out"), "{}", found[1].hint);
     }
 
     #[test]
