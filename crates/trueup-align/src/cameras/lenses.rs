@@ -139,7 +139,10 @@ impl LensSearch<'_> {
             let fine = problem.minimize(coarse, &model, FINE_HUBER_PX, self.context)?;
             let again = at(&fine, &wished, &bent, FINE_HUBER_PX).by_either();
             let denied = self.costs(&fine).iter().zip(by_pinholes).any(|(after, before)| *after > DENIED * before);
-            let is_still = |group: usize| first.by_matches[group] || (again[group] && !(only_edges && denied));
+            let is_still = |group: usize| {
+                self.is_visible(&fine, group_of, group)
+                    && (first.by_matches[group] || (again[group] && !(only_edges && denied)))
+            };
             let still: Vec<bool> = (0..bent.len()).map(|group| bent[group] && is_still(group)).collect();
             if still == bent {
                 free.clone_from_slice(&wished);
@@ -149,6 +152,14 @@ impl LensSearch<'_> {
             bent = still;
         }
         Ok(bent)
+    }
+
+    /// Whether k1, as it is in `parameters`, is worth a lens: of a pinhole the first look may show a bend that is gone when the
+    /// cameras have settled.
+    fn is_visible(&self, parameters: &Parameters, group_of: &[usize], group: usize) -> bool {
+        group_of.iter().position(|&of| of == group).is_some_and(|member| {
+            self.corner_shift(parameters, member, parameters.lenses[member].term(RADIAL)) > LEAST_SHIFT_PX
+        })
     }
 
     /// What matches and edges cost.

@@ -7,6 +7,9 @@ use trueup_core::lens::{Lens, LensProjection, LensTerms};
 use trueup_core::matches::{PairVerdict, PointMatch};
 use trueup_core::source::WorkingFrame;
 
+use super::bundle::BundleAdjustment;
+use super::intrinsics::LensState;
+use super::lenses::LensSearch;
 use super::rotations::relative_rotation;
 use super::*;
 
@@ -170,6 +173,33 @@ fn a_pinhole_stays_exactly_one() {
         assert!(cameras.cameras.iter().all(|camera| camera.lens.is_pinhole()), "{noise_px}");
         assert!(cameras.cameras.iter().all(|camera| camera.principal_point == [WIDTH / 2.0, HEIGHT / 2.0]));
     }
+}
+
+/// Cameras that have not settled look as if they bent; what is gone once they have is no lens.
+#[test]
+fn a_bend_that_does_not_stay_is_no_lens() {
+    let truth = row(ROLLS);
+    let pairs = matched(&truth, 0.3, 0.0);
+    let priors = vec![CameraPrior::unknown(frame(), 0); 8];
+    let observations = Observations::choose(&priors, &pairs.iter().collect::<Vec<_>>(), 200);
+    let curves = CurveObservations::default();
+    let problem = BundleAdjustment {
+        priors: &priors,
+        observations: &observations,
+        curves: &curves,
+        start_focal_px: vec![800.0; 8],
+        reference: 0,
+        focal_sd: vec![1.0; 8],
+    };
+    let unsettled = Parameters {
+        focal_px: vec![900.0; 8],
+        rotations: truth.iter().map(Camera::rotation).collect(),
+        lenses: vec![LensState::default(); 8],
+    };
+    let context = StageContext::default();
+    let search = LensSearch { problem: &problem, precise: &problem, kind: LensKind::Auto, context: &context };
+    let found = search.find(&unsettled, &[0; 8]).expect("not cancelled");
+    assert!(found.is_none(), "{:?}", found.map(|found| found.parameters.lenses[0]));
 }
 
 /// A pair is no evidence: parallax bends it as a lens would.
