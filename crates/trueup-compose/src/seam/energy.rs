@@ -14,10 +14,8 @@ const LENGTH: f64 = 2.0;
 /// Weight of the difference of gradients beside that of colors. Higher keeps seams from crossing contours that do not meet.
 const GRADIENT_WEIGHT: f64 = 1.0;
 
-/// Cost of showing a photograph where its highlights are clipped and another one's are not, gray levels per pixel: as much as
-/// [`SeamOptions::sharpness_weight`] is for what is out of focus, since what is clipped shows as little. More than the depth inside a photograph weighs, so that
-/// a white wall is not shown for being in the middle of its photograph.
-const CLIPPED_COST: f64 = 5.0;
+/// Cost of showing a photograph where its highlights are clipped and another one's are not, gray levels per pixel.
+const CLIPPED_COST: f64 = 1.5;
 
 /// Costs are whole numbers; one gray level of 255 is this many.
 pub(super) const UNIT: i32 = 16;
