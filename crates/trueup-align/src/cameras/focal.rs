@@ -1,6 +1,7 @@
 //! Start values for focal lengths and lenses.
 
 use nalgebra::{Matrix3, Vector2};
+use rayon::prelude::*;
 use trueup_core::geometry::Homography;
 use trueup_core::lens::{TriedLens, tried_lenses};
 use trueup_core::matches::PairMatches;
@@ -115,7 +116,7 @@ pub(super) fn initial_intrinsics(
         LensKind::Rectilinear => !lens.lens.is_fisheye(),
         _ => true,
     };
-    let tried = tried_lenses().into_iter().filter(suits).map(|TriedLens { lens, relative_focal }| {
+    let start_with = |TriedLens { lens, relative_focal }: TriedLens| {
         let focal_px = priors.iter().zip(&known).map(|(prior, known)| {
             known.unwrap_or_else(|| {
                 prior.believable_focal_px(relative_focal * prior.frame.width.max(prior.frame.height))
@@ -124,8 +125,9 @@ pub(super) fn initial_intrinsics(
         let (focal_px, lenses): (Vec<f64>, Vec<LensState>) =
             (focal_px.collect(), with_others(LensState { terms: lens.terms(), ..LensState::default() }));
         (common_cost(priors, observations, &focal_px, &lenses), InitialIntrinsics { focal_px, lenses })
-    });
-    let best = tried.min_by(|one, other| one.0.total_cmp(&other.0));
+    };
+    let tried: Vec<(f64, InitialIntrinsics)> = tried_lenses().into_par_iter().filter(suits).map(start_with).collect();
+    let best = tried.into_iter().min_by(|one, other| one.0.total_cmp(&other.0));
     best.filter(|(cost, _)| is_fisheye || *cost < LENS_SHARE * by_pinhole).map_or(straight, |(_, start)| start)
 }
 
@@ -180,7 +182,7 @@ fn common_relative_focal(
     let mut candidates: Vec<f64> = (0..CANDIDATES).map(|k| SHORTEST * STEP.powi(k)).collect();
     candidates.extend(median_from_homographies(priors, pairs));
     let cost = |relative: f64| common_cost(priors, observations, &filled_in(priors, known, relative), lenses);
-    let costs: Vec<f64> = candidates.iter().map(|&candidate| cost(candidate)).collect();
+    let costs: Vec<f64> = candidates.par_iter().map(|&candidate| cost(candidate)).collect();
     let best = (0..candidates.len()).min_by(|&one, &other| costs[one].total_cmp(&costs[other]));
     best.filter(|&best| costs[best] > 0.0 && costs[best].is_finite()).map_or(NORMAL_LENS, |best| candidates[best])
 }

@@ -10,7 +10,7 @@
 //! influence by a loss that forgives (Cauchy).
 
 use nalgebra::{DVector, Matrix2, Matrix3, Matrix3x2, RowSVector, SMatrix, SVector, Vector2, Vector3};
-use trueup_core::camera::{Camera, INTRINSICS};
+use trueup_core::camera::{Camera, INTRINSICS, ProjectionDerivatives};
 use trueup_core::lines::EdgeCurve;
 use trueup_core::source::WorkingFrame;
 
@@ -107,7 +107,7 @@ impl CurveTerm {
         let mut term = Self { normal: SMatrix::zeros(), gradient: SVector::zeros() };
         for curve in &cluster.curves {
             let Some(plane) = Plane::through(camera, curve) else { continue };
-            let Some(jacobian) = plane.jacobian(camera) else { continue };
+            let Some(jacobian) = plane.jacobian() else { continue };
             let weight = cauchy(plane.mean_square(), huber_px).1 / curve.places.len() as f64;
             for (row, distance) in jacobian.iter().zip(plane.distances_px.iter()) {
                 let weighted = row.transpose() * weight;
@@ -125,6 +125,8 @@ struct Plane {
     normal: Vector3<f64>,
     /// The rays, unit length.
     rays: Vec<Vector3<f64>>,
+    /// How the picture of each ray moves.
+    derivatives: Vec<ProjectionDerivatives>,
     /// How many pixels a ray's picture moves as the ray moves along the normal.
     scales_px: Vec<f64>,
     /// How far each place is from the plane's picture, pixels.
@@ -139,15 +141,14 @@ impl Plane {
             let scatter = |k: usize| rays[k] * rays[k].transpose() * weight(k);
             (0..rays.len()).map(scatter).fold(Matrix3::zeros(), |sum, one| sum + one)
         };
-        let scales = |normal: Vector3<f64>| -> Option<Vec<f64>> {
-            let scale = |ray: &Vector3<f64>| Some((camera.projection_derivatives(*ray)?.by_bearing * normal).norm());
-            rays.iter().map(scale).collect()
-        };
+        let derivatives: Vec<ProjectionDerivatives> =
+            rays.iter().map(|ray| camera.projection_derivatives(*ray)).collect::<Option<_>>()?;
         // Distances in the photograph are those of rays, times a scale that hardly changes along the edge.
-        let scales_px = scales(flattest(&spread(&|_| 1.0))?)?;
+        let roughly = flattest(&spread(&|_| 1.0))?;
+        let scales_px: Vec<f64> = derivatives.iter().map(|one| (one.by_bearing * roughly).norm()).collect();
         let normal = flattest(&spread(&|k| scales_px[k] * scales_px[k]))?;
         let distances_px = DVector::from_fn(rays.len(), |k, _| scales_px[k] * normal.dot(&rays[k]));
-        Some(Self { normal, rays, scales_px, distances_px })
+        Some(Self { normal, rays, derivatives, scales_px, distances_px })
     }
 
     fn mean_square(&self) -> f64 {
@@ -155,14 +156,13 @@ impl Plane {
     }
 
     /// How the distances change with the intrinsics while the places stay, and the plane turns after them: a row for each.
-    fn jacobian(&self, camera: &Camera) -> Option<Vec<RowSVector<f64, INTRINSICS>>> {
+    fn jacobian(&self) -> Option<Vec<RowSVector<f64, INTRINSICS>>> {
         let across = self.normal.cross(&self.rays[self.rays.len() / 2]).normalize();
         let tangents = Matrix3x2::from_columns(&[across, self.normal.cross(&across)]);
         let mut jacobian = Vec::with_capacity(self.rays.len());
         let turning = |(ray, scale): (&Vector3<f64>, &f64)| tangents.tr_mul(ray) * *scale;
         let (mut turns, mut coupling) = (Matrix2::zeros(), SMatrix::<f64, 2, INTRINSICS>::zeros());
-        for (ray, scale) in self.rays.iter().zip(&self.scales_px) {
-            let derivatives = camera.projection_derivatives(*ray)?;
+        for ((ray, scale), derivatives) in self.rays.iter().zip(&self.scales_px).zip(&self.derivatives) {
             let row = (self.normal.transpose() * derivatives.bearing_by_pixel()?) * derivatives.by_intrinsics * -scale;
             let turning = turning((ray, scale));
             turns += turning * turning.transpose();

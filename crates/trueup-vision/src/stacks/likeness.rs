@@ -36,11 +36,10 @@ pub(super) struct Likeness {
 /// How alike `dark` and `predicted`, what the other exposure lets expect of it, are; NaN where it lets expect nothing.
 pub(super) fn likeness(dark: &Raster<f32>, predicted: &[f32]) -> Likeness {
     let (width, height) = (dark.width(), dark.height());
-    let own = details(dark.data(), predicted, width);
-    let other = details(predicted, predicted, width);
+    let details = details(dark.data(), predicted, width);
     // Products over each tile: of the one, of both, of the other, and how many.
     let mut tiles = [[0.0_f64; 4]; TILES * TILES];
-    for (index, (&own, &other)) in own.iter().zip(&other).enumerate().filter(|(_, (own, _))| !own.is_nan()) {
+    for (index, &[own, other]) in details.iter().enumerate().filter(|(_, [own, _])| !own.is_nan()) {
         let (x, y) = (index % width, index / width);
         let tile = &mut tiles[(y * TILES / height) * TILES + x * TILES / width];
         let (own, other) = (f64::from(own), f64::from(other));
@@ -63,36 +62,43 @@ pub(super) fn likeness(dark: &Raster<f32>, predicted: &[f32]) -> Likeness {
     }
 }
 
-/// Differences of samples from the mean around them, over what is told; NaN where `told` is.
-fn details(samples: &[f32], told: &[f32], width: usize) -> Vec<f32> {
-    let height = samples.len() / width;
+/// Differences of the samples of both pictures, `dark` and `predicted`, from the means around them, over what both tell; NaN where
+/// `predicted` is.
+fn details(dark: &[f32], predicted: &[f32], width: usize) -> Vec<[f32; 2]> {
+    let height = dark.len() / width;
     let stride = width + 1;
-    // Sums, and counts, of all above and to the left.
-    let mut sums = vec![[0.0_f64; 2]; stride * (height + 1)];
+    // Sums of both, and counts, of all above and to the left.
+    let mut sums = vec![[0.0_f64; 3]; stride * (height + 1)];
     for y in 0..height {
-        let mut row = [0.0_f64; 2];
+        let mut row = [0.0_f64; 3];
         for x in 0..width {
             let index = y * width + x;
-            if !told[index].is_nan() {
-                row[0] += f64::from(samples[index]);
-                row[1] += 1.0;
+            if !predicted[index].is_nan() {
+                row[0] += f64::from(dark[index]);
+                row[1] += f64::from(predicted[index]);
+                row[2] += 1.0;
             }
             let above = sums[y * stride + x + 1];
-            sums[(y + 1) * stride + x + 1] = [above[0] + row[0], above[1] + row[1]];
+            sums[(y + 1) * stride + x + 1] = std::array::from_fn(|part| above[part] + row[part]);
         }
     }
-    let around = |index: usize| {
-        let (x, y) = (index % width, index / width);
-        let (left, right) = (x.saturating_sub(DETAIL_RADIUS), (x + DETAIL_RADIUS + 1).min(width));
+    let mut details = Vec::with_capacity(dark.len());
+    for y in 0..height {
         let (top, bottom) = (y.saturating_sub(DETAIL_RADIUS), (y + DETAIL_RADIUS + 1).min(height));
-        let at = |x: usize, y: usize, part: usize| sums[y * stride + x][part];
-        let within =
-            |part| at(right, bottom, part) - at(left, bottom, part) - at(right, top, part) + at(left, top, part);
-        (within(0) / within(1)) as f32
-    };
-    (0..samples.len())
-        .map(|index| if told[index].is_nan() { f32::NAN } else { samples[index] - around(index) })
-        .collect()
+        let [top, bottom] = [top, bottom].map(|row| &sums[row * stride..][..stride]);
+        for x in 0..width {
+            let index = y * width + x;
+            if predicted[index].is_nan() {
+                details.push([f32::NAN; 2]);
+                continue;
+            }
+            let (left, right) = (x.saturating_sub(DETAIL_RADIUS), (x + DETAIL_RADIUS + 1).min(width));
+            let within = |part: usize| bottom[right][part] - bottom[left][part] - top[right][part] + top[left][part];
+            let mean = |part: usize| (within(part) / within(2)) as f32;
+            details.push([dark[index] - mean(0), predicted[index] - mean(1)]);
+        }
+    }
+    details
 }
 
 /// What `bright`, already in the frame of `dark`, lets expect of it: NaN where it is clipped, and where neither shows any light.

@@ -197,12 +197,18 @@ fn measure(one: &OnePhotograph, options: &MeasureOptions, context: &StageContext
     let image = &files.sources()[index];
     let frame = WorkingFrame::new(image.width, image.height, options.working.pixels);
     let picture = context.time(DECODING, || files.working(index, &frame, THUMBNAIL_PIXELS))?;
-    let mut features = context.time(FEATURES, || features::detect(&picture.gray, &options.features, context))?;
-    let (mut lines, mut curves) = context.time(LINES, || -> Result<_> {
-        let lines = lines::detect(&picture.gray, &options.lines, context)?;
-        let curves = lines::edge_curves(&picture.gray, &lines);
-        Ok((lines, curves))
-    })?;
+    // Side by side, so that no core is left waiting for the last photograph.
+    let (features, lines) = rayon::join(
+        || context.time(FEATURES, || features::detect(&picture.gray, &options.features, context)),
+        || {
+            context.time(LINES, || -> Result<_> {
+                let lines = lines::detect(&picture.gray, &options.lines, context)?;
+                let curves = lines::edge_curves(&picture.gray, &lines);
+                Ok((lines, curves))
+            })
+        },
+    );
+    let (mut features, (mut lines, mut curves)) = (features?, lines?);
     let mut thumbnail = picture.thumbnail;
     if let Some(ignored) = files.masks(index).ignored {
         features = outside(&features, &ignored, &frame);
