@@ -84,10 +84,13 @@ struct Expectation {
 }
 
 impl Expectation {
-    /// Of what is known of each photograph: those with metadata alone where there are any.
+    /// Of what is known of each photograph: of those that the user told alone where there are any, else of those with metadata. All are longer
+    /// or shorter than expected by one factor: what is best known of some says it of the others.
     fn of(priors: &[CameraPrior], found: &Parameters, options: &CameraOptions) -> Self {
+        let told = priors.iter().any(|prior| prior.focal_told);
         let known = priors.iter().any(|prior| prior.focal_px.is_some());
-        let asked = priors.iter().zip(&found.focal_px).filter(|(prior, _)| prior.focal_px.is_some() == known);
+        let is_asked = |prior: &CameraPrior| if told { prior.focal_told } else { prior.focal_px.is_some() == known };
+        let asked = priors.iter().zip(&found.focal_px).filter(|(prior, _)| is_asked(prior));
         let off = |(prior, &focal_px): (&CameraPrior, &f64)| (focal_px / prior.expected_focal_px()).ln();
         let (sum, count) = asked.clone().map(off).fold((0.0, 0_usize), |(sum, count), one| (sum + one, count + 1));
         let sds = asked.map(|(prior, _)| if known { prior.focal_sd(options) } else { USUAL_FOCAL_SD });

@@ -93,3 +93,21 @@ fn what_is_expected_falls_off_as_a_bell() {
     assert!((expectation.improbable(1.0) - 3.003).abs() < 1e-3);
     assert!(expectation.improbable(0.5).abs() < 1e-12);
 }
+
+/// Told 660 px where matches say 1320, beside one with 1320 recorded and one of which nothing is known: what is told alone is asked, to 2 %.
+#[test]
+fn what_is_told_of_one_photograph_is_expected_of_all() {
+    let unknown = CameraPrior::unknown(FRAME, 0);
+    let recorded = CameraPrior { focal_px: Some(1320.0), ..unknown };
+    let told = CameraPrior { focal_px: Some(660.0), focal_told: true, ..unknown };
+    let found = Parameters {
+        focal_px: vec![1320.0; 3],
+        rotations: vec![Matrix3::identity(); 3],
+        lenses: vec![Default::default(); 3],
+    };
+    let expectation = |priors: &[CameraPrior]| Expectation::of(priors, &found, &CameraOptions::default());
+    let of_all = expectation(&[unknown, recorded, told]);
+    assert!((of_all.off - 2.0_f64.ln()).abs() < 1e-12 && (of_all.sd - 0.02).abs() < 1e-12, "{of_all:?}");
+    let without = expectation(&[unknown, recorded, unknown]);
+    assert!(without.off.abs() < 1e-12 && (without.sd - 0.1).abs() < 1e-12, "{without:?}");
+}

@@ -2,7 +2,7 @@
 //!
 //! The similarity energies compare every grid edge with the base, so the base decides which shape is free of cost.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 use trueup_core::camera::Camera;
@@ -69,10 +69,11 @@ pub fn tilts(cameras: &[Camera], prior: &SimilarityPrior) -> bool {
     tilt_from_level(&prior.corrected_cameras(cameras), &prior.level_from_world()).is_some()
 }
 
-/// The turn about the horizontal axis that brings a steep panorama's mean direction level; `None` if it is not steep.
+/// Pitch of what is looked at steeply, radians, 40 degrees.
+const STEEP: f64 = 0.7;
+
+/// The turn about the horizontal axis that brings a steep panorama's mean direction level; `None` if it is not steep, or goes round level as well.
 pub(crate) fn tilt_from_level(cameras: &[Camera], level_from_world: &Matrix3<f64>) -> Option<Matrix3<f64>> {
-    /// Radians, 40 degrees.
-    const STEEP: f64 = 0.7;
     /// Length of the mean direction below which the photographs look all round and have none.
     const ONE_WAY: f64 = 0.5;
     let forwards: Vec<Vector3<f64>> = cameras.iter().map(|camera| level_from_world * camera.forward()).collect();
@@ -80,7 +81,20 @@ pub(crate) fn tilt_from_level(cameras: &[Camera], level_from_world: &Matrix3<f64
     let pitch = forward.y.atan2(forward.z);
     let reaches_pole = forwards.iter().any(|&forward| !is_moderate(forward));
     let one_way = forward.norm() >= ONE_WAY * cameras.len() as f64;
-    (reaches_pole && one_way && pitch.abs() > STEEP).then(|| rotation_about_x(pitch))
+    let is_steep = reaches_pole && one_way && pitch.abs() > STEEP;
+    (is_steep && !look_round(&forwards)).then(|| rotation_about_x(pitch))
+}
+
+/// Whether those that look not steeply look all round, as a drone's do beside those that look down.
+fn look_round(forwards: &[Vector3<f64>]) -> bool {
+    /// Largest angle between neighboring headings, radians, 90 degrees: wider than that is no photograph but a fisheye.
+    const FARTHEST_HEADINGS: f64 = FRAC_PI_2;
+    let not_steep = forwards.iter().filter(|forward| forward.y.abs() < STEEP.sin() * forward.norm());
+    let mut headings: Vec<f64> = not_steep.map(|forward| forward.x.atan2(forward.z)).collect();
+    headings.sort_by(f64::total_cmp);
+    let Some(first) = headings.first() else { return false };
+    let next = headings.iter().skip(1).copied().chain([first + TAU]);
+    headings.iter().zip(next).all(|(heading, next)| next - heading <= FARTHEST_HEADINGS)
 }
 
 /// The base of one photograph: a smooth map from its pixels to panorama units, up to translation.
@@ -236,7 +250,11 @@ mod tests {
         let turn: Vec<Camera> = (0..12).map(|k| camera(f64::from(k) * TAU / 12.0, 1.25, 0.0)).collect();
         assert!(tilt(&turn[..1]).is_some());
         let lower: Vec<Camera> = (0..12).map(|k| camera(f64::from(k) * TAU / 12.0, -0.5, 0.0)).collect();
-        assert!(tilt(&[turn, lower].concat()).is_none());
+        assert!(tilt(&[turn.clone(), lower].concat()).is_none());
+        // Most look steeply, as a drone's do; eight look round, 20 degrees aside of level.
+        let round: Vec<Camera> = (0..8).map(|k| camera(f64::from(k) * TAU / 8.0, 0.35, 0.0)).collect();
+        assert!(tilt(&[turn.clone(), round.clone()].concat()).is_none());
+        assert!(tilt(&[turn, round[..4].to_vec()].concat()).is_some());
     }
 
     #[test]
