@@ -4,7 +4,7 @@ use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, SMatrix, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{matrix_from_rows, rows_of};
-use crate::lens::{Lens, LensDerivatives};
+use crate::lens::{Lens, LensDerivatives, PlacedLens};
 
 /// A rotating camera: square pixels, no skew, and a lens, which may be a pinhole.
 ///
@@ -53,6 +53,13 @@ impl Camera {
             camera_from_world: rows_of(camera_from_world),
             lens: Lens::PINHOLE,
         }
+    }
+
+    /// This camera, which looks at the photograph's middle, with a lens put on.
+    pub fn through(self, lens: &PlacedLens) -> Self {
+        let [middle_x, middle_y] = self.principal_point;
+        let principal_point = [middle_x + lens.center_px[0], middle_y + lens.center_px[1]];
+        Self { lens: Lens::new(lens.terms), principal_point, ..self }
     }
 
     /// The same camera of the same photograph in pixels of which `factor` are one of the present ones.

@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use crate::camera::Camera;
-use crate::lens::{Lens, LensProjection, PlacedLens, TriedLens, tried_lenses};
+use crate::lens::{LensProjection, PlacedLens, TriedLens, tried_lenses};
 use crate::source::WorkingFrame;
 
 /// Standard deviation of a focal length that the user told, relative: what is engraved on a lens is rounded, and focusing on near things
@@ -39,11 +39,7 @@ impl ToldLens {
         let focal_px = self.focal_px.unwrap_or(tried.relative_focal * frame.width.max(frame.height));
         let pinhole = Camera::new(focal_px, frame.width, frame.height, &Matrix3::identity());
         match self.lens {
-            Some(PlacedLens { terms, center_px: [x, y] }) => {
-                let [middle_x, middle_y] = pinhole.principal_point;
-                let principal_point = [middle_x + x, middle_y + y];
-                Some(Camera { lens: Lens::new(terms), principal_point, ..pinhole })
-            }
+            Some(lens) => Some(pinhole.through(&lens)),
             None if self.projection.is_some_and(|told| told != tried.lens.terms().projection) => None,
             None => Some(Camera { lens: tried.lens, ..pinhole }),
         }

@@ -54,8 +54,8 @@ pub use report::evaluation::{
 };
 pub use report::judgement::{Judgement, Verdict};
 pub use report::measures::{
-    BentLine, LongLines, MeasuredLine, Measures, PairMeasures, PhotographMeasures, PlaceMeasures, ReprojectionMeasures,
-    UprightMeasures, WorstPair,
+    BentLine, FEWEST_CERTAIN, LongLines, MeasuredLine, Measures, PairMeasures, PhotographMeasures, PlaceMeasures,
+    ReprojectionMeasures, UprightMeasures, WorstPair,
 };
 pub use report::shown::ShownPhotographs;
 pub use trueup_align::cameras::{CameraOptions, FlatEvidence, LensKind, SceneModel};

@@ -14,11 +14,11 @@ use trueup_core::geometry::{exp_rotation, nearest_rotation};
 use trueup_core::statistics::median;
 use trueup_core::{Result, StageContext};
 
-use super::equations::{Columns, NormalEquations, NormalPattern, Pull};
+use super::equations::{NormalEquations, NormalPattern, Pull};
 use super::intrinsics::{FOCAL, IntrinsicsModel, LensState, standard_deviation};
 use super::levenberg_marquardt::{self, LeastSquares};
 use super::observations::{Observations, PairObservations};
-use super::pair_cost::{LENS_LOCAL, PINHOLE_LOCAL, PairTerm, pair_cost, pair_distances};
+use super::pair_cost::{Columns, LENS_LOCAL, PINHOLE_LOCAL, PairTerm, pair_cost, pair_distances};
 use super::prior::CameraPrior;
 use super::straightness::{CurveObservations, CurveTerm, curve_cost};
 

@@ -4,10 +4,7 @@ use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{Argsort, Pair, SparseColMat, SymbolicSparseColMat};
 use trueup_core::{Error, Result};
 
-use super::pair_cost::PairTerm;
-
-/// Columns of a pair's local unknowns in the global system; `None` is held fixed.
-pub(super) type Columns<const LOCAL: usize> = [Option<usize>; LOCAL];
+use super::pair_cost::{Columns, PairTerm};
 
 /// Which unknowns meet, and the order in which they are eliminated: found once for many equations.
 pub(super) struct NormalPattern<const LOCAL: usize> {

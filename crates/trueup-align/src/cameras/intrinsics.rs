@@ -1,7 +1,7 @@
 //! What bundle adjustment may change of a camera beside its rotation, and who shares it.
 
 use trueup_core::camera::{Camera, INTRINSICS};
-use trueup_core::lens::{Lens, LensTerms, PlacedLens};
+use trueup_core::lens::{LensTerms, PlacedLens};
 use trueup_core::source::WorkingFrame;
 
 use super::prior::CameraPrior;
@@ -64,12 +64,7 @@ impl LensState {
 
     /// A pinhole camera with this lens put on.
     pub(super) fn on(&self, pinhole: Camera) -> Camera {
-        if self.is_pinhole() {
-            return pinhole;
-        }
-        let [x, y] = pinhole.principal_point;
-        let principal_point = [x + self.center_px[0], y + self.center_px[1]];
-        Camera { lens: Lens::new(self.terms), principal_point, ..pinhole }
+        pinhole.through(&PlacedLens { terms: self.terms, center_px: self.center_px })
     }
 
     /// An intrinsic unknown's value.

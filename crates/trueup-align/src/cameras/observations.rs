@@ -47,27 +47,33 @@ impl Observations {
     }
 }
 
+/// Entries of lists of these lengths, as (list, place in it): the first of each list, then the second of each, and so on.
+pub(super) fn in_turns(lengths: &[usize]) -> impl Iterator<Item = (usize, usize)> {
+    let longest = lengths.iter().copied().max().unwrap_or(0);
+    (0..longest).flat_map(move |turn| {
+        (0..lengths.len()).filter(move |&list| lengths[list] > turn).map(move |list| (list, turn))
+    })
+}
+
+/// In which of so many cells along a side of this `length` a coordinate lies.
+pub(super) fn cell_of(coordinate: f64, length: f64, cells: usize) -> usize {
+    // The cast saturates.
+    ((coordinate / length * cells as f64) as usize).min(cells - 1)
+}
+
 /// At most `limit` matches, taken in turns from the cells of a grid over photograph a, in their given order.
 fn spread_evenly(matches: &[PointMatch], prior: &CameraPrior, limit: usize) -> Vec<PointMatch> {
     if matches.len() <= limit {
         return matches.to_vec();
     }
-    let cell = |coordinate: f64, length: f64| ((coordinate / length * CELLS as f64) as usize).min(CELLS - 1);
     let mut cells: Vec<Vec<PointMatch>> = vec![Vec::new(); CELLS * CELLS];
     for one in matches {
-        let (x, y) = (cell(one.in_a[0], prior.frame.width), cell(one.in_a[1], prior.frame.height));
+        let x = cell_of(one.in_a[0], prior.frame.width, CELLS);
+        let y = cell_of(one.in_a[1], prior.frame.height, CELLS);
         cells[y * CELLS + x].push(*one);
     }
-    let mut chosen = Vec::with_capacity(limit);
-    for turn in 0.. {
-        for bucket in &cells {
-            if chosen.len() == limit {
-                return chosen;
-            }
-            chosen.extend(bucket.get(turn));
-        }
-    }
-    chosen
+    let lengths: Vec<usize> = cells.iter().map(Vec::len).collect();
+    in_turns(&lengths).take(limit).map(|(cell, turn)| cells[cell][turn]).collect()
 }
 
 /// Root mean square distance, over both directions, between a pair's matches and where the cameras put them; matches

@@ -5,13 +5,15 @@ use trueup_core::camera::{Camera, INTRINSICS};
 use trueup_core::geometry::cross_matrix;
 use trueup_core::matches::PointMatch;
 
-use super::equations::Columns;
 use super::observations::PairObservations;
 
 /// Unknowns of one pair of pinholes: rotation of a, rotation of b, log focal length of a, of b.
 pub(super) const PINHOLE_LOCAL: usize = 8;
 /// Unknowns of one pair with lenses: rotation of a, rotation of b, all intrinsics of a, of b.
 pub(super) const LENS_LOCAL: usize = 6 + 2 * INTRINSICS;
+
+/// Columns of a pair's local unknowns in the global system; `None` is held fixed.
+pub(super) type Columns<const LOCAL: usize> = [Option<usize>; LOCAL];
 
 /// The quadratic model of one pair's cost.
 pub(super) struct PairTerm<const LOCAL: usize> {

@@ -14,11 +14,11 @@ use rayon::prelude::*;
 use trueup_core::geometry::{cross_matrix, exp_rotation, nearest_rotation, rotation_about_z};
 use trueup_core::{Result, StageContext};
 
-use super::equations::{Columns, NormalEquations, NormalPattern, Pull};
+use super::equations::{NormalEquations, NormalPattern, Pull};
 use super::intrinsics::{FOCAL, IntrinsicsModel, LensState, RADIAL, standard_deviation};
 use super::levenberg_marquardt::{self, LeastSquares};
 use super::observations::{Observations, PairObservations};
-use super::pair_cost::{PairTerm, huber};
+use super::pair_cost::{Columns, PairTerm, huber};
 use super::plane_camera::PlaneCamera;
 use super::prior::CameraPrior;
 

@@ -14,6 +14,8 @@ use trueup_core::camera::{Camera, INTRINSICS, ProjectionDerivatives};
 use trueup_core::lines::EdgeCurve;
 use trueup_core::source::WorkingFrame;
 
+use super::observations::{cell_of, in_turns};
+
 /// How many square pixels of a match's error a square pixel of the mean square distance of an edge from straight is worth:
 /// such a mean scatters by a tenth of what a match does.
 const WORTH: f64 = 100.0;
@@ -21,8 +23,8 @@ const WORTH: f64 = 100.0;
 const LIMIT_SHARE: f64 = 0.1;
 /// Cells along each side of a photograph whose edges may err together: those of one thing.
 const CELLS: usize = 4;
-/// Edges used in all, so that time stays bounded; photographs share them evenly when there are many. Fifty photographs have as
-/// many.
+/// Edges used in all, so that time stays bounded; photographs share them evenly when there are many: up to fifty
+/// may use 160 and more each.
 const EDGES_IN_ALL: usize = 8000;
 /// Edges that every photograph may use, however many photographs there are.
 const FEWEST_EDGES: usize = 24;
@@ -50,9 +52,8 @@ impl CurveObservations {
             let mut cells: Vec<Vec<EdgeCurve>> = vec![Vec::new(); CELLS * CELLS];
             for curve in curves.iter().filter(|curve| curve.places.len() >= FEWEST_PLACES) {
                 let [x, y] = curve.places[curve.places.len() / 2];
-                // The casts saturate.
-                let cell = |place: f64, length: f64| ((place / length * CELLS as f64) as usize).min(CELLS - 1);
-                cells[cell(y, frame.height) * CELLS + cell(x, frame.width)].push(curve.clone());
+                let cell = cell_of(y, frame.height, CELLS) * CELLS + cell_of(x, frame.width, CELLS);
+                cells[cell].push(curve.clone());
             }
             keep_in_turns(&mut cells, limit);
             let filled = cells.into_iter().filter(|curves| !curves.is_empty());
@@ -64,10 +65,9 @@ impl CurveObservations {
 
 /// Shortens lists to at most `limit` entries together: the first of each, then the second of each, and so on.
 fn keep_in_turns<T>(lists: &mut [Vec<T>], limit: usize) {
+    let lengths: Vec<usize> = lists.iter().map(Vec::len).collect();
     let mut kept = vec![0; lists.len()];
-    let turns = (0..).map(|turn| (0..lists.len()).filter(|&list| lists[list].len() > turn).collect::<Vec<_>>());
-    let chosen = turns.take_while(|lists| !lists.is_empty()).flatten().take(limit);
-    chosen.for_each(|list| kept[list] += 1);
+    in_turns(&lengths).take(limit).for_each(|(list, _)| kept[list] += 1);
     for (list, kept) in lists.iter_mut().zip(kept) {
         list.truncate(kept);
     }

@@ -1,6 +1,6 @@
 //! What the panorama's own lines and matches say of it.
 
-use trueup::{Judgement, Measures, PhotographMeasures, Project};
+use trueup::{FEWEST_CERTAIN, Judgement, Measures, PhotographMeasures, Project};
 
 use super::labeled_lines::LabeledLines;
 use super::names::{listed, name_of};
@@ -64,7 +64,7 @@ fn upright(measures: &Measures, project: &Project, names: &[String]) -> String {
 fn not_measured(measures: &Measures) -> String {
     let told = measures.photographs.iter().filter(|photograph| photograph.certain).count();
     let all = photographs_in_words(measures.photographs.len());
-    format!("upright not measured: vertical lines tell it of {told} of {all} (2 needed)")
+    format!("upright not measured: vertical lines tell it of {told} of {all} ({FEWEST_CERTAIN} needed)")
 }
 
 fn photographs_in_words(count: usize) -> String {

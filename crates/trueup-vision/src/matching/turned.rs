@@ -113,7 +113,7 @@ impl TurnedLens {
                 let by_lens_of_a = arriving.by_bearing * b_from_a * by_pixel * leaving.by_intrinsics;
                 let mut jacobian = nalgebra::Matrix2x6::<f64>::zeros();
                 jacobian.fixed_columns_mut::<3>(0).copy_from(&by_turn);
-                let by_free = free.of_a(&by_lens_of_a) - free.of_b(&arriving.by_intrinsics);
+                let by_free = free.of(0, &by_lens_of_a) - free.of(1, &arriving.by_intrinsics);
                 jacobian.fixed_columns_mut::<3>(3).copy_from(&by_free);
                 normal += jacobian.transpose() * jacobian;
                 gradient += jacobian.transpose() * residual;
@@ -155,6 +155,7 @@ impl FreeIntrinsics {
         }
     }
 
+    /// Derivatives by what is free, of those by all intrinsics of the first photograph (0) or the second (1).
     fn of(&self, photograph: usize, by_intrinsics: &SMatrix<f64, 2, INTRINSICS>) -> SMatrix<f64, 2, 3> {
         const FOCAL: usize = 0;
         const RADIAL: usize = 3;
@@ -164,16 +165,6 @@ impl FreeIntrinsics {
         };
         let (focal, radial) = (self.focal[photograph], self.radial[photograph]);
         SMatrix::from_columns(&[column(focal, FOCAL), column(radial, RADIAL), column(radial, RADIAL + 1)])
-    }
-
-    /// Derivatives by what is free, of those by all intrinsics of the first photograph.
-    fn of_a(&self, by_intrinsics: &SMatrix<f64, 2, INTRINSICS>) -> SMatrix<f64, 2, 3> {
-        self.of(0, by_intrinsics)
-    }
-
-    /// The same of the second.
-    fn of_b(&self, by_intrinsics: &SMatrix<f64, 2, INTRINSICS>) -> SMatrix<f64, 2, 3> {
-        self.of(1, by_intrinsics)
     }
 
     /// How far each has come from `start`, and the standard deviation of that.

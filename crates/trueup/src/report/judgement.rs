@@ -153,27 +153,18 @@ fn misaligned(
         2 => String::new(),
         _ => format!("; over all photographs within {:.1}", found.percentile_95_px),
     };
+    // Without one of two there is no panorama.
+    let leave_out = (project.used() != 2).then_some("leave one out");
+    let mend = match asked_all_evidence(project, told) {
+        true => "hide with --mask what stands twice",
+        false => "try --align lines+photometric",
+    };
+    let ways: Vec<&str> = leave_out.into_iter().chain([mend]).collect();
     Some(Diagnostic::warning(
         MISALIGNED,
         Subject::Pair(place(&worst.a)?, place(&worst.b)?),
         format!("95 of 100 points that both show lie within {:.1} px of each other{all}", worst.percentile_95_px),
-        match (asked_all_evidence(project, told), project.used()) {
-            // Without one of two there is no panorama.
-            (true, 2) => {
-                "Look at the seam between them. Parallax or a false match may be the reason: hide with --mask what stands twice."
-            }
-            (true, _) => {
-                "Look at the seam between them. Parallax or a false match may be the reason: leave one out, or hide with --mask what \
-                 stands twice."
-            }
-            (false, 2) => {
-                "Look at the seam between them. Parallax or a false match may be the reason: try --align lines+photometric."
-            }
-            (false, _) => {
-                "Look at the seam between them. Parallax or a false match may be the reason: leave one out, or try --align \
-                 lines+photometric."
-            }
-        },
+        format!("Look at the seam between them. Parallax or a false match may be the reason: {}.", ways.join(", or ")),
     ))
 }
 

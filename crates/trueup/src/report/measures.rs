@@ -6,10 +6,13 @@ use trueup_align::metrics::Straightness;
 /// The paper prints LD in hundredths.
 pub(crate) const HUNDREDTHS: f64 = 100.0;
 
+/// Photographs whose lean is certain that a panorama needs for an uprightness of its own: fewer have none in common.
+pub const FEWEST_CERTAIN: usize = 2;
+
 /// Measures of a panorama that need no truth. Angles in degrees, positive clockwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Measures {
-    /// How upright it is by all its lines; `None` if fewer than two photographs are certain.
+    /// How upright it is by all its lines; `None` if fewer than [`FEWEST_CERTAIN`] photographs are certain.
     pub upright: Option<UprightMeasures>,
     /// Estimate of the paper's GDIC, with each photograph's roll by the lines of all of them in place of its true angle.
     /// Over the photographs that are certain; `None` with fewer than two.

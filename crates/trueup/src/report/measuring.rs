@@ -10,8 +10,8 @@ use trueup_core::mesh::GridMesh;
 
 use super::evidence::{Evidence, EvidenceLine, EvidencePair, EvidencePhotograph};
 use super::measures::{
-    BentLine, HUNDREDTHS, LongLines, MeasuredLine, Measures, PairMeasures, PhotographMeasures, PlaceMeasures,
-    ReprojectionMeasures, UprightMeasures, WorstPair,
+    BentLine, FEWEST_CERTAIN, HUNDREDTHS, LongLines, MeasuredLine, Measures, PairMeasures, PhotographMeasures,
+    PlaceMeasures, ReprojectionMeasures, UprightMeasures, WorstPair,
 };
 use crate::pipeline::arrange::Arrangement;
 use crate::project::record::ImageRecord;
@@ -19,8 +19,6 @@ use crate::project::record::ImageRecord;
 /// A photograph whose lean is less sure than this, half the width of its 95 % interval, has no figure: a lean of a degree is
 /// seen. Degrees.
 const WIDEST_DEG: f64 = 1.0;
-/// Fewer photographs have no uprightness in common.
-const FEWEST: usize = 2;
 /// Squares along the longer side of a photograph by which distances of matches are gathered: as fine as a look at the whole
 /// panorama tells apart.
 const PLACES_ALONG_A_SIDE: f64 = 16.0;
@@ -95,7 +93,7 @@ fn lean((mesh, photograph): (&GridMesh, &EvidencePhotograph)) -> Option<Lean> {
 fn upright(certain: &[Option<Lean>]) -> Option<UprightMeasures> {
     let found: Vec<Lean> = certain.iter().flatten().copied().collect();
     let measured = found.len();
-    if measured < FEWEST {
+    if measured < FEWEST_CERTAIN {
         return None;
     }
     let largest = found.iter().fold(0.0, |largest: f64, one| largest.max(one.lean.abs()));
