@@ -171,6 +171,17 @@ mod tests {
         assert!((moved.y - 240.0).abs() < 1e-9);
     }
 
+    /// By hand: at depth 1, x = 0.2 falls at 0.2 (1 - 0.1 * 0.04) = 0.1992, times 500, from a center at 320 + 6.
+    #[test]
+    fn a_lens_is_put_on_with_its_center() {
+        let terms = LensTerms { radial: [-0.1, 0.0, 0.0, 0.0], ..LensTerms::default() };
+        let pinhole = Camera::new(500.0, 640.0, 480.0, &Matrix3::identity());
+        let camera = pinhole.through(&PlacedLens { terms, center_px: [6.0, -4.0] });
+        let place = camera.project(Vector3::new(0.2, 0.0, 1.0)).expect("in front");
+        assert!((place - Vector2::new(326.0 + 99.6, 236.0)).norm() < 1e-9, "{place}");
+        assert_eq!(pinhole.through(&PlacedLens::default()), pinhole);
+    }
+
     #[test]
     fn points_behind_do_not_project() {
         let camera = Camera::new(500.0, 640.0, 480.0, &Matrix3::identity());
