@@ -7,6 +7,7 @@ pub mod full_turn;
 pub mod match_points;
 pub mod mesh;
 pub mod metrics;
+mod moving_dlt;
 mod plane_similarity;
 pub mod projection;
 pub mod similarity;

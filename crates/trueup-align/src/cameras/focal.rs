@@ -7,8 +7,9 @@ use trueup_core::lens::{TriedLens, tried_lenses};
 use trueup_core::matches::PairMatches;
 
 use super::intrinsics::{InitialIntrinsics, LensState};
+use super::local_focal::local_focal_lengths;
 use super::observations::{Observations, PairObservations};
-use super::options::LensKind;
+use super::options::{CameraOptions, LensKind, StartFocal};
 use super::prior::CameraPrior;
 use super::rotations::fit_rotation;
 
@@ -27,9 +28,9 @@ const MATCH_COST_LIMIT_PX: f64 = 20.0;
 
 /// The focal lengths of the two cameras behind a homography, in its pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct FocalLengths {
-    source: f64,
-    target: f64,
+pub(super) struct FocalLengths {
+    pub source: f64,
+    pub target: f64,
 }
 
 /// A quotient that is the square of a focal length.
@@ -58,7 +59,7 @@ impl Quotient {
 ///
 /// # Source
 /// Szeliski and Shum, "Creating full view panoramic image mosaics" (1997), section 5.
-fn focal_from_homography(target_from_source: &Matrix3<f64>) -> Option<FocalLengths> {
+pub(super) fn focal_from_homography(target_from_source: &Matrix3<f64>) -> Option<FocalLengths> {
     let h = |row: usize, column: usize| target_from_source[(row, column)];
     let source = better_root(
         Quotient::over(-h(0, 2) * h(1, 2), h(0, 0) * h(1, 0) + h(0, 1) * h(1, 1)),
@@ -95,10 +96,17 @@ pub(super) fn initial_intrinsics(
     priors: &[CameraPrior],
     pairs: &[&PairMatches],
     observations: &Observations,
-    kind: LensKind,
+    options: &CameraOptions,
 ) -> InitialIntrinsics {
+    let kind = options.kind_of_lens();
     let with_others = |lens: LensState| priors.iter().map(|prior| prior.lens.map_or(lens, LensState::from)).collect();
     let lenses: Vec<LensState> = with_others(LensState::default());
+    if options.start_focal == StartFocal::LocalHomographies && kind != LensKind::Fisheye {
+        let local = local_focal_lengths(priors, pairs);
+        let known = known_focal_lengths(priors);
+        let focal_px = known.iter().zip(local).map(|(known, local)| known.unwrap_or(local)).collect();
+        return InitialIntrinsics { focal_px, lenses };
+    }
     let straight = InitialIntrinsics { focal_px: initial_focal_lengths(priors, pairs, observations, &lenses), lenses };
     let InitialIntrinsics { focal_px, lenses } = &straight;
     if kind == LensKind::Pinhole || priors.iter().all(|prior| prior.lens.is_some()) {

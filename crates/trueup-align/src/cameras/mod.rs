@@ -1,6 +1,7 @@
 //! Focal lengths, lenses and rotations of the photographs of one component: the paper's R_i.
 //!
-//! Start values come from metadata, from the pair homographies and from a search over a common focal length (`focal`);
+//! Start values come from metadata, from the pair homographies and from a search over a common focal length (`focal`), or as GSP
+//! has them from local homographies (`local_focal`);
 //! rotations from the spanning tree and from averaging over all edges (`rotations`); both are refined together by
 //! bundle adjustment (`bundle`), from coarse to fine (`refinement`). Terms of the lenses are added as long as the matches, and
 //! edges that are to be straight (`straightness`), are sure of them (`lenses`, `lens_evidence`): a pinhole stays one. Pairs that then contradict the others are set
@@ -17,6 +18,7 @@ mod intrinsics;
 mod lens_evidence;
 mod lenses;
 mod levenberg_marquardt;
+mod local_focal;
 mod observations;
 mod options;
 mod pair_cost;
@@ -46,7 +48,7 @@ use refinement::RefinementInput;
 use straightness::CurveObservations;
 
 pub use flat_scene::{FlatEvidence, FlatScene};
-pub use options::{CameraOptions, FocalSharing, LensKind, SceneModel};
+pub use options::{CameraOptions, FocalSharing, LensKind, SceneModel, StartFocal};
 pub use plane_camera::PlaneCamera;
 pub use prior::{CameraPrior, USUAL_FOCAL};
 pub use transfer::CameraTransfer;
@@ -269,7 +271,7 @@ fn solve(
 ) -> Result<Solution> {
     let observations = Observations::choose(priors, pairs, MATCHES_PER_PAIR);
     let for_lenses = Observations::choose(priors, pairs, MATCHES_PER_PAIR_FOR_LENSES);
-    let intrinsics = focal::initial_intrinsics(priors, pairs, &observations, options.kind_of_lens());
+    let intrinsics = focal::initial_intrinsics(priors, pairs, &observations, options);
     let relative = rotations::relative_rotations(priors, pairs, &observations, &intrinsics);
     let graph = graph_of(priors.len(), pairs.iter().copied());
     let rotations = rotations::average(&graph, pairs, &relative, anchor);

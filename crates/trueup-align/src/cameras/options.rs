@@ -45,6 +45,16 @@ trueup_core::choice! {
     }
 }
 
+trueup_core::choice! {
+    /// Where the focal lengths of photographs without metadata start from.
+    pub enum StartFocal {
+        /// One for all, that by which turning cameras explain the matches best.
+        Searched = "searched",
+        /// Each photograph's own: the median of what the homographies around the vertices of its overlaps tell, as GSP has it.
+        LocalHomographies = "local-homographies",
+    }
+}
+
 trueup_core::options! {
     /// How cameras are found.
     pub struct CameraOptions("cameras") {
@@ -61,6 +71,8 @@ trueup_core::options! {
         /// Which photographs share a focal length. `shared` where the lens was not touched and short rows still bend;
         /// `per-photograph` where it was zoomed between photographs and `auto` does not notice.
         focal_sharing: FocalSharing = FocalSharing::Auto, Allowed::Any, "";
+        /// Where the focal lengths of photographs without metadata start from. `local-homographies` to compare with GSP as published.
+        start_focal: StartFocal = StartFocal::Searched, Allowed::Any, "";
         /// Standard deviation of a focal length from metadata, relative. Lower it where the metadata are calibrated;
         /// raise it where a lens reports a focal length that is far from the true one.
         known_focal_sd: f64 = 0.1, between(0.001, 10.0), "";

@@ -4,7 +4,6 @@
 //! Chen and Chuang, "Natural image stitching with the global similarity prior" (2016), section 3.1: grid vertices
 //! carried by local homographies replace the feature matches, because they cover the overlap uniformly.
 
-mod moving_dlt;
 mod residual;
 
 use nalgebra::Vector2;
@@ -15,11 +14,11 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::source::WorkingFrame;
 use trueup_core::{Result, StageContext};
 
-pub use moving_dlt::MovingDlt;
 use residual::{CameraResidual, MAX_DEVIATION};
 
 use crate::cameras::{CameraTransfer, Cameras};
 use crate::evidence::{self, FULL_PX, NEGLIGIBLE_SHARE};
+use crate::moving_dlt::MovingDlt;
 
 /// The vertices of photograph `from`'s grid carried into photograph `to` (working pixels).
 #[derive(Debug, Clone, PartialEq)]

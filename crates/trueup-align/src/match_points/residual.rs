@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 
-use super::moving_dlt::DECAY_PX;
 use crate::cameras::CameraTransfer;
 use crate::evidence::{CommonSquare, OverlapGap};
+use crate::moving_dlt::DECAY_PX;
 
 /// Largest distance of a carried vertex from its place without local corrections, in diagonals of the other photograph.
 pub(super) const MAX_DEVIATION: f64 = 0.1;

@@ -15,7 +15,7 @@ use super::input::{STAGE, WarpInput};
 use super::limits::corners;
 use super::options::WarpOptions;
 use super::placement::{Anchored, Step, one_after_another};
-use crate::match_points::MovingDlt;
+use crate::moving_dlt::MovingDlt;
 use crate::plane_similarity::{MatchedPoints, similarity_of_least_turn};
 
 /// Places the photographs one after the other, each between its local homography and a similarity.

@@ -12,7 +12,7 @@ use super::input::WarpInput;
 use super::limits::{MIN_DEPTH, depth_at, refuse, with_depth};
 use super::options::WarpOptions;
 use super::placement::one_after_another;
-use crate::match_points::MovingDlt;
+use crate::moving_dlt::MovingDlt;
 
 /// Places the photographs one after the other: each vertex goes where the homography goes that fits the matches around
 /// it best.

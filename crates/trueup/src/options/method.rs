@@ -1,5 +1,6 @@
 //! The methods: what a panorama's shape is found by, and what draws its photographs together.
 
+use trueup_align::cameras::StartFocal;
 use trueup_align::match_points::TransferModel;
 use trueup_align::mesh::BaseShape;
 use trueup_align::similarity::{BetaMode, Fallback, GateMode, PrintedEquations, PriorMethod};
@@ -35,8 +36,10 @@ impl Edition {
             return;
         }
         fix_published_mesh(options);
-        if prior == PriorMethod::VanishingPoints {
-            fix_published_guidance(options);
+        match prior {
+            PriorMethod::VanishingPoints => fix_published_guidance(options),
+            PriorMethod::Gsp2d | PriorMethod::Gsp3d => options.cameras.start_focal = StartFocal::LocalHomographies,
+            PriorMethod::Aanap | PriorMethod::Straightening => {}
         }
         if self == Self::Printed {
             options.similarity.as_printed = PrintedEquations::ALL;

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector2};
 use trueup_core::geometry::{Homography, Normalization};
 
 /// Distance over which the influence of a match on a vertex falls to 1/e, working px: the published 8.5 squared.
-pub(super) const DECAY_PX: f64 = 72.25;
+pub(crate) const DECAY_PX: f64 = 72.25;
 /// Smallest weight of a match; it keeps vertices far from all matches determined.
 const WEIGHT_FLOOR: f64 = 0.0015;
 
@@ -17,7 +17,7 @@ const WEIGHT_FLOOR: f64 = 0.0015;
 /// The weight of a match is exp(-distance / decay), with the distance not squared, as the code of the global similarity
 /// prior has it; the published weight squares it.
 #[derive(Debug, Clone)]
-pub struct MovingDlt {
+pub(crate) struct MovingDlt {
     /// Match positions in source pixels, for the weights.
     positions: Vec<Vector2<f64>>,
     /// Normalized (x, y) and (x', y').
@@ -30,7 +30,7 @@ pub struct MovingDlt {
 
 impl MovingDlt {
     /// Prepares the matches `source[k]` to `target[k]`. `None` with fewer than four or in a degenerate configuration.
-    pub fn new(source: &[Vector2<f64>], target: &[Vector2<f64>]) -> Option<Self> {
+    pub(crate) fn new(source: &[Vector2<f64>], target: &[Vector2<f64>]) -> Option<Self> {
         if source.len() < 4 || source.len() != target.len() {
             return None;
         }
@@ -56,7 +56,7 @@ impl MovingDlt {
     }
 
     /// The homography around `vertex` (source pixels); `None` where it is not determined.
-    pub(super) fn at(&self, vertex: Vector2<f64>) -> Option<Homography> {
+    pub(crate) fn at(&self, vertex: Vector2<f64>) -> Option<Homography> {
         // Beyond this distance the floor is the weight, which most matches have, without an exponential.
         let floor_px = -WEIGHT_FLOOR.ln() * DECAY_PX;
         self.solve(|position| {
@@ -70,7 +70,7 @@ impl MovingDlt {
     }
 
     /// The homography for any weights of the match positions.
-    pub fn solve(&self, weight: impl Fn(Vector2<f64>) -> f64) -> Option<Homography> {
+    pub(crate) fn solve(&self, weight: impl Fn(Vector2<f64>) -> f64) -> Option<Homography> {
         /// Most steps of the inverse iteration; two or three settle it.
         const ITERATIONS: usize = 8;
         /// Change of direction, 1 - cosine, below which it has settled.
