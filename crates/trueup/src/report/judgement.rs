@@ -174,6 +174,7 @@ fn misaligned(
 fn bent(project: &Project, measures: &Measures, place: &impl Fn(&str) -> Option<usize>) -> Option<Diagnostic> {
     let mend = match project.projection.map(|projection| projection.kind) {
         None | Some(FlatKind::Perspective) => "--structure lines keeps long lines straight.",
+        Some(_) if project.canvas.full_turn => "A full turn bows level lines; fewer photographs keep them straight.",
         Some(_) => {
             "A view as wide as this bows lines; fewer photographs, or --projection perspective, keep them straight."
         }
@@ -277,6 +278,9 @@ mod tests {
             project.projection = Some(serde_json::from_value(view(kind)).expect("a view"));
             assert!(hint(&project).contains(expected), "{kind}: {}", hint(&project));
         }
+        project.projection = Some(serde_json::from_value(view("equirectangular")).expect("a view"));
+        project.canvas.full_turn = true;
+        assert!(!hint(&project).contains("--"), "{}", hint(&project));
     }
 
     #[test]
