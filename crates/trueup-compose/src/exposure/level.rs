@@ -129,11 +129,30 @@ fn lost<'a>(photographs: impl Iterator<Item = (&'a Vec<Sample>, f64)>, [black, w
 }
 
 impl Corrections {
-    /// With a factor on all photographs that were compared, and no gain beyond `largest` or its inverse.
-    pub(super) fn at_level(mut self, log_factor: f64, compared: &[bool], largest: f64) -> Self {
+    /// With no photograph of those that were compared farther than the factor `largest` from the median one, brighter or darker; and whether one was.
+    ///
+    /// How far photographs lie apart has nothing to do with how bright the panorama is shown.
+    pub(super) fn limited(mut self, compared: &[bool], largest: f64) -> (Self, bool) {
+        let members = || self.photographs.iter().zip(compared).filter(|(_, compared)| **compared);
+        let mut logs: Vec<f64> = members().map(|(correction, _)| correction.brightness().ln()).collect();
+        logs.sort_by(f64::total_cmp);
+        let Some(median) = logs.get(logs.len() / 2).map(|upper| 0.5 * (upper + logs[(logs.len() - 1) / 2])) else {
+            return (self, false);
+        };
+        let [low, high] = [largest.recip(), largest].map(|limit| limit * median.exp());
+        let is_beyond = |gain: &f64| *gain < low || *gain > high;
+        let limited = members().any(|(correction, _)| correction.gain.iter().any(is_beyond));
+        for (correction, _) in self.photographs.iter_mut().zip(compared).filter(|(_, compared)| **compared) {
+            correction.gain = correction.gain.map(|gain| gain.clamp(low, high));
+        }
+        (self, limited)
+    }
+
+    /// With a factor on all photographs that were compared.
+    pub(super) fn at_level(mut self, log_factor: f64, compared: &[bool]) -> Self {
         let compared = self.photographs.iter_mut().zip(compared).filter(|(_, compared)| **compared);
         for (Correction { gain, .. }, _) in compared {
-            *gain = gain.map(|gain| (gain * log_factor.exp()).clamp(largest.recip(), largest));
+            *gain = gain.map(|gain| gain * log_factor.exp());
         }
         self
     }
@@ -151,14 +170,29 @@ mod tests {
     }
 
     #[test]
-    fn the_limit_holds_at_the_level_that_was_chosen() {
-        let at_level = corrections(&[1.0, 20.0, 1.0]).at_level(0.25_f64.ln(), &[true, true, false], 8.0);
-        // A quarter, 20 / 4 = 5; the last was compared with none.
+    fn the_level_is_a_factor_on_all_that_were_compared() {
+        let at_level = corrections(&[1.0, 20.0, 1.0]).at_level(0.25_f64.ln(), &[true, true, false]);
         for (correction, gain) in at_level.photographs.iter().zip([0.25, 5.0, 1.0]) {
             assert!((correction.brightness() / gain - 1.0).abs() < 1e-12, "{at_level:?}");
         }
-        let bounded = corrections(&[0.1, 20.0]).at_level(0.0, &[true; 2], 8.0);
-        assert_eq!(bounded, corrections(&[0.125, 8.0]));
+    }
+
+    /// A turn in sun and shade: two in the sun, a hundredth of the light of those in the shade, which a level in the sun brought to the limit before.
+    #[test]
+    fn photographs_are_limited_by_their_distance_from_one_another() {
+        let turn = [0.01, 0.01, 0.1, 0.1, 1.0, 1.0];
+        for level in [1.0, 0.01, 100.0] {
+            let gains = turn.map(|gain| level * gain);
+            assert_eq!(corrections(&gains).limited(&[true; 6], 32.0), (corrections(&gains), false));
+        }
+        // The geometric mean of 2 and 8 is 4, of which 0.25 and 64 are a sixteenth and sixteen times; the last was compared with none.
+        let (limited, is_limited) =
+            corrections(&[0.25, 2.0, 8.0, 64.0, 1e6]).limited(&[true, true, true, true, false], 8.0);
+        assert!(is_limited);
+        for (correction, gain) in limited.photographs.iter().zip([0.5, 2.0, 8.0, 32.0, 1e6]) {
+            assert!((correction.brightness() / gain - 1.0).abs() < 1e-12, "{limited:?}");
+        }
+        assert_eq!(corrections(&[7.0]).limited(&[false], 2.0), (corrections(&[7.0]), false));
     }
 
     #[test]

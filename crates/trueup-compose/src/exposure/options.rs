@@ -38,8 +38,8 @@ trueup_core::options! {
         /// are taken for light by the color profile's curve. Switch it off for photographs whose samples are known to follow
         /// their profile, such as developed raw files.
         response: bool = true, Allowed::Any, "";
-        /// Largest gain; the smallest is its inverse. Photographs of sun and shade that each were exposed for what they show lie
-        /// up to five stops apart. Lower it if a photograph that is nearly black comes out as noise.
+        /// Largest gain beside the median photograph's; the smallest is its inverse. Photographs of sun and shade that each were
+        /// exposed for what they show lie up to five stops from it. Lower it if a photograph that is nearly black comes out as noise.
         max_gain: f64 = 32.0, between(1.0, 1000.0), "";
     }
 }

@@ -69,13 +69,11 @@ pub(super) fn solve(input: &SolveInput<'_>, options: &ExposureOptions, context: 
         }
         solution.casts = problem.casts(&weights, &solution);
     }
-    let corrections = problem.corrections(&solution, input);
     // Gains grow with a response that stretches the light. At their limit photographs do not fit any longer, which is worse
     // than what a response is good for.
-    let limits = [options.max_gain, options.max_gain.recip()];
-    let at_limit = |correction: &Correction| correction.gain.iter().any(|gain| limits.contains(gain));
+    let (corrections, limited) = problem.corrections(&solution, input);
     let makes_curve = profile.is_none_or(|profile| corrections.response.curve(profile).is_ok());
-    if !makes_curve || (!corrections.response.is_plain() && corrections.photographs.iter().any(at_limit)) {
+    if !makes_curve || (!corrections.response.is_plain() && limited) {
         return without_response(input, options, context);
     }
     Ok(corrections)
@@ -91,8 +89,8 @@ fn without_response(
 }
 
 impl LightEquations<'_> {
-    /// Gains relative to the anchor, within the limits, the vignetting of each photograph's lens, and the response.
-    fn corrections(&self, solution: &Solution, input: &SolveInput<'_>) -> Corrections {
+    /// Gains relative to the anchor, the vignetting of each photograph's lens, and the response; and whether gains had to be limited.
+    fn corrections(&self, solution: &Solution, input: &SolveInput<'_>) -> (Corrections, bool) {
         let &SolveInput { thumbnails, reference, look, .. } = input;
         let mut compared = vec![false; self.count];
         for one in self.observed {
@@ -100,6 +98,7 @@ impl LightEquations<'_> {
             compared[one.pair.second] = true;
         }
         let corrections = self.relative_to(self.anchor(solution, &compared, reference), solution, &compared);
+        let (corrections, limited) = corrections.limited(&compared, self.options.max_gain);
         // What is kept of all light needs no level at which least is lost.
         let keeps_light = thumbnails.iter().any(|thumbnail| thumbnail.curve.light_range().is_some());
         let log_factor = match self.options.anchor {
@@ -109,7 +108,7 @@ impl LightEquations<'_> {
             }
             GainAnchor::Reference | GainAnchor::Mean => 0.0,
         };
-        corrections.at_level(log_factor, &compared, self.options.max_gain)
+        (corrections.at_level(log_factor, &compared), limited)
     }
 
     /// Logarithms of the gains that become 1.
