@@ -4,6 +4,7 @@
 pub mod cameras;
 mod evidence;
 pub mod full_turn;
+mod horizon;
 pub mod match_points;
 pub mod mesh;
 pub mod metrics;

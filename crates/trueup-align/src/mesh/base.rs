@@ -2,7 +2,7 @@
 //!
 //! The similarity energies compare every grid edge with the base, so the base decides which shape is free of cost.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 use trueup_core::camera::Camera;
@@ -14,6 +14,7 @@ use super::options::{BaseShape, MeshOptions};
 use super::sphere_view::{SphereView, derivative_at_center};
 use crate::cameras::{FlatScene, PlaneCamera};
 use crate::full_turn::is_moderate;
+use crate::horizon::goes_round_horizon;
 use crate::similarity::SimilarityPrior;
 
 /// What the prior wants of one photograph.
@@ -37,7 +38,7 @@ pub fn bases(cameras: &[Camera], grids: &[GridMesh], prior: &SimilarityPrior, op
     let cameras = &prior.corrected_cameras(cameras);
     let units_per_radian = units_per_radian(cameras, prior);
     let level_from_world = prior.level_from_world();
-    let tilt = tilt_from_level(cameras, &level_from_world);
+    let tilt = tilt_from_level(sized(cameras, grids), &level_from_world);
     let frame = tilt.unwrap_or_else(Matrix3::identity) * level_from_world;
     (0..grids.len())
         .map(|k| {
@@ -65,36 +66,34 @@ pub fn turn_length(cameras: &[Camera], prior: &SimilarityPrior) -> f64 {
 }
 
 /// Whether the panorama of [`bases`] is tilted, so that its rows are not those of the level world.
-pub fn tilts(cameras: &[Camera], prior: &SimilarityPrior) -> bool {
-    tilt_from_level(&prior.corrected_cameras(cameras), &prior.level_from_world()).is_some()
+pub fn tilts(cameras: &[Camera], grids: &[GridMesh], prior: &SimilarityPrior) -> bool {
+    tilt_from_level(sized(&prior.corrected_cameras(cameras), grids), &prior.level_from_world()).is_some()
+}
+
+/// Cameras with the sizes of their photographs.
+fn sized<'a>(cameras: &'a [Camera], grids: &'a [GridMesh]) -> impl Iterator<Item = (&'a Camera, [f64; 2])> + Clone {
+    cameras.iter().zip(grids.iter().map(|grid| [grid.width, grid.height]))
 }
 
 /// Pitch of what is looked at steeply, radians, 40 degrees.
 const STEEP: f64 = 0.7;
 
-/// The turn about the horizontal axis that brings a steep panorama's mean direction level; `None` if it is not steep, or goes round level as well.
-pub(crate) fn tilt_from_level(cameras: &[Camera], level_from_world: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+/// The turn about the horizontal axis that brings a steep panorama's mean direction level; `None` if it is not steep, or shows the horizon all
+/// round as well, as a drone's does beside photographs that look down. Photographs are cameras with their sizes.
+pub(crate) fn tilt_from_level<'a>(
+    photographs: impl Iterator<Item = (&'a Camera, [f64; 2])> + Clone,
+    level_from_world: &Matrix3<f64>,
+) -> Option<Matrix3<f64>> {
     /// Length of the mean direction below which the photographs look all round and have none.
     const ONE_WAY: f64 = 0.5;
-    let forwards: Vec<Vector3<f64>> = cameras.iter().map(|camera| level_from_world * camera.forward()).collect();
+    let forwards: Vec<Vector3<f64>> =
+        photographs.clone().map(|(camera, _)| level_from_world * camera.forward()).collect();
     let forward: Vector3<f64> = forwards.iter().sum();
     let pitch = forward.y.atan2(forward.z);
     let reaches_pole = forwards.iter().any(|&forward| !is_moderate(forward));
-    let one_way = forward.norm() >= ONE_WAY * cameras.len() as f64;
+    let one_way = forward.norm() >= ONE_WAY * forwards.len() as f64;
     let is_steep = reaches_pole && one_way && pitch.abs() > STEEP;
-    (is_steep && !look_round(&forwards)).then(|| rotation_about_x(pitch))
-}
-
-/// Whether those that look not steeply look all round, as a drone's do beside those that look down.
-fn look_round(forwards: &[Vector3<f64>]) -> bool {
-    /// Largest angle between neighboring headings, radians, 90 degrees: wider than that is no photograph but a fisheye.
-    const FARTHEST_HEADINGS: f64 = FRAC_PI_2;
-    let not_steep = forwards.iter().filter(|forward| forward.y.abs() < STEEP.sin() * forward.norm());
-    let mut headings: Vec<f64> = not_steep.map(|forward| forward.x.atan2(forward.z)).collect();
-    headings.sort_by(f64::total_cmp);
-    let Some(first) = headings.first() else { return false };
-    let next = headings.iter().skip(1).copied().chain([first + TAU]);
-    headings.iter().zip(next).all(|(heading, next)| next - heading <= FARTHEST_HEADINGS)
+    (is_steep && !goes_round_horizon(photographs, level_from_world)).then(|| rotation_about_x(pitch))
 }
 
 /// The base of one photograph: a smooth map from its pixels to panorama units, up to translation.
@@ -246,7 +245,10 @@ mod tests {
     /// A full turn that looks up a little has its mean direction near the pole without looking there.
     #[test]
     fn only_photographs_that_look_one_way_are_tilted_level() {
-        let tilt = |cameras: &[Camera]| tilt_from_level(cameras, &Matrix3::identity());
+        let tilt = |cameras: &[Camera]| {
+            let sized = cameras.iter().map(|camera| (camera, [800.0, 600.0]));
+            tilt_from_level(sized, &Matrix3::identity())
+        };
         let turn: Vec<Camera> = (0..12).map(|k| camera(f64::from(k) * TAU / 12.0, 1.25, 0.0)).collect();
         assert!(tilt(&turn[..1]).is_some());
         let lower: Vec<Camera> = (0..12).map(|k| camera(f64::from(k) * TAU / 12.0, -0.5, 0.0)).collect();

@@ -3,9 +3,9 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Matrix3, Vector2, Vector3};
-use trueup_core::geometry::wrap_angle;
 
 use super::photograph::PosedPhotograph;
+use crate::horizon::{Longitudes, SAMPLES, goes_round_horizon, spread_pixels};
 
 /// The directions that photographs cover, in the level world.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,16 +22,9 @@ pub(super) struct SphereCoverage {
     pub forward: Vector3<f64>,
 }
 
-/// Longitudes are counted in steps of half a degree.
-const STEPS: usize = 720;
-/// Latitude, radians (20 degrees), up to which a direction is near the horizon.
-const NEAR_HORIZON: f64 = 0.349;
-/// Samples along each side of a photograph.
-const SAMPLES: usize = 9;
-
 impl SphereCoverage {
     pub(super) fn of(photographs: &[PosedPhotograph]) -> Self {
-        let (mut covered, mut near_horizon) = ([false; STEPS], [false; STEPS]);
+        let mut longitudes = Longitudes::none();
         let mut latitudes = [f64::INFINITY, f64::NEG_INFINITY];
         let mut forward = Vector3::zeros();
         for photograph in photographs {
@@ -50,22 +43,14 @@ impl SphereCoverage {
                 }
             }
             if poles.contains(&true) {
-                covered = [true; STEPS];
+                longitudes = Longitudes::all();
                 continue;
             }
-            let is_near = |direction: &&Vector3<f64>| direction.y.abs() < NEAR_HORIZON.sin();
-            cover(&mut covered, ahead, directions.iter());
-            if directions.iter().any(|direction| is_near(&direction)) {
-                cover(&mut near_horizon, ahead, directions.iter().filter(is_near));
-            }
+            longitudes.cover(ahead, directions.iter());
         }
-        let (gap_start, gap) = widest_gap(&covered);
-        let span = TAU * (STEPS - gap) as f64 / STEPS as f64;
-        let middle = match gap {
-            0 => 0.0,
-            _ => wrap_angle((gap_start as f64 + (gap as f64 - 1.0) / 2.0) / STEPS as f64 * TAU + PI),
-        };
-        let goes_round_horizon = near_horizon == [true; STEPS];
+        let (span, middle) = longitudes.span_and_middle();
+        let sized = photographs.iter().map(|one| (&one.camera, [one.mesh.width, one.mesh.height]));
+        let goes_round_horizon = goes_round_horizon(sized, &Matrix3::identity());
         Self { middle, span, latitudes, goes_round_horizon, forward }
     }
 
@@ -89,22 +74,9 @@ impl SphereCoverage {
     }
 }
 
-/// Covers the longitudes between those of `directions` that are farthest to both sides of `ahead`.
-fn cover<'a>(covered: &mut [bool; STEPS], ahead: Vector3<f64>, directions: impl Iterator<Item = &'a Vector3<f64>>) {
-    let center = ahead.x.atan2(ahead.z);
-    let from_center = directions.map(|direction| wrap_angle(direction.x.atan2(direction.z) - center));
-    let (left, right) = from_center.fold((0.0_f64, 0.0_f64), |(left, right), one| (left.min(one), right.max(one)));
-    let step = |longitude: f64| (longitude / TAU * STEPS as f64).round() as i64;
-    for index in step(center + left)..=step(center + right) {
-        covered[index.rem_euclid(STEPS as i64) as usize] = true;
-    }
-}
-
 /// Pixels spread over a photograph, so many along each side, its border included.
 pub(super) fn samples(photograph: &PosedPhotograph, count: usize) -> impl Iterator<Item = Vector2<f64>> + use<> {
-    let size = Vector2::new(photograph.mesh.width, photograph.mesh.height);
-    let share = move |index: usize| index as f64 / (count - 1) as f64;
-    (0..count * count).map(move |index| size.component_mul(&Vector2::new(share(index % count), share(index / count))))
+    spread_pixels(Vector2::new(photograph.mesh.width, photograph.mesh.height), count)
 }
 
 /// The largest angle from the horizon of `frame` (from the level world) that a photograph reaches, radians.
@@ -122,24 +94,10 @@ pub(super) fn shows(photograph: &PosedPhotograph, direction: Vector3<f64>) -> bo
     photograph.camera.shows(direction, [photograph.mesh.width, photograph.mesh.height])
 }
 
-/// First step and length of the widest run of uncovered steps around the turn.
-fn widest_gap(covered: &[bool; STEPS]) -> (usize, usize) {
-    let Some(start) = covered.iter().position(|&step| step) else { return (0, STEPS) };
-    let (mut best, mut run) = ((0, 0), 0);
-    for offset in 1..=STEPS {
-        let index = (start + offset) % STEPS;
-        run = if covered[index] { 0 } else { run + 1 };
-        if run > best.1 {
-            best = ((index + STEPS + 1 - run) % STEPS, run);
-        }
-    }
-    best
-}
-
 #[cfg(test)]
 pub(super) mod tests {
     use trueup_core::camera::Camera;
-    use trueup_core::geometry::{rotation_about_x, rotation_about_y};
+    use trueup_core::geometry::{rotation_about_x, rotation_about_y, wrap_angle};
     use trueup_core::mesh::GridMesh;
 
     use super::*;

@@ -70,6 +70,11 @@ pub fn parallax_shifts(photographs: &[PosedPhotograph], period: Option<f64>, max
         .collect()
 }
 
+/// How far apart sights may be, as a share of the room that they have to meet in, the sum of their distances from their photographs' borders. Of
+/// photographs of 4:3 whose borders cross at a right angle, no place then moves by more than half a step against its neighbor a step aside:
+/// cells keep half of their width. From 0.6 on they would fold.
+const MOST_PER_ROOM: f64 = 0.3;
+
 /// Cells of the lattice of even steps along a photograph's longer side.
 const LATTICE_CELLS: f64 = 16.0;
 
@@ -86,8 +91,8 @@ struct Overlaps<'a> {
 
 impl<'a> Overlaps<'a> {
     fn new(photographs: &'a [PosedPhotograph], period: Option<f64>, max_parallax: f64) -> Self {
-        let cameras: Vec<Camera> = photographs.iter().map(|photograph| photograph.camera).collect();
-        let frame = tilt_from_level(&cameras, &Matrix3::identity()).unwrap_or_else(Matrix3::identity);
+        let sized = photographs.iter().map(|one| (&one.camera, [one.mesh.width, one.mesh.height]));
+        let frame = tilt_from_level(sized, &Matrix3::identity()).unwrap_or_else(Matrix3::identity);
         let trusts = photographs.iter().map(|photograph| trust(steepest(photograph, &frame))).collect();
         let bounds: Vec<_> = photographs.iter().map(|photograph| photograph.mesh.bounds()).collect();
         let of_each =
@@ -100,7 +105,9 @@ impl<'a> Overlaps<'a> {
     fn sights(&self, k: usize, pixel: Vector2<f64>) -> Vec<Sight> {
         let photograph = &self.photographs[k];
         let direction = photograph.camera.world_direction(pixel);
-        let own = Sight { photograph: k, pixel, direction, weight: depth(photograph, pixel), trust: self.trusts[k] };
+        let weight = depth(photograph, pixel);
+        let own =
+            Sight { photograph: k, pixel, direction, weight, room: room(photograph, weight), trust: self.trusts[k] };
         let place = photograph.mesh.warp(pixel);
         let others = self.neighbors[k].iter();
         std::iter::once(own).chain(others.filter_map(|&other| self.sight(other, place, &direction))).collect()
@@ -154,9 +161,9 @@ impl<'a> Overlaps<'a> {
         let pixel = other.mesh.source_of(place, expected)?;
         let inside = (0..2).all(|axis| (0.0..=size[axis]).contains(&pixel[axis]));
         let direction = other.camera.world_direction(pixel);
-        let seen =
-            Sight { photograph: number, pixel, direction, weight: depth(other, pixel), trust: self.trusts[number] };
-        inside.then_some(seen)
+        let weight = depth(other, pixel);
+        let (room, trust) = (room(other, weight), self.trusts[number]);
+        inside.then_some(Sight { photograph: number, pixel, direction, weight, room, trust })
     }
 }
 
@@ -181,6 +188,8 @@ struct Sight {
     /// By its camera.
     direction: Vector3<f64>,
     weight: f64,
+    /// About how far the photograph's border is, radians.
+    room: f64,
     /// How far its mesh is believed, 0 to 1.
     trust: f64,
 }
@@ -199,6 +208,11 @@ fn depth(photograph: &PosedPhotograph, pixel: Vector2<f64>) -> f64 {
     along(pixel.x, photograph.mesh.width) * along(pixel.y, photograph.mesh.height)
 }
 
+/// About how far from its border, radians, a place of a photograph lies that is so deep in it.
+fn room(photograph: &PosedPhotograph, depth: f64) -> f64 {
+    0.5 * depth * photograph.mesh.width.min(photograph.mesh.height) / photograph.camera.focal_px
+}
+
 /// Where a place is drawn that is seen in the directions `seen`: their mean, faded towards the first as the cameras contradict
 /// each other. All photographs that see the place come to the same mean and the same fading.
 fn common_direction(sights: &[Sight], max_parallax: f64, seen: impl Fn(&Sight) -> Vector3<f64>) -> Vector3<f64> {
@@ -211,7 +225,26 @@ fn common_direction(sights: &[Sight], max_parallax: f64, seen: impl Fn(&Sight) -
     else {
         return own;
     };
-    own.lerp(&mean, kept(sights, &by_cameras, max_parallax) * trust_of(sights)).normalize()
+    let share = kept(sights, &by_cameras, max_parallax) * trust_of(sights) * room_to_meet(sights, &seen);
+    own.lerp(&mean, share).normalize()
+}
+
+/// Which share of the way sights go to their mean where photographs end beside each other; their directions are those `seen`.
+///
+/// Where the border of one photograph crosses that of another, what is drawn goes from what the one sees to what the other sees within any
+/// distance, however small: cells fold. So sights meet only where they have room for it, and are left apart nearer to the crossing.
+fn room_to_meet(sights: &[Sight], seen: impl Fn(&Sight) -> Vector3<f64>) -> f64 {
+    let room: f64 = sights.iter().map(|sight| sight.room).sum();
+    let directions: Vec<Vector3<f64>> = sights.iter().map(seen).collect();
+    let pairs = directions.iter().enumerate().flat_map(|(k, one)| directions[..k].iter().map(|other| one.angle(other)));
+    let apart = pairs.fold(f64::MIN_POSITIVE, f64::max);
+    smooth_step(MOST_PER_ROOM * room / apart)
+}
+
+/// 0 up to 0, 1 from 1 on, and smooth between.
+fn smooth_step(share: f64) -> f64 {
+    let share = share.clamp(0.0, 1.0);
+    share * share * (3.0 - 2.0 * share)
 }
 
 /// The mean of the directions `seen`; `None` if none of the sights counts.
@@ -223,8 +256,7 @@ fn mean_direction(sights: &[Sight], seen: impl Fn(&Sight) -> Vector3<f64>) -> Op
 fn kept(sights: &[Sight], mean: &Vector3<f64>, max_parallax: f64) -> f64 {
     let counted = sights.iter().filter(|sight| sight.weight > 0.0);
     let farthest = counted.map(|sight| sight.direction.angle(mean)).fold(sights[0].direction.angle(mean), f64::max);
-    let kept = (2.0 - 2.0 * farthest / max_parallax.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    kept * kept * (3.0 - 2.0 * kept)
+    smooth_step(2.0 - 2.0 * farthest / max_parallax.max(f64::MIN_POSITIVE))
 }
 
 /// How far sights are believed, together.
@@ -308,6 +340,41 @@ mod tests {
             assert_eq!(shift.aside.len(), photograph.mesh.len());
             assert!(shift.aside.iter().all(|aside| aside.norm() < 1e-6));
         }
+    }
+
+    /// Around the place where the upper border of one photograph crosses the right border of another, 10 pixels apart in what they see there: no
+    /// place moves by more than half a step against its neighbor, in any direction, and cells do not fold; away from there both are drawn at the
+    /// same place.
+    #[test]
+    fn cells_do_not_fold_where_borders_cross() {
+        const FOCAL_PX: f64 = 700.0;
+        const APART: f64 = 10.0 / FOCAL_PX;
+        let sights = |below: f64, aside: f64, first: usize| {
+            let sight = |photograph: usize| {
+                let (distance, length) = if photograph == 0 { (below, 600.0) } else { (aside, 800.0) };
+                let (weight, room) = (2.0 * distance / length, distance / FOCAL_PX);
+                let direction = rotation_about_y(APART * photograph as f64) * Vector3::z();
+                Sight { photograph, pixel: Vector2::zeros(), direction, weight, room, trust: 1.0 }
+            };
+            [sight(first), sight(1 - first)]
+        };
+        let drawn = |below: f64, aside: f64, first: usize| {
+            let direction = common_direction(&sights(below, aside, first), 1.0, |sight| sight.direction);
+            FOCAL_PX * direction.x.atan2(direction.z)
+        };
+        let mut steepest = 0.0_f64;
+        for below in (1..160).map(|k| f64::from(k) * 0.25) {
+            for aside in (1..160).map(|k| f64::from(k) * 0.25) {
+                let here = drawn(below, aside, 0);
+                let by = [drawn(below + 0.01, aside, 0) - here, drawn(below, aside + 0.01, 0) - here];
+                steepest = steepest.max(by[0].hypot(by[1]) / 0.01);
+            }
+        }
+        assert!((0.4..0.55).contains(&steepest), "{steepest}");
+        let together = drawn(20.0, 15.0, 0) - drawn(20.0, 15.0, 1);
+        assert!(together.abs() < 1e-9, "{together}");
+        let apart = drawn(1e-6, 1e-6, 1) - drawn(1e-6, 1e-6, 0);
+        assert!((apart - 10.0).abs() < 1e-3, "{apart}");
     }
 
     #[test]

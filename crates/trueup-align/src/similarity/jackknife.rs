@@ -13,23 +13,25 @@ const MAX_GROUPS: usize = 8;
 /// A deviation estimated from k groups is too small for Student's t by about this over k - 1 (one standard deviation).
 const FEW_GROUPS: f64 = 0.66;
 
-/// Sectors of longitude of the scene about the vertical.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Sectors {
-    /// The vertical's column of the frame.
-    pub vertical: usize,
-    /// Width of a sector, radians.
-    pub width: f64,
+/// Width of a sector of the scene, degrees of longitude: a facade, seen from where its lines can be told apart.
+const SECTOR_DEG: f64 = 20.0;
+/// Fewer sectors with lines tell nothing of how they scatter.
+pub(super) const MIN_SECTORS: usize = 4;
+
+/// The sector of longitude about the vertical, column `vertical` of a frame, that a direction of the common frame lies in: a number from 0.
+fn sector(frame: &Matrix3<f64>, vertical: usize, toward: &Vector3<f64>) -> usize {
+    let (across, along) = (frame.column((vertical + 1) % 3), frame.column((vertical + 2) % 3));
+    let longitude = toward.dot(&across).atan2(toward.dot(&along));
+    // The longitude from 0 to a full turn; the cast saturates.
+    ((longitude + std::f64::consts::PI) / SECTOR_DEG.to_radians()) as usize
 }
 
-impl Sectors {
-    /// The sector, from 0, that a direction of the common frame lies in.
-    fn index(self, frame: &Matrix3<f64>, toward: &Vector3<f64>) -> usize {
-        let (across, along) = (frame.column((self.vertical + 1) % 3), frame.column((self.vertical + 2) % 3));
-        let longitude = toward.dot(&across).atan2(toward.dot(&along));
-        // The longitude from 0 to a full turn; the cast saturates.
-        ((longitude + std::f64::consts::PI) / self.width) as usize
-    }
+/// Standard deviation in radians of the vertical, column `vertical` of a frame that a refinement found, by what is left without one sector of the
+/// scene each; `None` with fewer than [`MIN_SECTORS`]. One thing that several photographs show is in the lines of all of them: leaving out
+/// photographs does not show that all rests on it.
+pub(super) fn deviation_by_sectors(vote: &LineVote, refinement: Refinement<'_>, vertical: usize) -> Option<f64> {
+    let frames = without_each_sector(vote, refinement, vertical);
+    (frames.len() >= MIN_SECTORS).then(|| axis_deviation(&frames, vertical))
 }
 
 /// Standard deviation in radians, by a delete-a-group jackknife over the photographs, of each axis (a column) of a
@@ -38,35 +40,69 @@ impl Sectors {
 ///
 /// Photographs, not segments, are left out, because the segments of one photograph err together.
 pub(super) fn axis_deviations(vote: &LineVote, refinement: Refinement<'_>) -> [f64; 3] {
-    let groups = vote.photographs().min(MAX_GROUPS);
-    if groups < 2 {
+    let frames = without_some_photographs(vote, refinement);
+    if frames.len() < 2 {
         return [f64::INFINITY; 3];
     }
-    let frames: Vec<Matrix3<f64>> = (0..groups)
-        .into_par_iter()
-        .map(|group| vote.refine_again(refinement, |one| one.photograph % groups != group))
-        .collect();
-    std::array::from_fn(|axis| {
-        let mean: Vector3<f64> =
-            frames.iter().map(|frame| frame.column(axis).into_owned()).sum::<Vector3<f64>>() / groups as f64;
-        let spread: f64 = frames.iter().map(|frame| (frame.column(axis) - mean).norm_squared()).sum();
-        let few = 1.0 + FEW_GROUPS / (groups - 1) as f64;
-        few * (spread * (groups - 1) as f64 / groups as f64).sqrt()
-    })
+    std::array::from_fn(|axis| axis_deviation(&frames, axis))
 }
 
-/// The frames that come out of a refined one when the segments of one sector of the scene at a time are not asked,
-/// whatever photographs show them. Only sectors with segments that support an axis that is used count.
+/// Standard deviation in radians of an axis, by frames found without one group each, of which there are two or more.
+fn axis_deviation(frames: &[Matrix3<f64>], axis: usize) -> f64 {
+    let groups = frames.len() as f64;
+    let mean: Vector3<f64> = frames.iter().map(|frame| frame.column(axis).into_owned()).sum::<Vector3<f64>>() / groups;
+    let spread: f64 = frames.iter().map(|frame| (frame.column(axis) - mean).norm_squared()).sum();
+    let few = 1.0 + FEW_GROUPS / (groups - 1.0);
+    few * (spread * (groups - 1.0) / groups).sqrt()
+}
+
+/// The frames that come out of a refined one when the segments of one group of photographs at a time are not asked: at most [`MAX_GROUPS`]
+/// groups, of equal numbers of photographs as far as these can be divided.
+pub(super) fn without_some_photographs(vote: &LineVote, refinement: Refinement<'_>) -> Vec<Matrix3<f64>> {
+    let groups = vote.photographs().min(MAX_GROUPS);
+    let without = |group: usize| vote.refine_again(refinement, |one| one.photograph % groups != group);
+    (0..groups).into_par_iter().map(without).collect()
+}
+
+/// The frames that come out of a refined one, whose column `vertical` is the vertical, when the segments of one sector of the scene at a time are not
+/// asked, whatever photographs show them. Only sectors with segments that support an axis that is used count.
 ///
 /// The pieces of a line, its views in several photographs, and the window frames of a facade lie in one sector. What
 /// they err by alike, leaving out photographs would not show: another photograph still has it.
-pub(super) fn without_each_sector(vote: &LineVote, refinement: Refinement<'_>, sectors: Sectors) -> Vec<Matrix3<f64>> {
+pub(super) fn without_each_sector(vote: &LineVote, refinement: Refinement<'_>, vertical: usize) -> Vec<Matrix3<f64>> {
     let Refinement { start: frame, axes_used, .. } = refinement;
-    let sector_of = vote.by_midpoint(|toward| sectors.index(frame, &toward));
+    let sector_of = vote.by_midpoint(|toward| sector(frame, vertical, &toward));
     let supporters = vote.supporters(frame, axes_used);
     let mut populated: Vec<usize> = supporters.iter().map(|one| sector_of[one.photograph][one.line]).collect();
     populated.sort_unstable();
     populated.dedup();
     let without = |sector: usize| vote.refine_again(refinement, |one| sector_of[one.photograph][one.line] != sector);
     populated.into_par_iter().map(without).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use trueup_core::geometry::{rotation_about_y, rotation_about_z};
+
+    use super::*;
+
+    /// The first axis 0.01 aside to four sides, four groups: the squares sum up to 4e-4, of which 3/4 count, times 1 + 0.66 / 3 for their fewness.
+    /// The third axis moves with the turns about y alone: squares of 2e-4.
+    #[test]
+    fn the_jackknife_of_known_frames() {
+        let frames = [rotation_about_y(0.01), rotation_about_y(-0.01), rotation_about_z(0.01), rotation_about_z(-0.01)];
+        let few = 1.22;
+        assert!((axis_deviation(&frames, 0) / (few * 3e-4_f64.sqrt()) - 1.0).abs() < 1e-4);
+        assert!((axis_deviation(&frames, 2) / (few * 1.5e-4_f64.sqrt()) - 1.0).abs() < 1e-4);
+    }
+
+    /// By hand: sectors are counted from half a turn to the left of the axis after the next one, toward the next.
+    #[test]
+    fn sectors_go_round_the_vertical() {
+        let frame = Matrix3::identity();
+        let toward = |degrees: f64| Vector3::new(degrees.to_radians().cos(), 7.0, degrees.to_radians().sin());
+        // The vertical is y: the axis after it z, the next x.
+        let sectors = [-179.0, -150.0, 1.0, 19.0, 21.0, 179.0].map(|degrees| sector(&frame, 1, &toward(degrees)));
+        assert_eq!(sectors, [0, 1, 9, 9, 10, 17]);
+    }
 }

@@ -5,8 +5,10 @@
 //! small turn of every camera against the others:
 //!
 //! * Segments do not err independently. A line is found in pieces, and again in every photograph that shows it; the
-//!   frames of a facade's windows are as plumb as the facade. Sectors of the scene, not segments and not photographs,
-//!   are what is left out in the jackknife that tells how far the vertical depends on chance.
+//!   frames of a facade's windows are as plumb as the facade. Sectors of the scene, not segments,
+//!   are what is left out in the jackknife that tells how far the vertical depends on chance. Where one thing fills several
+//!   sectors, leaving out one of them shows nothing; leaving out a photograph may: the jackknife over these is asked as well,
+//!   and the larger of both counts.
 //! * Plumb lines are not plumb, level ones not level, lenses and focal lengths a little different from what was found,
 //!   alike in all sectors: no comparison of sectors shows that.
 //! * The turns of single cameras have what segments and overlaps leave open of them.
@@ -19,17 +21,15 @@ use trueup_core::matches::PairMatches;
 use trueup_core::source::WorkingFrame;
 
 use super::camera_correction::{corrected_rotations, relative_certainties, turn_covariances};
-use super::jackknife::{Sectors, without_each_sector};
+use super::jackknife::{MIN_SECTORS, without_each_sector, without_some_photographs};
 use super::joint::{AxisWeights, LineVote, Refinement};
 use super::prior::SimilarityPrior;
 use super::vertical::roll_of;
 use super::vpg::axis_weights;
 use crate::vanishing::{InterpretationPlanes, VERTICAL_LINE_DEG};
 
-/// Width of a sector of the scene, degrees of longitude: a facade, seen from where its lines can be told apart.
-const SECTOR_DEG: f64 = 20.0;
-/// Fewer sectors with lines tell nothing of how they scatter.
-const MIN_SECTORS: usize = 4;
+/// Fewer photographs tell nothing of how they scatter: of two, Student's t is 12.7.
+const MIN_GROUPS: usize = 3;
 /// Standard deviation, about any level axis, of what all lines of a scene err by alike, degrees. Fitted on 100 photographs of rendered rooms, whose level
 /// is exact (which need none), and 267 cut from panoramas: the smallest hundredth with which the 95 % interval holds the truth of 95 % of either.
 /// docs/quality.md has the coverage on others.
@@ -74,8 +74,8 @@ pub struct EstimatedRoll {
 /// four sectors of the scene.
 ///
 /// # Source
-/// Efron and Tibshirani, An Introduction to the Bootstrap, chapter 11 (jackknife, here over sectors); Student's t with
-/// one degree of freedom less than sectors.
+/// Efron and Tibshirani, An Introduction to the Bootstrap, chapter 11 (jackknife, here over sectors, and over photographs); Student's t
+/// with one degree of freedom less than there are of these.
 pub fn estimated_rolls(input: &RollsInput<'_>) -> Option<Vec<Option<EstimatedRoll>>> {
     let scene = UprightScene::of(input)?;
     let vote = scene.vote(input);
@@ -86,14 +86,20 @@ pub fn estimated_rolls(input: &RollsInput<'_>) -> Option<Vec<Option<EstimatedRol
     }
     let UprightScene { frame, vertical, axes_used, axis_weights, .. } = &scene;
     let refinement = Refinement { start: frame, axes_used: *axes_used, axis_weights };
-    let sectors = Sectors { vertical: *vertical, width: SECTOR_DEG.to_radians() };
-    let others = without_each_sector(&vote, refinement, sectors);
     let sign = down.dot(&frame.column(*vertical)).signum();
-    let downs: Vec<Vector3<f64>> = others.iter().map(|other| other.column(*vertical) * sign).collect();
-    let scatter = Scatter::of(&downs).filter(|scatter| scatter.sectors >= MIN_SECTORS)?;
+    let scatter = |frames: Vec<Matrix3<f64>>, fewest: usize| {
+        let downs: Vec<Vector3<f64>> = frames.iter().map(|other| other.column(*vertical) * sign).collect();
+        Scatter::of(&downs).filter(|scatter| scatter.groups >= fewest)
+    };
+    let by_sectors = scatter(without_each_sector(&vote, refinement, *vertical), MIN_SECTORS)?;
+    let by_photographs = scatter(without_some_photographs(&vote, refinement), MIN_GROUPS);
+    let scatters: Vec<Scatter> = std::iter::once(by_sectors).chain(by_photographs).collect();
     let certainties = relative_certainties(&scene.cameras(input), input.edges);
     let turns = turn_covariances(&scene.rotations, &certainties, &vote, frame, axis_weights)?;
-    let estimate = |(rotation, turn): (&Matrix3<f64>, &Matrix3<f64>)| scatter.estimate(&down, rotation, turn);
+    let estimate = |(rotation, turn): (&Matrix3<f64>, &Matrix3<f64>)| {
+        let estimates = scatters.iter().filter_map(|scatter| scatter.estimate(&down, rotation, turn));
+        estimates.max_by(|one, other| one.within.total_cmp(&other.within))
+    };
     Some(scene.rotations.iter().zip(&turns).map(estimate).collect())
 }
 
@@ -163,23 +169,23 @@ impl UprightScene {
     }
 }
 
-/// How far the vertical depends on which sectors of the scene are asked.
+/// How far the vertical depends on which sectors of the scene, or which photographs, are asked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Scatter {
     /// Covariance of the vertical's direction, rad^2.
     covariance: Matrix3<f64>,
-    /// How many sectors there are.
-    sectors: usize,
+    /// How many sectors, or groups of photographs, there are.
+    groups: usize,
 }
 
 impl Scatter {
-    /// The jackknife of the verticals found without one sector each; `None` without any.
+    /// The jackknife of the verticals found without one group each; `None` without any.
     fn of(downs: &[Vector3<f64>]) -> Option<Self> {
-        let sectors = downs.len();
-        let count = sectors as f64;
+        let groups = downs.len();
+        let count = groups as f64;
         let mean = downs.iter().sum::<Vector3<f64>>() / count;
         let spread: Matrix3<f64> = downs.iter().map(|down| (down - mean) * (down - mean).transpose()).sum();
-        (sectors > 0).then_some(Self { covariance: spread * ((count - 1.0) / count), sectors })
+        (groups > 0).then_some(Self { covariance: spread * ((count - 1.0) / count), groups })
     }
 
     /// The roll of a camera, which `rotation` takes the world to, and whose own turn has the covariance `turn`.
@@ -193,7 +199,7 @@ impl Scatter {
         let scatter = by_down.dot(&(self.covariance * by_down));
         let alike = by_turn.norm_squared() * SCENE_DEVIATION_DEG.to_radians().powi(2);
         let own = by_turn.dot(&(turn * by_turn));
-        let within = (student_95(self.sectors - 1).powi(2) * scatter + NORMAL_95.powi(2) * (alike + own)).sqrt();
+        let within = (student_95(self.groups - 1).powi(2) * scatter + NORMAL_95.powi(2) * (alike + own)).sqrt();
         let standard_error = (scatter + alike + own).sqrt();
         Some(EstimatedRoll { roll: roll_from_down(&seen), standard_error, within })
     }
@@ -203,7 +209,7 @@ impl Scatter {
 ///
 /// # Source
 /// The expansion in reciprocal degrees of freedom: Abramowitz and Stegun, Handbook of Mathematical Functions, 26.7.5;
-/// right to 0.3 % from three degrees on.
+/// right to 0.3 % from three degrees on, to 0.8 % of two.
 fn student_95(degrees_of_freedom: usize) -> f64 {
     let (z, n) = (NORMAL_95, degrees_of_freedom as f64);
     let first = (z.powi(3) + z) / 4.0;
@@ -224,6 +230,7 @@ mod tests {
         for (degrees_of_freedom, expected) in [(3, 3.182_446), (4, 2.776_445), (10, 2.228_139), (30, 2.042_272)] {
             assert!((student_95(degrees_of_freedom) / expected - 1.0).abs() < 0.003, "{degrees_of_freedom}");
         }
+        assert!((student_95(2) / 4.302_653 - 1.0).abs() < 0.008);
     }
 
     /// Verticals at 1 and -1 hundredths about x and z, four sectors: mean 0, sums of squares 2e-4, times 3/4.
@@ -240,7 +247,7 @@ mod tests {
     #[test]
     fn a_level_camera_rolls_as_far_as_the_vertical_leans_across() {
         let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 0.0, 9e-4));
-        let scatter = Scatter { covariance, sectors: 31 };
+        let scatter = Scatter { covariance, groups: 31 };
         let (down, level) = (Vector3::y(), Matrix3::identity());
         let found = scatter.estimate(&down, &level, &Matrix3::zeros()).expect("level");
         let alike = SCENE_DEVIATION_DEG.to_radians().powi(2);

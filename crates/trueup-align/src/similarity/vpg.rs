@@ -10,7 +10,7 @@ use super::dominant::{Dominant, dominant_frame};
 use super::frame_search::{GUIDING_SIGNIFICANCE, PooledFrame, search_frame};
 use super::gate::{CameraAngle, GateEvidence, allowed_divergence, divergence, failed_clause};
 use super::input::PriorInput;
-use super::jackknife::axis_deviations;
+use super::jackknife::{axis_deviations, deviation_by_sectors};
 use super::joint::{self, AxisWeights, LineVote, Refinement};
 use super::level::CameraLevel;
 use super::options::{GateMode, SimilarityOptions};
@@ -222,8 +222,9 @@ impl<'a> SceneDirections<'a> {
         let frame = if joint { self.refined(&start, &axis_weights) } else { start };
         let mut down = self.vertical(&frame);
         if joint {
+            let vertical = frame.tr_mul(&down).iamax();
             let refinement = Refinement { start: &frame, axes_used: 3, axis_weights: &axis_weights };
-            let deviation = axis_deviations(&self.vote, refinement)[frame.tr_mul(&down).iamax()];
+            let deviation = self.deviation(refinement, vertical);
             down = self.weighed(&down, deviation, guidance)?;
         }
         guidance.dominant = Some(rows_of(&(turn_between(&self.vertical(&frame), &down) * frame)));
@@ -235,6 +236,15 @@ impl<'a> SceneDirections<'a> {
         let own =
             if joint { common_rolls(&down, &rotations) } else { self.own_rolls(&frame, &down, &guidance.inliers) };
         Ok(self.solve(&down, &own, rotations, guidance))
+    }
+
+    /// Standard deviation in radians of the vertical, column `vertical` of a frame that lines refined, by asking different photographs; or without one
+    /// sector of the scene each, where that is beyond what may guide: then all photographs know it from one and the same thing.
+    fn deviation(&self, refinement: Refinement<'_>, vertical: usize) -> f64 {
+        let by_photographs = axis_deviations(&self.vote, refinement)[vertical];
+        let by_sectors = deviation_by_sectors(&self.vote, refinement, vertical);
+        let too_wide = by_sectors.filter(|deviation| *deviation > MAX_GUIDING_DEVIATION_DEG.to_radians());
+        too_wide.map_or(by_photographs, |by_sectors| by_sectors.max(by_photographs))
     }
 
     /// The vertical of lines weighed against what else is known of it; an error with that vertical if lines do not guide it, with the
@@ -326,7 +336,7 @@ impl<'a> SceneDirections<'a> {
         let (first, second) = orthonormal_complement(&peak.down);
         let frame = Matrix3::from_columns(&[peak.down, first, second]);
         let refinement = Refinement { start: &frame, axes_used: 1, axis_weights: &[1.0; 3] };
-        let deviation = axis_deviations(&self.vote, refinement)[0];
+        let deviation = self.deviation(refinement, 0);
         let refused = guidance.clone();
         let Ok(down) = self.weighed(&peak.down, deviation, guidance) else {
             *guidance = refused;

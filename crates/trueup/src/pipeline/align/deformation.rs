@@ -61,7 +61,7 @@ impl Deformation<'_> {
         let solved = context.gather(|context| mesh::run(&input, &options.mesh, context))?;
         // What is turned or tilted as a whole, and the published similarity, want the mesh's own plane.
         let on_sphere = options.mesh.base == BaseShape::Sphere && flat_scene.is_none();
-        if on_sphere && component.reference_rotation == 0.0 && !mesh::tilts(cameras, self.prior) {
+        if on_sphere && component.reference_rotation == 0.0 && !mesh::tilts(cameras, self.grids, self.prior) {
             let by_cameras = self.by_cameras_if_better(solved.value.warped(), options, context)?;
             if let Some(drawn) = by_cameras {
                 return self.drawing_refined(drawn, options, context);
