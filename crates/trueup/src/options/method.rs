@@ -1,6 +1,5 @@
 //! The methods: what a panorama's shape is found by, and what draws its photographs together.
 
-use trueup_align::cameras::StartFocal;
 use trueup_align::match_points::TransferModel;
 use trueup_align::mesh::BaseShape;
 use trueup_align::similarity::{BetaMode, Fallback, GateMode, PrintedEquations, PriorMethod};
@@ -36,10 +35,8 @@ impl Edition {
             return;
         }
         fix_published_mesh(options);
-        match prior {
-            PriorMethod::VanishingPoints => fix_published_guidance(options),
-            PriorMethod::Gsp2d | PriorMethod::Gsp3d => options.cameras.start_focal = StartFocal::LocalHomographies,
-            PriorMethod::Aanap | PriorMethod::Straightening => {}
+        if prior == PriorMethod::VanishingPoints {
+            fix_published_guidance(options);
         }
         if self == Self::Printed {
             options.similarity.as_printed = PrintedEquations::ALL;
