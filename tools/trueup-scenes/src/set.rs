@@ -22,6 +22,7 @@ pub fn truth_of(posed: &PosedCamera, file: String) -> ImageTruth {
         width: posed.width,
         height: posed.height,
         focal_px: posed.camera.focal_px,
+        lens: None,
         rotation: posed.camera.camera_from_world,
         gamma_deg: posed.vertical_angle().to_degrees(),
         center: Some(posed.center),

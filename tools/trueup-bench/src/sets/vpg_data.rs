@@ -73,6 +73,7 @@ impl Camera {
             width: image.width,
             height: image.height,
             focal_px: self.focal_px,
+            lens: None,
             rotation: self.rotation,
             gamma_deg: roll_from_down(&down).to_degrees(),
             center: None,

@@ -56,6 +56,7 @@ pub fn cut_set(panorama: &Panorama360, spec: &CutSpec, directory: &Path, context
             width: view.width,
             height: view.height,
             focal_px: view.camera.focal_px,
+            lens: None,
             rotation: rows_of(&camera_from_world),
             gamma_deg: roll_from_down(&(camera_from_world * Vector3::y())).to_degrees(),
             center: None,

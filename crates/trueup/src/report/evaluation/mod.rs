@@ -291,10 +291,6 @@ fn alignment(known: &[Known], meshes: &[GridMesh], period: Option<f64>) -> Optio
     if known.iter().any(|one| one.truth.center != known[0].truth.center) {
         return None;
     }
-    let camera = |one: &Known| {
-        let truth = one.truth;
-        Camera::new(truth.focal_px, truth.width as f64, truth.height as f64, &truth.camera_from_world())
-    };
-    let cameras: Vec<Camera> = known.iter().map(camera).collect();
+    let cameras: Vec<Camera> = known.iter().map(|one| one.truth.camera()).collect();
     metrics::true_alignment(meshes, &cameras, period)
 }

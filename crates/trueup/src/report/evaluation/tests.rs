@@ -28,6 +28,7 @@ fn truth(gammas: [f64; 2]) -> Truth {
         width: 40,
         height: 30,
         focal_px: 40.0,
+        lens: None,
         rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         gamma_deg,
         center: None,
