@@ -1,10 +1,11 @@
 //! Start values for focal lengths and lenses.
 
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::Vector2;
 use rayon::prelude::*;
 use trueup_core::geometry::Homography;
 use trueup_core::lens::{TriedLens, tried_lenses};
 use trueup_core::matches::PairMatches;
+use trueup_core::source::WorkingFrame;
 
 use super::intrinsics::{InitialIntrinsics, LensState};
 use super::local_focal::local_focal_lengths;
@@ -52,15 +53,20 @@ impl Quotient {
     }
 }
 
-/// Focal lengths of the rotating cameras behind a homography in centered coordinates, if both are real.
+/// Focal lengths of the rotating cameras behind a homography from the first of two photographs to the second, if both are real.
 ///
 /// Of the two values that the rows (source) and the columns (target) of the homography give, the one with the larger
 /// denominator is taken.
 ///
 /// # Source
 /// Szeliski and Shum, "Creating full view panoramic image mosaics" (1997), section 5.
-pub(super) fn focal_from_homography(target_from_source: &Matrix3<f64>) -> Option<FocalLengths> {
-    let h = |row: usize, column: usize| target_from_source[(row, column)];
+pub(super) fn focal_from_homography(
+    target_from_source: &Homography,
+    frames: [&WorkingFrame; 2],
+) -> Option<FocalLengths> {
+    let [source, target] = frames.map(|frame| Vector2::new(frame.width / 2.0, frame.height / 2.0));
+    let centered = target_from_source.0.prepend_translation(&source).append_translation(&-target);
+    let h = |row: usize, column: usize| centered[(row, column)];
     let source = better_root(
         Quotient::over(-h(0, 2) * h(1, 2), h(0, 0) * h(1, 0) + h(0, 1) * h(1, 1)),
         Quotient::over(
@@ -197,16 +203,12 @@ fn common_relative_focal(
 
 /// Median over pairs and photographs of the homographies' focal lengths, in diagonals.
 fn median_from_homographies(priors: &[CameraPrior], pairs: &[&PairMatches]) -> Option<f64> {
-    let center = |k: usize| {
-        let frame = &priors[k].frame;
-        Matrix3::new(1.0, 0.0, frame.width / 2.0, 0.0, 1.0, frame.height / 2.0, 0.0, 0.0, 1.0)
-    };
     let mut estimates = Vec::new();
     for pair in pairs {
         let Some(rows) = &pair.b_from_a else { continue };
-        let Some(back) = center(pair.b).try_inverse() else { continue };
-        let centered = back * Homography::from_rows(rows).0 * center(pair.a);
-        if let Some(FocalLengths { source, target }) = focal_from_homography(&centered) {
+        let b_from_a = Homography::from_rows(rows);
+        let frames = [&priors[pair.a].frame, &priors[pair.b].frame];
+        if let Some(FocalLengths { source, target }) = focal_from_homography(&b_from_a, frames) {
             estimates.push(source / priors[pair.a].frame.diagonal());
             estimates.push(target / priors[pair.b].frame.diagonal());
         }
@@ -238,9 +240,13 @@ fn rotation_cost(priors: &[CameraPrior], focal: &[f64], lenses: &[LensState], pa
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Matrix3;
     use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z};
 
     use super::*;
+
+    /// Photographs whose pixels are counted from their middles.
+    const CENTERED: [&WorkingFrame; 2] = [&WorkingFrame { width: 0.0, height: 0.0, working_from_full: 1.0 }; 2];
 
     /// Focal lengths 800 and 1000 were put into the homography by hand: K_j R K_i^-1.
     #[test]
@@ -251,8 +257,8 @@ mod tests {
         let intrinsic = |focal: f64| Matrix3::from_diagonal(&nalgebra::Vector3::new(focal, focal, 1.0));
         let inverse = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0 / 800.0, 1.0 / 800.0, 1.0));
         for scale in [1.0, -0.37] {
-            let homography = intrinsic(1000.0) * rotation * inverse * scale;
-            let FocalLengths { source, target } = focal_from_homography(&homography).expect("regular");
+            let homography = Homography(intrinsic(1000.0) * rotation * inverse * scale);
+            let FocalLengths { source, target } = focal_from_homography(&homography, CENTERED).expect("regular");
             assert!((source - 800.0).abs() < 1e-9 * 800.0, "{source}");
             assert!((target - 1000.0).abs() < 1e-9 * 1000.0, "{target}");
         }
@@ -260,7 +266,7 @@ mod tests {
 
     #[test]
     fn a_translation_tells_no_focal_length() {
-        let shift = Matrix3::new(1.0, 0.0, 120.0, 0.0, 1.0, 7.0, 0.0, 0.0, 1.0);
-        assert!(focal_from_homography(&shift).is_none());
+        let shift = Homography(Matrix3::new(1.0, 0.0, 120.0, 0.0, 1.0, 7.0, 0.0, 0.0, 1.0));
+        assert!(focal_from_homography(&shift, CENTERED).is_none());
     }
 }

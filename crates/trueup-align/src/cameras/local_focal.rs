@@ -4,7 +4,7 @@
 //! Chen and Chuang, "Natural image stitching with the global similarity prior" (2016), section 3.3: more homographies than one a
 //! pair tell more focal lengths, whose median is more robust.
 
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::Vector2;
 use rayon::prelude::*;
 use trueup_core::matches::{PairMatches, PointMatch};
 use trueup_core::mesh::GridMesh;
@@ -54,24 +54,18 @@ fn told_from(
 ) -> Vec<FocalLengths> {
     let Some(dlt) = MovingDlt::new(points, places) else { return Vec::new() };
     let grid = GridMesh::regular(source.width, source.height, CELL_PX);
-    let corner_from_center = from_center(source, 1.0);
-    let center_from_corner = from_center(target, -1.0);
     let at_vertex = |vertex: Vector2<f64>| {
         let local = dlt.at(vertex)?;
         let place = local.apply(vertex);
         let is_inside = target.contains(place.x, place.y);
-        is_inside.then(|| focal_from_homography(&(center_from_corner * local.0 * corner_from_center))).flatten()
+        is_inside.then(|| focal_from_homography(&local, [source, target])).flatten()
     };
     (0..grid.len()).filter_map(|vertex| at_vertex(grid.source(vertex))).collect()
 }
 
-/// Moves by half of the photograph: from its center to its corner, or back.
-fn from_center(frame: &WorkingFrame, sign: f64) -> Matrix3<f64> {
-    Matrix3::new(1.0, 0.0, sign * frame.width / 2.0, 0.0, 1.0, sign * frame.height / 2.0, 0.0, 0.0, 1.0)
-}
-
 #[cfg(test)]
 mod tests {
+    use nalgebra::Matrix3;
     use trueup_core::camera::Camera;
     use trueup_core::geometry::{rotation_about_x, rotation_about_y, rotation_about_z};
 
