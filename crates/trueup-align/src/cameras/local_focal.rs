@@ -11,7 +11,7 @@ use trueup_core::mesh::GridMesh;
 use trueup_core::source::WorkingFrame;
 use trueup_core::statistics::median;
 
-use super::focal::{FocalLengths, focal_from_homography};
+use super::homography_focal::{FocalLengths, focal_from_homography};
 use super::prior::CameraPrior;
 use crate::moving_dlt::MovingDlt;
 

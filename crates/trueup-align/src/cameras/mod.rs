@@ -1,6 +1,6 @@
 //! Focal lengths, lenses and rotations of the photographs of one component: the paper's R_i.
 //!
-//! Start values come from metadata, from the pair homographies and from a search over a common focal length (`focal`), or as GSP
+//! Start values come from metadata, from the pair homographies (`homography_focal`) and from a search over a common focal length (`focal`), or as GSP
 //! has them from local homographies (`local_focal`);
 //! rotations from the spanning tree and from averaging over all edges (`rotations`); both are refined together by
 //! bundle adjustment (`bundle`), from coarse to fine (`refinement`). Terms of the lenses are added as long as the matches, and
@@ -14,6 +14,7 @@ mod equations;
 mod expected_focal;
 mod flat_scene;
 mod focal;
+mod homography_focal;
 mod intrinsics;
 mod lens_evidence;
 mod lenses;
