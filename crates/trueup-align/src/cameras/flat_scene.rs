@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use trueup_core::camera::Camera;
 use trueup_core::geometry::Homography;
@@ -143,7 +143,9 @@ pub(super) fn find(
         && rotating.rms_px > MORE_THAN_NOISE_PX
         && (is_recorded || is_longer_than(LONGEST_BESIDE_SCANS))
         && rotating.rms_px > CLEARLY_BETTER * by_homographies(input).rms_px;
-    if !(told || is_bad || is_longer_than(LONGEST_BESIDE_SCANS)) {
+    // From no place before a plane is more than half of all directions seen.
+    let are_all_round = rotating.rms_px <= MORE_THAN_NOISE_PX && look_all_round(input.rotating);
+    if !(told || is_bad || is_longer_than(LONGEST_BESIDE_SCANS) && !are_all_round) {
         return Ok(None);
     }
     let search = PlaneSearch::new(input, options, context);
@@ -192,6 +194,25 @@ fn by_homographies(input: &FlatInput<'_>) -> Residuals {
     };
     let homographies: BTreeMap<(usize, usize), Homography> = input.pairs.iter().filter_map(of_pair).flatten().collect();
     Residuals::of(input, |from, to, pixel| Some(homographies.get(&(from, to))?.apply(pixel)))
+}
+
+/// Whether there is no direction within 90 degrees of which all cameras look, or hardly one.
+///
+/// # Source
+/// Rosenblatt's perceptron (1958): a direction that all are within 90 degrees of, with a margin m in the cosine, is found in 1 / m^2 corrections.
+fn look_all_round(cameras: &[Camera]) -> bool {
+    const CORRECTIONS: usize = 200;
+    let forward: Vec<Vector3<f64>> = cameras.iter().map(Camera::forward).collect();
+    let mut middle: Vector3<f64> = forward.iter().sum();
+    for _ in 0..CORRECTIONS {
+        let aside = |one: &&Vector3<f64>| one.dot(&middle);
+        let Some(worst) = forward.iter().min_by(|one, other| aside(one).total_cmp(&aside(other))) else { return false };
+        if aside(&worst) > 0.0 {
+            return false;
+        }
+        middle += worst;
+    }
+    true
 }
 
 /// Whether the cameras have one resolution on the plane.

@@ -167,3 +167,16 @@ fn a_wall_with_things_before_it_is_no_flat_scene() {
     let flat = matched(5, |a, b, pixel| truth[a].transfer(&truth[b], pixel));
     assert_eq!(found(&flat, 5, None, SceneModel::Rotating).flat_scene, None, "as the user says");
 }
+
+/// A row of 5 x 30 degrees lies within a hemisphere, and so do two that look nearly apart; eight of 45 degrees go round, and three of 120.
+#[test]
+fn cameras_look_all_round_where_no_hemisphere_holds_them() {
+    let along = |degrees: &[f64]| -> Vec<Camera> {
+        let of_one = |degrees: &f64| Camera::new(FOCAL, WIDTH, HEIGHT, &rotation_about_y(degrees.to_radians()));
+        degrees.iter().map(of_one).collect()
+    };
+    let turn: Vec<f64> = (0..8).map(|k| 45.0 * f64::from(k)).collect();
+    assert!(look_all_round(&along(&turn)) && look_all_round(&along(&[0.0, 120.0, 240.0])));
+    assert!(!look_all_round(&along(&[-60.0, -30.0, 0.0, 30.0, 60.0])) && !look_all_round(&along(&[0.0, 175.0])));
+    assert!(!look_all_round(&[]));
+}

@@ -1,5 +1,6 @@
 //! Normal equations of the mesh, assembled block by block.
 
+use faer::c64;
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use nalgebra::Vector2;
 use trueup_core::mesh::GridMesh;
@@ -353,6 +354,24 @@ impl NormalEquations {
         // Every vertex has at least its own block, so that no column is skipped.
         (column_starts.len() == unknowns + 1).then(|| {
             let pattern = SymbolicSparseColMat::new_checked(unknowns, unknowns, column_starts, None, rows);
+            SparseColMat::new(pattern, values)
+        })
+    }
+
+    /// The same matrix in x + i y of the vertices, where all of its [`Self::blocks`] turn and scale alone.
+    pub(super) fn complex_matrix(&self, blocks: &[PlacedBlock]) -> Option<SparseColMat<usize, c64>> {
+        let vertices = self.inside.len();
+        let mut column_starts = Vec::with_capacity(vertices + 1);
+        column_starts.push(0);
+        let groups = blocks.chunk_by(|one, other| one.1 == other.1);
+        column_starts.extend(groups.scan(0, |end, group| {
+            *end += group.len();
+            Some(*end)
+        }));
+        let rows = blocks.iter().map(|&(row, _, _)| row as usize).collect();
+        let values = blocks.iter().map(|&(_, _, [cosine, _, sine, _])| c64::new(cosine, sine)).collect();
+        (column_starts.len() == vertices + 1).then(|| {
+            let pattern = SymbolicSparseColMat::new_checked(vertices, vertices, column_starts, None, rows);
             SparseColMat::new(pattern, values)
         })
     }

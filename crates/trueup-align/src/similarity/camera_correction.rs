@@ -5,12 +5,13 @@
 //! every camera is turned so that its own segments point to the frame's directions, as far as its overlaps allow: both
 //! are weighed by what they leave uncertain.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use trueup_core::camera::Camera;
 use trueup_core::geometry::{exp_rotation, nearest_rotation};
 use trueup_core::matches::PairMatches;
 
 use super::joint::{AxisWeights, LineVote, scales};
+use super::turn_equations::TurnEquations;
 
 /// Where there is parallax, a relative rotation absorbs most of it: the mean of the reciprocal depths of an overlap,
 /// which acts like a rotation about the photograph's axes, is several times their spread, which is what remains to be
@@ -23,8 +24,6 @@ const ABSORBED_ALONG: f64 = 1.5;
 const LINE_ERROR_PX: f64 = 0.5;
 /// Least error of an overlap's relative rotation, working pixels; where the matches show parallax, that counts.
 const MIN_OVERLAP_ERROR_PX: f64 = 0.1;
-/// Information, 1 / rad^2, that holds the common turn: a standard deviation of a ten-thousandth of a degree.
-const COMMON_TURN_INFORMATION: f64 = 3e11;
 
 /// How sure an overlap is of the relative rotation of two cameras.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -129,28 +128,23 @@ pub(super) fn corrected_rotations(
     frame: &Matrix3<f64>,
     axis_weights: &AxisWeights,
 ) -> Vec<Matrix3<f64>> {
-    let count = rotations.len();
-    let mut turns = vec![Vector3::<f64>::zeros(); count];
+    let mut turns = vec![Vector3::<f64>::zeros(); rotations.len()];
     let line_information = LINE_ERROR_PX.powi(-2);
     for scale in scales() {
-        let mut matrix = DMatrix::<f64>::zeros(3 * count, 3 * count);
-        let mut right = DVector::<f64>::zeros(3 * count);
-        for (index, rotation) in rotations.iter().enumerate() {
-            let turned = rotation * exp_rotation(&turns[index]);
-            let (normal, gradient) = vote.turn_equations(index, &turned, frame, axis_weights, scale);
-            let mut block = matrix.fixed_view_mut::<3, 3>(3 * index, 3 * index);
-            block += normal * line_information;
-            // The residual is linearized at the present turn; the unknown is the whole turn.
-            let mut part = right.fixed_rows_mut::<3>(3 * index);
-            part += (normal * turns[index] - gradient) * line_information;
-        }
-        add_overlaps(&mut matrix, certainties);
-        hold_common_turn(&mut matrix);
-        let Some(factor) = matrix.cholesky() else { return rotations.to_vec() };
-        let solution = factor.solve(&right);
-        for (index, turn) in turns.iter_mut().enumerate() {
-            *turn = solution.fixed_rows::<3>(3 * index).into_owned();
-        }
+        let asked: Vec<(Matrix3<f64>, Vector3<f64>)> = rotations
+            .iter()
+            .zip(&turns)
+            .enumerate()
+            .map(|(index, (rotation, turn))| {
+                let turned = rotation * exp_rotation(turn);
+                let (normal, gradient) = vote.turn_equations(index, &turned, frame, axis_weights, scale);
+                // The residual is linearized at the present turn; the unknown is the whole turn.
+                (normal * line_information, (normal * turn - gradient) * line_information)
+            })
+            .collect();
+        let (normals, right): (Vec<_>, Vec<_>) = asked.into_iter().unzip();
+        let Some(equations) = TurnEquations::new(&normals, certainties) else { return rotations.to_vec() };
+        turns = equations.solve(&right);
     }
     if turns.iter().any(|turn| !turn.iter().all(|value| value.is_finite())) {
         return rotations.to_vec();
@@ -167,43 +161,13 @@ pub(super) fn turn_covariances(
     frame: &Matrix3<f64>,
     axis_weights: &AxisWeights,
 ) -> Option<Vec<Matrix3<f64>>> {
-    let count = rotations.len();
     let scale = scales().last()?;
-    let mut matrix = DMatrix::<f64>::zeros(3 * count, 3 * count);
-    for (index, rotation) in rotations.iter().enumerate() {
+    let normal = |(index, rotation): (usize, &Matrix3<f64>)| {
         let (normal, _) = vote.turn_equations(index, rotation, frame, axis_weights, scale);
-        let mut block = matrix.fixed_view_mut::<3, 3>(3 * index, 3 * index);
-        block += normal * LINE_ERROR_PX.powi(-2);
-    }
-    add_overlaps(&mut matrix, certainties);
-    hold_common_turn(&mut matrix);
-    let inverse = matrix.cholesky()?.inverse();
-    Some((0..count).map(|index| inverse.fixed_view::<3, 3>(3 * index, 3 * index).into_owned()).collect())
-}
-
-/// Adds (w_i - w_j)^T information (w_i - w_j) of every overlap.
-fn add_overlaps(matrix: &mut DMatrix<f64>, certainties: &[RelativeCertainty]) {
-    for edge in certainties {
-        for (row, column, sign) in
-            [(edge.i, edge.i, 1.0), (edge.j, edge.j, 1.0), (edge.i, edge.j, -1.0), (edge.j, edge.i, -1.0)]
-        {
-            let mut block = matrix.fixed_view_mut::<3, 3>(3 * row, 3 * column);
-            block += edge.information * sign;
-        }
-    }
-}
-
-/// Holds the sum of the turns at zero, and directions that neither segments nor overlaps fix as they are.
-fn hold_common_turn(matrix: &mut DMatrix<f64>) {
-    let unknowns = matrix.nrows();
-    for row in 0..unknowns {
-        for column in (row % 3..unknowns).step_by(3) {
-            matrix[(row, column)] += COMMON_TURN_INFORMATION;
-        }
-    }
-    for entry in 0..unknowns {
-        matrix[(entry, entry)] += 1.0;
-    }
+        normal * LINE_ERROR_PX.powi(-2)
+    };
+    let normals: Vec<Matrix3<f64>> = rotations.iter().enumerate().map(normal).collect();
+    Some(TurnEquations::new(&normals, certainties)?.covariances())
 }
 
 #[cfg(test)]

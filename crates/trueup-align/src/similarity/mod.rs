@@ -4,6 +4,7 @@
 //! squares over unit vectors.
 
 mod aanap;
+mod block_matrix;
 mod camera_correction;
 mod dominant;
 mod edge_range;
@@ -25,6 +26,7 @@ mod prior;
 mod scale;
 mod signed_permutation;
 mod slope;
+mod turn_equations;
 mod turns;
 mod upright;
 mod vertical;

@@ -1,6 +1,9 @@
 //! Linear least squares over unit vectors (u_i, v_i) = (cos theta_i, sin theta_i): data terms and turns along edges.
 
-use nalgebra::{DMatrix, DVector};
+use faer::linalg::solvers::Solve;
+use nalgebra::{Matrix2, Rotation2};
+
+use super::block_matrix::BlockMatrix;
 
 /// A data term: weight (psi_i) and angle (alpha_i) of photograph `index`.
 #[derive(Debug, Clone, Copy)]
@@ -22,41 +25,33 @@ pub(super) struct TurnTerm {
 
 /// The vectors (u_i, v_i) of least energy; `None` if the terms leave some undetermined.
 ///
-/// Vectors are not normalized: a short one means that its terms contradict each other. Dense Cholesky of a 2N x 2N
+/// Vectors are not normalized: a short one means that its terms contradict each other. Sparse Cholesky of a 2N x 2N
 /// matrix.
 ///
 /// # Source
 /// The paper's eq. 7 and 9.
 pub(super) fn solve_unit_vectors(count: usize, data: &[DataTerm], turns: &[TurnTerm]) -> Option<Vec<[f64; 2]>> {
-    let mut matrix = DMatrix::<f64>::zeros(2 * count, 2 * count);
-    let mut right = DVector::<f64>::zeros(2 * count);
+    let mut matrix = BlockMatrix::<2>::zeros(count);
+    let mut right = faer::Mat::<f64>::zeros(2 * count, 1);
     for term in data {
         let (sine, cosine) = term.angle.sin_cos();
-        for (offset, value) in [(0, cosine), (1, sine)] {
-            matrix[(2 * term.index + offset, 2 * term.index + offset)] += term.weight;
-            right[2 * term.index + offset] += term.weight * value;
-        }
+        matrix.add(term.index, term.index, &(Matrix2::identity() * term.weight));
+        right[(2 * term.index, 0)] += term.weight * cosine;
+        right[(2 * term.index + 1, 0)] += term.weight * sine;
     }
     for term in turns {
         add_turn(&mut matrix, term);
     }
-    let solution = matrix.cholesky()?.solve(&right);
-    let vectors: Vec<[f64; 2]> = (0..count).map(|index| [solution[2 * index], solution[2 * index + 1]]).collect();
+    let solution = matrix.factor()?.solve(&right);
+    let vectors: Vec<[f64; 2]> =
+        (0..count).map(|index| [solution[(2 * index, 0)], solution[(2 * index + 1, 0)]]).collect();
     vectors.iter().flatten().all(|value| value.is_finite()).then_some(vectors)
 }
 
 /// Adds w |A x_i - x_j|^2, A = Rot(turn): since A is orthogonal the diagonal blocks are w I and the others -w A.
-fn add_turn(matrix: &mut DMatrix<f64>, term: &TurnTerm) {
-    let (sine, cosine) = term.turn.sin_cos();
-    let rotation = [[cosine, -sine], [sine, cosine]];
-    for row in 0..2 {
-        for index in [term.i, term.j] {
-            matrix[(2 * index + row, 2 * index + row)] += term.weight;
-        }
-        for column in 0..2 {
-            let entry = term.weight * rotation[row][column];
-            matrix[(2 * term.j + row, 2 * term.i + column)] -= entry;
-            matrix[(2 * term.i + column, 2 * term.j + row)] -= entry;
-        }
-    }
+fn add_turn(matrix: &mut BlockMatrix<2>, term: &TurnTerm) {
+    let whole = Matrix2::identity() * term.weight;
+    matrix.add(term.i, term.i, &whole);
+    matrix.add(term.j, term.j, &whole);
+    matrix.add(term.j, term.i, &(Rotation2::new(term.turn).matrix() * -term.weight));
 }
