@@ -31,6 +31,9 @@ pub(crate) struct Meeting {
     pub share: f64,
 }
 
+/// Cells of a lattice along a photograph's longer side for which the weights are; where there are fewer, and larger ones, second differences
+/// weigh as much less as they are larger, and so do leans.
+pub(crate) const LATTICE_CELLS: f64 = 16.0;
 /// Weight of the bending energy beside that of a meeting, per pixel of second difference from cell to cell of the lattice: what an overlap's
 /// difference changes within a cell or two is left to who draws overlaps together. Between 1 and 4 long lines of the facades that were looked at bend alike.
 const BENDING: f64 = 2.0;
@@ -117,6 +120,8 @@ fn shape_energy(cameras: &[Camera], lattices: &[GridMesh], asides: &[Vec<f64>]) 
     let mut equations = NormalEquations::new(lattices);
     for (photograph, lattice) in lattices.iter().enumerate() {
         let (rows, columns) = (lattice.rows, lattice.columns);
+        let coarseness = coarseness(lattice);
+        let bending = BENDING / (coarseness * coarseness);
         let mut add = |members: &[(usize, f64)]| {
             let members: Vec<(usize, Vector2<f64>)> =
                 members.iter().map(|&(vertex, factor)| (vertex, Vector2::new(factor, 0.0))).collect();
@@ -126,7 +131,7 @@ fn shape_energy(cameras: &[Camera], lattices: &[GridMesh], asides: &[Vec<f64>]) 
             let (row, column) = (vertex / columns, vertex % columns);
             add(&[(vertex, REST)]);
             let along =
-                |step: usize| [(vertex, BENDING), (vertex + step, -2.0 * BENDING), (vertex + 2 * step, BENDING)];
+                |step: usize| [(vertex, bending), (vertex + step, -2.0 * bending), (vertex + 2 * step, bending)];
             if column + 2 < columns {
                 add(&along(1));
             }
@@ -135,7 +140,7 @@ fn shape_energy(cameras: &[Camera], lattices: &[GridMesh], asides: &[Vec<f64>]) 
             }
             if column + 1 < columns && row + 1 < rows {
                 // Twice the square of the mixed derivative.
-                let twist = std::f64::consts::SQRT_2 * BENDING;
+                let twist = std::f64::consts::SQRT_2 * bending;
                 add(&[
                     (vertex, twist),
                     (vertex + 1, -twist),
@@ -149,10 +154,18 @@ fn shape_energy(cameras: &[Camera], lattices: &[GridMesh], asides: &[Vec<f64>]) 
     equations
 }
 
+/// How many times as large as usual a lattice's cells are, 1 where they are hardly larger: what is rounded to whole cells makes no difference.
+fn coarseness(lattice: &GridMesh) -> f64 {
+    const ROUNDING: f64 = 1.1;
+    let coarseness = lattice.cell_width() * LATTICE_CELLS / lattice.width.max(lattice.height);
+    if coarseness > ROUNDING { coarseness } else { 1.0 }
+}
+
 /// What keeps the scene's verticals as they stand: at every vertex, how far what lies a cell further down steps across the vertical
 /// beside it.
 fn add_leans(photograph: usize, camera: &Camera, lattice: &GridMesh, asides: &[f64], equations: &mut NormalEquations) {
     let cell = [lattice.cell_width(), lattice.cell_height()];
+    let coarseness = coarseness(lattice);
     for (vertex, aside) in asides.iter().enumerate() {
         let Some(down) = down_at(camera, lattice.source(vertex)) else { continue };
         // Differences to the neighbors to the right and below; on the border to those before.
@@ -165,7 +178,7 @@ fn add_leans(photograph: usize, camera: &Camera, lattice: &GridMesh, asides: &[f
         let members = members.map(|(vertex, weight)| WeightedVertex { photograph, vertex, weight });
         let across = Vector2::new(-down.y, down.x);
         let share = (aside / ALONE).clamp(0.0, 1.0);
-        let lean = LEAN + (LEAN_ALONE - LEAN) * share * share * (3.0 - 2.0 * share);
+        let lean = (LEAN + (LEAN_ALONE - LEAN) * share * share * (3.0 - 2.0 * share)) / coarseness;
         equations.add_sum(&members, Metric::along(across, lean * lean), Vector2::zeros());
     }
 }

@@ -10,9 +10,16 @@ const SIZE: [f64; 2] = [800.0, 600.0];
 /// Two level photographs 30 degrees apart, and meetings at every vertex of both whose place in the other lies `apart` pixels (as a
 /// function of the pixel, in the second photograph) from where the cameras have it.
 fn pair(apart: impl Fn(Vector2<f64>) -> Vector2<f64>) -> (Vec<Camera>, Vec<GridMesh>, Vec<Meeting>) {
+    pair_on_lattices(SIZE[0] / LATTICE_CELLS, apart)
+}
+
+fn pair_on_lattices(
+    cell_px: f64,
+    apart: impl Fn(Vector2<f64>) -> Vector2<f64>,
+) -> (Vec<Camera>, Vec<GridMesh>, Vec<Meeting>) {
     let camera = |yaw: f64| Camera::new(FOCAL_PX, SIZE[0], SIZE[1], &rotation_about_y(yaw).transpose());
     let cameras = vec![camera(0.0), camera(30_f64.to_radians())];
-    let lattices = vec![GridMesh::regular(SIZE[0], SIZE[1], 50.0); 2];
+    let lattices = vec![GridMesh::regular(SIZE[0], SIZE[1], cell_px); 2];
     let is_inside = |place: &Vector2<f64>| (0..2).all(|axis| (0.0..=SIZE[axis]).contains(&place[axis]));
     let mut meetings = Vec::new();
     for vertex in 0..lattices[0].len() {
@@ -95,4 +102,20 @@ fn where_nothing_meets_nothing_steps_aside() {
     let moved =
         still.iter().flat_map(|steps| &steps.target).map(|step| Vector2::from(*step).norm()).fold(0.0, f64::max);
     assert!(moved < 1e-6, "{moved}");
+}
+
+/// Cells twice as wide have weights of their own, so that photographs give way as far, within a pixel of six.
+#[test]
+fn a_coarser_lattice_steps_aside_alike() {
+    let apart = |place: Vector2<f64>| Vector2::new(0.0, 0.015 * (place.x + 0.5 * place.y - 400.0));
+    let [fine, coarse] = [50.0, 100.0].map(|cell_px| {
+        let (cameras, lattices, meetings) = pair_on_lattices(cell_px, apart);
+        smooth_steps(&cameras, &lattices, &meetings).expect("steps")
+    });
+    for (fine, coarse) in fine.iter().zip(&coarse) {
+        for place in (0..coarse.len()).map(|vertex| coarse.source(vertex)) {
+            let off = (fine.warp(place) - coarse.warp(place)).norm();
+            assert!(off < 1.0, "{off} px at {place}");
+        }
+    }
 }

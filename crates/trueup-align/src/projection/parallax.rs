@@ -23,7 +23,7 @@ use trueup_core::mesh::GridMesh;
 
 use super::coverage::steepest;
 use super::photograph::PosedPhotograph;
-use crate::mesh::{Meeting, smooth_steps, tilt_from_level};
+use crate::mesh::{LATTICE_CELLS, Meeting, coarsening, smooth_steps, tilt_from_level};
 
 /// By how many of its own pixels each vertex of a photograph's grid looks aside, row-major.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -75,9 +75,6 @@ pub fn parallax_shifts(photographs: &[PosedPhotograph], period: Option<f64>, max
 /// cells keep half of their width. From 0.6 on they would fold.
 const MOST_PER_ROOM: f64 = 0.3;
 
-/// Cells of the lattice of even steps along a photograph's longer side.
-const LATTICE_CELLS: f64 = 16.0;
-
 /// Photographs and what their mesh says of them.
 struct Overlaps<'a> {
     photographs: &'a [PosedPhotograph],
@@ -115,11 +112,15 @@ impl<'a> Overlaps<'a> {
 
     /// How far photographs give way as evenly as they can, see [`smooth_steps`]; `None` if nothing asks for it.
     fn smooth_steps(&self) -> Option<Vec<GridMesh>> {
-        let lattice = |photograph: &PosedPhotograph| {
-            let GridMesh { width, height, .. } = photograph.mesh;
-            GridMesh::regular(width, height, width.max(height) / LATTICE_CELLS)
+        let lattices = |coarsening: f64| -> Vec<GridMesh> {
+            let lattice = |photograph: &PosedPhotograph| {
+                let GridMesh { width, height, .. } = photograph.mesh;
+                GridMesh::regular(width, height, coarsening * width.max(height) / LATTICE_CELLS)
+            };
+            self.photographs.iter().map(lattice).collect()
         };
-        let lattices: Vec<GridMesh> = self.photographs.iter().map(lattice).collect();
+        let usual = lattices(1.0);
+        let lattices = lattices(coarsening(usual.iter().map(GridMesh::len).sum()));
         let meetings: Vec<Vec<Meeting>> = lattices
             .par_iter()
             .enumerate()

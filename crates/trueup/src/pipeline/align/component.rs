@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use trueup_align::cameras::CameraPrior;
+use trueup_align::mesh::{self, MeshOptions};
 use trueup_core::lines::{EdgeCurve, LineSegment};
 use trueup_core::matches::PairMatches;
 use trueup_core::mesh::GridMesh;
@@ -61,6 +62,11 @@ impl<'a> Component<'a> {
 
     pub(super) fn names(&self) -> Vec<String> {
         self.images.iter().map(|image| image.name.clone()).collect()
+    }
+
+    /// The largest side of a cell of its grids, working pixels.
+    pub(super) fn cell_px(&self, options: &MeshOptions) -> f64 {
+        mesh::cell_px(self.frames.iter().map(|frame| [frame.width, frame.height]), options)
     }
 
     /// Even grids over the working photographs, of cells about `cell_px` wide.

@@ -90,7 +90,7 @@ fn geometry_key(input: &AlignInput, options: &AlignOptions) -> Option<Key> {
 /// The stages in their order.
 fn find_geometry(input: &AlignInput, options: &AlignOptions, context: &StageContext) -> Result<Geometry> {
     let component = input.component;
-    let grids = component.grids(options.mesh.cell_px);
+    let grids = component.grids(component.cell_px(&options.mesh));
     let overlaps = overlaps::run(component, options, input.memo, context)?;
     let Overlaps { cameras, pairs, warps } = &overlaps.value;
     let lines = context
@@ -194,7 +194,7 @@ fn find_prior(
         gravity: &component.gravity(),
         edges: &overlaps.pairs,
         overlaps: &overlaps.warps,
-        cell_px: options.mesh.cell_px,
+        cell_px: component.cell_px(&options.mesh),
         vanishing: &options.vanishing,
         turn: component.reference_rotation,
         reference: component.reference,

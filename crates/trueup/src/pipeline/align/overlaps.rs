@@ -20,7 +20,7 @@ use crate::options::{AlignOptions, MethodForm};
 struct OverlapOptions<'a> {
     cameras: &'a CameraOptions,
     match_points: &'a MatchPointOptions,
-    /// `mesh.cell_px`.
+    /// The largest side of a cell of the grids, working pixels.
     cell_px: f64,
 }
 
@@ -47,7 +47,7 @@ pub(super) fn run(
     let options = OverlapOptions {
         cameras: &camera_options(options)?,
         match_points: &options.match_points,
-        cell_px: options.mesh.cell_px,
+        cell_px: component.cell_px(&options.mesh),
     };
     let group = (&component.members, component.reference);
     let overlaps = memo.run_in_memory(OVERLAPS, &group, component, &options, find, context)?;
