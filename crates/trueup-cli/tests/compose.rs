@@ -30,6 +30,18 @@ fn the_same_options_give_the_same_bytes() {
     assert_eq!(without_seconds("pano.json"), without_seconds("again.json"));
 }
 
+/// A panorama that was not cropped, because no rectangle keeps enough of it, has empty corners when it is composed again, too.
+#[test]
+fn what_was_kept_whole_stays_as_it_was() {
+    let desk = street_desk();
+    let view = ["--projection", "mesh", "--set", "canvas.min_kept=1", "--project", "pano.json"];
+    let stdout = desk.stitch(&[&STREET_NAMES[..], &view].concat()).expect_success().to_owned();
+    assert!(stdout.contains("it was not cropped"), "{stdout}");
+    compose(&desk, &["--project", "again.json"]).expect_success();
+    assert!(desk.read("pano.jpg") == desk.read("again.jpg"), "the panoramas differ");
+    assert_eq!(desk.json("pano.json")["diagnostics"], desk.json("again.json")["diagnostics"]);
+}
+
 /// Photographs of several exposures by a camera that presses highlights together: the response that was found is
 /// recorded, and gives the same panorama again.
 #[test]

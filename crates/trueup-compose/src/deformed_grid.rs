@@ -164,9 +164,6 @@ impl DeformedGrid {
         owner: &mut Vec<u32>,
         runs: &mut Vec<CellRun>,
     ) {
-        let start = columns.start;
-        owner.clear();
-        owner.resize(columns.len(), NO_CELL);
         runs.clear();
         let center_y = y as f64 + 0.5;
         for &index in candidates {
@@ -176,18 +173,18 @@ impl DeformedGrid {
             }
             let (crossings, count) = cell.crossings(center_y);
             for pair in crossings[..count].chunks_exact(2) {
-                let first = first_center_from(pair[0], columns.end).max(start);
-                let end = first_center_from(pair[1], columns.end).max(first);
-                owner[first - start..end - start].fill(index);
+                let first = first_center_from(pair[0], columns.end).max(columns.start);
+                let end = first_center_from(pair[1], columns.end);
+                if first < end {
+                    runs.push(CellRun { cell: index as usize, columns: first..end });
+                }
             }
         }
-        let mut column = 0;
-        for same in owner.chunk_by(|left, right| left == right) {
-            if same[0] != NO_CELL {
-                let columns = start + column..start + column + same.len();
-                runs.push(CellRun { cell: same[0] as usize, columns });
-            }
-            column += same.len();
+        runs.sort_unstable_by_key(|run| (run.columns.start, run.cell));
+        if runs.windows(2).any(|pair| pair[0].columns.end > pair[1].columns.start) {
+            // Where the grid folds, cells cover each other in their order.
+            runs.sort_unstable_by_key(|run| run.cell);
+            painted(columns, owner, runs);
         }
     }
 
@@ -289,6 +286,23 @@ impl Cell {
     /// The inverse of the cell's bilinear map along canvas row `y`.
     pub(crate) fn inverse_along_row(&self, y: usize) -> InverseBilinear {
         InverseBilinear::new(self.corners.map(Into::into), self.source, self.source_size, y as f64 + 0.5)
+    }
+}
+
+/// Cuts `runs` to what the later ones leave of them in `columns`. `owner` is scratch space.
+fn painted(columns: &Range<usize>, owner: &mut Vec<u32>, runs: &mut Vec<CellRun>) {
+    let start = columns.start;
+    owner.clear();
+    owner.resize(columns.len(), NO_CELL);
+    for run in runs.drain(..) {
+        owner[run.columns.start - start..run.columns.end - start].fill(run.cell as u32);
+    }
+    let mut column = start;
+    for same in owner.chunk_by(|left, right| left == right) {
+        if same[0] != NO_CELL {
+            runs.push(CellRun { cell: same[0] as usize, columns: column..column + same.len() });
+        }
+        column += same.len();
     }
 }
 

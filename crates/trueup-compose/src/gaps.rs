@@ -132,9 +132,28 @@ impl Gaps {
         rows.into_iter().any(|y| self.within_row(columns.clone(), y).next().is_some())
     }
 
-    /// Those of `columns` in row `y` that are part of a gap, in ascending order.
-    pub(crate) fn within_row(&self, columns: Range<usize>, y: usize) -> impl Iterator<Item = usize> {
-        self.coverage.uncovered(columns, y).flatten().filter(move |&x| self.is_gap(x, y))
+    /// The stretches of `columns` in row `y` that are part of a gap, in ascending order.
+    pub(crate) fn within_row(&self, columns: Range<usize>, y: usize) -> impl Iterator<Item = Range<usize>> {
+        // Of a rectangle all that is not covered is, which need not be asked pixel by pixel.
+        let (columns, small) = match &self.extent {
+            Extent::Small(gaps) => (columns, Some(gaps)),
+            Extent::Within(rectangle) if rectangle.rows.contains(&y) => (common(&columns, &rectangle.columns), None),
+            Extent::Within(_) => (columns.start..columns.start, None),
+        };
+        let parts = move |stretch: Range<usize>| {
+            let mut next = stretch.start;
+            std::iter::from_fn(move || {
+                let Some(gaps) = small else {
+                    let all = next..stretch.end;
+                    next = stretch.end;
+                    return (!all.is_empty()).then_some(all);
+                };
+                let first = (next..stretch.end).find(|&x| gaps.holds(x, y))?;
+                next = (first..stretch.end).find(|&x| !gaps.holds(x, y)).unwrap_or(stretch.end);
+                Some(first..next)
+            })
+        };
+        self.coverage.uncovered(columns, y).flat_map(parts)
     }
 
     /// The coverage as it is when the gaps are filled.

@@ -7,6 +7,9 @@ pub(crate) trait InterpolationKernel {
     /// Half its width in samples.
     const RADIUS: f64;
 
+    /// Whether it is straight between two samples, rather than cubic over four.
+    const IS_LINEAR: bool;
+
     /// Value at `distance` samples from the middle.
     fn at(distance: f32) -> f32;
 
@@ -20,6 +23,7 @@ pub(crate) struct Bilinear;
 
 impl InterpolationKernel for Bilinear {
     const RADIUS: f64 = 1.0;
+    const IS_LINEAR: bool = true;
 
     fn at(distance: f32) -> f32 {
         (1.0 - distance.abs()).max(0.0)
@@ -40,6 +44,7 @@ pub(crate) struct Bicubic;
 
 impl InterpolationKernel for Bicubic {
     const RADIUS: f64 = 2.0;
+    const IS_LINEAR: bool = false;
 
     #[inline(always)]
     fn at(distance: f32) -> f32 {

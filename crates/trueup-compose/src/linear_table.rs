@@ -1,5 +1,8 @@
 //! Tables of a curve, read between their entries.
 
+/// Adding 1.5 * 2^23 rounds to a whole number and leaves it in the low bits: cheaper than a checked cast.
+pub(crate) const ROUNDING: f32 = 12_582_912.0;
+
 /// A curve by its values at the whole numbers from 0 on, straight between them. The number of entries is a power of two, so that
 /// reading one needs no check.
 #[derive(Debug)]
@@ -14,6 +17,13 @@ impl<const ENTRIES: usize> LinearTable<ENTRIES> {
         const { assert!(ENTRIES.is_power_of_two()) };
         let entry = |index| [value(index) as f32, (value(index + 1) - value(index)) as f32];
         Self { entries: std::array::from_fn(entry) }
+    }
+
+    /// Every entry: its value, and the difference to the next.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    pub(crate) fn entries(&self) -> &[[f32; 2]; ENTRIES] {
+        &self.entries
     }
 
     /// The value at a position from 0 to below `ENTRIES`.
@@ -45,8 +55,6 @@ impl<const ENTRIES: usize> LinearTable<ENTRIES> {
     /// The entry at or below a position, and how far beyond it that lies.
     #[inline(always)]
     fn place(position: f32) -> (usize, f32) {
-        // Adding 1.5 * 2^23 rounds to a whole number and leaves it in the low bits: cheaper than a checked cast.
-        const ROUNDING: f32 = 12_582_912.0;
         // Half a step lower, rounding gives the entry at or below; at an entry itself either side of it will do.
         let rounded = (position - 0.5) + ROUNDING;
         (rounded.to_bits() as usize % ENTRIES, position - (rounded - ROUNDING))

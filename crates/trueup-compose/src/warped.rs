@@ -76,6 +76,15 @@ pub(crate) struct SamplingMemory {
     factors: Vec<f32>,
 }
 
+/// Takes a photograph's samples, one row of a window after the other.
+pub(crate) trait RowSink {
+    /// The photograph's own values, 0 to 255, before they are developed, of some pixels of the row that comes next, from its pixel `first` on.
+    fn own(&mut self, _first: usize, _samples: &[[f32; 4]]) {}
+
+    /// Row `number` of the window, as [`WarpedPhotograph::sample`] has it.
+    fn row(&mut self, number: usize, row: &mut [[f32; 4]]);
+}
+
 /// How a photograph joins a mean of several.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Averaging {
@@ -181,7 +190,7 @@ impl<'a> WarpedPhotograph<'a> {
         let contribution = Contribution {
             feather: &self.feather,
             light: &self.light,
-            local: self.local_factors(y, run, factors),
+            local: self.local_factors(y, &run.columns, factors),
             border_footprint: cell.near_border.then(|| cell.footprint.map(|pixels| pixels as f32)),
             weighting: averaging.weighting,
         };
@@ -197,49 +206,79 @@ impl<'a> WarpedPhotograph<'a> {
         resampling: &Resampling,
         scratch: &mut SamplingMemory,
     ) {
-        self.sample_with(window, out, resampling, scratch, |_, _| {});
-    }
-
-    /// [`Self::sample`], which shows `look` the photograph's own values (0 to 255) before they are developed, with their
-    /// place in `out`.
-    pub(crate) fn sample_with(
-        &self,
-        window: Window<'_>,
-        out: &mut [[f32; 4]],
-        resampling: &Resampling,
-        scratch: &mut SamplingMemory,
-        mut look: impl FnMut(usize, &[[f32; 4]]),
-    ) {
         let width = window.columns.len();
         let (columns, rows) = (common(window.columns, &self.grid.columns), common(window.rows, &self.grid.rows));
         if columns.is_empty() || rows.is_empty() {
             return;
         }
-        let SamplingMemory { candidates, owner, runs, positions, at_border, factors, .. } = scratch;
-        self.grid.cells_in_window(&columns, &rows, candidates);
+        self.grid.cells_in_window(&columns, &rows, &mut scratch.candidates);
         for y in rows {
-            self.grid.runs_within(y, &columns, candidates, owner, runs);
-            let start = (y - window.rows.start) * width;
-            for run in &*runs {
-                let first = start + run.columns.start - window.columns.start;
-                let samples = &mut out[first..first + run.columns.len()];
-                self.interpolate_run(y, run, resampling, positions, samples, at_border);
-                look(first, samples);
-                let cell = &self.grid.cells[run.cell];
-                let development = Development {
-                    feather: &self.feather,
-                    light: &self.light,
-                    local: self.local_factors(y, run, factors),
-                    border_footprint: cell.near_border.then(|| cell.footprint.map(|pixels| pixels as f32)),
-                };
-                develop(development, positions, samples);
-            }
+            let row = &mut out[(y - window.rows.start) * width..][..width];
+            self.sample_row(y, &columns, window.columns.start, row, resampling, scratch, &mut |_, _| {});
         }
     }
 
-    /// The factors of the places along one run, made in `factors`; `None` if they are 1.
-    fn local_factors<'f>(&self, y: usize, run: &CellRun, factors: &'f mut Vec<f32>) -> Option<&'f [f32]> {
-        self.local.as_ref()?.factors(y, run.columns.clone(), factors);
+    /// [`Self::sample`], which hands `sink` one row of the window after the other.
+    pub(crate) fn sample_rows(
+        &self,
+        window: Window<'_>,
+        resampling: &Resampling,
+        scratch: &mut SamplingMemory,
+        sink: &mut impl RowSink,
+    ) {
+        let Window { columns: all, rows: all_rows } = window;
+        let mut row = vec![[0.0; 4]; all.len()];
+        let (columns, rows) = (common(all, &self.grid.columns), common(all_rows, &self.grid.rows));
+        if !columns.is_empty() && !rows.is_empty() {
+            self.grid.cells_in_window(&columns, &rows, &mut scratch.candidates);
+        }
+        for y in all_rows.clone() {
+            row.fill([0.0; 4]);
+            if !columns.is_empty() && rows.contains(&y) {
+                self.sample_row(y, &columns, all.start, &mut row, resampling, scratch, &mut |first, own| {
+                    sink.own(first, own)
+                });
+            }
+            sink.row(y - all_rows.start, &mut row);
+        }
+    }
+
+    /// The pixels `columns` of canvas row `y`, of the `row` that begins at column `first`, among the candidates of `scratch`; `look` is
+    /// shown the photograph's own values as [`RowSink::own`] is.
+    #[allow(clippy::too_many_arguments)]
+    fn sample_row(
+        &self,
+        y: usize,
+        columns: &Range<usize>,
+        first: usize,
+        row: &mut [[f32; 4]],
+        resampling: &Resampling,
+        scratch: &mut SamplingMemory,
+        look: &mut impl FnMut(usize, &[[f32; 4]]),
+    ) {
+        let SamplingMemory { candidates, owner, runs, positions, at_border, factors, .. } = scratch;
+        self.grid.runs_within(y, columns, candidates, owner, runs);
+        let covered = runs.first().map_or(0, |run| run.columns.start)..runs.last().map_or(0, |run| run.columns.end);
+        let local = self.local_factors(y, &covered, factors);
+        for run in &*runs {
+            let start = run.columns.start - first;
+            let samples = &mut row[start..start + run.columns.len()];
+            self.interpolate_run(y, run, resampling, positions, samples, at_border);
+            look(start, samples);
+            let cell = &self.grid.cells[run.cell];
+            let development = Development {
+                feather: &self.feather,
+                light: &self.light,
+                local: local.map(|all| &all[run.columns.start - covered.start..run.columns.end - covered.start]),
+                border_footprint: cell.near_border.then(|| cell.footprint.map(|pixels| pixels as f32)),
+            };
+            develop(development, positions, samples);
+        }
+    }
+
+    /// The factors of the places along a row, made in `factors`; `None` if they are 1.
+    fn local_factors<'f>(&self, y: usize, columns: &Range<usize>, factors: &'f mut Vec<f32>) -> Option<&'f [f32]> {
+        self.local.as_ref()?.factors(y, columns.clone(), factors);
         Some(factors)
     }
 

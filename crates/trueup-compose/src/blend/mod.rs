@@ -121,7 +121,9 @@ impl<'a> Blending<'a> {
     /// [`trueup_core::Error::Cancelled`]; what the photographs and a scratch file return.
     pub(crate) fn finish(self, parts: &[Rectangle], context: &StageContext) -> Result<PixelStore<RootPixel>> {
         let mut pixels = self.canvas();
-        self.finish_each(parts, &mut |blocks| pixels.put(blocks), context)?;
+        // In memory, what shows nothing is empty already; in a file, nothing is before it is put there.
+        let with_empty = !pixels.is_in_memory();
+        self.finish_each(parts, with_empty, &mut |blocks| pixels.put(blocks), context)?;
         Ok(pixels)
     }
 
@@ -199,11 +201,12 @@ impl<'a> Blending<'a> {
         (0..unrolled.placed().len()).map(|at| decoded.bytes[unrolled.original(at)]).collect()
     }
 
-    /// [`Self::finish`], where `put` takes the tiles.
+    /// [`Self::finish`], where `put` takes the tiles; those that show nothing only `with_empty`.
     fn finish_each(
         self,
         parts: &[Rectangle],
-        put: &mut dyn FnMut(&[Block<'_, RootPixel>]) -> Result<()>,
+        with_empty: bool,
+        put: &mut (dyn FnMut(&[Block<'_, RootPixel>]) -> Result<()> + Send),
         context: &StageContext,
     ) -> Result<()> {
         let bytes = self.placement_bytes();
@@ -224,22 +227,33 @@ impl<'a> Blending<'a> {
             if let Some(levels) = &mut work.levels {
                 levels.own.hold(|at| loaded.warped()[at].is_some())?;
             }
-            for tiles in batch.tiles.chunks(TILES_AT_ONCE * rayon::current_num_threads().max(1)) {
-                let finish = |memory: &mut SamplingMemory, tile: &BlendTile| {
-                    context.check_cancelled()?;
-                    Ok(tile.finish(&work, loaded.warped(), memory))
-                };
-                let finished: Vec<Vec<RootPixel>> =
-                    tiles.par_iter().map_init(SamplingMemory::default, finish).collect::<Result<_>>()?;
+            let finish = |memory: &mut SamplingMemory, tile: &&BlendTile| {
+                context.check_cancelled()?;
+                Ok(tile.finish(&work, loaded.warped(), memory))
+            };
+            let finish_all = |tiles: &[&BlendTile]| -> Result<Vec<Vec<RootPixel>>> {
+                tiles.par_iter().map_init(SamplingMemory::default, finish).collect()
+            };
+            let mut put_all = |tiles: &[&BlendTile], finished: &[Vec<RootPixel>]| {
                 let block = |(tile, pixels)| {
-                    let BlendTile { columns, rows, .. }: &BlendTile = tile;
+                    let BlendTile { columns, rows, .. }: &&BlendTile = tile;
                     let columns = columns.start - unrolled.lead()..columns.end - unrolled.lead();
                     Block { columns, rows: rows.clone(), pixels }
                 };
                 let blocks: Vec<Block<'_, RootPixel>> =
                     tiles.iter().zip(finished.iter().map(Vec::as_slice)).map(block).collect();
-                put(&blocks)?;
+                put(&blocks)
+            };
+            // Tiles are put on the canvas while the next ones are finished: no thread waits for the others' last tile.
+            let mut last: (&[&BlendTile], Vec<Vec<RootPixel>>) = (&[], Vec::new());
+            let tiles: Vec<&BlendTile> =
+                batch.tiles.iter().filter(|tile| with_empty || !tile.shown.is_empty()).collect();
+            for tiles in tiles.chunks(TILES_AT_ONCE * rayon::current_num_threads().max(1)) {
+                let (done, finished) = rayon::join(|| put_all(last.0, &last.1), || finish_all(tiles));
+                done?;
+                last = (tiles, finished?);
             }
+            put_all(last.0, &last.1)?;
         }
         Ok(())
     }
@@ -319,6 +333,7 @@ pub(crate) fn finish_region(
     let mut tiles = Vec::new();
     blending.finish_each(
         &parts,
+        true,
         &mut |blocks| {
             let tile = |block: &Block<'_, RootPixel>| {
                 let Block { columns, rows, pixels } = block;

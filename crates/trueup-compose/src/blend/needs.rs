@@ -52,7 +52,8 @@ pub(crate) fn needed_bytes(unrolled: &Unrolled<'_>, levels: Option<WholeLevels>)
     // own levels.
     let coarse = sample * (whole * (1.0 + 4.0 / 3.0 + 1.0) + threads * COARSE_COPIES * largest(&own_levels));
     let side = (tile_side(first_level) + 2 * mask_margin(first_level)) as f64;
-    let finished = (TILES_AT_ONCE * RootPixel::BYTES) as f64 * (tile_side(first_level) as f64).powi(2);
+    // Those that are put on the canvas, and the next ones.
+    let finished = (2 * TILES_AT_ONCE * RootPixel::BYTES) as f64 * (tile_side(first_level) as f64).powi(2);
     let tiles = sample * whole + threads * (sample * TILE_COPIES * side * side + finished);
     let coarse = if levels.is_none() { 0.0 } else { coarse };
     let working = if several { searching.max(coarse).max(tiles) } else { tiles - sample * whole };

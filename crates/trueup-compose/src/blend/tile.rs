@@ -8,11 +8,13 @@ use trueup_core::mask::Mask;
 use super::work::BlendWork;
 use crate::ignored::in_mask;
 use crate::label::{Label, NOBODY};
-use crate::pyramid::{LEAST_WEIGHT, PyramidPlane, add_detail, collapse, color, level_shares, mask_margin, tile_margin};
+use crate::pyramid::{
+    Expansion, LEAST_WEIGHT, PyramidPlane, add_detail, collapse, color, level_shares, mask_margin, tile_margin,
+};
 use crate::simd::{VectorLoop, with_vector_instructions};
 use crate::small_views::CoarseLevel;
 use crate::store::RootPixel;
-use crate::warped::{SamplingMemory, WarpedPhotograph};
+use crate::warped::{RowSink, SamplingMemory, WarpedPhotograph};
 use crate::window::{Window, common};
 
 /// A box with so many pixels more on all sides, cut at the canvas.
@@ -81,22 +83,22 @@ impl BlendTile {
         label: usize,
         scratch: &mut SamplingMemory,
     ) -> Vec<RootPixel> {
-        let mut pixels = vec![[0.0; 4]; self.columns.len() * self.rows.len()];
-        photograph.sample(self.window(&self.columns, &self.rows), &mut pixels, &work.resampling, scratch);
+        let width = self.columns.len();
         let offset = work
             .levels
             .as_ref()
             .and_then(|levels| self.offset(&levels.blended, levels.own.at(label), work.first_level));
-        if let Some(offset) = offset {
-            for (pixel, offset) in pixels.iter_mut().zip(&offset.texels) {
-                // The last is the offset's own share.
-                (0..3).for_each(|channel| pixel[channel] += offset[channel]);
-            }
-        }
-        finished_all(&pixels)
+        let mut finishing = FinishingRows {
+            offsets: offset.as_ref().map(|offset| offset.expansion(&self.columns, self.rows.start)),
+            change: vec![[0.0; 4]; width],
+            out: vec![[0; 4]; width * self.rows.len()],
+        };
+        let window = self.window(&self.columns, &self.rows);
+        photograph.sample_rows(window, &work.resampling, scratch, &mut finishing);
+        finishing.out
     }
 
-    /// What the coarse levels change of a photograph, on the pixels of the tile; `None` if nothing.
+    /// What the coarse levels change of a photograph, around the tile at half its size; `None` if nothing.
     fn offset(
         &self,
         blended: &PyramidPlane<[f32; 4]>,
@@ -126,11 +128,10 @@ impl BlendTile {
         if !any {
             return None;
         }
-        for level in (0..first_level).rev() {
+        for level in (1..first_level).rev() {
             let within = |range: &Range<usize>, length: usize| {
-                // One sample more than the next finer level asks for, two in the end none.
-                let more = if level == 0 { 0 } else { 2 };
-                (range.start >> level).saturating_sub(more)..(((range.end - 1) >> level) + 1 + more).min(length)
+                // Two samples more than the next finer level asks for.
+                (range.start >> level).saturating_sub(2)..(((range.end - 1) >> level) + 3).min(length)
             };
             // At least as many samples as the canvas has.
             let columns = within(&self.columns, blended.columns.end << (first_level - level));
@@ -298,6 +299,28 @@ impl BlendTile {
     }
 }
 
+/// Finishes rows as they come: what is near in memory is used again at once.
+struct FinishingRows<'a> {
+    /// What is added to each.
+    offsets: Option<Expansion<'a, [f32; 4]>>,
+    change: Vec<[f32; 4]>,
+    out: Vec<RootPixel>,
+}
+
+impl RowSink for FinishingRows<'_> {
+    fn row(&mut self, number: usize, row: &mut [[f32; 4]]) {
+        if let Some(offsets) = &mut self.offsets {
+            offsets.next_row(&mut self.change);
+            for (pixel, &change) in row.iter_mut().zip(&self.change) {
+                let [r, g, b] = color(change).unwrap_or_default();
+                // The share is the offset's own.
+                *pixel = [pixel[0] + r, pixel[1] + g, pixel[2] + b, pixel[3]];
+            }
+        }
+        finish_all(row, &mut self.out[number * row.len()..][..row.len()]);
+    }
+}
+
 /// Which photographs count at a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Claim {
@@ -378,10 +401,8 @@ fn hide_ignored(
 const NO_CHANGE: f32 = 1e-6;
 
 /// Pixels of the panorama.
-fn finished_all(pixels: &[[f32; 4]]) -> Vec<RootPixel> {
-    let mut out = vec![[0; 4]; pixels.len()];
-    with_vector_instructions(Finishing { pixels, out: &mut out });
-    out
+fn finish_all(pixels: &[[f32; 4]], out: &mut [RootPixel]) {
+    with_vector_instructions(Finishing { pixels, out });
 }
 
 struct Finishing<'a> {

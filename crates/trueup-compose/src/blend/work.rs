@@ -12,8 +12,8 @@ use crate::pyramid::PyramidPlane;
 use crate::small_views::CoarseLevels;
 use crate::warped::Resampling;
 
-/// Tiles for each thread that are finished before they are put on the canvas.
-pub(super) const TILES_AT_ONCE: usize = 16;
+/// Tiles for each thread that are finished before they are put on the canvas, while the next ones are.
+pub(super) const TILES_AT_ONCE: usize = 8;
 
 /// The coarse levels, blended.
 pub(super) struct BlendedLevels {

@@ -37,8 +37,18 @@ pub struct Framing<'a> {
     pub coverage: &'a Coverage,
     /// What is wanted.
     pub options: &'a CanvasOptions,
-    /// The part that is kept, if that is decided.
-    pub known: Option<&'a Rectangle>,
+    /// What becomes of the canvas, if that is decided.
+    pub known: Option<&'a Frame>,
+}
+
+impl Frame {
+    /// What of a canvas of `size` pixels (width, height) is the panorama.
+    pub fn part_of(&self, size: [usize; 2]) -> Rectangle {
+        match self {
+            Self::Whole => Rectangle::whole(size),
+            Self::Part(part) => part.clone(),
+        }
+    }
 }
 
 impl Framing<'_> {
@@ -59,7 +69,7 @@ impl Framing<'_> {
     /// The frame, if what the panorama shows does not count.
     pub(crate) fn without_panorama(&self, layout: &CanvasLayout) -> Option<Frame> {
         match (self.known, self.options.crop, layout.period) {
-            (Some(known), _, _) => Some(Frame::Part(known.clone())),
+            (Some(known), _, _) => Some(known.clone()),
             (None, Crop::None, _) => Some(Frame::Whole),
             (None, Crop::Rectangle, None) => Some(self.frame(Some(self.coverage.largest_rectangle()))),
             (None, Crop::Rectangle, Some(_)) => Some(self.frame(Some(self.coverage.longest_whole_rows()))),

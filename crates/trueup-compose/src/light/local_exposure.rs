@@ -88,10 +88,14 @@ impl LocalExposure {
             let [left, right] = map.cells_beside(0, first).map(|at| upper[at] + below * (lower[at] - upper[at]));
             let filled = out.len();
             out.resize(filled + end - x, 0.0);
+            // Where the first one's middle lies, in pixels: the same for all stretches between the two, wherever they begin.
+            let middle = ((first + 0.5) * map.cell_px[0] + map.corner[0] - self.shift[0]) / self.scale[0] - 0.5;
+            let whole = middle.floor();
             with_vector_instructions(Straight {
-                local: self,
-                x,
-                first,
+                // The cast saturates; places farther away than 32 bits count hold one factor.
+                from: (x as f64 - whole) as i32,
+                beyond: (middle - whole) as f32,
+                cells_per_pixel: pixels_per_cell.recip() as f32,
                 factors: [left, right],
                 out: &mut out[filled..],
             });
@@ -107,11 +111,13 @@ impl LocalExposure {
     }
 }
 
-/// The factors between two cells: pixels from column `x` on, and the first of the cells.
+/// The factors between two cells.
 struct Straight<'a> {
-    local: &'a LocalExposure,
-    x: usize,
-    first: f64,
+    /// The first pixel, counted from the one at or before the middle of the first cell.
+    from: i32,
+    /// How far beyond that one's middle the cell's lies, pixels.
+    beyond: f32,
+    cells_per_pixel: f32,
     factors: [f32; 2],
     out: &'a mut [f32],
 }
@@ -119,15 +125,10 @@ struct Straight<'a> {
 impl VectorLoop for Straight<'_> {
     #[inline(always)]
     fn run(self) {
-        let Self { local, x, first, factors: [left, right], out } = self;
-        let (scale, shift) = (local.scale[0], local.shift[0]);
-        let (corner, cell) = (local.map.corner[0], local.map.cell_px[0]);
-        let start = x as f64;
-        // Whole numbers of 32 bits are what is turned into floating point side by side. A cell is not so wide that they do not do.
-        for (index, out) in (0_i32..).zip(out) {
-            // As `in_cells` has it: a column is a whole number, of which sums are exact.
-            let place = scale * (start + f64::from(index) + 0.5) + shift;
-            *out = left + ((place - corner) / cell - 0.5 - first) as f32 * (right - left);
+        let Self { from, beyond, cells_per_pixel, factors: [left, right], out } = self;
+        let step = right - left;
+        for (index, out) in (from..).zip(out) {
+            *out = left + ((index as f32 - beyond) * cells_per_pixel) * step;
         }
     }
 }

@@ -10,4 +10,6 @@ pub(crate) use by_response::ByResponse;
 pub use correction::{Correction, Corrections, VIGNETTING_TERMS};
 pub(crate) use local_exposure::{ExposureMap, LocalExposure};
 pub use response::{RESPONSE_TERMS, Response};
+#[cfg(target_arch = "x86_64")]
+pub(crate) use table::LEAST_LEVELLED;
 pub(crate) use table::{LightTable, PhotographLight, exposed};

@@ -11,7 +11,7 @@ use crate::transfer_curve::Linearize;
 
 /// Smallest factor whose levelling off is undone: highlights are lifted by its inverse at most, since what lies between the
 /// levels next to white is mostly noise.
-const LEAST_LEVELLED: f32 = 0.6;
+pub(crate) const LEAST_LEVELLED: f32 = 0.6;
 
 /// Linear light times a factor f, `f x / (1 + (f^4 - 1) x^4)^(1/4)`.
 ///
@@ -54,7 +54,7 @@ pub(crate) struct LightTable {
 const STEPS: usize = 256;
 
 /// Length of the table: the entries up to the corner, filled up to a power of two.
-const ENTRIES: usize = 512;
+pub(crate) const ENTRIES: usize = 512;
 
 impl LightTable {
     /// For a photograph of `size` pixels.
@@ -76,6 +76,14 @@ impl LightTable {
     /// Whether the factor depends on the place.
     pub(crate) fn varies(&self) -> bool {
         self.falloff.is_some()
+    }
+
+    /// The factors against vignetting by the squared distance from a center, pixels: the table, that center, table steps per squared pixel,
+    /// and the last step; `None` where there is none.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    pub(crate) fn falloff(&self) -> Option<(&LinearTable<ENTRIES>, [f32; 2], f32, f32)> {
+        Some((self.falloff.as_deref()?, self.center, self.steps_per_px2, STEPS as f32))
     }
 
     /// The factors against vignetting at positions in the photograph, pixels; only where [`Self::varies`].

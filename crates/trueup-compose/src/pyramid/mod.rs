@@ -17,6 +17,6 @@ mod plane;
 mod sums;
 mod tiling;
 
-pub(crate) use plane::{LEAST_SHARE, NEXT_TO_NOTHING, PyramidPlane, Texel, color, level_shares};
+pub(crate) use plane::{Expansion, LEAST_SHARE, NEXT_TO_NOTHING, PyramidPlane, Texel, color, level_shares};
 pub(crate) use sums::{LEAST_WEIGHT, add_base, add_detail, collapse};
 pub(crate) use tiling::{first_level, mask_margin, tile_margin, tile_side};

@@ -5,6 +5,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::bulk::Bulk;
+use crate::simd::{VectorLoop, with_vector_instructions};
 
 /// Something that can be summed with weights.
 pub(crate) trait Texel: Copy + Default {
@@ -97,10 +98,49 @@ impl<T: Texel> PyramidPlane<T> {
     pub(crate) fn reduced(&self) -> Self {
         let half = |range: &Range<usize>| range.start.div_ceil(2)..range.end.div_ceil(2);
         let mut reduced = Self::new(half(&self.columns), half(&self.rows));
-        let width = reduced.columns.len();
-        if width == 0 {
+        if reduced.columns.is_empty() {
             return reduced;
         }
+        with_vector_instructions(Reducing { plane: self, reduced: &mut reduced });
+        reduced
+    }
+
+    /// The part `columns` x `rows` of the next finer level, interpolated; sums not divided by their shares.
+    pub(crate) fn expanded(&self, columns: &Range<usize>, rows: &Range<usize>) -> Self {
+        let mut expanded = Self::new(columns.clone(), rows.clone());
+        let mut expansion = self.expansion(columns, rows.start);
+        for y in rows.clone() {
+            expansion.next_row(expanded.row_mut(y));
+        }
+        expanded
+    }
+
+    /// [`Self::expanded`] row by row, from row `first_row` on.
+    pub(crate) fn expansion(&self, columns: &Range<usize>, first_row: usize) -> Expansion<'_, T> {
+        let width = columns.len();
+        Expansion {
+            plane: self,
+            first: columns.start as isize / 2 - 1,
+            odd: columns.start % 2,
+            padded: vec![T::default(); width / 2 + 4],
+            window: std::array::from_fn(|_| vec![T::default(); width]),
+            next: first_row as isize / 2 - 1,
+            row: first_row,
+        }
+    }
+}
+
+/// A plane, and the samples of its next coarser level, which are to be made.
+struct Reducing<'a, T> {
+    plane: &'a PyramidPlane<T>,
+    reduced: &'a mut PyramidPlane<T>,
+}
+
+impl<T: Texel> VectorLoop for Reducing<'_, T> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { plane, reduced } = self;
+        let width = reduced.columns.len();
         // Rows of this level, reduced along x: a window of five of them.
         let mut padded = vec![T::default(); 2 * width + 3];
         let mut window: [Vec<T>; 5] = std::array::from_fn(|_| vec![T::default(); width]);
@@ -108,7 +148,7 @@ impl<T: Texel> PyramidPlane<T> {
         let mut next = 2 * reduced.rows.start as isize - 2;
         for y in reduced.rows.clone() {
             while next <= 2 * y as isize + 2 {
-                self.copy_row(next, first, &mut padded);
+                plane.copy_row(next, first, &mut padded);
                 let row = &mut window[next.rem_euclid(5) as usize];
                 for (out, taps) in row.iter_mut().zip(padded.windows(5).step_by(2)) {
                     *out = five(taps[0], taps[1], taps[2], taps[3], taps[4]);
@@ -121,53 +161,76 @@ impl<T: Texel> PyramidPlane<T> {
                 *out = five(a[x], b[x], c[x], d[x], e[x]);
             }
         }
-        reduced
     }
+}
 
-    /// The part `columns` x `rows` of the next finer level, interpolated; sums not divided by their shares.
-    pub(crate) fn expanded(&self, columns: &Range<usize>, rows: &Range<usize>) -> Self {
-        let mut expanded = Self::new(columns.clone(), rows.clone());
-        let width = columns.len();
-        if width == 0 {
-            return expanded;
+/// Rows of the next finer level, interpolated one after the other.
+pub(crate) struct Expansion<'a, T> {
+    plane: &'a PyramidPlane<T>,
+    /// The first column that is read of the plane; it may lie left of the canvas.
+    first: isize,
+    /// 1 where the first column is an odd one.
+    odd: usize,
+    padded: Vec<T>,
+    /// Three rows of the plane, interpolated along x.
+    window: [Vec<T>; 3],
+    /// The next row that is read of the plane.
+    next: isize,
+    /// The next row that is made.
+    row: usize,
+}
+
+impl<T: Texel> Expansion<'_, T> {
+    /// Makes the next row, as wide as the columns that were asked for.
+    pub(crate) fn next_row(&mut self, out: &mut [T]) {
+        let y = self.row;
+        self.row += 1;
+        if !out.is_empty() {
+            with_vector_instructions(ExpandedRow { expansion: self, y, out });
         }
-        let first = columns.start as isize / 2 - 1;
-        let mut padded = vec![T::default(); width / 2 + 4];
-        let mut window: [Vec<T>; 3] = std::array::from_fn(|_| vec![T::default(); width]);
-        let mut next = rows.start as isize / 2 - 1;
-        for y in rows.clone() {
-            let middle = (y / 2) as isize;
-            while next <= middle + 1 {
-                self.copy_row(next, first, &mut padded);
-                let row = &mut window[next.rem_euclid(3) as usize];
-                // Columns in pairs that the same taps are for, but for a first odd one.
-                let odd = columns.start % 2;
-                if let Some(out) = row.first_mut().filter(|_| odd == 1) {
-                    *out = two(padded[1], padded[2]);
-                }
-                for (pair, taps) in row[odd..].chunks_mut(2).zip(padded[odd..].windows(3)) {
-                    let [even, rest @ ..] = pair else { continue };
-                    *even = three(taps[0], taps[1], taps[2]);
-                    if let [odd] = rest {
-                        *odd = two(taps[1], taps[2]);
-                    }
-                }
-                next += 1;
+    }
+}
+
+/// Row `y` of an expansion, which is to be made.
+struct ExpandedRow<'e, 'a, T> {
+    expansion: &'e mut Expansion<'a, T>,
+    y: usize,
+    out: &'e mut [T],
+}
+
+impl<T: Texel> VectorLoop for ExpandedRow<'_, '_, T> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { expansion, y, out } = self;
+        let middle = (y / 2) as isize;
+        while expansion.next <= middle + 1 {
+            expansion.plane.copy_row(expansion.next, expansion.first, &mut expansion.padded);
+            let row = &mut expansion.window[expansion.next.rem_euclid(3) as usize];
+            // Columns in pairs that the same taps are for, but for a first odd one.
+            let (odd, padded) = (expansion.odd, &expansion.padded);
+            if let Some(out) = row.first_mut().filter(|_| odd == 1) {
+                *out = two(padded[1], padded[2]);
             }
-            let at = |row: isize| &window[row.rem_euclid(3) as usize][..width];
-            let (above, here, below) = (at(middle - 1), at(middle), at(middle + 1));
-            let out = expanded.row_mut(y);
-            if y.is_multiple_of(2) {
-                for (x, out) in out.iter_mut().enumerate() {
-                    *out = three(above[x], here[x], below[x]);
+            for (pair, taps) in row[odd..].chunks_mut(2).zip(padded[odd..].windows(3)) {
+                let [even, rest @ ..] = pair else { continue };
+                *even = three(taps[0], taps[1], taps[2]);
+                if let [odd] = rest {
+                    *odd = two(taps[1], taps[2]);
                 }
-            } else {
-                for (x, out) in out.iter_mut().enumerate() {
-                    *out = two(here[x], below[x]);
-                }
+            }
+            expansion.next += 1;
+        }
+        let at = |row: isize| &expansion.window[row.rem_euclid(3) as usize][..out.len()];
+        let (above, here, below) = (at(middle - 1), at(middle), at(middle + 1));
+        if y.is_multiple_of(2) {
+            for (x, out) in out.iter_mut().enumerate() {
+                *out = three(above[x], here[x], below[x]);
+            }
+        } else {
+            for (x, out) in out.iter_mut().enumerate() {
+                *out = two(here[x], below[x]);
             }
         }
-        expanded
     }
 }
 

@@ -235,7 +235,7 @@ impl<'a> Canvas<'a> {
         let across = |y: usize| {
             let of_stretch = |(first, own): (usize, Range<usize>)| {
                 let start = own.start;
-                self.gaps.within_row(own, y).map(move |x| first + x - start)
+                self.gaps.within_row(own, y).map(move |gap| first + gap.start - start..first + gap.end - start)
             };
             let mut gaps = stretches.iter().cloned().flat_map(of_stretch).peekable();
             gaps.peek().is_some().then(|| spread(gaps, border, columns))
@@ -391,12 +391,12 @@ fn surface(known: PyramidPlane<[f32; 4]>) -> PyramidPlane<[f32; 4]> {
     pulled(levels, None)
 }
 
-/// Which of `columns` lie no more than `reach` before or after one of `places`, which ascend.
-fn spread(places: impl Iterator<Item = usize>, reach: usize, columns: &Range<usize>) -> Vec<bool> {
+/// Which of `columns` lie no more than `reach` before or after one of the places of `stretches`, which ascend.
+fn spread(stretches: impl Iterator<Item = Range<usize>>, reach: usize, columns: &Range<usize>) -> Vec<bool> {
     let mut spread = vec![false; columns.len()];
     let mut done = columns.start;
-    for at in places {
-        let range = at.saturating_sub(reach).max(done)..(at + reach + 1).min(columns.end);
+    for stretch in stretches {
+        let range = stretch.start.saturating_sub(reach).max(done)..(stretch.end + reach).min(columns.end);
         if range.start < range.end {
             done = range.end;
             spread[range.start - columns.start..range.end - columns.start].fill(true);

@@ -14,7 +14,7 @@ use crate::test_photographs::{Memory, RamDisk, canvas, gradient, moved, noise};
 fn framed_and_whole(
     input: &RenderInput<'_>,
     options: &CanvasOptions,
-    known: Option<&Rectangle>,
+    known: Option<&Frame>,
     memory: usize,
 ) -> [Rendered; 2] {
     let coverage = Coverage::of(input.layout);
@@ -46,8 +46,9 @@ fn what_is_kept_is_the_same_and_the_rest_is_left_empty() {
     let (layout, corrections, photographs) = scene();
     let input = RenderInput { layout: &layout, corrections: &corrections, photographs: &photographs };
     let corner = Rectangle { columns: 40..500, rows: 60..180 };
+    let known_corner = Frame::Part(corner.clone());
     for memory in [usize::MAX, 1] {
-        for (crop, known) in [(Crop::Rectangle, None), (Crop::Auto, None), (Crop::Auto, Some(&corner))] {
+        for (crop, known) in [(Crop::Rectangle, None), (Crop::Auto, None), (Crop::Auto, Some(&known_corner))] {
             let options = CanvasOptions { crop, ..CanvasOptions::default() };
             let [framed, whole] = framed_and_whole(&input, &options, known, memory);
             let Some(Frame::Part(kept)) = framed.frame.clone() else { panic!("{crop:?}: {:?}", framed.frame) };

@@ -11,7 +11,7 @@ use std::marker::PhantomData;
 use trueup_core::raster::{Photograph, Raster};
 
 use crate::kernel::{Bilinear, InterpolationKernel};
-use crate::simd::{Positions, Rgb8, VectorLoop, interpolate_rgb8, with_vector_instructions};
+use crate::simd::{Positions, Rgb8, VectorLoop, cubic_rgb8, cubic_window, linear_rgb8, with_vector_instructions};
 
 /// Taps of a widened kernel per axis, at most: a kernel of radius 2 widened 15 times has 60.
 const MAX_TAPS: usize = 64;
@@ -72,9 +72,16 @@ pub(crate) fn interpolate<K: InterpolationKernel>(
         Photograph::Eight(raster) if raster.channels() == 3 && stretch == [1.0, 1.0] => {
             let picture = Rgb8 { samples: raster.data(), width: raster.width(), height: raster.height() };
             at_border.clear();
-            interpolate_rgb8::<K>(picture, positions, out, at_border);
+            if K::IS_LINEAR {
+                linear_rgb8(picture, positions, out, at_border);
+            } else {
+                cubic_rgb8(picture, positions, out, at_border);
+            }
             for &index in &*at_border {
-                out[index] = interpolate_one::<K, u8, 3>(raster, positions, index);
+                out[index] = match K::IS_LINEAR {
+                    true => interpolate_one::<K, u8, 3>(raster, positions, index),
+                    false => cubic_at_border(raster, positions, index),
+                };
             }
         }
         Photograph::Eight(raster) => interpolate_depth::<K, u8>(raster, positions, stretch, out),
@@ -148,15 +155,32 @@ fn pixel<T: Sample, const C: usize>(row: &[T], column: usize) -> [f32; 4] {
     }
 }
 
-/// The 4 x 4 samples around a position, weighted in the order the vector form has: along the columns first.
+/// The columns and rows of the 4 x 4 samples around a position; beyond the border, the outermost ones again.
+fn window_around<'r, T: Sample>(
+    raster: &'r Raster<T>,
+    positions: &Positions,
+    index: usize,
+) -> ([usize; 4], [&'r [T]; 4]) {
+    let tap = |at: i32, tap: usize, size: usize| (at.saturating_add(tap as i32 - 1).max(0) as usize).min(size - 1);
+    let columns = std::array::from_fn(|i| tap(positions.column[index], i, raster.width()));
+    (columns, std::array::from_fn(|i| raster.row(tap(positions.row[index], i, raster.height()))))
+}
+
+/// 8-bit RGB by cubic convolution where the border cuts the window.
+fn cubic_at_border(raster: &Raster<u8>, positions: &Positions, index: usize) -> [f32; 4] {
+    let (columns, rows) = window_around(raster, positions, index);
+    let pixel = |row: &[u8], column: usize| [row[3 * column], row[3 * column + 1], row[3 * column + 2]];
+    let window = columns.map(|column| rows.map(|row| pixel(row, column)));
+    cubic_window(window, positions.fraction_x[index], positions.fraction_y[index])
+}
+
+/// The 4 x 4 samples around a position, weighted along the columns first.
 fn interpolate_one<K: InterpolationKernel, T: Sample, const C: usize>(
     raster: &Raster<T>,
     positions: &Positions,
     index: usize,
 ) -> [f32; 4] {
-    let tap = |at: i32, tap: usize, size: usize| (at.saturating_add(tap as i32 - 1).max(0) as usize).min(size - 1);
-    let columns: [usize; 4] = std::array::from_fn(|i| tap(positions.column[index], i, raster.width()));
-    let rows: [&[T]; 4] = std::array::from_fn(|i| raster.row(tap(positions.row[index], i, raster.height())));
+    let (columns, rows) = window_around(raster, positions, index);
     let (fraction_x, fraction_y) = (positions.fraction_x[index], positions.fraction_y[index]);
     let (wx, wy) = (K::taps(fraction_x), K::taps(fraction_y));
     let window: [[[f32; 4]; 4]; 4] = columns.map(|column| rows.map(|row| pixel::<T, C>(row, column)));

@@ -3,6 +3,8 @@
 use rayon::prelude::*;
 use trueup_core::raster::{Photograph, Raster};
 
+use crate::simd::{VectorLoop, with_vector_instructions};
+
 /// The photograph at half the size: every sample the mean of 2 x 2. Coordinates are exactly halved; the last column or
 /// row of an odd size averages the samples it has. Colors are weighted by alpha where there is one.
 pub(crate) fn reduce_by_two(photograph: &Photograph) -> Photograph {
@@ -18,8 +20,8 @@ fn halve<T: Copy + Default + Send + Sync>(
     sample: impl Fn(u32) -> T + Sync,
 ) -> Raster<T> {
     match raster.channels() {
-        1 => halve_rows::<T, 1>(raster, |quad| mean(quad, &value, &sample)),
-        3 => halve_rows::<T, 3>(raster, |quad| mean(quad, &value, &sample)),
+        1 => halve_opaque::<T, 1>(raster, &value, &sample),
+        3 => halve_opaque::<T, 3>(raster, &value, &sample),
         _ => halve_rows::<T, 4>(raster, |quad| mean_by_alpha(quad, &value, &sample)),
     }
 }
@@ -44,16 +46,57 @@ fn halve_rows<T: Copy + Default + Send + Sync, const C: usize>(
     reduced
 }
 
-#[inline(always)]
-fn mean<T: Copy + Default, const C: usize>(
-    [a, b, c, d]: [&[T; C]; 4],
-    value: impl Fn(T) -> u32,
-    sample: impl Fn(u32) -> T,
-) -> [T; C] {
-    std::array::from_fn(|channel| {
-        let sum = value(a[channel]) + value(b[channel]) + value(c[channel]) + value(d[channel]);
-        sample((sum + 2) / 4)
-    })
+/// [`halve_rows`] where every pixel counts the same: rows are added up first, side by side.
+fn halve_opaque<T: Copy + Default + Send + Sync, const C: usize>(
+    raster: &Raster<T>,
+    value: &(impl Fn(T) -> u32 + Sync),
+    sample: &(impl Fn(u32) -> T + Sync),
+) -> Raster<T> {
+    let (width, height) = (raster.width().div_ceil(2), raster.height().div_ceil(2));
+    let mut reduced = Raster::new(width, height, C);
+    let rows = reduced.data_mut().par_chunks_mut((width * C).max(1)).enumerate();
+    rows.for_each_init(Vec::new, |sums, (y, row)| {
+        let [upper, lower] = [2 * y, (2 * y + 1).min(raster.height() - 1)].map(|row| raster.row(row));
+        with_vector_instructions(HalvedRow::<T, _, _, C> { upper, lower, value, sample, sums, row });
+    });
+    reduced
+}
+
+/// A row of means of 2 x 2 pixels of `C` channels.
+struct HalvedRow<'a, T, V, S, const C: usize> {
+    upper: &'a [T],
+    lower: &'a [T],
+    value: &'a V,
+    sample: &'a S,
+    /// Room for the sums of both rows.
+    sums: &'a mut Vec<u32>,
+    row: &'a mut [T],
+}
+
+impl<T: Copy, V: Fn(T) -> u32, S: Fn(u32) -> T, const C: usize> VectorLoop for HalvedRow<'_, T, V, S, C> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { upper, lower, value, sample, sums, row } = self;
+        sums.clear();
+        sums.resize(upper.len(), 0);
+        for ((sum, &upper), &lower) in sums.iter_mut().zip(upper).zip(lower) {
+            *sum = value(upper) + value(lower);
+        }
+        let columns = sums.as_chunks::<C>().0;
+        let (pairs, odd) = columns.as_chunks::<2>();
+        let row = row.as_chunks_mut::<C>().0;
+        for (out, [left, right]) in row.iter_mut().zip(pairs) {
+            for channel in 0..C {
+                out[channel] = sample((left[channel] + right[channel] + 2) / 4);
+            }
+        }
+        // Of an odd width the last column stands for two.
+        if let ([last], Some(out)) = (odd, row.last_mut()) {
+            for channel in 0..C {
+                out[channel] = sample((2 * last[channel] + 2) / 4);
+            }
+        }
+    }
 }
 
 fn mean_by_alpha<T: Copy + Default, const C: usize>(

@@ -56,7 +56,8 @@ fn interpolation_is_the_kernels_sum() {
             sums.iter_mut().zip(pixel).for_each(|(sum, &level)| *sum += weight * f64::from(level));
         }
         for (found, expected) in found.iter().zip(sums) {
-            assert!((f64::from(*found) - expected).abs() < 1e-3, "{found} for {expected} at ({x}, {y})");
+            // Columns in 64ths of a level, over weights whose sizes add up to at most 1.25; weights in 16384ths, rounded.
+            assert!((f64::from(*found) - expected).abs() < 0.05, "{found} for {expected} at ({x}, {y})");
         }
         assert_eq!(found[3], 255.0);
     }
@@ -81,7 +82,7 @@ fn vector_and_portable_forms_agree_bit_for_bit() {
     let positions = positions(&points);
     let fast = sample::<Bicubic>(&Photograph::Eight(raster.clone()), [1.0, 1.0], &points);
     for (index, fast) in fast.iter().enumerate() {
-        let slow = interpolate_one::<Bicubic, u8, 3>(&raster, &positions, index);
+        let slow = cubic_at_border(&raster, &positions, index);
         assert_eq!(fast.map(f32::to_bits), slow.map(f32::to_bits), "at {:?}", points[index]);
     }
 }
@@ -105,7 +106,7 @@ fn all_depths_and_layouts_agree_on_a_gray_photograph() {
             for (got, expected) in sample::<Bicubic>(photograph, stretch, &points).iter().zip(&expected) {
                 for (got, expected) in got.iter().zip(expected) {
                     // Masked photographs are averaged without negative lobes, so only the plain form must agree there.
-                    let tolerance = if photograph.channels() == 4 && stretch != [1.0, 1.0] { 60.0 } else { 1e-3 };
+                    let tolerance = if photograph.channels() == 4 && stretch != [1.0, 1.0] { 60.0 } else { 0.05 };
                     assert!((got - expected).abs() < tolerance, "{got} {expected}");
                 }
             }

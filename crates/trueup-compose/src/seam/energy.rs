@@ -135,6 +135,30 @@ impl<'a> SeamEnergy<'a> {
         self.views[label].flags(x, y, self.turn) & wanted != 0
     }
 
+    /// Tells `found` of those of `columns` in row `y` where photograph `label` may not be shown.
+    pub(super) fn each_not_allowed(
+        &self,
+        label: usize,
+        columns: std::ops::Range<usize>,
+        y: usize,
+        found: &mut impl FnMut(usize),
+    ) {
+        let view = &self.views[label];
+        let in_first_turn = view.columns.start <= columns.start && columns.end <= view.columns.end;
+        if !in_first_turn || !view.rows.contains(&y) {
+            return columns.filter(|&x| !self.allowed(label, x, y)).for_each(found);
+        }
+        let start = (y - view.rows.start) * view.columns.len() + columns.start - view.columns.start;
+        let pixels = &view.pixels[start..start + columns.len()];
+        let anyone = &self.anyone[y * self.width + columns.start..][..columns.len()];
+        for (x, (pixel, anyone)) in columns.zip(pixels.iter().zip(anyone)) {
+            let wanted = if anyone & ANY_WHOLE != 0 { WHOLLY } else { PARTLY };
+            if pixel[3] & wanted == 0 {
+                found(x);
+            }
+        }
+    }
+
     /// How deep inside photograph `label` a canvas pixel lies, 0 to 255.
     pub(super) fn depth(&self, label: usize, x: usize, y: usize) -> u8 {
         self.views[label].index_around(x, y, self.turn).map_or(0, |index| self.depths[label].at(index))

@@ -186,10 +186,16 @@ fn follow(
 ) -> Result<Vec<Label>> {
     let width = energy.width;
     labels.par_chunks_exact_mut(width).enumerate().for_each(|(y, labels)| {
-        for (x, label) in labels.iter_mut().enumerate() {
-            if *label == NOBODY || !energy.allowed(usize::from(*label), x, y) {
-                *label = deepest_at(energy, [x, y]);
+        let mut first = 0;
+        while first < width {
+            let label = labels[first];
+            let end = first + labels[first..].iter().take_while(|&&other| other == label).count();
+            let mut change = |x: usize| labels[x] = deepest_at(energy, [x, y]);
+            match label {
+                NOBODY => (first..end).for_each(change),
+                _ => energy.each_not_allowed(usize::from(label), first..end, y, &mut change),
             }
+            first = end;
         }
     });
     let band = Band::around_changes(&labels, width, energy.turn, BAND_PX);

@@ -1,5 +1,6 @@
 //! Where a photograph shows less detail than another one that shows the same.
 
+use std::collections::VecDeque;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -99,15 +100,23 @@ impl Detail {
         let (columns, rows) = (view.columns.len().div_ceil(CELL_PX), view.rows.len().div_ceil(CELL_PX));
         let mut sums = vec![Sums::default(); columns * rows];
         let (width, height) = (view.columns.len(), view.rows.len());
+        // Brightness in three rows, in 256ths of a level; below 0 where it tells nothing.
+        let brightness = |y: usize| -> Vec<i32> {
+            let row = &view.pixels[y * width..(y + 1) * width];
+            row.iter().map(|pixel| if tells(pixel) { luma(pixel) as i32 } else { -1 }).collect()
+        };
+        let mut window: VecDeque<Vec<i32>> = (0..height.min(2)).map(brightness).collect();
         for y in 1..height.saturating_sub(1) {
+            window.push_back(brightness(y + 1));
+            let pixels = &view.pixels[y * width..(y + 1) * width];
             for x in 1..width.saturating_sub(1) {
-                let at = y * width + x;
-                let around = [at - 1, at + 1, at - width, at + width].map(|at| &view.pixels[at]);
-                let own = &view.pixels[at];
-                if tells(own) && around.iter().all(|pixel| tells(pixel)) {
-                    sums[y / CELL_PX * columns + x / CELL_PX].add(own, laplacian(own, around));
+                let around = [window[1][x - 1], window[1][x + 1], window[0][x], window[2][x]];
+                let own = window[1][x];
+                if around.into_iter().fold(own, i32::min) >= 0 {
+                    sums[y / CELL_PX * columns + x / CELL_PX].add(&pixels[x], laplacian(own, around));
                 }
             }
+            window.pop_front();
         }
         let cell = |index: usize| {
             let near = |at: usize, length: usize| at.saturating_sub(1)..(at + 2).min(length);
@@ -166,8 +175,8 @@ fn tells(pixel: &SmallPixel) -> bool {
 }
 
 /// Size of the Laplacian of the brightness, in 256ths of a level.
-fn laplacian(own: &SmallPixel, around: [&SmallPixel; 4]) -> u32 {
-    (4 * luma(own)).abs_diff(around.into_iter().map(luma).sum())
+fn laplacian(own: i32, around: [i32; 4]) -> u32 {
+    (4 * own).abs_diff(around.into_iter().sum())
 }
 
 #[cfg(test)]

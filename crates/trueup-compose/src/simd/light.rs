@@ -87,14 +87,17 @@ pub(crate) fn develop(development: Development<'_>, positions: &Positions, sampl
     develop_portable(development, positions, samples);
 }
 
-#[inline(always)]
 fn develop_portable(development: Development<'_>, positions: &Positions, samples: &mut [[f32; 4]]) {
+    develop_from(0, development, positions, samples);
+}
+
+/// [`develop`] of samples of which the first is number `first`.
+#[inline(always)]
+fn develop_from(first: usize, development: Development<'_>, positions: &Positions, samples: &mut [[f32; 4]]) {
     let Development { feather, light, local, border_footprint } = development;
-    let length = samples.len();
-    for start in (0..length).step_by(BLOCK) {
-        let block = start..(start + BLOCK).min(length);
+    for (number, samples) in samples.chunks_mut(BLOCK).enumerate() {
+        let block = first + number * BLOCK..first + number * BLOCK + samples.len();
         let lifts = lifts(light, local, positions, &block);
-        let samples = &mut samples[block.clone()];
         let mut roots = corrected(light, samples, &lifts);
         roots.iter_mut().flatten().for_each(|value| *value = value.sqrt());
         if light.keeps_light {
@@ -151,6 +154,9 @@ fn corrected(light: &LightTable, samples: &[[f32; 4]], lifts: &[f32; BLOCK]) -> 
     levels
 }
 
+/// The share that is covered of a sample, for each level of its opacity.
+const SHARE_PER_LEVEL: f32 = 1.0 / 255.0;
+
 /// The share of a canvas pixel that a sample covers: what is transparent of it covers nothing, and neither does what lies
 /// beyond the photograph's border.
 #[inline(always)]
@@ -161,8 +167,7 @@ fn share(
     positions: &Positions,
     index: usize,
 ) -> f32 {
-    const PER_LEVEL: f32 = 1.0 / 255.0;
-    let share = (opacity * PER_LEVEL).clamp(0.0, 1.0);
+    let share = (opacity * SHARE_PER_LEVEL).clamp(0.0, 1.0);
     match border_footprint {
         Some(footprint) => share * feather.coverage(center(positions, index), footprint),
         None => share,
@@ -180,7 +185,19 @@ fn center(positions: &Positions, index: usize) -> [f32; 2] {
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
+    use std::arch::x86_64::{
+        __m256, _mm_loadu_ps, _mm_storeu_ps, _mm_unpackhi_epi64, _mm_unpacklo_epi64, _mm256_add_ps, _mm256_and_si256,
+        _mm256_castpd_ps, _mm256_castps_si256, _mm256_castps128_ps256, _mm256_castps256_ps128, _mm256_castsi256_si128,
+        _mm256_cvtepi32_ps, _mm256_div_ps, _mm256_extractf128_ps, _mm256_extracti128_si256, _mm256_i32gather_pd,
+        _mm256_insertf128_ps, _mm256_loadu_ps, _mm256_loadu_si256, _mm256_max_ps, _mm256_min_ps, _mm256_mul_ps,
+        _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps, _mm256_sqrt_ps, _mm256_sub_ps,
+        _mm256_unpackhi_ps, _mm256_unpacklo_ps,
+    };
+    use std::ops::Range;
+
     use super::{Contribution, Development, Positions};
+    use crate::light::{LEAST_LEVELLED, LightTable};
+    use crate::linear_table::{LinearTable, ROUNDING};
 
     #[target_feature(enable = "avx2")]
     pub(super) fn accumulate(
@@ -192,8 +209,143 @@ mod x86 {
         super::accumulate_portable(contribution, positions, samples, sums);
     }
 
+    /// Eight pixels at a time; what is left, and where a border cuts pixels, as the portable form does it.
     #[target_feature(enable = "avx2")]
     pub(super) fn develop(development: Development<'_>, positions: &Positions, samples: &mut [[f32; 4]]) {
-        super::develop_portable(development, positions, samples);
+        let Development { light, local, border_footprint, .. } = development;
+        let whole = if border_footprint.is_some() { 0 } else { samples.len() / LANES * LANES };
+        let (eights, rest) = samples.split_at_mut(whole);
+        let varies = light.varies();
+        for (at, eight) in eights.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+            let block = at * LANES..(at + 1) * LANES;
+            let mut lifts = _mm256_set1_ps(1.0);
+            if varies {
+                lifts = falloff(light, positions, &block);
+            }
+            if let Some(factors) = local {
+                let factors: &[f32] = &factors[block];
+                // SAFETY: there are eight factors.
+                lifts = _mm256_mul_ps(lifts, unsafe { _mm256_loadu_ps(factors.as_ptr()) });
+            }
+            let [r, g, b, opacity] = by_channel(eight);
+            let root = |level: __m256, gain: f32| {
+                let linear = linear(light, level);
+                let factor = _mm256_mul_ps(_mm256_set1_ps(gain), lifts);
+                if light.keeps_light {
+                    _mm256_sqrt_ps(_mm256_sqrt_ps(_mm256_mul_ps(linear, factor)))
+                } else {
+                    _mm256_sqrt_ps(exposed_all(linear, factor))
+                }
+            };
+            let roots = [root(r, light.gain[0]), root(g, light.gain[1]), root(b, light.gain[2])];
+            let share = _mm256_mul_ps(opacity, _mm256_set1_ps(super::SHARE_PER_LEVEL));
+            let share = _mm256_min_ps(_mm256_max_ps(share, _mm256_setzero_ps()), _mm256_set1_ps(1.0));
+            by_pixel([roots[0], roots[1], roots[2], share], eight);
+        }
+        if !rest.is_empty() {
+            super::develop_from(whole, development, positions, rest);
+        }
+    }
+
+    /// Pixels that are developed side by side.
+    const LANES: usize = 8;
+
+    /// [`exposed`](crate::light::exposed), the same operations in the same order.
+    #[target_feature(enable = "avx2")]
+    fn exposed_all(linear: __m256, factor: __m256) -> __m256 {
+        let square = |value| _mm256_mul_ps(value, value);
+        let one = _mm256_set1_ps(1.0);
+        let strength = _mm256_sub_ps(square(square(_mm256_max_ps(factor, _mm256_set1_ps(LEAST_LEVELLED)))), one);
+        let levelled = _mm256_add_ps(one, _mm256_mul_ps(strength, square(square(linear))));
+        _mm256_div_ps(_mm256_mul_ps(factor, linear), _mm256_sqrt_ps(_mm256_sqrt_ps(levelled)))
+    }
+
+    /// Linear light of samples on the scale of 0 to 255.
+    #[target_feature(enable = "avx2")]
+    fn linear(light: &LightTable, level: __m256) -> __m256 {
+        // The first operand is the one that is not kept where one is no number.
+        let level = _mm256_max_ps(level, _mm256_setzero_ps());
+        let level = _mm256_min_ps(level, _mm256_set1_ps(255.0));
+        let (values, per_level) = light.linearize.table();
+        at_all(values, _mm256_mul_ps(level, _mm256_set1_ps(per_level)))
+    }
+
+    /// The factors against vignetting of a block of eight positions.
+    #[target_feature(enable = "avx2")]
+    fn falloff(light: &LightTable, positions: &Positions, block: &Range<usize>) -> __m256 {
+        let Some((table, center, steps_per_px2, last)) = light.falloff() else { return _mm256_set1_ps(1.0) };
+        let from_center = |whole: &[i32], fraction: &[f32], center: f32| {
+            let (whole, fraction): (&[i32], &[f32]) = (&whole[block.clone()], &fraction[block.clone()]);
+            // SAFETY: there are eight of both.
+            let (whole, fraction) =
+                unsafe { (_mm256_loadu_si256(whole.as_ptr().cast()), _mm256_loadu_ps(fraction.as_ptr())) };
+            let place = _mm256_add_ps(_mm256_add_ps(_mm256_cvtepi32_ps(whole), _mm256_set1_ps(0.5)), fraction);
+            _mm256_sub_ps(place, _mm256_set1_ps(center))
+        };
+        let dx = from_center(&positions.column, &positions.fraction_x, center[0]);
+        let dy = from_center(&positions.row, &positions.fraction_y, center[1]);
+        let squared = _mm256_add_ps(_mm256_mul_ps(dx, dx), _mm256_mul_ps(dy, dy));
+        let steps = _mm256_mul_ps(squared, _mm256_set1_ps(steps_per_px2));
+        at_all(table, _mm256_min_ps(steps, _mm256_set1_ps(last)))
+    }
+
+    /// [`LinearTable::at_all`] of eight positions.
+    #[target_feature(enable = "avx2")]
+    fn at_all<const ENTRIES: usize>(table: &LinearTable<ENTRIES>, positions: __m256) -> __m256 {
+        let rounding = _mm256_set1_ps(ROUNDING);
+        let rounded = _mm256_add_ps(_mm256_sub_ps(positions, _mm256_set1_ps(0.5)), rounding);
+        let beyond = _mm256_sub_ps(positions, _mm256_sub_ps(rounded, rounding));
+        let indices = _mm256_and_si256(_mm256_castps_si256(rounded), _mm256_set1_epi32(ENTRIES as i32 - 1));
+        let (low, high) = (_mm256_castsi256_si128(indices), _mm256_extracti128_si256::<1>(indices));
+        let entries: *const f64 = table.entries().as_ptr().cast();
+        // An entry is two floats, read as one double. The halves of both vectors are put together as they are taken apart below.
+        // SAFETY: indices are below the number of entries.
+        let (first, second) = unsafe {
+            (
+                _mm256_i32gather_pd::<8>(entries, _mm_unpacklo_epi64(low, high)),
+                _mm256_i32gather_pd::<8>(entries, _mm_unpackhi_epi64(low, high)),
+            )
+        };
+        let (first, second) = (_mm256_castpd_ps(first), _mm256_castpd_ps(second));
+        let values = _mm256_shuffle_ps::<0b10_00_10_00>(first, second);
+        let steps = _mm256_shuffle_ps::<0b11_01_11_01>(first, second);
+        _mm256_add_ps(values, _mm256_mul_ps(beyond, steps))
+    }
+
+    /// Eight pixels, channel by channel.
+    #[target_feature(enable = "avx2")]
+    fn by_channel(pixels: &[[f32; 4]; LANES]) -> [__m256; 4] {
+        // Pixels 0 and 4, 1 and 5, 2 and 6, 3 and 7.
+        let pair = |at: usize| {
+            // SAFETY: a pixel is four floats.
+            let (low, high) = unsafe { (_mm_loadu_ps(pixels[at].as_ptr()), _mm_loadu_ps(pixels[at + 4].as_ptr())) };
+            _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(low), high)
+        };
+        transposed([pair(0), pair(1), pair(2), pair(3)])
+    }
+
+    /// Puts channels back into eight pixels.
+    #[target_feature(enable = "avx2")]
+    fn by_pixel(channels: [__m256; 4], pixels: &mut [[f32; 4]; LANES]) {
+        for (at, pair) in transposed(channels).into_iter().enumerate() {
+            // SAFETY: a pixel is four floats.
+            unsafe {
+                _mm_storeu_ps(pixels[at].as_mut_ptr(), _mm256_castps256_ps128(pair));
+                _mm_storeu_ps(pixels[at + 4].as_mut_ptr(), _mm256_extractf128_ps::<1>(pair));
+            }
+        }
+    }
+
+    /// Rows as columns of the 4 x 4 in each half.
+    #[target_feature(enable = "avx2")]
+    fn transposed([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
+        let (ab_low, ab_high) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+        let (cd_low, cd_high) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+        [
+            _mm256_shuffle_ps::<0b01_00_01_00>(ab_low, cd_low),
+            _mm256_shuffle_ps::<0b11_10_11_10>(ab_low, cd_low),
+            _mm256_shuffle_ps::<0b01_00_01_00>(ab_high, cd_high),
+            _mm256_shuffle_ps::<0b11_10_11_10>(ab_high, cd_high),
+        ]
     }
 }

@@ -7,7 +7,7 @@ mod interpolation;
 mod light;
 mod positions;
 
-pub(crate) use interpolation::{Rgb8, interpolate_rgb8};
+pub(crate) use interpolation::{Rgb8, cubic_rgb8, cubic_window, linear_rgb8};
 pub(crate) use light::{Contribution, Development, accumulate, develop};
 pub(crate) use positions::{InverseBilinear, Positions, invert_row};
 

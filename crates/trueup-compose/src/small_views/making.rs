@@ -9,7 +9,7 @@ use super::view::{CLIPPED, IGNORED, KEPT, PARTLY, SmallPixel, SmallView, WHOLLY}
 use crate::ignored::in_mask;
 use crate::layout::columns_around;
 use crate::transfer_curve::EncodeRoots;
-use crate::warped::{SamplingMemory, WarpedPhotograph};
+use crate::warped::{RowSink, SamplingMemory, WarpedPhotograph};
 use crate::weights::WHOLE;
 use crate::window::Window;
 
@@ -26,18 +26,38 @@ pub(super) fn small_view(
 ) -> SmallView {
     let (all, rows) = (warped.columns(), warped.rows());
     let columns = all.start..all.end.min(all.start + period.unwrap_or(all.len()));
-    let mut samples = vec![[0.0; 4]; columns.len() * rows.len()];
-    let mut clipped = vec![false; samples.len()];
     let window = Window { columns: &columns, rows: &rows };
-    warped.sample_with(window, &mut samples, &SAMPLING, &mut SamplingMemory::default(), |first, raw| {
-        for (clipped, sample) in clipped[first..].iter_mut().zip(raw) {
+    let pixels = Vec::with_capacity(columns.len() * rows.len());
+    let mut making = SmallRows { view_levels, clipped: vec![false; columns.len()], pixels };
+    warped.sample_rows(window, &SAMPLING, &mut SamplingMemory::default(), &mut making);
+    let mut pixels = making.pixels;
+    mark(&mut pixels, window, warped, masks);
+    let (columns, turned) = columns_around(columns, period);
+    if turned > 0 {
+        pixels.chunks_exact_mut(columns.len()).for_each(|row| row.rotate_right(turned));
+    }
+    SmallView { columns, rows, pixels }
+}
+
+/// Makes a small view's pixels of rows as they come.
+struct SmallRows<'a> {
+    view_levels: Option<&'a EncodeRoots>,
+    /// Which of the row's pixels are clipped.
+    clipped: Vec<bool>,
+    pixels: Vec<SmallPixel>,
+}
+
+impl RowSink for SmallRows<'_> {
+    fn own(&mut self, first: usize, samples: &[[f32; 4]]) {
+        for (clipped, sample) in self.clipped[first..].iter_mut().zip(samples) {
             *clipped = sample[..3].iter().any(|&level| level >= SATURATED);
         }
-    });
-    let mut pixels: Vec<SmallPixel> = samples
-        .iter()
-        .zip(clipped)
-        .map(|(&[r, g, b, share], clipped)| {
+    }
+
+    fn row(&mut self, _number: usize, row: &mut [[f32; 4]]) {
+        let view_levels = self.view_levels;
+        let pixel = |(&[r, g, b, share], clipped): (&[f32; 4], &mut bool)| {
+            let clipped = std::mem::take(clipped);
             // The casts saturate.
             let level = |root: f32| match view_levels {
                 Some(levels) => levels.level((root * f32::from(u16::MAX) + 0.5) as u16),
@@ -47,14 +67,9 @@ pub(super) fn small_view(
                 | (u8::from(share >= WHOLE) * WHOLLY)
                 | (u8::from(clipped && share > 0.0) * CLIPPED);
             [level(r), level(g), level(b), flags]
-        })
-        .collect();
-    mark(&mut pixels, window, warped, masks);
-    let (columns, turned) = columns_around(columns, period);
-    if turned > 0 {
-        pixels.chunks_exact_mut(columns.len()).for_each(|row| row.rotate_right(turned));
+        };
+        self.pixels.extend(row.iter().zip(&mut self.clipped).map(pixel));
     }
-    SmallView { columns, rows, pixels }
 }
 
 /// Adds what the photographer marked to the pixels of a window.

@@ -243,7 +243,7 @@ impl Making<'_> {
         let light = PhotographLight { curve: self.curve, correction, local: local_small.as_ref() };
         let warped = WarpedPhotograph::new(Cow::Borrowed(&photograph), &mesh, clip, light, &HALVING);
         let masks = photographs.masks(placed.photograph);
-        let view = match layout.placed.len() {
+        let view = || match layout.placed.len() {
             1 => SmallView::default(),
             _ => small_view(&warped, &masks, period, self.input.view_levels),
         };
@@ -261,7 +261,8 @@ impl Making<'_> {
             }),
             None => CoarseLevel::default(),
         };
-        let coarse_levels = unrolled.placements(position).map(coarse_level).collect();
+        let coarse_levels = || unrolled.placements(position).map(coarse_level).collect();
+        let (view, coarse_levels) = rayon::join(view, coarse_levels);
         drop(warped);
         let border = self.border(&first, &photograph, correction);
         let bytes = photograph.bytes();

@@ -56,6 +56,11 @@ impl<P: Pixel> PixelStore<P> {
         Self::of_pixels(width, vec![P::default(); width * height])
     }
 
+    /// Whether it is in memory.
+    pub(crate) fn is_in_memory(&self) -> bool {
+        matches!(self, Self::Memory { .. })
+    }
+
     /// Row-major pixels.
     pub(crate) fn of_pixels(width: usize, pixels: Vec<P>) -> Self {
         Self::Memory { width, pixels }

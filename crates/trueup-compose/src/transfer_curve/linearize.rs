@@ -12,7 +12,7 @@ use crate::linear_table::LinearTable;
 const STEPS_PER_LEVEL: usize = 16;
 
 /// Length of the table: 255 levels of 16 steps and the end, filled up to a power of two.
-const ENTRIES: usize = 4096;
+pub(crate) const ENTRIES: usize = 4096;
 
 /// Linear light from samples on the scale of 0 to 255, whole or between.
 #[derive(Debug)]
@@ -32,6 +32,13 @@ impl Linearize {
         let last = 255 * STEPS_PER_LEVEL;
         let values: Vec<f64> = (0..=last).map(|index| curve.linear(index as f64 / last as f64)).collect();
         Self { values: LinearTable::new(|index| values[index.min(last)]) }
+    }
+
+    /// The table, and its steps for each level of a sample.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    pub(crate) fn table(&self) -> (&LinearTable<ENTRIES>, f32) {
+        (&self.values, STEPS_PER_LEVEL as f32)
     }
 
     /// Linear light, 0 to 1, of a sample on the scale of 0 to 255; values outside are clamped, NaN gives 0.

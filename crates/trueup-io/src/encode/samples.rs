@@ -11,6 +11,9 @@ pub(crate) const RGBA: usize = 4;
 
 /// A sample of a picture that is written. Pixels are RGBA with straight alpha.
 pub(crate) trait OutputSample: Copy + Default + PartialEq + Send + Sync + 'static {
+    /// Alpha of a pixel that nothing shows through.
+    const OPAQUE: Self;
+
     /// Row `y` of a picture, `4 * width` samples.
     fn row(picture: &dyn RowSource, y: usize, row: &mut [Self]) -> Result<()>;
 
@@ -33,6 +36,8 @@ pub(crate) trait OutputSample: Copy + Default + PartialEq + Send + Sync + 'stati
 macro_rules! whole_sample {
     ($type:ty, $wide:ty, $row:ident) => {
         impl OutputSample for $type {
+            const OPAQUE: Self = <$type>::MAX;
+
             fn row(picture: &dyn RowSource, y: usize, row: &mut [Self]) -> Result<()> {
                 picture.$row(y, row)
             }
@@ -85,6 +90,8 @@ whole_sample!(u16, u64, rgba16_row);
 
 /// Linear light.
 impl OutputSample for f32 {
+    const OPAQUE: Self = 1.0;
+
     fn row(picture: &dyn RowSource, y: usize, row: &mut [Self]) -> Result<()> {
         picture.linear_row(y, row)
     }
@@ -127,10 +134,23 @@ impl OutputSample for f32 {
 
 /// A row of RGBA as it is written: with `channels` 4 as it is, with 3 laid over the background. Replaces `out`.
 pub(crate) fn flattened<S: OutputSample>(rgba: &[S], channels: usize, background: [S; 3], out: &mut Vec<S>) {
-    out.clear();
     match channels {
-        4 => out.extend_from_slice(rgba),
-        _ => out.extend(rgba.as_chunks::<4>().0.iter().flat_map(|&pixel| S::over(pixel, background))),
+        4 => {
+            out.clear();
+            out.extend_from_slice(rgba);
+        }
+        _ => {
+            out.resize(rgba.len() / RGBA * 3, S::default());
+            lay_over(rgba, background, out);
+        }
+    }
+}
+
+/// Lays a row of RGBA over the background: as many pixels of three samples, `out`.
+pub(crate) fn lay_over<S: OutputSample>(rgba: &[S], background: [S; 3], out: &mut [S]) {
+    for (out, &pixel) in out.as_chunks_mut::<3>().0.iter_mut().zip(rgba.as_chunks::<RGBA>().0) {
+        let [r, g, b, alpha] = pixel;
+        *out = if alpha == S::OPAQUE { [r, g, b] } else { S::over(pixel, background) };
     }
 }
 

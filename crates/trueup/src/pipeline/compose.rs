@@ -63,16 +63,16 @@ pub(crate) struct ComposeInput<'a> {
     pub resources: Resources<'a>,
     /// What of the canvas is filled and kept.
     pub canvas: &'a CanvasOptions,
-    /// What is kept, if that is decided.
-    pub kept: Option<Rectangle>,
+    /// What becomes of the canvas, if that is decided.
+    pub kept: Option<Frame>,
 }
 
 /// What comes of composing.
 pub(crate) struct Composed {
     /// The panorama, cropped.
     pub rendered: Rendered,
-    /// What of the canvas it is, if it is to be cropped.
-    pub kept: Option<Rectangle>,
+    /// What became of the canvas, if it was to be cropped.
+    pub kept: Option<Frame>,
     /// See [`CropRecord::lost`](crate::project::record::CropRecord).
     pub lost: f64,
     /// See [`CropRecord::filled`](crate::project::record::CropRecord).
@@ -133,7 +133,7 @@ fn framed(
     let Frame::Part(kept) = frame else {
         let whole = Rectangle::whole([layout.width, layout.height]);
         report_kept_whole(photographed, &whole, framing.options, context);
-        let kept = (framing.options.crop != Crop::None).then_some(whole);
+        let kept = (framing.options.crop != Crop::None).then_some(Frame::Whole);
         return Ok(Composed { rendered, kept, lost: 0.0, filled: 0.0 });
     };
     let filled = match framing.gaps(layout, &kept) {
@@ -144,7 +144,7 @@ fn framed(
     let share = |part: usize, of: usize| part as f64 / of.max(1) as f64;
     let lost = 1.0 - share(photographed.area_within(&kept), photographed.area());
     let filled = share(filled, kept.area());
-    Ok(Composed { rendered, kept: Some(kept), lost, filled })
+    Ok(Composed { rendered, kept: Some(Frame::Part(kept)), lost, filled })
 }
 
 /// Says how much of a panorama no photograph shows.

@@ -27,7 +27,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use trueup_align::vanishing::TriadOutcome;
-use trueup_compose::crop::{Crop, Rectangle};
+use trueup_compose::crop::{Crop, Frame, Rectangle};
 use trueup_compose::exposure::Corrections;
 use trueup_compose::fidelity::{self, Fidelity};
 use trueup_compose::layout::CanvasLayout;
@@ -461,18 +461,23 @@ pub(crate) fn composing_resources<'a>(
     Budget::new(&options.run.resources).composing(photographs, scratch)
 }
 
-/// The part of a canvas that a project records.
+/// What became of a canvas by what a project records.
 ///
 /// # Errors
-/// [`Error::Input`] if it is none.
-fn kept_in_record(recorded: Option<(CropRecord, Canvas)>, layout: &CanvasLayout) -> Result<Option<Rectangle>> {
-    let Some((CropRecord { left, top, .. }, Canvas { width, height, .. })) = recorded else { return Ok(None) };
+/// [`Error::Input`] if what was kept is no part of it.
+fn kept_in_record(recorded: Option<(CropRecord, Canvas)>, layout: &CanvasLayout) -> Result<Option<Frame>> {
+    let Some((CropRecord { left, top, filled, .. }, Canvas { width, height, .. })) = recorded else { return Ok(None) };
     let stretch = |start: usize, length: usize, whole: usize| {
         let end = start.checked_add(length).filter(|&end| length > 0 && end <= whole)?;
         Some(start..end)
     };
     match (stretch(left, width, layout.width), stretch(top, height, layout.height)) {
-        (Some(columns), Some(rows)) => Ok(Some(Rectangle { columns, rows })),
+        (Some(columns), Some(rows)) => {
+            let part = Rectangle { columns, rows };
+            // What was kept whole without filling anything stays as it is, whatever no photograph covers of it.
+            let is_as_it_was = filled == 0.0 && part == Rectangle::whole([layout.width, layout.height]);
+            Ok(Some(if is_as_it_was { Frame::Whole } else { Frame::Part(part) }))
+        }
         _ => Err(Error::input(
             "the project",
             format!("its panorama of {width} x {height} px is no part of its canvas"),

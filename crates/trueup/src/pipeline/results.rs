@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use trueup_align::vanishing::TriadOutcome;
-use trueup_compose::crop::{self, Rectangle};
+use trueup_compose::crop::{self, Frame, Rectangle};
 use trueup_compose::exposure::Corrections;
 use trueup_compose::layout::CanvasLayout;
 use trueup_compose::render::RenderInput;
@@ -68,8 +68,8 @@ pub struct Alignment {
     pub project: Project,
     /// All of the canvas.
     pub(super) layout: CanvasLayout,
-    /// What of it is the panorama; `None` until that is decided: by the record, or by the first composing.
-    pub(super) kept: Option<Rectangle>,
+    /// What becomes of it; `None` until that is decided: by the record, or by the first composing.
+    pub(super) kept: Option<Frame>,
     pub(super) corrections: Corrections,
     pub(super) photographs: Arc<FilePhotographs>,
     pub(super) directions: Vec<TriadOutcome>,
@@ -105,7 +105,7 @@ impl Alignment {
 
     /// What of the canvas is the panorama: all of it before it is composed.
     pub(crate) fn kept(&self) -> Rectangle {
-        self.kept.clone().unwrap_or_else(|| Rectangle::whole([self.layout.width, self.layout.height]))
+        self.kept.as_ref().unwrap_or(&Frame::Whole).part_of([self.layout.width, self.layout.height])
     }
 
     /// Where the photographs lie on the panorama.
@@ -125,12 +125,13 @@ impl Alignment {
     }
 
     /// Records what of the canvas is the panorama.
-    pub(super) fn keep(&mut self, kept: Rectangle, lost: f64, filled: f64) {
+    pub(super) fn keep(&mut self, kept: Frame, lost: f64, filled: f64) {
         let (canvas_width, canvas_height) = (self.layout.width, self.layout.height);
         if self.project.crop.is_none() {
-            let (left, top) = (kept.columns.start, kept.rows.start);
+            let part = kept.part_of([canvas_width, canvas_height]);
+            let (left, top) = (part.columns.start, part.rows.start);
             let crop = CropRecord { left, top, canvas_width, canvas_height, lost, filled };
-            record_crop(&mut self.project, &kept, crop);
+            record_crop(&mut self.project, &part, crop);
         }
         self.kept = Some(kept);
     }

@@ -10,7 +10,7 @@ use super::segments::with_metadata;
 use crate::encode::failure::WriteFailure;
 use crate::encode::metadata::Metadata;
 use crate::encode::options::{ChromaSubsampling, OutputOptions};
-use crate::encode::samples::{OutputSample, RGBA, flattened};
+use crate::encode::samples::{OutputSample, RGBA, lay_over};
 use crate::format::Output;
 
 /// Rows of a strip: a multiple of 8 and of 16, the heights of a minimum coded unit, and few enough that the units of a
@@ -78,11 +78,10 @@ fn encode_strip(
 ) -> Result<Vec<u8>, WriteFailure> {
     let width = picture.width();
     let mut row = vec![0; width * RGBA];
-    let (mut rgb, mut flat) = (Vec::with_capacity(width * rows * 3), Vec::new());
-    for y in 0..rows {
+    let mut rgb = vec![0; width * rows * 3];
+    for (y, rgb) in rgb.chunks_exact_mut((width * 3).max(1)).enumerate() {
         picture.rgba8_row(first + y, &mut row)?;
-        flattened(&row, 3, u8::of(options.background), &mut flat);
-        rgb.extend_from_slice(&flat);
+        lay_over(&row, u8::of(options.background), rgb);
     }
     let (unit_width, unit_height) = match options.jpeg_subsampling {
         ChromaSubsampling::Full => (8, 8),
