@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 pub const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
 
 /// [`LUMA`] of encoded red, green and blue in 256ths of a level, by whole numbers: off by less than half a level.
+#[inline]
 pub fn luma_256ths([red, green, blue]: [u8; 3]) -> u32 {
     77 * u32::from(red) + 150 * u32::from(green) + 29 * u32::from(blue)
 }
